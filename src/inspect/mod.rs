@@ -1,0 +1,3 @@
+//! Questions a user asks of a cloud or a mesh.
+
+pub mod verify;

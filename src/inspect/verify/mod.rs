@@ -1,0 +1,1 @@
+//! Is a mesh file a clean manifold?

@@ -1,0 +1,75 @@
+//! Records sent to numbered receivers: an external sort by receiver, then one section each.
+
+use super::{Record, Sections, Sorter};
+use crate::error::Result;
+use crate::workspace::Workspace;
+
+/// Collects records whose first word is the number of the section they are for.
+#[derive(Debug)]
+pub struct Exchange<const N: usize> {
+    sorter: Sorter<N>,
+    name: String,
+}
+
+impl<const N: usize> Exchange<N> {
+    /// An exchange that sorts in `buffer` bytes of memory, already reserved by the caller.
+    #[must_use]
+    pub fn new(workspace: &Workspace, name: &str, buffer: u64) -> Self {
+        Self {
+            sorter: Sorter::new(workspace, name, buffer),
+            name: name.to_owned(),
+        }
+    }
+
+    /// Sends records; the first word of each is its receiver.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`].
+    pub fn send(&self, records: &[Record<N>]) -> Result<()> {
+        self.sorter.push(records)
+    }
+
+    /// Delivers: section `r` holds, sorted, all records whose first word is `r`.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+    pub fn deliver(self, workspace: &Workspace, receivers: usize) -> Result<Sections<N>> {
+        let sections = Sections::create(workspace, &format!("{}.sections", self.name), receivers)?;
+        let mut current: Vec<Record<N>> = Vec::new();
+        self.sorter.finish(workspace)?.for_each(|record| {
+            if current.first().is_some_and(|first| first[0] != record[0]) {
+                sections.put(current[0][0] as usize, &current)?;
+                current.clear();
+            }
+            current.push(record);
+            Ok(())
+        })?;
+        if let Some(first) = current.first() {
+            sections.put(first[0] as usize, &current)?;
+        }
+        Ok(sections)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn delivers_sorted_to_each_receiver() {
+        let workspace = crate::spill::sorter::tests::workspace();
+        let exchange = Exchange::<2>::new(&workspace, "mail", 64);
+        for i in (0..100u32).rev() {
+            exchange.send(&[[i % 7, i]]).unwrap();
+        }
+        let sections = exchange.deliver(&workspace, 9).unwrap();
+        for receiver in 0..9u32 {
+            let got = sections.get(receiver as usize).unwrap();
+            let want: Vec<_> = (0..100)
+                .filter(|i| i % 7 == receiver)
+                .map(|i| [receiver, i])
+                .collect();
+            assert_eq!(got, want);
+        }
+    }
+}

@@ -1,0 +1,63 @@
+//! Units of work on all threads, as many at a time as the memory budget allows.
+
+use super::Workspace;
+use crate::error::{Error, Result};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+impl Workspace {
+    /// Runs `work(unit)` for every unit in `0..count`, on all threads, in ascending order of start.
+    ///
+    /// Before a unit starts, `bytes(unit)` are reserved as `name`, waiting for other units to end;
+    /// so the budget, not the number of threads, bounds what is in memory. The first error (that
+    /// of the lowest unit) ends the loop and is returned.
+    ///
+    /// # Errors
+    /// What `work` returned, [`Error::Memory`] if one unit alone does not fit, or
+    /// [`Error::Cancelled`].
+    pub fn for_each_unit(
+        &self,
+        name: &'static str,
+        count: usize,
+        bytes: impl Fn(usize) -> u64 + Sync,
+        work: impl Fn(usize) -> Result<()> + Sync,
+    ) -> Result<()> {
+        let next = AtomicUsize::new(0);
+        let stop = AtomicBool::new(false);
+        let failed: Mutex<Option<(usize, Error)>> = Mutex::new(None);
+        let worker = || {
+            while !stop.load(Ordering::Relaxed) {
+                let unit = next.fetch_add(1, Ordering::Relaxed);
+                if unit >= count {
+                    break;
+                }
+                let outcome = self
+                    .check_cancel()
+                    .and_then(|()| self.memory.reserve_waiting(name, bytes(unit)))
+                    .and_then(|_held| work(unit));
+                if let Err(error) = outcome {
+                    stop.store(true, Ordering::Relaxed);
+                    let mut first = failed
+                        .lock()
+                        .unwrap_or_else(std::sync::PoisonError::into_inner);
+                    if first.as_ref().is_none_or(|(u, _)| unit < *u) {
+                        *first = Some((unit, error));
+                    }
+                }
+            }
+        };
+        std::thread::scope(|scope| {
+            for _ in 1..self.threads.min(count) {
+                scope.spawn(worker);
+            }
+            worker();
+        });
+        match failed
+            .into_inner()
+            .unwrap_or_else(std::sync::PoisonError::into_inner)
+        {
+            Some((_, error)) => Err(error),
+            None => Ok(()),
+        }
+    }
+}
