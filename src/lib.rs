@@ -3,6 +3,7 @@
 pub mod error;
 pub mod geom;
 pub mod inspect;
+pub mod params;
 pub mod spill;
 pub mod stages;
 pub mod workspace;

@@ -1,8 +1,11 @@
 //! Exact geometry on the integer lattice: points, boxes, curve keys, planes, predicates, cells.
 
 pub mod aabb;
+pub mod clip;
 pub mod hilbert;
 pub mod lattice;
+pub mod plane;
+pub mod predicate;
 
 /// A position on the lattice, each coordinate in `0..2^30`.
 pub type Point = [i32; 3];

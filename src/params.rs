@@ -1,0 +1,130 @@
+//! The geometric parameters of a reconstruction, checked once.
+
+use crate::error::{Error, Result};
+
+/// Radius of the disks (paper, section 3.4).
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Radius {
+    /// The distance of the last neighbour used for the plane: follows the local density.
+    Auto,
+    /// Percent of the diagonal of the cloud's bounding box.
+    Percent(f64),
+    /// A length in the input's unit.
+    Length(f64),
+}
+
+impl std::str::FromStr for Radius {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let number = |t: &str| match t.trim().parse::<f64>() {
+            Ok(x) if x > 0.0 && x.is_finite() => Ok(x),
+            _ => Err(format!(
+                "{text:?} is not auto, a percentage like 5%, or a positive length"
+            )),
+        };
+        match text.trim() {
+            "auto" => Ok(Radius::Auto),
+            t => match t.strip_suffix('%') {
+                Some(percent) => number(percent).map(Radius::Percent),
+                None => number(t).map(Radius::Length),
+            },
+        }
+    }
+}
+
+/// Everything that decides the mesh. Two runs with equal parameters and equal points give the same
+/// bytes.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Params {
+    /// Neighbours for planes and smoothing (paper: 30).
+    pub neighbors: usize,
+    /// Rounds of smoothing (paper: 0 to 2).
+    pub smooth: u32,
+    /// Disk radius.
+    pub radius: Radius,
+    /// Largest angle between neighbouring normals for T12 triangles, in degrees (paper: 60).
+    pub max_angle: f64,
+    /// Fill holes of up to this many edges (paper: 500).
+    pub max_hole_edges: usize,
+    /// Remove components with fewer triangles (paper: 10).
+    pub min_component: u64,
+    /// Bridges, holes and small components (paper, section 3.6).
+    pub repair: bool,
+    /// Points per block, the unit in which T12 triangles are decided; part of the result.
+    #[serde(skip)]
+    pub block: u32,
+}
+
+/// The block size that a reconstruction uses unless a test asks for another.
+pub const BLOCK: u32 = 1 << 16;
+
+/// Largest number of neighbours that can be asked for.
+pub const MAX_NEIGHBORS: usize = 255;
+
+impl Default for Params {
+    fn default() -> Self {
+        Self {
+            neighbors: 30,
+            smooth: 0,
+            radius: Radius::Auto,
+            max_angle: 60.0,
+            max_hole_edges: 500,
+            min_component: 10,
+            repair: true,
+            block: BLOCK,
+        }
+    }
+}
+
+impl Params {
+    /// # Errors
+    /// [`Error::Parameter`] for the first value out of range.
+    pub fn check(&self) -> Result<()> {
+        let error = |name, found: String, expected: &str| {
+            Err(Error::Parameter {
+                name,
+                found,
+                expected: expected.into(),
+            })
+        };
+        if !(3..=MAX_NEIGHBORS).contains(&self.neighbors) {
+            return error("--neighbors", self.neighbors.to_string(), "3 to 255");
+        }
+        if !(self.max_angle > 0.0 && self.max_angle <= 180.0) {
+            return error(
+                "--max-angle",
+                self.max_angle.to_string(),
+                "more than 0, up to 180",
+            );
+        }
+        if self.smooth > 100 {
+            return error("--smooth", self.smooth.to_string(), "0 to 100");
+        }
+        if self.max_hole_edges > 10_000 {
+            return error(
+                "--max-hole-edges",
+                self.max_hole_edges.to_string(),
+                "0 to 10000",
+            );
+        }
+        match self.radius {
+            Radius::Percent(x) | Radius::Length(x) if !(x > 0.0 && x.is_finite()) => {
+                error("--radius", x.to_string(), "a positive number")
+            }
+            _ if self.block == 0 => error("block", "0".into(), "at least 1"),
+            _ => Ok(()),
+        }
+    }
+
+    /// Cosine of the largest angle, by a library that gives the same bits on every machine.
+    #[must_use]
+    pub fn cos_max_angle(&self) -> f64 {
+        if self.max_angle == 60.0 {
+            0.5
+        } else {
+            libm::cos(self.max_angle.to_radians())
+        }
+    }
+}
