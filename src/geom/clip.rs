@@ -233,6 +233,23 @@ impl Cell {
         self.update_reach();
     }
 
+    /// False if no point in a box, given relative to the cell's point, can change the cell: a point
+    /// cuts off a corner only if it is nearer to the corner than the cell's own point.
+    #[must_use]
+    pub fn may_touch(&self, low: [f64; 3], high: [f64; 3]) -> bool {
+        let [u, v] = self.frame;
+        self.corners.iter().any(|corner| {
+            let mut distance2 = 0.0;
+            for axis in 0..3 {
+                let x = corner.at[0] * u[axis] + corner.at[1] * v[axis];
+                let gap = (low[axis] - x).max(x - high[axis]).max(0.0);
+                distance2 += gap * gap;
+            }
+            let reach = (corner.reach + corner.error) * (1.0 + 1e-9);
+            distance2 <= reach * reach
+        })
+    }
+
     /// Calls `each` with the ids of the two bisectors at every corner between bisectors, in turn
     /// around the cell: with the cell's own id, the triples it sees.
     pub fn triples(&self, mut each: impl FnMut(u32, u32)) {

@@ -46,12 +46,13 @@ impl Moments {
         }
     }
 
-    /// As [`Moments::add`] for many differences whose components are below 2^27 and fewer than
-    /// 256: sums in 64 bits.
-    pub fn add_near(&mut self, differences: &[[i64; 3]]) {
-        debug_assert!(differences.len() <= 256);
+    /// As [`Moments::add`] for up to 256 differences whose components are below 2^27 in size: sums
+    /// in 64 bits.
+    pub fn add_near(&mut self, differences: impl Iterator<Item = [i64; 3]>) {
         let mut products = [0i64; 6];
+        let mut count = 0;
         for d in differences {
+            count += 1;
             for axis in 0..3 {
                 self.sum[axis] += d[axis];
             }
@@ -62,7 +63,8 @@ impl Moments {
             products[4] += d[0] * d[2];
             products[5] += d[1] * d[2];
         }
-        self.count += differences.len() as i64;
+        debug_assert!(count <= 256);
+        self.count += count;
         for (total, more) in self.products.iter_mut().zip(products) {
             *total += i128::from(more);
         }
@@ -255,7 +257,7 @@ mod tests {
             points in prop::collection::vec(prop::array::uniform3(-(1i64 << 26)..1 << 26), 0..60),
         ) {
             let mut near = Moments::default();
-            near.add_near(&points);
+            near.add_near(points.iter().copied());
             prop_assert_eq!(near, moments(&points));
         }
 

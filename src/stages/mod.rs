@@ -1,3 +1,12 @@
 //! The stages of a reconstruction, one folder each, in the order the data flows.
 
 pub mod ingest;
+pub mod order;
+
+pub mod tiles;
+
+pub mod cells;
+
+pub mod triples;
+
+pub mod blocks;

@@ -1,0 +1,244 @@
+//! One cell: neighbours, plane, disk, clipping up to the radius of security (paper, 3.3 and 3.4).
+
+use crate::error::Result;
+use crate::geom::Point;
+use crate::geom::clip::Cell;
+use crate::geom::plane::{Moments, Plane};
+use crate::stages::order::PointStore;
+use crate::stages::tiles::Near;
+use crate::stages::tiles::near::Query;
+use crate::stages::tiles::walk::{PageCache, Walk};
+
+/// How often the neighbourhood is doubled when it lies on a line.
+const WIDENINGS: u32 = 3;
+
+/// Below this squared distance, differences are small enough for sums in 64 bits.
+const NEAR_LIMIT2: u64 = 1 << 54;
+
+/// Disk radius in lattice steps, or the distance of the last neighbour.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum DiskRadius {
+    /// The distance of the last neighbour used for the plane.
+    Auto,
+    /// Fixed, in steps.
+    Steps(f64),
+}
+
+/// What became of a point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Outcome {
+    /// Its cell is complete and certified; its triples were handed out.
+    Complete,
+    /// The tile does not prove the cell; nothing was handed out.
+    Uncertain,
+    /// All its neighbours are on one line: no plane, no cell.
+    NoPlane,
+}
+
+/// Where the neighbours of a point come from.
+trait Source {
+    /// The neighbours known so far, nearest first.
+    fn near(&self) -> &[Near];
+    /// Makes `count` neighbours known, or all there are; false if that cannot be certified.
+    fn reach(&mut self, count: usize) -> Result<bool>;
+}
+
+impl Source for Query<'_> {
+    fn near(&self) -> &[Near] {
+        Query::near(self)
+    }
+
+    fn reach(&mut self, count: usize) -> Result<bool> {
+        Ok(self.extend_to(count))
+    }
+}
+
+/// Neighbours from the whole store.
+struct Walked<'a> {
+    walk: Walk<'a>,
+    near: Vec<Near>,
+}
+
+impl Source for Walked<'_> {
+    fn near(&self) -> &[Near] {
+        &self.near
+    }
+
+    fn reach(&mut self, count: usize) -> Result<bool> {
+        while self.near.len() < count {
+            match self.walk.next(|_| true)? {
+                Some(near) => self.near.push(near),
+                None => break,
+            }
+        }
+        Ok(true)
+    }
+}
+
+/// The plane of a point and the moments it came from.
+#[derive(Debug, Clone, Copy)]
+pub struct Fit {
+    /// Normal, and whether the neighbours span a plane.
+    pub plane: Plane,
+    /// The sums over the neighbours.
+    pub moments: Moments,
+    /// Squared distance of the last neighbour used.
+    pub last2: u64,
+}
+
+/// Sums over the neighbours.
+fn moments(near: &[Near]) -> Moments {
+    let mut moments = Moments::default();
+    if near.len() <= 256 && near.last().is_some_and(|n| n.distance2 < NEAR_LIMIT2) {
+        moments.add_near(near.iter().map(|n| n.difference));
+    } else {
+        near.iter().for_each(|n| moments.add(n.difference));
+    }
+    moments
+}
+
+fn fit_from(source: &mut impl Source, neighbors: usize, widenings: u32) -> Result<Option<Fit>> {
+    let mut wanted = neighbors;
+    for round in 0..=widenings {
+        if !source.reach(wanted)? {
+            return Ok(None);
+        }
+        let used = &source.near()[..wanted.min(source.near().len())];
+        let moments = moments(used);
+        let plane = moments.plane();
+        if plane.spans || used.len() < wanted || round == widenings {
+            let last2 = used.last().map_or(0, |n| n.distance2);
+            return Ok(Some(Fit { plane, moments, last2 }));
+        }
+        wanted *= 2;
+    }
+    Ok(None)
+}
+
+/// Makes cells one after the other in the same memory.
+#[derive(Debug)]
+pub struct CellMaker {
+    neighbors: usize,
+    radius: DiskRadius,
+    cell: Cell,
+}
+
+impl CellMaker {
+    /// For planes of `neighbors` neighbours and disks of `radius`.
+    #[must_use]
+    pub fn new(neighbors: usize, radius: DiskRadius) -> Self {
+        Self { neighbors, radius, cell: Cell::new(0, [0, 0, 1 << 24], 1.0) }
+    }
+
+    fn start(&mut self, id: u32, fit: &Fit) -> bool {
+        let Some(normal) = fit.plane.normal else { return false };
+        let radius = match self.radius {
+            DiskRadius::Auto => (fit.last2 as f64).sqrt(),
+            DiskRadius::Steps(steps) => steps,
+        };
+        self.cell.start(id, normal, radius);
+        true
+    }
+
+    /// The cell of a point from what its tile knows; `each` gets the ids at its corners.
+    ///
+    /// # Errors
+    /// None today; the signature is that of [`CellMaker::from_store`].
+    pub fn from_tile(
+        &mut self,
+        query: &mut Query<'_>,
+        each: impl FnMut(u32, u32),
+    ) -> Result<Outcome> {
+        let Some(fit) = fit_from(query, self.neighbors, WIDENINGS)? else {
+            return Ok(Outcome::Uncertain);
+        };
+        if !self.start(query.id(), &fit) {
+            return Ok(Outcome::NoPlane);
+        }
+        let mut next = 0;
+        loop {
+            while let Some(near) = query.near().get(next) {
+                if near.distance2 > self.cell.reach2() {
+                    break;
+                }
+                self.cell.clip(near.difference, near.id);
+                next += 1;
+            }
+            if next < query.near().len() || self.cell.reach2() <= query.complete2() {
+                self.cell.triples(each);
+                return Ok(Outcome::Complete);
+            }
+            if !query.extend(self.cell.reach2()) {
+                return Ok(Outcome::Uncertain);
+            }
+        }
+    }
+
+    /// The cell of a point from the whole store.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+    pub fn from_store(
+        &mut self,
+        store: &PointStore,
+        cache: &mut PageCache,
+        id: u32,
+        point: Point,
+        each: impl FnMut(u32, u32),
+    ) -> Result<Outcome> {
+        let mut source = Walked { walk: Walk::new(store, cache, id, point), near: Vec::new() };
+        let Some(fit) = fit_from(&mut source, self.neighbors, WIDENINGS)? else {
+            return Ok(Outcome::Uncertain);
+        };
+        if !self.start(id, &fit) {
+            return Ok(Outcome::NoPlane);
+        }
+        let Walked { mut walk, near } = source;
+        for near in near {
+            if near.distance2 <= self.cell.reach2() {
+                self.cell.clip(near.difference, near.id);
+            }
+        }
+        let own = point.map(f64::from);
+        loop {
+            let cell = &self.cell;
+            let next = walk.next(|bounds| {
+                cell.may_touch(
+                    std::array::from_fn(|k| f64::from(bounds.min[k]) - own[k]),
+                    std::array::from_fn(|k| f64::from(bounds.max[k]) - own[k]),
+                )
+            })?;
+            match next {
+                Some(near) if near.distance2 <= self.cell.reach2() => {
+                    self.cell.clip(near.difference, near.id);
+                }
+                _ => break,
+            }
+        }
+        self.cell.triples(each);
+        Ok(Outcome::Complete)
+    }
+}
+
+/// The plane of exactly the `neighbors` nearest from what the tile knows; `None` if uncertain.
+///
+/// # Errors
+/// None today; see [`fit_in_store`].
+pub fn fit_in_tile(query: &mut Query<'_>, neighbors: usize) -> Result<Option<Fit>> {
+    fit_from(query, neighbors, 0)
+}
+
+/// As [`fit_in_tile`], from the whole store.
+///
+/// # Errors
+/// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+pub fn fit_in_store(
+    store: &PointStore,
+    cache: &mut PageCache,
+    id: u32,
+    point: Point,
+    neighbors: usize,
+) -> Result<Option<Fit>> {
+    let mut source = Walked { walk: Walk::new(store, cache, id, point), near: Vec::new() };
+    fit_from(&mut source, neighbors, 0)
+}

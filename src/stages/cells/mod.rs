@@ -1,0 +1,214 @@
+//! Restricted Voronoi cells of all points, tile by tile (paper, sections 3.3 and 3.4).
+
+mod cell;
+
+pub use cell::{CellMaker, DiskRadius, Fit, Outcome, fit_in_store, fit_in_tile};
+
+use crate::error::Result;
+use crate::geom::Point;
+use crate::spill::{Exchange, Sections};
+use crate::stages::blocks::Blocks;
+use crate::stages::order::PointStore;
+use crate::stages::tiles::Tile;
+use crate::stages::tiles::near::Search;
+use crate::stages::tiles::walk::PageCache;
+use crate::workspace::Workspace;
+use serde::Serialize;
+use std::ops::Range;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Bytes reserved for sorting the triples that leave their tile.
+const EXCHANGE_BUFFER: u64 = 16 << 20;
+
+/// What this stage leaves behind: for each tile the sorted triples `[i, j, k, count]` seen by its
+/// cells whose smallest vertex is in the tile, and those sent to it by later tiles, `[tile, i, j,
+/// k, count]`.
+#[derive(Debug)]
+pub struct CellTriples {
+    /// Division into tiles.
+    pub tiles: TileRanges,
+    /// Triples of the tile's own cells.
+    pub own: Sections<4>,
+    /// Triples seen by the cells of later tiles.
+    pub received: Sections<5>,
+}
+
+/// Counts of this stage.
+#[derive(Debug, Clone, Copy, Default, Serialize, PartialEq, Eq)]
+pub struct CellStats {
+    /// Cells whose halo did not prove them and that were made from the whole cloud.
+    pub second_looks: u64,
+    /// Points without a plane: all their neighbours are on one line.
+    pub no_plane: u64,
+    /// Corners of cells: triples, each as often as it was seen.
+    pub raw_triples: u64,
+}
+
+/// Tiles: ranges of at most `size` ids that do not cross a block's border.
+#[derive(Debug, Clone, Copy)]
+pub struct TileRanges {
+    blocks: Blocks,
+    block: u32,
+    size: u32,
+    per_block: u32,
+}
+
+impl TileRanges {
+    /// Tiles of at most `size` points.
+    #[must_use]
+    pub fn new(blocks: Blocks, size: u32) -> Self {
+        let block = blocks.ids(0).end.max(1);
+        let size = size.clamp(1, block);
+        Self { blocks, block, size, per_block: block.div_ceil(size) }
+    }
+
+    /// Number of tiles.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        let points = self.blocks.points();
+        if points == 0 { 0 } else { self.of(points as u32 - 1) as usize + 1 }
+    }
+
+    /// The tile of an id.
+    #[must_use]
+    pub fn of(&self, id: u32) -> u32 {
+        self.blocks.of(id) * self.per_block + id % self.block / self.size
+    }
+
+    /// The ids of a tile.
+    #[must_use]
+    pub fn ids(&self, tile: usize) -> Range<usize> {
+        let block = self.blocks.ids(tile / self.per_block as usize);
+        let start = block.start + tile as u32 % self.per_block * self.size;
+        start as usize..(start.saturating_add(self.size)).min(block.end) as usize
+    }
+
+    /// The tiles of a block.
+    #[must_use]
+    pub fn of_block(&self, block: usize) -> Range<usize> {
+        let start = block * self.per_block as usize;
+        start..(start + self.per_block as usize).min(self.count())
+    }
+}
+
+#[derive(Default)]
+struct Counters {
+    second_looks: AtomicU64,
+    no_plane: AtomicU64,
+    raw: AtomicU64,
+}
+
+/// Computes all cells and collects their triples.
+///
+/// # Errors
+/// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
+/// [`crate::Error::Cancelled`].
+pub fn cells(
+    store: &PointStore,
+    blocks: Blocks,
+    tile_points: u32,
+    neighbors: usize,
+    radius: DiskRadius,
+    workspace: &Workspace,
+) -> Result<(CellTriples, CellStats)> {
+    let tiles = TileRanges::new(blocks, tile_points);
+    let own = Sections::create(workspace, "cells.own", tiles.count())?;
+    let held = workspace.reserve("cells: exchange", EXCHANGE_BUFFER)?;
+    let exchange = Exchange::new(workspace, "cells.sent", EXCHANGE_BUFFER);
+    let counters = Counters::default();
+    let bytes = |tile: usize| {
+        let points = tiles.ids(tile).len() as u64;
+        Tile::bytes(points as usize) + PageCache::bytes(store) + points * 120
+    };
+    workspace.for_each_unit("cells: tile", tiles.count(), bytes, |tile| {
+        let ids = tiles.ids(tile);
+        let mut triples = Vec::with_capacity(ids.len() * 7);
+        one_tile(store, ids.clone(), neighbors, radius, &counters, &mut triples)?;
+        counters.raw.fetch_add(triples.len() as u64, Ordering::Relaxed);
+        triples.sort_unstable();
+        let (kept, sent) = fold(&triples, &tiles, tile as u32);
+        drop(triples);
+        own.put(tile, &kept)?;
+        exchange.send(&sent)?;
+        workspace.observer.advance(ids.len() as u64);
+        Ok(())
+    })?;
+    let received = exchange.deliver(workspace, tiles.count())?;
+    drop(held);
+    let stats = CellStats {
+        second_looks: counters.second_looks.into_inner(),
+        no_plane: counters.no_plane.into_inner(),
+        raw_triples: counters.raw.into_inner(),
+    };
+    Ok((CellTriples { tiles, own, received }, stats))
+}
+
+fn one_tile(
+    store: &PointStore,
+    ids: Range<usize>,
+    neighbors: usize,
+    radius: DiskRadius,
+    counters: &Counters,
+    triples: &mut Vec<[u32; 3]>,
+) -> Result<()> {
+    let tile = Tile::load(store, ids)?;
+    let mut maker = CellMaker::new(neighbors, radius);
+    let mut search = Search::default();
+    let mut uncertain: Vec<(u32, Point)> = Vec::new();
+    let mut no_plane = 0;
+    let mut failed = None;
+    tile.for_each_query(neighbors, &mut search, |id, point, query| {
+        let outcome = match query {
+            None => Ok(Outcome::Uncertain),
+            Some(mut query) => maker.from_tile(&mut query, |a, b| triples.push(sorted(id, a, b))),
+        };
+        match outcome {
+            Ok(Outcome::Complete) => {}
+            Ok(Outcome::NoPlane) => no_plane += 1,
+            Ok(Outcome::Uncertain) => uncertain.push((id, point)),
+            Err(error) => failed = Some(error),
+        }
+    });
+    if let Some(error) = failed {
+        return Err(error);
+    }
+    drop(tile);
+    let mut cache = PageCache::default();
+    for &(id, point) in &uncertain {
+        let each = |a, b| triples.push(sorted(id, a, b));
+        if maker.from_store(store, &mut cache, id, point, each)? == Outcome::NoPlane {
+            no_plane += 1;
+        }
+    }
+    counters.second_looks.fetch_add(uncertain.len() as u64, Ordering::Relaxed);
+    counters.no_plane.fetch_add(no_plane, Ordering::Relaxed);
+    Ok(())
+}
+
+fn sorted(a: u32, b: u32, c: u32) -> [u32; 3] {
+    let (low, high) = if b < c { (b, c) } else { (c, b) };
+    if a < low {
+        [a, low, high]
+    } else if a < high {
+        [low, a, high]
+    } else {
+        [low, high, a]
+    }
+}
+
+/// Equal neighbours of a sorted list as one record with a count, split by whose they are.
+fn fold(triples: &[[u32; 3]], tiles: &TileRanges, tile: u32) -> (Vec<[u32; 4]>, Vec<[u32; 5]>) {
+    let mut kept = Vec::with_capacity(triples.len() / 2);
+    let mut sent = Vec::new();
+    for group in triples.chunk_by(|a, b| a == b) {
+        let [i, j, k] = group[0];
+        let count = group.len() as u32;
+        let owner = tiles.of(i);
+        if owner == tile {
+            kept.push([i, j, k, count]);
+        } else {
+            sent.push([owner, i, j, k, count]);
+        }
+    }
+    (kept, sent)
+}

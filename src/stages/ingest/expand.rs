@@ -1,0 +1,71 @@
+//! Folders to the point files in them.
+
+use super::format::{self, Family, has_extension};
+use super::input::Input;
+use crate::error::{Error, Result};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Names that promise a point cloud; one that does not hold it is an error, not a file to skip.
+const PROMISING: [&str; 3] = ["las", "laz", "ply"];
+
+/// Names under which text in a folder is taken for points.
+const TEXT: [&str; 9] = ["xyz", "txt", "csv", "pts", "asc", "ply", "xyzrgb", "xyzn", "neu"];
+
+/// The point files among `inputs`: files as they are, folders recursively, by name.
+///
+/// Inside a folder, hidden files and files that are no point cloud are skipped; links to folders
+/// are not followed.
+///
+/// # Errors
+/// [`Error::Io`] if something cannot be read, [`Error::Input`] for a folder without point files.
+pub fn expand(inputs: &[PathBuf]) -> Result<Vec<PathBuf>> {
+    let mut files = Vec::new();
+    for input in inputs {
+        let meta = std::fs::metadata(input).map_err(|e| Error::io(input, "open", e))?;
+        if !meta.is_dir() {
+            files.push(input.clone());
+            continue;
+        }
+        let before = files.len();
+        walk(input, &mut files)?;
+        if files.len() == before {
+            let expected = format!("at least one file of {}", format::READABLE);
+            return Err(Error::input(input, "folder", "no point file", expected));
+        }
+    }
+    Ok(files)
+}
+
+fn walk(folder: &Path, files: &mut Vec<PathBuf>) -> Result<()> {
+    let failed = |e| Error::io(folder, "list", e);
+    let mut entries = std::fs::read_dir(folder)
+        .and_then(Iterator::collect::<std::io::Result<Vec<_>>>)
+        .map_err(failed)?;
+    entries.sort_by_key(std::fs::DirEntry::file_name);
+    for entry in entries {
+        if entry.file_name().as_encoded_bytes().starts_with(b".") {
+            continue;
+        }
+        let path = entry.path();
+        if entry.file_type().map_err(failed)?.is_dir() {
+            walk(&path, files)?;
+        } else if std::fs::metadata(&path).is_ok_and(|m| m.is_file()) && is_points(&path)? {
+            files.push(path);
+        }
+    }
+    Ok(())
+}
+
+fn is_points(path: &Path) -> Result<bool> {
+    if has_extension(path, &PROMISING) {
+        return Ok(true);
+    }
+    let input = Input::open(path, Arc::default())?;
+    Ok(match format::family_of(&input)? {
+        // A cloud that cannot be read must not go missing silently.
+        Family::Las | Family::Ply | Family::Foreign(_) => true,
+        Family::Text(_) => has_extension(path, &TEXT),
+        Family::Unknown(_) => false,
+    })
+}

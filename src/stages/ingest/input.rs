@@ -1,0 +1,143 @@
+//! An input file: positioned reads, counted, with errors that name the place.
+
+use crate::error::{Error, Result};
+use crate::workspace::IoCounters;
+use std::fs::File;
+use std::io::Read;
+use std::os::unix::fs::FileExt;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// An open input file.
+#[derive(Debug)]
+pub(super) struct Input {
+    pub(super) path: PathBuf,
+    /// Size in bytes when it was opened.
+    pub(super) bytes: u64,
+    file: File,
+    io: Arc<IoCounters>,
+}
+
+impl Input {
+    pub(super) fn open(path: &Path, io: Arc<IoCounters>) -> Result<Self> {
+        let file = File::open(path).map_err(|e| Error::io(path, "open", e))?;
+        let meta = file
+            .metadata()
+            .map_err(|e| Error::io(path, "read the size of", e))?;
+        if !meta.is_file() {
+            return Err(Error::input(
+                path,
+                "file type",
+                "something that is not a regular file",
+                "a file that can be read at any position",
+            ));
+        }
+        Ok(Self {
+            path: path.to_path_buf(),
+            bytes: meta.len(),
+            file,
+            io,
+        })
+    }
+
+    /// An [`Error::Input`] of this file.
+    pub(super) fn error(
+        &self,
+        place: impl Into<String>,
+        found: impl Into<String>,
+        expected: impl Into<String>,
+    ) -> Error {
+        Error::input(&self.path, place, found, expected)
+    }
+
+    /// Fills `buffer` from `offset` as far as the file reaches; returns the bytes read.
+    pub(super) fn read_at(&self, offset: u64, buffer: &mut [u8]) -> Result<usize> {
+        let mut done = 0;
+        while done < buffer.len() {
+            match self.file.read_at(&mut buffer[done..], offset + done as u64) {
+                Ok(0) => break,
+                Ok(n) => done += n,
+                Err(e) if e.kind() == std::io::ErrorKind::Interrupted => {}
+                Err(e) => {
+                    let action = format!("read {} bytes at byte {offset}", buffer.len());
+                    return Err(Error::io(&self.path, action, e));
+                }
+            }
+        }
+        self.io.add_read(done as u64);
+        Ok(done)
+    }
+
+    /// Fills `buffer` from `offset`, or says that the file ends before `what` does.
+    pub(super) fn read_exact_at(&self, offset: u64, buffer: &mut [u8], what: &str) -> Result<()> {
+        let got = self.read_at(offset, buffer)?;
+        if got == buffer.len() {
+            return Ok(());
+        }
+        Err(self.error(
+            format!("{what} at byte {offset}"),
+            format!("the end of the file after {} bytes", offset + got as u64),
+            format!("{} more bytes", buffer.len() - got),
+        ))
+    }
+
+    /// The first bytes of the file, at most `most`.
+    pub(super) fn head(&self, most: usize) -> Result<Vec<u8>> {
+        let mut head = vec![0; most.min(usize::try_from(self.bytes).unwrap_or(most))];
+        let got = self.read_at(0, &mut head)?;
+        head.truncate(got);
+        Ok(head)
+    }
+
+    /// A buffered reader of the bytes `start..end`.
+    pub(super) fn stream(&self, start: u64, end: u64) -> std::io::BufReader<Range<'_>> {
+        let range = Range {
+            input: self,
+            at: start,
+            end: end.min(self.bytes),
+        };
+        std::io::BufReader::with_capacity(STREAM_BUFFER, range)
+    }
+}
+
+/// Bytes buffered by [`Input::stream`].
+pub(super) const STREAM_BUFFER: usize = 256 << 10;
+
+/// Reads a range of an input from its start to its end.
+#[derive(Debug)]
+pub(super) struct Range<'a> {
+    input: &'a Input,
+    at: u64,
+    end: u64,
+}
+
+impl Read for Range<'_> {
+    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+        let left = usize::try_from(self.end.saturating_sub(self.at)).unwrap_or(usize::MAX);
+        let wanted = buffer.len().min(left);
+        let got = self.input.file.read_at(&mut buffer[..wanted], self.at)?;
+        self.at += got as u64;
+        self.input.io.add_read(got as u64);
+        Ok(got)
+    }
+}
+
+/// Little-endian `u16` at `at`; the caller has checked the length.
+pub(super) fn u16_at(bytes: &[u8], at: usize) -> u16 {
+    u16::from_le_bytes([bytes[at], bytes[at + 1]])
+}
+
+/// Little-endian `u32` at `at`; the caller has checked the length.
+pub(super) fn u32_at(bytes: &[u8], at: usize) -> u32 {
+    u32::from(u16_at(bytes, at)) | u32::from(u16_at(bytes, at + 2)) << 16
+}
+
+/// Little-endian `u64` at `at`; the caller has checked the length.
+pub(super) fn u64_at(bytes: &[u8], at: usize) -> u64 {
+    u64::from(u32_at(bytes, at)) | u64::from(u32_at(bytes, at + 4)) << 32
+}
+
+/// Little-endian `f64` at `at`; the caller has checked the length.
+pub(super) fn f64_at(bytes: &[u8], at: usize) -> f64 {
+    f64::from_bits(u64_at(bytes, at))
+}

@@ -1,0 +1,215 @@
+//! The choice of one lattice for all sources.
+
+use super::map::{SourceMap, rational};
+use super::source::Source;
+use super::stats::IngestStats;
+use crate::error::{Error, Result};
+use crate::geom::lattice::{COORDINATE_LIMIT, Lattice};
+
+/// A lattice offset may be refined by at most this factor to meet the offsets of all files.
+const MOST_REFINEMENT: i64 = 1000;
+
+/// Maps of all sources for one candidate lattice.
+struct Placed {
+    base: [i64; 3],
+    exact: bool,
+}
+
+/// The lattice of the sources; see `Spool::choose_lattice`.
+pub(super) fn choose(sources: &[Source], stats: &IngestStats, refine: u32) -> Result<Lattice> {
+    let sources: Vec<&Source> = sources.iter().filter(|s| s.stats.kept > 0).collect();
+    if sources.is_empty() {
+        return Err(no_points(stats));
+    }
+    let offset = common_offset(&sources);
+    let mut step = match grid_step(&sources, offset) {
+        Some(step) => refine_for_floats(&sources, offset, step),
+        None => float_step(&sources),
+    };
+    let placed = loop {
+        match place(&sources, step, offset) {
+            Some(placed) => break placed,
+            None => step *= 2.0,
+        }
+        if !step.is_finite() {
+            return Err(Error::Degenerate {
+                found: "coordinates so large that no lattice can hold them".into(),
+            });
+        }
+    };
+    let mut chosen = (step, placed);
+    for _ in 0..refine {
+        let half = chosen.0 / 2.0;
+        match place(&sources, half, offset) {
+            Some(placed) if half.is_normal() => chosen = (half, placed),
+            _ => break,
+        }
+    }
+    let (step, Placed { base, exact }) = chosen;
+    Ok(Lattice {
+        step,
+        offset,
+        base,
+        exact,
+    })
+}
+
+fn no_points(stats: &IngestStats) -> Error {
+    let left_out = match (stats.dropped_non_finite, stats.withheld) {
+        (0, 0) => String::new(),
+        (d, w) => format!(" ({d} with coordinates that are no numbers, {w} withheld were left out)"),
+    };
+    Error::Degenerate {
+        found: format!("{} input files hold no usable point{left_out}", stats.files.len()),
+    }
+}
+
+/// Base and exactness of a lattice, or `None` if the sources do not fit it.
+fn place(sources: &[&Source], step: f64, offset: [f64; 3]) -> Option<Placed> {
+    let mut low = [i64::MAX; 3];
+    let mut high = [i64::MIN; 3];
+    let mut exact = true;
+    for source in sources {
+        let map = SourceMap::new(source, step, offset)?;
+        exact &= map.exact;
+        for axis in 0..3 {
+            let [a, b] = map.extent(source, axis)?;
+            low[axis] = low[axis].min(a);
+            high[axis] = high[axis].max(b);
+        }
+    }
+    let fits = (0..3).all(|a| high[a].checked_sub(low[a]).is_some_and(|e| e < COORDINATE_LIMIT));
+    fits.then_some(Placed { base: low, exact })
+}
+
+/// The lowest offset of all sources on a grid, so that it does not depend on their order.
+fn common_offset(sources: &[&Source]) -> [f64; 3] {
+    std::array::from_fn(|axis| {
+        let offsets = sources.iter().filter_map(|s| s.grid(axis));
+        let lowest = offsets.map(|(_, offset)| offset).reduce(f64::min);
+        // No negative zero, whichever file comes first.
+        lowest.unwrap_or(0.0) + 0.0
+    })
+}
+
+/// The step for the sources on grids (LAS, decimals): of all scales the greatest common divisor,
+/// refined to meet all offsets, if it fits; else the finest that fits. `None` without such sources.
+fn grid_step(sources: &[&Source], offset: [f64; 3]) -> Option<f64> {
+    let grids: Vec<Vec<(f64, f64)>> = (0..3)
+        .map(|axis| sources.iter().filter_map(|s| s.grid(axis)).collect())
+        .collect();
+    let mut scales: Vec<f64> = grids.iter().flatten().map(|(s, _)| s.abs()).collect();
+    scales.sort_by(f64::total_cmp);
+    scales.dedup();
+    let finest = *scales.first()?;
+    let common = common_divisor(&scales);
+    let step = common.unwrap_or(finest);
+    let shifts = (0..3).flat_map(|a| grids[a].iter().map(move |(_, o)| (o - offset[a], offset[a])));
+    let parts = common.and_then(|step| offset_parts(step, shifts));
+    if let Some(parts) = parts {
+        let fine = divided(step, parts);
+        if place(sources, fine, offset).is_some() {
+            return Some(fine);
+        }
+    }
+    if parts.is_none() {
+        // Nothing is exact, but a tenth of a step keeps the rounding out of sight.
+        let fine = divided(step, 10);
+        if place(sources, fine, offset).is_some() {
+            return Some(fine);
+        }
+    }
+    let factors = (0..).flat_map(|k| [1.0, 2.0, 5.0].map(|f: f64| f * 10f64.powi(k)));
+    factors
+        .take(60)
+        .map(|factor| nice(step * factor))
+        .find(|step| place(sources, *step, offset).is_some())
+        .or(Some(step))
+}
+
+/// `step / parts`, as the decimal it was meant to be.
+fn divided(step: f64, parts: i64) -> f64 {
+    if parts == 1 {
+        step
+    } else {
+        nice(step / parts as f64)
+    }
+}
+
+/// The multiple of 1e-12 that `step` is up to rounding noise, else `step`.
+fn nice(step: f64) -> f64 {
+    let picos = (step * 1e12).round();
+    let decimal = picos / 1e12;
+    if picos < 9e15 && (decimal - step).abs() <= 1e-12 * step {
+        decimal
+    } else {
+        step
+    }
+}
+
+/// The greatest common divisor of ascending scales, if they are commensurable.
+fn common_divisor(scales: &[f64]) -> Option<f64> {
+    let (&finest, rest) = scales.split_first()?;
+    let mut parts = 1i64;
+    for scale in rest {
+        let (_, d) = rational(scale / (finest / parts as f64), MOST_REFINEMENT)?;
+        parts = parts.checked_mul(d)?;
+        if parts > MOST_REFINEMENT {
+            return None;
+        }
+    }
+    // Noise such as 1.0000000000000002e-7 is cleaned up only if there is a choice to be made.
+    Some(if rest.is_empty() {
+        finest
+    } else {
+        nice(finest / parts as f64)
+    })
+}
+
+/// Into how many parts a step must be divided for all offsets to be whole numbers of parts.
+fn offset_parts(step: f64, shifts: impl Iterator<Item = (f64, f64)>) -> Option<i64> {
+    let mut parts = 1i64;
+    for (shift, origin) in shifts {
+        let noise = (shift.abs() + 2.0 * origin.abs()) * f64::EPSILON / step;
+        let steps = shift / step;
+        let on = |q: i64| {
+            let x = steps * q as f64;
+            (x - x.round()).abs() <= (1e-6 + noise) * q as f64
+        };
+        // Beyond a tenth of a part the test would accept anything.
+        let most = MOST_REFINEMENT.min((0.1 / (1e-6 + noise)) as i64);
+        let q = (1..=most).find(|q| on(parts * q))?;
+        parts *= q;
+        if parts > MOST_REFINEMENT {
+            return None;
+        }
+    }
+    Some(parts)
+}
+
+/// Halves a step until the floating-point sources beside the grids are on it, as far as it fits.
+fn refine_for_floats(sources: &[&Source], offset: [f64; 3], mut step: f64) -> f64 {
+    let floats = sources.iter().filter(|s| s.grid(0).is_none());
+    let Some(wanted) = floats.map(|s| s.stats.exponent).min() else {
+        return step;
+    };
+    while step > pow2(wanted) && place(sources, step / 2.0, offset).is_some() {
+        step /= 2.0;
+    }
+    step
+}
+
+/// The step for floating-point sources alone: the coarsest of which all values are multiples, or
+/// the finest that fits.
+fn float_step(sources: &[&Source]) -> f64 {
+    let exponent = sources.iter().map(|s| s.stats.exponent).min();
+    match exponent {
+        None | Some(i32::MAX) => 1.0,
+        // A step must stay a normal number for its inverse to be finite.
+        Some(e) => pow2(e.max(-1000)),
+    }
+}
+
+fn pow2(exponent: i32) -> f64 {
+    2f64.powi(exponent.clamp(-1074, 1023))
+}

@@ -1,0 +1,255 @@
+//! From native coordinates to lattice positions, axis by axis.
+
+use super::source::{Native, Source};
+use super::spool::FrameBuffer;
+
+/// Positions beyond this, before the base is taken off, are refused so that sums cannot overflow.
+const POSITION_LIMIT: f64 = (1u64 << 62) as f64;
+
+/// Parts of a step by which a file's offset may miss the lattice and still count as on it.
+const RESIDUE: f64 = 1e-6;
+
+/// Relative tolerance when two scales are compared: over all of `i32` it stays far below a step.
+const RATIO: f64 = 1e-12;
+
+/// The rational `n / d` closest to `x > 0` within a relative 1e-12, with `d` at most `limit`.
+pub(super) fn rational(x: f64, limit: i64) -> Option<(i64, i64)> {
+    let (mut n, mut d) = ([0i64, 1], [1i64, 0]);
+    let mut rest = x;
+    for _ in 0..40 {
+        let whole = rest.floor();
+        if !(0.0..9e15).contains(&whole) {
+            return None;
+        }
+        let next = |v: [i64; 2]| {
+            (whole as i64)
+                .checked_mul(v[1])
+                .and_then(|p| p.checked_add(v[0]))
+        };
+        n = [n[1], next(n)?];
+        d = [d[1], next(d)?];
+        if d[1] > limit {
+            return None;
+        }
+        if n[1] > 0 && (n[1] as f64 / d[1] as f64 - x).abs() <= RATIO * x {
+            return Some((n[1], d[1]));
+        }
+        rest = 1.0 / (rest - whole);
+    }
+    None
+}
+
+/// How one axis of one source maps to positions, before the base is taken off.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum AxisMap {
+    /// `(i * mul + shift) / div`, rounded half to even.
+    Ratio { mul: i64, shift: i64, div: i64 },
+    /// `(v * scale + shift) / step`, rounded half to even.
+    Real { scale: f64, shift: f64, step: f64 },
+}
+
+impl AxisMap {
+    fn integer(self, i: i64) -> i128 {
+        match self {
+            Self::Ratio { mul, shift, div } => {
+                let numerator = i128::from(i) * i128::from(mul) + i128::from(shift);
+                divide_half_even(numerator, i128::from(div))
+            }
+            Self::Real { .. } => self.real(i as f64) as i128,
+        }
+    }
+
+    fn real(self, v: f64) -> f64 {
+        match self {
+            Self::Ratio { .. } => f64::NAN,
+            Self::Real { scale, shift, step } => ((v * scale + shift) / step).round_ties_even(),
+        }
+    }
+}
+
+fn divide_half_even(numerator: i128, divisor: i128) -> i128 {
+    if divisor == 1 {
+        return numerator;
+    }
+    let floor = numerator.div_euclid(divisor);
+    let twice = 2 * numerator.rem_euclid(divisor);
+    let up = twice > divisor || (twice == divisor && floor & 1 == 1);
+    floor + i128::from(up)
+}
+
+/// The map of one source.
+#[derive(Debug, Clone)]
+pub(super) struct SourceMap {
+    axes: [AxisMap; 3],
+    /// Power of ten that makes the numbers of a text source integers.
+    decimal: Option<f64>,
+    /// Every point of the source is on the lattice without rounding.
+    pub(super) exact: bool,
+}
+
+impl SourceMap {
+    /// The map to steps of `step` from `offset`; `None` if positions would be out of all bounds.
+    pub(super) fn new(source: &Source, step: f64, offset: [f64; 3]) -> Option<Self> {
+        let mut axes = [AxisMap::Real {
+            scale: 1.0,
+            shift: 0.0,
+            step,
+        }; 3];
+        let mut exact = true;
+        for axis in 0..3 {
+            let (map, on) = match source.grid(axis) {
+                Some((scale, shift)) => grid_map(scale, shift - offset[axis], offset[axis], step)?,
+                None => float_map(source, offset[axis], step),
+            };
+            axes[axis] = map;
+            exact &= on;
+        }
+        Some(Self {
+            axes,
+            decimal: source.decimals().map(|d| 10f64.powi(d as i32)),
+            exact,
+        })
+    }
+
+    /// Lowest and highest positions of an axis; `None` if they are out of all bounds.
+    pub(super) fn extent(&self, source: &Source, axis: usize) -> Option<[i64; 2]> {
+        let ends = [source.stats.min[axis], source.stats.max[axis]];
+        let ends = ends.map(|end| self.position(source.native, axis, end));
+        match ends {
+            [Some(a), Some(b)] => Some([a.min(b), a.max(b)]),
+            _ => None,
+        }
+    }
+
+    fn position(&self, native: Native, axis: usize, value: f64) -> Option<i64> {
+        let integer = match (native, self.decimal) {
+            (Native::Las { .. }, _) => Some(value),
+            (_, Some(power)) => Some((value * power).round()),
+            _ => None,
+        };
+        let position = match integer {
+            Some(i) => self.axes[axis].integer(i as i64) as f64,
+            None => self.axes[axis].real(value),
+        };
+        if position.abs() >= POSITION_LIMIT || position.is_nan() {
+            return None;
+        }
+        Some(match integer {
+            Some(i) => i64::try_from(self.axes[axis].integer(i as i64)).ok()?,
+            None => position as i64,
+        })
+    }
+
+    /// Positions of a frame of the source, less `base`.
+    pub(super) fn apply(&self, native: Native, frame: &FrameBuffer, base: [i64; 3], out: &mut Vec<[i64; 3]>) {
+        out.clear();
+        out.resize(frame.points, [0; 3]);
+        for axis in 0..3 {
+            let (map, base) = (self.axes[axis], base[axis]);
+            match (native, self.decimal) {
+                (Native::Las { .. }, _) => {
+                    let values = frame.points::<i32>().iter().map(|p| i64::from(p[axis]));
+                    integers(map, base, axis, values, out);
+                }
+                (Native::F64, Some(power)) => {
+                    let values = frame.points::<f64>().iter();
+                    let values = values.map(|p| (p[axis] * power).round() as i64);
+                    integers(map, base, axis, values, out);
+                }
+                (Native::F64, None) => {
+                    for (to, p) in out.iter_mut().zip(frame.points::<f64>()) {
+                        to[axis] = (map.real(p[axis]) as i64).wrapping_sub(base);
+                    }
+                }
+                (Native::F32, _) => {
+                    for (to, p) in out.iter_mut().zip(frame.points::<f32>()) {
+                        to[axis] = (map.real(f64::from(p[axis])) as i64).wrapping_sub(base);
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn integers(
+    map: AxisMap,
+    base: i64,
+    axis: usize,
+    values: impl Iterator<Item = i64>,
+    out: &mut [[i64; 3]],
+) {
+    match map {
+        // The extent was checked against the limit, so no value of the source overflows; a value
+        // that does comes from a damaged spool and is refused by its position.
+        AxisMap::Ratio { mul, shift, div: 1 } => {
+            let shift = shift.wrapping_sub(base);
+            for (to, i) in out.iter_mut().zip(values) {
+                to[axis] = i.wrapping_mul(mul).wrapping_add(shift);
+            }
+        }
+        _ => {
+            for (to, i) in out.iter_mut().zip(values) {
+                to[axis] = (map.integer(i) as i64).wrapping_sub(base);
+            }
+        }
+    }
+}
+
+/// The map of values on a grid of `scale`, shifted by `shift` from the lattice's `origin`.
+fn grid_map(scale: f64, shift: f64, origin: f64, step: f64) -> Option<(AxisMap, bool)> {
+    let real = AxisMap::Real { scale, shift, step };
+    let Some((mul, div)) = rational(scale.abs() / step, 10_000_000) else {
+        return Some((real, false));
+    };
+    let mul = if scale < 0.0 { -mul } else { mul };
+    let steps = shift / step * div as f64;
+    if steps.abs() >= POSITION_LIMIT {
+        return None;
+    }
+    let whole = steps.round_ties_even();
+    // Offsets are decimals that a double holds only nearly.
+    let noise = (shift.abs() + 2.0 * origin.abs()) * f64::EPSILON / step;
+    let on = div == 1 && (steps - whole).abs() <= RESIDUE + noise;
+    let map = AxisMap::Ratio {
+        mul,
+        shift: whole as i64,
+        div,
+    };
+    Some((map, on))
+}
+
+/// The map of floating-point values, and whether all are on the lattice.
+fn float_map(source: &Source, origin: f64, step: f64) -> (AxisMap, bool) {
+    let map = AxisMap::Real {
+        scale: 1.0,
+        shift: -origin,
+        step,
+    };
+    let power_of_two = step.is_normal() && step.to_bits() & ((1 << 52) - 1) == 0;
+    let exponent = (step.to_bits() >> 52 & 0x7ff) as i32 - 1023;
+    let on = origin == 0.0 && power_of_two && exponent <= source.stats.exponent;
+    (map, on)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn finds_ratios_of_decimals() {
+        assert_eq!(rational(0.01 / 0.001, 100), Some((10, 1)));
+        assert_eq!(rational(0.00025 / 0.001, 100), Some((1, 4)));
+        assert_eq!(rational(1.000_000_000_000_000_2e-6 / 1e-7, 100), Some((10, 1)));
+        assert_eq!(rational(std::f64::consts::PI, 1000), None);
+        assert_eq!(rational(1e300, 1000), None);
+        assert_eq!(rational(1e-300, 1000), None);
+    }
+
+    #[test]
+    fn rounds_half_to_even() {
+        let halves: Vec<i128> = (-5..=5).map(|n| divide_half_even(n, 2)).collect();
+        assert_eq!(halves, [-2, -2, -2, -1, 0, 0, 0, 1, 2, 2, 2]);
+        assert_eq!(divide_half_even(7, 5), 1);
+        assert_eq!(divide_half_even(-8, 5), -2);
+    }
+}

@@ -1,0 +1,70 @@
+//! A source: the points of one input file in their native form.
+
+use super::stats::{NOT_FIXED, SourceStats};
+
+/// How the spool holds the coordinates of a source.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Native {
+    /// Integers; the coordinate is `i * scale + offset`.
+    Las {
+        scale: [f64; 3],
+        offset: [f64; 3],
+    },
+    /// Single precision.
+    F32,
+    /// Double precision.
+    F64,
+}
+
+/// One input file in the spool.
+#[derive(Debug, Clone)]
+pub(super) struct Source {
+    pub(super) native: Native,
+    pub(super) stats: SourceStats,
+    /// The numbers come from text, so a fixed number of decimals is a lattice.
+    pub(super) text: bool,
+}
+
+impl Source {
+    /// Number of decimals of all coordinates, if they come from text with a fixed point and are
+    /// few enough for the integer of the last decimal to be exact.
+    pub(super) fn decimals(&self) -> Option<u32> {
+        let stats = &self.stats;
+        let fixed = self.text
+            && self.native == Native::F64
+            && stats.decimals != NOT_FIXED
+            && stats.decimals <= 9;
+        let largest = (0..3)
+            .map(|a| stats.min[a].abs().max(stats.max[a].abs()))
+            .fold(0.0, f64::max);
+        let power = 10f64.powi(stats.decimals.min(9) as i32);
+        (fixed && largest * power < (1u64 << 50) as f64).then_some(stats.decimals)
+    }
+
+    /// Scale and offset of an axis, if the native values are integers or decimals.
+    pub(super) fn grid(&self, axis: usize) -> Option<(f64, f64)> {
+        match self.native {
+            Native::Las { scale, offset } => Some((scale[axis], offset[axis])),
+            Native::F32 | Native::F64 => {
+                let decimals = self.decimals()?;
+                Some((1.0 / 10f64.powi(decimals as i32), 0.0))
+            }
+        }
+    }
+
+    /// Lowest and highest coordinates in the input's unit; `None` without points.
+    pub(super) fn bounds(&self) -> Option<[[f64; 3]; 2]> {
+        if self.stats.kept == 0 {
+            return None;
+        }
+        let (mut min, mut max) = (self.stats.min, self.stats.max);
+        if let Native::Las { scale, offset } = self.native {
+            for axis in 0..3 {
+                let ends = [min[axis], max[axis]].map(|i| i * scale[axis] + offset[axis]);
+                min[axis] = ends[0].min(ends[1]);
+                max[axis] = ends[0].max(ends[1]);
+            }
+        }
+        Some([min, max])
+    }
+}

@@ -1,0 +1,99 @@
+//! What was read: counts and extents per file and in all.
+
+use super::format::Format;
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// Counts of one run over all input files.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct IngestStats {
+    /// Points found in the files.
+    pub read: u64,
+    /// Points that went into the spool.
+    pub kept: u64,
+    /// Points left out because a coordinate was not a number or infinite.
+    pub dropped_non_finite: u64,
+    /// Points left out because the file flags them as withheld.
+    pub withheld: u64,
+    /// The same, file by file, in the order given.
+    pub files: Vec<FileStats>,
+    /// What the user should know, one line each.
+    pub warnings: Vec<String>,
+}
+
+/// Counts and extents of one input file.
+#[derive(Debug, Clone, Serialize)]
+pub struct FileStats {
+    /// The file.
+    pub path: PathBuf,
+    /// Its format, found by content.
+    pub format: Format,
+    /// Its size in bytes.
+    pub bytes: u64,
+    /// Points its header claims; text has no such claim.
+    pub claimed: Option<u64>,
+    /// Points found.
+    pub points: u64,
+    /// Points kept.
+    pub kept: u64,
+    /// Points left out because a coordinate was not a number or infinite.
+    pub dropped_non_finite: u64,
+    /// Points left out because they are flagged as withheld.
+    pub withheld: u64,
+    /// Lowest coordinates of the kept points, in the file's unit; none without points.
+    pub min: Option<[f64; 3]>,
+    /// Highest coordinates of the kept points, in the file's unit; none without points.
+    pub max: Option<[f64; 3]>,
+}
+
+/// Decimals of numbers that are not written with a fixed point.
+pub(super) const NOT_FIXED: u32 = u32::MAX;
+
+/// Exact statistics of one source, in its native form; merging is commutative.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct SourceStats {
+    pub(super) read: u64,
+    pub(super) kept: u64,
+    pub(super) dropped: u64,
+    pub(super) withheld: u64,
+    pub(super) min: [f64; 3],
+    pub(super) max: [f64; 3],
+    /// All coordinates are multiples of two to this power; `i32::MAX` if all are zero.
+    pub(super) exponent: i32,
+    /// Largest number of decimals in text, or [`NOT_FIXED`].
+    pub(super) decimals: u32,
+    /// Points that count lines inside the text claim.
+    pub(super) claimed: u64,
+}
+
+impl Default for SourceStats {
+    fn default() -> Self {
+        Self {
+            read: 0,
+            kept: 0,
+            dropped: 0,
+            withheld: 0,
+            min: [f64::INFINITY; 3],
+            max: [f64::NEG_INFINITY; 3],
+            exponent: i32::MAX,
+            decimals: 0,
+            claimed: 0,
+        }
+    }
+}
+
+impl SourceStats {
+    pub(super) fn merge(&mut self, other: &Self) {
+        self.read += other.read;
+        self.kept += other.kept;
+        self.dropped += other.dropped;
+        self.withheld += other.withheld;
+        for axis in 0..3 {
+            self.min[axis] = self.min[axis].min(other.min[axis]);
+            self.max[axis] = self.max[axis].max(other.max[axis]);
+        }
+        self.exponent = self.exponent.min(other.exponent);
+        self.decimals = self.decimals.max(other.decimals);
+        self.claimed = self.claimed.saturating_add(other.claimed);
+    }
+}

@@ -1,0 +1,298 @@
+//! The ordered store: positions by id in one file, in pages, with a tree of page boxes in memory.
+
+use crate::error::{Error, Result};
+use crate::geom::Point;
+use crate::geom::aabb::Aabb;
+use crate::workspace::memory::Reservation;
+use crate::workspace::{IoCounters, Workspace};
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::ops::Range;
+use std::os::unix::fs::FileExt;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// Points per page unless a test asks for another number.
+pub const PAGE: usize = 256;
+
+/// Children of a node of the box tree.
+const FAN: usize = 8;
+
+/// Positions of all points by id; 12 bytes a point on disk, 28/256 in memory.
+#[derive(Debug)]
+pub struct PointStore {
+    path: PathBuf,
+    file: File,
+    len: usize,
+    page: usize,
+    checks: Vec<u32>,
+    /// `levels[0]` has a box for each page, each further level one for `FAN` of the last.
+    levels: Vec<Vec<Aabb>>,
+    io: Arc<IoCounters>,
+    _held: Reservation,
+}
+
+impl PointStore {
+    /// Number of points.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.len
+    }
+
+    /// True if there is no point.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
+    /// Points per page.
+    #[must_use]
+    pub fn page_size(&self) -> usize {
+        self.page
+    }
+
+    /// Number of pages.
+    #[must_use]
+    pub fn pages(&self) -> usize {
+        self.levels[0].len()
+    }
+
+    /// The box around a page.
+    #[must_use]
+    pub fn page_box(&self, page: usize) -> &Aabb {
+        &self.levels[0][page]
+    }
+
+    /// Ids of the points in a page.
+    #[must_use]
+    pub fn page_ids(&self, page: usize) -> Range<usize> {
+        page * self.page..((page + 1) * self.page).min(self.len)
+    }
+
+    /// The box around all points.
+    #[must_use]
+    pub fn bounds(&self) -> Aabb {
+        self.levels.last().map_or(Aabb::EMPTY, |top| top.iter().fold(Aabb::EMPTY, |a, b| a.union(*b)))
+    }
+
+    /// Number of levels of the box tree; level 0 are the pages.
+    #[must_use]
+    pub fn tree_levels(&self) -> usize {
+        self.levels.len()
+    }
+
+    /// The boxes of a level.
+    #[must_use]
+    pub fn tree_boxes(&self, level: usize) -> &[Aabb] {
+        &self.levels[level]
+    }
+
+    /// The nodes of `level - 1` under node `index` of `level`.
+    #[must_use]
+    pub fn tree_children(&self, level: usize, index: usize) -> Range<usize> {
+        index * FAN..((index + 1) * FAN).min(self.levels[level - 1].len())
+    }
+
+    /// Calls `each` with all pages whose box is within squared distance `d2` of `target`, ascending,
+    /// until it returns false.
+    pub fn pages_near(&self, target: &Aabb, d2: u64, each: &mut dyn FnMut(usize) -> bool) {
+        let top = self.levels.len() - 1;
+        for node in 0..self.levels[top].len() {
+            if !self.descend(top, node, target, d2, each) {
+                return;
+            }
+        }
+    }
+
+    fn descend(
+        &self,
+        level: usize,
+        node: usize,
+        target: &Aabb,
+        d2: u64,
+        each: &mut dyn FnMut(usize) -> bool,
+    ) -> bool {
+        if self.levels[level][node].distance2_box(target) > d2 {
+            return true;
+        }
+        if level == 0 {
+            return each(node);
+        }
+        self.tree_children(level, node).all(|child| self.descend(level - 1, child, target, d2, each))
+    }
+
+    /// Reads a run of pages and appends their points to `points`.
+    ///
+    /// # Errors
+    /// [`Error::Io`]; [`Error::Corrupt`] if a page is not what was written.
+    pub fn read_pages(&self, pages: Range<usize>, points: &mut Vec<Point>) -> Result<()> {
+        let ids = pages.start * self.page..(pages.end * self.page).min(self.len);
+        let before = points.len();
+        points.resize(before + ids.len(), [0; 3]);
+        let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut points[before..]);
+        let offset = ids.start as u64 * 12;
+        self.file
+            .read_exact_at(bytes, offset)
+            .map_err(|e| Error::io(&self.path, format!("read {} bytes", bytes.len()), e))?;
+        self.io.add_read(bytes.len() as u64);
+        for (page, part) in pages.zip(bytes.chunks(self.page * 12)) {
+            let crc = crc32fast::hash(part);
+            if crc != self.checks[page] {
+                return Err(Error::Corrupt {
+                    path: self.path.clone(),
+                    offset: (page * self.page * 12) as u64,
+                    found: format!("checksum {crc:08x}"),
+                    expected: format!("{:08x}", self.checks[page]),
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// Positions of ascending `ids`, appended to `points` in the same order.
+    ///
+    /// # Errors
+    /// See [`PointStore::read_pages`].
+    pub fn fetch(&self, ids: &[u32], points: &mut Vec<Point>) -> Result<()> {
+        let mut buffer = Vec::new();
+        let mut loaded = usize::MAX;
+        for &id in ids {
+            let page = id as usize / self.page;
+            if page != loaded {
+                buffer.clear();
+                self.read_pages(page..page + 1, &mut buffer)?;
+                loaded = page;
+            }
+            points.push(buffer[id as usize % self.page]);
+        }
+        Ok(())
+    }
+
+    /// Positions of the ids in `range`.
+    ///
+    /// # Errors
+    /// See [`PointStore::read_pages`].
+    pub fn slice(&self, range: Range<usize>) -> Result<Vec<Point>> {
+        if range.is_empty() {
+            return Ok(Vec::new());
+        }
+        let pages = range.start / self.page..range.end.div_ceil(self.page);
+        let first = pages.start * self.page;
+        let mut points = Vec::new();
+        self.read_pages(pages, &mut points)?;
+        points.truncate(range.end - first);
+        points.drain(..range.start - first);
+        Ok(points)
+    }
+}
+
+impl Drop for PointStore {
+    fn drop(&mut self) {
+        self.io.shrink_scratch(self.len as u64 * 12);
+        // A scratch file that cannot be deleted goes with its folder.
+        let _ = std::fs::remove_file(&self.path);
+    }
+}
+
+/// Writes a [`PointStore`] in id order.
+#[derive(Debug)]
+pub struct StoreWriter {
+    path: PathBuf,
+    file: BufWriter<File>,
+    len: usize,
+    page: usize,
+    pending: Vec<Point>,
+    checks: Vec<u32>,
+    boxes: Vec<Aabb>,
+    io: Arc<IoCounters>,
+}
+
+impl StoreWriter {
+    /// Starts the scratch file `name`.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn create(workspace: &Workspace, name: &str, page: usize) -> Result<Self> {
+        let path = workspace.file(name);
+        let file = File::options()
+            .read(true)
+            .write(true)
+            .create_new(true)
+            .open(&path)
+            .map_err(|e| Error::io(&path, "create", e))?;
+        Ok(Self {
+            path,
+            file: BufWriter::with_capacity(1 << 18, file),
+            len: 0,
+            page: page.max(1),
+            pending: Vec::new(),
+            checks: Vec::new(),
+            boxes: Vec::new(),
+            io: workspace.io.clone(),
+        })
+    }
+
+    /// Appends points, in order of id.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn push(&mut self, mut points: &[Point]) -> Result<()> {
+        while !points.is_empty() {
+            let (now, later) = points.split_at((self.page - self.pending.len()).min(points.len()));
+            self.pending.extend_from_slice(now);
+            points = later;
+            if self.pending.len() == self.page {
+                self.flush_page()?;
+            }
+        }
+        Ok(())
+    }
+
+    fn flush_page(&mut self) -> Result<()> {
+        if self.pending.is_empty() {
+            return Ok(());
+        }
+        let bytes: &[u8] = bytemuck::cast_slice(&self.pending);
+        self.file
+            .write_all(bytes)
+            .map_err(|e| Error::io(&self.path, format!("write {} bytes", bytes.len()), e))?;
+        self.io.add_written(bytes.len() as u64);
+        self.io.grow_scratch(bytes.len() as u64);
+        self.checks.push(crc32fast::hash(bytes));
+        self.boxes.push(Aabb::of(&self.pending));
+        self.len += self.pending.len();
+        self.pending.clear();
+        Ok(())
+    }
+
+    /// Ends the file and builds the tree of boxes.
+    ///
+    /// # Errors
+    /// [`Error::Io`], [`Error::Memory`].
+    pub fn finish(mut self, workspace: &Workspace) -> Result<PointStore> {
+        self.flush_page()?;
+        let file = self
+            .file
+            .into_inner()
+            .map_err(|e| Error::io(&self.path, "flush", e.into_error()))?;
+        let held = workspace.reserve("point index", self.boxes.len() as u64 * 32 + 4096)?;
+        let mut levels = vec![self.boxes];
+        while levels.last().is_some_and(|top| top.len() > FAN) {
+            let next = levels[levels.len() - 1]
+                .chunks(FAN)
+                .map(|boxes| boxes.iter().fold(Aabb::EMPTY, |a, b| a.union(*b)))
+                .collect();
+            levels.push(next);
+        }
+        Ok(PointStore {
+            path: self.path,
+            file,
+            len: self.len,
+            page: self.page,
+            checks: self.checks,
+            levels,
+            io: self.io,
+            _held: held,
+        })
+    }
+}

@@ -1,0 +1,101 @@
+//! Triples with their counts, by block: what the cells of all tiles saw, added up (paper, 3.4).
+
+use crate::error::Result;
+use crate::spill::{Exchange, Sections};
+use crate::stages::blocks::Blocks;
+use crate::stages::cells::CellTriples;
+use crate::workspace::Workspace;
+use serde::Serialize;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+const EXCHANGE_BUFFER: u64 = 16 << 20;
+
+/// All triples `[i, j, k, count]` with `i < j < k`, ascending.
+#[derive(Debug)]
+pub struct Triples {
+    /// By the block of the smallest vertex.
+    pub own: Sections<4>,
+    /// Crossing triples, `[block, i, j, k, count]`, for the blocks of their other vertices.
+    pub visiting: Sections<5>,
+}
+
+/// Distinct triples by count.
+#[derive(Debug, Clone, Copy, Default, Serialize, PartialEq, Eq)]
+pub struct TripleStats {
+    /// All distinct triples.
+    pub triples: u64,
+    /// Seen by all three cells.
+    pub t3: u64,
+    /// Seen by two cells.
+    pub t2: u64,
+    /// Seen by one cell.
+    pub t1: u64,
+    /// Those with vertices in more than one block.
+    pub crossing: u64,
+}
+
+/// Adds up the counts of all tiles.
+///
+/// # Errors
+/// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
+/// [`crate::Error::Cancelled`].
+pub fn triples(
+    cells: &CellTriples,
+    blocks: Blocks,
+    workspace: &Workspace,
+) -> Result<(Triples, TripleStats)> {
+    let own = Sections::create(workspace, "triples.own", blocks.count())?;
+    let held = workspace.reserve("triples: exchange", EXCHANGE_BUFFER)?;
+    let exchange = Exchange::new(workspace, "triples.sent", EXCHANGE_BUFFER);
+    let counts: [AtomicU64; 4] = Default::default();
+    let bytes = |block: usize| {
+        let tiles = cells.tiles.of_block(block);
+        tiles.map(|t| 50 * (cells.own.records(t) + cells.received.records(t)) as u64).sum()
+    };
+    workspace.for_each_unit("triples: block", blocks.count(), bytes, |block| {
+        let mut all = Vec::new();
+        for tile in cells.tiles.of_block(block) {
+            merge(&cells.own.get(tile)?, &cells.received.get(tile)?, &mut all);
+        }
+        let mut sent = Vec::new();
+        let mut local = [0u64; 4];
+        for &[i, j, k, count] in &all {
+            local[(count - 1) as usize] += 1;
+            for visited in blocks.visited([i, j, k]) {
+                sent.push([visited, i, j, k, count]);
+            }
+            local[3] += u64::from(blocks.crossing([i, j, k]));
+        }
+        for (total, more) in counts.iter().zip(local) {
+            total.fetch_add(more, Ordering::Relaxed);
+        }
+        own.put(block, &all)?;
+        exchange.send(&sent)?;
+        workspace.observer.advance(all.len() as u64);
+        Ok(())
+    })?;
+    let visiting = exchange.deliver(workspace, blocks.count())?;
+    drop(held);
+    let [t1, t2, t3, crossing] = counts.map(AtomicU64::into_inner);
+    Ok((Triples { own, visiting }, TripleStats { triples: t1 + t2 + t3, t3, t2, t1, crossing }))
+}
+
+/// Merges two ascending lists, adding up counts; `received` may hold a triple more than once.
+fn merge(own: &[[u32; 4]], received: &[[u32; 5]], all: &mut Vec<[u32; 4]>) {
+    let received = received.iter().map(|&[_, i, j, k, count]| [i, j, k, count]);
+    let mut a = own.iter().copied().peekable();
+    let mut b = received.peekable();
+    loop {
+        let take_a = match (a.peek(), b.peek()) {
+            (Some(x), Some(y)) => x[..3] <= y[..3],
+            (Some(_), None) => true,
+            (None, Some(_)) => false,
+            (None, None) => break,
+        };
+        let Some(next) = (if take_a { a.next() } else { b.next() }) else { break };
+        match all.last_mut() {
+            Some(last) if last[..3] == next[..3] => last[3] += next[3],
+            _ => all.push(next),
+        }
+    }
+}
