@@ -26,6 +26,9 @@ fn main() {
     let (c, s) = stages::cells::cells(&store, blocks, 65536, 30, if std::env::args().nth(2).is_some() { stages::cells::DiskRadius::Steps(25e6) } else { stages::cells::DiskRadius::Auto }, &ws).unwrap();
     eprintln!("cells {s:?} {:?}", t.elapsed());
     let t = std::time::Instant::now();
-    let (_tr, s) = stages::triples::triples(&c, blocks, &ws).unwrap();
+    let (tr, s) = stages::triples::triples(&c, blocks, &ws).unwrap();
     eprintln!("triples {s:?} {:?}", t.elapsed());
+    let t = std::time::Instant::now();
+    let (_st, b, i) = stages::stitch::stitch(&store, &tr, blocks, 0.5, &ws).unwrap();
+    eprintln!("stitch {b:?} {i:?} {:?}", t.elapsed());
 }

@@ -9,4 +9,6 @@ pub mod cells;
 
 pub mod triples;
 
+pub mod stitch;
+
 pub mod blocks;

@@ -3,7 +3,7 @@
 use crate::error::{Error, Result};
 use crate::workspace::IoCounters;
 use std::fs::File;
-use std::io::Read;
+use std::io::{Read, Seek, SeekFrom};
 use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -109,6 +109,25 @@ pub(super) struct Range<'a> {
     input: &'a Input,
     at: u64,
     end: u64,
+}
+
+impl Range<'_> {
+    /// Where the next byte is read.
+    pub(super) fn position(&self) -> u64 {
+        self.at
+    }
+}
+
+impl Seek for Range<'_> {
+    fn seek(&mut self, to: SeekFrom) -> std::io::Result<u64> {
+        let place = match to {
+            SeekFrom::Start(at) => Some(at),
+            SeekFrom::End(by) => self.end.checked_add_signed(by),
+            SeekFrom::Current(by) => self.at.checked_add_signed(by),
+        };
+        self.at = place.ok_or(std::io::ErrorKind::InvalidInput)?;
+        Ok(self.at)
+    }
 }
 
 impl Read for Range<'_> {

@@ -1,1 +1,251 @@
 //! Formats in, lattice positions out.
+//!
+//! [`ingest`] decodes every input once into a [`Spool`]: one scratch file with all points in their
+//! native precision, and exact statistics of each file. [`Spool::choose_lattice`] then finds one
+//! lattice for all of them, and [`Spool::for_each`] streams the points as positions on it.
+//!
+//! Formats are told apart by content: LAS 1.0 to 1.4 with point formats 0 to 10, LAZ (COPC
+//! included), PLY, and text with a point a line.
+
+mod contain;
+mod expand;
+mod format;
+mod input;
+mod las;
+mod lattice;
+mod map;
+mod ply;
+mod probe;
+mod source;
+mod spool;
+mod stats;
+mod stream;
+mod text;
+
+pub use expand::expand;
+pub use format::Format;
+pub use probe::{Probe, probe};
+pub use stats::{FileStats, IngestStats};
+pub use stream::READ_BUFFERS;
+
+use crate::error::Result;
+use crate::geom::lattice::Lattice;
+use crate::workspace::Workspace;
+use crate::workspace::progress::Cancel;
+use format::Family;
+use input::Input;
+use source::{Native, Source};
+use spool::{SourceWriter, SpoolFile};
+use stats::SourceStats;
+use std::path::{Path, PathBuf};
+
+/// Precision in which coordinates of the cloud can be written without harm.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum CoordinateType {
+    /// Single precision: all inputs have it, or it moves no point by a tenth of a step.
+    F32,
+    /// Double precision.
+    F64,
+}
+
+/// All points of the inputs in one scratch file, which is deleted on drop.
+#[derive(Debug)]
+pub struct Spool {
+    file: SpoolFile,
+    sources: Vec<Source>,
+    stats: IngestStats,
+    cancel: Cancel,
+}
+
+/// Decodes all inputs, files and folders, into a spool.
+///
+/// The observer is told of points as they are read; the caller begins and ends the stage. Memory
+/// is reserved per unit of work, a few MiB a thread.
+///
+/// # Errors
+/// [`crate::Error::Input`] for a file that is not what it claims to be, [`crate::Error::Io`], [`crate::Error::Disk`],
+/// [`crate::Error::Memory`], [`crate::Error::Cancelled`].
+pub fn ingest(inputs: &[PathBuf], workspace: &Workspace) -> Result<Spool> {
+    let file = SpoolFile::create(workspace)?;
+    let mut sources = Vec::new();
+    let mut stats = IngestStats::default();
+    for path in expand(inputs)? {
+        workspace.check_cancel()?;
+        let opened = Opened::new(&path, workspace.io.clone())?;
+        let target = SourceWriter::new(workspace, &file, sources.len() as u32);
+        let warnings = opened.read(&target)?;
+        let source = Source {
+            native: opened.native(),
+            stats: target.into_stats(),
+            text: matches!(opened.format(), Format::Text | Format::PlyAscii),
+        };
+        opened.check(&source.stats)?;
+        let shown = |w: String| format!("{}: {w}", path.display());
+        stats.warnings.extend(warnings.into_iter().map(shown));
+        stats.add(&opened, &source);
+        sources.push(source);
+    }
+    Ok(Spool {
+        file,
+        sources,
+        stats,
+        cancel: workspace.cancel.clone(),
+    })
+}
+
+/// An input file whose header was read.
+struct Opened {
+    input: Input,
+    kind: Kind,
+}
+
+enum Kind {
+    Las(las::Header),
+    Ply(ply::Header),
+    Text(text::dialect::Dialect),
+}
+
+impl Opened {
+    fn new(path: &Path, io: std::sync::Arc<crate::workspace::IoCounters>) -> Result<Self> {
+        let input = Input::open(path, io)?;
+        let kind = match format::family_of(&input)? {
+            Family::Las => Kind::Las(las::Header::read(&input)?),
+            Family::Ply => Kind::Ply(ply::Header::read(&input)?),
+            Family::Text(dialect) => Kind::Text(dialect),
+            other => return Err(format::refuse(&input, &other)),
+        };
+        Ok(Self { input, kind })
+    }
+
+    fn read(&self, target: &SourceWriter<'_>) -> Result<Vec<String>> {
+        match &self.kind {
+            Kind::Las(header) => {
+                let mut warnings = header.warnings.clone();
+                warnings.extend(las::read(&self.input, header, target)?);
+                Ok(warnings)
+            }
+            Kind::Ply(header) => ply::read(&self.input, header, target),
+            Kind::Text(dialect) => text::read(&self.input, dialect, target),
+        }
+    }
+
+    fn check(&self, stats: &SourceStats) -> Result<()> {
+        match &self.kind {
+            Kind::Text(dialect) => {
+                text::check_claim(&self.input, dialect, stats.claimed, stats.read)
+            }
+            Kind::Las(_) | Kind::Ply(_) => Ok(()),
+        }
+    }
+
+    fn format(&self) -> Format {
+        match &self.kind {
+            Kind::Las(header) if header.compressed => Format::Laz,
+            Kind::Las(_) => Format::Las,
+            Kind::Ply(header) => header.format(),
+            Kind::Text(_) => Format::Text,
+        }
+    }
+
+    fn native(&self) -> Native {
+        match &self.kind {
+            Kind::Las(header) => header.native(),
+            Kind::Ply(header) => header.native(),
+            Kind::Text(_) => Native::F64,
+        }
+    }
+
+    fn las(&self) -> Option<&las::Header> {
+        match &self.kind {
+            Kind::Las(header) => Some(header),
+            Kind::Ply(_) | Kind::Text(_) => None,
+        }
+    }
+
+    fn claimed(&self) -> Option<u64> {
+        match &self.kind {
+            Kind::Las(header) => Some(header.claimed),
+            Kind::Ply(header) => Some(header.claimed()),
+            Kind::Text(_) => None,
+        }
+    }
+}
+
+impl IngestStats {
+    fn add(&mut self, opened: &Opened, source: &Source) {
+        let stats = &source.stats;
+        self.read += stats.read;
+        self.kept += stats.kept;
+        self.dropped_non_finite += stats.dropped;
+        self.withheld += stats.withheld;
+        let bounds = source.bounds();
+        self.files.push(FileStats {
+            path: opened.input.path.clone(),
+            format: opened.format(),
+            bytes: opened.input.bytes,
+            claimed: opened.claimed(),
+            points: stats.read,
+            kept: stats.kept,
+            dropped_non_finite: stats.dropped,
+            withheld: stats.withheld,
+            min: bounds.map(|b| b[0]),
+            max: bounds.map(|b| b[1]),
+        });
+    }
+}
+
+impl Spool {
+    /// What was read.
+    #[must_use]
+    pub fn stats(&self) -> &IngestStats {
+        &self.stats
+    }
+
+    /// Number of points in the spool.
+    #[must_use]
+    pub fn points(&self) -> u64 {
+        self.stats.kept
+    }
+
+    /// One isotropic lattice for the whole cloud, whatever the order of the files.
+    ///
+    /// LAS scales and fixed decimals give the greatest common step, floating-point values the
+    /// coarsest power of two of which all are multiples. What would span 2^30 steps or more gets a
+    /// coarser step, and `exact` is false. The step is then halved up to `refine` times, as often
+    /// as the cloud still fits.
+    ///
+    /// # Errors
+    /// [`crate::Error::Degenerate`] if there are no points.
+    pub fn choose_lattice(&self, refine: u32) -> Result<Lattice> {
+        lattice::choose(&self.sources, &self.stats, refine)
+    }
+
+    /// The precision in which coordinates should be written.
+    #[must_use]
+    pub fn source_precision(&self) -> CoordinateType {
+        let kept = || self.sources.iter().filter(|s| s.stats.kept > 0);
+        if kept().all(|s| s.native == Native::F32) {
+            return CoordinateType::F32;
+        }
+        let Ok(lattice) = self.choose_lattice(0) else {
+            return CoordinateType::F64;
+        };
+        let bounds = kept().filter_map(Source::bounds);
+        let largest = bounds
+            .flat_map(|b| b.into_iter().flatten())
+            .fold(0.0, |m: f64, c| m.max(c.abs()));
+        // Rounding to single precision moves a coordinate by at most 2^-24 of the power of two at
+        // or below it.
+        let half_unit = if largest == 0.0 {
+            0.0
+        } else {
+            largest.log2().floor().exp2() * 2f64.powi(-24)
+        };
+        if half_unit < lattice.step / 10.0 {
+            CoordinateType::F32
+        } else {
+            CoordinateType::F64
+        }
+    }
+}

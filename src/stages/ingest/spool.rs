@@ -73,18 +73,22 @@ impl Coordinate for f64 {
     }
 }
 
-/// The file being written.
+/// Tells the spools of one scratch folder apart.
+static MADE: AtomicU64 = AtomicU64::new(0);
+
+/// The scratch file; it is deleted on drop.
 #[derive(Debug)]
-pub(super) struct SpoolWriter {
-    path: PathBuf,
+pub(super) struct SpoolFile {
+    pub(super) path: PathBuf,
     file: File,
     end: AtomicU64,
     io: Arc<IoCounters>,
 }
 
-impl SpoolWriter {
+impl SpoolFile {
     pub(super) fn create(workspace: &Workspace) -> Result<Self> {
-        let path = workspace.file("ingest.spool");
+        let number = MADE.fetch_add(1, Ordering::Relaxed);
+        let path = workspace.file(&format!("ingest-{number}.spool"));
         let file = File::options()
             .read(true)
             .write(true)
@@ -102,6 +106,7 @@ impl SpoolWriter {
     fn append(&self, frame: &[u8]) -> Result<()> {
         let bytes = frame.len() as u64;
         let offset = self.end.fetch_add(bytes, Ordering::Relaxed);
+        self.io.grow_scratch(bytes);
         self.file.write_all_at(frame, offset).map_err(|e| {
             if e.kind() == std::io::ErrorKind::StorageFull {
                 Error::Disk {
@@ -114,34 +119,23 @@ impl SpoolWriter {
             }
         })?;
         self.io.add_written(bytes);
-        self.io.grow_scratch(bytes);
         Ok(())
-    }
-
-    /// Ends writing.
-    pub(super) fn finish(self) -> SpoolFile {
-        SpoolFile {
-            end: self.end.into_inner(),
-            path: self.path,
-            file: self.file,
-            io: self.io,
-        }
     }
 }
 
 /// Takes the points of one source in, from any number of threads.
 pub(super) struct SourceWriter<'a> {
     pub(super) workspace: &'a Workspace,
-    writer: &'a SpoolWriter,
+    file: &'a SpoolFile,
     source: u32,
     stats: Mutex<SourceStats>,
 }
 
 impl<'a> SourceWriter<'a> {
-    pub(super) fn new(workspace: &'a Workspace, writer: &'a SpoolWriter, source: u32) -> Self {
+    pub(super) fn new(workspace: &'a Workspace, file: &'a SpoolFile, source: u32) -> Self {
         Self {
             workspace,
-            writer,
+            file,
             source,
             stats: Mutex::default(),
         }
@@ -231,7 +225,7 @@ impl<T: Coordinate> Sink<'_, T> {
         let crc = frame_crc(&self.bytes[..12], &self.bytes[HEADER..]);
         self.bytes[12..HEADER].copy_from_slice(&crc.to_ne_bytes());
         self.points.clear();
-        self.target.writer.append(&self.bytes)
+        self.target.file.append(&self.bytes)
     }
 
     /// Writes the rest and adds the statistics to the source's.
@@ -251,15 +245,6 @@ fn frame_crc(head: &[u8], body: &[u8]) -> u32 {
     hasher.update(head);
     hasher.update(body);
     hasher.finalize()
-}
-
-/// The finished scratch file; it is deleted on drop.
-#[derive(Debug)]
-pub(super) struct SpoolFile {
-    pub(super) path: PathBuf,
-    file: File,
-    end: u64,
-    io: Arc<IoCounters>,
 }
 
 /// Memory of one frame while it is read.
@@ -313,7 +298,7 @@ impl SpoolFile {
         offset: u64,
         frame: &mut FrameBuffer,
     ) -> Result<Option<u64>> {
-        if offset >= self.end {
+        if offset >= self.end.load(Ordering::Relaxed) {
             return Ok(None);
         }
         let mut words = [0u32; 4];
@@ -349,7 +334,7 @@ impl SpoolFile {
 
 impl Drop for SpoolFile {
     fn drop(&mut self) {
-        self.io.shrink_scratch(self.end);
+        self.io.shrink_scratch(self.end.load(Ordering::Relaxed));
         // A scratch file that cannot be deleted goes with its folder.
         let _ = std::fs::remove_file(&self.path);
     }

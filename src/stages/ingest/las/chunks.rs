@@ -1,0 +1,196 @@
+//! Decoding one chunk.
+
+use super::super::contain::contain;
+use super::super::input::{Input, u32_at};
+use super::super::spool::Sink;
+use super::table::Chunk;
+use super::vlr::{Laszip, layers};
+use super::{Header, Record, position};
+use crate::error::{Error, Result};
+use laz::LazItem;
+use laz::record::{
+    LayeredPointRecordDecompressor, RecordDecompressor, SequentialPointRecordDecompressor,
+};
+use std::io::{Cursor, Read};
+
+/// Bytes decoded between two looks at the sink.
+const BATCH: usize = 64 << 10;
+
+/// Layers of the point item: x and y, z, class, flags, …
+const POINT_LAYERS: usize = 9;
+/// Layers that are decoded: x and y, z, flags.
+const WANTED: [usize; 3] = [0, 1, 3];
+
+/// The head of a layered chunk: first record, number of points, sizes of the layers.
+pub(super) struct LayerHead {
+    /// Number of points in the chunk.
+    pub(super) points: u64,
+    /// Size of the whole chunk.
+    pub(super) bytes: u64,
+    /// The first 30 bytes of the first record.
+    first: [u8; 30],
+    /// Sizes of the layers of the point item.
+    sizes: [u32; POINT_LAYERS],
+    /// Where the layers start in the file.
+    layers_at: u64,
+}
+
+impl LayerHead {
+    /// Reads the head of the chunk at `at`; the whole chunk lies inside the file.
+    pub(super) fn read(input: &Input, header: &Header, laszip: &Laszip, at: u64) -> Result<Self> {
+        let record = usize::from(header.record_bytes);
+        let count: usize = laszip.items.iter().map(layers).sum();
+        let mut head = vec![0u8; record + 4 + 4 * count];
+        input.read_exact_at(at, &mut head, "head of a LAZ chunk")?;
+        let mut first = [0u8; 30];
+        first.copy_from_slice(&head[..30]);
+        let size = |layer: usize| u32_at(&head, record + 4 + 4 * layer);
+        let layers: u64 = (0..count).map(|l| u64::from(size(l))).sum();
+        let bytes = head.len() as u64 + layers;
+        if bytes > input.bytes - at {
+            return Err(input.error(
+                format!("LAZ chunk at byte {at}"),
+                format!("layers of {layers} bytes"),
+                format!("at most {}, up to the end of the file", input.bytes - at),
+            ));
+        }
+        Ok(Self {
+            points: u64::from(u32_at(&head, record)),
+            bytes,
+            first,
+            sizes: std::array::from_fn(size),
+            layers_at: at + head.len() as u64,
+        })
+    }
+
+    /// Bytes of the layers that are decoded.
+    fn wanted_bytes(&self) -> u64 {
+        WANTED.iter().map(|l| u64::from(self.sizes[*l])).sum()
+    }
+
+    /// A chunk of the point item alone, without the layers that are of no use.
+    ///
+    /// A layer of no bytes is legal and means that the field keeps its first value.
+    fn reduced(&self, input: &Input) -> Result<Vec<u8>> {
+        let mut chunk = Vec::with_capacity(70 + self.wanted_bytes() as usize);
+        chunk.extend_from_slice(&self.first);
+        chunk.extend_from_slice(&(self.points as u32).to_le_bytes());
+        for (layer, size) in self.sizes.iter().enumerate() {
+            let kept = if WANTED.contains(&layer) { *size } else { 0 };
+            chunk.extend_from_slice(&kept.to_le_bytes());
+        }
+        let mut at = self.layers_at;
+        for (layer, size) in self.sizes.iter().enumerate() {
+            if WANTED.contains(&layer) {
+                let start = chunk.len();
+                chunk.resize(start + *size as usize, 0);
+                input.read_exact_at(at, &mut chunk[start..], "layer of a LAZ chunk")?;
+            }
+            at += u64::from(*size);
+        }
+        Ok(chunk)
+    }
+}
+
+/// Decodes chunks of one file.
+pub(super) struct Decoder<'a> {
+    pub(super) input: &'a Input,
+    pub(super) header: &'a Header,
+    pub(super) laszip: &'a Laszip,
+}
+
+impl Decoder<'_> {
+    /// Decodes a layered chunk.
+    pub(super) fn layers(&self, chunk: Chunk, sink: &mut Sink<'_, i32>) -> Result<()> {
+        let head = LayerHead::read(self.input, self.header, self.laszip, chunk.at)?;
+        if head.points < chunk.points || head.bytes > chunk.bytes {
+            return Err(self.input.error(
+                format!("LAZ chunk at byte {}", chunk.at),
+                format!("{} points in {} bytes", head.points, head.bytes),
+                format!("{} points in {} bytes", chunk.points, chunk.bytes),
+            ));
+        }
+        let source = Cursor::new(head.reduced(self.input)?);
+        let mut decoder = LayeredPointRecordDecompressor::new(source);
+        self.set_items(&mut decoder, self.laszip.items[..1].to_vec())?;
+        self.points(&mut decoder, chunk.at, chunk.points, sink)
+    }
+
+    /// Decodes a chunk, or a stream, of whole points from `source`; returns the source, behind it.
+    pub(super) fn stream<R: Read>(
+        &self,
+        source: R,
+        at: u64,
+        points: u64,
+        sink: &mut Sink<'_, i32>,
+    ) -> Result<R> {
+        let mut decoder = SequentialPointRecordDecompressor::new(source);
+        self.set_items(&mut decoder, self.laszip.items.clone())?;
+        self.points(&mut decoder, at, points, sink)?;
+        Ok(decoder.into_inner())
+    }
+
+    fn set_items<R>(
+        &self,
+        decoder: &mut impl RecordDecompressor<R>,
+        items: Vec<LazItem>,
+    ) -> Result<()> {
+        let done = contain(|| decoder.set_fields_from(&items));
+        done.and_then(|r| r.map_err(|e| e.to_string())).map_err(|why| {
+            self.input
+                .error("laszip record", why, "items that can be decoded")
+        })
+    }
+
+    fn points<R>(
+        &self,
+        decoder: &mut impl RecordDecompressor<R>,
+        at: u64,
+        points: u64,
+        sink: &mut Sink<'_, i32>,
+    ) -> Result<()> {
+        let size = decoder.record_size();
+        let record = Record::of(self.header);
+        let most = (BATCH / size).max(1);
+        let mut batch = vec![0u8; size * most];
+        let mut done = 0u64;
+        while done < points {
+            let now = (points - done).min(most as u64) as usize;
+            let mut decoded = 0usize;
+            let result = contain(|| {
+                for bytes in batch[..now * size].chunks_exact_mut(size) {
+                    decoder.decompress_next(bytes)?;
+                    decoded += 1;
+                }
+                Ok::<(), std::io::Error>(())
+            });
+            let result = result.and_then(|r| r.map_err(|e| reason(&e)));
+            result.map_err(|why| self.damaged(at, done + decoded as u64, points, why))?;
+            for bytes in batch[..now * size].chunks_exact(size) {
+                if record.is_withheld(bytes) {
+                    sink.withhold();
+                } else {
+                    sink.push(position(bytes))?;
+                }
+            }
+            done += now as u64;
+        }
+        Ok(())
+    }
+
+    fn damaged(&self, at: u64, point: u64, points: u64, why: String) -> Error {
+        self.input.error(
+            format!("LAZ chunk at byte {at}, point {point} of {points}"),
+            why,
+            "compressed points",
+        )
+    }
+}
+
+fn reason(error: &std::io::Error) -> String {
+    if error.kind() == std::io::ErrorKind::UnexpectedEof {
+        "the end of the compressed data".into()
+    } else {
+        error.to_string()
+    }
+}

@@ -1,0 +1,176 @@
+//! LAZ: chunks decoded on all threads where the file says where they are, else one by one.
+
+use super::super::input::{Input, STREAM_BUFFER};
+use super::super::spool::{SourceWriter, sink_bytes};
+use super::Header;
+use super::chunks::{Decoder, LayerHead};
+use super::table::{self, Chunk, Table};
+use super::vlr::{self, Laszip, Layout};
+use crate::error::Result;
+
+/// Memory of the decoder's models, without those of extra bytes.
+const MODELS: u64 = 1 << 20;
+/// Memory of the models of one extra byte: 256 symbols with their tables.
+const MODELS_PER_BYTE: u64 = 4 << 10;
+/// Chunks of whole points up to this size are decoded from memory.
+const IN_MEMORY: u64 = 8 << 20;
+
+pub(super) fn read(input: &Input, header: &Header, writer: &SourceWriter<'_>) -> Result<Vec<String>> {
+    let mut warnings = Vec::new();
+    let workspace = writer.workspace;
+    let laszip = vlr::read(input, header)?;
+    if header.claimed == 0 && header.data + 8 > input.bytes {
+        return Ok(warnings);
+    }
+    let decoder = Decoder {
+        input,
+        header,
+        laszip: &laszip,
+    };
+    let table = match laszip.layout {
+        Layout::Stream => None,
+        Layout::Chunks | Layout::Layers => table::read(input, header, &laszip, workspace)?,
+    };
+    let mut table = match (table, laszip.layout) {
+        (Some(table), _) => table,
+        (None, Layout::Layers) => table::walk(input, header, &laszip, workspace)?,
+        (None, Layout::Stream | Layout::Chunks) => {
+            one_by_one(&decoder, writer)?;
+            return Ok(warnings);
+        }
+    };
+    limit(input, header, &laszip, &mut table, &mut warnings)?;
+    in_parallel(&decoder, &table.chunks, writer)?;
+    Ok(warnings)
+}
+
+/// Memory of the models that decode all items.
+fn models(laszip: &Laszip) -> u64 {
+    let extra: u64 = match laszip.layout {
+        Layout::Layers => 0,
+        Layout::Stream | Layout::Chunks => laszip
+            .items
+            .iter()
+            .filter(|i| matches!(i.item_type(), laz::LazItemType::Byte(_)))
+            .map(|i| u64::from(i.size()))
+            .sum(),
+    };
+    MODELS + extra * MODELS_PER_BYTE
+}
+
+fn in_parallel(decoder: &Decoder<'_>, chunks: &[Chunk], writer: &SourceWriter<'_>) -> Result<()> {
+    let fixed = models(decoder.laszip) + sink_bytes::<i32>();
+    let layered = decoder.laszip.layout == Layout::Layers;
+    let memory = |unit: usize| {
+        let bytes = chunks[unit].bytes;
+        fixed
+            + match layered {
+                // The decoder copies every layer once.
+                true => 2 * bytes,
+                false if bytes <= IN_MEMORY => bytes,
+                false => STREAM_BUFFER as u64,
+            }
+    };
+    let work = |unit: usize| {
+        let chunk = chunks[unit];
+        let mut sink = writer.sink::<i32>();
+        if layered {
+            decoder.layers(chunk, &mut sink)?;
+        } else if chunk.bytes <= IN_MEMORY {
+            let mut bytes = vec![0u8; chunk.bytes as usize];
+            decoder.input.read_exact_at(chunk.at, &mut bytes, "LAZ chunk")?;
+            decoder.stream(&bytes[..], chunk.at, chunk.points, &mut sink)?;
+        } else {
+            let source = decoder.input.stream(chunk.at, chunk.at + chunk.bytes);
+            decoder.stream(source, chunk.at, chunk.points, &mut sink)?;
+        }
+        sink.finish()
+    };
+    writer
+        .workspace
+        .for_each_unit("LAZ chunks", chunks.len(), memory, work)
+}
+
+/// Decodes a file whose chunks can only be found by decoding what is before them.
+fn one_by_one(decoder: &Decoder<'_>, writer: &SourceWriter<'_>) -> Result<()> {
+    let (input, header) = (decoder.input, decoder.header);
+    let (mut at, per_chunk) = match (decoder.laszip.layout, decoder.laszip.chunk_points) {
+        (Layout::Stream, _) => (header.data, u64::MAX),
+        (_, Some(points)) => (header.data + 8, points),
+        (_, None) => {
+            return Err(input.error(
+                format!("offset of the chunk table at byte {}", header.data),
+                "no chunk table",
+                "one, for the chunks are of different sizes",
+            ));
+        }
+    };
+    let memory = models(decoder.laszip) + sink_bytes::<i32>() + STREAM_BUFFER as u64;
+    let _held = writer.workspace.reserve("LAZ stream", memory)?;
+    let mut source = input.stream(at, input.bytes);
+    let mut sink = writer.sink::<i32>();
+    let mut left = header.claimed;
+    while left > 0 {
+        let points = left.min(per_chunk);
+        source = decoder.stream(source, at, points, &mut sink)?;
+        at = source.get_ref().position() - source.buffer().len() as u64;
+        left -= points;
+    }
+    sink.finish()
+}
+
+/// Makes the chunks hold as many points as the header claims.
+fn limit(
+    input: &Input,
+    header: &Header,
+    laszip: &Laszip,
+    table: &mut Table,
+    warnings: &mut Vec<String>,
+) -> Result<()> {
+    let claimed = header.claimed;
+    let layered = laszip.layout == Layout::Layers;
+    if claimed == 0 && layered {
+        // Each chunk says how many points it holds.
+        for chunk in &mut table.chunks {
+            chunk.points = LayerHead::read(input, header, laszip, chunk.at)?.points;
+        }
+    }
+    let present: u64 = table.chunks.iter().map(|c| c.points).sum();
+    if claimed > present {
+        return Err(input.error(
+            "point count in the header",
+            format!("{claimed} points"),
+            format!("at most {present}, those of the {} chunks", table.chunks.len()),
+        ));
+    }
+    // With chunks of one size, only the count in the header says how full the last one is.
+    let counted = laszip.chunk_points.is_none();
+    if claimed == 0 && present > 0 {
+        if !layered && !counted {
+            return Err(input.error(
+                "point count in the header",
+                "0 points",
+                format!("the number of points in the {} chunks", table.chunks.len()),
+            ));
+        }
+        warnings.push(format!(
+            "the header claims 0 points, the {present} in the chunks are read"
+        ));
+        return Ok(());
+    }
+    let full = laszip.chunk_points.unwrap_or(1);
+    if present - claimed >= full {
+        let about = if counted { "" } else { "up to " };
+        warnings.push(format!(
+            "{about}{} points after the {claimed} that the header claims are not read",
+            present - claimed
+        ));
+    }
+    let mut left = claimed;
+    for chunk in &mut table.chunks {
+        chunk.points = chunk.points.min(left);
+        left -= chunk.points;
+    }
+    table.chunks.retain(|c| c.points > 0);
+    Ok(())
+}

@@ -1,0 +1,81 @@
+//! Uncompressed LAS: slabs of records, converted on all threads.
+
+use super::super::input::Input;
+use super::super::spool::{SourceWriter, sink_bytes};
+use super::{Header, Record, position};
+use crate::error::Result;
+
+/// Bytes of records read at one time.
+const SLAB: u64 = 2 << 20;
+
+pub(super) fn read(input: &Input, header: &Header, writer: &SourceWriter<'_>) -> Result<Vec<String>> {
+    let mut warnings = Vec::new();
+    let record_bytes = u64::from(header.record_bytes);
+    let points = count(input, header, &mut warnings)?;
+    let rows = (SLAB / record_bytes).max(1);
+    let units = usize::try_from(points.div_ceil(rows)).unwrap_or(usize::MAX);
+    let record = Record::of(header);
+    let memory = rows * record_bytes + sink_bytes::<i32>();
+    writer.workspace.for_each_unit(
+        "LAS records",
+        units,
+        |_| memory,
+        |unit| {
+            let first = unit as u64 * rows;
+            let rows = rows.min(points - first);
+            let mut slab = vec![0u8; (rows * record_bytes) as usize];
+            let what = format!("records {first} to {}", first + rows - 1);
+            input.read_exact_at(header.data + first * record_bytes, &mut slab, &what)?;
+            let mut sink = writer.sink::<i32>();
+            for bytes in slab.chunks_exact(header.record_bytes.into()) {
+                if record.is_withheld(bytes) {
+                    sink.withhold();
+                } else {
+                    sink.push(position(bytes))?;
+                }
+            }
+            sink.finish()
+        },
+    )?;
+    Ok(warnings)
+}
+
+/// Number of points to read: what the header claims, if it is there.
+fn count(input: &Input, header: &Header, warnings: &mut Vec<String>) -> Result<u64> {
+    let record_bytes = u64::from(header.record_bytes);
+    let until = |end: u64| (end - header.data) / record_bytes;
+    // A start of extended records or waveforms inside the points is a lie about that start.
+    let present = if header.claimed > until(header.data_end) {
+        until(input.bytes)
+    } else {
+        until(header.data_end)
+    };
+    let claimed = header.claimed;
+    if claimed > present {
+        return Err(input.error(
+            "point count in the header",
+            format!("{claimed} points"),
+            format!(
+                "at most the {present} records of {record_bytes} bytes between byte {} and the end \
+                 of the file at byte {}",
+                header.data, input.bytes
+            ),
+        ));
+    }
+    let left = header.data_end.saturating_sub(header.data + claimed * record_bytes);
+    let whole_records = left > 0 && left.is_multiple_of(record_bytes);
+    if claimed == 0 && whole_records {
+        // A writer that was interrupted never came back to fill the count in.
+        warnings.push(format!(
+            "the header claims 0 points, the {present} records in the file are read"
+        ));
+        return Ok(present);
+    }
+    if whole_records {
+        warnings.push(format!(
+            "{} records after the {claimed} points that the header claims are not read",
+            left / record_bytes
+        ));
+    }
+    Ok(claimed)
+}

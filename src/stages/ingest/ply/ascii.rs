@@ -1,0 +1,141 @@
+//! PLY with numbers as text, one record a line.
+
+use super::super::input::{Input, Range, STREAM_BUFFER};
+use super::super::spool::{SourceWriter, sink_bytes};
+use super::super::text::number;
+use super::FromScalar;
+use super::header::{Header, Property, Vertex};
+use crate::error::{Error, Result};
+use std::io::{BufRead, BufReader};
+
+/// Longest line that is read.
+const LONGEST_LINE: usize = 1 << 20;
+
+pub(super) fn read<T: FromScalar>(
+    input: &Input,
+    header: &Header,
+    writer: &SourceWriter<'_>,
+) -> Result<()> {
+    let Some(vertex) = &header.vertex else {
+        return Ok(());
+    };
+    let memory = sink_bytes::<T>() + (STREAM_BUFFER + LONGEST_LINE) as u64;
+    let _held = writer.workspace.reserve("PLY lines", memory)?;
+    let mut lines = Lines {
+        input,
+        source: input.stream(header.data, input.bytes),
+        line: Vec::new(),
+        at: header.data,
+    };
+    for element in &header.before {
+        for number in 0..element.count {
+            if number % 65536 == 0 {
+                writer.workspace.check_cancel()?;
+            }
+            lines.next(&element.name, number, element.count)?;
+        }
+    }
+    let mut sink = writer.sink::<T>();
+    for number in 0..vertex.count {
+        lines.next("vertex", number, vertex.count)?;
+        let point = lines.point(vertex, number, &mut sink.stats.decimals)?;
+        sink.push(point)?;
+    }
+    sink.finish()
+}
+
+struct Lines<'a> {
+    input: &'a Input,
+    source: BufReader<Range<'a>>,
+    line: Vec<u8>,
+    /// Where the line starts.
+    at: u64,
+}
+
+impl Lines<'_> {
+    /// Reads the next line that is not blank.
+    fn next(&mut self, element: &str, number: u64, count: u64) -> Result<()> {
+        let wrong = |input: &Input, at: u64, found: &str| {
+            Err(input.error(
+                format!("{element} {number} at byte {at}"),
+                found,
+                format!("{count} lines of element {element}"),
+            ))
+        };
+        self.line.clear();
+        loop {
+            self.at = self.source.get_ref().position() - self.source.buffer().len() as u64;
+            let buffer = match self.source.fill_buf() {
+                Ok(buffer) => buffer,
+                Err(e) => return Err(Error::io(&self.input.path, "read a line", e)),
+            };
+            if buffer.is_empty() {
+                if self.line.trim_ascii().is_empty() {
+                    return wrong(self.input, self.at, "the end of the file");
+                }
+                return Ok(());
+            }
+            let end = buffer.iter().position(|b| matches!(b, b'\n' | b'\r'));
+            let taken = end.unwrap_or(buffer.len());
+            if self.line.len() + taken > LONGEST_LINE {
+                return wrong(self.input, self.at, "a line of more than 1 MiB");
+            }
+            self.line.extend_from_slice(&buffer[..taken]);
+            self.source.consume(taken + usize::from(end.is_some()));
+            if end.is_some() {
+                if !self.line.trim_ascii().is_empty() {
+                    return Ok(());
+                }
+                self.line.clear();
+            }
+        }
+    }
+
+    fn point<T: FromScalar>(
+        &self,
+        vertex: &Vertex,
+        number: u64,
+        decimals: &mut u32,
+    ) -> Result<[T; 3]> {
+        let mut point = [T::from_single(0.0); 3];
+        let mut words = self
+            .line
+            .split(u8::is_ascii_whitespace)
+            .filter(|w| !w.is_empty());
+        let mut found = 0;
+        for (column, property) in vertex.properties.iter().enumerate() {
+            let Some(word) = words.next() else {
+                break;
+            };
+            if let Property::List { .. } = property {
+                let mut none = 0;
+                let items = number::parse(word, false, &mut none).unwrap_or(0.0);
+                for _ in 0..items as u64 {
+                    if words.next().is_none() {
+                        break;
+                    }
+                }
+            }
+            if let Some(axis) = vertex.coordinates.iter().position(|c| c.0 == column) {
+                let Some(value) = T::parse(word, decimals) else {
+                    break;
+                };
+                point[axis] = value;
+                found += 1;
+            }
+        }
+        if found == 3 {
+            return Ok(point);
+        }
+        let shown = &self.line[..self.line.len().min(60)];
+        Err(self.input.error(
+            format!("vertex {number}, line before byte {}", self.position()),
+            format!("\"{}\"", shown.escape_ascii()),
+            format!("{} numbers", vertex.properties.len()),
+        ))
+    }
+
+    fn position(&self) -> u64 {
+        self.source.get_ref().position() - self.source.buffer().len() as u64
+    }
+}

@@ -1,0 +1,276 @@
+//! How a text file writes its points, guessed from its first lines.
+
+use super::number;
+
+/// Data lines that a guess must explain.
+const SAMPLE: usize = 50;
+
+/// What is between two numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in super::super) enum Separator {
+    /// Spaces and tabs.
+    Space,
+    /// Commas, with or without spaces.
+    Comma,
+    /// Semicolons, with or without spaces.
+    Semicolon,
+}
+
+impl Separator {
+    pub(super) fn describe(self) -> &'static str {
+        match self {
+            Self::Space => "separated by spaces or tabs",
+            Self::Comma => "separated by commas",
+            Self::Semicolon => "separated by semicolons",
+        }
+    }
+}
+
+/// How a text file writes its points.
+#[derive(Debug, Clone, PartialEq)]
+pub(in super::super) struct Dialect {
+    pub(super) separator: Separator,
+    decimal_comma: bool,
+    columns: [usize; 3],
+    /// Where the data start, behind byte order mark and header line.
+    pub(in super::super) start: u64,
+    /// Lines with one integer count the points that follow, as in PTS.
+    pub(super) counted: bool,
+}
+
+/// What a line holds.
+pub(super) enum Row {
+    Blank,
+    Point([f64; 3]),
+    Count(u64),
+    /// Something else; what.
+    Wrong(String),
+}
+
+impl Dialect {
+    /// Reads a line; `decimals` is raised to the largest number of decimals seen.
+    pub(super) fn row(&self, line: &[u8], decimals: &mut u32) -> Row {
+        let line = line.trim_ascii();
+        if is_blank(line) {
+            return Row::Blank;
+        }
+        let last = self.columns[0].max(self.columns[1]).max(self.columns[2]);
+        let mut point = [0.0; 3];
+        let mut columns = 0;
+        for (column, token) in self.tokens(line).take(last + 1).enumerate() {
+            columns += 1;
+            if let Some(axis) = self.columns.iter().position(|c| *c == column) {
+                match number::parse(token, self.decimal_comma, decimals) {
+                    Some(value) => point[axis] = value,
+                    None => return Row::Wrong(format!("\"{}\"", shown(token))),
+                }
+            }
+        }
+        if columns <= last {
+            return match count(line) {
+                Some(count) if self.counted => Row::Count(count),
+                _ => Row::Wrong(format!("{columns} columns in \"{}\"", shown(line))),
+            };
+        }
+        Row::Point(point)
+    }
+
+    fn tokens<'a>(&self, line: &'a [u8]) -> impl Iterator<Item = &'a [u8]> {
+        let separator = self.separator;
+        line.split(move |b| match separator {
+            Separator::Space => matches!(b, b' ' | b'\t'),
+            Separator::Comma => *b == b',',
+            Separator::Semicolon => *b == b';',
+        })
+        .filter(move |t| separator != Separator::Space || !t.is_empty())
+        .map(|t| t.trim_ascii().trim_quotes())
+    }
+}
+
+trait TrimQuotes {
+    fn trim_quotes(&self) -> &Self;
+}
+
+impl TrimQuotes for [u8] {
+    fn trim_quotes(&self) -> &[u8] {
+        self.strip_prefix(b"\"")
+            .and_then(|t| t.strip_suffix(b"\""))
+            .unwrap_or(self)
+    }
+}
+
+fn is_blank(line: &[u8]) -> bool {
+    line.is_empty() || line.starts_with(b"#") || line.starts_with(b"//")
+}
+
+/// A short text for error messages.
+fn shown(text: &[u8]) -> String {
+    let cut = &text[..text.len().min(40)];
+    let dots = if cut.len() < text.len() { "…" } else { "" };
+    format!("{}{dots}", cut.escape_ascii())
+}
+
+fn count(line: &[u8]) -> Option<u64> {
+    std::str::from_utf8(line).ok()?.parse().ok()
+}
+
+/// The lines of the head that are neither blank nor comments, with where each starts and ends.
+fn lines(head: &[u8], whole: bool) -> Vec<(usize, usize, &[u8])> {
+    let mut found = Vec::new();
+    let mut at = 0;
+    for line in head.split(|b| matches!(b, b'\n' | b'\r')) {
+        let end = at + line.len();
+        // The last line of a part of a file is cut somewhere.
+        if (end < head.len() || whole) && !is_blank(line.trim_ascii()) {
+            found.push((at, end, line.trim_ascii()));
+        }
+        at = end + 1;
+        if found.len() > SAMPLE {
+            break;
+        }
+    }
+    found
+}
+
+/// Guesses how the points are written, or says why this is no text with points.
+pub(in super::super) fn guess(head: &[u8], whole: bool) -> Result<Dialect, String> {
+    let mark = if head.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 };
+    let lines = lines(&head[mark..], whole);
+    let Some(&(_, first_end, first)) = lines.first() else {
+        return Err("no line with numbers".into());
+    };
+    let styles = [
+        (Separator::Space, false),
+        (Separator::Comma, false),
+        (Separator::Semicolon, false),
+        (Separator::Semicolon, true),
+        (Separator::Space, true),
+    ];
+    for (separator, decimal_comma) in styles {
+        let mut dialect = Dialect {
+            separator,
+            decimal_comma,
+            columns: [0, 1, 2],
+            start: mark as u64,
+            counted: count(first).is_some(),
+        };
+        if explains(&dialect, &lines) {
+            return Ok(dialect);
+        }
+        // The first line may be names.
+        if lines.len() > 1 && is_header(first) {
+            dialect.start = (mark + first_end) as u64;
+            dialect.columns = named_columns(first).unwrap_or([0, 1, 2]);
+            dialect.counted = false;
+            if explains(&dialect, &lines[1..]) {
+                return Ok(dialect);
+            }
+        }
+    }
+    Err(format!("text that is no list of points, \"{}\"", shown(first)))
+}
+
+/// True if the first data line is a point; later lines may be wrong, with an error that says where.
+fn explains(dialect: &Dialect, lines: &[(usize, usize, &[u8])]) -> bool {
+    let mut decimals = 0;
+    let mut points = 0;
+    let mut wrong = 0;
+    for (_, _, line) in lines.iter().take(SAMPLE) {
+        match dialect.row(line, &mut decimals) {
+            Row::Point(_) => points += 1,
+            Row::Wrong(_) if points == 0 => return false,
+            Row::Wrong(_) => wrong += 1,
+            Row::Blank | Row::Count(_) => {}
+        }
+    }
+    points > wrong
+}
+
+fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
+    line.split(|b| matches!(b, b' ' | b'\t' | b',' | b';'))
+        .map(|w| w.trim_ascii().trim_quotes())
+        .filter(|w| !w.is_empty())
+}
+
+/// True for a line of names: every word starts with a letter or a sign that no number has.
+fn is_header(line: &[u8]) -> bool {
+    let mut decimals = 0;
+    words(line).all(|w| number::parse(w, false, &mut decimals).is_none())
+}
+
+/// The columns called x, y and z.
+fn named_columns(header: &[u8]) -> Option<[usize; 3]> {
+    let find = |name: &str| words(header).position(|w| w.eq_ignore_ascii_case(name.as_bytes()));
+    Some([find("x")?, find("y")?, find("z")?])
+}
+
+/// True for the header of a PCD file.
+pub(in super::super) fn is_pcd(head: &[u8]) -> bool {
+    let line = head.split(|b| matches!(b, b'\n' | b'\r')).map(<[u8]>::trim_ascii);
+    let first = line.clone().find(|l| !l.is_empty() && !l.starts_with(b"#"));
+    head.starts_with(b"# .PCD")
+        || first.is_some_and(|l| l.starts_with(b"VERSION ") || l.starts_with(b"FIELDS "))
+}
+
+/// True for the header of a PTX file: columns, rows, four lines of three and four of four numbers.
+pub(in super::super) fn is_ptx(head: &[u8]) -> bool {
+    let numbers = |line: &[u8]| {
+        let mut decimals = 0;
+        let all = words(line).all(|w| number::parse(w, false, &mut decimals).is_some());
+        all.then(|| words(line).count())
+    };
+    let lines = lines(head, true);
+    let shape: Vec<_> = lines.iter().take(10).map(|(_, _, l)| numbers(l)).collect();
+    shape == [1, 1, 3, 3, 3, 3, 4, 4, 4, 4].map(Some)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn points(text: &str) -> Vec<[f64; 3]> {
+        let dialect = guess(text.as_bytes(), true).unwrap();
+        let mut decimals = 0;
+        text.as_bytes()[dialect.start as usize..]
+            .split(|b| matches!(b, b'\n' | b'\r'))
+            .filter_map(|line| match dialect.row(line, &mut decimals) {
+                Row::Point(p) => Some(p),
+                Row::Wrong(why) => panic!("{why}"),
+                Row::Blank | Row::Count(_) => None,
+            })
+            .collect()
+    }
+
+    #[test]
+    fn reads_every_way_of_writing() {
+        let want = [[1.5, 2.0, -3.25], [4.0, 5.0, 6.0]];
+        for text in [
+            "1.5 2 -3.25\n4 5 6\n",
+            "1.5\t2\t-3.25\r\n4\t5\t6",
+            "1.5,2,-3.25\r4,5,6\r",
+            "1.5, 2, -3.25, 9\n4, 5, 6, 9\n",
+            "1.5;2;-3.25\n4;5;6\n",
+            "1,5;2;-3,25\n4;5;6\n",
+            "1,5 2 -3,25\n4 5 6\n",
+            "# note\n\nX Y Z\n1.5 2 -3.25\n4 5 6\n",
+            "//X,Y,Z\n1.5,2,-3.25\n4,5,6\n",
+            "\u{feff}1.5 2 -3.25\n4 5 6\n",
+            "2\n1.5 2 -3.25 -100 1 2 3\n4 5 6 -100 1 2 3\n",
+            "\"z\",\"x\",\"y\"\n-3.25,1.5,2\n6,4,5\n",
+            "\"X\",\"Y\",\"Z\"\n1.5 2 -3.25\n4 5 6\n",
+        ] {
+            assert_eq!(points(text), want, "{text:?}");
+        }
+    }
+
+    #[test]
+    fn refuses_what_is_no_list_of_points() {
+        for text in ["", "# only a note\n", "some prose here\nand more\n", "1 2\n3 4\n"] {
+            assert!(guess(text.as_bytes(), true).is_err(), "{text:?}");
+        }
+        assert!(is_pcd(b"# .PCD v0.7\nVERSION 0.7\n"));
+        assert!(is_ptx(
+            b"1\n1\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n0 0 0 0.5\n"
+        ));
+    }
+}

@@ -1,0 +1,136 @@
+//! Union–find in which every member has an orientation relative to its set.
+
+/// Sets of labels with relative orientations.
+#[derive(Debug, Clone, Default)]
+pub struct ParitySets {
+    /// Parent and, in the lowest bit, orientation relative to it.
+    parent: Vec<u32>,
+}
+
+impl ParitySets {
+    /// `count` sets of one label each.
+    #[must_use]
+    pub fn new(count: usize) -> Self {
+        Self { parent: (0..count as u32).map(|label| label << 1).collect() }
+    }
+
+    /// Adds a set of one new label.
+    pub fn push(&mut self) -> u32 {
+        let label = self.parent.len() as u32;
+        self.parent.push(label << 1);
+        label
+    }
+
+    /// Number of labels.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.parent.len()
+    }
+
+    /// True if there is no label.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.parent.is_empty()
+    }
+
+    /// The set of a label, by its root, and the label's orientation relative to the root.
+    pub fn find(&mut self, label: u32) -> (u32, bool) {
+        let mut node = label;
+        let mut flip = 0;
+        loop {
+            let word = self.parent[node as usize];
+            let up = word >> 1;
+            if up == node {
+                return (node, flip & 1 == 1);
+            }
+            let above = self.parent[up as usize];
+            flip ^= word & 1;
+            // Path halving: point at the grandparent.
+            if above >> 1 != up {
+                self.parent[node as usize] = above ^ (word & 1);
+                flip ^= above & 1;
+                node = above >> 1;
+            } else {
+                node = up;
+            }
+        }
+    }
+
+    /// Joins two labels, `b` turned by `flip` against `a`; the root of `a` stays a root. False,
+    /// and nothing changes, if they are in one set already the other way round.
+    pub fn join(&mut self, a: u32, b: u32, flip: bool) -> bool {
+        let (root_a, flip_a) = self.find(a);
+        let (root_b, flip_b) = self.find(b);
+        let turned = flip ^ flip_a ^ flip_b;
+        if root_a == root_b {
+            return !turned;
+        }
+        self.parent[root_b as usize] = root_a << 1 | u32::from(turned);
+        true
+    }
+
+    /// Makes every label point straight at its root.
+    pub fn flatten(&mut self) {
+        for label in 0..self.parent.len() as u32 {
+            let (root, flip) = self.find(label);
+            self.parent[label as usize] = root << 1 | u32::from(flip);
+        }
+    }
+
+    /// As [`ParitySets::find`] without shortening paths.
+    #[must_use]
+    pub fn look(&self, label: u32) -> (u32, bool) {
+        let (mut node, mut flip) = (label, 0);
+        loop {
+            let word = self.parent[node as usize];
+            if word >> 1 == node {
+                return (node, flip & 1 == 1);
+            }
+            flip ^= word & 1;
+            node = word >> 1;
+        }
+    }
+
+    /// How two labels are turned against each other; `None` if they are in different sets.
+    pub fn relation(&mut self, a: u32, b: u32) -> Option<bool> {
+        let (root_a, flip_a) = self.find(a);
+        let (root_b, flip_b) = self.find(b);
+        (root_a == root_b).then_some(flip_a ^ flip_b)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// Against plain colouring by search.
+        #[test]
+        fn agrees_with_colouring(joins in prop::collection::vec((0u32..12, 0u32..12, any::<bool>()), 0..40)) {
+            let mut sets = ParitySets::new(12);
+            let mut accepted: Vec<(u32, u32, bool)> = Vec::new();
+            let relation = |edges: &[(u32, u32, bool)], a: u32, b: u32| {
+                let mut colour = vec![None; 12];
+                colour[a as usize] = Some(false);
+                for _ in 0..12 {
+                    for &(x, y, f) in edges {
+                        match (colour[x as usize], colour[y as usize]) {
+                            (Some(c), None) => colour[y as usize] = Some(c ^ f),
+                            (None, Some(c)) => colour[x as usize] = Some(c ^ f),
+                            _ => {}
+                        }
+                    }
+                }
+                colour[b as usize]
+            };
+            for (a, b, flip) in joins {
+                let known = relation(&accepted, a, b);
+                prop_assert_eq!(sets.relation(a, b), known);
+                let fits = known.is_none_or(|k| k == flip);
+                prop_assert_eq!(sets.join(a, b, flip), fits);
+                if fits { accepted.push((a, b, flip)); }
+            }
+        }
+    }
+}

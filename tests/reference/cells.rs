@@ -1,0 +1,109 @@
+//! Sections 1.1 to 1.3: ids, neighbours, planes, cells and the triples they see.
+
+use super::surface::Triangle;
+use super::{Radius, Settings};
+use outcrop::geom::clip::Cell;
+use outcrop::geom::lattice::COORDINATE_LIMIT;
+use outcrop::geom::plane::{Moments, Plane};
+use outcrop::geom::{Point, distance2, hilbert, sub};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// All different points in the order of their ids.
+pub fn in_id_order(points: &[Point]) -> Vec<Point> {
+    let different: BTreeSet<Point> = points.iter().copied().collect();
+    let mut ordered: Vec<Point> = different.into_iter().collect();
+    ordered.sort_by_key(|&p| hilbert::encode(p));
+    ordered
+}
+
+/// The diagonal of the box around the points, in steps.
+pub fn diagonal(points: &[Point]) -> f64 {
+    let side = |axis: usize| {
+        let along = points.iter().map(|p| i64::from(p[axis]));
+        along.clone().max().unwrap_or(0) - along.min().unwrap_or(0)
+    };
+    let squares: i64 = (0..3).map(|axis| side(axis) * side(axis)).sum();
+    (squares as f64).sqrt()
+}
+
+/// All ids but `i` by (squared distance, id).
+fn by_distance(points: &[Point], i: usize) -> Vec<usize> {
+    let mut others: Vec<usize> = (0..points.len()).filter(|&j| j != i).collect();
+    others.sort_by_key(|&j| (distance2(points[i], points[j]), j));
+    others
+}
+
+fn plane_of(points: &[Point], i: usize, neighbors: &[usize]) -> (Moments, Plane) {
+    let mut moments = Moments::default();
+    for &j in neighbors {
+        moments.add(sub(points[j], points[i]));
+    }
+    (moments, moments.plane())
+}
+
+/// One round of smoothing. The plane is that of exactly the `k` nearest; a point without a plane
+/// stays. The rounded offset is added to the position, which is kept on the lattice.
+pub fn smooth(points: &[Point], k: usize) -> Vec<Point> {
+    let moved = |i: usize| {
+        let others = by_distance(points, i);
+        let (moments, plane) = plane_of(points, i, &others[..k.min(others.len())]);
+        let Some(normal) = plane.normal else {
+            return points[i];
+        };
+        let offset = moments.project(normal);
+        std::array::from_fn(|axis| {
+            let moved = i64::from(points[i][axis]) + offset[axis].round() as i64;
+            moved.clamp(0, COORDINATE_LIMIT - 1) as i32
+        })
+    };
+    (0..points.len()).map(moved).collect()
+}
+
+/// The pairs that the cell of `i` makes triples with. `diagonal` is that of the whole cloud.
+fn corners(points: &[Point], i: usize, settings: &Settings, diagonal: f64) -> Vec<(u32, u32)> {
+    let others = by_distance(points, i);
+    let mut k = settings.neighbors;
+    let (plane, last) = loop {
+        let used = &others[..k.min(others.len())];
+        let (_, plane) = plane_of(points, i, used);
+        if plane.spans || k >= 8 * settings.neighbors {
+            break (plane, used.last().copied());
+        }
+        k *= 2;
+    };
+    let (Some(normal), Some(last)) = (plane.normal, last) else {
+        return Vec::new();
+    };
+    let radius = match settings.radius {
+        Radius::Auto => (distance2(points[i], points[last]) as f64).sqrt(),
+        Radius::Percent(percent) => percent / 100.0 * diagonal,
+        Radius::Length(steps) => steps,
+    };
+    let mut cell = Cell::new(i as u32, normal, radius);
+    for &j in &others {
+        cell.clip(sub(points[j], points[i]), j as u32);
+    }
+    let mut seen = Vec::new();
+    // A point that shares its place with one of lower id has no cell.
+    if others.iter().any(|&j| j < i && points[j] == points[i]) {
+        return seen;
+    }
+    cell.triples(|j, l| seen.push((j, l)));
+    seen
+}
+
+/// How many of its three cells see each triple.
+pub fn triples(points: &[Point], settings: &Settings, diagonal: f64) -> BTreeMap<Triangle, u32> {
+    let mut cells_of: BTreeMap<Triangle, BTreeSet<u32>> = BTreeMap::new();
+    for i in 0..points.len() {
+        for (j, l) in corners(points, i, settings, diagonal) {
+            let mut triple = [i as u32, j, l];
+            triple.sort_unstable();
+            cells_of.entry(triple).or_default().insert(i as u32);
+        }
+    }
+    cells_of
+        .into_iter()
+        .map(|(triple, cells)| (triple, cells.len() as u32))
+        .collect()
+}

@@ -1,0 +1,252 @@
+//! Section 1.6: the loops around holes, and how they are filled.
+
+use super::big::{Big, Big3, cross, dot, plus, vector};
+use super::insert::normal;
+use super::repair::{ClockwiseAngle, pinched, run};
+use super::surface::{Component, Edge, Surface, Triangle};
+use outcrop::geom::{Point, distance2, sub};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// What became of the loops.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Filling {
+    pub loops: usize,
+    pub too_long: usize,
+    pub outlines: usize,
+    pub not_split: usize,
+    pub filled: usize,
+    pub triangles: usize,
+}
+
+/// From one vertex to another, in the direction of travel.
+type HalfEdge = (u32, u32);
+
+struct Holes<'a> {
+    points: &'a [Point],
+    surface: &'a Surface,
+    /// Triangles as they run, by each of their directed edges.
+    half_edges: BTreeMap<HalfEdge, Triangle>,
+    turned: Component,
+    /// Vertices with several fans (of whatever component).
+    pinched: BTreeSet<u32>,
+}
+
+/// The triangles that fill the holes of an oriented surface, as they run. All loops are found and
+/// all chords chosen on the surface as it was before anything was filled.
+pub fn fill(
+    points: &[Point],
+    surface: &Surface,
+    components: &[Component],
+    longest: usize,
+) -> (Vec<[u32; 3]>, Filling) {
+    let mut holes = Holes {
+        points,
+        surface,
+        half_edges: BTreeMap::new(),
+        turned: components
+            .iter()
+            .flatten()
+            .map(|(&t, &turned)| (t, turned))
+            .collect(),
+        pinched: pinched(surface),
+    };
+    for (&t, &turned) in &holes.turned {
+        let [a, b, c] = run(t, turned);
+        for half_edge in [(a, b), (b, c), (c, a)] {
+            let before = holes.half_edges.insert(half_edge, t);
+            assert!(before.is_none(), "two triangles run along {half_edge:?}");
+        }
+    }
+    let mut filling = Filling::default();
+    let mut triangles = Vec::new();
+    for hole in holes.loops(components) {
+        filling.loops += 1;
+        if hole.len() > longest {
+            filling.too_long += 1;
+        } else if holes.is_outline(&hole) {
+            filling.outlines += 1;
+        } else if let Some(patch) = holes.patch(&hole) {
+            filling.filled += 1;
+            filling.triangles += patch.len();
+            triangles.extend(patch);
+        } else {
+            filling.not_split += 1;
+        }
+    }
+    (triangles, filling)
+}
+
+/// An open fan: `v → start` is in its first triangle, `end → v` in its last.
+struct Opening {
+    start: u32,
+    end: u32,
+}
+
+impl Holes<'_> {
+    fn difference(&self, from: u32, to: u32) -> [i64; 3] {
+        sub(self.points[to as usize], self.points[from as usize])
+    }
+
+    /// Every loop as its vertices in the direction of travel, from its smallest (from, to) on.
+    fn loops(&self, components: &[Component]) -> Vec<Vec<u32>> {
+        let mut next: BTreeMap<HalfEdge, HalfEdge> = BTreeMap::new();
+        for component in components {
+            let vertices: BTreeSet<u32> = component.keys().flatten().copied().collect();
+            for v in vertices {
+                for (start, end) in self.matching(v, component) {
+                    next.insert((start, v), (v, end));
+                }
+            }
+        }
+        let mut found = Vec::new();
+        while let Some((&first, _)) = next.first_key_value() {
+            let mut hole = Vec::new();
+            let mut at = first;
+            while let Some(following) = next.remove(&at) {
+                hole.push(at.0);
+                at = following;
+            }
+            assert_eq!(at, first, "a hole ends where it began");
+            found.push(hole);
+        }
+        found
+    }
+
+    /// Which way in belongs to which way out of a hole, at the fans of one component at `v`.
+    fn matching(&self, v: u32, component: &Component) -> Vec<(u32, u32)> {
+        let mut openings = Vec::new();
+        let mut axis = [0i128; 3];
+        for fan in self.surface.fans(v) {
+            if fan.closed || !fan.triangles.iter().all(|t| component.contains_key(t)) {
+                continue;
+            }
+            for &t in &fan.triangles {
+                let n = normal(self.points, t);
+                let sign = if component[&t] { -1 } else { 1 };
+                axis = std::array::from_fn(|k| axis[k] + sign * n[k]);
+            }
+            let free = |from, to| {
+                let own = self
+                    .half_edges
+                    .get(&(from, to))
+                    .is_some_and(|t| fan.triangles.contains(t));
+                own && !self.half_edges.contains_key(&(to, from))
+            };
+            let others: BTreeSet<u32> = fan.triangles.iter().flatten().copied().collect();
+            let start = others
+                .iter()
+                .copied()
+                .find(|&x| free(v, x))
+                .expect("a fan has a start");
+            let end = others
+                .iter()
+                .copied()
+                .find(|&x| free(x, v))
+                .expect("a fan has an end");
+            openings.push(Opening { start, end });
+        }
+        let mut pairs = Vec::new();
+        for a in &openings {
+            for b in &openings {
+                let (from, to) = (self.difference(v, a.start), self.difference(v, b.end));
+                pairs.push((ClockwiseAngle::new(axis, from, to), a.start, b.end));
+            }
+        }
+        pairs.sort_by(|p, q| p.0.compare(&q.0).then((p.1, p.2).cmp(&(q.1, q.2))));
+        let (mut ins, mut outs) = (BTreeSet::new(), BTreeSet::new());
+        let mut matched = Vec::new();
+        for (_, start, end) in pairs {
+            if !ins.contains(&start) && !outs.contains(&end) {
+                ins.insert(start);
+                outs.insert(end);
+                matched.push((start, end));
+            }
+        }
+        matched
+    }
+
+    /// Whether a loop runs around the outside of its surface. A triangle with two edges in the
+    /// loop counts twice.
+    fn is_outline(&self, hole: &[u32]) -> bool {
+        let mut area2: Big3<8> = [Big::ZERO; 3];
+        let mut normals: Big3<8> = [Big::ZERO; 3];
+        for (k, &from) in hole.iter().enumerate() {
+            let to = hole[(k + 1) % hole.len()];
+            // About the loop's first vertex: the sum is the same about any point.
+            let (a, b) = (self.difference(hole[0], from), self.difference(hole[0], to));
+            area2 = plus(area2, cross(vector(a), vector(b)));
+            let t = self.half_edges[&(to, from)];
+            let sign = if self.turned[&t] { -1 } else { 1 };
+            normals = plus(normals, vector(normal(self.points, t).map(|x| sign * x)));
+        }
+        dot(area2, normals).sign() < 0
+    }
+
+    /// The triangles that fill a loop, or nothing.
+    fn patch(&self, hole: &[u32]) -> Option<Vec<[u32; 3]>> {
+        let mut chords = BTreeSet::new();
+        let mut triangles = Vec::new();
+        self.split(hole, &mut chords, &mut triangles)
+            .then_some(triangles)
+    }
+
+    /// Fills a part of a loop; false if that cannot be done. Of the two parts that a chord between
+    /// positions `a < b` makes, the one at positions `a..=b` comes first, then `0..=a, b..`.
+    fn split(&self, part: &[u32], chords: &mut BTreeSet<Edge>, out: &mut Vec<[u32; 3]>) -> bool {
+        if let &[a, b, c] = part {
+            out.push([a, b, c]);
+            return !self.collinear(a, b, c);
+        }
+        let Some((a, b)) = self.best_chord(part, chords) else {
+            return false;
+        };
+        chords.insert([part[a].min(part[b]), part[a].max(part[b])]);
+        let rest: Vec<u32> = part[..=a].iter().chain(&part[b..]).copied().collect();
+        self.split(&part[a..=b], chords, out) && self.split(&rest, chords, out)
+    }
+
+    /// The positions of the chord with the least length relative to the shorter way round the
+    /// part. The way from `a` to `b` is the difference of two running sums of edge lengths from
+    /// position 0 on; the other way is the whole sum less this. The first of equal chords counts.
+    fn best_chord(&self, part: &[u32], chords: &BTreeSet<Edge>) -> Option<(usize, usize)> {
+        let count = part.len();
+        let length = |a: u32, b: u32| {
+            (distance2(self.points[a as usize], self.points[b as usize]) as f64).sqrt()
+        };
+        let mut along = vec![0.0];
+        for k in 0..count {
+            along.push(along[k] + length(part[k], part[(k + 1) % count]));
+        }
+        let mut best: Option<(f64, usize, usize)> = None;
+        for a in 0..count {
+            for b in a + 2..count {
+                if a == 0 && b == count - 1 || !self.allowed(part, a, b, chords) {
+                    continue;
+                }
+                let one_way = along[b] - along[a];
+                let ratio = length(part[a], part[b]) / one_way.min(along[count] - one_way);
+                if best.is_none_or(|(least, ..)| ratio < least) {
+                    best = Some((ratio, a, b));
+                }
+            }
+        }
+        best.map(|(_, a, b)| (a, b))
+    }
+
+    fn allowed(&self, part: &[u32], a: usize, b: usize, chords: &BTreeSet<Edge>) -> bool {
+        let (u, v) = (part[a], part[b]);
+        let edge = [u.min(v), u.max(v)];
+        let count = part.len();
+        let flat = b - a == 2 && self.collinear(u, part[a + 1], v)
+            || count - (b - a) == 2 && self.collinear(v, part[(b + 1) % count], u);
+        u != v
+            && !flat
+            && self.surface.at_edge(edge).is_empty()
+            && !chords.contains(&edge)
+            && !(self.pinched.contains(&u) && self.pinched.contains(&v))
+    }
+
+    fn collinear(&self, a: u32, b: u32, c: u32) -> bool {
+        normal(self.points, [a, b, c]) == [0; 3]
+    }
+}

@@ -1,0 +1,309 @@
+//! Tests of the reference implementation itself.
+
+#[path = "mod.rs"]
+mod reference;
+
+use outcrop::geom::Point;
+use reference::base::base;
+use reference::check::check;
+use reference::clouds::Random;
+use reference::{Mesh, Radius, Settings, cells, clouds, from_triples, reconstruct};
+use std::collections::BTreeSet;
+
+fn kind(name: &str) -> usize {
+    clouds::KINDS
+        .iter()
+        .position(|(n, _)| *n == name)
+        .expect("a kind of this name")
+}
+
+/// The mesh of a cloud, with all that must hold of every mesh checked.
+fn checked(points: &[Point], settings: &Settings) -> Mesh {
+    let mesh = reconstruct(points, settings);
+    let counts = mesh.counts;
+    check(&mesh, settings.repair).unwrap_or_else(|e| panic!("{e}: {counts:?}"));
+    mesh
+}
+
+#[test]
+fn a_tetrahedron_closes_if_its_cells_agree() {
+    let points = [[0, 0, 0], [10, 10, 0], [10, 0, 10], [0, 10, 10]];
+    let settings = Settings {
+        cos_max_angle: -1.0,
+        min_component: 0,
+        radius: Radius::Length(100.0),
+        ..Settings::default()
+    };
+    // No plane through four such points is better than another: each triple lacks a cell, and
+    // without a base there is nothing to insert candidates at.
+    let counts = checked(&points, &settings).counts;
+    assert_eq!((counts.t3, counts.t2, counts.t1, counts.base), (0, 4, 0, 0));
+    for block in [1, 2, 4] {
+        // Two T3 side by side, and two T12 that close the rest.
+        let triples = [
+            ([0, 1, 2], 3),
+            ([0, 1, 3], 3),
+            ([0, 2, 3], 2),
+            ([1, 2, 3], 1),
+        ]
+        .into();
+        let ordered = cells::in_id_order(&points);
+        let mesh = from_triples(ordered, &triples, &Settings { block, ..settings });
+        let shape = check(&mesh, true).unwrap();
+        assert_eq!(
+            (shape.triangles, shape.boundary),
+            (4, 0),
+            "{:?}",
+            mesh.counts
+        );
+        assert!(
+            mesh.triangles
+                .iter()
+                .map(|t| volume6(&mesh, *t, 0.0))
+                .sum::<f64>()
+                > 0.0
+        );
+    }
+}
+
+#[test]
+fn an_octahedron_is_closed_at_once() {
+    let points = [
+        [0, 5, 5],
+        [10, 5, 5],
+        [5, 0, 5],
+        [5, 10, 5],
+        [5, 5, 0],
+        [5, 5, 10],
+    ];
+    let settings = Settings {
+        neighbors: 4,
+        // The corners of its cells are as far away as its neighbours.
+        radius: Radius::Length(8.0),
+        min_component: 8,
+        ..Settings::default()
+    };
+    let mesh = checked(&points, &settings);
+    assert_eq!((mesh.counts.t3, mesh.triangles.len()), (8, 8));
+    assert!(mesh.triangles.iter().all(|t| volume6(&mesh, *t, 5.0) > 0.0));
+}
+
+#[test]
+fn a_small_sphere_is_closed_and_faces_outwards() {
+    // A hundred points, evenly spread.
+    let golden = std::f64::consts::PI * (3.0 - 5f64.sqrt());
+    let point = |k: usize| {
+        let z = 1.0 - 2.0 * (k as f64 + 0.5) / 100.0;
+        let (flat, turn) = ((1.0 - z * z).sqrt(), golden * k as f64);
+        [flat * turn.cos(), flat * turn.sin(), z].map(|x| (1000.0 * x).round() as i32 + 1000)
+    };
+    let points: Vec<Point> = (0..100).map(point).collect();
+    for block in [7, 20, 65_536] {
+        let settings = Settings {
+            neighbors: 10,
+            block,
+            ..Settings::default()
+        };
+        let mesh = checked(&points, &settings);
+        let shape = check(&mesh, true).unwrap();
+        assert_eq!(
+            (shape.boundary, shape.euler(), shape.vertices),
+            (0, 2, 100),
+            "{shape:?}"
+        );
+        let volume: f64 = mesh
+            .triangles
+            .iter()
+            .map(|t| volume6(&mesh, *t, 1000.0))
+            .sum();
+        assert!(
+            volume / 6.0 > 0.8 * 4.0 / 3.0 * std::f64::consts::PI * 1e9,
+            "{volume}"
+        );
+    }
+}
+
+/// Six times the volume of a triangle's tetrahedron with the point of three equal coordinates.
+fn volume6(mesh: &Mesh, t: [u32; 3], middle: f64) -> f64 {
+    let at = t.map(|v| {
+        let id = mesh.vertices[v as usize];
+        mesh.ids[id as usize].map(|x| f64::from(x) - middle)
+    });
+    let [a, b, c] = at;
+    a[0] * (b[1] * c[2] - b[2] * c[1])
+        + a[1] * (b[2] * c[0] - b[0] * c[2])
+        + a[2] * (b[0] * c[1] - b[1] * c[0])
+}
+
+#[test]
+fn flat_grids_have_no_holes_and_only_full_triples_inside() {
+    for (name, block) in [
+        ("grid", 9),
+        ("grid", 65_536),
+        ("turned grid", 16),
+        ("skewed grid", 50),
+    ] {
+        let points = clouds::cloud(kind(name), 100, 1);
+        let settings = Settings {
+            neighbors: 8,
+            block,
+            ..Settings::default()
+        };
+        let mesh = checked(&points, &settings);
+        let shape = check(&mesh, true).unwrap();
+        assert_eq!(shape.vertices, 100, "{name}: {:?}", mesh.counts);
+        assert_eq!(shape.euler(), 1, "{name}: {:?}", mesh.counts);
+        if name != "skewed grid" {
+            assert_eq!(
+                (mesh.counts.t3, mesh.counts.t2, mesh.counts.t1),
+                (162, 0, 0),
+                "{name}"
+            );
+            assert_eq!((shape.triangles, shape.boundary), (162, 36), "{name}");
+        }
+    }
+}
+
+#[test]
+fn a_line_has_no_surface() {
+    let mesh = checked(&clouds::cloud(kind("line"), 60, 1), &Settings::default());
+    assert_eq!((mesh.triangles.len(), mesh.vertices.len()), (0, 0));
+}
+
+#[test]
+fn a_gap_in_a_grid_is_a_hole_that_can_be_filled() {
+    let at = |k: i32| [k % 12 * 10, k / 12 * 10, 0];
+    let gap = |p: &Point| (40..70).contains(&p[0]) && (40..70).contains(&p[1]);
+    let points: Vec<Point> = (0..144).map(at).filter(|p| !gap(p)).collect();
+    let settings = Settings {
+        neighbors: 8,
+        radius: Radius::Length(15.0),
+        max_hole_edges: 11,
+        ..Settings::default()
+    };
+    let open = checked(&points, &settings);
+    assert_eq!(
+        (open.counts.holes.loops, open.counts.holes.too_long),
+        (2, 2)
+    );
+    assert_eq!(check(&open, true).unwrap().euler(), 0);
+    let closed = checked(
+        &points,
+        &Settings {
+            max_hole_edges: 500,
+            ..settings
+        },
+    );
+    let holes = closed.counts.holes;
+    assert_eq!(
+        (holes.filled, holes.outlines, holes.triangles),
+        (1, 1, 10),
+        "{holes:?}"
+    );
+    assert_eq!(check(&closed, true).unwrap().euler(), 1);
+}
+
+#[test]
+fn a_moebius_band_is_cut_open() {
+    let points = clouds::cloud(kind("moebius band"), 300, 1);
+    let settings = Settings {
+        neighbors: 8,
+        ..Settings::default()
+    };
+    let mesh = checked(&points, &settings);
+    assert!(mesh.counts.one_sided > 0, "{:?}", mesh.counts);
+}
+
+#[test]
+fn the_order_of_points_and_duplicates_do_not_matter() {
+    let points = clouds::cloud(kind("sphere"), 80, 5);
+    let mut other = points.clone();
+    other.reverse();
+    other.extend(&points[..20]);
+    let settings = Settings {
+        neighbors: 10,
+        ..Settings::default()
+    };
+    assert_eq!(
+        reconstruct(&points, &settings),
+        reconstruct(&other, &settings)
+    );
+}
+
+#[test]
+fn every_mesh_of_every_cloud_is_a_manifold() {
+    for seed in 0..6 {
+        for (name, points) in clouds::one_of_each(seed) {
+            for settings in varied(seed) {
+                println!("{name} {seed} {settings:?}");
+                checked(&points, &settings);
+            }
+        }
+    }
+}
+
+#[test]
+fn edges_of_three_triangles_and_vertices_by_excess_are_flagged() {
+    let book = BTreeSet::from([[0, 1, 2], [0, 1, 3], [0, 1, 4], [1, 2, 5]]);
+    let found = base(&book, 100);
+    assert_eq!(
+        found.flagged,
+        BTreeSet::from([[0, 1, 2], [0, 1, 3], [0, 1, 4]])
+    );
+    let cone = [[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 1, 4]];
+    let other = [[0, 5, 6], [0, 6, 7]];
+    let found = base(&cone.into_iter().chain(other).collect(), 100);
+    assert_eq!(found.flagged, BTreeSet::from(other));
+}
+
+/// What cells see never has an edge with three T3; other triples have.
+#[test]
+fn triples_with_any_counts_make_manifolds() {
+    let (mut flagged, mut one_sided, mut joints_removed) = (0, 0, 0);
+    for seed in 50..56 {
+        let mut random = Random::new(seed);
+        for (name, points) in clouds::one_of_each(seed) {
+            let [settings, ..] = varied(seed);
+            let points = cells::in_id_order(&points);
+            let mut triples = cells::triples(&points, &settings, 0.0);
+            triples
+                .values_mut()
+                .for_each(|count| *count = random.integer(1, 4) as u32);
+            let mesh = from_triples(points, &triples, &settings);
+            check(&mesh, true).unwrap_or_else(|e| panic!("{name} {seed}: {e}"));
+            flagged += mesh.counts.flagged;
+            one_sided += mesh.counts.one_sided;
+            joints_removed += mesh.counts.joints_removed;
+        }
+    }
+    assert!(flagged > 0 && one_sided > 0 && joints_removed > 0);
+}
+
+/// Settings that reach different parts of the method.
+fn varied(seed: u64) -> [Settings; 3] {
+    let plain = Settings {
+        neighbors: 10,
+        min_component: 1,
+        ..Settings::default()
+    };
+    let percent = Radius::Percent([5.0, 0.5, 40.0][seed as usize % 3]);
+    [
+        Settings {
+            block: [16, 40, 100][seed as usize % 3],
+            ..plain
+        },
+        Settings {
+            radius: percent,
+            neighbors: 30,
+            block: 25,
+            cos_max_angle: -0.5,
+            ..plain
+        },
+        Settings {
+            smooth: 2,
+            repair: seed.is_multiple_of(2),
+            block: 10,
+            ..plain
+        },
+    ]
+}

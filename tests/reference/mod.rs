@@ -1,0 +1,218 @@
+//! A slow implementation of section 1 of `ARCHITECTURE.md`, in memory and by brute force.
+//!
+//! It exists to be compared with the program, so it shares with it only what section 1 leaves to
+//! floating point: planes and cells (`outcrop::geom`). Everything else is written here as plainly
+//! as it can be said. Nothing is tuned; a few hundred points are a large cloud.
+
+// Each test that includes this module uses another part of it.
+#![allow(dead_code)]
+
+pub mod base;
+pub mod big;
+pub mod cells;
+pub mod check;
+pub mod clouds;
+pub mod holes;
+pub mod homes;
+pub mod insert;
+pub mod output;
+pub mod repair;
+pub mod surface;
+
+use holes::Filling;
+use outcrop::geom::Point;
+use std::collections::{BTreeMap, BTreeSet};
+use surface::{Component, Surface, Triangle};
+
+/// The radius of the disks.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Radius {
+    /// The distance of the last neighbour used for the plane.
+    Auto,
+    /// Of the diagonal of the box around the points as given (before smoothing).
+    Percent(f64),
+    /// In lattice steps.
+    Length(f64),
+}
+
+/// The parameters of the method.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// `k`.
+    pub neighbors: usize,
+    /// Rounds of smoothing; the lattice is taken as it is.
+    pub smooth: u32,
+    pub radius: Radius,
+    /// Cosine of the largest angle between normals (test G).
+    pub cos_max_angle: f64,
+    /// Holes of more edges stay.
+    pub max_hole_edges: usize,
+    /// Components of fewer triangles go.
+    pub min_component: usize,
+    /// Without, nothing of section 1.6 happens but orientation.
+    pub repair: bool,
+    /// `B`.
+    pub block: u32,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            neighbors: 30,
+            smooth: 0,
+            radius: Radius::Auto,
+            cos_max_angle: 0.5,
+            max_hole_edges: 500,
+            min_component: 10,
+            repair: true,
+            block: 65_536,
+        }
+    }
+}
+
+/// Candidates rejected for good, by test.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Rejected {
+    /// I
+    pub edges: usize,
+    /// II
+    pub full_edge: usize,
+    /// III
+    pub vertex: usize,
+    /// G
+    pub angle: usize,
+    /// IV
+    pub orientation: usize,
+}
+
+/// What happened on the way.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Different points.
+    pub points: usize,
+    /// Triples that three cells, two or one see.
+    pub t3: usize,
+    pub t2: usize,
+    pub t1: usize,
+    /// T3 flagged in 1.4.
+    pub flagged: usize,
+    /// T3 that would close a Möbius band.
+    pub one_sided: usize,
+    /// T3 that are left.
+    pub base: usize,
+    pub candidates: usize,
+    /// Inserted by blocks for themselves; removed joints are counted here.
+    pub inserted_interior: usize,
+    /// Inserted when blocks were put together, interior candidates tried again among them.
+    pub inserted_crossing: usize,
+    pub joints: usize,
+    pub joints_removed: usize,
+    pub rejected: Rejected,
+    pub bridges: usize,
+    pub small_components: usize,
+    /// Triangles of the small components.
+    pub small_triangles: usize,
+    pub holes: Filling,
+    /// Vertices added for the fans of pinched ones.
+    pub copies: usize,
+}
+
+/// The mesh.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Mesh {
+    /// Positions of all different points in the order of their ids, after smoothing.
+    pub ids: Vec<Point>,
+    /// The id of each output vertex, copies of pinched vertices last.
+    pub vertices: Vec<u32>,
+    /// Indices into `vertices`.
+    pub triangles: Vec<[u32; 3]>,
+    pub counts: Counts,
+}
+
+/// Reconstructs the surface of a cloud.
+pub fn reconstruct(points: &[Point], settings: &Settings) -> Mesh {
+    let mut points = cells::in_id_order(points);
+    let diagonal = cells::diagonal(&points);
+    for _ in 0..settings.smooth {
+        points = cells::smooth(&points, settings.neighbors);
+    }
+    let triples = cells::triples(&points, settings, diagonal);
+    from_triples(points, &triples, settings)
+}
+
+/// Sections 1.4 to 1.7, from points in the order of their ids and the number of cells that see
+/// each triple. Triples need not come from cells: what cells see has, for one, never an edge with
+/// more than two T3, as each cell has at most two corners on a bisector.
+pub fn from_triples(
+    points: Vec<Point>,
+    triples: &BTreeMap<Triangle, u32>,
+    settings: &Settings,
+) -> Mesh {
+    let mut counts = Counts {
+        points: points.len(),
+        ..Counts::default()
+    };
+    let seen_by = |n: u32| triples.values().filter(|&&count| count == n).count();
+    (counts.t3, counts.t2, counts.t1) = (seen_by(3), seen_by(2), seen_by(1));
+
+    let t3: BTreeSet<Triangle> = triples
+        .iter()
+        .filter(|(_, count)| **count == 3)
+        .map(|(&t, _)| t)
+        .collect();
+    let base = base::base(&t3, settings.block);
+    counts.flagged = base.flagged.len();
+    counts.one_sided = base.one_sided.len();
+    counts.base = base.surface.triangles().len();
+
+    let inserted = insert::insert(&points, triples, base, settings);
+    counts.candidates = inserted.candidates;
+    counts.inserted_interior = inserted.interior;
+    counts.inserted_crossing = inserted.crossing;
+    (counts.joints, counts.joints_removed) = (inserted.joints, inserted.joints_removed);
+    counts.rejected = inserted.rejected;
+
+    let mut surface = inserted.surface;
+    let turned = repair_and_orient(&points, &mut surface, settings, &mut counts);
+    let (vertices, triangles) = output::in_file_order(&surface, &turned, settings.repair);
+    counts.copies = vertices.len() - surface.vertices().len();
+    Mesh {
+        ids: points,
+        vertices,
+        triangles,
+        counts,
+    }
+}
+
+/// Section 1.6 but for pinched vertices: bridges, small components, which way components face,
+/// holes, in this order. Gives the way the triangles run.
+fn repair_and_orient(
+    points: &[Point],
+    surface: &mut Surface,
+    settings: &Settings,
+    counts: &mut Counts,
+) -> Component {
+    if settings.repair {
+        counts.bridges = repair::remove_bridges(surface);
+        (counts.small_components, counts.small_triangles) =
+            repair::remove_small_components(surface, settings.min_component);
+    }
+    let components = repair::oriented(points, surface);
+    let mut turned: Component = components
+        .iter()
+        .flatten()
+        .map(|(&t, &turned)| (t, turned))
+        .collect();
+    if settings.repair {
+        let (filled, filling) = holes::fill(points, surface, &components, settings.max_hole_edges);
+        counts.holes = filling;
+        for corners in filled {
+            let mut t = corners;
+            t.sort_unstable();
+            surface.insert(t);
+            let first = corners.iter().position(|&v| v == t[0]).expect("sorted");
+            turned.insert(t, corners[(first + 1) % 3] != t[1]);
+        }
+    }
+    turned
+}

@@ -1,0 +1,158 @@
+//! Section 1.6 without holes: bridges, small components, and which way components face.
+
+use super::big::{Big, Big3, cross, determinant, dot, plus, vector};
+use super::insert::normal;
+use super::surface::{Component, Edge, Surface, Triangle, edges};
+use outcrop::geom::Point;
+use std::collections::BTreeSet;
+
+/// Enough for every product below: the largest has about 300 bits.
+type Wide = Big<8>;
+
+/// Removes bridges, all at once; gives how many there were.
+pub fn remove_bridges(surface: &mut Surface) -> usize {
+    let is_bridge = |&t: &Triangle| {
+        let border: Vec<Edge> = edges(t)
+            .into_iter()
+            .filter(|&e| surface.is_boundary(e))
+            .collect();
+        t.into_iter().any(|v| {
+            let both = border.iter().filter(|edge| edge.contains(&v)).count() == 2;
+            both && surface.fans(v).len() > 1
+        })
+    };
+    let bridges: Vec<Triangle> = surface
+        .triangles()
+        .iter()
+        .copied()
+        .filter(is_bridge)
+        .collect();
+    bridges.iter().for_each(|&t| surface.remove(t));
+    bridges.len()
+}
+
+/// Removes components of fewer than `least` triangles; gives how many components and triangles.
+pub fn remove_small_components(surface: &mut Surface, least: usize) -> (usize, usize) {
+    let mut removed = (0, 0);
+    for component in surface.components().expect("the mesh is orientable") {
+        if component.len() < least {
+            component.keys().for_each(|&t| surface.remove(t));
+            removed = (removed.0 + 1, removed.1 + component.len());
+        }
+    }
+    removed
+}
+
+/// The corners of `t` as it runs, beginning with the smallest.
+pub fn run([i, j, k]: Triangle, turned: bool) -> [u32; 3] {
+    if turned { [i, k, j] } else { [i, j, k] }
+}
+
+/// All triangles with the way they run once every component faces as it should.
+pub fn oriented(points: &[Point], surface: &Surface) -> Vec<Component> {
+    let mut components = surface.components().expect("the mesh is orientable");
+    for component in &mut components {
+        let open = component
+            .keys()
+            .any(|&t| edges(t).iter().any(|&e| surface.is_boundary(e)));
+        if faces_wrongly(points, component, open) {
+            component.values_mut().for_each(|turned| *turned = !*turned);
+        }
+    }
+    components
+}
+
+/// Whether a component, in which the smallest triangle runs i → j → k, has to be turned over.
+///
+/// Sums over its triangles (p, q, r), as they run, all exact:
+/// * `volume6` = Σ det(p, q, r) with positions from the lattice's origin, six times the volume;
+/// * `area2` = Σ (q − p) × (r − p), twice the vector area;
+/// * `size2` = Σ floor(sqrt(|(q − p) × (r − p)|²)), about twice the area;
+/// * `corners` = Σ p + q + r, with `count` = 3 · (number of triangles): the centroid is their
+///   quotient, a mean over triangle corners and not over vertices.
+///
+/// Closed (no edge with one triangle): turned over if `volume6 < 0`. Open with
+/// `4 |area2|² ≥ size2²`: turned over if the first component of `area2` that is not zero, in the
+/// order z, y, x, is negative. Otherwise, turned over if the volume about the centroid is negative:
+/// `count · volume6 − corners · area2 < 0` (six times the volume, times `count`). A sum of zero
+/// leaves the component as it is: its smallest triangle runs i → j → k.
+fn faces_wrongly(points: &[Point], component: &Component, open: bool) -> bool {
+    let mut volume6 = Wide::ZERO;
+    let mut area2: Big3<8> = [Wide::ZERO; 3];
+    let mut size2 = 0u128;
+    let mut corners: Big3<8> = [Wide::ZERO; 3];
+    for (&t, &turned) in component {
+        let at = run(t, turned).map(|v| vector::<8, i64>(points[v as usize].map(i64::from)));
+        volume6 = volume6 + determinant(at);
+        let n = normal(points, t).map(|x| if turned { -x } else { x });
+        area2 = plus(area2, vector(n));
+        let square: i128 = n.iter().map(|x| x * x).sum();
+        size2 += square.unsigned_abs().isqrt();
+        corners = at.into_iter().fold(corners, plus);
+    }
+    if !open {
+        return volume6.sign() < 0;
+    }
+    let size2 = Wide::from(size2 as i128);
+    if dot(area2, area2) * Wide::from(4i64) >= size2 * size2 {
+        let up = [2, 1, 0].map(|axis: usize| area2[axis].sign());
+        return up.into_iter().find(|&sign| sign != 0).unwrap_or(0) < 0;
+    }
+    let count = Wide::from(3 * component.len() as i64);
+    (count * volume6 - dot(corners, area2)).sign() < 0
+}
+
+/// For each hole to be matched at a vertex: the angle from one edge to another, turned clockwise
+/// about `axis`, compared exactly. A vanishing angle counts as a full turn.
+#[derive(Debug, Clone, Copy)]
+pub struct ClockwiseAngle {
+    /// 0 for less than half a turn, 1 for half a turn, 2 for more, 3 for a full turn.
+    quarter: u8,
+    /// Cosine and sine, times a common positive factor each that does not depend on the angle but
+    /// for the lengths of the edges.
+    cosine: Wide,
+    sine: Wide,
+}
+
+impl ClockwiseAngle {
+    pub fn new(axis: [i128; 3], from: [i64; 3], to: [i64; 3]) -> Self {
+        let (n, a, b) = (
+            vector::<8, _>(axis),
+            vector::<8, _>(from),
+            vector::<8, _>(to),
+        );
+        let cosine = dot(n, n) * dot(a, b) - dot(a, n) * dot(b, n);
+        let sine = -dot(n, cross(a, b));
+        let quarter = match (sine.sign(), cosine.sign()) {
+            (1, _) => 0,
+            (0, -1) => 1,
+            (-1, _) => 2,
+            _ => 3,
+        };
+        Self {
+            quarter,
+            cosine,
+            sine,
+        }
+    }
+
+    pub fn compare(&self, other: &Self) -> std::cmp::Ordering {
+        // Within half a turn the angle grows with the cross product's sign.
+        let turn = self.cosine * other.sine - self.sine * other.cosine;
+        let within = if self.quarter.is_multiple_of(2) {
+            0.cmp(&turn.sign())
+        } else {
+            0.cmp(&0)
+        };
+        self.quarter.cmp(&other.quarter).then(within)
+    }
+}
+
+/// Vertices with more than one fan.
+pub fn pinched(surface: &Surface) -> BTreeSet<u32> {
+    surface
+        .vertices()
+        .into_iter()
+        .filter(|&v| surface.fans(v).len() > 1)
+        .collect()
+}

@@ -1,0 +1,155 @@
+//! Odd, old, empty and broken files: each has its expected outcome, and none panics.
+
+use outcrop::stages::ingest::{Spool, ingest};
+use outcrop::workspace::Workspace;
+use outcrop::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
+use outcrop::workspace::progress::{Cancel, Silent};
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+const ZOO: &str = "../shared/data/zoo";
+
+fn zoo() -> Option<&'static Path> {
+    let path = Path::new(ZOO);
+    if !path.is_dir() {
+        println!("skipped: {ZOO} is absent");
+        return None;
+    }
+    Some(path)
+}
+
+fn workspace(folder: &Path) -> Workspace {
+    let memory = MemoryPool::new(MINIMUM_BUDGET).unwrap();
+    Workspace::new(folder, memory, 2, Arc::new(Silent), Cancel::new()).unwrap()
+}
+
+fn manifest(path: &Path) -> Vec<Value> {
+    let text = std::fs::read_to_string(path.join("MANIFEST.json")).unwrap();
+    serde_json::from_str(&text).unwrap()
+}
+
+/// Streams the spool and checks what must hold of every cloud.
+fn check_stream(spool: &Spool, workspace: &Workspace) {
+    let stats = spool.stats();
+    assert_eq!(stats.read, stats.kept + stats.dropped_non_finite + stats.withheld);
+    let Ok(lattice) = spool.choose_lattice(0) else {
+        assert_eq!(spool.points(), 0);
+        return;
+    };
+    let mut count = 0;
+    let (mut low, mut high) = ([i32::MAX; 3], [i32::MIN; 3]);
+    spool
+        .for_each(&lattice, |points| {
+            count += points.len() as u64;
+            for p in points {
+                for axis in 0..3 {
+                    low[axis] = low[axis].min(p[axis]);
+                    high[axis] = high[axis].max(p[axis]);
+                }
+            }
+            Ok(())
+        })
+        .unwrap();
+    assert_eq!(count, spool.points());
+    assert_eq!(low, [0; 3]);
+    let file = &stats.files[0];
+    let tolerance = if lattice.exact { 1e-6 } else { 0.51 } * lattice.step;
+    for axis in 0..3 {
+        let (found, want) = (lattice.position(high)[axis], file.max.unwrap()[axis]);
+        let slack = tolerance + want.abs() * 1e-15;
+        assert!((found - want).abs() <= slack, "axis {axis}: {found} for {want}, {lattice:?}");
+    }
+    assert_eq!(workspace.memory.available(), workspace.memory.capacity());
+}
+
+/// Points read, or the error.
+fn read(path: &Path, workspace: &Workspace) -> Result<u64, String> {
+    match ingest(&[PathBuf::from(path)], workspace) {
+        Ok(spool) => {
+            check_stream(&spool, workspace);
+            Ok(spool.stats().read - spool.stats().dropped_non_finite)
+        }
+        Err(error) => {
+            let text = error.to_string();
+            assert!(!text.contains('\n'), "{text:?} is more than one line");
+            assert!(text.starts_with(&*path.display().to_string()), "{text} names no file");
+            Err(text)
+        }
+    }
+}
+
+/// Formats that are recognised and refused.
+fn refused_format(file: &str) -> Option<&'static str> {
+    let extension = Path::new(file).extension()?.to_str()?;
+    [("e57", "E57"), ("ptx", "PTX"), ("pcd", "PCD")]
+        .into_iter()
+        .find(|(e, _)| *e == extension)
+        .map(|(_, name)| name)
+}
+
+#[test]
+fn generated_files_have_their_expected_outcome() {
+    let Some(zoo) = zoo() else { return };
+    let zoo = zoo.join("generated");
+    let scratch = tempfile::tempdir().unwrap();
+    let workspace = workspace(scratch.path());
+    let mut wrong = Vec::new();
+    for entry in manifest(&zoo) {
+        let file = entry["file"].as_str().unwrap();
+        let points = entry["points"].as_u64();
+        let outcome = read(&zoo.join(file), &workspace);
+        let good = match (file, entry["expect"].as_str().unwrap(), &outcome) {
+            (f, _, Err(text)) if refused_format(f).is_some() => {
+                text.contains(refused_format(f).unwrap())
+            }
+            // Content decides, not the name: these are lists of points.
+            ("xyz_named.ply", _, Ok(n)) => *n == 2000,
+            // The header of an interrupted writer: what is there is read.
+            ("count_zero.las", _, Ok(n)) => *n == 2000,
+            (_, "ok" | "ok-empty" | "ok-no-crash" | "ok-or-warn" | "ok-drop-nonfinite", o) => {
+                o.as_ref().ok().copied() == points
+            }
+            (_, "error", o) => o.is_err(),
+            (_, "error-or-partial" | "error-or-garbage" | "ambiguous", _) => true,
+            (_, "ok-or-error" | "error-or-ok" | "error-or-warn", Ok(n)) => {
+                points.is_none_or(|p| p == *n)
+            }
+            (_, "ok-or-error" | "error-or-ok" | "error-or-warn", Err(_)) => true,
+            (_, expect, _) => panic!("unknown expectation {expect}"),
+        };
+        println!("{file}: {} -> {outcome:?}", entry["expect"]);
+        if !good {
+            wrong.push(format!("{file}: {outcome:?}, expected {entry}"));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn real_files_hold_as_many_points_as_another_reader_finds() {
+    let Some(zoo) = zoo() else { return };
+    let scratch = tempfile::tempdir().unwrap();
+    let workspace = workspace(scratch.path());
+    let mut wrong = Vec::new();
+    for entry in manifest(zoo) {
+        let file = entry["file"].as_str().unwrap();
+        let points = entry["points_by_another_reader"].as_u64();
+        let outcome = read(&zoo.join(file), &workspace);
+        let good = match (&outcome, points) {
+            (Err(text), _) if refused_format(file).is_some() => {
+                text.contains(refused_format(file).unwrap())
+            }
+            (Ok(n), Some(p)) => *n == p,
+            // Nothing there: an error says so as well.
+            (Err(_), Some(0) | None) => true,
+            (Ok(_), None) => true,
+            (Err(_), Some(_)) => false,
+        };
+        println!("{file}: {points:?} -> {outcome:?}");
+        if !good {
+            wrong.push(format!("{file}: {outcome:?}, expected {entry}"));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}

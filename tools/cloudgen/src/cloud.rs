@@ -1,0 +1,272 @@
+//! The description of a cloud.
+
+use std::path::{Path, PathBuf};
+
+use crate::error::{Error, Result};
+use crate::generator::Generator;
+use crate::kind::Kind;
+use crate::write::{self, Format};
+
+/// Order of the points.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Order {
+    /// No order.
+    #[default]
+    Random,
+    /// Along a sweep over the surface; with scan lines, line after line.
+    Sorted,
+}
+
+/// Direction of the noise.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum NoiseMode {
+    /// Along the surface normal.
+    #[default]
+    Normal,
+    /// The same in every direction.
+    Isotropic,
+}
+
+/// Everything that determines a cloud. Equal descriptions give equal points, to the bit.
+///
+/// ```
+/// use outcrop_cloudgen::{Cloud, Kind};
+///
+/// # fn main() -> outcrop_cloudgen::Result<()> {
+/// let cloud = Cloud::new(Kind::Torus).points(1000).seed(7).noise(0.1);
+/// assert_eq!(cloud.euler_characteristic(), Some(0));
+/// let mut tail = [[0.0; 3]; 10];
+/// cloud.generator()?.fill(990, &mut tail);
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Cloud {
+    /// The surface.
+    pub kind: Kind,
+    /// Number of points, outliers and duplicates included.
+    pub points: u64,
+    /// Seed of all random numbers.
+    pub seed: u64,
+    /// Diagonal of the bounding box.
+    pub size: f64,
+    /// Standard deviation of the noise.
+    pub noise: f64,
+    /// Direction of the noise.
+    pub noise_mode: NoiseMode,
+    /// Fraction of points placed anywhere in a box 1.5 times the size.
+    pub outliers: f64,
+    /// Fraction of points that are exact copies of an earlier one.
+    pub duplicates: f64,
+    /// Let the density fall with the squared distance from the scanner.
+    pub falloff: bool,
+    /// Place of the scanner in fractions of the bounding box; None for a place that suits the kind.
+    pub scanner: Option<[f64; 3]>,
+    /// Put the points on lines, this many times closer along than across.
+    pub scanlines: Option<f64>,
+    /// Turn everything by the frame (2 1 2)/3, (-2 2 1)/3, (-1 -2 2)/3. A grid stays integer: its
+    /// steps are then multiples of (2 1 2) and (-2 2 1).
+    pub rotated: bool,
+    /// Added to every coordinate at the end.
+    pub offset: [f64; 3],
+    /// Order of the points.
+    pub order: Order,
+}
+
+impl Cloud {
+    /// A clean cloud of 100 000 points of size 1000.
+    pub fn new(kind: Kind) -> Self {
+        Cloud {
+            kind,
+            points: 100_000,
+            seed: 0,
+            size: 1000.0,
+            noise: 0.0,
+            noise_mode: NoiseMode::Normal,
+            outliers: 0.0,
+            duplicates: 0.0,
+            falloff: false,
+            scanner: None,
+            scanlines: None,
+            rotated: false,
+            offset: [0.0; 3],
+            order: Order::Random,
+        }
+    }
+
+    /// Sets the number of points.
+    pub fn points(self, points: u64) -> Self {
+        Cloud { points, ..self }
+    }
+
+    /// Sets the seed.
+    pub fn seed(self, seed: u64) -> Self {
+        Cloud { seed, ..self }
+    }
+
+    /// Sets the diagonal of the bounding box.
+    pub fn size(self, size: f64) -> Self {
+        Cloud { size, ..self }
+    }
+
+    /// Sets the standard deviation of the noise.
+    pub fn noise(self, noise: f64) -> Self {
+        Cloud { noise, ..self }
+    }
+
+    /// Sets the direction of the noise.
+    pub fn noise_mode(self, noise_mode: NoiseMode) -> Self {
+        Cloud { noise_mode, ..self }
+    }
+
+    /// Sets the fraction of outliers.
+    pub fn outliers(self, outliers: f64) -> Self {
+        Cloud { outliers, ..self }
+    }
+
+    /// Sets the fraction of duplicates.
+    pub fn duplicates(self, duplicates: f64) -> Self {
+        Cloud { duplicates, ..self }
+    }
+
+    /// Switches the density falloff.
+    pub fn falloff(self, falloff: bool) -> Self {
+        Cloud { falloff, ..self }
+    }
+
+    /// Sets the place of the scanner, in fractions of the bounding box.
+    pub fn scanner(self, scanner: [f64; 3]) -> Self {
+        Cloud {
+            scanner: Some(scanner),
+            ..self
+        }
+    }
+
+    /// Puts the points on scan lines, `ratio` times closer along than across.
+    pub fn scanlines(self, ratio: f64) -> Self {
+        Cloud {
+            scanlines: Some(ratio),
+            ..self
+        }
+    }
+
+    /// Switches the rotation.
+    pub fn rotated(self, rotated: bool) -> Self {
+        Cloud { rotated, ..self }
+    }
+
+    /// Sets the offset.
+    pub fn offset(self, offset: [f64; 3]) -> Self {
+        Cloud { offset, ..self }
+    }
+
+    /// Sets the order.
+    pub fn order(self, order: Order) -> Self {
+        Cloud { order, ..self }
+    }
+
+    /// Euler characteristic of the surface if it is closed: 2 - 2 * genus.
+    pub fn euler_characteristic(&self) -> Option<i64> {
+        self.kind.euler_characteristic()
+    }
+
+    /// Prepares the surface. This is where impossible settings are refused.
+    pub fn generator(&self) -> Result<Generator> {
+        self.check()?;
+        Generator::new(self)
+    }
+
+    /// Writes the cloud to a file.
+    pub fn write(&self, path: impl AsRef<Path>, format: Format) -> Result<()> {
+        write::write_part(&self.generator()?, path.as_ref(), format, 0, 1)
+    }
+
+    /// Writes the cloud as a random partition into the files `NAME-0.EXT`, `NAME-1.EXT`, and so
+    /// on, and returns their paths.
+    pub fn write_split(
+        &self,
+        path: impl AsRef<Path>,
+        format: Format,
+        parts: u32,
+    ) -> Result<Vec<PathBuf>> {
+        if parts == 0 {
+            return Err(Error::parameter("split", parts, "one part or more"));
+        }
+        let generator = self.generator()?;
+        let mut paths = Vec::new();
+        for part in 0..parts {
+            let path = write::part_path(path.as_ref(), part);
+            write::write_part(&generator, &path, format, part, parts)?;
+            paths.push(path);
+        }
+        Ok(paths)
+    }
+
+    fn check(&self) -> Result<()> {
+        let finite = |name, values: &[f64]| match values.iter().find(|v| !v.is_finite()) {
+            Some(value) => Err(Error::parameter(name, value, "a finite number")),
+            None => Ok(()),
+        };
+        let fraction = |name, value: f64| match value {
+            0.0..1.0 => Ok(()),
+            _ => Err(Error::parameter(
+                name,
+                value,
+                "a fraction from 0 to below 1",
+            )),
+        };
+        if self.points > 1 << 48 {
+            return Err(Error::parameter("points", self.points, "at most 2^48"));
+        }
+        if !(1e-100..1e100).contains(&self.size) {
+            return Err(Error::parameter("size", self.size, "a positive number"));
+        }
+        if !(0.0..1e100).contains(&self.noise) {
+            return Err(Error::parameter(
+                "noise",
+                self.noise,
+                "zero or a positive number",
+            ));
+        }
+        fraction("outliers", self.outliers)?;
+        fraction("duplicates", self.duplicates)?;
+        finite("offset", &self.offset)?;
+        finite("scanner", self.scanner.as_ref().map_or(&[], |s| s))?;
+        if let Some(ratio) = self.scanlines
+            && !(1.0..=1e6).contains(&ratio)
+        {
+            return Err(Error::parameter(
+                "scanlines",
+                ratio,
+                "a ratio from 1 to 1e6",
+            ));
+        }
+        if self.scanner.is_some() && !self.falloff {
+            let why = "without falloff the scanner has no effect";
+            return Err(Error::Conflict {
+                first: "scanner",
+                second: "even density",
+                why,
+            });
+        }
+        if self.falloff && self.order == Order::Sorted {
+            let why = "the falloff draws points by chance, in no order";
+            return Err(Error::Conflict {
+                first: "falloff",
+                second: "sorted order",
+                why,
+            });
+        }
+        if self.kind == Kind::Grid && (self.falloff || self.scanlines.is_some()) {
+            let first = if self.falloff { "falloff" } else { "scanlines" };
+            let why = "its nodes are fixed";
+            return Err(Error::Conflict {
+                first,
+                second: "grid",
+                why,
+            });
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,312 @@
+//! Making the points of a cloud.
+
+use std::thread;
+
+use crate::cloud::{Cloud, NoiseMode, Order};
+use crate::error::Result;
+use crate::kind::Kind;
+use crate::picker::Picker;
+use crate::rng::{Permutation, Purpose, Rng};
+use crate::surface::{
+    Bumpy, FRAME, Grid, Line, Plane, Room, Sample, Sphere, Surface, Terrain, Torus, box_distance,
+    box_point,
+};
+use crate::vec3::{Vec3, add, dot, length, scale, sub};
+
+/// Draws until a point survives the falloff; far more than any sensible scanner place needs.
+const FALLOFF_TRIES: u32 = 4096;
+
+/// Size of the box of outliers in terms of the bounding box.
+const OUTLIER_BOX: f64 = 1.5;
+
+/// Points below this number are not worth a second thread.
+const PARALLEL_FROM: usize = 4096;
+
+/// Where positions come from.
+#[derive(Debug)]
+enum Source {
+    Grid(Grid),
+    Surface {
+        surface: Box<dyn Surface>,
+        scan: Option<(Vec<Line>, Picker)>,
+    },
+}
+
+/// How point `i` gets its place in the sweep over the surface.
+#[derive(Debug)]
+enum Sweep {
+    /// By chance, independent of all others.
+    Chance,
+    /// Point `i` lies in the `i`-th of equal parts of the sweep.
+    InOrder,
+    /// As in order, but through a permutation.
+    Shuffled(Permutation),
+}
+
+/// Makes any point of a cloud on demand. Point `i` depends on the description and `i` only.
+#[derive(Debug)]
+pub struct Generator {
+    cloud: Cloud,
+    source: Source,
+    sweep: Sweep,
+    scanner: Vec3,
+    /// Distance of the scanner within which the density is constant.
+    near: f64,
+    /// Box of the outliers, before rotation and offset.
+    outlier_box: [Vec3; 2],
+}
+
+impl Generator {
+    pub(crate) fn new(cloud: &Cloud) -> Result<Self> {
+        let size = cloud.size;
+        let surface: Box<dyn Surface> = match cloud.kind {
+            Kind::Sphere => Box::new(Sphere::new(size)),
+            Kind::Torus => Box::new(Torus::new(size)),
+            Kind::Bumpy => Box::new(Bumpy::new(size)),
+            Kind::Terrain => Box::new(Terrain::new(size)),
+            Kind::Room => Box::new(Room::new(size)),
+            Kind::Plane => Box::new(Plane::new(size)),
+            Kind::Grid => {
+                let grid = Grid::new(cloud.points, size, cloud.rotated)?;
+                let bounds = grid.bounds();
+                return Ok(Self::with(cloud, Source::Grid(grid), bounds, [0.0; 3]));
+            }
+        };
+        let bounds = surface.bounds();
+        let scanner = cloud
+            .scanner
+            .map_or_else(|| surface.scanner(), |s| box_point(bounds, s));
+        let scan = cloud.scanlines.map(|ratio| {
+            let spacing = (surface.area() * ratio / cloud.points.max(1) as f64).sqrt();
+            let lines = surface.scan_lines(spacing);
+            let picker = Picker::new(lines.iter().map(|line| line.weight));
+            (lines, picker)
+        });
+        Ok(Self::with(
+            cloud,
+            Source::Surface { surface, scan },
+            bounds,
+            scanner,
+        ))
+    }
+
+    fn with(cloud: &Cloud, source: Source, bounds: [Vec3; 2], scanner: Vec3) -> Self {
+        let regular = cloud.kind == Kind::Grid || (cloud.scanlines.is_some() && !cloud.falloff);
+        let sweep = match cloud.order {
+            Order::Sorted => Sweep::InOrder,
+            Order::Random if regular => Sweep::Shuffled(Permutation::new(cloud.points, cloud.seed)),
+            Order::Random => Sweep::Chance,
+        };
+        let low = (1.0 - OUTLIER_BOX) / 2.0;
+        // A flat box gets the depth of a cube that size: outliers must leave the surface.
+        let depth = cloud.size / 4.0;
+        let mut fat = bounds;
+        for k in 0..3 {
+            let [low, high] = &mut fat;
+            let lack = (depth - (high[k] - low[k])).max(0.0) / 2.0;
+            low[k] -= lack;
+            high[k] += lack;
+        }
+        let outlier_box = [box_point(fat, [low; 3]), box_point(fat, [1.0 - low; 3])];
+        let near = box_distance(bounds, scanner).max(0.05 * cloud.size);
+        Generator {
+            cloud: cloud.clone(),
+            source,
+            sweep,
+            scanner,
+            near,
+            outlier_box,
+        }
+    }
+
+    /// The description.
+    pub fn cloud(&self) -> &Cloud {
+        &self.cloud
+    }
+
+    /// Number of points.
+    pub fn len(&self) -> u64 {
+        self.cloud.points
+    }
+
+    /// Whether there is no point.
+    pub fn is_empty(&self) -> bool {
+        self.cloud.points == 0
+    }
+
+    /// Point `index` with the normal of the surface; `index` is taken modulo the number of points.
+    pub fn sample(&self, index: u64) -> Sample {
+        let mut index = index % self.cloud.points.max(1);
+        if self.cloud.duplicates > 0.0 {
+            // A copy is always of an earlier point, so this ends.
+            while index > 0 {
+                let mut rng = Rng::at(self.cloud.seed, Purpose::Duplicate, index);
+                if rng.uniform() >= self.cloud.duplicates {
+                    break;
+                }
+                index = rng.below(index);
+            }
+        }
+        self.original(index)
+    }
+
+    /// Fills `out` with the points from `start` on.
+    pub fn fill(&self, start: u64, out: &mut [[f64; 3]]) {
+        for (index, point) in (start..).zip(out) {
+            *point = self.sample(index).position;
+        }
+    }
+
+    /// All points in order.
+    pub fn iter(&self) -> impl Iterator<Item = [f64; 3]> + '_ {
+        (0..self.cloud.points).map(|index| self.sample(index).position)
+    }
+
+    /// Distance of a position to the true surface: exact for the kinds with a closed form, of
+    /// first order for `bumpy` and `terrain`.
+    pub fn distance(&self, position: [f64; 3]) -> f64 {
+        let p = sub(position, self.cloud.offset);
+        match &self.source {
+            Source::Grid(grid) => grid.distance(p),
+            Source::Surface { surface, .. } => {
+                let frame = frame();
+                let turned = |p: Vec3| frame.map(|axis| dot(axis, p));
+                surface.distance(if self.cloud.rotated { turned(p) } else { p })
+            }
+        }
+    }
+
+    /// Fills `out` with the points of the given indices, on all processors.
+    pub(crate) fn gather(&self, indices: &[u64], out: &mut [[f64; 3]]) {
+        let make = |indices: &[u64], out: &mut [[f64; 3]]| {
+            for (&index, point) in indices.iter().zip(out) {
+                *point = self.sample(index).position;
+            }
+        };
+        let threads = thread::available_parallelism()
+            .map_or(1, usize::from)
+            .min(16);
+        let share = out.len().div_ceil(threads).max(PARALLEL_FROM);
+        if out.len() <= share {
+            return make(indices, out);
+        }
+        thread::scope(|scope| {
+            for (indices, out) in indices.chunks(share).zip(out.chunks_mut(share)) {
+                scope.spawn(move || make(indices, out));
+            }
+        });
+    }
+
+    /// Largest absolute coordinate before the offset that can reasonably occur.
+    pub(crate) fn reach(&self) -> f64 {
+        let corner = self
+            .outlier_box
+            .iter()
+            .flatten()
+            .fold(0.0, |m: f64, c| m.max(c.abs()));
+        corner * 3f64.sqrt() + 10.0 * self.cloud.noise
+    }
+
+    /// Point `index` unless it is a duplicate.
+    fn original(&self, index: u64) -> Sample {
+        let sample = self.outlier(index).unwrap_or_else(|| self.noisy(index));
+        Sample {
+            position: add(sample.position, self.cloud.offset),
+            ..sample
+        }
+    }
+
+    fn outlier(&self, index: u64) -> Option<Sample> {
+        if self.cloud.outliers == 0.0 {
+            return None;
+        }
+        let mut rng = Rng::at(self.cloud.seed, Purpose::Outlier, index);
+        if rng.uniform() >= self.cloud.outliers {
+            return None;
+        }
+        let place = box_point(self.outlier_box, std::array::from_fn(|_| rng.uniform()));
+        Some(self.turn(Sample {
+            position: place,
+            normal: [0.0; 3],
+        }))
+    }
+
+    fn noisy(&self, index: u64) -> Sample {
+        let mut sample = match &self.source {
+            Source::Grid(grid) => grid.node(match &self.sweep {
+                Sweep::Shuffled(permutation) => permutation.apply(index),
+                Sweep::Chance | Sweep::InOrder => index,
+            }),
+            Source::Surface { surface, scan } => {
+                self.turn(self.on_surface(surface.as_ref(), scan.as_ref(), index))
+            }
+        };
+        let sigma = self.cloud.noise;
+        if sigma > 0.0 {
+            let mut rng = Rng::at(self.cloud.seed, Purpose::Noise, index);
+            let shift = match self.cloud.noise_mode {
+                NoiseMode::Normal => scale(sample.normal, sigma * rng.normal()),
+                NoiseMode::Isotropic => std::array::from_fn(|_| sigma * rng.normal()),
+            };
+            sample.position = add(sample.position, shift);
+        }
+        sample
+    }
+
+    fn on_surface(
+        &self,
+        surface: &dyn Surface,
+        scan: Option<&(Vec<Line>, Picker)>,
+        index: u64,
+    ) -> Sample {
+        let mut rng = Rng::at(self.cloud.seed, Purpose::Position, index);
+        let part = |index: u64, jitter: f64| (index as f64 + jitter) / self.cloud.points as f64;
+        let mut tries = 0;
+        loop {
+            let (jitter, v) = (rng.uniform(), rng.uniform());
+            let u = match &self.sweep {
+                Sweep::Chance => jitter,
+                Sweep::InOrder => part(index, jitter),
+                Sweep::Shuffled(permutation) => part(permutation.apply(index), jitter),
+            };
+            let sample = match scan {
+                Some((lines, picker)) => {
+                    let (line, t) = picker.pick(u);
+                    surface.on_line(&lines[line], t, v)
+                }
+                None => surface.at(u, v),
+            };
+            tries += 1;
+            if !self.cloud.falloff || tries == FALLOFF_TRIES || self.seen(&sample, &mut rng) {
+                return sample;
+            }
+        }
+    }
+
+    /// Whether a point survives the falloff.
+    fn seen(&self, sample: &Sample, rng: &mut Rng) -> bool {
+        let near = self.near / length(sub(sample.position, self.scanner)).max(self.near);
+        rng.uniform() < near * near
+    }
+
+    fn turn(&self, sample: Sample) -> Sample {
+        // The box of a grid, and so its outliers, is in the turned frame already.
+        if !self.cloud.rotated || matches!(self.source, Source::Grid(_)) {
+            return sample;
+        }
+        let frame = frame();
+        let turn = |p: Vec3| {
+            let [a, b, c] = [0, 1, 2].map(|k| scale(frame[k], p[k]));
+            add(add(a, b), c)
+        };
+        Sample {
+            position: turn(sample.position),
+            normal: turn(sample.normal),
+        }
+    }
+}
+
+/// The rotation as its three unit axes.
+fn frame() -> [Vec3; 3] {
+    FRAME.map(|axis| axis.map(|c| c as f64 / 3.0))
+}

@@ -1,0 +1,80 @@
+//! The list of surfaces.
+
+use std::{fmt, str::FromStr};
+
+use crate::error::Error;
+
+/// A surface with known geometry and topology.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Kind {
+    /// A sphere.
+    Sphere,
+    /// A torus around the z axis, its tube 0.4 of the ring.
+    Torus,
+    /// A bumpy smooth closed surface of genus 5.
+    Bumpy,
+    /// A height field with hills and roughness over a square.
+    Terrain,
+    /// Two rooms with a doorway, a pillar and a table, seen from inside; genus 4.
+    Room,
+    /// A square.
+    Plane,
+    /// An exact integer grid in a plane.
+    Grid,
+}
+
+impl Kind {
+    /// All kinds.
+    pub const ALL: [Kind; 7] = [
+        Kind::Sphere,
+        Kind::Torus,
+        Kind::Bumpy,
+        Kind::Terrain,
+        Kind::Room,
+        Kind::Plane,
+        Kind::Grid,
+    ];
+
+    /// Name as on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Kind::Sphere => "sphere",
+            Kind::Torus => "torus",
+            Kind::Bumpy => "bumpy",
+            Kind::Terrain => "terrain",
+            Kind::Room => "room",
+            Kind::Plane => "plane",
+            Kind::Grid => "grid",
+        }
+    }
+
+    /// Euler characteristic of the surface if it is closed: 2 - 2 * genus.
+    pub fn euler_characteristic(self) -> Option<i64> {
+        match self {
+            Kind::Sphere => Some(2),
+            Kind::Torus => Some(0),
+            Kind::Bumpy => Some(-8),
+            Kind::Room => Some(-6),
+            Kind::Terrain | Kind::Plane | Kind::Grid => None,
+        }
+    }
+}
+
+impl fmt::Display for Kind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for Kind {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self, Error> {
+        let names = Kind::ALL.map(Kind::name).join(", ");
+        Kind::ALL
+            .into_iter()
+            .find(|kind| kind.name() == text)
+            .ok_or_else(|| Error::parameter("kind", text, format!("one of {names}")))
+    }
+}

@@ -1,0 +1,29 @@
+//! Point clouds with known ground truth, for tests and measurements.
+//!
+//! A [`Cloud`] describes a cloud: the surface ([`Kind`]), the number of points, the seed and what
+//! a real scanner would do to it (noise, outliers, duplicates, uneven density). Its
+//! [`Generator`] makes any point on demand, and [`Cloud::write`] streams all of them to a file, in
+//! a few megabytes of memory whatever the number of points.
+//!
+//! Every point is a pure function of the description and its index, and all transcendental
+//! functions come from `libm`: the same description gives the same bytes everywhere.
+//!
+//! Surfaces other than the grid are centred on the origin before the offset; the grid starts at
+//! the origin.
+
+mod cloud;
+mod error;
+mod generator;
+mod kind;
+mod picker;
+mod rng;
+mod surface;
+mod vec3;
+mod write;
+
+pub use cloud::{Cloud, NoiseMode, Order};
+pub use error::{Error, Result};
+pub use generator::Generator;
+pub use kind::Kind;
+pub use surface::Sample;
+pub use write::{Encoding, Format, LasOptions, PointFormat, Precision};

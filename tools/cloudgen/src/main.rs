@@ -1,0 +1,248 @@
+//! Command line of the cloud generator.
+
+use std::{path::PathBuf, process::ExitCode};
+
+use clap::{Parser, ValueEnum};
+use outcrop_cloudgen::{Cloud, Format, Kind, LasOptions, NoiseMode, Order, PointFormat, Result};
+
+/// Writes a point cloud with known ground truth. Equal arguments give equal files.
+#[derive(Debug, Parser)]
+#[command(name = "cloudgen", version, allow_negative_numbers = true)]
+struct Args {
+    /// Surface: sphere, torus, bumpy (genus 5), terrain, room (genus 4), plane or grid
+    kind: Kind,
+
+    /// Number of points, e.g. 1e6, 100k or 10M
+    #[arg(short, long, value_name = "N", default_value = "100k", value_parser = parse_count)]
+    points: u64,
+
+    /// Output file; its extension decides on the format: .las, .laz, .ply, .xyz
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+
+    /// Format: las, laz, ply-{le,be,ascii}-{f32,f64} or xyz [default: by extension; .ply is
+    /// ply-le-f64]
+    #[arg(long, value_name = "NAME")]
+    format: Option<Format>,
+
+    /// Seed of all random numbers
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u64,
+
+    /// Diagonal of the bounding box; a grid grows beyond it if unit steps need more
+    #[arg(long, value_name = "UNITS", default_value_t = 1000.0)]
+    size: f64,
+
+    /// Standard deviation of gaussian noise
+    #[arg(long, value_name = "SIGMA", default_value_t = 0.0)]
+    noise: f64,
+
+    /// Direction of the noise
+    #[arg(long, value_enum, value_name = "MODE", default_value = "normal")]
+    noise_mode: NoiseModeArg,
+
+    /// Fraction of points anywhere in an inflated box
+    #[arg(long, value_name = "FRACTION", default_value_t = 0.0)]
+    outliers: f64,
+
+    /// Fraction of points that are exact copies of others
+    #[arg(long, value_name = "FRACTION", default_value_t = 0.0)]
+    duplicates: f64,
+
+    /// Let the density fall with the squared distance from a scanner
+    #[arg(long)]
+    falloff: bool,
+
+    /// Place of that scanner in fractions of the bounding box, e.g. 0.5,0.5,2
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_triple, allow_hyphen_values = true)]
+    scanner: Option<Triple>,
+
+    /// Put the points on lines, RATIO times closer along than across
+    #[arg(long, value_name = "RATIO")]
+    scanlines: Option<f64>,
+
+    /// Turn everything by the frame (2 1 2)/3, (-2 2 1)/3, (-1 -2 2)/3; a grid stays integer
+    #[arg(long)]
+    rotated: bool,
+
+    /// Added to every coordinate, e.g. 500000,5400000,300
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_triple, allow_hyphen_values = true)]
+    offset: Option<Triple>,
+
+    /// Order of the points; `lines` is `sorted` for scan lines
+    #[arg(long, value_enum, value_name = "ORDER", default_value = "random")]
+    order: OrderArg,
+
+    /// Write N files NAME-0.EXT, NAME-1.EXT, ..., a random partition
+    #[arg(long, value_name = "N")]
+    split: Option<u32>,
+
+    /// LAS point format, 0 or 6
+    #[arg(long, value_name = "N", default_value = "0", value_parser = parse_point_format)]
+    point_format: PointFormat,
+
+    /// Step of LAS coordinates [default: 0.001; 1/1024 for a grid]
+    #[arg(long, value_name = "STEP")]
+    scale: Option<f64>,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum NoiseModeArg {
+    /// Along the surface normal
+    Normal,
+    /// The same in every direction
+    Isotropic,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum OrderArg {
+    /// No order
+    Random,
+    /// Along a sweep over the surface
+    #[value(alias = "lines")]
+    Sorted,
+}
+
+/// Three coordinates; a type of its own since clap reads a bare array as repeated values.
+#[derive(Clone, Copy, Debug)]
+struct Triple([f64; 3]);
+
+/// Reads 1000000, 1_000_000, 1e6, 2.5M, 100k or 1G.
+fn parse_count(text: &str) -> Result<u64, String> {
+    let plain = text.replace('_', "");
+    let (digits, unit) = match plain.char_indices().last() {
+        Some((at, 'k' | 'K')) => (&plain[..at], 1e3),
+        Some((at, 'm' | 'M')) => (&plain[..at], 1e6),
+        Some((at, 'g' | 'G')) => (&plain[..at], 1e9),
+        _ => (plain.as_str(), 1.0),
+    };
+    let count = digits
+        .parse::<f64>()
+        .map_or(f64::NAN, |number| number * unit);
+    // Forms such as 4.1M are not exact in binary.
+    let whole = count.round();
+    if (0.0..9e15).contains(&whole) && (count - whole).abs() < 1e-6 * count.max(1.0) {
+        Ok(whole as u64)
+    } else {
+        Err("expected a whole number such as 250000, 1e6, 100k or 10M".to_owned())
+    }
+}
+
+fn parse_triple(text: &str) -> Result<Triple, String> {
+    let numbers: Vec<f64> = text
+        .split(',')
+        .filter_map(|part| part.trim().parse().ok())
+        .collect();
+    match (text.split(',').count(), numbers.as_slice()) {
+        (3, &[x, y, z]) => Ok(Triple([x, y, z])),
+        _ => Err("expected three numbers separated by commas".to_owned()),
+    }
+}
+
+fn parse_point_format(text: &str) -> Result<PointFormat, String> {
+    match text {
+        "0" => Ok(PointFormat::Legacy),
+        "6" => Ok(PointFormat::Extended),
+        _ => Err("expected 0 or 6".to_owned()),
+    }
+}
+
+fn run(args: &Args) -> Result<()> {
+    let mut cloud = Cloud::new(args.kind)
+        .points(args.points)
+        .seed(args.seed)
+        .size(args.size)
+        .noise(args.noise)
+        .noise_mode(match args.noise_mode {
+            NoiseModeArg::Normal => NoiseMode::Normal,
+            NoiseModeArg::Isotropic => NoiseMode::Isotropic,
+        })
+        .outliers(args.outliers)
+        .duplicates(args.duplicates)
+        .falloff(args.falloff)
+        .rotated(args.rotated)
+        .order(match args.order {
+            OrderArg::Random => Order::Random,
+            OrderArg::Sorted => Order::Sorted,
+        });
+    cloud.scanner = args.scanner.map(|Triple(place)| place);
+    cloud.scanlines = args.scanlines;
+    cloud.offset = args.offset.map_or([0.0; 3], |Triple(offset)| offset);
+    let format = match args.format {
+        Some(format) => format,
+        None => Format::from_path(&args.output)?,
+    };
+    let options = LasOptions {
+        point_format: args.point_format,
+        scale: args.scale,
+    };
+    let format = format.with_las_options(options);
+    match args.split {
+        Some(parts) => cloud.write_split(&args.output, format, parts).map(drop),
+        None => cloud.write(&args.output, format),
+    }
+}
+
+/// The message of a usage error on one line, without the usage text.
+fn one_line(error: &clap::Error) -> String {
+    let text = error.to_string();
+    let lines = text
+        .lines()
+        .take_while(|line| !line.trim().is_empty())
+        .map(str::trim);
+    lines.collect::<Vec<_>>().join(" ")
+}
+
+fn main() -> ExitCode {
+    let args = match Args::try_parse() {
+        Ok(args) => args,
+        Err(error) if !error.use_stderr() => error.exit(),
+        Err(error) => {
+            eprintln!("{}", one_line(&error));
+            return ExitCode::from(2);
+        }
+    };
+    match run(&args) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn counts() {
+        for (text, count) in [
+            ("0", 0),
+            ("1234567", 1_234_567),
+            ("1_000", 1000),
+            ("1e6", 1_000_000),
+            ("2.5e3", 2500),
+            ("100k", 100_000),
+            ("10M", 10_000_000),
+            ("4.1M", 4_100_000),
+            ("1G", 1_000_000_000),
+        ] {
+            assert_eq!(parse_count(text), Ok(count), "{text}");
+        }
+        for text in ["", "k", "-1", "1.5", "1e30", "nan", "ten", "1kk"] {
+            assert!(parse_count(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn triples() {
+        assert_eq!(
+            parse_triple("1, -2.5,3e2").map(|t| t.0),
+            Ok([1.0, -2.5, 300.0])
+        );
+        for text in ["", "1,2", "1,2,3,4", "1,x,2,3", "1,2,"] {
+            assert!(parse_triple(text).is_err(), "{text}");
+        }
+    }
+}

@@ -1,0 +1,68 @@
+//! The error type.
+
+use std::path::{Path, PathBuf};
+
+/// Result with this program's [`Error`].
+pub(crate) type Result<T, E = Error> = std::result::Result<T, E>;
+
+/// Why no image came out.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum Error {
+    /// The operating system refused to read or write a file.
+    #[error("{path}: cannot {action}: {source}", path = path.display())]
+    Io {
+        path: PathBuf,
+        action: &'static str,
+        source: std::io::Error,
+    },
+    /// The input is not a PLY file that can be drawn.
+    #[error("{path}: {place}: {what}", path = path.display())]
+    Ply {
+        path: PathBuf,
+        place: String,
+        what: String,
+    },
+    /// A setting is out of range.
+    #[error("{name}: {found} is not valid, expected {expected}")]
+    Parameter {
+        name: &'static str,
+        found: String,
+        expected: &'static str,
+    },
+    /// The image could not be encoded.
+    #[error("{path}: cannot write the PNG: {source}", path = path.display())]
+    Png {
+        path: PathBuf,
+        source: png::EncodingError,
+    },
+}
+
+impl Error {
+    pub(crate) fn io(path: &Path, action: &'static str, source: std::io::Error) -> Self {
+        Error::Io {
+            path: path.to_path_buf(),
+            action,
+            source,
+        }
+    }
+
+    pub(crate) fn ply(path: &Path, place: impl Into<String>, what: impl Into<String>) -> Self {
+        Error::Ply {
+            path: path.to_path_buf(),
+            place: place.into(),
+            what: what.into(),
+        }
+    }
+
+    pub(crate) fn parameter(
+        name: &'static str,
+        found: impl std::fmt::Display,
+        expected: &'static str,
+    ) -> Self {
+        Error::Parameter {
+            name,
+            found: found.to_string(),
+            expected,
+        }
+    }
+}

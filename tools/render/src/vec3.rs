@@ -1,0 +1,29 @@
+//! The few vector operations that drawing needs.
+
+pub(crate) type Vec3 = [f64; 3];
+
+pub(crate) fn sub(a: Vec3, b: Vec3) -> Vec3 {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+pub(crate) fn dot(a: Vec3, b: Vec3) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+pub(crate) fn cross(a: Vec3, b: Vec3) -> Vec3 {
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
+}
+
+/// `a` at length one; the zero vector stays zero.
+pub(crate) fn normalize(a: Vec3) -> Vec3 {
+    let length = dot(a, a).sqrt();
+    if length > 0.0 {
+        a.map(|c| c / length)
+    } else {
+        a
+    }
+}
