@@ -1,3 +1,4 @@
 //! Questions a user asks of a cloud or a mesh.
 
+pub mod ply_mesh;
 pub mod verify;

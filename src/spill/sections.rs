@@ -75,6 +75,20 @@ impl<const N: usize> Sections<N> {
         self.places().iter().map(|p| p.records).sum()
     }
 
+    /// Writes a further section and gives its number.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn append(&self, records: &[Record<N>]) -> Result<usize> {
+        let section = {
+            let mut places = self.places();
+            places.push(Place::default());
+            places.len() - 1
+        };
+        self.put(section, records)?;
+        Ok(section)
+    }
+
     /// Writes a section; an earlier content of it is forgotten.
     ///
     /// # Errors

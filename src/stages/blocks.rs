@@ -13,7 +13,10 @@ impl Blocks {
     /// Blocks of `size` ids for `points` points.
     #[must_use]
     pub fn new(points: usize, size: u32) -> Self {
-        Self { points: points as u32, size: size.max(1) }
+        Self {
+            points: points as u32,
+            size: size.max(1),
+        }
     }
 
     /// Number of points.
@@ -50,6 +53,8 @@ impl Blocks {
     /// The other blocks that the vertices of ascending `ids` lie in, besides that of the first.
     pub fn visited(&self, [i, j, k]: [u32; 3]) -> impl Iterator<Item = u32> + use<> {
         let (a, b, c) = (self.of(i), self.of(j), self.of(k));
-        [(b != a).then_some(b), (c != b).then_some(c)].into_iter().flatten()
+        [(b != a).then_some(b), (c != b).then_some(c)]
+            .into_iter()
+            .flatten()
     }
 }

@@ -5,10 +5,17 @@ pub mod order;
 
 pub mod tiles;
 
+pub mod smooth;
+
 pub mod cells;
 
 pub mod triples;
 
 pub mod stitch;
 
+pub mod repair;
+
+pub mod export;
+
 pub mod blocks;
+pub mod surface;

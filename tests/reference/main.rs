@@ -256,6 +256,20 @@ fn edges_of_three_triangles_and_vertices_by_excess_are_flagged() {
     assert_eq!(found.flagged, BTreeSet::from(other));
 }
 
+#[test]
+fn of_points_in_one_place_only_the_first_is_seen() {
+    for seed in 20..24 {
+        for (name, points) in clouds::one_of_each(seed) {
+            let mut points = cells::in_id_order(&points);
+            let count = points.len();
+            points.extend_from_within(..count / 2);
+            for triple in cells::triples(&points, &varied(seed)[1], 1000.0).keys() {
+                assert!((triple[2] as usize) < count, "{name} {seed} {triple:?}");
+            }
+        }
+    }
+}
+
 /// What cells see never has an edge with three T3; other triples have.
 #[test]
 fn triples_with_any_counts_make_manifolds() {

@@ -108,7 +108,11 @@ fn fit_from(source: &mut impl Source, neighbors: usize, widenings: u32) -> Resul
         let plane = moments.plane();
         if plane.spans || used.len() < wanted || round == widenings {
             let last2 = used.last().map_or(0, |n| n.distance2);
-            return Ok(Some(Fit { plane, moments, last2 }));
+            return Ok(Some(Fit {
+                plane,
+                moments,
+                last2,
+            }));
         }
         wanted *= 2;
     }
@@ -127,11 +131,17 @@ impl CellMaker {
     /// For planes of `neighbors` neighbours and disks of `radius`.
     #[must_use]
     pub fn new(neighbors: usize, radius: DiskRadius) -> Self {
-        Self { neighbors, radius, cell: Cell::new(0, [0, 0, 1 << 24], 1.0) }
+        Self {
+            neighbors,
+            radius,
+            cell: Cell::new(0, [0, 0, 1 << 24], 1.0),
+        }
     }
 
     fn start(&mut self, id: u32, fit: &Fit) -> bool {
-        let Some(normal) = fit.plane.normal else { return false };
+        let Some(normal) = fit.plane.normal else {
+            return false;
+        };
         let radius = match self.radius {
             DiskRadius::Auto => (fit.last2 as f64).sqrt(),
             DiskRadius::Steps(steps) => steps,
@@ -186,7 +196,10 @@ impl CellMaker {
         point: Point,
         each: impl FnMut(u32, u32),
     ) -> Result<Outcome> {
-        let mut source = Walked { walk: Walk::new(store, cache, id, point), near: Vec::new() };
+        let mut source = Walked {
+            walk: Walk::new(store, cache, id, point),
+            near: Vec::new(),
+        };
         let Some(fit) = fit_from(&mut source, self.neighbors, WIDENINGS)? else {
             return Ok(Outcome::Uncertain);
         };
@@ -239,6 +252,9 @@ pub fn fit_in_store(
     point: Point,
     neighbors: usize,
 ) -> Result<Option<Fit>> {
-    let mut source = Walked { walk: Walk::new(store, cache, id, point), near: Vec::new() };
+    let mut source = Walked {
+        walk: Walk::new(store, cache, id, point),
+        near: Vec::new(),
+    };
     fit_from(&mut source, neighbors, 0)
 }

@@ -59,14 +59,23 @@ impl TileRanges {
     pub fn new(blocks: Blocks, size: u32) -> Self {
         let block = blocks.ids(0).end.max(1);
         let size = size.clamp(1, block);
-        Self { blocks, block, size, per_block: block.div_ceil(size) }
+        Self {
+            blocks,
+            block,
+            size,
+            per_block: block.div_ceil(size),
+        }
     }
 
     /// Number of tiles.
     #[must_use]
     pub fn count(&self) -> usize {
         let points = self.blocks.points();
-        if points == 0 { 0 } else { self.of(points as u32 - 1) as usize + 1 }
+        if points == 0 {
+            0
+        } else {
+            self.of(points as u32 - 1) as usize + 1
+        }
     }
 
     /// The tile of an id.
@@ -105,13 +114,11 @@ struct Counters {
 /// [`crate::Error::Cancelled`].
 pub fn cells(
     store: &PointStore,
-    blocks: Blocks,
-    tile_points: u32,
+    tiles: TileRanges,
     neighbors: usize,
     radius: DiskRadius,
     workspace: &Workspace,
 ) -> Result<(CellTriples, CellStats)> {
-    let tiles = TileRanges::new(blocks, tile_points);
     let own = Sections::create(workspace, "cells.own", tiles.count())?;
     let held = workspace.reserve("cells: exchange", EXCHANGE_BUFFER)?;
     let exchange = Exchange::new(workspace, "cells.sent", EXCHANGE_BUFFER);
@@ -123,8 +130,17 @@ pub fn cells(
     workspace.for_each_unit("cells: tile", tiles.count(), bytes, |tile| {
         let ids = tiles.ids(tile);
         let mut triples = Vec::with_capacity(ids.len() * 7);
-        one_tile(store, ids.clone(), neighbors, radius, &counters, &mut triples)?;
-        counters.raw.fetch_add(triples.len() as u64, Ordering::Relaxed);
+        one_tile(
+            store,
+            ids.clone(),
+            neighbors,
+            radius,
+            &counters,
+            &mut triples,
+        )?;
+        counters
+            .raw
+            .fetch_add(triples.len() as u64, Ordering::Relaxed);
         triples.sort_unstable();
         let (kept, sent) = fold(&triples, &tiles, tile as u32);
         drop(triples);
@@ -140,7 +156,14 @@ pub fn cells(
         no_plane: counters.no_plane.into_inner(),
         raw_triples: counters.raw.into_inner(),
     };
-    Ok((CellTriples { tiles, own, received }, stats))
+    Ok((
+        CellTriples {
+            tiles,
+            own,
+            received,
+        },
+        stats,
+    ))
 }
 
 fn one_tile(
@@ -180,7 +203,9 @@ fn one_tile(
             no_plane += 1;
         }
     }
-    counters.second_looks.fetch_add(uncertain.len() as u64, Ordering::Relaxed);
+    counters
+        .second_looks
+        .fetch_add(uncertain.len() as u64, Ordering::Relaxed);
     counters.no_plane.fetch_add(no_plane, Ordering::Relaxed);
     Ok(())
 }

@@ -10,7 +10,9 @@ use std::sync::Arc;
 const PROMISING: [&str; 3] = ["las", "laz", "ply"];
 
 /// Names under which text in a folder is taken for points.
-const TEXT: [&str; 9] = ["xyz", "txt", "csv", "pts", "asc", "ply", "xyzrgb", "xyzn", "neu"];
+const TEXT: [&str; 9] = [
+    "xyz", "txt", "csv", "pts", "asc", "ply", "xyzrgb", "xyzn", "neu",
+];
 
 /// The point files among `inputs`: files as they are, folders recursively, by name.
 ///

@@ -41,7 +41,10 @@ impl std::fmt::Display for Format {
 pub(super) const READABLE: &str = "LAS, LAZ, PLY or text (XYZ, CSV, PTS)";
 
 /// Bytes at the start of a file that decide its format.
-pub(super) const HEAD: usize = 64 << 10;
+const HEAD: usize = 64 << 10;
+
+/// The same for a file with a very long first line.
+const LONG_HEAD: usize = 1 << 20;
 
 /// A file's family of formats, with what was learnt on the way.
 pub(super) enum Family {
@@ -80,8 +83,8 @@ pub(super) fn family(path: &Path, head: &[u8], whole: bool) -> Family {
     if head.contains(&0) {
         return Family::Unknown(format!("{}, binary data", first_bytes(head)));
     }
-    if dialect::is_ptx(head) {
-        return Family::Foreign("PTX");
+    if let Some(name) = dialect::foreign(head) {
+        return Family::Foreign(name);
     }
     match dialect::guess(head, whole) {
         Ok(dialect) => Family::Text(dialect),
@@ -98,7 +101,10 @@ fn is_ply(head: &[u8]) -> bool {
 }
 
 fn first_bytes(head: &[u8]) -> String {
-    format!("the first bytes \"{}\"", head[..head.len().min(8)].escape_ascii())
+    format!(
+        "the first bytes \"{}\"",
+        head[..head.len().min(8)].escape_ascii()
+    )
 }
 
 /// True if the name ends, in any case, with one of the extensions.
@@ -110,7 +116,11 @@ pub(super) fn has_extension(path: &Path, extensions: &[&str]) -> bool {
 
 /// The family of an open file.
 pub(super) fn family_of(input: &Input) -> Result<Family> {
-    let head = input.head(HEAD)?;
+    let mut head = input.head(HEAD)?;
+    if !head.iter().any(|b| matches!(b, b'\n' | b'\r')) {
+        // The first line is longer.
+        head = input.head(LONG_HEAD)?;
+    }
     Ok(family(&input.path, &head, head.len() as u64 == input.bytes))
 }
 

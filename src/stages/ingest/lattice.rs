@@ -57,10 +57,15 @@ pub(super) fn choose(sources: &[Source], stats: &IngestStats, refine: u32) -> Re
 fn no_points(stats: &IngestStats) -> Error {
     let left_out = match (stats.dropped_non_finite, stats.withheld) {
         (0, 0) => String::new(),
-        (d, w) => format!(" ({d} with coordinates that are no numbers, {w} withheld were left out)"),
+        (d, w) => {
+            format!(" ({d} with coordinates that are no numbers, {w} withheld were left out)")
+        }
     };
     Error::Degenerate {
-        found: format!("{} input files hold no usable point{left_out}", stats.files.len()),
+        found: format!(
+            "{} input files hold no usable point{left_out}",
+            stats.files.len()
+        ),
     }
 }
 
@@ -78,7 +83,11 @@ fn place(sources: &[&Source], step: f64, offset: [f64; 3]) -> Option<Placed> {
             high[axis] = high[axis].max(b);
         }
     }
-    let fits = (0..3).all(|a| high[a].checked_sub(low[a]).is_some_and(|e| e < COORDINATE_LIMIT));
+    let fits = (0..3).all(|a| {
+        high[a]
+            .checked_sub(low[a])
+            .is_some_and(|e| e < COORDINATE_LIMIT)
+    });
     fits.then_some(Placed { base: low, exact })
 }
 
@@ -104,7 +113,11 @@ fn grid_step(sources: &[&Source], offset: [f64; 3]) -> Option<f64> {
     let finest = *scales.first()?;
     let common = common_divisor(&scales);
     let step = common.unwrap_or(finest);
-    let shifts = (0..3).flat_map(|a| grids[a].iter().map(move |(_, o)| (o - offset[a], offset[a])));
+    let shifts = (0..3).flat_map(|a| {
+        grids[a]
+            .iter()
+            .map(move |(_, o)| (o - offset[a], offset[a]))
+    });
     let parts = common.and_then(|step| offset_parts(step, shifts));
     if let Some(parts) = parts {
         let fine = divided(step, parts);
@@ -170,14 +183,15 @@ fn common_divisor(scales: &[f64]) -> Option<f64> {
 fn offset_parts(step: f64, shifts: impl Iterator<Item = (f64, f64)>) -> Option<i64> {
     let mut parts = 1i64;
     for (shift, origin) in shifts {
-        let noise = (shift.abs() + 2.0 * origin.abs()) * f64::EPSILON / step;
+        // What rounding offsets to doubles may have moved them, in steps.
+        let noise = 1e-9 + (shift.abs() + 2.0 * origin.abs()) * f64::EPSILON / step;
         let steps = shift / step;
         let on = |q: i64| {
             let x = steps * q as f64;
-            (x - x.round()).abs() <= (1e-6 + noise) * q as f64
+            (x - x.round()).abs() <= noise * q as f64
         };
-        // Beyond a tenth of a part the test would accept anything.
-        let most = MOST_REFINEMENT.min((0.1 / (1e-6 + noise)) as i64);
+        // With more parts, any offset would meet some of them by chance.
+        let most = MOST_REFINEMENT.min((0.1 / noise.sqrt()) as i64).max(1);
         let q = (1..=most).find(|q| on(parts * q))?;
         parts *= q;
         if parts > MOST_REFINEMENT {

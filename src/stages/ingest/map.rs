@@ -141,7 +141,13 @@ impl SourceMap {
     }
 
     /// Positions of a frame of the source, less `base`.
-    pub(super) fn apply(&self, native: Native, frame: &FrameBuffer, base: [i64; 3], out: &mut Vec<[i64; 3]>) {
+    pub(super) fn apply(
+        &self,
+        native: Native,
+        frame: &FrameBuffer,
+        base: [i64; 3],
+        out: &mut Vec<[i64; 3]>,
+    ) {
         out.clear();
         out.resize(frame.points, [0; 3]);
         for axis in 0..3 {
@@ -239,7 +245,10 @@ mod tests {
     fn finds_ratios_of_decimals() {
         assert_eq!(rational(0.01 / 0.001, 100), Some((10, 1)));
         assert_eq!(rational(0.00025 / 0.001, 100), Some((1, 4)));
-        assert_eq!(rational(1.000_000_000_000_000_2e-6 / 1e-7, 100), Some((10, 1)));
+        assert_eq!(
+            rational(1.000_000_000_000_000_2e-6 / 1e-7, 100),
+            Some((10, 1))
+        );
         assert_eq!(rational(std::f64::consts::PI, 1000), None);
         assert_eq!(rational(1e300, 1000), None);
         assert_eq!(rational(1e-300, 1000), None);

@@ -64,8 +64,8 @@ pub struct Spool {
 /// is reserved per unit of work, a few MiB a thread.
 ///
 /// # Errors
-/// [`crate::Error::Input`] for a file that is not what it claims to be, [`crate::Error::Io`], [`crate::Error::Disk`],
-/// [`crate::Error::Memory`], [`crate::Error::Cancelled`].
+/// [`crate::Error::Input`] for a file that is not what it claims to be; [`crate::Error::Io`],
+/// [`crate::Error::Disk`], [`crate::Error::Memory`], [`crate::Error::Cancelled`].
 pub fn ingest(inputs: &[PathBuf], workspace: &Workspace) -> Result<Spool> {
     let file = SpoolFile::create(workspace)?;
     let mut sources = Vec::new();

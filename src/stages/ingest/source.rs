@@ -6,10 +6,7 @@ use super::stats::{NOT_FIXED, SourceStats};
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Native {
     /// Integers; the coordinate is `i * scale + offset`.
-    Las {
-        scale: [f64; 3],
-        offset: [f64; 3],
-    },
+    Las { scale: [f64; 3], offset: [f64; 3] },
     /// Single precision.
     F32,
     /// Double precision.

@@ -210,11 +210,11 @@ impl<T: Coordinate> Sink<'_, T> {
         }
         self.stats.kept += self.points.len() as u64;
         for point in &self.points {
-            for axis in 0..3 {
-                let value = point[axis].value();
+            for (axis, coordinate) in point.iter().enumerate() {
+                let value = coordinate.value();
                 self.stats.min[axis] = self.stats.min[axis].min(value);
                 self.stats.max[axis] = self.stats.max[axis].max(value);
-                self.stats.exponent = self.stats.exponent.min(point[axis].exponent());
+                self.stats.exponent = self.stats.exponent.min(coordinate.exponent());
             }
         }
         self.bytes.truncate(HEADER);
@@ -282,7 +282,11 @@ impl SpoolFile {
         let wanted = buffer.len();
         self.file.read_exact_at(buffer, offset).map_err(|e| {
             if e.kind() == std::io::ErrorKind::UnexpectedEof {
-                self.damaged(offset, "the end of the file".into(), format!("{wanted} bytes"))
+                self.damaged(
+                    offset,
+                    "the end of the file".into(),
+                    format!("{wanted} bytes"),
+                )
             } else {
                 Error::io(&self.path, format!("read {wanted} bytes"), e)
             }
@@ -309,7 +313,10 @@ impl SpoolFile {
             return Err(self.damaged(
                 offset,
                 format!("frame header {words:08x?}"),
-                format!("a frame of at most {FRAME} points of one of {} sources", sources.len()),
+                format!(
+                    "a frame of at most {FRAME} points of one of {} sources",
+                    sources.len()
+                ),
             ));
         }
         let bytes = points * sources[source].native.point_bytes();

@@ -114,7 +114,9 @@ impl Spool {
         {
             let mut at = lock(next);
             *at = match *at {
-                Some(now) => self.file.next_frame(&self.sources, now, &mut buffers.frame)?,
+                Some(now) => self
+                    .file
+                    .next_frame(&self.sources, now, &mut buffers.frame)?,
                 None => None,
             };
             if at.is_none() {

@@ -32,7 +32,12 @@ impl Orderer {
         let buffer = (workspace.memory.available() / 3).max(16 << 20);
         // Growing a buffer holds the old and the new one for a moment.
         let held = workspace.reserve("order: sort buffer", buffer + buffer / 2)?;
-        Ok(Self { sorter: Sorter::new(workspace, "order", buffer), keys: Vec::new(), taken: 0, held })
+        Ok(Self {
+            sorter: Sorter::new(workspace, "order", buffer),
+            keys: Vec::new(),
+            taken: 0,
+            held,
+        })
     }
 
     /// Takes in positions, each coordinate in `0..2^30`.
@@ -42,7 +47,11 @@ impl Orderer {
     pub fn push(&mut self, workspace: &Workspace, points: &[Point]) -> Result<()> {
         workspace.check_cancel()?;
         workspace.install(|| {
-            points.par_iter().with_min_len(1024).map(|&p| hilbert::encode(p)).collect_into_vec(&mut self.keys);
+            points
+                .par_iter()
+                .with_min_len(1024)
+                .map(|&p| hilbert::encode(p))
+                .collect_into_vec(&mut self.keys);
         });
         self.taken += points.len() as u64;
         self.sorter.push(&self.keys)
@@ -54,7 +63,12 @@ impl Orderer {
     /// # Errors
     /// [`Error::Io`], [`Error::Corrupt`], [`Error::TooManyPoints`], [`Error::Cancelled`].
     pub fn finish(self, workspace: &Workspace, page: usize) -> Result<(PointStore, u64)> {
-        let Self { sorter, taken, held, .. } = self;
+        let Self {
+            sorter,
+            taken,
+            held,
+            ..
+        } = self;
         let mut writer = StoreWriter::create(workspace, "points", page)?;
         let mut batch: Vec<hilbert::Key> = Vec::with_capacity(BATCH);
         let mut points: Vec<Point> = Vec::new();
@@ -62,7 +76,11 @@ impl Orderer {
         let mut flush = |batch: &mut Vec<hilbert::Key>| -> Result<()> {
             workspace.check_cancel()?;
             workspace.install(|| {
-                batch.par_iter().with_min_len(1024).map(|&k| hilbert::decode(k)).collect_into_vec(&mut points);
+                batch
+                    .par_iter()
+                    .with_min_len(1024)
+                    .map(|&k| hilbert::decode(k))
+                    .collect_into_vec(&mut points);
             });
             workspace.observer.advance(batch.len() as u64);
             batch.clear();
@@ -83,7 +101,10 @@ impl Orderer {
         let store = writer.finish(workspace)?;
         let limit = u64::from(u32::MAX) - 1;
         if store.len() as u64 > limit {
-            return Err(Error::TooManyPoints { found: store.len() as u64, limit });
+            return Err(Error::TooManyPoints {
+                found: store.len() as u64,
+                limit,
+            });
         }
         let folded = taken - store.len() as u64;
         Ok((store, folded))

@@ -72,7 +72,9 @@ impl PointStore {
     /// The box around all points.
     #[must_use]
     pub fn bounds(&self) -> Aabb {
-        self.levels.last().map_or(Aabb::EMPTY, |top| top.iter().fold(Aabb::EMPTY, |a, b| a.union(*b)))
+        self.levels.last().map_or(Aabb::EMPTY, |top| {
+            top.iter().fold(Aabb::EMPTY, |a, b| a.union(*b))
+        })
     }
 
     /// Number of levels of the box tree; level 0 are the pages.
@@ -118,7 +120,8 @@ impl PointStore {
         if level == 0 {
             return each(node);
         }
-        self.tree_children(level, node).all(|child| self.descend(level - 1, child, target, d2, each))
+        self.tree_children(level, node)
+            .all(|child| self.descend(level - 1, child, target, d2, each))
     }
 
     /// Reads a run of pages and appends their points to `points`.

@@ -1,16 +1,12 @@
-//! The base: T3 triangles without non-manifold edges and vertices by excess, and its orientation
-//! (paper, section 3.5, first part).
+//! The base: T3 triangles without non-manifold edges and vertices by excess (paper, section 3.5,
+//! first part).
 
-use super::parity::ParitySets;
-use super::star::{EDGES, Link, Star, Triangle, opposed};
 use crate::error::Result;
 use crate::spill::{Exchange, Sections};
 use crate::stages::blocks::Blocks;
+use crate::stages::surface::star::{Link, Star, Triangle, has, others};
 use crate::stages::triples::Triples;
 use crate::workspace::Workspace;
-use rustc_hash::FxHashMap;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicU64, Ordering};
 
 const EXCHANGE_BUFFER: u64 = 8 << 20;
 
@@ -18,9 +14,14 @@ const EXCHANGE_BUFFER: u64 = 8 << 20;
 fn t3_around(triples: &Triples, block: usize) -> Result<Vec<Triangle>> {
     let own = triples.own.get(block)?;
     let visiting = triples.visiting.get(block)?;
-    let visiting = visiting.iter().filter(|r| r[4] == 3).map(|r| [r[1], r[2], r[3]]);
+    let visiting = visiting
+        .iter()
+        .filter(|r| r[4] == 3)
+        .map(|r| [r[1], r[2], r[3]]);
     // Visitors have their smallest vertex in a lower block, so they come first.
-    Ok(visiting.chain(own.iter().filter(|r| r[3] == 3).map(|r| [r[0], r[1], r[2]])).collect())
+    Ok(visiting
+        .chain(own.iter().filter(|r| r[3] == 3).map(|r| [r[0], r[1], r[2]]))
+        .collect())
 }
 
 /// Bytes that working on a block takes.
@@ -65,10 +66,15 @@ pub fn flag(triples: &Triples, blocks: Blocks, workspace: &Workspace) -> Result<
 fn refused(v: u32, star: &Star, triangles: &[Triangle], link: &mut Link, flagged: &mut Vec<u32>) {
     let around = star.at(v);
     let degree = |node: u32| {
-        around.iter().filter(|&&n| super::star::has(triangles[n as usize], node)).count()
+        around
+            .iter()
+            .filter(|&&n| has(triangles[n as usize], node))
+            .count()
     };
     let crowded = |n: u32| {
-        super::star::others(triangles[n as usize], v).into_iter().any(|node| degree(node) > 2)
+        others(triangles[n as usize], v)
+            .into_iter()
+            .any(|node| degree(node) > 2)
     };
     let any_crowded = around.len() > 3 && around.iter().any(|&n| crowded(n));
     let kept: Vec<u32> = if any_crowded {
@@ -82,285 +88,31 @@ fn refused(v: u32, star: &Star, triangles: &[Triangle], link: &mut Link, flagged
         return;
     }
     // Triangles are numbered ascending, so the first in a cycle is the smallest in any cycle.
-    let Some(first) = (0..kept.len()).find(|&i| link.is_closed(link.group(i))) else { return };
+    let Some(first) = (0..kept.len()).find(|&i| link.is_closed(link.group(i))) else {
+        return;
+    };
     let keep = link.group(first);
-    flagged.extend((0..kept.len()).filter(|&i| link.group(i) != keep).map(|i| kept[i]));
-}
-
-/// The oriented base.
-#[derive(Debug)]
-pub struct Base {
-    /// `[i, j, k, label << 1 | flip]` of interior triangles by block; labels are the block's own.
-    pub interior: Sections<4>,
-    /// `[block, i, j, k, label << 1 | flip]` of crossing triangles for each block they touch;
-    /// labels are global.
-    pub crossing: Sections<5>,
-    /// For each block, the global label of its label 0 and the number of labels that are global.
-    pub globals: Vec<(u32, u32)>,
-    /// For each block, the number of its labels.
-    pub labels: Vec<u32>,
-    /// Relations of the global labels.
-    pub sets: ParitySets,
-    /// Which roots have a crossing triangle.
-    pub crosses: Vec<bool>,
-    /// Triangles removed because they close a Möbius band.
-    pub mobius: u64,
-    /// Triangles in the base.
-    pub triangles: u64,
-    _held: crate::workspace::memory::Reservation,
+    flagged.extend(
+        (0..kept.len())
+            .filter(|&i| link.group(i) != keep)
+            .map(|i| kept[i]),
+    );
 }
 
 /// The base triangles that touch a block: crossing ones of lower blocks first, then its own.
-fn base_around(triples: &Triples, flags: &Sections<4>, block: usize) -> Result<Vec<Triangle>> {
+pub(super) fn base_around(
+    triples: &Triples,
+    flags: &Sections<4>,
+    block: usize,
+) -> Result<Vec<Triangle>> {
     let mut triangles = t3_around(triples, block)?;
     let flags = flags.get(block)?;
     if !flags.is_empty() {
-        triangles.retain(|t| flags.binary_search(&[block as u32, t[0], t[1], t[2]]).is_err());
+        triangles.retain(|t| {
+            flags
+                .binary_search(&[block as u32, t[0], t[1], t[2]])
+                .is_err()
+        });
     }
     Ok(triangles)
-}
-
-/// Orients the base: interior triangles of every block by themselves, then the crossing ones.
-///
-/// # Errors
-/// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
-/// [`crate::Error::Cancelled`].
-pub fn orient(
-    triples: &Triples,
-    flags: &Sections<4>,
-    blocks: Blocks,
-    workspace: &Workspace,
-) -> Result<Base> {
-    let interior = Sections::create(workspace, "stitch.base", blocks.count())?;
-    let relations = {
-        let _held = workspace.reserve("stitch: exchange", EXCHANGE_BUFFER)?;
-        let exchange = Exchange::<6>::new(workspace, "stitch.relations", EXCHANGE_BUFFER);
-        let labels = Mutex::new(vec![(0u32, 0u32); blocks.count()]);
-        let (mobius, triangles) = (AtomicU64::new(0), AtomicU64::new(0));
-        let bytes = |block| block_bytes(triples, block);
-        workspace.for_each_unit("stitch: block", blocks.count(), bytes, |block| {
-            let around = base_around(triples, flags, block)?;
-            let done = orient_block(&around, blocks, block);
-            interior.put(block, &done.interior)?;
-            exchange.send(&done.relations)?;
-            labels.lock().unwrap_or_else(std::sync::PoisonError::into_inner)[block] =
-                (done.global, done.labels);
-            mobius.fetch_add(done.mobius, Ordering::Relaxed);
-            triangles.fetch_add(done.interior.len() as u64, Ordering::Relaxed);
-            Ok(())
-        })?;
-        let labels = labels.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
-        let delivered = exchange.deliver(workspace, blocks.count())?;
-        (delivered, labels, mobius.into_inner(), triangles.into_inner())
-    };
-    let (relations, labels, mobius, triangles) = relations;
-    let mut globals = Vec::with_capacity(labels.len());
-    let mut next = 0u32;
-    for (global, _) in &labels {
-        globals.push((next, *global));
-        next += global;
-    }
-    let held = workspace.reserve("stitch: labels", u64::from(next) * 10 + 1024)?;
-    let mut base = Base {
-        interior,
-        crossing: Sections::create(workspace, "stitch.empty", 0)?,
-        globals,
-        labels: labels.into_iter().map(|(_, all)| all).collect(),
-        sets: ParitySets::new(next as usize),
-        crosses: vec![false; next as usize],
-        mobius,
-        triangles,
-        _held: held,
-    };
-    orient_crossing(&mut base, triples, flags, &relations, blocks, workspace)?;
-    Ok(base)
-}
-
-struct OrientedBlock {
-    interior: Vec<[u32; 4]>,
-    /// `[owner block, i, j, k, this block, label << 1 | flip]`: what an interior triangle of this
-    /// block asks of the crossing triangle `i, j, k`.
-    relations: Vec<[u32; 6]>,
-    /// Number of labels that occur in relations; they come first.
-    global: u32,
-    labels: u32,
-    mobius: u64,
-}
-
-fn orient_block(around: &[Triangle], blocks: Blocks, block: usize) -> OrientedBlock {
-    let ids = blocks.ids(block);
-    let (inner, crossing): (Vec<Triangle>, Vec<Triangle>) =
-        around.iter().partition(|t| !blocks.crossing(**t));
-    let mut star = Star::with_room(ids.clone(), inner.iter().copied());
-    let mut sets = ParitySets::new(inner.len());
-    let mut kept = Vec::with_capacity(inner.len());
-    let mut mobius = 0;
-    for (number, &t) in inner.iter().enumerate() {
-        let number = number as u32;
-        // Either all adjacent triangles agree and are joined, or the triangle goes.
-        let asks: Vec<(u32, bool)> = adjacent(t, &star, &inner, &ids).collect();
-        if !consistent(&mut sets, &asks) {
-            mobius += 1;
-            continue;
-        }
-        for (other, flip) in asks {
-            sets.join(other, number, flip);
-        }
-        star.add(t, number);
-        kept.push(number);
-    }
-    let mut relations = Vec::new();
-    for &c in &crossing {
-        for (other, flip) in adjacent(c, &star, &inner, &ids) {
-            relations.push((c, other, flip));
-        }
-    }
-    number_labels(&inner, &kept, &relations, &mut sets, blocks, block, mobius)
-}
-
-/// Gives labels to the sets, those in relations first, both in order of first appearance.
-fn number_labels(
-    inner: &[Triangle],
-    kept: &[u32],
-    relations: &[(Triangle, u32, bool)],
-    sets: &mut ParitySets,
-    blocks: Blocks,
-    block: usize,
-    mobius: u64,
-) -> OrientedBlock {
-    let mut labels: FxHashMap<u32, u32> = FxHashMap::default();
-    let mut sent = Vec::with_capacity(relations.len());
-    for &(c, other, flip) in relations {
-        let (root, turned) = sets.find(other);
-        let next = labels.len() as u32;
-        let label = *labels.entry(root).or_insert(next);
-        let word = label << 1 | u32::from(flip ^ turned);
-        sent.push([blocks.of(c[0]), c[0], c[1], c[2], block as u32, word]);
-    }
-    let global = labels.len() as u32;
-    let mut interior = Vec::with_capacity(kept.len());
-    for &number in kept {
-        let (root, turned) = sets.find(number);
-        let next = labels.len() as u32;
-        let label = *labels.entry(root).or_insert(next);
-        let t = inner[number as usize];
-        interior.push([t[0], t[1], t[2], label << 1 | u32::from(turned)]);
-    }
-    OrientedBlock { interior, relations: sent, global, labels: labels.len() as u32, mobius }
-}
-
-/// Triangles in the star that share an edge inside the block with `t`, and whether `t` must be
-/// turned against them.
-fn adjacent<'a>(
-    t: Triangle,
-    star: &'a Star,
-    triangles: &'a [Triangle],
-    ids: &'a std::ops::Range<u32>,
-) -> impl Iterator<Item = (u32, bool)> + 'a {
-    EDGES.into_iter().filter(move |(a, b, ..)| ids.contains(&t[*a]) && ids.contains(&t[*b])).flat_map(
-        move |(a, b, ..)| {
-            let (low, high) = (t[a], t[b]);
-            star.at(low).iter().copied().filter_map(move |n| {
-                let other = triangles[n as usize];
-                super::star::has(other, high).then(|| (n, opposed(t, other, low, high)))
-            })
-        },
-    )
-}
-
-/// True if no two of `asks`, taken together with what is joined already, contradict each other.
-pub(super) fn consistent(sets: &mut ParitySets, asks: &[(u32, bool)]) -> bool {
-    asks.iter().enumerate().all(|(x, &(a, flip_a))| {
-        asks[..x]
-            .iter()
-            .all(|&(b, flip_b)| sets.relation(a, b).is_none_or(|turned| turned == (flip_a ^ flip_b)))
-    })
-}
-
-/// The crossing triangles in ascending order, each against those before it.
-fn orient_crossing(
-    base: &mut Base,
-    triples: &Triples,
-    flags: &Sections<4>,
-    relations: &Sections<6>,
-    blocks: Blocks,
-    workspace: &Workspace,
-) -> Result<()> {
-    let _held = workspace.reserve("stitch: exchange", EXCHANGE_BUFFER)?;
-    let exchange = Exchange::<5>::new(workspace, "stitch.crossing", EXCHANGE_BUFFER);
-    let mut edges: FxHashMap<(u32, u32), Vec<(Triangle, u32)>> = FxHashMap::default();
-    for group in 0..blocks.count() {
-        workspace.check_cancel()?;
-        let relations = relations.get(group)?;
-        let mut sent = Vec::new();
-        let own = triples.own.get(group)?;
-        let flags = flags.get(group)?;
-        for r in own.iter().filter(|r| r[3] == 3 && blocks.crossing([r[0], r[1], r[2]])) {
-            let t = [r[0], r[1], r[2]];
-            if flags.binary_search(&[group as u32, t[0], t[1], t[2]]).is_ok() {
-                continue;
-            }
-            let Some(word) = orient_one(base, t, &relations, group as u32, &edges) else {
-                base.mobius += 1;
-                continue;
-            };
-            base.triangles += 1;
-            for (a, b, ..) in EDGES {
-                edges.entry((t[a], t[b])).or_default().push((t, word));
-            }
-            sent.push([blocks.of(t[0]), t[0], t[1], t[2], word]);
-            sent.extend(blocks.visited(t).map(|b| [b, t[0], t[1], t[2], word]));
-        }
-        exchange.send(&sent)?;
-        // A triangle at an edge has its smallest vertex at or below the edge's.
-        edges.retain(|(low, _), _| blocks.of(*low) > group as u32);
-    }
-    base.crossing = exchange.deliver(workspace, blocks.count())?;
-    base.sets.flatten();
-    // Crossing marks were set on labels; what counts is the set.
-    for label in 0..base.sets.len() as u32 {
-        if base.crosses[label as usize] {
-            let (root, _) = base.sets.find(label);
-            base.crosses[root as usize] = true;
-        }
-    }
-    Ok(())
-}
-
-/// Joins one crossing triangle; its label and flip, or `None` if it closes a Möbius band.
-fn orient_one(
-    base: &mut Base,
-    t: Triangle,
-    relations: &[[u32; 6]],
-    group: u32,
-    edges: &FxHashMap<(u32, u32), Vec<(Triangle, u32)>>,
-) -> Option<u32> {
-    let key = [group, t[0], t[1], t[2]];
-    let start = relations.partition_point(|r| r[..4] < key[..]);
-    let mut asks: Vec<(u32, bool)> = relations[start..]
-        .iter()
-        .take_while(|r| r[..4] == key[..])
-        .map(|r| (base.globals[r[4] as usize].0 + (r[5] >> 1), r[5] & 1 == 1))
-        .collect();
-    for (a, b, ..) in EDGES {
-        for &(other, word) in edges.get(&(t[a], t[b])).into_iter().flatten() {
-            let flip = opposed(t, other, t[a], t[b]) ^ (word & 1 == 1);
-            asks.push((word >> 1, flip));
-        }
-    }
-    if !consistent(&mut base.sets, &asks) {
-        return None;
-    }
-    let (label, flip) = match asks.first() {
-        Some(&first) => first,
-        None => {
-            base.crosses.push(false);
-            (base.sets.push(), false)
-        }
-    };
-    for &(other, turned) in &asks {
-        base.sets.join(label, other, flip ^ turned);
-    }
-    base.crosses[label as usize] = true;
-    Some(label << 1 | u32::from(flip))
 }

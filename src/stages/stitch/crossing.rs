@@ -1,10 +1,7 @@
 //! T12 insertion across blocks (paper, section 3.5, second part): block by block in ascending
 //! order, with only the surroundings of borders that are still needed in memory.
 
-use super::base::{Base, consistent};
 use super::interior::{Home, Interior, NOTHING};
-use super::parity::ParitySets;
-use super::star::Triangle;
 use super::tests_of_paper::{Adjacent, Rank, Refusal, View, examine, rank};
 use super::{InsertStats, SharedStats};
 use crate::error::Result;
@@ -12,6 +9,9 @@ use crate::geom::Point;
 use crate::spill::{Exchange, Sections};
 use crate::stages::blocks::Blocks;
 use crate::stages::order::PointStore;
+use crate::stages::surface::orient::{Oriented, consistent};
+use crate::stages::surface::parity::ParitySets;
+use crate::stages::surface::star::Triangle;
 use crate::stages::triples::Triples;
 use crate::workspace::Workspace;
 use crate::workspace::memory::Reservation;
@@ -40,7 +40,7 @@ struct Tri {
 /// The surroundings of the borders of the blocks that are loaded.
 struct Context<'a> {
     store: &'a PointStore,
-    base: &'a Base,
+    base: &'a Oriented,
     interior: &'a Interior,
     blocks: Blocks,
     sets: ParitySets,
@@ -79,12 +79,15 @@ impl View for Context<'_> {
 /// # Errors
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
 /// [`crate::Error::Cancelled`].
-#[expect(clippy::too_many_arguments, reason = "the inputs of a stage, each used once")]
+#[expect(
+    clippy::too_many_arguments,
+    reason = "the inputs of a stage, each used once"
+)]
 pub fn insert(
     store: &PointStore,
     triples: &Triples,
     flags: &Sections<4>,
-    base: &mut Base,
+    base: &mut Oriented,
     interior: &Interior,
     blocks: Blocks,
     cos_max_angle: f64,
@@ -130,7 +133,7 @@ pub fn insert(
 }
 
 /// The crossing triangles of the base belong to the mesh as well.
-fn send_base(base: &Base, blocks: Blocks, added: &Exchange<4>) -> Result<()> {
+fn send_base(base: &Oriented, blocks: Blocks, added: &Exchange<4>) -> Result<()> {
     for block in 0..blocks.count() {
         let records = base.crossing.get(block)?;
         let records: Vec<_> = records.iter().map(|r| [r[0], r[1], r[2], r[3]]).collect();
@@ -161,7 +164,10 @@ impl Lives {
                 }
             }
         }
-        let mut lives = Self { begin: vec![Vec::new(); count], end: vec![Vec::new(); count] };
+        let mut lives = Self {
+            begin: vec![Vec::new(); count],
+            end: vec![Vec::new(); count],
+        };
         for block in 0..count {
             lives.begin[first[block] as usize].push(block as u32);
             lives.end[last[block] as usize].push(block as u32);
@@ -173,7 +179,7 @@ impl Lives {
 impl<'a> Context<'a> {
     fn new(
         store: &'a PointStore,
-        base: &'a Base,
+        base: &'a Oriented,
         interior: &'a Interior,
         blocks: Blocks,
         sets: ParitySets,
@@ -212,7 +218,11 @@ impl<'a> Context<'a> {
             } else {
                 home.number
             };
-            let tri = Tri { ids: [r[0], r[1], r[2]], label, flip: home.flip };
+            let tri = Tri {
+                ids: [r[0], r[1], r[2]],
+                label,
+                flip: home.flip,
+            };
             let number = self.put(tri);
             self.hang(number, block as u32);
         }
@@ -220,14 +230,24 @@ impl<'a> Context<'a> {
             let ids = [r[1], r[2], r[3]];
             let known = self.crossing.get(&ids).copied();
             let number = known.unwrap_or_else(|| {
-                let number = self.put(Tri { ids, label: r[4] >> 1, flip: r[4] & 1 == 1 });
+                let number = self.put(Tri {
+                    ids,
+                    label: r[4] >> 1,
+                    flip: r[4] & 1 == 1,
+                });
                 self.crossing.insert(ids, number);
                 number
             });
             self.hang(number, block as u32);
         }
         let located = self.locate(&vertices, &near, &crossing)?;
-        self.loaded.insert(block as u32, Loaded { located, _held: held });
+        self.loaded.insert(
+            block as u32,
+            Loaded {
+                located,
+                _held: held,
+            },
+        );
         Ok(())
     }
 
@@ -291,7 +311,12 @@ impl<'a> Context<'a> {
                 self.free.push(number);
             }
         }
-        for v in self.loaded.remove(&block).map(|l| l.located).unwrap_or_default() {
+        for v in self
+            .loaded
+            .remove(&block)
+            .map(|l| l.located)
+            .unwrap_or_default()
+        {
             if let Some((_, users)) = self.positions.get_mut(&v) {
                 *users -= 1;
                 if *users == 0 {
@@ -305,8 +330,11 @@ impl<'a> Context<'a> {
     fn joints(&mut self, block: usize) -> Result<Vec<[u32; 4]>> {
         let mut gone = Vec::new();
         for r in self.interior.joints.get(block)? {
-            let asks: Vec<(u32, bool)> =
-                r[3..].iter().filter(|w| **w != NOTHING).map(|w| (w >> 1, w & 1 == 1)).collect();
+            let asks: Vec<(u32, bool)> = r[3..]
+                .iter()
+                .filter(|w| **w != NOTHING)
+                .map(|w| (w >> 1, w & 1 == 1))
+                .collect();
             if consistent(&mut self.sets, &asks) {
                 self.join(&asks);
             } else {
@@ -347,7 +375,11 @@ impl<'a> Context<'a> {
         block: usize,
     ) -> Result<Vec<(Rank, u32)>> {
         let flags = flags.get(block)?;
-        let flagged = |t: Triangle| flags.binary_search(&[block as u32, t[0], t[1], t[2]]).is_ok();
+        let flagged = |t: Triangle| {
+            flags
+                .binary_search(&[block as u32, t[0], t[1], t[2]])
+                .is_ok()
+        };
         let own = triples.own.get(block)?;
         let crossing = own.iter().filter(|r| {
             let t = [r[0], r[1], r[2]];
@@ -410,7 +442,11 @@ impl<'a> Context<'a> {
             return false;
         }
         self.join(&asks);
-        let number = self.put(Tri { ids: t, label: asks[0].0, flip: asks[0].1 });
+        let number = self.put(Tri {
+            ids: t,
+            label: asks[0].0,
+            flip: asks[0].1,
+        });
         for v in t {
             self.around.entry(v).or_default().push(number);
             // A block may outlive the others that the triangle touches.

@@ -1,9 +1,7 @@
 //! T12 insertion inside a block (paper, section 3.5, second part): the candidates whose vertices
 //! are all in one block, each block by itself.
 
-use super::base::{Base, block_bytes};
-use super::parity::ParitySets;
-use super::star::{Star, Triangle};
+use super::base::block_bytes;
 use super::tests_of_paper::{Adjacent, Rank, Refusal, View, examine, rank};
 use super::{InsertStats, SharedStats};
 use crate::error::Result;
@@ -11,6 +9,9 @@ use crate::geom::Point;
 use crate::spill::Sections;
 use crate::stages::blocks::Blocks;
 use crate::stages::order::PointStore;
+use crate::stages::surface::orient::{Oriented, consistent};
+use crate::stages::surface::parity::ParitySets;
+use crate::stages::surface::star::{Star, Triangle};
 use crate::stages::triples::Triples;
 use crate::workspace::Workspace;
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -57,7 +58,11 @@ impl Home {
     /// From a word.
     #[must_use]
     pub fn from_word(word: u32) -> Self {
-        Self { number: word >> 2, local: word & 2 != 0, flip: word & 1 != 0 }
+        Self {
+            number: word >> 2,
+            local: word & 2 != 0,
+            flip: word & 1 != 0,
+        }
     }
 }
 
@@ -66,12 +71,15 @@ impl Home {
 /// # Errors
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
 /// [`crate::Error::Cancelled`].
-#[expect(clippy::too_many_arguments, reason = "the inputs of a stage, each used once")]
+#[expect(
+    clippy::too_many_arguments,
+    reason = "the inputs of a stage, each used once"
+)]
 pub fn insert(
     store: &PointStore,
     triples: &Triples,
     flags: &Sections<4>,
-    base: &Base,
+    base: &Oriented,
     blocks: Blocks,
     cos_max_angle: f64,
     stats: &SharedStats,
@@ -141,7 +149,7 @@ impl BlockWork {
         store: &PointStore,
         triples: &Triples,
         flags: &Sections<4>,
-        base: &Base,
+        base: &Oriented,
         blocks: Blocks,
         block: usize,
     ) -> Result<Self> {
@@ -152,7 +160,11 @@ impl BlockWork {
         let own = store.slice(ids.start as usize..ids.end as usize)?;
         let mut border = FxHashSet::default();
         let mut mark = |t: Triangle| border.extend(t.into_iter().filter(|v| ids.contains(v)));
-        triples.visiting.get(block)?.iter().for_each(|r| mark([r[1], r[2], r[3]]));
+        triples
+            .visiting
+            .get(block)?
+            .iter()
+            .for_each(|r| mark([r[1], r[2], r[3]]));
         let at = |v: u32| own[(v - ids.start) as usize];
         let mut candidates = Vec::new();
         for &[i, j, k, count] in &triples.own.get(block)? {
@@ -192,7 +204,13 @@ impl BlockWork {
         Ok(work)
     }
 
-    fn add_base(&mut self, interior: &[[u32; 4]], crossing: &[[u32; 5]], base: &Base, block: usize) {
+    fn add_base(
+        &mut self,
+        interior: &[[u32; 4]],
+        crossing: &[[u32; 5]],
+        base: &Oriented,
+        block: usize,
+    ) {
         let (first, globals) = base.globals[block];
         // Nodes: the block's own labels; those whose set has a crossing triangle are one node for
         // each set, shared with the crossing triangles.
@@ -200,7 +218,11 @@ impl BlockWork {
         let mut of_label: Vec<(u32, bool)> = Vec::with_capacity(base.labels[block] as usize);
         let mut node_for = |work: &mut Self, label: u32| {
             let (root, flip) = base.sets.look(label);
-            let global = if base.crosses[root as usize] { root } else { NOTHING };
+            let global = if base.crosses[root as usize] {
+                root
+            } else {
+                NOTHING
+            };
             let node = *node_of_root.entry(root).or_insert_with(|| {
                 work.global.push(global);
                 work.global.len() as u32 - 1
@@ -236,8 +258,12 @@ impl BlockWork {
 
     fn fetch_foreign(&mut self, store: &PointStore) -> Result<()> {
         let crossing = &self.triangles[self.interior_base..];
-        let mut ids: Vec<u32> =
-            crossing.iter().flatten().copied().filter(|v| !self.ids.contains(v)).collect();
+        let mut ids: Vec<u32> = crossing
+            .iter()
+            .flatten()
+            .copied()
+            .filter(|v| !self.ids.contains(v))
+            .collect();
         ids.sort_unstable();
         ids.dedup();
         let mut points = Vec::with_capacity(ids.len());
@@ -286,7 +312,7 @@ impl BlockWork {
                 (home, flip ^ up ^ turned)
             })
             .collect();
-        let (fits, home) = (super::base::consistent(&mut self.joined, &asks), asks[0]);
+        let (fits, home) = (consistent(&mut self.joined, &asks), asks[0]);
         // Absorbed homes are joined too, so one check covers both.
         if !fits {
             return false;
@@ -329,7 +355,8 @@ impl BlockWork {
         }
         if globals.len() > 1 {
             globals.resize(3, NOTHING);
-            self.joints.push([t[0], t[1], t[2], globals[0], globals[1], globals[2]]);
+            self.joints
+                .push([t[0], t[1], t[2], globals[0], globals[1], globals[2]]);
         }
     }
 
@@ -347,7 +374,10 @@ impl BlockWork {
                 leftovers.push([t[0], t[1], t[2], count]);
                 context.extend(t);
             } else {
-                stats.add(&InsertStats { unconnected: 1, ..InsertStats::default() });
+                stats.add(&InsertStats {
+                    unconnected: 1,
+                    ..InsertStats::default()
+                });
             }
         }
         let mut mesh = Vec::with_capacity(self.triangles.len());
@@ -361,7 +391,17 @@ impl BlockWork {
                 let label = self.global[root as usize];
                 let local = label == NOTHING;
                 let number = if local { root } else { label };
-                around.push([t[0], t[1], t[2], Home { number, local, flip: flip ^ up }.word()]);
+                around.push([
+                    t[0],
+                    t[1],
+                    t[2],
+                    Home {
+                        number,
+                        local,
+                        flip: flip ^ up,
+                    }
+                    .word(),
+                ]);
             }
         }
         mesh.sort_unstable();

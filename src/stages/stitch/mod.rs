@@ -7,8 +7,6 @@
 mod base;
 mod crossing;
 mod interior;
-pub mod parity;
-pub mod star;
 mod tests_of_paper;
 
 pub use tests_of_paper::normal;
@@ -17,6 +15,7 @@ use crate::error::Result;
 use crate::spill::Sections;
 use crate::stages::blocks::Blocks;
 use crate::stages::order::PointStore;
+use crate::stages::surface::orient::orient;
 use crate::stages::triples::Triples;
 use crate::workspace::Workspace;
 use serde::Serialize;
@@ -82,7 +81,10 @@ pub(crate) struct SharedStats(Mutex<InsertStats>);
 
 impl SharedStats {
     fn add(&self, more: &InsertStats) {
-        let mut all = self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let mut all = self
+            .0
+            .lock()
+            .unwrap_or_else(std::sync::PoisonError::into_inner);
         all.accepted += more.accepted;
         all.unconnected += more.unconnected;
         all.full_edge += more.full_edge;
@@ -100,26 +102,51 @@ impl SharedStats {
 /// [`crate::Error::Cancelled`].
 pub fn stitch(
     store: &PointStore,
-    triples: &Triples,
+    triples: Triples,
     blocks: Blocks,
     cos_max_angle: f64,
     workspace: &Workspace,
 ) -> Result<(Stitched, BaseStats, InsertStats)> {
+    let triples = &triples;
     let flags = base::flag(triples, blocks, workspace)?;
-    let mut base = base::orient(triples, &flags, blocks, workspace)?;
-    let mut counts = BaseStats { mobius: base.mobius, triangles: base.triangles, flagged: 0 };
+    let around = |block| base::base_around(triples, &flags, block);
+    let bytes = |block| base::block_bytes(triples, block);
+    let mut base = orient("stitch.base", around, bytes, blocks, workspace)?;
+    let mut counts = BaseStats {
+        mobius: base.mobius,
+        triangles: base.triangles,
+        flagged: 0,
+    };
     for block in 0..blocks.count() {
         let flagged = flags.get(block)?;
         counts.flagged += flagged.iter().filter(|r| blocks.of(r[1]) == r[0]).count() as u64;
     }
     let stats = SharedStats::default();
     let interior = interior::insert(
-        store, triples, &flags, &base, blocks, cos_max_angle, &stats, workspace,
+        store,
+        triples,
+        &flags,
+        &base,
+        blocks,
+        cos_max_angle,
+        &stats,
+        workspace,
     )?;
     let crossing = crossing::insert(
-        store, triples, &flags, &mut base, &interior, blocks, cos_max_angle, &stats, workspace,
+        store,
+        triples,
+        &flags,
+        &mut base,
+        &interior,
+        blocks,
+        cos_max_angle,
+        &stats,
+        workspace,
     )?;
-    let inserted = stats.0.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+    let inserted = stats
+        .0
+        .into_inner()
+        .unwrap_or_else(std::sync::PoisonError::into_inner);
     let stitched = Stitched {
         interior: interior.mesh,
         added: crossing.added,

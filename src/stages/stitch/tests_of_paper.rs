@@ -1,8 +1,8 @@
 //! The tests that a T12 triangle must pass (paper, section 3.5): combinatorial I to III and the
 //! geometric one. Test IV is with the callers, who know the components.
 
-use super::star::{EDGES, Triangle, has, opposed, others};
 use crate::geom::{Point, sub};
+use crate::stages::surface::star::{EDGES, Triangle, has, opposed, others};
 
 /// The mesh around the vertices of a triangle.
 pub trait View {
@@ -68,10 +68,15 @@ pub fn examine(
     }
     let mut adjacent = [None; 3];
     for (edge, (a, b, c, _)) in EDGES.into_iter().enumerate() {
-        let Some((number, other)) = found[edge] else { continue };
+        let Some((number, other)) = found[edge] else {
+            continue;
+        };
         let far = others_than(other, t[a], t[b]);
-        if !angle_fits([t[a], t[b], t[c]].map(|v| view.position(v)), view.position(far), cos_max_angle)
-        {
+        if !angle_fits(
+            [t[a], t[b], t[c]].map(|v| view.position(v)),
+            view.position(far),
+            cos_max_angle,
+        ) {
             return Err(Refusal::Angle);
         }
         adjacent[edge] = Some((number, opposed(t, other, t[a], t[b])));
@@ -94,7 +99,12 @@ fn makes_excess(t: Triangle, v: u32, view: &impl View) -> bool {
         return false;
     }
     // A link without ends is closed already.
-    let degree = |node: u32| edges.iter().filter(|(a, b)| *a == node || *b == node).count();
+    let degree = |node: u32| {
+        edges
+            .iter()
+            .filter(|(a, b)| *a == node || *b == node)
+            .count()
+    };
     if edges.iter().all(|&(a, b)| degree(a) == 2 && degree(b) == 2) {
         return true;
     }
@@ -103,12 +113,16 @@ fn makes_excess(t: Triangle, v: u32, view: &impl View) -> bool {
     let mut used = vec![false; edges.len()];
     let mut steps = 0;
     while node != goal {
-        let next = (0..edges.len())
-            .find(|&e| !used[e] && (edges[e].0 == node || edges[e].1 == node));
+        let next =
+            (0..edges.len()).find(|&e| !used[e] && (edges[e].0 == node || edges[e].1 == node));
         let Some(edge) = next else { return false };
         used[edge] = true;
         steps += 1;
-        node = if edges[edge].0 == node { edges[edge].1 } else { edges[edge].0 };
+        node = if edges[edge].0 == node {
+            edges[edge].1
+        } else {
+            edges[edge].0
+        };
     }
     steps < edges.len()
 }
@@ -117,15 +131,19 @@ fn makes_excess(t: Triangle, v: u32, view: &impl View) -> bool {
 #[must_use]
 pub fn normal(a: Point, b: Point, c: Point) -> [i128; 3] {
     let (u, v) = (sub(b, a).map(i128::from), sub(c, a).map(i128::from));
-    [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]
+    [
+        u[1] * v[2] - u[2] * v[1],
+        u[2] * v[0] - u[0] * v[2],
+        u[0] * v[1] - u[1] * v[0],
+    ]
 }
 
 /// Do `a b c` and its neighbour `b a far` across the edge `a b` agree?
 fn angle_fits([a, b, c]: [Point; 3], far: Point, cos_max_angle: f64) -> bool {
-    let n = normal(a, b, c).map(|x| x as f64);
-    let m = normal(b, a, far).map(|x| x as f64);
-    let dot = |x: [f64; 3], y: [f64; 3]| x[0] * y[0] + x[1] * y[1] + x[2] * y[2];
-    dot(n, m) >= cos_max_angle * (dot(n, n).sqrt() * dot(m, m).sqrt())
+    let n = normal(a, b, c);
+    let m = normal(b, a, far);
+    let dot = |x: [i128; 3], y: [i128; 3]| (x[0] * y[0] + x[1] * y[1] + x[2] * y[2]) as f64;
+    dot(n, m) >= cos_max_angle * dot(n, n).sqrt() * dot(m, m).sqrt()
 }
 
 /// The order in which candidates are tried: class, square of the longest edge, ids.

@@ -109,14 +109,20 @@ impl Tile {
     fn index(&mut self, reaches: Vec<(usize, u64, Vec<usize>)>) {
         for local in 0..self.pages.len() {
             let points = &self.points[self.range(local)];
-            self.leaf_boxes.extend(points.chunks(self.leaf).map(Aabb::of));
+            self.leaf_boxes
+                .extend(points.chunks(self.leaf).map(Aabb::of));
             self.leaf_boxes.resize((local + 1) * LEAVES, Aabb::EMPTY);
         }
         for (number, reach2, near) in reaches {
             let begin = self.near.len();
-            self.near.extend(near.iter().filter_map(|p| self.pages.binary_search(p).ok()));
+            self.near
+                .extend(near.iter().filter_map(|p| self.pages.binary_search(p).ok()));
             if let Ok(local) = self.pages.binary_search(&number) {
-                self.own.push(OwnPage { local, near: begin..self.near.len(), reach2 });
+                self.own.push(OwnPage {
+                    local,
+                    near: begin..self.near.len(),
+                    reach2,
+                });
             }
         }
     }

@@ -65,7 +65,18 @@ impl Tile {
                         self.gather(own, &Aabb::of(&[point]), *limit, search);
                     }
                     search.list(point, id, None, *limit);
-                    each(id, point, Some(Query { tile: self, own, search, point, id, complete2: *limit }));
+                    each(
+                        id,
+                        point,
+                        Some(Query {
+                            tile: self,
+                            own,
+                            search,
+                            point,
+                            id,
+                            complete2: *limit,
+                        }),
+                    );
                 }
             }
         }
@@ -73,7 +84,13 @@ impl Tile {
 
     /// An upper bound of the squared distance of the `k`th neighbour for each point of a group,
     /// from the points around it in curve order.
-    fn limits(&self, group: std::ops::Range<usize>, k: usize, window: &mut Vec<u64>, out: &mut Vec<u64>) {
+    fn limits(
+        &self,
+        group: std::ops::Range<usize>,
+        k: usize,
+        window: &mut Vec<u64>,
+        out: &mut Vec<u64>,
+    ) {
         let side = (k + 1).max(32);
         let around = group.start.saturating_sub(side)..(group.end + side).min(self.points.len());
         out.clear();
@@ -84,7 +101,11 @@ impl Tile {
             }
             let point = self.points[index];
             window.clear();
-            window.extend(self.points[around.clone()].iter().map(|&p| distance2(p, point)));
+            window.extend(
+                self.points[around.clone()]
+                    .iter()
+                    .map(|&p| distance2(p, point)),
+            );
             // The point itself is among them, at distance 0.
             out.push(*window.select_nth_unstable(k).1);
         }
@@ -105,7 +126,9 @@ impl Tile {
                 }
                 let first = leaf * self.leaf;
                 let last = (first + self.leaf).min(range.len());
-                search.candidates.extend_from_slice(&self.points[range.start + first..range.start + last]);
+                search
+                    .candidates
+                    .extend_from_slice(&self.points[range.start + first..range.start + last]);
                 let id = self.id(local, first) as u32;
                 search.ids.extend(id..id + (last - first) as u32);
             }
@@ -162,7 +185,11 @@ impl Search {
         let id = self.ids[rank];
         if id != own {
             let difference = sub(self.candidates[rank], point);
-            self.near.push(Near { distance2, id, difference });
+            self.near.push(Near {
+                distance2,
+                id,
+                difference,
+            });
         }
     }
 }
@@ -196,8 +223,10 @@ impl Query<'_> {
             return false;
         }
         self.search.swap_aside();
-        self.tile.gather(self.own, &Aabb::of(&[self.point]), distance2, self.search);
-        self.search.list(self.point, self.id, Some(self.complete2), distance2);
+        self.tile
+            .gather(self.own, &Aabb::of(&[self.point]), distance2, self.search);
+        self.search
+            .list(self.point, self.id, Some(self.complete2), distance2);
         self.search.swap_aside();
         self.complete2 = distance2;
         true

@@ -71,7 +71,13 @@ impl<'a> Walk<'a> {
             .enumerate()
             .map(|(index, b)| Reverse((b.distance2(point), Item::Node { level, index })))
             .collect();
-        Self { store, cache, id, point, queue }
+        Self {
+            store,
+            cache,
+            id,
+            point,
+            queue,
+        }
     }
 
     /// The next neighbour, nearest first by (distance, id), of those in boxes that `wanted` lets
@@ -84,7 +90,11 @@ impl<'a> Walk<'a> {
             match item {
                 Item::Point { id, at } => {
                     let difference = sub(at, self.point);
-                    return Ok(Some(Near { distance2: distance, id, difference }));
+                    return Ok(Some(Near {
+                        distance2: distance,
+                        id,
+                        difference,
+                    }));
                 }
                 Item::Node { level, index } => {
                     if !wanted(&self.store.tree_boxes(level)[index]) {
@@ -100,7 +110,10 @@ impl<'a> Walk<'a> {
                         }
                     } else {
                         for child in self.store.tree_children(level, index) {
-                            let node = Item::Node { level: level - 1, index: child };
+                            let node = Item::Node {
+                                level: level - 1,
+                                index: child,
+                            };
                             let d2 = self.store.tree_boxes(level - 1)[child].distance2(self.point);
                             self.queue.push(Reverse((d2, node)));
                         }

@@ -40,7 +40,7 @@ pub struct TripleStats {
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
 /// [`crate::Error::Cancelled`].
 pub fn triples(
-    cells: &CellTriples,
+    cells: CellTriples,
     blocks: Blocks,
     workspace: &Workspace,
 ) -> Result<(Triples, TripleStats)> {
@@ -50,7 +50,9 @@ pub fn triples(
     let counts: [AtomicU64; 4] = Default::default();
     let bytes = |block: usize| {
         let tiles = cells.tiles.of_block(block);
-        tiles.map(|t| 50 * (cells.own.records(t) + cells.received.records(t)) as u64).sum()
+        tiles
+            .map(|t| 50 * (cells.own.records(t) + cells.received.records(t)) as u64)
+            .sum()
     };
     workspace.for_each_unit("triples: block", blocks.count(), bytes, |block| {
         let mut all = Vec::new();
@@ -77,7 +79,16 @@ pub fn triples(
     let visiting = exchange.deliver(workspace, blocks.count())?;
     drop(held);
     let [t1, t2, t3, crossing] = counts.map(AtomicU64::into_inner);
-    Ok((Triples { own, visiting }, TripleStats { triples: t1 + t2 + t3, t3, t2, t1, crossing }))
+    Ok((
+        Triples { own, visiting },
+        TripleStats {
+            triples: t1 + t2 + t3,
+            t3,
+            t2,
+            t1,
+            crossing,
+        },
+    ))
 }
 
 /// Merges two ascending lists, adding up counts; `received` may hold a triple more than once.
@@ -92,7 +103,9 @@ fn merge(own: &[[u32; 4]], received: &[[u32; 5]], all: &mut Vec<[u32; 4]>) {
             (None, Some(_)) => false,
             (None, None) => break,
         };
-        let Some(next) = (if take_a { a.next() } else { b.next() }) else { break };
+        let Some(next) = (if take_a { a.next() } else { b.next() }) else {
+            break;
+        };
         match all.last_mut() {
             Some(last) if last[..3] == next[..3] => last[3] += next[3],
             _ => all.push(next),

@@ -3,14 +3,15 @@
 use super::super::contain::contain;
 use super::super::input::{Input, u32_at};
 use super::super::spool::Sink;
+use super::gps::GpsTimes;
 use super::table::Chunk;
 use super::vlr::{Laszip, layers};
 use super::{Header, Record, position};
 use crate::error::{Error, Result};
-use laz::LazItem;
 use laz::record::{
     LayeredPointRecordDecompressor, RecordDecompressor, SequentialPointRecordDecompressor,
 };
+use laz::{LazItem, LazItemType};
 use std::io::{Cursor, Read};
 
 /// Bytes decoded between two looks at the sink.
@@ -112,7 +113,7 @@ impl Decoder<'_> {
         }
         let source = Cursor::new(head.reduced(self.input)?);
         let mut decoder = LayeredPointRecordDecompressor::new(source);
-        self.set_items(&mut decoder, self.laszip.items[..1].to_vec())?;
+        self.add_item(&mut decoder, &self.laszip.items[0])?;
         self.points(&mut decoder, chunk.at, chunk.points, sink)
     }
 
@@ -125,18 +126,21 @@ impl Decoder<'_> {
         sink: &mut Sink<'_, i32>,
     ) -> Result<R> {
         let mut decoder = SequentialPointRecordDecompressor::new(source);
-        self.set_items(&mut decoder, self.laszip.items.clone())?;
+        for item in &self.laszip.items {
+            if item.item_type() == LazItemType::GpsTime && item.version() == 2 {
+                decoder.add_field_decompressor(GpsTimes::default());
+            } else {
+                self.add_item(&mut decoder, item)?;
+            }
+        }
         self.points(&mut decoder, at, points, sink)?;
         Ok(decoder.into_inner())
     }
 
-    fn set_items<R>(
-        &self,
-        decoder: &mut impl RecordDecompressor<R>,
-        items: Vec<LazItem>,
-    ) -> Result<()> {
-        let done = contain(|| decoder.set_fields_from(&items));
-        done.and_then(|r| r.map_err(|e| e.to_string())).map_err(|why| {
+    fn add_item<R>(&self, decoder: &mut impl RecordDecompressor<R>, item: &LazItem) -> Result<()> {
+        let done = contain(|| decoder.set_fields_from(&vec![*item]));
+        let done = done.and_then(|r| r.map_err(|e| e.to_string()));
+        done.map_err(|why| {
             self.input
                 .error("laszip record", why, "items that can be decoded")
         })

@@ -15,7 +15,11 @@ const MODELS_PER_BYTE: u64 = 4 << 10;
 /// Chunks of whole points up to this size are decoded from memory.
 const IN_MEMORY: u64 = 8 << 20;
 
-pub(super) fn read(input: &Input, header: &Header, writer: &SourceWriter<'_>) -> Result<Vec<String>> {
+pub(super) fn read(
+    input: &Input,
+    header: &Header,
+    writer: &SourceWriter<'_>,
+) -> Result<Vec<String>> {
     let mut warnings = Vec::new();
     let workspace = writer.workspace;
     let laszip = vlr::read(input, header)?;
@@ -78,7 +82,9 @@ fn in_parallel(decoder: &Decoder<'_>, chunks: &[Chunk], writer: &SourceWriter<'_
             decoder.layers(chunk, &mut sink)?;
         } else if chunk.bytes <= IN_MEMORY {
             let mut bytes = vec![0u8; chunk.bytes as usize];
-            decoder.input.read_exact_at(chunk.at, &mut bytes, "LAZ chunk")?;
+            decoder
+                .input
+                .read_exact_at(chunk.at, &mut bytes, "LAZ chunk")?;
             decoder.stream(&bytes[..], chunk.at, chunk.points, &mut sink)?;
         } else {
             let source = decoder.input.stream(chunk.at, chunk.at + chunk.bytes);
@@ -140,7 +146,10 @@ fn limit(
         return Err(input.error(
             "point count in the header",
             format!("{claimed} points"),
-            format!("at most {present}, those of the {} chunks", table.chunks.len()),
+            format!(
+                "at most {present}, those of the {} chunks",
+                table.chunks.len()
+            ),
         ));
     }
     // With chunks of one size, only the count in the header says how full the last one is.

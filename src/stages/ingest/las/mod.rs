@@ -1,6 +1,7 @@
 //! LAS 1.0 to 1.4 and LAZ.
 
 mod chunks;
+mod gps;
 mod header;
 mod laz;
 mod plain;
@@ -18,7 +19,11 @@ use super::spool::SourceWriter;
 use crate::error::Result;
 
 /// Reads a LAS or LAZ file into the spool; returns what the user should know.
-pub(super) fn read(input: &Input, header: &Header, writer: &SourceWriter<'_>) -> Result<Vec<String>> {
+pub(super) fn read(
+    input: &Input,
+    header: &Header,
+    writer: &SourceWriter<'_>,
+) -> Result<Vec<String>> {
     if header.compressed {
         laz::read(input, header, writer)
     } else {

@@ -8,7 +8,11 @@ use crate::error::Result;
 /// Bytes of records read at one time.
 const SLAB: u64 = 2 << 20;
 
-pub(super) fn read(input: &Input, header: &Header, writer: &SourceWriter<'_>) -> Result<Vec<String>> {
+pub(super) fn read(
+    input: &Input,
+    header: &Header,
+    writer: &SourceWriter<'_>,
+) -> Result<Vec<String>> {
     let mut warnings = Vec::new();
     let record_bytes = u64::from(header.record_bytes);
     let points = count(input, header, &mut warnings)?;
@@ -62,7 +66,9 @@ fn count(input: &Input, header: &Header, warnings: &mut Vec<String>) -> Result<u
             ),
         ));
     }
-    let left = header.data_end.saturating_sub(header.data + claimed * record_bytes);
+    let left = header
+        .data_end
+        .saturating_sub(header.data + claimed * record_bytes);
     let whole_records = left > 0 && left.is_multiple_of(record_bytes);
     if claimed == 0 && whole_records {
         // A writer that was interrupted never came back to fill the count in.

@@ -62,7 +62,11 @@ pub(super) fn read(
     let entries = contain(|| ChunkTable::read(&mut input.stream(at, input.bytes), counted));
     let entries = entries.and_then(|r| r.map_err(|e| e.to_string()));
     let entries = entries.map_err(|why| {
-        input.error(format!("chunk table at byte {at}"), why, format!("{count} entries"))
+        input.error(
+            format!("chunk table at byte {at}"),
+            why,
+            format!("{count} entries"),
+        )
     })?;
     let mut chunks = Vec::with_capacity(entries.len());
     let mut start = first;

@@ -96,7 +96,10 @@ fn parse(input: &Input, header: &Header, at: u64, record: &[u8]) -> Result<Laszi
         (3, true) => Layout::Layers,
         (other, _) => {
             return wrong(
-                format!("compressor {other} for point format {}", header.point_format),
+                format!(
+                    "compressor {other} for point format {}",
+                    header.point_format
+                ),
                 "1 or 2 for point formats 0 to 5, 3 for 6 to 10".into(),
             );
         }

@@ -2,8 +2,8 @@
 
 use super::super::input::{Input, Range, STREAM_BUFFER};
 use super::super::spool::{SourceWriter, sink_bytes};
-use super::header::{Body, Header, Property, Scalar, Vertex};
 use super::FromScalar;
+use super::header::{Body, Header, Property, Scalar, Vertex};
 use crate::error::{Error, Result};
 use std::io::{BufReader, Read};
 
@@ -102,8 +102,8 @@ fn fixed<T: FromScalar>(
             "PLY header, element vertex",
             format!("{} vertices", vertex.count),
             format!(
-                "at most the {present} records of {bytes} bytes between byte {start} and the end of \
-                 the file at byte {}",
+                "at most the {present} records of {bytes} bytes between byte {start} and the end \
+                 of the file at byte {}",
                 input.bytes
             ),
         ));
@@ -187,10 +187,8 @@ impl<'a> Records<'a> {
                     return Err(std::io::Error::other(format!("a list of {count} items")));
                 }
                 let bytes = count as u64 * item.bytes() as u64;
-                let skipped = std::io::copy(
-                    &mut self.source.by_ref().take(bytes),
-                    &mut std::io::sink(),
-                )?;
+                let skipped =
+                    std::io::copy(&mut self.source.by_ref().take(bytes), &mut std::io::sink())?;
                 if skipped < bytes {
                     return Err(std::io::ErrorKind::UnexpectedEof.into());
                 }

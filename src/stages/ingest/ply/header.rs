@@ -103,7 +103,11 @@ impl Header {
                 None if whole || most >= LONGEST => {
                     return Err(input.error(
                         "PLY header",
-                        if whole { "the end of the file" } else { "no end in 1 MiB" },
+                        if whole {
+                            "the end of the file"
+                        } else {
+                            "no end in 1 MiB"
+                        },
                         "a line \"end_header\"",
                     ));
                 }
@@ -131,7 +135,8 @@ impl<'a> Parser<'a> {
         };
         // Lines end with CR alone only if the first one does.
         let first_end = head.iter().position(|b| matches!(b, b'\n' | b'\r'));
-        let old_mac = first_end.is_some_and(|e| head[e] == b'\r' && head.get(e + 1) != Some(&b'\n'));
+        let old_mac =
+            first_end.is_some_and(|e| head[e] == b'\r' && head.get(e + 1) != Some(&b'\n'));
         let end = if old_mac { b'\r' } else { b'\n' };
         let mut at = 0;
         while let Some(length) = head[at..].iter().position(|b| *b == end) {

@@ -40,9 +40,15 @@ impl Header {
 }
 
 /// Reads a PLY file into the spool; returns what the user should know.
-pub(super) fn read(input: &Input, header: &Header, writer: &SourceWriter<'_>) -> Result<Vec<String>> {
+pub(super) fn read(
+    input: &Input,
+    header: &Header,
+    writer: &SourceWriter<'_>,
+) -> Result<Vec<String>> {
     if header.vertex.is_none() {
-        return Ok(vec!["the header has no element \"vertex\", so there are no points".into()]);
+        return Ok(vec![
+            "the header has no element \"vertex\", so there are no points".into(),
+        ]);
     }
     match (header.body, header.native()) {
         (Body::Ascii, Native::F32) => ascii::read::<f32>(input, header, writer),

@@ -134,7 +134,11 @@ fn lines(head: &[u8], whole: bool) -> Vec<(usize, usize, &[u8])> {
 
 /// Guesses how the points are written, or says why this is no text with points.
 pub(in super::super) fn guess(head: &[u8], whole: bool) -> Result<Dialect, String> {
-    let mark = if head.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 };
+    let mark = if head.starts_with(b"\xef\xbb\xbf") {
+        3
+    } else {
+        0
+    };
     let lines = lines(&head[mark..], whole);
     let Some(&(_, first_end, first)) = lines.first() else {
         return Err("no line with numbers".into());
@@ -167,7 +171,10 @@ pub(in super::super) fn guess(head: &[u8], whole: bool) -> Result<Dialect, Strin
             }
         }
     }
-    Err(format!("text that is no list of points, \"{}\"", shown(first)))
+    Err(format!(
+        "text that is no list of points, \"{}\"",
+        shown(first)
+    ))
 }
 
 /// True if the first data line is a point; later lines may be wrong, with an error that says where.
@@ -206,14 +213,38 @@ fn named_columns(header: &[u8]) -> Option<[usize; 3]> {
 
 /// True for the header of a PCD file.
 pub(in super::super) fn is_pcd(head: &[u8]) -> bool {
-    let line = head.split(|b| matches!(b, b'\n' | b'\r')).map(<[u8]>::trim_ascii);
+    let line = head
+        .split(|b| matches!(b, b'\n' | b'\r'))
+        .map(<[u8]>::trim_ascii);
     let first = line.clone().find(|l| !l.is_empty() && !l.starts_with(b"#"));
     head.starts_with(b"# .PCD")
         || first.is_some_and(|l| l.starts_with(b"VERSION ") || l.starts_with(b"FIELDS "))
 }
 
+/// The name of a text format that holds geometry but is not read.
+pub(in super::super) fn foreign(head: &[u8]) -> Option<&'static str> {
+    let lines = lines(head, true);
+    let keyword = |line: &[u8]| {
+        let word = line.split(|b| *b == b' ').next().unwrap_or(line);
+        let known: [&[u8]; 7] = [b"v", b"vn", b"vt", b"o", b"g", b"mtllib", b"usemtl"];
+        known.contains(&word)
+    };
+    if is_ptx(head) {
+        Some("PTX")
+    } else if lines.len() > 1 && lines[..2].iter().all(|(_, _, line)| keyword(line)) {
+        Some("OBJ")
+    } else if lines
+        .first()
+        .is_some_and(|(_, _, line)| line.starts_with(b"solid "))
+    {
+        Some("STL")
+    } else {
+        None
+    }
+}
+
 /// True for the header of a PTX file: columns, rows, four lines of three and four of four numbers.
-pub(in super::super) fn is_ptx(head: &[u8]) -> bool {
+fn is_ptx(head: &[u8]) -> bool {
     let numbers = |line: &[u8]| {
         let mut decimals = 0;
         let all = words(line).all(|w| number::parse(w, false, &mut decimals).is_some());
@@ -265,7 +296,12 @@ mod tests {
 
     #[test]
     fn refuses_what_is_no_list_of_points() {
-        for text in ["", "# only a note\n", "some prose here\nand more\n", "1 2\n3 4\n"] {
+        for text in [
+            "",
+            "# only a note\n",
+            "some prose here\nand more\n",
+            "1 2\n3 4\n",
+        ] {
             assert!(guess(text.as_bytes(), true).is_err(), "{text:?}");
         }
         assert!(is_pcd(b"# .PCD v0.7\nVERSION 0.7\n"));

@@ -11,7 +11,11 @@ use dialect::{Dialect, Row};
 use lines::{LONGEST_LINE, Lines, SLAB};
 
 /// Reads a text file into the spool; returns what the user should know.
-pub(super) fn read(input: &Input, dialect: &Dialect, writer: &SourceWriter<'_>) -> Result<Vec<String>> {
+pub(super) fn read(
+    input: &Input,
+    dialect: &Dialect,
+    writer: &SourceWriter<'_>,
+) -> Result<Vec<String>> {
     let slabs = input.bytes.saturating_sub(dialect.start).div_ceil(SLAB);
     let memory = SLAB + LONGEST_LINE + sink_bytes::<f64>();
     writer.workspace.for_each_unit(

@@ -4,13 +4,19 @@ use super::super::stats::NOT_FIXED;
 
 /// Parses a number; raises `decimals` to its number of decimals, or to [`NOT_FIXED`] if it has an
 /// exponent. Words for infinities and what is not a number are numbers too.
-pub(in super::super) fn parse(token: &[u8], decimal_comma: bool, decimals: &mut u32) -> Option<f64> {
+pub(in super::super) fn parse(
+    token: &[u8],
+    decimal_comma: bool,
+    decimals: &mut u32,
+) -> Option<f64> {
     let mut copy = [0u8; 64];
     let token = if decimal_comma {
         // Longer than any sensible number.
         let copy = copy.get_mut(..token.len())?;
         copy.copy_from_slice(token);
-        copy.iter_mut().filter(|b| **b == b',').for_each(|b| *b = b'.');
+        copy.iter_mut()
+            .filter(|b| **b == b',')
+            .for_each(|b| *b = b'.');
         &*copy
     } else {
         token
@@ -22,7 +28,10 @@ pub(in super::super) fn parse(token: &[u8], decimal_comma: bool, decimals: &mut 
         Err(_) => return None,
     };
     if value.is_finite() {
-        let found = match token.iter().position(|b| !matches!(b, b'0'..=b'9' | b'+' | b'-')) {
+        let found = match token
+            .iter()
+            .position(|b| !matches!(b, b'0'..=b'9' | b'+' | b'-'))
+        {
             None => 0,
             Some(dot) if token[dot + 1..].iter().all(u8::is_ascii_digit) && token[dot] == b'.' => {
                 (token.len() - dot - 1) as u32

@@ -11,7 +11,9 @@ impl ParitySets {
     /// `count` sets of one label each.
     #[must_use]
     pub fn new(count: usize) -> Self {
-        Self { parent: (0..count as u32).map(|label| label << 1).collect() }
+        Self {
+            parent: (0..count as u32).map(|label| label << 1).collect(),
+        }
     }
 
     /// Adds a set of one new label.

@@ -63,7 +63,12 @@ impl Star {
             start[v + 1] += start[v];
         }
         let list = vec![0; start[ids.len()] as usize];
-        Self { len: vec![0; ids.len()], ids, start, list }
+        Self {
+            len: vec![0; ids.len()],
+            ids,
+            start,
+            list,
+        }
     }
 
     /// The star of all `triangles`, numbered in their order.
@@ -116,7 +121,8 @@ impl Link {
     /// Takes in the triangles around `v`.
     pub fn set(&mut self, v: u32, triangles: impl Iterator<Item = Triangle>) {
         self.edges.clear();
-        self.edges.extend(triangles.map(|t| others(t, v)).map(|[a, b]| (a, b)));
+        self.edges
+            .extend(triangles.map(|t| others(t, v)).map(|[a, b]| (a, b)));
         self.group.clear();
         self.group.resize(self.edges.len(), usize::MAX);
         self.closed.clear();

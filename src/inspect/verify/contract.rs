@@ -1,0 +1,134 @@
+//! Connected components of a graph on vertices, one range of vertices in memory at a time.
+//!
+//! Ranges come from the last to the first. Edges whose higher end is in the current range either
+//! join two vertices of it or leave it downwards. Once a range is closed it is contracted: each of
+//! its components keeps its lowest outside neighbour, and instead of its vertices that neighbour
+//! is joined to the component's other outside neighbours. A component that leaves nowhere is
+//! complete and counted.
+
+use super::buckets::Buckets;
+use super::plan::Plan;
+use crate::error::Result;
+use crate::spill::Record;
+use crate::workspace::Workspace;
+
+/// Marks a vertex not met, a component without outside neighbour.
+const NONE: u32 = u32::MAX;
+
+/// Edges remembered so as not to hand them down twice in a row.
+const RECENT: usize = 1 << 12;
+
+/// Union–find over one range of vertices.
+#[derive(Debug, Default)]
+pub(super) struct Forest {
+    first: u32,
+    parent: Vec<u32>,
+    lowest: Vec<u32>,
+}
+
+impl Forest {
+    /// Starts over with the range of `length` vertices from `first`.
+    pub(super) fn reset(&mut self, first: u32, length: usize) {
+        self.first = first;
+        for words in [&mut self.parent, &mut self.lowest] {
+            words.clear();
+            words.reserve_exact(length);
+            words.resize(length, NONE);
+        }
+    }
+
+    /// Says that a vertex of the range belongs to the graph.
+    pub(super) fn touch(&mut self, vertex: u32) {
+        let at = vertex - self.first;
+        let parent = &mut self.parent[at as usize];
+        if *parent == NONE {
+            *parent = at;
+        }
+    }
+
+    fn root(&mut self, vertex: u32) -> u32 {
+        self.touch(vertex);
+        let mut at = vertex - self.first;
+        while self.parent[at as usize] != at {
+            let up = self.parent[self.parent[at as usize] as usize];
+            self.parent[at as usize] = up;
+            at = up;
+        }
+        at
+    }
+
+    fn join(&mut self, a: u32, b: u32) {
+        let (a, b) = (self.root(a), self.root(b));
+        let (low, high) = (a.min(b), a.max(b));
+        self.parent[high as usize] = low;
+    }
+}
+
+/// A graph whose components are being counted.
+#[derive(Debug)]
+pub(super) struct Contraction {
+    /// Edges (lower end, higher end) in the bucket of the range of their higher end.
+    edges: Buckets<2>,
+    plan: Plan,
+    block: Vec<Record<2>>,
+    /// Components complete so far.
+    pub(super) complete: u64,
+}
+
+impl Contraction {
+    pub(super) fn new(workspace: &Workspace, plan: &Plan, name: &str) -> Self {
+        Self {
+            edges: Buckets::new(workspace, name, plan.ranges, plan.blocks[1]),
+            plan: plan.clone(),
+            block: Vec::new(),
+            complete: 0,
+        }
+    }
+
+    /// Adds an edge whose higher end is in the range of `forest`.
+    pub(super) fn connect(&mut self, forest: &mut Forest, low: u32, high: u32) -> Result<()> {
+        if low >= forest.first {
+            forest.join(low, high);
+            return Ok(());
+        }
+        self.edges.push(self.plan.range_of(high), [low, high])
+    }
+
+    /// Contracts range `k`, to which nothing will be added any more.
+    pub(super) fn close(&mut self, forest: &mut Forest, k: usize) -> Result<()> {
+        let mut block = std::mem::take(&mut self.block);
+        let first = forest.first;
+        let mut cursor = self.edges.cursor(k);
+        while self.edges.next(&mut cursor, &mut block)? {
+            for &[low, high] in block.iter().filter(|[low, _]| *low >= first) {
+                forest.join(low, high);
+            }
+        }
+        let mut cursor = self.edges.cursor(k);
+        while self.edges.next(&mut cursor, &mut block)? {
+            for &[low, high] in block.iter().filter(|[low, _]| *low < first) {
+                let root = forest.root(high) as usize;
+                forest.lowest[root] = forest.lowest[root].min(low);
+            }
+        }
+        let mut recent = vec![[NONE; 2]; RECENT];
+        let mut cursor = self.edges.cursor(k);
+        while self.edges.next(&mut cursor, &mut block)? {
+            for &[other, high] in block.iter().filter(|[low, _]| *low < first) {
+                let root = forest.root(high) as usize;
+                let edge = [forest.lowest[root], other];
+                let slot = &mut recent[(other ^ edge[0].rotate_left(16)) as usize % RECENT];
+                if edge[0] != other && *slot != edge {
+                    *slot = edge;
+                    self.edges.push(self.plan.range_of(other), edge)?;
+                }
+            }
+        }
+        self.edges.clear(k);
+        let roots = forest.parent.iter().zip(&forest.lowest).enumerate();
+        let complete = roots.filter(|&(i, (&up, &low))| up == i as u32 && low == NONE);
+        self.complete += complete.count() as u64;
+        self.block = block;
+        Ok(())
+    }
+}

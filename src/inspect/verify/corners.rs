@@ -1,0 +1,165 @@
+//! The triangles around each vertex of one range, side by side in memory.
+
+use super::star::{Inspector, NO_MORE, Tally};
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Vertices inspected by one task.
+const TASK: usize = 4096;
+
+/// The stars of a range of vertices, or of a part of it.
+#[derive(Debug, Default)]
+pub(super) struct Corners {
+    first: u32,
+    /// Triangles at each vertex of the range.
+    degree: Vec<u32>,
+    /// Of each vertex of the part, where its next triangle goes; in the end, the end of its star.
+    end: Vec<u32>,
+    part: Range<usize>,
+    links: Vec<[u32; 2]>,
+}
+
+impl Corners {
+    /// Starts over with the range of `length` vertices from `first`.
+    pub(super) fn reset(&mut self, first: u32, length: usize) {
+        self.first = first;
+        for words in [&mut self.degree, &mut self.end] {
+            words.clear();
+            words.reserve_exact(length);
+            words.resize(length, 0);
+        }
+    }
+
+    /// First vertex of the range.
+    pub(super) fn first(&self) -> u32 {
+        self.first
+    }
+
+    fn local(&self, vertex: u32) -> usize {
+        // Vertices below the range wrap around to numbers beyond it.
+        vertex.wrapping_sub(self.first) as usize
+    }
+
+    /// Counts the triangles at each vertex.
+    pub(super) fn count(&mut self, triangles: &[[u32; 3]]) {
+        for corner in triangles.iter().flatten() {
+            let at = self.local(*corner);
+            if let Some(degree) = self.degree.get_mut(at) {
+                *degree = degree.saturating_add(1);
+            }
+        }
+    }
+
+    /// The vertices of the range that have triangles.
+    pub(super) fn referenced(&self) -> impl Iterator<Item = u32> {
+        let degrees = (self.first..).zip(&self.degree);
+        degrees.filter(|(_, degree)| **degree > 0).map(|(v, _)| v)
+    }
+
+    /// The part from vertex `start` of the range that has at most `most` corners; one vertex at
+    /// least. Also the number of its corners.
+    pub(super) fn part_from(&self, start: usize, most: usize) -> (Range<usize>, usize) {
+        let mut corners = 0;
+        for (at, &degree) in self.degree.iter().enumerate().skip(start) {
+            if at > start && corners + degree as usize > most {
+                return (start..at, corners);
+            }
+            corners += degree as usize;
+        }
+        (start..self.degree.len(), corners)
+    }
+
+    /// Makes room for the stars of a part; they are then filled in by [`Corners::fill`].
+    pub(super) fn begin(&mut self, part: Range<usize>, corners: usize) {
+        let mut next = 0;
+        for at in part.clone() {
+            self.end[at] = next;
+            next += self.degree[at];
+        }
+        self.part = part;
+        if self.links.capacity() < corners {
+            self.links = Vec::new();
+            self.links.reserve_exact(corners);
+        }
+        self.links.resize(corners, [0; 2]);
+    }
+
+    /// Files triangles under their corners in the part.
+    pub(super) fn fill(&mut self, triangles: &[[u32; 3]]) {
+        for &[x, y, z] in triangles {
+            for (v, link) in [(x, [y, z]), (y, [z, x]), (z, [x, y])] {
+                let at = self.local(v);
+                if self.part.contains(&at) {
+                    self.links[self.end[at] as usize] = link;
+                    self.end[at] += 1;
+                }
+            }
+        }
+    }
+
+    /// Gives the memory of the stars back if it is more than `most` corners.
+    pub(super) fn trim(&mut self, most: usize) {
+        if self.links.capacity() > most {
+            self.links = Vec::new();
+        }
+    }
+
+    fn star(&self, at: usize) -> Range<usize> {
+        let end = self.end[at] as usize;
+        end - self.degree[at] as usize..end
+    }
+
+    /// Inspects all stars of up to `most` triangles, on all threads.
+    pub(super) fn inspect(&mut self, most: usize) -> Tally {
+        let mut tasks = Vec::with_capacity(self.part.len() / TASK + 1);
+        let (mut rest, mut start) = (&mut self.links[..], self.part.start);
+        while start < self.part.end {
+            let end = (start + TASK).min(self.part.end);
+            let size = self.degree[start..end].iter().map(|d| *d as usize).sum();
+            let (now, later) = rest.split_at_mut(size);
+            tasks.push((start..end, now));
+            (rest, start) = (later, end);
+        }
+        let (first, degrees) = (self.first, &self.degree);
+        let inspect = |mut inspector: Inspector, (vertices, mut links): (Range<usize>, &mut _)| {
+            for at in vertices {
+                let all: &mut [[u32; 2]] = std::mem::take(&mut links);
+                let (star, later) = all.split_at_mut(degrees[at] as usize);
+                if star.len() <= most {
+                    inspector.inspect(first + at as u32, star);
+                }
+                links = later;
+            }
+            inspector
+        };
+        tasks
+            .into_par_iter()
+            .fold(Inspector::default, inspect)
+            .map(|inspector| inspector.tally)
+            .reduce(Tally::default, |a, b| a + b)
+    }
+
+    /// The next vertex of the part from `at` on whose star has more than `most` triangles, as its
+    /// number in the range, and its star.
+    pub(super) fn large(&mut self, at: usize, most: usize) -> Option<(usize, &mut [[u32; 2]])> {
+        let mut rest = at.max(self.part.start)..self.part.end;
+        let found = rest.find(|&at| self.degree[at] as usize > most)?;
+        let star = self.star(found);
+        Some((found, &mut self.links[star]))
+    }
+
+    /// After inspection: each vertex of the part that ends boundary edges, with their other ends.
+    pub(super) fn boundaries(&self) -> impl Iterator<Item = (u32, &[u32])> {
+        self.part.clone().filter_map(|at| {
+            let words: &[u32] = bytemuck::cast_slice(&self.links[self.star(at)]);
+            if words.first().is_none_or(|w| *w == NO_MORE) {
+                return None;
+            }
+            let count = words
+                .iter()
+                .position(|w| *w == NO_MORE)
+                .unwrap_or(words.len());
+            Some((self.first + at as u32, &words[..count]))
+        })
+    }
+}

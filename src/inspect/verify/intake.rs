@@ -1,0 +1,103 @@
+//! Reads the mesh into buckets of triangles, one for each range of vertices.
+
+use super::buckets::Buckets;
+use super::plan::Plan;
+use super::positions::Positions;
+use super::verdict::Bounds;
+use crate::error::Result;
+use crate::inspect::ply_mesh::{PlyMesh, Sink};
+use crate::workspace::Workspace;
+
+/// What is counted while reading.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Counts {
+    pub(super) vertices: u64,
+    pub(super) non_finite_vertices: u64,
+    pub(super) triangles: u64,
+    pub(super) non_triangles: u64,
+    pub(super) index_out_of_range: u64,
+    pub(super) degenerate_triangles: u64,
+}
+
+/// The mesh, ready for the sweep over its ranges.
+pub(super) struct Intake<'a> {
+    plan: &'a Plan,
+    workspace: &'a Workspace,
+    pub(super) counts: Counts,
+    pub(super) bounds: Option<Bounds>,
+    pub(super) positions: Positions,
+    /// Triangles with three distinct, valid corners, in the bucket of each corner's range.
+    pub(super) triangles: Buckets<3>,
+}
+
+/// Reads all of `mesh`.
+pub(super) fn read<'a>(
+    mesh: PlyMesh,
+    plan: &'a Plan,
+    workspace: &'a Workspace,
+) -> Result<Intake<'a>> {
+    let total = mesh.vertices() + mesh.faces();
+    workspace
+        .observer
+        .begin("read mesh", "vertices and faces", total);
+    let mut intake = Intake {
+        plan,
+        workspace,
+        counts: Counts::default(),
+        bounds: None,
+        positions: Positions::new(workspace, plan)?,
+        triangles: Buckets::new(workspace, "verify.triangles", plan.ranges, plan.blocks[0]),
+    };
+    mesh.read(&mut intake)?;
+    intake.positions.finish()?;
+    workspace.observer.end();
+    Ok(intake)
+}
+
+impl Sink for Intake<'_> {
+    fn vertices(&mut self, positions: &[[f64; 3]]) -> Result<()> {
+        self.workspace.check_cancel()?;
+        self.counts.vertices += positions.len() as u64;
+        for &position in positions {
+            if position.iter().all(|c| c.is_finite()) {
+                self.bounds = Some(Bounds::with(self.bounds, position));
+            } else {
+                self.counts.non_finite_vertices += 1;
+            }
+        }
+        self.positions.append(positions)?;
+        self.workspace.observer.advance(positions.len() as u64);
+        Ok(())
+    }
+
+    fn triangles(&mut self, triangles: &[[u32; 3]]) -> Result<()> {
+        self.workspace.check_cancel()?;
+        self.counts.triangles += triangles.len() as u64;
+        for &[x, y, z] in triangles {
+            if x.max(y).max(z) >= self.plan.vertices {
+                self.counts.index_out_of_range += 1;
+                continue;
+            }
+            if x == y || y == z || z == x {
+                self.counts.degenerate_triangles += 1;
+                continue;
+            }
+            let [a, b, c] = [x, y, z].map(|v| self.plan.range_of(v));
+            self.triangles.push(a, [x, y, z])?;
+            if b != a {
+                self.triangles.push(b, [x, y, z])?;
+            }
+            if c != a && c != b {
+                self.triangles.push(c, [x, y, z])?;
+            }
+        }
+        self.workspace.observer.advance(triangles.len() as u64);
+        Ok(())
+    }
+
+    fn non_triangles(&mut self, count: u64) -> Result<()> {
+        self.counts.non_triangles += count;
+        self.workspace.observer.advance(count);
+        Ok(())
+    }
+}

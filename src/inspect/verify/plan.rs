@@ -1,0 +1,135 @@
+//! How the memory at hand is shared out.
+
+use super::star;
+use crate::error::Result;
+use crate::workspace::Workspace;
+use crate::workspace::memory::Reservation;
+
+/// Largest block a bucket collects before it goes to disk, in bytes.
+const LARGEST_BLOCK: u64 = 256 << 10;
+
+/// Smallest such block, unless tiny ranges are asked for.
+const SMALLEST_BLOCK: u64 = 512;
+
+/// Most ranges, whatever was asked for.
+const MOST_RANGES: u64 = 1 << 16;
+
+/// Bytes a range takes in four kinds of buckets and in the table of positions, while it is empty.
+const PER_RANGE: u64 = 4 * 32 + 24;
+
+/// Bytes a vertex takes while its range is in memory, without triangles and position: union–find
+/// (8), number of triangles and place of the first (8).
+const PER_VERTEX: u64 = 16;
+
+/// Bytes of a position.
+const POSITION: u64 = 24;
+
+/// Bytes of a triangle at one of its corners.
+const PER_CORNER: u64 = 8;
+
+/// Sizes of everything large.
+#[derive(Debug, Clone)]
+pub(super) struct Plan {
+    /// Number of vertices of the mesh; every valid id is below.
+    pub(super) vertices: u32,
+    /// Vertex `v` belongs to range `v >> shift`.
+    pub(super) shift: u32,
+    /// Number of ranges.
+    pub(super) ranges: usize,
+    /// All positions stay in memory.
+    pub(super) all_positions: bool,
+    /// Corners held at a time, in number.
+    pub(super) corners: usize,
+    /// Bytes of one block of the buckets of triangles, of a contraction, of triangles on the way.
+    pub(super) blocks: [u64; 3],
+    /// Stars above this number of triangles are inspected one at a time.
+    pub(super) large_star: usize,
+}
+
+impl Plan {
+    /// The plan for a mesh in `free` bytes; `range` is the wanted number of vertices of a range.
+    pub(super) fn new(vertices: u64, faces: u64, free: u64, range: Option<u32>) -> Self {
+        let all = vertices * POSITION;
+        let all_positions = range.is_none() && all <= free / 4;
+        let rest = if all_positions { free - all } else { free };
+        // An eighth for triangles on their way into buckets, a sixteenth for those on the way to
+        // their other positions, a thirty-second for each of two contractions, half for the range;
+        // the rest is left for large stars.
+        let (quotas, quota) = ([rest / 8, rest / 32, rest / 16], rest / 2);
+        let fixed = PER_VERTEX + if all_positions { 0 } else { POSITION };
+        // A quarter more corners than the mean, for ranges that have more than others.
+        let degree = (3 * u128::from(faces)).div_ceil(u128::from(vertices.max(1)));
+        let each = u128::from(fixed) + degree * u128::from(PER_CORNER) * 5 / 4;
+        let fitting = (u128::from(quota) / each).clamp(1, 1 << 31) as u64;
+        let whole = vertices.max(1).next_power_of_two();
+        let mut shift = fitting.min(whole).ilog2();
+        match range {
+            Some(range) => shift = range.max(1).ilog2(),
+            // One block of every range must fit its quota.
+            None => {
+                while (vertices >> shift) * SMALLEST_BLOCK > quotas[1] && shift < 31 {
+                    shift += 1;
+                }
+            }
+        }
+        while vertices >> shift > MOST_RANGES {
+            shift += 1;
+        }
+        let ranges = (vertices.div_ceil(1 << shift)).max(1);
+        let corners = quota.saturating_sub(fixed << shift).max(1 << 20) / PER_CORNER;
+        Self {
+            // The reader refuses more.
+            vertices: u32::try_from(vertices).unwrap_or(u32::MAX),
+            shift,
+            ranges: ranges as usize,
+            all_positions,
+            corners: corners as usize,
+            blocks: quotas.map(|quota| (quota / ranges).min(LARGEST_BLOCK)),
+            large_star: 4096,
+        }
+    }
+
+    /// Number of vertices of a range that is not the last.
+    pub(super) fn range_length(&self) -> usize {
+        1 << self.shift
+    }
+
+    /// First vertex and number of vertices of range `k`.
+    pub(super) fn range(&self, k: usize) -> (u32, usize) {
+        let first = k << self.shift;
+        let end = (first + self.range_length()).min(self.vertices as usize);
+        (first as u32, end.saturating_sub(first))
+    }
+
+    /// The range of a vertex.
+    pub(super) fn range_of(&self, vertex: u32) -> usize {
+        (vertex >> self.shift) as usize
+    }
+
+    /// Reserves all that is planned.
+    pub(super) fn reserve(&self, workspace: &Workspace) -> Result<Vec<Reservation>> {
+        let [triangles, contraction, area] = self.blocks.map(|b| b * self.ranges as u64);
+        let held = if self.all_positions {
+            self.vertices as usize
+        } else {
+            self.range_length()
+        };
+        let held = held.min(self.vertices as usize) as u64;
+        let range = self.range_length().min(self.vertices as usize) as u64;
+        let blocks = self.blocks.iter().sum::<u64>() + (1 << 20);
+        let tables = self.ranges as u64 * PER_RANGE;
+        let stars = star::scratch_bytes(self.large_star) * workspace.threads as u64;
+        Ok(vec![
+            workspace.reserve("verify: buckets of triangles", triangles)?,
+            workspace.reserve("verify: buckets of edges", 2 * contraction)?,
+            workspace.reserve("verify: triangles between ranges", area)?,
+            workspace.reserve("verify: positions", held * POSITION)?,
+            workspace.reserve("verify: vertices of one range", range * PER_VERTEX)?,
+            workspace.reserve(
+                "verify: corners of one range",
+                self.corners as u64 * PER_CORNER,
+            )?,
+            workspace.reserve("verify: blocks and stars at hand", blocks + tables + stars)?,
+        ])
+    }
+}

@@ -1,0 +1,141 @@
+//! All that is decided at one vertex, from the triangles around it.
+
+/// Counts of what was found at some vertices. Each edge counts at its higher vertex, each triangle
+/// at its highest.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(super) struct Tally {
+    pub(super) referenced: u64,
+    pub(super) edges: u64,
+    pub(super) boundary_edges: u64,
+    pub(super) non_manifold_edges: u64,
+    pub(super) inconsistent_edges: u64,
+    pub(super) pinched_vertices: u64,
+    pub(super) repeated_triangles: u64,
+}
+
+impl std::ops::Add for Tally {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self {
+            referenced: self.referenced + other.referenced,
+            edges: self.edges + other.edges,
+            boundary_edges: self.boundary_edges + other.boundary_edges,
+            non_manifold_edges: self.non_manifold_edges + other.non_manifold_edges,
+            inconsistent_edges: self.inconsistent_edges + other.inconsistent_edges,
+            pinched_vertices: self.pinched_vertices + other.pinched_vertices,
+            repeated_triangles: self.repeated_triangles + other.repeated_triangles,
+        }
+    }
+}
+
+/// Stands after the last neighbour left in a star, see [`Inspector::inspect`].
+pub(super) const NO_MORE: u32 = u32::MAX;
+
+/// Looks at stars one after the other.
+#[derive(Debug, Default)]
+pub(super) struct Inspector {
+    pub(super) tally: Tally,
+    /// (neighbour, slot): slot `2i` runs from the vertex to the neighbour in triangle `i`,
+    /// slot `2i + 1` from the neighbour to the vertex.
+    ends: Vec<u64>,
+    /// Of each slot, the number of its neighbour.
+    neighbour: Vec<u32>,
+    /// Union–find over the neighbours.
+    parent: Vec<u32>,
+}
+
+/// Bytes an [`Inspector`] needs for stars of up to `triangles` triangles.
+pub(super) fn scratch_bytes(triangles: usize) -> u64 {
+    // Two slots a triangle; vectors may have grown to twice what they hold.
+    2 * 2 * triangles as u64 * (8 + 4 + 4)
+}
+
+impl Inspector {
+    /// Inspects the star of `vertex`: for each triangle (vertex, a, b) around it the pair (a, b).
+    ///
+    /// Leaves in `star`, read as words, the neighbours at the end of boundary edges, then
+    /// [`NO_MORE`] if there is room.
+    pub(super) fn inspect(&mut self, vertex: u32, star: &mut [[u32; 2]]) {
+        if star.is_empty() {
+            return;
+        }
+        self.tally.referenced += 1;
+        self.count_repeated(vertex, star);
+        self.ends.clear();
+        for (i, &[a, b]) in star.iter().enumerate() {
+            self.ends.push((u64::from(a) << 32) | (2 * i as u64));
+            self.ends.push((u64::from(b) << 32) | (2 * i as u64 + 1));
+        }
+        self.ends.sort_unstable();
+        self.neighbour.clear();
+        self.neighbour.resize(2 * star.len(), 0);
+        self.parent.clear();
+        let boundary: &mut [u32] = bytemuck::cast_slice_mut(star);
+        let (mut open, mut manifold) = (0, true);
+        for group in self.ends.chunk_by(|x, y| x >> 32 == y >> 32) {
+            let other = (group[0] >> 32) as u32;
+            let number = self.parent.len() as u32;
+            self.parent.push(number);
+            let mut leaving = 0;
+            for end in group {
+                let slot = (end & u64::from(u32::MAX)) as usize;
+                self.neighbour[slot] = number;
+                leaving += 1 - slot % 2;
+            }
+            manifold &= group.len() <= 2;
+            if group.len() == 1 {
+                boundary[open] = other;
+                open += 1;
+            }
+            if other < vertex {
+                self.tally.edges += 1;
+                self.tally.boundary_edges += u64::from(group.len() == 1);
+                self.tally.non_manifold_edges += u64::from(group.len() > 2);
+                self.tally.inconsistent_edges += u64::from(group.len() == 2 && leaving != 1);
+            }
+        }
+        if let Some(end) = boundary.get_mut(open) {
+            *end = NO_MORE;
+        }
+        if manifold && self.pieces() > 1 {
+            self.tally.pinched_vertices += 1;
+        }
+    }
+
+    /// Triangles with the same corners as another one, at their highest corner.
+    fn count_repeated(&mut self, vertex: u32, star: &[[u32; 2]]) {
+        let highest = star.iter().filter(|[a, b]| *a < vertex && *b < vertex);
+        self.ends.clear();
+        let key = |&[a, b]: &[u32; 2]| (u64::from(a.min(b)) << 32) | u64::from(a.max(b));
+        self.ends.extend(highest.map(key));
+        self.ends.sort_unstable();
+        let again = self.ends.windows(2).filter(|pair| pair[0] == pair[1]);
+        self.tally.repeated_triangles += again.count() as u64;
+    }
+
+    /// Connected pieces the triangles form around the vertex.
+    fn pieces(&mut self) -> usize {
+        let mut pieces = self.parent.len();
+        for pair in self.neighbour.chunks_exact(2) {
+            let (a, b) = (
+                root(&mut self.parent, pair[0]),
+                root(&mut self.parent, pair[1]),
+            );
+            if a != b {
+                self.parent[a.max(b) as usize] = a.min(b);
+                pieces -= 1;
+            }
+        }
+        pieces
+    }
+}
+
+fn root(parent: &mut [u32], mut at: u32) -> u32 {
+    while parent[at as usize] != at {
+        let up = parent[parent[at as usize] as usize];
+        parent[at as usize] = up;
+        at = up;
+    }
+    at
+}

@@ -1,0 +1,162 @@
+//! The visit to all ranges of vertices, from the last to the first.
+
+use super::area::Areas;
+use super::buckets::Buckets;
+use super::contract::{Contraction, Forest};
+use super::corners::Corners;
+use super::intake::Intake;
+use super::plan::Plan;
+use super::star::{Inspector, Tally, scratch_bytes};
+use crate::error::Result;
+use crate::workspace::Workspace;
+
+/// What the sweep counted.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(super) struct Swept {
+    pub(super) tally: Tally,
+    pub(super) components: u64,
+    pub(super) boundary_loops: u64,
+    pub(super) zero_area_triangles: u64,
+}
+
+struct Sweep<'a> {
+    plan: &'a Plan,
+    workspace: &'a Workspace,
+    triangles: Buckets<3>,
+    block: Vec<[u32; 3]>,
+    corners: Corners,
+    areas: Areas,
+    forest: Forest,
+    surface: Contraction,
+    boundary: Contraction,
+    tally: Tally,
+}
+
+/// Visits all ranges of the mesh.
+pub(super) fn run(intake: Intake<'_>, plan: &Plan, workspace: &Workspace) -> Result<Swept> {
+    let mut sweep = Sweep {
+        plan,
+        workspace,
+        areas: Areas::new(workspace, plan, intake.positions),
+        triangles: intake.triangles,
+        block: Vec::new(),
+        corners: Corners::default(),
+        forest: Forest::default(),
+        surface: Contraction::new(workspace, plan, "verify.surface"),
+        boundary: Contraction::new(workspace, plan, "verify.boundary"),
+        tally: Tally::default(),
+    };
+    let vertices = u64::from(plan.vertices);
+    workspace.observer.begin("check mesh", "vertices", vertices);
+    for k in (0..plan.ranges).rev() {
+        workspace.check_cancel()?;
+        sweep.visit(k)?;
+        workspace.observer.advance(plan.range(k).1 as u64);
+    }
+    workspace.observer.end();
+    Ok(Swept {
+        tally: sweep.tally,
+        components: sweep.surface.complete,
+        boundary_loops: sweep.boundary.complete,
+        zero_area_triangles: sweep.areas.zero,
+    })
+}
+
+impl Sweep<'_> {
+    fn visit(&mut self, k: usize) -> Result<()> {
+        let (first, length) = self.plan.range(k);
+        self.corners.reset(first, length);
+        self.forest.reset(first, length);
+        self.join_surface(k)?;
+        self.forest.reset(first, length);
+        self.areas.enter(k, first)?;
+        let mut start = 0;
+        while start < length {
+            let (part, corners) = self.corners.part_from(start, self.plan.corners);
+            let end = part.end;
+            let more = corners.saturating_sub(self.plan.corners) as u64;
+            let _held = self
+                .workspace
+                .reserve("verify: star of one vertex", 8 * more)?;
+            self.corners.begin(part, corners);
+            self.gather(k, start == 0)?;
+            self.inspect()?;
+            self.corners.trim(self.plan.corners);
+            start = end;
+        }
+        self.boundary.close(&mut self.forest, k)?;
+        self.triangles.clear(k);
+        Ok(())
+    }
+
+    /// Counts the triangles at each vertex and joins the vertices of each triangle.
+    fn join_surface(&mut self, k: usize) -> Result<()> {
+        let (first, length) = self.plan.range(k);
+        let mut cursor = self.triangles.cursor(k);
+        while self.triangles.next(&mut cursor, &mut self.block)? {
+            self.workspace.check_cancel()?;
+            let (block, corners) = (&self.block, &mut self.corners);
+            let (surface, forest) = (&mut self.surface, &mut self.forest);
+            let join = || {
+                for triangle in block {
+                    let [x, y, z] = *triangle;
+                    let high = x.max(y).max(z);
+                    // Any other triangle was joined in the range of its highest corner.
+                    if high.wrapping_sub(first) as usize >= length {
+                        continue;
+                    }
+                    for &low in triangle.iter().filter(|v| **v != high) {
+                        surface.connect(forest, low, high)?;
+                    }
+                }
+                Ok(())
+            };
+            rayon::join(|| corners.count(block), join).1?;
+        }
+        for vertex in self.corners.referenced() {
+            self.forest.touch(vertex);
+        }
+        self.surface.close(&mut self.forest, k)
+    }
+
+    /// Brings the stars of the current part together; looks at the areas too the `first_time`.
+    fn gather(&mut self, k: usize, first_time: bool) -> Result<()> {
+        let (first, length) = self.plan.range(k);
+        let mut cursor = self.triangles.cursor(k);
+        while self.triangles.next(&mut cursor, &mut self.block)? {
+            self.workspace.check_cancel()?;
+            let (block, corners, areas) = (&self.block, &mut self.corners, &mut self.areas);
+            if first_time {
+                let look = || areas.look(block, first, length);
+                rayon::join(|| corners.fill(block), look).1?;
+            } else {
+                corners.fill(block);
+            }
+        }
+        Ok(())
+    }
+
+    /// Inspects the stars of the current part.
+    fn inspect(&mut self) -> Result<()> {
+        self.tally = self.tally + self.corners.inspect(self.plan.large_star);
+        let (first, mut from) = (self.corners.first(), 0);
+        while let Some((at, star)) = self.corners.large(from, self.plan.large_star) {
+            self.workspace.check_cancel()?;
+            let bytes = scratch_bytes(star.len());
+            let _held = self
+                .workspace
+                .reserve("verify: star of one vertex", bytes)?;
+            let mut inspector = Inspector::default();
+            inspector.inspect(first + at as u32, star);
+            self.tally = self.tally + inspector.tally;
+            from = at + 1;
+        }
+        for (vertex, others) in self.corners.boundaries() {
+            self.forest.touch(vertex);
+            for &other in others.iter().filter(|other| **other < vertex) {
+                self.boundary.connect(&mut self.forest, other, vertex)?;
+            }
+        }
+        Ok(())
+    }
+}

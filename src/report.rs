@@ -1,0 +1,83 @@
+//! What happened in a run, for machines: the content of `--report`.
+
+use crate::params::Params;
+use crate::stages::cells::CellStats;
+use crate::stages::export::{CoordinateType, MeshStats};
+use crate::stages::ingest::IngestStats;
+use crate::stages::repair::RepairStats;
+use crate::stages::stitch::{BaseStats, InsertStats};
+use crate::stages::triples::TripleStats;
+use serde::Serialize;
+
+/// Everything a run counts and measures. Keys are stable; new ones may be added.
+#[derive(Debug, Clone, Serialize)]
+pub struct Report {
+    /// Version of the program.
+    pub version: &'static str,
+    /// Geometric parameters.
+    pub parameters: Params,
+    /// Memory budget in bytes.
+    pub memory_budget: u64,
+    /// Worker threads.
+    pub threads: usize,
+    /// Points and files read.
+    pub input: IngestStats,
+    /// Points that share their position with another one and were folded into it.
+    pub duplicates_folded: u64,
+    /// Distinct points: what the surface is made from.
+    pub points: u64,
+    /// The lattice that positions are kept on.
+    pub lattice: LatticeReport,
+    /// Disk radius in the input's unit; absent if it follows the local density.
+    pub radius: Option<f64>,
+    /// Cells.
+    pub cells: CellStats,
+    /// Triples by count.
+    pub triples: TripleStats,
+    /// The base of T3 triangles.
+    pub base: BaseStats,
+    /// T12 candidates: accepted, and rejected by each test.
+    pub insertion: InsertStats,
+    /// Bridges, components and holes.
+    pub repair: RepairStats,
+    /// Holes left: too long, outlines of the surface, and not cleanly triangulable.
+    pub holes_left: u64,
+    /// The mesh.
+    pub mesh: MeshStats,
+    /// Type of the coordinates in the file.
+    pub coordinates: CoordinateType,
+    /// Peak resident memory of the process in bytes.
+    pub peak_resident_bytes: u64,
+    /// Peak of the memory reserved by name in bytes.
+    pub peak_reserved_bytes: u64,
+    /// Peak of the scratch space in bytes.
+    pub peak_scratch_bytes: u64,
+    /// Seconds in all.
+    pub seconds: f64,
+    /// Seconds and bytes of each stage, in order.
+    pub stages: Vec<StageReport>,
+    /// What the user should know, one line each.
+    pub warnings: Vec<String>,
+}
+
+/// The lattice, for the report.
+#[derive(Debug, Clone, Serialize)]
+pub struct LatticeReport {
+    /// Length of a step in the input's unit.
+    pub step: f64,
+    /// True if every input position is on the lattice without rounding.
+    pub exact: bool,
+}
+
+/// Time and bytes of one stage.
+#[derive(Debug, Clone, Serialize)]
+pub struct StageReport {
+    /// Name of the stage.
+    pub name: &'static str,
+    /// Wall-clock seconds.
+    pub seconds: f64,
+    /// Bytes read from files.
+    pub bytes_read: u64,
+    /// Bytes written to files.
+    pub bytes_written: u64,
+}

@@ -1,0 +1,163 @@
+//! Steps over compressed GPS times (laszip item 7, version 2).
+//!
+//! In chunks of whole points the times share one stream with the positions, so they must be
+//! decoded to get past them; the times themselves are not wanted. The decoder of the `laz` crate
+//! does the same by recursion, whose depth damaged data can drive past any stack.
+
+use laz::decoders::ArithmeticDecoder;
+use laz::decompressors::{IntegerDecompressor, IntegerDecompressorBuilder};
+use laz::models::{ArithmeticModel, ArithmeticModelBuilder};
+use laz::record::FieldDecompressor;
+use std::io::Read;
+
+/// Multiples of the last difference that have their own symbol: 1 to 500, then -1 to -10.
+const MULTIPLES: i32 = 500;
+const NEGATIVE_MULTIPLES: i32 = 10;
+/// Symbol of a time that did not change.
+const UNCHANGED: i32 = MULTIPLES + NEGATIVE_MULTIPLES + 1;
+/// Symbol of a time that is stored whole; symbols above it switch to another sequence.
+const WHOLE: i32 = UNCHANGED + 1;
+
+/// Switches from one sequence of times to another in a row; a writer makes one at most.
+const MOST_SWITCHES: usize = 16;
+
+/// State of the four interleaved sequences of times.
+pub(super) struct GpsTimes {
+    multiple: ArithmeticModel,
+    first_difference: ArithmeticModel,
+    integers: IntegerDecompressor,
+    last: usize,
+    next: usize,
+    differences: [i32; 4],
+    extremes: [u32; 4],
+}
+
+impl Default for GpsTimes {
+    fn default() -> Self {
+        Self {
+            multiple: ArithmeticModelBuilder::new((WHOLE + 4) as u32).build(),
+            first_difference: ArithmeticModelBuilder::new(6).build(),
+            integers: IntegerDecompressorBuilder::new()
+                .bits(32)
+                .contexts(9)
+                .build_initialized(),
+            last: 0,
+            next: 0,
+            differences: [0; 4],
+            extremes: [0; 4],
+        }
+    }
+}
+
+impl GpsTimes {
+    /// Decodes a difference predicted as `multiple` times the last one.
+    fn predicted<R: Read>(
+        &mut self,
+        decoder: &mut ArithmeticDecoder<R>,
+        multiple: i32,
+        context: u32,
+    ) -> std::io::Result<i32> {
+        let prediction = multiple.wrapping_mul(self.differences[self.last]);
+        self.integers.decompress(decoder, prediction, context)
+    }
+
+    /// After four extreme differences in a row, the last of them is the one to predict from.
+    fn extreme(&mut self, difference: i32) {
+        self.extremes[self.last] += 1;
+        if self.extremes[self.last] > 3 {
+            self.extremes[self.last] = 0;
+            self.differences[self.last] = difference;
+        }
+    }
+
+    /// A time stored whole starts a new sequence.
+    fn whole<R: Read>(&mut self, decoder: &mut ArithmeticDecoder<R>) -> std::io::Result<()> {
+        // What is predicted does not change what is consumed.
+        self.integers.decompress(decoder, 0, 8)?;
+        decoder.read_int()?;
+        self.next = (self.next + 1) & 3;
+        self.last = self.next;
+        self.differences[self.last] = 0;
+        self.extremes[self.last] = 0;
+        Ok(())
+    }
+
+    /// Decodes one symbol and what follows it; true if it was a switch to another sequence.
+    fn step<R: Read>(&mut self, decoder: &mut ArithmeticDecoder<R>) -> std::io::Result<bool> {
+        if self.differences[self.last] == 0 {
+            match decoder.decode_symbol(&mut self.first_difference)? {
+                0 => {}
+                1 => {
+                    self.differences[self.last] = self.integers.decompress(decoder, 0, 0)?;
+                    self.extremes[self.last] = 0;
+                }
+                2 => self.whole(decoder)?,
+                switch => {
+                    self.last = (self.last + switch as usize - 2) & 3;
+                    return Ok(true);
+                }
+            }
+            return Ok(false);
+        }
+        let multiple = decoder.decode_symbol(&mut self.multiple)? as i32;
+        match multiple {
+            1 => {
+                self.predicted(decoder, 1, 1)?;
+                self.extremes[self.last] = 0;
+            }
+            0 => {
+                let difference = self.integers.decompress(decoder, 0, 7)?;
+                self.extreme(difference);
+            }
+            2..10 => {
+                self.predicted(decoder, multiple, 2)?;
+            }
+            10..MULTIPLES => {
+                self.predicted(decoder, multiple, 3)?;
+            }
+            MULTIPLES => {
+                let difference = self.predicted(decoder, multiple, 4)?;
+                self.extreme(difference);
+            }
+            _ if multiple < MULTIPLES + NEGATIVE_MULTIPLES => {
+                self.predicted(decoder, MULTIPLES - multiple, 5)?;
+            }
+            _ if multiple < UNCHANGED => {
+                let difference = self.predicted(decoder, -NEGATIVE_MULTIPLES, 6)?;
+                self.extreme(difference);
+            }
+            UNCHANGED => {}
+            WHOLE => self.whole(decoder)?,
+            switch => {
+                self.last = (self.last + (switch - WHOLE) as usize) & 3;
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+}
+
+impl<R: Read> FieldDecompressor<R> for GpsTimes {
+    fn size_of_field(&self) -> usize {
+        size_of::<f64>()
+    }
+
+    fn decompress_first(&mut self, source: &mut R, first: &mut [u8]) -> std::io::Result<()> {
+        source.read_exact(first)
+    }
+
+    fn decompress_with(
+        &mut self,
+        decoder: &mut ArithmeticDecoder<R>,
+        _time: &mut [u8],
+    ) -> std::io::Result<()> {
+        for _ in 0..MOST_SWITCHES {
+            if !self.step(decoder)? {
+                return Ok(());
+            }
+        }
+        Err(std::io::Error::other(
+            "GPS times that belong to no sequence",
+        ))
+    }
+}

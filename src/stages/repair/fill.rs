@@ -1,0 +1,141 @@
+//! Filling one hole by splitting its loop (paper, section 3.6).
+
+use crate::geom::{Point, distance2};
+use crate::stages::stitch::normal;
+
+/// A vertex of a boundary loop.
+#[derive(Debug, Clone, Copy)]
+pub struct Corner {
+    /// Its id.
+    pub id: u32,
+    /// Its position.
+    pub at: Point,
+    /// Position of the third vertex of the triangle at the edge that comes in.
+    pub apex: Point,
+    /// True if the triangles at this vertex are not one fan.
+    pub pinched: bool,
+}
+
+/// What became of a loop.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Filling {
+    /// Triangles as they run.
+    Filled(Vec<[u32; 3]>),
+    /// The loop runs around the surface, not around a hole.
+    Outline,
+    /// No way to split it cleanly.
+    Impossible,
+}
+
+/// Triangulates the hole inside `corners`; `edge(a, b)` tells if the mesh has an edge.
+pub fn fill(mut corners: Vec<Corner>, edge: impl Fn(u32, u32) -> bool) -> Filling {
+    let n = corners.len();
+    // Edge x runs from corner x - 1 to corner x; the smallest comes first.
+    let first = (0..n)
+        .min_by_key(|&x| (corners[(x + n - 1) % n].id, corners[x].id))
+        .unwrap_or(0);
+    corners.rotate_left((first + n - 1) % n);
+    if is_outline(&corners) {
+        return Filling::Outline;
+    }
+    let mut splitter = Splitter { corners: &corners, edge, chords: Vec::new(), out: Vec::new() };
+    if splitter.split(&(0..n).collect::<Vec<_>>()) {
+        Filling::Filled(splitter.out)
+    } else {
+        Filling::Impossible
+    }
+}
+
+/// True if the loop's vector area looks away from the triangles along it.
+fn is_outline(corners: &[Corner]) -> bool {
+    let n = corners.len();
+    let mut area = [0i128; 3];
+    let mut normals = [0i128; 3];
+    for x in 0..n {
+        let (from, to) = (&corners[(x + n - 1) % n], &corners[x]);
+        let a = normal(corners[0].at, from.at, to.at);
+        let m = normal(to.at, from.at, to.apex);
+        for k in 0..3 {
+            area[k] += a[k];
+            normals[k] += m[k];
+        }
+    }
+    (0..3).map(|k| area[k] as f64 * normals[k] as f64).sum::<f64>() < 0.0
+}
+
+struct Splitter<'a, E> {
+    corners: &'a [Corner],
+    edge: E,
+    chords: Vec<(u32, u32)>,
+    out: Vec<[u32; 3]>,
+}
+
+impl<E: Fn(u32, u32) -> bool> Splitter<'_, E> {
+    /// Splits the loop until only triangles are left; false if it gets stuck.
+    fn split(&mut self, ring: &[usize]) -> bool {
+        // An explicit stack: a long thin hole splits as often as it has edges.
+        let mut rings = vec![ring.to_vec()];
+        while let Some(ring) = rings.pop() {
+            if let [a, b, c] = ring[..] {
+                if self.is_flat(a, b, c) {
+                    return false;
+                }
+                self.out.push([a, b, c].map(|x| self.corners[x].id));
+                continue;
+            }
+            let Some((i, j)) = self.best_chord(&ring) else { return false };
+            let (a, b) = (self.corners[ring[i]].id, self.corners[ring[j]].id);
+            self.chords.push((a.min(b), a.max(b)));
+            rings.push(ring[..=i].iter().chain(&ring[j..]).copied().collect());
+            rings.push(ring[i..=j].to_vec());
+        }
+        true
+    }
+
+    fn is_flat(&self, a: usize, b: usize, c: usize) -> bool {
+        let [a, b, c] = [a, b, c].map(|x| self.corners[x].at);
+        normal(a, b, c) == [0; 3]
+    }
+
+    /// The chord that is shortest against the way round.
+    fn best_chord(&self, ring: &[usize]) -> Option<(usize, usize)> {
+        let n = ring.len();
+        let length = |x: usize, y: usize| {
+            (distance2(self.corners[ring[x]].at, self.corners[ring[y]].at) as f64).sqrt()
+        };
+        let mut along = Vec::with_capacity(n);
+        let mut total = 0.0;
+        for x in 0..n {
+            along.push(total);
+            total += length(x, (x + 1) % n);
+        }
+        let mut best: Option<(f64, usize, usize)> = None;
+        for i in 0..n {
+            for j in i + 2..n {
+                if i == 0 && j == n - 1 {
+                    continue;
+                }
+                let way = along[j] - along[i];
+                let ratio = length(i, j) / way.min(total - way);
+                if best.is_none_or(|(least, ..)| ratio < least) && self.allowed(ring, i, j) {
+                    best = Some((ratio, i, j));
+                }
+            }
+        }
+        best.map(|(_, i, j)| (i, j))
+    }
+
+    fn allowed(&self, ring: &[usize], i: usize, j: usize) -> bool {
+        let (a, b) = (&self.corners[ring[i]], &self.corners[ring[j]]);
+        if a.id == b.id || a.pinched && b.pinched || (self.edge)(a.id, b.id) {
+            return false;
+        }
+        if self.chords.contains(&(a.id.min(b.id), a.id.max(b.id))) {
+            return false;
+        }
+        let n = ring.len();
+        let inner = j - i == 2 && self.is_flat(ring[i], ring[i + 1], ring[j]);
+        let outer = n - (j - i) == 2 && self.is_flat(ring[i], ring[j], ring[(j + 1) % n]);
+        !inner && !outer
+    }
+}

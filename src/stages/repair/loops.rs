@@ -1,0 +1,177 @@
+//! Boundary loops: which boundary edge follows which, around the vertices of a block.
+
+use super::OrientedTriangle;
+use crate::geom::{Point, sub};
+use crate::stages::stitch::normal;
+use crate::stages::surface::star::{Link, Star, others};
+
+/// One step of a hole's border: it comes from `from` to `at` and goes on to `to`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Step {
+    /// Where the half-edge into `at` begins.
+    pub from: u32,
+    /// The vertex, one of the block's.
+    pub at: u32,
+    /// The next vertex.
+    pub to: u32,
+    /// The third vertex of the triangle at the edge `from`, `at`.
+    pub apex: u32,
+    /// True if the triangles at `at` are not one fan.
+    pub pinched: bool,
+}
+
+/// A fan of triangles that is not closed, seen from its vertex.
+#[derive(Debug, Clone, Copy)]
+struct Fan {
+    start: u32,
+    end: u32,
+    apex: u32,
+    component: u32,
+    normal: [i128; 3],
+}
+
+/// The steps at all boundary vertices of a block, ascending by (`from`, `at`).
+pub fn steps(
+    star: &Star,
+    triangles: &[[u32; 4]],
+    position: impl Fn(u32) -> Point,
+) -> Vec<Step> {
+    let mut link = Link::default();
+    let mut all = Vec::new();
+    let mut fans: Vec<Fan> = Vec::new();
+    for v in star.ids() {
+        let at = star.at(v);
+        link.set(v, at.iter().map(|&n| ids(&triangles[n as usize])));
+        let open = (0..link.groups()).filter(|g| !link.is_closed(*g));
+        fans.clear();
+        for group in open {
+            let members = (0..at.len()).filter(|&i| link.group(i) == group);
+            let members = members.map(|i| &triangles[at[i] as usize]);
+            fans.extend(fan(v, members, &position));
+        }
+        let pinched = link.groups() > 1;
+        let mut put = |incoming: &Fan, outgoing: &Fan| {
+            all.push(Step {
+                from: incoming.start,
+                at: v,
+                to: outgoing.end,
+                apex: incoming.apex,
+                pinched,
+            });
+        };
+        match &fans[..] {
+            [] => {}
+            [one] => put(one, one),
+            several => pair_up(v, several, &position, &mut put),
+        }
+    }
+    all.sort_unstable();
+    all
+}
+
+fn ids(t: &[u32; 4]) -> OrientedTriangle {
+    [t[0], t[1], t[2]]
+}
+
+/// The other two vertices of an oriented triangle, as they run after `v`.
+fn after(t: OrientedTriangle, v: u32) -> [u32; 2] {
+    if t[0] == v {
+        [t[1], t[2]]
+    } else if t[1] == v {
+        [t[2], t[0]]
+    } else {
+        [t[0], t[1]]
+    }
+}
+
+fn fan<'a>(
+    v: u32,
+    members: impl Iterator<Item = &'a [u32; 4]> + Clone,
+    position: &impl Fn(u32) -> Point,
+) -> Option<Fan> {
+    let edges = members.clone().map(|t| after(ids(t), v));
+    let starts = |x: u32| edges.clone().any(|[a, _]| a == x);
+    let ends = |x: u32| edges.clone().any(|[_, b]| b == x);
+    let [start, apex] = edges.clone().find(|&[a, _]| !ends(a))?;
+    let [_, end] = edges.clone().find(|&[_, b]| !starts(b))?;
+    let mut sum = [0i128; 3];
+    for [a, b] in edges.clone() {
+        let n = normal(position(v), position(a), position(b));
+        for axis in 0..3 {
+            sum[axis] += n[axis];
+        }
+    }
+    let component = members.clone().next()?[3];
+    Some(Fan { start, end, apex, component, normal: sum })
+}
+
+/// Matches incoming and outgoing edges of the fans of each component across the gaps between them.
+fn pair_up(
+    v: u32,
+    fans: &[Fan],
+    position: &impl Fn(u32) -> Point,
+    put: &mut impl FnMut(&Fan, &Fan),
+) {
+    let own = position(v);
+    let away = |x: u32| sub(position(x), own).map(|c| c as f64);
+    let mut pairs = Vec::new();
+    for (x, a) in fans.iter().enumerate() {
+        let mut axis = [0i128; 3];
+        for b in fans.iter().filter(|b| b.component == a.component) {
+            for k in 0..3 {
+                axis[k] += b.normal[k];
+            }
+        }
+        let axis = axis.map(|c| c as f64);
+        for (y, b) in fans.iter().enumerate() {
+            if a.component == b.component {
+                let angle = clockwise(axis, away(a.start), away(b.end));
+                pairs.push((angle, a.start, b.end, x, y));
+            }
+        }
+    }
+    pairs.sort_unstable_by(|a, b| {
+        a.0.total_cmp(&b.0).then((a.1, a.2, a.3, a.4).cmp(&(b.1, b.2, b.3, b.4)))
+    });
+    let mut used_in = vec![false; fans.len()];
+    let mut used_out = vec![false; fans.len()];
+    for (.., x, y) in pairs {
+        if !used_in[x] && !used_out[y] {
+            used_in[x] = true;
+            used_out[y] = true;
+            put(&fans[x], &fans[y]);
+        }
+    }
+}
+
+/// The angle turned clockwise about `axis` from `s` to `e`, as a number that grows with it from
+/// more than 0 to 4 for a full turn.
+fn clockwise(axis: [f64; 3], s: [f64; 3], e: [f64; 3]) -> f64 {
+    let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    let length = dot(axis, axis).sqrt();
+    if length == 0.0 {
+        return 4.0;
+    }
+    let n = axis.map(|x| x / length);
+    let cosine = dot(s, e) - dot(s, n) * dot(e, n);
+    let cross =
+        [s[1] * e[2] - s[2] * e[1], s[2] * e[0] - s[0] * e[2], s[0] * e[1] - s[1] * e[0]];
+    let sine = -dot(n, cross);
+    let quarter = |a: f64, b: f64| if a + b > 0.0 { b / (a + b) } else { 0.0 };
+    let turned = match (cosine >= 0.0, sine >= 0.0) {
+        (true, true) => quarter(cosine, sine),
+        (false, true) => 1.0 + quarter(sine, -cosine),
+        (false, false) => 2.0 + quarter(-cosine, -sine),
+        (true, false) => 3.0 + quarter(-sine, cosine),
+    };
+    if turned == 0.0 { 4.0 } else { turned }
+}
+
+/// The neighbours of a vertex: all vertices it shares an edge with.
+pub fn neighbors(star: &Star, triangles: &[[u32; 4]], v: u32) -> Vec<u32> {
+    let mut all: Vec<u32> =
+        star.at(v).iter().flat_map(|&n| others(ids(&triangles[n as usize]), v)).collect();
+    all.sort_unstable();
+    all.dedup();
+    all
+}

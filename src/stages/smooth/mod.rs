@@ -1,0 +1,82 @@
+//! Smoothing: every point is projected on the plane of its neighbours (paper, section 3.2).
+//!
+//! Ids stay as they are; only positions and the boxes around them change.
+
+use crate::error::Result;
+use crate::geom::Point;
+use crate::geom::lattice::COORDINATE_LIMIT;
+use crate::spill::Sections;
+use crate::stages::cells::{Fit, TileRanges, fit_in_store, fit_in_tile};
+use crate::stages::order::{PointStore, StoreWriter};
+use crate::stages::tiles::Tile;
+use crate::stages::tiles::near::Search;
+use crate::stages::tiles::walk::PageCache;
+use crate::workspace::Workspace;
+use std::ops::Range;
+
+/// One round of smoothing: the same points, each on the plane of its `neighbors` nearest.
+///
+/// # Errors
+/// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
+/// [`crate::Error::Cancelled`].
+pub fn smooth(
+    store: &PointStore,
+    tiles: TileRanges,
+    neighbors: usize,
+    round: u32,
+    workspace: &Workspace,
+) -> Result<PointStore> {
+    let moved = Sections::<3>::create(workspace, &format!("smooth{round}"), tiles.count())?;
+    let bytes = |tile: usize| {
+        let points = tiles.ids(tile).len();
+        Tile::bytes(points) + PageCache::bytes(store) + points as u64 * 24
+    };
+    workspace.for_each_unit("smooth: tile", tiles.count(), bytes, |tile| {
+        let points = smooth_tile(store, tiles.ids(tile), neighbors)?;
+        workspace.observer.advance(points.len() as u64);
+        moved.put(tile, bytemuck::cast_slice(&points))
+    })?;
+    let mut writer =
+        StoreWriter::create(workspace, &format!("points{round}"), store.page_size())?;
+    for tile in 0..tiles.count() {
+        workspace.check_cancel()?;
+        writer.push(bytemuck::cast_slice(&moved.get(tile)?))?;
+    }
+    writer.finish(workspace)
+}
+
+fn smooth_tile(store: &PointStore, ids: Range<usize>, neighbors: usize) -> Result<Vec<Point>> {
+    let tile = Tile::load(store, ids.clone())?;
+    let mut points = vec![[0; 3]; ids.len()];
+    let mut search = Search::default();
+    let mut uncertain = Vec::new();
+    let mut failed = None;
+    tile.for_each_query(neighbors, &mut search, |id, point, query| {
+        let fit = query.map(|mut query| fit_in_tile(&mut query, neighbors));
+        match fit.transpose().map(Option::flatten) {
+            Ok(Some(fit)) => points[id as usize - ids.start] = project(point, &fit),
+            Ok(None) => uncertain.push((id, point)),
+            Err(error) => failed = Some(error),
+        }
+    });
+    if let Some(error) = failed {
+        return Err(error);
+    }
+    drop(tile);
+    let mut cache = PageCache::default();
+    for (id, point) in uncertain {
+        let fit = fit_in_store(store, &mut cache, id, point, neighbors)?;
+        points[id as usize - ids.start] = fit.map_or(point, |fit| project(point, &fit));
+    }
+    Ok(points)
+}
+
+/// The foot of a point on its plane, on the lattice; the point itself if there is no plane.
+fn project(point: Point, fit: &Fit) -> Point {
+    let Some(normal) = fit.plane.normal else { return point };
+    let offset = fit.moments.project(normal);
+    std::array::from_fn(|axis| {
+        let moved = i64::from(point[axis]) + offset[axis].round() as i64;
+        moved.clamp(0, COORDINATE_LIMIT - 1) as i32
+    })
+}

@@ -1,0 +1,5 @@
+//! Surfaces as triangles around the vertices of a block: what stitching and repair share.
+
+pub mod orient;
+pub mod parity;
+pub mod star;

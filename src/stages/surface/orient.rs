@@ -1,0 +1,298 @@
+//! Components and orientation of a surface given block by block.
+
+use super::parity::ParitySets;
+use super::star::{EDGES, Star, Triangle, has, opposed};
+use crate::error::Result;
+use crate::spill::{Exchange, Sections};
+use crate::stages::blocks::Blocks;
+use crate::workspace::Workspace;
+use rustc_hash::FxHashMap;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+const EXCHANGE_BUFFER: u64 = 8 << 20;
+
+/// An oriented surface: every triangle has a label and an orientation relative to it.
+#[derive(Debug)]
+pub struct Oriented {
+    /// `[i, j, k, label << 1 | flip]` of interior triangles by block; labels are the block's own.
+    pub interior: Sections<4>,
+    /// `[block, i, j, k, label << 1 | flip]` of crossing triangles for each block they touch;
+    /// labels are global.
+    pub crossing: Sections<5>,
+    /// For each block, the global label of its label 0 and the number of labels that are global.
+    pub globals: Vec<(u32, u32)>,
+    /// For each block, the number of its labels.
+    pub labels: Vec<u32>,
+    /// Relations of the global labels.
+    pub sets: ParitySets,
+    /// Which roots have a crossing triangle.
+    pub crosses: Vec<bool>,
+    /// Triangles removed because they close a Möbius band.
+    pub mobius: u64,
+    /// Triangles that are left.
+    pub triangles: u64,
+    _held: crate::workspace::memory::Reservation,
+}
+
+/// Orients a surface: the interior triangles of every block by themselves, then the crossing ones,
+/// each ascending. A triangle that would make it non-orientable is removed.
+///
+/// `around(block)` gives all triangles that touch a block, ascending; `bytes(block)` what that
+/// takes in memory.
+///
+/// # Errors
+/// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
+/// [`crate::Error::Cancelled`].
+pub fn orient(
+    name: &str,
+    around: impl Fn(usize) -> Result<Vec<Triangle>> + Sync,
+    bytes: impl Fn(usize) -> u64 + Sync,
+    blocks: Blocks,
+    workspace: &Workspace,
+) -> Result<Oriented> {
+    let interior = Sections::create(workspace, &format!("{name}.interior"), blocks.count())?;
+    let exchange_held = workspace.reserve("exchange", 2 * EXCHANGE_BUFFER)?;
+    let exchange = Exchange::<6>::new(workspace, &format!("{name}.relations"), EXCHANGE_BUFFER);
+    let labels = Mutex::new(vec![(0u32, 0u32); blocks.count()]);
+    let (mobius, triangles) = (AtomicU64::new(0), AtomicU64::new(0));
+    workspace.for_each_unit("block", blocks.count(), &bytes, |block| {
+        let done = orient_block(&around(block)?, blocks, block);
+        interior.put(block, &done.interior)?;
+        exchange.send(&done.relations)?;
+        labels
+            .lock()
+            .unwrap_or_else(std::sync::PoisonError::into_inner)[block] = (done.global, done.labels);
+        mobius.fetch_add(done.mobius, Ordering::Relaxed);
+        triangles.fetch_add(done.interior.len() as u64, Ordering::Relaxed);
+        workspace.observer.advance(1);
+        Ok(())
+    })?;
+    let labels = labels
+        .into_inner()
+        .unwrap_or_else(std::sync::PoisonError::into_inner);
+    let relations = exchange.deliver(workspace, blocks.count())?;
+    let mut globals = Vec::with_capacity(labels.len());
+    let mut next = 0u32;
+    for (global, _) in &labels {
+        globals.push((next, *global));
+        next += global;
+    }
+    let held = workspace.reserve("labels", u64::from(next) * 10 + 1024)?;
+    let mut surface = Oriented {
+        interior,
+        crossing: Sections::create(workspace, &format!("{name}.none"), 0)?,
+        globals,
+        labels: labels.into_iter().map(|(_, all)| all).collect(),
+        sets: ParitySets::new(next as usize),
+        crosses: vec![false; next as usize],
+        mobius: mobius.into_inner(),
+        triangles: triangles.into_inner(),
+        _held: held,
+    };
+    orient_crossing(
+        &mut surface,
+        name,
+        &around,
+        &bytes,
+        &relations,
+        blocks,
+        workspace,
+    )?;
+    drop(exchange_held);
+    Ok(surface)
+}
+
+struct OrientedBlock {
+    interior: Vec<[u32; 4]>,
+    /// `[owner block, i, j, k, this block, label << 1 | flip]`: what an interior triangle of this
+    /// block asks of the crossing triangle `i, j, k`.
+    relations: Vec<[u32; 6]>,
+    /// Number of labels that occur in relations; they come first.
+    global: u32,
+    labels: u32,
+    mobius: u64,
+}
+
+fn orient_block(around: &[Triangle], blocks: Blocks, block: usize) -> OrientedBlock {
+    let ids = blocks.ids(block);
+    let (inner, crossing): (Vec<Triangle>, Vec<Triangle>) =
+        around.iter().partition(|t| !blocks.crossing(**t));
+    let mut star = Star::with_room(ids.clone(), inner.iter().copied());
+    let mut sets = ParitySets::new(inner.len());
+    let mut kept = Vec::with_capacity(inner.len());
+    let mut mobius = 0;
+    for (number, &t) in inner.iter().enumerate() {
+        let number = number as u32;
+        // Either all adjacent triangles agree and are joined, or the triangle goes.
+        let asks: Vec<(u32, bool)> = adjacent(t, &star, &inner, &ids).collect();
+        if !consistent(&mut sets, &asks) {
+            mobius += 1;
+            continue;
+        }
+        for (other, flip) in asks {
+            sets.join(other, number, flip);
+        }
+        star.add(t, number);
+        kept.push(number);
+    }
+    let mut relations = Vec::new();
+    for &c in &crossing {
+        for (other, flip) in adjacent(c, &star, &inner, &ids) {
+            relations.push((c, other, flip));
+        }
+    }
+    number_labels(&inner, &kept, &relations, &mut sets, blocks, block, mobius)
+}
+
+/// Gives labels to the sets, those in relations first, both in order of first appearance.
+fn number_labels(
+    inner: &[Triangle],
+    kept: &[u32],
+    relations: &[(Triangle, u32, bool)],
+    sets: &mut ParitySets,
+    blocks: Blocks,
+    block: usize,
+    mobius: u64,
+) -> OrientedBlock {
+    let mut labels: FxHashMap<u32, u32> = FxHashMap::default();
+    let mut sent = Vec::with_capacity(relations.len());
+    for &(c, other, flip) in relations {
+        let (root, turned) = sets.find(other);
+        let next = labels.len() as u32;
+        let label = *labels.entry(root).or_insert(next);
+        let word = label << 1 | u32::from(flip ^ turned);
+        sent.push([blocks.of(c[0]), c[0], c[1], c[2], block as u32, word]);
+    }
+    let global = labels.len() as u32;
+    let mut interior = Vec::with_capacity(kept.len());
+    for &number in kept {
+        let (root, turned) = sets.find(number);
+        let next = labels.len() as u32;
+        let label = *labels.entry(root).or_insert(next);
+        let t = inner[number as usize];
+        interior.push([t[0], t[1], t[2], label << 1 | u32::from(turned)]);
+    }
+    OrientedBlock {
+        interior,
+        relations: sent,
+        global,
+        labels: labels.len() as u32,
+        mobius,
+    }
+}
+
+/// Triangles in the star that share an edge inside the block with `t`, and whether `t` must be
+/// turned against them.
+fn adjacent<'a>(
+    t: Triangle,
+    star: &'a Star,
+    triangles: &'a [Triangle],
+    ids: &'a std::ops::Range<u32>,
+) -> impl Iterator<Item = (u32, bool)> + 'a {
+    EDGES
+        .into_iter()
+        .filter(move |(a, b, ..)| ids.contains(&t[*a]) && ids.contains(&t[*b]))
+        .flat_map(move |(a, b, ..)| {
+            let (low, high) = (t[a], t[b]);
+            star.at(low).iter().copied().filter_map(move |n| {
+                let other = triangles[n as usize];
+                has(other, high).then(|| (n, opposed(t, other, low, high)))
+            })
+        })
+}
+
+/// True if no two of `asks`, taken together with what is joined already, contradict each other.
+#[must_use]
+pub fn consistent(sets: &mut ParitySets, asks: &[(u32, bool)]) -> bool {
+    asks.iter().enumerate().all(|(x, &(a, flip_a))| {
+        asks[..x].iter().all(|&(b, flip_b)| {
+            sets.relation(a, b)
+                .is_none_or(|turned| turned == (flip_a ^ flip_b))
+        })
+    })
+}
+
+/// The crossing triangles in ascending order, each against those before it.
+fn orient_crossing(
+    base: &mut Oriented,
+    name: &str,
+    around: &impl Fn(usize) -> Result<Vec<Triangle>>,
+    bytes: &impl Fn(usize) -> u64,
+    relations: &Sections<6>,
+    blocks: Blocks,
+    workspace: &Workspace,
+) -> Result<()> {
+    let exchange = Exchange::<5>::new(workspace, &format!("{name}.crossing"), EXCHANGE_BUFFER);
+    let mut edges: FxHashMap<(u32, u32), Vec<(Triangle, u32)>> = FxHashMap::default();
+    for group in 0..blocks.count() {
+        workspace.check_cancel()?;
+        let _held = workspace.reserve("block", bytes(group))?;
+        let relations = relations.get(group)?;
+        let mut sent = Vec::new();
+        let mine = |t: &Triangle| blocks.of(t[0]) == group as u32 && blocks.crossing(*t);
+        for t in around(group)?.into_iter().filter(mine) {
+            let Some(word) = orient_one(base, t, &relations, group as u32, &edges) else {
+                base.mobius += 1;
+                continue;
+            };
+            base.triangles += 1;
+            for (a, b, ..) in EDGES {
+                edges.entry((t[a], t[b])).or_default().push((t, word));
+            }
+            sent.push([blocks.of(t[0]), t[0], t[1], t[2], word]);
+            sent.extend(blocks.visited(t).map(|b| [b, t[0], t[1], t[2], word]));
+        }
+        exchange.send(&sent)?;
+        // A triangle at an edge has its smallest vertex at or below the edge's.
+        edges.retain(|(low, _), _| blocks.of(*low) > group as u32);
+    }
+    base.crossing = exchange.deliver(workspace, blocks.count())?;
+    base.sets.flatten();
+    // Crossing marks were set on labels; what counts is the set.
+    for label in 0..base.sets.len() as u32 {
+        if base.crosses[label as usize] {
+            let (root, _) = base.sets.find(label);
+            base.crosses[root as usize] = true;
+        }
+    }
+    Ok(())
+}
+
+/// Joins one crossing triangle; its label and flip, or `None` if it closes a Möbius band.
+fn orient_one(
+    base: &mut Oriented,
+    t: Triangle,
+    relations: &[[u32; 6]],
+    group: u32,
+    edges: &FxHashMap<(u32, u32), Vec<(Triangle, u32)>>,
+) -> Option<u32> {
+    let key = [group, t[0], t[1], t[2]];
+    let start = relations.partition_point(|r| r[..4] < key[..]);
+    let mut asks: Vec<(u32, bool)> = relations[start..]
+        .iter()
+        .take_while(|r| r[..4] == key[..])
+        .map(|r| (base.globals[r[4] as usize].0 + (r[5] >> 1), r[5] & 1 == 1))
+        .collect();
+    for (a, b, ..) in EDGES {
+        for &(other, word) in edges.get(&(t[a], t[b])).into_iter().flatten() {
+            let flip = opposed(t, other, t[a], t[b]) ^ (word & 1 == 1);
+            asks.push((word >> 1, flip));
+        }
+    }
+    if !consistent(&mut base.sets, &asks) {
+        return None;
+    }
+    let (label, flip) = match asks.first() {
+        Some(&first) => first,
+        None => {
+            base.crosses.push(false);
+            (base.sets.push(), false)
+        }
+    };
+    for &(other, turned) in &asks {
+        base.sets.join(label, other, flip ^ turned);
+    }
+    base.crosses[label as usize] = true;
+    Some(label << 1 | u32::from(flip))
+}
