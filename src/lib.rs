@@ -1,5 +1,6 @@
 //! Out-of-core surface reconstruction by restricted Voronoi cells.
 
+pub mod cli;
 pub mod error;
 pub mod geom;
 pub mod inspect;

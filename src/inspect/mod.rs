@@ -1,4 +1,5 @@
 //! Questions a user asks of a cloud or a mesh.
 
+pub mod info;
 pub mod ply_mesh;
 pub mod verify;

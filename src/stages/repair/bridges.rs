@@ -31,10 +31,13 @@ pub fn find(
             if link.groups() < 2 {
                 continue;
             }
-            // A triangle that is a component by itself has both its edges at v on the boundary.
+            // A triangle that is a fan by itself has both its edges at v on the boundary. If there
+            // is no larger fan, the first stays, so that v stays.
+            let size = |group| (0..at.len()).filter(|&i| link.group(i) == group).count();
+            let larger = (0..link.groups()).any(|group| size(group) > 1);
             for (index, &n) in at.iter().enumerate() {
                 let group = link.group(index);
-                if (0..at.len()).all(|other| other == index || link.group(other) != group) {
+                if size(group) == 1 && (larger || group > 0) {
                     found.push(n);
                 }
             }

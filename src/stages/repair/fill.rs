@@ -46,21 +46,29 @@ pub fn fill(mut corners: Vec<Corner>, edge: impl Fn(u32, u32) -> bool) -> Fillin
     }
 }
 
-/// True if the loop's vector area looks away from the triangles along it.
+/// True if the loop's vector area looks away from the triangles along it: by more than half of what
+/// it would if they were all flat against it.
 fn is_outline(corners: &[Corner]) -> bool {
     let n = corners.len();
     let mut area = [0i128; 3];
     let mut normals = [0i128; 3];
+    let mut lengths = 0.0;
     for x in 0..n {
         let (from, to) = (&corners[(x + n - 1) % n], &corners[x]);
         let a = normal(corners[0].at, from.at, to.at);
         let m = normal(to.at, from.at, to.apex);
+        lengths += length(m);
         for k in 0..3 {
             area[k] += a[k];
             normals[k] += m[k];
         }
     }
-    (0..3).map(|k| area[k] as f64 * normals[k] as f64).sum::<f64>() < 0.0
+    let product: f64 = (0..3).map(|k| area[k] as f64 * normals[k] as f64).sum();
+    product < -0.5 * length(area) * lengths
+}
+
+fn length(v: [i128; 3]) -> f64 {
+    v.iter().map(|x| *x as f64 * *x as f64).sum::<f64>().sqrt()
 }
 
 struct Splitter<'a, E> {

@@ -1,0 +1,208 @@
+//! Flags, as the user gives them.
+
+use crate::params::{Params, Radius};
+use clap::{Args as ClapArgs, Parser, Subcommand};
+use std::path::PathBuf;
+
+/// Turns point clouds of any size into clean triangle meshes, inside the memory you give it.
+#[derive(Debug, Parser)]
+#[command(version, about, long_about = LONG_ABOUT, max_term_width = 100, after_help = EXAMPLES)]
+pub struct Args {
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+const LONG_ABOUT: &str = "Turns point clouds of any size into clean triangle meshes, inside the \
+memory you give it.
+
+The mesh interpolates the points: its vertices are points of the cloud. Every edge has at most two \
+triangles, every vertex is a disk or a half-disk, and triangles run consistently. The same cloud \
+and parameters give the same file, byte for byte, whatever memory, threads and order of inputs.";
+
+const EXAMPLES: &str = "Examples:
+  outcrop reconstruct scan.laz -o mesh.ply
+  outcrop reconstruct tiles/ -o town.ply --memory 4GiB --report town.json
+  outcrop reconstruct noisy.las -o smooth.ply --smooth 1
+  outcrop info scan.laz
+  outcrop verify mesh.ply && echo manifold
+  outcrop demo
+
+Exit codes: 0 fine, 1 the answer is no (verify), 2 error, 130 stopped by Ctrl-C.";
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Make a mesh from points
+    Reconstruct(Reconstruct),
+    /// Say what is in a cloud and what a run would need
+    Info(Info),
+    /// Check that a mesh is a manifold: exit 0 yes, 1 no
+    Verify(Verify),
+    /// Make a cloud, reconstruct it, verify the mesh: a first look at the program
+    Demo(Demo),
+}
+
+/// Limits of a run.
+#[derive(Debug, ClapArgs)]
+pub struct Limits {
+    /// Ceiling for memory, e.g. 512MiB or 4GiB [default: half of what machine and cgroup allow]
+    #[arg(long, value_name = "SIZE", value_parser = size)]
+    pub memory: Option<u64>,
+    /// Worker threads [default: all available]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub threads: Option<u16>,
+    /// Folder for scratch files, removed at the end [default: beside the output]
+    #[arg(long, value_name = "DIR")]
+    pub scratch: Option<PathBuf>,
+    /// No progress, even on a terminal
+    #[arg(long, short)]
+    pub quiet: bool,
+}
+
+/// Geometric parameters.
+#[derive(Debug, ClapArgs)]
+#[command(next_help_heading = "Surface")]
+pub struct Surface {
+    /// Neighbours for the plane at each point
+    #[arg(long, value_name = "N", default_value_t = 30)]
+    pub neighbors: usize,
+    /// Rounds of smoothing before the surface is made; 1 or 2 help noisy scans
+    #[arg(long, value_name = "ROUNDS", default_value_t = 0)]
+    pub smooth: u32,
+    /// Disk radius: auto (follows the local density), a percentage of the bounding box's diagonal
+    /// like 5%, or a length in the cloud's unit
+    #[arg(long, value_name = "auto|PERCENT%|LENGTH", default_value = "auto")]
+    pub radius: Radius,
+    /// Largest angle between neighbouring normals where the surface is uncertain, in degrees
+    #[arg(long, value_name = "DEGREES", default_value_t = 60.0)]
+    pub max_angle: f64,
+}
+
+/// Post-processing.
+#[derive(Debug, ClapArgs)]
+#[command(next_help_heading = "Repair")]
+pub struct Repair {
+    /// Fill holes of up to this many edges; 0 fills none
+    #[arg(long, value_name = "N", default_value_t = 500)]
+    pub max_hole_edges: usize,
+    /// Remove components with fewer triangles
+    #[arg(long, value_name = "N", default_value_t = 10)]
+    pub min_component: u64,
+    /// Leave out bridges, holes and components: the surface as extracted
+    #[arg(long)]
+    pub no_repair: bool,
+}
+
+/// `outcrop reconstruct`
+#[derive(Debug, ClapArgs)]
+pub struct Reconstruct {
+    /// Files (LAS, LAZ, PLY, XYZ text) or folders of them; together one cloud
+    #[arg(value_name = "INPUT", required = true)]
+    pub inputs: Vec<PathBuf>,
+    /// The mesh to write, binary PLY
+    #[arg(long, short, value_name = "MESH.ply")]
+    pub output: PathBuf,
+    #[command(flatten)]
+    pub surface: Surface,
+    #[command(flatten)]
+    pub repair: Repair,
+    #[command(flatten, next_help_heading = "Limits")]
+    pub limits: Limits,
+    /// Write what happened as JSON
+    #[arg(long, value_name = "FILE.json")]
+    pub report: Option<PathBuf>,
+    /// Points worked on at a time; does not change the result
+    #[arg(long, value_name = "N", hide = true)]
+    pub tile_points: Option<u32>,
+}
+
+/// `outcrop info`
+#[derive(Debug, ClapArgs)]
+pub struct Info {
+    /// Files or folders
+    #[arg(value_name = "INPUT", required = true)]
+    pub inputs: Vec<PathBuf>,
+    /// Answer as JSON
+    #[arg(long)]
+    pub json: bool,
+    #[command(flatten)]
+    pub limits: Limits,
+}
+
+/// `outcrop verify`
+#[derive(Debug, ClapArgs)]
+pub struct Verify {
+    /// The mesh, PLY
+    #[arg(value_name = "MESH")]
+    pub mesh: PathBuf,
+    /// Answer as JSON
+    #[arg(long)]
+    pub json: bool,
+    /// Vertices without a triangle are no defect
+    #[arg(long)]
+    pub allow_unreferenced: bool,
+    #[command(flatten)]
+    pub limits: Limits,
+}
+
+/// `outcrop demo`
+#[derive(Debug, ClapArgs)]
+pub struct Demo {
+    /// Folder for the cloud, the mesh and the report
+    #[arg(value_name = "DIR", default_value = "demo")]
+    pub folder: PathBuf,
+    /// Number of points, e.g. 200000 or 1e6
+    #[arg(long, value_name = "N", default_value = "200000", value_parser = count)]
+    pub points: u64,
+    #[command(flatten)]
+    pub limits: Limits,
+}
+
+impl Reconstruct {
+    /// The geometric parameters.
+    pub fn params(&self) -> Params {
+        Params {
+            neighbors: self.surface.neighbors,
+            smooth: self.surface.smooth,
+            radius: self.surface.radius,
+            max_angle: self.surface.max_angle,
+            max_hole_edges: self.repair.max_hole_edges,
+            min_component: self.repair.min_component,
+            repair: !self.repair.no_repair,
+            ..Params::default()
+        }
+    }
+}
+
+fn size(text: &str) -> Result<u64, String> {
+    let size: bytesize::ByteSize = text
+        .parse()
+        .map_err(|_| format!("{text:?} is not a size like 512MiB, 4GiB or 2000000000"))?;
+    Ok(size.as_u64())
+}
+
+fn count(text: &str) -> Result<u64, String> {
+    match text.parse::<f64>() {
+        Ok(x) if (1.0..=4e9).contains(&x) && x.fract() == 0.0 => Ok(x as u64),
+        _ => Err(format!("{text:?} is not a number of points like 200000 or 1e6")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn flags_are_well_formed() {
+        use clap::CommandFactory;
+        Args::command().debug_assert();
+    }
+
+    #[test]
+    fn sizes_are_read() {
+        assert_eq!(size("512MiB"), Ok(512 << 20));
+        assert_eq!(size("2GiB"), Ok(2 << 30));
+        assert_eq!(size("1000"), Ok(1000));
+        assert!(size("lots").is_err());
+    }
+}

@@ -1,0 +1,194 @@
+//! What each command does.
+
+use super::args::{Command, Demo, Info, Limits, Reconstruct, Verify};
+use super::progress::{Bars, Warnings};
+use super::{Answer, style};
+use crate::error::{Error, Result};
+use crate::inspect::{info, verify};
+use crate::pipeline::{Reconstruction, default_memory, default_threads};
+use crate::report::Report;
+use crate::workspace::memory::MemoryPool;
+use crate::workspace::progress::{Cancel, Observer, Silent};
+use crate::workspace::Workspace;
+use std::io::{IsTerminal, Write};
+use std::path::Path;
+use std::sync::Arc;
+
+/// Runs a command.
+pub fn run(command: Command) -> Result<Answer> {
+    match command {
+        Command::Reconstruct(args) => reconstruct(&args),
+        Command::Info(args) => tell(&args),
+        Command::Verify(args) => check(&args),
+        Command::Demo(args) => demo(&args),
+    }
+}
+
+fn observer(quiet: bool) -> Arc<dyn Observer> {
+    if quiet {
+        Arc::new(Silent)
+    } else if std::io::stderr().is_terminal() {
+        Arc::new(Bars::default())
+    } else {
+        Arc::new(Warnings)
+    }
+}
+
+/// A flag that Ctrl-C and a terminating signal raise; a second one ends the program at once.
+fn cancel_on_signal() -> Cancel {
+    let cancel = Cancel::new();
+    let raised = cancel.clone();
+    // Without a handler a signal ends the program, which is no worse than before.
+    let _ = ctrlc::set_handler(move || {
+        if raised.is_cancelled() {
+            std::process::exit(130);
+        }
+        raised.cancel();
+    });
+    cancel
+}
+
+fn threads(limits: &Limits) -> usize {
+    limits.threads.map_or_else(default_threads, usize::from)
+}
+
+fn workspace(limits: &Limits, beside: &Path) -> Result<Workspace> {
+    let memory = MemoryPool::new(limits.memory.unwrap_or_else(default_memory))?;
+    let scratch = limits.scratch.as_deref().unwrap_or(beside);
+    Workspace::new(scratch, memory, threads(limits), observer(limits.quiet), cancel_on_signal())
+}
+
+fn print(text: &str) -> Result<()> {
+    let mut out = std::io::stdout().lock();
+    writeln!(out, "{text}").map_err(|e| Error::io("standard output", "write", e))
+}
+
+fn json<T: serde::Serialize>(value: &T) -> Result<String> {
+    serde_json::to_string_pretty(value)
+        .map_err(|e| Error::io("standard output", "write JSON", e.into()))
+}
+
+fn reconstruct(args: &Reconstruct) -> Result<Answer> {
+    let report = run_reconstruction(args, cancel_on_signal())?;
+    if !args.limits.quiet && std::io::stdout().is_terminal() {
+        print(&summary(&report, &args.output))?;
+    }
+    Ok(Answer::Yes)
+}
+
+fn run_reconstruction(args: &Reconstruct, cancel: Cancel) -> Result<Report> {
+    let new_report = args.report.as_ref().is_some_and(|path| !path.exists());
+    if let Some(path) = &args.report {
+        // Better now than after hours of work.
+        let mut options = std::fs::File::options();
+        let opened = options.append(true).create(true).open(path);
+        opened.map_err(|e| Error::io(path, "write the report", e))?;
+    }
+    let mut builder = Reconstruction::builder()
+        .output(&args.output)
+        .params(args.params())
+        .threads(threads(&args.limits))
+        .observer(observer(args.limits.quiet))
+        .cancel(cancel);
+    for input in &args.inputs {
+        builder = builder.input(input);
+    }
+    if let Some(memory) = args.limits.memory {
+        builder = builder.memory(memory);
+    }
+    if let Some(scratch) = &args.limits.scratch {
+        builder = builder.scratch(scratch);
+    }
+    if let Some(points) = args.tile_points {
+        builder = builder.tile_points(points);
+    }
+    let outcome = builder.build().and_then(|r| r.run());
+    match (&outcome, &args.report) {
+        (Ok(report), Some(path)) => std::fs::write(path, json(report)? + "\n")
+            .map_err(|e| Error::io(path, "write the report", e))?,
+        // No report of a run that did not end.
+        (Err(_), Some(path)) if new_report => drop(std::fs::remove_file(path)),
+        _ => {}
+    }
+    outcome
+}
+
+fn summary(report: &Report, output: &Path) -> String {
+    let mesh = &report.mesh;
+    format!(
+        "{}: {} triangles, {} vertices from {} points; {} components, {} boundary edges\n\
+         {} in all, at most {} of memory and {} of scratch",
+        output.display(),
+        style::grouped(mesh.triangles),
+        style::grouped(mesh.vertices),
+        style::grouped(report.points),
+        style::grouped(report.repair.components_found - report.repair.components_removed),
+        style::grouped(mesh.boundary_edges),
+        style::seconds(report.seconds),
+        style::bytes(report.peak_resident_bytes),
+        style::bytes(report.peak_scratch_bytes),
+    )
+}
+
+fn tell(args: &Info) -> Result<Answer> {
+    let workspace = workspace(&args.limits, &std::env::temp_dir())?;
+    let info = info::info(&args.inputs, &workspace)?;
+    print(&if args.json { json(&info)? } else { info.to_string() })?;
+    Ok(Answer::Yes)
+}
+
+fn check(args: &Verify) -> Result<Answer> {
+    let workspace = workspace(&args.limits, &std::env::temp_dir())?;
+    let options = verify::Options {
+        allow_unreferenced: args.allow_unreferenced,
+        ..verify::Options::default()
+    };
+    let verdict = verify::verify_with(&args.mesh, &options, &workspace)?;
+    print(&if args.json { json(&verdict)? } else { verdict.to_string() })?;
+    Ok(if verdict.manifold { Answer::Yes } else { Answer::No })
+}
+
+fn demo(args: &Demo) -> Result<Answer> {
+    use outcrop_cloudgen::{Cloud, Format, Kind};
+    let folder = &args.folder;
+    std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, "make the folder", e))?;
+    let cloud = folder.join("bumpy.laz");
+    let format = Format::from_path(&cloud).map_err(|e| generator_error(&cloud, &e))?;
+    print(&format!("making {} points on a closed surface", style::grouped(args.points)))?;
+    Cloud::new(Kind::Bumpy)
+        .points(args.points)
+        .write(&cloud, format)
+        .map_err(|e| generator_error(&cloud, &e))?;
+    let mesh = folder.join("bumpy.ply");
+    let observer = observer(args.limits.quiet);
+    let mut builder = Reconstruction::builder()
+        .input(&cloud)
+        .output(&mesh)
+        .threads(threads(&args.limits))
+        .observer(observer)
+        .cancel(cancel_on_signal());
+    if let Some(memory) = args.limits.memory {
+        builder = builder.memory(memory);
+    }
+    let report = builder.build()?.run()?;
+    let path = folder.join("report.json");
+    std::fs::write(&path, json(&report)? + "\n")
+        .map_err(|e| Error::io(&path, "write the report", e))?;
+    print(&summary(&report, &mesh))?;
+    let memory = MemoryPool::new(args.limits.memory.unwrap_or_else(default_memory))?;
+    let threads = threads(&args.limits);
+    let workspace = Workspace::new(folder, memory, threads, Arc::new(Silent), Cancel::new())?;
+    let verdict = verify::verify(&mesh, &workspace)?;
+    print(&verdict.to_string())?;
+    print(&format!(
+        "the cloud is {}, the mesh {} (open it in MeshLab, CloudCompare or Blender), the report {}",
+        cloud.display(),
+        mesh.display(),
+        path.display()
+    ))?;
+    Ok(if verdict.manifold { Answer::Yes } else { Answer::No })
+}
+
+fn generator_error(path: &Path, error: &outcrop_cloudgen::Error) -> Error {
+    Error::io(path, "make the demo cloud", std::io::Error::other(error.to_string()))
+}

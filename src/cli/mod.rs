@@ -1,0 +1,38 @@
+//! The command line: flags to configuration, messages, exit codes. The only code that prints.
+
+mod args;
+mod commands;
+mod progress;
+mod style;
+
+use crate::error::Error;
+use clap::Parser;
+use std::process::ExitCode;
+
+/// Exit code when the answer is no, or a run was stopped.
+const NO: u8 = 1;
+/// Exit code for errors.
+const FAILED: u8 = 2;
+
+/// What a command comes to.
+enum Answer {
+    Yes,
+    No,
+}
+
+/// Runs the command line; 0 fine, 1 the answer is no, 2 error.
+#[must_use]
+pub fn main() -> ExitCode {
+    let args = args::Args::parse();
+    match commands::run(args.command) {
+        Ok(Answer::Yes) => ExitCode::SUCCESS,
+        Ok(Answer::No) => ExitCode::from(NO),
+        Err(error) => {
+            // A reader that went away (`| head`) is no error.
+            if !style::is_broken_pipe(&error) {
+                eprintln!("outcrop: {error}");
+            }
+            ExitCode::from(if matches!(error, Error::Cancelled) { 130 } else { FAILED })
+        }
+    }
+}

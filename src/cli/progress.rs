@@ -1,0 +1,83 @@
+//! Progress on a terminal: stage, rate, time left, memory; one line a stage.
+
+use crate::workspace::limits;
+use crate::workspace::progress::Observer;
+use indicatif::{HumanCount, ProgressBar, ProgressState, ProgressStyle};
+use std::fmt::Write;
+use std::sync::Mutex;
+use std::time::Duration;
+
+/// Draws a bar for the current stage on standard error.
+#[derive(Default)]
+pub struct Bars {
+    current: Mutex<Option<ProgressBar>>,
+}
+
+const KNOWN: &str = "{prefix:>8} [{bar:24}] {pos}/{len} {msg}  {rate}  {eta} left  {memory}";
+const UNKNOWN: &str = "{prefix:>8} {spinner} {pos} {msg}  {rate}  {elapsed}  {memory}";
+const DONE: &str = "{prefix:>8} {pos} {msg} in {elapsed_precise}";
+
+fn style(template: &str) -> ProgressStyle {
+    ProgressStyle::with_template(template)
+        .unwrap_or_else(|_| ProgressStyle::default_bar())
+        .progress_chars("=> ")
+        .with_key("pos", |state: &ProgressState, out: &mut dyn Write| {
+            let _ = write!(out, "{}", HumanCount(state.pos()));
+        })
+        .with_key("len", |state: &ProgressState, out: &mut dyn Write| {
+            let _ = write!(out, "{}", HumanCount(state.len().unwrap_or(0)));
+        })
+        .with_key("rate", |state: &ProgressState, out: &mut dyn Write| {
+            let _ = write!(out, "{}/s", HumanCount(state.per_sec() as u64));
+        })
+        .with_key("memory", |_: &ProgressState, out: &mut dyn Write| {
+            let _ = write!(out, "{} MiB", limits::resident() >> 20);
+        })
+}
+
+impl Bars {
+    fn with(&self, work: impl FnOnce(&ProgressBar)) {
+        let current = self.current.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        if let Some(bar) = current.as_ref() {
+            work(bar);
+        }
+    }
+}
+
+impl Observer for Bars {
+    fn begin(&self, name: &'static str, unit: &'static str, total: u64) {
+        let bar = if total > 0 {
+            ProgressBar::new(total).with_style(style(KNOWN))
+        } else {
+            ProgressBar::new_spinner().with_style(style(UNKNOWN))
+        };
+        let bar = bar.with_prefix(name).with_message(unit);
+        bar.enable_steady_tick(Duration::from_millis(200));
+        let mut current = self.current.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        *current = Some(bar);
+    }
+
+    fn advance(&self, count: u64) {
+        self.with(|bar| bar.inc(count));
+    }
+
+    fn end(&self) {
+        self.with(|bar| {
+            bar.set_style(style(DONE));
+            bar.finish();
+        });
+    }
+
+    fn warn(&self, message: &str) {
+        self.with(|bar| bar.suspend(|| eprintln!("outcrop: warning: {message}")));
+    }
+}
+
+/// Prints warnings only.
+pub struct Warnings;
+
+impl Observer for Warnings {
+    fn warn(&self, message: &str) {
+        eprintln!("outcrop: warning: {message}");
+    }
+}

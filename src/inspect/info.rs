@@ -1,0 +1,183 @@
+//! What is in a cloud, and what a run on it would need.
+
+use crate::error::Result;
+use crate::geom::aabb::Aabb;
+use crate::pipeline::order;
+use crate::stages::cells::{CellMaker, DiskRadius};
+use crate::stages::ingest::{IngestStats, ingest};
+use crate::stages::order::{PAGE, PointStore};
+use crate::stages::tiles::Tile;
+use crate::stages::tiles::near::Search;
+use crate::workspace::Workspace;
+use crate::workspace::memory::MINIMUM_BUDGET;
+use serde::Serialize;
+use std::fmt;
+use std::path::PathBuf;
+use std::time::Instant;
+
+/// Neighbours that the suggested radius reaches to.
+const NEIGHBORS: usize = 30;
+
+/// Sampled runs of points, and points in each.
+const SAMPLES: usize = 24;
+const SAMPLE_POINTS: usize = 1024;
+
+/// Seconds of the other stages for each second of cells; measured on real scans.
+const OTHER_STAGES: f64 = 1.3;
+
+/// Scratch bytes a point at the peak; measured on real scans.
+const SCRATCH_PER_POINT: u64 = 150;
+
+/// Percentiles of a length over a sample of the points, in the cloud's unit.
+#[derive(Debug, Clone, Copy, Default, Serialize, PartialEq)]
+pub struct Percentiles {
+    /// 5th percentile.
+    pub p5: f64,
+    /// Median.
+    pub p50: f64,
+    /// 95th percentile.
+    pub p95: f64,
+}
+
+/// A cloud and what it needs.
+#[derive(Debug, Clone, Serialize)]
+pub struct Info {
+    /// Points and files.
+    pub input: IngestStats,
+    /// Points that share their position with another one.
+    pub duplicates: u64,
+    /// Distinct points.
+    pub points: u64,
+    /// Lowest corner in the cloud's unit.
+    pub min: [f64; 3],
+    /// Highest corner in the cloud's unit.
+    pub max: [f64; 3],
+    /// Step of the lattice that positions would be kept on.
+    pub lattice_step: f64,
+    /// True if every position is on it without rounding.
+    pub lattice_exact: bool,
+    /// Distance to the nearest other point.
+    pub spacing: Percentiles,
+    /// Disk radius that `--radius auto` would use.
+    pub auto_radius: Percentiles,
+    /// Smallest memory budget that a run accepts, in bytes.
+    pub memory_minimum: u64,
+    /// Scratch space a run would take at its peak, about, in bytes.
+    pub scratch_bytes: u64,
+    /// Size of the mesh file, about, in bytes.
+    pub output_bytes: u64,
+    /// Seconds a run would take on these threads, about.
+    pub seconds: f64,
+}
+
+/// Reads the whole cloud once and samples it.
+///
+/// # Errors
+/// As for a reconstruction, but a cloud too small for a surface is no error.
+pub fn info(inputs: &[PathBuf], workspace: &Workspace) -> Result<Info> {
+    let start = Instant::now();
+    let observer = &workspace.observer;
+    observer.begin("ingest", "points", 0);
+    let spool = ingest(inputs, workspace)?;
+    observer.end();
+    let input = spool.stats().clone();
+    let lattice = spool.choose_lattice(0)?;
+    observer.begin("order", "points", input.kept);
+    let (store, duplicates) = order(spool, &lattice, PAGE, workspace)?;
+    observer.end();
+    let read = start.elapsed().as_secs_f64();
+    let sample = sample(&store, workspace)?;
+    let Aabb { min, max } = store.bounds();
+    let points = store.len() as u64;
+    let cells = sample.seconds / sample.points.max(1) as f64 * points as f64;
+    Ok(Info {
+        duplicates,
+        points,
+        min: lattice.position(min),
+        max: lattice.position(max),
+        lattice_step: lattice.step,
+        lattice_exact: lattice.exact,
+        spacing: percentiles(sample.nearest, lattice.step),
+        auto_radius: percentiles(sample.radius, lattice.step),
+        memory_minimum: MINIMUM_BUDGET,
+        scratch_bytes: points * SCRATCH_PER_POINT,
+        output_bytes: points * (24 + 26),
+        seconds: read + cells / workspace.threads as f64 * (1.0 + OTHER_STAGES),
+        input,
+    })
+}
+
+#[derive(Default)]
+struct Sample {
+    nearest: Vec<f64>,
+    radius: Vec<f64>,
+    points: usize,
+    seconds: f64,
+}
+
+fn sample(store: &PointStore, workspace: &Workspace) -> Result<Sample> {
+    let _held = workspace.reserve("info: sample", 16 << 20)?;
+    let mut sample = Sample::default();
+    let mut maker = CellMaker::new(NEIGHBORS, DiskRadius::Auto);
+    let mut search = Search::default();
+    let count = SAMPLES.min(store.len().div_ceil(SAMPLE_POINTS));
+    for index in 0..count {
+        workspace.check_cancel()?;
+        let start = (store.len() * index / count) / PAGE * PAGE;
+        let ids = start..(start + SAMPLE_POINTS).min(store.len());
+        let tile = Tile::load(store, ids.clone())?;
+        let begin = Instant::now();
+        let mut failed = None;
+        tile.for_each_query(NEIGHBORS, &mut search, |_, _, query| {
+            let Some(mut query) = query else { return };
+            let near = query.near();
+            if let Some(last) = near.get(NEIGHBORS - 1) {
+                sample.nearest.push((near[0].distance2 as f64).sqrt());
+                sample.radius.push((last.distance2 as f64).sqrt());
+            }
+            failed = maker.from_tile(&mut query, |_, _| {}).err().or(failed.take());
+        });
+        sample.seconds += begin.elapsed().as_secs_f64();
+        sample.points += ids.len();
+        if let Some(error) = failed {
+            return Err(error);
+        }
+    }
+    Ok(sample)
+}
+
+fn percentiles(mut lengths: Vec<f64>, step: f64) -> Percentiles {
+    if lengths.is_empty() {
+        return Percentiles::default();
+    }
+    lengths.sort_unstable_by(f64::total_cmp);
+    let at = |share: f64| lengths[((lengths.len() - 1) as f64 * share).round() as usize] * step;
+    Percentiles { p5: at(0.05), p50: at(0.5), p95: at(0.95) }
+}
+
+impl fmt::Display for Info {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for file in &self.input.files {
+            writeln!(f, "{}: {:?}, {} points", file.path.display(), file.format, file.points)?;
+        }
+        let three = |p: &[f64; 3]| format!("{} {} {}", p[0], p[1], p[2]);
+        let spread = |p: &Percentiles| format!("{:.4} (5-95 %: {:.4} to {:.4})", p.p50, p.p5, p.p95);
+        let mib = |bytes: u64| bytes.div_ceil(1 << 20);
+        writeln!(f, "points       {} distinct of {} read", self.points, self.input.read)?;
+        writeln!(
+            f,
+            "left out     {} duplicates, {} not finite, {} withheld",
+            self.duplicates, self.input.dropped_non_finite, self.input.withheld
+        )?;
+        writeln!(f, "lowest       {}", three(&self.min))?;
+        writeln!(f, "highest      {}", three(&self.max))?;
+        let rounding = if self.lattice_exact { "exact" } else { "rounded" };
+        writeln!(f, "lattice      step {} ({rounding})", self.lattice_step)?;
+        writeln!(f, "spacing      {}", spread(&self.spacing))?;
+        writeln!(f, "auto radius  {}", spread(&self.auto_radius))?;
+        writeln!(f, "memory       any budget from {} MiB", mib(self.memory_minimum))?;
+        writeln!(f, "scratch      about {} MiB", mib(self.scratch_bytes))?;
+        writeln!(f, "mesh         about {} MiB", mib(self.output_bytes))?;
+        write!(f, "time         about {:.0} s", self.seconds.ceil())
+    }
+}
