@@ -170,6 +170,7 @@ impl Holes<'_> {
     fn is_outline(&self, hole: &[u32]) -> bool {
         let mut area2: Big3<8> = [Big::ZERO; 3];
         let mut normals: Big3<8> = [Big::ZERO; 3];
+        let mut lengths = 0.0;
         for (k, &from) in hole.iter().enumerate() {
             let to = hole[(k + 1) % hole.len()];
             // About the loop's first vertex: the sum is the same about any point.
@@ -177,9 +178,12 @@ impl Holes<'_> {
             area2 = plus(area2, cross(vector(a), vector(b)));
             let t = self.half_edges[&(to, from)];
             let sign = if self.turned[&t] { -1 } else { 1 };
-            normals = plus(normals, vector(normal(self.points, t).map(|x| sign * x)));
+            let n = normal(self.points, t);
+            lengths += n.iter().map(|&x| (x as f64) * (x as f64)).sum::<f64>().sqrt();
+            normals = plus(normals, vector(n.map(|x| sign * x)));
         }
-        dot(area2, normals).sign() < 0
+        let size = dot(area2, area2).approximate().sqrt();
+        dot(area2, normals).approximate() < -0.5 * size * lengths
     }
 
     /// The triangles that fill a loop, or nothing.

@@ -49,7 +49,7 @@ pub struct Settings {
     pub max_hole_edges: usize,
     /// Components of fewer triangles go.
     pub min_component: usize,
-    /// Without, nothing of section 1.6 happens but orientation.
+    /// Without, nothing of section 1.6 happens but orientation and the splitting of vertices.
     pub repair: bool,
     /// `B`.
     pub block: u32,
@@ -174,7 +174,7 @@ pub fn from_triples(
 
     let mut surface = inserted.surface;
     let turned = repair_and_orient(&points, &mut surface, settings, &mut counts);
-    let (vertices, triangles) = output::in_file_order(&surface, &turned, settings.repair);
+    let (vertices, triangles) = output::in_file_order(&surface, &turned, true);
     counts.copies = vertices.len() - surface.vertices().len();
     Mesh {
         ids: points,

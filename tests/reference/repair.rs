@@ -18,7 +18,11 @@ pub fn remove_bridges(surface: &mut Surface) -> usize {
             .collect();
         t.into_iter().any(|v| {
             let both = border.iter().filter(|edge| edge.contains(&v)).count() == 2;
-            both && surface.fans(v).len() > 1
+            let fans = surface.fans(v);
+            // Where all fans are single triangles, the smallest stays.
+            let smallest = fans.iter().flat_map(|fan| &fan.triangles).min();
+            let stays = fans.iter().all(|fan| fan.triangles.len() == 1) && smallest == Some(&t);
+            both && fans.len() > 1 && !stays
         })
     };
     let bridges: Vec<Triangle> = surface

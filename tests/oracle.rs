@@ -1,0 +1,219 @@
+//! The pipeline's mesh equals the reference's, triangle for triangle, on many small and nasty
+//! clouds, for every block size, tile size, page size and number of threads.
+
+mod reference;
+
+use outcrop::inspect::ply_mesh::{PlyMesh, Sink};
+use outcrop::{Error, Params, Radius, Reconstruction, Report};
+use reference::{Mesh, Settings, clouds};
+use std::fmt::Write;
+use std::path::Path;
+
+type Point = [i32; 3];
+
+/// A mesh as it was read back: positions in lattice steps.
+#[derive(Default)]
+struct ReadBack {
+    vertices: Vec<[f64; 3]>,
+    triangles: Vec<[u32; 3]>,
+}
+
+impl Sink for ReadBack {
+    fn vertices(&mut self, positions: &[[f64; 3]]) -> outcrop::Result<()> {
+        self.vertices.extend_from_slice(positions);
+        Ok(())
+    }
+
+    fn triangles(&mut self, triangles: &[[u32; 3]]) -> outcrop::Result<()> {
+        self.triangles.extend_from_slice(triangles);
+        Ok(())
+    }
+
+    fn non_triangles(&mut self, count: u64) -> outcrop::Result<()> {
+        assert_eq!(count, 0);
+        Ok(())
+    }
+}
+
+/// How the work is cut up; must not matter.
+#[derive(Debug, Clone, Copy)]
+struct Cut {
+    tile: u32,
+    page: usize,
+    threads: usize,
+}
+
+fn pipeline(points: &[Point], settings: &Settings, cut: Cut) -> outcrop::Result<(ReadBack, Report)> {
+    let folder = tempfile::tempdir().unwrap();
+    let (input, output) = (folder.path().join("cloud.xyz"), folder.path().join("mesh.ply"));
+    let mut text = String::new();
+    for p in points {
+        writeln!(text, "{} {} {}", p[0], p[1], p[2]).unwrap();
+    }
+    std::fs::write(&input, text).unwrap();
+    let params = Params {
+        neighbors: settings.neighbors,
+        smooth: settings.smooth,
+        radius: match settings.radius {
+            reference::Radius::Auto => Radius::Auto,
+            reference::Radius::Percent(x) => Radius::Percent(x),
+            reference::Radius::Length(x) => Radius::Length(x),
+        },
+        max_angle: if settings.cos_max_angle == 0.5 { 60.0 } else { 120.0 },
+        max_hole_edges: settings.max_hole_edges,
+        min_component: settings.min_component as u64,
+        repair: settings.repair,
+        block: settings.block,
+    };
+    assert_eq!(params.cos_max_angle(), settings.cos_max_angle);
+    let report = Reconstruction::builder()
+        .input(&input)
+        .output(&output)
+        .params(params)
+        .memory(192 << 20)
+        .threads(cut.threads)
+        .tile_points(cut.tile)
+        .page_points(cut.page)
+        .build()?
+        .run()?;
+    let mut mesh = ReadBack::default();
+    PlyMesh::open(Path::new(&output))?.read(&mut mesh)?;
+    Ok((mesh, report))
+}
+
+/// The cloud moved to the lattice's origin, as the pipeline has it, without duplicates in a row.
+fn at_origin(points: &[Point]) -> Vec<Point> {
+    let least: Point =
+        std::array::from_fn(|axis| points.iter().map(|p| p[axis]).min().unwrap_or(0));
+    points.iter().map(|p| std::array::from_fn(|axis| p[axis] - least[axis])).collect()
+}
+
+fn compare(name: &str, points: &[Point], settings: &Settings, cuts: &[Cut]) {
+    let points = at_origin(points);
+    // Smoothing works on a lattice ten times halved.
+    let scale = if settings.smooth > 0 { 1024 } else { 1 };
+    let fine: Vec<Point> = points.iter().map(|p| p.map(|x| x * scale)).collect();
+    let fine_settings = Settings {
+        radius: match settings.radius {
+            reference::Radius::Length(x) => reference::Radius::Length(x * f64::from(scale)),
+            other => other,
+        },
+        ..*settings
+    };
+    let expected = reference::reconstruct(&fine, &fine_settings);
+    for &cut in cuts {
+        let what = format!("{name}, {} points, {settings:?}, {cut:?}", points.len());
+        match pipeline(&points, settings, cut) {
+            Ok((mesh, report)) => same(&what, &mesh, &report, &expected, f64::from(scale)),
+            Err(Error::NoTriangles { .. } | Error::Degenerate { .. }) => {
+                assert!(expected.triangles.is_empty(), "{what}: nothing was made");
+            }
+            Err(error) => panic!("{what}: {error}"),
+        }
+    }
+}
+
+fn same(what: &str, mesh: &ReadBack, report: &Report, expected: &Mesh, scale: f64) {
+    let counts = &expected.counts;
+    let t = &report.triples;
+    assert_eq!(
+        (t.t3 as usize, t.t2 as usize, t.t1 as usize),
+        (counts.t3, counts.t2, counts.t1),
+        "{what}: triples"
+    );
+    assert_eq!(report.base.triangles as usize, counts.base, "{what}: base");
+    let i = &report.insertion;
+    assert_eq!(
+        [i.unconnected, i.full_edge, i.excess, i.angle, i.orientation].map(|x| x as usize),
+        {
+            let r = &counts.rejected;
+            [r.edges, r.full_edge, r.vertex, r.angle, r.orientation]
+        },
+        "{what}: rejected"
+    );
+    assert_eq!(i.joints_removed as usize, counts.joints_removed, "{what}: joints removed");
+    assert_eq!(
+        i.accepted as usize,
+        counts.inserted_interior + counts.inserted_crossing,
+        "{what}: accepted"
+    );
+    let r = &report.repair;
+    assert_eq!(r.bridges_removed as usize, counts.bridges, "{what}: bridges");
+    assert_eq!(r.components_removed as usize, counts.small_components, "{what}: components");
+    assert_eq!(r.holes_filled as usize, counts.holes.filled, "{what}: holes filled");
+    assert_eq!(r.holes_outline as usize, counts.holes.outlines, "{what}: outlines");
+    assert_eq!(mesh.triangles, expected.triangles, "{what}: triangles");
+    let position = |id: &u32| {
+        // A coordinate in the file is single precision where that is enough for the input.
+        expected.ids[*id as usize].map(|x| f64::from(x) / scale)
+    };
+    let close = |a: &[f64; 3], b: &[f64; 3]| (0..3).all(|k| (a[k] - b[k]).abs() <= 0.05);
+    let expected: Vec<_> = expected.vertices.iter().map(position).collect();
+    assert_eq!(mesh.vertices.len(), expected.len(), "{what}: vertices");
+    for (a, b) in mesh.vertices.iter().zip(&expected) {
+        assert!(close(a, b), "{what}: vertex at {a:?}, expected {b:?}");
+    }
+}
+
+const CUTS: [Cut; 3] = [
+    Cut { tile: u32::MAX, page: 256, threads: 2 },
+    Cut { tile: 30, page: 16, threads: 1 },
+    Cut { tile: 4, page: 3, threads: 2 },
+];
+
+fn run(seeds: std::ops::Range<u64>, settings: impl Fn(u64) -> Settings) {
+    for seed in seeds {
+        for (name, points) in clouds::one_of_each(seed) {
+            let settings = settings(seed);
+            if settings.smooth > 0 && points.iter().flatten().any(|x| *x >= 1 << 19) {
+                continue;
+            }
+            compare(&format!("{name}, seed {seed}"), &points, &settings, &CUTS);
+        }
+    }
+}
+
+#[test]
+fn one_block() {
+    run(0..3, |_| Settings::default());
+}
+
+#[test]
+fn small_blocks() {
+    run(10..16, |seed| Settings {
+        block: [40, 7, 100, 15][seed as usize % 4],
+        ..Settings::default()
+    });
+}
+
+#[test]
+fn without_repair() {
+    run(20..22, |_| Settings { block: 25, repair: false, ..Settings::default() });
+}
+
+#[test]
+fn few_neighbors_and_fixed_radius() {
+    run(30..34, |seed| Settings {
+        neighbors: [5, 8, 12][seed as usize % 3],
+        radius: [reference::Radius::Percent(5.0), reference::Radius::Percent(40.0)]
+            [seed as usize % 2],
+        block: 33,
+        min_component: 2,
+        ..Settings::default()
+    });
+}
+
+#[test]
+fn smoothed() {
+    run(40..42, |seed| Settings { smooth: 1 + seed as u32 % 2, block: 50, ..Settings::default() });
+}
+
+#[test]
+fn holes_of_few_edges_and_wide_angles() {
+    run(50..53, |seed| Settings {
+        max_hole_edges: 3 + seed as usize % 5,
+        cos_max_angle: Params { max_angle: 120.0, ..Params::default() }.cos_max_angle(),
+        block: 60,
+        ..Settings::default()
+    });
+}

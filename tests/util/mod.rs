@@ -1,0 +1,145 @@
+//! What the end-to-end tests share: clouds made on the spot, runs of the library and of the
+//! program, and what they left behind.
+#![allow(dead_code)] // every test binary uses its own part
+
+use outcrop::inspect::verify::{Verdict, verify};
+use outcrop::params::Params;
+use outcrop::pipeline::{Builder, Reconstruction};
+use outcrop::report::Report;
+use outcrop::workspace::Workspace;
+use outcrop::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
+use outcrop::workspace::progress::{Cancel, Silent};
+use outcrop_cloudgen::{Cloud, Format};
+use std::ffi::OsStr;
+use std::hash::Hasher;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+use std::sync::Arc;
+
+/// Real scans that are used where they are, if they are.
+pub const SCANS: &str = "../shared/data/scans";
+
+/// The real scan `name`, or none with a word about it.
+pub fn scan(name: &str) -> Option<PathBuf> {
+    let path = Path::new(SCANS).join(name);
+    if !path.exists() {
+        println!("skipped: {} is absent", path.display());
+        return None;
+    }
+    Some(path)
+}
+
+/// A folder for one test.
+pub struct Bench(tempfile::TempDir);
+
+impl Bench {
+    pub fn new() -> Self {
+        Self(tempfile::tempdir().unwrap())
+    }
+
+    pub fn folder(&self) -> &Path {
+        self.0.path()
+    }
+
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    /// Writes `bytes` to the file `name`.
+    pub fn write(&self, name: &str, bytes: impl AsRef<[u8]>) -> PathBuf {
+        let path = self.path(name);
+        std::fs::write(&path, bytes).unwrap();
+        path
+    }
+
+    /// Writes a generated cloud to the file `name`, in the format of its extension.
+    pub fn cloud(&self, name: &str, cloud: &Cloud) -> PathBuf {
+        let path = self.path(name);
+        cloud.write(&path, Format::from_path(&path).unwrap()).unwrap();
+        path
+    }
+
+    /// Writes points as text.
+    pub fn points(&self, name: &str, points: &[[f64; 3]]) -> PathBuf {
+        let lines: Vec<_> = points.iter().map(|[x, y, z]| format!("{x} {y} {z}\n")).collect();
+        self.write(name, lines.concat())
+    }
+
+    /// A new, empty folder.
+    pub fn subfolder(&self, name: &str) -> PathBuf {
+        let path = self.path(name);
+        std::fs::create_dir(&path).unwrap();
+        path
+    }
+}
+
+/// Names of everything in a folder, sorted.
+pub fn listing(folder: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(folder).unwrap();
+    let mut names: Vec<_> =
+        entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
+}
+
+/// A fingerprint of a file's bytes.
+pub fn hash(path: &Path) -> u64 {
+    let bytes = std::fs::read(path).unwrap();
+    let mut hasher = std::collections::hash_map::DefaultHasher::new();
+    hasher.write(&bytes);
+    hasher.finish()
+}
+
+/// A description of a run with the smallest budget and two threads.
+pub fn builder(inputs: &[PathBuf], output: &Path, params: &Params) -> Builder {
+    let start = Reconstruction::builder()
+        .output(output)
+        .params(params.clone())
+        .memory(MINIMUM_BUDGET)
+        .threads(2);
+    inputs.iter().fold(start, |builder, input| builder.input(input))
+}
+
+/// Runs with the smallest budget and two threads.
+pub fn reconstruct(input: &Path, output: &Path, params: &Params) -> Report {
+    builder(&[input.into()], output, params).build().unwrap().run().unwrap()
+}
+
+/// What `verify` says of a mesh.
+pub fn verdict(mesh: &Path) -> Verdict {
+    let memory = MemoryPool::new(MINIMUM_BUDGET).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let workspace =
+        Workspace::new(folder.path(), memory, 2, Arc::new(Silent), Cancel::new()).unwrap();
+    verify(mesh, &workspace).unwrap()
+}
+
+/// The program with arguments, not started yet.
+pub fn program<S: AsRef<OsStr>>(arguments: impl IntoIterator<Item = S>) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_outcrop"));
+    command.args(arguments).stdin(Stdio::null());
+    command
+}
+
+/// What a finished program said.
+#[derive(Debug)]
+pub struct Said {
+    pub code: Option<i32>,
+    pub out: String,
+    pub err: String,
+}
+
+impl From<Output> for Said {
+    fn from(output: Output) -> Self {
+        Self {
+            code: output.status.code(),
+            out: String::from_utf8(output.stdout).unwrap(),
+            err: String::from_utf8(output.stderr).unwrap(),
+        }
+    }
+}
+
+/// Runs the program to its end.
+pub fn run<S: AsRef<OsStr>>(arguments: impl IntoIterator<Item = S>) -> Said {
+    program(arguments).output().unwrap().into()
+}

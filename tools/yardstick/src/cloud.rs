@@ -1,0 +1,57 @@
+//! The cloud to measure with, and its points as the k-d tree wants them.
+
+use crate::Result;
+use outcrop::workspace::Workspace;
+use outcrop_cloudgen::{Cloud, Format, Kind};
+use std::path::{Path, PathBuf};
+
+/// A generated cloud: a uniform sample of a surface.
+#[derive(Debug, clap::Args)]
+pub struct Sample {
+    /// Surface to sample, as cloudgen names them
+    #[arg(long, value_name = "NAME", default_value = "bumpy", conflicts_with = "input")]
+    kind: Kind,
+    /// Number of points, e.g. 1e6
+    #[arg(long, value_name = "N", default_value = "1e6", value_parser = count)]
+    points: u64,
+    /// Format of the cloud, as cloudgen names them
+    #[arg(long, value_name = "NAME", default_value = "ply-le-f32", conflicts_with = "input")]
+    format: Format,
+}
+
+fn count(text: &str) -> std::result::Result<u64, String> {
+    match text.replace('_', "").parse::<f64>() {
+        Ok(x) if (1.0..=4e9).contains(&x) && x.fract() == 0.0 => Ok(x as u64),
+        _ => Err(format!("{text:?} is not a number of points like 200000 or 1e6")),
+    }
+}
+
+impl Sample {
+    /// Writes the cloud into `folder`; its path.
+    pub fn write(&self, folder: &Path) -> Result<PathBuf> {
+        let extension = match self.format {
+            Format::Las(_) => "las",
+            Format::Laz(_) => "laz",
+            Format::Ply(..) => "ply",
+            Format::Xyz => "xyz",
+        };
+        let path = folder.join(format!("{}.{extension}", self.kind.name()));
+        Cloud::new(self.kind).points(self.points).write(&path, self.format)?;
+        // Or the disk would still be busy with it while the clock runs.
+        std::fs::File::open(&path)?.sync_all()?;
+        Ok(path)
+    }
+}
+
+/// The distinct points of a cloud along the Hilbert curve, relative to its lowest corner: what is
+/// left after the pipeline's own ingest and order.
+pub fn sorted_points(cloud: &Path, workspace: &Workspace) -> Result<Vec<[f32; 3]>> {
+    use outcrop::stages::{ingest, order};
+    let spool = ingest::ingest(&[cloud.to_owned()], workspace)?;
+    let lattice = spool.choose_lattice(0)?;
+    let mut orderer = order::Orderer::new(workspace)?;
+    spool.for_each(&lattice, |points| orderer.push(workspace, points))?;
+    let (store, _) = orderer.finish(workspace, order::PAGE)?;
+    let scaled = |p: [i32; 3]| p.map(|c| (f64::from(c) * lattice.step) as f32);
+    Ok(store.slice(0..store.len())?.into_iter().map(scaled).collect())
+}

@@ -1,0 +1,40 @@
+//! K: a k-d tree answers one query after the other.
+
+use crate::Result;
+use kiddo::{ImmutableKdTree, SquaredEuclidean};
+use outcrop::workspace::Workspace;
+use rayon::prelude::*;
+use std::num::NonZero;
+use std::time::Instant;
+
+/// Neighbours asked for; the query itself is one of them.
+const NEIGHBORS: usize = 30;
+
+/// The k-d tree's times in seconds.
+#[derive(Debug, Clone, Copy)]
+pub struct Times {
+    /// Building the tree; not part of K.
+    pub build: f64,
+    /// All queries: K.
+    pub queries: f64,
+}
+
+/// Answers `nearest_n(30)` for all points on the workspace's threads.
+pub fn time(points: &[[f32; 3]], workspace: &Workspace) -> Result<Times> {
+    let neighbors = NonZero::new(NEIGHBORS).ok_or("no neighbours asked for")?;
+    let start = Instant::now();
+    let tree: ImmutableKdTree<f32, 3> = ImmutableKdTree::new_from_slice(points);
+    let build = start.elapsed().as_secs_f64();
+    let start = Instant::now();
+    let answer = |p| {
+        let near = tree.nearest_n::<SquaredEuclidean>(p, neighbors);
+        near.last().map_or(0.0, |n| f64::from(n.distance))
+    };
+    let sum: f64 = workspace.install(|| points.par_iter().map(answer).sum());
+    let queries = start.elapsed().as_secs_f64();
+    // The sum keeps the compiler from leaving the queries out.
+    if !sum.is_finite() {
+        return Err("the k-d tree's distances are not finite".into());
+    }
+    Ok(Times { build, queries })
+}

@@ -1,0 +1,52 @@
+//! One reconstruction, cloud to mesh, in a process of its own: so its peak memory is its own, and
+//! its time holds all that a user waits for.
+
+use crate::Result;
+use outcrop::Reconstruction;
+use serde_json::Value;
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
+use std::time::Instant;
+
+/// What to reconstruct, and in which limits.
+#[derive(Debug, Clone, clap::Args)]
+pub struct Job {
+    /// The cloud
+    pub input: PathBuf,
+    /// The mesh
+    pub output: PathBuf,
+    /// Worker threads
+    #[arg(long)]
+    pub threads: usize,
+    /// Memory budget in bytes
+    #[arg(long)]
+    pub memory: u64,
+}
+
+/// The child's part: reconstructs and prints the report.
+pub fn work(job: &Job) -> Result<()> {
+    let report = Reconstruction::builder()
+        .input(&job.input)
+        .output(&job.output)
+        .threads(job.threads)
+        .memory(job.memory)
+        .build()?
+        .run()?;
+    println!("{}", serde_json::to_string(&report)?);
+    Ok(())
+}
+
+/// The parent's part: wall-clock seconds of the whole process, and its report.
+pub fn time(job: &Job) -> Result<(f64, Value)> {
+    let mut command = Command::new(std::env::current_exe()?);
+    command.arg("pipeline").arg(&job.input).arg(&job.output);
+    command.arg("--threads").arg(job.threads.to_string());
+    command.arg("--memory").arg(job.memory.to_string());
+    let start = Instant::now();
+    let output = command.stderr(Stdio::inherit()).output()?;
+    let seconds = start.elapsed().as_secs_f64();
+    if !output.status.success() {
+        return Err(format!("the reconstruction failed: {}", output.status).into());
+    }
+    Ok((seconds, serde_json::from_slice(&output.stdout)?))
+}
