@@ -49,7 +49,7 @@ const fn entry(digit: u32) -> u32 {
 const fn direction(digit: u32) -> u32 {
     let of = if digit == 0 {
         return 0;
-    } else if digit % 2 == 0 {
+    } else if digit.is_multiple_of(2) {
         digit - 1
     } else {
         digit

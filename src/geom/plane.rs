@@ -37,12 +37,16 @@ impl Moments {
     /// Takes in the difference of a neighbour to the point itself.
     pub fn add(&mut self, d: [i64; 3]) {
         self.count += 1;
-        for axis in 0..3 {
-            self.sum[axis] += d[axis];
-        }
+        self.shift(d);
         let pairs = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
         for (product, (a, b)) in self.products.iter_mut().zip(pairs) {
             *product += i128::from(d[a]) * i128::from(d[b]);
+        }
+    }
+
+    fn shift(&mut self, d: [i64; 3]) {
+        for (sum, x) in self.sum.iter_mut().zip(d) {
+            *sum += x;
         }
     }
 
@@ -53,9 +57,7 @@ impl Moments {
         let mut count = 0;
         for d in differences {
             count += 1;
-            for axis in 0..3 {
-                self.sum[axis] += d[axis];
-            }
+            self.shift(d);
             products[0] += d[0] * d[0];
             products[1] += d[1] * d[1];
             products[2] += d[2] * d[2];

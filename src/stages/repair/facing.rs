@@ -28,10 +28,14 @@ struct Sums {
     area: u128,
     /// Sum of the positions of all corners.
     corners: [i128; 3],
+    /// The smallest triangle, and whether it is turned.
+    first: Option<(Triangle, bool)>,
 }
 
 impl Sums {
-    fn add(&mut self, [a, b, c]: [Point; 3], flip: bool, boundary: u64) {
+    fn add(&mut self, t: Triangle, at: impl Fn(u32) -> Point, flip: bool, boundary: u64) {
+        let [a, b, c] = t.map(at);
+        self.see(t, flip);
         let sign = if flip { -1 } else { 1 };
         let n = crate::stages::stitch::normal(a, b, c);
         self.triangles += 1;
@@ -46,8 +50,17 @@ impl Sums {
         }
     }
 
+    fn see(&mut self, t: Triangle, flip: bool) {
+        if self.first.is_none_or(|(first, _)| t < first) {
+            self.first = Some((t, flip));
+        }
+    }
+
     fn merge(&mut self, other: &Sums, flip: bool) {
         let sign = if flip { -1 } else { 1 };
+        if let Some((t, turned)) = other.first {
+            self.see(t, turned ^ flip);
+        }
         self.triangles += other.triangles;
         self.boundary += other.boundary;
         self.volume6 += sign * other.volume6;
@@ -58,21 +71,26 @@ impl Sums {
         }
     }
 
-    /// True if the component must be turned round.
+    /// True if the component must be turned round; where nothing else decides, its smallest triangle
+    /// runs in ascending order.
     fn faces_wrong_way(&self) -> bool {
-        if self.boundary == 0 {
-            return self.volume6 < 0;
-        }
-        let v = self.area_vector.map(|x| x as f64);
-        if 2.0 * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt() >= self.area as f64 {
-            let [x, y, z] = self.area_vector;
-            return [z, y, x].into_iter().find(|c| *c != 0).is_some_and(|c| c < 0);
-        }
-        self.volume_about_centroid() < 0.0
+        let wrong = if self.boundary == 0 {
+            sign(self.volume6)
+        } else {
+            let v = self.area_vector.map(|x| x as f64);
+            let length = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
+            if 2.0 * length >= self.area as f64 {
+                let [x, y, z] = self.area_vector;
+                [z, y, x].into_iter().find_map(sign)
+            } else {
+                sign(self.volume_about_centroid())
+            }
+        };
+        wrong.unwrap_or_else(|| self.first.is_some_and(|(_, turned)| turned))
     }
 
     /// Six times the volume against the mean corner, times the number of corners.
-    fn volume_about_centroid(&self) -> f64 {
+    fn volume_about_centroid(&self) -> i128 {
         let corners = 3 * i128::from(self.triangles);
         let exact = || {
             let mut sum = corners.checked_mul(self.volume6)?;
@@ -80,14 +98,20 @@ impl Sums {
                 let part = self.corners[axis].checked_mul(self.area_vector[axis])?;
                 sum = sum.checked_sub(part)?;
             }
-            Some(sum as f64)
+            Some(sum)
         };
         exact().unwrap_or_else(|| {
             let parts: f64 =
                 (0..3).map(|k| self.corners[k] as f64 * self.area_vector[k] as f64).sum();
-            corners as f64 * self.volume6 as f64 - parts
+            // The conversion saturates, which keeps the sign.
+            (corners as f64 * self.volume6 as f64 - parts) as i128
         })
     }
+}
+
+/// Whether a number is negative; `None` for zero.
+fn sign(x: i128) -> Option<bool> {
+    (x != 0).then_some(x < 0)
 }
 
 /// What becomes of a component.
@@ -223,7 +247,7 @@ fn sum_block(
     let mut sums = vec![Sums::default(); surface.labels[block] as usize];
     for r in &interior {
         let t = [r[0], r[1], r[2]];
-        sums[(r[3] >> 1) as usize].add(t.map(at), r[3] & 1 == 1, boundary(t));
+        sums[(r[3] >> 1) as usize].add(t, at, r[3] & 1 == 1, boundary(t));
     }
     let mut global: FxHashMap<u32, Sums> = FxHashMap::default();
     for r in &crossing {
@@ -231,7 +255,7 @@ fn sum_block(
         let (root, turned) = surface.sets.look(r[4] >> 1);
         let entry = global.entry(root).or_default();
         if mine(&r) {
-            entry.add(t.map(at), turned ^ (r[4] & 1 == 1), boundary(t));
+            entry.add(t, at, turned ^ (r[4] & 1 == 1), boundary(t));
         } else {
             entry.boundary += boundary(t);
         }

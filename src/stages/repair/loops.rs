@@ -118,8 +118,8 @@ fn pair_up(
     for (x, a) in fans.iter().enumerate() {
         let mut axis = [0i128; 3];
         for b in fans.iter().filter(|b| b.component == a.component) {
-            for k in 0..3 {
-                axis[k] += b.normal[k];
+            for (sum, part) in axis.iter_mut().zip(b.normal) {
+                *sum += part;
             }
         }
         let axis = axis.map(|c| c as f64);
@@ -130,9 +130,7 @@ fn pair_up(
             }
         }
     }
-    pairs.sort_unstable_by(|a, b| {
-        a.0.total_cmp(&b.0).then((a.1, a.2, a.3, a.4).cmp(&(b.1, b.2, b.3, b.4)))
-    });
+    pairs.sort_unstable();
     let mut used_in = vec![false; fans.len()];
     let mut used_out = vec![false; fans.len()];
     for (.., x, y) in pairs {
@@ -144,27 +142,44 @@ fn pair_up(
     }
 }
 
+/// A full turn in the measure of [`clockwise`].
+const FULL_TURN: u64 = 4 << ANGLE_BITS;
+
+/// Angles closer than this many binary digits of a quarter turn are equal: rounding must not decide
+/// between directions that are exactly opposite or alike.
+const ANGLE_BITS: u32 = 36;
+
 /// The angle turned clockwise about `axis` from `s` to `e`, as a number that grows with it from
-/// more than 0 to 4 for a full turn.
-fn clockwise(axis: [f64; 3], s: [f64; 3], e: [f64; 3]) -> f64 {
+/// more than 0 to [`FULL_TURN`].
+fn clockwise(axis: [f64; 3], s: [f64; 3], e: [f64; 3]) -> u64 {
     let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     let length = dot(axis, axis).sqrt();
     if length == 0.0 {
-        return 4.0;
+        return FULL_TURN;
     }
     let n = axis.map(|x| x / length);
-    let cosine = dot(s, e) - dot(s, n) * dot(e, n);
+    // In the plane across the axis, both of unit length.
+    let flat = |v: [f64; 3]| {
+        let along = dot(v, n);
+        let f: [f64; 3] = std::array::from_fn(|k| v[k] - along * n[k]);
+        let size = dot(f, f).sqrt();
+        (size > 1e-9 * dot(v, v).sqrt()).then(|| f.map(|x| x / size))
+    };
+    let (Some(s), Some(e)) = (flat(s), flat(e)) else { return FULL_TURN };
     let cross =
         [s[1] * e[2] - s[2] * e[1], s[2] * e[0] - s[0] * e[2], s[0] * e[1] - s[1] * e[0]];
-    let sine = -dot(n, cross);
-    let quarter = |a: f64, b: f64| if a + b > 0.0 { b / (a + b) } else { 0.0 };
+    let (cosine, sine) = (dot(s, e), -dot(n, cross));
+    let quarter = |a: f64, b: f64| b / (a + b);
     let turned = match (cosine >= 0.0, sine >= 0.0) {
         (true, true) => quarter(cosine, sine),
         (false, true) => 1.0 + quarter(sine, -cosine),
         (false, false) => 2.0 + quarter(-cosine, -sine),
         (true, false) => 3.0 + quarter(-sine, cosine),
     };
-    if turned == 0.0 { 4.0 } else { turned }
+    match (turned * f64::from(1u32 << 18) * f64::from(1u32 << (ANGLE_BITS - 18))).round() as u64 {
+        0 => FULL_TURN,
+        angle => angle,
+    }
 }
 
 /// The neighbours of a vertex: all vertices it shares an edge with.

@@ -110,15 +110,21 @@ pub fn insert(
         let gone = context.joints(group)?;
         counts.joints_removed += gone.len() as u64;
         removed.send(&gone)?;
-        pending.extend(context.candidates(triples, flags, group)?);
-        pending.sort_unstable();
-        let new = context.rounds(&mut pending, cos_max_angle, &mut counts);
+        let here = |((.., t), _): &(Rank, u32)| t.iter().any(|v| blocks.of(*v) == group as u32);
+        let (mut tried, mut waiting): (Vec<_>, Vec<_>) = pending.into_iter().partition(here);
+        tried.extend(context.candidates(triples, flags, group)?);
+        tried.sort_unstable();
+        let new = context.rounds(&mut tried, cos_max_angle, &mut counts);
         added.send(&new)?;
         // What has no vertex in a later block will not be tried again.
-        let later = |t: &Triangle| blocks.of(t[2]) > group as u32;
-        let before = pending.len();
-        pending.retain(|((.., t), _)| later(t));
-        counts.unconnected += (before - pending.len()) as u64;
+        for candidate in tried {
+            if blocks.of(candidate.0.2[2]) > group as u32 {
+                waiting.push(candidate);
+            } else {
+                counts.unconnected += 1;
+            }
+        }
+        pending = waiting;
         for &block in &lives.end[group] {
             context.unload(block);
         }

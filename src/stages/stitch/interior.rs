@@ -98,7 +98,7 @@ pub fn insert(
         let mut work = BlockWork::load(store, triples, flags, base, blocks, block)?;
         let undecided = work.insert_all(cos_max_angle, stats);
         work.write(&out, block, &undecided, stats)?;
-        workspace.observer.advance(work.triangles.len() as u64);
+        workspace.observer.advance(1);
         Ok(())
     })?;
     Ok(out)

@@ -113,7 +113,7 @@ mod tests {
             let mut sets = ParitySets::new(12);
             let mut accepted: Vec<(u32, u32, bool)> = Vec::new();
             let relation = |edges: &[(u32, u32, bool)], a: u32, b: u32| {
-                let mut colour = vec![None; 12];
+                let mut colour = [None; 12];
                 colour[a as usize] = Some(false);
                 for _ in 0..12 {
                     for &(x, y, f) in edges {
