@@ -227,6 +227,8 @@ impl Reconstruction {
 
         let spool = clock.stage("ingest", "points", 0, || ingest(&self.inputs, workspace))?;
         let input = spool.stats().clone();
+        input.warnings.iter().for_each(|w| self.observer.warn(w));
+        room(&self.scratch, input.kept)?;
         let coordinates = match spool.source_precision() {
             ingest::CoordinateType::F32 => CoordinateType::Float,
             ingest::CoordinateType::F64 => CoordinateType::Double,
@@ -335,6 +337,20 @@ fn writable(output: &Path) -> Result<()> {
     tempfile::tempfile_in(folder)
         .map(drop)
         .map_err(|e| Error::io(output, "write the mesh into this folder", e))
+}
+
+/// Scratch bytes a point at the peak, about, after the points were read; measured on real scans.
+pub(crate) const SCRATCH_PER_POINT: u64 = 110;
+
+/// Refuses before the long stages what the scratch folder has no room for.
+fn room(scratch: &Path, points: u64) -> Result<()> {
+    let needed = points * SCRATCH_PER_POINT;
+    match limits::disk_free(scratch) {
+        Some(free) if free < needed => {
+            Err(Error::Disk { path: scratch.to_path_buf(), needed, free })
+        }
+        _ => Ok(()),
+    }
 }
 
 fn enough(store: &PointStore) -> Result<()> {

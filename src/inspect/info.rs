@@ -2,7 +2,7 @@
 
 use crate::error::Result;
 use crate::geom::aabb::Aabb;
-use crate::pipeline::order;
+use crate::pipeline::{SCRATCH_PER_POINT, order};
 use crate::stages::cells::{CellMaker, DiskRadius};
 use crate::stages::ingest::{IngestStats, ingest};
 use crate::stages::order::{PAGE, PointStore};
@@ -24,9 +24,6 @@ const SAMPLE_POINTS: usize = 1024;
 
 /// Seconds of the other stages for each second of cells; measured on real scans.
 const OTHER_STAGES: f64 = 1.3;
-
-/// Scratch bytes a point at the peak; measured on real scans.
-const SCRATCH_PER_POINT: u64 = 150;
 
 /// Percentiles of a length over a sample of the points, in the cloud's unit.
 #[derive(Debug, Clone, Copy, Default, Serialize, PartialEq)]

@@ -26,7 +26,7 @@ fn t3_around(triples: &Triples, block: usize) -> Result<Vec<Triangle>> {
 
 /// Bytes that working on a block takes.
 pub(super) fn block_bytes(triples: &Triples, block: usize) -> u64 {
-    140 * (triples.own.records(block) + triples.visiting.records(block)) as u64 + (2 << 20)
+    90 * (triples.own.records(block) + triples.visiting.records(block)) as u64 + (2 << 20)
 }
 
 /// Lets every vertex flag the T3 triangles that it refuses; `[block, i, j, k]` for each block that

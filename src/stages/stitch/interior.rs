@@ -93,6 +93,7 @@ pub fn insert(
         vertices: Sections::create(workspace, "stitch.vertices", count)?,
         leftovers: Sections::create(workspace, "stitch.leftovers", count)?,
     };
+    // Candidates, their ranks, homes and what is written at the end.
     let bytes = |block| 2 * block_bytes(triples, block);
     workspace.for_each_unit("stitch: block", count, bytes, |block| {
         let mut work = BlockWork::load(store, triples, flags, base, blocks, block)?;

@@ -19,6 +19,9 @@ const LEAVES: usize = 16;
 /// Most pages that the reach of one page may touch; an outlier's page shrinks its reach instead.
 const MOST_NEAR: usize = 96;
 
+/// Most halo pages for each page of the tile itself.
+const MOST_HALO: usize = 4;
+
 /// A neighbour of a point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Near {
@@ -57,10 +60,10 @@ pub struct Tile {
 }
 
 impl Tile {
-    /// Bytes that a tile of `points` points takes, with a generous halo.
+    /// Bytes that a tile of `points` points takes with the largest halo.
     #[must_use]
     pub fn bytes(points: usize) -> u64 {
-        points as u64 * 60 + (1 << 20)
+        (points as u64 + 256) * (1 + MOST_HALO as u64) * 15 + (1 << 20)
     }
 
     /// Loads the tile of the points `ids`.
@@ -70,15 +73,7 @@ impl Tile {
     pub fn load(store: &PointStore, ids: Range<usize>) -> Result<Self> {
         let page = store.page_size();
         let own_pages = ids.start / page..ids.end.div_ceil(page);
-        let mut wanted: Vec<usize> = Vec::new();
-        let mut reaches = Vec::with_capacity(own_pages.len());
-        for number in own_pages.clone() {
-            let (reach2, near) = near_pages(store, number);
-            wanted.extend_from_slice(&near);
-            reaches.push((number, reach2, near));
-        }
-        wanted.sort_unstable();
-        wanted.dedup();
+        let (wanted, reaches) = halo(store, &own_pages);
         let mut points = Vec::with_capacity(wanted.len() * page);
         let mut start = 0;
         while start < wanted.len() {
@@ -145,10 +140,35 @@ impl Tile {
     }
 }
 
+/// A page, its squared reach and the pages within it.
+type Reach = (usize, u64, Vec<usize>);
+
+/// All pages of a tile, and the reaches of its own ones; shorter than usual where the halo would
+/// outgrow the tile, as it would around scattered outliers.
+fn halo(store: &PointStore, own: &Range<usize>) -> (Vec<usize>, Vec<Reach>) {
+    let most = own.len() * (1 + MOST_HALO) + MOST_NEAR;
+    let mut shrink = 1;
+    loop {
+        let mut wanted: Vec<usize> = own.clone().collect();
+        let mut reaches = Vec::with_capacity(own.len());
+        for number in own.clone() {
+            let (reach2, near) = near_pages(store, number, shrink);
+            wanted.extend_from_slice(&near);
+            reaches.push((number, reach2, near));
+        }
+        wanted.sort_unstable();
+        wanted.dedup();
+        if wanted.len() <= most || shrink > 1 << 40 {
+            return (wanted, reaches);
+        }
+        shrink *= 2;
+    }
+}
+
 /// Squared reach of a page and the pages within it.
-fn near_pages(store: &PointStore, page: usize) -> (u64, Vec<usize>) {
+fn near_pages(store: &PointStore, page: usize, shrink: i64) -> (u64, Vec<usize>) {
     let bounds = store.page_box(page);
-    let mut reach = (bounds.longest_side() * 5 / 8).max(1) as u64;
+    let mut reach = (bounds.longest_side() * 5 / 8 / shrink).max(1) as u64;
     loop {
         let mut near = Vec::new();
         store.pages_near(bounds, reach * reach, &mut |p| {

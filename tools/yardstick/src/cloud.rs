@@ -9,20 +9,32 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, clap::Args)]
 pub struct Sample {
     /// Surface to sample, as cloudgen names them
-    #[arg(long, value_name = "NAME", default_value = "bumpy", conflicts_with = "input")]
+    #[arg(
+        long,
+        value_name = "NAME",
+        default_value = "bumpy",
+        conflicts_with = "input"
+    )]
     kind: Kind,
     /// Number of points, e.g. 1e6
     #[arg(long, value_name = "N", default_value = "1e6", value_parser = count)]
     points: u64,
     /// Format of the cloud, as cloudgen names them
-    #[arg(long, value_name = "NAME", default_value = "ply-le-f32", conflicts_with = "input")]
+    #[arg(
+        long,
+        value_name = "NAME",
+        default_value = "ply-le-f32",
+        conflicts_with = "input"
+    )]
     format: Format,
 }
 
 fn count(text: &str) -> std::result::Result<u64, String> {
     match text.replace('_', "").parse::<f64>() {
         Ok(x) if (1.0..=4e9).contains(&x) && x.fract() == 0.0 => Ok(x as u64),
-        _ => Err(format!("{text:?} is not a number of points like 200000 or 1e6")),
+        _ => Err(format!(
+            "{text:?} is not a number of points like 200000 or 1e6"
+        )),
     }
 }
 
@@ -36,7 +48,9 @@ impl Sample {
             Format::Xyz => "xyz",
         };
         let path = folder.join(format!("{}.{extension}", self.kind.name()));
-        Cloud::new(self.kind).points(self.points).write(&path, self.format)?;
+        Cloud::new(self.kind)
+            .points(self.points)
+            .write(&path, self.format)?;
         // Or the disk would still be busy with it while the clock runs.
         std::fs::File::open(&path)?.sync_all()?;
         Ok(path)
@@ -53,5 +67,9 @@ pub fn sorted_points(cloud: &Path, workspace: &Workspace) -> Result<Vec<[f32; 3]
     spool.for_each(&lattice, |points| orderer.push(workspace, points))?;
     let (store, _) = orderer.finish(workspace, order::PAGE)?;
     let scaled = |p: [i32; 3]| p.map(|c| (f64::from(c) * lattice.step) as f32);
-    Ok(store.slice(0..store.len())?.into_iter().map(scaled).collect())
+    Ok(store
+        .slice(0..store.len())?
+        .into_iter()
+        .map(scaled)
+        .collect())
 }

@@ -80,9 +80,15 @@ impl Machine {
     fn here() -> Self {
         let info = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
         let named = info.lines().find(|l| l.starts_with("model name"));
-        let model = named.and_then(|l| l.split_once(':')).map_or("unknown", |(_, m)| m.trim());
+        let model = named
+            .and_then(|l| l.split_once(':'))
+            .map_or("unknown", |(_, m)| m.trim());
         let memory = limits::memory_allowed();
-        Self { model: model.to_owned(), cores: default_threads(), memory }
+        Self {
+            model: model.to_owned(),
+            cores: default_threads(),
+            memory,
+        }
     }
 }
 
@@ -99,7 +105,9 @@ fn median(values: impl IntoIterator<Item = f64>) -> f64 {
 /// `yardstick run`
 pub fn run(options: &Run) -> Result<()> {
     let parent = options.scratch.clone().unwrap_or_else(std::env::temp_dir);
-    let folder = tempfile::Builder::new().prefix("yardstick-").tempdir_in(parent)?;
+    let folder = tempfile::Builder::new()
+        .prefix("yardstick-")
+        .tempdir_in(parent)?;
     let measured = measure(options, folder.path())?;
     print!("{}", show::text(&measured));
     if let Some(path) = &options.json {
@@ -122,19 +130,34 @@ fn measure(options: &Run, folder: &Path) -> Result<Measurement> {
         input: input.clone(),
         output: folder.join("mesh.ply"),
         threads,
-        memory: options.memory.map_or_else(default_memory, |size| size.as_u64()),
+        memory: options
+            .memory
+            .map_or_else(default_memory, |size| size.as_u64()),
     };
     let (mut pairs, mut builds, mut reports) = (Vec::new(), Vec::new(), Vec::new());
     for _ in 0..options.repeat.max(1) {
         let tree = knn::time(&points, &workspace)?;
         let (seconds, report) = pipeline::time(&job)?;
-        pairs.push(Pair { k_seconds: tree.queries, pipeline_seconds: seconds });
+        pairs.push(Pair {
+            k_seconds: tree.queries,
+            pipeline_seconds: seconds,
+        });
         builds.push(tree.build);
         reports.push(report);
     }
-    let most = |key: &str| reports.iter().filter_map(|r| r[key].as_u64()).max().unwrap_or(0);
+    let most = |key: &str| {
+        reports
+            .iter()
+            .filter_map(|r| r[key].as_u64())
+            .max()
+            .unwrap_or(0)
+    };
     Ok(Measurement {
-        cloud: input.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+        cloud: input
+            .file_name()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned(),
         points: points.len() as u64,
         threads,
         memory_budget: job.memory,
@@ -188,7 +211,10 @@ mod tests {
             ]})
         };
         let got = stages(&[report(1.0, 5.0), report(3.0, 7.0), report(2.0, 6.0)]);
-        assert_eq!(got.iter().map(|s| s.seconds).collect::<Vec<_>>(), [2.0, 6.0]);
+        assert_eq!(
+            got.iter().map(|s| s.seconds).collect::<Vec<_>>(),
+            [2.0, 6.0]
+        );
         assert_eq!(got[1].bytes_read, 3);
     }
 }

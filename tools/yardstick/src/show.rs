@@ -24,14 +24,30 @@ pub fn text(m: &Measurement) -> String {
         m.machine.cores,
     ));
     let per_point = m.k_seconds / millions;
-    line(format!("K          {:9.3} s  ({per_point:.2} us a point)", m.k_seconds));
+    line(format!(
+        "K          {:9.3} s  ({per_point:.2} us a point)",
+        m.k_seconds
+    ));
     let per_point = m.pipeline_seconds / millions;
-    line(format!("outcrop    {:9.3} s  ({per_point:.2} us a point)", m.pipeline_seconds));
-    line(format!("ratio      {:9.2} K  ({} pairs)", m.ratio, m.pairs.len()));
-    line(format!("resident   {:9.0} MiB at peak", m.peak_resident_bytes as f64 / MIB));
+    line(format!(
+        "outcrop    {:9.3} s  ({per_point:.2} us a point)",
+        m.pipeline_seconds
+    ));
+    line(format!(
+        "ratio      {:9.2} K  ({} pairs)",
+        m.ratio,
+        m.pairs.len()
+    ));
+    line(format!(
+        "resident   {:9.0} MiB at peak",
+        m.peak_resident_bytes as f64 / MIB
+    ));
     let scratch = m.peak_scratch_bytes as f64 / m.points as f64;
     line(format!("scratch    {scratch:9.1} bytes a point at peak"));
-    line(format!("{:10} {:>9} {:>7} {:>9} {:>9}", "stage", "s", "K", "MiB read", "written"));
+    line(format!(
+        "{:10} {:>9} {:>7} {:>9} {:>9}",
+        "stage", "s", "K", "MiB read", "written"
+    ));
     for s in &m.stages {
         let share = s.seconds / m.k_seconds;
         let (read, written) = (s.bytes_read as f64 / MIB, s.bytes_written as f64 / MIB);
@@ -89,7 +105,13 @@ fn markdown(all: &[Measurement]) -> Result<String> {
     writeln!(out, "\n| seconds in | threads | {} |", names.join(" | "))?;
     writeln!(out, "|---|--:|{}", "--:|".repeat(names.len()))?;
     for m in all {
-        write!(out, "| {}, {:.2} M | {} |", m.cloud, m.points as f64 / 1e6, m.threads)?;
+        write!(
+            out,
+            "| {}, {:.2} M | {} |",
+            m.cloud,
+            m.points as f64 / 1e6,
+            m.threads
+        )?;
         for name in &names {
             let mine = m.stages.iter().filter(|s| s.name == *name);
             write!(out, " {:.2} |", mine.map(|s| s.seconds).sum::<f64>())?;

@@ -1,13 +1,11 @@
 //! One cloud and one set of parameters give one file, byte for byte, whatever the threads, the
 //! memory, the tiles, the pages, and the order and format of the inputs.
 
-mod util;
-
+use crate::util::{self, Bench};
 use outcrop::params::Params;
 use outcrop::workspace::memory::MINIMUM_BUDGET;
 use outcrop_cloudgen::{Cloud, Format, Kind, LasOptions};
 use std::path::{Path, PathBuf};
-use util::Bench;
 
 /// Everything that must not matter.
 #[derive(Debug, Clone)]
@@ -21,7 +19,13 @@ struct Way {
 
 impl Way {
     fn of(input: &Path) -> Self {
-        Self { inputs: vec![input.into()], threads: 2, memory: 512 << 20, tile: None, page: None }
+        Self {
+            inputs: vec![input.into()],
+            threads: 2,
+            memory: 512 << 20,
+            tile: None,
+            page: None,
+        }
     }
 
     fn threads(self, threads: usize) -> Self {
@@ -33,15 +37,24 @@ impl Way {
     }
 
     fn tile(self, points: u32) -> Self {
-        Self { tile: Some(points), ..self }
+        Self {
+            tile: Some(points),
+            ..self
+        }
     }
 
     fn page(self, points: usize) -> Self {
-        Self { page: Some(points), ..self }
+        Self {
+            page: Some(points),
+            ..self
+        }
     }
 
     fn inputs(self, inputs: &[PathBuf]) -> Self {
-        Self { inputs: inputs.to_vec(), ..self }
+        Self {
+            inputs: inputs.to_vec(),
+            ..self
+        }
     }
 
     fn hash(&self, bench: &Bench, params: &Params) -> u64 {
@@ -68,7 +81,12 @@ fn one_hash(bench: &Bench, params: &Params, ways: &[Way]) {
     let expected = ways[0].hash(bench, params);
     println!("{expected:016x}");
     for way in &ways[1..] {
-        assert_eq!(way.hash(bench, params), expected, "{way:#?} differs from {:#?}", ways[0]);
+        assert_eq!(
+            way.hash(bench, params),
+            expected,
+            "{way:#?} differs from {:#?}",
+            ways[0]
+        );
     }
 }
 
@@ -80,7 +98,11 @@ fn settings(base: &Way) -> Vec<Way> {
         base.clone().memory(MINIMUM_BUDGET),
         base.clone().memory(4 << 30),
         base.clone().tile(500).page(64),
-        base.clone().tile(7000).page(16).threads(1).memory(MINIMUM_BUDGET),
+        base.clone()
+            .tile(7000)
+            .page(16)
+            .threads(1)
+            .memory(MINIMUM_BUDGET),
     ]
 }
 
@@ -108,7 +130,10 @@ fn threads_memory_tiles_and_pages_do_not_matter() {
 fn nor_do_they_with_smoothing() {
     let bench = Bench::new();
     let cloud = bench.cloud("cloud.laz", &nasty(150_000));
-    let params = Params { smooth: 1, ..Params::default() };
+    let params = Params {
+        smooth: 1,
+        ..Params::default()
+    };
     one_hash(&bench, &params, &settings(&Way::of(&cloud)));
 }
 
@@ -117,7 +142,12 @@ fn nor_do_they_where_many_blocks_meet() {
     let bench = Bench::new();
     let cloud = bench.cloud("cloud.laz", &nasty(60_000));
     for (block, smooth, repair) in [(1000, 0, true), (1000, 2, true), (333, 0, false)] {
-        let params = Params { block, smooth, repair, ..Params::default() };
+        let params = Params {
+            block,
+            smooth,
+            repair,
+            ..Params::default()
+        };
         let mut ways = settings(&Way::of(&cloud));
         ways.push(ways[0].clone().tile(97).page(7));
         one_hash(&bench, &params, &ways);
@@ -130,7 +160,10 @@ fn a_small_cloud_survives_the_smallest_tiles() {
     let cloud = bench.cloud("cloud.las", &nasty(3000));
     let base = Way::of(&cloud);
     for block in [40, 1000, 1 << 16] {
-        let params = Params { block, ..Params::default() };
+        let params = Params {
+            block,
+            ..Params::default()
+        };
         let ways: Vec<_> = [(1, 1), (2, 3), (17, 5), (1000, 2000)]
             .into_iter()
             .map(|(tile, page)| base.clone().tile(tile).page(page))
@@ -146,10 +179,19 @@ fn order_and_number_of_files_do_not_matter() {
     let whole = bench.cloud("whole.laz", &cloud);
     let options = LasOptions::default();
     let parts = bench.subfolder("parts");
-    let laz = cloud.write_split(parts.join("part.laz"), Format::Laz(options), 3).unwrap();
-    let las = cloud.write_split(bench.path("part.las"), Format::Las(options), 4).unwrap();
+    let laz = cloud
+        .write_split(parts.join("part.laz"), Format::Laz(options), 3)
+        .unwrap();
+    let las = cloud
+        .write_split(bench.path("part.las"), Format::Las(options), 4)
+        .unwrap();
     let reversed = |files: &[PathBuf]| files.iter().rev().cloned().collect::<Vec<_>>();
-    let mixed = [las[3].clone(), las[0].clone(), las[2].clone(), las[1].clone()];
+    let mixed = [
+        las[3].clone(),
+        las[0].clone(),
+        las[2].clone(),
+        las[1].clone(),
+    ];
     let base = Way::of(&whole);
     let ways = [
         base.clone(),
@@ -178,7 +220,11 @@ fn the_order_of_points_does_not_matter() {
     let lines: Vec<&str> = text.lines().filter(|line| !line.starts_with('#')).collect();
     let reversed: String = lines.iter().rev().map(|line| format!("{line}\n")).collect();
     let (even, odd): (Vec<_>, Vec<_>) = lines.iter().enumerate().partition(|(i, _)| i % 2 == 0);
-    let shuffled: String = odd.iter().chain(&even).map(|(_, line)| format!("{line}\n")).collect();
+    let shuffled: String = odd
+        .iter()
+        .chain(&even)
+        .map(|(_, line)| format!("{line}\n"))
+        .collect();
     let ways = [
         Way::of(&cloud),
         Way::of(&bench.write("reversed.xyz", reversed)),
@@ -197,36 +243,91 @@ fn repeated_runs_do_not_differ() {
 
 #[test]
 fn a_photogrammetric_scan() {
-    let Some(scan) = util::scan("lion.laz") else { return };
-    one_hash(&Bench::new(), &Params::default(), &settings(&Way::of(&scan)));
+    let Some(scan) = util::scan("lion.laz") else {
+        return;
+    };
+    one_hash(
+        &Bench::new(),
+        &Params::default(),
+        &settings(&Way::of(&scan)),
+    );
 }
 
 #[test]
 fn a_photogrammetric_scan_smoothed() {
-    let Some(scan) = util::scan("lion.laz") else { return };
-    let params = Params { smooth: 1, ..Params::default() };
+    let Some(scan) = util::scan("lion.laz") else {
+        return;
+    };
+    let params = Params {
+        smooth: 1,
+        ..Params::default()
+    };
     let base = Way::of(&scan);
-    let other = base.clone().tile(7000).page(64).threads(1).memory(MINIMUM_BUDGET);
+    let other = base
+        .clone()
+        .tile(7000)
+        .page(64)
+        .threads(1)
+        .memory(MINIMUM_BUDGET);
     one_hash(&Bench::new(), &params, &[base, other]);
 }
 
 #[test]
 fn a_terrestrial_scan_in_three_shapes() {
-    let Some(whole) = util::scan("lone-star.laz") else { return };
-    let Some(split) = util::scan("lone-star-split") else { return };
-    let mut files: Vec<_> =
-        util::listing(&split).into_iter().map(|name| split.join(name)).collect();
+    let Some(whole) = util::scan("lone-star.laz") else {
+        return;
+    };
+    let Some(split) = util::scan("lone-star-split") else {
+        return;
+    };
+    let mut files: Vec<_> = util::listing(&split)
+        .into_iter()
+        .map(|name| split.join(name))
+        .collect();
     files.reverse();
     let base = Way::of(&whole);
-    let mut ways = vec![
+    let ways = [
         base.clone(),
         base.clone().threads(1).memory(MINIMUM_BUDGET).tile(7000),
         base.clone().memory(4 << 30).tile(500).page(64),
         base.clone().inputs(&[split]),
-        base.clone().inputs(&files).memory(MINIMUM_BUDGET),
+        base.inputs(&files).memory(MINIMUM_BUDGET),
     ];
-    if let Some(copc) = util::scan("lone-star.copc.laz") {
-        ways.push(base.inputs(&[copc]));
-    }
     one_hash(&Bench::new(), &Params::default(), &ways);
+}
+
+/// The triangles of a mesh, and its vertices in steps of a millionth.
+fn triangles_and_places(scan: &Path) -> (Vec<u8>, Vec<i64>) {
+    let bench = Bench::new();
+    let mesh = bench.path("mesh.ply");
+    let report = util::reconstruct(scan, &mesh, &Params::default());
+    let bytes = std::fs::read(mesh).unwrap();
+    assert!(
+        bytes
+            .windows(17)
+            .take(200)
+            .any(|w| w == b"property double z")
+    );
+    let faces = bytes.len() - 13 * report.mesh.triangles as usize;
+    let places = bytes[faces - 24 * report.mesh.vertices as usize..faces]
+        .chunks_exact(8)
+        .map(|x| (f64::from_le_bytes(x.try_into().unwrap()) * 1e6).round() as i64)
+        .collect();
+    (bytes[faces..].to_vec(), places)
+}
+
+/// The two files count from different origins, so that decoded coordinates differ in the last bit.
+#[test]
+fn a_terrestrial_scan_from_two_origins() {
+    let Some(laz) = util::scan("lone-star.laz") else {
+        return;
+    };
+    let Some(copc) = util::scan("lone-star.copc.laz") else {
+        return;
+    };
+    let (a, b) = (triangles_and_places(&laz), triangles_and_places(&copc));
+    assert!(a.0 == b.0, "different triangles");
+    assert_eq!(a.1.len(), b.1.len());
+    let apart = a.1.iter().zip(&b.1).map(|(a, b)| (a - b).abs()).max();
+    assert!(apart <= Some(1), "{apart:?} millionths apart");
 }

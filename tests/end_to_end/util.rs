@@ -1,6 +1,5 @@
 //! What the end-to-end tests share: clouds made on the spot, runs of the library and of the
 //! program, and what they left behind.
-#![allow(dead_code)] // every test binary uses its own part
 
 use outcrop::inspect::verify::{Verdict, verify};
 use outcrop::params::Params;
@@ -55,13 +54,18 @@ impl Bench {
     /// Writes a generated cloud to the file `name`, in the format of its extension.
     pub fn cloud(&self, name: &str, cloud: &Cloud) -> PathBuf {
         let path = self.path(name);
-        cloud.write(&path, Format::from_path(&path).unwrap()).unwrap();
+        cloud
+            .write(&path, Format::from_path(&path).unwrap())
+            .unwrap();
         path
     }
 
     /// Writes points as text.
     pub fn points(&self, name: &str, points: &[[f64; 3]]) -> PathBuf {
-        let lines: Vec<_> = points.iter().map(|[x, y, z]| format!("{x} {y} {z}\n")).collect();
+        let lines: Vec<_> = points
+            .iter()
+            .map(|[x, y, z]| format!("{x} {y} {z}\n"))
+            .collect();
         self.write(name, lines.concat())
     }
 
@@ -76,8 +80,9 @@ impl Bench {
 /// Names of everything in a folder, sorted.
 pub fn listing(folder: &Path) -> Vec<String> {
     let entries = std::fs::read_dir(folder).unwrap();
-    let mut names: Vec<_> =
-        entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+    let mut names: Vec<_> = entries
+        .map(|e| e.unwrap().file_name().into_string().unwrap())
+        .collect();
     names.sort();
     names
 }
@@ -97,12 +102,18 @@ pub fn builder(inputs: &[PathBuf], output: &Path, params: &Params) -> Builder {
         .params(params.clone())
         .memory(MINIMUM_BUDGET)
         .threads(2);
-    inputs.iter().fold(start, |builder, input| builder.input(input))
+    inputs
+        .iter()
+        .fold(start, |builder, input| builder.input(input))
 }
 
 /// Runs with the smallest budget and two threads.
 pub fn reconstruct(input: &Path, output: &Path, params: &Params) -> Report {
-    builder(&[input.into()], output, params).build().unwrap().run().unwrap()
+    builder(&[input.into()], output, params)
+        .build()
+        .unwrap()
+        .run()
+        .unwrap()
 }
 
 /// What `verify` says of a mesh.

@@ -1,0 +1,44 @@
+//! The plane through the neighbours of a point: sums, and the fit from the sums.
+
+mod util;
+
+use divan::counter::ItemsCount;
+use divan::{Bencher, black_box};
+use outcrop::geom::plane::Moments;
+use outcrop::stages::tiles::Near;
+
+const POINTS: usize = 20_000;
+
+fn main() {
+    divan::main();
+}
+
+fn neighbors() -> Vec<(u32, Vec<Near>)> {
+    util::neighbors(POINTS)
+}
+
+fn sums(near: &[Near]) -> Moments {
+    let mut moments = Moments::default();
+    moments.add_near(near.iter().take(util::NEIGHBORS).map(|n| n.difference));
+    moments
+}
+
+#[divan::bench]
+fn moments(bencher: Bencher<'_, '_>) {
+    let all = neighbors();
+    bencher.counter(ItemsCount::new(all.len())).bench_local(|| {
+        for (_, near) in &all {
+            black_box(sums(black_box(near)));
+        }
+    });
+}
+
+#[divan::bench]
+fn fit(bencher: Bencher<'_, '_>) {
+    let all: Vec<Moments> = neighbors().iter().map(|(_, near)| sums(near)).collect();
+    bencher.counter(ItemsCount::new(all.len())).bench_local(|| {
+        for moments in &all {
+            black_box(black_box(moments).plane());
+        }
+    });
+}

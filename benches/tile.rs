@@ -1,0 +1,40 @@
+//! Neighbours of all points of a tile, and reading the tile with its halo.
+
+mod util;
+
+use divan::counter::ItemsCount;
+use divan::{Bencher, black_box};
+use outcrop::stages::tiles::Tile;
+use outcrop::stages::tiles::near::Search;
+
+const POINTS: usize = 200_000;
+/// A tile in the middle of the cloud, of the pipeline's size.
+const TILE: std::ops::Range<usize> = 65_536..131_072;
+
+fn main() {
+    divan::main();
+}
+
+#[divan::bench]
+fn load(bencher: Bencher<'_, '_>) {
+    let workspace = util::workspace();
+    let store = util::store(POINTS, &workspace);
+    bencher
+        .counter(ItemsCount::new(TILE.len()))
+        .bench_local(|| Tile::load(&store, TILE).expect("scratch file"));
+}
+
+#[divan::bench(args = [10, 30], sample_count = 30)]
+fn neighbors(bencher: Bencher<'_, '_>, k: usize) {
+    let workspace = util::workspace();
+    let store = util::store(POINTS, &workspace);
+    let tile = Tile::load(&store, TILE).expect("scratch file");
+    let mut search = Search::default();
+    bencher
+        .counter(ItemsCount::new(TILE.len()))
+        .bench_local(|| {
+            tile.for_each_query(k, &mut search, |_, _, query| {
+                black_box(query.map_or(0, |q| q.near().len()));
+            });
+        });
+}

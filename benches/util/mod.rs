@@ -1,0 +1,57 @@
+//! The surface that the kernels are measured on, as the stages see it.
+#![allow(dead_code, reason = "every bench uses a part of this")]
+
+use outcrop::geom::Point;
+use outcrop::stages::order::{Orderer, PAGE, PointStore};
+use outcrop::stages::tiles::near::Search;
+use outcrop::stages::tiles::{Near, Tile};
+use outcrop::workspace::Workspace;
+use outcrop::workspace::memory::MemoryPool;
+use outcrop::workspace::progress::{Cancel, Silent};
+use outcrop_cloudgen::{Cloud, Kind};
+use std::sync::Arc;
+
+/// Neighbours of a plane, as the pipeline's default.
+pub const NEIGHBORS: usize = 30;
+
+/// A workspace of one thread in the temporary folder.
+pub fn workspace() -> Workspace {
+    let memory = MemoryPool::new(1 << 30).expect("more than the minimum");
+    let folder = std::env::temp_dir();
+    Workspace::new(&folder, memory, 1, Arc::new(Silent), Cancel::new()).expect("a scratch folder")
+}
+
+/// A uniform sample of a bumpy closed surface in no order, on a lattice of a thousandth.
+pub fn points(count: usize) -> Vec<Point> {
+    let cloud = Cloud::new(Kind::Bumpy).points(count as u64);
+    let mut positions = vec![[0.0; 3]; count];
+    cloud
+        .generator()
+        .expect("sane parameters")
+        .fill(0, &mut positions);
+    positions
+        .iter()
+        .map(|p| p.map(|c| ((c + 1000.0) * 1000.0) as i32))
+        .collect()
+}
+
+/// The same as an ordered store.
+pub fn store(count: usize, workspace: &Workspace) -> PointStore {
+    let mut orderer = Orderer::new(workspace).expect("memory");
+    orderer
+        .push(workspace, &points(count))
+        .expect("scratch space");
+    orderer.finish(workspace, PAGE).expect("scratch space").0
+}
+
+/// The id and nearest neighbours of every point, at least [`NEIGHBORS`], nearest first.
+pub fn neighbors(count: usize) -> Vec<(u32, Vec<Near>)> {
+    let workspace = workspace();
+    let store = store(count, &workspace);
+    let tile = Tile::load(&store, 0..store.len()).expect("scratch file");
+    let mut all = Vec::with_capacity(count);
+    tile.for_each_query(NEIGHBORS, &mut Search::default(), |id, _, query| {
+        all.extend(query.map(|q| (id, q.near().to_vec())));
+    });
+    all
+}

@@ -1,0 +1,11 @@
+//! Whole runs, through the library and through the program. One test binary, so that it links once.
+
+mod bad_input;
+mod cli;
+mod determinism;
+mod library;
+mod report;
+mod scans;
+mod stop;
+mod topology;
+mod util;
