@@ -130,7 +130,11 @@ impl Builder {
     pub fn build(self) -> Result<Reconstruction> {
         self.params.check()?;
         let missing = |name, expected: &str| {
-            Err(Error::Parameter { name, found: "nothing".into(), expected: expected.into() })
+            Err(Error::Parameter {
+                name,
+                found: "nothing".into(),
+                expected: expected.into(),
+            })
         };
         if self.inputs.is_empty() {
             return missing("INPUT", "at least one file or folder");
@@ -140,7 +144,9 @@ impl Builder {
         }
         let budget = self.memory.unwrap_or_else(default_memory);
         let parent = self.output.parent().filter(|p| !p.as_os_str().is_empty());
-        let scratch = self.scratch.unwrap_or_else(|| parent.unwrap_or(Path::new(".")).into());
+        let scratch = self
+            .scratch
+            .unwrap_or_else(|| parent.unwrap_or(Path::new(".")).into());
         Ok(Reconstruction {
             inputs: self.inputs,
             output: self.output,
@@ -176,7 +182,10 @@ pub(crate) struct Clock<'a> {
 
 impl<'a> Clock<'a> {
     pub(crate) fn new(workspace: &'a Workspace) -> Self {
-        Self { workspace, stages: Vec::new() }
+        Self {
+            workspace,
+            stages: Vec::new(),
+        }
     }
 
     pub(crate) fn stage<T>(
@@ -267,7 +276,15 @@ impl Reconstruction {
             repair(&store, stitched, blocks, options, workspace)
         })?;
         let mesh = clock.stage("export", "blocks", 2 * count, || {
-            export(&store, &repaired, blocks, &lattice, coordinates, &self.output, workspace)
+            export(
+                &store,
+                &repaired,
+                blocks,
+                &lattice,
+                coordinates,
+                &self.output,
+                workspace,
+            )
         })?;
 
         Ok(Report {
@@ -279,7 +296,10 @@ impl Reconstruction {
             input,
             duplicates_folded,
             points,
-            lattice: LatticeReport { step: lattice.step, exact: lattice.exact },
+            lattice: LatticeReport {
+                step: lattice.step,
+                exact: lattice.exact,
+            },
             radius: match radius {
                 DiskRadius::Auto => None,
                 DiskRadius::Steps(steps) => Some(steps * lattice.step),
@@ -329,7 +349,10 @@ pub(crate) fn disk_radius(radius: Radius, store: &PointStore, lattice: &Lattice)
 
 /// Finds out before any work whether the output's folder takes files.
 fn writable(output: &Path) -> Result<()> {
-    let folder = output.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder = output
+        .parent()
+        .filter(|p| !p.as_os_str().is_empty())
+        .unwrap_or(Path::new("."));
     if output.is_dir() {
         let error = std::io::Error::from(std::io::ErrorKind::IsADirectory);
         return Err(Error::io(output, "write the mesh", error));
@@ -346,9 +369,11 @@ pub(crate) const SCRATCH_PER_POINT: u64 = 110;
 fn room(scratch: &Path, points: u64) -> Result<()> {
     let needed = points * SCRATCH_PER_POINT;
     match limits::disk_free(scratch) {
-        Some(free) if free < needed => {
-            Err(Error::Disk { path: scratch.to_path_buf(), needed, free })
-        }
+        Some(free) if free < needed => Err(Error::Disk {
+            path: scratch.to_path_buf(),
+            needed,
+            free,
+        }),
         _ => Ok(()),
     }
 }
@@ -369,5 +394,7 @@ fn not_a_line(stats: &CellStats, points: u64) -> Result<()> {
     if stats.no_plane < points {
         return Ok(());
     }
-    Err(Error::Degenerate { found: format!("{points} distinct points, all on one line") })
+    Err(Error::Degenerate {
+        found: format!("{points} distinct points, all on one line"),
+    })
 }

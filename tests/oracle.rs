@@ -43,9 +43,16 @@ struct Cut {
     threads: usize,
 }
 
-fn pipeline(points: &[Point], settings: &Settings, cut: Cut) -> outcrop::Result<(ReadBack, Report)> {
+fn pipeline(
+    points: &[Point],
+    settings: &Settings,
+    cut: Cut,
+) -> outcrop::Result<(ReadBack, Report)> {
     let folder = tempfile::tempdir().unwrap();
-    let (input, output) = (folder.path().join("cloud.xyz"), folder.path().join("mesh.ply"));
+    let (input, output) = (
+        folder.path().join("cloud.xyz"),
+        folder.path().join("mesh.ply"),
+    );
     let mut text = String::new();
     for p in points {
         writeln!(text, "{} {} {}", p[0], p[1], p[2]).unwrap();
@@ -59,7 +66,11 @@ fn pipeline(points: &[Point], settings: &Settings, cut: Cut) -> outcrop::Result<
             reference::Radius::Percent(x) => Radius::Percent(x),
             reference::Radius::Length(x) => Radius::Length(x),
         },
-        max_angle: if settings.cos_max_angle == 0.5 { 60.0 } else { 120.0 },
+        max_angle: if settings.cos_max_angle == 0.5 {
+            60.0
+        } else {
+            120.0
+        },
         max_hole_edges: settings.max_hole_edges,
         min_component: settings.min_component as u64,
         repair: settings.repair,
@@ -85,7 +96,10 @@ fn pipeline(points: &[Point], settings: &Settings, cut: Cut) -> outcrop::Result<
 fn at_origin(points: &[Point]) -> Vec<Point> {
     let least: Point =
         std::array::from_fn(|axis| points.iter().map(|p| p[axis]).min().unwrap_or(0));
-    points.iter().map(|p| std::array::from_fn(|axis| p[axis] - least[axis])).collect()
+    points
+        .iter()
+        .map(|p| std::array::from_fn(|axis| p[axis] - least[axis]))
+        .collect()
 }
 
 fn compare(name: &str, points: &[Point], settings: &Settings, cuts: &[Cut]) {
@@ -131,17 +145,32 @@ fn same(what: &str, mesh: &ReadBack, report: &Report, expected: &Mesh, scale: f6
         },
         "{what}: rejected"
     );
-    assert_eq!(i.joints_removed as usize, counts.joints_removed, "{what}: joints removed");
+    assert_eq!(
+        i.joints_removed as usize, counts.joints_removed,
+        "{what}: joints removed"
+    );
     assert_eq!(
         i.accepted as usize,
         counts.inserted_interior + counts.inserted_crossing,
         "{what}: accepted"
     );
     let r = &report.repair;
-    assert_eq!(r.bridges_removed as usize, counts.bridges, "{what}: bridges");
-    assert_eq!(r.components_removed as usize, counts.small_components, "{what}: components");
-    assert_eq!(r.holes_filled as usize, counts.holes.filled, "{what}: holes filled");
-    assert_eq!(r.holes_outline as usize, counts.holes.outlines, "{what}: outlines");
+    assert_eq!(
+        r.bridges_removed as usize, counts.bridges,
+        "{what}: bridges"
+    );
+    assert_eq!(
+        r.components_removed as usize, counts.small_components,
+        "{what}: components"
+    );
+    assert_eq!(
+        r.holes_filled as usize, counts.holes.filled,
+        "{what}: holes filled"
+    );
+    assert_eq!(
+        r.holes_outline as usize, counts.holes.outlines,
+        "{what}: outlines"
+    );
     assert_eq!(mesh.triangles, expected.triangles, "{what}: triangles");
     let position = |id: &u32| {
         // A coordinate in the file is single precision where that is enough for the input.
@@ -156,9 +185,21 @@ fn same(what: &str, mesh: &ReadBack, report: &Report, expected: &Mesh, scale: f6
 }
 
 const CUTS: [Cut; 3] = [
-    Cut { tile: u32::MAX, page: 256, threads: 2 },
-    Cut { tile: 30, page: 16, threads: 1 },
-    Cut { tile: 4, page: 3, threads: 2 },
+    Cut {
+        tile: u32::MAX,
+        page: 256,
+        threads: 2,
+    },
+    Cut {
+        tile: 30,
+        page: 16,
+        threads: 1,
+    },
+    Cut {
+        tile: 4,
+        page: 3,
+        threads: 2,
+    },
 ];
 
 fn run(seeds: std::ops::Range<u64>, settings: impl Fn(u64) -> Settings) {
@@ -188,15 +229,21 @@ fn small_blocks() {
 
 #[test]
 fn without_repair() {
-    run(20..22, |_| Settings { block: 25, repair: false, ..Settings::default() });
+    run(20..22, |_| Settings {
+        block: 25,
+        repair: false,
+        ..Settings::default()
+    });
 }
 
 #[test]
 fn few_neighbors_and_fixed_radius() {
     run(30..34, |seed| Settings {
         neighbors: [5, 8, 12][seed as usize % 3],
-        radius: [reference::Radius::Percent(5.0), reference::Radius::Percent(40.0)]
-            [seed as usize % 2],
+        radius: [
+            reference::Radius::Percent(5.0),
+            reference::Radius::Percent(40.0),
+        ][seed as usize % 2],
         block: 33,
         min_component: 2,
         ..Settings::default()
@@ -205,14 +252,22 @@ fn few_neighbors_and_fixed_radius() {
 
 #[test]
 fn smoothed() {
-    run(40..42, |seed| Settings { smooth: 1 + seed as u32 % 2, block: 50, ..Settings::default() });
+    run(40..42, |seed| Settings {
+        smooth: 1 + seed as u32 % 2,
+        block: 50,
+        ..Settings::default()
+    });
 }
 
 #[test]
 fn holes_of_few_edges_and_wide_angles() {
     run(50..53, |seed| Settings {
         max_hole_edges: 3 + seed as usize % 5,
-        cos_max_angle: Params { max_angle: 120.0, ..Params::default() }.cos_max_angle(),
+        cos_max_angle: Params {
+            max_angle: 120.0,
+            ..Params::default()
+        }
+        .cos_max_angle(),
         block: 60,
         ..Settings::default()
     });

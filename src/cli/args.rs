@@ -184,7 +184,9 @@ fn size(text: &str) -> Result<u64, String> {
 fn count(text: &str) -> Result<u64, String> {
     match text.parse::<f64>() {
         Ok(x) if (1.0..=4e9).contains(&x) && x.fract() == 0.0 => Ok(x as u64),
-        _ => Err(format!("{text:?} is not a number of points like 200000 or 1e6")),
+        _ => Err(format!(
+            "{text:?} is not a number of points like 200000 or 1e6"
+        )),
     }
 }
 

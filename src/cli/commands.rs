@@ -7,9 +7,9 @@ use crate::error::{Error, Result};
 use crate::inspect::{info, verify};
 use crate::pipeline::{Reconstruction, default_memory, default_threads};
 use crate::report::Report;
+use crate::workspace::Workspace;
 use crate::workspace::memory::MemoryPool;
 use crate::workspace::progress::{Cancel, Observer, Silent};
-use crate::workspace::Workspace;
 use std::io::{IsTerminal, Write};
 use std::path::Path;
 use std::sync::Arc;
@@ -55,7 +55,13 @@ fn threads(limits: &Limits) -> usize {
 fn workspace(limits: &Limits, beside: &Path) -> Result<Workspace> {
     let memory = MemoryPool::new(limits.memory.unwrap_or_else(default_memory))?;
     let scratch = limits.scratch.as_deref().unwrap_or(beside);
-    Workspace::new(scratch, memory, threads(limits), observer(limits.quiet), cancel_on_signal())
+    Workspace::new(
+        scratch,
+        memory,
+        threads(limits),
+        observer(limits.quiet),
+        cancel_on_signal(),
+    )
 }
 
 fn print(text: &str) -> Result<()> {
@@ -116,13 +122,16 @@ fn run_reconstruction(args: &Reconstruct, cancel: Cancel) -> Result<Report> {
 fn summary(report: &Report, output: &Path) -> String {
     let mesh = &report.mesh;
     format!(
-        "{}: {} triangles, {} vertices from {} points; {} components, {} boundary edges\n\
+        "{}: {} triangles, {} vertices from {} points; {}, {} boundary edges\n\
          {} in all, at most {} of memory and {} of scratch",
         output.display(),
         style::grouped(mesh.triangles),
         style::grouped(mesh.vertices),
         style::grouped(report.points),
-        style::grouped(report.repair.components_found - report.repair.components_removed),
+        style::counted(
+            report.repair.components_found - report.repair.components_removed,
+            "component"
+        ),
         style::grouped(mesh.boundary_edges),
         style::seconds(report.seconds),
         style::bytes(report.peak_resident_bytes),
@@ -133,7 +142,11 @@ fn summary(report: &Report, output: &Path) -> String {
 fn tell(args: &Info) -> Result<Answer> {
     let workspace = workspace(&args.limits, &std::env::temp_dir())?;
     let info = info::info(&args.inputs, &workspace)?;
-    print(&if args.json { json(&info)? } else { info.to_string() })?;
+    print(&if args.json {
+        json(&info)?
+    } else {
+        info.to_string()
+    })?;
     Ok(Answer::Yes)
 }
 
@@ -144,8 +157,16 @@ fn check(args: &Verify) -> Result<Answer> {
         ..verify::Options::default()
     };
     let verdict = verify::verify_with(&args.mesh, &options, &workspace)?;
-    print(&if args.json { json(&verdict)? } else { verdict.to_string() })?;
-    Ok(if verdict.manifold { Answer::Yes } else { Answer::No })
+    print(&if args.json {
+        json(&verdict)?
+    } else {
+        verdict.to_string()
+    })?;
+    Ok(if verdict.manifold {
+        Answer::Yes
+    } else {
+        Answer::No
+    })
 }
 
 fn demo(args: &Demo) -> Result<Answer> {
@@ -154,7 +175,10 @@ fn demo(args: &Demo) -> Result<Answer> {
     std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, "make the folder", e))?;
     let cloud = folder.join("bumpy.laz");
     let format = Format::from_path(&cloud).map_err(|e| generator_error(&cloud, &e))?;
-    print(&format!("making {} points on a closed surface", style::grouped(args.points)))?;
+    print(&format!(
+        "making {} points on a closed surface",
+        style::grouped(args.points)
+    ))?;
     Cloud::new(Kind::Bumpy)
         .points(args.points)
         .write(&cloud, format)
@@ -186,9 +210,17 @@ fn demo(args: &Demo) -> Result<Answer> {
         mesh.display(),
         path.display()
     ))?;
-    Ok(if verdict.manifold { Answer::Yes } else { Answer::No })
+    Ok(if verdict.manifold {
+        Answer::Yes
+    } else {
+        Answer::No
+    })
 }
 
 fn generator_error(path: &Path, error: &outcrop_cloudgen::Error) -> Error {
-    Error::io(path, "make the demo cloud", std::io::Error::other(error.to_string()))
+    Error::io(
+        path,
+        "make the demo cloud",
+        std::io::Error::other(error.to_string()),
+    )
 }

@@ -32,7 +32,11 @@ pub fn main() -> ExitCode {
             if !style::is_broken_pipe(&error) {
                 eprintln!("outcrop: {error}");
             }
-            ExitCode::from(if matches!(error, Error::Cancelled) { 130 } else { FAILED })
+            ExitCode::from(if matches!(error, Error::Cancelled) {
+                130
+            } else {
+                FAILED
+            })
         }
     }
 }

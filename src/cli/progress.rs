@@ -37,7 +37,10 @@ fn style(template: &str) -> ProgressStyle {
 
 impl Bars {
     fn with(&self, work: impl FnOnce(&ProgressBar)) {
-        let current = self.current.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let current = self
+            .current
+            .lock()
+            .unwrap_or_else(std::sync::PoisonError::into_inner);
         if let Some(bar) = current.as_ref() {
             work(bar);
         }
@@ -53,7 +56,10 @@ impl Observer for Bars {
         };
         let bar = bar.with_prefix(name).with_message(unit);
         bar.enable_steady_tick(Duration::from_millis(200));
-        let mut current = self.current.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let mut current = self
+            .current
+            .lock()
+            .unwrap_or_else(std::sync::PoisonError::into_inner);
         *current = Some(bar);
     }
 

@@ -132,7 +132,10 @@ fn sample(store: &PointStore, workspace: &Workspace) -> Result<Sample> {
                 sample.nearest.push((near[0].distance2 as f64).sqrt());
                 sample.radius.push((last.distance2 as f64).sqrt());
             }
-            failed = maker.from_tile(&mut query, |_, _| {}).err().or(failed.take());
+            failed = maker
+                .from_tile(&mut query, |_, _| {})
+                .err()
+                .or(failed.take());
         });
         sample.seconds += begin.elapsed().as_secs_f64();
         sample.points += ids.len();
@@ -149,18 +152,33 @@ fn percentiles(mut lengths: Vec<f64>, step: f64) -> Percentiles {
     }
     lengths.sort_unstable_by(f64::total_cmp);
     let at = |share: f64| lengths[((lengths.len() - 1) as f64 * share).round() as usize] * step;
-    Percentiles { p5: at(0.05), p50: at(0.5), p95: at(0.95) }
+    Percentiles {
+        p5: at(0.05),
+        p50: at(0.5),
+        p95: at(0.95),
+    }
 }
 
 impl fmt::Display for Info {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for file in &self.input.files {
-            writeln!(f, "{}: {:?}, {} points", file.path.display(), file.format, file.points)?;
+            writeln!(
+                f,
+                "{}: {}, {} points",
+                file.path.display(),
+                file.format,
+                file.points
+            )?;
         }
         let three = |p: &[f64; 3]| format!("{} {} {}", p[0], p[1], p[2]);
-        let spread = |p: &Percentiles| format!("{:.4} (5-95 %: {:.4} to {:.4})", p.p50, p.p5, p.p95);
+        let spread =
+            |p: &Percentiles| format!("{:.4} (5-95 %: {:.4} to {:.4})", p.p50, p.p5, p.p95);
         let mib = |bytes: u64| bytes.div_ceil(1 << 20);
-        writeln!(f, "points       {} distinct of {} read", self.points, self.input.read)?;
+        writeln!(
+            f,
+            "points       {} distinct of {} read",
+            self.points, self.input.read
+        )?;
         writeln!(
             f,
             "left out     {} duplicates, {} not finite, {} withheld",
@@ -168,11 +186,19 @@ impl fmt::Display for Info {
         )?;
         writeln!(f, "lowest       {}", three(&self.min))?;
         writeln!(f, "highest      {}", three(&self.max))?;
-        let rounding = if self.lattice_exact { "exact" } else { "rounded" };
+        let rounding = if self.lattice_exact {
+            "exact"
+        } else {
+            "rounded"
+        };
         writeln!(f, "lattice      step {} ({rounding})", self.lattice_step)?;
         writeln!(f, "spacing      {}", spread(&self.spacing))?;
         writeln!(f, "auto radius  {}", spread(&self.auto_radius))?;
-        writeln!(f, "memory       any budget from {} MiB", mib(self.memory_minimum))?;
+        writeln!(
+            f,
+            "memory       any budget from {} MiB",
+            mib(self.memory_minimum)
+        )?;
         writeln!(f, "scratch      about {} MiB", mib(self.scratch_bytes))?;
         writeln!(f, "mesh         about {} MiB", mib(self.output_bytes))?;
         write!(f, "time         about {:.0} s", self.seconds.ceil())

@@ -34,6 +34,23 @@ impl<const N: usize> Exchange<N> {
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
     pub fn deliver(self, workspace: &Workspace, receivers: usize) -> Result<Sections<N>> {
+        self.deliver_if(workspace, receivers, |_, _| true)
+    }
+
+    /// As [`Exchange::deliver`]; of records that were sent more than once only one is kept.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+    pub fn deliver_unique(self, workspace: &Workspace, receivers: usize) -> Result<Sections<N>> {
+        self.deliver_if(workspace, receivers, |last, record| last != Some(record))
+    }
+
+    fn deliver_if(
+        self,
+        workspace: &Workspace,
+        receivers: usize,
+        wanted: impl Fn(Option<&Record<N>>, &Record<N>) -> bool,
+    ) -> Result<Sections<N>> {
         let sections = Sections::create(workspace, &format!("{}.sections", self.name), receivers)?;
         let mut current: Vec<Record<N>> = Vec::new();
         self.sorter.finish(workspace)?.for_each(|record| {
@@ -41,7 +58,9 @@ impl<const N: usize> Exchange<N> {
                 sections.put(current[0][0] as usize, &current)?;
                 current.clear();
             }
-            current.push(record);
+            if wanted(current.last(), &record) {
+                current.push(record);
+            }
             Ok(())
         })?;
         if let Some(first) = current.first() {

@@ -179,7 +179,11 @@ impl Holes<'_> {
             let t = self.half_edges[&(to, from)];
             let sign = if self.turned[&t] { -1 } else { 1 };
             let n = normal(self.points, t);
-            lengths += n.iter().map(|&x| (x as f64) * (x as f64)).sum::<f64>().sqrt();
+            lengths += n
+                .iter()
+                .map(|&x| (x as f64) * (x as f64))
+                .sum::<f64>()
+                .sqrt();
             normals = plus(normals, vector(n.map(|x| sign * x)));
         }
         let size = dot(area2, area2).approximate().sqrt();

@@ -76,7 +76,7 @@ pub fn oriented(points: &[Point], surface: &Surface) -> Vec<Component> {
 ///   quotient, a mean over triangle corners and not over vertices.
 ///
 /// Closed (no edge with one triangle): turned over if `volume6 < 0`. Open with
-/// `4 |area2|² ≥ size2²`: turned over if the first component of `area2` that is not zero, in the
+/// `16 |area2|² ≥ size2²`: turned over if the first component of `area2` that is not zero, in the
 /// order z, y, x, is negative. Otherwise, turned over if the volume about the centroid is negative:
 /// `count · volume6 − corners · area2 < 0` (six times the volume, times `count`). A sum of zero
 /// leaves the component as it is: its smallest triangle runs i → j → k.
@@ -98,7 +98,7 @@ fn faces_wrongly(points: &[Point], component: &Component, open: bool) -> bool {
         return volume6.sign() < 0;
     }
     let size2 = Wide::from(size2 as i128);
-    if dot(area2, area2) * Wide::from(4i64) >= size2 * size2 {
+    if dot(area2, area2) * Wide::from(16i64) >= size2 * size2 {
         let up = [2, 1, 0].map(|axis: usize| area2[axis].sign());
         return up.into_iter().find(|&sign| sign != 0).unwrap_or(0) < 0;
     }

@@ -90,8 +90,13 @@ pub(super) struct Header {
 
 /// Text of a damaged file, cut to what fits a message.
 fn shown(text: &str) -> String {
-    let text: String = text.chars().take(60).collect();
-    format!("'{}'", text.escape_debug())
+    let text: String = text
+        .chars()
+        .take(60)
+        .flat_map(char::escape_debug)
+        .take(60)
+        .collect();
+    format!("'{text}'")
 }
 
 impl Header {

@@ -70,7 +70,9 @@ pub fn export(
     let numbering = number::number(repaired, blocks, workspace)?;
     let stats = numbering.stats;
     if stats.triangles == 0 {
-        return Err(Error::NoTriangles { why: NO_TRIANGLES.into() });
+        return Err(Error::NoTriangles {
+            why: NO_TRIANGLES.into(),
+        });
     }
     let file = ply::MeshFile::create(output, coordinates, &stats, workspace)?;
     let bytes = |block| block_bytes(repaired, blocks, block);
@@ -100,12 +102,21 @@ fn write_block(
     let at = |v: u32| lattice.position(points[(v - ids.start) as usize]);
     let used: Vec<[f64; 3]> = ids.clone().filter(|v| numbering.used(*v)).map(at).collect();
     file.vertices(numbering.first_used(block), &used)?;
-    let copies: Vec<[f64; 3]> = numbering.copies.get(block)?.iter().map(|c| at(c[0])).collect();
+    let copies: Vec<[f64; 3]> = numbering
+        .copies
+        .get(block)?
+        .iter()
+        .map(|c| at(c[0]))
+        .collect();
     file.vertices(numbering.first_copy(block), &copies)?;
     let splits = numbering.splits.get(block)?;
     let triangles = triangles_around(repaired, block)?;
-    let mine = triangles.into_iter().filter(|t| blocks.of(t[0]) == block as u32);
-    let faces: Vec<[u32; 3]> = mine.map(|t| renumber(t, &splits, numbering, block)).collect();
+    let mine = triangles
+        .into_iter()
+        .filter(|t| blocks.of(t[0]) == block as u32);
+    let faces: Vec<[u32; 3]> = mine
+        .map(|t| renumber(t, &splits, numbering, block))
+        .collect();
     file.faces(numbering.first_face(block), &faces)
 }
 

@@ -43,7 +43,10 @@ impl Numbering {
     fn word(&self, v: u32) -> (usize, u32) {
         let block = self.blocks.of(v) as usize;
         let local = v - self.blocks.ids(block).start;
-        (block * self.words_per_block + local as usize / 64, local % 64)
+        (
+            block * self.words_per_block + local as usize / 64,
+            local % 64,
+        )
     }
 
     /// True if a point is a vertex.
@@ -102,7 +105,9 @@ pub fn number(repaired: &Repaired, blocks: Blocks, workspace: &Workspace) -> Res
         let numbers = number_block(repaired, blocks, block)?;
         exchange.send(&numbers.splits)?;
         copies.put(block, &numbers.copies)?;
-        let mut shared = shared.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let mut shared = shared
+            .lock()
+            .unwrap_or_else(std::sync::PoisonError::into_inner);
         let start = block * words_per_block;
         shared.0[start..start + numbers.used.len()].copy_from_slice(&numbers.used);
         shared.1[block] = Firsts {
@@ -116,8 +121,9 @@ pub fn number(repaired: &Repaired, blocks: Blocks, workspace: &Workspace) -> Res
         Ok(())
     })?;
     let splits = exchange.deliver(workspace, count)?;
-    let (used, mut firsts, boundary_edges) =
-        shared.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+    let (used, mut firsts, boundary_edges) = shared
+        .into_inner()
+        .unwrap_or_else(std::sync::PoisonError::into_inner);
     let mut total = Firsts::default();
     for block in &mut firsts {
         let own = *block;
@@ -129,7 +135,10 @@ pub fn number(repaired: &Repaired, blocks: Blocks, workspace: &Workspace) -> Res
     let vertices = total.used + total.copies;
     let limit = u64::from(u32::MAX) - 1;
     if vertices > limit {
-        return Err(Error::TooManyPoints { found: vertices, limit });
+        return Err(Error::TooManyPoints {
+            found: vertices,
+            limit,
+        });
     }
     let rank = used
         .iter()
@@ -146,7 +155,17 @@ pub fn number(repaired: &Repaired, blocks: Blocks, workspace: &Workspace) -> Res
         triangles: total.faces,
         boundary_edges,
     };
-    Ok(Numbering { used, rank, blocks, words_per_block, firsts, copies, splits, stats, _held: held })
+    Ok(Numbering {
+        used,
+        rank,
+        blocks,
+        words_per_block,
+        firsts,
+        copies,
+        splits,
+        stats,
+        _held: held,
+    })
 }
 
 fn number_block(repaired: &Repaired, blocks: Blocks, block: usize) -> Result<BlockNumbers> {
@@ -157,7 +176,10 @@ fn number_block(repaired: &Repaired, blocks: Blocks, block: usize) -> Result<Blo
         used: vec![0; ids.len().div_ceil(64)],
         copies: Vec::new(),
         splits: Vec::new(),
-        faces: triangles.iter().filter(|t| blocks.of(t[0]) == block as u32).count() as u64,
+        faces: triangles
+            .iter()
+            .filter(|t| blocks.of(t[0]) == block as u32)
+            .count() as u64,
         boundary: 0,
     };
     let mut link = Link::default();
@@ -176,7 +198,9 @@ fn number_block(repaired: &Repaired, blocks: Blocks, block: usize) -> Result<Blo
             if fan > 0 {
                 let t = sorted(triangles[n as usize]);
                 let copy = (first + fan - 1) as u32;
-                numbers.splits.push([blocks.of(t[0]), t[0], t[1], t[2], v, block as u32, copy]);
+                numbers
+                    .splits
+                    .push([blocks.of(t[0]), t[0], t[1], t[2], v, block as u32, copy]);
             }
         }
         for _ in 1..link.groups() {

@@ -64,7 +64,11 @@ impl MeshFile {
         workspace: &Workspace,
     ) -> Result<Self> {
         // A file with up to 2^31 vertices can use the index type that every reader knows.
-        let index = if stats.vertices <= 1 << 31 { "int" } else { "uint" };
+        let index = if stats.vertices <= 1 << 31 {
+            "int"
+        } else {
+            "uint"
+        };
         let scalar = coordinates.name();
         let header = format!(
             "ply\nformat binary_little_endian 1.0\ncomment made by outcrop {}\n\
@@ -74,12 +78,15 @@ impl MeshFile {
             stats.vertices,
             stats.triangles,
         );
-        let bytes = header.len() as u64
-            + stats.vertices * 3 * coordinates.bytes()
-            + stats.triangles * FACE;
+        let bytes =
+            header.len() as u64 + stats.vertices * 3 * coordinates.bytes() + stats.triangles * FACE;
         let folder = folder_of(output);
         if let Some(free) = limits::disk_free(folder).filter(|free| *free < bytes) {
-            return Err(Error::Disk { path: output.to_path_buf(), needed: bytes, free });
+            return Err(Error::Disk {
+                path: output.to_path_buf(),
+                needed: bytes,
+                free,
+            });
         }
         let io = |action: &'static str| move |e| Error::io(output, action, e);
         let temporary = tempfile::Builder::new()
@@ -90,7 +97,8 @@ impl MeshFile {
             .map_err(io("create a file beside it"))?;
         let (file, temporary) = temporary.into_parts();
         file.set_len(bytes).map_err(io("make room for the mesh"))?;
-        file.write_all_at(header.as_bytes(), 0).map_err(io("write the header"))?;
+        file.write_all_at(header.as_bytes(), 0)
+            .map_err(io("write the header"))?;
         workspace.io.add_written(header.len() as u64);
         Ok(Self {
             output: output.to_path_buf(),
@@ -106,7 +114,11 @@ impl MeshFile {
     fn write(&self, bytes: &[u8], offset: u64) -> Result<()> {
         self.io.add_written(bytes.len() as u64);
         self.file.write_all_at(bytes, offset).map_err(|e| {
-            Error::io(&self.output, format!("write {} bytes at {offset}", bytes.len()), e)
+            Error::io(
+                &self.output,
+                format!("write {} bytes at {offset}", bytes.len()),
+                e,
+            )
         })
     }
 
@@ -137,14 +149,14 @@ impl MeshFile {
     /// # Errors
     /// [`Error::Io`].
     pub fn faces(&self, first: u64, triangles: &[[u32; 3]]) -> Result<()> {
-        let mut offset =
-            self.header + self.vertices * 3 * self.coordinates.bytes() + first * FACE;
+        let mut offset = self.header + self.vertices * 3 * self.coordinates.bytes() + first * FACE;
         let mut bytes = Vec::with_capacity(SLICE.min(triangles.len() * FACE as usize));
         for part in triangles.chunks(SLICE / FACE as usize) {
             bytes.clear();
             for t in part {
                 bytes.push(3);
-                t.iter().for_each(|v| bytes.extend_from_slice(&v.to_le_bytes()));
+                t.iter()
+                    .for_each(|v| bytes.extend_from_slice(&v.to_le_bytes()));
             }
             self.write(&bytes, offset)?;
             offset += bytes.len() as u64;
@@ -157,7 +169,9 @@ impl MeshFile {
     /// # Errors
     /// [`Error::Io`].
     pub fn finish(mut self) -> Result<()> {
-        self.file.sync_all().map_err(|e| Error::io(&self.output, "sync", e))?;
+        self.file
+            .sync_all()
+            .map_err(|e| Error::io(&self.output, "sync", e))?;
         if let Some(temporary) = self.temporary.take() {
             temporary
                 .persist(&self.output)

@@ -53,14 +53,5 @@ pub fn find(
         // A triangle may be found from several of its vertices, in several blocks.
         exchange.send(&sent)
     })?;
-    let all = exchange.deliver(workspace, blocks.count())?;
-    for block in 0..blocks.count() {
-        let mut records = all.get(block)?;
-        let before = records.len();
-        records.dedup();
-        if records.len() < before {
-            all.put(block, &records)?;
-        }
-    }
-    Ok(all)
+    exchange.deliver_unique(workspace, blocks.count())
 }

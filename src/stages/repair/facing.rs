@@ -45,8 +45,7 @@ impl Sums {
         for axis in 0..3 {
             self.volume6 += sign * n[axis] * i128::from(a[axis]);
             self.area_vector[axis] += sign * n[axis];
-            self.corners[axis] +=
-                i128::from(a[axis]) + i128::from(b[axis]) + i128::from(c[axis]);
+            self.corners[axis] += i128::from(a[axis]) + i128::from(b[axis]) + i128::from(c[axis]);
         }
     }
 
@@ -79,7 +78,7 @@ impl Sums {
         } else {
             let v = self.area_vector.map(|x| x as f64);
             let length = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
-            if 2.0 * length >= self.area as f64 {
+            if 4.0 * length >= self.area as f64 {
                 let [x, y, z] = self.area_vector;
                 [z, y, x].into_iter().find_map(sign)
             } else {
@@ -101,8 +100,9 @@ impl Sums {
             Some(sum)
         };
         exact().unwrap_or_else(|| {
-            let parts: f64 =
-                (0..3).map(|k| self.corners[k] as f64 * self.area_vector[k] as f64).sum();
+            let parts: f64 = (0..3)
+                .map(|k| self.corners[k] as f64 * self.area_vector[k] as f64)
+                .sum();
             // The conversion saturates, which keeps the sign.
             (corners as f64 * self.volume6 as f64 - parts) as i128
         })
@@ -143,7 +143,10 @@ impl Tally {
             self.removed += 1;
             self.removed_triangles += sums.triangles;
         }
-        Fate { keep, turn: sums.faces_wrong_way() }
+        Fate {
+            keep,
+            turn: sums.faces_wrong_way(),
+        }
     }
 }
 
@@ -171,22 +174,31 @@ pub fn face(
     let bytes = |block| block_bytes(surface, blocks, block);
     workspace.for_each_unit("repair: block", blocks.count(), bytes, |block| {
         let sums = sum_block(store, surface, blocks, block)?;
-        let mut tally = tally.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let mut tally = tally
+            .lock()
+            .unwrap_or_else(std::sync::PoisonError::into_inner);
         for (root, (flip, sums)) in sums.global {
             tally.global.entry(root).or_default().merge(&sums, flip);
         }
-        let local: Vec<[u32; 1]> =
-            sums.local.iter().map(|s| [tally.judge(s, least).word()]).collect();
+        let local: Vec<[u32; 1]> = sums
+            .local
+            .iter()
+            .map(|s| [tally.judge(s, least).word()])
+            .collect();
         drop(tally);
         fates.put(block, &local)?;
         workspace.observer.advance(1);
         Ok(())
     })?;
-    let mut tally = tally.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+    let mut tally = tally
+        .into_inner()
+        .unwrap_or_else(std::sync::PoisonError::into_inner);
     let global = std::mem::take(&mut tally.global);
     let _held = workspace.reserve("components", global.len() as u64 * 200)?;
-    let global: FxHashMap<u32, Fate> =
-        global.iter().map(|(root, sums)| (*root, tally.judge(sums, least))).collect();
+    let global: FxHashMap<u32, Fate> = global
+        .iter()
+        .map(|(root, sums)| (*root, tally.judge(sums, least)))
+        .collect();
     stats.components_found = tally.found;
     stats.components_removed = tally.removed;
     stats.component_triangles_removed = tally.removed_triangles;
@@ -221,8 +233,11 @@ fn sum_block(
         .collect();
     let star = Star::of(ids.clone(), &triangles);
     let own = store.slice(ids.start as usize..ids.end as usize)?;
-    let mut foreign: Vec<u32> =
-        crossing.iter().flat_map(|r| [r[1], r[2], r[3]]).filter(|v| !ids.contains(v)).collect();
+    let mut foreign: Vec<u32> = crossing
+        .iter()
+        .flat_map(|r| [r[1], r[2], r[3]])
+        .filter(|v| !ids.contains(v))
+        .collect();
     foreign.sort_unstable();
     foreign.dedup();
     let mut points = Vec::with_capacity(foreign.len());
@@ -239,9 +254,17 @@ fn sum_block(
     let boundary = |t: Triangle| {
         let single = |low: u32, high: u32| {
             ids.contains(&low)
-                && star.at(low).iter().filter(|n| has(triangles[**n as usize], high)).count() == 1
+                && star
+                    .at(low)
+                    .iter()
+                    .filter(|n| has(triangles[**n as usize], high))
+                    .count()
+                    == 1
         };
-        EDGES.iter().filter(|(a, b, ..)| single(t[*a], t[*b])).count() as u64
+        EDGES
+            .iter()
+            .filter(|(a, b, ..)| single(t[*a], t[*b]))
+            .count() as u64
     };
     let globals = surface.globals[block].1;
     let mut sums = vec![Sums::default(); surface.labels[block] as usize];
@@ -260,13 +283,18 @@ fn sum_block(
             entry.boundary += boundary(t);
         }
     }
-    let mut all: Vec<(u32, (bool, Sums))> =
-        global.into_iter().map(|(root, sums)| (root, (false, sums))).collect();
+    let mut all: Vec<(u32, (bool, Sums))> = global
+        .into_iter()
+        .map(|(root, sums)| (root, (false, sums)))
+        .collect();
     for label in 0..globals {
         let (root, turned) = surface.sets.look(surface.globals[block].0 + label);
         all.push((root, (turned, sums[label as usize])));
     }
-    Ok(BlockSums { local: sums.split_off(globals as usize), global: all })
+    Ok(BlockSums {
+        local: sums.split_off(globals as usize),
+        global: all,
+    })
 }
 
 fn apply(
@@ -278,7 +306,10 @@ fn apply(
     let (first, globals) = surface.globals[block];
     let fate = |label: u32| -> (Fate, bool, u32) {
         let (root, turned) = surface.sets.look(label);
-        let fate = global.get(&root).copied().unwrap_or(Fate { keep: false, turn: false });
+        let fate = global.get(&root).copied().unwrap_or(Fate {
+            keep: false,
+            turn: false,
+        });
         (fate, turned, root << 1 | 1)
     };
     let mut out = Vec::new();
@@ -291,7 +322,12 @@ fn apply(
     };
     for r in surface.crossing.get(block)? {
         let (fate, turned, component) = fate(r[4] >> 1);
-        put([r[1], r[2], r[3]], fate, turned ^ (r[4] & 1 == 1), component);
+        put(
+            [r[1], r[2], r[3]],
+            fate,
+            turned ^ (r[4] & 1 == 1),
+            component,
+        );
     }
     for r in surface.interior.get(block)? {
         let label = r[3] >> 1;
@@ -299,9 +335,21 @@ fn apply(
             fate(first + label)
         } else {
             let word = local[(label - globals) as usize][0];
-            (Fate { keep: word & 2 != 0, turn: word & 1 != 0 }, false, label << 1)
+            (
+                Fate {
+                    keep: word & 2 != 0,
+                    turn: word & 1 != 0,
+                },
+                false,
+                label << 1,
+            )
         };
-        put([r[0], r[1], r[2]], fate, turned ^ (r[3] & 1 == 1), component);
+        put(
+            [r[0], r[1], r[2]],
+            fate,
+            turned ^ (r[3] & 1 == 1),
+            component,
+        );
     }
     out.sort_unstable_by_key(|&[i, a, b, _]| sorted([i, a, b]));
     Ok(out)

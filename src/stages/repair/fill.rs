@@ -38,7 +38,12 @@ pub fn fill(mut corners: Vec<Corner>, edge: impl Fn(u32, u32) -> bool) -> Fillin
     if is_outline(&corners) {
         return Filling::Outline;
     }
-    let mut splitter = Splitter { corners: &corners, edge, chords: Vec::new(), out: Vec::new() };
+    let mut splitter = Splitter {
+        corners: &corners,
+        edge,
+        chords: Vec::new(),
+        out: Vec::new(),
+    };
     if splitter.split(&(0..n).collect::<Vec<_>>()) {
         Filling::Filled(splitter.out)
     } else {
@@ -91,7 +96,9 @@ impl<E: Fn(u32, u32) -> bool> Splitter<'_, E> {
                 self.out.push([a, b, c].map(|x| self.corners[x].id));
                 continue;
             }
-            let Some((i, j)) = self.best_chord(&ring) else { return false };
+            let Some((i, j)) = self.best_chord(&ring) else {
+                return false;
+            };
             let (a, b) = (self.corners[ring[i]].id, self.corners[ring[j]].id);
             self.chords.push((a.min(b), a.max(b)));
             rings.push(ring[..=i].iter().chain(&ring[j..]).copied().collect());

@@ -47,7 +47,8 @@ pub fn fill(
     let exchange = Exchange::<4>::new(workspace, "repair.filled", EXCHANGE_BUFFER);
     let kept = Sections::<1>::create(workspace, "repair.fragments", 0)?;
     let found = Mutex::new(Found::default());
-    let bytes = |b: usize| 150 * around.records(b) as u64 + blocks.ids(b).len() as u64 * 40 + (1 << 20);
+    let bytes =
+        |b: usize| 150 * around.records(b) as u64 + blocks.ids(b).len() as u64 * 40 + (1 << 20);
     workspace.for_each_unit("repair: block", blocks.count(), bytes, |block| {
         let work = BlockHoles::load(store, around, blocks, block)?;
         let (loops, open) = work.trace();
@@ -69,17 +70,26 @@ pub fn fill(
             let words = (part.len() <= limit).then(|| work.words(&part));
             let kept = words.map(|w| kept.append(&w)).transpose()?;
             let (start, end) = ((first.from, first.at), (last.at, last.to));
-            fragments.push(Fragment { start, end, steps: part.len(), kept });
+            fragments.push(Fragment {
+                start,
+                end,
+                steps: part.len(),
+                kept,
+            });
         }
         exchange.send(&addressed(&triangles, blocks))?;
-        let mut found = found.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let mut found = found
+            .lock()
+            .unwrap_or_else(std::sync::PoisonError::into_inner);
         found.fragments.extend(fragments);
         add(&mut found.stats, &local);
         drop(found);
         workspace.observer.advance(1);
         Ok(())
     })?;
-    let mut found = found.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+    let mut found = found
+        .into_inner()
+        .unwrap_or_else(std::sync::PoisonError::into_inner);
     let _fragments = workspace.reserve("fragments", found.fragments.len() as u64 * 120)?;
     let mut triangles = Vec::new();
     let local = &mut found.stats;
@@ -153,13 +163,24 @@ impl BlockHoles {
         let plain: Vec<[u32; 3]> = triangles.iter().map(|t| [t[0], t[1], t[2]]).collect();
         let star = Star::of(ids.clone(), &plain);
         let own = store.slice(ids.start as usize..ids.end as usize)?;
-        let mut far: Vec<u32> = plain.into_iter().flatten().filter(|v| !ids.contains(v)).collect();
+        let mut far: Vec<u32> = plain
+            .into_iter()
+            .flatten()
+            .filter(|v| !ids.contains(v))
+            .collect();
         far.sort_unstable();
         far.dedup();
         let mut points = Vec::with_capacity(far.len());
         store.fetch(&far, &mut points)?;
         let foreign = far.into_iter().zip(points).collect();
-        let mut work = Self { ids, triangles, star, own, foreign, steps: Vec::new() };
+        let mut work = Self {
+            ids,
+            triangles,
+            star,
+            own,
+            foreign,
+            steps: Vec::new(),
+        };
         work.steps = steps(&work.star, &work.triangles, |v| work.position(v));
         Ok(work)
     }
@@ -182,7 +203,10 @@ impl BlockHoles {
     }
 
     fn has_edge(&self, a: u32, b: u32) -> bool {
-        self.star.at(a).iter().any(|&n| self.triangles[n as usize][..3].contains(&b))
+        self.star
+            .at(a)
+            .iter()
+            .any(|&n| self.triangles[n as usize][..3].contains(&b))
     }
 
     /// Loops that stay in the block, and parts of loops that leave it.
@@ -204,10 +228,13 @@ impl BlockHoles {
             part
         };
         let enters = |s: &Step| !self.ids.contains(&s.from);
-        let open =
-            (0..self.steps.len()).filter(|&i| enters(&self.steps[i])).map(&mut follow).collect();
-        let loops =
-            (0..self.steps.len()).map(&mut follow).filter(|part: &Vec<Step>| !part.is_empty());
+        let open = (0..self.steps.len())
+            .filter(|&i| enters(&self.steps[i]))
+            .map(&mut follow)
+            .collect();
+        let loops = (0..self.steps.len())
+            .map(&mut follow)
+            .filter(|part: &Vec<Step>| !part.is_empty());
         (loops.collect(), open)
     }
 
@@ -217,7 +244,15 @@ impl BlockHoles {
         let mut words = Vec::new();
         for step in part {
             let around = neighbors(&self.star, &self.triangles, step.at);
-            words.extend([step.at, step.apex, u32::from(step.pinched), around.len() as u32].map(|w| [w]));
+            words.extend(
+                [
+                    step.at,
+                    step.apex,
+                    u32::from(step.pinched),
+                    around.len() as u32,
+                ]
+                .map(|w| [w]),
+            );
             words.extend(around.into_iter().map(|v| [v]));
         }
         words
@@ -226,8 +261,11 @@ impl BlockHoles {
 
 /// Chains fragments to loops; every fragment is in one.
 fn link_up(fragments: &[Fragment]) -> Vec<Vec<usize>> {
-    let by_start: FxHashMap<(u32, u32), usize> =
-        fragments.iter().enumerate().map(|(i, f)| (f.start, i)).collect();
+    let by_start: FxHashMap<(u32, u32), usize> = fragments
+        .iter()
+        .enumerate()
+        .map(|(i, f)| (f.start, i))
+        .collect();
     let mut seen = vec![false; fragments.len()];
     let mut loops = Vec::new();
     for first in 0..fragments.len() {
@@ -254,12 +292,17 @@ fn fill_across(
     let mut parts: Vec<(u32, u32, bool)> = Vec::new();
     let mut edges: FxHashMap<u32, Vec<u32>> = FxHashMap::default();
     for &f in ring {
-        let Some(section) = fragments[f].kept else { return Ok(Filling::Impossible) };
+        let Some(section) = fragments[f].kept else {
+            return Ok(Filling::Impossible);
+        };
         let words = kept.get(section)?;
         let mut at = 0;
         while at < words.len() {
             let [id, apex, pinched, count] = std::array::from_fn(|k| words[at + k][0]);
-            let around = words[at + 4..at + 4 + count as usize].iter().map(|w| w[0]).collect();
+            let around = words[at + 4..at + 4 + count as usize]
+                .iter()
+                .map(|w| w[0])
+                .collect();
             edges.insert(id, around);
             parts.push((id, apex, pinched == 1));
             at += 4 + count as usize;
@@ -271,7 +314,14 @@ fn fill_across(
     let mut points = Vec::with_capacity(ids.len());
     store.fetch(&ids, &mut points)?;
     let at = |v: u32| points[ids.partition_point(|x| *x < v)];
-    let corner = |&(id, apex, pinched): &(u32, u32, bool)| Corner { id, at: at(id), apex: at(apex), pinched };
+    let corner = |&(id, apex, pinched): &(u32, u32, bool)| Corner {
+        id,
+        at: at(id),
+        apex: at(apex),
+        pinched,
+    };
     let corners = parts.iter().map(corner).collect();
-    Ok(fill_loop(corners, |a, b| edges.get(&a).is_some_and(|around| around.contains(&b))))
+    Ok(fill_loop(corners, |a, b| {
+        edges.get(&a).is_some_and(|around| around.contains(&b))
+    }))
 }

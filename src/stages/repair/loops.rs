@@ -31,11 +31,7 @@ struct Fan {
 }
 
 /// The steps at all boundary vertices of a block, ascending by (`from`, `at`).
-pub fn steps(
-    star: &Star,
-    triangles: &[[u32; 4]],
-    position: impl Fn(u32) -> Point,
-) -> Vec<Step> {
+pub fn steps(star: &Star, triangles: &[[u32; 4]], position: impl Fn(u32) -> Point) -> Vec<Step> {
     let mut link = Link::default();
     let mut all = Vec::new();
     let mut fans: Vec<Fan> = Vec::new();
@@ -102,7 +98,13 @@ fn fan<'a>(
         }
     }
     let component = members.clone().next()?[3];
-    Some(Fan { start, end, apex, component, normal: sum })
+    Some(Fan {
+        start,
+        end,
+        apex,
+        component,
+        normal: sum,
+    })
 }
 
 /// Matches incoming and outgoing edges of the fans of each component across the gaps between them.
@@ -165,9 +167,14 @@ fn clockwise(axis: [f64; 3], s: [f64; 3], e: [f64; 3]) -> u64 {
         let size = dot(f, f).sqrt();
         (size > 1e-9 * dot(v, v).sqrt()).then(|| f.map(|x| x / size))
     };
-    let (Some(s), Some(e)) = (flat(s), flat(e)) else { return FULL_TURN };
-    let cross =
-        [s[1] * e[2] - s[2] * e[1], s[2] * e[0] - s[0] * e[2], s[0] * e[1] - s[1] * e[0]];
+    let (Some(s), Some(e)) = (flat(s), flat(e)) else {
+        return FULL_TURN;
+    };
+    let cross = [
+        s[1] * e[2] - s[2] * e[1],
+        s[2] * e[0] - s[0] * e[2],
+        s[0] * e[1] - s[1] * e[0],
+    ];
     let (cosine, sine) = (dot(s, e), -dot(n, cross));
     let quarter = |a: f64, b: f64| b / (a + b);
     let turned = match (cosine >= 0.0, sine >= 0.0) {
@@ -184,8 +191,11 @@ fn clockwise(axis: [f64; 3], s: [f64; 3], e: [f64; 3]) -> u64 {
 
 /// The neighbours of a vertex: all vertices it shares an edge with.
 pub fn neighbors(star: &Star, triangles: &[[u32; 4]], v: u32) -> Vec<u32> {
-    let mut all: Vec<u32> =
-        star.at(v).iter().flat_map(|&n| others(ids(&triangles[n as usize]), v)).collect();
+    let mut all: Vec<u32> = star
+        .at(v)
+        .iter()
+        .flat_map(|&n| others(ids(&triangles[n as usize]), v))
+        .collect();
     all.sort_unstable();
     all.dedup();
     all

@@ -94,7 +94,13 @@ fn gather(stitched: &Stitched, blocks: Blocks, workspace: &Workspace) -> Result<
                 removed.iter().map(|r| [r[1], r[2], r[3]]).collect();
             triangles.retain(|t| !removed.contains(t));
         }
-        triangles.extend(stitched.added.get(block)?.iter().map(|r| [r[1], r[2], r[3]]));
+        triangles.extend(
+            stitched
+                .added
+                .get(block)?
+                .iter()
+                .map(|r| [r[1], r[2], r[3]]),
+        );
         triangles.sort_unstable();
         around.put(block, &triangles)
     })?;
@@ -116,7 +122,11 @@ pub fn repair(
     let mut stats = RepairStats::default();
     let gathered = gather(&stitched, blocks, workspace)?;
     drop(stitched);
-    let bytes = |b: usize| 150 * gathered.records(b) as u64 + u64::from(blocks.ids(b).end - blocks.ids(b).start) * 32 + (1 << 20);
+    let bytes = |b: usize| {
+        150 * gathered.records(b) as u64
+            + u64::from(blocks.ids(b).end - blocks.ids(b).start) * 32
+            + (1 << 20)
+    };
     let removed = if options.repair {
         let removed = bridges::find(&gathered, bytes, blocks, workspace)?;
         stats.bridges_removed = own_records(&removed, blocks)?;
@@ -129,18 +139,31 @@ pub fn repair(
         if let Some(removed) = &removed {
             let removed = removed.get(block)?;
             triangles.retain(|t| {
-                removed.binary_search(&[block as u32, t[0], t[1], t[2]]).is_err()
+                removed
+                    .binary_search(&[block as u32, t[0], t[1], t[2]])
+                    .is_err()
             });
         }
         Ok(triangles)
     };
     let surface = orient("repair.surface", current, bytes, blocks, workspace)?;
-    let least = if options.repair { options.min_component } else { 0 };
+    let least = if options.repair {
+        options.min_component
+    } else {
+        0
+    };
     let around = facing::face(store, &surface, least, blocks, &mut stats, workspace)?;
     drop(surface);
     drop(gathered);
     let filled = if options.repair && options.max_hole_edges >= 3 {
-        holes::fill(store, &around, options.max_hole_edges, blocks, &mut stats, workspace)?
+        holes::fill(
+            store,
+            &around,
+            options.max_hole_edges,
+            blocks,
+            &mut stats,
+            workspace,
+        )?
     } else {
         Exchange::<4>::new(workspace, "repair.filled", 64).deliver(workspace, blocks.count())?
     };

@@ -36,8 +36,7 @@ pub fn smooth(
         workspace.observer.advance(points.len() as u64);
         moved.put(tile, bytemuck::cast_slice(&points))
     })?;
-    let mut writer =
-        StoreWriter::create(workspace, &format!("points{round}"), store.page_size())?;
+    let mut writer = StoreWriter::create(workspace, &format!("points{round}"), store.page_size())?;
     for tile in 0..tiles.count() {
         workspace.check_cancel()?;
         writer.push(bytemuck::cast_slice(&moved.get(tile)?))?;
@@ -73,7 +72,9 @@ fn smooth_tile(store: &PointStore, ids: Range<usize>, neighbors: usize) -> Resul
 
 /// The foot of a point on its plane, on the lattice; the point itself if there is no plane.
 fn project(point: Point, fit: &Fit) -> Point {
-    let Some(normal) = fit.plane.normal else { return point };
+    let Some(normal) = fit.plane.normal else {
+        return point;
+    };
     let offset = fit.moments.project(normal);
     std::array::from_fn(|axis| {
         let moved = i64::from(point[axis]) + offset[axis].round() as i64;

@@ -59,7 +59,8 @@ pub fn flag(triples: &Triples, blocks: Blocks, workspace: &Workspace) -> Result<
         workspace.observer.advance(1);
         Ok(())
     })?;
-    exchange.deliver(workspace, blocks.count())
+    // Several blocks may flag a crossing triangle.
+    exchange.deliver_unique(workspace, blocks.count())
 }
 
 /// The triangles around `v` that it flags: at edges with more than two, and beside a closed fan.
@@ -76,7 +77,7 @@ fn refused(v: u32, star: &Star, triangles: &[Triangle], link: &mut Link, flagged
             .into_iter()
             .any(|node| degree(node) > 2)
     };
-    let any_crowded = around.len() > 3 && around.iter().any(|&n| crowded(n));
+    let any_crowded = around.len() > 2 && around.iter().any(|&n| crowded(n));
     let kept: Vec<u32> = if any_crowded {
         flagged.extend(around.iter().copied().filter(|&n| crowded(n)));
         around.iter().copied().filter(|&n| !crowded(n)).collect()

@@ -1,6 +1,6 @@
 //! K: a k-d tree answers one query after the other.
 
-use crate::Result;
+use crate::{Result, cpu};
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use outcrop::workspace::Workspace;
 use rayon::prelude::*;
@@ -17,6 +17,8 @@ pub struct Times {
     pub build: f64,
     /// All queries: K.
     pub queries: f64,
+    /// Processor time of all queries.
+    pub cpu: f64,
 }
 
 /// Answers `nearest_n(30)` for all points on the workspace's threads.
@@ -25,16 +27,21 @@ pub fn time(points: &[[f32; 3]], workspace: &Workspace) -> Result<Times> {
     let start = Instant::now();
     let tree: ImmutableKdTree<f32, 3> = ImmutableKdTree::new_from_slice(points);
     let build = start.elapsed().as_secs_f64();
-    let start = Instant::now();
+    let (start, cpu) = (Instant::now(), cpu::own()?);
     let answer = |p| {
         let near = tree.nearest_n::<SquaredEuclidean>(p, neighbors);
         near.last().map_or(0.0, |n| f64::from(n.distance))
     };
     let sum: f64 = workspace.install(|| points.par_iter().map(answer).sum());
     let queries = start.elapsed().as_secs_f64();
+    let cpu = cpu::own()? - cpu;
     // The sum keeps the compiler from leaving the queries out.
     if !sum.is_finite() {
         return Err("the k-d tree's distances are not finite".into());
     }
-    Ok(Times { build, queries })
+    Ok(Times {
+        build,
+        queries,
+        cpu,
+    })
 }

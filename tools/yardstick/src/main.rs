@@ -5,6 +5,7 @@
 //! Machines differ and drift; the ratio of a reconstruction to K does so much less.
 
 mod cloud;
+mod cpu;
 mod knn;
 mod measure;
 mod pipeline;

@@ -29,6 +29,10 @@ pub struct Measurement {
     pub pipeline_seconds: f64,
     /// Median over the pairs of pipeline / K.
     pub ratio: f64,
+    /// The same of processor times: what a busy machine disturbs least.
+    pub cpu_ratio: f64,
+    /// Share of the threads' wall-clock time that the pipeline spent computing, median.
+    pub utilisation: f64,
     /// Stages in order, median seconds.
     pub stages: Vec<Stage>,
     /// Largest resident memory of the pipeline's process in bytes.
@@ -50,6 +54,10 @@ pub struct Pair {
     pub k_seconds: f64,
     /// Seconds of the pipeline right after.
     pub pipeline_seconds: f64,
+    /// Processor time of all queries.
+    pub k_cpu_seconds: f64,
+    /// Processor time of the pipeline.
+    pub pipeline_cpu_seconds: f64,
 }
 
 /// Time and bytes of a stage.
@@ -137,13 +145,15 @@ fn measure(options: &Run, folder: &Path) -> Result<Measurement> {
     let (mut pairs, mut builds, mut reports) = (Vec::new(), Vec::new(), Vec::new());
     for _ in 0..options.repeat.max(1) {
         let tree = knn::time(&points, &workspace)?;
-        let (seconds, report) = pipeline::time(&job)?;
+        let outcome = pipeline::time(&job)?;
         pairs.push(Pair {
             k_seconds: tree.queries,
-            pipeline_seconds: seconds,
+            pipeline_seconds: outcome.seconds,
+            k_cpu_seconds: tree.cpu,
+            pipeline_cpu_seconds: outcome.cpu,
         });
         builds.push(tree.build);
-        reports.push(report);
+        reports.push(outcome.report);
     }
     let most = |key: &str| {
         reports
@@ -165,6 +175,16 @@ fn measure(options: &Run, folder: &Path) -> Result<Measurement> {
         k_seconds: median(pairs.iter().map(|p| p.k_seconds)),
         pipeline_seconds: median(pairs.iter().map(|p| p.pipeline_seconds)),
         ratio: median(pairs.iter().map(|p| p.pipeline_seconds / p.k_seconds)),
+        cpu_ratio: median(
+            pairs
+                .iter()
+                .map(|p| p.pipeline_cpu_seconds / p.k_cpu_seconds),
+        ),
+        utilisation: median(
+            pairs
+                .iter()
+                .map(|p| p.pipeline_cpu_seconds / p.pipeline_seconds / threads as f64),
+        ),
         stages: stages(&reports),
         peak_resident_bytes: most("peak_resident_bytes"),
         peak_scratch_bytes: most("peak_scratch_bytes"),

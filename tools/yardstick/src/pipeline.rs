@@ -1,7 +1,7 @@
 //! One reconstruction, cloud to mesh, in a process of its own: so its peak memory is its own, and
 //! its time holds all that a user waits for.
 
-use crate::Result;
+use crate::{Result, cpu};
 use outcrop::Reconstruction;
 use serde_json::Value;
 use std::path::PathBuf;
@@ -36,17 +36,33 @@ pub fn work(job: &Job) -> Result<()> {
     Ok(())
 }
 
-/// The parent's part: wall-clock seconds of the whole process, and its report.
-pub fn time(job: &Job) -> Result<(f64, Value)> {
+/// What the parent sees of a reconstruction.
+#[derive(Debug)]
+pub struct Outcome {
+    /// Wall-clock seconds of the whole process.
+    pub seconds: f64,
+    /// Its processor time in seconds.
+    pub cpu: f64,
+    /// Its report.
+    pub report: Value,
+}
+
+/// The parent's part: starts the child and waits for it.
+pub fn time(job: &Job) -> Result<Outcome> {
     let mut command = Command::new(std::env::current_exe()?);
     command.arg("pipeline").arg(&job.input).arg(&job.output);
     command.arg("--threads").arg(job.threads.to_string());
     command.arg("--memory").arg(job.memory.to_string());
-    let start = Instant::now();
+    let (start, cpu) = (Instant::now(), cpu::children()?);
     let output = command.stderr(Stdio::inherit()).output()?;
     let seconds = start.elapsed().as_secs_f64();
+    let cpu = cpu::children()? - cpu;
     if !output.status.success() {
         return Err(format!("the reconstruction failed: {}", output.status).into());
     }
-    Ok((seconds, serde_json::from_slice(&output.stdout)?))
+    Ok(Outcome {
+        seconds,
+        cpu,
+        report: serde_json::from_slice(&output.stdout)?,
+    })
 }
