@@ -1,7 +1,6 @@
 //! Surfaces of known shape come out with the right topology.
 
 use crate::util::{self, Bench};
-
 use outcrop::params::{Params, Radius};
 use outcrop_cloudgen::{Cloud, Kind, LasOptions};
 use std::path::Path;

@@ -78,13 +78,13 @@ fn markdown(all: &[Measurement]) -> Result<String> {
     let mut out = String::new();
     writeln!(
         out,
-        "| cloud | points | threads | budget | K | outcrop | ratio | by CPU | peak resident | scratch |"
+        "| cloud | points | threads | budget | K | outcrop | ratio | by CPU | used | peak resident | scratch |"
     )?;
-    writeln!(out, "|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|")?;
+    writeln!(out, "|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|")?;
     for m in all {
         writeln!(
             out,
-            "| {} | {:.2} M | {} | {:.0} MiB | {:.2} s | {:.2} s | **{:.2} K** | {:.2} K | {:.0} MiB | \
+            "| {} | {:.2} M | {} | {:.0} MiB | {:.2} s | {:.2} s | **{:.2} K** | {:.2} K | {:.0} % | {:.0} MiB | \
              {:.0} B/pt |",
             m.cloud,
             m.points as f64 / 1e6,
@@ -94,6 +94,7 @@ fn markdown(all: &[Measurement]) -> Result<String> {
             m.pipeline_seconds,
             m.ratio,
             m.cpu_ratio,
+            100.0 * m.utilisation,
             m.peak_resident_bytes as f64 / MIB,
             m.peak_scratch_bytes as f64 / m.points as f64,
         )?;
