@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Radius {
-    /// The distance of the last neighbour used for the plane: follows the local density.
+    /// Twice the distance of the last neighbour used for the plane: follows the local density.
     Auto,
     /// Percent of the diagonal of the cloud's bounding box.
     Percent(f64),

@@ -224,6 +224,7 @@ impl Reconstruction {
     pub fn run(&self) -> Result<Report> {
         let begin = Instant::now();
         writable(&self.output)?;
+        not_an_input(&self.output, &self.inputs)?;
         let workspace = &Workspace::new(
             &self.scratch,
             self.memory.clone(),
@@ -236,7 +237,13 @@ impl Reconstruction {
 
         let spool = clock.stage("ingest", "points", 0, || ingest(&self.inputs, workspace))?;
         let input = spool.stats().clone();
-        input.warnings.iter().for_each(|w| self.observer.warn(w));
+        let mut warnings = input.warnings.clone();
+        if input.dropped_non_finite > 0 {
+            let count = input.dropped_non_finite;
+            warnings.push(format!(
+                "{count} points left out: a coordinate is NaN or infinite"
+            ));
+        }
         room(&self.scratch, input.kept)?;
         let coordinates = match spool.source_precision() {
             ingest::CoordinateType::F32 => CoordinateType::Float,
@@ -248,6 +255,14 @@ impl Reconstruction {
             order(spool, &lattice, self.page_points, workspace)
         })?;
         let points = store.len() as u64;
+        if !lattice.exact && duplicates_folded > input.kept / 100 {
+            warnings.push(format!(
+                "{duplicates_folded} points fell together: the cloud is so wide that positions had to \
+                 be rounded to steps of {}; are there outliers far away?",
+                lattice.step
+            ));
+        }
+        warnings.iter().for_each(|w| self.observer.warn(w));
         enough(&store)?;
         let radius = disk_radius(params.radius, &store, &lattice);
         let blocks = Blocks::new(store.len(), params.block);
@@ -272,7 +287,8 @@ impl Reconstruction {
             min_component: params.min_component,
             max_hole_edges: params.max_hole_edges,
         };
-        let (repaired, repair) = clock.stage("repair", "blocks", 3 * count, || {
+        let passes = if params.repair { 3 } else { 2 };
+        let (repaired, repair) = clock.stage("repair", "blocks", passes * count, || {
             repair(&store, stitched, blocks, options, workspace)
         })?;
         let mesh = clock.stage("export", "blocks", 2 * count, || {
@@ -292,7 +308,7 @@ impl Reconstruction {
             parameters: params.clone(),
             memory_budget: self.memory.budget(),
             threads: self.threads,
-            warnings: input.warnings.clone(),
+            warnings,
             input,
             duplicates_folded,
             points,
@@ -334,15 +350,18 @@ pub(crate) fn order(
     orderer.finish(workspace, page)
 }
 
+/// Disks larger than this, in steps, see all of any cloud.
+const LARGEST_RADIUS: f64 = (1u64 << 34) as f64;
+
 /// The radius in lattice steps.
 pub(crate) fn disk_radius(radius: Radius, store: &PointStore, lattice: &Lattice) -> DiskRadius {
     match radius {
         Radius::Auto => DiskRadius::Auto,
-        Radius::Length(length) => DiskRadius::Steps(length / lattice.step),
+        Radius::Length(length) => DiskRadius::Steps((length / lattice.step).min(LARGEST_RADIUS)),
         Radius::Percent(percent) => {
             let bounds = store.bounds();
             let diagonal = (crate::geom::distance2(bounds.min, bounds.max) as f64).sqrt();
-            DiskRadius::Steps(percent / 100.0 * diagonal)
+            DiskRadius::Steps((percent / 100.0 * diagonal).min(LARGEST_RADIUS))
         }
     }
 }
@@ -376,6 +395,23 @@ fn room(scratch: &Path, points: u64) -> Result<()> {
         }),
         _ => Ok(()),
     }
+}
+
+/// Refuses to replace a file that the cloud is read from.
+fn not_an_input(output: &Path, inputs: &[PathBuf]) -> Result<()> {
+    let Ok(output) = output.canonicalize() else {
+        return Ok(());
+    };
+    for input in ingest::expand(inputs)? {
+        if input.canonicalize().is_ok_and(|input| input == output) {
+            return Err(Error::Parameter {
+                name: "--output",
+                found: format!("{}, which is one of the inputs", output.display()),
+                expected: "another file".into(),
+            });
+        }
+    }
+    Ok(())
 }
 
 fn enough(store: &PointStore) -> Result<()> {

@@ -83,6 +83,13 @@ fn reconstruct(args: &Reconstruct) -> Result<Answer> {
 }
 
 fn run_reconstruction(args: &Reconstruct, cancel: Cancel) -> Result<Report> {
+    if args.report.as_ref() == Some(&args.output) {
+        return Err(Error::Parameter {
+            name: "--report",
+            found: args.output.display().to_string(),
+            expected: "a file other than the mesh".into(),
+        });
+    }
     let new_report = args.report.as_ref().is_some_and(|path| !path.exists());
     if let Some(path) = &args.report {
         // Better now than after hours of work.

@@ -120,7 +120,7 @@ impl Cell {
     #[must_use]
     pub fn reach2(&self) -> u64 {
         // The conversion saturates for disks larger than any cloud.
-        (4.0 * self.reach * self.reach * (1.0 + 1e-9)) as u64 + 1
+        ((4.0 * self.reach * self.reach * (1.0 + 1e-9)) as u64).saturating_add(1)
     }
 
     /// Clips by the bisector of the point `id` at `difference` from this cell's point.

@@ -3,7 +3,7 @@
 use crate::error::Result;
 use crate::geom::aabb::Aabb;
 use crate::pipeline::{SCRATCH_PER_POINT, order};
-use crate::stages::cells::{CellMaker, DiskRadius};
+use crate::stages::cells::{AUTO_REACH, CellMaker, DiskRadius};
 use crate::stages::ingest::{IngestStats, ingest};
 use crate::stages::order::{PAGE, PointStore};
 use crate::stages::tiles::Tile;
@@ -130,7 +130,9 @@ fn sample(store: &PointStore, workspace: &Workspace) -> Result<Sample> {
             let near = query.near();
             if let Some(last) = near.get(NEIGHBORS - 1) {
                 sample.nearest.push((near[0].distance2 as f64).sqrt());
-                sample.radius.push((last.distance2 as f64).sqrt());
+                sample
+                    .radius
+                    .push(AUTO_REACH * (last.distance2 as f64).sqrt());
             }
             failed = maker
                 .from_tile(&mut query, |_, _| {})

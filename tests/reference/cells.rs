@@ -75,7 +75,7 @@ fn corners(points: &[Point], i: usize, settings: &Settings, diagonal: f64) -> Ve
         return Vec::new();
     };
     let radius = match settings.radius {
-        Radius::Auto => (distance2(points[i], points[last]) as f64).sqrt(),
+        Radius::Auto => 2.0 * (distance2(points[i], points[last]) as f64).sqrt(),
         Radius::Percent(percent) => percent / 100.0 * diagonal,
         Radius::Length(steps) => steps,
     };

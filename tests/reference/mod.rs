@@ -27,7 +27,7 @@ use surface::{Component, Surface, Triangle};
 /// The radius of the disks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Radius {
-    /// The distance of the last neighbour used for the plane.
+    /// Twice the distance of the last neighbour used for the plane.
     Auto,
     /// Of the diagonal of the box around the points as given (before smoothing).
     Percent(f64),

@@ -2,7 +2,7 @@
 
 mod cell;
 
-pub use cell::{CellMaker, DiskRadius, Fit, Outcome, fit_in_store, fit_in_tile};
+pub use cell::{AUTO_REACH, CellMaker, DiskRadius, Fit, Outcome, fit_in_store, fit_in_tile};
 
 use crate::error::Result;
 use crate::geom::Point;

@@ -63,7 +63,7 @@ fn no_points(stats: &IngestStats) -> Error {
     };
     Error::Degenerate {
         found: format!(
-            "{} input files hold no usable point{left_out}",
+            "no usable point in {} input file(s){left_out}",
             stats.files.len()
         ),
     }

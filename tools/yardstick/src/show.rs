@@ -78,14 +78,15 @@ fn markdown(all: &[Measurement]) -> Result<String> {
     let mut out = String::new();
     writeln!(
         out,
-        "| cloud | points | threads | budget | K | outcrop | ratio | by CPU | used | peak resident | scratch |"
+        "| cloud | points | threads | budget | K | outcrop | ratio | by CPU | used | peak resident \
+         | scratch |"
     )?;
     writeln!(out, "|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|")?;
     for m in all {
         writeln!(
             out,
-            "| {} | {:.2} M | {} | {:.0} MiB | {:.2} s | {:.2} s | **{:.2} K** | {:.2} K | {:.0} % | {:.0} MiB | \
-             {:.0} B/pt |",
+            "| {} | {:.2} M | {} | {:.0} MiB | {:.2} s | {:.2} s | **{:.2} K** | {:.2} K | {:.0} % \
+             | {:.0} MiB | {:.0} B/pt |",
             m.cloud,
             m.points as f64 / 1e6,
             m.threads,
