@@ -406,7 +406,7 @@ fn not_an_input(output: &Path, inputs: &[PathBuf]) -> Result<()> {
         if input.canonicalize().is_ok_and(|input| input == output) {
             return Err(Error::Parameter {
                 name: "--output",
-                found: format!("{}, which is one of the inputs", output.display()),
+                found: format!("{} (an input)", output.display()),
                 expected: "another file".into(),
             });
         }
