@@ -35,13 +35,7 @@ impl<const N: usize> Sections<N> {
     /// # Errors
     /// [`Error::Io`].
     pub fn create(workspace: &Workspace, name: &str, count: usize) -> Result<Self> {
-        let path = workspace.file(name);
-        let file = File::options()
-            .read(true)
-            .write(true)
-            .create_new(true)
-            .open(&path)
-            .map_err(|e| Error::io(&path, "create", e))?;
+        let (path, file) = workspace.create_file(name)?;
         Ok(Self {
             path,
             file,

@@ -10,6 +10,7 @@ mod units;
 use crate::error::{Error, Result};
 use memory::{MemoryPool, Reservation};
 use progress::{Cancel, Observer};
+use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -119,6 +120,21 @@ impl Workspace {
     #[must_use]
     pub fn file(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
+    }
+
+    /// Makes the scratch file `name`, for reading and writing.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn create_file(&self, name: &str) -> Result<(PathBuf, File)> {
+        let path = self.file(name);
+        let file = File::options()
+            .read(true)
+            .write(true)
+            .create_new(true)
+            .open(&path)
+            .map_err(|e| Error::io(&path, "create", e))?;
+        Ok((path, file))
     }
 
     /// Reserves memory out of the budget.

@@ -12,6 +12,7 @@ use crate::spill::Sections;
 use crate::stages::blocks::Blocks;
 use crate::stages::order::PointStore;
 use crate::stages::repair::Repaired;
+use crate::stages::surface::star::sorted;
 use crate::workspace::Workspace;
 use number::Numbering;
 use serde::Serialize;
@@ -42,10 +43,6 @@ fn triangles_around(repaired: &Repaired, block: usize) -> Result<Vec<[u32; 3]>> 
         triangles.sort_unstable_by_key(|t| sorted(*t));
     }
     Ok(triangles)
-}
-
-fn sorted([i, a, b]: [u32; 3]) -> [u32; 3] {
-    if a < b { [i, a, b] } else { [i, b, a] }
 }
 
 fn block_bytes(repaired: &Repaired, blocks: Blocks, block: usize) -> u64 {

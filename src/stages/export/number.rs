@@ -1,11 +1,11 @@
 //! Numbers for the mesh's vertices and triangles.
 
-use super::{MeshStats, Splits, block_bytes, sorted, triangles_around};
+use super::{MeshStats, Splits, block_bytes, triangles_around};
 use crate::error::{Error, Result};
 use crate::spill::{Exchange, Sections};
 use crate::stages::blocks::Blocks;
 use crate::stages::repair::Repaired;
-use crate::stages::surface::star::{EDGES, Link, Star, has};
+use crate::stages::surface::star::{EDGES, Link, Star, has, sorted};
 use crate::workspace::Workspace;
 use crate::workspace::memory::Reservation;
 use std::sync::Mutex;

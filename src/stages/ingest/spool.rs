@@ -88,13 +88,7 @@ pub(super) struct SpoolFile {
 impl SpoolFile {
     pub(super) fn create(workspace: &Workspace) -> Result<Self> {
         let number = MADE.fetch_add(1, Ordering::Relaxed);
-        let path = workspace.file(&format!("ingest-{number}.spool"));
-        let file = File::options()
-            .read(true)
-            .write(true)
-            .create_new(true)
-            .open(&path)
-            .map_err(|e| Error::io(&path, "create", e))?;
+        let (path, file) = workspace.create_file(&format!("ingest-{number}.spool"))?;
         Ok(Self {
             path,
             file,

@@ -216,13 +216,7 @@ impl StoreWriter {
     /// # Errors
     /// [`Error::Io`].
     pub fn create(workspace: &Workspace, name: &str, page: usize) -> Result<Self> {
-        let path = workspace.file(name);
-        let file = File::options()
-            .read(true)
-            .write(true)
-            .create_new(true)
-            .open(&path)
-            .map_err(|e| Error::io(&path, "create", e))?;
+        let (path, file) = workspace.create_file(name)?;
         Ok(Self {
             path,
             file: BufWriter::with_capacity(1 << 18, file),

@@ -2,14 +2,14 @@
 //!
 //! Sums over a component are exact integers, so they do not depend on the order of triangles.
 
-use super::{OrientedTriangle, RepairStats};
+use super::RepairStats;
 use crate::error::Result;
 use crate::geom::Point;
 use crate::spill::Sections;
 use crate::stages::blocks::Blocks;
 use crate::stages::order::PointStore;
 use crate::stages::surface::orient::Oriented;
-use crate::stages::surface::star::{EDGES, Star, Triangle, has};
+use crate::stages::surface::star::{EDGES, Star, Triangle, has, sorted};
 use crate::workspace::Workspace;
 use rustc_hash::FxHashMap;
 use std::sync::Mutex;
@@ -353,9 +353,4 @@ fn apply(
     }
     out.sort_unstable_by_key(|&[i, a, b, _]| sorted([i, a, b]));
     Ok(out)
-}
-
-/// The ids of an oriented triangle in ascending order.
-pub(super) fn sorted([i, a, b]: OrientedTriangle) -> Triangle {
-    if a < b { [i, a, b] } else { [i, b, a] }
 }

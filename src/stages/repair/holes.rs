@@ -9,7 +9,7 @@ use crate::geom::Point;
 use crate::spill::{Exchange, Sections};
 use crate::stages::blocks::Blocks;
 use crate::stages::order::PointStore;
-use crate::stages::surface::star::Star;
+use crate::stages::surface::star::{Star, sorted};
 use crate::workspace::Workspace;
 use rustc_hash::FxHashMap;
 use std::sync::Mutex;
@@ -135,7 +135,7 @@ fn addressed(triangles: &[[u32; 3]], blocks: Blocks) -> Vec<[u32; 4]> {
     let mut sent = Vec::with_capacity(triangles.len());
     for &t in triangles {
         sent.push([blocks.of(t[0]), t[0], t[1], t[2]]);
-        let sorted = super::facing::sorted(t);
+        let sorted = sorted(t);
         sent.extend(blocks.visited(sorted).map(|b| [b, t[0], t[1], t[2]]));
     }
     sent

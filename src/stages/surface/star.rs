@@ -21,6 +21,12 @@ fn runs_up(t: Triangle, low: u32, high: u32) -> bool {
     !(t[0] == low && t[2] == high)
 }
 
+/// The ids, ascending, of a triangle that begins with its smallest and runs either way.
+#[must_use]
+pub fn sorted([i, a, b]: [u32; 3]) -> Triangle {
+    if a < b { [i, a, b] } else { [i, b, a] }
+}
+
 /// The other two vertices of a triangle at `v`, in ascending order.
 #[must_use]
 pub fn others(t: Triangle, v: u32) -> [u32; 2] {
