@@ -4,7 +4,9 @@
 //! tile. It follows the page's own extent, so it follows the local density. What a query needs
 //! beyond its reach, it asks of the whole store ([`walk::Walk`]).
 
+mod candidates;
 pub mod near;
+pub mod neighbors;
 pub mod walk;
 
 use crate::error::Result;

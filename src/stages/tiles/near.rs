@@ -1,20 +1,43 @@
 //! Neighbours inside a tile, for all points of a leaf at once (paper, section 3.1).
+//!
+//! What a leaf's points may need is gathered once, within a distance that is a guess from the leaf
+//! before. Guesses decide only how much is looked at: a query is answered when what was gathered
+//! proves the answer, and else gathers for itself.
 
-use super::{LEAVES, Near, OwnPage, Tile};
+use super::candidates::{Candidates, PageLeaves};
+use super::neighbors::Neighbors;
+use super::{OwnPage, Tile};
 use crate::geom::aabb::Aabb;
-use crate::geom::{Point, distance2, sub};
+use crate::geom::{Point, distance2};
+use crate::kernels::{Level, count_within, distances, keep_within, ranks};
+use std::ops::Range;
 
-/// A set of candidates and the sorted neighbours of one query, reused from query to query.
+/// Up to this number, keys are sorted by counting.
+const MOST_RANKED: usize = 96;
+
+/// Bound on the relative error of approximate squared distances, and then some.
+pub(super) const APPROXIMATE: f64 = 1.0 / (1 << 20) as f64;
+
+/// How often the limit of a query is corrected before one that is too large is taken.
+const CORRECTIONS: usize = 6;
+
+/// The candidates and the sorted neighbours of one query, in memory that is used again and again.
 #[derive(Debug, Default)]
 pub struct Search {
-    candidates: Vec<Point>,
-    ids: Vec<u32>,
+    level: Level,
+    leaves: PageLeaves,
+    candidates: Candidates,
     /// The group's candidates while one query looks farther.
-    aside: (Vec<Point>, Vec<u32>),
-    keys: Vec<u64>,
+    aside: Option<Candidates>,
+    spare: Candidates,
+    /// Approximate squared distances of the candidates to the query.
+    distances: Vec<f32>,
+    kept: Vec<u32>,
+    keys: Vec<i64>,
+    places: Vec<u32>,
     long_keys: Vec<(u64, u32)>,
     window: Vec<u64>,
-    near: Vec<Near>,
+    near: Neighbors,
 }
 
 /// The neighbours of one point, nearest first, as far as they are known.
@@ -38,160 +61,219 @@ impl Tile {
         search: &mut Search,
         mut each: impl FnMut(u32, Point, Option<Query<'_>>),
     ) {
-        let mut limits = Vec::new();
+        let mut guess = None;
         for own in &self.own {
+            search.leaves.set(self, own);
             let range = self.range(own.local);
             for start in range.clone().step_by(self.leaf) {
                 let group = start..(start + self.leaf).min(range.end);
-                self.limits(group.clone(), k, &mut search.window, &mut limits);
-                let farthest = limits.iter().copied().max().unwrap_or(u64::MAX);
-                let certified = farthest <= own.reach2;
-                if certified {
-                    let leaf = (start - range.start) / self.leaf;
-                    let around = self.leaf_boxes[own.local * LEAVES + leaf];
-                    self.gather(own, &around, farthest, search);
+                let first = self.id(own.local, start - range.start);
+                if first + group.len() <= self.ids.start || first >= self.ids.end {
+                    continue;
                 }
-                for (index, limit) in group.zip(&limits) {
-                    let id = self.id(own.local, index - range.start);
+                let likely = guess.unwrap_or_else(|| self.limit(group.clone(), k, search));
+                let around = Aabb::of(&self.points[group.clone()]);
+                search.gather(self, &around, likely.min(own.reach2));
+                let mut farthest = 0;
+                for (id, index) in (first..).zip(group) {
                     if !self.ids.contains(&id) {
                         continue;
                     }
                     let (point, id) = (self.points[index], id as u32);
-                    if !certified && (*limit > own.reach2) {
+                    let Some(complete2) = self.nearest(own, index, id, k, search) else {
+                        search.swap_back();
                         each(id, point, None);
                         continue;
-                    }
-                    if !certified {
-                        self.gather(own, &Aabb::of(&[point]), *limit, search);
-                    }
-                    search.list(point, id, None, *limit);
-                    each(
-                        id,
+                    };
+                    farthest = farthest.max(search.near.distances2[k - 1]);
+                    let query = Query {
+                        tile: self,
+                        own,
+                        search,
                         point,
-                        Some(Query {
-                            tile: self,
-                            own,
-                            search,
-                            point,
-                            id,
-                            complete2: *limit,
-                        }),
-                    );
+                        id,
+                        complete2,
+                    };
+                    each(id, point, Some(query));
+                    search.swap_back();
+                }
+                if farthest > 0 {
+                    // A little farther than the leaf before needed.
+                    guess = Some(farthest + farthest / 4);
                 }
             }
         }
     }
 
-    /// An upper bound of the squared distance of the `k`th neighbour for each point of a group,
-    /// from the points around it in curve order.
-    fn limits(
+    /// Lists at least the `k` nearest neighbours of point `index`; the squared distance up to which
+    /// the list is complete.
+    fn nearest(
         &self,
-        group: std::ops::Range<usize>,
+        own: &OwnPage,
+        index: usize,
+        id: u32,
         k: usize,
-        window: &mut Vec<u64>,
-        out: &mut Vec<u64>,
-    ) {
+        search: &mut Search,
+    ) -> Option<u64> {
+        let point = self.points[index];
+        search.measure(point);
+        if let Some(complete2) = search.list_nearest(point, id, k) {
+            return Some(complete2);
+        }
+        if search.candidates.complete2 >= own.reach2 {
+            return None;
+        }
+        let limit = self.limit(index..index + 1, k, search);
+        search.step_aside();
+        search.gather(self, &Aabb::of(&[point]), limit.min(own.reach2));
+        search.measure(point);
+        search.list_nearest(point, id, k)
+    }
+
+    /// An upper bound of the squared distance of the `k`th neighbour of each point of a group,
+    /// from the points around it in curve order; `u64::MAX` if there are too few.
+    fn limit(&self, group: Range<usize>, k: usize, search: &mut Search) -> u64 {
         let side = (k + 1).max(32);
         let around = group.start.saturating_sub(side)..(group.end + side).min(self.points.len());
-        out.clear();
-        for index in group {
-            if around.len() <= k {
-                out.push(u64::MAX);
-                continue;
-            }
+        if around.len() <= k {
+            return u64::MAX;
+        }
+        let window = &mut search.window;
+        let limit = |index: usize| {
             let point = self.points[index];
+            let near = self.points[around.clone()].iter();
             window.clear();
-            window.extend(
-                self.points[around.clone()]
-                    .iter()
-                    .map(|&p| distance2(p, point)),
-            );
+            window.extend(near.map(|&p| distance2(p, point)));
             // The point itself is among them, at distance 0.
-            out.push(*window.select_nth_unstable(k).1);
-        }
-    }
-
-    /// Collects all points within `d2` of `around`, in order of id.
-    fn gather(&self, own: &OwnPage, around: &Aabb, d2: u64, search: &mut Search) {
-        search.candidates.clear();
-        search.ids.clear();
-        for &local in &self.near[own.near.clone()] {
-            if self.page_boxes[local].distance2_box(around) > d2 {
-                continue;
-            }
-            let range = self.range(local);
-            for leaf in 0..range.len().div_ceil(self.leaf) {
-                if self.leaf_boxes[local * LEAVES + leaf].distance2_box(around) > d2 {
-                    continue;
-                }
-                let first = leaf * self.leaf;
-                let last = (first + self.leaf).min(range.len());
-                search
-                    .candidates
-                    .extend_from_slice(&self.points[range.start + first..range.start + last]);
-                let id = self.id(local, first) as u32;
-                search.ids.extend(id..id + (last - first) as u32);
-            }
-        }
+            *window.select_nth_unstable(k).1
+        };
+        group.map(limit).max().unwrap_or(u64::MAX)
     }
 }
 
 impl Search {
-    fn swap_aside(&mut self) {
-        std::mem::swap(&mut self.candidates, &mut self.aside.0);
-        std::mem::swap(&mut self.ids, &mut self.aside.1);
+    fn gather(&mut self, tile: &Tile, around: &Aabb, d2: u64) {
+        self.leaves
+            .gather(self.level, tile, around, d2, &mut self.candidates);
     }
 
-    /// Lists the candidates with `after < d² ≤ upto` in order of (distance, id), behind those there
-    /// already if `after` is given.
-    fn list(&mut self, point: Point, own: u32, after: Option<u64>, upto: u64) {
-        if after.is_none() {
-            self.near.clear();
+    /// Keeps the group's candidates for later, so that others can be gathered.
+    fn step_aside(&mut self) {
+        if self.aside.is_none() {
+            let group = std::mem::take(&mut self.candidates);
+            self.candidates = std::mem::take(&mut self.spare);
+            self.aside = Some(group);
         }
-        let beyond = |d2: u64| after.is_none_or(|a| d2 > a) && d2 <= upto;
-        let bits = usize::BITS - self.candidates.len().leading_zeros();
-        if bits < 32 && upto < 1 << (64 - bits) {
-            // Candidates are in order of id, so distance and rank in one word sort as they must.
-            self.keys.clear();
-            for (rank, &p) in self.candidates.iter().enumerate() {
-                let d2 = distance2(p, point);
-                if beyond(d2) {
-                    self.keys.push(d2 << bits | rank as u64);
+    }
+
+    fn swap_back(&mut self) {
+        if let Some(group) = self.aside.take() {
+            self.spare = std::mem::replace(&mut self.candidates, group);
+        }
+    }
+
+    /// Measures the candidates from `point`.
+    fn measure(&mut self, point: Point) {
+        let Candidates { x, y, z, .. } = &self.candidates;
+        self.distances.resize(x.len(), 0.0);
+        distances(self.level, x, y, z, point, &mut self.distances);
+    }
+
+    /// Lists the `k` nearest neighbours, and some more; the squared distance up to which all are
+    /// listed. `None` if there are fewer than `k` as far as the candidates are complete.
+    fn list_nearest(&mut self, point: Point, own: u32, k: usize) -> Option<u64> {
+        let most = above(self.candidates.complete2);
+        // The neighbours of the query before are about as far.
+        let last = self.near.distances2.get(k.wrapping_sub(1));
+        let mut limit = last.map_or(most, |d2| (*d2 as f32 * 1.15).max(1.0).min(most));
+        // The point itself is a candidate; one more, for those that are not sure to be within.
+        let wanted = k + 2;
+        for correction in 0.. {
+            let count = count_within(self.level, &self.distances, limit);
+            if count >= wanted || limit >= most {
+                if count > 2 * wanted && correction < CORRECTIONS {
+                    limit *= (wanted + 6) as f32 / count as f32;
+                    continue;
+                }
+                let complete2 = self.list(point, own, limit);
+                if self.near.len() >= k {
+                    return Some(complete2);
+                }
+                if limit >= most {
+                    return None;
                 }
             }
-            self.keys.sort_unstable();
-            let mask = (1u64 << bits) - 1;
-            for i in 0..self.keys.len() {
-                let key = self.keys[i];
-                self.push((key & mask) as usize, key >> bits, point, own);
+            let grow = (wanted + 4) as f32 / (count.max(1) as f32);
+            limit = (limit * grow.clamp(1.1, 8.0) + 4.0).min(most);
+        }
+        None
+    }
+
+    /// Lists the candidates whose approximate squared distance is at most `limit` in order of
+    /// (distance, id); the squared distance up to which all are listed.
+    fn list(&mut self, point: Point, own: u32, limit: f32) -> u64 {
+        let below = (f64::from(limit) * (1.0 - APPROXIMATE)) as u64;
+        let complete2 = below.min(self.candidates.complete2);
+        keep_within(self.level, &self.distances, limit, &mut self.kept);
+        let bits = usize::BITS - self.candidates.x.len().leading_zeros();
+        if bits < 32 && complete2 < 1 << (63 - bits) {
+            self.list_short(point, own, complete2, bits);
+        } else {
+            self.list_long(point, own, complete2);
+        }
+        complete2
+    }
+
+    /// Candidates are in order of id, so distance and place in one word sort as they must.
+    fn list_short(&mut self, point: Point, own: u32, complete2: u64, bits: u32) {
+        let set = &self.candidates;
+        self.keys.clear();
+        for &place in &self.kept {
+            let at = place as usize;
+            let d2 = distance2(set.point(at), point);
+            if d2 <= complete2 && set.ids[at] != own {
+                self.keys.push((d2 << bits | u64::from(place)) as i64);
+            }
+        }
+        self.near.resize(self.keys.len());
+        let mask = (1i64 << bits) - 1;
+        if self.keys.len() <= MOST_RANKED {
+            self.places.resize(self.keys.len(), 0);
+            ranks(self.level, &self.keys, &mut self.places);
+            for (&key, &to) in self.keys.iter().zip(&self.places) {
+                let near = set.near((key & mask) as usize, (key >> bits) as u64, point);
+                self.near.set(to as usize, near);
             }
         } else {
-            self.long_keys.clear();
-            for (rank, &p) in self.candidates.iter().enumerate() {
-                let d2 = distance2(p, point);
-                if beyond(d2) {
-                    self.long_keys.push((d2, rank as u32));
-                }
-            }
-            self.long_keys.sort_unstable();
-            for i in 0..self.long_keys.len() {
-                let (d2, rank) = self.long_keys[i];
-                self.push(rank as usize, d2, point, own);
+            self.keys.sort_unstable();
+            for (to, &key) in self.keys.iter().enumerate() {
+                let near = set.near((key & mask) as usize, (key >> bits) as u64, point);
+                self.near.set(to, near);
             }
         }
     }
 
-    fn push(&mut self, rank: usize, distance2: u64, point: Point, own: u32) {
-        let id = self.ids[rank];
-        if id != own {
-            let difference = sub(self.candidates[rank], point);
-            self.near.push(Near {
-                distance2,
-                id,
-                difference,
-            });
+    fn list_long(&mut self, point: Point, own: u32, complete2: u64) {
+        let set = &self.candidates;
+        self.long_keys.clear();
+        for &place in &self.kept {
+            let at = place as usize;
+            let d2 = distance2(set.point(at), point);
+            if d2 <= complete2 && set.ids[at] != own {
+                self.long_keys.push((d2, place));
+            }
+        }
+        self.long_keys.sort_unstable();
+        self.near.resize(self.long_keys.len());
+        for (to, &(d2, place)) in self.long_keys.iter().enumerate() {
+            self.near.set(to, set.near(place as usize, d2, point));
         }
     }
+}
+
+/// An approximate squared distance that is not below any of points within `d2`.
+pub(super) fn above(d2: u64) -> f32 {
+    (d2 as f64 * (1.0 + 2.0 * APPROXIMATE)) as f32
 }
 
 impl Query<'_> {
@@ -203,7 +285,7 @@ impl Query<'_> {
 
     /// The neighbours known so far, nearest first, none left out between them.
     #[must_use]
-    pub fn near(&self) -> &[Near] {
+    pub fn near(&self) -> &Neighbors {
         &self.search.near
     }
 
@@ -222,13 +304,16 @@ impl Query<'_> {
         if distance2 > self.own.reach2 {
             return false;
         }
-        self.search.swap_aside();
-        self.tile
-            .gather(self.own, &Aabb::of(&[self.point]), distance2, self.search);
-        self.search
-            .list(self.point, self.id, Some(self.complete2), distance2);
-        self.search.swap_aside();
-        self.complete2 = distance2;
+        let search = &mut *self.search;
+        if distance2 > search.candidates.complete2 {
+            search.step_aside();
+            search.gather(self.tile, &Aabb::of(&[self.point]), distance2);
+            search.measure(self.point);
+        }
+        // Twice the slack: what is within `distance2` is surely listed.
+        let limit = (distance2 as f64 * (1.0 + 3.0 * APPROXIMATE) + 1.0) as f32;
+        self.complete2 = search.list(self.point, self.id, limit);
+        debug_assert!(self.complete2 >= distance2);
         true
     }
 
