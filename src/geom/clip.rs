@@ -1,11 +1,16 @@
 //! The restricted Voronoi cell of a point: its disk clipped by bisectors (paper, Algorithm 1).
 //!
-//! The polygon lives in two dimensions, in a frame of the disk's plane. A corner is kept as the
-//! pair of lines that make it; whether a new bisector cuts it off is read off floating point where
-//! a forward error bound allows, and else decided exactly ([`super::predicate`]).
+//! The polygon lives in two dimensions, in a frame of the disk's plane. Its corners are kept in
+//! columns, in no order, linked into a ring; each knows the side that it ends. Whether a new
+//! bisector cuts a corner off is read off floating point where a forward error bound allows, for
+//! all corners at once ([`crate::kernels::cut_corners`]), and else decided exactly
+//! ([`super::predicate`]).
 
 use super::plane::Normal;
 use super::predicate::{Neighbor, cuts_corner, cuts_parallel};
+use crate::kernels::{
+    CORNER_LANES, CornerColumns, CornerPlace, Level, Line, SLACK, cut_corners, farthest,
+};
 
 /// Number of corners of the disk.
 const RIM_CORNERS: usize = 10;
@@ -29,54 +34,68 @@ const RIM_SIDES: [[f64; 2]; RIM_CORNERS] = [
 ];
 const RIM_DISTANCE: f64 = 0.951_056_516_295_153_5;
 
-/// Factor of the forward error bounds, in units of the last place; several times what a count of
-/// the roundings gives.
-const SLACK: f64 = 32.0 * f64::EPSILON;
-
-/// A side of the polygon: the line `line · q = offset` in the plane's frame.
+/// A side of the polygon.
 #[derive(Debug, Clone, Copy)]
 struct Side {
-    line: [f64; 2],
-    offset: f64,
-    /// Length of the neighbour's difference in space, which scales the error of `line`.
-    length: f64,
+    line: Line,
     neighbor: Neighbor,
-}
-
-/// The end of a side: where it meets the next.
-#[derive(Debug, Clone, Copy)]
-struct Corner {
-    at: [f64; 2],
-    /// Bound on the distance of `at` from the true corner.
-    error: f64,
-    /// Distance from the centre, at most.
-    reach: f64,
 }
 
 /// A restricted Voronoi cell in the making. One value can serve many cells in turn.
 #[derive(Debug, Clone)]
 pub struct Cell {
+    level: Level,
     own: u32,
     normal: Normal,
     frame: [[f64; 3]; 2],
+    /// All sides so far, also those that are no longer part of the polygon; the rim's come first.
     sides: Vec<Side>,
-    corners: Vec<Corner>,
-    cut: Vec<f64>,
+    corners: CornerColumns,
+    /// Of each corner the next one around the polygon, and the side between it and the one before.
+    links: Vec<Link>,
+    /// Places in the columns without a corner.
+    free: Vec<u32>,
+    count: usize,
+    cut: Vec<u64>,
+    doubt: Vec<u64>,
     reach: f64,
     hidden: bool,
+}
+
+#[derive(Debug, Clone, Copy, Default)]
+struct Link {
+    next: u32,
+    before: u32,
+    side: u32,
 }
 
 impl Cell {
     /// The whole disk of point `own`: radius in steps, in the plane with `normal`.
     #[must_use]
     pub fn new(own: u32, normal: Normal, radius: f64) -> Self {
+        let rim = |line| Side {
+            line: Line {
+                line,
+                offset: 0.0,
+                length: 1.0,
+            },
+            neighbor: Neighbor {
+                difference: [0; 3],
+                id: RIM,
+            },
+        };
         let mut cell = Self {
+            level: Level::best(),
             own,
             normal,
             frame: [[0.0; 3]; 2],
-            sides: Vec::with_capacity(24),
-            corners: Vec::with_capacity(24),
-            cut: Vec::with_capacity(24),
+            sides: RIM_SIDES.map(rim).to_vec(),
+            corners: CornerColumns::default(),
+            links: Vec::new(),
+            free: Vec::new(),
+            count: 0,
+            cut: Vec::new(),
+            doubt: Vec::new(),
             reach: 0.0,
             hidden: false,
         };
@@ -90,34 +109,46 @@ impl Cell {
         self.normal = normal;
         self.frame = frame(normal);
         self.hidden = false;
-        self.sides.clear();
-        self.corners.clear();
-        for line in RIM_SIDES {
-            let neighbor = Neighbor {
-                difference: [0; 3],
-                id: RIM,
-            };
-            self.sides.push(Side {
-                line,
-                offset: radius * RIM_DISTANCE,
-                length: 1.0,
-                neighbor,
-            });
+        self.sides.truncate(RIM_CORNERS);
+        for side in &mut self.sides {
+            side.line.offset = radius * RIM_DISTANCE;
         }
+        self.corners.resize(RIM_CORNERS.next_multiple_of(CORNER_LANES));
+        self.links.resize(self.corners.len(), Link::default());
+        self.free.clear();
+        for k in RIM_CORNERS..self.corners.len() {
+            self.corners.clear(k);
+            self.free.push(k as u32);
+        }
+        self.count = RIM_CORNERS;
         for k in 0..RIM_CORNERS {
-            self.corners
-                .push(meet(&self.sides[k], &self.sides[(k + 1) % RIM_CORNERS]));
+            let next = (k + 1) % RIM_CORNERS;
+            // Halfway between the normals of its sides.
+            let [a, b] = [RIM_SIDES[k], RIM_SIDES[next]];
+            let half = 0.5 / RIM_DISTANCE * radius;
+            let reach = radius * (1.0 + 4.0 * SLACK);
+            self.corners.set(
+                k,
+                CornerPlace {
+                    x: half * (a[0] + b[0]),
+                    y: half * (a[1] + b[1]),
+                    error: 4.0 * SLACK * radius,
+                    reach,
+                },
+            );
+            self.links[k] = Link {
+                next: next as u32,
+                before: ((k + RIM_CORNERS - 1) % RIM_CORNERS) as u32,
+                side: k as u32,
+            };
+            self.reach = reach;
         }
-        self.update_reach();
-    }
-
-    fn update_reach(&mut self) {
-        self.reach = self.corners.iter().fold(0.0, |r, c| r.max(c.reach));
     }
 
     /// Points at a larger squared distance than this cannot touch the cell: four times the squared
     /// radius of security, rounded up.
     #[must_use]
+    #[inline]
     pub fn reach2(&self) -> u64 {
         // The conversion saturates for disks larger than any cloud.
         ((4.0 * self.reach * self.reach * (1.0 + 1e-9)) as u64).saturating_add(1)
@@ -130,107 +161,157 @@ impl Cell {
             self.hidden |= id < self.own;
             return;
         }
-        let side = self.side(difference, id);
-        let flat2 = side.line[0] * side.line[0] + side.line[1] * side.line[1];
-        if side.offset * side.offset > self.reach * self.reach * flat2 * (1.0 + 1e-9) {
-            return;
-        }
-        if let Some((first, count)) = self.arc_cut_by(&side) {
-            self.replace(first, count, side);
-        }
-    }
-
-    fn side(&self, difference: [i64; 3], id: u32) -> Side {
         let d = difference.map(|x| x as f64);
         let dot = |u: [f64; 3]| d[0] * u[0] + d[1] * u[1] + d[2] * u[2];
         let length2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-        Side {
-            line: [dot(self.frame[0]), dot(self.frame[1])],
-            offset: 0.5 * length2,
+        let [x, y] = [dot(self.frame[0]), dot(self.frame[1])];
+        let offset = 0.5 * length2;
+        if offset * offset > self.reach * self.reach * (x * x + y * y) * (1.0 + 1e-9) {
+            return;
+        }
+        let line = Line {
+            line: [x, y],
+            offset,
             length: length2.sqrt(),
-            neighbor: Neighbor { difference, id },
-        }
-    }
-
-    /// The run of corners that `side` cuts off, as first and number; `None` if there is none.
-    fn arc_cut_by(&mut self, side: &Side) -> Option<(usize, usize)> {
-        let n = self.corners.len();
-        self.cut.clear();
-        let mut deepest = None;
-        for k in 0..n {
-            let depth = self.depth(k, side);
-            if depth > 0.0 && deepest.is_none_or(|(d, _)| depth > d) {
-                deepest = Some((depth, k));
+        };
+        let words = self.corners.len().div_ceil(64);
+        self.cut.resize(words, 0);
+        self.doubt.resize(words, 0);
+        if cut_corners(self.level, &self.corners, &line, &mut self.cut, &mut self.doubt) {
+            let neighbor = Neighbor { difference, id };
+            let side = Side { line, neighbor };
+            self.settle_doubts(&side);
+            if let Some((first, last)) = self.arc(&side) {
+                self.replace(first, last, side);
             }
-            self.cut.push(depth);
         }
-        let (_, seed) = deepest?;
-        // A line cuts one run off a convex polygon; rim corners decided in floating point might
-        // say otherwise by a hair, so the run around the deepest one counts.
-        let mut first = seed;
-        let mut count = 1;
-        while count < n && self.cut[(first + n - 1) % n] > 0.0 {
-            first = (first + n - 1) % n;
-            count += 1;
-        }
-        while count < n && self.cut[(first + count) % n] > 0.0 {
-            count += 1;
-        }
-        // The cell's own point is never cut off, so some corner stays.
-        (count < n).then_some((first, count))
     }
 
-    /// How far beyond `side` corner `k` lies; positive exactly if it is cut off.
-    fn depth(&self, k: usize, side: &Side) -> f64 {
-        let corner = &self.corners[k];
-        let depth = side.line[0] * corner.at[0] + side.line[1] * corner.at[1] - side.offset;
-        let bound = side.length * corner.error + SLACK * (side.length * corner.reach + side.offset);
-        if depth.abs() > bound {
-            return depth;
+    /// Decides the corners that floating point does not.
+    fn settle_doubts(&mut self, side: &Side) {
+        for word in 0..self.doubt.len() {
+            let mut doubt = self.doubt[word];
+            while doubt != 0 {
+                let bit = doubt.trailing_zeros();
+                doubt &= doubt - 1;
+                let cut = self.cuts(word * 64 + bit as usize, side);
+                self.cut[word] |= u64::from(cut) << bit;
+            }
         }
-        let a = self.sides[k].neighbor;
-        let b = self.sides[(k + 1) % self.sides.len()].neighbor;
+    }
+
+    /// Whether `side` cuts off corner `k`: exact, but for corners on the rim.
+    fn cuts(&self, k: usize, side: &Side) -> bool {
+        let a = self.sides[self.links[k].side as usize].neighbor;
+        let next = self.links[k].next as usize;
+        let b = self.sides[self.links[next].side as usize].neighbor;
         let c = side.neighbor;
-        let cut = match (a.id == RIM, b.id == RIM) {
-            (false, false) => cuts_corner(self.normal, self.own, a, b, c),
-            (true, true) => return depth,
+        let exact = match (a.id == RIM, b.id == RIM) {
+            (false, false) => Some(cuts_corner(self.normal, self.own, a, b, c)),
+            (true, true) => None,
             (a_is_rim, _) => {
                 let other = if a_is_rim { b } else { a };
-                match cuts_parallel(self.normal, self.own, other, c) {
-                    Some(cut) => cut,
-                    None => return depth,
-                }
+                cuts_parallel(self.normal, self.own, other, c)
             }
         };
-        if cut {
-            f64::MIN_POSITIVE.max(depth)
-        } else {
-            0.0
-        }
+        exact.unwrap_or_else(|| self.depth(k, side) > 0.0)
     }
 
-    /// Puts `side` in place of `count` corners from `first` on, and the sides between them.
-    fn replace(&mut self, first: usize, count: usize, side: Side) {
-        let n = self.sides.len();
-        // Turned so that the corners that go come last: side 0 begins at the first kept corner.
-        let start = (first + count) % n;
-        self.sides.rotate_left((start + 1) % n);
-        self.corners.rotate_left(start);
-        // Now corner k ends side k - 1 (mod n) and begins side k.
-        let kept = n - count;
-        self.corners.truncate(kept);
-        // Sides 0..kept run from kept corner to kept corner or to the first that goes; the last
-        // side of the list runs from the last that goes to kept corner 0.
-        let into = self.sides[n - 1];
-        self.sides.truncate(kept);
-        let out = self.sides[kept - 1];
-        self.corners.push(meet(&out, &side));
-        self.corners.push(meet(&side, &into));
+    fn depth(&self, k: usize, side: &Side) -> f64 {
+        side.line.depth(self.corners.x[k], self.corners.y[k])
+    }
+
+    fn is_cut(&self, k: u32) -> bool {
+        self.cut[k as usize / 64] >> (k % 64) & 1 == 1
+    }
+
+    /// The run of corners that is cut off, by its first and last; `None` if there is none.
+    fn arc(&self, side: &Side) -> Option<(u32, u32)> {
+        let total: usize = self.cut.iter().map(|w| w.count_ones() as usize).sum();
+        let word = self.cut.iter().position(|w| *w != 0)?;
+        let seed = (word * 64) as u32 + self.cut[word].trailing_zeros();
+        let (first, last, count) = self.run(seed)?;
+        if count == total {
+            return Some((first, last));
+        }
+        // A line cuts one run off a convex polygon; rim corners decided in floating point might
+        // say otherwise by a hair, so the run around the deepest one counts.
+        let mut deepest: Option<(f64, u32)> = None;
+        for k in (0..self.corners.len() as u32).filter(|k| self.is_cut(*k)) {
+            let depth = self.depth(k as usize, side).max(f64::MIN_POSITIVE);
+            if deepest.is_none_or(|(d, _)| depth > d) {
+                deepest = Some((depth, k));
+            }
+        }
+        let (first, last, _) = self.run(deepest?.1)?;
+        Some((first, last))
+    }
+
+    /// The run of cut corners around `seed`: first, last, how many. The cell's own point is never
+    /// cut off, so some corner stays: `None` if none does.
+    fn run(&self, seed: u32) -> Option<(u32, u32, usize)> {
+        let (mut first, mut last, mut count) = (seed, seed, 1);
+        while count < self.count && self.is_cut(self.links[first as usize].before) {
+            first = self.links[first as usize].before;
+            count += 1;
+        }
+        while count < self.count && self.is_cut(self.links[last as usize].next) {
+            last = self.links[last as usize].next;
+            count += 1;
+        }
+        (count < self.count).then_some((first, last, count))
+    }
+
+    /// Puts `side` in place of the corners from `first` to `last`, and the sides between them.
+    fn replace(&mut self, first: u32, last: u32, side: Side) {
+        let start = self.links[first as usize];
+        let end = self.links[last as usize];
+        let mut gone = first;
+        while gone != last {
+            gone = self.links[gone as usize].next;
+            self.corners.clear(gone as usize);
+            self.free.push(gone);
+            self.count -= 1;
+        }
+        let into = self.links[end.next as usize].side;
+        let entry = meet(&self.sides[start.side as usize].line, &side.line);
+        let exit = meet(&side.line, &self.sides[into as usize].line);
+        // The side before the run now ends where it meets the new side, and that at the side after.
+        self.corners.set(first as usize, entry);
+        let second = self.free_place();
+        self.corners.set(second as usize, exit);
+        self.links[second as usize] = Link {
+            next: end.next,
+            before: first,
+            side: self.sides.len() as u32,
+        };
+        self.links[end.next as usize].before = second;
+        self.links[first as usize].next = second;
+        self.count += 1;
         self.sides.push(side);
-        self.sides.push(into);
-        // Back to the convention that corner k ends side k.
-        self.corners.rotate_left(1);
-        self.update_reach();
+        self.reach = farthest(self.level, &self.corners);
+    }
+
+    fn free_place(&mut self) -> u32 {
+        if let Some(place) = self.free.pop() {
+            return place;
+        }
+        let place = self.corners.len() as u32;
+        self.corners.resize(place as usize + CORNER_LANES);
+        self.links.resize(self.corners.len(), Link::default());
+        self.free.extend(place + 1..self.corners.len() as u32);
+        place
+    }
+
+    /// The places of the corners, in turn around the cell.
+    fn ring(&self) -> impl Iterator<Item = usize> + '_ {
+        let free = |k: &u32| !self.free.contains(k);
+        let first = (0..self.corners.len() as u32).find(free).unwrap_or(0);
+        std::iter::successors(Some(first), move |k| {
+            let next = self.links[*k as usize].next;
+            (next != first).then_some(next)
+        })
+        .map(|k| k as usize)
     }
 
     /// False if no point in a box, given relative to the cell's point, can change the cell: a point
@@ -238,14 +319,14 @@ impl Cell {
     #[must_use]
     pub fn may_touch(&self, low: [f64; 3], high: [f64; 3]) -> bool {
         let [u, v] = self.frame;
-        self.corners.iter().any(|corner| {
+        self.ring().any(|k| {
             let mut distance2 = 0.0;
             for axis in 0..3 {
-                let x = corner.at[0] * u[axis] + corner.at[1] * v[axis];
+                let x = self.corners.x[k] * u[axis] + self.corners.y[k] * v[axis];
                 let gap = (low[axis] - x).max(x - high[axis]).max(0.0);
                 distance2 += gap * gap;
             }
-            let reach = (corner.reach + corner.error) * (1.0 + 1e-9);
+            let reach = (self.corners.reach[k] + self.corners.error[k]) * (1.0 + 1e-9);
             distance2 <= reach * reach
         })
     }
@@ -256,12 +337,10 @@ impl Cell {
         if self.hidden {
             return;
         }
-        let n = self.sides.len();
-        for k in 0..n {
-            let (a, b) = (
-                self.sides[k].neighbor.id,
-                self.sides[(k + 1) % n].neighbor.id,
-            );
+        for k in self.ring() {
+            let next = self.links[k].next as usize;
+            let [a, b] =
+                [k, next].map(|k| self.sides[self.links[k].side as usize].neighbor.id);
             if a != RIM && b != RIM {
                 each(a, b);
             }
@@ -295,18 +374,17 @@ fn frame(normal: Normal) -> [[f64; 3]; 2] {
     [u, cross(unit(n), u)]
 }
 
-/// Where two sides meet.
-fn meet(a: &Side, b: &Side) -> Corner {
+/// Where two lines meet.
+fn meet(a: &Line, b: &Line) -> CornerPlace {
     let determinant = a.line[0] * b.line[1] - a.line[1] * b.line[0];
-    let at = [
-        (a.offset * b.line[1] - b.offset * a.line[1]) / determinant,
-        (b.offset * a.line[0] - a.offset * b.line[0]) / determinant,
-    ];
-    let distance = (at[0] * at[0] + at[1] * at[1]).sqrt();
+    let x = (a.offset * b.line[1] - b.offset * a.line[1]) / determinant;
+    let y = (b.offset * a.line[0] - a.offset * b.line[0]) / determinant;
+    let distance = (x * x + y * y).sqrt();
     let lengths = a.length + b.length;
     let error = SLACK * lengths / determinant.abs() * (a.offset + b.offset + lengths * distance);
-    Corner {
-        at,
+    CornerPlace {
+        x,
+        y,
         error,
         reach: distance + error,
     }

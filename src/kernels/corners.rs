@@ -24,6 +24,55 @@ pub struct CornerColumns {
     pub reach: Vec<f64>,
 }
 
+/// A corner in [`CornerColumns`].
+#[derive(Debug, Clone, Copy, Default)]
+pub struct CornerPlace {
+    /// Position.
+    pub x: f64,
+    /// Position.
+    pub y: f64,
+    /// Bound on the distance from the true corner.
+    pub error: f64,
+    /// Distance from the origin, at most.
+    pub reach: f64,
+}
+
+impl CornerColumns {
+    /// Number of places.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.x.len()
+    }
+
+    /// True if there is no place.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.x.is_empty()
+    }
+
+    /// Makes room for `places`, a multiple of [`CORNER_LANES`].
+    pub fn resize(&mut self, places: usize) {
+        for column in [&mut self.x, &mut self.y, &mut self.error, &mut self.reach] {
+            column.resize(places, 0.0);
+        }
+    }
+
+    /// Puts a corner in place `k`.
+    #[inline]
+    pub fn set(&mut self, k: usize, corner: CornerPlace) {
+        self.x[k] = corner.x;
+        self.y[k] = corner.y;
+        self.error[k] = corner.error;
+        self.reach[k] = corner.reach;
+    }
+
+    /// Leaves no corner in place `k`.
+    #[inline]
+    pub fn clear(&mut self, k: usize) {
+        self.set(k, CornerPlace::default());
+    }
+}
+
 /// The line `line · q = offset`, `offset > 0`; what is beyond it is cut off.
 #[derive(Debug, Clone, Copy)]
 pub struct Line {

@@ -13,7 +13,8 @@ mod ranks;
 mod sums;
 
 pub use boxes::{Boxes, boxes_near};
-pub use corners::{CORNER_LANES, CornerColumns, Line, cut_corners, farthest};
+pub(crate) use corners::SLACK;
+pub use corners::{CORNER_LANES, CornerColumns, CornerPlace, Line, cut_corners, farthest};
 pub use distances::{count_within, distances, keep_within};
 pub use ranks::ranks;
 pub use sums::{SecondMoments, second_moments};
