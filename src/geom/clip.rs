@@ -9,7 +9,7 @@
 use super::plane::Normal;
 use super::predicate::{Neighbor, cuts_corner, cuts_parallel};
 use crate::kernels::{
-    CORNER_LANES, CornerColumns, CornerPlace, Level, Line, SLACK, cut_corners, farthest,
+    CornerGroup, Frame, LANES, Level, Line, SLACK, bisectors_body, cut_body, farthest_body, kernel,
 };
 
 /// Number of corners of the disk.
@@ -41,16 +41,41 @@ struct Side {
     neighbor: Neighbor,
 }
 
+/// A corner of the polygon.
+#[derive(Debug, Clone, Copy, Default)]
+struct Corner {
+    at: [f64; 2],
+    /// Bound on the distance of `at` from the true corner.
+    error: f64,
+    /// Distance from the centre, at most.
+    reach: f64,
+}
+
+/// Neighbours of a cell's point in columns, nearest first.
+#[derive(Debug, Clone, Copy)]
+pub struct Nearest<'a> {
+    /// Squared distances.
+    pub distances2: &'a [u64],
+    /// Ids.
+    pub ids: &'a [u32],
+    /// Differences to the cell's point along x.
+    pub x: &'a [i32],
+    /// Along y.
+    pub y: &'a [i32],
+    /// Along z.
+    pub z: &'a [i32],
+}
+
 /// A restricted Voronoi cell in the making. One value can serve many cells in turn.
 #[derive(Debug, Clone)]
 pub struct Cell {
     level: Level,
     own: u32,
     normal: Normal,
-    frame: [[f64; 3]; 2],
+    frame: Frame,
     /// All sides so far, also those that are no longer part of the polygon; the rim's come first.
     sides: Vec<Side>,
-    corners: CornerColumns,
+    corners: Vec<CornerGroup>,
     /// Of each corner the next one around the polygon, and the side between it and the one before.
     links: Vec<Link>,
     /// Places in the columns without a corner.
@@ -59,6 +84,7 @@ pub struct Cell {
     cut: Vec<u64>,
     doubt: Vec<u64>,
     reach: f64,
+    reach2: u64,
     hidden: bool,
 }
 
@@ -90,13 +116,14 @@ impl Cell {
             normal,
             frame: [[0.0; 3]; 2],
             sides: RIM_SIDES.map(rim).to_vec(),
-            corners: CornerColumns::default(),
+            corners: Vec::new(),
             links: Vec::new(),
             free: Vec::new(),
             count: 0,
             cut: Vec::new(),
             doubt: Vec::new(),
             reach: 0.0,
+            reach2: 0,
             hidden: false,
         };
         cell.start(own, normal, radius);
@@ -113,36 +140,68 @@ impl Cell {
         for side in &mut self.sides {
             side.line.offset = radius * RIM_DISTANCE;
         }
-        self.corners.resize(RIM_CORNERS.next_multiple_of(CORNER_LANES));
-        self.links.resize(self.corners.len(), Link::default());
+        self.corners.clear();
         self.free.clear();
-        for k in RIM_CORNERS..self.corners.len() {
-            self.corners.clear(k);
-            self.free.push(k as u32);
-        }
+        self.grow(RIM_CORNERS.next_multiple_of(LANES));
+        self.free.truncate(self.free.len() - RIM_CORNERS);
         self.count = RIM_CORNERS;
+        let reach = radius * (1.0 + 4.0 * SLACK);
         for k in 0..RIM_CORNERS {
             let next = (k + 1) % RIM_CORNERS;
             // Halfway between the normals of its sides.
             let [a, b] = [RIM_SIDES[k], RIM_SIDES[next]];
             let half = 0.5 / RIM_DISTANCE * radius;
-            let reach = radius * (1.0 + 4.0 * SLACK);
-            self.corners.set(
-                k,
-                CornerPlace {
-                    x: half * (a[0] + b[0]),
-                    y: half * (a[1] + b[1]),
-                    error: 4.0 * SLACK * radius,
-                    reach,
-                },
-            );
+            let corner = Corner {
+                at: [half * (a[0] + b[0]), half * (a[1] + b[1])],
+                error: 4.0 * SLACK * radius,
+                reach,
+            };
+            self.set_corner(k, corner);
             self.links[k] = Link {
                 next: next as u32,
                 before: ((k + RIM_CORNERS - 1) % RIM_CORNERS) as u32,
                 side: k as u32,
             };
-            self.reach = reach;
         }
+        self.set_reach(reach);
+    }
+
+    #[inline(always)]
+    fn set_reach(&mut self, reach: f64) {
+        self.reach = reach;
+        // The conversion saturates for disks larger than any cloud.
+        self.reach2 = ((4.0 * reach * reach * (1.0 + 1e-9)) as u64).saturating_add(1);
+    }
+
+    /// Number of places for corners.
+    fn places(&self) -> usize {
+        self.corners.len() * LANES
+    }
+
+    /// Makes free places up to a number of them, a multiple of [`LANES`]; lower ones are used first.
+    fn grow(&mut self, places: usize) {
+        let before = self.places() as u32;
+        self.corners.resize(places / LANES, CornerGroup::default());
+        self.links.resize(places, Link::default());
+        self.free.extend((before..places as u32).rev());
+    }
+
+    #[inline(always)]
+    fn corner(&self, k: usize) -> Corner {
+        let (group, k) = (&self.corners[k / LANES], k % LANES);
+        Corner {
+            at: [group.x[k], group.y[k]],
+            error: group.error[k],
+            reach: group.reach[k],
+        }
+    }
+
+    #[inline(always)]
+    fn set_corner(&mut self, k: usize, corner: Corner) {
+        let (group, k) = (&mut self.corners[k / LANES], k % LANES);
+        [group.x[k], group.y[k]] = corner.at;
+        group.error[k] = corner.error;
+        group.reach[k] = corner.reach;
     }
 
     /// Points at a larger squared distance than this cannot touch the cell: four times the squared
@@ -150,44 +209,66 @@ impl Cell {
     #[must_use]
     #[inline]
     pub fn reach2(&self) -> u64 {
-        // The conversion saturates for disks larger than any cloud.
-        ((4.0 * self.reach * self.reach * (1.0 + 1e-9)) as u64).saturating_add(1)
+        self.reach2
     }
 
     /// Clips by the bisector of the point `id` at `difference` from this cell's point.
     pub fn clip(&mut self, difference: [i64; 3], id: u32) {
-        if difference == [0; 3] {
-            // Of two points in one place the heavier, with the lower id, has the cell.
-            self.hidden |= id < self.own;
-            return;
-        }
-        let d = difference.map(|x| x as f64);
-        let dot = |u: [f64; 3]| d[0] * u[0] + d[1] * u[1] + d[2] * u[2];
-        let length2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-        let [x, y] = [dot(self.frame[0]), dot(self.frame[1])];
-        let offset = 0.5 * length2;
-        if offset * offset > self.reach * self.reach * (x * x + y * y) * (1.0 + 1e-9) {
-            return;
-        }
-        let line = Line {
-            line: [x, y],
-            offset,
-            length: length2.sqrt(),
+        // Differences of coordinates in 0..2^30 fit 32 bits.
+        let [x, y, z] = difference.map(|c| [c as i32]);
+        let near = Nearest {
+            distances2: &[0],
+            ids: &[id],
+            x: &x,
+            y: &y,
+            z: &z,
         };
-        let words = self.corners.len().div_ceil(64);
-        self.cut.resize(words, 0);
-        self.doubt.resize(words, 0);
-        if cut_corners(self.level, &self.corners, &line, &mut self.cut, &mut self.doubt) {
-            let neighbor = Neighbor { difference, id };
-            let side = Side { line, neighbor };
+        clip_nearest(self.level, self, near, 0);
+    }
+
+    /// Clips by the bisectors of neighbours from number `next` on, nearest first, until one cannot
+    /// touch the cell; the number of that, or of all.
+    pub fn clip_nearest(&mut self, near: Nearest<'_>, next: usize) -> usize {
+        clip_nearest(self.level, self, near, next)
+    }
+
+    #[inline(always)]
+    fn clip_line(&mut self, line: Line, neighbor: Neighbor) {
+        if neighbor.difference == [0; 3] {
+            // Of two points in one place the heavier, with the lower id, has the cell.
+            self.hidden |= neighbor.id < self.own;
+            return;
+        }
+        let [x, y] = line.line;
+        let reach2 = self.reach * self.reach;
+        if line.offset * line.offset > reach2 * (x * x + y * y) * (1.0 + 1e-9) {
+            return;
+        }
+        self.cut.clear();
+        let mut doubts = 0;
+        let mut all = 0;
+        self.doubt.clear();
+        for corners in self.corners.chunks(64 / LANES) {
+            let (cut, doubt) = cut_body(corners, &line);
+            self.cut.push(cut);
+            self.doubt.push(doubt);
+            doubts |= doubt;
+            all |= cut | doubt;
+        }
+        if all == 0 {
+            return;
+        }
+        let side = Side { line, neighbor };
+        if doubts != 0 {
             self.settle_doubts(&side);
-            if let Some((first, last)) = self.arc(&side) {
-                self.replace(first, last, side);
-            }
+        }
+        if let Some((first, last)) = self.arc(&side) {
+            self.replace(first, last, side);
         }
     }
 
     /// Decides the corners that floating point does not.
+    #[cold]
     fn settle_doubts(&mut self, side: &Side) {
         for word in 0..self.doubt.len() {
             let mut doubt = self.doubt[word];
@@ -217,15 +298,19 @@ impl Cell {
         exact.unwrap_or_else(|| self.depth(k, side) > 0.0)
     }
 
+    #[inline(always)]
     fn depth(&self, k: usize, side: &Side) -> f64 {
-        side.line.depth(self.corners.x[k], self.corners.y[k])
+        let [x, y] = self.corner(k).at;
+        side.line.depth(x, y)
     }
 
+    #[inline(always)]
     fn is_cut(&self, k: u32) -> bool {
         self.cut[k as usize / 64] >> (k % 64) & 1 == 1
     }
 
     /// The run of corners that is cut off, by its first and last; `None` if there is none.
+    #[inline(always)]
     fn arc(&self, side: &Side) -> Option<(u32, u32)> {
         let total: usize = self.cut.iter().map(|w| w.count_ones() as usize).sum();
         let word = self.cut.iter().position(|w| *w != 0)?;
@@ -234,10 +319,16 @@ impl Cell {
         if count == total {
             return Some((first, last));
         }
+        self.deepest_run(side)
+    }
+
+    /// The run around the corner that is deepest beyond `side`, where there are several.
+    #[cold]
+    fn deepest_run(&self, side: &Side) -> Option<(u32, u32)> {
         // A line cuts one run off a convex polygon; rim corners decided in floating point might
         // say otherwise by a hair, so the run around the deepest one counts.
         let mut deepest: Option<(f64, u32)> = None;
-        for k in (0..self.corners.len() as u32).filter(|k| self.is_cut(*k)) {
+        for k in (0..self.places() as u32).filter(|k| self.is_cut(*k)) {
             let depth = self.depth(k as usize, side).max(f64::MIN_POSITIVE);
             if deepest.is_none_or(|(d, _)| depth > d) {
                 deepest = Some((depth, k));
@@ -249,6 +340,7 @@ impl Cell {
 
     /// The run of cut corners around `seed`: first, last, how many. The cell's own point is never
     /// cut off, so some corner stays: `None` if none does.
+    #[inline(always)]
     fn run(&self, seed: u32) -> Option<(u32, u32, usize)> {
         let (mut first, mut last, mut count) = (seed, seed, 1);
         while count < self.count && self.is_cut(self.links[first as usize].before) {
@@ -263,13 +355,14 @@ impl Cell {
     }
 
     /// Puts `side` in place of the corners from `first` to `last`, and the sides between them.
+    #[inline(always)]
     fn replace(&mut self, first: u32, last: u32, side: Side) {
         let start = self.links[first as usize];
         let end = self.links[last as usize];
         let mut gone = first;
         while gone != last {
             gone = self.links[gone as usize].next;
-            self.corners.clear(gone as usize);
+            self.set_corner(gone as usize, Corner::default());
             self.free.push(gone);
             self.count -= 1;
         }
@@ -277,9 +370,9 @@ impl Cell {
         let entry = meet(&self.sides[start.side as usize].line, &side.line);
         let exit = meet(&side.line, &self.sides[into as usize].line);
         // The side before the run now ends where it meets the new side, and that at the side after.
-        self.corners.set(first as usize, entry);
+        self.set_corner(first as usize, entry);
         let second = self.free_place();
-        self.corners.set(second as usize, exit);
+        self.set_corner(second as usize, exit);
         self.links[second as usize] = Link {
             next: end.next,
             before: first,
@@ -289,24 +382,20 @@ impl Cell {
         self.links[first as usize].next = second;
         self.count += 1;
         self.sides.push(side);
-        self.reach = farthest(self.level, &self.corners);
+        self.set_reach(farthest_body(&self.corners));
     }
 
     fn free_place(&mut self) -> u32 {
-        if let Some(place) = self.free.pop() {
-            return place;
+        if self.free.is_empty() {
+            self.grow(self.places() + LANES);
         }
-        let place = self.corners.len() as u32;
-        self.corners.resize(place as usize + CORNER_LANES);
-        self.links.resize(self.corners.len(), Link::default());
-        self.free.extend(place + 1..self.corners.len() as u32);
-        place
+        self.free.pop().unwrap_or_default()
     }
 
     /// The places of the corners, in turn around the cell.
     fn ring(&self) -> impl Iterator<Item = usize> + '_ {
         let free = |k: &u32| !self.free.contains(k);
-        let first = (0..self.corners.len() as u32).find(free).unwrap_or(0);
+        let first = (0..self.places() as u32).find(free).unwrap_or(0);
         std::iter::successors(Some(first), move |k| {
             let next = self.links[*k as usize].next;
             (next != first).then_some(next)
@@ -320,13 +409,14 @@ impl Cell {
     pub fn may_touch(&self, low: [f64; 3], high: [f64; 3]) -> bool {
         let [u, v] = self.frame;
         self.ring().any(|k| {
+            let corner = self.corner(k);
             let mut distance2 = 0.0;
             for axis in 0..3 {
-                let x = self.corners.x[k] * u[axis] + self.corners.y[k] * v[axis];
+                let x = corner.at[0] * u[axis] + corner.at[1] * v[axis];
                 let gap = (low[axis] - x).max(x - high[axis]).max(0.0);
                 distance2 += gap * gap;
             }
-            let reach = (self.corners.reach[k] + self.corners.error[k]) * (1.0 + 1e-9);
+            let reach = (corner.reach + corner.error) * (1.0 + 1e-9);
             distance2 <= reach * reach
         })
     }
@@ -339,8 +429,7 @@ impl Cell {
         }
         for k in self.ring() {
             let next = self.links[k].next as usize;
-            let [a, b] =
-                [k, next].map(|k| self.sides[self.links[k].side as usize].neighbor.id);
+            let [a, b] = [k, next].map(|k| self.sides[self.links[k].side as usize].neighbor.id);
             if a != RIM && b != RIM {
                 each(a, b);
             }
@@ -348,8 +437,33 @@ impl Cell {
     }
 }
 
+kernel! {
+    /// See [`Cell::clip_nearest`].
+    fn clip_nearest(cell: &mut Cell, near: Nearest<'_>, next: usize) -> usize = clip_nearest_body
+}
+
+#[inline(always)]
+fn clip_nearest_body(cell: &mut Cell, near: Nearest<'_>, mut next: usize) -> usize {
+    let count = near.distances2.len();
+    while next < count {
+        let group = next..(next + LANES).min(count);
+        let [x, y, z] = [near.x, near.y, near.z].map(|column| &column[group.clone()]);
+        let lines = bisectors_body(x, y, z, &cell.frame);
+        for (k, number) in group.enumerate() {
+            if near.distances2[number] > cell.reach2 {
+                return number;
+            }
+            let difference = [x[k], y[k], z[k]].map(i64::from);
+            let id = near.ids[number];
+            cell.clip_line(lines.get(k), Neighbor { difference, id });
+            next += 1;
+        }
+    }
+    next
+}
+
 /// Two unit vectors that span the plane across `normal`.
-fn frame(normal: Normal) -> [[f64; 3]; 2] {
+fn frame(normal: Normal) -> Frame {
     let n = normal.map(f64::from);
     let unit = |v: [f64; 3]| {
         let length = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
@@ -375,16 +489,17 @@ fn frame(normal: Normal) -> [[f64; 3]; 2] {
 }
 
 /// Where two lines meet.
-fn meet(a: &Line, b: &Line) -> CornerPlace {
+#[inline(always)]
+fn meet(a: &Line, b: &Line) -> Corner {
     let determinant = a.line[0] * b.line[1] - a.line[1] * b.line[0];
-    let x = (a.offset * b.line[1] - b.offset * a.line[1]) / determinant;
-    let y = (b.offset * a.line[0] - a.offset * b.line[0]) / determinant;
+    let inverse = 1.0 / determinant;
+    let x = (a.offset * b.line[1] - b.offset * a.line[1]) * inverse;
+    let y = (b.offset * a.line[0] - a.offset * b.line[0]) * inverse;
     let distance = (x * x + y * y).sqrt();
     let lengths = a.length + b.length;
-    let error = SLACK * lengths / determinant.abs() * (a.offset + b.offset + lengths * distance);
-    CornerPlace {
-        x,
-        y,
+    let error = SLACK * lengths * inverse.abs() * (a.offset + b.offset + lengths * distance);
+    Corner {
+        at: [x, y],
         error,
         reach: distance + error,
     }

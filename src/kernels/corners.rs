@@ -1,76 +1,26 @@
-//! Which corners of a polygon lie beyond a line.
+//! Bisectors as lines in a plane, and which corners of a polygon lie beyond one.
 
 use super::kernel;
 
-/// Corners are looked at in groups of this size; columns are padded to a multiple.
-pub const CORNER_LANES: usize = 8;
+/// Corners are looked at in groups of this size, and lines made.
+pub const LANES: usize = 8;
 
 /// Factor of the forward error bounds, in units of the last place; several times what a count of
 /// the roundings gives.
 pub(crate) const SLACK: f64 = 32.0 * f64::EPSILON;
 
-/// Corners of a convex polygon around the origin, in columns of equal length, a multiple of
-/// [`CORNER_LANES`]. All zeros is a place without a corner: it is at the origin, which no line
-/// cuts off.
-#[derive(Debug, Clone, Default)]
-pub struct CornerColumns {
-    /// Position.
-    pub x: Vec<f64>,
-    /// Position.
-    pub y: Vec<f64>,
-    /// Bound on the distance from the true corner.
-    pub error: Vec<f64>,
-    /// Distance from the origin, at most.
-    pub reach: Vec<f64>,
-}
-
-/// A corner in [`CornerColumns`].
+/// Corners of a convex polygon around the origin, in columns. All zeros is a place without a
+/// corner: it is at the origin, which no line cuts off.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct CornerPlace {
+pub struct CornerGroup {
     /// Position.
-    pub x: f64,
+    pub x: [f64; LANES],
     /// Position.
-    pub y: f64,
+    pub y: [f64; LANES],
     /// Bound on the distance from the true corner.
-    pub error: f64,
+    pub error: [f64; LANES],
     /// Distance from the origin, at most.
-    pub reach: f64,
-}
-
-impl CornerColumns {
-    /// Number of places.
-    #[must_use]
-    pub fn len(&self) -> usize {
-        self.x.len()
-    }
-
-    /// True if there is no place.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.x.is_empty()
-    }
-
-    /// Makes room for `places`, a multiple of [`CORNER_LANES`].
-    pub fn resize(&mut self, places: usize) {
-        for column in [&mut self.x, &mut self.y, &mut self.error, &mut self.reach] {
-            column.resize(places, 0.0);
-        }
-    }
-
-    /// Puts a corner in place `k`.
-    #[inline]
-    pub fn set(&mut self, k: usize, corner: CornerPlace) {
-        self.x[k] = corner.x;
-        self.y[k] = corner.y;
-        self.error[k] = corner.error;
-        self.reach[k] = corner.reach;
-    }
-
-    /// Leaves no corner in place `k`.
-    #[inline]
-    pub fn clear(&mut self, k: usize) {
-        self.set(k, CornerPlace::default());
-    }
+    pub reach: [f64; LANES],
 }
 
 /// The line `line · q = offset`, `offset > 0`; what is beyond it is cut off.
@@ -80,81 +30,141 @@ pub struct Line {
     pub line: [f64; 2],
     /// Where the line is.
     pub offset: f64,
-    /// Scales the error of `line`.
+    /// Length of the difference in space whose bisector it is; scales the error of `line`.
     pub length: f64,
 }
 
 impl Line {
     /// How far beyond the line a corner is, times the length of the line's normal.
     #[inline(always)]
+    #[must_use]
     pub fn depth(&self, x: f64, y: f64) -> f64 {
         self.line[0] * x + self.line[1] * y - self.offset
     }
 
     /// A bound on the error of [`Line::depth`].
     #[inline(always)]
+    #[must_use]
     pub fn bound(&self, error: f64, reach: f64) -> f64 {
         self.length * error + SLACK * (self.length * reach + self.offset)
     }
 }
 
+/// Lines in columns.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct LineGroup {
+    x: [f64; LANES],
+    y: [f64; LANES],
+    offset: [f64; LANES],
+    length: [f64; LANES],
+}
+
+impl LineGroup {
+    /// One of the lines.
+    #[inline(always)]
+    #[must_use]
+    pub fn get(&self, k: usize) -> Line {
+        Line {
+            line: [self.x[k], self.y[k]],
+            offset: self.offset[k],
+            length: self.length[k],
+        }
+    }
+}
+
+/// Two unit vectors that span a plane.
+pub type Frame = [[f64; 3]; 2];
+
 kernel! {
-    /// Sets bit `k` of `cut` if corner `k` is surely cut off by the line, and bit `k` of `doubt` if
-    /// the error bound does not allow to say. Both have a word for each 64 corners. False if no
-    /// bit was set.
-    pub fn cut_corners(corners: &CornerColumns, line: &Line, cut: &mut [u64], doubt: &mut [u64]) -> bool = cut_body
+    /// The bisectors between the origin and up to [`LANES`] differences, in a plane through the
+    /// origin. The line of a difference of zero means nothing.
+    pub fn bisectors(x: &[i32], y: &[i32], z: &[i32], frame: &Frame) -> LineGroup = bisectors_body
 }
 
 #[inline(always)]
-fn cut_body(corners: &CornerColumns, line: &Line, cut: &mut [u64], doubt: &mut [u64]) -> bool {
-    let n = corners.x.len();
-    let (x, y) = (&corners.x[..n], &corners.y[..n]);
-    let (error, reach) = (&corners.error[..n], &corners.reach[..n]);
-    cut.fill(0);
-    doubt.fill(0);
-    let mut any = 0;
-    let groups = x
-        .chunks_exact(CORNER_LANES)
-        .zip(y.chunks_exact(CORNER_LANES))
-        .zip(error.chunks_exact(CORNER_LANES))
-        .zip(reach.chunks_exact(CORNER_LANES));
-    for (group, (((x, y), error), reach)) in groups.enumerate() {
-        let mut depth = [0.0; CORNER_LANES];
-        let mut bound = [0.0; CORNER_LANES];
-        for k in 0..CORNER_LANES {
-            depth[k] = line.depth(x[k], y[k]);
-            bound[k] = line.bound(error[k], reach[k]);
+pub(crate) fn bisectors_body(x: &[i32], y: &[i32], z: &[i32], frame: &Frame) -> LineGroup {
+    let columns = (
+        <[i32; LANES]>::try_from(x),
+        <[i32; LANES]>::try_from(y),
+        <[i32; LANES]>::try_from(z),
+    );
+    if let (Ok(x), Ok(y), Ok(z)) = columns {
+        return eight_bisectors(&x, &y, &z, frame);
+    }
+    let mut padded = [[1; LANES]; 3];
+    for (column, padded) in [x, y, z].into_iter().zip(&mut padded) {
+        for (value, padded) in column.iter().zip(padded) {
+            *padded = *value;
         }
+    }
+    eight_bisectors(&padded[0], &padded[1], &padded[2], frame)
+}
+
+#[inline(always)]
+fn eight_bisectors(
+    x: &[i32; LANES],
+    y: &[i32; LANES],
+    z: &[i32; LANES],
+    [u, v]: &Frame,
+) -> LineGroup {
+    let mut lines = LineGroup::default();
+    for k in 0..LANES {
+        let d = [f64::from(x[k]), f64::from(y[k]), f64::from(z[k])];
+        let length2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+        lines.x[k] = d[0] * u[0] + d[1] * u[1] + d[2] * u[2];
+        lines.y[k] = d[0] * v[0] + d[1] * v[1] + d[2] * v[2];
+        lines.offset[k] = 0.5 * length2;
+        lines.length[k] = length2.sqrt();
+    }
+    lines
+}
+
+kernel! {
+    /// Two words for up to 64 corners: in the first, bit `k` is set if corner `k` is surely cut off
+    /// by the line; in the second, if the error bound does not allow to say.
+    pub fn cut_corners(corners: &[CornerGroup], line: &Line) -> (u64, u64) = cut_body
+}
+
+#[inline(always)]
+pub(crate) fn cut_body(corners: &[CornerGroup], line: &Line) -> (u64, u64) {
+    let (mut cut, mut doubt) = (0, 0);
+    for (group, corners) in corners.iter().enumerate() {
         let (mut sure, mut open) = (0u64, 0u64);
-        for k in 0..CORNER_LANES {
-            sure |= u64::from(depth[k] > bound[k]) << k;
+        for k in 0..LANES {
+            let depth = line.depth(corners.x[k], corners.y[k]);
+            let bound = line.bound(corners.error[k], corners.reach[k]);
+            sure |= u64::from(depth > bound) << k;
             // Not a number is in doubt, too.
             #[allow(clippy::neg_cmp_op_on_partial_ord, reason = "must be true for NaN")]
-            let doubtful = !(depth[k].abs() > bound[k]);
+            let doubtful = !(depth.abs() > bound);
             open |= u64::from(doubtful) << k;
         }
-        let at = group * CORNER_LANES;
-        cut[at / 64] |= sure << (at % 64);
-        doubt[at / 64] |= open << (at % 64);
-        any |= sure | open;
+        cut |= sure << (group * LANES);
+        doubt |= open << (group * LANES);
     }
-    any != 0
+    (cut, doubt)
 }
 
 kernel! {
     /// The largest of the corners' reaches.
-    pub fn farthest(corners: &CornerColumns) -> f64 = farthest_body
+    pub fn farthest(corners: &[CornerGroup]) -> f64 = farthest_body
 }
 
 #[inline(always)]
-fn farthest_body(corners: &CornerColumns) -> f64 {
-    let mut lanes = [0.0f64; CORNER_LANES];
-    for reach in corners.reach.chunks_exact(CORNER_LANES) {
-        for k in 0..CORNER_LANES {
-            lanes[k] = if reach[k] > lanes[k] { reach[k] } else { lanes[k] };
+pub(crate) fn farthest_body(corners: &[CornerGroup]) -> f64 {
+    let mut lanes = [0.0f64; LANES];
+    for group in corners {
+        for k in 0..LANES {
+            lanes[k] = if group.reach[k] > lanes[k] {
+                group.reach[k]
+            } else {
+                lanes[k]
+            };
         }
     }
-    lanes.into_iter().fold(0.0, |a, b| if b > a { b } else { a })
+    lanes
+        .into_iter()
+        .fold(0.0, |a, b| if b > a { b } else { a })
 }
 
 #[cfg(test)]
@@ -174,37 +184,48 @@ mod tests {
 
     proptest! {
         #[test]
-        fn every_level_gives_the_same_bits(
-            rows in prop::collection::vec((number(), number(), number(), number()), 0..150),
+        fn every_level_cuts_the_same_corners(
+            rows in prop::collection::vec((number(), number(), number(), number()), 0..64),
             line in prop::array::uniform2(-4i32..5),
             offset in 0.5f64..5.0,
         ) {
-            let padded = rows.len().next_multiple_of(CORNER_LANES);
-            let mut corners = CornerColumns {
-                x: rows.iter().map(|r| r.0).collect(),
-                y: rows.iter().map(|r| r.1).collect(),
-                error: rows.iter().map(|r| r.2.abs() * 1e-3).collect(),
-                reach: rows.iter().map(|r| r.3.abs()).collect(),
-            };
-            for column in [&mut corners.x, &mut corners.y, &mut corners.error, &mut corners.reach] {
-                column.resize(padded, 0.0);
+            let mut corners = vec![CornerGroup::default(); rows.len().div_ceil(LANES)];
+            for (k, row) in rows.iter().enumerate() {
+                let group = &mut corners[k / LANES];
+                let k = k % LANES;
+                (group.x[k], group.y[k]) = (row.0, row.1);
+                (group.error[k], group.reach[k]) = (row.2.abs() * 1e-3, row.3.abs());
             }
             let line = Line { line: line.map(f64::from), offset, length: 8.0 };
-            let words = padded.div_ceil(64);
-            let (mut cut, mut doubt) = (vec![0; words], vec![0; words]);
-            let any = cut_body(&corners, &line, &mut cut, &mut doubt);
-            for (k, row) in rows.iter().enumerate() {
-                let depth = line.depth(row.0, row.1);
-                let bound = line.bound(row.2.abs() * 1e-3, row.3.abs());
-                prop_assert_eq!(cut[k / 64] >> (k % 64) & 1 == 1, depth > bound);
+            let (cut, doubt) = cut_body(&corners, &line);
+            for k in 0..corners.len() * LANES {
+                let group = &corners[k / LANES];
+                let depth = line.depth(group.x[k % LANES], group.y[k % LANES]);
+                let bound = line.bound(group.error[k % LANES], group.reach[k % LANES]);
+                prop_assert_eq!(cut >> k & 1 == 1, depth > bound);
                 let surely = depth.abs() > bound;
-                prop_assert_eq!(doubt[k / 64] >> (k % 64) & 1 == 0, surely);
+                prop_assert_eq!(doubt >> k & 1 == 0, surely);
             }
             for level in Level::all() {
-                let (mut c, mut d) = (vec![1; words], vec![1; words]);
-                prop_assert_eq!(cut_corners(level, &corners, &line, &mut c, &mut d), any);
-                prop_assert_eq!((&c, &d), (&cut, &doubt));
+                prop_assert_eq!(cut_corners(level, &corners, &line), (cut, doubt));
                 prop_assert_eq!(farthest(level, &corners).to_bits(), farthest_body(&corners).to_bits());
+            }
+        }
+
+        #[test]
+        fn every_level_makes_the_same_lines(
+            d in prop::collection::vec(prop::array::uniform3(-(1i32 << 30)..1 << 30), 1..=LANES),
+            frame in prop::array::uniform2(prop::array::uniform3(-1.0f64..1.0)),
+        ) {
+            let column = |axis: usize| d.iter().map(|d| d[axis]).collect::<Vec<_>>();
+            let (x, y, z) = (column(0), column(1), column(2));
+            let expected = bisectors_body(&x, &y, &z, &frame);
+            for level in Level::all() {
+                let got = bisectors(level, &x, &y, &z, &frame);
+                for k in 0..d.len() {
+                    let words = |l: Line| [l.line[0], l.line[1], l.offset, l.length].map(f64::to_bits);
+                    prop_assert_eq!(words(got.get(k)), words(expected.get(k)));
+                }
             }
         }
     }

@@ -9,7 +9,7 @@ kernel! {
 }
 
 #[inline(always)]
-fn distances_body(x: &[i32], y: &[i32], z: &[i32], p: [i32; 3], out: &mut [f32]) {
+pub(crate) fn distances_body(x: &[i32], y: &[i32], z: &[i32], p: [i32; 3], out: &mut [f32]) {
     for (((x, y), z), out) in x.iter().zip(y).zip(z).zip(out) {
         let dx = (x - p[0]) as f32;
         let dy = (y - p[1]) as f32;
@@ -24,12 +24,9 @@ kernel! {
 }
 
 #[inline(always)]
-fn count_body(numbers: &[f32], limit: f32) -> usize {
+pub(crate) fn count_body(numbers: &[f32], limit: f32) -> usize {
     // 32-bit sums keep as many lanes as there are numbers in a register.
-    numbers
-        .iter()
-        .map(|d| u32::from(*d <= limit))
-        .sum::<u32>() as usize
+    numbers.iter().map(|d| u32::from(*d <= limit)).sum::<u32>() as usize
 }
 
 kernel! {
@@ -38,7 +35,7 @@ kernel! {
 }
 
 #[inline(always)]
-fn keep_body(numbers: &[f32], limit: f32, out: &mut Vec<u32>) {
+pub(crate) fn keep_body(numbers: &[f32], limit: f32, out: &mut Vec<u32>) {
     /// Numbers whose comparisons are held in one word.
     const WORD: usize = 64;
     out.clear();

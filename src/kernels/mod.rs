@@ -14,9 +14,12 @@ mod sums;
 
 pub use boxes::{Boxes, boxes_near};
 pub(crate) use corners::SLACK;
-pub use corners::{CORNER_LANES, CornerColumns, CornerPlace, Line, cut_corners, farthest};
+pub use corners::{CornerGroup, Frame, LANES, Line, LineGroup, bisectors, cut_corners, farthest};
+pub(crate) use corners::{bisectors_body, cut_body, farthest_body};
+pub(crate) use distances::{count_body, distances_body, keep_body};
 pub use distances::{count_within, distances, keep_within};
 pub use ranks::ranks;
+pub(crate) use ranks::ranks_body;
 pub use sums::{SecondMoments, second_moments};
 
 /// A set of vector instructions that this machine has.
@@ -24,7 +27,7 @@ pub use sums::{SecondMoments, second_moments};
 pub struct Level(Width);
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Width {
+pub(crate) enum Width {
     /// What every machine of the architecture has.
     Base,
     /// AVX2, 256 bits.
@@ -67,6 +70,13 @@ impl Level {
     }
 }
 
+impl Level {
+    #[cfg(target_arch = "x86_64")]
+    pub(crate) fn width(self) -> Width {
+        self.0
+    }
+}
+
 impl Default for Level {
     fn default() -> Self {
         Self::best()
@@ -91,12 +101,13 @@ fn avx512() -> bool {
         && is_x86_feature_detected!("avx512vl")
 }
 
-/// Makes `name(level, …)` out of the scalar definition `body(…)`, which must be `inline(always)`.
+/// Makes `name(level, …)` out of the scalar definition `body(…)`, which must be `inline(always)`, as
+/// must be what it calls and should be widened with it.
 macro_rules! kernel {
-    ($(#[$doc:meta])* pub fn $name:ident($($arg:ident: $type:ty),* $(,)?) $(-> $out:ty)? = $body:path) => {
+    ($(#[$doc:meta])* $vis:vis fn $name:ident($($arg:ident: $type:ty),* $(,)?) $(-> $out:ty)? = $body:path) => {
         $(#[$doc])*
         #[allow(unsafe_code, reason = "the wide versions need instructions that were looked for")]
-        pub fn $name(level: $crate::kernels::Level, $($arg: $type),*) $(-> $out)? {
+        $vis fn $name(level: $crate::kernels::Level, $($arg: $type),*) $(-> $out)? {
             #[cfg(target_arch = "x86_64")]
             {
                 #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
@@ -107,7 +118,7 @@ macro_rules! kernel {
                 fn avx512($($arg: $type),*) $(-> $out)? {
                     $body($($arg),*)
                 }
-                match level.0 {
+                match level.width() {
                     $crate::kernels::Width::Base => {}
                     // SAFETY: only `Level::best` and `Level::all` make this level, after they found
                     // these instructions on the machine.
@@ -121,4 +132,4 @@ macro_rules! kernel {
         }
     };
 }
-use kernel;
+pub(crate) use kernel;

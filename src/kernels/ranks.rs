@@ -9,7 +9,7 @@ kernel! {
 }
 
 #[inline(always)]
-fn ranks_body(keys: &[i64], out: &mut [u32]) {
+pub(crate) fn ranks_body(keys: &[i64], out: &mut [u32]) {
     for (key, out) in keys.iter().zip(out) {
         *out = keys.iter().map(|other| i64::from(other < key)).sum::<i64>() as u32;
     }

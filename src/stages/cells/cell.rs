@@ -4,8 +4,8 @@ use crate::error::Result;
 use crate::geom::Point;
 use crate::geom::clip::Cell;
 use crate::geom::plane::{Moments, Plane};
-use crate::stages::order::PointStore;
 use crate::kernels::Level;
+use crate::stages::order::PointStore;
 use crate::stages::tiles::near::Query;
 use crate::stages::tiles::neighbors::Neighbors;
 use crate::stages::tiles::walk::{PageCache, Walk};
@@ -160,13 +160,7 @@ impl CellMaker {
         }
         let mut next = 0;
         loop {
-            while let Some(near) = query.near().get(next) {
-                if near.distance2 > self.cell.reach2() {
-                    break;
-                }
-                self.cell.clip(near.difference, near.id);
-                next += 1;
-            }
+            next = self.cell.clip_nearest(query.near().columns(), next);
             if next < query.near().len() || self.cell.reach2() <= query.complete2() {
                 self.cell.triples(each);
                 return Ok(Outcome::Complete);

@@ -9,7 +9,7 @@ use super::neighbors::Neighbors;
 use super::{OwnPage, Tile};
 use crate::geom::aabb::Aabb;
 use crate::geom::{Point, distance2};
-use crate::kernels::{Level, count_within, distances, keep_within, ranks};
+use crate::kernels::{Level, count_body, distances_body, keep_body, kernel, ranks_body};
 use std::ops::Range;
 
 /// Up to this number, keys are sorted by counting.
@@ -17,6 +17,9 @@ const MOST_RANKED: usize = 96;
 
 /// Bound on the relative error of approximate squared distances, and then some.
 pub(super) const APPROXIMATE: f64 = 1.0 / (1 << 20) as f64;
+
+/// The limit of a query against the last distance of the query before.
+const MARGIN: f32 = 1.08;
 
 /// How often the limit of a query is corrected before one that is too large is taken.
 const CORRECTIONS: usize = 6;
@@ -116,8 +119,7 @@ impl Tile {
         search: &mut Search,
     ) -> Option<u64> {
         let point = self.points[index];
-        search.measure(point);
-        if let Some(complete2) = search.list_nearest(point, id, k) {
+        if let Some(complete2) = list_nearest(search.level, search, point, id, k) {
             return Some(complete2);
         }
         if search.candidates.complete2 >= own.reach2 {
@@ -126,8 +128,7 @@ impl Tile {
         let limit = self.limit(index..index + 1, k, search);
         search.step_aside();
         search.gather(self, &Aabb::of(&[point]), limit.min(own.reach2));
-        search.measure(point);
-        search.list_nearest(point, id, k)
+        list_nearest(search.level, search, point, id, k)
     }
 
     /// An upper bound of the squared distance of the `k`th neighbour of each point of a group,
@@ -172,59 +173,8 @@ impl Search {
         }
     }
 
-    /// Measures the candidates from `point`.
-    fn measure(&mut self, point: Point) {
-        let Candidates { x, y, z, .. } = &self.candidates;
-        self.distances.resize(x.len(), 0.0);
-        distances(self.level, x, y, z, point, &mut self.distances);
-    }
-
-    /// Lists the `k` nearest neighbours, and some more; the squared distance up to which all are
-    /// listed. `None` if there are fewer than `k` as far as the candidates are complete.
-    fn list_nearest(&mut self, point: Point, own: u32, k: usize) -> Option<u64> {
-        let most = above(self.candidates.complete2);
-        // The neighbours of the query before are about as far.
-        let last = self.near.distances2.get(k.wrapping_sub(1));
-        let mut limit = last.map_or(most, |d2| (*d2 as f32 * 1.15).max(1.0).min(most));
-        // The point itself is a candidate; one more, for those that are not sure to be within.
-        let wanted = k + 2;
-        for correction in 0.. {
-            let count = count_within(self.level, &self.distances, limit);
-            if count >= wanted || limit >= most {
-                if count > 2 * wanted && correction < CORRECTIONS {
-                    limit *= (wanted + 6) as f32 / count as f32;
-                    continue;
-                }
-                let complete2 = self.list(point, own, limit);
-                if self.near.len() >= k {
-                    return Some(complete2);
-                }
-                if limit >= most {
-                    return None;
-                }
-            }
-            let grow = (wanted + 4) as f32 / (count.max(1) as f32);
-            limit = (limit * grow.clamp(1.1, 8.0) + 4.0).min(most);
-        }
-        None
-    }
-
-    /// Lists the candidates whose approximate squared distance is at most `limit` in order of
-    /// (distance, id); the squared distance up to which all are listed.
-    fn list(&mut self, point: Point, own: u32, limit: f32) -> u64 {
-        let below = (f64::from(limit) * (1.0 - APPROXIMATE)) as u64;
-        let complete2 = below.min(self.candidates.complete2);
-        keep_within(self.level, &self.distances, limit, &mut self.kept);
-        let bits = usize::BITS - self.candidates.x.len().leading_zeros();
-        if bits < 32 && complete2 < 1 << (63 - bits) {
-            self.list_short(point, own, complete2, bits);
-        } else {
-            self.list_long(point, own, complete2);
-        }
-        complete2
-    }
-
     /// Candidates are in order of id, so distance and place in one word sort as they must.
+    #[inline(always)]
     fn list_short(&mut self, point: Point, own: u32, complete2: u64, bits: u32) {
         let set = &self.candidates;
         self.keys.clear();
@@ -239,7 +189,7 @@ impl Search {
         let mask = (1i64 << bits) - 1;
         if self.keys.len() <= MOST_RANKED {
             self.places.resize(self.keys.len(), 0);
-            ranks(self.level, &self.keys, &mut self.places);
+            ranks_body(&self.keys, &mut self.places);
             for (&key, &to) in self.keys.iter().zip(&self.places) {
                 let near = set.near((key & mask) as usize, (key >> bits) as u64, point);
                 self.near.set(to as usize, near);
@@ -253,6 +203,7 @@ impl Search {
         }
     }
 
+    #[cold]
     fn list_long(&mut self, point: Point, own: u32, complete2: u64) {
         let set = &self.candidates;
         self.long_keys.clear();
@@ -269,6 +220,75 @@ impl Search {
             self.near.set(to, set.near(place as usize, d2, point));
         }
     }
+}
+
+kernel! {
+    /// Measures the candidates from `point` and lists the `k` nearest neighbours, and some more;
+    /// the squared distance up to which all are listed. `None` if there are fewer than `k` as far as
+    /// the candidates are complete.
+    fn list_nearest(search: &mut Search, point: Point, own: u32, k: usize) -> Option<u64> = nearest_body
+}
+
+#[inline(always)]
+fn nearest_body(search: &mut Search, point: Point, own: u32, k: usize) -> Option<u64> {
+    measure_body(search, point);
+    let most = above(search.candidates.complete2);
+    // The neighbours of the query before are about as far.
+    let last = search.near.distances2.get(k.wrapping_sub(1));
+    let mut limit = last.map_or(most, |d2| (*d2 as f32 * MARGIN).max(1.0).min(most));
+    // The point itself is a candidate; one more, for those that are not sure to be within.
+    let wanted = k + 2;
+    for correction in 0.. {
+        let count = count_body(&search.distances, limit);
+        if count >= wanted || limit >= most {
+            if count > 2 * wanted && correction < CORRECTIONS {
+                limit *= (wanted + 6) as f32 / count as f32;
+                continue;
+            }
+            let complete2 = list_body(search, point, own, limit);
+            if search.near.len() >= k {
+                return Some(complete2);
+            }
+            if limit >= most {
+                return None;
+            }
+        }
+        let grow = (wanted + 4) as f32 / (count.max(1) as f32);
+        limit = (limit * grow.clamp(1.1, 8.0) + 4.0).min(most);
+    }
+    None
+}
+
+kernel! {
+    /// Measures the candidates from `point`.
+    fn measure(search: &mut Search, point: Point) = measure_body
+}
+
+#[inline(always)]
+fn measure_body(search: &mut Search, point: Point) {
+    let Candidates { x, y, z, .. } = &search.candidates;
+    search.distances.resize(x.len(), 0.0);
+    distances_body(x, y, z, point, &mut search.distances);
+}
+
+kernel! {
+    /// Lists the measured candidates whose approximate squared distance is at most `limit` in order
+    /// of (distance, id); the squared distance up to which all are listed.
+    fn list(search: &mut Search, point: Point, own: u32, limit: f32) -> u64 = list_body
+}
+
+#[inline(always)]
+fn list_body(search: &mut Search, point: Point, own: u32, limit: f32) -> u64 {
+    let below = (f64::from(limit) * (1.0 - APPROXIMATE)) as u64;
+    let complete2 = below.min(search.candidates.complete2);
+    keep_body(&search.distances, limit, &mut search.kept);
+    let bits = usize::BITS - search.candidates.x.len().leading_zeros();
+    if bits < 32 && complete2 < 1 << (63 - bits) {
+        search.list_short(point, own, complete2, bits);
+    } else {
+        search.list_long(point, own, complete2);
+    }
+    complete2
 }
 
 /// An approximate squared distance that is not below any of points within `d2`.
@@ -308,11 +328,11 @@ impl Query<'_> {
         if distance2 > search.candidates.complete2 {
             search.step_aside();
             search.gather(self.tile, &Aabb::of(&[self.point]), distance2);
-            search.measure(self.point);
+            measure(search.level, search, self.point);
         }
         // Twice the slack: what is within `distance2` is surely listed.
         let limit = (distance2 as f64 * (1.0 + 3.0 * APPROXIMATE) + 1.0) as f32;
-        self.complete2 = search.list(self.point, self.id, limit);
+        self.complete2 = list(search.level, search, self.point, self.id, limit);
         debug_assert!(self.complete2 >= distance2);
         true
     }

@@ -1,6 +1,7 @@
 //! The neighbours of one point in columns, nearest first.
 
 use super::Near;
+use crate::geom::clip::Nearest;
 use crate::geom::plane::Moments;
 use crate::kernels::{Level, second_moments};
 
@@ -40,6 +41,18 @@ impl Neighbors {
             id: self.ids[index],
             difference: [self.x[index], self.y[index], self.z[index]].map(i64::from),
         })
+    }
+
+    /// The columns.
+    #[must_use]
+    pub fn columns(&self) -> Nearest<'_> {
+        Nearest {
+            distances2: &self.distances2,
+            ids: &self.ids,
+            x: &self.x,
+            y: &self.y,
+            z: &self.z,
+        }
     }
 
     /// All of them, nearest first.
