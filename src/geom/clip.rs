@@ -16,7 +16,7 @@ use crate::kernels::{
 const RIM_CORNERS: usize = 10;
 
 /// Id of a line that is part of the disk's rim and not a bisector.
-const RIM: u32 = u32::MAX;
+const RIM_ID: u32 = u32::MAX;
 
 /// Unit normals of the disk's sides, at odd multiples of 18 degrees, and their distance from the
 /// centre, cos 18°, for a disk of radius 1. Written out so that no library function decides bits.
@@ -34,6 +34,54 @@ const RIM_SIDES: [[f64; 2]; RIM_CORNERS] = [
 ];
 const RIM_DISTANCE: f64 = 0.951_056_516_295_153_5;
 
+/// Places for corners in the beginning.
+const RIM_PLACES: usize = RIM_CORNERS.next_multiple_of(LANES);
+
+/// The disk of radius 1.
+struct Rim {
+    corners: [CornerGroup; RIM_PLACES / LANES],
+    links: [Link; RIM_PLACES],
+}
+
+static RIM: Rim = rim();
+
+/// Corner `k` is between sides `k` and `k + 1`, halfway between their normals.
+const fn rim() -> Rim {
+    const NONE: [f64; LANES] = [0.0; LANES];
+    let group = CornerGroup {
+        x: NONE,
+        y: NONE,
+        error: NONE,
+        reach2: NONE,
+    };
+    let link = Link {
+        next: 0,
+        before: 0,
+        side: 0,
+    };
+    let mut rim = Rim {
+        corners: [group; RIM_PLACES / LANES],
+        links: [link; RIM_PLACES],
+    };
+    let half = 0.5 / RIM_DISTANCE;
+    let mut k = 0;
+    while k < RIM_CORNERS {
+        let next = (k + 1) % RIM_CORNERS;
+        let group = &mut rim.corners[k / LANES];
+        group.x[k % LANES] = half * (RIM_SIDES[k][0] + RIM_SIDES[next][0]);
+        group.y[k % LANES] = half * (RIM_SIDES[k][1] + RIM_SIDES[next][1]);
+        group.error[k % LANES] = 4.0 * SLACK;
+        group.reach2[k % LANES] = 1.0 + 16.0 * SLACK;
+        rim.links[k] = Link {
+            next: next as u32,
+            before: ((k + RIM_CORNERS - 1) % RIM_CORNERS) as u32,
+            side: k as u32,
+        };
+        k += 1;
+    }
+    rim
+}
+
 /// A side of the polygon.
 #[derive(Debug, Clone, Copy)]
 struct Side {
@@ -47,8 +95,8 @@ struct Corner {
     at: [f64; 2],
     /// Bound on the distance of `at` from the true corner.
     error: f64,
-    /// Distance from the centre, at most.
-    reach: f64,
+    /// Squared distance of the true corner from the centre, at most.
+    reach2: f64,
 }
 
 /// Neighbours of a cell's point in columns, nearest first.
@@ -83,8 +131,10 @@ pub struct Cell {
     count: usize,
     cut: Vec<u64>,
     doubt: Vec<u64>,
-    reach: f64,
-    reach2: u64,
+    /// The largest of the corners'.
+    reach2: f64,
+    /// Four times that, rounded up.
+    secure2: u64,
     hidden: bool,
 }
 
@@ -107,7 +157,7 @@ impl Cell {
             },
             neighbor: Neighbor {
                 difference: [0; 3],
-                id: RIM,
+                id: RIM_ID,
             },
         };
         let mut cell = Self {
@@ -122,8 +172,8 @@ impl Cell {
             count: 0,
             cut: Vec::new(),
             doubt: Vec::new(),
-            reach: 0.0,
-            reach2: 0,
+            reach2: 0.0,
+            secure2: 0,
             hidden: false,
         };
         cell.start(own, normal, radius);
@@ -140,37 +190,26 @@ impl Cell {
         for side in &mut self.sides {
             side.line.offset = radius * RIM_DISTANCE;
         }
-        self.corners.clear();
-        self.free.clear();
-        self.grow(RIM_CORNERS.next_multiple_of(LANES));
-        self.free.truncate(self.free.len() - RIM_CORNERS);
         self.count = RIM_CORNERS;
-        let reach = radius * (1.0 + 4.0 * SLACK);
-        for k in 0..RIM_CORNERS {
-            let next = (k + 1) % RIM_CORNERS;
-            // Halfway between the normals of its sides.
-            let [a, b] = [RIM_SIDES[k], RIM_SIDES[next]];
-            let half = 0.5 / RIM_DISTANCE * radius;
-            let corner = Corner {
-                at: [half * (a[0] + b[0]), half * (a[1] + b[1])],
-                error: 4.0 * SLACK * radius,
-                reach,
-            };
-            self.set_corner(k, corner);
-            self.links[k] = Link {
-                next: next as u32,
-                before: ((k + RIM_CORNERS - 1) % RIM_CORNERS) as u32,
-                side: k as u32,
-            };
-        }
-        self.set_reach(reach);
+        self.corners.clear();
+        self.corners.extend(RIM.corners.iter().map(|unit| CornerGroup {
+            x: unit.x.map(|x| x * radius),
+            y: unit.y.map(|y| y * radius),
+            error: unit.error.map(|e| e * radius),
+            reach2: unit.reach2.map(|r| r * radius * radius),
+        }));
+        self.links.clear();
+        self.links.extend_from_slice(&RIM.links);
+        self.free.clear();
+        self.free.extend((RIM_CORNERS as u32..RIM_PLACES as u32).rev());
+        self.set_reach(farthest_body(&self.corners));
     }
 
     #[inline(always)]
-    fn set_reach(&mut self, reach: f64) {
-        self.reach = reach;
+    fn set_reach(&mut self, reach2: f64) {
+        self.reach2 = reach2;
         // The conversion saturates for disks larger than any cloud.
-        self.reach2 = ((4.0 * reach * reach * (1.0 + 1e-9)) as u64).saturating_add(1);
+        self.secure2 = ((4.0 * reach2 * (1.0 + 1e-9)) as u64).saturating_add(1);
     }
 
     /// Number of places for corners.
@@ -192,7 +231,7 @@ impl Cell {
         Corner {
             at: [group.x[k], group.y[k]],
             error: group.error[k],
-            reach: group.reach[k],
+            reach2: group.reach2[k],
         }
     }
 
@@ -201,7 +240,7 @@ impl Cell {
         let (group, k) = (&mut self.corners[k / LANES], k % LANES);
         [group.x[k], group.y[k]] = corner.at;
         group.error[k] = corner.error;
-        group.reach[k] = corner.reach;
+        group.reach2[k] = corner.reach2;
     }
 
     /// Points at a larger squared distance than this cannot touch the cell: four times the squared
@@ -209,7 +248,7 @@ impl Cell {
     #[must_use]
     #[inline]
     pub fn reach2(&self) -> u64 {
-        self.reach2
+        self.secure2
     }
 
     /// Clips by the bisector of the point `id` at `difference` from this cell's point.
@@ -240,8 +279,7 @@ impl Cell {
             return;
         }
         let [x, y] = line.line;
-        let reach2 = self.reach * self.reach;
-        if line.offset * line.offset > reach2 * (x * x + y * y) * (1.0 + 1e-9) {
+        if line.offset * line.offset > self.reach2 * (x * x + y * y) * (1.0 + 1e-9) {
             return;
         }
         self.cut.clear();
@@ -287,7 +325,7 @@ impl Cell {
         let next = self.links[k].next as usize;
         let b = self.sides[self.links[next].side as usize].neighbor;
         let c = side.neighbor;
-        let exact = match (a.id == RIM, b.id == RIM) {
+        let exact = match (a.id == RIM_ID, b.id == RIM_ID) {
             (false, false) => Some(cuts_corner(self.normal, self.own, a, b, c)),
             (true, true) => None,
             (a_is_rim, _) => {
@@ -416,8 +454,7 @@ impl Cell {
                 let gap = (low[axis] - x).max(x - high[axis]).max(0.0);
                 distance2 += gap * gap;
             }
-            let reach = (corner.reach + corner.error) * (1.0 + 1e-9);
-            distance2 <= reach * reach
+            distance2 <= corner.reach2 * (1.0 + 1e-9)
         })
     }
 
@@ -430,7 +467,7 @@ impl Cell {
         for k in self.ring() {
             let next = self.links[k].next as usize;
             let [a, b] = [k, next].map(|k| self.sides[self.links[k].side as usize].neighbor.id);
-            if a != RIM && b != RIM {
+            if a != RIM_ID && b != RIM_ID {
                 each(a, b);
             }
         }
@@ -450,7 +487,7 @@ fn clip_nearest_body(cell: &mut Cell, near: Nearest<'_>, mut next: usize) -> usi
         let [x, y, z] = [near.x, near.y, near.z].map(|column| &column[group.clone()]);
         let lines = bisectors_body(x, y, z, &cell.frame);
         for (k, number) in group.enumerate() {
-            if near.distances2[number] > cell.reach2 {
+            if near.distances2[number] > cell.secure2 {
                 return number;
             }
             let difference = [x[k], y[k], z[k]].map(i64::from);
@@ -495,13 +532,13 @@ fn meet(a: &Line, b: &Line) -> Corner {
     let inverse = 1.0 / determinant;
     let x = (a.offset * b.line[1] - b.offset * a.line[1]) * inverse;
     let y = (b.offset * a.line[0] - a.offset * b.line[0]) * inverse;
-    let distance = (x * x + y * y).sqrt();
+    let distance = x.abs() + y.abs();
     let lengths = a.length + b.length;
     let error = SLACK * lengths * inverse.abs() * (a.offset + b.offset + lengths * distance);
     Corner {
         at: [x, y],
         error,
-        reach: distance + error,
+        reach2: (x * x + y * y) * (1.0 + SLACK) + error * (2.0 * distance + error),
     }
 }
 

@@ -19,8 +19,8 @@ pub struct CornerGroup {
     pub y: [f64; LANES],
     /// Bound on the distance from the true corner.
     pub error: [f64; LANES],
-    /// Distance from the origin, at most.
-    pub reach: [f64; LANES],
+    /// Squared distance of the true corner from the origin, at most.
+    pub reach2: [f64; LANES],
 }
 
 /// The line `line · q = offset`, `offset > 0`; what is beyond it is cut off.
@@ -30,7 +30,8 @@ pub struct Line {
     pub line: [f64; 2],
     /// Where the line is.
     pub offset: f64,
-    /// Length of the difference in space whose bisector it is; scales the error of `line`.
+    /// At least the length of the difference in space whose bisector it is; scales the error of
+    /// `line`.
     pub length: f64,
 }
 
@@ -45,8 +46,8 @@ impl Line {
     /// A bound on the error of [`Line::depth`].
     #[inline(always)]
     #[must_use]
-    pub fn bound(&self, error: f64, reach: f64) -> f64 {
-        self.length * error + SLACK * (self.length * reach + self.offset)
+    pub fn bound(&self, x: f64, y: f64, error: f64) -> f64 {
+        self.length * (error + SLACK * (x.abs() + y.abs())) + SLACK * self.offset
     }
 }
 
@@ -114,7 +115,8 @@ fn eight_bisectors(
         lines.x[k] = d[0] * u[0] + d[1] * u[1] + d[2] * u[2];
         lines.y[k] = d[0] * v[0] + d[1] * v[1] + d[2] * v[2];
         lines.offset[k] = 0.5 * length2;
-        lines.length[k] = length2.sqrt();
+        // No shorter than the true length, and without a root.
+        lines.length[k] = d[0].abs() + d[1].abs() + d[2].abs();
     }
     lines
 }
@@ -132,7 +134,7 @@ pub(crate) fn cut_body(corners: &[CornerGroup], line: &Line) -> (u64, u64) {
         let (mut sure, mut open) = (0u64, 0u64);
         for k in 0..LANES {
             let depth = line.depth(corners.x[k], corners.y[k]);
-            let bound = line.bound(corners.error[k], corners.reach[k]);
+            let bound = line.bound(corners.x[k], corners.y[k], corners.error[k]);
             sure |= u64::from(depth > bound) << k;
             // Not a number is in doubt, too.
             #[allow(clippy::neg_cmp_op_on_partial_ord, reason = "must be true for NaN")]
@@ -146,7 +148,7 @@ pub(crate) fn cut_body(corners: &[CornerGroup], line: &Line) -> (u64, u64) {
 }
 
 kernel! {
-    /// The largest of the corners' reaches.
+    /// The largest of the corners' squared reaches.
     pub fn farthest(corners: &[CornerGroup]) -> f64 = farthest_body
 }
 
@@ -155,8 +157,8 @@ pub(crate) fn farthest_body(corners: &[CornerGroup]) -> f64 {
     let mut lanes = [0.0f64; LANES];
     for group in corners {
         for k in 0..LANES {
-            lanes[k] = if group.reach[k] > lanes[k] {
-                group.reach[k]
+            lanes[k] = if group.reach2[k] > lanes[k] {
+                group.reach2[k]
             } else {
                 lanes[k]
             };
@@ -194,14 +196,14 @@ mod tests {
                 let group = &mut corners[k / LANES];
                 let k = k % LANES;
                 (group.x[k], group.y[k]) = (row.0, row.1);
-                (group.error[k], group.reach[k]) = (row.2.abs() * 1e-3, row.3.abs());
+                (group.error[k], group.reach2[k]) = (row.2.abs() * 1e-3, row.3.abs());
             }
             let line = Line { line: line.map(f64::from), offset, length: 8.0 };
             let (cut, doubt) = cut_body(&corners, &line);
             for k in 0..corners.len() * LANES {
                 let group = &corners[k / LANES];
                 let depth = line.depth(group.x[k % LANES], group.y[k % LANES]);
-                let bound = line.bound(group.error[k % LANES], group.reach[k % LANES]);
+                let bound = line.bound(group.x[k % LANES], group.y[k % LANES], group.error[k % LANES]);
                 prop_assert_eq!(cut >> k & 1 == 1, depth > bound);
                 let surely = depth.abs() > bound;
                 prop_assert_eq!(doubt >> k & 1 == 0, surely);
