@@ -278,10 +278,6 @@ impl Cell {
             self.hidden |= neighbor.id < self.own;
             return;
         }
-        let [x, y] = line.line;
-        if line.offset * line.offset > self.reach2 * (x * x + y * y) * (1.0 + 1e-9) {
-            return;
-        }
         self.cut.clear();
         let mut doubts = 0;
         let mut all = 0;
