@@ -192,16 +192,18 @@ impl Cell {
         }
         self.count = RIM_CORNERS;
         self.corners.clear();
-        self.corners.extend(RIM.corners.iter().map(|unit| CornerGroup {
-            x: unit.x.map(|x| x * radius),
-            y: unit.y.map(|y| y * radius),
-            error: unit.error.map(|e| e * radius),
-            reach2: unit.reach2.map(|r| r * radius * radius),
-        }));
+        self.corners
+            .extend(RIM.corners.iter().map(|unit| CornerGroup {
+                x: unit.x.map(|x| x * radius),
+                y: unit.y.map(|y| y * radius),
+                error: unit.error.map(|e| e * radius),
+                reach2: unit.reach2.map(|r| r * radius * radius),
+            }));
         self.links.clear();
         self.links.extend_from_slice(&RIM.links);
         self.free.clear();
-        self.free.extend((RIM_CORNERS as u32..RIM_PLACES as u32).rev());
+        self.free
+            .extend((RIM_CORNERS as u32..RIM_PLACES as u32).rev());
         self.set_reach(farthest_body(&self.corners));
     }
 

@@ -1,7 +1,6 @@
 //! Which of many boxes come near another box.
 
-use super::{Level, kernel};
-use crate::geom::aabb::Aabb;
+use super::kernel;
 
 /// Boxes in columns.
 #[derive(Debug, Clone, Default)]
@@ -17,11 +16,11 @@ impl Boxes {
         self.max.iter_mut().for_each(Vec::clear);
     }
 
-    /// Puts in a box, not empty, of coordinates in `0..2^30`.
-    pub fn push(&mut self, b: &Aabb) {
+    /// Puts in the box from `min` to `max`, not empty, of coordinates in `0..2^30`.
+    pub fn push(&mut self, min: [i32; 3], max: [i32; 3]) {
         for axis in 0..3 {
-            self.min[axis].push(b.min[axis]);
-            self.max[axis].push(b.max[axis]);
+            self.min[axis].push(min[axis]);
+            self.max[axis].push(max[axis]);
         }
     }
 
@@ -38,28 +37,20 @@ impl Boxes {
     }
 }
 
-/// Squared distances of `boxes` to the box `around`, to a relative error below 2^-21, in place of
-/// what is in `out`.
-pub fn boxes_near(level: Level, boxes: &Boxes, around: &Aabb, out: &mut Vec<f32>) {
-    out.clear();
-    out.resize(boxes.len(), 0.0);
-    box_distances(level, boxes, around, out);
-}
-
 kernel! {
-    /// See [`boxes_near`].
-    pub fn box_distances(boxes: &Boxes, around: &Aabb, out: &mut [f32]) = box_distances_body
+    /// Squared distances of `boxes` to the box from `min` to `max`, to a relative error below 2^-21.
+    /// `out` is as long as there are boxes.
+    pub fn box_distances(boxes: &Boxes, min: [i32; 3], max: [i32; 3], out: &mut [f32]) = box_distances_body
 }
 
 #[inline(always)]
-fn box_distances_body(boxes: &Boxes, around: &Aabb, out: &mut [f32]) {
+fn box_distances_body(boxes: &Boxes, min: [i32; 3], max: [i32; 3], out: &mut [f32]) {
     let n = out.len();
     let ([x0, y0, z0], [x1, y1, z1]) = (&boxes.min, &boxes.max);
     let (x0, y0, z0) = (&x0[..n], &y0[..n], &z0[..n]);
     let (x1, y1, z1) = (&x1[..n], &y1[..n], &z1[..n]);
-    let gap = |low: i32, high: i32, axis: usize| {
-        (low - around.max[axis]).max(around.min[axis] - high).max(0) as f32
-    };
+    let gap =
+        |low: i32, high: i32, axis: usize| (low - max[axis]).max(min[axis] - high).max(0) as f32;
     for i in 0..n {
         let dx = gap(x0[i], x1[i], 0);
         let dy = gap(y0[i], y1[i], 1);
@@ -70,7 +61,9 @@ fn box_distances_body(boxes: &Boxes, around: &Aabb, out: &mut [f32]) {
 
 #[cfg(test)]
 mod tests {
+    use super::super::Level;
     use super::*;
+    use crate::geom::aabb::Aabb;
     use proptest::prelude::*;
 
     proptest! {
@@ -81,12 +74,13 @@ mod tests {
             let all: Vec<Aabb> = corners.iter()
                 .map(|c| Aabb::of(&[[c[0], c[1], c[2]], [c[3], c[4], c[5]]])).collect();
             let mut boxes = Boxes::default();
-            all.iter().for_each(|b| boxes.push(b));
+            all.iter().for_each(|b| boxes.push(b.min, b.max));
+            let Aabb { min, max } = all[0];
             let mut expected = vec![0.0; all.len()];
-            box_distances_body(&boxes, &all[0], &mut expected);
+            box_distances_body(&boxes, min, max, &mut expected);
             for level in Level::all() {
-                let mut got = Vec::new();
-                boxes_near(level, &boxes, &all[0], &mut got);
+                let mut got = vec![0.0; all.len()];
+                box_distances(level, &boxes, min, max, &mut got);
                 for ((got, expected), b) in got.iter().zip(&expected).zip(&all) {
                     prop_assert_eq!(got.to_bits(), expected.to_bits());
                     let exact = b.distance2_box(&all[0]) as f64;

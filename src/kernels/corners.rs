@@ -156,12 +156,8 @@ kernel! {
 pub(crate) fn farthest_body(corners: &[CornerGroup]) -> f64 {
     let mut lanes = [0.0f64; LANES];
     for group in corners {
-        for k in 0..LANES {
-            lanes[k] = if group.reach2[k] > lanes[k] {
-                group.reach2[k]
-            } else {
-                lanes[k]
-            };
+        for (lane, &reach2) in lanes.iter_mut().zip(&group.reach2) {
+            *lane = if reach2 > *lane { reach2 } else { *lane };
         }
     }
     lanes

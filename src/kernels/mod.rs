@@ -12,7 +12,7 @@ mod distances;
 mod ranks;
 mod sums;
 
-pub use boxes::{Boxes, boxes_near};
+pub use boxes::{Boxes, box_distances};
 pub(crate) use corners::SLACK;
 pub use corners::{CornerGroup, Frame, LANES, Line, LineGroup, bisectors, cut_corners, farthest};
 pub(crate) use corners::{bisectors_body, cut_body, farthest_body};

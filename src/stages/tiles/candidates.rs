@@ -4,7 +4,7 @@ use super::near::above;
 use super::{LEAVES, Near, OwnPage, Tile};
 use crate::geom::aabb::Aabb;
 use crate::geom::{Point, sub};
-use crate::kernels::{Boxes, Level, boxes_near};
+use crate::kernels::{Boxes, Level, box_distances};
 
 /// All points within a squared distance of some box, and others, in order of id.
 #[derive(Debug, Clone, Default)]
@@ -55,7 +55,7 @@ impl PageLeaves {
                 if boxes[leaf].distance2_box(around) > own.reach2 {
                     continue;
                 }
-                self.boxes.push(&boxes[leaf]);
+                self.boxes.push(boxes[leaf].min, boxes[leaf].max);
                 let count = tile.leaf.min(range.end - start);
                 let id = tile.id(local, start - range.start);
                 self.leaves.push((start as u32, count as u32, id as u32));
@@ -78,7 +78,9 @@ impl PageLeaves {
             column.clear();
         }
         out.ids.clear();
-        boxes_near(level, &self.boxes, around, &mut self.distances);
+        self.distances.resize(self.boxes.len(), 0.0);
+        let Aabb { min, max } = *around;
+        box_distances(level, &self.boxes, min, max, &mut self.distances);
         let limit = above(d2);
         for (&(start, count, id), distance2) in self.leaves.iter().zip(&self.distances) {
             if *distance2 > limit {
