@@ -8,6 +8,7 @@
 
 use super::plane::Normal;
 use super::predicate::{Neighbor, cuts_corner, cuts_parallel};
+use crate::kernels::eight::{Base, Eight};
 use crate::kernels::{
     CornerGroup, Frame, LANES, Level, Line, SLACK, bisectors_body, cut_body, farthest_body, kernel,
 };
@@ -204,7 +205,7 @@ impl Cell {
         self.free.clear();
         self.free
             .extend((RIM_CORNERS as u32..RIM_PLACES as u32).rev());
-        self.set_reach(farthest_body(&self.corners));
+        self.set_reach(farthest_body::<Base>(&self.corners));
     }
 
     #[inline(always)]
@@ -274,7 +275,7 @@ impl Cell {
     }
 
     #[inline(always)]
-    fn clip_line(&mut self, line: Line, neighbor: Neighbor) {
+    fn clip_line<E: Eight>(&mut self, line: Line, neighbor: Neighbor) {
         if neighbor.difference == [0; 3] {
             // Of two points in one place the heavier, with the lower id, has the cell.
             self.hidden |= neighbor.id < self.own;
@@ -285,7 +286,7 @@ impl Cell {
         let mut all = 0;
         self.doubt.clear();
         for corners in self.corners.chunks(64 / LANES) {
-            let (cut, doubt) = cut_body(corners, &line);
+            let (cut, doubt) = cut_body::<E>(corners, &line);
             self.cut.push(cut);
             self.doubt.push(doubt);
             doubts |= doubt;
@@ -299,7 +300,7 @@ impl Cell {
             self.settle_doubts(&side);
         }
         if let Some((first, last)) = self.arc(&side) {
-            self.replace(first, last, side);
+            self.replace::<E>(first, last, side);
         }
     }
 
@@ -392,7 +393,7 @@ impl Cell {
 
     /// Puts `side` in place of the corners from `first` to `last`, and the sides between them.
     #[inline(always)]
-    fn replace(&mut self, first: u32, last: u32, side: Side) {
+    fn replace<E: Eight>(&mut self, first: u32, last: u32, side: Side) {
         let start = self.links[first as usize];
         let end = self.links[last as usize];
         let mut gone = first;
@@ -418,7 +419,7 @@ impl Cell {
         self.links[first as usize].next = second;
         self.count += 1;
         self.sides.push(side);
-        self.set_reach(farthest_body(&self.corners));
+        self.set_reach(farthest_body::<E>(&self.corners));
     }
 
     fn free_place(&mut self) -> u32 {
@@ -474,23 +475,23 @@ impl Cell {
 
 kernel! {
     /// See [`Cell::clip_nearest`].
-    fn clip_nearest(cell: &mut Cell, near: Nearest<'_>, next: usize) -> usize = clip_nearest_body
+    fn clip_nearest(cell: &mut Cell, near: Nearest<'_>, next: usize) -> usize = clip_nearest_body<Eight>
 }
 
 #[inline(always)]
-fn clip_nearest_body(cell: &mut Cell, near: Nearest<'_>, mut next: usize) -> usize {
+fn clip_nearest_body<E: Eight>(cell: &mut Cell, near: Nearest<'_>, mut next: usize) -> usize {
     let count = near.distances2.len();
     while next < count {
         let group = next..(next + LANES).min(count);
         let [x, y, z] = [near.x, near.y, near.z].map(|column| &column[group.clone()]);
-        let lines = bisectors_body(x, y, z, &cell.frame);
+        let lines = bisectors_body::<E>(x, y, z, &cell.frame);
         for (k, number) in group.enumerate() {
             if near.distances2[number] > cell.secure2 {
                 return number;
             }
             let difference = [x[k], y[k], z[k]].map(i64::from);
             let id = near.ids[number];
-            cell.clip_line(lines.get(k), Neighbor { difference, id });
+            cell.clip_line::<E>(lines.get(k), Neighbor { difference, id });
             next += 1;
         }
     }

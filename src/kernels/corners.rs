@@ -1,5 +1,6 @@
 //! Bisectors as lines in a plane, and which corners of a polygon lie beyond one.
 
+use super::eight::Eight;
 use super::kernel;
 
 /// Corners are looked at in groups of this size, and lines made.
@@ -79,18 +80,23 @@ pub type Frame = [[f64; 3]; 2];
 kernel! {
     /// The bisectors between the origin and up to [`LANES`] differences, in a plane through the
     /// origin. The line of a difference of zero means nothing.
-    pub fn bisectors(x: &[i32], y: &[i32], z: &[i32], frame: &Frame) -> LineGroup = bisectors_body
+    pub fn bisectors(x: &[i32], y: &[i32], z: &[i32], frame: &Frame) -> LineGroup = bisectors_body<Eight>
 }
 
 #[inline(always)]
-pub(crate) fn bisectors_body(x: &[i32], y: &[i32], z: &[i32], frame: &Frame) -> LineGroup {
+pub(crate) fn bisectors_body<E: Eight>(
+    x: &[i32],
+    y: &[i32],
+    z: &[i32],
+    frame: &Frame,
+) -> LineGroup {
     let columns = (
-        <[i32; LANES]>::try_from(x),
-        <[i32; LANES]>::try_from(y),
-        <[i32; LANES]>::try_from(z),
+        <&[i32; LANES]>::try_from(x),
+        <&[i32; LANES]>::try_from(y),
+        <&[i32; LANES]>::try_from(z),
     );
     if let (Ok(x), Ok(y), Ok(z)) = columns {
-        return eight_bisectors(&x, &y, &z, frame);
+        return eight_bisectors::<E>(x, y, z, frame);
     }
     let mut padded = [[1; LANES]; 3];
     for (column, padded) in [x, y, z].into_iter().zip(&mut padded) {
@@ -98,68 +104,74 @@ pub(crate) fn bisectors_body(x: &[i32], y: &[i32], z: &[i32], frame: &Frame) -> 
             *padded = *value;
         }
     }
-    eight_bisectors(&padded[0], &padded[1], &padded[2], frame)
+    eight_bisectors::<E>(&padded[0], &padded[1], &padded[2], frame)
 }
 
 #[inline(always)]
-fn eight_bisectors(
+fn eight_bisectors<E: Eight>(
     x: &[i32; LANES],
     y: &[i32; LANES],
     z: &[i32; LANES],
     [u, v]: &Frame,
 ) -> LineGroup {
+    let (x, y, z) = (E::convert(x), E::convert(y), E::convert(z));
+    let dot = |w: &[f64; 3]| {
+        let along = [
+            x.mul(E::splat(w[0])),
+            y.mul(E::splat(w[1])),
+            z.mul(E::splat(w[2])),
+        ];
+        along[0].add(along[1]).add(along[2])
+    };
+    let length2 = x.mul(x).add(y.mul(y)).add(z.mul(z));
     let mut lines = LineGroup::default();
-    for k in 0..LANES {
-        let d = [f64::from(x[k]), f64::from(y[k]), f64::from(z[k])];
-        let length2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-        lines.x[k] = d[0] * u[0] + d[1] * u[1] + d[2] * u[2];
-        lines.y[k] = d[0] * v[0] + d[1] * v[1] + d[2] * v[2];
-        lines.offset[k] = 0.5 * length2;
-        // No shorter than the true length, and without a root.
-        lines.length[k] = d[0].abs() + d[1].abs() + d[2].abs();
-    }
+    dot(u).store(&mut lines.x);
+    dot(v).store(&mut lines.y);
+    E::splat(0.5).mul(length2).store(&mut lines.offset);
+    // No shorter than the true length, and without a root.
+    x.abs().add(y.abs()).add(z.abs()).store(&mut lines.length);
     lines
 }
 
 kernel! {
     /// Two words for up to 64 corners: in the first, bit `k` is set if corner `k` is surely cut off
     /// by the line; in the second, if the error bound does not allow to say.
-    pub fn cut_corners(corners: &[CornerGroup], line: &Line) -> (u64, u64) = cut_body
+    pub fn cut_corners(corners: &[CornerGroup], line: &Line) -> (u64, u64) = cut_body<Eight>
 }
 
 #[inline(always)]
-pub(crate) fn cut_body(corners: &[CornerGroup], line: &Line) -> (u64, u64) {
+pub(crate) fn cut_body<E: Eight>(corners: &[CornerGroup], line: &Line) -> (u64, u64) {
+    let [u, v] = line.line.map(E::splat);
+    let (offset, length) = (E::splat(line.offset), E::splat(line.length));
+    let slack = E::splat(SLACK);
     let (mut cut, mut doubt) = (0, 0);
     for (group, corners) in corners.iter().enumerate() {
-        let (mut sure, mut open) = (0u64, 0u64);
-        for k in 0..LANES {
-            let depth = line.depth(corners.x[k], corners.y[k]);
-            let bound = line.bound(corners.x[k], corners.y[k], corners.error[k]);
-            sure |= u64::from(depth > bound) << k;
-            // Not a number is in doubt, too.
-            #[allow(clippy::neg_cmp_op_on_partial_ord, reason = "must be true for NaN")]
-            let doubtful = !(depth.abs() > bound);
-            open |= u64::from(doubtful) << k;
-        }
-        cut |= sure << (group * LANES);
-        doubt |= open << (group * LANES);
+        let (x, y) = (E::load(&corners.x), E::load(&corners.y));
+        // As `Line::depth` and `Line::bound`.
+        let depth = u.mul(x).add(v.mul(y)).sub(offset);
+        let around = slack.mul(x.abs().add(y.abs()));
+        let error = E::load(&corners.error).add(around);
+        let bound = length.mul(error).add(slack.mul(offset));
+        cut |= depth.greater(bound) << (group * LANES);
+        // Not a number is in doubt, too.
+        doubt |= (!depth.abs().greater(bound) & 0xff) << (group * LANES);
     }
     (cut, doubt)
 }
 
 kernel! {
     /// The largest of the corners' squared reaches.
-    pub fn farthest(corners: &[CornerGroup]) -> f64 = farthest_body
+    pub fn farthest(corners: &[CornerGroup]) -> f64 = farthest_body<Eight>
 }
 
 #[inline(always)]
-pub(crate) fn farthest_body(corners: &[CornerGroup]) -> f64 {
-    let mut lanes = [0.0f64; LANES];
+pub(crate) fn farthest_body<E: Eight>(corners: &[CornerGroup]) -> f64 {
+    let mut most = E::splat(0.0);
     for group in corners {
-        for (lane, &reach2) in lanes.iter_mut().zip(&group.reach2) {
-            *lane = if reach2 > *lane { reach2 } else { *lane };
-        }
+        most = E::load(&group.reach2).larger(most);
     }
+    let mut lanes = [0.0; LANES];
+    most.store(&mut lanes);
     lanes
         .into_iter()
         .fold(0.0, |a, b| if b > a { b } else { a })
@@ -168,6 +180,7 @@ pub(crate) fn farthest_body(corners: &[CornerGroup]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::super::Level;
+    use super::super::eight::Base;
     use super::*;
     use proptest::prelude::*;
 
@@ -195,7 +208,7 @@ mod tests {
                 (group.error[k], group.reach2[k]) = (row.2.abs() * 1e-3, row.3.abs());
             }
             let line = Line { line: line.map(f64::from), offset, length: 8.0 };
-            let (cut, doubt) = cut_body(&corners, &line);
+            let (cut, doubt) = cut_body::<Base>(&corners, &line);
             for k in 0..corners.len() * LANES {
                 let group = &corners[k / LANES];
                 let depth = line.depth(group.x[k % LANES], group.y[k % LANES]);
@@ -206,7 +219,7 @@ mod tests {
             }
             for level in Level::all() {
                 prop_assert_eq!(cut_corners(level, &corners, &line), (cut, doubt));
-                prop_assert_eq!(farthest(level, &corners).to_bits(), farthest_body(&corners).to_bits());
+                prop_assert_eq!(farthest(level, &corners).to_bits(), farthest_body::<Base>(&corners).to_bits());
             }
         }
 
@@ -217,7 +230,7 @@ mod tests {
         ) {
             let column = |axis: usize| d.iter().map(|d| d[axis]).collect::<Vec<_>>();
             let (x, y, z) = (column(0), column(1), column(2));
-            let expected = bisectors_body(&x, &y, &z, &frame);
+            let expected = bisectors_body::<Base>(&x, &y, &z, &frame);
             for level in Level::all() {
                 let got = bisectors(level, &x, &y, &z, &frame);
                 for k in 0..d.len() {

@@ -9,6 +9,7 @@
 mod boxes;
 mod corners;
 mod distances;
+pub(crate) mod eight;
 mod ranks;
 mod sums;
 
@@ -102,9 +103,24 @@ fn avx512() -> bool {
 }
 
 /// Makes `name(level, …)` out of the scalar definition `body(…)`, which must be `inline(always)`, as
-/// must be what it calls and should be widened with it.
+/// must be what it calls and should be widened with it. With `<Eight>` behind its name the body takes
+/// the type of eight numbers for the level.
 macro_rules! kernel {
+    ($(#[$doc:meta])* $vis:vis fn $name:ident($($arg:ident: $type:ty),* $(,)?) $(-> $out:ty)? = $body:ident<Eight>) => {
+        $crate::kernels::kernel! {
+            @made $(#[$doc])* $vis fn $name($($arg: $type),*) $(-> $out)?
+                = $body::<$crate::kernels::eight::Base>,
+                $body::<$crate::kernels::eight::Avx2>,
+                $body::<$crate::kernels::eight::Avx512>
+        }
+    };
     ($(#[$doc:meta])* $vis:vis fn $name:ident($($arg:ident: $type:ty),* $(,)?) $(-> $out:ty)? = $body:path) => {
+        $crate::kernels::kernel! {
+            @made $(#[$doc])* $vis fn $name($($arg: $type),*) $(-> $out)? = $body, $body, $body
+        }
+    };
+    (@made $(#[$doc:meta])* $vis:vis fn $name:ident($($arg:ident: $type:ty),*) $(-> $out:ty)?
+        = $base:expr, $avx2:expr, $avx512:expr) => {
         $(#[$doc])*
         #[allow(unsafe_code, reason = "the wide versions need instructions that were looked for")]
         $vis fn $name(level: $crate::kernels::Level, $($arg: $type),*) $(-> $out)? {
@@ -112,11 +128,11 @@ macro_rules! kernel {
             {
                 #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
                 fn avx2($($arg: $type),*) $(-> $out)? {
-                    $body($($arg),*)
+                    $avx2($($arg),*)
                 }
                 #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx2,bmi1,bmi2,lzcnt,popcnt")]
                 fn avx512($($arg: $type),*) $(-> $out)? {
-                    $body($($arg),*)
+                    $avx512($($arg),*)
                 }
                 match level.width() {
                     $crate::kernels::Width::Base => {}
@@ -128,7 +144,7 @@ macro_rules! kernel {
                 }
             }
             let _ = level;
-            $body($($arg),*)
+            $base($($arg),*)
         }
     };
 }
