@@ -72,7 +72,7 @@ impl Moments {
             s[0] * s[2],
             s[1] * s[2],
         ];
-        std::array::from_fn(|i| (m * self.products[i] - crossed[i]) as f64)
+        std::array::from_fn(|i| rounded(m * self.products[i] - crossed[i]))
     }
 
     /// The best-fitting plane of the point and its neighbours.
@@ -138,6 +138,11 @@ impl Moments {
             (c[0] * n[0] + c[1] * n[1] + c[2] * n[2]) / (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
         n.map(|x| x * along)
     }
+}
+
+/// The nearest `f64`; most sums fit a machine word, whose conversion is one instruction.
+fn rounded(sum: i128) -> f64 {
+    i64::try_from(sum).map_or(sum as f64, |small| small as f64)
 }
 
 fn minors(m: &[f64; 6]) -> f64 {

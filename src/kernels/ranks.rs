@@ -28,10 +28,7 @@ pub(crate) fn ranks_body(keys: &[i64], out: &mut [u32]) {
         }
     }
     for (key, out) in blocks.remainder().iter().zip(outs.into_remainder()) {
-        *out = keys
-            .iter()
-            .map(|other| u32::from(other < key))
-            .sum();
+        *out = keys.iter().map(|other| u32::from(other < key)).sum();
     }
 }
 

@@ -6,82 +6,18 @@
 //! all corners at once ([`crate::kernels::cut_corners`]), and else decided exactly
 //! ([`super::predicate`]).
 
+mod rim;
+
 use super::plane::Normal;
 use super::predicate::{Neighbor, cuts_corner, cuts_parallel};
 use crate::kernels::eight::{Base, Eight};
 use crate::kernels::{
     CornerGroup, Frame, LANES, Level, Line, SLACK, bisectors_body, cut_body, farthest_body, kernel,
 };
-
-/// Number of corners of the disk.
-const RIM_CORNERS: usize = 10;
+use rim::{RIM, RIM_CORNERS, RIM_DISTANCE, RIM_PLACES, RIM_SIDES};
 
 /// Id of a line that is part of the disk's rim and not a bisector.
 const RIM_ID: u32 = u32::MAX;
-
-/// Unit normals of the disk's sides, at odd multiples of 18 degrees, and their distance from the
-/// centre, cos 18°, for a disk of radius 1. Written out so that no library function decides bits.
-const RIM_SIDES: [[f64; 2]; RIM_CORNERS] = [
-    [0.951_056_516_295_153_5, 0.309_016_994_374_947_45],
-    [0.587_785_252_292_473_1, 0.809_016_994_374_947_5],
-    [0.0, 1.0],
-    [-0.587_785_252_292_473_1, 0.809_016_994_374_947_5],
-    [-0.951_056_516_295_153_5, 0.309_016_994_374_947_45],
-    [-0.951_056_516_295_153_5, -0.309_016_994_374_947_45],
-    [-0.587_785_252_292_473_1, -0.809_016_994_374_947_5],
-    [0.0, -1.0],
-    [0.587_785_252_292_473_1, -0.809_016_994_374_947_5],
-    [0.951_056_516_295_153_5, -0.309_016_994_374_947_45],
-];
-const RIM_DISTANCE: f64 = 0.951_056_516_295_153_5;
-
-/// Places for corners in the beginning.
-const RIM_PLACES: usize = RIM_CORNERS.next_multiple_of(LANES);
-
-/// The disk of radius 1.
-struct Rim {
-    corners: [CornerGroup; RIM_PLACES / LANES],
-    links: [Link; RIM_PLACES],
-}
-
-static RIM: Rim = rim();
-
-/// Corner `k` is between sides `k` and `k + 1`, halfway between their normals.
-const fn rim() -> Rim {
-    const NONE: [f64; LANES] = [0.0; LANES];
-    let group = CornerGroup {
-        x: NONE,
-        y: NONE,
-        error: NONE,
-        reach2: NONE,
-    };
-    let link = Link {
-        next: 0,
-        before: 0,
-        side: 0,
-    };
-    let mut rim = Rim {
-        corners: [group; RIM_PLACES / LANES],
-        links: [link; RIM_PLACES],
-    };
-    let half = 0.5 / RIM_DISTANCE;
-    let mut k = 0;
-    while k < RIM_CORNERS {
-        let next = (k + 1) % RIM_CORNERS;
-        let group = &mut rim.corners[k / LANES];
-        group.x[k % LANES] = half * (RIM_SIDES[k][0] + RIM_SIDES[next][0]);
-        group.y[k % LANES] = half * (RIM_SIDES[k][1] + RIM_SIDES[next][1]);
-        group.error[k % LANES] = 4.0 * SLACK;
-        group.reach2[k % LANES] = 1.0 + 16.0 * SLACK;
-        rim.links[k] = Link {
-            next: next as u32,
-            before: ((k + RIM_CORNERS - 1) % RIM_CORNERS) as u32,
-            side: k as u32,
-        };
-        k += 1;
-    }
-    rim
-}
 
 /// A side of the polygon.
 #[derive(Debug, Clone, Copy)]
@@ -130,6 +66,8 @@ pub struct Cell {
     /// Places in the columns without a corner.
     free: Vec<u32>,
     count: usize,
+    /// Some corner.
+    head: u32,
     cut: Vec<u64>,
     doubt: Vec<u64>,
     /// The largest of the corners'.
@@ -171,6 +109,7 @@ impl Cell {
             links: Vec::new(),
             free: Vec::new(),
             count: 0,
+            head: 0,
             cut: Vec::new(),
             doubt: Vec::new(),
             reach2: 0.0,
@@ -192,6 +131,7 @@ impl Cell {
             side.line.offset = radius * RIM_DISTANCE;
         }
         self.count = RIM_CORNERS;
+        self.head = 0;
         self.corners.clear();
         self.corners
             .extend(RIM.corners.iter().map(|unit| CornerGroup {
@@ -418,6 +358,7 @@ impl Cell {
         self.links[end.next as usize].before = second;
         self.links[first as usize].next = second;
         self.count += 1;
+        self.head = first;
         self.sides.push(side);
         self.set_reach(farthest_body::<E>(&self.corners));
     }
@@ -431,8 +372,7 @@ impl Cell {
 
     /// The places of the corners, in turn around the cell.
     fn ring(&self) -> impl Iterator<Item = usize> + '_ {
-        let free = |k: &u32| !self.free.contains(k);
-        let first = (0..self.places() as u32).find(free).unwrap_or(0);
+        let first = self.head;
         std::iter::successors(Some(first), move |k| {
             let next = self.links[*k as usize].next;
             (next != first).then_some(next)
@@ -542,80 +482,4 @@ fn meet(a: &Line, b: &Line) -> Corner {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    const UP: Normal = [0, 0, 1 << 24];
-
-    fn seen(cell: &Cell) -> Vec<(u32, u32)> {
-        let mut all = Vec::new();
-        cell.triples(|a, b| all.push((a.min(b), a.max(b))));
-        all.sort_unstable();
-        all
-    }
-
-    #[test]
-    fn a_square_grid_gives_one_cell_of_four_sides() {
-        let mut cell = Cell::new(0, UP, 50.0);
-        for (id, d) in [
-            (1, [10, 0, 0]),
-            (2, [0, 10, 0]),
-            (3, [-10, 0, 0]),
-            (4, [0, -10, 0]),
-        ] {
-            cell.clip(d, id);
-        }
-        assert_eq!(seen(&cell), [(1, 2), (1, 4), (2, 3), (3, 4)]);
-        assert!((200..=202).contains(&cell.reach2()), "{}", cell.reach2());
-    }
-
-    #[test]
-    fn a_point_straight_above_changes_nothing() {
-        let mut cell = Cell::new(0, UP, 50.0);
-        let before = cell.reach2();
-        cell.clip([0, 0, 3], 1);
-        assert_eq!(cell.reach2(), before);
-    }
-
-    #[test]
-    fn of_two_points_in_one_place_the_lower_id_has_the_cell() {
-        let mut cell = Cell::new(5, UP, 50.0);
-        cell.clip([0, 0, 0], 7);
-        assert!(!cell.hidden);
-        cell.clip([0, 0, 0], 2);
-        assert!(cell.hidden);
-    }
-
-    proptest! {
-        /// Corners found by clipping are those that no other bisector cuts off, decided exactly.
-        #[test]
-        fn corners_are_those_nobody_cuts_off(
-            points in prop::collection::hash_set(prop::array::uniform3(-6i64..=6), 3..14),
-            n in prop::array::uniform3(-3i32..=3),
-        ) {
-            prop_assume!(n != [0; 3]);
-            let normal = n.map(|x| x << 20);
-            let mut points: Vec<_> = points.into_iter().filter(|p| *p != [0; 3]).collect();
-            points.sort_by_key(|p| (p.iter().map(|x| x * x).sum::<i64>(), *p));
-            let all: Vec<_> = points.iter().enumerate()
-                .map(|(i, &difference)| Neighbor { difference, id: i as u32 + 1 }).collect();
-            // A disk so large that every bounded corner is inside.
-            let mut cell = Cell::new(0, normal, 1e7);
-            for p in &all { cell.clip(p.difference, p.id); }
-            let mut expected = Vec::new();
-            for (x, &a) in all.iter().enumerate() {
-                for &b in &all[x + 1..] {
-                    if super::super::predicate::turn(normal, a.difference, b.difference) == 0 {
-                        continue;
-                    }
-                    let kept = all.iter().filter(|c| c.id != a.id && c.id != b.id)
-                        .all(|&c| !cuts_corner(normal, 0, a, b, c));
-                    if kept { expected.push((a.id, b.id)); }
-                }
-            }
-            expected.sort_unstable();
-            prop_assert_eq!(seen(&cell), expected);
-        }
-    }
-}
+mod tests;
