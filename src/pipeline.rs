@@ -287,8 +287,7 @@ impl Reconstruction {
             min_component: params.min_component,
             max_hole_edges: params.max_hole_edges,
         };
-        let passes = if params.repair { 3 } else { 2 };
-        let (repaired, repair) = clock.stage("repair", "blocks", passes * count, || {
+        let (repaired, repair) = clock.stage("repair", "blocks", 2 * count, || {
             repair(&store, stitched, blocks, options, workspace)
         })?;
         let mesh = clock.stage("export", "blocks", 2 * count, || {
