@@ -7,7 +7,7 @@ use crate::report::{LatticeReport, Report, StageReport};
 use crate::stages::blocks::Blocks;
 use crate::stages::cells::{CellStats, DiskRadius, TileRanges, cells};
 use crate::stages::export::{CoordinateType, export};
-use crate::stages::ingest::{self, Spool, ingest};
+use crate::stages::ingest::{self, READ_BUFFERS, Spool, ingest};
 use crate::stages::order::{Orderer, PAGE, PointStore};
 use crate::stages::repair::{RepairOptions, repair};
 use crate::stages::smooth::smooth;
@@ -343,8 +343,13 @@ pub(crate) fn order(
     page: usize,
     workspace: &Workspace,
 ) -> Result<(PointStore, u64)> {
-    let mut orderer = Orderer::new(workspace)?;
-    spool.for_each(lattice, |points| orderer.push(workspace, points))?;
+    // Their buffers must not take much of what is there to sort in.
+    let most = workspace.memory.available() / (8 * READ_BUFFERS);
+    let threads = workspace.threads.min(most as usize).max(1);
+    let held = workspace.reserve("order: frames", threads as u64 * READ_BUFFERS)?;
+    let orderer = Orderer::new(workspace)?;
+    spool.par_for_each(threads, lattice, |points| orderer.push(workspace, points))?;
+    drop(held);
     drop(spool);
     orderer.finish(workspace, page)
 }

@@ -6,6 +6,7 @@
 
 mod exchange;
 mod sections;
+mod sort;
 mod sorter;
 
 pub use exchange::Exchange;

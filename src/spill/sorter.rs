@@ -1,9 +1,8 @@
 //! The external sorter: sorted runs on disk, merged with a bounded fan-in.
 
-use super::Record;
+use super::{Record, sort};
 use crate::error::{Error, Result};
 use crate::workspace::{IoCounters, Workspace};
-use rayon::slice::ParallelSliceMut;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::fs::File;
@@ -94,7 +93,7 @@ impl<const N: usize> Sorter<N> {
     }
 
     fn spill(&self, state: &mut State<N>) -> Result<()> {
-        self.pool.install(|| state.buffer.par_sort_unstable());
+        self.pool.install(|| sort::sort(&mut state.buffer));
         let mut writer = self.run_writer(&mut state.made)?;
         for frame in state.buffer.chunks(FRAME) {
             writer.frame(frame)?;
@@ -131,7 +130,7 @@ impl<const N: usize> Sorter<N> {
             )
         };
         if state.runs.is_empty() {
-            self.pool.install(|| state.buffer.par_sort_unstable());
+            self.pool.install(|| sort::sort(&mut state.buffer));
             return Ok(Sorted {
                 buffer: state.buffer,
                 runs: Vec::new(),
@@ -175,6 +174,18 @@ pub struct Sorted<const N: usize> {
 }
 
 impl<const N: usize> Sorted<N> {
+    /// All records in ascending order if they are in memory.
+    ///
+    /// # Errors
+    /// The records as they were, on disk.
+    pub fn in_memory(self) -> std::result::Result<Vec<Record<N>>, Self> {
+        if self.runs.is_empty() {
+            Ok(self.buffer)
+        } else {
+            Err(self)
+        }
+    }
+
     /// Calls `each` with every record in ascending order.
     ///
     /// # Errors

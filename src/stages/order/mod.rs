@@ -9,17 +9,19 @@ use crate::error::{Error, Result};
 use crate::geom::{Point, hilbert};
 use crate::spill::Sorter;
 use crate::workspace::Workspace;
-use rayon::prelude::*;
+use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Keys decoded and written at a time.
-const BATCH: usize = 1 << 16;
+/// Keys encoded at a time.
+const CHUNK: usize = 1 << 12;
+
+/// Keys of a merge that are decoded and written at a time.
+const BATCH: usize = 1 << 18;
 
 /// Takes in positions in any order and gives back the ordered store.
 #[derive(Debug)]
 pub struct Orderer {
     sorter: Sorter<3>,
-    keys: Vec<hilbert::Key>,
-    taken: u64,
+    taken: AtomicU64,
     held: crate::workspace::memory::Reservation,
 }
 
@@ -34,27 +36,25 @@ impl Orderer {
         let held = workspace.reserve("order: sort buffer", buffer + buffer / 2)?;
         Ok(Self {
             sorter: Sorter::new(workspace, "order", buffer),
-            keys: Vec::new(),
-            taken: 0,
+            taken: AtomicU64::new(0),
             held,
         })
     }
 
-    /// Takes in positions, each coordinate in `0..2^30`.
+    /// Takes in positions, each coordinate in `0..2^30`; safe to call from several threads.
     ///
     /// # Errors
     /// [`Error::Io`], [`Error::Cancelled`].
-    pub fn push(&mut self, workspace: &Workspace, points: &[Point]) -> Result<()> {
+    pub fn push(&self, workspace: &Workspace, points: &[Point]) -> Result<()> {
         workspace.check_cancel()?;
-        workspace.install(|| {
-            points
-                .par_iter()
-                .with_min_len(1024)
-                .map(|&p| hilbert::encode(p))
-                .collect_into_vec(&mut self.keys);
-        });
-        self.taken += points.len() as u64;
-        self.sorter.push(&self.keys)
+        let mut keys = Vec::with_capacity(CHUNK.min(points.len()));
+        for part in points.chunks(CHUNK) {
+            keys.clear();
+            keys.extend(part.iter().map(|&p| hilbert::encode(p)));
+            self.sorter.push(&keys)?;
+        }
+        self.taken.fetch_add(points.len() as u64, Ordering::Relaxed);
+        Ok(())
     }
 
     /// The store of all distinct points in curve order, in pages of `page` points, and the number
@@ -67,36 +67,32 @@ impl Orderer {
             sorter,
             taken,
             held,
-            ..
         } = self;
         let mut writer = StoreWriter::create(workspace, "points", page)?;
-        let mut batch: Vec<hilbert::Key> = Vec::with_capacity(BATCH);
-        let mut points: Vec<Point> = Vec::new();
-        let mut last = None;
-        let mut flush = |batch: &mut Vec<hilbert::Key>| -> Result<()> {
-            workspace.check_cancel()?;
-            workspace.install(|| {
-                batch
-                    .par_iter()
-                    .with_min_len(1024)
-                    .map(|&k| hilbert::decode(k))
-                    .collect_into_vec(&mut points);
-            });
-            workspace.observer.advance(batch.len() as u64);
-            batch.clear();
-            writer.push(&points)
-        };
-        sorter.finish(workspace)?.for_each(|key| {
-            if last != Some(key) {
-                last = Some(key);
-                batch.push(key);
-                if batch.len() == BATCH {
-                    flush(&mut batch)?;
-                }
+        let mut write =
+            |keys: &[hilbert::Key]| writer.append(workspace, keys, |key| hilbert::decode(*key));
+        match sorter.finish(workspace)?.in_memory() {
+            Ok(mut keys) => {
+                keys.dedup();
+                write(&keys)?;
             }
-            Ok(())
-        })?;
-        flush(&mut batch)?;
+            Err(sorted) => {
+                let mut batch: Vec<hilbert::Key> = Vec::with_capacity(BATCH);
+                let mut last = None;
+                sorted.for_each(|key| {
+                    if last != Some(key) {
+                        last = Some(key);
+                        batch.push(key);
+                        if batch.len() == BATCH {
+                            write(&batch)?;
+                            batch.clear();
+                        }
+                    }
+                    Ok(())
+                })?;
+                write(&batch)?;
+            }
+        }
         drop(held);
         let store = writer.finish(workspace)?;
         let limit = u64::from(u32::MAX) - 1;
@@ -106,7 +102,7 @@ impl Orderer {
                 limit,
             });
         }
-        let folded = taken - store.len() as u64;
+        let folded = taken.into_inner() - store.len() as u64;
         Ok((store, folded))
     }
 }

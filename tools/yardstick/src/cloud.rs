@@ -63,7 +63,7 @@ pub fn sorted_points(cloud: &Path, workspace: &Workspace) -> Result<Vec<[f32; 3]
     use outcrop::stages::{ingest, order};
     let spool = ingest::ingest(&[cloud.to_owned()], workspace)?;
     let lattice = spool.choose_lattice(0)?;
-    let mut orderer = order::Orderer::new(workspace)?;
+    let orderer = order::Orderer::new(workspace)?;
     spool.for_each(&lattice, |points| orderer.push(workspace, points))?;
     let (store, _) = orderer.finish(workspace, order::PAGE)?;
     let scaled = |p: [i32; 3]| p.map(|c| (f64::from(c) * lattice.step) as f32);
