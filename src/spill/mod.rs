@@ -5,10 +5,12 @@
 //! checked when it is read.
 
 mod exchange;
+mod pack;
 mod sections;
 mod sorter;
 
 pub use exchange::Exchange;
+pub use pack::{Layout, Word, layouts};
 pub use sections::Sections;
 pub use sorter::{Sorted, Sorter};
 

@@ -6,6 +6,7 @@ use super::RepairStats;
 use crate::error::Result;
 use crate::geom::Point;
 use crate::spill::Sections;
+use crate::spill::layouts::ORIENTED;
 use crate::stages::blocks::Blocks;
 use crate::stages::order::PointStore;
 use crate::stages::surface::orient::Oriented;
@@ -202,7 +203,7 @@ pub fn face(
     stats.components_found = tally.found;
     stats.components_removed = tally.removed;
     stats.component_triangles_removed = tally.removed_triangles;
-    let around = Sections::create(workspace, "repair.faced", blocks.count())?;
+    let around = Sections::with_layout(workspace, "repair.faced", blocks.count(), ORIENTED)?;
     workspace.for_each_unit("repair: block", blocks.count(), bytes, |block| {
         let local = fates.get(block)?;
         around.put(block, &apply(surface, block, &local, &global)?)

@@ -10,6 +10,7 @@ mod holes;
 mod loops;
 
 use crate::error::Result;
+use crate::spill::layouts::TRIANGLE;
 use crate::spill::{Exchange, Sections};
 use crate::stages::blocks::Blocks;
 use crate::stages::order::PointStore;
@@ -83,7 +84,7 @@ pub struct RepairStats {
 
 /// All triangles that touch each block, by ascending ids, after stitching.
 fn gather(stitched: &Stitched, blocks: Blocks, workspace: &Workspace) -> Result<Sections<3>> {
-    let around = Sections::create(workspace, "repair.around", blocks.count())?;
+    let around = Sections::with_layout(workspace, "repair.around", blocks.count(), TRIANGLE)?;
     let bytes =
         |b| 60 * (stitched.interior.records(b) + stitched.added.records(b)) as u64 + (1 << 20);
     workspace.for_each_unit("repair: block", blocks.count(), bytes, |block| {
