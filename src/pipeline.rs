@@ -386,7 +386,7 @@ fn writable(output: &Path) -> Result<()> {
 }
 
 /// Scratch bytes a point at the peak, about, after the points were read; measured on real scans.
-pub(crate) const SCRATCH_PER_POINT: u64 = 110;
+pub(crate) const SCRATCH_PER_POINT: u64 = 50;
 
 /// Refuses before the long stages what the scratch folder has no room for.
 fn room(scratch: &Path, points: u64) -> Result<()> {

@@ -9,7 +9,8 @@ use super::patch::Patch;
 use super::{EXCHANGE_BUFFER, OrientedTriangle, RepairOptions, RepairStats, around, bridges};
 use crate::error::Result;
 use crate::geom::Point;
-use crate::spill::{Exchange, Sections};
+use crate::spill::layouts::SENT;
+use crate::spill::{Exchange, Layout, Sections, Word};
 use crate::stages::blocks::Blocks;
 use crate::stages::order::PointStore;
 use crate::stages::stitch::Stitched;
@@ -19,6 +20,19 @@ use crate::workspace::Workspace;
 use crate::workspace::memory::Reservation;
 use rustc_hash::FxHashMap;
 use std::sync::{Mutex, PoisonError};
+
+/// `[i, a, b]` with `i` smaller than `a` and `b`, ascending by `i`.
+const ORIENTED: Layout<3> = [Word::Above, Word::Rising, Word::Left];
+
+/// `[owner, i, j, k, block, label << 1 | flip]`, ascending.
+const SEEN: Layout<6> = [
+    Word::Above,
+    Word::Above,
+    Word::Rising,
+    Word::Rising,
+    Word::Above,
+    Word::Above,
+];
 
 /// The oriented surface, small components and bridges left out.
 #[derive(Debug)]
@@ -158,12 +172,12 @@ pub fn build(
         stitched: &stitched,
         blocks,
         options,
-        triangles: Sections::create(workspace, "repair.surface", count)?,
-        runs: Sections::create(workspace, "repair.runs", count)?,
-        rims: Sections::create(workspace, "repair.rims", count)?,
-        sums: Sections::create(workspace, "repair.sums", count)?,
-        bridges: Exchange::new(workspace, "repair.bridges", EXCHANGE_BUFFER),
-        seen: Exchange::new(workspace, "repair.seen", EXCHANGE_BUFFER),
+        triangles: Sections::with_layout(workspace, "repair.surface", count, ORIENTED)?,
+        runs: Sections::unpacked(workspace, "repair.runs", count)?,
+        rims: Sections::unpacked(workspace, "repair.rims", count)?,
+        sums: Sections::unpacked(workspace, "repair.sums", count)?,
+        bridges: Exchange::new(workspace, "repair.bridges", EXCHANGE_BUFFER).packed(SENT),
+        seen: Exchange::new(workspace, "repair.seen", EXCHANGE_BUFFER).packed(SEEN),
         shared: Mutex::new(Shared {
             globals: vec![0; count],
             stats: RepairStats::default(),

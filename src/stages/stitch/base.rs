@@ -2,6 +2,7 @@
 //! first part).
 
 use crate::error::Result;
+use crate::spill::layouts::SENT;
 use crate::spill::{Exchange, Sections};
 use crate::stages::blocks::Blocks;
 use crate::stages::surface::star::{Link, Star, Triangle, has, others};
@@ -37,7 +38,7 @@ pub(super) fn block_bytes(triples: &Triples, block: usize) -> u64 {
 /// [`crate::Error::Cancelled`].
 pub fn flag(triples: &Triples, blocks: Blocks, workspace: &Workspace) -> Result<Sections<4>> {
     let _held = workspace.reserve("stitch: exchange", EXCHANGE_BUFFER)?;
-    let exchange = Exchange::new(workspace, "stitch.flags", EXCHANGE_BUFFER);
+    let exchange = Exchange::new(workspace, "stitch.flags", EXCHANGE_BUFFER).packed(SENT);
     let bytes = |block| block_bytes(triples, block);
     workspace.for_each_unit("stitch: block", blocks.count(), bytes, |block| {
         let triangles = t3_around(triples, block)?;

@@ -6,6 +6,7 @@ use super::tests_of_paper::{Adjacent, Rank, Refusal, View, examine, rank};
 use super::{InsertStats, SharedStats};
 use crate::error::Result;
 use crate::geom::Point;
+use crate::spill::layouts::SENT;
 use crate::spill::{Exchange, Sections};
 use crate::stages::blocks::Blocks;
 use crate::stages::order::PointStore;
@@ -95,8 +96,8 @@ pub fn insert(
     workspace: &Workspace,
 ) -> Result<Crossing> {
     let _held = workspace.reserve("stitch: exchanges", 2 * EXCHANGE_BUFFER)?;
-    let added = Exchange::<4>::new(workspace, "stitch.added", EXCHANGE_BUFFER);
-    let removed = Exchange::<4>::new(workspace, "stitch.removed", EXCHANGE_BUFFER);
+    let added = Exchange::<4>::new(workspace, "stitch.added", EXCHANGE_BUFFER).packed(SENT);
+    let removed = Exchange::<4>::new(workspace, "stitch.removed", EXCHANGE_BUFFER).packed(SENT);
     let lives = Lives::of(triples, blocks)?;
     let sets = std::mem::take(&mut base.sets);
     let mut context = Context::new(store, base, interior, blocks, sets, workspace);

@@ -7,6 +7,7 @@ use super::{InsertStats, SharedStats};
 use crate::error::Result;
 use crate::geom::Point;
 use crate::spill::Sections;
+use crate::spill::layouts::{LABELLED, TRIANGLE};
 use crate::stages::blocks::Blocks;
 use crate::stages::order::PointStore;
 use crate::stages::surface::orient::{Oriented, consistent};
@@ -87,11 +88,11 @@ pub fn insert(
 ) -> Result<Interior> {
     let count = blocks.count();
     let out = Interior {
-        mesh: Sections::create(workspace, "stitch.mesh", count)?,
+        mesh: Sections::with_layout(workspace, "stitch.mesh", count, TRIANGLE)?,
         joints: Sections::create(workspace, "stitch.joints", count)?,
-        context: Sections::create(workspace, "stitch.context", count)?,
+        context: Sections::with_layout(workspace, "stitch.context", count, LABELLED)?,
         vertices: Sections::create(workspace, "stitch.vertices", count)?,
-        leftovers: Sections::create(workspace, "stitch.leftovers", count)?,
+        leftovers: Sections::with_layout(workspace, "stitch.leftovers", count, LABELLED)?,
     };
     // Candidates, their ranks, homes and what is written at the end.
     let bytes = |block| 2 * block_bytes(triples, block);

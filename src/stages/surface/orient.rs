@@ -3,6 +3,7 @@
 use super::parity::ParitySets;
 use super::star::{EDGES, Star, Triangle, has, opposed};
 use crate::error::Result;
+use crate::spill::layouts::{LABELLED, SENT_LABELLED};
 use crate::spill::{Exchange, Sections};
 use crate::stages::blocks::Blocks;
 use crate::workspace::Workspace;
@@ -51,7 +52,12 @@ pub fn orient(
     blocks: Blocks,
     workspace: &Workspace,
 ) -> Result<Oriented> {
-    let interior = Sections::create(workspace, &format!("{name}.interior"), blocks.count())?;
+    let interior = Sections::with_layout(
+        workspace,
+        &format!("{name}.interior"),
+        blocks.count(),
+        LABELLED,
+    )?;
     let exchange_held = workspace.reserve("exchange", 2 * EXCHANGE_BUFFER)?;
     let exchange = Exchange::<6>::new(workspace, &format!("{name}.relations"), EXCHANGE_BUFFER);
     let labels = Mutex::new(vec![(0u32, 0u32); blocks.count()]);
@@ -223,7 +229,8 @@ fn orient_crossing(
     blocks: Blocks,
     workspace: &Workspace,
 ) -> Result<()> {
-    let exchange = Exchange::<5>::new(workspace, &format!("{name}.crossing"), EXCHANGE_BUFFER);
+    let exchange = Exchange::<5>::new(workspace, &format!("{name}.crossing"), EXCHANGE_BUFFER)
+        .packed(SENT_LABELLED);
     let mut edges: FxHashMap<(u32, u32), Vec<(Triangle, u32)>> = FxHashMap::default();
     for group in 0..blocks.count() {
         workspace.check_cancel()?;
