@@ -7,15 +7,16 @@ pub use store::{PAGE, PointStore, StoreWriter};
 
 use crate::error::{Error, Result};
 use crate::geom::{Point, hilbert};
-use crate::spill::Sorter;
+use crate::spill::{Sorted, Sorter};
 use crate::workspace::Workspace;
+use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Keys encoded at a time.
 const CHUNK: usize = 1 << 12;
 
-/// Keys of a merge that are decoded and written at a time.
-const BATCH: usize = 1 << 18;
+/// Keys of a merge that one thread takes at a time, or more if there are many runs.
+const PART: usize = 1 << 18;
 
 /// Takes in positions in any order and gives back the ordered store.
 #[derive(Debug)]
@@ -69,29 +70,12 @@ impl Orderer {
             held,
         } = self;
         let mut writer = StoreWriter::create(workspace, "points", page)?;
-        let mut write =
-            |keys: &[hilbert::Key]| writer.append(workspace, keys, |key| hilbert::decode(*key));
         match sorter.finish(workspace)?.in_memory() {
             Ok(mut keys) => {
                 keys.dedup();
-                write(&keys)?;
+                writer.append(workspace, &keys, |key| hilbert::decode(*key))?;
             }
-            Err(sorted) => {
-                let mut batch: Vec<hilbert::Key> = Vec::with_capacity(BATCH);
-                let mut last = None;
-                sorted.for_each(|key| {
-                    if last != Some(key) {
-                        last = Some(key);
-                        batch.push(key);
-                        if batch.len() == BATCH {
-                            write(&batch)?;
-                            batch.clear();
-                        }
-                    }
-                    Ok(())
-                })?;
-                write(&batch)?;
-            }
+            Err(sorted) => merge(&sorted, held.bytes(), &mut writer, workspace)?,
         }
         drop(held);
         let store = writer.finish(workspace)?;
@@ -105,4 +89,41 @@ impl Orderer {
         let folded = taken.into_inner() - store.len() as u64;
         Ok((store, folded))
     }
+}
+
+/// Where a part of the keys begins and ends.
+type Part = (Option<hilbert::Key>, Option<hilbert::Key>);
+
+/// Writes what is on disk in order, part by part, each merged by one thread, in `memory` bytes.
+fn merge(
+    sorted: &Sorted<3>,
+    memory: u64,
+    writer: &mut StoreWriter,
+    workspace: &Workspace,
+) -> Result<()> {
+    let cuts = sorted.cuts(PART).into_iter().map(Some);
+    let ends: Vec<_> = [None].into_iter().chain(cuts).chain([None]).collect();
+    let parts: Vec<Part> = ends.windows(2).map(|w| (w[0], w[1])).collect();
+    // A part has a frame more of each run at most, and its list grows by doubling.
+    let part = 3 * (PART * size_of::<hilbert::Key>()) as u64 + 4 * sorted.merge_bytes();
+    let threads = (memory / part).clamp(1, workspace.threads as u64) as usize;
+    let one = |&(from, to): &Part| {
+        workspace.check_cancel()?;
+        let mut keys = Vec::with_capacity(PART);
+        sorted.for_range(from, to, |key| {
+            if keys.last() != Some(&key) {
+                keys.push(key);
+            }
+            Ok(())
+        })?;
+        Ok(keys)
+    };
+    for wave in parts.chunks(threads) {
+        let merged: Result<Vec<Vec<hilbert::Key>>> =
+            workspace.install(|| wave.par_iter().with_max_len(1).map(one).collect());
+        for keys in merged? {
+            writer.append(workspace, &keys, |key| hilbert::decode(*key))?;
+        }
+    }
+    Ok(())
 }
