@@ -3,7 +3,7 @@
 use crate::error::{Error, Result};
 use crate::geom::lattice::Lattice;
 use crate::params::{Params, Radius};
-use crate::report::{LatticeReport, Report, StageReport};
+use crate::report::{LatticeReport, PartReport, Report, StageReport};
 use crate::stages::blocks::Blocks;
 use crate::stages::cells::{CellStats, DiskRadius, TileRanges, cells};
 use crate::stages::export::{CoordinateType, export};
@@ -200,11 +200,15 @@ impl<'a> Clock<'a> {
         self.workspace.observer.begin(name, unit, total);
         let outcome = work();
         self.workspace.observer.end();
+        let parts = self.workspace.take_parts().into_iter();
         self.stages.push(StageReport {
             name,
             seconds: start.elapsed().as_secs_f64(),
             bytes_read: io.read() - read,
             bytes_written: io.written() - written,
+            parts: parts
+                .map(|(name, seconds)| PartReport { name, seconds })
+                .collect(),
         });
         outcome
     }
@@ -279,7 +283,7 @@ impl Reconstruction {
         let (triples, triple_stats) =
             clock.stage("triples", "triples", 0, || triples(seen, blocks, workspace))?;
         let count = blocks.count() as u64;
-        let (stitched, base, insertion) = clock.stage("stitch", "blocks", 4 * count, || {
+        let (stitched, base, insertion) = clock.stage("stitch", "blocks", 3 * count, || {
             stitch(&store, triples, blocks, params.cos_max_angle(), workspace)
         })?;
         let options = RepairOptions {
