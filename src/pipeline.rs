@@ -3,11 +3,11 @@
 use crate::error::{Error, Result};
 use crate::geom::lattice::Lattice;
 use crate::params::{Params, Radius};
-use crate::report::{LatticeReport, Report, StageReport};
+use crate::report::{LatticeReport, PartReport, Report, StageReport};
 use crate::stages::blocks::Blocks;
 use crate::stages::cells::{CellStats, DiskRadius, TileRanges, cells};
 use crate::stages::export::{CoordinateType, export};
-use crate::stages::ingest::{self, Spool, ingest};
+use crate::stages::ingest::{self, READ_BUFFERS, Spool, ingest};
 use crate::stages::order::{Orderer, PAGE, PointStore};
 use crate::stages::repair::{RepairOptions, repair};
 use crate::stages::smooth::smooth;
@@ -200,11 +200,15 @@ impl<'a> Clock<'a> {
         self.workspace.observer.begin(name, unit, total);
         let outcome = work();
         self.workspace.observer.end();
+        let parts = self.workspace.take_parts().into_iter();
         self.stages.push(StageReport {
             name,
             seconds: start.elapsed().as_secs_f64(),
             bytes_read: io.read() - read,
             bytes_written: io.written() - written,
+            parts: parts
+                .map(|(name, seconds)| PartReport { name, seconds })
+                .collect(),
         });
         outcome
     }
@@ -279,7 +283,7 @@ impl Reconstruction {
         let (triples, triple_stats) =
             clock.stage("triples", "triples", 0, || triples(seen, blocks, workspace))?;
         let count = blocks.count() as u64;
-        let (stitched, base, insertion) = clock.stage("stitch", "blocks", 4 * count, || {
+        let (stitched, base, insertion) = clock.stage("stitch", "blocks", 3 * count, || {
             stitch(&store, triples, blocks, params.cos_max_angle(), workspace)
         })?;
         let options = RepairOptions {
@@ -287,8 +291,7 @@ impl Reconstruction {
             min_component: params.min_component,
             max_hole_edges: params.max_hole_edges,
         };
-        let passes = if params.repair { 3 } else { 2 };
-        let (repaired, repair) = clock.stage("repair", "blocks", passes * count, || {
+        let (repaired, repair) = clock.stage("repair", "blocks", 2 * count, || {
             repair(&store, stitched, blocks, options, workspace)
         })?;
         let mesh = clock.stage("export", "blocks", 2 * count, || {
@@ -344,8 +347,13 @@ pub(crate) fn order(
     page: usize,
     workspace: &Workspace,
 ) -> Result<(PointStore, u64)> {
-    let mut orderer = Orderer::new(workspace)?;
-    spool.for_each(lattice, |points| orderer.push(workspace, points))?;
+    // Their buffers must not take much of what is there to sort in.
+    let most = workspace.memory.available() / (8 * READ_BUFFERS);
+    let threads = workspace.threads.min(most as usize).max(1);
+    let held = workspace.reserve("order: frames", threads as u64 * READ_BUFFERS)?;
+    let orderer = Orderer::new(workspace)?;
+    spool.par_for_each(threads, lattice, |points| orderer.push(workspace, points))?;
+    drop(held);
     drop(spool);
     orderer.finish(workspace, page)
 }
@@ -382,7 +390,7 @@ fn writable(output: &Path) -> Result<()> {
 }
 
 /// Scratch bytes a point at the peak, about, after the points were read; measured on real scans.
-pub(crate) const SCRATCH_PER_POINT: u64 = 110;
+pub(crate) const SCRATCH_PER_POINT: u64 = 50;
 
 /// Refuses before the long stages what the scratch folder has no room for.
 fn room(scratch: &Path, points: u64) -> Result<()> {

@@ -80,4 +80,15 @@ pub struct StageReport {
     pub bytes_read: u64,
     /// Bytes written to files.
     pub bytes_written: u64,
+    /// What the stage did one after the other, if it says so.
+    pub parts: Vec<PartReport>,
+}
+
+/// Time of a part of a stage.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PartReport {
+    /// Name of the part.
+    pub name: &'static str,
+    /// Wall-clock seconds.
+    pub seconds: f64,
 }

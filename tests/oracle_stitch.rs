@@ -52,7 +52,7 @@ fn workspace() -> Workspace {
 }
 
 fn store_of(points: &[Point], workspace: &Workspace) -> PointStore {
-    let mut orderer = Orderer::new(workspace).unwrap();
+    let orderer = Orderer::new(workspace).unwrap();
     orderer.push(workspace, points).unwrap();
     orderer.finish(workspace, 16).unwrap().0
 }

@@ -38,7 +38,7 @@ pub fn points(count: usize) -> Vec<Point> {
 
 /// The same as an ordered store.
 pub fn store(count: usize, workspace: &Workspace) -> PointStore {
-    let mut orderer = Orderer::new(workspace).expect("memory");
+    let orderer = Orderer::new(workspace).expect("memory");
     orderer
         .push(workspace, &points(count))
         .expect("scratch space");

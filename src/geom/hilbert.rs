@@ -23,7 +23,14 @@ struct Tables {
     octant: [[u8; 8]; STATES],
 }
 
-static TABLES: Tables = tables();
+/// The same for two levels at a time, packed as `next state << 6 | result`. Digits are six bits of a
+/// key, octants two bits each of x, y and z.
+struct Pairs {
+    digits: [[u16; 64]; STATES],
+    octants: [[u16; 64]; STATES],
+}
+
+static PAIRS: Pairs = pairs();
 
 const fn rotate_left(bits: u32, by: u32) -> u32 {
     let by = by % 3;
@@ -83,6 +90,34 @@ const fn tables() -> Tables {
     t
 }
 
+const fn pairs() -> Pairs {
+    let single = tables();
+    let mut pairs = Pairs {
+        digits: [[0; 64]; STATES],
+        octants: [[0; 64]; STATES],
+    };
+    let mut state = 0;
+    while state < STATES {
+        let mut digits = 0;
+        while digits < 64 {
+            let upper = single.octant[state][digits >> 3] as usize;
+            let lower = single.octant[upper >> 3][digits & 7] as usize;
+            // Of each octant one bit of x, y and z; of the pair two bits each.
+            let (a, b) = (upper & 7, lower & 7);
+            let x = (a >> 2) << 1 | b >> 2;
+            let y = (a >> 1 & 1) << 1 | b >> 1 & 1;
+            let z = (a & 1) << 1 | b & 1;
+            let octants = x << 4 | y << 2 | z;
+            let next = (lower >> 3) << 6;
+            pairs.octants[state][digits] = (next | octants) as u16;
+            pairs.digits[state][octants] = (next | digits) as u16;
+            digits += 1;
+        }
+        state += 1;
+    }
+    pairs
+}
+
 /// The key of a position with coordinates in `0..2^30`.
 #[must_use]
 pub fn encode(p: Point) -> Key {
@@ -90,12 +125,12 @@ pub fn encode(p: Point) -> Key {
     let mut key = [0u32; 3];
     let mut state = 0usize;
     for (word, out) in key.iter_mut().enumerate() {
-        for level in 0..10 {
-            let shift = BITS - 1 - (word as u32 * 10 + level);
-            let octant = (x >> shift & 1) << 2 | (y >> shift & 1) << 1 | (z >> shift & 1);
-            let step = TABLES.digit[state][octant as usize];
-            *out = *out << 3 | u32::from(step & 7);
-            state = usize::from(step >> 3);
+        for pair in 0..5 {
+            let shift = BITS - 2 - (word as u32 * 10 + 2 * pair);
+            let octants = (x >> shift & 3) << 4 | (y >> shift & 3) << 2 | (z >> shift & 3);
+            let step = PAIRS.digits[state][octants as usize];
+            *out = *out << 6 | u32::from(step & 63);
+            state = usize::from(step >> 6);
         }
     }
     key
@@ -107,16 +142,16 @@ pub fn decode(key: Key) -> Point {
     let mut p = [0u32; 3];
     let mut state = 0usize;
     for word in key {
-        for level in 0..10 {
-            let digit = word >> (27 - 3 * level) & 7;
-            let step = TABLES.octant[state][digit as usize];
-            let octant = u32::from(step & 7);
+        for pair in 0..5 {
+            let digits = word >> (24 - 6 * pair) & 63;
+            let step = PAIRS.octants[state][digits as usize];
+            let octants = u32::from(step);
             p = [
-                p[0] << 1 | octant >> 2,
-                p[1] << 1 | (octant >> 1 & 1),
-                p[2] << 1 | (octant & 1),
+                p[0] << 2 | (octants >> 4 & 3),
+                p[1] << 2 | (octants >> 2 & 3),
+                p[2] << 2 | (octants & 3),
             ];
-            state = usize::from(step >> 3);
+            state = usize::from(step >> 6);
         }
     }
     p.map(|c| c as i32)

@@ -1,6 +1,6 @@
 //! Records sent to numbered receivers: an external sort by receiver, then one section each.
 
-use super::{Record, Sections, Sorter};
+use super::{Layout, Record, Sections, Sorter, Word};
 use crate::error::Result;
 use crate::workspace::Workspace;
 
@@ -9,6 +9,7 @@ use crate::workspace::Workspace;
 pub struct Exchange<const N: usize> {
     sorter: Sorter<N>,
     name: String,
+    layout: Layout<N>,
 }
 
 impl<const N: usize> Exchange<N> {
@@ -18,7 +19,15 @@ impl<const N: usize> Exchange<N> {
         Self {
             sorter: Sorter::new(workspace, name, buffer),
             name: name.to_owned(),
+            layout: [Word::Above; N],
         }
+    }
+
+    /// The exchange whose records are delivered packed with this layout.
+    #[must_use]
+    pub fn packed(mut self, layout: Layout<N>) -> Self {
+        self.layout = layout;
+        self
     }
 
     /// Sends records; the first word of each is its receiver.
@@ -51,7 +60,12 @@ impl<const N: usize> Exchange<N> {
         receivers: usize,
         wanted: impl Fn(Option<&Record<N>>, &Record<N>) -> bool,
     ) -> Result<Sections<N>> {
-        let sections = Sections::create(workspace, &format!("{}.sections", self.name), receivers)?;
+        let sections = Sections::with_layout(
+            workspace,
+            &format!("{}.sections", self.name),
+            receivers,
+            self.layout,
+        )?;
         let mut current: Vec<Record<N>> = Vec::new();
         self.sorter.finish(workspace)?.for_each(|record| {
             if current.first().is_some_and(|first| first[0] != record[0]) {

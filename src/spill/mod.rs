@@ -5,10 +5,13 @@
 //! checked when it is read.
 
 mod exchange;
+mod pack;
 mod sections;
+mod sort;
 mod sorter;
 
 pub use exchange::Exchange;
+pub use pack::{Layout, Word, layouts};
 pub use sections::Sections;
 pub use sorter::{Sorted, Sorter};
 

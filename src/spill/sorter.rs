@@ -1,18 +1,20 @@
 //! The external sorter: sorted runs on disk, merged with a bounded fan-in.
 
-use super::Record;
+use super::{Record, sort};
 use crate::error::{Error, Result};
 use crate::workspace::{IoCounters, Workspace};
-use rayon::slice::ParallelSliceMut;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::fs::File;
-use std::io::{Read, Write};
+use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 
 /// Records per checksummed frame of a run.
 const FRAME: usize = 4096;
+
+/// Bytes of a run that are read from its file at a time.
+const FILE_BUFFER: usize = 1 << 15;
 
 /// Sorts any number of records in a bounded buffer.
 #[derive(Debug)]
@@ -27,19 +29,21 @@ pub struct Sorter<const N: usize> {
 #[derive(Debug)]
 struct State<const N: usize> {
     buffer: Vec<Record<N>>,
-    runs: Vec<Run>,
+    runs: Vec<Run<N>>,
     made: usize,
 }
 
 /// One sorted file of frames: `u32` length in records, `u32` CRC-32, records.
 #[derive(Debug)]
-struct Run {
+struct Run<const N: usize> {
     path: PathBuf,
     bytes: u64,
+    /// The first record of each frame; all frames but the last are full.
+    firsts: Vec<Record<N>>,
     io: Arc<IoCounters>,
 }
 
-impl Drop for Run {
+impl<const N: usize> Drop for Run<N> {
     fn drop(&mut self) {
         self.io.shrink_scratch(self.bytes);
         // A scratch file that cannot be deleted goes with its folder.
@@ -94,7 +98,7 @@ impl<const N: usize> Sorter<N> {
     }
 
     fn spill(&self, state: &mut State<N>) -> Result<()> {
-        self.pool.install(|| state.buffer.par_sort_unstable());
+        self.pool.install(|| sort::sort(&mut state.buffer));
         let mut writer = self.run_writer(&mut state.made)?;
         for frame in state.buffer.chunks(FRAME) {
             writer.frame(frame)?;
@@ -104,7 +108,7 @@ impl<const N: usize> Sorter<N> {
         Ok(())
     }
 
-    fn run_writer(&self, made: &mut usize) -> Result<RunWriter> {
+    fn run_writer(&self, made: &mut usize) -> Result<RunWriter<N>> {
         let mut name = self.folder_name.clone().into_os_string();
         name.push(format!(".run{made}"));
         *made += 1;
@@ -131,7 +135,7 @@ impl<const N: usize> Sorter<N> {
             )
         };
         if state.runs.is_empty() {
-            self.pool.install(|| state.buffer.par_sort_unstable());
+            self.pool.install(|| sort::sort(&mut state.buffer));
             return Ok(Sorted {
                 buffer: state.buffer,
                 runs: Vec::new(),
@@ -149,7 +153,7 @@ impl<const N: usize> Sorter<N> {
             let batch = std::mem::replace(&mut state.runs, rest);
             let mut writer = self.run_writer(&mut state.made)?;
             let mut frame = Vec::with_capacity(FRAME);
-            merge(&batch, |record: Record<N>| {
+            merge(&batch, None, None, |record: Record<N>| {
                 frame.push(record);
                 if frame.len() == FRAME {
                     writer.frame(&frame)?;
@@ -171,10 +175,22 @@ impl<const N: usize> Sorter<N> {
 #[derive(Debug)]
 pub struct Sorted<const N: usize> {
     buffer: Vec<Record<N>>,
-    runs: Vec<Run>,
+    runs: Vec<Run<N>>,
 }
 
 impl<const N: usize> Sorted<N> {
+    /// All records in ascending order if they are in memory.
+    ///
+    /// # Errors
+    /// The records as they were, on disk.
+    pub fn in_memory(self) -> std::result::Result<Vec<Record<N>>, Self> {
+        if self.runs.is_empty() {
+            Ok(self.buffer)
+        } else {
+            Err(self)
+        }
+    }
+
     /// Calls `each` with every record in ascending order.
     ///
     /// # Errors
@@ -183,17 +199,52 @@ impl<const N: usize> Sorted<N> {
         if self.runs.is_empty() {
             return self.buffer.into_iter().try_for_each(each);
         }
-        merge(&self.runs, &mut each)
+        merge(&self.runs, None, None, &mut each)
+    }
+
+    /// Records that cut what is on disk into parts of about `records` records, more by no more than
+    /// a frame of each run; ascending.
+    #[must_use]
+    pub fn cuts(&self, records: usize) -> Vec<Record<N>> {
+        let mut firsts: Vec<Record<N>> =
+            self.runs.iter().flat_map(|r| &r.firsts).copied().collect();
+        firsts.sort_unstable();
+        let frames = (records / FRAME).max(1);
+        let mut cuts: Vec<Record<N>> = firsts.into_iter().step_by(frames).skip(1).collect();
+        cuts.dedup();
+        cuts
+    }
+
+    /// Calls `each` with every record on disk from `from` on and below `to`, in ascending order.
+    /// Several threads may do so at the same time, each in memory of [`Sorted::merge_bytes`].
+    ///
+    /// # Errors
+    /// What `each` returned, [`Error::Io`], [`Error::Corrupt`].
+    pub fn for_range(
+        &self,
+        from: Option<Record<N>>,
+        to: Option<Record<N>>,
+        each: impl FnMut(Record<N>) -> Result<()>,
+    ) -> Result<()> {
+        merge(&self.runs, from, to, each)
+    }
+
+    /// Memory that merging takes, in bytes.
+    #[must_use]
+    pub fn merge_bytes(&self) -> u64 {
+        (self.runs.len() * (FRAME * size_of::<Record<N>>() + FILE_BUFFER)) as u64
     }
 }
 
 fn merge<const N: usize>(
-    runs: &[Run],
+    runs: &[Run<N>],
+    from: Option<Record<N>>,
+    to: Option<Record<N>>,
     mut each: impl FnMut(Record<N>) -> Result<()>,
 ) -> Result<()> {
     let mut readers = runs
         .iter()
-        .map(RunReader::open)
+        .map(|run| RunReader::open(run, from, to))
         .collect::<Result<Vec<_>>>()?;
     let mut heap = BinaryHeap::with_capacity(readers.len());
     for (index, reader) in readers.iter_mut().enumerate() {
@@ -214,28 +265,31 @@ fn merge<const N: usize>(
     Ok(())
 }
 
-struct RunWriter {
+struct RunWriter<const N: usize> {
     path: PathBuf,
     file: std::io::BufWriter<File>,
     bytes: u64,
+    firsts: Vec<Record<N>>,
     io: Arc<IoCounters>,
 }
 
-impl RunWriter {
+impl<const N: usize> RunWriter<N> {
     fn create(path: PathBuf, io: Arc<IoCounters>) -> Result<Self> {
         let file = File::create_new(&path).map_err(|e| Error::io(&path, "create", e))?;
         Ok(Self {
             path,
             file: std::io::BufWriter::with_capacity(1 << 16, file),
             bytes: 0,
+            firsts: Vec::new(),
             io,
         })
     }
 
-    fn frame<const N: usize>(&mut self, records: &[Record<N>]) -> Result<()> {
-        if records.is_empty() {
+    fn frame(&mut self, records: &[Record<N>]) -> Result<()> {
+        let Some(first) = records.first() else {
             return Ok(());
-        }
+        };
+        self.firsts.push(*first);
         let bytes: &[u8] = bytemuck::cast_slice(records);
         let head = [records.len() as u32, crc32fast::hash(bytes)];
         self.file
@@ -249,20 +303,22 @@ impl RunWriter {
         Ok(())
     }
 
-    fn finish(self) -> Result<Run> {
+    fn finish(self) -> Result<Run<N>> {
         self.file
             .into_inner()
             .map_err(|e| Error::io(&self.path, "flush", e.into_error()))?;
         Ok(Run {
             path: self.path,
             bytes: self.bytes,
+            firsts: self.firsts,
             io: self.io,
         })
     }
 }
 
 struct RunReader<'a, const N: usize> {
-    run: &'a Run,
+    run: &'a Run<N>,
+    to: Option<Record<N>>,
     file: std::io::BufReader<File>,
     offset: u64,
     frame: Vec<Record<N>>,
@@ -270,16 +326,29 @@ struct RunReader<'a, const N: usize> {
 }
 
 impl<'a, const N: usize> RunReader<'a, N> {
-    fn open(run: &'a Run) -> Result<Self> {
-        let file = File::open(&run.path).map_err(|e| Error::io(&run.path, "open", e))?;
-        let file = std::io::BufReader::with_capacity(1 << 15, file);
-        Ok(Self {
+    /// Stands before the first record that is not below `from`.
+    fn open(run: &'a Run<N>, from: Option<Record<N>>, to: Option<Record<N>>) -> Result<Self> {
+        let io = |action: &'static str| move |e| Error::io(&run.path, action, e);
+        let mut file = File::open(&run.path).map_err(io("open"))?;
+        // The frame before the first that begins at or above `from` may end above it.
+        let below = from.map_or(0, |from| run.firsts.partition_point(|f| *f < from));
+        let offset = below.saturating_sub(1) as u64 * (8 + FRAME * size_of::<Record<N>>()) as u64;
+        if offset > 0 {
+            file.seek(SeekFrom::Start(offset)).map_err(io("seek in"))?;
+        }
+        let mut reader = Self {
             run,
-            file,
-            offset: 0,
+            to,
+            file: std::io::BufReader::with_capacity(FILE_BUFFER, file),
+            offset,
             frame: Vec::new(),
             at: 0,
-        })
+        };
+        if let Some(from) = from.filter(|_| below > 0) {
+            reader.read_frame()?;
+            reader.at = reader.frame.partition_point(|record| *record < from);
+        }
+        Ok(reader)
     }
 
     fn next(&mut self) -> Result<Option<Record<N>>> {
@@ -289,8 +358,12 @@ impl<'a, const N: usize> RunReader<'a, N> {
             }
             self.read_frame()?;
         }
+        let record = self.frame[self.at];
+        if self.to.is_some_and(|to| record >= to) {
+            return Ok(None);
+        }
         self.at += 1;
-        Ok(Some(self.frame[self.at - 1]))
+        Ok(Some(record))
     }
 
     fn corrupt(&self, found: String, expected: String) -> Error {
@@ -373,6 +446,29 @@ pub(super) mod tests {
             let got = collect(sorter.finish(&workspace).unwrap());
             records.sort_unstable();
             prop_assert_eq!(got, records);
+        }
+
+        #[test]
+        fn parts_make_the_whole(
+            mut records in prop::collection::vec([0u32..5000, 0u32..2], 1..40_000),
+            part in prop::sample::select(vec![1usize, 9000, 100_000]),
+        ) {
+            let workspace = workspace();
+            let sorter = Sorter::<2>::new(&workspace, "s", 80_000);
+            for chunk in records.chunks(1000) { sorter.push(chunk).unwrap(); }
+            let sorted = sorter.finish(&workspace).unwrap();
+            if let Err(sorted) = sorted.in_memory() {
+                let cuts = sorted.cuts(part);
+                let ends = cuts.iter().copied().map(Some).chain([None]);
+                let mut got = Vec::new();
+                let mut from = None;
+                for to in ends {
+                    sorted.for_range(from, to, |r| { got.push(r); Ok(()) }).unwrap();
+                    from = to;
+                }
+                records.sort_unstable();
+                prop_assert_eq!(got, records);
+            }
         }
     }
 

@@ -12,8 +12,9 @@ use memory::{MemoryPool, Reservation};
 use progress::{Cancel, Observer};
 use std::fs::File;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Instant;
 
 /// Bytes moved and scratch space held, counted where files are read and written.
 #[derive(Debug, Default)]
@@ -78,6 +79,7 @@ pub struct Workspace {
     pub observer: Arc<dyn Observer>,
     /// Bytes moved so far.
     pub io: Arc<IoCounters>,
+    parts: Mutex<Vec<(&'static str, f64)>>,
     pool: Arc<rayon::ThreadPool>,
 }
 
@@ -112,6 +114,7 @@ impl Workspace {
             cancel,
             observer,
             io: Arc::default(),
+            parts: Mutex::default(),
             pool: Arc::new(pool),
         })
     }
@@ -154,6 +157,25 @@ impl Workspace {
     /// Runs `work` with rayon's parallel iterators bound to this run's threads.
     pub fn install<T: Send>(&self, work: impl FnOnce() -> T + Send) -> T {
         self.pool.install(work)
+    }
+
+    /// Does `work` and notes, for the report, how long it took as part `name` of the stage.
+    pub fn part<T>(&self, name: &'static str, work: impl FnOnce() -> T) -> T {
+        let start = Instant::now();
+        let outcome = work();
+        self.note_part(name, start.elapsed().as_secs_f64());
+        outcome
+    }
+
+    /// Notes a part of the stage that took so many seconds.
+    pub fn note_part(&self, name: &'static str, seconds: f64) {
+        let mut parts = self.parts.lock().unwrap_or_else(PoisonError::into_inner);
+        parts.push((name, seconds));
+    }
+
+    /// The parts noted since this was last asked for.
+    pub fn take_parts(&self) -> Vec<(&'static str, f64)> {
+        std::mem::take(&mut *self.parts.lock().unwrap_or_else(PoisonError::into_inner))
     }
 
     /// # Errors

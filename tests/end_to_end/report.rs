@@ -118,11 +118,23 @@ fn every_key_is_there() {
         assert!(stage["seconds"].as_f64().unwrap() >= 0.0, "{stage}");
         assert!(stage["bytes_read"].as_u64().unwrap() > 0, "{stage}");
         assert!(stage["bytes_written"].as_u64().unwrap() > 0, "{stage}");
+        parts_add_up(stage);
     }
     assert_eq!(json["version"], env!("CARGO_PKG_VERSION"));
     assert_eq!(json["parameters"]["smooth"], 2);
     assert_eq!(json["memory_budget"], 192 << 20);
     assert!(json["radius"].as_f64().unwrap() > 0.0);
+}
+
+/// A stage that has parts does nothing else for long.
+fn parts_add_up(stage: &Value) {
+    let parts = stage["parts"].as_array().unwrap();
+    let names: Vec<_> = parts.iter().map(|p| p["name"].as_str().unwrap()).collect();
+    let sum: f64 = parts.iter().map(|p| p["seconds"].as_f64().unwrap()).sum();
+    if stage["name"] == "stitch" {
+        assert_eq!(names, ["base", "orient", "insert", "cross"]);
+    }
+    assert!(sum <= stage["seconds"].as_f64().unwrap(), "{stage}");
 }
 
 #[test]

@@ -27,7 +27,7 @@ impl Positions {
         };
         let stored = match plan.all_positions {
             true => None,
-            false => Some(Sections::create(
+            false => Some(Sections::unpacked(
                 workspace,
                 "verify.positions",
                 plan.ranges,

@@ -7,6 +7,7 @@ pub use cell::{AUTO_REACH, CellMaker, DiskRadius, Fit, Outcome, fit_in_store, fi
 
 use crate::error::Result;
 use crate::geom::Point;
+use crate::spill::layouts::{LABELLED, SENT_LABELLED};
 use crate::spill::{Exchange, Sections};
 use crate::stages::blocks::Blocks;
 use crate::stages::order::PointStore;
@@ -121,9 +122,9 @@ pub fn cells(
     radius: DiskRadius,
     workspace: &Workspace,
 ) -> Result<(CellTriples, CellStats)> {
-    let own = Sections::create(workspace, "cells.own", tiles.count())?;
+    let own = Sections::with_layout(workspace, "cells.own", tiles.count(), LABELLED)?;
     let held = workspace.reserve("cells: exchange", EXCHANGE_BUFFER)?;
-    let exchange = Exchange::new(workspace, "cells.sent", EXCHANGE_BUFFER);
+    let exchange = Exchange::new(workspace, "cells.sent", EXCHANGE_BUFFER).packed(SENT_LABELLED);
     let counters = Counters::default();
     let bytes = |tile: usize| {
         let points = tiles.ids(tile).len() as u64;

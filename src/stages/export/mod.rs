@@ -1,6 +1,7 @@
 //! The mesh file: used points renumbered, pinched vertices split, slices written in parallel at
 //! known offsets under a temporary name, then renamed.
 
+mod faces;
 mod number;
 mod ply;
 
@@ -12,8 +13,8 @@ use crate::spill::Sections;
 use crate::stages::blocks::Blocks;
 use crate::stages::order::PointStore;
 use crate::stages::repair::Repaired;
-use crate::stages::surface::star::sorted;
 use crate::workspace::Workspace;
+use faces::Faces;
 use number::Numbering;
 use serde::Serialize;
 use std::path::Path;
@@ -33,21 +34,9 @@ pub struct MeshStats {
     pub boundary_edges: u64,
 }
 
-/// All triangles of the mesh that touch a block, as they run, ascending by sorted ids.
-fn triangles_around(repaired: &Repaired, block: usize) -> Result<Vec<[u32; 3]>> {
-    let around = repaired.around.get(block)?;
-    let filled = repaired.filled.get(block)?;
-    let mut triangles: Vec<[u32; 3]> = around.iter().map(|t| [t[0], t[1], t[2]]).collect();
-    if !filled.is_empty() {
-        triangles.extend(filled.iter().map(|t| [t[1], t[2], t[3]]));
-        triangles.sort_unstable_by_key(|t| sorted(*t));
-    }
-    Ok(triangles)
-}
-
 fn block_bytes(repaired: &Repaired, blocks: Blocks, block: usize) -> u64 {
-    let records = repaired.around.records(block) + repaired.filled.records(block);
-    120 * records as u64 + blocks.ids(block).len() as u64 * 60 + (1 << 20)
+    let records = repaired.surface.records(block) + repaired.filled.records(block);
+    60 * records as u64 + blocks.ids(block).len() as u64 * 60 + (1 << 20)
 }
 
 /// Writes the mesh to `output`.
@@ -88,7 +77,7 @@ const NO_TRIANGLES: &str = "no three cells agree on one that belongs to a compon
 fn write_block(
     store: &PointStore,
     repaired: &Repaired,
-    numbering: &Numbering,
+    numbering: &Numbering<'_>,
     blocks: Blocks,
     lattice: &Lattice,
     file: &ply::MeshFile,
@@ -97,40 +86,20 @@ fn write_block(
     let ids = blocks.ids(block);
     let points = store.slice(ids.start as usize..ids.end as usize)?;
     let at = |v: u32| lattice.position(points[(v - ids.start) as usize]);
-    let used: Vec<[f64; 3]> = ids.clone().filter(|v| numbering.used(*v)).map(at).collect();
-    file.vertices(numbering.first_used(block), &used)?;
-    let copies: Vec<[f64; 3]> = numbering
-        .copies
-        .get(block)?
-        .iter()
-        .map(|c| at(c[0]))
-        .collect();
-    file.vertices(numbering.first_copy(block), &copies)?;
-    let splits = numbering.splits.get(block)?;
-    let triangles = triangles_around(repaired, block)?;
-    let mine = triangles
-        .into_iter()
-        .filter(|t| blocks.of(t[0]) == block as u32);
-    let faces: Vec<[u32; 3]> = mine
-        .map(|t| renumber(t, &splits, numbering, block))
-        .collect();
-    file.faces(numbering.first_face(block), &faces)
-}
-
-/// The triangle in the file's numbers; a corner in a fan with a copy of its own takes the copy.
-fn renumber(t: [u32; 3], splits: &[[u32; 7]], numbering: &Numbering, block: usize) -> [u32; 3] {
-    let key = sorted(t);
-    let start = splits.partition_point(|s| s[..4] < [block as u32, key[0], key[1], key[2]][..]);
-    let mine = splits[start..].iter().take_while(|s| s[1..4] == key[..]);
-    let mut out = t.map(|v| numbering.vertex(v));
-    for s in mine {
-        for (corner, v) in out.iter_mut().zip(t) {
-            if v == s[4] {
-                *corner = numbering.first_copy(s[5] as usize) as u32 + s[6];
-            }
-        }
+    let mut bytes = Vec::with_capacity(file.vertex_bytes() * ids.len());
+    let used = ids.clone().filter(|v| numbering.used(*v));
+    used.for_each(|v| file.encode_vertex(at(v), &mut bytes));
+    file.write_vertices(numbering.vertex(ids.start).into(), &bytes)?;
+    bytes.clear();
+    for copy in numbering.copies.get(block)? {
+        file.encode_vertex(at(copy[0]), &mut bytes);
     }
-    out
+    file.write_vertices(numbering.first_copy(block), &bytes)?;
+    drop(points);
+    bytes.clear();
+    let faces = Faces::load(repaired, numbering, ids, block)?;
+    faces.encode(&mut bytes);
+    file.write_faces(numbering.first_face(block), &bytes)
 }
 
 type Splits = Sections<7>;

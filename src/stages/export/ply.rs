@@ -35,10 +35,17 @@ impl CoordinateType {
 }
 
 /// Bytes of a triangle: the number of its corners and three indices.
-const FACE: u64 = 13;
+pub const FACE: u64 = 13;
 
-/// Bytes encoded before they are written.
-const SLICE: usize = 1 << 20;
+/// Appends the bytes of a triangle to `bytes`.
+#[inline]
+pub fn encode_face([a, b, c]: [u32; 3], bytes: &mut Vec<u8>) {
+    let mut face = [3u8; FACE as usize];
+    face[1..5].copy_from_slice(&a.to_le_bytes());
+    face[5..9].copy_from_slice(&b.to_le_bytes());
+    face[9..].copy_from_slice(&c.to_le_bytes());
+    bytes.extend_from_slice(&face);
+}
 
 /// A mesh file under its temporary name; deleted unless finished.
 #[derive(Debug)]
@@ -122,46 +129,40 @@ impl MeshFile {
         })
     }
 
+    /// Bytes of a vertex.
+    pub fn vertex_bytes(&self) -> usize {
+        3 * self.coordinates.bytes() as usize
+    }
+
+    /// Appends the bytes of a vertex to `bytes`.
+    #[inline]
+    pub fn encode_vertex(&self, position: [f64; 3], bytes: &mut Vec<u8>) {
+        match self.coordinates {
+            CoordinateType::Float => {
+                let words = position.map(|x| (x as f32).to_le_bytes());
+                bytes.extend_from_slice(words.as_flattened());
+            }
+            CoordinateType::Double => {
+                bytes.extend_from_slice(position.map(f64::to_le_bytes).as_flattened());
+            }
+        }
+    }
+
     /// Writes vertices from number `first` on.
     ///
     /// # Errors
     /// [`Error::Io`].
-    pub fn vertices(&self, first: u64, positions: &[[f64; 3]]) -> Result<()> {
-        let size = 3 * self.coordinates.bytes();
-        let mut offset = self.header + first * size;
-        let mut bytes = Vec::with_capacity(SLICE.min(positions.len() * size as usize));
-        for part in positions.chunks(SLICE / 24) {
-            bytes.clear();
-            for x in part.iter().flatten() {
-                match self.coordinates {
-                    CoordinateType::Float => bytes.extend_from_slice(&(*x as f32).to_le_bytes()),
-                    CoordinateType::Double => bytes.extend_from_slice(&x.to_le_bytes()),
-                }
-            }
-            self.write(&bytes, offset)?;
-            offset += bytes.len() as u64;
-        }
-        Ok(())
+    pub fn write_vertices(&self, first: u64, bytes: &[u8]) -> Result<()> {
+        self.write(bytes, self.header + first * 3 * self.coordinates.bytes())
     }
 
-    /// Writes triangles from number `first` on.
+    /// Writes triangles from number `first` on, as [`encode_face`] makes them.
     ///
     /// # Errors
     /// [`Error::Io`].
-    pub fn faces(&self, first: u64, triangles: &[[u32; 3]]) -> Result<()> {
-        let mut offset = self.header + self.vertices * 3 * self.coordinates.bytes() + first * FACE;
-        let mut bytes = Vec::with_capacity(SLICE.min(triangles.len() * FACE as usize));
-        for part in triangles.chunks(SLICE / FACE as usize) {
-            bytes.clear();
-            for t in part {
-                bytes.push(3);
-                t.iter()
-                    .for_each(|v| bytes.extend_from_slice(&v.to_le_bytes()));
-            }
-            self.write(&bytes, offset)?;
-            offset += bytes.len() as u64;
-        }
-        Ok(())
+    pub fn write_faces(&self, first: u64, bytes: &[u8]) -> Result<()> {
+        let faces = self.header + self.vertices * 3 * self.coordinates.bytes();
+        self.write(bytes, faces + first * FACE)
     }
 
     /// Makes the file durable and gives it its name.

@@ -62,8 +62,19 @@ impl AxisMap {
     fn real(self, v: f64) -> f64 {
         match self {
             Self::Ratio { .. } => f64::NAN,
-            Self::Real { scale, shift, step } => ((v * scale + shift) / step).round_ties_even(),
+            Self::Real { scale, shift, step } => nearest((v * scale + shift) / step),
         }
+    }
+}
+
+/// Rounds half to even; small numbers by adding one whose last binary digit is a whole, which is
+/// faster where the processor cannot be counted on to know rounding.
+fn nearest(x: f64) -> f64 {
+    const WHOLES: f64 = 1.5 * (1u64 << 52) as f64;
+    if x.abs() < (1u64 << 51) as f64 {
+        (x + WHOLES) - WHOLES
+    } else {
+        x.round_ties_even()
     }
 }
 
@@ -252,6 +263,29 @@ mod tests {
         assert_eq!(rational(std::f64::consts::PI, 1000), None);
         assert_eq!(rational(1e300, 1000), None);
         assert_eq!(rational(1e-300, 1000), None);
+    }
+
+    #[test]
+    fn rounds_as_the_standard_library() {
+        let large = (1u64 << 51) as f64;
+        for x in [
+            0.0,
+            0.5,
+            1.5,
+            2.5,
+            1e9 + 0.5,
+            large - 0.5,
+            large,
+            large + 1.5,
+            1e18,
+        ] {
+            for x in [x, x.next_up(), x.next_down(), f64::NAN, f64::INFINITY] {
+                for x in [x, -x] {
+                    let (got, want) = (nearest(x), x.round_ties_even());
+                    assert!(got == want || got.is_nan() && want.is_nan(), "{x}: {got}");
+                }
+            }
+        }
     }
 
     #[test]

@@ -5,8 +5,8 @@ use crate::geom::Point;
 use crate::geom::aabb::Aabb;
 use crate::workspace::memory::Reservation;
 use crate::workspace::{IoCounters, Workspace};
+use rayon::prelude::*;
 use std::fs::File;
-use std::io::{BufWriter, Write};
 use std::ops::Range;
 use std::os::unix::fs::FileExt;
 use std::path::PathBuf;
@@ -197,13 +197,18 @@ impl Drop for PointStore {
     }
 }
 
+/// Pages written at a time.
+const GROUP: usize = 64;
+
 /// Writes a [`PointStore`] in id order.
 #[derive(Debug)]
 pub struct StoreWriter {
     path: PathBuf,
-    file: BufWriter<File>,
+    file: File,
+    /// Points written.
     len: usize,
     page: usize,
+    /// Points not yet written, less than a group of pages.
     pending: Vec<Point>,
     checks: Vec<u32>,
     boxes: Vec<Aabb>,
@@ -219,7 +224,7 @@ impl StoreWriter {
         let (path, file) = workspace.create_file(name)?;
         Ok(Self {
             path,
-            file: BufWriter::with_capacity(1 << 18, file),
+            file,
             len: 0,
             page: page.max(1),
             pending: Vec::new(),
@@ -235,28 +240,74 @@ impl StoreWriter {
     /// [`Error::Io`].
     pub fn push(&mut self, mut points: &[Point]) -> Result<()> {
         while !points.is_empty() {
-            let (now, later) = points.split_at((self.page - self.pending.len()).min(points.len()));
+            let room = GROUP * self.page - self.pending.len();
+            let (now, later) = points.split_at(room.min(points.len()));
             self.pending.extend_from_slice(now);
             points = later;
-            if self.pending.len() == self.page {
-                self.flush_page()?;
+            if self.pending.len() == GROUP * self.page {
+                self.flush()?;
             }
         }
         Ok(())
     }
 
-    fn flush_page(&mut self) -> Result<()> {
-        if self.pending.is_empty() {
-            return Ok(());
+    /// Appends the points of `items`, in order of id, on all threads.
+    ///
+    /// # Errors
+    /// [`Error::Io`], [`Error::Cancelled`].
+    pub fn append<T: Sync>(
+        &mut self,
+        workspace: &Workspace,
+        items: &[T],
+        point: impl Fn(&T) -> Point + Sync,
+    ) -> Result<()> {
+        let group = GROUP * self.page;
+        let (first, rest) = items.split_at(((group - self.pending.len()) % group).min(items.len()));
+        let (groups, last) = rest.split_at(rest.len() / group * group);
+        self.push(&first.iter().map(&point).collect::<Vec<_>>())?;
+        let written: Result<Vec<Vec<(u32, Aabb)>>> = workspace.install(|| {
+            let parts = groups.par_chunks(group).enumerate();
+            let write = |(n, part): (usize, &[T])| {
+                workspace.check_cancel()?;
+                let points: Vec<Point> = part.iter().map(&point).collect();
+                workspace.observer.advance(points.len() as u64);
+                self.write(self.len + n * group, &points)
+            };
+            parts.map(write).collect()
+        });
+        for page in written?.into_iter().flatten() {
+            self.checks.push(page.0);
+            self.boxes.push(page.1);
         }
-        let bytes: &[u8] = bytemuck::cast_slice(&self.pending);
+        self.len += groups.len();
+        workspace
+            .observer
+            .advance((first.len() + last.len()) as u64);
+        self.push(&last.iter().map(&point).collect::<Vec<_>>())
+    }
+
+    /// Writes pages from point `first` on; their checksums and boxes.
+    fn write(&self, first: usize, points: &[Point]) -> Result<Vec<(u32, Aabb)>> {
+        let bytes: &[u8] = bytemuck::cast_slice(points);
         self.file
-            .write_all(bytes)
+            .write_all_at(bytes, first as u64 * 12)
             .map_err(|e| Error::io(&self.path, format!("write {} bytes", bytes.len()), e))?;
         self.io.add_written(bytes.len() as u64);
         self.io.grow_scratch(bytes.len() as u64);
-        self.checks.push(crc32fast::hash(bytes));
-        self.boxes.push(Aabb::of(&self.pending));
+        let page = |page: &[Point]| {
+            let crc = crc32fast::hash(bytemuck::cast_slice(page));
+            (crc, Aabb::of(page))
+        };
+        Ok(points.chunks(self.page).map(page).collect())
+    }
+
+    /// Writes what is pending.
+    fn flush(&mut self) -> Result<()> {
+        let pages = self.write(self.len, &self.pending)?;
+        for (crc, aabb) in pages {
+            self.checks.push(crc);
+            self.boxes.push(aabb);
+        }
         self.len += self.pending.len();
         self.pending.clear();
         Ok(())
@@ -267,11 +318,7 @@ impl StoreWriter {
     /// # Errors
     /// [`Error::Io`], [`Error::Memory`].
     pub fn finish(mut self, workspace: &Workspace) -> Result<PointStore> {
-        self.flush_page()?;
-        let file = self
-            .file
-            .into_inner()
-            .map_err(|e| Error::io(&self.path, "flush", e.into_error()))?;
+        self.flush()?;
         let held = workspace.reserve("point index", self.boxes.len() as u64 * 32 + 4096)?;
         let mut levels = vec![self.boxes];
         while levels.last().is_some_and(|top| top.len() > FAN) {
@@ -283,7 +330,7 @@ impl StoreWriter {
         }
         Ok(PointStore {
             path: self.path,
-            file,
+            file: self.file,
             len: self.len,
             page: self.page,
             checks: self.checks,

@@ -1,57 +1,42 @@
 //! Bridges: triangles that hang by one edge and touch another part with the opposite vertex.
 
-use super::EXCHANGE_BUFFER;
-use crate::error::Result;
-use crate::spill::{Exchange, Sections};
-use crate::stages::blocks::Blocks;
-use crate::stages::surface::star::{Link, Star};
-use crate::workspace::Workspace;
+use super::patch::Patch;
+use crate::stages::surface::star::{Link, Star, Triangle};
+use std::ops::Range;
 
-/// The bridge triangles, `[block, i, j, k]`, for each block they touch.
+/// Numbers, ascending, of the triangles that are bridges at a vertex of the block.
 ///
-/// # Errors
-/// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
-/// [`crate::Error::Cancelled`].
-pub fn find(
-    around: &Sections<3>,
-    bytes: impl Fn(usize) -> u64 + Sync,
-    blocks: Blocks,
-    workspace: &Workspace,
-) -> Result<Sections<4>> {
-    let _held = workspace.reserve("exchange", EXCHANGE_BUFFER)?;
-    let exchange = Exchange::new(workspace, "repair.bridges", EXCHANGE_BUFFER);
-    workspace.for_each_unit("repair: block", blocks.count(), bytes, |block| {
-        let triangles = around.get(block)?;
-        let star = Star::of(blocks.ids(block), &triangles);
-        let mut link = Link::default();
-        let mut found = Vec::new();
-        for v in star.ids() {
-            let at = star.at(v);
-            link.set(v, at.iter().map(|&n| triangles[n as usize]));
-            if link.groups() < 2 {
-                continue;
-            }
-            // A triangle that is a fan by itself has both its edges at v on the boundary. If there
-            // is no larger fan, the first stays, so that v stays.
-            let size = |group| (0..at.len()).filter(|&i| link.group(i) == group).count();
-            let larger = (0..link.groups()).any(|group| size(group) > 1);
-            for (index, &n) in at.iter().enumerate() {
-                let group = link.group(index);
-                if size(group) == 1 && (larger || group > 0) {
-                    found.push(n);
-                }
+/// A bridge has two boundary edges, so it is next to at most one triangle: taking it away leaves
+/// the rest connected as it was, and the component of that triangle was open before.
+#[must_use]
+pub fn find(ids: Range<u32>, triangles: &[Triangle], patch: &Patch) -> Vec<u32> {
+    // Every fan that is not closed has two boundary edges, and a closed fan is alone.
+    let several = |v: u32| ids.contains(&v) && patch.rims[(v - ids.start) as usize] >= 4;
+    let near: Vec<u32> = (0..triangles.len() as u32)
+        .filter(|&n| triangles[n as usize].into_iter().any(several))
+        .collect();
+    if near.is_empty() {
+        return Vec::new();
+    }
+    let these: Vec<Triangle> = near.iter().map(|&n| triangles[n as usize]).collect();
+    let star = Star::of(ids.clone(), &these);
+    let mut link = Link::default();
+    let mut found = Vec::new();
+    for v in ids.clone().filter(|v| several(*v)) {
+        let at = star.at(v);
+        link.set(v, at.iter().map(|&n| these[n as usize]));
+        // A triangle that is a fan by itself has both its edges at v on the boundary. If there
+        // is no larger fan, the first stays, so that v stays.
+        let size = |group| (0..at.len()).filter(|&i| link.group(i) == group).count();
+        let larger = (0..link.groups()).any(|group| size(group) > 1);
+        for (index, &n) in at.iter().enumerate() {
+            let group = link.group(index);
+            if size(group) == 1 && (larger || group > 0) {
+                found.push(near[n as usize]);
             }
         }
-        found.sort_unstable();
-        found.dedup();
-        let mut sent = Vec::new();
-        for n in found {
-            let t = triangles[n as usize];
-            sent.push([blocks.of(t[0]), t[0], t[1], t[2]]);
-            sent.extend(blocks.visited(t).map(|b| [b, t[0], t[1], t[2]]));
-        }
-        // A triangle may be found from several of its vertices, in several blocks.
-        exchange.send(&sent)
-    })?;
-    exchange.deliver_unique(workspace, blocks.count())
+    }
+    found.sort_unstable();
+    found.dedup();
+    found
 }

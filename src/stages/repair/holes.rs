@@ -2,17 +2,17 @@
 //! from the fragments that the blocks leave.
 
 use super::fill::{Corner, Filling, fill as fill_loop};
-use super::loops::{Step, neighbors, steps};
+use super::rim::{BlockRim, Outline};
+use super::surface::Surface;
 use super::{EXCHANGE_BUFFER, RepairStats, from_smallest};
 use crate::error::Result;
-use crate::geom::Point;
 use crate::spill::{Exchange, Sections};
 use crate::stages::blocks::Blocks;
 use crate::stages::order::PointStore;
-use crate::stages::surface::star::{Star, sorted};
+use crate::stages::surface::star::sorted;
 use crate::workspace::Workspace;
 use rustc_hash::FxHashMap;
-use std::sync::Mutex;
+use std::sync::{Mutex, PoisonError};
 
 /// A part of a loop inside one block: it enters at `start` (from, at) and leaves at `end` (at, to).
 #[derive(Debug, Clone, Copy)]
@@ -24,110 +24,134 @@ struct Fragment {
     kept: Option<usize>,
 }
 
-#[derive(Default)]
 struct Found {
     fragments: Vec<Fragment>,
-    stats: RepairStats,
+    settled: Settled,
+    outline: Outline,
 }
 
-/// Fills holes of up to `limit` edges; `[block, i, a, b]` for each block that a triangle touches.
+/// Fills holes of up to `limit` edges, or none; `[block, i, a, b]` for each block that a triangle
+/// touches, and what the boundary looks like.
 ///
 /// # Errors
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
 /// [`crate::Error::Cancelled`].
 pub fn fill(
     store: &PointStore,
-    around: &Sections<4>,
-    limit: usize,
+    surface: &Surface,
+    limit: Option<usize>,
     blocks: Blocks,
     stats: &mut RepairStats,
     workspace: &Workspace,
-) -> Result<Sections<4>> {
+) -> Result<(Sections<4>, Outline)> {
     let _held = workspace.reserve("exchange", EXCHANGE_BUFFER)?;
     let exchange = Exchange::<4>::new(workspace, "repair.filled", EXCHANGE_BUFFER);
     let kept = Sections::<1>::create(workspace, "repair.fragments", 0)?;
-    let found = Mutex::new(Found::default());
+    let found = Mutex::new(Found {
+        fragments: Vec::new(),
+        settled: Settled::default(),
+        outline: Outline::new(blocks, workspace)?,
+    });
     let bytes =
-        |b: usize| 150 * around.records(b) as u64 + blocks.ids(b).len() as u64 * 40 + (1 << 20);
+        |b: usize| 150 * surface.records(b) as u64 + blocks.ids(b).len() as u64 * 40 + (1 << 20);
     workspace.for_each_unit("repair: block", blocks.count(), bytes, |block| {
-        let work = BlockHoles::load(store, around, blocks, block)?;
-        let (loops, open) = work.trace();
-        let mut local = RepairStats::default();
-        let mut triangles = Vec::new();
-        for ring in loops {
-            local.holes_found += 1;
-            if ring.len() > limit {
-                local.holes_too_long += 1;
-                continue;
-            }
-            let corners = ring.iter().map(|s| work.corner(s)).collect();
-            let filling = fill_loop(corners, |a, b| work.has_edge(a, b));
-            settle(filling, &mut local, &mut triangles);
-        }
-        let mut fragments = Vec::with_capacity(open.len());
-        for part in open {
-            let (first, last) = (part[0], part[part.len() - 1]);
-            let words = (part.len() <= limit).then(|| work.words(&part));
-            let kept = words.map(|w| kept.append(&w)).transpose()?;
-            let (start, end) = ((first.from, first.at), (last.at, last.to));
-            fragments.push(Fragment {
-                start,
-                end,
-                steps: part.len(),
-                kept,
-            });
-        }
-        exchange.send(&addressed(&triangles, blocks))?;
-        let mut found = found
-            .lock()
-            .unwrap_or_else(std::sync::PoisonError::into_inner);
+        let rim = BlockRim::load(store, surface, blocks, block)?;
+        let mut settled = Settled::default();
+        let fragments = match limit {
+            Some(limit) => fill_inside(&rim, limit, &kept, &mut settled)?,
+            None => Vec::new(),
+        };
+        exchange.send(&addressed(&settled.triangles, blocks))?;
+        let mut found = found.lock().unwrap_or_else(PoisonError::into_inner);
         found.fragments.extend(fragments);
-        add(&mut found.stats, &local);
+        found.settled.add(&settled);
+        found.outline.add(block, &blocks.ids(block), &rim);
+        found.outline.pinches.put(block, &rim.pinches)?;
+        found.outline.pinched.put(block, &rim.pinched())?;
         drop(found);
         workspace.observer.advance(1);
         Ok(())
     })?;
-    let mut found = found
-        .into_inner()
-        .unwrap_or_else(std::sync::PoisonError::into_inner);
+    let found = found.into_inner().unwrap_or_else(PoisonError::into_inner);
+    let (mut settled, mut outline) = (found.settled, found.outline);
     let _fragments = workspace.reserve("fragments", found.fragments.len() as u64 * 120)?;
-    let mut triangles = Vec::new();
-    let local = &mut found.stats;
     for ring in link_up(&found.fragments) {
         workspace.check_cancel()?;
-        local.holes_found += 1;
+        settled.stats.holes_found += 1;
         let edges: usize = ring.iter().map(|&f| found.fragments[f].steps).sum();
-        if edges > limit {
-            local.holes_too_long += 1;
+        if limit.is_none_or(|limit| edges > limit) {
+            settled.stats.holes_too_long += 1;
             continue;
         }
         let filling = fill_across(store, &ring, &found.fragments, &kept)?;
-        settle(filling, local, &mut triangles);
-        exchange.send(&addressed(&triangles, blocks))?;
-        triangles.clear();
+        settled.settle(filling, edges);
+        exchange.send(&addressed(&settled.triangles, blocks))?;
+        settled.triangles.clear();
     }
-    add(stats, local);
-    exchange.deliver(workspace, blocks.count())
+    stats.add(&settled.stats);
+    outline.boundary_edges -= settled.edges;
+    Ok((exchange.deliver(workspace, blocks.count())?, outline))
 }
 
-fn add(total: &mut RepairStats, more: &RepairStats) {
-    total.holes_found += more.holes_found;
-    total.holes_filled += more.holes_filled;
-    total.holes_outline += more.holes_outline;
-    total.holes_too_long += more.holes_too_long;
-    total.holes_not_filled += more.holes_not_filled;
-    total.hole_triangles += more.hole_triangles;
-}
-
-fn settle(filling: Filling, stats: &mut RepairStats, triangles: &mut Vec<[u32; 3]>) {
-    match filling {
-        Filling::Filled(new) => {
-            stats.holes_filled += 1;
-            stats.hole_triangles += new.len() as u64;
-            triangles.extend(new.into_iter().map(from_smallest));
+/// Fills the holes that lie in a block by themselves, and keeps the parts of the others.
+fn fill_inside(
+    rim: &BlockRim,
+    limit: usize,
+    kept: &Sections<1>,
+    settled: &mut Settled,
+) -> Result<Vec<Fragment>> {
+    let (loops, open) = rim.trace();
+    for ring in loops {
+        settled.stats.holes_found += 1;
+        if ring.len() > limit {
+            settled.stats.holes_too_long += 1;
+            continue;
         }
-        Filling::Outline => stats.holes_outline += 1,
-        Filling::Impossible => stats.holes_not_filled += 1,
+        let corners = ring.iter().map(|s| rim.corner(s)).collect();
+        let filling = fill_loop(corners, |a, b| rim.has_edge(a, b));
+        settled.settle(filling, ring.len());
+    }
+    let mut fragments = Vec::with_capacity(open.len());
+    for part in open {
+        let (first, last) = (part[0], part[part.len() - 1]);
+        let words = (part.len() <= limit).then(|| rim.words(&part));
+        fragments.push(Fragment {
+            start: (first.from, first.at),
+            end: (last.at, last.to),
+            steps: part.len(),
+            kept: words.map(|w| kept.append(&w)).transpose()?,
+        });
+    }
+    Ok(fragments)
+}
+
+/// What became of loops.
+#[derive(Default)]
+struct Settled {
+    stats: RepairStats,
+    /// Edges of the holes that were filled.
+    edges: u64,
+    triangles: Vec<[u32; 3]>,
+}
+
+impl Settled {
+    fn settle(&mut self, filling: Filling, edges: usize) {
+        match filling {
+            Filling::Filled(new) => {
+                self.stats.holes_filled += 1;
+                self.stats.hole_triangles += new.len() as u64;
+                self.edges += edges as u64;
+                self.triangles.extend(new.into_iter().map(from_smallest));
+            }
+            Filling::Outline => self.stats.holes_outline += 1,
+            Filling::Impossible => self.stats.holes_not_filled += 1,
+        }
+    }
+
+    /// Adds up all but the triangles.
+    fn add(&mut self, other: &Self) {
+        self.stats.add(&other.stats);
+        self.edges += other.edges;
     }
 }
 
@@ -139,124 +163,6 @@ fn addressed(triangles: &[[u32; 3]], blocks: Blocks) -> Vec<[u32; 4]> {
         sent.extend(blocks.visited(sorted).map(|b| [b, t[0], t[1], t[2]]));
     }
     sent
-}
-
-/// A block's boundary.
-struct BlockHoles {
-    ids: std::ops::Range<u32>,
-    triangles: Vec<[u32; 4]>,
-    star: Star,
-    own: Vec<Point>,
-    foreign: FxHashMap<u32, Point>,
-    steps: Vec<Step>,
-}
-
-impl BlockHoles {
-    fn load(
-        store: &PointStore,
-        around: &Sections<4>,
-        blocks: Blocks,
-        block: usize,
-    ) -> Result<Self> {
-        let ids = blocks.ids(block);
-        let triangles = around.get(block)?;
-        let plain: Vec<[u32; 3]> = triangles.iter().map(|t| [t[0], t[1], t[2]]).collect();
-        let star = Star::of(ids.clone(), &plain);
-        let own = store.slice(ids.start as usize..ids.end as usize)?;
-        let mut far: Vec<u32> = plain
-            .into_iter()
-            .flatten()
-            .filter(|v| !ids.contains(v))
-            .collect();
-        far.sort_unstable();
-        far.dedup();
-        let mut points = Vec::with_capacity(far.len());
-        store.fetch(&far, &mut points)?;
-        let foreign = far.into_iter().zip(points).collect();
-        let mut work = Self {
-            ids,
-            triangles,
-            star,
-            own,
-            foreign,
-            steps: Vec::new(),
-        };
-        work.steps = steps(&work.star, &work.triangles, |v| work.position(v));
-        Ok(work)
-    }
-
-    fn position(&self, v: u32) -> Point {
-        if self.ids.contains(&v) {
-            self.own[(v - self.ids.start) as usize]
-        } else {
-            self.foreign[&v]
-        }
-    }
-
-    fn corner(&self, step: &Step) -> Corner {
-        Corner {
-            id: step.at,
-            at: self.position(step.at),
-            apex: self.position(step.apex),
-            pinched: step.pinched,
-        }
-    }
-
-    fn has_edge(&self, a: u32, b: u32) -> bool {
-        self.star
-            .at(a)
-            .iter()
-            .any(|&n| self.triangles[n as usize][..3].contains(&b))
-    }
-
-    /// Loops that stay in the block, and parts of loops that leave it.
-    fn trace(&self) -> (Vec<Vec<Step>>, Vec<Vec<Step>>) {
-        let mut seen = vec![false; self.steps.len()];
-        let next = |step: &Step| {
-            let key = (step.at, step.to);
-            let at = self.steps.partition_point(|s| (s.from, s.at) < key);
-            (at < self.steps.len() && (self.steps[at].from, self.steps[at].at) == key).then_some(at)
-        };
-        let mut follow = |start: usize| {
-            let mut part = Vec::new();
-            let mut at = Some(start);
-            while let Some(index) = at.filter(|i| !seen[*i]) {
-                seen[index] = true;
-                part.push(self.steps[index]);
-                at = next(&self.steps[index]);
-            }
-            part
-        };
-        let enters = |s: &Step| !self.ids.contains(&s.from);
-        let open = (0..self.steps.len())
-            .filter(|&i| enters(&self.steps[i]))
-            .map(&mut follow)
-            .collect();
-        let loops = (0..self.steps.len())
-            .map(&mut follow)
-            .filter(|part: &Vec<Step>| !part.is_empty());
-        (loops.collect(), open)
-    }
-
-    /// Steps as words: for each vertex its id, apex, whether it is pinched, number of neighbours,
-    /// neighbours.
-    fn words(&self, part: &[Step]) -> Vec<[u32; 1]> {
-        let mut words = Vec::new();
-        for step in part {
-            let around = neighbors(&self.star, &self.triangles, step.at);
-            words.extend(
-                [
-                    step.at,
-                    step.apex,
-                    u32::from(step.pinched),
-                    around.len() as u32,
-                ]
-                .map(|w| [w]),
-            );
-            words.extend(around.into_iter().map(|v| [v]));
-        }
-        words
-    }
 }
 
 /// Chains fragments to loops; every fragment is in one.

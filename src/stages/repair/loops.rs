@@ -30,39 +30,81 @@ struct Fan {
     normal: [i128; 3],
 }
 
-/// The steps at all boundary vertices of a block, ascending by (`from`, `at`).
-pub fn steps(star: &Star, triangles: &[[u32; 4]], position: impl Fn(u32) -> Point) -> Vec<Step> {
+/// The steps at those of `vertices` that have a boundary edge, ascending by (`from`, `at`); calls
+/// `pinch` with every vertex whose triangles are not one fan.
+pub fn steps(
+    vertices: impl Iterator<Item = u32>,
+    star: &Star,
+    triangles: &[[u32; 4]],
+    position: impl Fn(u32) -> Point,
+    mut pinch: impl FnMut(u32),
+) -> Vec<Step> {
     let mut link = Link::default();
     let mut all = Vec::new();
     let mut fans: Vec<Fan> = Vec::new();
-    for v in star.ids() {
+    for v in vertices {
         let at = star.at(v);
+        let edges = at.iter().map(|&n| after(ids(&triangles[n as usize]), v));
+        match ends(edges) {
+            Ends::None => continue,
+            Ends::One { start, apex, end } => {
+                all.push(Step {
+                    from: start,
+                    at: v,
+                    to: end,
+                    apex,
+                    pinched: false,
+                });
+                continue;
+            }
+            Ends::More => pinch(v),
+        }
         link.set(v, at.iter().map(|&n| ids(&triangles[n as usize])));
-        let open = (0..link.groups()).filter(|g| !link.is_closed(*g));
         fans.clear();
-        for group in open {
+        for group in 0..link.groups() {
             let members = (0..at.len()).filter(|&i| link.group(i) == group);
             let members = members.map(|i| &triangles[at[i] as usize]);
             fans.extend(fan(v, members, &position));
         }
-        let pinched = link.groups() > 1;
-        let mut put = |incoming: &Fan, outgoing: &Fan| {
+        pair_up(v, &fans, &position, &mut |incoming, outgoing| {
             all.push(Step {
                 from: incoming.start,
                 at: v,
                 to: outgoing.end,
                 apex: incoming.apex,
-                pinched,
+                pinched: true,
             });
-        };
-        match &fans[..] {
-            [] => {}
-            [one] => put(one, one),
-            several => pair_up(v, several, &position, &mut put),
-        }
+        });
     }
     all.sort_unstable();
     all
+}
+
+/// Where the fans around a vertex begin and end.
+enum Ends {
+    /// Nowhere: there is no triangle, or they go all the way round.
+    None,
+    /// There is one fan.
+    One { start: u32, apex: u32, end: u32 },
+    /// There are several fans.
+    More,
+}
+
+/// From the edges opposite to the vertex, as they run.
+fn ends(edges: impl Iterator<Item = [u32; 2]> + Clone) -> Ends {
+    let mut starts = edges
+        .clone()
+        .filter(|[a, _]| edges.clone().all(|[_, b]| b != *a));
+    let Some([start, apex]) = starts.next() else {
+        return Ends::None;
+    };
+    if starts.next().is_some() {
+        return Ends::More;
+    }
+    let last = |&[_, b]: &[u32; 2]| edges.clone().all(|[a, _]| a != b);
+    // A fan that has a start has an end.
+    let end = edges.clone().find(last).map_or(start, |[_, b]| b);
+    Ends::One { start, apex, end }
 }
 
 fn ids(t: &[u32; 4]) -> OrientedTriangle {

@@ -3,19 +3,24 @@
 //! Everything here looks only at triangles and positions, block by block; how the triangles were
 //! chosen is not its business.
 
+mod around;
 mod bridges;
 mod facing;
 mod fill;
 mod holes;
 mod loops;
+mod patch;
+mod rim;
+mod surface;
+
+pub use rim::Outline;
+pub use surface::{Run, Surface};
 
 use crate::error::Result;
-use crate::spill::{Exchange, Sections};
+use crate::spill::Sections;
 use crate::stages::blocks::Blocks;
 use crate::stages::order::PointStore;
 use crate::stages::stitch::Stitched;
-use crate::stages::surface::orient::orient;
-use crate::stages::surface::star::Triangle;
 use crate::workspace::Workspace;
 use serde::Serialize;
 
@@ -36,13 +41,15 @@ pub fn from_smallest([a, b, c]: [u32; 3]) -> OrientedTriangle {
     }
 }
 
-/// The finished surface: for each block all triangles that touch it, as they run.
+/// The finished surface.
 #[derive(Debug)]
 pub struct Repaired {
-    /// `[i, a, b, component]`, ascending by sorted ids.
-    pub around: Sections<4>,
+    /// The triangles of each block, but for those that fill holes.
+    pub surface: Surface,
     /// Triangles that fill holes, `[block, i, a, b]`.
     pub filled: Sections<4>,
+    /// What the numbers of the mesh follow from.
+    pub outline: Outline,
 }
 
 /// What repair should do.
@@ -81,30 +88,31 @@ pub struct RepairStats {
     pub hole_triangles: u64,
 }
 
-/// All triangles that touch each block, by ascending ids, after stitching.
-fn gather(stitched: &Stitched, blocks: Blocks, workspace: &Workspace) -> Result<Sections<3>> {
-    let around = Sections::create(workspace, "repair.around", blocks.count())?;
-    let bytes =
-        |b| 60 * (stitched.interior.records(b) + stitched.added.records(b)) as u64 + (1 << 20);
-    workspace.for_each_unit("repair: block", blocks.count(), bytes, |block| {
-        let mut triangles: Vec<Triangle> = stitched.interior.get(block)?;
-        let removed = stitched.removed.get(block)?;
-        if !removed.is_empty() {
-            let removed: rustc_hash::FxHashSet<Triangle> =
-                removed.iter().map(|r| [r[1], r[2], r[3]]).collect();
-            triangles.retain(|t| !removed.contains(t));
-        }
-        triangles.extend(
-            stitched
-                .added
-                .get(block)?
-                .iter()
-                .map(|r| [r[1], r[2], r[3]]),
-        );
-        triangles.sort_unstable();
-        around.put(block, &triangles)
-    })?;
-    Ok(around)
+impl RepairOptions {
+    /// The least triangles of a component that stays.
+    fn least(&self) -> u64 {
+        if self.repair { self.min_component } else { 0 }
+    }
+
+    /// The longest hole that is filled; `None` if none is.
+    fn longest_hole(&self) -> Option<usize> {
+        Some(self.max_hole_edges).filter(|edges| self.repair && *edges >= 3)
+    }
+}
+
+impl RepairStats {
+    fn add(&mut self, more: &Self) {
+        self.bridges_removed += more.bridges_removed;
+        self.components_found += more.components_found;
+        self.components_removed += more.components_removed;
+        self.component_triangles_removed += more.component_triangles_removed;
+        self.holes_found += more.holes_found;
+        self.holes_filled += more.holes_filled;
+        self.holes_outline += more.holes_outline;
+        self.holes_too_long += more.holes_too_long;
+        self.holes_not_filled += more.holes_not_filled;
+        self.hole_triangles += more.hole_triangles;
+    }
 }
 
 /// Repairs and orients the surface.
@@ -120,62 +128,13 @@ pub fn repair(
     workspace: &Workspace,
 ) -> Result<(Repaired, RepairStats)> {
     let mut stats = RepairStats::default();
-    let gathered = gather(&stitched, blocks, workspace)?;
-    drop(stitched);
-    let bytes = |b: usize| {
-        150 * gathered.records(b) as u64
-            + u64::from(blocks.ids(b).end - blocks.ids(b).start) * 32
-            + (1 << 20)
+    let surface = surface::build(store, stitched, blocks, options, &mut stats, workspace)?;
+    let limit = options.longest_hole();
+    let (filled, outline) = holes::fill(store, &surface, limit, blocks, &mut stats, workspace)?;
+    let repaired = Repaired {
+        surface,
+        filled,
+        outline,
     };
-    let removed = if options.repair {
-        let removed = bridges::find(&gathered, bytes, blocks, workspace)?;
-        stats.bridges_removed = own_records(&removed, blocks)?;
-        Some(removed)
-    } else {
-        None
-    };
-    let current = |block: usize| -> Result<Vec<Triangle>> {
-        let mut triangles = gathered.get(block)?;
-        if let Some(removed) = &removed {
-            let removed = removed.get(block)?;
-            triangles.retain(|t| {
-                removed
-                    .binary_search(&[block as u32, t[0], t[1], t[2]])
-                    .is_err()
-            });
-        }
-        Ok(triangles)
-    };
-    let surface = orient("repair.surface", current, bytes, blocks, workspace)?;
-    let least = if options.repair {
-        options.min_component
-    } else {
-        0
-    };
-    let around = facing::face(store, &surface, least, blocks, &mut stats, workspace)?;
-    drop(surface);
-    drop(gathered);
-    let filled = if options.repair && options.max_hole_edges >= 3 {
-        holes::fill(
-            store,
-            &around,
-            options.max_hole_edges,
-            blocks,
-            &mut stats,
-            workspace,
-        )?
-    } else {
-        Exchange::<4>::new(workspace, "repair.filled", 64).deliver(workspace, blocks.count())?
-    };
-    Ok((Repaired { around, filled }, stats))
-}
-
-/// Number of different triangles among records `[block, i, j, k]`.
-fn own_records(records: &Sections<4>, blocks: Blocks) -> Result<u64> {
-    let mut count = 0;
-    for block in 0..blocks.count() {
-        let mine = |r: &&[u32; 4]| blocks.of(r[1].min(r[2]).min(r[3])) == r[0];
-        count += records.get(block)?.iter().filter(mine).count() as u64;
-    }
-    Ok(count)
+    Ok((repaired, stats))
 }

@@ -1,119 +1,280 @@
 //! The base: T3 triangles without non-manifold edges and vertices by excess (paper, section 3.5,
 //! first part).
 
+use super::BaseStats;
 use crate::error::Result;
+use crate::spill::layouts::{LABELLED, SENT};
 use crate::spill::{Exchange, Sections};
 use crate::stages::blocks::Blocks;
+use crate::stages::surface::orient::{Oriented, orient_inside};
 use crate::stages::surface::star::{Link, Star, Triangle, has, others};
 use crate::stages::triples::Triples;
 use crate::workspace::Workspace;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 const EXCHANGE_BUFFER: u64 = 8 << 20;
 
-/// T3 triples that touch a block: its own and those of lower blocks, ascending.
-fn t3_around(triples: &Triples, block: usize) -> Result<Vec<Triangle>> {
-    let own = triples.own.get(block)?;
-    let visiting = triples.visiting.get(block)?;
-    let visiting = visiting
-        .iter()
-        .filter(|r| r[4] == 3)
-        .map(|r| [r[1], r[2], r[3]]);
-    // Visitors have their smallest vertex in a lower block, so they come first.
-    Ok(visiting
-        .chain(own.iter().filter(|r| r[3] == 3).map(|r| [r[0], r[1], r[2]]))
-        .collect())
+/// The base, and what the triples leave for insertion.
+#[derive(Debug)]
+pub(super) struct Base {
+    /// Its triangles, oriented.
+    pub surface: Oriented,
+    /// Interior candidates by block, `[i, j, k, count]`.
+    pub candidates: Sections<4>,
+    /// All crossing triples by the block of their smallest vertex, `[i, j, k, count]`.
+    pub crossing: Sections<4>,
+    /// The same for the blocks of their other vertices, `[block, i, j, k, count]`.
+    pub visiting: Sections<5>,
+    /// Crossing T3 triangles that are flagged, by the block of their smallest vertex, `[block, i,
+    /// j, k]`.
+    pub flags: Sections<4>,
+    /// For each block the first and the last block that a triple of it touches.
+    pub spans: Vec<(u32, u32)>,
 }
 
-/// Bytes that working on a block takes.
-pub(super) fn block_bytes(triples: &Triples, block: usize) -> u64 {
-    90 * (triples.own.records(block) + triples.visiting.records(block)) as u64 + (2 << 20)
-}
-
-/// Lets every vertex flag the T3 triangles that it refuses; `[block, i, j, k]` for each block that
-/// the triangle touches. Also counts the flagged triangles.
+/// Makes the base. The triples are read once: what is needed of them later is written apart.
 ///
 /// # Errors
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
 /// [`crate::Error::Cancelled`].
-pub fn flag(triples: &Triples, blocks: Blocks, workspace: &Workspace) -> Result<Sections<4>> {
-    let _held = workspace.reserve("stitch: exchange", EXCHANGE_BUFFER)?;
-    let exchange = Exchange::new(workspace, "stitch.flags", EXCHANGE_BUFFER);
-    let bytes = |block| block_bytes(triples, block);
-    workspace.for_each_unit("stitch: block", blocks.count(), bytes, |block| {
-        let triangles = t3_around(triples, block)?;
-        let star = Star::of(blocks.ids(block), &triangles);
-        let mut flagged = Vec::new();
-        let mut link = Link::default();
-        for v in star.ids() {
-            refused(v, &star, &triangles, &mut link, &mut flagged);
-        }
-        flagged.sort_unstable();
-        flagged.dedup();
-        let mut sent = Vec::new();
-        for number in flagged {
-            let t = triangles[number as usize];
-            sent.push([blocks.of(t[0]), t[0], t[1], t[2]]);
-            sent.extend(blocks.visited(t).map(|b| [b, t[0], t[1], t[2]]));
-        }
-        exchange.send(&sent)?;
-        workspace.observer.advance(1);
-        Ok(())
+pub(super) fn base(
+    triples: Triples,
+    blocks: Blocks,
+    workspace: &Workspace,
+) -> Result<(Base, BaseStats)> {
+    let count = blocks.count();
+    let held = workspace.reserve("stitch: exchange", EXCHANGE_BUFFER)?;
+    let look = Look {
+        candidates: Sections::with_layout(workspace, "stitch.candidates", count, LABELLED)?,
+        crossing: Sections::with_layout(workspace, "stitch.crossing", count, LABELLED)?,
+        flags: Exchange::new(workspace, "stitch.flags", EXCHANGE_BUFFER).packed(SENT),
+        flagged: AtomicU64::new(0),
+        spans: Mutex::new(vec![(0, 0); count]),
+        triples: &triples,
+        blocks,
+    };
+    let bytes = |block: usize| {
+        let records = triples.own.records(block) + triples.visiting.records(block);
+        100 * records as u64 + (3 << 20)
+    };
+    let around = |block| look.block(block);
+    let name = "stitch.base";
+    let inside = workspace.part("base", || {
+        orient_inside(name, around, bytes, blocks, workspace)
     })?;
-    // Several blocks may flag a crossing triangle.
-    exchange.deliver_unique(workspace, blocks.count())
+    let start = std::time::Instant::now();
+    let flags = look.flags.deliver_unique(workspace, count)?;
+    let (candidates, crossing) = (look.candidates, look.crossing);
+    let spans = look
+        .spans
+        .into_inner()
+        .unwrap_or_else(std::sync::PoisonError::into_inner);
+    let flagged = look.flagged.into_inner() + flags.total();
+    let Triples { own, visiting } = triples;
+    drop((own, held));
+    let surface = inside.join(name, Some(&flags), blocks, workspace)?;
+    workspace.note_part("orient", start.elapsed().as_secs_f64());
+    let stats = BaseStats {
+        flagged,
+        mobius: surface.mobius,
+        triangles: surface.triangles,
+    };
+    let base = Base {
+        surface,
+        candidates,
+        crossing,
+        visiting,
+        flags,
+        spans,
+    };
+    Ok((base, stats))
 }
 
-/// The triangles around `v` that it flags: at edges with more than two, and beside a closed fan.
-fn refused(v: u32, star: &Star, triangles: &[Triangle], link: &mut Link, flagged: &mut Vec<u32>) {
-    let around = star.at(v);
-    let degree = |node: u32| {
-        around
-            .iter()
-            .filter(|&&n| has(triangles[n as usize], node))
-            .count()
-    };
-    let crowded = |n: u32| {
-        others(triangles[n as usize], v)
-            .into_iter()
-            .any(|node| degree(node) > 2)
-    };
-    let any_crowded = around.len() > 2 && around.iter().any(|&n| crowded(n));
-    let kept: Vec<u32> = if any_crowded {
-        flagged.extend(around.iter().copied().filter(|&n| crowded(n)));
-        around.iter().copied().filter(|&n| !crowded(n)).collect()
-    } else {
-        around.to_vec()
-    };
-    link.set(v, kept.iter().map(|&n| triangles[n as usize]));
-    if link.groups() < 2 {
-        return;
-    }
-    // Triangles are numbered ascending, so the first in a cycle is the smallest in any cycle.
-    let Some(first) = (0..kept.len()).find(|&i| link.is_closed(link.group(i))) else {
-        return;
-    };
-    let keep = link.group(first);
-    flagged.extend(
-        (0..kept.len())
-            .filter(|&i| link.group(i) != keep)
-            .map(|i| kept[i]),
-    );
+/// The one look at the triples.
+struct Look<'a> {
+    triples: &'a Triples,
+    blocks: Blocks,
+    candidates: Sections<4>,
+    crossing: Sections<4>,
+    flags: Exchange<4>,
+    /// Interior triangles that are flagged.
+    flagged: AtomicU64,
+    spans: Mutex<Vec<(u32, u32)>>,
 }
 
-/// The base triangles that touch a block: crossing ones of lower blocks first, then its own.
-pub(super) fn base_around(
-    triples: &Triples,
-    flags: &Sections<4>,
-    block: usize,
-) -> Result<Vec<Triangle>> {
-    let mut triangles = t3_around(triples, block)?;
-    let flags = flags.get(block)?;
-    if !flags.is_empty() {
-        triangles.retain(|t| {
-            flags
-                .binary_search(&[block as u32, t[0], t[1], t[2]])
-                .is_err()
-        });
+impl Look<'_> {
+    /// The T3 triangles that touch a block and that no vertex of it flags, ascending.
+    fn block(&self, block: usize) -> Result<Vec<Triangle>> {
+        let (mut triangles, mut candidates) = self.part(block)?;
+        let star = Star::of(self.blocks.ids(block), &triangles);
+        let mut flagged = Vec::new();
+        let mut refusing = Refusing::default();
+        for v in star.ids() {
+            refusing.at(v, &star, &triangles, &mut flagged);
+        }
+        drop(star);
+        if !flagged.is_empty() {
+            flagged.sort_unstable();
+            flagged.dedup();
+            let mut sent = Vec::new();
+            let interior = candidates.len();
+            for &number in &flagged {
+                let t = triangles[number as usize];
+                if self.blocks.crossing(t) {
+                    sent.push([self.blocks.of(t[0]), t[0], t[1], t[2]]);
+                } else {
+                    candidates.push([t[0], t[1], t[2], 3]);
+                }
+            }
+            let interior = (candidates.len() - interior) as u64;
+            self.flagged.fetch_add(interior, Ordering::Relaxed);
+            candidates.sort_unstable();
+            self.flags.send(&sent)?;
+            let (mut number, mut next) = (0, 0);
+            triangles.retain(|_| {
+                let gone = flagged.get(next) == Some(&number);
+                number += 1;
+                next += usize::from(gone);
+                !gone
+            });
+        }
+        self.candidates.put(block, &candidates)?;
+        Ok(triangles)
     }
-    Ok(triangles)
+
+    /// The T3 triangles that touch a block, ascending, and its interior candidates so far. The
+    /// crossing triples are put apart.
+    fn part(&self, block: usize) -> Result<(Vec<Triangle>, Vec<[u32; 4]>)> {
+        let visiting = self.triples.visiting.get(block)?;
+        let own = self.triples.own.get(block)?;
+        let t3 = visiting.iter().filter(|r| r[4] == 3).count()
+            + own.iter().filter(|r| r[3] == 3).count();
+        let mut triangles = Vec::with_capacity(t3);
+        let mut candidates = Vec::new();
+        let mut crossing = Vec::new();
+        let mut span = (block as u32, block as u32);
+        // Visitors have their smallest vertex in a lower block, so they come first.
+        for r in &visiting {
+            let (first, last) = (self.blocks.of(r[1]), self.blocks.of(r[3]));
+            span = (span.0.min(first), span.1.max(last));
+            if r[4] == 3 {
+                triangles.push([r[1], r[2], r[3]]);
+            }
+        }
+        // Ids ascend, so a triple is interior if its last one is in the block.
+        let end = self.blocks.ids(block).end;
+        for &[i, j, k, count] in &own {
+            if count == 3 {
+                triangles.push([i, j, k]);
+            }
+            if k >= end {
+                span.1 = span.1.max(self.blocks.of(k));
+                crossing.push([i, j, k, count]);
+            } else if count < 3 {
+                candidates.push([i, j, k, count]);
+            }
+        }
+        self.crossing.put(block, &crossing)?;
+        self.spans
+            .lock()
+            .unwrap_or_else(std::sync::PoisonError::into_inner)[block] = span;
+        Ok((triangles, candidates))
+    }
+}
+
+/// Most triangles around a vertex that are looked at the quick way.
+const FEW: usize = 16;
+
+/// What a vertex refuses.
+#[derive(Default)]
+struct Refusing {
+    link: Link,
+    kept: Vec<u32>,
+}
+
+impl Refusing {
+    /// The triangles around `v` that it flags: at edges with more than two, and beside a closed fan.
+    fn at(&mut self, v: u32, star: &Star, triangles: &[Triangle], flagged: &mut Vec<u32>) {
+        let around = star.at(v);
+        if one_fan(v, around, triangles) {
+            return;
+        }
+        let degree = |node: u32| {
+            around
+                .iter()
+                .filter(|&&n| has(triangles[n as usize], node))
+                .count()
+        };
+        let crowded = |n: u32| {
+            others(triangles[n as usize], v)
+                .into_iter()
+                .any(|node| degree(node) > 2)
+        };
+        self.kept.clear();
+        for &n in around {
+            if crowded(n) {
+                flagged.push(n);
+            } else {
+                self.kept.push(n);
+            }
+        }
+        let (link, kept) = (&mut self.link, &self.kept);
+        link.set(v, kept.iter().map(|&n| triangles[n as usize]));
+        if link.groups() < 2 {
+            return;
+        }
+        // Triangles are numbered ascending, so the first in a cycle is the smallest in any cycle.
+        let Some(first) = (0..kept.len()).find(|&i| link.is_closed(link.group(i))) else {
+            return;
+        };
+        let keep = link.group(first);
+        flagged.extend(
+            (0..kept.len())
+                .filter(|&i| link.group(i) != keep)
+                .map(|i| kept[i]),
+        );
+    }
+}
+
+/// True if the link of `v` is one path or one cycle, or nothing: then nothing is flagged. False says
+/// only that this was not found out.
+fn one_fan(v: u32, around: &[u32], triangles: &[Triangle]) -> bool {
+    let count = around.len();
+    if count < 2 {
+        return true;
+    }
+    if count > FEW {
+        return false;
+    }
+    let mut edges = [[0u32; 2]; FEW];
+    for (edge, &n) in edges.iter_mut().zip(around) {
+        *edge = others(triangles[n as usize], v);
+    }
+    let edges = &edges[..count];
+    // Bits of the edges that were not walked yet, from the first one on, both ways.
+    let mut left = ((1u32 << count) - 1) & !1;
+    for mut node in [edges[0][1], edges[0][0]] {
+        loop {
+            let mut next = 0u32;
+            for (e, edge) in edges.iter().enumerate() {
+                next |= u32::from((edge[0] == node) | (edge[1] == node)) << e;
+            }
+            next &= left;
+            if next == 0 {
+                break;
+            }
+            if !next.is_power_of_two() {
+                return false;
+            }
+            let [a, b] = edges[next.trailing_zeros() as usize];
+            node ^= a ^ b;
+            left &= !next;
+            if node == edges[0][0] {
+                // A cycle; whatever is left is beside it.
+                return left == 0;
+            }
+        }
+    }
+    left == 0
 }

@@ -1,20 +1,20 @@
 //! T12 insertion inside a block (paper, section 3.5, second part): the candidates whose vertices
 //! are all in one block, each block by itself.
 
-use super::base::block_bytes;
-use super::tests_of_paper::{Adjacent, Rank, Refusal, View, examine, rank};
+use super::base::Base;
+use super::tests_of_paper::{Adjacent, Candidate, Refusal, View, examine};
 use super::{InsertStats, SharedStats};
 use crate::error::Result;
 use crate::geom::Point;
-use crate::spill::Sections;
+use crate::spill::layouts::{LABELLED, TRIANGLE};
+use crate::spill::{Sections, Word};
 use crate::stages::blocks::Blocks;
 use crate::stages::order::PointStore;
-use crate::stages::surface::orient::{Oriented, consistent};
+use crate::stages::surface::orient::{Asks, consistent};
 use crate::stages::surface::parity::ParitySets;
 use crate::stages::surface::star::{Star, Triangle};
-use crate::stages::triples::Triples;
 use crate::workspace::Workspace;
-use rustc_hash::{FxHashMap, FxHashSet};
+use rustc_hash::FxHashMap;
 use std::ops::Range;
 
 /// What the blocks leave for the crossing candidates.
@@ -27,10 +27,35 @@ pub struct Interior {
     pub joints: Sections<6>,
     /// Interior triangles that touch a context vertex: `[i, j, k, home]`, see [`Home`].
     pub context: Sections<4>,
-    /// Context vertices of the block, ascending.
-    pub vertices: Sections<1>,
-    /// Interior candidates that failed only test I and touch a crossing triple: `[i, j, k, count]`.
-    pub leftovers: Sections<4>,
+    /// Vertices of these, of the crossing base and the context vertices, ascending: `[v, 1 for a
+    /// context vertex, x, y, z]`.
+    pub vertices: Sections<5>,
+    /// Crossing candidates with their smallest vertex in the block, and interior ones that failed
+    /// only test I and touch a crossing triple; ascending, see [`Candidate::record`].
+    pub ranked: Sections<5>,
+}
+
+impl Interior {
+    /// Makes the files.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`].
+    pub fn create(workspace: &Workspace, count: usize) -> Result<Self> {
+        let ranked = [
+            Word::Above,
+            Word::Above,
+            Word::Above,
+            Word::Rising,
+            Word::Rising,
+        ];
+        Ok(Self {
+            mesh: Sections::with_layout(workspace, "stitch.mesh", count, TRIANGLE)?,
+            joints: Sections::create(workspace, "stitch.joints", count)?,
+            context: Sections::with_layout(workspace, "stitch.context", count, LABELLED)?,
+            vertices: Sections::create(workspace, "stitch.vertices", count)?,
+            ranked: Sections::with_layout(workspace, "stitch.ranked", count, ranked)?,
+        })
+    }
 }
 
 /// Placeholder in a joint.
@@ -66,43 +91,33 @@ impl Home {
     }
 }
 
-/// Inserts the interior candidates of all blocks.
+/// Bytes that the work on a block takes.
+pub fn block_bytes(base: &Base, block: usize) -> u64 {
+    let triangles = base.surface.interior.records(block) + base.surface.crossing.records(block);
+    let candidates = base.candidates.records(block) + base.crossing.records(block);
+    let records = triangles + candidates + base.visiting.records(block);
+    180 * records as u64 + (4 << 20)
+}
+
+/// Inserts the interior candidates of a block.
 ///
 /// # Errors
-/// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
-/// [`crate::Error::Cancelled`].
-#[expect(
-    clippy::too_many_arguments,
-    reason = "the inputs of a stage, each used once"
-)]
+/// [`crate::Error::Io`], [`crate::Error::Corrupt`].
 pub fn insert(
     store: &PointStore,
-    triples: &Triples,
-    flags: &Sections<4>,
-    base: &Oriented,
+    base: &Base,
+    out: &Interior,
     blocks: Blocks,
+    block: usize,
     cos_max_angle: f64,
     stats: &SharedStats,
-    workspace: &Workspace,
-) -> Result<Interior> {
-    let count = blocks.count();
-    let out = Interior {
-        mesh: Sections::create(workspace, "stitch.mesh", count)?,
-        joints: Sections::create(workspace, "stitch.joints", count)?,
-        context: Sections::create(workspace, "stitch.context", count)?,
-        vertices: Sections::create(workspace, "stitch.vertices", count)?,
-        leftovers: Sections::create(workspace, "stitch.leftovers", count)?,
-    };
-    // Candidates, their ranks, homes and what is written at the end.
-    let bytes = |block| 2 * block_bytes(triples, block);
-    workspace.for_each_unit("stitch: block", count, bytes, |block| {
-        let mut work = BlockWork::load(store, triples, flags, base, blocks, block)?;
-        let undecided = work.insert_all(cos_max_angle, stats);
-        work.write(&out, block, &undecided, stats)?;
-        workspace.observer.advance(1);
-        Ok(())
-    })?;
-    Ok(out)
+) -> Result<()> {
+    let mut work = BlockWork::load(store, base, blocks, block)?;
+    let mut counts = InsertStats::default();
+    let undecided = work.insert_all(cos_max_angle, &mut counts);
+    work.write(out, block, &undecided, &mut counts)?;
+    stats.add(&counts);
+    Ok(())
 }
 
 /// The mesh around a block while candidates are inserted.
@@ -115,7 +130,10 @@ struct BlockWork {
     homes: Vec<(u32, bool)>,
     interior_base: usize,
     base: usize,
-    candidates: Vec<(Rank, u32)>,
+    candidates: Vec<Candidate>,
+    crossing_candidates: Vec<Candidate>,
+    /// For each vertex the time, as a number of triangles, when one was last inserted at it.
+    changed: Vec<u32>,
     /// Homes absorbed into one another for good.
     absorbed: ParitySets,
     /// Homes joined for this block.
@@ -125,15 +143,14 @@ struct BlockWork {
     joints: Vec<[u32; 6]>,
     own: Vec<Point>,
     foreign: FxHashMap<u32, Point>,
-    /// Vertices of the block in crossing triples.
-    border: FxHashSet<u32>,
+    /// For each vertex of the block, is it in a crossing triple?
+    border: Vec<bool>,
 }
 
 impl View for BlockWork {
-    fn around(&self, v: u32, each: &mut dyn FnMut(u32, Triangle)) {
-        for &n in self.star.at(v) {
-            each(n, self.triangles[n as usize]);
-        }
+    fn around(&self, v: u32) -> impl Iterator<Item = (u32, Triangle)> {
+        let at = self.star.at(v).iter();
+        at.map(|&n| (n, self.triangles[n as usize]))
     }
 
     fn position(&self, v: u32) -> Point {
@@ -146,72 +163,103 @@ impl View for BlockWork {
 }
 
 impl BlockWork {
-    fn load(
-        store: &PointStore,
-        triples: &Triples,
-        flags: &Sections<4>,
-        base: &Oriented,
-        blocks: Blocks,
-        block: usize,
-    ) -> Result<Self> {
+    fn load(store: &PointStore, base: &Base, blocks: Blocks, block: usize) -> Result<Self> {
         let ids = blocks.ids(block);
-        let interior = base.interior.get(block)?;
-        let crossing = base.crossing.get(block)?;
-        let flags = flags.get(block)?;
         let own = store.slice(ids.start as usize..ids.end as usize)?;
-        let mut border = FxHashSet::default();
-        let mut mark = |t: Triangle| border.extend(t.into_iter().filter(|v| ids.contains(v)));
-        triples
-            .visiting
-            .get(block)?
-            .iter()
-            .for_each(|r| mark([r[1], r[2], r[3]]));
         let at = |v: u32| own[(v - ids.start) as usize];
-        let mut candidates = Vec::new();
-        for &[i, j, k, count] in &triples.own.get(block)? {
+        let mut candidates: Vec<Candidate> = Vec::with_capacity(base.candidates.records(block));
+        for &[i, j, k, count] in &base.candidates.get(block)? {
             let t = [i, j, k];
-            if blocks.crossing(t) {
-                mark(t);
-            } else if count < 3 || flags.binary_search(&[block as u32, i, j, k]).is_ok() {
-                candidates.push((rank(t, count, t.map(at)), count));
-            }
+            candidates.push(Candidate::new(t, count, t.map(at)));
         }
         candidates.sort_unstable();
+        let interior = base.surface.interior.get(block)?;
+        let crossing = base.surface.crossing.get(block)?;
+        let star = Star::with_room(
+            ids.clone(),
+            interior
+                .iter()
+                .map(|r| [r[0], r[1], r[2]])
+                .chain(crossing.iter().map(|r| [r[1], r[2], r[3]]))
+                .chain(candidates.iter().map(|c| c.ids)),
+        );
+        let most = interior.len() + crossing.len() + candidates.len() / 2;
         let mut work = Self {
-            star: Star::with_room(
-                ids.clone(),
-                interior
-                    .iter()
-                    .map(|r| [r[0], r[1], r[2]])
-                    .chain(crossing.iter().map(|r| [r[1], r[2], r[3]]))
-                    .chain(candidates.iter().map(|((.., t), _)| *t)),
-            ),
-            ids,
-            triangles: Vec::with_capacity(interior.len() + crossing.len() + candidates.len() / 2),
-            homes: Vec::new(),
+            star,
+            triangles: Vec::with_capacity(most),
+            homes: Vec::with_capacity(most),
             interior_base: interior.len(),
             base: interior.len() + crossing.len(),
             candidates,
+            crossing_candidates: Vec::new(),
+            changed: vec![0; ids.len()],
             absorbed: ParitySets::default(),
             joined: ParitySets::default(),
             global: Vec::new(),
             joints: Vec::new(),
             own,
             foreign: FxHashMap::default(),
-            border,
+            border: vec![false; ids.len()],
+            ids,
         };
         work.add_base(&interior, &crossing, base, block);
-        work.fetch_foreign(store)?;
+        drop((interior, crossing));
+        work.see_crossing(store, base, block)?;
         Ok(work)
+    }
+
+    /// Takes in the crossing triples: which vertices they touch, which are candidates, and where
+    /// their vertices are.
+    fn see_crossing(&mut self, store: &PointStore, base: &Base, block: usize) -> Result<()> {
+        let mut foreign: Vec<u32> = Vec::new();
+        let mut mark = |t: Triangle| {
+            for v in t {
+                if self.ids.contains(&v) {
+                    self.border[(v - self.ids.start) as usize] = true;
+                }
+            }
+        };
+        for r in &base.visiting.get(block)? {
+            mark([r[1], r[2], r[3]]);
+        }
+        let flags = base.flags.get(block)?;
+        let mut candidates = base.crossing.get(block)?;
+        for r in &candidates {
+            mark([r[0], r[1], r[2]]);
+        }
+        candidates.retain(|&[i, j, k, count]| {
+            count < 3 || flags.binary_search(&[block as u32, i, j, k]).is_ok()
+        });
+        let outside = |v: &u32| !self.ids.contains(v);
+        let base_crossing = &self.triangles[self.interior_base..];
+        foreign.extend(base_crossing.iter().flatten().copied().filter(outside));
+        foreign.extend(
+            candidates
+                .iter()
+                .flat_map(|r| [r[0], r[1], r[2]])
+                .filter(outside),
+        );
+        foreign.sort_unstable();
+        foreign.dedup();
+        let mut points = Vec::with_capacity(foreign.len());
+        store.fetch(&foreign, &mut points)?;
+        self.foreign = foreign.into_iter().zip(points).collect();
+        let new = |&[i, j, k, count]: &[u32; 4]| {
+            let t = [i, j, k];
+            Candidate::new(t, count, t.map(|v| self.position(v)))
+        };
+        self.crossing_candidates = candidates.iter().map(new).collect();
+        Ok(())
     }
 
     fn add_base(
         &mut self,
         interior: &[[u32; 4]],
         crossing: &[[u32; 5]],
-        base: &Oriented,
+        base: &Base,
         block: usize,
     ) {
+        let base = &base.surface;
         let (first, globals) = base.globals[block];
         // Nodes: the block's own labels; those whose set has a crossing triangle are one node for
         // each set, shared with the crossing triangles.
@@ -257,68 +305,54 @@ impl BlockWork {
         self.homes.push(home);
     }
 
-    fn fetch_foreign(&mut self, store: &PointStore) -> Result<()> {
-        let crossing = &self.triangles[self.interior_base..];
-        let mut ids: Vec<u32> = crossing
-            .iter()
-            .flatten()
-            .copied()
-            .filter(|v| !self.ids.contains(v))
-            .collect();
-        ids.sort_unstable();
-        ids.dedup();
-        let mut points = Vec::with_capacity(ids.len());
-        store.fetch(&ids, &mut points)?;
-        self.foreign = ids.into_iter().zip(points).collect();
-        Ok(())
-    }
-
     /// Rounds over the candidates in rank order until one inserts nothing; those left undecided.
-    fn insert_all(&mut self, cos_max_angle: f64, stats: &SharedStats) -> Vec<(Rank, u32)> {
+    fn insert_all(&mut self, cos_max_angle: f64, counts: &mut InsertStats) -> Vec<Candidate> {
         let mut pending = std::mem::take(&mut self.candidates);
-        let mut local = InsertStats::default();
+        let mut link = Vec::new();
         loop {
             let before = self.triangles.len();
-            pending.retain(|&((.., t), _)| match examine(t, self, cos_max_angle) {
-                Err(Refusal::Unconnected) => true,
-                Err(refusal) => {
-                    local.refuse(refusal);
-                    false
+            pending.retain_mut(|candidate| {
+                let now = self.triangles.len() as u32 + 1;
+                let t = candidate.ids;
+                // Test I looks at nothing but the triangles at these vertices.
+                let changed = |v: &u32| self.changed[(v - self.ids.start) as usize];
+                if candidate.tried > 0 && t.iter().all(|v| changed(v) <= candidate.tried) {
+                    return true;
                 }
-                Ok(adjacent) => {
-                    if self.try_insert(t, adjacent) {
-                        local.accepted += 1;
-                    } else {
-                        local.orientation += 1;
+                candidate.tried = now;
+                match examine(t, self, cos_max_angle, &mut link) {
+                    Err(Refusal::Unconnected) => return true,
+                    Err(refusal) => counts.refuse(refusal),
+                    Ok(adjacent) if self.try_insert(t, adjacent) => {
+                        counts.accepted += 1;
+                        for v in t {
+                            self.changed[(v - self.ids.start) as usize] = now + 1;
+                        }
                     }
-                    false
+                    Ok(_) => counts.orientation += 1,
                 }
+                false
             });
             if self.triangles.len() == before {
-                break;
+                return pending;
             }
         }
-        stats.add(&local);
-        pending
     }
 
     /// Test IV and the insertion.
     fn try_insert(&mut self, t: Triangle, adjacent: [Option<Adjacent>; 3]) -> bool {
-        let asks: Vec<(u32, bool)> = adjacent
-            .into_iter()
-            .flatten()
-            .map(|(number, turned)| {
-                let (node, flip) = self.homes[number as usize];
-                let (home, up) = self.absorbed.find(node);
-                (home, flip ^ up ^ turned)
-            })
-            .collect();
-        let (fits, home) = (consistent(&mut self.joined, &asks), asks[0]);
+        let mut asks = Asks::default();
+        for (number, turned) in adjacent.into_iter().flatten() {
+            let (node, flip) = self.homes[number as usize];
+            let (home, up) = self.absorbed.find(node);
+            asks.push((home, flip ^ up ^ turned));
+        }
+        let (asks, home) = (asks.all(), asks.all()[0]);
         // Absorbed homes are joined too, so one check covers both.
-        if !fits {
+        if !consistent(&mut self.joined, asks) {
             return false;
         }
-        self.meet(t, &asks);
+        self.meet(t, asks);
         let (root, up) = self.absorbed.find(home.0);
         self.put(t, (root, home.1 ^ up));
         true
@@ -327,7 +361,8 @@ impl BlockWork {
     /// Absorbs or joins the homes that meet at an inserted triangle.
     fn meet(&mut self, t: Triangle, asks: &[(u32, bool)]) {
         let mut current = asks[0];
-        let mut globals: Vec<u32> = Vec::new();
+        let mut globals = [NOTHING; 3];
+        let mut count = 0;
         for &(next, flip) in asks {
             self.joined.join(current.0, next, current.1 ^ flip);
             let (a, up_a) = self.absorbed.find(current.0);
@@ -350,12 +385,12 @@ impl BlockWork {
             let (root, up) = self.absorbed.find(home);
             let label = self.global[root as usize];
             let word = label << 1 | u32::from(flip ^ up);
-            if label != NOTHING && !globals.contains(&word) {
-                globals.push(word);
+            if label != NOTHING && !globals[..count].contains(&word) {
+                globals[count] = word;
+                count += 1;
             }
         }
-        if globals.len() > 1 {
-            globals.resize(3, NOTHING);
+        if count > 1 {
             self.joints
                 .push([t[0], t[1], t[2], globals[0], globals[1], globals[2]]);
         }
@@ -365,53 +400,74 @@ impl BlockWork {
         &mut self,
         out: &Interior,
         block: usize,
-        undecided: &[(Rank, u32)],
-        stats: &SharedStats,
+        undecided: &[Candidate],
+        counts: &mut InsertStats,
     ) -> Result<()> {
-        let mut context: FxHashSet<u32> = self.border.clone();
-        let mut leftovers = Vec::new();
-        for &((.., t), count) in undecided {
-            if t.iter().any(|v| self.border.contains(v)) {
-                leftovers.push([t[0], t[1], t[2], count]);
-                context.extend(t);
+        let slot = |v: u32| (v - self.ids.start) as usize;
+        let mut context = self.border.clone();
+        let mut ranked = std::mem::take(&mut self.crossing_candidates);
+        for candidate in undecided {
+            if candidate.ids.iter().any(|&v| self.border[slot(v)]) {
+                ranked.push(*candidate);
+                candidate.ids.iter().for_each(|&v| context[slot(v)] = true);
             } else {
-                stats.add(&InsertStats {
-                    unconnected: 1,
-                    ..InsertStats::default()
-                });
+                counts.unconnected += 1;
             }
         }
-        let mut mesh = Vec::with_capacity(self.triangles.len());
+        ranked.sort_unstable();
+        let ranked: Vec<_> = ranked.iter().map(Candidate::record).collect();
+        out.ranked.put(block, &ranked)?;
+        drop(ranked);
+        let around = self.around_context(&context);
+        out.context.put(block, &around)?;
+        out.vertices.put(block, &self.located(&context, &around))?;
+        drop(around);
+        out.joints.put(block, &self.joints)?;
+        let (base, inserted) = self.triangles.split_at_mut(self.base);
+        inserted.sort_unstable();
+        let mut mesh = Vec::with_capacity(self.interior_base + inserted.len());
+        mesh.extend_from_slice(&base[..self.interior_base]);
+        mesh.extend_from_slice(inserted);
+        // Two ascending runs: this sort merges them.
+        mesh.sort();
+        out.mesh.put(block, &mesh)
+    }
+
+    /// The interior triangles at context vertices with their homes.
+    fn around_context(&mut self, context: &[bool]) -> Vec<[u32; 4]> {
         let mut around = Vec::new();
         for number in (0..self.interior_base).chain(self.base..self.triangles.len()) {
             let t = self.triangles[number];
-            mesh.push(t);
-            if t.iter().any(|v| context.contains(v)) {
+            if t.iter().any(|v| context[(v - self.ids.start) as usize]) {
                 let (node, flip) = self.homes[number];
                 let (root, up) = self.absorbed.find(node);
                 let label = self.global[root as usize];
                 let local = label == NOTHING;
-                let number = if local { root } else { label };
-                around.push([
-                    t[0],
-                    t[1],
-                    t[2],
-                    Home {
-                        number,
-                        local,
-                        flip: flip ^ up,
-                    }
-                    .word(),
-                ]);
+                let home = Home {
+                    number: if local { root } else { label },
+                    local,
+                    flip: flip ^ up,
+                };
+                around.push([t[0], t[1], t[2], home.word()]);
             }
         }
-        mesh.sort_unstable();
-        let mut vertices: Vec<[u32; 1]> = context.into_iter().map(|v| [v]).collect();
-        vertices.sort_unstable();
-        out.mesh.put(block, &mesh)?;
-        out.joints.put(block, &self.joints)?;
-        out.context.put(block, &around)?;
-        out.vertices.put(block, &vertices)?;
-        out.leftovers.put(block, &leftovers)
+        around
+    }
+
+    /// The vertices whose positions the crossing candidates may need.
+    fn located(&self, context: &[bool], around: &[[u32; 4]]) -> Vec<[u32; 5]> {
+        let crossing = &self.triangles[self.interior_base..self.base];
+        let mut ids: Vec<u32> = crossing.iter().flatten().copied().collect();
+        ids.extend(around.iter().flat_map(|r| [r[0], r[1], r[2]]));
+        let in_context = |v: &u32| self.ids.contains(v) && context[(v - self.ids.start) as usize];
+        ids.extend(self.ids.clone().filter(in_context));
+        ids.sort_unstable();
+        ids.dedup();
+        ids.into_iter()
+            .map(|v| {
+                let [x, y, z] = self.position(v).map(|c| c as u32);
+                [v, u32::from(in_context(&v)), x, y, z]
+            })
+            .collect()
     }
 }

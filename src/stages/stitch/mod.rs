@@ -5,6 +5,7 @@
 //! See the semantics in `ARCHITECTURE.md`.
 
 mod base;
+mod context;
 mod crossing;
 mod interior;
 mod tests_of_paper;
@@ -15,11 +16,14 @@ use crate::error::Result;
 use crate::spill::Sections;
 use crate::stages::blocks::Blocks;
 use crate::stages::order::PointStore;
-use crate::stages::surface::orient::orient;
 use crate::stages::triples::Triples;
 use crate::workspace::Workspace;
+use base::Base;
+use crossing::Pass;
+use interior::Interior;
 use serde::Serialize;
 use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
 use tests_of_paper::Refusal;
 
 /// The mesh after manifold extraction; triangles by ascending ids, orientable, not yet oriented.
@@ -107,42 +111,21 @@ pub fn stitch(
     cos_max_angle: f64,
     workspace: &Workspace,
 ) -> Result<(Stitched, BaseStats, InsertStats)> {
-    let triples = &triples;
-    let flags = base::flag(triples, blocks, workspace)?;
-    let around = |block| base::base_around(triples, &flags, block);
-    let bytes = |block| base::block_bytes(triples, block);
-    let mut base = orient("stitch.base", around, bytes, blocks, workspace)?;
-    let mut counts = BaseStats {
-        mobius: base.mobius,
-        triangles: base.triangles,
-        flagged: 0,
-    };
-    for block in 0..blocks.count() {
-        let flagged = flags.get(block)?;
-        counts.flagged += flagged.iter().filter(|r| blocks.of(r[1]) == r[0]).count() as u64;
-    }
+    let (base, counts) = base::base(triples, blocks, workspace)?;
     let stats = SharedStats::default();
-    let interior = interior::insert(
-        store,
-        triples,
-        &flags,
-        &base,
-        blocks,
-        cos_max_angle,
-        &stats,
-        workspace,
-    )?;
-    let crossing = crossing::insert(
-        store,
-        triples,
-        &flags,
-        &mut base,
-        &interior,
-        blocks,
-        cos_max_angle,
-        &stats,
-        workspace,
-    )?;
+    let interior = Interior::create(workspace, blocks.count())?;
+    let mut pass = Pass::new(&base, &interior, blocks, cos_max_angle, workspace)?;
+    workspace.part("insert", || {
+        insert(
+            store, &mut pass, &base, &interior, blocks, &stats, workspace,
+        )
+    })?;
+    let crossing = workspace.part("cross", || {
+        pass.advance(|_| true, None)?;
+        let (crossing, more) = pass.finish()?;
+        stats.add(&more);
+        Ok::<_, crate::Error>(crossing)
+    })?;
     let inserted = stats
         .0
         .into_inner()
@@ -153,4 +136,38 @@ pub fn stitch(
         removed: crossing.removed,
     };
     Ok((stitched, counts, inserted))
+}
+
+/// Inserts inside all blocks, in the order in which the pass across them needs them; whoever has
+/// finished a block takes the pass as far as it goes by then.
+fn insert(
+    store: &PointStore,
+    pass: &mut Pass<'_>,
+    base: &Base,
+    interior: &Interior,
+    blocks: Blocks,
+    stats: &SharedStats,
+    workspace: &Workspace,
+) -> Result<()> {
+    let order = pass.order();
+    let bytes = |unit: usize| interior::block_bytes(base, order[unit] as usize);
+    // The pass takes only what the blocks at work cannot need.
+    let most = (0..order.len()).map(bytes).max().unwrap_or(0);
+    let spare = workspace.memory.available();
+    let spare = spare.saturating_sub(most * workspace.threads as u64);
+    let done: Vec<AtomicBool> = order.iter().map(|_| AtomicBool::new(false)).collect();
+    let ready = |block: u32| done[block as usize].load(Ordering::Acquire);
+    let angle = pass.cos_max_angle();
+    let pass = Mutex::new(pass);
+    workspace.for_each_unit("stitch: block", order.len(), bytes, |unit| {
+        let block = order[unit] as usize;
+        interior::insert(store, base, interior, blocks, block, angle, stats)?;
+        done[block].store(true, Ordering::Release);
+        workspace.observer.advance(1);
+        match pass.try_lock() {
+            Ok(mut pass) => pass.advance(ready, Some(spare)),
+            // Someone else is at it.
+            Err(_) => Ok(()),
+        }
+    })
 }

@@ -6,8 +6,8 @@ use crate::stages::surface::star::{EDGES, Triangle, has, opposed, others};
 
 /// The mesh around the vertices of a triangle.
 pub trait View {
-    /// Calls `each` with all triangles at `v`: their number and their ids.
-    fn around(&self, v: u32, each: &mut dyn FnMut(u32, Triangle));
+    /// All triangles at `v`: their number and their ids.
+    fn around(&self, v: u32) -> impl Iterator<Item = (u32, Triangle)>;
     /// The position of a vertex of a triangle of the mesh or of a candidate.
     fn position(&self, v: u32) -> Point;
 }
@@ -30,6 +30,7 @@ pub enum Refusal {
 pub type Adjacent = (u32, bool);
 
 /// Applies the tests I, II, III and G in this order; the adjacent triangles by edge on success.
+/// `link` is room to work in.
 ///
 /// # Errors
 /// The first test that fails.
@@ -37,33 +38,43 @@ pub fn examine(
     t: Triangle,
     view: &impl View,
     cos_max_angle: f64,
+    link: &mut Vec<[u32; 2]>,
 ) -> Result<[Option<Adjacent>; 3], Refusal> {
     let mut found: [Option<(u32, Triangle)>; 3] = [None; 3];
     let mut counts = [0usize; 3];
-    let mut opposite_used = [false; 3];
-    // Position 0 sees edges (0,1) and (0,2); position 1 sees (1,2); each says if it is used.
-    for (position, &v) in t.iter().enumerate() {
-        view.around(v, &mut |number, other| {
-            opposite_used[position] = true;
-            for (edge, (a, b, ..)) in EDGES.into_iter().enumerate() {
-                if a == position && has(other, t[b]) {
-                    counts[edge] += 1;
-                    found[edge] = Some((number, other));
-                }
-            }
-        });
+    let mut used = [false; 3];
+    let mut see = |edge: usize, number: u32, other: Triangle| {
+        counts[edge] += 1;
+        found[edge] = Some((number, other));
+    };
+    // The edges are (0,1), (0,2) and (1,2); the first two are seen from vertex 0.
+    for (number, other) in view.around(t[0]) {
+        used[0] = true;
+        if has(other, t[1]) {
+            see(0, number, other);
+        }
+        if has(other, t[2]) {
+            see(1, number, other);
+        }
     }
+    for (number, other) in view.around(t[1]) {
+        used[1] = true;
+        if has(other, t[2]) {
+            see(2, number, other);
+        }
+    }
+    used[2] = view.around(t[2]).next().is_some();
     let connected = counts.iter().filter(|c| **c > 0).count();
     let lone = (0..3).find(|&e| counts[e] > 0);
     match (connected, lone) {
         (0, _) | (_, None) => return Err(Refusal::Unconnected),
-        (1, Some(edge)) if opposite_used[EDGES[edge].2] => return Err(Refusal::Unconnected),
+        (1, Some(edge)) if used[EDGES[edge].2] => return Err(Refusal::Unconnected),
         _ => {}
     }
     if counts.iter().any(|c| *c > 1) {
         return Err(Refusal::FullEdge);
     }
-    if t.iter().any(|&v| makes_excess(t, v, view)) {
+    if t.iter().any(|&v| makes_excess(t, v, view, link)) {
         return Err(Refusal::Excess);
     }
     let mut adjacent = [None; 3];
@@ -89,52 +100,38 @@ fn others_than(t: Triangle, a: u32, b: u32) -> u32 {
 }
 
 /// True if with `t` the link of `v` would have a closed cycle and another component.
-fn makes_excess(t: Triangle, v: u32, view: &impl View) -> bool {
-    let mut edges: Vec<(u32, u32)> = Vec::with_capacity(12);
-    view.around(v, &mut |_, other| {
-        let [a, b] = others(other, v);
-        edges.push((a, b));
-    });
-    if edges.is_empty() {
+fn makes_excess(t: Triangle, v: u32, view: &impl View, link: &mut Vec<[u32; 2]>) -> bool {
+    link.clear();
+    link.extend(view.around(v).map(|(_, other)| others(other, v)));
+    let edges = link.len();
+    if edges == 0 {
         return false;
     }
     // A link without ends is closed already.
-    let degree = |node: u32| {
-        edges
-            .iter()
-            .filter(|(a, b)| *a == node || *b == node)
-            .count()
-    };
-    if edges.iter().all(|&(a, b)| degree(a) == 2 && degree(b) == 2) {
+    let degree = |node: u32| link.iter().filter(|e| e[0] == node || e[1] == node).count();
+    if link.iter().flatten().all(|&node| degree(node) == 2) {
         return true;
     }
     let [from, goal] = others(t, v);
     let mut node = from;
-    let mut used = vec![false; edges.len()];
-    let mut steps = 0;
     while node != goal {
-        let next =
-            (0..edges.len()).find(|&e| !used[e] && (edges[e].0 == node || edges[e].1 == node));
-        let Some(edge) = next else { return false };
-        used[edge] = true;
-        steps += 1;
-        node = if edges[edge].0 == node {
-            edges[edge].1
-        } else {
-            edges[edge].0
-        };
+        let next = link.iter().position(|e| e[0] == node || e[1] == node);
+        let Some(next) = next else { return false };
+        let [a, b] = link.swap_remove(next);
+        node ^= a ^ b;
     }
-    steps < edges.len()
+    !link.is_empty()
 }
 
 /// The exact normal of the triangle `a → b → c`, twice its area long.
 #[must_use]
 pub fn normal(a: Point, b: Point, c: Point) -> [i128; 3] {
-    let (u, v) = (sub(b, a).map(i128::from), sub(c, a).map(i128::from));
+    let (u, v) = (sub(b, a), sub(c, a));
+    // Differences are less than 2^30, so this fits 64 bits.
     [
-        u[1] * v[2] - u[2] * v[1],
-        u[2] * v[0] - u[0] * v[2],
-        u[0] * v[1] - u[1] * v[0],
+        i128::from(u[1] * v[2] - u[2] * v[1]),
+        i128::from(u[2] * v[0] - u[0] * v[2]),
+        i128::from(u[0] * v[1] - u[1] * v[0]),
     ]
 }
 
@@ -146,12 +143,44 @@ fn angle_fits([a, b, c]: [Point; 3], far: Point, cos_max_angle: f64) -> bool {
     dot(n, m) >= cos_max_angle * dot(n, n).sqrt() * dot(m, m).sqrt()
 }
 
-/// The order in which candidates are tried: class, square of the longest edge, ids.
-pub type Rank = (u32, u64, Triangle);
+/// A triangle that may be inserted; in the order in which they are tried.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Candidate {
+    /// Class and, below 2^62, the square of the longest edge.
+    rank: u64,
+    /// Vertices.
+    pub ids: Triangle,
+    /// When it was last tried; used by the one who tries.
+    pub tried: u32,
+}
 
-/// The rank of a candidate seen by `count` cells (3: it was flagged).
-#[must_use]
-pub fn rank(t: Triangle, count: u32, [a, b, c]: [Point; 3]) -> Rank {
-    let d = crate::geom::distance2;
-    (3 - count.min(3), d(a, b).max(d(b, c)).max(d(a, c)), t)
+impl Candidate {
+    /// The candidate seen by `count` cells (3: it was flagged).
+    #[must_use]
+    pub fn new(ids: Triangle, count: u32, [a, b, c]: [Point; 3]) -> Self {
+        let d = crate::geom::distance2;
+        let length = d(a, b).max(d(b, c)).max(d(a, c));
+        Self {
+            rank: u64::from(3 - count.min(3)) << 62 | length,
+            ids,
+            tried: 0,
+        }
+    }
+
+    /// As a record, in the same order.
+    #[must_use]
+    pub fn record(&self) -> [u32; 5] {
+        let [i, j, k] = self.ids;
+        [(self.rank >> 32) as u32, self.rank as u32, i, j, k]
+    }
+
+    /// From a record.
+    #[must_use]
+    pub fn from_record([high, low, i, j, k]: [u32; 5]) -> Self {
+        Self {
+            rank: u64::from(high) << 32 | u64::from(low),
+            ids: [i, j, k],
+            tried: 0,
+        }
+    }
 }

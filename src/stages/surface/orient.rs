@@ -1,8 +1,9 @@
 //! Components and orientation of a surface given block by block.
 
 use super::parity::ParitySets;
-use super::star::{EDGES, Star, Triangle, has, opposed};
+use super::star::{EDGES, Edges, Triangle, opposed};
 use crate::error::Result;
+use crate::spill::layouts::{LABELLED, SENT_LABELLED, TRIANGLE};
 use crate::spill::{Exchange, Sections};
 use crate::stages::blocks::Blocks;
 use crate::workspace::Workspace;
@@ -51,15 +52,56 @@ pub fn orient(
     blocks: Blocks,
     workspace: &Workspace,
 ) -> Result<Oriented> {
-    let interior = Sections::create(workspace, &format!("{name}.interior"), blocks.count())?;
-    let exchange_held = workspace.reserve("exchange", 2 * EXCHANGE_BUFFER)?;
-    let exchange = Exchange::<6>::new(workspace, &format!("{name}.relations"), EXCHANGE_BUFFER);
-    let labels = Mutex::new(vec![(0u32, 0u32); blocks.count()]);
+    let inside = orient_inside(name, around, bytes, blocks, workspace)?;
+    inside.join(name, None, blocks, workspace)
+}
+
+/// A surface whose blocks are oriented, but not yet what lies between them.
+#[derive(Debug)]
+pub struct OrientedInside {
+    interior: Sections<4>,
+    relations: Sections<6>,
+    /// Crossing triangles by the block of their smallest vertex.
+    crossing: Sections<3>,
+    /// For each block, the number of labels that are global, and of all.
+    labels: Vec<(u32, u32)>,
+    mobius: u64,
+    triangles: u64,
+}
+
+/// The first half of [`orient`]: the interior triangles.
+///
+/// # Errors
+/// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
+/// [`crate::Error::Cancelled`].
+pub fn orient_inside(
+    name: &str,
+    around: impl Fn(usize) -> Result<Vec<Triangle>> + Sync,
+    bytes: impl Fn(usize) -> u64 + Sync,
+    blocks: Blocks,
+    workspace: &Workspace,
+) -> Result<OrientedInside> {
+    let count = blocks.count();
+    let sections = |part: &str| format!("{name}.{part}");
+    let interior = Sections::with_layout(workspace, &sections("interior"), count, LABELLED)?;
+    let border = Sections::with_layout(workspace, &sections("border"), count, TRIANGLE)?;
+    let _held = workspace.reserve("exchange", EXCHANGE_BUFFER)?;
+    let exchange = Exchange::<6>::new(workspace, &sections("relations"), EXCHANGE_BUFFER);
+    let labels = Mutex::new(vec![(0u32, 0u32); count]);
     let (mobius, triangles) = (AtomicU64::new(0), AtomicU64::new(0));
-    workspace.for_each_unit("block", blocks.count(), &bytes, |block| {
-        let done = orient_block(&around(block)?, blocks, block);
+    workspace.for_each_unit("block", count, &bytes, |block| {
+        let around = around(block)?;
+        let (inner, crossing): (Vec<Triangle>, Vec<Triangle>) =
+            around.iter().partition(|t| !blocks.crossing(**t));
+        drop(around);
+        let done = orient_block(&inner, &crossing, blocks, block);
         interior.put(block, &done.interior)?;
         exchange.send(&done.relations)?;
+        let mine = |t: &&Triangle| blocks.of(t[0]) == block as u32;
+        border.put(
+            block,
+            &crossing.iter().filter(mine).copied().collect::<Vec<_>>(),
+        )?;
         labels
             .lock()
             .unwrap_or_else(std::sync::PoisonError::into_inner)[block] = (done.global, done.labels);
@@ -68,39 +110,70 @@ pub fn orient(
         workspace.observer.advance(1);
         Ok(())
     })?;
-    let labels = labels
-        .into_inner()
-        .unwrap_or_else(std::sync::PoisonError::into_inner);
-    let relations = exchange.deliver(workspace, blocks.count())?;
-    let mut globals = Vec::with_capacity(labels.len());
-    let mut next = 0u32;
-    for (global, _) in &labels {
-        globals.push((next, *global));
-        next += global;
-    }
-    let held = workspace.reserve("labels", u64::from(next) * 10 + 1024)?;
-    let mut surface = Oriented {
+    Ok(OrientedInside {
         interior,
-        crossing: Sections::create(workspace, &format!("{name}.none"), 0)?,
-        globals,
-        labels: labels.into_iter().map(|(_, all)| all).collect(),
-        sets: ParitySets::new(next as usize),
-        crosses: vec![false; next as usize],
+        relations: exchange.deliver(workspace, count)?,
+        crossing: border,
+        labels: labels
+            .into_inner()
+            .unwrap_or_else(std::sync::PoisonError::into_inner),
         mobius: mobius.into_inner(),
         triangles: triangles.into_inner(),
-        _held: held,
-    };
-    orient_crossing(
-        &mut surface,
-        name,
-        &around,
-        &bytes,
-        &relations,
-        blocks,
-        workspace,
-    )?;
-    drop(exchange_held);
-    Ok(surface)
+    })
+}
+
+impl OrientedInside {
+    /// The second half of [`orient`]: the crossing triangles, without those in `removed`, `[block,
+    /// i, j, k]` by the block of their smallest vertex.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
+    /// [`crate::Error::Cancelled`].
+    pub fn join(
+        self,
+        name: &str,
+        removed: Option<&Sections<4>>,
+        blocks: Blocks,
+        workspace: &Workspace,
+    ) -> Result<Oriented> {
+        let _exchange = workspace.reserve("exchange", EXCHANGE_BUFFER)?;
+        let mut globals = Vec::with_capacity(self.labels.len());
+        let mut next = 0u32;
+        for (global, _) in &self.labels {
+            globals.push((next, *global));
+            next += global;
+        }
+        let held = workspace.reserve("labels", u64::from(next) * 16 + 1024)?;
+        let mut surface = Oriented {
+            interior: self.interior,
+            crossing: Sections::create(workspace, &format!("{name}.none"), 0)?,
+            globals,
+            labels: self.labels.into_iter().map(|(_, all)| all).collect(),
+            sets: ParitySets::new(next as usize),
+            crosses: vec![false; next as usize],
+            mobius: self.mobius,
+            triangles: self.triangles,
+            _held: held,
+        };
+        let border = |block: usize| {
+            let mut triangles = self.crossing.get(block)?;
+            if let Some(removed) = removed {
+                let removed = removed.get(block)?;
+                let gone = |t: &Triangle| removed.binary_search(&[block as u32, t[0], t[1], t[2]]);
+                triangles.retain(|t| gone(t).is_err());
+            }
+            Ok(triangles)
+        };
+        orient_crossing(
+            &mut surface,
+            name,
+            border,
+            &self.relations,
+            blocks,
+            workspace,
+        )?;
+        Ok(surface)
+    }
 }
 
 struct OrientedBlock {
@@ -114,35 +187,66 @@ struct OrientedBlock {
     mobius: u64,
 }
 
-fn orient_block(around: &[Triangle], blocks: Blocks, block: usize) -> OrientedBlock {
+/// What the triangles adjacent to one ask for: their label, and if the triangle must be turned
+/// against it. At most two at each edge.
+#[derive(Debug, Default)]
+pub struct Asks {
+    list: [(u32, bool); 6],
+    len: usize,
+}
+
+impl Asks {
+    /// Adds one.
+    pub fn push(&mut self, ask: (u32, bool)) {
+        // A third triangle at an edge would be no surface; it is not looked at.
+        if self.len < 6 {
+            self.list[self.len] = ask;
+            self.len += 1;
+        }
+    }
+
+    /// All of them in order.
+    #[must_use]
+    pub fn all(&self) -> &[(u32, bool)] {
+        &self.list[..self.len]
+    }
+}
+
+fn orient_block(
+    inner: &[Triangle],
+    crossing: &[Triangle],
+    blocks: Blocks,
+    block: usize,
+) -> OrientedBlock {
     let ids = blocks.ids(block);
-    let (inner, crossing): (Vec<Triangle>, Vec<Triangle>) =
-        around.iter().partition(|t| !blocks.crossing(**t));
-    let mut star = Star::with_room(ids.clone(), inner.iter().copied());
+    let mut edges = Edges::with_room(ids.clone(), inner);
     let mut sets = ParitySets::new(inner.len());
     let mut kept = Vec::with_capacity(inner.len());
     let mut mobius = 0;
     for (number, &t) in inner.iter().enumerate() {
         let number = number as u32;
         // Either all adjacent triangles agree and are joined, or the triangle goes.
-        let asks: Vec<(u32, bool)> = adjacent(t, &star, &inner, &ids).collect();
-        if !consistent(&mut sets, &asks) {
+        let mut asks = Asks::default();
+        adjacent(t, &edges, inner, &ids, |other, flip| {
+            asks.push((other, flip))
+        });
+        if !consistent(&mut sets, asks.all()) {
             mobius += 1;
             continue;
         }
-        for (other, flip) in asks {
+        for &(other, flip) in asks.all() {
             sets.join(other, number, flip);
         }
-        star.add(t, number);
+        edges.add(t, number);
         kept.push(number);
     }
     let mut relations = Vec::new();
-    for &c in &crossing {
-        for (other, flip) in adjacent(c, &star, &inner, &ids) {
+    for &c in crossing {
+        adjacent(c, &edges, inner, &ids, |other, flip| {
             relations.push((c, other, flip));
-        }
+        });
     }
-    number_labels(&inner, &kept, &relations, &mut sets, blocks, block, mobius)
+    number_labels(inner, &kept, &relations, &mut sets, blocks, block, mobius)
 }
 
 /// Gives labels to the sets, those in relations first, both in order of first appearance.
@@ -155,21 +259,29 @@ fn number_labels(
     block: usize,
     mobius: u64,
 ) -> OrientedBlock {
-    let mut labels: FxHashMap<u32, u32> = FxHashMap::default();
+    const NONE: u32 = u32::MAX;
+    let mut label_of = vec![NONE; inner.len()];
+    let mut labels = 0;
+    let mut find = |triangle: u32| {
+        let (root, turned) = sets.find(triangle);
+        let label = &mut label_of[root as usize];
+        if *label == NONE {
+            *label = labels;
+            labels += 1;
+        }
+        (*label, turned, labels)
+    };
+    let mut global = 0;
     let mut sent = Vec::with_capacity(relations.len());
     for &(c, other, flip) in relations {
-        let (root, turned) = sets.find(other);
-        let next = labels.len() as u32;
-        let label = *labels.entry(root).or_insert(next);
+        let (label, turned, labels) = find(other);
+        global = labels;
         let word = label << 1 | u32::from(flip ^ turned);
         sent.push([blocks.of(c[0]), c[0], c[1], c[2], block as u32, word]);
     }
-    let global = labels.len() as u32;
     let mut interior = Vec::with_capacity(kept.len());
     for &number in kept {
-        let (root, turned) = sets.find(number);
-        let next = labels.len() as u32;
-        let label = *labels.entry(root).or_insert(next);
+        let (label, turned, _) = find(number);
         let t = inner[number as usize];
         interior.push([t[0], t[1], t[2], label << 1 | u32::from(turned)]);
     }
@@ -177,29 +289,28 @@ fn number_labels(
         interior,
         relations: sent,
         global,
-        labels: labels.len() as u32,
+        labels,
         mobius,
     }
 }
 
-/// Triangles in the star that share an edge inside the block with `t`, and whether `t` must be
-/// turned against them.
-fn adjacent<'a>(
+/// Calls `each` with the triangles that share an edge inside the block with `t`, and whether `t`
+/// must be turned against them.
+fn adjacent(
     t: Triangle,
-    star: &'a Star,
-    triangles: &'a [Triangle],
-    ids: &'a std::ops::Range<u32>,
-) -> impl Iterator<Item = (u32, bool)> + 'a {
-    EDGES
-        .into_iter()
-        .filter(move |(a, b, ..)| ids.contains(&t[*a]) && ids.contains(&t[*b]))
-        .flat_map(move |(a, b, ..)| {
-            let (low, high) = (t[a], t[b]);
-            star.at(low).iter().copied().filter_map(move |n| {
-                let other = triangles[n as usize];
-                has(other, high).then(|| (n, opposed(t, other, low, high)))
-            })
-        })
+    edges: &Edges,
+    triangles: &[Triangle],
+    ids: &std::ops::Range<u32>,
+    mut each: impl FnMut(u32, bool),
+) {
+    for (a, b, ..) in EDGES {
+        let (low, high) = (t[a], t[b]);
+        if ids.contains(&high) {
+            for n in edges.at(low, high) {
+                each(n, opposed(t, triangles[n as usize], low, high));
+            }
+        }
+    }
 }
 
 /// True if no two of `asks`, taken together with what is joined already, contradict each other.
@@ -217,21 +328,19 @@ pub fn consistent(sets: &mut ParitySets, asks: &[(u32, bool)]) -> bool {
 fn orient_crossing(
     base: &mut Oriented,
     name: &str,
-    around: &impl Fn(usize) -> Result<Vec<Triangle>>,
-    bytes: &impl Fn(usize) -> u64,
+    border: impl Fn(usize) -> Result<Vec<Triangle>>,
     relations: &Sections<6>,
     blocks: Blocks,
     workspace: &Workspace,
 ) -> Result<()> {
-    let exchange = Exchange::<5>::new(workspace, &format!("{name}.crossing"), EXCHANGE_BUFFER);
+    let exchange = Exchange::<5>::new(workspace, &format!("{name}.crossing"), EXCHANGE_BUFFER)
+        .packed(SENT_LABELLED);
     let mut edges: FxHashMap<(u32, u32), Vec<(Triangle, u32)>> = FxHashMap::default();
     for group in 0..blocks.count() {
         workspace.check_cancel()?;
-        let _held = workspace.reserve("block", bytes(group))?;
         let relations = relations.get(group)?;
         let mut sent = Vec::new();
-        let mine = |t: &Triangle| blocks.of(t[0]) == group as u32 && blocks.crossing(*t);
-        for t in around(group)?.into_iter().filter(mine) {
+        for t in border(group)? {
             let Some(word) = orient_one(base, t, &relations, group as u32, &edges) else {
                 base.mobius += 1;
                 continue;

@@ -113,6 +113,68 @@ impl Star {
     }
 }
 
+/// For each vertex of a block, the edges to higher vertices with the triangles at them.
+#[derive(Debug)]
+pub struct Edges {
+    ids: Range<u32>,
+    start: Vec<u32>,
+    len: Vec<u32>,
+    /// Higher vertex and triangle.
+    list: Vec<(u32, u32)>,
+}
+
+impl Edges {
+    /// No edges, with room for those of `triangles` whose lower vertex is in `ids`.
+    #[must_use]
+    pub fn with_room(ids: Range<u32>, triangles: &[Triangle]) -> Self {
+        let mut start = vec![0u32; ids.len() + 1];
+        for t in triangles {
+            // Two edges begin at the lowest vertex, one at the middle one.
+            for (v, edges) in [(t[0], 2), (t[1], 1)] {
+                if ids.contains(&v) {
+                    start[(v - ids.start) as usize + 1] += edges;
+                }
+            }
+        }
+        for v in 0..ids.len() {
+            start[v + 1] += start[v];
+        }
+        Self {
+            list: vec![(0, 0); start[ids.len()] as usize],
+            len: vec![0; ids.len()],
+            ids,
+            start,
+        }
+    }
+
+    /// Puts in triangle `t` as `number`; room must have been left.
+    pub fn add(&mut self, t: Triangle, number: u32) {
+        for (a, b, ..) in EDGES {
+            if self.ids.contains(&t[a]) {
+                let v = (t[a] - self.ids.start) as usize;
+                self.list[(self.start[v] + self.len[v]) as usize] = (t[b], number);
+                self.len[v] += 1;
+            }
+        }
+    }
+
+    /// Numbers of the triangles at the edge `low < high`, in order of insertion; none if `low` is
+    /// not in the block.
+    pub fn at(&self, low: u32, high: u32) -> impl Iterator<Item = u32> + '_ {
+        let edges = if self.ids.contains(&low) {
+            let v = (low - self.ids.start) as usize;
+            let start = self.start[v] as usize;
+            &self.list[start..start + self.len[v] as usize]
+        } else {
+            &[]
+        };
+        edges
+            .iter()
+            .filter(move |(other, _)| *other == high)
+            .map(|(_, number)| *number)
+    }
+}
+
 /// The components of the link of a vertex: groups of triangles that hang together through edges at
 /// the vertex. Works for links whose nodes have at most two edges.
 #[derive(Debug, Default)]

@@ -1,6 +1,7 @@
 //! Triples with their counts, by block: what the cells of all tiles saw, added up (paper, 3.4).
 
 use crate::error::Result;
+use crate::spill::layouts::{LABELLED, SENT_LABELLED};
 use crate::spill::{Exchange, Sections};
 use crate::stages::blocks::Blocks;
 use crate::stages::cells::CellTriples;
@@ -44,9 +45,9 @@ pub fn triples(
     blocks: Blocks,
     workspace: &Workspace,
 ) -> Result<(Triples, TripleStats)> {
-    let own = Sections::create(workspace, "triples.own", blocks.count())?;
+    let own = Sections::with_layout(workspace, "triples.own", blocks.count(), LABELLED)?;
     let held = workspace.reserve("triples: exchange", EXCHANGE_BUFFER)?;
-    let exchange = Exchange::new(workspace, "triples.sent", EXCHANGE_BUFFER);
+    let exchange = Exchange::new(workspace, "triples.sent", EXCHANGE_BUFFER).packed(SENT_LABELLED);
     let counts: [AtomicU64; 4] = Default::default();
     let bytes = |block: usize| {
         let tiles = cells.tiles.of_block(block);
@@ -57,7 +58,9 @@ pub fn triples(
     workspace.for_each_unit("triples: block", blocks.count(), bytes, |block| {
         let mut all = Vec::new();
         for tile in cells.tiles.of_block(block) {
-            merge(&cells.own.get(tile)?, &cells.received.get(tile)?, &mut all);
+            let (seen, received) = (cells.own.get(tile)?, cells.received.get(tile)?);
+            all.reserve_exact(seen.len() + received.len());
+            merge(&seen, &received, &mut all);
         }
         let mut sent = Vec::new();
         let mut local = [0u64; 4];

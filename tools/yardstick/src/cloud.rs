@@ -64,7 +64,7 @@ impl Sample {
 pub fn ordered(cloud: &Path, workspace: &Workspace) -> Result<(PointStore, f64)> {
     let spool = ingest::ingest(&[cloud.to_owned()], workspace)?;
     let lattice = spool.choose_lattice(0)?;
-    let mut orderer = order::Orderer::new(workspace)?;
+    let orderer = order::Orderer::new(workspace)?;
     spool.for_each(&lattice, |points| orderer.push(workspace, points))?;
     let (store, _) = orderer.finish(workspace, order::PAGE)?;
     Ok((store, lattice.step))

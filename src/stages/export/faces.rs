@@ -1,0 +1,92 @@
+//! The triangles of a block in the file's numbers.
+
+use super::number::Numbering;
+use super::ply::{FACE, encode_face};
+use crate::error::Result;
+use crate::stages::repair::Repaired;
+use crate::stages::surface::star::sorted;
+use std::ops::Range;
+
+/// The triangles whose smallest vertex is in a block.
+pub struct Faces<'a> {
+    numbering: &'a Numbering<'a>,
+    ids: Range<u32>,
+    /// Numbers of the block's vertices.
+    numbers: Vec<u32>,
+    /// Those of the surface, ascending by sorted ids.
+    triangles: Vec<[u32; 3]>,
+    /// Those that fill holes, likewise.
+    filled: Vec<[u32; 3]>,
+    /// Corners that take copies, by triangle.
+    splits: Vec<[u32; 7]>,
+}
+
+impl<'a> Faces<'a> {
+    /// Reads the triangles of a block with vertices `ids`.
+    pub fn load(
+        repaired: &Repaired,
+        numbering: &'a Numbering<'a>,
+        ids: Range<u32>,
+        block: usize,
+    ) -> Result<Self> {
+        let (triangles, _) = repaired.surface.load(block)?;
+        let filled = repaired.filled.get(block)?;
+        let filled = filled.iter().map(|r| [r[1], r[2], r[3]]);
+        let mut filled: Vec<_> = filled.filter(|t| t[0] >= ids.start).collect();
+        filled.sort_unstable_by_key(|t| sorted(*t));
+        Ok(Self {
+            numbering,
+            numbers: ids.clone().map(|v| numbering.vertex(v)).collect(),
+            ids,
+            triangles,
+            filled,
+            splits: numbering.splits.get(block)?,
+        })
+    }
+
+    /// Appends all triangles, ascending by sorted ids, to `bytes`.
+    pub fn encode(&self, bytes: &mut Vec<u8>) {
+        let first = self.triangles.partition_point(|t| t[0] < self.ids.start);
+        let own = &self.triangles[first..];
+        bytes.reserve_exact((own.len() + self.filled.len()) * FACE as usize);
+        let mut filled = self.filled.iter().copied().peekable();
+        let mut splits = &self.splits[..];
+        // The smallest vertex of the next triangle that needs more than numbers.
+        let mut special = 0;
+        for &t in own {
+            if t[0] >= special {
+                while let Some(f) = filled.next_if(|f| sorted(*f) < sorted(t)) {
+                    self.encode_special(f, &mut splits, bytes);
+                }
+                self.encode_special(t, &mut splits, bytes);
+                let next_filled = filled.peek().map_or(u32::MAX, |f| f[0]);
+                special = next_filled.min(splits.first().map_or(u32::MAX, |s| s[1]));
+            } else {
+                encode_face(t.map(|v| self.number(v)), bytes);
+            }
+        }
+        filled.for_each(|f| self.encode_special(f, &mut splits, bytes));
+    }
+
+    #[inline]
+    fn number(&self, v: u32) -> u32 {
+        let own = self.numbers.get(v.wrapping_sub(self.ids.start) as usize);
+        own.copied().unwrap_or_else(|| self.numbering.vertex(v))
+    }
+
+    /// A triangle with corners that may take copies: those in a fan with a copy of its own.
+    fn encode_special(&self, t: [u32; 3], splits: &mut &[[u32; 7]], bytes: &mut Vec<u8>) {
+        let mut out = t.map(|v| self.number(v));
+        while let Some((s, rest)) = splits.split_first()
+            && s[1..4] == sorted(t)
+        {
+            for (corner, v) in out.iter_mut().zip(t) {
+                if v == s[4] {
+                    *corner = self.numbering.first_copy(s[5] as usize) as u32 + s[6];
+                }
+            }
+            *splits = rest;
+        }
+        encode_face(out, bytes);
+    }
+}

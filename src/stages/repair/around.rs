@@ -1,0 +1,61 @@
+//! The triangles around a block as stitching left them.
+
+use crate::error::Result;
+use crate::stages::stitch::Stitched;
+use crate::stages::surface::star::Triangle;
+
+/// All triangles that touch a block, ascending.
+///
+/// # Errors
+/// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+pub fn load(stitched: &Stitched, block: usize) -> Result<Vec<Triangle>> {
+    let mut triangles = stitched.interior.get(block)?;
+    let removed = stitched.removed.get(block)?;
+    if !removed.is_empty() {
+        let gone = |t: &Triangle| removed.binary_search(&[block as u32, t[0], t[1], t[2]]);
+        triangles.retain(|t| gone(t).is_err());
+    }
+    let added = stitched.added.get(block)?;
+    merge(&mut triangles, added.iter().map(|r| [r[1], r[2], r[3]]));
+    Ok(triangles)
+}
+
+/// Merges ascending triangles into ascending ones, in place and from behind.
+fn merge(
+    into: &mut Vec<Triangle>,
+    more: impl DoubleEndedIterator<Item = Triangle> + ExactSizeIterator,
+) {
+    let (mut from, mut to) = (into.len(), into.len() + more.len());
+    into.reserve_exact(more.len());
+    into.resize(to, [0; 3]);
+    for t in more.rev() {
+        while from > 0 && into[from - 1] > t {
+            from -= 1;
+            to -= 1;
+            into[to] = into[from];
+        }
+        to -= 1;
+        into[to] = t;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn merging_is_sorting(
+            mut a in prop::collection::vec([0u32..9, 0u32..9, 0u32..9], 0..40),
+            mut b in prop::collection::vec([0u32..9, 0u32..9, 0u32..9], 0..40),
+        ) {
+            a.sort_unstable();
+            b.sort_unstable();
+            let mut want = [a.clone(), b.clone()].concat();
+            want.sort_unstable();
+            merge(&mut a, b.iter().copied());
+            prop_assert_eq!(a, want);
+        }
+    }
+}

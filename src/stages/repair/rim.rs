@@ -1,0 +1,233 @@
+//! What is at the boundary: the triangles, steps of boundary loops and pinched vertices of a block.
+
+use super::fill::Corner;
+use super::loops::{Step, neighbors, steps};
+use super::surface::Surface;
+use crate::error::Result;
+use crate::geom::Point;
+use crate::spill::Sections;
+use crate::stages::blocks::Blocks;
+use crate::stages::order::PointStore;
+use crate::stages::surface::star::Star;
+use crate::workspace::Workspace;
+use crate::workspace::memory::Reservation;
+use rustc_hash::FxHashMap;
+use std::ops::Range;
+
+/// What the numbers of vertices and triangles follow from.
+#[derive(Debug)]
+pub struct Outline {
+    /// A bit for each point, 64 a word: is it a vertex?
+    pub used: Vec<u64>,
+    /// For each block, the triangles whose smallest vertex is in it, without those that fill holes.
+    pub faces: Vec<u32>,
+    /// Edges with one triangle, after holes were filled.
+    pub boundary_edges: u64,
+    /// The vertices of each block that had several fans before holes were filled.
+    pub pinches: Sections<1>,
+    /// All triangles at these vertices before holes were filled, as they run.
+    pub pinched: Sections<3>,
+    _held: Reservation,
+}
+
+impl Outline {
+    pub(super) fn new(blocks: Blocks, workspace: &Workspace) -> Result<Self> {
+        let (words, count) = (blocks.points().div_ceil(64) + 1, blocks.count());
+        let held = workspace.reserve("vertices", (words * 8 + count * 4) as u64)?;
+        Ok(Self {
+            used: vec![0; words],
+            faces: vec![0; count],
+            boundary_edges: 0,
+            pinches: Sections::create(workspace, "repair.pinches", count)?,
+            pinched: Sections::create(workspace, "repair.pinched", count)?,
+            _held: held,
+        })
+    }
+
+    /// Takes in what a block found.
+    pub(super) fn add(&mut self, block: usize, ids: &Range<u32>, found: &BlockRim) {
+        self.faces[block] = found.faces;
+        self.boundary_edges += found.steps.len() as u64;
+        let (first, shift) = (ids.start as usize / 64, ids.start % 64);
+        for (n, word) in found.used.iter().enumerate() {
+            self.used[first + n] |= word << shift;
+            if shift > 0 {
+                self.used[first + n + 1] |= word >> (64 - shift);
+            }
+        }
+    }
+}
+
+/// The boundary of the surface in a block.
+pub struct BlockRim {
+    ids: Range<u32>,
+    /// Bits: the block's vertices that have a triangle.
+    used: Vec<u64>,
+    /// Triangles whose smallest vertex is in the block.
+    faces: u32,
+    /// All triangles at vertices with a boundary edge, and the component of each.
+    triangles: Vec<[u32; 4]>,
+    star: Star,
+    own: Vec<Point>,
+    foreign: FxHashMap<u32, Point>,
+    /// Steps of boundary loops, ascending.
+    pub steps: Vec<Step>,
+    /// Vertices with several fans, ascending.
+    pub pinches: Vec<[u32; 1]>,
+}
+
+impl BlockRim {
+    pub(super) fn load(
+        store: &PointStore,
+        surface: &Surface,
+        blocks: Blocks,
+        block: usize,
+    ) -> Result<Self> {
+        let ids = blocks.ids(block);
+        let rims = surface.rims(block)?;
+        let mut rim = Self {
+            used: vec![0; ids.len().div_ceil(64)],
+            faces: 0,
+            triangles: Vec::new(),
+            star: Star::of(ids.start..ids.start, &[]),
+            own: Vec::new(),
+            foreign: FxHashMap::default(),
+            steps: Vec::new(),
+            pinches: Vec::new(),
+            ids: ids.clone(),
+        };
+        rim.pick(surface, block, &rims)?;
+        if rim.triangles.is_empty() {
+            return Ok(rim);
+        }
+        let plain = || rim.triangles.iter().map(|t| [t[0], t[1], t[2]]);
+        rim.star = Star::of(ids.clone(), &plain().collect::<Vec<_>>());
+        let mut far: Vec<u32> = plain().flatten().filter(|v| !ids.contains(v)).collect();
+        far.sort_unstable();
+        far.dedup();
+        let mut points = Vec::with_capacity(far.len());
+        store.fetch(&far, &mut points)?;
+        rim.foreign = far.into_iter().zip(points).collect();
+        rim.own = store.slice(ids.start as usize..ids.end as usize)?;
+        let on_rim = |v: &u32| bit(&rims, v - ids.start);
+        let mut pinches = Vec::new();
+        let position = |v| rim.position(v);
+        let pinch = |v| pinches.push([v]);
+        let vertices = ids.clone().filter(on_rim);
+        rim.steps = steps(vertices, &rim.star, &rim.triangles, position, pinch);
+        rim.pinches = pinches;
+        Ok(rim)
+    }
+
+    /// Goes through all triangles and picks those at vertices with a boundary edge.
+    fn pick(&mut self, surface: &Surface, block: usize, rims: &[[u32; 1]]) -> Result<()> {
+        let (triangles, runs) = surface.load(block)?;
+        let size = self.ids.len() as u32;
+        let mut rest = &triangles[..];
+        for run in runs {
+            let (these, later) = rest.split_at(run.count);
+            rest = later;
+            for t in these {
+                let mut at_rim = false;
+                for v in t {
+                    let local = v.wrapping_sub(self.ids.start);
+                    if local < size {
+                        self.used[local as usize / 64] |= 1 << (local % 64);
+                        at_rim |= bit(rims, local);
+                    }
+                }
+                self.faces += u32::from(t[0].wrapping_sub(self.ids.start) < size);
+                if at_rim {
+                    self.triangles.push([t[0], t[1], t[2], run.component]);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn position(&self, v: u32) -> Point {
+        if self.ids.contains(&v) {
+            self.own[(v - self.ids.start) as usize]
+        } else {
+            self.foreign[&v]
+        }
+    }
+
+    /// The corner of a boundary loop at a step.
+    pub fn corner(&self, step: &Step) -> Corner {
+        Corner {
+            id: step.at,
+            at: self.position(step.at),
+            apex: self.position(step.apex),
+            pinched: step.pinched,
+        }
+    }
+
+    /// True if the mesh has the edge from `a`, a vertex of a step, to `b`.
+    pub fn has_edge(&self, a: u32, b: u32) -> bool {
+        self.star
+            .at(a)
+            .iter()
+            .any(|&n| self.triangles[n as usize][..3].contains(&b))
+    }
+
+    /// All triangles at pinched vertices, ascending by sorted ids.
+    pub fn pinched(&self) -> Vec<[u32; 3]> {
+        let at = |v: &[u32; 1]| self.star.at(v[0]).iter().copied();
+        let mut numbers: Vec<u32> = self.pinches.iter().flat_map(at).collect();
+        numbers.sort_unstable();
+        numbers.dedup();
+        let plain = |n: u32| &self.triangles[n as usize];
+        numbers
+            .into_iter()
+            .map(plain)
+            .map(|t| [t[0], t[1], t[2]])
+            .collect()
+    }
+
+    /// Loops that stay in the block, and parts of loops that leave it.
+    pub fn trace(&self) -> (Vec<Vec<Step>>, Vec<Vec<Step>>) {
+        let mut seen = vec![false; self.steps.len()];
+        let next = |step: &Step| {
+            let key = (step.at, step.to);
+            let at = self.steps.partition_point(|s| (s.from, s.at) < key);
+            (at < self.steps.len() && (self.steps[at].from, self.steps[at].at) == key).then_some(at)
+        };
+        let mut follow = |start: usize| {
+            let mut part = Vec::new();
+            let mut at = Some(start);
+            while let Some(index) = at.filter(|i| !seen[*i]) {
+                seen[index] = true;
+                part.push(self.steps[index]);
+                at = next(&self.steps[index]);
+            }
+            part
+        };
+        let enters = |s: &Step| !self.ids.contains(&s.from);
+        let open = (0..self.steps.len())
+            .filter(|&i| enters(&self.steps[i]))
+            .map(&mut follow)
+            .collect();
+        let loops = (0..self.steps.len())
+            .map(&mut follow)
+            .filter(|part: &Vec<Step>| !part.is_empty());
+        (loops.collect(), open)
+    }
+
+    /// Steps as words: for each vertex its id, apex, whether it is pinched, number of neighbours,
+    /// neighbours.
+    pub fn words(&self, part: &[Step]) -> Vec<[u32; 1]> {
+        let mut words = Vec::new();
+        for step in part {
+            let around = neighbors(&self.star, &self.triangles, step.at);
+            let pinched = u32::from(step.pinched);
+            let head = [step.at, step.apex, pinched, around.len() as u32];
+            words.extend(head.into_iter().chain(around).map(|w| [w]));
+        }
+        words
+    }
+}
+
+fn bit(words: &[[u32; 1]], local: u32) -> bool {
+    words[local as usize / 32][0] >> (local % 32) & 1 == 1
+}

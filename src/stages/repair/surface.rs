@@ -1,0 +1,464 @@
+//! The surface by block: bridges found, triangles oriented, components judged.
+//!
+//! One pass looks at everything: each block by itself sets the triangles that touch it apart into
+//! labels, turns those of components that it has to itself, and leaves out the small ones. The
+//! labels of components that reach further are joined by the triangles that several blocks see.
+
+use super::facing::{Fate, SUMS, Sums, judge};
+use super::patch::Patch;
+use super::{EXCHANGE_BUFFER, OrientedTriangle, RepairOptions, RepairStats, around, bridges};
+use crate::error::Result;
+use crate::geom::Point;
+use crate::spill::layouts::SENT;
+use crate::spill::{Exchange, Layout, Sections, Word};
+use crate::stages::blocks::Blocks;
+use crate::stages::order::PointStore;
+use crate::stages::stitch::Stitched;
+use crate::stages::surface::parity::ParitySets;
+use crate::stages::surface::star::Triangle;
+use crate::workspace::Workspace;
+use crate::workspace::memory::Reservation;
+use rustc_hash::FxHashMap;
+use std::sync::{Mutex, PoisonError};
+
+/// `[i, a, b]` with `i` smaller than `a` and `b`, ascending by `i`.
+const ORIENTED: Layout<3> = [Word::Above, Word::Rising, Word::Left];
+
+/// `[owner, i, j, k, block, label << 1 | flip]`, ascending.
+const SEEN: Layout<6> = [
+    Word::Above,
+    Word::Above,
+    Word::Rising,
+    Word::Rising,
+    Word::Above,
+    Word::Above,
+];
+
+/// The oriented surface, small components and bridges left out.
+#[derive(Debug)]
+pub struct Surface {
+    /// Triangles that touch each block, ascending, as they run relative to their label.
+    triangles: Sections<3>,
+    /// `[count, label]`: how many of these in a row have which label; those of global labels come
+    /// first.
+    runs: Sections<2>,
+    /// Bits, 32 a word: the vertices of each block that have a boundary edge.
+    rims: Sections<1>,
+    /// `[block, i, j, k]`: bridges that several blocks see, for each of them.
+    bridges: Sections<4>,
+    /// For each block, the number of the first of its labels that are global, and how many are.
+    globals: Vec<(u32, u32)>,
+    /// For each global label its component, and what becomes of the label.
+    components: Vec<u32>,
+    fates: Vec<Fate>,
+    _held: Reservation,
+}
+
+/// The triangles of a component in a row.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Run {
+    /// Number of triangles.
+    pub count: usize,
+    /// The component; numbers can be compared within a block.
+    pub component: u32,
+}
+
+impl Surface {
+    /// Number of triangles that touch a block, or some more.
+    #[must_use]
+    pub fn records(&self, block: usize) -> usize {
+        self.triangles.records(block)
+    }
+
+    /// All triangles that touch a block, as they run, ascending by sorted ids; and the components
+    /// they belong to.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+    pub fn load(&self, block: usize) -> Result<(Vec<OrientedTriangle>, Vec<Run>)> {
+        let mut triangles = self.triangles.get(block)?;
+        let bridges = self.bridges.get(block)?;
+        let is_bridge = |[i, a, b]: OrientedTriangle| {
+            let key = [block as u32, i, a.min(b), a.max(b)];
+            !bridges.is_empty() && bridges.binary_search(&key).is_ok()
+        };
+        let (first, globals) = self.globals[block];
+        let runs = self.runs.get(block)?;
+        let mut kept = Vec::with_capacity(runs.len());
+        let (mut from, mut to) = (0, 0);
+        for [count, label] in runs {
+            let all = from..from + count as usize;
+            from = all.end;
+            let run = |component, before, after| Run {
+                count: after - before,
+                component,
+            };
+            let before = to;
+            if label >= globals {
+                triangles.copy_within(all, to);
+                to += count as usize;
+                kept.push(run(label << 1, before, to));
+                continue;
+            }
+            let label = (first + label) as usize;
+            let Fate { keep, turn } = self.fates[label];
+            if !keep {
+                continue;
+            }
+            for n in all {
+                let t = triangles[n];
+                if !is_bridge(t) {
+                    triangles[to] = if turn { [t[0], t[2], t[1]] } else { t };
+                    to += 1;
+                }
+            }
+            if to > before {
+                kept.push(run(self.components[label] << 1 | 1, before, to));
+            }
+        }
+        triangles.truncate(to);
+        Ok((triangles, kept))
+    }
+
+    /// The vertices of a block that have a boundary edge, as bits, 32 a word.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+    pub fn rims(&self, block: usize) -> Result<Vec<[u32; 1]>> {
+        self.rims.get(block)
+    }
+}
+
+/// Files that the blocks leave, and what they add up to.
+struct Build<'a> {
+    store: &'a PointStore,
+    stitched: &'a Stitched,
+    blocks: Blocks,
+    options: RepairOptions,
+    triangles: Sections<3>,
+    runs: Sections<2>,
+    rims: Sections<1>,
+    /// Sums over the interior triangles of each block's global labels.
+    sums: Sections<SUMS>,
+    bridges: Exchange<4>,
+    /// `[owner, i, j, k, block, label << 1 | flip]`: how a block sees a crossing triangle, for the
+    /// block of its smallest vertex.
+    seen: Exchange<6>,
+    shared: Mutex<Shared>,
+}
+
+struct Shared {
+    globals: Vec<u32>,
+    stats: RepairStats,
+}
+
+/// Builds the surface.
+///
+/// # Errors
+/// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
+/// [`crate::Error::Cancelled`].
+pub fn build(
+    store: &PointStore,
+    stitched: Stitched,
+    blocks: Blocks,
+    options: RepairOptions,
+    stats: &mut RepairStats,
+    workspace: &Workspace,
+) -> Result<Surface> {
+    let count = blocks.count();
+    let held = workspace.reserve("exchanges", 2 * EXCHANGE_BUFFER)?;
+    let build = Build {
+        store,
+        stitched: &stitched,
+        blocks,
+        options,
+        triangles: Sections::with_layout(workspace, "repair.surface", count, ORIENTED)?,
+        runs: Sections::unpacked(workspace, "repair.runs", count)?,
+        rims: Sections::unpacked(workspace, "repair.rims", count)?,
+        sums: Sections::unpacked(workspace, "repair.sums", count)?,
+        bridges: Exchange::new(workspace, "repair.bridges", EXCHANGE_BUFFER).packed(SENT),
+        seen: Exchange::new(workspace, "repair.seen", EXCHANGE_BUFFER).packed(SEEN),
+        shared: Mutex::new(Shared {
+            globals: vec![0; count],
+            stats: RepairStats::default(),
+        }),
+    };
+    let bytes = |b: usize| {
+        let records = stitched.interior.records(b) + stitched.added.records(b);
+        230 * records as u64 + blocks.ids(b).len() as u64 * 30 + (1 << 20)
+    };
+    workspace.for_each_unit("repair: block", count, bytes, |block| {
+        build.block(block)?;
+        workspace.observer.advance(1);
+        Ok(())
+    })?;
+    let shared = build.shared.into_inner();
+    let shared = shared.unwrap_or_else(PoisonError::into_inner);
+    *stats = shared.stats;
+    let bridges = build.bridges.deliver_unique(workspace, count)?;
+    for block in 0..count {
+        let own = |r: &&[u32; 4]| blocks.of(r[1]) == r[0];
+        stats.bridges_removed += bridges.get(block)?.iter().filter(own).count() as u64;
+    }
+    let seen = build.seen.deliver(workspace, count)?;
+    let (triangles, runs, rims, sums) = (build.triangles, build.runs, build.rims, build.sums);
+    drop(stitched);
+    drop(held);
+    let mut next = 0;
+    let mut globals = Vec::with_capacity(count);
+    for own in shared.globals {
+        globals.push((next, own));
+        next += own;
+    }
+    let held = workspace.reserve("labels", u64::from(next) * 10 + count as u64 * 8 + 1024)?;
+    let sets = join(&seen, &globals, next, workspace)?;
+    let parts = Parts {
+        store,
+        seen: &seen,
+        sums: &sums,
+        bridges: &bridges,
+        globals: &globals,
+        sets: &sets,
+    };
+    let (components, fates) = parts.judge(options, stats, workspace)?;
+    Ok(Surface {
+        triangles,
+        runs,
+        rims,
+        bridges,
+        globals,
+        components,
+        fates,
+        _held: held,
+    })
+}
+
+impl Build<'_> {
+    fn block(&self, block: usize) -> Result<()> {
+        let ids = self.blocks.ids(block);
+        let triangles = around::load(self.stitched, block)?;
+        let patch = Patch::of(ids.clone(), &triangles);
+        let bridges = if self.options.repair {
+            bridges::find(ids.clone(), &triangles, &patch)
+        } else {
+            Vec::new()
+        };
+        let mut rims = vec![[0u32]; ids.len().div_ceil(32)];
+        for (v, _) in patch.rims.iter().enumerate().filter(|(_, n)| **n > 0) {
+            rims[v / 32][0] |= 1 << (v % 32);
+        }
+        self.rims.put(block, &rims)?;
+        let sums = self.sum(block, &triangles, &patch, &bridges)?;
+        let (global, local) = sums.split_at(patch.global as usize);
+        let global: Vec<[u32; SUMS]> = global.iter().map(Sums::words).collect();
+        self.sums.put(block, &global)?;
+        let mut stats = RepairStats::default();
+        let least = self.options.least();
+        let fates: Vec<Fate> = local.iter().map(|s| judge(s, least, &mut stats)).collect();
+        drop(sums);
+        let interior = |n: &&u32| !self.blocks.crossing(triangles[**n as usize]);
+        stats.bridges_removed = bridges.iter().filter(interior).count() as u64;
+        self.send(block, &triangles, &patch, &bridges)?;
+        self.write(block, triangles, &patch, &bridges, &fates)?;
+        let mut shared = self.shared.lock().unwrap_or_else(PoisonError::into_inner);
+        shared.globals[block] = patch.global;
+        shared.stats.add(&stats);
+        Ok(())
+    }
+
+    /// Sums over the interior triangles by label.
+    fn sum(
+        &self,
+        block: usize,
+        triangles: &[Triangle],
+        patch: &Patch,
+        bridges: &[u32],
+    ) -> Result<Vec<Sums>> {
+        let ids = self.blocks.ids(block);
+        let points = self.store.slice(ids.start as usize..ids.end as usize)?;
+        let mut sums = vec![Sums::default(); patch.labels as usize];
+        let mut bridges = bridges.iter().peekable();
+        for (number, t) in triangles.iter().enumerate() {
+            let sum = &mut sums[(patch.words[number] >> 1) as usize];
+            if patch.open[number] {
+                sum.open();
+            }
+            if bridges.next_if(|n| **n as usize == number).is_some() {
+                continue;
+            }
+            if ids.contains(&t[0]) && ids.contains(&t[2]) {
+                let corners = t.map(|v| points[(v - ids.start) as usize]);
+                sum.add(*t, corners, patch.words[number] & 1 == 1);
+            }
+        }
+        Ok(sums)
+    }
+
+    /// Tells other blocks of crossing triangles: their labels here, and which are bridges.
+    fn send(
+        &self,
+        block: usize,
+        triangles: &[Triangle],
+        patch: &Patch,
+        bridges: &[u32],
+    ) -> Result<()> {
+        let ids = self.blocks.ids(block);
+        let mut seen = Vec::new();
+        let mut found = Vec::new();
+        for (number, &t) in triangles.iter().enumerate() {
+            if ids.contains(&t[0]) && ids.contains(&t[2]) {
+                continue;
+            }
+            let owner = self.blocks.of(t[0]);
+            let word = patch.words[number];
+            seen.push([owner, t[0], t[1], t[2], block as u32, word]);
+            if bridges.binary_search(&(number as u32)).is_ok() {
+                found.push([owner, t[0], t[1], t[2]]);
+                let others = self.blocks.visited(t);
+                found.extend(others.map(|b| [b, t[0], t[1], t[2]]));
+            }
+        }
+        self.seen.send(&seen)?;
+        self.bridges.send(&found)
+    }
+
+    /// Writes what stays of the triangles, as they run.
+    fn write(
+        &self,
+        block: usize,
+        mut triangles: Vec<Triangle>,
+        patch: &Patch,
+        bridges: &[u32],
+        fates: &[Fate],
+    ) -> Result<()> {
+        let mut runs: Vec<[u32; 2]> = Vec::new();
+        let mut bridges = bridges.iter().peekable();
+        let mut kept = 0;
+        for number in 0..triangles.len() {
+            if bridges.next_if(|n| **n as usize == number).is_some() {
+                continue;
+            }
+            let t = triangles[number];
+            let (label, flip) = (patch.words[number] >> 1, patch.words[number] & 1 == 1);
+            let fate = match label.checked_sub(patch.global) {
+                Some(local) => fates[local as usize],
+                None => Fate::UNKNOWN,
+            };
+            if !fate.keep {
+                continue;
+            }
+            let turn = flip ^ fate.turn;
+            triangles[kept] = if turn { [t[0], t[2], t[1]] } else { t };
+            kept += 1;
+            match runs.last_mut() {
+                Some(run) if run[1] == label => run[0] += 1,
+                _ => runs.push([1, label]),
+            }
+        }
+        self.triangles.put(block, &triangles[..kept])?;
+        self.runs.put(block, &runs)
+    }
+}
+
+/// Joins global labels of which a triangle has both.
+fn join(
+    seen: &Sections<6>,
+    globals: &[(u32, u32)],
+    labels: u32,
+    workspace: &Workspace,
+) -> Result<ParitySets> {
+    let mut sets = ParitySets::new(labels as usize);
+    for block in 0..globals.len() {
+        workspace.check_cancel()?;
+        let _held = workspace.reserve("labels seen", seen.records(block) as u64 * 24)?;
+        let all = seen.get(block)?;
+        for same in all.chunk_by(|a, b| a[1..4] == b[1..4]) {
+            let global = |r: &[u32; 6]| globals[r[4] as usize].0 + (r[5] >> 1);
+            for other in &same[1..] {
+                let turned = (same[0][5] ^ other[5]) & 1 == 1;
+                sets.join(global(&same[0]), global(other), turned);
+            }
+        }
+    }
+    sets.flatten();
+    Ok(sets)
+}
+
+/// What the components of global labels are put together from.
+struct Parts<'a> {
+    store: &'a PointStore,
+    seen: &'a Sections<6>,
+    sums: &'a Sections<SUMS>,
+    bridges: &'a Sections<4>,
+    globals: &'a [(u32, u32)],
+    sets: &'a ParitySets,
+}
+
+impl Parts<'_> {
+    /// The component and the fate of each global label.
+    fn judge(
+        &self,
+        options: RepairOptions,
+        stats: &mut RepairStats,
+        workspace: &Workspace,
+    ) -> Result<(Vec<u32>, Vec<Fate>)> {
+        let all: Mutex<FxHashMap<u32, Sums>> = Mutex::default();
+        let bytes = |block: usize| {
+            let labels = self.globals[block].1;
+            self.seen.records(block) as u64 * 150 + u64::from(labels) * 500 + (1 << 16)
+        };
+        workspace.for_each_unit("repair: borders", self.globals.len(), bytes, |block| {
+            let own = self.sum(block)?;
+            let mut all = all.lock().unwrap_or_else(PoisonError::into_inner);
+            for (root, sums) in own {
+                all.entry(root).or_default().merge(&sums, false);
+            }
+            Ok(())
+        })?;
+        let all = all.into_inner().unwrap_or_else(PoisonError::into_inner);
+        let _held = workspace.reserve("components", all.len() as u64 * 500)?;
+        let fates: FxHashMap<u32, Fate> = all
+            .iter()
+            .map(|(root, sums)| (*root, judge(sums, options.least(), stats)))
+            .collect();
+        let labels = (0..self.sets.len() as u32).map(|label| {
+            let (root, turned) = self.sets.look(label);
+            // Every label has sums.
+            let fate = fates.get(&root).copied().unwrap_or(Fate::UNKNOWN);
+            let turn = fate.turn ^ turned;
+            (root, Fate { turn, ..fate })
+        });
+        Ok(labels.unzip())
+    }
+
+    /// Sums over a block's interior triangles and the crossing ones that it owns, by the roots of
+    /// their labels.
+    fn sum(&self, block: usize) -> Result<FxHashMap<u32, Sums>> {
+        let mut own: FxHashMap<u32, Sums> = FxHashMap::default();
+        for (label, words) in (self.globals[block].0..).zip(self.sums.get(block)?) {
+            let (root, turned) = self.sets.look(label);
+            let sums = Sums::from_words(&words);
+            own.entry(root).or_default().merge(&sums, turned);
+        }
+        let seen = self.seen.get(block)?;
+        let bridges = self.bridges.get(block)?;
+        let mut ids: Vec<u32> = seen.iter().flat_map(|r| [r[1], r[2], r[3]]).collect();
+        ids.sort_unstable();
+        ids.dedup();
+        let mut points: Vec<Point> = Vec::with_capacity(ids.len());
+        self.store.fetch(&ids, &mut points)?;
+        for same in seen.chunk_by(|a, b| a[1..4] == b[1..4]) {
+            let r = same[0];
+            if bridges.binary_search(&[r[0], r[1], r[2], r[3]]).is_ok() {
+                continue;
+            }
+            let t = [r[1], r[2], r[3]];
+            let (root, turned) = self.sets.look(self.globals[r[4] as usize].0 + (r[5] >> 1));
+            // Every corner was fetched.
+            let corners = t.map(|v| points[ids.partition_point(|id| *id < v)]);
+            let flip = turned ^ (r[5] & 1 == 1);
+            own.entry(root).or_default().add(t, corners, flip);
+        }
+        Ok(own)
+    }
+}
