@@ -1,9 +1,8 @@
 //! The points that may be among the neighbours of a query, in columns.
 
 use super::near::above;
-use super::{LEAVES, Near, OwnPage, Tile};
+use super::{LEAVES, OwnPage, Tile};
 use crate::geom::aabb::Aabb;
-use crate::geom::{Point, sub};
 use crate::kernels::{Boxes, Level, box_distances};
 
 /// All points within a squared distance of some box, and others, in order of id.
@@ -18,18 +17,16 @@ pub(super) struct Candidates {
 }
 
 impl Candidates {
-    #[inline]
-    pub fn point(&self, at: usize) -> Point {
-        [self.x[at], self.y[at], self.z[at]]
-    }
-
-    #[inline]
-    pub fn near(&self, at: usize, distance2: u64, point: Point) -> Near {
-        Near {
-            distance2,
-            id: self.ids[at],
-            difference: sub(self.point(at), point),
-        }
+    /// The columns, x, y, z and ids, of one length for all.
+    #[inline(always)]
+    pub fn columns(&self) -> (&[i32], &[i32], &[i32], &[u32]) {
+        let count = self.ids.len();
+        (
+            &self.x[..count],
+            &self.y[..count],
+            &self.z[..count],
+            &self.ids,
+        )
     }
 }
 

@@ -6,9 +6,9 @@
 
 use super::candidates::{Candidates, PageLeaves};
 use super::neighbors::Neighbors;
-use super::{OwnPage, Tile};
+use super::{Near, OwnPage, Tile};
 use crate::geom::aabb::Aabb;
-use crate::geom::{Point, distance2};
+use crate::geom::{Point, distance2, sub};
 use crate::kernels::{Level, count_body, distances_body, keep_body, kernel, ranks_body};
 use std::ops::Range;
 
@@ -88,7 +88,11 @@ impl Tile {
                         each(id, point, None);
                         continue;
                     };
-                    farthest = farthest.max(search.near.distances2[k - 1]);
+                    farthest = search
+                        .near
+                        .get(k - 1)
+                        .map_or(0, |n| n.distance2)
+                        .max(farthest);
                     let query = Query {
                         tile: self,
                         own,
@@ -176,48 +180,59 @@ impl Search {
     /// Candidates are in order of id, so distance and place in one word sort as they must.
     #[inline(always)]
     fn list_short(&mut self, point: Point, own: u32, complete2: u64, bits: u32) {
-        let set = &self.candidates;
-        self.keys.clear();
+        let (x, y, z, ids) = self.candidates.columns();
+        let most = self.kept.len();
+        self.keys.resize(most.max(self.keys.len()), 0);
+        let keys = &mut self.keys[..most];
+        let mut count = 0;
         for &place in &self.kept {
             let at = place as usize;
-            let d2 = distance2(set.point(at), point);
-            if d2 <= complete2 && set.ids[at] != own {
-                self.keys.push((d2 << bits | u64::from(place)) as i64);
-            }
+            let d2 = distance2([x[at], y[at], z[at]], point);
+            keys[count] = (d2 << bits | u64::from(place)) as i64;
+            count += usize::from(d2 <= complete2 && ids[at] != own);
         }
-        self.near.resize(self.keys.len());
-        let mask = (1i64 << bits) - 1;
-        if self.keys.len() <= MOST_RANKED {
-            self.places.resize(self.keys.len(), 0);
-            ranks_body(&self.keys, &mut self.places);
-            for (&key, &to) in self.keys.iter().zip(&self.places) {
-                let near = set.near((key & mask) as usize, (key >> bits) as u64, point);
-                self.near.set(to as usize, near);
-            }
+        let keys = &mut keys[..count];
+        self.places.resize(count.max(self.places.len()), 0);
+        let places = &mut self.places[..count];
+        if count <= MOST_RANKED {
+            ranks_body(keys, places);
         } else {
-            self.keys.sort_unstable();
-            for (to, &key) in self.keys.iter().enumerate() {
-                let near = set.near((key & mask) as usize, (key >> bits) as u64, point);
-                self.near.set(to, near);
-            }
+            keys.sort_unstable();
+            (0..)
+                .zip(places.iter_mut())
+                .for_each(|(n, place)| *place = n);
+        }
+        let near = self.near.resize(count);
+        let mask = (1i64 << bits) - 1;
+        for (&key, &to) in keys.iter().zip(places.iter()) {
+            let (to, at) = (to as usize, (key & mask) as usize);
+            near.distances2[to] = (key >> bits) as u64;
+            near.ids[to] = ids[at];
+            near.x[to] = x[at] - point[0];
+            near.y[to] = y[at] - point[1];
+            near.z[to] = z[at] - point[2];
         }
     }
 
     #[cold]
     fn list_long(&mut self, point: Point, own: u32, complete2: u64) {
-        let set = &self.candidates;
-        self.long_keys.clear();
-        for &place in &self.kept {
+        let (x, y, z, ids) = self.candidates.columns();
+        let within = |&place: &u32| {
             let at = place as usize;
-            let d2 = distance2(set.point(at), point);
-            if d2 <= complete2 && set.ids[at] != own {
-                self.long_keys.push((d2, place));
-            }
-        }
+            let d2 = distance2([x[at], y[at], z[at]], point);
+            (d2 <= complete2 && ids[at] != own).then_some((d2, place))
+        };
+        self.long_keys.clear();
+        self.long_keys.extend(self.kept.iter().filter_map(within));
         self.long_keys.sort_unstable();
-        self.near.resize(self.long_keys.len());
-        for (to, &(d2, place)) in self.long_keys.iter().enumerate() {
-            self.near.set(to, set.near(place as usize, d2, point));
+        self.near.clear();
+        for &(distance2, place) in &self.long_keys {
+            let at = place as usize;
+            self.near.push(Near {
+                distance2,
+                id: ids[at],
+                difference: sub([x[at], y[at], z[at]], point),
+            });
         }
     }
 }
@@ -234,8 +249,8 @@ fn nearest_body(search: &mut Search, point: Point, own: u32, k: usize) -> Option
     measure_body(search, point);
     let most = above(search.candidates.complete2);
     // The neighbours of the query before are about as far.
-    let last = search.near.distances2.get(k.wrapping_sub(1));
-    let mut limit = last.map_or(most, |d2| (*d2 as f32 * MARGIN).max(1.0).min(most));
+    let last = search.near.get(k.wrapping_sub(1));
+    let mut limit = last.map_or(most, |n| (n.distance2 as f32 * MARGIN).max(1.0).min(most));
     // The point itself is a candidate; one more, for those that are not sure to be within.
     let wanted = k + 2;
     for correction in 0.. {

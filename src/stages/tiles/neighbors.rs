@@ -11,31 +11,42 @@ const NEAR_LIMIT2: u64 = 1 << 54;
 /// Neighbours by (squared distance, id).
 #[derive(Debug, Clone, Default)]
 pub struct Neighbors {
-    pub(super) distances2: Vec<u64>,
-    pub(super) ids: Vec<u32>,
-    pub(super) x: Vec<i32>,
-    pub(super) y: Vec<i32>,
-    pub(super) z: Vec<i32>,
+    len: usize,
+    /// The columns have room for `len` and maybe more.
+    distances2: Vec<u64>,
+    ids: Vec<u32>,
+    x: Vec<i32>,
+    y: Vec<i32>,
+    z: Vec<i32>,
+}
+
+/// The columns of [`Neighbors`] to write to, each as long as there are neighbours.
+pub(super) struct Columns<'a> {
+    pub distances2: &'a mut [u64],
+    pub ids: &'a mut [u32],
+    pub x: &'a mut [i32],
+    pub y: &'a mut [i32],
+    pub z: &'a mut [i32],
 }
 
 impl Neighbors {
     /// How many there are.
     #[must_use]
     pub fn len(&self) -> usize {
-        self.distances2.len()
+        self.len
     }
 
     /// True if there is none.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.distances2.is_empty()
+        self.len == 0
     }
 
     /// The neighbour with `index` nearer ones, if it is known.
     #[must_use]
     #[inline]
     pub fn get(&self, index: usize) -> Option<Near> {
-        let distance2 = *self.distances2.get(index)?;
+        let distance2 = *self.distances2[..self.len].get(index)?;
         Some(Near {
             distance2,
             id: self.ids[index],
@@ -47,11 +58,11 @@ impl Neighbors {
     #[must_use]
     pub fn columns(&self) -> Nearest<'_> {
         Nearest {
-            distances2: &self.distances2,
-            ids: &self.ids,
-            x: &self.x,
-            y: &self.y,
-            z: &self.z,
+            distances2: &self.distances2[..self.len],
+            ids: &self.ids[..self.len],
+            x: &self.x[..self.len],
+            y: &self.y[..self.len],
+            z: &self.z[..self.len],
         }
     }
 
@@ -62,29 +73,38 @@ impl Neighbors {
 
     /// Forgets all.
     pub fn clear(&mut self) {
-        self.resize(0);
+        self.len = 0;
     }
 
     /// Puts in one that is no nearer than those there.
     pub fn push(&mut self, near: Near) {
-        self.resize(self.len() + 1);
-        self.set(self.len() - 1, near);
-    }
-
-    pub(super) fn resize(&mut self, len: usize) {
-        self.distances2.resize(len, 0);
-        self.ids.resize(len, 0);
-        self.x.resize(len, 0);
-        self.y.resize(len, 0);
-        self.z.resize(len, 0);
-    }
-
-    #[inline]
-    pub(super) fn set(&mut self, index: usize, near: Near) {
-        self.distances2[index] = near.distance2;
-        self.ids[index] = near.id;
+        let last = self.len;
+        let columns = self.resize(last + 1);
+        columns.distances2[last] = near.distance2;
+        columns.ids[last] = near.id;
         // Differences of coordinates in 0..2^30 fit 32 bits.
-        [self.x[index], self.y[index], self.z[index]] = near.difference.map(|c| c as i32);
+        let [x, y, z] = near.difference.map(|c| c as i32);
+        (columns.x[last], columns.y[last], columns.z[last]) = (x, y, z);
+    }
+
+    /// Makes it `len` neighbours; what they are, the caller writes.
+    pub(super) fn resize(&mut self, len: usize) -> Columns<'_> {
+        if len > self.ids.len() {
+            let room = len.next_multiple_of(64);
+            self.distances2.resize(room, 0);
+            self.ids.resize(room, 0);
+            self.x.resize(room, 0);
+            self.y.resize(room, 0);
+            self.z.resize(room, 0);
+        }
+        self.len = len;
+        Columns {
+            distances2: &mut self.distances2[..len],
+            ids: &mut self.ids[..len],
+            x: &mut self.x[..len],
+            y: &mut self.y[..len],
+            z: &mut self.z[..len],
+        }
     }
 
     /// Exact sums over the first `count`.
