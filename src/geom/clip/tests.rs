@@ -42,6 +42,47 @@ fn of_two_points_in_one_place_the_lower_id_has_the_cell() {
     assert!(cell.hidden);
 }
 
+/// Points around a circle of `radius`, a little inside a regular polygon of `count` corners.
+fn around(count: u32, radius: f64, first: u32) -> Vec<([i64; 3], u32)> {
+    let at = |k: u32| {
+        let angle = f64::from(k) / f64::from(count) * std::f64::consts::TAU;
+        let along = [angle.cos(), angle.sin()].map(|x| (x * radius) as i64);
+        ([along[0], along[1], 0], first + k)
+    };
+    (0..count).map(at).collect()
+}
+
+#[test]
+fn a_polygon_of_hundreds_of_corners_and_a_cut_through_most_of_them() {
+    let outer = around(300, 1e6, 1);
+    let inner = around(5, 0.7e6, 1001);
+    for level in Level::all() {
+        let mut cell = Cell::new(0, UP, 1e7);
+        cell.level = level;
+        for &(difference, id) in &outer {
+            cell.clip(difference, id);
+        }
+        let ring: Vec<_> = (1..300).map(|k| (k, k + 1)).collect();
+        let all = seen(&cell);
+        assert_eq!(all.len(), 300);
+        assert!(ring.iter().all(|pair| all.contains(pair)) && all.contains(&(1, 300)));
+        // A pentagon inside leaves the five corners between its own sides.
+        for &(difference, id) in &inner {
+            cell.clip(difference, id);
+        }
+        assert_eq!(
+            seen(&cell),
+            [
+                (1001, 1002),
+                (1001, 1005),
+                (1002, 1003),
+                (1003, 1004),
+                (1004, 1005)
+            ]
+        );
+    }
+}
+
 proptest! {
     /// Corners found by clipping are those that no other bisector cuts off, decided exactly.
     #[test]
@@ -55,9 +96,6 @@ proptest! {
         points.sort_by_key(|p| (p.iter().map(|x| x * x).sum::<i64>(), *p));
         let all: Vec<_> = points.iter().enumerate()
             .map(|(i, &difference)| Neighbor { difference, id: i as u32 + 1 }).collect();
-        // A disk so large that every bounded corner is inside.
-        let mut cell = Cell::new(0, normal, 1e7);
-        for p in &all { cell.clip(p.difference, p.id); }
         let mut expected = Vec::new();
         for (x, &a) in all.iter().enumerate() {
             for &b in &all[x + 1..] {
@@ -70,6 +108,12 @@ proptest! {
             }
         }
         expected.sort_unstable();
-        prop_assert_eq!(seen(&cell), expected);
+        for level in Level::all() {
+            // A disk so large that every bounded corner is inside.
+            let mut cell = Cell::new(0, normal, 1e7);
+            cell.level = level;
+            all.iter().for_each(|p| cell.clip(p.difference, p.id));
+            prop_assert_eq!(seen(&cell), &expected[..]);
+        }
     }
 }

@@ -186,3 +186,6 @@ fn near_pages(store: &PointStore, page: usize, shrink: i64) -> (u64, Vec<usize>)
         reach /= 2;
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -157,6 +157,15 @@ impl Tile {
 }
 
 impl Search {
+    /// A search with the kernels of `level`; they differ in speed only.
+    #[must_use]
+    pub fn at(level: Level) -> Self {
+        Self {
+            level,
+            ..Self::default()
+        }
+    }
+
     fn gather(&mut self, tile: &Tile, around: &Aabb, d2: u64) {
         self.leaves
             .gather(self.level, tile, around, d2, &mut self.candidates);

@@ -1,0 +1,112 @@
+//! The search of a tile against all distances, for every level of the kernels.
+
+use super::near::Search;
+use super::*;
+use crate::geom::distance2;
+use crate::kernels::Level;
+use crate::stages::order::Orderer;
+use crate::workspace::Workspace;
+use crate::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
+use crate::workspace::progress::{Cancel, Silent};
+use proptest::prelude::*;
+use std::sync::Arc;
+
+fn workspace() -> Workspace {
+    let memory = MemoryPool::new(MINIMUM_BUDGET).unwrap();
+    let folder = std::env::temp_dir();
+    Workspace::new(&folder, memory, 1, Arc::new(Silent), Cancel::new()).unwrap()
+}
+
+fn store(points: &[Point], page: usize, workspace: &Workspace) -> PointStore {
+    let mut orderer = Orderer::new(workspace).unwrap();
+    orderer.push(workspace, points).unwrap();
+    orderer.finish(workspace, page).unwrap().0
+}
+
+/// All other points as (squared distance, id), ascending.
+fn all_near(points: &[Point], id: usize) -> Vec<(u64, u32)> {
+    let others = (0..points.len()).filter(|&j| j != id);
+    let mut all: Vec<_> = others
+        .map(|j| (distance2(points[id], points[j]), j as u32))
+        .collect();
+    all.sort_unstable();
+    all
+}
+
+/// Clouds that are flat, thin, gridded, clustered, or reach to the ends of the lattice.
+fn clouds() -> impl Strategy<Value = Vec<Point>> {
+    let cube =
+        |side: i32, count: usize| prop::collection::vec(prop::array::uniform3(0..side), 1..count);
+    let far = |mut points: Vec<Point>| {
+        points.extend([[0; 3], [(1 << 30) - 1; 3], [0, (1 << 30) - 1, 7]]);
+        points
+    };
+    prop_oneof![
+        cube(1 << 30, 400),
+        cube(9, 500),
+        cube(40, 600).prop_map(|c| c
+            .into_iter()
+            .map(|p| [p[0] * 1000, p[1] * 1000, p[2] % 2])
+            .collect()),
+        cube(300, 300).prop_map(|c| c.into_iter().map(|p| [p[0] << 20, 5, 5]).collect()),
+        cube(2000, 400).prop_map(far),
+    ]
+}
+
+/// Asks for everything that a query offers; what it does not know must not be claimed.
+fn check(points: &[Point], tile: &Tile, k: usize, search: &mut Search) {
+    let mut next = tile.ids().start;
+    tile.for_each_query(k, search, |id, point, query| {
+        assert_eq!(id as usize, next);
+        next += 1;
+        assert_eq!(point, points[id as usize]);
+        let Some(mut query) = query else { return };
+        let expected = all_near(points, id as usize);
+        let agrees = |query: &near::Query<'_>| {
+            let complete = expected.partition_point(|(d2, _)| *d2 <= query.complete2());
+            let got = query.near().iter().map(|n| (n.distance2, n.id));
+            assert!(got.eq(expected[..complete].iter().copied()));
+        };
+        agrees(&query);
+        assert!(query.near().len() >= k);
+        for near in query.near().iter() {
+            let there = points[near.id as usize];
+            assert_eq!(near.difference, crate::geom::sub(there, point));
+        }
+        let farther = query.complete2() * 2 + 1;
+        if query.extend(farther) {
+            assert!(query.complete2() >= farther);
+            agrees(&query);
+        }
+        if query.extend_to(2 * k) {
+            assert!(query.near().len() >= 2 * k);
+        }
+        agrees(&query);
+    });
+    assert_eq!(next, tile.ids().end);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(96))]
+    #[test]
+    fn neighbors_are_those_of_all_distances(
+        cloud in clouds(),
+        k in 1usize..40,
+        page in prop::sample::select(vec![1usize, 5, 16, 64, 256]),
+        cut in 0.0f64..1.0,
+    ) {
+        let workspace = workspace();
+        let store = store(&cloud, page, &workspace);
+        let points = store.slice(0..store.len()).unwrap();
+        let cut = (store.len() as f64 * cut) as usize;
+        for ids in [0..cut, cut..store.len()] {
+            if ids.is_empty() {
+                continue;
+            }
+            let tile = Tile::load(&store, ids).unwrap();
+            for level in Level::all() {
+                check(&points, &tile, k, &mut Search::at(level));
+            }
+        }
+    }
+}
