@@ -5,8 +5,9 @@ mod util;
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 use outcrop::geom::clip::Cell;
-use outcrop::geom::plane::{Moments, Normal};
-use outcrop::stages::tiles::Near;
+use outcrop::geom::plane::Normal;
+use outcrop::kernels::Level;
+use outcrop::stages::tiles::neighbors::Neighbors;
 
 const POINTS: usize = 20_000;
 
@@ -15,14 +16,18 @@ fn main() {
 }
 
 /// A cell's id, normal, disk radius and neighbours.
-type Task = (u32, Normal, f64, Vec<Near>);
+type Task = (u32, Normal, f64, Neighbors);
 
 fn tasks() -> Vec<Task> {
-    let task = |(id, near): (u32, Vec<Near>)| {
-        let mut moments = Moments::default();
-        moments.add_near(near.iter().take(util::NEIGHBORS).map(|n| n.difference));
-        let radius = (near[util::NEIGHBORS - 1].distance2 as f64).sqrt();
-        Some((id, moments.plane().normal?, radius, near))
+    let task = |(id, near): (u32, Neighbors)| {
+        let plane = near.moments(util::NEIGHBORS, Level::best()).plane();
+        let last = near.get(util::NEIGHBORS - 1)?;
+        Some((
+            id,
+            plane.normal?,
+            2.0 * (last.distance2 as f64).sqrt(),
+            near,
+        ))
     };
     util::neighbors(POINTS)
         .into_iter()
@@ -53,12 +58,7 @@ fn whole_cell(bencher: Bencher<'_, '_>) {
         .bench_local(|| {
             for (id, normal, radius, near) in &tasks {
                 cell.start(*id, *normal, *radius);
-                for n in near {
-                    if n.distance2 > cell.reach2() {
-                        break;
-                    }
-                    cell.clip(n.difference, n.id);
-                }
+                cell.clip_nearest(near.columns(), 0);
                 cell.triples(|a, b| {
                     black_box((a, b));
                 });

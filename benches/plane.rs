@@ -5,7 +5,8 @@ mod util;
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 use outcrop::geom::plane::Moments;
-use outcrop::stages::tiles::Near;
+use outcrop::kernels::Level;
+use outcrop::stages::tiles::neighbors::Neighbors;
 
 const POINTS: usize = 20_000;
 
@@ -13,14 +14,12 @@ fn main() {
     divan::main();
 }
 
-fn neighbors() -> Vec<(u32, Vec<Near>)> {
+fn neighbors() -> Vec<(u32, Neighbors)> {
     util::neighbors(POINTS)
 }
 
-fn sums(near: &[Near]) -> Moments {
-    let mut moments = Moments::default();
-    moments.add_near(near.iter().take(util::NEIGHBORS).map(|n| n.difference));
-    moments
+fn sums(near: &Neighbors) -> Moments {
+    near.moments(util::NEIGHBORS, Level::best())
 }
 
 #[divan::bench]

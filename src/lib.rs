@@ -50,6 +50,7 @@ pub mod cli;
 pub mod error;
 pub mod geom;
 pub mod inspect;
+pub mod kernels;
 pub mod params;
 pub mod pipeline;
 pub mod report;

@@ -3,8 +3,9 @@
 
 use outcrop::geom::Point;
 use outcrop::stages::order::{Orderer, PAGE, PointStore};
+use outcrop::stages::tiles::Tile;
 use outcrop::stages::tiles::near::Search;
-use outcrop::stages::tiles::{Near, Tile};
+use outcrop::stages::tiles::neighbors::Neighbors;
 use outcrop::workspace::Workspace;
 use outcrop::workspace::memory::MemoryPool;
 use outcrop::workspace::progress::{Cancel, Silent};
@@ -45,13 +46,13 @@ pub fn store(count: usize, workspace: &Workspace) -> PointStore {
 }
 
 /// The id and nearest neighbours of every point, at least [`NEIGHBORS`], nearest first.
-pub fn neighbors(count: usize) -> Vec<(u32, Vec<Near>)> {
+pub fn neighbors(count: usize) -> Vec<(u32, Neighbors)> {
     let workspace = workspace();
     let store = store(count, &workspace);
     let tile = Tile::load(&store, 0..store.len()).expect("scratch file");
     let mut all = Vec::with_capacity(count);
     tile.for_each_query(NEIGHBORS, &mut Search::default(), |id, _, query| {
-        all.extend(query.map(|q| (id, q.near().to_vec())));
+        all.extend(query.map(|q| (id, q.near().clone())));
     });
     all
 }

@@ -129,7 +129,8 @@ fn sample(store: &PointStore, workspace: &Workspace) -> Result<Sample> {
             let Some(mut query) = query else { return };
             let near = query.near();
             if let Some(last) = near.get(NEIGHBORS - 1) {
-                sample.nearest.push((near[0].distance2 as f64).sqrt());
+                let first2 = near.get(0).map_or(0, |n| n.distance2);
+                sample.nearest.push((first2 as f64).sqrt());
                 sample
                     .radius
                     .push(AUTO_REACH * (last.distance2 as f64).sqrt());

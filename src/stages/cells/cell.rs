@@ -4,9 +4,10 @@ use crate::error::Result;
 use crate::geom::Point;
 use crate::geom::clip::Cell;
 use crate::geom::plane::{Moments, Plane};
+use crate::kernels::Level;
 use crate::stages::order::PointStore;
-use crate::stages::tiles::Near;
 use crate::stages::tiles::near::Query;
+use crate::stages::tiles::neighbors::Neighbors;
 use crate::stages::tiles::walk::{PageCache, Walk};
 
 /// How often the neighbourhood is doubled when it lies on a line.
@@ -15,9 +16,6 @@ const WIDENINGS: u32 = 3;
 /// Automatic radius in units of the distance of the last neighbour: on uniform samples, borders
 /// included, such disks see 99.9 % of the triangles that very large ones see.
 pub const AUTO_REACH: f64 = 2.0;
-
-/// Below this squared distance, differences are small enough for sums in 64 bits.
-const NEAR_LIMIT2: u64 = 1 << 54;
 
 /// Disk radius in lattice steps, or from the neighbours.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,13 +40,13 @@ pub enum Outcome {
 /// Where the neighbours of a point come from.
 trait Source {
     /// The neighbours known so far, nearest first.
-    fn near(&self) -> &[Near];
+    fn near(&self) -> &Neighbors;
     /// Makes `count` neighbours known, or all there are; false if that cannot be certified.
     fn reach(&mut self, count: usize) -> Result<bool>;
 }
 
 impl Source for Query<'_> {
-    fn near(&self) -> &[Near] {
+    fn near(&self) -> &Neighbors {
         Query::near(self)
     }
 
@@ -60,11 +58,11 @@ impl Source for Query<'_> {
 /// Neighbours from the whole store.
 struct Walked<'a> {
     walk: Walk<'a>,
-    near: Vec<Near>,
+    near: Neighbors,
 }
 
 impl Source for Walked<'_> {
-    fn near(&self) -> &[Near] {
+    fn near(&self) -> &Neighbors {
         &self.near
     }
 
@@ -90,28 +88,19 @@ pub struct Fit {
     pub last2: u64,
 }
 
-/// Sums over the neighbours.
-fn moments(near: &[Near]) -> Moments {
-    let mut moments = Moments::default();
-    if near.len() <= 256 && near.last().is_some_and(|n| n.distance2 < NEAR_LIMIT2) {
-        moments.add_near(near.iter().map(|n| n.difference));
-    } else {
-        near.iter().for_each(|n| moments.add(n.difference));
-    }
-    moments
-}
-
 fn fit_from(source: &mut impl Source, neighbors: usize, widenings: u32) -> Result<Option<Fit>> {
+    let level = Level::best();
     let mut wanted = neighbors;
     for round in 0..=widenings {
         if !source.reach(wanted)? {
             return Ok(None);
         }
-        let used = &source.near()[..wanted.min(source.near().len())];
-        let moments = moments(used);
+        let near = source.near();
+        let used = wanted.min(near.len());
+        let moments = near.moments(used, level);
         let plane = moments.plane();
-        if plane.spans || used.len() < wanted || round == widenings {
-            let last2 = used.last().map_or(0, |n| n.distance2);
+        if plane.spans || used < wanted || round == widenings {
+            let last2 = near.get(used.wrapping_sub(1)).map_or(0, |n| n.distance2);
             return Ok(Some(Fit {
                 plane,
                 moments,
@@ -171,13 +160,7 @@ impl CellMaker {
         }
         let mut next = 0;
         loop {
-            while let Some(near) = query.near().get(next) {
-                if near.distance2 > self.cell.reach2() {
-                    break;
-                }
-                self.cell.clip(near.difference, near.id);
-                next += 1;
-            }
+            next = self.cell.clip_nearest(query.near().columns(), next);
             if next < query.near().len() || self.cell.reach2() <= query.complete2() {
                 self.cell.triples(each);
                 return Ok(Outcome::Complete);
@@ -202,7 +185,7 @@ impl CellMaker {
     ) -> Result<Outcome> {
         let mut source = Walked {
             walk: Walk::new(store, cache, id, point),
-            near: Vec::new(),
+            near: Neighbors::default(),
         };
         let Some(fit) = fit_from(&mut source, self.neighbors, WIDENINGS)? else {
             return Ok(Outcome::Uncertain);
@@ -211,7 +194,7 @@ impl CellMaker {
             return Ok(Outcome::NoPlane);
         }
         let Walked { mut walk, near } = source;
-        for near in near {
+        for near in near.iter() {
             if near.distance2 <= self.cell.reach2() {
                 self.cell.clip(near.difference, near.id);
             }
@@ -258,7 +241,7 @@ pub fn fit_in_store(
 ) -> Result<Option<Fit>> {
     let mut source = Walked {
         walk: Walk::new(store, cache, id, point),
-        near: Vec::new(),
+        near: Neighbors::default(),
     };
     fit_from(&mut source, neighbors, 0)
 }

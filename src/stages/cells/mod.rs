@@ -1,6 +1,7 @@
 //! Restricted Voronoi cells of all points, tile by tile (paper, sections 3.3 and 3.4).
 
 mod cell;
+mod fold;
 
 pub use cell::{AUTO_REACH, CellMaker, DiskRadius, Fit, Outcome, fit_in_store, fit_in_tile};
 
@@ -14,6 +15,7 @@ use crate::stages::tiles::Tile;
 use crate::stages::tiles::near::Search;
 use crate::stages::tiles::walk::PageCache;
 use crate::workspace::Workspace;
+use fold::Seen;
 use serde::Serialize;
 use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -126,25 +128,14 @@ pub fn cells(
     let counters = Counters::default();
     let bytes = |tile: usize| {
         let points = tiles.ids(tile).len() as u64;
-        Tile::bytes(points as usize) + PageCache::bytes(store) + points * 120
+        Tile::bytes(points as usize) + PageCache::bytes(store) + Seen::bytes(points as usize)
     };
     workspace.for_each_unit("cells: tile", tiles.count(), bytes, |tile| {
         let ids = tiles.ids(tile);
-        let mut triples = Vec::with_capacity(ids.len() * 7);
-        one_tile(
-            store,
-            ids.clone(),
-            neighbors,
-            radius,
-            &counters,
-            &mut triples,
-        )?;
-        counters
-            .raw
-            .fetch_add(triples.len() as u64, Ordering::Relaxed);
-        triples.sort_unstable();
-        let (kept, sent) = fold(&triples, &tiles, tile as u32);
-        drop(triples);
+        let mut seen = Seen::new(ids.clone());
+        one_tile(store, ids.clone(), neighbors, radius, &counters, &mut seen)?;
+        counters.raw.fetch_add(seen.len() as u64, Ordering::Relaxed);
+        let (kept, sent) = seen.fold(&tiles);
         own.put(tile, &kept)?;
         exchange.send(&sent)?;
         workspace.observer.advance(ids.len() as u64);
@@ -173,7 +164,7 @@ fn one_tile(
     neighbors: usize,
     radius: DiskRadius,
     counters: &Counters,
-    triples: &mut Vec<[u32; 3]>,
+    seen: &mut Seen,
 ) -> Result<()> {
     let tile = Tile::load(store, ids)?;
     let mut maker = CellMaker::new(neighbors, radius);
@@ -184,7 +175,7 @@ fn one_tile(
     tile.for_each_query(neighbors, &mut search, |id, point, query| {
         let outcome = match query {
             None => Ok(Outcome::Uncertain),
-            Some(mut query) => maker.from_tile(&mut query, |a, b| triples.push(sorted(id, a, b))),
+            Some(mut query) => maker.from_tile(&mut query, |a, b| seen.see(id, a, b)),
         };
         match outcome {
             Ok(Outcome::Complete) => {}
@@ -199,7 +190,7 @@ fn one_tile(
     drop(tile);
     let mut cache = PageCache::default();
     for &(id, point) in &uncertain {
-        let each = |a, b| triples.push(sorted(id, a, b));
+        let each = |a, b| seen.see(id, a, b);
         if maker.from_store(store, &mut cache, id, point, each)? == Outcome::NoPlane {
             no_plane += 1;
         }
@@ -209,32 +200,4 @@ fn one_tile(
         .fetch_add(uncertain.len() as u64, Ordering::Relaxed);
     counters.no_plane.fetch_add(no_plane, Ordering::Relaxed);
     Ok(())
-}
-
-fn sorted(a: u32, b: u32, c: u32) -> [u32; 3] {
-    let (low, high) = if b < c { (b, c) } else { (c, b) };
-    if a < low {
-        [a, low, high]
-    } else if a < high {
-        [low, a, high]
-    } else {
-        [low, high, a]
-    }
-}
-
-/// Equal neighbours of a sorted list as one record with a count, split by whose they are.
-fn fold(triples: &[[u32; 3]], tiles: &TileRanges, tile: u32) -> (Vec<[u32; 4]>, Vec<[u32; 5]>) {
-    let mut kept = Vec::with_capacity(triples.len() / 2);
-    let mut sent = Vec::new();
-    for group in triples.chunk_by(|a, b| a == b) {
-        let [i, j, k] = group[0];
-        let count = group.len() as u32;
-        let owner = tiles.of(i);
-        if owner == tile {
-            kept.push([i, j, k, count]);
-        } else {
-            sent.push([owner, i, j, k, count]);
-        }
-    }
-    (kept, sent)
 }

@@ -4,7 +4,9 @@
 //! tile. It follows the page's own extent, so it follows the local density. What a query needs
 //! beyond its reach, it asks of the whole store ([`walk::Walk`]).
 
+mod candidates;
 pub mod near;
+pub mod neighbors;
 pub mod walk;
 
 use crate::error::Result;
@@ -168,7 +170,7 @@ fn halo(store: &PointStore, own: &Range<usize>) -> (Vec<usize>, Vec<Reach>) {
 /// Squared reach of a page and the pages within it.
 fn near_pages(store: &PointStore, page: usize, shrink: i64) -> (u64, Vec<usize>) {
     let bounds = store.page_box(page);
-    let mut reach = (bounds.longest_side() * 5 / 8 / shrink).max(1) as u64;
+    let mut reach = (bounds.longest_side() * 7 / 8 / shrink).max(1) as u64;
     loop {
         let mut near = Vec::new();
         store.pages_near(bounds, reach * reach, &mut |p| {

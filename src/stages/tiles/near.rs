@@ -1,20 +1,46 @@
 //! Neighbours inside a tile, for all points of a leaf at once (paper, section 3.1).
+//!
+//! What a leaf's points may need is gathered once, within a distance that is a guess from the leaf
+//! before. Guesses decide only how much is looked at: a query is answered when what was gathered
+//! proves the answer, and else gathers for itself.
 
-use super::{LEAVES, Near, OwnPage, Tile};
+use super::candidates::{Candidates, PageLeaves};
+use super::neighbors::Neighbors;
+use super::{Near, OwnPage, Tile};
 use crate::geom::aabb::Aabb;
 use crate::geom::{Point, distance2, sub};
+use crate::kernels::{Level, count_body, distances_body, keep_body, kernel, ranks_body};
+use std::ops::Range;
 
-/// A set of candidates and the sorted neighbours of one query, reused from query to query.
+/// Up to this number, keys are sorted by counting.
+const MOST_RANKED: usize = 96;
+
+/// Bound on the relative error of approximate squared distances, and then some.
+pub(super) const APPROXIMATE: f64 = 1.0 / (1 << 20) as f64;
+
+/// The limit of a query against the last distance of the query before.
+const MARGIN: f32 = 1.08;
+
+/// How often the limit of a query is corrected before one that is too large is taken.
+const CORRECTIONS: usize = 6;
+
+/// The candidates and the sorted neighbours of one query, in memory that is used again and again.
 #[derive(Debug, Default)]
 pub struct Search {
-    candidates: Vec<Point>,
-    ids: Vec<u32>,
+    level: Level,
+    leaves: PageLeaves,
+    candidates: Candidates,
     /// The group's candidates while one query looks farther.
-    aside: (Vec<Point>, Vec<u32>),
-    keys: Vec<u64>,
+    aside: Option<Candidates>,
+    spare: Candidates,
+    /// Approximate squared distances of the candidates to the query.
+    distances: Vec<f32>,
+    kept: Vec<u32>,
+    keys: Vec<i64>,
+    places: Vec<u32>,
     long_keys: Vec<(u64, u32)>,
     window: Vec<u64>,
-    near: Vec<Near>,
+    near: Neighbors,
 }
 
 /// The neighbours of one point, nearest first, as far as they are known.
@@ -38,160 +64,251 @@ impl Tile {
         search: &mut Search,
         mut each: impl FnMut(u32, Point, Option<Query<'_>>),
     ) {
-        let mut limits = Vec::new();
+        let mut guess = None;
         for own in &self.own {
+            search.leaves.set(self, own);
             let range = self.range(own.local);
             for start in range.clone().step_by(self.leaf) {
                 let group = start..(start + self.leaf).min(range.end);
-                self.limits(group.clone(), k, &mut search.window, &mut limits);
-                let farthest = limits.iter().copied().max().unwrap_or(u64::MAX);
-                let certified = farthest <= own.reach2;
-                if certified {
-                    let leaf = (start - range.start) / self.leaf;
-                    let around = self.leaf_boxes[own.local * LEAVES + leaf];
-                    self.gather(own, &around, farthest, search);
+                let first = self.id(own.local, start - range.start);
+                if first + group.len() <= self.ids.start || first >= self.ids.end {
+                    continue;
                 }
-                for (index, limit) in group.zip(&limits) {
-                    let id = self.id(own.local, index - range.start);
+                let likely = guess.unwrap_or_else(|| self.limit(group.clone(), k, search));
+                let around = Aabb::of(&self.points[group.clone()]);
+                search.gather(self, &around, likely.min(own.reach2));
+                let mut farthest = 0;
+                for (id, index) in (first..).zip(group) {
                     if !self.ids.contains(&id) {
                         continue;
                     }
                     let (point, id) = (self.points[index], id as u32);
-                    if !certified && (*limit > own.reach2) {
+                    let Some(complete2) = self.nearest(own, index, id, k, search) else {
+                        search.swap_back();
                         each(id, point, None);
                         continue;
-                    }
-                    if !certified {
-                        self.gather(own, &Aabb::of(&[point]), *limit, search);
-                    }
-                    search.list(point, id, None, *limit);
-                    each(
-                        id,
+                    };
+                    farthest = search
+                        .near
+                        .get(k - 1)
+                        .map_or(0, |n| n.distance2)
+                        .max(farthest);
+                    let query = Query {
+                        tile: self,
+                        own,
+                        search,
                         point,
-                        Some(Query {
-                            tile: self,
-                            own,
-                            search,
-                            point,
-                            id,
-                            complete2: *limit,
-                        }),
-                    );
+                        id,
+                        complete2,
+                    };
+                    each(id, point, Some(query));
+                    search.swap_back();
+                }
+                if farthest > 0 {
+                    // A little farther than the leaf before needed.
+                    guess = Some(farthest + farthest / 4);
                 }
             }
         }
     }
 
-    /// An upper bound of the squared distance of the `k`th neighbour for each point of a group,
-    /// from the points around it in curve order.
-    fn limits(
+    /// Lists at least the `k` nearest neighbours of point `index`; the squared distance up to which
+    /// the list is complete.
+    fn nearest(
         &self,
-        group: std::ops::Range<usize>,
+        own: &OwnPage,
+        index: usize,
+        id: u32,
         k: usize,
-        window: &mut Vec<u64>,
-        out: &mut Vec<u64>,
-    ) {
+        search: &mut Search,
+    ) -> Option<u64> {
+        let point = self.points[index];
+        if let Some(complete2) = list_nearest(search.level, search, point, id, k) {
+            return Some(complete2);
+        }
+        if search.candidates.complete2 >= own.reach2 {
+            return None;
+        }
+        let limit = self.limit(index..index + 1, k, search);
+        search.step_aside();
+        search.gather(self, &Aabb::of(&[point]), limit.min(own.reach2));
+        list_nearest(search.level, search, point, id, k)
+    }
+
+    /// An upper bound of the squared distance of the `k`th neighbour of each point of a group,
+    /// from the points around it in curve order; `u64::MAX` if there are too few.
+    fn limit(&self, group: Range<usize>, k: usize, search: &mut Search) -> u64 {
         let side = (k + 1).max(32);
         let around = group.start.saturating_sub(side)..(group.end + side).min(self.points.len());
-        out.clear();
-        for index in group {
-            if around.len() <= k {
-                out.push(u64::MAX);
-                continue;
-            }
+        if around.len() <= k {
+            return u64::MAX;
+        }
+        let window = &mut search.window;
+        let limit = |index: usize| {
             let point = self.points[index];
+            let near = self.points[around.clone()].iter();
             window.clear();
-            window.extend(
-                self.points[around.clone()]
-                    .iter()
-                    .map(|&p| distance2(p, point)),
-            );
+            window.extend(near.map(|&p| distance2(p, point)));
             // The point itself is among them, at distance 0.
-            out.push(*window.select_nth_unstable(k).1);
-        }
-    }
-
-    /// Collects all points within `d2` of `around`, in order of id.
-    fn gather(&self, own: &OwnPage, around: &Aabb, d2: u64, search: &mut Search) {
-        search.candidates.clear();
-        search.ids.clear();
-        for &local in &self.near[own.near.clone()] {
-            if self.page_boxes[local].distance2_box(around) > d2 {
-                continue;
-            }
-            let range = self.range(local);
-            for leaf in 0..range.len().div_ceil(self.leaf) {
-                if self.leaf_boxes[local * LEAVES + leaf].distance2_box(around) > d2 {
-                    continue;
-                }
-                let first = leaf * self.leaf;
-                let last = (first + self.leaf).min(range.len());
-                search
-                    .candidates
-                    .extend_from_slice(&self.points[range.start + first..range.start + last]);
-                let id = self.id(local, first) as u32;
-                search.ids.extend(id..id + (last - first) as u32);
-            }
-        }
+            *window.select_nth_unstable(k).1
+        };
+        group.map(limit).max().unwrap_or(u64::MAX)
     }
 }
 
 impl Search {
-    fn swap_aside(&mut self) {
-        std::mem::swap(&mut self.candidates, &mut self.aside.0);
-        std::mem::swap(&mut self.ids, &mut self.aside.1);
+    fn gather(&mut self, tile: &Tile, around: &Aabb, d2: u64) {
+        self.leaves
+            .gather(self.level, tile, around, d2, &mut self.candidates);
     }
 
-    /// Lists the candidates with `after < d² ≤ upto` in order of (distance, id), behind those there
-    /// already if `after` is given.
-    fn list(&mut self, point: Point, own: u32, after: Option<u64>, upto: u64) {
-        if after.is_none() {
-            self.near.clear();
+    /// Keeps the group's candidates for later, so that others can be gathered.
+    fn step_aside(&mut self) {
+        if self.aside.is_none() {
+            let group = std::mem::take(&mut self.candidates);
+            self.candidates = std::mem::take(&mut self.spare);
+            self.aside = Some(group);
         }
-        let beyond = |d2: u64| after.is_none_or(|a| d2 > a) && d2 <= upto;
-        let bits = usize::BITS - self.candidates.len().leading_zeros();
-        if bits < 32 && upto < 1 << (64 - bits) {
-            // Candidates are in order of id, so distance and rank in one word sort as they must.
-            self.keys.clear();
-            for (rank, &p) in self.candidates.iter().enumerate() {
-                let d2 = distance2(p, point);
-                if beyond(d2) {
-                    self.keys.push(d2 << bits | rank as u64);
-                }
-            }
-            self.keys.sort_unstable();
-            let mask = (1u64 << bits) - 1;
-            for i in 0..self.keys.len() {
-                let key = self.keys[i];
-                self.push((key & mask) as usize, key >> bits, point, own);
-            }
+    }
+
+    fn swap_back(&mut self) {
+        if let Some(group) = self.aside.take() {
+            self.spare = std::mem::replace(&mut self.candidates, group);
+        }
+    }
+
+    /// Candidates are in order of id, so distance and place in one word sort as they must.
+    #[inline(always)]
+    fn list_short(&mut self, point: Point, own: u32, complete2: u64, bits: u32) {
+        let (x, y, z, ids) = self.candidates.columns();
+        let most = self.kept.len();
+        self.keys.resize(most.max(self.keys.len()), 0);
+        let keys = &mut self.keys[..most];
+        let mut count = 0;
+        for &place in &self.kept {
+            let at = place as usize;
+            let d2 = distance2([x[at], y[at], z[at]], point);
+            keys[count] = (d2 << bits | u64::from(place)) as i64;
+            count += usize::from(d2 <= complete2 && ids[at] != own);
+        }
+        let keys = &mut keys[..count];
+        self.places.resize(count.max(self.places.len()), 0);
+        let places = &mut self.places[..count];
+        if count <= MOST_RANKED {
+            ranks_body(keys, places);
         } else {
-            self.long_keys.clear();
-            for (rank, &p) in self.candidates.iter().enumerate() {
-                let d2 = distance2(p, point);
-                if beyond(d2) {
-                    self.long_keys.push((d2, rank as u32));
-                }
-            }
-            self.long_keys.sort_unstable();
-            for i in 0..self.long_keys.len() {
-                let (d2, rank) = self.long_keys[i];
-                self.push(rank as usize, d2, point, own);
-            }
+            keys.sort_unstable();
+            (0..)
+                .zip(places.iter_mut())
+                .for_each(|(n, place)| *place = n);
+        }
+        let near = self.near.resize(count);
+        let mask = (1i64 << bits) - 1;
+        for (&key, &to) in keys.iter().zip(places.iter()) {
+            let (to, at) = (to as usize, (key & mask) as usize);
+            near.distances2[to] = (key >> bits) as u64;
+            near.ids[to] = ids[at];
+            near.x[to] = x[at] - point[0];
+            near.y[to] = y[at] - point[1];
+            near.z[to] = z[at] - point[2];
         }
     }
 
-    fn push(&mut self, rank: usize, distance2: u64, point: Point, own: u32) {
-        let id = self.ids[rank];
-        if id != own {
-            let difference = sub(self.candidates[rank], point);
+    #[cold]
+    fn list_long(&mut self, point: Point, own: u32, complete2: u64) {
+        let (x, y, z, ids) = self.candidates.columns();
+        let within = |&place: &u32| {
+            let at = place as usize;
+            let d2 = distance2([x[at], y[at], z[at]], point);
+            (d2 <= complete2 && ids[at] != own).then_some((d2, place))
+        };
+        self.long_keys.clear();
+        self.long_keys.extend(self.kept.iter().filter_map(within));
+        self.long_keys.sort_unstable();
+        self.near.clear();
+        for &(distance2, place) in &self.long_keys {
+            let at = place as usize;
             self.near.push(Near {
                 distance2,
-                id,
-                difference,
+                id: ids[at],
+                difference: sub([x[at], y[at], z[at]], point),
             });
         }
     }
+}
+
+kernel! {
+    /// Measures the candidates from `point` and lists the `k` nearest neighbours, and some more;
+    /// the squared distance up to which all are listed. `None` if there are fewer than `k` as far as
+    /// the candidates are complete.
+    fn list_nearest(search: &mut Search, point: Point, own: u32, k: usize) -> Option<u64> = nearest_body
+}
+
+#[inline(always)]
+fn nearest_body(search: &mut Search, point: Point, own: u32, k: usize) -> Option<u64> {
+    measure_body(search, point);
+    let most = above(search.candidates.complete2);
+    // The neighbours of the query before are about as far.
+    let last = search.near.get(k.wrapping_sub(1));
+    let mut limit = last.map_or(most, |n| (n.distance2 as f32 * MARGIN).max(1.0).min(most));
+    // The point itself is a candidate; one more, for those that are not sure to be within.
+    let wanted = k + 2;
+    for correction in 0.. {
+        let count = count_body(&search.distances, limit);
+        if count >= wanted || limit >= most {
+            if count > 2 * wanted && correction < CORRECTIONS {
+                limit *= (wanted + 6) as f32 / count as f32;
+                continue;
+            }
+            let complete2 = list_body(search, point, own, limit);
+            if search.near.len() >= k {
+                return Some(complete2);
+            }
+            if limit >= most {
+                return None;
+            }
+        }
+        let grow = (wanted + 4) as f32 / (count.max(1) as f32);
+        limit = (limit * grow.clamp(1.1, 8.0) + 4.0).min(most);
+    }
+    None
+}
+
+kernel! {
+    /// Measures the candidates from `point`.
+    fn measure(search: &mut Search, point: Point) = measure_body
+}
+
+#[inline(always)]
+fn measure_body(search: &mut Search, point: Point) {
+    let Candidates { x, y, z, .. } = &search.candidates;
+    search.distances.resize(x.len(), 0.0);
+    distances_body(x, y, z, point, &mut search.distances);
+}
+
+kernel! {
+    /// Lists the measured candidates whose approximate squared distance is at most `limit` in order
+    /// of (distance, id); the squared distance up to which all are listed.
+    fn list(search: &mut Search, point: Point, own: u32, limit: f32) -> u64 = list_body
+}
+
+#[inline(always)]
+fn list_body(search: &mut Search, point: Point, own: u32, limit: f32) -> u64 {
+    let below = (f64::from(limit) * (1.0 - APPROXIMATE)) as u64;
+    let complete2 = below.min(search.candidates.complete2);
+    keep_body(&search.distances, limit, &mut search.kept);
+    let bits = usize::BITS - search.candidates.x.len().leading_zeros();
+    if bits < 32 && complete2 < 1 << (63 - bits) {
+        search.list_short(point, own, complete2, bits);
+    } else {
+        search.list_long(point, own, complete2);
+    }
+    complete2
+}
+
+/// An approximate squared distance that is not below any of points within `d2`.
+pub(super) fn above(d2: u64) -> f32 {
+    (d2 as f64 * (1.0 + 2.0 * APPROXIMATE)) as f32
 }
 
 impl Query<'_> {
@@ -203,7 +320,7 @@ impl Query<'_> {
 
     /// The neighbours known so far, nearest first, none left out between them.
     #[must_use]
-    pub fn near(&self) -> &[Near] {
+    pub fn near(&self) -> &Neighbors {
         &self.search.near
     }
 
@@ -222,13 +339,16 @@ impl Query<'_> {
         if distance2 > self.own.reach2 {
             return false;
         }
-        self.search.swap_aside();
-        self.tile
-            .gather(self.own, &Aabb::of(&[self.point]), distance2, self.search);
-        self.search
-            .list(self.point, self.id, Some(self.complete2), distance2);
-        self.search.swap_aside();
-        self.complete2 = distance2;
+        let search = &mut *self.search;
+        if distance2 > search.candidates.complete2 {
+            search.step_aside();
+            search.gather(self.tile, &Aabb::of(&[self.point]), distance2);
+            measure(search.level, search, self.point);
+        }
+        // Twice the slack: what is within `distance2` is surely listed.
+        let limit = (distance2 as f64 * (1.0 + 3.0 * APPROXIMATE) + 1.0) as f32;
+        self.complete2 = list(search.level, search, self.point, self.id, limit);
+        debug_assert!(self.complete2 >= distance2);
         true
     }
 

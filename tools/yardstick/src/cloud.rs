@@ -1,6 +1,8 @@
 //! The cloud to measure with, and its points as the k-d tree wants them.
 
 use crate::Result;
+use outcrop::stages::ingest;
+use outcrop::stages::order::{self, PointStore};
 use outcrop::workspace::Workspace;
 use outcrop_cloudgen::{Cloud, Format, Kind};
 use std::path::{Path, PathBuf};
@@ -57,16 +59,20 @@ impl Sample {
     }
 }
 
-/// The distinct points of a cloud along the Hilbert curve, relative to its lowest corner: what is
-/// left after the pipeline's own ingest and order.
-pub fn sorted_points(cloud: &Path, workspace: &Workspace) -> Result<Vec<[f32; 3]>> {
-    use outcrop::stages::{ingest, order};
+/// The distinct points of a cloud along the Hilbert curve: what is left after the pipeline's own
+/// ingest and order; and the length of a lattice step.
+pub fn ordered(cloud: &Path, workspace: &Workspace) -> Result<(PointStore, f64)> {
     let spool = ingest::ingest(&[cloud.to_owned()], workspace)?;
     let lattice = spool.choose_lattice(0)?;
     let orderer = order::Orderer::new(workspace)?;
     spool.for_each(&lattice, |points| orderer.push(workspace, points))?;
     let (store, _) = orderer.finish(workspace, order::PAGE)?;
-    let scaled = |p: [i32; 3]| p.map(|c| (f64::from(c) * lattice.step) as f32);
+    Ok((store, lattice.step))
+}
+
+/// The same points as the k-d tree wants them, relative to the cloud's lowest corner.
+pub fn points(store: &PointStore, step: f64) -> Result<Vec<[f32; 3]>> {
+    let scaled = |p: [i32; 3]| p.map(|c| (f64::from(c) * step) as f32);
     Ok(store
         .slice(0..store.len())?
         .into_iter()

@@ -8,6 +8,7 @@ mod cloud;
 mod cpu;
 mod knn;
 mod measure;
+mod neighbors;
 mod pipeline;
 mod show;
 

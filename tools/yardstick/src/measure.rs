@@ -1,6 +1,6 @@
 //! A measurement: pairs of K and pipeline, medians.
 
-use crate::{Result, Run, cloud, knn, pipeline, show};
+use crate::{Result, Run, cloud, knn, neighbors, pipeline, show};
 use outcrop::pipeline::{default_memory, default_threads};
 use outcrop::workspace::memory::MemoryPool;
 use outcrop::workspace::progress::{Cancel, Silent};
@@ -29,7 +29,9 @@ pub struct Measurement {
     pub pipeline_seconds: f64,
     /// Median over the pairs of pipeline / K.
     pub ratio: f64,
-    /// The same of processor times: what a busy machine disturbs least.
+    /// Median over the pairs of the pipeline's own neighbour search alone / K.
+    pub neighbors_ratio: f64,
+    /// The same as `ratio`, of processor times: what a busy machine disturbs least.
     pub cpu_ratio: f64,
     /// Share of the threads' wall-clock time that the pipeline spent computing, median.
     pub utilisation: f64,
@@ -54,6 +56,8 @@ pub struct Pair {
     pub k_seconds: f64,
     /// Seconds of the pipeline right after.
     pub pipeline_seconds: f64,
+    /// Seconds of the pipeline's own neighbour search alone, between the two.
+    pub neighbors_seconds: f64,
     /// Processor time of all queries.
     pub k_cpu_seconds: f64,
     /// Processor time of the pipeline.
@@ -133,7 +137,8 @@ fn measure(options: &Run, folder: &Path) -> Result<Measurement> {
     // K has all the memory there is; only the pipeline has a budget.
     let all = MemoryPool::new(limits::memory_allowed())?;
     let workspace = Workspace::new(folder, all, threads, Arc::new(Silent), Cancel::new())?;
-    let points = cloud::sorted_points(&input, &workspace)?;
+    let (store, step) = cloud::ordered(&input, &workspace)?;
+    let points = cloud::points(&store, step)?;
     let job = pipeline::Job {
         input: input.clone(),
         output: folder.join("mesh.ply"),
@@ -145,10 +150,12 @@ fn measure(options: &Run, folder: &Path) -> Result<Measurement> {
     let (mut pairs, mut builds, mut reports) = (Vec::new(), Vec::new(), Vec::new());
     for _ in 0..options.repeat.max(1) {
         let tree = knn::time(&points, &workspace)?;
+        let near = neighbors::time(&store, &workspace)?;
         let outcome = pipeline::time(&job)?;
         pairs.push(Pair {
             k_seconds: tree.queries,
             pipeline_seconds: outcome.seconds,
+            neighbors_seconds: near,
             k_cpu_seconds: tree.cpu,
             pipeline_cpu_seconds: outcome.cpu,
         });
@@ -175,6 +182,7 @@ fn measure(options: &Run, folder: &Path) -> Result<Measurement> {
         k_seconds: median(pairs.iter().map(|p| p.k_seconds)),
         pipeline_seconds: median(pairs.iter().map(|p| p.pipeline_seconds)),
         ratio: median(pairs.iter().map(|p| p.pipeline_seconds / p.k_seconds)),
+        neighbors_ratio: median(pairs.iter().map(|p| p.neighbors_seconds / p.k_seconds)),
         cpu_ratio: median(
             pairs
                 .iter()

@@ -41,6 +41,10 @@ pub fn text(m: &Measurement) -> String {
         m.pairs.len(),
     ));
     line(format!(
+        "neighbours {:9.2} K  (its own 30-NN search alone)",
+        m.neighbors_ratio
+    ));
+    line(format!(
         "resident   {:9.0} MiB at peak",
         m.peak_resident_bytes as f64 / MIB
     ));
@@ -78,14 +82,14 @@ fn markdown(all: &[Measurement]) -> Result<String> {
     let mut out = String::new();
     writeln!(
         out,
-        "| cloud | points | threads | budget | K | outcrop | ratio | by CPU | used | peak resident \
+        "| cloud | points | threads | budget | K | outcrop | ratio | 30-NN alone | by CPU | used | peak resident \
          | scratch |"
     )?;
-    writeln!(out, "|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|")?;
+    writeln!(out, "|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|")?;
     for m in all {
         writeln!(
             out,
-            "| {} | {:.2} M | {} | {:.0} MiB | {:.2} s | {:.2} s | **{:.2} K** | {:.2} K | {:.0} % \
+            "| {} | {:.2} M | {} | {:.0} MiB | {:.2} s | {:.2} s | **{:.2} K** | {:.2} K | {:.2} K | {:.0} % \
              | {:.0} MiB | {:.0} B/pt |",
             m.cloud,
             m.points as f64 / 1e6,
@@ -94,6 +98,7 @@ fn markdown(all: &[Measurement]) -> Result<String> {
             m.k_seconds,
             m.pipeline_seconds,
             m.ratio,
+            m.neighbors_ratio,
             m.cpu_ratio,
             100.0 * m.utilisation,
             m.peak_resident_bytes as f64 / MIB,

@@ -1,0 +1,485 @@
+//! The restricted Voronoi cell of a point: its disk clipped by bisectors (paper, Algorithm 1).
+//!
+//! The polygon lives in two dimensions, in a frame of the disk's plane. Its corners are kept in
+//! columns, in no order, linked into a ring; each knows the side that it ends. Whether a new
+//! bisector cuts a corner off is read off floating point where a forward error bound allows, for
+//! all corners at once ([`crate::kernels::cut_corners`]), and else decided exactly
+//! ([`super::predicate`]).
+
+mod rim;
+
+use super::plane::Normal;
+use super::predicate::{Neighbor, cuts_corner, cuts_parallel};
+use crate::kernels::eight::{Base, Eight};
+use crate::kernels::{
+    CornerGroup, Frame, LANES, Level, Line, SLACK, bisectors_body, cut_body, farthest_body, kernel,
+};
+use rim::{RIM, RIM_CORNERS, RIM_DISTANCE, RIM_PLACES, RIM_SIDES};
+
+/// Id of a line that is part of the disk's rim and not a bisector.
+const RIM_ID: u32 = u32::MAX;
+
+/// A side of the polygon.
+#[derive(Debug, Clone, Copy)]
+struct Side {
+    line: Line,
+    neighbor: Neighbor,
+}
+
+/// A corner of the polygon.
+#[derive(Debug, Clone, Copy, Default)]
+struct Corner {
+    at: [f64; 2],
+    /// Bound on the distance of `at` from the true corner.
+    error: f64,
+    /// Squared distance of the true corner from the centre, at most.
+    reach2: f64,
+}
+
+/// Neighbours of a cell's point in columns, nearest first.
+#[derive(Debug, Clone, Copy)]
+pub struct Nearest<'a> {
+    /// Squared distances.
+    pub distances2: &'a [u64],
+    /// Ids.
+    pub ids: &'a [u32],
+    /// Differences to the cell's point along x.
+    pub x: &'a [i32],
+    /// Along y.
+    pub y: &'a [i32],
+    /// Along z.
+    pub z: &'a [i32],
+}
+
+/// A restricted Voronoi cell in the making. One value can serve many cells in turn.
+#[derive(Debug, Clone)]
+pub struct Cell {
+    level: Level,
+    own: u32,
+    normal: Normal,
+    frame: Frame,
+    /// All sides so far, also those that are no longer part of the polygon; the rim's come first.
+    sides: Vec<Side>,
+    corners: Vec<CornerGroup>,
+    /// Of each corner the next one around the polygon, and the side between it and the one before.
+    links: Vec<Link>,
+    /// Places in the columns without a corner.
+    free: Vec<u32>,
+    count: usize,
+    /// Some corner.
+    head: u32,
+    cut: Vec<u64>,
+    doubt: Vec<u64>,
+    /// The largest of the corners'.
+    reach2: f64,
+    /// Four times that, rounded up.
+    secure2: u64,
+    hidden: bool,
+}
+
+#[derive(Debug, Clone, Copy, Default)]
+struct Link {
+    next: u32,
+    before: u32,
+    side: u32,
+}
+
+impl Cell {
+    /// The whole disk of point `own`: radius in steps, in the plane with `normal`.
+    #[must_use]
+    pub fn new(own: u32, normal: Normal, radius: f64) -> Self {
+        let rim = |line| Side {
+            line: Line {
+                line,
+                offset: 0.0,
+                length: 1.0,
+            },
+            neighbor: Neighbor {
+                difference: [0; 3],
+                id: RIM_ID,
+            },
+        };
+        let mut cell = Self {
+            level: Level::best(),
+            own,
+            normal,
+            frame: [[0.0; 3]; 2],
+            sides: RIM_SIDES.map(rim).to_vec(),
+            corners: Vec::new(),
+            links: Vec::new(),
+            free: Vec::new(),
+            count: 0,
+            head: 0,
+            cut: Vec::new(),
+            doubt: Vec::new(),
+            reach2: 0.0,
+            secure2: 0,
+            hidden: false,
+        };
+        cell.start(own, normal, radius);
+        cell
+    }
+
+    /// Begins another cell in the same memory.
+    pub fn start(&mut self, own: u32, normal: Normal, radius: f64) {
+        self.own = own;
+        self.normal = normal;
+        self.frame = frame(normal);
+        self.hidden = false;
+        self.sides.truncate(RIM_CORNERS);
+        for side in &mut self.sides {
+            side.line.offset = radius * RIM_DISTANCE;
+        }
+        self.count = RIM_CORNERS;
+        self.head = 0;
+        self.corners.clear();
+        self.corners
+            .extend(RIM.corners.iter().map(|unit| CornerGroup {
+                x: unit.x.map(|x| x * radius),
+                y: unit.y.map(|y| y * radius),
+                error: unit.error.map(|e| e * radius),
+                reach2: unit.reach2.map(|r| r * radius * radius),
+            }));
+        self.links.clear();
+        self.links.extend_from_slice(&RIM.links);
+        self.free.clear();
+        self.free
+            .extend((RIM_CORNERS as u32..RIM_PLACES as u32).rev());
+        self.set_reach(farthest_body::<Base>(&self.corners));
+    }
+
+    #[inline(always)]
+    fn set_reach(&mut self, reach2: f64) {
+        self.reach2 = reach2;
+        // The conversion saturates for disks larger than any cloud.
+        self.secure2 = ((4.0 * reach2 * (1.0 + 1e-9)) as u64).saturating_add(1);
+    }
+
+    /// Number of places for corners.
+    fn places(&self) -> usize {
+        self.corners.len() * LANES
+    }
+
+    /// Makes free places up to a number of them, a multiple of [`LANES`]; lower ones are used first.
+    fn grow(&mut self, places: usize) {
+        let before = self.places() as u32;
+        self.corners.resize(places / LANES, CornerGroup::default());
+        self.links.resize(places, Link::default());
+        self.free.extend((before..places as u32).rev());
+    }
+
+    #[inline(always)]
+    fn corner(&self, k: usize) -> Corner {
+        let (group, k) = (&self.corners[k / LANES], k % LANES);
+        Corner {
+            at: [group.x[k], group.y[k]],
+            error: group.error[k],
+            reach2: group.reach2[k],
+        }
+    }
+
+    #[inline(always)]
+    fn set_corner(&mut self, k: usize, corner: Corner) {
+        let (group, k) = (&mut self.corners[k / LANES], k % LANES);
+        [group.x[k], group.y[k]] = corner.at;
+        group.error[k] = corner.error;
+        group.reach2[k] = corner.reach2;
+    }
+
+    /// Points at a larger squared distance than this cannot touch the cell: four times the squared
+    /// radius of security, rounded up.
+    #[must_use]
+    #[inline]
+    pub fn reach2(&self) -> u64 {
+        self.secure2
+    }
+
+    /// Clips by the bisector of the point `id` at `difference` from this cell's point.
+    pub fn clip(&mut self, difference: [i64; 3], id: u32) {
+        // Differences of coordinates in 0..2^30 fit 32 bits.
+        let [x, y, z] = difference.map(|c| [c as i32]);
+        let near = Nearest {
+            distances2: &[0],
+            ids: &[id],
+            x: &x,
+            y: &y,
+            z: &z,
+        };
+        clip_nearest(self.level, self, near, 0);
+    }
+
+    /// Clips by the bisectors of neighbours from number `next` on, nearest first, until one cannot
+    /// touch the cell; the number of that, or of all.
+    pub fn clip_nearest(&mut self, near: Nearest<'_>, next: usize) -> usize {
+        clip_nearest(self.level, self, near, next)
+    }
+
+    #[inline(always)]
+    fn clip_line<E: Eight>(&mut self, line: Line, neighbor: Neighbor) {
+        if neighbor.difference == [0; 3] {
+            // Of two points in one place the heavier, with the lower id, has the cell.
+            self.hidden |= neighbor.id < self.own;
+            return;
+        }
+        self.cut.clear();
+        let mut doubts = 0;
+        let mut all = 0;
+        self.doubt.clear();
+        for corners in self.corners.chunks(64 / LANES) {
+            let (cut, doubt) = cut_body::<E>(corners, &line);
+            self.cut.push(cut);
+            self.doubt.push(doubt);
+            doubts |= doubt;
+            all |= cut | doubt;
+        }
+        if all == 0 {
+            return;
+        }
+        let side = Side { line, neighbor };
+        if doubts != 0 {
+            self.settle_doubts(&side);
+        }
+        if let Some((first, last)) = self.arc(&side) {
+            self.replace::<E>(first, last, side);
+        }
+    }
+
+    /// Decides the corners that floating point does not.
+    #[cold]
+    fn settle_doubts(&mut self, side: &Side) {
+        for word in 0..self.doubt.len() {
+            let mut doubt = self.doubt[word];
+            while doubt != 0 {
+                let bit = doubt.trailing_zeros();
+                doubt &= doubt - 1;
+                let cut = self.cuts(word * 64 + bit as usize, side);
+                self.cut[word] |= u64::from(cut) << bit;
+            }
+        }
+    }
+
+    /// Whether `side` cuts off corner `k`: exact, but for corners on the rim.
+    fn cuts(&self, k: usize, side: &Side) -> bool {
+        let a = self.sides[self.links[k].side as usize].neighbor;
+        let next = self.links[k].next as usize;
+        let b = self.sides[self.links[next].side as usize].neighbor;
+        let c = side.neighbor;
+        let exact = match (a.id == RIM_ID, b.id == RIM_ID) {
+            (false, false) => Some(cuts_corner(self.normal, self.own, a, b, c)),
+            (true, true) => None,
+            (a_is_rim, _) => {
+                let other = if a_is_rim { b } else { a };
+                cuts_parallel(self.normal, self.own, other, c)
+            }
+        };
+        exact.unwrap_or_else(|| self.depth(k, side) > 0.0)
+    }
+
+    #[inline(always)]
+    fn depth(&self, k: usize, side: &Side) -> f64 {
+        let [x, y] = self.corner(k).at;
+        side.line.depth(x, y)
+    }
+
+    #[inline(always)]
+    fn is_cut(&self, k: u32) -> bool {
+        self.cut[k as usize / 64] >> (k % 64) & 1 == 1
+    }
+
+    /// The run of corners that is cut off, by its first and last; `None` if there is none.
+    #[inline(always)]
+    fn arc(&self, side: &Side) -> Option<(u32, u32)> {
+        let total: usize = self.cut.iter().map(|w| w.count_ones() as usize).sum();
+        let word = self.cut.iter().position(|w| *w != 0)?;
+        let seed = (word * 64) as u32 + self.cut[word].trailing_zeros();
+        let (first, last, count) = self.run(seed)?;
+        if count == total {
+            return Some((first, last));
+        }
+        self.deepest_run(side)
+    }
+
+    /// The run around the corner that is deepest beyond `side`, where there are several.
+    #[cold]
+    fn deepest_run(&self, side: &Side) -> Option<(u32, u32)> {
+        // A line cuts one run off a convex polygon; rim corners decided in floating point might
+        // say otherwise by a hair, so the run around the deepest one counts.
+        let mut deepest: Option<(f64, u32)> = None;
+        for k in (0..self.places() as u32).filter(|k| self.is_cut(*k)) {
+            let depth = self.depth(k as usize, side).max(f64::MIN_POSITIVE);
+            if deepest.is_none_or(|(d, _)| depth > d) {
+                deepest = Some((depth, k));
+            }
+        }
+        let (first, last, _) = self.run(deepest?.1)?;
+        Some((first, last))
+    }
+
+    /// The run of cut corners around `seed`: first, last, how many. The cell's own point is never
+    /// cut off, so some corner stays: `None` if none does.
+    #[inline(always)]
+    fn run(&self, seed: u32) -> Option<(u32, u32, usize)> {
+        let (mut first, mut last, mut count) = (seed, seed, 1);
+        while count < self.count && self.is_cut(self.links[first as usize].before) {
+            first = self.links[first as usize].before;
+            count += 1;
+        }
+        while count < self.count && self.is_cut(self.links[last as usize].next) {
+            last = self.links[last as usize].next;
+            count += 1;
+        }
+        (count < self.count).then_some((first, last, count))
+    }
+
+    /// Puts `side` in place of the corners from `first` to `last`, and the sides between them.
+    #[inline(always)]
+    fn replace<E: Eight>(&mut self, first: u32, last: u32, side: Side) {
+        let start = self.links[first as usize];
+        let end = self.links[last as usize];
+        let mut gone = first;
+        while gone != last {
+            gone = self.links[gone as usize].next;
+            self.set_corner(gone as usize, Corner::default());
+            self.free.push(gone);
+            self.count -= 1;
+        }
+        let into = self.links[end.next as usize].side;
+        let entry = meet(&self.sides[start.side as usize].line, &side.line);
+        let exit = meet(&side.line, &self.sides[into as usize].line);
+        // The side before the run now ends where it meets the new side, and that at the side after.
+        self.set_corner(first as usize, entry);
+        let second = self.free_place();
+        self.set_corner(second as usize, exit);
+        self.links[second as usize] = Link {
+            next: end.next,
+            before: first,
+            side: self.sides.len() as u32,
+        };
+        self.links[end.next as usize].before = second;
+        self.links[first as usize].next = second;
+        self.count += 1;
+        self.head = first;
+        self.sides.push(side);
+        self.set_reach(farthest_body::<E>(&self.corners));
+    }
+
+    fn free_place(&mut self) -> u32 {
+        if self.free.is_empty() {
+            self.grow(self.places() + LANES);
+        }
+        self.free.pop().unwrap_or_default()
+    }
+
+    /// The places of the corners, in turn around the cell.
+    fn ring(&self) -> impl Iterator<Item = usize> + '_ {
+        let first = self.head;
+        std::iter::successors(Some(first), move |k| {
+            let next = self.links[*k as usize].next;
+            (next != first).then_some(next)
+        })
+        .map(|k| k as usize)
+    }
+
+    /// False if no point in a box, given relative to the cell's point, can change the cell: a point
+    /// cuts off a corner only if it is nearer to the corner than the cell's own point.
+    #[must_use]
+    pub fn may_touch(&self, low: [f64; 3], high: [f64; 3]) -> bool {
+        let [u, v] = self.frame;
+        self.ring().any(|k| {
+            let corner = self.corner(k);
+            let mut distance2 = 0.0;
+            for axis in 0..3 {
+                let x = corner.at[0] * u[axis] + corner.at[1] * v[axis];
+                let gap = (low[axis] - x).max(x - high[axis]).max(0.0);
+                distance2 += gap * gap;
+            }
+            distance2 <= corner.reach2 * (1.0 + 1e-9)
+        })
+    }
+
+    /// Calls `each` with the ids of the two bisectors at every corner between bisectors, in turn
+    /// around the cell: with the cell's own id, the triples it sees.
+    pub fn triples(&self, mut each: impl FnMut(u32, u32)) {
+        if self.hidden {
+            return;
+        }
+        for k in self.ring() {
+            let next = self.links[k].next as usize;
+            let [a, b] = [k, next].map(|k| self.sides[self.links[k].side as usize].neighbor.id);
+            if a != RIM_ID && b != RIM_ID {
+                each(a, b);
+            }
+        }
+    }
+}
+
+kernel! {
+    /// See [`Cell::clip_nearest`].
+    fn clip_nearest(cell: &mut Cell, near: Nearest<'_>, next: usize) -> usize = clip_nearest_body<Eight>
+}
+
+#[inline(always)]
+fn clip_nearest_body<E: Eight>(cell: &mut Cell, near: Nearest<'_>, mut next: usize) -> usize {
+    let count = near.distances2.len();
+    while next < count {
+        let group = next..(next + LANES).min(count);
+        let [x, y, z] = [near.x, near.y, near.z].map(|column| &column[group.clone()]);
+        let lines = bisectors_body::<E>(x, y, z, &cell.frame);
+        for (k, number) in group.enumerate() {
+            if near.distances2[number] > cell.secure2 {
+                return number;
+            }
+            let difference = [x[k], y[k], z[k]].map(i64::from);
+            let id = near.ids[number];
+            cell.clip_line::<E>(lines.get(k), Neighbor { difference, id });
+            next += 1;
+        }
+    }
+    next
+}
+
+/// Two unit vectors that span the plane across `normal`.
+fn frame(normal: Normal) -> Frame {
+    let n = normal.map(f64::from);
+    let unit = |v: [f64; 3]| {
+        let length = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
+        v.map(|x| x / length)
+    };
+    let cross = |a: [f64; 3], b: [f64; 3]| {
+        [
+            a[1] * b[2] - a[2] * b[1],
+            a[2] * b[0] - a[0] * b[2],
+            a[0] * b[1] - a[1] * b[0],
+        ]
+    };
+    let mut axis = [0.0; 3];
+    let mut least = 0;
+    for k in 1..3 {
+        if n[k].abs() < n[least].abs() {
+            least = k;
+        }
+    }
+    axis[least] = 1.0;
+    let u = unit(cross(n, axis));
+    [u, cross(unit(n), u)]
+}
+
+/// Where two lines meet.
+#[inline(always)]
+fn meet(a: &Line, b: &Line) -> Corner {
+    let determinant = a.line[0] * b.line[1] - a.line[1] * b.line[0];
+    let inverse = 1.0 / determinant;
+    let x = (a.offset * b.line[1] - b.offset * a.line[1]) * inverse;
+    let y = (b.offset * a.line[0] - a.offset * b.line[0]) * inverse;
+    let distance = x.abs() + y.abs();
+    let lengths = a.length + b.length;
+    let error = SLACK * lengths * inverse.abs() * (a.offset + b.offset + lengths * distance);
+    Corner {
+        at: [x, y],
+        error,
+        reach2: (x * x + y * y) * (1.0 + SLACK) + error * (2.0 * distance + error),
+    }
+}
+
+#[cfg(test)]
+mod tests;

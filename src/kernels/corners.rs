@@ -1,0 +1,243 @@
+//! Bisectors as lines in a plane, and which corners of a polygon lie beyond one.
+
+use super::eight::Eight;
+use super::kernel;
+
+/// Corners are looked at in groups of this size, and lines made.
+pub const LANES: usize = 8;
+
+/// Factor of the forward error bounds, in units of the last place; several times what a count of
+/// the roundings gives.
+pub(crate) const SLACK: f64 = 32.0 * f64::EPSILON;
+
+/// Corners of a convex polygon around the origin, in columns. All zeros is a place without a
+/// corner: it is at the origin, which no line cuts off.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct CornerGroup {
+    /// Position.
+    pub x: [f64; LANES],
+    /// Position.
+    pub y: [f64; LANES],
+    /// Bound on the distance from the true corner.
+    pub error: [f64; LANES],
+    /// Squared distance of the true corner from the origin, at most.
+    pub reach2: [f64; LANES],
+}
+
+/// The line `line · q = offset`, `offset > 0`; what is beyond it is cut off.
+#[derive(Debug, Clone, Copy)]
+pub struct Line {
+    /// Normal of the line, of any length.
+    pub line: [f64; 2],
+    /// Where the line is.
+    pub offset: f64,
+    /// At least the length of the difference in space whose bisector it is; scales the error of
+    /// `line`.
+    pub length: f64,
+}
+
+impl Line {
+    /// How far beyond the line a corner is, times the length of the line's normal.
+    #[inline(always)]
+    #[must_use]
+    pub fn depth(&self, x: f64, y: f64) -> f64 {
+        self.line[0] * x + self.line[1] * y - self.offset
+    }
+
+    /// A bound on the error of [`Line::depth`].
+    #[inline(always)]
+    #[must_use]
+    pub fn bound(&self, x: f64, y: f64, error: f64) -> f64 {
+        self.length * (error + SLACK * (x.abs() + y.abs())) + SLACK * self.offset
+    }
+}
+
+/// Lines in columns.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct LineGroup {
+    x: [f64; LANES],
+    y: [f64; LANES],
+    offset: [f64; LANES],
+    length: [f64; LANES],
+}
+
+impl LineGroup {
+    /// One of the lines.
+    #[inline(always)]
+    #[must_use]
+    pub fn get(&self, k: usize) -> Line {
+        Line {
+            line: [self.x[k], self.y[k]],
+            offset: self.offset[k],
+            length: self.length[k],
+        }
+    }
+}
+
+/// Two unit vectors that span a plane.
+pub type Frame = [[f64; 3]; 2];
+
+kernel! {
+    /// The bisectors between the origin and up to [`LANES`] differences, in a plane through the
+    /// origin. The line of a difference of zero means nothing.
+    pub fn bisectors(x: &[i32], y: &[i32], z: &[i32], frame: &Frame) -> LineGroup = bisectors_body<Eight>
+}
+
+#[inline(always)]
+pub(crate) fn bisectors_body<E: Eight>(
+    x: &[i32],
+    y: &[i32],
+    z: &[i32],
+    frame: &Frame,
+) -> LineGroup {
+    let columns = (
+        <&[i32; LANES]>::try_from(x),
+        <&[i32; LANES]>::try_from(y),
+        <&[i32; LANES]>::try_from(z),
+    );
+    if let (Ok(x), Ok(y), Ok(z)) = columns {
+        return eight_bisectors::<E>(x, y, z, frame);
+    }
+    let mut padded = [[1; LANES]; 3];
+    for (column, padded) in [x, y, z].into_iter().zip(&mut padded) {
+        for (value, padded) in column.iter().zip(padded) {
+            *padded = *value;
+        }
+    }
+    eight_bisectors::<E>(&padded[0], &padded[1], &padded[2], frame)
+}
+
+#[inline(always)]
+fn eight_bisectors<E: Eight>(
+    x: &[i32; LANES],
+    y: &[i32; LANES],
+    z: &[i32; LANES],
+    [u, v]: &Frame,
+) -> LineGroup {
+    let (x, y, z) = (E::convert(x), E::convert(y), E::convert(z));
+    let dot = |w: &[f64; 3]| {
+        let along = [
+            x.mul(E::splat(w[0])),
+            y.mul(E::splat(w[1])),
+            z.mul(E::splat(w[2])),
+        ];
+        along[0].add(along[1]).add(along[2])
+    };
+    let length2 = x.mul(x).add(y.mul(y)).add(z.mul(z));
+    let mut lines = LineGroup::default();
+    dot(u).store(&mut lines.x);
+    dot(v).store(&mut lines.y);
+    E::splat(0.5).mul(length2).store(&mut lines.offset);
+    // No shorter than the true length, and without a root.
+    x.abs().add(y.abs()).add(z.abs()).store(&mut lines.length);
+    lines
+}
+
+kernel! {
+    /// Two words for up to 64 corners: in the first, bit `k` is set if corner `k` is surely cut off
+    /// by the line; in the second, if the error bound does not allow to say.
+    pub fn cut_corners(corners: &[CornerGroup], line: &Line) -> (u64, u64) = cut_body<Eight>
+}
+
+#[inline(always)]
+pub(crate) fn cut_body<E: Eight>(corners: &[CornerGroup], line: &Line) -> (u64, u64) {
+    let [u, v] = line.line.map(E::splat);
+    let (offset, length) = (E::splat(line.offset), E::splat(line.length));
+    let slack = E::splat(SLACK);
+    let (mut cut, mut doubt) = (0, 0);
+    for (group, corners) in corners.iter().enumerate() {
+        let (x, y) = (E::load(&corners.x), E::load(&corners.y));
+        // As `Line::depth` and `Line::bound`.
+        let depth = u.mul(x).add(v.mul(y)).sub(offset);
+        let around = slack.mul(x.abs().add(y.abs()));
+        let error = E::load(&corners.error).add(around);
+        let bound = length.mul(error).add(slack.mul(offset));
+        cut |= depth.greater(bound) << (group * LANES);
+        // Not a number is in doubt, too.
+        doubt |= (!depth.abs().greater(bound) & 0xff) << (group * LANES);
+    }
+    (cut, doubt)
+}
+
+kernel! {
+    /// The largest of the corners' squared reaches.
+    pub fn farthest(corners: &[CornerGroup]) -> f64 = farthest_body<Eight>
+}
+
+#[inline(always)]
+pub(crate) fn farthest_body<E: Eight>(corners: &[CornerGroup]) -> f64 {
+    let mut most = E::splat(0.0);
+    for group in corners {
+        most = E::load(&group.reach2).larger(most);
+    }
+    let mut lanes = [0.0; LANES];
+    most.store(&mut lanes);
+    lanes
+        .into_iter()
+        .fold(0.0, |a, b| if b > a { b } else { a })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Level;
+    use super::super::eight::Base;
+    use super::*;
+    use proptest::prelude::*;
+
+    fn number() -> impl Strategy<Value = f64> {
+        prop_oneof![
+            8 => -1e3f64..1e3,
+            1 => Just(f64::NAN),
+            1 => Just(f64::INFINITY),
+            2 => (-4i32..5).prop_map(f64::from),
+        ]
+    }
+
+    proptest! {
+        #[test]
+        fn every_level_cuts_the_same_corners(
+            rows in prop::collection::vec((number(), number(), number(), number()), 0..64),
+            line in prop::array::uniform2(-4i32..5),
+            offset in 0.5f64..5.0,
+        ) {
+            let mut corners = vec![CornerGroup::default(); rows.len().div_ceil(LANES)];
+            for (k, row) in rows.iter().enumerate() {
+                let group = &mut corners[k / LANES];
+                let k = k % LANES;
+                (group.x[k], group.y[k]) = (row.0, row.1);
+                (group.error[k], group.reach2[k]) = (row.2.abs() * 1e-3, row.3.abs());
+            }
+            let line = Line { line: line.map(f64::from), offset, length: 8.0 };
+            let (cut, doubt) = cut_body::<Base>(&corners, &line);
+            for k in 0..corners.len() * LANES {
+                let group = &corners[k / LANES];
+                let depth = line.depth(group.x[k % LANES], group.y[k % LANES]);
+                let bound = line.bound(group.x[k % LANES], group.y[k % LANES], group.error[k % LANES]);
+                prop_assert_eq!(cut >> k & 1 == 1, depth > bound);
+                let surely = depth.abs() > bound;
+                prop_assert_eq!(doubt >> k & 1 == 0, surely);
+            }
+            for level in Level::all() {
+                prop_assert_eq!(cut_corners(level, &corners, &line), (cut, doubt));
+                prop_assert_eq!(farthest(level, &corners).to_bits(), farthest_body::<Base>(&corners).to_bits());
+            }
+        }
+
+        #[test]
+        fn every_level_makes_the_same_lines(
+            d in prop::collection::vec(prop::array::uniform3(-(1i32 << 30)..1 << 30), 1..=LANES),
+            frame in prop::array::uniform2(prop::array::uniform3(-1.0f64..1.0)),
+        ) {
+            let column = |axis: usize| d.iter().map(|d| d[axis]).collect::<Vec<_>>();
+            let (x, y, z) = (column(0), column(1), column(2));
+            let expected = bisectors_body::<Base>(&x, &y, &z, &frame);
+            for level in Level::all() {
+                let got = bisectors(level, &x, &y, &z, &frame);
+                for k in 0..d.len() {
+                    let words = |l: Line| [l.line[0], l.line[1], l.offset, l.length].map(f64::to_bits);
+                    prop_assert_eq!(words(got.get(k)), words(expected.get(k)));
+                }
+            }
+        }
+    }
+}

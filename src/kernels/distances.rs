@@ -1,0 +1,100 @@
+//! Approximate squared distances, and which of them are within a limit.
+
+use super::kernel;
+
+kernel! {
+    /// Squared distances of the points in columns to `p`, to a relative error below 2^-21.
+    /// Coordinates are in `0..2^30`; all slices are of one length.
+    pub fn distances(x: &[i32], y: &[i32], z: &[i32], p: [i32; 3], out: &mut [f32]) = distances_body
+}
+
+#[inline(always)]
+pub(crate) fn distances_body(x: &[i32], y: &[i32], z: &[i32], p: [i32; 3], out: &mut [f32]) {
+    for (((x, y), z), out) in x.iter().zip(y).zip(z).zip(out) {
+        let dx = (x - p[0]) as f32;
+        let dy = (y - p[1]) as f32;
+        let dz = (z - p[2]) as f32;
+        *out = dx * dx + dy * dy + dz * dz;
+    }
+}
+
+kernel! {
+    /// How many numbers are at most `limit`.
+    pub fn count_within(numbers: &[f32], limit: f32) -> usize = count_body
+}
+
+#[inline(always)]
+pub(crate) fn count_body(numbers: &[f32], limit: f32) -> usize {
+    // 32-bit sums keep as many lanes as there are numbers in a register.
+    numbers.iter().map(|d| u32::from(*d <= limit)).sum::<u32>() as usize
+}
+
+kernel! {
+    /// Where the numbers that are at most `limit` stand, ascending, in place of what is in `out`.
+    pub fn keep_within(numbers: &[f32], limit: f32, out: &mut Vec<u32>) = keep_body
+}
+
+#[inline(always)]
+pub(crate) fn keep_body(numbers: &[f32], limit: f32, out: &mut Vec<u32>) {
+    /// Numbers whose comparisons are held in one word.
+    const WORD: usize = 64;
+    out.clear();
+    for (word, numbers) in numbers.chunks(WORD).enumerate() {
+        let mut kept = 0u64;
+        if let Ok(numbers) = <&[f32; WORD]>::try_from(numbers) {
+            for (bit, d) in numbers.iter().enumerate() {
+                kept |= u64::from(*d <= limit) << bit;
+            }
+        } else {
+            for (bit, d) in numbers.iter().enumerate() {
+                kept |= u64::from(*d <= limit) << bit;
+            }
+        }
+        while kept != 0 {
+            out.push((word * WORD) as u32 + kept.trailing_zeros());
+            kept &= kept - 1;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Level;
+    use super::*;
+    use crate::geom::distance2;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn every_level_gives_the_same_bits(
+            points in prop::collection::vec(prop::array::uniform3(0i32..1 << 30), 0..200),
+            p in prop::array::uniform3(0i32..1 << 30),
+            share in 0.0f32..1.5,
+        ) {
+            let column = |axis: usize| points.iter().map(|q| q[axis]).collect::<Vec<_>>();
+            let (x, y, z) = (column(0), column(1), column(2));
+            let mut expected = vec![0.0; points.len()];
+            distances_body(&x, &y, &z, p, &mut expected);
+            let limit = share * expected.iter().copied().fold(0.0, f32::max);
+            let mut kept = Vec::new();
+            keep_body(&expected, limit, &mut kept);
+            let plain: Vec<u32> =
+                (0..points.len() as u32).filter(|&i| expected[i as usize] <= limit).collect();
+            prop_assert_eq!(&kept, &plain);
+            for level in Level::all() {
+                let mut got = vec![0.0; points.len()];
+                distances(level, &x, &y, &z, p, &mut got);
+                let bits = |d: &[f32]| d.iter().map(|d| d.to_bits()).collect::<Vec<_>>();
+                prop_assert_eq!(bits(&got), bits(&expected));
+                prop_assert_eq!(count_within(level, &got, limit), kept.len());
+                let mut out = vec![7];
+                keep_within(level, &got, limit, &mut out);
+                prop_assert_eq!(&out, &kept);
+            }
+            for (q, d) in points.iter().zip(&expected) {
+                let exact = distance2(*q, p) as f64;
+                prop_assert!((f64::from(*d) - exact).abs() <= exact / f64::from(1 << 21));
+            }
+        }
+    }
+}

@@ -1,0 +1,151 @@
+//! The inner loops that run once for every point and candidate, compiled for the registers that
+//! the machine has.
+//!
+//! A kernel is written once, as plain code over columns: that is its definition. The same text is
+//! compiled for each [`Level`] and the compiler widens it. Integer arithmetic is exact, and
+//! floating-point operations keep their order (none is contracted or reassociated), so every level
+//! gives the same bits; the tests of each kernel compare them.
+
+mod boxes;
+mod corners;
+mod distances;
+pub(crate) mod eight;
+mod ranks;
+mod sums;
+
+pub use boxes::{Boxes, box_distances};
+pub(crate) use corners::SLACK;
+pub use corners::{CornerGroup, Frame, LANES, Line, LineGroup, bisectors, cut_corners, farthest};
+pub(crate) use corners::{bisectors_body, cut_body, farthest_body};
+pub(crate) use distances::{count_body, distances_body, keep_body};
+pub use distances::{count_within, distances, keep_within};
+pub use ranks::ranks;
+pub(crate) use ranks::ranks_body;
+pub use sums::{SecondMoments, second_moments};
+
+/// A set of vector instructions that this machine has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Level(Width);
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Width {
+    /// What every machine of the architecture has.
+    Base,
+    /// AVX2, 256 bits.
+    #[cfg(target_arch = "x86_64")]
+    Avx2,
+    /// AVX-512 (F, BW, DQ, VL), 512 bits.
+    #[cfg(target_arch = "x86_64")]
+    Avx512,
+}
+
+impl Level {
+    /// What every machine has: the scalar definition.
+    pub const BASE: Self = Self(Width::Base);
+
+    /// The widest that this machine has.
+    #[must_use]
+    pub fn best() -> Self {
+        #[cfg(target_arch = "x86_64")]
+        {
+            if avx512() {
+                return Self(Width::Avx512);
+            }
+            if avx2() {
+                return Self(Width::Avx2);
+            }
+        }
+        Self::BASE
+    }
+
+    /// All that this machine has, narrowest first.
+    #[must_use]
+    pub fn all() -> Vec<Self> {
+        let mut all = vec![Self::BASE];
+        #[cfg(target_arch = "x86_64")]
+        {
+            all.extend(avx2().then_some(Self(Width::Avx2)));
+            all.extend(avx512().then_some(Self(Width::Avx512)));
+        }
+        all
+    }
+}
+
+impl Level {
+    #[cfg(target_arch = "x86_64")]
+    pub(crate) fn width(self) -> Width {
+        self.0
+    }
+}
+
+impl Default for Level {
+    fn default() -> Self {
+        Self::best()
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+fn avx2() -> bool {
+    is_x86_feature_detected!("avx2")
+        && is_x86_feature_detected!("bmi1")
+        && is_x86_feature_detected!("bmi2")
+        && is_x86_feature_detected!("lzcnt")
+        && is_x86_feature_detected!("popcnt")
+}
+
+#[cfg(target_arch = "x86_64")]
+fn avx512() -> bool {
+    avx2()
+        && is_x86_feature_detected!("avx512f")
+        && is_x86_feature_detected!("avx512bw")
+        && is_x86_feature_detected!("avx512dq")
+        && is_x86_feature_detected!("avx512vl")
+}
+
+/// Makes `name(level, …)` out of the scalar definition `body(…)`, which must be `inline(always)`, as
+/// must be what it calls and should be widened with it. With `<Eight>` behind its name the body takes
+/// the type of eight numbers for the level.
+macro_rules! kernel {
+    ($(#[$doc:meta])* $vis:vis fn $name:ident($($arg:ident: $type:ty),* $(,)?) $(-> $out:ty)? = $body:ident<Eight>) => {
+        $crate::kernels::kernel! {
+            @made $(#[$doc])* $vis fn $name($($arg: $type),*) $(-> $out)?
+                = $body::<$crate::kernels::eight::Base>,
+                $body::<$crate::kernels::eight::Avx2>,
+                $body::<$crate::kernels::eight::Avx512>
+        }
+    };
+    ($(#[$doc:meta])* $vis:vis fn $name:ident($($arg:ident: $type:ty),* $(,)?) $(-> $out:ty)? = $body:path) => {
+        $crate::kernels::kernel! {
+            @made $(#[$doc])* $vis fn $name($($arg: $type),*) $(-> $out)? = $body, $body, $body
+        }
+    };
+    (@made $(#[$doc:meta])* $vis:vis fn $name:ident($($arg:ident: $type:ty),*) $(-> $out:ty)?
+        = $base:expr, $avx2:expr, $avx512:expr) => {
+        $(#[$doc])*
+        #[allow(unsafe_code, reason = "the wide versions need instructions that were looked for")]
+        $vis fn $name(level: $crate::kernels::Level, $($arg: $type),*) $(-> $out)? {
+            #[cfg(target_arch = "x86_64")]
+            {
+                #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
+                fn avx2($($arg: $type),*) $(-> $out)? {
+                    $avx2($($arg),*)
+                }
+                #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx2,bmi1,bmi2,lzcnt,popcnt")]
+                fn avx512($($arg: $type),*) $(-> $out)? {
+                    $avx512($($arg),*)
+                }
+                match level.width() {
+                    $crate::kernels::Width::Base => {}
+                    // SAFETY: only `Level::best` and `Level::all` make this level, after they found
+                    // these instructions on the machine.
+                    $crate::kernels::Width::Avx2 => return unsafe { avx2($($arg),*) },
+                    // SAFETY: as above.
+                    $crate::kernels::Width::Avx512 => return unsafe { avx512($($arg),*) },
+                }
+            }
+            let _ = level;
+            $base($($arg),*)
+        }
+    };
+}
+pub(crate) use kernel;

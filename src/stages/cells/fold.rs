@@ -1,0 +1,126 @@
+//! The triples seen by the cells of a tile, each once with its count (paper, section 3.4).
+
+use super::TileRanges;
+use std::ops::Range;
+
+/// Triples as the cells of one tile see them, and the memory to put them in order.
+#[derive(Debug)]
+pub(super) struct Seen {
+    ids: Range<usize>,
+    /// Those whose smallest vertex is in the tile: its rank there, and the other two in one word.
+    here: Vec<(u32, u32, u32)>,
+    /// How many of `here` begin with each vertex.
+    begins: Vec<u32>,
+    elsewhere: Vec<[u32; 3]>,
+}
+
+/// Triples with counts: `[i, j, k, count]` of the tile, `[tile, i, j, k, count]` for others, both
+/// ascending.
+pub(super) type Folded = (Vec<[u32; 4]>, Vec<[u32; 5]>);
+
+impl Seen {
+    /// Bytes that the triples of `points` cells take at most: usual cells have five or six corners
+    /// between bisectors.
+    pub fn bytes(points: usize) -> u64 {
+        points as u64 * 200
+    }
+
+    /// For the cells of the points `ids`.
+    pub fn new(ids: Range<usize>) -> Self {
+        Self {
+            here: Vec::with_capacity(ids.len() * 6),
+            begins: vec![0; ids.len() + 1],
+            elsewhere: Vec::new(),
+            ids,
+        }
+    }
+
+    /// Number of triples so far, each as often as it was seen.
+    pub fn len(&self) -> usize {
+        self.here.len() + self.elsewhere.len()
+    }
+
+    /// The cell of `v` sees the triple that it makes with `a` and `b`.
+    #[inline]
+    pub fn see(&mut self, v: u32, a: u32, b: u32) {
+        let (low, high) = (a.min(b), a.max(b));
+        let [i, j, k] = [v.min(low), v.max(low).min(high), v.max(high)];
+        let rank = (i as usize).wrapping_sub(self.ids.start);
+        if rank < self.ids.len() {
+            self.begins[rank + 1] += 1;
+            self.here.push((rank as u32, j, k));
+        } else {
+            self.elsewhere.push([i, j, k]);
+        }
+    }
+
+    /// Equal triples as one record with a count.
+    pub fn fold(mut self, tiles: &TileRanges) -> Folded {
+        // By smallest vertex with one pass of counting, then in order by hand: half a dozen each.
+        let mut start = self.begins;
+        for rank in 1..start.len() {
+            start[rank] += start[rank - 1];
+        }
+        let mut sorted = vec![0u64; self.here.len()];
+        for (rank, j, k) in self.here.drain(..) {
+            let place = &mut start[rank as usize];
+            sorted[*place as usize] = u64::from(j) << 32 | u64::from(k);
+            *place += 1;
+        }
+        drop(self.here);
+        let mut kept: Vec<[u32; 4]> = Vec::with_capacity(sorted.len() / 2);
+        let mut begin = 0;
+        for (i, end) in (self.ids.start as u32..).zip(&start[..self.ids.len()]) {
+            // Every place has moved on to where the next vertex begins.
+            let pairs = &mut sorted[begin..*end as usize];
+            begin = *end as usize;
+            pairs.sort_unstable();
+            for group in pairs.chunk_by(|a, b| a == b) {
+                let (j, k) = ((group[0] >> 32) as u32, group[0] as u32);
+                kept.push([i, j, k, group.len() as u32]);
+            }
+        }
+        self.elsewhere.sort_unstable();
+        let sent = self.elsewhere.chunk_by(|a, b| a == b).map(|group| {
+            let [i, j, k] = group[0];
+            [tiles.of(i), i, j, k, group.len() as u32]
+        });
+        (kept, sent.collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stages::blocks::Blocks;
+    use proptest::prelude::*;
+    use std::collections::BTreeMap;
+
+    proptest! {
+        #[test]
+        fn counts_what_was_seen(
+            seen in prop::collection::vec(prop::collection::hash_set(0u32..60, 3), 0..300),
+        ) {
+            let tiles = TileRanges::new(Blocks::new(60, 30), 20);
+            let ids = tiles.ids(1);
+            let mut here = Seen::new(ids.clone());
+            let mut counts: BTreeMap<[u32; 3], u32> = BTreeMap::new();
+            for triple in &seen {
+                let t: Vec<u32> = triple.iter().copied().collect();
+                here.see(t[0], t[1], t[2]);
+                let mut t = [t[0], t[1], t[2]];
+                t.sort_unstable();
+                *counts.entry(t).or_default() += 1;
+            }
+            prop_assert_eq!(here.len(), seen.len());
+            let (kept, sent) = here.fold(&tiles);
+            let mine = |t: &[u32; 3]| ids.contains(&(t[0] as usize));
+            let expected: Vec<_> = counts.iter().filter(|(t, _)| mine(t))
+                .map(|(t, n)| [t[0], t[1], t[2], *n]).collect();
+            prop_assert_eq!(kept, expected);
+            let expected: Vec<_> = counts.iter().filter(|(t, _)| !mine(t))
+                .map(|(t, n)| [tiles.of(t[0]), t[0], t[1], t[2], *n]).collect();
+            prop_assert_eq!(sent, expected);
+        }
+    }
+}

@@ -1,0 +1,151 @@
+//! The neighbours of one point in columns, nearest first.
+
+use super::Near;
+use crate::geom::clip::Nearest;
+use crate::geom::plane::Moments;
+use crate::kernels::{Level, second_moments};
+
+/// Below this squared distance, differences are small enough for sums in 64 bits.
+const NEAR_LIMIT2: u64 = 1 << 54;
+
+/// Neighbours by (squared distance, id).
+#[derive(Debug, Clone, Default)]
+pub struct Neighbors {
+    len: usize,
+    /// The columns have room for `len` and maybe more.
+    distances2: Vec<u64>,
+    ids: Vec<u32>,
+    x: Vec<i32>,
+    y: Vec<i32>,
+    z: Vec<i32>,
+}
+
+/// The columns of [`Neighbors`] to write to, each as long as there are neighbours.
+pub(super) struct Columns<'a> {
+    pub distances2: &'a mut [u64],
+    pub ids: &'a mut [u32],
+    pub x: &'a mut [i32],
+    pub y: &'a mut [i32],
+    pub z: &'a mut [i32],
+}
+
+impl Neighbors {
+    /// How many there are.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.len
+    }
+
+    /// True if there is none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
+    /// The neighbour with `index` nearer ones, if it is known.
+    #[must_use]
+    #[inline]
+    pub fn get(&self, index: usize) -> Option<Near> {
+        let distance2 = *self.distances2[..self.len].get(index)?;
+        Some(Near {
+            distance2,
+            id: self.ids[index],
+            difference: [self.x[index], self.y[index], self.z[index]].map(i64::from),
+        })
+    }
+
+    /// The columns.
+    #[must_use]
+    pub fn columns(&self) -> Nearest<'_> {
+        Nearest {
+            distances2: &self.distances2[..self.len],
+            ids: &self.ids[..self.len],
+            x: &self.x[..self.len],
+            y: &self.y[..self.len],
+            z: &self.z[..self.len],
+        }
+    }
+
+    /// All of them, nearest first.
+    pub fn iter(&self) -> impl Iterator<Item = Near> + '_ {
+        (0..self.len()).filter_map(|index| self.get(index))
+    }
+
+    /// Forgets all.
+    pub fn clear(&mut self) {
+        self.len = 0;
+    }
+
+    /// Puts in one that is no nearer than those there.
+    pub fn push(&mut self, near: Near) {
+        let last = self.len;
+        let columns = self.resize(last + 1);
+        columns.distances2[last] = near.distance2;
+        columns.ids[last] = near.id;
+        // Differences of coordinates in 0..2^30 fit 32 bits.
+        let [x, y, z] = near.difference.map(|c| c as i32);
+        (columns.x[last], columns.y[last], columns.z[last]) = (x, y, z);
+    }
+
+    /// Makes it `len` neighbours; what they are, the caller writes.
+    pub(super) fn resize(&mut self, len: usize) -> Columns<'_> {
+        if len > self.ids.len() {
+            let room = len.next_multiple_of(64);
+            self.distances2.resize(room, 0);
+            self.ids.resize(room, 0);
+            self.x.resize(room, 0);
+            self.y.resize(room, 0);
+            self.z.resize(room, 0);
+        }
+        self.len = len;
+        Columns {
+            distances2: &mut self.distances2[..len],
+            ids: &mut self.ids[..len],
+            x: &mut self.x[..len],
+            y: &mut self.y[..len],
+            z: &mut self.z[..len],
+        }
+    }
+
+    /// Exact sums over the first `count`.
+    #[must_use]
+    pub fn moments(&self, count: usize, level: Level) -> Moments {
+        let small = count <= 256 && self.distances2[..count].last() < Some(&NEAR_LIMIT2);
+        if small {
+            let (sum, products) =
+                second_moments(level, &self.x[..count], &self.y[..count], &self.z[..count]);
+            return Moments::from_sums(count, sum, products);
+        }
+        let mut moments = Moments::default();
+        self.iter()
+            .take(count)
+            .for_each(|near| moments.add(near.difference));
+        moments
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn moments_are_exact_for_near_and_far(
+            points in prop::collection::vec(prop::array::uniform3(-(1i64 << 29)..1 << 29), 0..40),
+            shift in 0u32..29,
+        ) {
+            let mut points: Vec<_> = points.iter().map(|p| p.map(|c| c >> shift)).collect();
+            let length2 = |p: &[i64; 3]| p.iter().map(|c| c * c).sum::<i64>() as u64;
+            points.sort_by_key(length2);
+            let mut neighbors = Neighbors::default();
+            let mut exact = Moments::default();
+            for (id, p) in points.iter().enumerate() {
+                neighbors.push(Near { distance2: length2(p), id: id as u32, difference: *p });
+                exact.add(*p);
+            }
+            prop_assert_eq!(neighbors.moments(points.len(), Level::best()), exact);
+            prop_assert!(neighbors.iter().map(|n| n.difference).eq(points));
+        }
+    }
+}
