@@ -45,7 +45,7 @@ impl<const N: usize> Sorter<N> {
     /// Takes records in; safe to call from several threads.
     ///
     /// # Errors
-    /// [`Error::Io`].
+    /// [`crate::Error::Io`].
     pub fn push(&self, mut records: &[Record<N>]) -> Result<()> {
         let mut state = self
             .state
@@ -91,7 +91,7 @@ impl<const N: usize> Sorter<N> {
     /// Ends input: the records in ascending order, equal ones adjacent.
     ///
     /// # Errors
-    /// [`Error::Io`], [`Error::Corrupt`].
+    /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
     pub fn finish(self, workspace: &Workspace) -> Result<Sorted<N>> {
         let mut state = {
             let mut guard = self
@@ -167,7 +167,7 @@ impl<const N: usize> Sorted<N> {
     /// Calls `each` with every record in ascending order.
     ///
     /// # Errors
-    /// What `each` returned, [`Error::Io`], [`Error::Corrupt`].
+    /// What `each` returned, [`crate::Error::Io`], [`crate::Error::Corrupt`].
     pub fn for_each(self, mut each: impl FnMut(Record<N>) -> Result<()>) -> Result<()> {
         if self.runs.is_empty() {
             return self.buffer.into_iter().try_for_each(each);
@@ -192,7 +192,7 @@ impl<const N: usize> Sorted<N> {
     /// Several threads may do so at the same time, each in memory of [`Sorted::merge_bytes`].
     ///
     /// # Errors
-    /// What `each` returned, [`Error::Io`], [`Error::Corrupt`].
+    /// What `each` returned, [`crate::Error::Io`], [`crate::Error::Corrupt`].
     pub fn for_range(
         &self,
         from: Option<Record<N>>,
