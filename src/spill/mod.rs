@@ -6,6 +6,7 @@
 
 mod exchange;
 mod pack;
+mod runs;
 mod sections;
 mod sort;
 mod sorter;

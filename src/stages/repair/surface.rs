@@ -165,29 +165,13 @@ pub fn build(
     stats: &mut RepairStats,
     workspace: &Workspace,
 ) -> Result<Surface> {
-    let count = blocks.count();
     let held = workspace.reserve("exchanges", 2 * EXCHANGE_BUFFER)?;
-    let build = Build {
-        store,
-        stitched: &stitched,
-        blocks,
-        options,
-        triangles: Sections::with_layout(workspace, "repair.surface", count, ORIENTED)?,
-        runs: Sections::unpacked(workspace, "repair.runs", count)?,
-        rims: Sections::unpacked(workspace, "repair.rims", count)?,
-        sums: Sections::unpacked(workspace, "repair.sums", count)?,
-        bridges: Exchange::new(workspace, "repair.bridges", EXCHANGE_BUFFER).packed(SENT),
-        seen: Exchange::new(workspace, "repair.seen", EXCHANGE_BUFFER).packed(SEEN),
-        shared: Mutex::new(Shared {
-            globals: vec![0; count],
-            stats: RepairStats::default(),
-        }),
-    };
+    let build = Build::create(store, &stitched, blocks, options, workspace)?;
     let bytes = |b: usize| {
         let records = stitched.interior.records(b) + stitched.added.records(b);
         230 * records as u64 + blocks.ids(b).len() as u64 * 30 + (1 << 20)
     };
-    workspace.for_each_unit("repair: block", count, bytes, |block| {
+    workspace.for_each_unit("repair: block", blocks.count(), bytes, |block| {
         build.block(block)?;
         workspace.observer.advance(1);
         Ok(())
@@ -195,22 +179,23 @@ pub fn build(
     let shared = build.shared.into_inner();
     let shared = shared.unwrap_or_else(PoisonError::into_inner);
     *stats = shared.stats;
-    let bridges = build.bridges.deliver_unique(workspace, count)?;
-    for block in 0..count {
+    let bridges = build.bridges.deliver_unique(workspace, blocks.count())?;
+    for block in 0..blocks.count() {
         let own = |r: &&[u32; 4]| blocks.of(r[1]) == r[0];
         stats.bridges_removed += bridges.get(block)?.iter().filter(own).count() as u64;
     }
-    let seen = build.seen.deliver(workspace, count)?;
+    let seen = build.seen.deliver(workspace, blocks.count())?;
     let (triangles, runs, rims, sums) = (build.triangles, build.runs, build.rims, build.sums);
     drop(stitched);
     drop(held);
     let mut next = 0;
-    let mut globals = Vec::with_capacity(count);
+    let mut globals = Vec::with_capacity(blocks.count());
     for own in shared.globals {
         globals.push((next, own));
         next += own;
     }
-    let held = workspace.reserve("labels", u64::from(next) * 10 + count as u64 * 8 + 1024)?;
+    let bytes = u64::from(next) * 10 + globals.len() as u64 * 8 + 1024;
+    let held = workspace.reserve("labels", bytes)?;
     let sets = join(&seen, &globals, next, workspace)?;
     let parts = Parts {
         store,
@@ -233,7 +218,33 @@ pub fn build(
     })
 }
 
-impl Build<'_> {
+impl<'a> Build<'a> {
+    fn create(
+        store: &'a PointStore,
+        stitched: &'a Stitched,
+        blocks: Blocks,
+        options: RepairOptions,
+        workspace: &Workspace,
+    ) -> Result<Self> {
+        let count = blocks.count();
+        Ok(Self {
+            store,
+            stitched,
+            blocks,
+            options,
+            triangles: Sections::with_layout(workspace, "repair.surface", count, ORIENTED)?,
+            runs: Sections::unpacked(workspace, "repair.runs", count)?,
+            rims: Sections::unpacked(workspace, "repair.rims", count)?,
+            sums: Sections::unpacked(workspace, "repair.sums", count)?,
+            bridges: Exchange::new(workspace, "repair.bridges", EXCHANGE_BUFFER).packed(SENT),
+            seen: Exchange::new(workspace, "repair.seen", EXCHANGE_BUFFER).packed(SEEN),
+            shared: Mutex::new(Shared {
+                globals: vec![0; count],
+                stats: RepairStats::default(),
+            }),
+        })
+    }
+
     fn block(&self, block: usize) -> Result<()> {
         let ids = self.blocks.ids(block);
         let triangles = around::load(self.stitched, block)?;
