@@ -10,7 +10,7 @@ use crate::geom::Point;
 use crate::stages::blocks::Blocks;
 use crate::stages::surface::orient::{Asks, consistent};
 use crate::stages::surface::parity::ParitySets;
-use crate::stages::surface::star::Triangle;
+use crate::stages::surface::star::{Triangle, others};
 use crate::workspace::Workspace;
 use crate::workspace::memory::Reservation;
 use rustc_hash::FxHashMap;
@@ -59,12 +59,12 @@ struct Loaded {
 }
 
 impl View for Context<'_> {
-    fn around(&self, v: u32) -> impl Iterator<Item = (u32, Triangle)> {
+    fn around(&self, v: u32) -> impl Iterator<Item = (u32, [u32; 2])> {
         let around = self.around.get(&v).map(|a| a.triangles.iter());
         around
             .into_iter()
             .flatten()
-            .map(|&n| (n, self.tris[n as usize].ids))
+            .map(move |&n| (n, others(self.tris[n as usize].ids, v)))
     }
 
     fn position(&self, v: u32) -> Point {
