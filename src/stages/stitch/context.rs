@@ -100,13 +100,14 @@ impl<'a> Context<'a> {
         let section = block as usize;
         let (interior, surface) = (self.interior, &self.base.surface);
         let triangles = interior.context.records(section) + surface.crossing.records(section);
-        let bytes = (interior.vertices.records(section) * 160 + triangles * 120) as u64;
+        let vertices = interior.vertices.get(section)?;
+        let touched = vertices.iter().filter(|r| r[1] == 1).count();
+        let bytes = (touched * 160 + triangles * 120) as u64;
         if most.is_some_and(|most| self.held + bytes > most) {
             return Ok(false);
         }
         let held = self.workspace.reserve("stitch: borders", bytes)?;
         self.held += bytes;
-        let vertices = interior.vertices.get(section)?;
         let near = interior.context.get(section)?;
         let crossing = surface.crossing.get(section)?;
         for &[v, context, ..] in &vertices {
