@@ -10,7 +10,7 @@ use crate::geom::Point;
 use crate::stages::blocks::Blocks;
 use crate::stages::surface::orient::{Asks, consistent};
 use crate::stages::surface::parity::ParitySets;
-use crate::stages::surface::star::Triangle;
+use crate::stages::surface::star::{Triangle, others};
 use crate::workspace::Workspace;
 use crate::workspace::memory::Reservation;
 use rustc_hash::FxHashMap;
@@ -59,12 +59,12 @@ struct Loaded {
 }
 
 impl View for Context<'_> {
-    fn around(&self, v: u32) -> impl Iterator<Item = (u32, Triangle)> {
+    fn around(&self, v: u32) -> impl Iterator<Item = (u32, [u32; 2])> {
         let around = self.around.get(&v).map(|a| a.triangles.iter());
         around
             .into_iter()
             .flatten()
-            .map(|&n| (n, self.tris[n as usize].ids))
+            .map(move |&n| (n, others(self.tris[n as usize].ids, v)))
     }
 
     fn position(&self, v: u32) -> Point {
@@ -100,13 +100,14 @@ impl<'a> Context<'a> {
         let section = block as usize;
         let (interior, surface) = (self.interior, &self.base.surface);
         let triangles = interior.context.records(section) + surface.crossing.records(section);
-        let bytes = (interior.vertices.records(section) * 160 + triangles * 120) as u64;
+        let vertices = interior.vertices.get(section)?;
+        let touched = vertices.iter().filter(|r| r[1] == 1).count();
+        let bytes = (touched * 160 + triangles * 120) as u64;
         if most.is_some_and(|most| self.held + bytes > most) {
             return Ok(false);
         }
         let held = self.workspace.reserve("stitch: borders", bytes)?;
         self.held += bytes;
-        let vertices = interior.vertices.get(section)?;
         let near = interior.context.get(section)?;
         let crossing = surface.crossing.get(section)?;
         for &[v, context, ..] in &vertices {

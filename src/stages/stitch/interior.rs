@@ -2,6 +2,7 @@
 //! are all in one block, each block by itself.
 
 use super::base::Base;
+use super::fans::Fans;
 use super::tests_of_paper::{Adjacent, Candidate, Refusal, View, examine};
 use super::{InsertStats, SharedStats};
 use crate::error::Result;
@@ -12,7 +13,7 @@ use crate::stages::blocks::Blocks;
 use crate::stages::order::PointStore;
 use crate::stages::surface::orient::{Asks, consistent};
 use crate::stages::surface::parity::ParitySets;
-use crate::stages::surface::star::{Star, Triangle};
+use crate::stages::surface::star::Triangle;
 use crate::workspace::Workspace;
 use rustc_hash::FxHashMap;
 use std::ops::Range;
@@ -120,11 +121,34 @@ pub fn insert(
     Ok(())
 }
 
+/// For each vertex of a block, is it in a crossing triple?
+fn border(base: &Base, ids: &Range<u32>, block: usize) -> Result<Vec<bool>> {
+    let mut border = vec![false; ids.len()];
+    let mut mark = |t: Triangle| {
+        for v in t {
+            if ids.contains(&v) {
+                border[(v - ids.start) as usize] = true;
+            }
+        }
+    };
+    for r in &base.visiting.get(block)? {
+        mark([r[1], r[2], r[3]]);
+    }
+    for r in &base.crossing.get(block)? {
+        mark([r[0], r[1], r[2]]);
+    }
+    Ok(border)
+}
+
 /// The mesh around a block while candidates are inserted.
 struct BlockWork {
     ids: Range<u32>,
-    star: Star,
-    /// Base interior, base crossing, then inserted triangles.
+    /// The interior triangles of the base.
+    mesh: Vec<Triangle>,
+    /// Around the vertices of candidates.
+    fans: Fans,
+    /// Those of base interior that touch a candidate or a crossing triple, base crossing, then
+    /// inserted triangles.
     triangles: Vec<Triangle>,
     /// For each triangle its home's node and its orientation relative to it.
     homes: Vec<(u32, bool)>,
@@ -132,8 +156,6 @@ struct BlockWork {
     base: usize,
     candidates: Vec<Candidate>,
     crossing_candidates: Vec<Candidate>,
-    /// For each vertex the time, as a number of triangles, when one was last inserted at it.
-    changed: Vec<u32>,
     /// Homes absorbed into one another for good.
     absorbed: ParitySets,
     /// Homes joined for this block.
@@ -148,9 +170,8 @@ struct BlockWork {
 }
 
 impl View for BlockWork {
-    fn around(&self, v: u32) -> impl Iterator<Item = (u32, Triangle)> {
-        let at = self.star.at(v).iter();
-        at.map(|&n| (n, self.triangles[n as usize]))
+    fn around(&self, v: u32) -> impl Iterator<Item = (u32, [u32; 2])> {
+        self.fans.at(v)
     }
 
     fn position(&self, v: u32) -> Point {
@@ -173,60 +194,51 @@ impl BlockWork {
             candidates.push(Candidate::new(t, count, t.map(at)));
         }
         candidates.sort_unstable();
+        let mut active = vec![false; ids.len()];
+        for v in candidates.iter().flat_map(|c| c.ids) {
+            active[(v - ids.start) as usize] = true;
+        }
+        let border = border(base, &ids, block)?;
         let interior = base.surface.interior.get(block)?;
         let crossing = base.surface.crossing.get(block)?;
-        let star = Star::with_room(
+        let fans = Fans::with_room(
             ids.clone(),
+            &active,
             interior
                 .iter()
                 .map(|r| [r[0], r[1], r[2]])
                 .chain(crossing.iter().map(|r| [r[1], r[2], r[3]]))
                 .chain(candidates.iter().map(|c| c.ids)),
         );
-        let most = interior.len() + crossing.len() + candidates.len() / 2;
         let mut work = Self {
-            star,
-            triangles: Vec::with_capacity(most),
-            homes: Vec::with_capacity(most),
-            interior_base: interior.len(),
-            base: interior.len() + crossing.len(),
+            mesh: Vec::with_capacity(interior.len()),
+            fans,
+            triangles: Vec::new(),
+            homes: Vec::new(),
+            interior_base: 0,
+            base: 0,
             candidates,
             crossing_candidates: Vec::new(),
-            changed: vec![0; ids.len()],
             absorbed: ParitySets::default(),
             joined: ParitySets::default(),
             global: Vec::new(),
             joints: Vec::new(),
             own,
             foreign: FxHashMap::default(),
-            border: vec![false; ids.len()],
+            border,
             ids,
         };
-        work.add_base(&interior, &crossing, base, block);
+        work.add_base(&interior, &crossing, &active, base, block);
         drop((interior, crossing));
         work.see_crossing(store, base, block)?;
         Ok(work)
     }
 
-    /// Takes in the crossing triples: which vertices they touch, which are candidates, and where
-    /// their vertices are.
+    /// Takes in which crossing triples are candidates, and where their vertices are.
     fn see_crossing(&mut self, store: &PointStore, base: &Base, block: usize) -> Result<()> {
         let mut foreign: Vec<u32> = Vec::new();
-        let mut mark = |t: Triangle| {
-            for v in t {
-                if self.ids.contains(&v) {
-                    self.border[(v - self.ids.start) as usize] = true;
-                }
-            }
-        };
-        for r in &base.visiting.get(block)? {
-            mark([r[1], r[2], r[3]]);
-        }
         let flags = base.flags.get(block)?;
         let mut candidates = base.crossing.get(block)?;
-        for r in &candidates {
-            mark([r[0], r[1], r[2]]);
-        }
         candidates.retain(|&[i, j, k, count]| {
             count < 3 || flags.binary_search(&[block as u32, i, j, k]).is_ok()
         });
@@ -256,6 +268,7 @@ impl BlockWork {
         &mut self,
         interior: &[[u32; 4]],
         crossing: &[[u32; 5]],
+        active: &[bool],
         base: &Base,
         block: usize,
     ) {
@@ -288,21 +301,34 @@ impl BlockWork {
             of_label.push(home);
         }
         for r in interior {
-            let (node, flip) = of_label[(r[3] >> 1) as usize];
-            self.put([r[0], r[1], r[2]], (node, flip ^ (r[3] & 1 == 1)));
+            let t = [r[0], r[1], r[2]];
+            self.mesh.push(t);
+            let slots = t.map(|v| (v - self.ids.start) as usize);
+            if slots.iter().any(|&v| active[v] || self.border[v]) {
+                let (node, flip) = of_label[(r[3] >> 1) as usize];
+                self.put(t, (node, flip ^ (r[3] & 1 == 1)));
+            }
         }
+        self.interior_base = self.triangles.len();
         for r in crossing {
             let (node, flip) = node_for(self, r[4] >> 1);
             self.put([r[1], r[2], r[3]], (node, flip ^ (r[4] & 1 == 1)));
         }
+        self.base = self.triangles.len();
         self.absorbed = ParitySets::new(self.global.len());
         self.joined = ParitySets::new(self.global.len());
     }
 
     fn put(&mut self, t: Triangle, home: (u32, bool)) {
-        self.star.add(t, self.triangles.len() as u32);
+        let number = self.triangles.len() as u32;
         self.triangles.push(t);
+        self.fans.add(t, number, self.now());
         self.homes.push(home);
+    }
+
+    /// The time is told by the number of triangles, and is never 0.
+    fn now(&self) -> u32 {
+        self.triangles.len() as u32 + 1
     }
 
     /// Rounds over the candidates in rank order until one inserts nothing; those left undecided.
@@ -312,23 +338,17 @@ impl BlockWork {
         loop {
             let before = self.triangles.len();
             pending.retain_mut(|candidate| {
-                let now = self.triangles.len() as u32 + 1;
                 let t = candidate.ids;
                 // Test I looks at nothing but the triangles at these vertices.
-                let changed = |v: &u32| self.changed[(v - self.ids.start) as usize];
-                if candidate.tried > 0 && t.iter().all(|v| changed(v) <= candidate.tried) {
+                let changed = |v: &u32| self.fans.changed(*v) > candidate.tried;
+                if candidate.tried > 0 && !t.iter().any(changed) {
                     return true;
                 }
-                candidate.tried = now;
+                candidate.tried = self.now();
                 match examine(t, self, cos_max_angle, &mut link) {
                     Err(Refusal::Unconnected) => return true,
                     Err(refusal) => counts.refuse(refusal),
-                    Ok(adjacent) if self.try_insert(t, adjacent) => {
-                        counts.accepted += 1;
-                        for v in t {
-                            self.changed[(v - self.ids.start) as usize] = now + 1;
-                        }
-                    }
+                    Ok(adjacent) if self.try_insert(t, adjacent) => counts.accepted += 1,
                     Ok(_) => counts.orientation += 1,
                 }
                 false
@@ -423,10 +443,9 @@ impl BlockWork {
         out.vertices.put(block, &self.located(&context, &around))?;
         drop(around);
         out.joints.put(block, &self.joints)?;
-        let (base, inserted) = self.triangles.split_at_mut(self.base);
+        let inserted = &mut self.triangles[self.base..];
         inserted.sort_unstable();
-        let mut mesh = Vec::with_capacity(self.interior_base + inserted.len());
-        mesh.extend_from_slice(&base[..self.interior_base]);
+        let mut mesh = std::mem::take(&mut self.mesh);
         mesh.extend_from_slice(inserted);
         // Two ascending runs: this sort merges them.
         mesh.sort();

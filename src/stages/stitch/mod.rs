@@ -7,6 +7,7 @@
 mod base;
 mod context;
 mod crossing;
+mod fans;
 mod interior;
 mod tests_of_paper;
 

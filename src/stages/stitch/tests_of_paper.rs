@@ -2,12 +2,12 @@
 //! geometric one. Test IV is with the callers, who know the components.
 
 use crate::geom::{Point, sub};
-use crate::stages::surface::star::{EDGES, Triangle, has, opposed, others};
+use crate::stages::surface::star::{EDGES, Triangle, opposed, others};
 
 /// The mesh around the vertices of a triangle.
 pub trait View {
-    /// All triangles at `v`: their number and their ids.
-    fn around(&self, v: u32) -> impl Iterator<Item = (u32, Triangle)>;
+    /// All triangles at `v`: their number and their other two vertices, ascending.
+    fn around(&self, v: u32) -> impl Iterator<Item = (u32, [u32; 2])>;
     /// The position of a vertex of a triangle of the mesh or of a candidate.
     fn position(&self, v: u32) -> Point;
 }
@@ -40,28 +40,26 @@ pub fn examine(
     cos_max_angle: f64,
     link: &mut Vec<[u32; 2]>,
 ) -> Result<[Option<Adjacent>; 3], Refusal> {
-    let mut found: [Option<(u32, Triangle)>; 3] = [None; 3];
+    // At each edge the number of a triangle and its third vertex.
+    let mut found: [Option<(u32, u32)>; 3] = [None; 3];
     let mut counts = [0usize; 3];
     let mut used = [false; 3];
-    let mut see = |edge: usize, number: u32, other: Triangle| {
-        counts[edge] += 1;
-        found[edge] = Some((number, other));
+    // Does the triangle with `other` beside its first vertex have the edge to `end`?
+    let mut see = |edge: usize, number: u32, [a, b]: [u32; 2], end: u32| {
+        if a == end || b == end {
+            counts[edge] += 1;
+            found[edge] = Some((number, if a == end { b } else { a }));
+        }
     };
     // The edges are (0,1), (0,2) and (1,2); the first two are seen from vertex 0.
     for (number, other) in view.around(t[0]) {
         used[0] = true;
-        if has(other, t[1]) {
-            see(0, number, other);
-        }
-        if has(other, t[2]) {
-            see(1, number, other);
-        }
+        see(0, number, other, t[1]);
+        see(1, number, other, t[2]);
     }
     for (number, other) in view.around(t[1]) {
         used[1] = true;
-        if has(other, t[2]) {
-            see(2, number, other);
-        }
+        see(2, number, other, t[2]);
     }
     used[2] = view.around(t[2]).next().is_some();
     let connected = counts.iter().filter(|c| **c > 0).count();
@@ -79,10 +77,9 @@ pub fn examine(
     }
     let mut adjacent = [None; 3];
     for (edge, (a, b, c, _)) in EDGES.into_iter().enumerate() {
-        let Some((number, other)) = found[edge] else {
+        let Some((number, far)) = found[edge] else {
             continue;
         };
-        let far = others_than(other, t[a], t[b]);
         if !angle_fits(
             [t[a], t[b], t[c]].map(|v| view.position(v)),
             view.position(far),
@@ -90,19 +87,27 @@ pub fn examine(
         ) {
             return Err(Refusal::Angle);
         }
+        let other = with_edge(t[a], t[b], far);
         adjacent[edge] = Some((number, opposed(t, other, t[a], t[b])));
     }
     Ok(adjacent)
 }
 
-fn others_than(t: Triangle, a: u32, b: u32) -> u32 {
-    t.into_iter().find(|v| *v != a && *v != b).unwrap_or(a)
+/// The triangle of an edge `low < high` and a third vertex.
+fn with_edge(low: u32, high: u32, third: u32) -> Triangle {
+    if third < low {
+        [third, low, high]
+    } else if third < high {
+        [low, third, high]
+    } else {
+        [low, high, third]
+    }
 }
 
 /// True if with `t` the link of `v` would have a closed cycle and another component.
 fn makes_excess(t: Triangle, v: u32, view: &impl View, link: &mut Vec<[u32; 2]>) -> bool {
     link.clear();
-    link.extend(view.around(v).map(|(_, other)| others(other, v)));
+    link.extend(view.around(v).map(|(_, other)| other));
     let edges = link.len();
     if edges == 0 {
         return false;
