@@ -18,7 +18,7 @@ fn workspace() -> Workspace {
 }
 
 fn store(points: &[Point], page: usize, workspace: &Workspace) -> PointStore {
-    let mut orderer = Orderer::new(workspace).unwrap();
+    let orderer = Orderer::new(workspace).unwrap();
     orderer.push(workspace, points).unwrap();
     orderer.finish(workspace, page).unwrap().0
 }
