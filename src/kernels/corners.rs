@@ -115,22 +115,24 @@ fn eight_bisectors<E: Eight>(
     [u, v]: &Frame,
 ) -> LineGroup {
     let (x, y, z) = (E::convert(x), E::convert(y), E::convert(z));
-    let dot = |w: &[f64; 3]| {
-        let along = [
-            x.mul(E::splat(w[0])),
-            y.mul(E::splat(w[1])),
-            z.mul(E::splat(w[2])),
-        ];
-        along[0].add(along[1]).add(along[2])
-    };
     let length2 = x.mul(x).add(y.mul(y)).add(z.mul(z));
     let mut lines = LineGroup::default();
-    dot(u).store(&mut lines.x);
-    dot(v).store(&mut lines.y);
+    dot(x, y, z, u).store(&mut lines.x);
+    dot(x, y, z, v).store(&mut lines.y);
     E::splat(0.5).mul(length2).store(&mut lines.offset);
     // No shorter than the true length, and without a root.
     x.abs().add(y.abs()).add(z.abs()).store(&mut lines.length);
     lines
+}
+
+#[inline(always)]
+fn dot<E: Eight>(x: E, y: E, z: E, w: &[f64; 3]) -> E {
+    let (x, y, z) = (
+        x.mul(E::splat(w[0])),
+        y.mul(E::splat(w[1])),
+        z.mul(E::splat(w[2])),
+    );
+    x.add(y).add(z)
 }
 
 kernel! {
@@ -141,7 +143,7 @@ kernel! {
 
 #[inline(always)]
 pub(crate) fn cut_body<E: Eight>(corners: &[CornerGroup], line: &Line) -> (u64, u64) {
-    let [u, v] = line.line.map(E::splat);
+    let (u, v) = (E::splat(line.line[0]), E::splat(line.line[1]));
     let (offset, length) = (E::splat(line.offset), E::splat(line.length));
     let slack = E::splat(SLACK);
     let (mut cut, mut doubt) = (0, 0);

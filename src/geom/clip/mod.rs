@@ -142,6 +142,8 @@ impl Cell {
             }));
         self.links.clear();
         self.links.extend_from_slice(&RIM.links);
+        self.cut.resize(RIM_PLACES.div_ceil(64), 0);
+        self.doubt.resize(RIM_PLACES.div_ceil(64), 0);
         self.free.clear();
         self.free
             .extend((RIM_CORNERS as u32..RIM_PLACES as u32).rev());
@@ -165,6 +167,8 @@ impl Cell {
         let before = self.places() as u32;
         self.corners.resize(places / LANES, CornerGroup::default());
         self.links.resize(places, Link::default());
+        self.cut.resize(places.div_ceil(64), 0);
+        self.doubt.resize(places.div_ceil(64), 0);
         self.free.extend((before..places as u32).rev());
     }
 
@@ -221,16 +225,12 @@ impl Cell {
             self.hidden |= neighbor.id < self.own;
             return;
         }
-        self.cut.clear();
-        let mut doubts = 0;
-        let mut all = 0;
-        self.doubt.clear();
-        for corners in self.corners.chunks(64 / LANES) {
-            let (cut, doubt) = cut_body::<E>(corners, &line);
-            self.cut.push(cut);
-            self.doubt.push(doubt);
-            doubts |= doubt;
-            all |= cut | doubt;
+        let (mut doubts, mut all) = (0, 0);
+        let words = self.cut.iter_mut().zip(&mut self.doubt);
+        for (corners, (cut, doubt)) in self.corners.chunks(64 / LANES).zip(words) {
+            (*cut, *doubt) = cut_body::<E>(corners, &line);
+            doubts |= *doubt;
+            all |= *cut | *doubt;
         }
         if all == 0 {
             return;
@@ -423,13 +423,14 @@ fn clip_nearest_body<E: Eight>(cell: &mut Cell, near: Nearest<'_>, mut next: usi
     let count = near.distances2.len();
     while next < count {
         let group = next..(next + LANES).min(count);
-        let [x, y, z] = [near.x, near.y, near.z].map(|column| &column[group.clone()]);
+        let (x, y) = (&near.x[group.clone()], &near.y[group.clone()]);
+        let z = &near.z[group.clone()];
         let lines = bisectors_body::<E>(x, y, z, &cell.frame);
         for (k, number) in group.enumerate() {
             if near.distances2[number] > cell.secure2 {
                 return number;
             }
-            let difference = [x[k], y[k], z[k]].map(i64::from);
+            let difference = [i64::from(x[k]), i64::from(y[k]), i64::from(z[k])];
             let id = near.ids[number];
             cell.clip_line::<E>(lines.get(k), Neighbor { difference, id });
             next += 1;
