@@ -15,6 +15,23 @@ use std::sync::Arc;
 /// Neighbours of a plane, as the pipeline's default.
 pub const NEIGHBORS: usize = 30;
 
+/// Candidates of a query, about.
+pub const CANDIDATES: usize = 192;
+
+/// Neighbours listed for a query, about.
+pub const LISTED: usize = 40;
+
+/// Numbers without a pattern.
+pub fn column(count: usize, seed: u32) -> Vec<i32> {
+    let mixed = |n: u32| {
+        (n + 1)
+            .wrapping_mul(seed)
+            .rotate_left(13)
+            .wrapping_mul(0x9e37_79b1)
+    };
+    (0..count as u32).map(|n| (mixed(n) >> 12) as i32).collect()
+}
+
 /// A workspace of one thread in the temporary folder.
 pub fn workspace() -> Workspace {
     let memory = MemoryPool::new(1 << 30).expect("more than the minimum");

@@ -1,0 +1,19 @@
+//! The sums that a plane is fitted to, at every level that the machine has.
+
+mod util;
+
+use divan::counter::ItemsCount;
+use divan::{Bencher, black_box};
+use outcrop::kernels::{Level, second_moments};
+
+fn main() {
+    divan::main();
+}
+
+#[divan::bench(args = Level::all())]
+fn neighbors(bencher: Bencher<'_, '_>, level: Level) {
+    let [x, y, z] = [7, 11, 13].map(|seed| util::column(util::NEIGHBORS, seed));
+    bencher
+        .counter(ItemsCount::new(util::NEIGHBORS))
+        .bench_local(|| second_moments(level, black_box(&x), &y, &z));
+}
