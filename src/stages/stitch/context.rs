@@ -99,21 +99,21 @@ impl<'a> Context<'a> {
     pub fn load(&mut self, block: u32, most: Option<u64>) -> Result<bool> {
         let section = block as usize;
         let (interior, surface) = (self.interior, &self.base.surface);
-        let triangles = interior.context.records(section) + surface.crossing.records(section);
         let vertices = interior.vertices.get(section)?;
-        let touched = vertices.iter().filter(|r| r[1] == 1).count();
-        let bytes = (touched * 160 + triangles * 120) as u64;
+        let context = vertices.iter().filter(|r| r[1] == 1).map(|r| r[0]);
+        let context: Vec<u32> = context.collect();
+        let mut crossing = surface.crossing.get(section)?;
+        crossing.retain(|r| r[1..4].iter().any(|v| context.binary_search(v).is_ok()));
+        let triangles = interior.context.records(section) + crossing.len();
+        let bytes = (context.len() * 160 + triangles * 120) as u64;
         if most.is_some_and(|most| self.held + bytes > most) {
             return Ok(false);
         }
         let held = self.workspace.reserve("stitch: borders", bytes)?;
         self.held += bytes;
         let near = interior.context.get(section)?;
-        let crossing = surface.crossing.get(section)?;
-        for &[v, context, ..] in &vertices {
-            if context == 1 {
-                self.around.insert(v, Around::default());
-            }
+        for &v in &context {
+            self.around.insert(v, Around::default());
         }
         let mut local: FxHashMap<u32, u32> = FxHashMap::default();
         for r in &near {

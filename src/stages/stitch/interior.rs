@@ -121,21 +121,26 @@ pub fn insert(
     Ok(())
 }
 
-/// For each vertex of a block, is it in a crossing triple?
-fn border(base: &Base, ids: &Range<u32>, block: usize) -> Result<Vec<bool>> {
-    let mut border = vec![false; ids.len()];
-    let mut mark = |t: Triangle| {
-        for v in t {
-            if ids.contains(&v) {
-                border[(v - ids.start) as usize] = true;
-            }
+/// For each vertex of a block: is it in a crossing triple?
+const BORDER: u8 = 1;
+/// Is it in one that is not in the base, so that it may be a candidate?
+const OPEN: u8 = 2;
+
+/// [`BORDER`] and [`OPEN`] of the vertices of a block; `crossing` is the crossing base around it.
+fn border(base: &Base, crossing: &[[u32; 5]], ids: &Range<u32>, block: usize) -> Result<Vec<u8>> {
+    let mut border = vec![0; ids.len()];
+    let mut mark = |t: Triangle, count: u32| {
+        let in_base = || crossing.binary_search_by_key(&t, |r| [r[1], r[2], r[3]]);
+        let open = count < 3 || in_base().is_err();
+        for v in t.into_iter().filter(|v| ids.contains(v)) {
+            border[(v - ids.start) as usize] |= if open { BORDER | OPEN } else { BORDER };
         }
     };
     for r in &base.visiting.get(block)? {
-        mark([r[1], r[2], r[3]]);
+        mark([r[1], r[2], r[3]], r[4]);
     }
     for r in &base.crossing.get(block)? {
-        mark([r[0], r[1], r[2]]);
+        mark([r[0], r[1], r[2]], r[3]);
     }
     Ok(border)
 }
@@ -165,8 +170,8 @@ struct BlockWork {
     joints: Vec<[u32; 6]>,
     own: Vec<Point>,
     foreign: FxHashMap<u32, Point>,
-    /// For each vertex of the block, is it in a crossing triple?
-    border: Vec<bool>,
+    /// For each vertex of the block [`BORDER`] and [`OPEN`].
+    border: Vec<u8>,
 }
 
 impl View for BlockWork {
@@ -198,9 +203,9 @@ impl BlockWork {
         for v in candidates.iter().flat_map(|c| c.ids) {
             active[(v - ids.start) as usize] = true;
         }
-        let border = border(base, &ids, block)?;
         let interior = base.surface.interior.get(block)?;
         let crossing = base.surface.crossing.get(block)?;
+        let border = border(base, &crossing, &ids, block)?;
         let fans = Fans::with_room(
             ids.clone(),
             &active,
@@ -304,7 +309,7 @@ impl BlockWork {
             let t = [r[0], r[1], r[2]];
             self.mesh.push(t);
             let slots = t.map(|v| (v - self.ids.start) as usize);
-            if slots.iter().any(|&v| active[v] || self.border[v]) {
+            if slots.iter().any(|&v| active[v] || self.border[v] != 0) {
                 let (node, flip) = of_label[(r[3] >> 1) as usize];
                 self.put(t, (node, flip ^ (r[3] & 1 == 1)));
             }
@@ -424,10 +429,10 @@ impl BlockWork {
         counts: &mut InsertStats,
     ) -> Result<()> {
         let slot = |v: u32| (v - self.ids.start) as usize;
-        let mut context = self.border.clone();
+        let mut context: Vec<bool> = self.border.iter().map(|b| b & OPEN != 0).collect();
         let mut ranked = std::mem::take(&mut self.crossing_candidates);
         for candidate in undecided {
-            if candidate.ids.iter().any(|&v| self.border[slot(v)]) {
+            if candidate.ids.iter().any(|&v| self.border[slot(v)] != 0) {
                 ranked.push(*candidate);
                 candidate.ids.iter().for_each(|&v| context[slot(v)] = true);
             } else {
@@ -475,10 +480,11 @@ impl BlockWork {
 
     /// The vertices whose positions the crossing candidates may need.
     fn located(&self, context: &[bool], around: &[[u32; 4]]) -> Vec<[u32; 5]> {
-        let crossing = &self.triangles[self.interior_base..self.base];
-        let mut ids: Vec<u32> = crossing.iter().flatten().copied().collect();
-        ids.extend(around.iter().flat_map(|r| [r[0], r[1], r[2]]));
         let in_context = |v: &u32| self.ids.contains(v) && context[(v - self.ids.start) as usize];
+        let crossing = self.triangles[self.interior_base..self.base].iter();
+        let touching = crossing.filter(|t| t.iter().any(in_context));
+        let mut ids: Vec<u32> = touching.flatten().copied().collect();
+        ids.extend(around.iter().flat_map(|r| [r[0], r[1], r[2]]));
         ids.extend(self.ids.clone().filter(in_context));
         ids.sort_unstable();
         ids.dedup();
