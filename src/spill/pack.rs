@@ -46,8 +46,8 @@ pub mod layouts {
         Word::Rising,
         Word::Above,
     ];
-    /// `[i, a, b, attribute]` with `i` smaller than `a` and `b`, ascending by `i`.
-    pub const ORIENTED: Layout<4> = [Word::Above, Word::Rising, Word::Left, Word::Above];
+    /// `[i, a, b]` with `i` smaller than `a` and `b`, ascending by `i`.
+    pub const ORIENTED: Layout<3> = [Word::Above, Word::Rising, Word::Left];
 }
 
 /// A layout as masks, so that packing a word takes no branch.

@@ -9,7 +9,7 @@ use super::patch::Patch;
 use super::{EXCHANGE_BUFFER, OrientedTriangle, RepairOptions, RepairStats, around, bridges};
 use crate::error::Result;
 use crate::geom::Point;
-use crate::spill::layouts::SENT;
+use crate::spill::layouts::{ORIENTED, SENT};
 use crate::spill::{Exchange, Layout, Sections, Word};
 use crate::stages::blocks::Blocks;
 use crate::stages::order::PointStore;
@@ -20,9 +20,6 @@ use crate::workspace::Workspace;
 use crate::workspace::memory::Reservation;
 use rustc_hash::FxHashMap;
 use std::sync::{Mutex, PoisonError};
-
-/// `[i, a, b]` with `i` smaller than `a` and `b`, ascending by `i`.
-const ORIENTED: Layout<3> = [Word::Above, Word::Rising, Word::Left];
 
 /// `[owner, i, j, k, block, label << 1 | flip]`, ascending.
 const SEEN: Layout<6> = [

@@ -73,7 +73,7 @@ pub(super) fn base(
     let flagged = look.flagged.into_inner() + flags.total();
     let Triples { own, visiting } = triples;
     drop((own, held));
-    let surface = inside.join(name, Some(&flags), blocks, workspace)?;
+    let surface = inside.join(name, &flags, blocks, workspace)?;
     workspace.note_part("orient", start.elapsed().as_secs_f64());
     let stats = BaseStats {
         flagged,

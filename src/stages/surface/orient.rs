@@ -36,26 +36,6 @@ pub struct Oriented {
     _held: crate::workspace::memory::Reservation,
 }
 
-/// Orients a surface: the interior triangles of every block by themselves, then the crossing ones,
-/// each ascending. A triangle that would make it non-orientable is removed.
-///
-/// `around(block)` gives all triangles that touch a block, ascending; `bytes(block)` what that
-/// takes in memory.
-///
-/// # Errors
-/// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
-/// [`crate::Error::Cancelled`].
-pub fn orient(
-    name: &str,
-    around: impl Fn(usize) -> Result<Vec<Triangle>> + Sync,
-    bytes: impl Fn(usize) -> u64 + Sync,
-    blocks: Blocks,
-    workspace: &Workspace,
-) -> Result<Oriented> {
-    let inside = orient_inside(name, around, bytes, blocks, workspace)?;
-    inside.join(name, None, blocks, workspace)
-}
-
 /// A surface whose blocks are oriented, but not yet what lies between them.
 #[derive(Debug)]
 pub struct OrientedInside {
@@ -69,7 +49,12 @@ pub struct OrientedInside {
     triangles: u64,
 }
 
-/// The first half of [`orient`]: the interior triangles.
+/// Orients a surface: the interior triangles of every block by themselves, ascending; the crossing
+/// ones follow in [`OrientedInside::join`]. A triangle that would make the surface non-orientable is
+/// removed.
+///
+/// `around(block)` gives all triangles that touch a block, ascending; `bytes(block)` what that
+/// takes in memory.
 ///
 /// # Errors
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
@@ -123,8 +108,8 @@ pub fn orient_inside(
 }
 
 impl OrientedInside {
-    /// The second half of [`orient`]: the crossing triangles, without those in `removed`, `[block,
-    /// i, j, k]` by the block of their smallest vertex.
+    /// The second half of [`orient_inside`]: the crossing triangles, ascending, without those in
+    /// `removed`, `[block, i, j, k]` by the block of their smallest vertex.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
@@ -132,7 +117,7 @@ impl OrientedInside {
     pub fn join(
         self,
         name: &str,
-        removed: Option<&Sections<4>>,
+        removed: &Sections<4>,
         blocks: Blocks,
         workspace: &Workspace,
     ) -> Result<Oriented> {
@@ -157,11 +142,9 @@ impl OrientedInside {
         };
         let border = |block: usize| {
             let mut triangles = self.crossing.get(block)?;
-            if let Some(removed) = removed {
-                let removed = removed.get(block)?;
-                let gone = |t: &Triangle| removed.binary_search(&[block as u32, t[0], t[1], t[2]]);
-                triangles.retain(|t| gone(t).is_err());
-            }
+            let removed = removed.get(block)?;
+            let gone = |t: &Triangle| removed.binary_search(&[block as u32, t[0], t[1], t[2]]);
+            triangles.retain(|t| gone(t).is_err());
             Ok(triangles)
         };
         orient_crossing(
