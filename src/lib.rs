@@ -59,7 +59,7 @@ pub mod stages;
 pub mod workspace;
 
 pub use error::{Error, Result};
-pub use params::{Params, Radius};
+pub use params::{Method, Params, Radius};
 pub use pipeline::{Builder, Reconstruction};
 pub use report::Report;
 pub use workspace::progress::{Cancel, Observer};

@@ -5,6 +5,7 @@ use crate::stages::cells::CellStats;
 use crate::stages::export::{CoordinateType, MeshStats};
 use crate::stages::ingest::IngestStats;
 use crate::stages::repair::RepairStats;
+use crate::stages::smooth::RelaxStats;
 use crate::stages::stitch::{BaseStats, InsertStats};
 use crate::stages::triples::TripleStats;
 use serde::Serialize;
@@ -30,6 +31,8 @@ pub struct Report {
     pub lattice: LatticeReport,
     /// Disk radius in the input's unit; absent if it follows the local density.
     pub radius: Option<f64>,
+    /// What relaxing did; none with `--relax 0`.
+    pub relax: Option<RelaxStats>,
     /// Cells.
     pub cells: CellStats,
     /// Triples by count.

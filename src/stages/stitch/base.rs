@@ -3,10 +3,13 @@
 
 use super::BaseStats;
 use crate::error::Result;
+use crate::geom::Point;
 use crate::spill::layouts::{LABELLED, SENT};
 use crate::spill::{Exchange, Sections};
 use crate::stages::blocks::Blocks;
-use crate::stages::surface::orient::{Oriented, orient_inside};
+use crate::stages::located::{Located, Places, on_a_line, small_normal};
+use crate::stages::surface::evidence::Evidence;
+use crate::stages::surface::orient::{Around, Oriented, orient_inside};
 use crate::stages::surface::star::{Link, Star, Triangle, has, others};
 use crate::stages::triples::Triples;
 use crate::workspace::Workspace;
@@ -39,8 +42,10 @@ pub(super) struct Base {
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
 /// [`crate::Error::Cancelled`].
 pub(super) fn base(
+    places: Places<'_>,
     triples: Triples,
     blocks: Blocks,
+    weigh: bool,
     workspace: &Workspace,
 ) -> Result<(Base, BaseStats)> {
     let count = blocks.count();
@@ -52,6 +57,8 @@ pub(super) fn base(
         flagged: AtomicU64::new(0),
         spans: Mutex::new(vec![(0, 0); count]),
         triples: &triples,
+        places,
+        weigh,
         blocks,
     };
     let bytes = |block: usize| {
@@ -61,7 +68,7 @@ pub(super) fn base(
     let around = |block| look.block(block);
     let name = "stitch.base";
     let inside = workspace.part("base", || {
-        orient_inside(name, around, bytes, blocks, workspace)
+        orient_inside(name, around, bytes, blocks, weigh, workspace)
     })?;
     let start = std::time::Instant::now();
     let flags = look.flags.deliver_unique(workspace, count)?;
@@ -94,6 +101,9 @@ pub(super) fn base(
 /// The one look at the triples.
 struct Look<'a> {
     triples: &'a Triples,
+    places: Places<'a>,
+    /// Gather evidence for the orientation.
+    weigh: bool,
     blocks: Blocks,
     candidates: Sections<4>,
     crossing: Sections<4>,
@@ -105,8 +115,9 @@ struct Look<'a> {
 
 impl Look<'_> {
     /// The T3 triangles that touch a block and that no vertex of it flags, ascending.
-    fn block(&self, block: usize) -> Result<Vec<Triangle>> {
+    fn block(&self, block: usize) -> Result<Around> {
         let (mut triangles, mut candidates) = self.part(block)?;
+        self.drop_flat(block, &mut triangles, &mut candidates)?;
         let star = Star::of(self.blocks.ids(block), &triangles);
         let mut flagged = Vec::new();
         let mut refusing = Refusing::default();
@@ -140,7 +151,48 @@ impl Look<'_> {
             });
         }
         self.candidates.put(block, &candidates)?;
-        Ok(triangles)
+        let evidence = if self.weigh {
+            Some(self.evidence(block, &triangles, &candidates)?)
+        } else {
+            None
+        };
+        Ok(Around {
+            triangles,
+            evidence,
+        })
+    }
+
+    /// How the triangles around a block and its candidates lie.
+    fn evidence(
+        &self,
+        block: usize,
+        triangles: &[Triangle],
+        candidates: &[[u32; 4]],
+    ) -> Result<Evidence> {
+        let vertices = triangles.iter().flatten().copied();
+        let shape = Located::load(self.places.shape, self.blocks, block, vertices)?;
+        let normal = |t: Triangle| unit(t.map(|v| shape.at(v)));
+        let open = candidates.iter().map(|r| [r[0], r[1], r[2]]);
+        Ok(Evidence {
+            normals: triangles.iter().map(|t| normal(*t)).collect(),
+            candidates: open.map(|t| (t, normal(t))).collect(),
+        })
+    }
+
+    /// Leaves out what would be on a line in the file.
+    fn drop_flat(
+        &self,
+        block: usize,
+        triangles: &mut Vec<Triangle>,
+        candidates: &mut Vec<[u32; 4]>,
+    ) -> Result<()> {
+        if self.places.differ() {
+            let vertices = triangles.iter().flatten().copied();
+            let file = Located::load(self.places.file, self.blocks, block, vertices)?;
+            triangles.retain(|t| !on_a_line(t.map(|v| file.at(v))));
+            candidates.retain(|r| !on_a_line([r[0], r[1], r[2]].map(|v| file.at(v))));
+        }
+        Ok(())
     }
 
     /// The T3 triangles that touch a block, ascending, and its interior candidates so far. The
@@ -181,6 +233,13 @@ impl Look<'_> {
             .unwrap_or_else(std::sync::PoisonError::into_inner)[block] = span;
         Ok((triangles, candidates))
     }
+}
+
+/// The unit normal of a triangle; zero if it has none.
+fn unit([a, b, c]: [Point; 3]) -> [f64; 3] {
+    let n = small_normal(a, b, c).map(|x| x as f64);
+    let length = (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]).sqrt();
+    if length > 0.0 { n.map(|x| x / length) } else { n }
 }
 
 /// Most triangles around a vertex that are looked at the quick way.

@@ -11,12 +11,10 @@ mod fans;
 mod interior;
 mod tests_of_paper;
 
-pub use tests_of_paper::normal;
-
 use crate::error::Result;
 use crate::spill::Sections;
 use crate::stages::blocks::Blocks;
-use crate::stages::order::PointStore;
+use crate::stages::located::Places;
 use crate::stages::triples::Triples;
 use crate::workspace::Workspace;
 use base::Base;
@@ -37,6 +35,15 @@ pub struct Stitched {
     pub added: Sections<4>,
     /// Triangles to take out of `interior`, `[block, i, j, k]`.
     pub removed: Sections<4>,
+}
+
+/// How the manifold is extracted.
+#[derive(Debug, Clone, Copy)]
+pub struct StitchOptions {
+    /// Cosine of the largest angle between the normals of a T12 triangle and its neighbours.
+    pub cos_max_angle: f64,
+    /// Orient by evidence instead of in the order of triangles.
+    pub weigh: bool,
 }
 
 /// Counts of the base.
@@ -106,19 +113,19 @@ impl SharedStats {
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
 /// [`crate::Error::Cancelled`].
 pub fn stitch(
-    store: &PointStore,
+    places: Places<'_>,
     triples: Triples,
     blocks: Blocks,
-    cos_max_angle: f64,
+    options: StitchOptions,
     workspace: &Workspace,
 ) -> Result<(Stitched, BaseStats, InsertStats)> {
-    let (base, counts) = base::base(triples, blocks, workspace)?;
+    let (base, counts) = base::base(places, triples, blocks, options.weigh, workspace)?;
     let stats = SharedStats::default();
     let interior = Interior::create(workspace, blocks.count())?;
-    let mut pass = Pass::new(&base, &interior, blocks, cos_max_angle, workspace)?;
+    let mut pass = Pass::new(&base, &interior, blocks, options.cos_max_angle, workspace)?;
     workspace.part("insert", || {
         insert(
-            store, &mut pass, &base, &interior, blocks, &stats, workspace,
+            places, &mut pass, &base, &interior, blocks, &stats, workspace,
         )
     })?;
     let crossing = workspace.part("cross", || {
@@ -142,7 +149,7 @@ pub fn stitch(
 /// Inserts inside all blocks, in the order in which the pass across them needs them; whoever has
 /// finished a block takes the pass as far as it goes by then.
 fn insert(
-    store: &PointStore,
+    places: Places<'_>,
     pass: &mut Pass<'_>,
     base: &Base,
     interior: &Interior,
@@ -162,7 +169,7 @@ fn insert(
     let pass = Mutex::new(pass);
     workspace.for_each_unit("stitch: block", order.len(), bytes, |unit| {
         let block = order[unit] as usize;
-        interior::insert(store, base, interior, blocks, block, angle, stats)?;
+        interior::insert(places, base, interior, blocks, block, angle, stats)?;
         done[block].store(true, Ordering::Release);
         workspace.observer.advance(1);
         match pass.try_lock() {

@@ -1,5 +1,6 @@
 //! Components and orientation of a surface given block by block.
 
+use super::evidence::{Evidence, Votes, cosine, join_by_flatness, weight};
 use super::parity::ParitySets;
 use super::star::{EDGES, Edges, Triangle, opposed};
 use crate::error::Result;
@@ -40,13 +41,23 @@ pub struct Oriented {
 #[derive(Debug)]
 pub struct OrientedInside {
     interior: Sections<4>,
-    relations: Sections<6>,
+    relations: Sections<7>,
+    /// Votes of the candidates on global labels, `[a, b, votes]`, by block; if there is evidence.
+    votes: Option<Sections<3>>,
     /// Crossing triangles by the block of their smallest vertex.
     crossing: Sections<3>,
     /// For each block, the number of labels that are global, and of all.
     labels: Vec<(u32, u32)>,
     mobius: u64,
     triangles: u64,
+}
+
+/// The triangles around a block.
+pub struct Around {
+    /// All that touch the block, ascending.
+    pub triangles: Vec<Triangle>,
+    /// What speaks for their orientation; without, the order of triangles decides.
+    pub evidence: Option<Evidence>,
 }
 
 /// Orients a surface: the interior triangles of every block by themselves, ascending; the crossing
@@ -61,9 +72,10 @@ pub struct OrientedInside {
 /// [`crate::Error::Cancelled`].
 pub fn orient_inside(
     name: &str,
-    around: impl Fn(usize) -> Result<Vec<Triangle>> + Sync,
+    around: impl Fn(usize) -> Result<Around> + Sync,
     bytes: impl Fn(usize) -> u64 + Sync,
     blocks: Blocks,
+    evidence: bool,
     workspace: &Workspace,
 ) -> Result<OrientedInside> {
     let count = blocks.count();
@@ -71,15 +83,20 @@ pub fn orient_inside(
     let interior = Sections::with_layout(workspace, &sections("interior"), count, LABELLED)?;
     let border = Sections::with_layout(workspace, &sections("border"), count, TRIANGLE)?;
     let _held = workspace.reserve("exchange", EXCHANGE_BUFFER)?;
-    let exchange = Exchange::<6>::new(workspace, &sections("relations"), EXCHANGE_BUFFER);
+    let exchange = Exchange::<7>::new(workspace, &sections("relations"), EXCHANGE_BUFFER);
+    let votes = evidence
+        .then(|| Sections::create(workspace, &sections("votes"), count))
+        .transpose()?;
     let labels = Mutex::new(vec![(0u32, 0u32); count]);
     let (mobius, triangles) = (AtomicU64::new(0), AtomicU64::new(0));
     workspace.for_each_unit("block", count, &bytes, |block| {
         let around = around(block)?;
         let (inner, crossing): (Vec<Triangle>, Vec<Triangle>) =
-            around.iter().partition(|t| !blocks.crossing(**t));
-        drop(around);
-        let done = orient_block(&inner, &crossing, blocks, block);
+            around.triangles.iter().partition(|t| !blocks.crossing(**t));
+        let done = orient_block(&inner, &crossing, around, blocks, block);
+        if let Some(votes) = &votes {
+            votes.put(block, &done.votes)?;
+        }
         interior.put(block, &done.interior)?;
         exchange.send(&done.relations)?;
         let mine = |t: &&Triangle| blocks.of(t[0]) == block as u32;
@@ -98,6 +115,7 @@ pub fn orient_inside(
     Ok(OrientedInside {
         interior,
         relations: exchange.deliver(workspace, count)?,
+        votes,
         crossing: border,
         labels: labels
             .into_inner()
@@ -147,6 +165,9 @@ impl OrientedInside {
             triangles.retain(|t| gone(t).is_err());
             Ok(triangles)
         };
+        if let Some(votes) = &self.votes {
+            vote(&mut surface, &border, &self.relations, votes, blocks, workspace)?;
+        }
         orient_crossing(
             &mut surface,
             name,
@@ -161,9 +182,10 @@ impl OrientedInside {
 
 struct OrientedBlock {
     interior: Vec<[u32; 4]>,
-    /// `[owner block, i, j, k, this block, label << 1 | flip]`: what an interior triangle of this
-    /// block asks of the crossing triangle `i, j, k`.
-    relations: Vec<[u32; 6]>,
+    /// `[owner block, i, j, k, this block, label << 1 | flip, weight]`: what an interior triangle of
+    /// this block asks of the crossing triangle `i, j, k`.
+    relations: Vec<[u32; 7]>,
+    votes: Vec<[u32; 3]>,
     /// Number of labels that occur in relations; they come first.
     global: u32,
     labels: u32,
@@ -198,9 +220,14 @@ impl Asks {
 fn orient_block(
     inner: &[Triangle],
     crossing: &[Triangle],
+    around: Around,
     blocks: Blocks,
     block: usize,
 ) -> OrientedBlock {
+    if let Some(evidence) = around.evidence {
+        return weigh_block(inner, crossing, &around.triangles, &evidence, blocks, block);
+    }
+    drop(around);
     let ids = blocks.ids(block);
     let mut edges = Edges::with_room(ids.clone(), inner);
     let mut sets = ParitySets::new(inner.len());
@@ -226,21 +253,82 @@ fn orient_block(
     let mut relations = Vec::new();
     for &c in crossing {
         adjacent(c, &edges, inner, &ids, |other, flip| {
-            relations.push((c, other, flip));
+            relations.push((c, other, flip, 1));
         });
     }
-    number_labels(inner, &kept, &relations, &mut sets, blocks, block, mobius)
+    let votes = Vec::new();
+    number_labels(inner, &kept, &relations, &mut sets, blocks, block, mobius, votes)
+}
+
+/// As [`orient_block`], by what the evidence says.
+fn weigh_block(
+    inner: &[Triangle],
+    crossing: &[Triangle],
+    all: &[Triangle],
+    evidence: &Evidence,
+    blocks: Blocks,
+    block: usize,
+) -> OrientedBlock {
+    let ids = blocks.ids(block);
+    let mut normals = Vec::with_capacity(inner.len());
+    let mut outer = Vec::with_capacity(crossing.len());
+    for (t, normal) in all.iter().zip(&evidence.normals) {
+        if blocks.crossing(*t) {
+            outer.push(*normal);
+        } else {
+            normals.push(*normal);
+        }
+    }
+    let mut edges = Edges::with_room(ids.clone(), inner);
+    for (number, &t) in inner.iter().enumerate() {
+        edges.add(t, number as u32);
+    }
+    let mut sets = ParitySets::new(inner.len());
+    let dead = join_by_flatness(inner, &normals, &edges, &mut sets);
+    let kept: Vec<u32> = (0..inner.len() as u32)
+        .filter(|n| !dead[*n as usize])
+        .collect();
+    let mut relations = Vec::new();
+    for (&c, &normal) in crossing.iter().zip(&outer) {
+        adjacent(c, &edges, inner, &ids, |other, flip| {
+            if !dead[other as usize] {
+                let cosine = cosine(normal, normals[other as usize], flip);
+                relations.push((c, other, flip, weight(cosine)));
+            }
+        });
+    }
+    let mut votes = Vec::new();
+    for &(c, normal) in &evidence.candidates {
+        let mut asks: [(u32, bool, f64); 3] = [(0, false, 0.0); 3];
+        let mut count = 0;
+        adjacent(c, &edges, inner, &ids, |other, flip| {
+            if !dead[other as usize] && count < 3 {
+                let cosine = cosine(normal, normals[other as usize], flip);
+                asks[count] = (other, flip, cosine);
+                count += 1;
+            }
+        });
+        for x in 1..count {
+            for y in 0..x {
+                let ((a, flip_a, cos_a), (b, flip_b, cos_b)) = (asks[x], asks[y]);
+                votes.push((a, b, flip_a ^ flip_b, weight(cos_a.min(cos_b))));
+            }
+        }
+    }
+    let mobius = (inner.len() - kept.len()) as u64;
+    number_labels(inner, &kept, &relations, &mut sets, blocks, block, mobius, votes)
 }
 
 /// Gives labels to the sets, those in relations first, both in order of first appearance.
 fn number_labels(
     inner: &[Triangle],
     kept: &[u32],
-    relations: &[(Triangle, u32, bool)],
+    relations: &[(Triangle, u32, bool, i64)],
     sets: &mut ParitySets,
     blocks: Blocks,
     block: usize,
     mobius: u64,
+    votes: Vec<(u32, u32, bool, i64)>,
 ) -> OrientedBlock {
     const NONE: u32 = u32::MAX;
     let mut label_of = vec![NONE; inner.len()];
@@ -256,11 +344,12 @@ fn number_labels(
     };
     let mut global = 0;
     let mut sent = Vec::with_capacity(relations.len());
-    for &(c, other, flip) in relations {
+    for &(c, other, flip, weight) in relations {
         let (label, turned, labels) = find(other);
         global = labels;
         let word = label << 1 | u32::from(flip ^ turned);
-        sent.push([blocks.of(c[0]), c[0], c[1], c[2], block as u32, word]);
+        let owner = blocks.of(c[0]);
+        sent.push([owner, c[0], c[1], c[2], block as u32, word, weight as u32]);
     }
     let mut interior = Vec::with_capacity(kept.len());
     for &number in kept {
@@ -268,9 +357,19 @@ fn number_labels(
         let t = inner[number as usize];
         interior.push([t[0], t[1], t[2], label << 1 | u32::from(turned)]);
     }
+    let mut counted = Votes::default();
+    for (a, b, flip, weight) in votes {
+        let ((a, turned_a, _), (b, turned_b, _)) = (find(a), find(b));
+        if a < global && b < global {
+            counted.add(a, b, flip ^ turned_a ^ turned_b, weight);
+        }
+    }
+    let votes = counted.counted().into_iter();
+    let votes = votes.map(|(a, b, votes)| [a, b, votes as i32 as u32]).collect();
     OrientedBlock {
         interior,
         relations: sent,
+        votes,
         global,
         labels,
         mobius,
@@ -307,12 +406,71 @@ pub fn consistent(sets: &mut ParitySets, asks: &[(u32, bool)]) -> bool {
     })
 }
 
+/// Joins the global labels by the votes of all crossing triangles and candidates.
+fn vote(
+    surface: &mut Oriented,
+    border: impl Fn(usize) -> Result<Vec<Triangle>>,
+    relations: &Sections<7>,
+    candidates: &Sections<3>,
+    blocks: Blocks,
+    workspace: &Workspace,
+) -> Result<()> {
+    let mut votes = Votes::default();
+    for block in 0..blocks.count() {
+        let first = surface.globals[block].0;
+        for [a, b, count] in candidates.get(block)? {
+            votes.add(first + a, first + b, false, i64::from(count as i32));
+        }
+    }
+    let mut edges: FxHashMap<(u32, u32), Vec<(Triangle, u32)>> = FxHashMap::default();
+    for group in 0..blocks.count() {
+        workspace.check_cancel()?;
+        let relations = relations.get(group)?;
+        for t in border(group)? {
+            let key = [group as u32, t[0], t[1], t[2]];
+            let start = relations.partition_point(|r| r[..4] < key[..]);
+            let mut asks: Vec<(u32, bool, i64)> = relations[start..]
+                .iter()
+                .take_while(|r| r[..4] == key[..])
+                .map(|r| {
+                    let label = surface.globals[r[4] as usize].0 + (r[5] >> 1);
+                    (label, r[5] & 1 == 1, CROSSING * i64::from(r[6]))
+                })
+                .collect();
+            for (a, b, ..) in EDGES {
+                for &(other, word) in edges.get(&(t[a], t[b])).into_iter().flatten() {
+                    let flip = opposed(t, other, t[a], t[b]) ^ (word & 1 == 1);
+                    asks.push((word >> 1, flip, CROSSING * weight(0.0)));
+                }
+            }
+            // It runs as its strongest neighbour asks; the others are votes.
+            let Some(&(label, flip, _)) = asks.iter().rev().max_by_key(|ask| ask.2) else {
+                continue;
+            };
+            for &(other, turned, weight) in &asks {
+                votes.add(label, other, flip ^ turned, weight);
+            }
+            let word = label << 1 | u32::from(flip);
+            for (a, b, ..) in EDGES {
+                edges.entry((t[a], t[b])).or_default().push((t, word));
+            }
+        }
+        edges.retain(|(low, _), _| blocks.of(*low) > group as u32);
+    }
+    let _held = workspace.reserve("votes", votes.len() as u64 * 72)?;
+    votes.join(&mut surface.sets);
+    Ok(())
+}
+
+/// A crossing triangle of the surface counts for so many candidates.
+const CROSSING: i64 = 8;
+
 /// The crossing triangles in ascending order, each against those before it.
 fn orient_crossing(
     base: &mut Oriented,
     name: &str,
     border: impl Fn(usize) -> Result<Vec<Triangle>>,
-    relations: &Sections<6>,
+    relations: &Sections<7>,
     blocks: Blocks,
     workspace: &Workspace,
 ) -> Result<()> {
@@ -355,7 +513,7 @@ fn orient_crossing(
 fn orient_one(
     base: &mut Oriented,
     t: Triangle,
-    relations: &[[u32; 6]],
+    relations: &[[u32; 7]],
     group: u32,
     edges: &FxHashMap<(u32, u32), Vec<(Triangle, u32)>>,
 ) -> Option<u32> {
