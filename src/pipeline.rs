@@ -7,8 +7,8 @@ use crate::report::{LatticeReport, PartReport, Report, StageReport};
 use crate::stages::blocks::Blocks;
 use crate::stages::cells::{CellStats, DiskRadius, TileRanges, cells};
 use crate::stages::export::{CoordinateType, export};
-use crate::stages::located::Places;
 use crate::stages::ingest::{self, READ_BUFFERS, Spool, ingest};
+use crate::stages::located::Places;
 use crate::stages::order::{Orderer, PAGE, PointStore};
 use crate::stages::repair::{RepairOptions, repair};
 use crate::stages::smooth::{relax, smooth};
@@ -254,7 +254,11 @@ impl Reconstruction {
             ingest::CoordinateType::F32 => CoordinateType::Float,
             ingest::CoordinateType::F64 => CoordinateType::Double,
         };
-        let refine = if params.smooth + params.relax > 0 { SMOOTH_REFINE } else { 0 };
+        let refine = if params.smooth + params.relax > 0 {
+            SMOOTH_REFINE
+        } else {
+            0
+        };
         let lattice = spool.choose_lattice(refine)?;
         let (mut store, duplicates_folded) = clock.stage("order", "points", input.kept, || {
             order(spool, &lattice, self.page_points, workspace)
@@ -278,14 +282,19 @@ impl Reconstruction {
             })?;
         }
         let relaxed = if params.relax > 0 {
-            Some(clock.stage("relax", "points", points * u64::from(params.relax), || {
-                relax(&store, tiles, params.neighbors, params.relax, workspace)
-            })?)
+            Some(
+                clock.stage("relax", "points", points * u64::from(params.relax), || {
+                    relax(&store, tiles, params.neighbors, params.relax, workspace)
+                })?,
+            )
         } else {
             None
         };
         let places = Places {
-            shape: relaxed.as_ref().and_then(|r| r.store.as_ref()).unwrap_or(&store),
+            shape: relaxed
+                .as_ref()
+                .and_then(|r| r.store.as_ref())
+                .unwrap_or(&store),
             file: &store,
         };
         let (seen, cell_stats) = clock.stage("cells", "points", points, || {

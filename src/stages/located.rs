@@ -58,11 +58,7 @@ impl Located {
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
-    pub fn add(
-        &mut self,
-        store: &PointStore,
-        vertices: impl Iterator<Item = u32>,
-    ) -> Result<()> {
+    pub fn add(&mut self, store: &PointStore, vertices: impl Iterator<Item = u32>) -> Result<()> {
         let mut far: Vec<u32> = vertices.filter(|v| !self.ids.contains(v)).collect();
         far.sort_unstable();
         far.dedup();

@@ -140,7 +140,14 @@ pub fn repair(
     workspace: &Workspace,
 ) -> Result<(Repaired, RepairStats)> {
     let mut stats = RepairStats::default();
-    let surface = surface::build(places.shape, stitched, blocks, options, &mut stats, workspace)?;
+    let surface = surface::build(
+        places.shape,
+        stitched,
+        blocks,
+        options,
+        &mut stats,
+        workspace,
+    )?;
     let limit = options.filling();
     let (filled, outline) = holes::fill(places, &surface, limit, blocks, &mut stats, workspace)?;
     let repaired = Repaired {

@@ -103,7 +103,12 @@ impl BlockRim {
         rim.star = Star::of(ids.clone(), &plain().collect::<Vec<_>>());
         rim.shape = Located::load(places.shape, blocks, block, plain().flatten())?;
         rim.file = if places.differ() {
-            Some(Located::load(places.file, blocks, block, plain().flatten())?)
+            Some(Located::load(
+                places.file,
+                blocks,
+                block,
+                plain().flatten(),
+            )?)
         } else {
             None
         };

@@ -78,10 +78,15 @@ impl Patches {
 
     /// Patches stay active where enough was rough; the number of those that do.
     fn settle(&mut self) -> usize {
-        for (active, (seen, rough)) in
-            self.active.iter_mut().zip(self.seen.iter_mut().zip(&mut self.rough))
+        for (active, (seen, rough)) in self
+            .active
+            .iter_mut()
+            .zip(self.seen.iter_mut().zip(&mut self.rough))
         {
-            let (seen, rough) = (std::mem::take(seen.get_mut()), std::mem::take(rough.get_mut()));
+            let (seen, rough) = (
+                std::mem::take(seen.get_mut()),
+                std::mem::take(rough.get_mut()),
+            );
             *active &= u32::from(rough) * SHARE > u32::from(seen);
         }
         self.active.iter().filter(|a| **a).count()
@@ -107,7 +112,7 @@ pub fn relax(
     };
     let mut patches = Patches::new(store.len(), workspace)?;
     if rounds > 0 {
-        let sampled = |id: usize| id / RUN % SAMPLE == 0;
+        let sampled = |id: usize| (id / RUN).is_multiple_of(SAMPLE);
         workspace.part("sample", || {
             let bytes = |tile: usize| Tile::bytes(tiles.ids(tile).len()) + PageCache::bytes(store);
             workspace.for_each_unit("relax: tile", tiles.count(), bytes, |tile| {
@@ -124,7 +129,9 @@ pub fn relax(
         }
         let current = relaxed.store.as_ref().unwrap_or(store);
         let count = AtomicU64::new(0);
-        let next = one_round(current, tiles, neighbors, round, &patches, &count, workspace)?;
+        let next = one_round(
+            current, tiles, neighbors, round, &patches, &count, workspace,
+        )?;
         relaxed.store = Some(next);
         relaxed.stats.rounds = round;
         relaxed.stats.moved += count.into_inner();

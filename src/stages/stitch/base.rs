@@ -34,6 +34,8 @@ pub(super) struct Base {
     pub flags: Sections<4>,
     /// For each block the first and the last block that a triple of it touches.
     pub spans: Vec<(u32, u32)>,
+    /// Interior candidates left out because they would be on a line in the file.
+    pub flat_candidates: u64,
 }
 
 /// Makes the base. The triples are read once: what is needed of them later is written apart.
@@ -55,6 +57,8 @@ pub(super) fn base(
         crossing: Sections::with_layout(workspace, "stitch.crossing", count, LABELLED)?,
         flags: Exchange::new(workspace, "stitch.flags", EXCHANGE_BUFFER).packed(SENT),
         flagged: AtomicU64::new(0),
+        flat: AtomicU64::new(0),
+        flat_candidates: AtomicU64::new(0),
         spans: Mutex::new(vec![(0, 0); count]),
         triples: &triples,
         places,
@@ -78,12 +82,14 @@ pub(super) fn base(
         .into_inner()
         .unwrap_or_else(std::sync::PoisonError::into_inner);
     let flagged = look.flagged.into_inner() + flags.total();
+    let (flat, flat_candidates) = (look.flat.into_inner(), look.flat_candidates.into_inner());
     let Triples { own, visiting } = triples;
     drop((own, held));
     let surface = inside.join(name, &flags, blocks, workspace)?;
     workspace.note_part("orient", start.elapsed().as_secs_f64());
     let stats = BaseStats {
         flagged,
+        on_a_line: flat,
         mobius: surface.mobius,
         triangles: surface.triangles,
     };
@@ -94,6 +100,7 @@ pub(super) fn base(
         visiting,
         flags,
         spans,
+        flat_candidates,
     };
     Ok((base, stats))
 }
@@ -110,6 +117,9 @@ struct Look<'a> {
     flags: Exchange<4>,
     /// Interior triangles that are flagged.
     flagged: AtomicU64,
+    /// T3 triangles and interior candidates on a line.
+    flat: AtomicU64,
+    flat_candidates: AtomicU64,
     spans: Mutex<Vec<(u32, u32)>>,
 }
 
@@ -189,8 +199,16 @@ impl Look<'_> {
         if self.places.differ() {
             let vertices = triangles.iter().flatten().copied();
             let file = Located::load(self.places.file, self.blocks, block, vertices)?;
-            triangles.retain(|t| !on_a_line(t.map(|v| file.at(v))));
+            let (mut t3, open) = (0, candidates.len());
+            triangles.retain(|t| {
+                let flat = on_a_line(t.map(|v| file.at(v)));
+                t3 += u64::from(flat && self.blocks.of(t[0]) == block as u32);
+                !flat
+            });
             candidates.retain(|r| !on_a_line([r[0], r[1], r[2]].map(|v| file.at(v))));
+            self.flat.fetch_add(t3, Ordering::Relaxed);
+            let open = (open - candidates.len()) as u64;
+            self.flat_candidates.fetch_add(open, Ordering::Relaxed);
         }
         Ok(())
     }
@@ -239,7 +257,11 @@ impl Look<'_> {
 fn unit([a, b, c]: [Point; 3]) -> [f64; 3] {
     let n = small_normal(a, b, c).map(|x| x as f64);
     let length = (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]).sqrt();
-    if length > 0.0 { n.map(|x| x / length) } else { n }
+    if length > 0.0 {
+        n.map(|x| x / length)
+    } else {
+        n
+    }
 }
 
 /// Most triangles around a vertex that are looked at the quick way.

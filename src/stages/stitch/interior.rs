@@ -114,7 +114,10 @@ pub fn insert(
     stats: &SharedStats,
 ) -> Result<()> {
     let mut work = BlockWork::load(places, base, blocks, block)?;
-    let mut counts = InsertStats::default();
+    let mut counts = InsertStats {
+        on_a_line: work.flat,
+        ..InsertStats::default()
+    };
     let undecided = work.insert_all(cos_max_angle, &mut counts);
     work.write(out, block, &undecided, &mut counts)?;
     stats.add(&counts);
@@ -171,6 +174,8 @@ struct BlockWork {
     located: Located,
     /// For each vertex of the block [`BORDER`] and [`OPEN`].
     border: Vec<u8>,
+    /// Crossing candidates that would be on a line in the file.
+    flat: u64,
 }
 
 impl View for BlockWork {
@@ -224,6 +229,7 @@ impl BlockWork {
             joints: Vec::new(),
             located,
             border,
+            flat: 0,
             ids,
         };
         work.add_base(&interior, &crossing, &active, base, block);
@@ -253,7 +259,9 @@ impl BlockWork {
         if places.differ() {
             let all = vertices(&candidates).into_iter();
             let file = Located::load(places.file, blocks, block, all)?;
+            let before = candidates.len();
             candidates.retain(|r| !on_a_line([r[0], r[1], r[2]].map(|v| file.at(v))));
+            self.flat = (before - candidates.len()) as u64;
         }
         let all = vertices(&candidates).into_iter();
         self.located.add(places.shape, all)?;

@@ -51,6 +51,8 @@ pub struct StitchOptions {
 pub struct BaseStats {
     /// T3 triangles flagged at non-manifold edges and vertices by excess.
     pub flagged: u64,
+    /// T3 triangles left out because their points are on a line in the file.
+    pub on_a_line: u64,
     /// T3 triangles removed because they close a Möbius band.
     pub mobius: u64,
     /// Triangles of the base.
@@ -72,6 +74,8 @@ pub struct InsertStats {
     pub angle: u64,
     /// Test IV: would close a Möbius band.
     pub orientation: u64,
+    /// Not tried: its points are on a line in the file.
+    pub on_a_line: u64,
     /// Of the accepted, those taken out again because blocks joined components differently.
     pub joints_removed: u64,
 }
@@ -103,6 +107,7 @@ impl SharedStats {
         all.excess += more.excess;
         all.angle += more.angle;
         all.orientation += more.orientation;
+        all.on_a_line += more.on_a_line;
         all.joints_removed += more.joints_removed;
     }
 }
@@ -121,6 +126,10 @@ pub fn stitch(
 ) -> Result<(Stitched, BaseStats, InsertStats)> {
     let (base, counts) = base::base(places, triples, blocks, options.weigh, workspace)?;
     let stats = SharedStats::default();
+    stats.add(&InsertStats {
+        on_a_line: base.flat_candidates,
+        ..InsertStats::default()
+    });
     let interior = Interior::create(workspace, blocks.count())?;
     let mut pass = Pass::new(&base, &interior, blocks, options.cos_max_angle, workspace)?;
     workspace.part("insert", || {

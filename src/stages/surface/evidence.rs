@@ -101,7 +101,11 @@ impl Votes {
     /// All pairs with what was decided, ascending.
     #[must_use]
     pub fn counted(self) -> Vec<(u32, u32, i64)> {
-        let mut all: Vec<_> = self.pairs.into_iter().map(|((a, b), n)| (a, b, n)).collect();
+        let mut all: Vec<_> = self
+            .pairs
+            .into_iter()
+            .map(|((a, b), n)| (a, b, n))
+            .collect();
         all.sort_unstable();
         all
     }

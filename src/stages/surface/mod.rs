@@ -4,3 +4,4 @@ pub mod evidence;
 pub mod orient;
 pub mod parity;
 pub mod star;
+mod weigh;

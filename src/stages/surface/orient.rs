@@ -1,8 +1,9 @@
 //! Components and orientation of a surface given block by block.
 
-use super::evidence::{Evidence, Votes, cosine, join_by_flatness, weight};
+use super::evidence::{Evidence, Votes};
 use super::parity::ParitySets;
 use super::star::{EDGES, Edges, Triangle, opposed};
+use super::weigh::{vote, weigh_block};
 use crate::error::Result;
 use crate::spill::layouts::{LABELLED, SENT_LABELLED, TRIANGLE};
 use crate::spill::{Exchange, Sections};
@@ -166,7 +167,14 @@ impl OrientedInside {
             Ok(triangles)
         };
         if let Some(votes) = &self.votes {
-            vote(&mut surface, &border, &self.relations, votes, blocks, workspace)?;
+            vote(
+                &mut surface,
+                border,
+                &self.relations,
+                votes,
+                blocks,
+                workspace,
+            )?;
         }
         orient_crossing(
             &mut surface,
@@ -180,7 +188,7 @@ impl OrientedInside {
     }
 }
 
-struct OrientedBlock {
+pub(super) struct OrientedBlock {
     interior: Vec<[u32; 4]>,
     /// `[owner block, i, j, k, this block, label << 1 | flip, weight]`: what an interior triangle of
     /// this block asks of the crossing triangle `i, j, k`.
@@ -250,85 +258,34 @@ fn orient_block(
         edges.add(t, number);
         kept.push(number);
     }
-    let mut relations = Vec::new();
+    let mut bonds = Bonds::default();
     for &c in crossing {
         adjacent(c, &edges, inner, &ids, |other, flip| {
-            relations.push((c, other, flip, 1));
+            bonds.relations.push((c, other, flip, 1));
         });
     }
-    let votes = Vec::new();
-    number_labels(inner, &kept, &relations, &mut sets, blocks, block, mobius, votes)
+    number_labels(inner, &kept, bonds, &mut sets, blocks, block, mobius)
 }
 
-/// As [`orient_block`], by what the evidence says.
-fn weigh_block(
-    inner: &[Triangle],
-    crossing: &[Triangle],
-    all: &[Triangle],
-    evidence: &Evidence,
-    blocks: Blocks,
-    block: usize,
-) -> OrientedBlock {
-    let ids = blocks.ids(block);
-    let mut normals = Vec::with_capacity(inner.len());
-    let mut outer = Vec::with_capacity(crossing.len());
-    for (t, normal) in all.iter().zip(&evidence.normals) {
-        if blocks.crossing(*t) {
-            outer.push(*normal);
-        } else {
-            normals.push(*normal);
-        }
-    }
-    let mut edges = Edges::with_room(ids.clone(), inner);
-    for (number, &t) in inner.iter().enumerate() {
-        edges.add(t, number as u32);
-    }
-    let mut sets = ParitySets::new(inner.len());
-    let dead = join_by_flatness(inner, &normals, &edges, &mut sets);
-    let kept: Vec<u32> = (0..inner.len() as u32)
-        .filter(|n| !dead[*n as usize])
-        .collect();
-    let mut relations = Vec::new();
-    for (&c, &normal) in crossing.iter().zip(&outer) {
-        adjacent(c, &edges, inner, &ids, |other, flip| {
-            if !dead[other as usize] {
-                let cosine = cosine(normal, normals[other as usize], flip);
-                relations.push((c, other, flip, weight(cosine)));
-            }
-        });
-    }
-    let mut votes = Vec::new();
-    for &(c, normal) in &evidence.candidates {
-        let mut asks: [(u32, bool, f64); 3] = [(0, false, 0.0); 3];
-        let mut count = 0;
-        adjacent(c, &edges, inner, &ids, |other, flip| {
-            if !dead[other as usize] && count < 3 {
-                let cosine = cosine(normal, normals[other as usize], flip);
-                asks[count] = (other, flip, cosine);
-                count += 1;
-            }
-        });
-        for x in 1..count {
-            for y in 0..x {
-                let ((a, flip_a, cos_a), (b, flip_b, cos_b)) = (asks[x], asks[y]);
-                votes.push((a, b, flip_a ^ flip_b, weight(cos_a.min(cos_b))));
-            }
-        }
-    }
-    let mobius = (inner.len() - kept.len()) as u64;
-    number_labels(inner, &kept, &relations, &mut sets, blocks, block, mobius, votes)
+/// What speaks for how the sets of a block run.
+#[derive(Default)]
+pub(super) struct Bonds {
+    /// A crossing triangle, an interior one at an edge of it, whether one must be turned against the
+    /// other, and the weight of that.
+    pub relations: Vec<(Triangle, u32, bool, i64)>,
+    /// The same of two interior triangles at a candidate.
+    pub votes: Vec<(u32, u32, bool, i64)>,
 }
 
 /// Gives labels to the sets, those in relations first, both in order of first appearance.
-fn number_labels(
+pub(super) fn number_labels(
     inner: &[Triangle],
     kept: &[u32],
-    relations: &[(Triangle, u32, bool, i64)],
+    bonds: Bonds,
     sets: &mut ParitySets,
     blocks: Blocks,
     block: usize,
     mobius: u64,
-    votes: Vec<(u32, u32, bool, i64)>,
 ) -> OrientedBlock {
     const NONE: u32 = u32::MAX;
     let mut label_of = vec![NONE; inner.len()];
@@ -343,8 +300,8 @@ fn number_labels(
         (*label, turned, labels)
     };
     let mut global = 0;
-    let mut sent = Vec::with_capacity(relations.len());
-    for &(c, other, flip, weight) in relations {
+    let mut sent = Vec::with_capacity(bonds.relations.len());
+    for (c, other, flip, weight) in bonds.relations {
         let (label, turned, labels) = find(other);
         global = labels;
         let word = label << 1 | u32::from(flip ^ turned);
@@ -358,14 +315,16 @@ fn number_labels(
         interior.push([t[0], t[1], t[2], label << 1 | u32::from(turned)]);
     }
     let mut counted = Votes::default();
-    for (a, b, flip, weight) in votes {
+    for (a, b, flip, weight) in bonds.votes {
         let ((a, turned_a, _), (b, turned_b, _)) = (find(a), find(b));
         if a < global && b < global {
             counted.add(a, b, flip ^ turned_a ^ turned_b, weight);
         }
     }
     let votes = counted.counted().into_iter();
-    let votes = votes.map(|(a, b, votes)| [a, b, votes as i32 as u32]).collect();
+    let votes = votes
+        .map(|(a, b, votes)| [a, b, votes as i32 as u32])
+        .collect();
     OrientedBlock {
         interior,
         relations: sent,
@@ -378,7 +337,7 @@ fn number_labels(
 
 /// Calls `each` with the triangles that share an edge inside the block with `t`, and whether `t`
 /// must be turned against them.
-fn adjacent(
+pub(super) fn adjacent(
     t: Triangle,
     edges: &Edges,
     triangles: &[Triangle],
@@ -405,65 +364,6 @@ pub fn consistent(sets: &mut ParitySets, asks: &[(u32, bool)]) -> bool {
         })
     })
 }
-
-/// Joins the global labels by the votes of all crossing triangles and candidates.
-fn vote(
-    surface: &mut Oriented,
-    border: impl Fn(usize) -> Result<Vec<Triangle>>,
-    relations: &Sections<7>,
-    candidates: &Sections<3>,
-    blocks: Blocks,
-    workspace: &Workspace,
-) -> Result<()> {
-    let mut votes = Votes::default();
-    for block in 0..blocks.count() {
-        let first = surface.globals[block].0;
-        for [a, b, count] in candidates.get(block)? {
-            votes.add(first + a, first + b, false, i64::from(count as i32));
-        }
-    }
-    let mut edges: FxHashMap<(u32, u32), Vec<(Triangle, u32)>> = FxHashMap::default();
-    for group in 0..blocks.count() {
-        workspace.check_cancel()?;
-        let relations = relations.get(group)?;
-        for t in border(group)? {
-            let key = [group as u32, t[0], t[1], t[2]];
-            let start = relations.partition_point(|r| r[..4] < key[..]);
-            let mut asks: Vec<(u32, bool, i64)> = relations[start..]
-                .iter()
-                .take_while(|r| r[..4] == key[..])
-                .map(|r| {
-                    let label = surface.globals[r[4] as usize].0 + (r[5] >> 1);
-                    (label, r[5] & 1 == 1, CROSSING * i64::from(r[6]))
-                })
-                .collect();
-            for (a, b, ..) in EDGES {
-                for &(other, word) in edges.get(&(t[a], t[b])).into_iter().flatten() {
-                    let flip = opposed(t, other, t[a], t[b]) ^ (word & 1 == 1);
-                    asks.push((word >> 1, flip, CROSSING * weight(0.0)));
-                }
-            }
-            // It runs as its strongest neighbour asks; the others are votes.
-            let Some(&(label, flip, _)) = asks.iter().rev().max_by_key(|ask| ask.2) else {
-                continue;
-            };
-            for &(other, turned, weight) in &asks {
-                votes.add(label, other, flip ^ turned, weight);
-            }
-            let word = label << 1 | u32::from(flip);
-            for (a, b, ..) in EDGES {
-                edges.entry((t[a], t[b])).or_default().push((t, word));
-            }
-        }
-        edges.retain(|(low, _), _| blocks.of(*low) > group as u32);
-    }
-    let _held = workspace.reserve("votes", votes.len() as u64 * 72)?;
-    votes.join(&mut surface.sets);
-    Ok(())
-}
-
-/// A crossing triangle of the surface counts for so many candidates.
-const CROSSING: i64 = 8;
 
 /// The crossing triangles in ascending order, each against those before it.
 fn orient_crossing(
