@@ -12,7 +12,7 @@
 //!   area is cut into as many equal parts, along the curve, and each gets one point at random. Mean,
 //!   RMS and percentiles are those of the points on faces, so they do not depend on how the surface
 //!   is cut into triangles; vertices count for the maximum. A mesh without area is sampled at its
-//!   vertices alone, and these count.
+//!   vertices alone, and then these count.
 //!
 //! The result depends on the files, the number of samples and the seed, and on nothing else.
 

@@ -4,13 +4,13 @@ use super::vector::{V3, add, dot, scale, sub};
 
 /// Squared height over squared side below which the edges are asked too: what is computed about the
 /// inside of such a needle is less certain than its edges.
-const NEEDLE: f64 = 1e-10;
+const NEEDLE: f64 = 1e-4;
 
 /// Squared distance from `p` to the nearest point of a triangle, which may be a segment or a point.
 pub(super) fn distance2(triangle: &[V3; 3], p: V3) -> f64 {
     let [a, b, c] = triangle.map(|corner| sub(corner, p));
     let (ab, ac) = (sub(b, a), sub(c, a));
-    let (base2, side2) = (dot(ab, ab), dot(ac, ac));
+    let base2 = dot(ab, ab);
     let edges = || segment(a, b).min(segment(b, c)).min(segment(c, a));
     if base2 == 0.0 {
         return edges();
@@ -27,10 +27,11 @@ pub(super) fn distance2(triangle: &[V3; 3], p: V3) -> f64 {
     }
     let nearest = add(a, add(scale(ab, v), scale(ac, w)));
     let inside = dot(nearest, nearest);
-    if height2 < NEEDLE * side2 {
+    if height2 < NEEDLE * (base2 + dot(ac, ac)) {
         inside.min(edges())
     } else {
-        inside
+        // A corner is at no distance from itself, whatever rounding has done above.
+        inside.min(dot(a, a)).min(dot(b, b)).min(dot(c, c))
     }
 }
 
