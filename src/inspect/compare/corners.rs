@@ -73,37 +73,19 @@ impl<'a> Joined<'a> {
         let index = workspace.reserve("compare: positions", 64 * sections + (1 << 20))?;
         let corners = Corners::new(self.sorter.finish(workspace)?);
 
-        workspace.observer.begin("corners", "corners", self.corners);
         let buffer = workspace.memory.available() / 4;
         let (placed, placed_held) = sorter::<8>(workspace, &format!("{name}.placed"), buffer)?;
-        let mut used = 0u64;
-        let mut last = None;
-        let mut window = Window::new(&self.positions);
-        corners.for_each(|[v, high, low]| {
-            let p = window.get(v)?;
-            let words: Record<6> = bytemuck::cast(p);
-            if last != Some(v) {
-                if !usable(p) {
-                    return Err(unusable(path, &format!("vertex {v}"), p));
-                }
-                workspace.check_cancel()?;
-                last = Some(v);
-                used += 1;
-            }
-            let [a, b, c, d, e, f] = words;
-            workspace.observer.advance(1);
-            placed.push(&[[high, low, a, b, c, d, e, f]])
-        })?;
+        workspace.observer.begin("corners", "corners", self.corners);
+        let used = place(&corners, &self.positions, &placed, path, workspace)?;
         workspace.observer.end();
 
         let buffer = workspace.memory.available() / 2;
         let (keys, keys_held) = sorter(workspace, &format!("{name}.order"), buffer)?;
         let mut triangle = [[0.0; 3]; 3];
         placed.finish(workspace)?.for_each(|record: Placed| {
-            let [_, low, words @ ..] = record;
-            let number = u64::from(record[0]) << 32 | u64::from(low);
-            let corner = (number % 3) as usize;
-            triangle[corner] = bytemuck::cast(words);
+            let [high, low, words @ ..] = record;
+            let corner = (u64::from(high) << 32 | u64::from(low)) % 3;
+            triangle[corner as usize] = bytemuck::cast(words);
             if corner == 2 {
                 keys.push(&[keyed(triangle, &self.bounds)])?;
             }
@@ -114,18 +96,36 @@ impl<'a> Joined<'a> {
         drop(keys_held);
 
         let mut chooser = Chooser::new(workspace, name, used, triangles.1, choice)?;
-        let mut last = None;
-        let mut window = Window::new(&self.positions);
-        corners.for_each(|[v, ..]| {
-            if last != Some(v) {
-                last = Some(v);
-                chooser.offer(window.get(v)?)?;
-            }
-            Ok(())
-        })?;
+        corners.for_each_vertex(&self.positions, |_, p| chooser.offer(p))?;
         drop((self.held, index));
         Ok(shape(path, triangles, [used, faces], chooser.finish()?))
     }
+}
+
+/// Sends every corner's position back to its triangle; the number of vertices that have corners.
+fn place(
+    corners: &Corners,
+    positions: &Sections<6>,
+    placed: &Sorter<8>,
+    path: &Path,
+    workspace: &Workspace,
+) -> Result<u64> {
+    let mut used = 0;
+    corners.for_each_vertex(positions, |v, p| {
+        used += 1;
+        if usable(p) {
+            workspace.check_cancel()
+        } else {
+            Err(unusable(path, &format!("vertex {v}"), p))
+        }
+    })?;
+    let mut window = Window::new(positions);
+    corners.for_each(|[v, high, low]| {
+        let [a, b, c, d, e, f] = bytemuck::cast::<V3, Record<6>>(window.get(v)?);
+        workspace.observer.advance(1);
+        placed.push(&[[high, low, a, b, c, d, e, f]])
+    })?;
+    Ok(used)
 }
 
 impl Sink for Joined<'_> {
@@ -184,6 +184,25 @@ impl Corners {
             Self::Memory(all) => all.iter().try_for_each(|c| each(*c)),
             Self::Disk(sorted) => sorted.for_range(None, None, each),
         }
+    }
+}
+
+impl Corners {
+    /// Calls `each` with every vertex that has corners, ascending, and its position.
+    fn for_each_vertex(
+        &self,
+        positions: &Sections<6>,
+        mut each: impl FnMut(u32, V3) -> Result<()>,
+    ) -> Result<()> {
+        let mut last = None;
+        let mut window = Window::new(positions);
+        self.for_each(|[v, ..]| {
+            if last == Some(v) {
+                return Ok(());
+            }
+            last = Some(v);
+            each(v, window.get(v)?)
+        })
     }
 }
 

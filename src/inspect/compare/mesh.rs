@@ -49,7 +49,7 @@ pub(super) fn read(
     let free = workspace.memory.available();
     let small = vertices * VERTEX <= free / 4 && mesh.vertices_first();
     observer.begin("read mesh", "vertices and faces", total);
-    let shape = if small {
+    if small {
         let _held = workspace.reserve("compare: vertices", vertices * VERTEX)?;
         let mut direct = Direct::new(path, name, vertices, faces, workspace)?;
         mesh.read(&mut direct)?;
@@ -60,8 +60,7 @@ pub(super) fn read(
         mesh.read(&mut joined)?;
         observer.end();
         joined.finish(faces, choice)
-    };
-    shape
+    }
 }
 
 /// The error for faces that have not three corners.

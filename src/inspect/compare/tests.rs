@@ -2,33 +2,31 @@ use super::triangle::distance2;
 use super::vector::{Box3, V3, add, dot, scale, sub};
 use proptest::prelude::*;
 
-/// Halves the parameters' box again and again around the best of a grid: no algebra about regions.
-fn searched(triangle: &[V3; 3], p: V3) -> f64 {
-    let [a, b, c] = *triangle;
-    let at = |u: f64, v: f64| add(a, add(scale(sub(b, a), u), scale(sub(c, a), v)));
-    let far = |u: f64, v: f64| {
-        let d = sub(at(u, v), p);
-        dot(d, d)
-    };
-    let (mut best, mut centre, mut reach) = (far(0.0, 0.0), [0.0, 0.0], 1.0);
-    for _ in 0..80 {
-        let around = centre;
-        for i in -8..=8 {
-            for j in -8..=8 {
-                let u = (around[0] + f64::from(i) * reach / 8.0).clamp(0.0, 1.0);
-                let v = (around[1] + f64::from(j) * reach / 8.0).clamp(0.0, 1.0);
-                // On the long side as well.
-                for (u, v) in [(u, v), (u, 1.0 - u)] {
-                    if u + v <= 1.0 && far(u, v) < best {
-                        best = far(u, v);
-                        centre = [u, v];
-                    }
-                }
-            }
+/// The least value of a convex function on `0..=1`.
+fn least(f: impl Fn(f64) -> f64) -> f64 {
+    let (mut low, mut high) = (0.0, 1.0);
+    for _ in 0..100 {
+        let (m, n) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
+        if f(m) <= f(n) {
+            high = n;
+        } else {
+            low = m;
         }
-        reach *= 0.7;
     }
-    best.sqrt()
+    f(low).min(f(high)).min(f(0.0)).min(f(1.0))
+}
+
+/// A search in a search, along all segments from the first corner: no algebra about regions.
+fn searched([a, b, c]: &[V3; 3], p: V3) -> f64 {
+    let mix = |x: V3, y: V3, t: f64| add(scale(x, 1.0 - t), scale(y, t));
+    let across = |t: f64| {
+        let (from, to) = (mix(*a, *b, t), mix(*a, *c, t));
+        least(|s| {
+            let d = sub(mix(from, to, s), p);
+            dot(d, d)
+        })
+    };
+    least(across).sqrt()
 }
 
 fn check(triangle: &[V3; 3], p: V3) {
