@@ -136,3 +136,32 @@ fn what_cannot_be_done_is_said_in_one_line() {
         assert_eq!(error.lines().count(), 1, "{arguments:?}: {error}");
     }
 }
+
+/// Real scans that are used where they are, if they are: name, and its distinct finite points.
+const SCANS: [(&str, &str); 5] = [
+    ("pump.e57", "155201"),
+    ("facade-steps.pcd", "108104"),
+    ("railway.pcd", "487208"),
+    ("rgbd.pcd", "249647"),
+    ("room2d.pcd", "56159"),
+];
+
+#[test]
+fn real_scans_of_other_formats() {
+    let folder = tempfile::tempdir().unwrap();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/scans");
+    for (name, points) in SCANS {
+        let scan = root.join(name);
+        if !scan.exists() {
+            println!("skipped: {} is absent", scan.display());
+            continue;
+        }
+        let scan = scan.to_str().unwrap();
+        let arguments = [&["split", scan], &SPLIT[2..]].concat();
+        let text = said(&arguments, folder.path());
+        assert!(
+            text.starts_with(&format!("{points} distinct points")),
+            "{name}: {text}"
+        );
+    }
+}
