@@ -36,6 +36,10 @@ enum Command {
     /// Leave out random points of a scan
     Split(split::Split),
     /// Distance of the points left out to the mesh of the others, in units of the local spacing
+    ///
+    /// The local spacing at a point left out is the mean, over the 8 points nearest to it of those that
+    /// stayed, of the distance from each to the nearest other point that stayed. Percentiles are the
+    /// smallest value that so many points do not exceed.
     Measure(measure::Measure),
     /// Print a row of a Markdown table from the JSON files of one run
     Row(row::Row),

@@ -14,11 +14,7 @@ use std::path::PathBuf;
 /// Points around a point left out whose spacing is its local spacing.
 const AROUND: usize = 8;
 
-/// `holdout measure`
-///
-/// The local spacing at a point left out is the mean, over the 8 points nearest to it of those that
-/// stayed, of the distance from each to the nearest other point that stayed. So it is a property of
-/// the cloud that the mesh was made of. Percentiles are the smallest value that so many do not exceed.
+/// `holdout measure`; the program's help defines the local spacing.
 #[derive(Debug, Args)]
 pub(crate) struct Measure {
     /// The points that the mesh was made of
@@ -116,7 +112,8 @@ fn measure(args: &Measure, workspace: &Workspace) -> Result<HeldOut> {
     })
 }
 
-/// The local spacing of `train` at each of `places`; see [`Measure`].
+/// The local spacing of `train` at each of `places`; the mean of the distances from the nearest
+/// [`AROUND`] of them to their own nearest neighbours.
 fn spacings(train: &[[f64; 3]], places: &[[f64; 3]]) -> Vec<f64> {
     let tree: ImmutableKdTree<f64, 3> = ImmutableKdTree::new_from_slice(train);
     let two = NonZero::<usize>::MIN.saturating_add(1);
