@@ -25,6 +25,7 @@ const EXAMPLES: &str = "Examples:
   outcrop reconstruct noisy.las -o smooth.ply --smooth 1
   outcrop info scan.laz
   outcrop verify mesh.ply && echo manifold
+  outcrop compare mesh.ply scan.laz
   outcrop demo
 
 Exit codes: 0 fine, 1 the answer is no (verify), 2 error, 130 stopped by Ctrl-C.";
@@ -38,6 +39,8 @@ pub enum Command {
     Info(Info),
     /// Check that a mesh is a manifold: exit 0 yes, 1 no
     Verify(Verify),
+    /// Measure how far two meshes or clouds are from each other
+    Compare(Compare),
     /// Make a cloud, reconstruct it, verify the mesh: a first look at the program
     Demo(Demo),
 }
@@ -151,6 +154,28 @@ pub struct Verify {
     /// Vertices without a triangle are no defect
     #[arg(long)]
     pub allow_unreferenced: bool,
+    #[command(flatten)]
+    pub limits: Limits,
+}
+
+/// `outcrop compare`
+#[derive(Debug, ClapArgs)]
+pub struct Compare {
+    /// A mesh (PLY with faces), or a cloud (LAS, LAZ, PLY, XYZ text, a folder of them)
+    #[arg(value_name = "A")]
+    pub a: PathBuf,
+    /// What to compare it with, likewise
+    #[arg(value_name = "B")]
+    pub b: PathBuf,
+    /// Most places of each side from which the distance to the other is taken, e.g. 1e6
+    #[arg(long, value_name = "N", default_value = "1000000", value_parser = count)]
+    pub samples: u64,
+    /// Seed of the random choice of these places
+    #[arg(long, value_name = "SEED", default_value_t = 0)]
+    pub seed: u64,
+    /// Answer as JSON
+    #[arg(long)]
+    pub json: bool,
     #[command(flatten)]
     pub limits: Limits,
 }
