@@ -3,11 +3,10 @@
 
 use super::BaseStats;
 use crate::error::Result;
-use crate::geom::Point;
 use crate::spill::layouts::{LABELLED, SENT};
 use crate::spill::{Exchange, Sections};
 use crate::stages::blocks::Blocks;
-use crate::stages::located::{Located, Places, on_a_line, small_normal};
+use crate::stages::located::{Located, Places, on_a_line};
 use crate::stages::surface::evidence::Evidence;
 use crate::stages::surface::orient::{Around, Oriented, orient_inside};
 use crate::stages::surface::star::{Link, Star, Triangle, has, others};
@@ -180,12 +179,9 @@ impl Look<'_> {
         candidates: &[[u32; 4]],
     ) -> Result<Evidence> {
         let vertices = triangles.iter().flatten().copied();
-        let shape = Located::load(self.places.shape, self.blocks, block, vertices)?;
-        let normal = |t: Triangle| unit(t.map(|v| shape.at(v)));
-        let open = candidates.iter().map(|r| [r[0], r[1], r[2]]);
         Ok(Evidence {
-            normals: triangles.iter().map(|t| normal(*t)).collect(),
-            candidates: open.map(|t| (t, normal(t))).collect(),
+            places: Located::load(self.places.shape, self.blocks, block, vertices)?,
+            candidates: candidates.iter().map(|r| [r[0], r[1], r[2]]).collect(),
         })
     }
 
@@ -250,17 +246,6 @@ impl Look<'_> {
             .lock()
             .unwrap_or_else(std::sync::PoisonError::into_inner)[block] = span;
         Ok((triangles, candidates))
-    }
-}
-
-/// The unit normal of a triangle; zero if it has none.
-fn unit([a, b, c]: [Point; 3]) -> [f64; 3] {
-    let n = small_normal(a, b, c).map(|x| x as f64);
-    let length = (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]).sqrt();
-    if length > 0.0 {
-        n.map(|x| x / length)
-    } else {
-        n
     }
 }
 

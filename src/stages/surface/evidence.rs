@@ -6,15 +6,31 @@
 
 use super::parity::ParitySets;
 use super::star::{EDGES, Edges, Triangle, opposed};
+use crate::stages::located::{Located, small_normal};
 use rustc_hash::FxHashMap;
 
-/// Unit normals of triangles, each by its ascending ids.
+/// Where triangles lie, and what may be inserted between them later.
 #[derive(Debug, Default)]
 pub struct Evidence {
-    /// Of the triangles around a block, in their order.
-    pub normals: Vec<[f64; 3]>,
-    /// Triangles inside the block that may be inserted later, with their normals.
-    pub candidates: Vec<(Triangle, [f64; 3])>,
+    /// The vertices of the triangles around a block.
+    pub places: Located,
+    /// Candidates inside the block.
+    pub candidates: Vec<Triangle>,
+}
+
+impl Evidence {
+    /// The unit normal of a triangle by its ascending ids; zero if it has none.
+    #[must_use]
+    pub fn normal(&self, t: Triangle) -> [f64; 3] {
+        let [a, b, c] = t.map(|v| self.places.at(v));
+        let n = small_normal(a, b, c).map(|x| x as f64);
+        let length = (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]).sqrt();
+        if length > 0.0 {
+            n.map(|x| x / length)
+        } else {
+            n
+        }
+    }
 }
 
 /// The cosine of the angle between two triangles when they run alike, `flip` if one must be turned
@@ -37,14 +53,45 @@ const FLAT: f64 = 0.9;
 /// Steps of flatness below [`FLAT`].
 const STEPS: usize = 64;
 
-/// Joins `triangles` across the edges inside a block, the flattest first. Of two that would have to
-/// run both ways the later one is marked as dead.
-pub fn join_by_flatness(
+/// Joins `triangles` across the edges inside a block. Of two that would have to run both ways the
+/// later one is marked as dead; to begin with, the flattest edges are joined.
+pub fn join_inside(
     triangles: &[Triangle],
-    normals: &[[f64; 3]],
     edges: &Edges,
+    evidence: &Evidence,
     sets: &mut ParitySets,
 ) -> Vec<bool> {
+    // Without a contradiction the order of the edges makes no difference.
+    let mut agree = true;
+    each_edge(triangles, edges, |n, m, flip| {
+        agree &= sets.join(n, m, flip)
+    });
+    if agree {
+        return vec![false; triangles.len()];
+    }
+    *sets = ParitySets::new(triangles.len());
+    join_by_flatness(triangles, edges, evidence, sets)
+}
+
+/// Calls `each` with the two triangles at every edge, the earlier one first, and whether one must be
+/// turned against the other.
+fn each_edge(triangles: &[Triangle], edges: &Edges, mut each: impl FnMut(u32, u32, bool)) {
+    for (n, t) in (0..).zip(triangles) {
+        for (a, b, ..) in EDGES {
+            for m in edges.at(t[a], t[b]).filter(|m| *m > n) {
+                each(n, m, opposed(*t, triangles[m as usize], t[a], t[b]));
+            }
+        }
+    }
+}
+
+fn join_by_flatness(
+    triangles: &[Triangle],
+    edges: &Edges,
+    evidence: &Evidence,
+    sets: &mut ParitySets,
+) -> Vec<bool> {
+    let normals: Vec<_> = triangles.iter().map(|t| evidence.normal(*t)).collect();
     let mut steps: Vec<Vec<(u32, u32, bool)>> = vec![Vec::new(); STEPS];
     let mut dead = vec![false; triangles.len()];
     let mut join = |(n, m, flip): (u32, u32, bool)| {
@@ -52,21 +99,15 @@ pub fn join_by_flatness(
             dead[m as usize] = true;
         }
     };
-    for (number, t) in triangles.iter().enumerate() {
-        let n = number as u32;
-        for (a, b, ..) in EDGES {
-            for m in edges.at(t[a], t[b]).filter(|m| *m > n) {
-                let flip = opposed(*t, triangles[m as usize], t[a], t[b]);
-                let cosine = cosine(normals[number], normals[m as usize], flip);
-                if cosine > FLAT {
-                    join((n, m, flip));
-                } else {
-                    let step = (FLAT - cosine) / (1.0 + FLAT) * (STEPS - 1) as f64;
-                    steps[(step as usize).min(STEPS - 1)].push((n, m, flip));
-                }
-            }
+    each_edge(triangles, edges, |n, m, flip| {
+        let cosine = cosine(normals[n as usize], normals[m as usize], flip);
+        if cosine > FLAT {
+            join((n, m, flip));
+        } else {
+            let step = (FLAT - cosine) / (1.0 + FLAT) * (STEPS - 1) as f64;
+            steps[(step as usize).min(STEPS - 1)].push((n, m, flip));
         }
-    }
+    });
     steps.into_iter().flatten().for_each(join);
     dead
 }

@@ -233,7 +233,7 @@ fn orient_block(
     block: usize,
 ) -> OrientedBlock {
     if let Some(evidence) = around.evidence {
-        return weigh_block(inner, crossing, &around.triangles, &evidence, blocks, block);
+        return weigh_block(inner, crossing, &evidence, blocks, block);
     }
     drop(around);
     let ids = blocks.ids(block);

@@ -1,6 +1,6 @@
 //! Orientation by evidence: inside a block, and between blocks.
 
-use super::evidence::{Evidence, Votes, cosine, join_by_flatness, weight};
+use super::evidence::{Evidence, Votes, cosine, join_inside, weight};
 use super::orient::{Bonds, Oriented, OrientedBlock, adjacent, number_labels};
 use super::parity::ParitySets;
 use super::star::{EDGES, Edges, Triangle, opposed};
@@ -14,54 +14,50 @@ use rustc_hash::FxHashMap;
 pub(super) fn weigh_block(
     inner: &[Triangle],
     crossing: &[Triangle],
-    all: &[Triangle],
     evidence: &Evidence,
     blocks: Blocks,
     block: usize,
 ) -> OrientedBlock {
     let ids = blocks.ids(block);
-    let mut normals = Vec::with_capacity(inner.len());
-    let mut outer = Vec::with_capacity(crossing.len());
-    for (t, normal) in all.iter().zip(&evidence.normals) {
-        if blocks.crossing(*t) {
-            outer.push(*normal);
-        } else {
-            normals.push(*normal);
-        }
-    }
     let mut edges = Edges::with_room(ids.clone(), inner);
     for (number, &t) in inner.iter().enumerate() {
         edges.add(t, number as u32);
     }
     let mut sets = ParitySets::new(inner.len());
-    let dead = join_by_flatness(inner, &normals, &edges, &mut sets);
+    let dead = join_inside(inner, &edges, evidence, &mut sets);
     let kept: Vec<u32> = (0..inner.len() as u32)
         .filter(|n| !dead[*n as usize])
         .collect();
     let mut bonds = Bonds::default();
-    for (&c, &normal) in crossing.iter().zip(&outer) {
+    for &c in crossing {
+        let normal = evidence.normal(c);
         adjacent(c, &edges, inner, &ids, |other, flip| {
             if !dead[other as usize] {
-                let cosine = cosine(normal, normals[other as usize], flip);
+                let cosine = cosine(normal, evidence.normal(inner[other as usize]), flip);
                 bonds.relations.push((c, other, flip, weight(cosine)));
             }
         });
     }
-    for &(c, normal) in &evidence.candidates {
-        let mut asks: [(u32, bool, f64); 3] = [(0, false, 0.0); 3];
+    for &c in &evidence.candidates {
+        let mut asks = [(0, false); 3];
         let mut count = 0;
         adjacent(c, &edges, inner, &ids, |other, flip| {
             if !dead[other as usize] && count < 3 {
-                let cosine = cosine(normal, normals[other as usize], flip);
-                asks[count] = (other, flip, cosine);
+                asks[count] = (other, flip);
                 count += 1;
             }
         });
         for x in 1..count {
             for y in 0..x {
-                let ((a, flip_a, cos_a), (b, flip_b, cos_b)) = (asks[x], asks[y]);
-                let flip = flip_a ^ flip_b;
-                bonds.votes.push((a, b, flip, weight(cos_a.min(cos_b))));
+                let ((a, flip_a), (b, flip_b)) = (asks[x], asks[y]);
+                if sets.find(a).0 != sets.find(b).0 {
+                    let normal = evidence.normal(c);
+                    let flat = |(other, flip): (u32, bool)| {
+                        cosine(normal, evidence.normal(inner[other as usize]), flip)
+                    };
+                    let weight = weight(flat(asks[x]).min(flat(asks[y])));
+                    bonds.votes.push((a, b, flip_a ^ flip_b, weight));
+                }
             }
         }
     }
