@@ -62,4 +62,5 @@ pub use error::{Error, Result};
 pub use params::{Params, Radius};
 pub use pipeline::{Builder, Reconstruction};
 pub use report::Report;
+pub use stages::ingest::Classes;
 pub use workspace::progress::{Cancel, Observer};

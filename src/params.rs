@@ -1,6 +1,7 @@
 //! The geometric parameters of a reconstruction, checked once.
 
 use crate::error::{Error, Result};
+use crate::stages::ingest::Classes;
 
 /// Radius of the disks (paper, section 3.4).
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
@@ -38,6 +39,8 @@ impl std::str::FromStr for Radius {
 /// bytes.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Params {
+    /// Points to read, by class.
+    pub classes: Classes,
     /// Neighbours for planes and smoothing (paper: 30).
     pub neighbors: usize,
     /// Rounds of smoothing (paper: 0 to 2).
@@ -66,6 +69,7 @@ pub const MAX_NEIGHBORS: usize = 255;
 impl Default for Params {
     fn default() -> Self {
         Self {
+            classes: Classes::All,
             neighbors: 30,
             smooth: 0,
             radius: Radius::Auto,

@@ -7,7 +7,7 @@ use crate::report::{LatticeReport, PartReport, Report, StageReport};
 use crate::stages::blocks::Blocks;
 use crate::stages::cells::{CellStats, DiskRadius, TileRanges, cells};
 use crate::stages::export::{CoordinateType, export};
-use crate::stages::ingest::{self, READ_BUFFERS, Spool, ingest};
+use crate::stages::ingest::{self, READ_BUFFERS, Spool, ingest_classes};
 use crate::stages::order::{Orderer, PAGE, PointStore};
 use crate::stages::repair::{RepairOptions, repair};
 use crate::stages::smooth::smooth;
@@ -239,7 +239,9 @@ impl Reconstruction {
         let params = &self.params;
         let mut clock = Clock::new(workspace);
 
-        let spool = clock.stage("ingest", "points", 0, || ingest(&self.inputs, workspace))?;
+        let spool = clock.stage("ingest", "points", 0, || {
+            ingest_classes(&self.inputs, &params.classes, workspace)
+        })?;
         let input = spool.stats().clone();
         let mut warnings = input.warnings.clone();
         if input.dropped_non_finite > 0 {

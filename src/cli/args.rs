@@ -1,6 +1,7 @@
 //! Flags, as the user gives them.
 
 use crate::params::{Params, Radius};
+use crate::stages::ingest::Classes;
 use clap::{Args as ClapArgs, Parser, Subcommand};
 use std::path::PathBuf;
 
@@ -59,6 +60,40 @@ pub struct Limits {
     pub quiet: bool,
 }
 
+/// Which points are read.
+#[derive(Debug, ClapArgs)]
+#[command(next_help_heading = "Points")]
+pub struct Points {
+    /// Leave out points of these classes (LAS, LAZ), e.g. 7,18 for noise
+    #[arg(
+        long,
+        value_name = "CLASSES",
+        value_delimiter = ',',
+        conflicts_with = "keep_classes"
+    )]
+    pub drop_classes: Vec<u8>,
+    /// Read only points of these classes (LAS, LAZ), e.g. 2,6 for ground and buildings
+    #[arg(long, value_name = "CLASSES", value_delimiter = ',')]
+    pub keep_classes: Vec<u8>,
+}
+
+impl Points {
+    /// The classes to read.
+    pub fn classes(&self) -> Classes {
+        let sorted = |classes: &[u8]| {
+            let mut classes = classes.to_vec();
+            classes.sort_unstable();
+            classes.dedup();
+            classes
+        };
+        match (self.keep_classes.as_slice(), self.drop_classes.as_slice()) {
+            ([], []) => Classes::All,
+            ([], dropped) => Classes::Drop(sorted(dropped)),
+            (kept, _) => Classes::Keep(sorted(kept)),
+        }
+    }
+}
+
 /// Geometric parameters.
 #[derive(Debug, ClapArgs)]
 #[command(next_help_heading = "Surface")]
@@ -103,6 +138,8 @@ pub struct Reconstruct {
     #[arg(long, short, value_name = "MESH.ply")]
     pub output: PathBuf,
     #[command(flatten)]
+    pub points: Points,
+    #[command(flatten)]
     pub surface: Surface,
     #[command(flatten)]
     pub repair: Repair,
@@ -126,6 +163,8 @@ pub struct Info {
     #[arg(long)]
     pub json: bool,
     #[command(flatten)]
+    pub points: Points,
+    #[command(flatten, next_help_heading = "Limits")]
     pub limits: Limits,
 }
 
@@ -162,6 +201,7 @@ impl Reconstruct {
     /// The geometric parameters.
     pub fn params(&self) -> Params {
         Params {
+            classes: self.points.classes(),
             neighbors: self.surface.neighbors,
             smooth: self.surface.smooth,
             radius: self.surface.radius,

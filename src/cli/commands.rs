@@ -148,7 +148,7 @@ fn summary(report: &Report, output: &Path) -> String {
 
 fn tell(args: &Info) -> Result<Answer> {
     let workspace = workspace(&args.limits, &std::env::temp_dir())?;
-    let info = info::info(&args.inputs, &workspace)?;
+    let info = info::info(&args.inputs, &args.points.classes(), &workspace)?;
     print(&if args.json {
         json(&info)?
     } else {
