@@ -41,6 +41,10 @@ impl std::str::FromStr for Radius {
 pub struct Params {
     /// Points to read, by class.
     pub classes: Classes,
+    /// Keep at most one point in each cube of this side, in the input's unit.
+    pub thin: Option<f64>,
+    /// Drop points whose spacing is this many times as large as around them.
+    pub drop_outliers: Option<f64>,
     /// Neighbours for planes and smoothing (paper: 30).
     pub neighbors: usize,
     /// Rounds of smoothing (paper: 0 to 2).
@@ -63,6 +67,9 @@ pub struct Params {
 /// The block size that a reconstruction uses unless a test asks for another.
 pub const BLOCK: u32 = 1 << 16;
 
+/// The factor of [`Params::drop_outliers`] that suits most clouds.
+pub const OUTLIER_FACTOR: f64 = 5.0;
+
 /// Largest number of neighbours that can be asked for.
 pub const MAX_NEIGHBORS: usize = 255;
 
@@ -70,6 +77,8 @@ impl Default for Params {
     fn default() -> Self {
         Self {
             classes: Classes::All,
+            thin: None,
+            drop_outliers: None,
             neighbors: 30,
             smooth: 0,
             radius: Radius::Auto,
@@ -93,6 +102,16 @@ impl Params {
                 expected: expected.into(),
             })
         };
+        if let Some(side) = self.thin
+            && !(side > 0.0 && side.is_finite())
+        {
+            return error("--thin", side.to_string(), "a positive length");
+        }
+        if let Some(factor) = self.drop_outliers
+            && !(factor >= 1.0 && factor.is_finite())
+        {
+            return error("--drop-outliers", factor.to_string(), "1 or more");
+        }
         if !(3..=MAX_NEIGHBORS).contains(&self.neighbors) {
             return error("--neighbors", self.neighbors.to_string(), "3 to 255");
         }

@@ -77,6 +77,29 @@ pub struct Points {
     pub keep_classes: Vec<u8>,
 }
 
+/// Which points are left of those.
+#[derive(Debug, ClapArgs)]
+#[command(next_help_heading = "Points")]
+pub struct Filters {
+    /// Keep at most one point in each cube of this side, in the cloud's unit: the one nearest to its
+    /// centre
+    #[arg(long, value_name = "LENGTH")]
+    pub thin: Option<f64>,
+    /// Drop points that are FACTOR times as far from their neighbours as the points around them are
+    /// from theirs [without a number: 5]
+    #[arg(
+        long,
+        value_name = "FACTOR",
+        num_args = 0..=1,
+        require_equals = true,
+        default_missing_value = OUTLIER_FACTOR_TEXT
+    )]
+    pub drop_outliers: Option<f64>,
+}
+
+/// [`crate::params::OUTLIER_FACTOR`] as text.
+const OUTLIER_FACTOR_TEXT: &str = "5";
+
 impl Points {
     /// The classes to read.
     pub fn classes(&self) -> Classes {
@@ -140,6 +163,8 @@ pub struct Reconstruct {
     #[command(flatten)]
     pub points: Points,
     #[command(flatten)]
+    pub filters: Filters,
+    #[command(flatten)]
     pub surface: Surface,
     #[command(flatten)]
     pub repair: Repair,
@@ -202,6 +227,8 @@ impl Reconstruct {
     pub fn params(&self) -> Params {
         Params {
             classes: self.points.classes(),
+            thin: self.filters.thin,
+            drop_outliers: self.filters.drop_outliers,
             neighbors: self.surface.neighbors,
             smooth: self.surface.smooth,
             radius: self.surface.radius,
@@ -238,6 +265,14 @@ mod tests {
     fn flags_are_well_formed() {
         use clap::CommandFactory;
         Args::command().debug_assert();
+    }
+
+    #[test]
+    fn the_default_factor_is_what_the_library_says() {
+        assert_eq!(
+            OUTLIER_FACTOR_TEXT.parse(),
+            Ok(crate::params::OUTLIER_FACTOR)
+        );
     }
 
     #[test]
