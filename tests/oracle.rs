@@ -75,6 +75,7 @@ fn pipeline(
         min_component: settings.min_component as u64,
         repair: settings.repair,
         block: settings.block,
+        ..Params::default()
     };
     assert_eq!(params.cos_max_angle(), settings.cos_max_angle);
     let report = Reconstruction::builder()

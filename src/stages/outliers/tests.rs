@@ -45,19 +45,13 @@ fn far_outliers_go_and_the_surface_stays() {
         let cloud = Cloud::new(kind).points(60_000).outliers(0.01);
         let generator = cloud.generator().unwrap();
         let all = points(&generator);
-        let (left, stats) = kept(&all, 5.0, 1 << 16, 256);
+        let (left, _) = kept(&all, 5.0, 1 << 16, 256);
         let far = |points: &[Point], least: f64| {
             let far = |p: &&Point| generator.distance(coordinates(**p)) > least;
             points.iter().filter(far).count()
         };
         let (before, after) = (far(&all, 50.0), far(&left, 50.0));
-        println!(
-            "{kind}: {stats:?}, far {before} {after}, off {} {}",
-            far(&all, 0.1),
-            far(&left, 0.1)
-        );
         let lost = (all.len() - far(&all, 0.1)) - (left.len() - far(&left, 0.1));
-        println!("lost {lost}");
         assert!(
             after * 100 <= before,
             "{kind}: {after} of {before} far ones left"
@@ -82,7 +76,6 @@ fn clean_clouds_stay() {
             let cloud = Cloud::new(kind).points(30_000).sampling(sampling);
             let all = points(&cloud.generator().unwrap());
             let (left, stats) = kept(&all, 5.0, 1 << 16, 256);
-            println!("{kind} {sampling:?} {stats:?}");
             assert!(
                 (all.len() - left.len()) * 1000 <= all.len(),
                 "{kind}: {stats:?}"
@@ -97,7 +90,7 @@ fn small_clusters_go_however_they_are_worked_on() {
     let surface = points(&cloud.generator().unwrap());
     let mut all = surface.clone();
     for cluster in 0..6 {
-        let at = [0, 1, 2].map(|k| (((cluster * 7 + k * 3) % 11) * 30_000_000) as i32 + 5_000_000);
+        let at = [0, 1, 2].map(|k| ((cluster * 7 + k * 3) % 11) * 30_000_000 + 5_000_000);
         // One to five points, closer together than those of the surface.
         for n in 0..1 + cluster % 5 {
             all.push([at[0] + 9000 * n, at[1] - 7000 * n, at[2] + 100 * n]);
