@@ -44,8 +44,8 @@
 //! | [`stages::repair`] | triangles by block | bridges and small components gone, holes filled, oriented | 3.6 |
 //! | [`stages::export`] | triangles by block | the mesh file | |
 //!
-//! [`inspect`] answers questions about files without a reconstruction: what is in a cloud, and is a
-//! mesh a manifold. [`report::Report`] is what a run counts and measures. The semantics of the mesh
+//! [`inspect`] answers questions about files without a reconstruction: what is in a cloud, is a
+//! mesh a manifold, and how far are two shapes from each other. [`report::Report`] is what a run counts and measures. The semantics of the mesh
 //! and the formats of scratch files are in `ARCHITECTURE.md`.
 
 pub mod cli;
@@ -61,7 +61,7 @@ pub mod stages;
 pub mod workspace;
 
 pub use error::{Error, Result};
-pub use params::{Params, Radius};
+pub use params::{Method, Params, Radius};
 pub use pipeline::{Builder, Reconstruction};
 pub use report::Report;
 pub use stages::ingest::Classes;

@@ -35,6 +35,28 @@ impl std::str::FromStr for Radius {
     }
 }
 
+/// How the surface is made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Method {
+    /// The paper's cells on relaxed positions, oriented by evidence, torn boundaries closed.
+    Robust,
+    /// The paper's method as it is written.
+    Paper,
+}
+
+impl std::str::FromStr for Method {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "robust" => Ok(Method::Robust),
+            "paper" => Ok(Method::Paper),
+            _ => Err(format!("{text:?} is not robust or paper")),
+        }
+    }
+}
+
 /// Everything that decides the mesh. Two runs with equal parameters and equal points give the same
 /// bytes.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -45,18 +67,23 @@ pub struct Params {
     pub thin: Option<f64>,
     /// Drop points whose spacing is this many times as large as around them.
     pub drop_outliers: Option<f64>,
+    /// How the surface is made; [`Params::paper`] sets what goes with the paper's.
+    pub method: Method,
     /// Neighbours for planes and smoothing (paper: 30).
     pub neighbors: usize,
     /// Rounds of smoothing (paper: 0 to 2).
     pub smooth: u32,
+    /// Most rounds of relaxing: smoothing that decides only which points are connected.
+    pub relax: u32,
     /// Disk radius.
     pub radius: Radius,
     /// Largest angle between neighbouring normals for T12 triangles, in degrees (paper: 60).
     pub max_angle: f64,
     /// Fill holes of up to this many edges (paper: 500).
     pub max_hole_edges: usize,
-    /// Remove components with fewer triangles (paper: 10).
-    pub min_component: u64,
+    /// Remove components with fewer triangles (paper: 10); `None`: one for each thousand points,
+    /// from 10 to 100.
+    pub min_component: Option<u64>,
     /// Bridges, holes and small components (paper, section 3.6).
     pub repair: bool,
     /// Points per block, the unit in which T12 triangles are decided; part of the result.
@@ -79,12 +106,14 @@ impl Default for Params {
             classes: Classes::All,
             thin: None,
             drop_outliers: None,
+            method: Method::Robust,
             neighbors: 30,
             smooth: 0,
+            relax: 3,
             radius: Radius::Auto,
-            max_angle: 60.0,
+            max_angle: 143.0,
             max_hole_edges: 500,
-            min_component: 10,
+            min_component: None,
             repair: true,
             block: BLOCK,
         }
@@ -92,6 +121,25 @@ impl Default for Params {
 }
 
 impl Params {
+    /// The paper's method with its defaults.
+    #[must_use]
+    pub fn paper() -> Self {
+        Self {
+            method: Method::Paper,
+            relax: 0,
+            max_angle: 60.0,
+            min_component: Some(10),
+            ..Self::default()
+        }
+    }
+
+    /// The least triangles of a component that stays, in a cloud of so many points.
+    #[must_use]
+    pub fn least_component(&self, points: u64) -> u64 {
+        self.min_component
+            .unwrap_or_else(|| (points / 1000).clamp(10, 100))
+    }
+
     /// # Errors
     /// [`Error::Parameter`] for the first value out of range.
     pub fn check(&self) -> Result<()> {
@@ -124,6 +172,9 @@ impl Params {
         }
         if self.smooth > 100 {
             return error("--smooth", self.smooth.to_string(), "0 to 100");
+        }
+        if self.relax > 100 {
+            return error("--relax", self.relax.to_string(), "0 to 100");
         }
         if self.max_hole_edges > 10_000 {
             return error(

@@ -4,16 +4,17 @@ mod points;
 
 use crate::error::{Error, Result};
 use crate::geom::lattice::Lattice;
-use crate::params::{Params, Radius};
+use crate::params::{Method, Params, Radius};
 use crate::report::{LatticeReport, PartReport, Report, StageReport};
 use crate::stages::blocks::Blocks;
 use crate::stages::cells::{CellStats, DiskRadius, TileRanges, cells};
 use crate::stages::export::{CoordinateType, export};
 use crate::stages::ingest::{self, ingest_classes};
+use crate::stages::located::Places;
 use crate::stages::order::{PAGE, PointStore};
 use crate::stages::repair::{RepairOptions, repair};
-use crate::stages::smooth::smooth;
-use crate::stages::stitch::stitch;
+use crate::stages::smooth::{relax, smooth};
+use crate::stages::stitch::{StitchOptions, stitch};
 use crate::stages::triples::triples;
 use crate::workspace::memory::MemoryPool;
 use crate::workspace::progress::{Cancel, Observer, Silent};
@@ -258,7 +259,11 @@ impl Reconstruction {
             ingest::CoordinateType::F32 => CoordinateType::Float,
             ingest::CoordinateType::F64 => CoordinateType::Double,
         };
-        let refine = if params.smooth > 0 { SMOOTH_REFINE } else { 0 };
+        let refine = if params.smooth + params.relax > 0 {
+            SMOOTH_REFINE
+        } else {
+            0
+        };
         let lattice = spool.choose_lattice(refine)?;
         let (store, duplicates_folded, thin) =
             self.in_order(spool, &lattice, &mut clock, workspace)?;
@@ -271,7 +276,9 @@ impl Reconstruction {
         }
         warnings.iter().for_each(|w| self.observer.warn(w));
         enough(&store)?;
-        room(&self.scratch, store.len() as u64 * SCRATCH_PER_POINT)?;
+        if params.thin.is_some() {
+            room(&self.scratch, store.len() as u64 * SCRATCH_PER_POINT)?;
+        }
         let (mut store, outliers) = self.without_outliers(store, &mut clock, workspace)?;
         enough(&store)?;
         let points = store.len() as u64;
@@ -283,23 +290,44 @@ impl Reconstruction {
                 smooth(&store, tiles, params.neighbors, round, workspace)
             })?;
         }
+        let relaxed = if params.relax > 0 {
+            Some(
+                clock.stage("relax", "points", points * u64::from(params.relax), || {
+                    relax(&store, tiles, params.neighbors, params.relax, workspace)
+                })?,
+            )
+        } else {
+            None
+        };
+        let places = Places {
+            shape: relaxed
+                .as_ref()
+                .and_then(|r| r.store.as_ref())
+                .unwrap_or(&store),
+            file: &store,
+        };
         let (seen, cell_stats) = clock.stage("cells", "points", points, || {
-            cells(&store, tiles, params.neighbors, radius, workspace)
+            cells(places.shape, tiles, params.neighbors, radius, workspace)
         })?;
         not_a_line(&cell_stats, points)?;
         let (triples, triple_stats) =
             clock.stage("triples", "triples", 0, || triples(seen, blocks, workspace))?;
         let count = blocks.count() as u64;
+        let extraction = StitchOptions {
+            cos_max_angle: params.cos_max_angle(),
+            weigh: params.method == Method::Robust,
+        };
         let (stitched, base, insertion) = clock.stage("stitch", "blocks", 3 * count, || {
-            stitch(&store, triples, blocks, params.cos_max_angle(), workspace)
+            stitch(places, triples, blocks, extraction, workspace)
         })?;
         let options = RepairOptions {
             repair: params.repair,
-            min_component: params.min_component,
+            min_component: params.least_component(points),
             max_hole_edges: params.max_hole_edges,
+            zip: params.method == Method::Robust,
         };
         let (repaired, repair) = clock.stage("repair", "blocks", 2 * count, || {
-            repair(&store, stitched, blocks, options, workspace)
+            repair(places, stitched, blocks, options, workspace)
         })?;
         let mesh = clock.stage("export", "blocks", 2 * count, || {
             export(
@@ -332,6 +360,7 @@ impl Reconstruction {
                 DiskRadius::Auto => None,
                 DiskRadius::Steps(steps) => Some(steps * lattice.step),
             },
+            relax: relaxed.as_ref().map(|r| r.stats),
             cells: cell_stats,
             triples: triple_stats,
             base,

@@ -6,6 +6,7 @@ use crate::stages::export::{CoordinateType, MeshStats};
 use crate::stages::ingest::IngestStats;
 use crate::stages::outliers::OutlierStats;
 use crate::stages::repair::RepairStats;
+use crate::stages::smooth::RelaxStats;
 use crate::stages::stitch::{BaseStats, InsertStats};
 use crate::stages::thin::ThinStats;
 use crate::stages::triples::TripleStats;
@@ -36,6 +37,8 @@ pub struct Report {
     pub lattice: LatticeReport,
     /// Disk radius in the input's unit; absent if it follows the local density.
     pub radius: Option<f64>,
+    /// What relaxing did; none with `--relax 0`.
+    pub relax: Option<RelaxStats>,
     /// Cells.
     pub cells: CellStats,
     /// Triples by count.

@@ -72,10 +72,10 @@ fn pipeline(
             120.0
         },
         max_hole_edges: settings.max_hole_edges,
-        min_component: settings.min_component as u64,
+        min_component: Some(settings.min_component as u64),
         repair: settings.repair,
         block: settings.block,
-        ..Params::default()
+        ..Params::paper()
     };
     assert_eq!(params.cos_max_angle(), settings.cos_max_angle);
     let report = Reconstruction::builder()
@@ -266,7 +266,7 @@ fn holes_of_few_edges_and_wide_angles() {
         max_hole_edges: 3 + seed as usize % 5,
         cos_max_angle: Params {
             max_angle: 120.0,
-            ..Params::default()
+            ..Params::paper()
         }
         .cos_max_angle(),
         block: 60,

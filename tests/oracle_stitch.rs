@@ -6,9 +6,10 @@ mod reference;
 use outcrop::inspect::ply_mesh::{PlyMesh, Sink};
 use outcrop::stages::blocks::Blocks;
 use outcrop::stages::export::{CoordinateType, export};
+use outcrop::stages::located::Places;
 use outcrop::stages::order::{Orderer, PointStore};
 use outcrop::stages::repair::{RepairOptions, repair};
-use outcrop::stages::stitch::stitch;
+use outcrop::stages::stitch::{StitchOptions, stitch};
 use outcrop::stages::triples::Triples;
 use outcrop::workspace::Workspace;
 use outcrop::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
@@ -86,14 +87,22 @@ fn pipeline(
     let store = store_of(points, workspace);
     let blocks = Blocks::new(store.len(), settings.block);
     let triples = sections(all, blocks, workspace);
-    let (stitched, base, inserted) =
-        stitch(&store, triples, blocks, settings.cos_max_angle, workspace)?;
+    let places = Places {
+        shape: &store,
+        file: &store,
+    };
+    let extraction = StitchOptions {
+        cos_max_angle: settings.cos_max_angle,
+        weigh: false,
+    };
+    let (stitched, base, inserted) = stitch(places, triples, blocks, extraction, workspace)?;
     let options = RepairOptions {
         repair: settings.repair,
         min_component: settings.min_component as u64,
         max_hole_edges: settings.max_hole_edges,
+        zip: false,
     };
-    let (repaired, _) = repair(&store, stitched, blocks, options, workspace)?;
+    let (repaired, _) = repair(places, stitched, blocks, options, workspace)?;
     let lattice = outcrop::geom::lattice::Lattice {
         step: 1.0,
         offset: [0.0; 3],
@@ -163,7 +172,7 @@ fn arbitrary_triples() {
         // Cells never see three points on a line.
         all.retain(|t, _| {
             let [a, b, c] = t.map(|v| points[v as usize]);
-            outcrop::stages::stitch::normal(a, b, c) != [0; 3]
+            outcrop::stages::located::normal(a, b, c) != [0; 3]
         });
         let settings = Settings {
             block: [4, 9, 25, 1000][seed as usize % 4],

@@ -1,6 +1,6 @@
 //! Flags, as the user gives them.
 
-use crate::params::{Params, Radius};
+use crate::params::{Method, Params, Radius};
 use crate::stages::ingest::Classes;
 use clap::{Args as ClapArgs, Parser, Subcommand};
 use std::path::PathBuf;
@@ -26,6 +26,7 @@ const EXAMPLES: &str = "Examples:
   outcrop reconstruct noisy.las -o smooth.ply --smooth 1
   outcrop info scan.laz
   outcrop verify mesh.ply && echo manifold
+  outcrop compare mesh.ply scan.laz
   outcrop demo
 
 Exit codes: 0 fine, 1 the answer is no (verify), 2 error, 130 stopped by Ctrl-C.";
@@ -39,6 +40,8 @@ pub enum Command {
     Info(Info),
     /// Check that a mesh is a manifold: exit 0 yes, 1 no
     Verify(Verify),
+    /// Measure how far two meshes or clouds are from each other
+    Compare(Compare),
     /// Make a cloud, reconstruct it, verify the mesh: a first look at the program
     Demo(Demo),
 }
@@ -121,19 +124,28 @@ impl Points {
 #[derive(Debug, ClapArgs)]
 #[command(next_help_heading = "Surface")]
 pub struct Surface {
+    /// How the surface is made: robust, for scans as they are, or paper, the published method as it
+    /// is written
+    #[arg(long, value_name = "robust|paper", default_value = "robust")]
+    pub method: Method,
     /// Neighbours for the plane at each point
     #[arg(long, value_name = "N", default_value_t = 30)]
     pub neighbors: usize,
     /// Rounds of smoothing before the surface is made; 1 or 2 help noisy scans
     #[arg(long, value_name = "ROUNDS", default_value_t = 0)]
     pub smooth: u32,
+    /// Most rounds of relaxing: smoothing that only decides which points are connected, and leaves
+    /// the points where they are [default: 3; with --method paper 0]
+    #[arg(long, value_name = "ROUNDS")]
+    pub relax: Option<u32>,
     /// Disk radius: auto (follows the local density), a percentage of the bounding box's diagonal
     /// like 5%, or a length in the cloud's unit
     #[arg(long, value_name = "auto|PERCENT%|LENGTH", default_value = "auto")]
     pub radius: Radius,
     /// Largest angle between neighbouring normals where the surface is uncertain, in degrees
-    #[arg(long, value_name = "DEGREES", default_value_t = 60.0)]
-    pub max_angle: f64,
+    /// [default: 143; with --method paper 60]
+    #[arg(long, value_name = "DEGREES")]
+    pub max_angle: Option<f64>,
 }
 
 /// Post-processing.
@@ -143,9 +155,10 @@ pub struct Repair {
     /// Fill holes of up to this many edges; 0 fills none
     #[arg(long, value_name = "N", default_value_t = 500)]
     pub max_hole_edges: usize,
-    /// Remove components with fewer triangles
-    #[arg(long, value_name = "N", default_value_t = 10)]
-    pub min_component: u64,
+    /// Remove components with fewer triangles [default: a thousandth of the points, from 10 to 100;
+    /// with --method paper 10]
+    #[arg(long, value_name = "N")]
+    pub min_component: Option<u64>,
     /// Leave out bridges, holes and components: the surface as extracted
     #[arg(long)]
     pub no_repair: bool,
@@ -209,6 +222,28 @@ pub struct Verify {
     pub limits: Limits,
 }
 
+/// `outcrop compare`
+#[derive(Debug, ClapArgs)]
+pub struct Compare {
+    /// A mesh (PLY with faces), or a cloud (LAS, LAZ, PLY, XYZ text, a folder of them)
+    #[arg(value_name = "A")]
+    pub a: PathBuf,
+    /// What to compare it with, likewise
+    #[arg(value_name = "B")]
+    pub b: PathBuf,
+    /// Most places of each side from which the distance to the other is taken, e.g. 1e6
+    #[arg(long, value_name = "N", default_value = "1000000", value_parser = count)]
+    pub samples: u64,
+    /// Seed of the random choice of these places
+    #[arg(long, value_name = "SEED", default_value_t = 0)]
+    pub seed: u64,
+    /// Answer as JSON
+    #[arg(long)]
+    pub json: bool,
+    #[command(flatten)]
+    pub limits: Limits,
+}
+
 /// `outcrop demo`
 #[derive(Debug, ClapArgs)]
 pub struct Demo {
@@ -225,18 +260,23 @@ pub struct Demo {
 impl Reconstruct {
     /// The geometric parameters.
     pub fn params(&self) -> Params {
+        let usual = match self.surface.method {
+            Method::Robust => Params::default(),
+            Method::Paper => Params::paper(),
+        };
         Params {
             classes: self.points.classes(),
             thin: self.filters.thin,
             drop_outliers: self.filters.drop_outliers,
             neighbors: self.surface.neighbors,
             smooth: self.surface.smooth,
+            relax: self.surface.relax.unwrap_or(usual.relax),
             radius: self.surface.radius,
-            max_angle: self.surface.max_angle,
+            max_angle: self.surface.max_angle.unwrap_or(usual.max_angle),
             max_hole_edges: self.repair.max_hole_edges,
-            min_component: self.repair.min_component,
+            min_component: self.repair.min_component.or(usual.min_component),
             repair: !self.repair.no_repair,
-            ..Params::default()
+            ..usual
         }
     }
 }

@@ -1,10 +1,10 @@
 //! What each command does.
 
-use super::args::{Command, Demo, Info, Limits, Reconstruct, Verify};
+use super::args::{Command, Compare, Demo, Info, Limits, Reconstruct, Verify};
 use super::progress::{Bars, Warnings};
 use super::{Answer, style};
 use crate::error::{Error, Result};
-use crate::inspect::{info, verify};
+use crate::inspect::{compare, info, verify};
 use crate::pipeline::{Reconstruction, default_memory, default_threads};
 use crate::report::Report;
 use crate::workspace::Workspace;
@@ -20,6 +20,7 @@ pub fn run(command: Command) -> Result<Answer> {
         Command::Reconstruct(args) => reconstruct(&args),
         Command::Info(args) => tell(&args),
         Command::Verify(args) => check(&args),
+        Command::Compare(args) => measure(&args),
         Command::Demo(args) => demo(&args),
     }
 }
@@ -191,6 +192,21 @@ fn check(args: &Verify) -> Result<Answer> {
     } else {
         Answer::No
     })
+}
+
+fn measure(args: &Compare) -> Result<Answer> {
+    let workspace = workspace(&args.limits, &std::env::temp_dir())?;
+    let options = compare::Options {
+        samples: args.samples,
+        seed: args.seed,
+    };
+    let comparison = compare::compare(&args.a, &args.b, &options, &workspace)?;
+    print(&if args.json {
+        json(&comparison)?
+    } else {
+        comparison.to_string()
+    })?;
+    Ok(Answer::Yes)
 }
 
 fn demo(args: &Demo) -> Result<Answer> {

@@ -22,4 +22,5 @@ pub mod repair;
 pub mod export;
 
 pub mod blocks;
+pub mod located;
 pub mod surface;

@@ -295,3 +295,57 @@ fn the_mesh_of_the_program_is_that_of_the_library() {
     assert_eq!(said.code, Some(0), "{said:?}");
     assert_eq!(util::hash(&a), util::hash(&b));
 }
+
+#[test]
+fn compare_answers_in_words_and_json() {
+    let bench = Bench::new();
+    let a = bench.write("a.ply", ply(&CORNERS[..4], &TETRAHEDRON));
+    let b = bench.points("b.xyz", &CORNERS);
+    let compare = |more: &[&str]| {
+        let mut arguments = vec![OsStr::new("compare"), a.as_os_str(), b.as_os_str()];
+        arguments.extend(more.iter().map(OsStr::new));
+        run(&arguments)
+    };
+    let said = compare(&[]);
+    assert_eq!((said.code, said.err.as_str()), (Some(0), ""), "{said:?}");
+    assert!(said.out.contains("99.9 %"), "{said:?}");
+
+    let said = compare(&["--json", "--samples", "1e3", "--seed", "5"]);
+    let json: Value = serde_json::from_str(&said.out).unwrap();
+    assert_eq!(
+        (&json["a"]["kind"], &json["b"]["kind"]),
+        (&"mesh".into(), &"cloud".into())
+    );
+    assert_eq!(
+        (&json["most_samples"], &json["seed"]),
+        (&1000.into(), &5.into())
+    );
+    assert_eq!(
+        (&json["a_to_b"]["samples"], &json["b_to_a"]["samples"]),
+        (&1000.into(), &5.into())
+    );
+    // From (1, 1, 1) to the slanted side.
+    let far = json["b_to_a"]["max"].as_f64().unwrap();
+    assert!((far - 2.0 / 3f64.sqrt()).abs() < 1e-12, "{json}");
+    let limited = [
+        "--json",
+        "--samples",
+        "1e3",
+        "--seed",
+        "5",
+        "--threads",
+        "1",
+        "--memory",
+        "192MiB",
+    ];
+    assert_eq!(compare(&limited).out, said.out);
+
+    assert_eq!(compare(&["--samples", "0"]).code, Some(2));
+    let absent = bench.path("absent.ply");
+    let said = run(&[OsStr::new("compare"), a.as_os_str(), absent.as_os_str()]);
+    assert_eq!(
+        (said.code, said.err.lines().count()),
+        (Some(2), 1),
+        "{said:?}"
+    );
+}

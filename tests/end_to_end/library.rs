@@ -246,7 +246,7 @@ fn errors_of_a_run_are_typed() {
     let error = outcome(text("line.xyz", "0 0 0\n1 1 1\n2 2 2\n4 4 4\n"), &default);
     assert!(matches!(error, Error::Degenerate { .. }), "{error:?}");
     let strict = Params {
-        min_component: 1_000_000,
+        min_component: Some(1_000_000),
         ..Params::default()
     };
     let error = outcome(small(&bench), &strict);

@@ -92,12 +92,20 @@ fn closed_surfaces_with_many_blocks() {
     }
 }
 
-/// The bunny is closed, and has at most so many holes before repair.
+/// The bunny is closed, and has at most so many holes before repair. The paper's method uses all
+/// points; relaxed, a few of the sharpest ridges fall behind others.
 fn bunny(name: &str, holes: u64) {
+    let params = [Params::paper(), Params::default()];
+    for (params, unused) in params.iter().zip([0, 5]) {
+        bunny_with(name, holes, params, unused);
+    }
+}
+
+fn bunny_with(name: &str, holes: u64, params: &Params, unused: u64) {
     let Some(scan) = util::scan(name) else { return };
     let bench = Bench::new();
     let mesh = bench.path("mesh.ply");
-    let report = util::reconstruct(&scan, &mesh, &Params::default());
+    let report = util::reconstruct(&scan, &mesh, params);
     let verdict = util::verdict(&mesh);
     assert!(verdict.manifold, "{verdict}");
     assert_eq!(
@@ -106,13 +114,13 @@ fn bunny(name: &str, holes: u64) {
         "{verdict}"
     );
     assert_eq!(verdict.euler_characteristic, 2, "{verdict}");
-    assert_eq!(report.mesh.points_used, report.points);
+    assert!(report.mesh.points_used + unused >= report.points);
     util::reconstruct(
         &scan,
         &mesh,
         &Params {
             repair: false,
-            ..Params::default()
+            ..params.clone()
         },
     );
     let verdict = util::verdict(&mesh);

@@ -52,6 +52,26 @@ pub struct PlyMesh {
     source: Source,
 }
 
+/// True for a PLY file whose header announces faces: a mesh and not a cloud. What is no PLY file, or
+/// has a header that cannot be read, is for others to judge.
+///
+/// # Errors
+/// [`Error::Io`].
+pub fn holds_faces(path: &Path) -> Result<bool> {
+    let mut source = Source::open(path)?;
+    if source.peek(3)?.get(..3) != Some(b"ply") {
+        return Ok(false);
+    }
+    match Header::read(&mut source) {
+        Ok(header) => Ok(header
+            .elements
+            .iter()
+            .any(|e| e.name == "face" && e.count > 0)),
+        Err(Error::Input { .. }) => Ok(false),
+        Err(other) => Err(other),
+    }
+}
+
 /// Where `x`, `y` and `z` are among the properties of element `vertex`.
 type Axes = [usize; 3];
 
@@ -78,6 +98,15 @@ impl PlyMesh {
     #[must_use]
     pub fn faces(&self) -> u64 {
         self.count("face")
+    }
+
+    /// True if all vertices come before the first face.
+    #[must_use]
+    pub fn vertices_first(&self) -> bool {
+        let mut elements = self.header.elements.iter();
+        elements
+            .find(|e| e.name == "vertex" || e.name == "face")
+            .is_some_and(|e| e.name == "vertex")
     }
 
     fn count(&self, name: &str) -> u64 {

@@ -1,7 +1,7 @@
 //! Filling one hole by splitting its loop (paper, section 3.6).
 
 use crate::geom::{Point, distance2};
-use crate::stages::stitch::normal;
+use crate::stages::located::{normal, on_a_line};
 
 /// A vertex of a boundary loop.
 #[derive(Debug, Clone, Copy)]
@@ -12,6 +12,8 @@ pub struct Corner {
     pub at: Point,
     /// Position of the third vertex of the triangle at the edge that comes in.
     pub apex: Point,
+    /// Its position in the file.
+    pub file: Point,
     /// True if the triangles at this vertex are not one fan.
     pub pinched: bool,
 }
@@ -21,6 +23,8 @@ pub struct Corner {
 pub enum Filling {
     /// Triangles as they run.
     Filled(Vec<[u32; 3]>),
+    /// Triangles that close it in part, and the edges that are left.
+    Zipped(Vec<[u32; 3]>, usize),
     /// The loop runs around the surface, not around a hole.
     Outline,
     /// No way to split it cleanly.
@@ -28,14 +32,16 @@ pub enum Filling {
 }
 
 /// Triangulates the hole inside `corners`; `edge(a, b)` tells if the mesh has an edge.
-pub fn fill(mut corners: Vec<Corner>, edge: impl Fn(u32, u32) -> bool) -> Filling {
+///
+/// Loops of more than `sure` edges are first looked at whether they are an outline.
+pub fn fill(mut corners: Vec<Corner>, sure: usize, edge: impl Fn(u32, u32) -> bool) -> Filling {
     let n = corners.len();
     // Edge x runs from corner x - 1 to corner x; the smallest comes first.
     let first = (0..n)
         .min_by_key(|&x| (corners[(x + n - 1) % n].id, corners[x].id))
         .unwrap_or(0);
     corners.rotate_left((first + n - 1) % n);
-    if is_outline(&corners) {
+    if n > sure && is_outline(&corners) {
         return Filling::Outline;
     }
     let mut splitter = Splitter {
@@ -72,7 +78,7 @@ fn is_outline(corners: &[Corner]) -> bool {
     product < -0.5 * length(area) * lengths
 }
 
-fn length(v: [i128; 3]) -> f64 {
+pub fn length(v: [i128; 3]) -> f64 {
     v.iter().map(|x| *x as f64 * *x as f64).sum::<f64>().sqrt()
 }
 
@@ -108,8 +114,8 @@ impl<E: Fn(u32, u32) -> bool> Splitter<'_, E> {
     }
 
     fn is_flat(&self, a: usize, b: usize, c: usize) -> bool {
-        let [a, b, c] = [a, b, c].map(|x| self.corners[x].at);
-        normal(a, b, c) == [0; 3]
+        let corners = [a, b, c].map(|x| &self.corners[x]);
+        on_a_line(corners.map(|c| c.at)) || on_a_line(corners.map(|c| c.file))
     }
 
     /// The chord that is shortest against the way round.

@@ -1,14 +1,15 @@
 //! Finds boundary loops and has them filled: those inside a block at once, those across blocks
 //! from the fragments that the blocks leave.
 
-use super::fill::{Corner, Filling, fill as fill_loop};
+use super::fill::{Corner, Filling};
+use super::mend::Mending;
 use super::rim::{BlockRim, Outline};
 use super::surface::Surface;
 use super::{EXCHANGE_BUFFER, RepairStats, from_smallest};
 use crate::error::Result;
 use crate::spill::{Exchange, Sections};
 use crate::stages::blocks::Blocks;
-use crate::stages::order::PointStore;
+use crate::stages::located::Places;
 use crate::stages::surface::star::sorted;
 use crate::workspace::Workspace;
 use rustc_hash::FxHashMap;
@@ -30,16 +31,16 @@ struct Found {
     outline: Outline,
 }
 
-/// Fills holes of up to `limit` edges, or none; `[block, i, a, b]` for each block that a triangle
+/// Fills holes as `mending` says, or none; `[block, i, a, b]` for each block that a triangle
 /// touches, and what the boundary looks like.
 ///
 /// # Errors
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
 /// [`crate::Error::Cancelled`].
 pub fn fill(
-    store: &PointStore,
+    places: Places<'_>,
     surface: &Surface,
-    limit: Option<usize>,
+    mending: Option<Mending>,
     blocks: Blocks,
     stats: &mut RepairStats,
     workspace: &Workspace,
@@ -55,10 +56,10 @@ pub fn fill(
     let bytes =
         |b: usize| 150 * surface.records(b) as u64 + blocks.ids(b).len() as u64 * 40 + (1 << 20);
     workspace.for_each_unit("repair: block", blocks.count(), bytes, |block| {
-        let rim = BlockRim::load(store, surface, blocks, block)?;
+        let rim = BlockRim::load(places, surface, blocks, block)?;
         let mut settled = Settled::default();
-        let fragments = match limit {
-            Some(limit) => fill_inside(&rim, limit, &kept, &mut settled)?,
+        let fragments = match mending {
+            Some(mending) => fill_inside(&rim, mending, &kept, &mut settled)?,
             None => Vec::new(),
         };
         exchange.send(&addressed(&settled.triangles, blocks))?;
@@ -79,11 +80,11 @@ pub fn fill(
         workspace.check_cancel()?;
         settled.stats.holes_found += 1;
         let edges: usize = ring.iter().map(|&f| found.fragments[f].steps).sum();
-        if limit.is_none_or(|limit| edges > limit) {
+        let Some(mending) = mending.filter(|m| edges <= m.longest_loop()) else {
             settled.stats.holes_too_long += 1;
             continue;
-        }
-        let filling = fill_across(store, &ring, &found.fragments, &kept)?;
+        };
+        let filling = fill_across(places, &ring, &found.fragments, &kept, mending)?;
         settled.settle(filling, edges);
         exchange.send(&addressed(&settled.triangles, blocks))?;
         settled.triangles.clear();
@@ -96,25 +97,25 @@ pub fn fill(
 /// Fills the holes that lie in a block by themselves, and keeps the parts of the others.
 fn fill_inside(
     rim: &BlockRim,
-    limit: usize,
+    mending: Mending,
     kept: &Sections<1>,
     settled: &mut Settled,
 ) -> Result<Vec<Fragment>> {
     let (loops, open) = rim.trace();
     for ring in loops {
         settled.stats.holes_found += 1;
-        if ring.len() > limit {
+        if ring.len() > mending.longest_loop() {
             settled.stats.holes_too_long += 1;
             continue;
         }
         let corners = ring.iter().map(|s| rim.corner(s)).collect();
-        let filling = fill_loop(corners, |a, b| rim.has_edge(a, b));
+        let filling = mending.mend(corners, |a, b| rim.has_edge(a, b));
         settled.settle(filling, ring.len());
     }
     let mut fragments = Vec::with_capacity(open.len());
     for part in open {
         let (first, last) = (part[0], part[part.len() - 1]);
-        let words = (part.len() <= limit).then(|| rim.words(&part));
+        let words = (part.len() <= mending.longest_loop()).then(|| rim.words(&part));
         fragments.push(Fragment {
             start: (first.from, first.at),
             end: (last.at, last.to),
@@ -142,6 +143,12 @@ impl Settled {
                 self.stats.hole_triangles += new.len() as u64;
                 self.edges += edges as u64;
                 self.triangles.extend(new.into_iter().map(from_smallest));
+            }
+            Filling::Zipped(new, left) => {
+                self.stats.hole_triangles += new.len() as u64;
+                self.edges += (edges - left) as u64;
+                self.triangles.extend(new.into_iter().map(from_smallest));
+                self.stats.holes_zipped += 1;
             }
             Filling::Outline => self.stats.holes_outline += 1,
             Filling::Impossible => self.stats.holes_not_filled += 1,
@@ -190,10 +197,11 @@ fn link_up(fragments: &[Fragment]) -> Vec<Vec<usize>> {
 }
 
 fn fill_across(
-    store: &PointStore,
+    places: Places<'_>,
     ring: &[usize],
     fragments: &[Fragment],
     kept: &Sections<1>,
+    mending: Mending,
 ) -> Result<Filling> {
     let mut parts: Vec<(u32, u32, bool)> = Vec::new();
     let mut edges: FxHashMap<u32, Vec<u32>> = FxHashMap::default();
@@ -218,16 +226,22 @@ fn fill_across(
     ids.sort_unstable();
     ids.dedup();
     let mut points = Vec::with_capacity(ids.len());
-    store.fetch(&ids, &mut points)?;
-    let at = |v: u32| points[ids.partition_point(|x| *x < v)];
+    places.shape.fetch(&ids, &mut points)?;
+    let mut in_file = Vec::new();
+    if places.differ() {
+        places.file.fetch(&ids, &mut in_file)?;
+    }
+    let rank = |v: u32| ids.partition_point(|x| *x < v);
+    let at = |v: u32| points[rank(v)];
     let corner = |&(id, apex, pinched): &(u32, u32, bool)| Corner {
         id,
         at: at(id),
         apex: at(apex),
+        file: *in_file.get(rank(id)).unwrap_or(&at(id)),
         pinched,
     };
     let corners = parts.iter().map(corner).collect();
-    Ok(fill_loop(corners, |a, b| {
+    Ok(mending.mend(corners, |a, b| {
         edges.get(&a).is_some_and(|around| around.contains(&b))
     }))
 }

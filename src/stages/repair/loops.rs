@@ -2,7 +2,7 @@
 
 use super::OrientedTriangle;
 use crate::geom::{Point, sub};
-use crate::stages::stitch::normal;
+use crate::stages::located::normal;
 use crate::stages::surface::star::{Link, Star, others};
 
 /// One step of a hole's border: it comes from `from` to `at` and goes on to `to`.

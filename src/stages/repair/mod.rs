@@ -9,9 +9,11 @@ mod facing;
 mod fill;
 mod holes;
 mod loops;
+mod mend;
 mod patch;
 mod rim;
 mod surface;
+mod zip;
 
 pub use rim::Outline;
 pub use surface::{Run, Surface};
@@ -19,9 +21,10 @@ pub use surface::{Run, Surface};
 use crate::error::Result;
 use crate::spill::Sections;
 use crate::stages::blocks::Blocks;
-use crate::stages::order::PointStore;
+use crate::stages::located::Places;
 use crate::stages::stitch::Stitched;
 use crate::workspace::Workspace;
+use mend::Mending;
 use serde::Serialize;
 
 const EXCHANGE_BUFFER: u64 = 8 << 20;
@@ -61,6 +64,8 @@ pub struct RepairOptions {
     pub min_component: u64,
     /// Fill holes of up to this many edges.
     pub max_hole_edges: usize,
+    /// Close torn boundaries of any length as far as they are torn; do not fill openings.
+    pub zip: bool,
 }
 
 /// Counts of this stage.
@@ -78,6 +83,8 @@ pub struct RepairStats {
     pub holes_found: u64,
     /// Holes filled.
     pub holes_filled: u64,
+    /// Boundary loops closed in part.
+    pub holes_zipped: u64,
     /// Boundary loops left alone because they are an outline of the surface.
     pub holes_outline: u64,
     /// Boundary loops left alone because they are too long.
@@ -94,9 +101,13 @@ impl RepairOptions {
         if self.repair { self.min_component } else { 0 }
     }
 
-    /// The longest hole that is filled; `None` if none is.
-    fn longest_hole(&self) -> Option<usize> {
-        Some(self.max_hole_edges).filter(|edges| self.repair && *edges >= 3)
+    /// Which holes are filled; `None` if none is.
+    fn filling(&self) -> Option<Mending> {
+        let filling = Mending {
+            longest: self.max_hole_edges,
+            zip: self.zip,
+        };
+        Some(filling).filter(|f| self.repair && f.longest >= 3)
     }
 }
 
@@ -108,6 +119,7 @@ impl RepairStats {
         self.component_triangles_removed += more.component_triangles_removed;
         self.holes_found += more.holes_found;
         self.holes_filled += more.holes_filled;
+        self.holes_zipped += more.holes_zipped;
         self.holes_outline += more.holes_outline;
         self.holes_too_long += more.holes_too_long;
         self.holes_not_filled += more.holes_not_filled;
@@ -121,16 +133,23 @@ impl RepairStats {
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
 /// [`crate::Error::Cancelled`].
 pub fn repair(
-    store: &PointStore,
+    places: Places<'_>,
     stitched: Stitched,
     blocks: Blocks,
     options: RepairOptions,
     workspace: &Workspace,
 ) -> Result<(Repaired, RepairStats)> {
     let mut stats = RepairStats::default();
-    let surface = surface::build(store, stitched, blocks, options, &mut stats, workspace)?;
-    let limit = options.longest_hole();
-    let (filled, outline) = holes::fill(store, &surface, limit, blocks, &mut stats, workspace)?;
+    let surface = surface::build(
+        places.shape,
+        stitched,
+        blocks,
+        options,
+        &mut stats,
+        workspace,
+    )?;
+    let limit = options.filling();
+    let (filled, outline) = holes::fill(places, &surface, limit, blocks, &mut stats, workspace)?;
     let repaired = Repaired {
         surface,
         filled,

@@ -4,14 +4,12 @@ use super::fill::Corner;
 use super::loops::{Step, neighbors, steps};
 use super::surface::Surface;
 use crate::error::Result;
-use crate::geom::Point;
 use crate::spill::Sections;
 use crate::stages::blocks::Blocks;
-use crate::stages::order::PointStore;
+use crate::stages::located::{Located, Places};
 use crate::stages::surface::star::Star;
 use crate::workspace::Workspace;
 use crate::workspace::memory::Reservation;
-use rustc_hash::FxHashMap;
 use std::ops::Range;
 
 /// What the numbers of vertices and triangles follow from.
@@ -68,8 +66,9 @@ pub struct BlockRim {
     /// All triangles at vertices with a boundary edge, and the component of each.
     triangles: Vec<[u32; 4]>,
     star: Star,
-    own: Vec<Point>,
-    foreign: FxHashMap<u32, Point>,
+    shape: Located,
+    /// Positions in the file, if they differ.
+    file: Option<Located>,
     /// Steps of boundary loops, ascending.
     pub steps: Vec<Step>,
     /// Vertices with several fans, ascending.
@@ -78,7 +77,7 @@ pub struct BlockRim {
 
 impl BlockRim {
     pub(super) fn load(
-        store: &PointStore,
+        places: Places<'_>,
         surface: &Surface,
         blocks: Blocks,
         block: usize,
@@ -90,8 +89,8 @@ impl BlockRim {
             faces: 0,
             triangles: Vec::new(),
             star: Star::of(ids.start..ids.start, &[]),
-            own: Vec::new(),
-            foreign: FxHashMap::default(),
+            shape: Located::default(),
+            file: None,
             steps: Vec::new(),
             pinches: Vec::new(),
             ids: ids.clone(),
@@ -102,16 +101,20 @@ impl BlockRim {
         }
         let plain = || rim.triangles.iter().map(|t| [t[0], t[1], t[2]]);
         rim.star = Star::of(ids.clone(), &plain().collect::<Vec<_>>());
-        let mut far: Vec<u32> = plain().flatten().filter(|v| !ids.contains(v)).collect();
-        far.sort_unstable();
-        far.dedup();
-        let mut points = Vec::with_capacity(far.len());
-        store.fetch(&far, &mut points)?;
-        rim.foreign = far.into_iter().zip(points).collect();
-        rim.own = store.slice(ids.start as usize..ids.end as usize)?;
+        rim.shape = Located::load(places.shape, blocks, block, plain().flatten())?;
+        rim.file = if places.differ() {
+            Some(Located::load(
+                places.file,
+                blocks,
+                block,
+                plain().flatten(),
+            )?)
+        } else {
+            None
+        };
         let on_rim = |v: &u32| bit(&rims, v - ids.start);
         let mut pinches = Vec::new();
-        let position = |v| rim.position(v);
+        let position = |v| rim.shape.at(v);
         let pinch = |v| pinches.push([v]);
         let vertices = ids.clone().filter(on_rim);
         rim.steps = steps(vertices, &rim.star, &rim.triangles, position, pinch);
@@ -145,20 +148,13 @@ impl BlockRim {
         Ok(())
     }
 
-    fn position(&self, v: u32) -> Point {
-        if self.ids.contains(&v) {
-            self.own[(v - self.ids.start) as usize]
-        } else {
-            self.foreign[&v]
-        }
-    }
-
     /// The corner of a boundary loop at a step.
     pub fn corner(&self, step: &Step) -> Corner {
         Corner {
             id: step.at,
-            at: self.position(step.at),
-            apex: self.position(step.apex),
+            at: self.shape.at(step.at),
+            apex: self.shape.at(step.apex),
+            file: self.file.as_ref().unwrap_or(&self.shape).at(step.at),
             pinched: step.pinched,
         }
     }

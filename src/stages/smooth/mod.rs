@@ -2,6 +2,10 @@
 //!
 //! Ids stay as they are; only positions and the boxes around them change.
 
+mod relax;
+
+pub use relax::{RelaxStats, Relaxed, relax};
+
 use crate::error::Result;
 use crate::geom::Point;
 use crate::geom::lattice::COORDINATE_LIMIT;
@@ -75,7 +79,10 @@ fn project(point: Point, fit: &Fit) -> Point {
     let Some(normal) = fit.plane.normal else {
         return point;
     };
-    let offset = fit.moments.project(normal);
+    moved(point, fit.moments.project(normal))
+}
+
+fn moved(point: Point, offset: [f64; 3]) -> Point {
     std::array::from_fn(|axis| {
         let moved = i64::from(point[axis]) + offset[axis].round() as i64;
         moved.clamp(0, COORDINATE_LIMIT - 1) as i32

@@ -3,10 +3,13 @@
 
 use super::BaseStats;
 use crate::error::Result;
+use crate::geom::Point;
 use crate::spill::layouts::{LABELLED, SENT};
 use crate::spill::{Exchange, Sections};
 use crate::stages::blocks::Blocks;
-use crate::stages::surface::orient::{Oriented, orient_inside};
+use crate::stages::located::{Located, Places, on_a_line, small_normal};
+use crate::stages::surface::evidence::Evidence;
+use crate::stages::surface::orient::{Around, Oriented, orient_inside};
 use crate::stages::surface::star::{Link, Star, Triangle, has, others};
 use crate::stages::triples::Triples;
 use crate::workspace::Workspace;
@@ -31,6 +34,8 @@ pub(super) struct Base {
     pub flags: Sections<4>,
     /// For each block the first and the last block that a triple of it touches.
     pub spans: Vec<(u32, u32)>,
+    /// Interior candidates left out because they would be on a line in the file.
+    pub flat_candidates: u64,
 }
 
 /// Makes the base. The triples are read once: what is needed of them later is written apart.
@@ -39,8 +44,10 @@ pub(super) struct Base {
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
 /// [`crate::Error::Cancelled`].
 pub(super) fn base(
+    places: Places<'_>,
     triples: Triples,
     blocks: Blocks,
+    weigh: bool,
     workspace: &Workspace,
 ) -> Result<(Base, BaseStats)> {
     let count = blocks.count();
@@ -50,8 +57,12 @@ pub(super) fn base(
         crossing: Sections::with_layout(workspace, "stitch.crossing", count, LABELLED)?,
         flags: Exchange::new(workspace, "stitch.flags", EXCHANGE_BUFFER).packed(SENT),
         flagged: AtomicU64::new(0),
+        flat: AtomicU64::new(0),
+        flat_candidates: AtomicU64::new(0),
         spans: Mutex::new(vec![(0, 0); count]),
         triples: &triples,
+        places,
+        weigh,
         blocks,
     };
     let bytes = |block: usize| {
@@ -61,7 +72,7 @@ pub(super) fn base(
     let around = |block| look.block(block);
     let name = "stitch.base";
     let inside = workspace.part("base", || {
-        orient_inside(name, around, bytes, blocks, workspace)
+        orient_inside(name, around, bytes, blocks, weigh, workspace)
     })?;
     let start = std::time::Instant::now();
     let flags = look.flags.deliver_unique(workspace, count)?;
@@ -71,12 +82,14 @@ pub(super) fn base(
         .into_inner()
         .unwrap_or_else(std::sync::PoisonError::into_inner);
     let flagged = look.flagged.into_inner() + flags.total();
+    let (flat, flat_candidates) = (look.flat.into_inner(), look.flat_candidates.into_inner());
     let Triples { own, visiting } = triples;
     drop((own, held));
     let surface = inside.join(name, &flags, blocks, workspace)?;
     workspace.note_part("orient", start.elapsed().as_secs_f64());
     let stats = BaseStats {
         flagged,
+        on_a_line: flat,
         mobius: surface.mobius,
         triangles: surface.triangles,
     };
@@ -87,6 +100,7 @@ pub(super) fn base(
         visiting,
         flags,
         spans,
+        flat_candidates,
     };
     Ok((base, stats))
 }
@@ -94,19 +108,26 @@ pub(super) fn base(
 /// The one look at the triples.
 struct Look<'a> {
     triples: &'a Triples,
+    places: Places<'a>,
+    /// Gather evidence for the orientation.
+    weigh: bool,
     blocks: Blocks,
     candidates: Sections<4>,
     crossing: Sections<4>,
     flags: Exchange<4>,
     /// Interior triangles that are flagged.
     flagged: AtomicU64,
+    /// T3 triangles and interior candidates on a line.
+    flat: AtomicU64,
+    flat_candidates: AtomicU64,
     spans: Mutex<Vec<(u32, u32)>>,
 }
 
 impl Look<'_> {
     /// The T3 triangles that touch a block and that no vertex of it flags, ascending.
-    fn block(&self, block: usize) -> Result<Vec<Triangle>> {
+    fn block(&self, block: usize) -> Result<Around> {
         let (mut triangles, mut candidates) = self.part(block)?;
+        self.drop_flat(block, &mut triangles, &mut candidates)?;
         let star = Star::of(self.blocks.ids(block), &triangles);
         let mut flagged = Vec::new();
         let mut refusing = Refusing::default();
@@ -140,7 +161,56 @@ impl Look<'_> {
             });
         }
         self.candidates.put(block, &candidates)?;
-        Ok(triangles)
+        let evidence = if self.weigh {
+            Some(self.evidence(block, &triangles, &candidates)?)
+        } else {
+            None
+        };
+        Ok(Around {
+            triangles,
+            evidence,
+        })
+    }
+
+    /// How the triangles around a block and its candidates lie.
+    fn evidence(
+        &self,
+        block: usize,
+        triangles: &[Triangle],
+        candidates: &[[u32; 4]],
+    ) -> Result<Evidence> {
+        let vertices = triangles.iter().flatten().copied();
+        let shape = Located::load(self.places.shape, self.blocks, block, vertices)?;
+        let normal = |t: Triangle| unit(t.map(|v| shape.at(v)));
+        let open = candidates.iter().map(|r| [r[0], r[1], r[2]]);
+        Ok(Evidence {
+            normals: triangles.iter().map(|t| normal(*t)).collect(),
+            candidates: open.map(|t| (t, normal(t))).collect(),
+        })
+    }
+
+    /// Leaves out what would be on a line in the file.
+    fn drop_flat(
+        &self,
+        block: usize,
+        triangles: &mut Vec<Triangle>,
+        candidates: &mut Vec<[u32; 4]>,
+    ) -> Result<()> {
+        if self.places.differ() {
+            let vertices = triangles.iter().flatten().copied();
+            let file = Located::load(self.places.file, self.blocks, block, vertices)?;
+            let (mut t3, open) = (0, candidates.len());
+            triangles.retain(|t| {
+                let flat = on_a_line(t.map(|v| file.at(v)));
+                t3 += u64::from(flat && self.blocks.of(t[0]) == block as u32);
+                !flat
+            });
+            candidates.retain(|r| !on_a_line([r[0], r[1], r[2]].map(|v| file.at(v))));
+            self.flat.fetch_add(t3, Ordering::Relaxed);
+            let open = (open - candidates.len()) as u64;
+            self.flat_candidates.fetch_add(open, Ordering::Relaxed);
+        }
+        Ok(())
     }
 
     /// The T3 triangles that touch a block, ascending, and its interior candidates so far. The
@@ -180,6 +250,17 @@ impl Look<'_> {
             .lock()
             .unwrap_or_else(std::sync::PoisonError::into_inner)[block] = span;
         Ok((triangles, candidates))
+    }
+}
+
+/// The unit normal of a triangle; zero if it has none.
+fn unit([a, b, c]: [Point; 3]) -> [f64; 3] {
+    let n = small_normal(a, b, c).map(|x| x as f64);
+    let length = (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]).sqrt();
+    if length > 0.0 {
+        n.map(|x| x / length)
+    } else {
+        n
     }
 }
 

@@ -10,7 +10,7 @@ use crate::geom::Point;
 use crate::spill::layouts::{LABELLED, TRIANGLE};
 use crate::spill::{Sections, Word};
 use crate::stages::blocks::Blocks;
-use crate::stages::order::PointStore;
+use crate::stages::located::{Located, Places, on_a_line};
 use crate::stages::surface::orient::{Asks, consistent};
 use crate::stages::surface::parity::ParitySets;
 use crate::stages::surface::star::Triangle;
@@ -105,7 +105,7 @@ pub fn block_bytes(base: &Base, block: usize) -> u64 {
 /// # Errors
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
 pub fn insert(
-    store: &PointStore,
+    places: Places<'_>,
     base: &Base,
     out: &Interior,
     blocks: Blocks,
@@ -113,8 +113,11 @@ pub fn insert(
     cos_max_angle: f64,
     stats: &SharedStats,
 ) -> Result<()> {
-    let mut work = BlockWork::load(store, base, blocks, block)?;
-    let mut counts = InsertStats::default();
+    let mut work = BlockWork::load(places, base, blocks, block)?;
+    let mut counts = InsertStats {
+        on_a_line: work.flat,
+        ..InsertStats::default()
+    };
     let undecided = work.insert_all(cos_max_angle, &mut counts);
     work.write(out, block, &undecided, &mut counts)?;
     stats.add(&counts);
@@ -168,10 +171,11 @@ struct BlockWork {
     /// Global label of each node, [`NOTHING`] for local homes.
     global: Vec<u32>,
     joints: Vec<[u32; 6]>,
-    own: Vec<Point>,
-    foreign: FxHashMap<u32, Point>,
+    located: Located,
     /// For each vertex of the block [`BORDER`] and [`OPEN`].
     border: Vec<u8>,
+    /// Crossing candidates that would be on a line in the file.
+    flat: u64,
 }
 
 impl View for BlockWork {
@@ -180,23 +184,18 @@ impl View for BlockWork {
     }
 
     fn position(&self, v: u32) -> Point {
-        if self.ids.contains(&v) {
-            self.own[(v - self.ids.start) as usize]
-        } else {
-            self.foreign[&v]
-        }
+        self.located.at(v)
     }
 }
 
 impl BlockWork {
-    fn load(store: &PointStore, base: &Base, blocks: Blocks, block: usize) -> Result<Self> {
+    fn load(places: Places<'_>, base: &Base, blocks: Blocks, block: usize) -> Result<Self> {
         let ids = blocks.ids(block);
-        let own = store.slice(ids.start as usize..ids.end as usize)?;
-        let at = |v: u32| own[(v - ids.start) as usize];
+        let located = Located::load(places.shape, blocks, block, std::iter::empty())?;
         let mut candidates: Vec<Candidate> = Vec::with_capacity(base.candidates.records(block));
         for &[i, j, k, count] in &base.candidates.get(block)? {
             let t = [i, j, k];
-            candidates.push(Candidate::new(t, count, t.map(at)));
+            candidates.push(Candidate::new(t, count, t.map(|v| located.at(v))));
         }
         candidates.sort_unstable();
         let mut active = vec![false; ids.len()];
@@ -228,39 +227,44 @@ impl BlockWork {
             joined: ParitySets::default(),
             global: Vec::new(),
             joints: Vec::new(),
-            own,
-            foreign: FxHashMap::default(),
+            located,
             border,
+            flat: 0,
             ids,
         };
         work.add_base(&interior, &crossing, &active, base, block);
         drop((interior, crossing));
-        work.see_crossing(store, base, block)?;
+        work.see_crossing(places, base, blocks, block)?;
         Ok(work)
     }
 
     /// Takes in which crossing triples are candidates, and where their vertices are.
-    fn see_crossing(&mut self, store: &PointStore, base: &Base, block: usize) -> Result<()> {
-        let mut foreign: Vec<u32> = Vec::new();
+    fn see_crossing(
+        &mut self,
+        places: Places<'_>,
+        base: &Base,
+        blocks: Blocks,
+        block: usize,
+    ) -> Result<()> {
         let flags = base.flags.get(block)?;
         let mut candidates = base.crossing.get(block)?;
         candidates.retain(|&[i, j, k, count]| {
             count < 3 || flags.binary_search(&[block as u32, i, j, k]).is_ok()
         });
-        let outside = |v: &u32| !self.ids.contains(v);
-        let base_crossing = &self.triangles[self.interior_base..];
-        foreign.extend(base_crossing.iter().flatten().copied().filter(outside));
-        foreign.extend(
-            candidates
-                .iter()
-                .flat_map(|r| [r[0], r[1], r[2]])
-                .filter(outside),
-        );
-        foreign.sort_unstable();
-        foreign.dedup();
-        let mut points = Vec::with_capacity(foreign.len());
-        store.fetch(&foreign, &mut points)?;
-        self.foreign = foreign.into_iter().zip(points).collect();
+        let vertices = |all: &[[u32; 4]]| -> Vec<u32> {
+            let open = all.iter().flat_map(|r| [r[0], r[1], r[2]]);
+            let base = self.triangles[self.interior_base..].iter().flatten();
+            open.chain(base.copied()).collect()
+        };
+        if places.differ() {
+            let all = vertices(&candidates).into_iter();
+            let file = Located::load(places.file, blocks, block, all)?;
+            let before = candidates.len();
+            candidates.retain(|r| !on_a_line([r[0], r[1], r[2]].map(|v| file.at(v))));
+            self.flat = (before - candidates.len()) as u64;
+        }
+        let all = vertices(&candidates).into_iter();
+        self.located.add(places.shape, all)?;
         let new = |&[i, j, k, count]: &[u32; 4]| {
             let t = [i, j, k];
             Candidate::new(t, count, t.map(|v| self.position(v)))

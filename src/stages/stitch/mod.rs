@@ -11,12 +11,10 @@ mod fans;
 mod interior;
 mod tests_of_paper;
 
-pub use tests_of_paper::normal;
-
 use crate::error::Result;
 use crate::spill::Sections;
 use crate::stages::blocks::Blocks;
-use crate::stages::order::PointStore;
+use crate::stages::located::Places;
 use crate::stages::triples::Triples;
 use crate::workspace::Workspace;
 use base::Base;
@@ -39,11 +37,22 @@ pub struct Stitched {
     pub removed: Sections<4>,
 }
 
+/// How the manifold is extracted.
+#[derive(Debug, Clone, Copy)]
+pub struct StitchOptions {
+    /// Cosine of the largest angle between the normals of a T12 triangle and its neighbours.
+    pub cos_max_angle: f64,
+    /// Orient by evidence instead of in the order of triangles.
+    pub weigh: bool,
+}
+
 /// Counts of the base.
 #[derive(Debug, Clone, Copy, Default, Serialize, PartialEq, Eq)]
 pub struct BaseStats {
     /// T3 triangles flagged at non-manifold edges and vertices by excess.
     pub flagged: u64,
+    /// T3 triangles left out because their points are on a line in the file.
+    pub on_a_line: u64,
     /// T3 triangles removed because they close a Möbius band.
     pub mobius: u64,
     /// Triangles of the base.
@@ -65,6 +74,8 @@ pub struct InsertStats {
     pub angle: u64,
     /// Test IV: would close a Möbius band.
     pub orientation: u64,
+    /// Not tried: its points are on a line in the file.
+    pub on_a_line: u64,
     /// Of the accepted, those taken out again because blocks joined components differently.
     pub joints_removed: u64,
 }
@@ -96,6 +107,7 @@ impl SharedStats {
         all.excess += more.excess;
         all.angle += more.angle;
         all.orientation += more.orientation;
+        all.on_a_line += more.on_a_line;
         all.joints_removed += more.joints_removed;
     }
 }
@@ -106,19 +118,23 @@ impl SharedStats {
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
 /// [`crate::Error::Cancelled`].
 pub fn stitch(
-    store: &PointStore,
+    places: Places<'_>,
     triples: Triples,
     blocks: Blocks,
-    cos_max_angle: f64,
+    options: StitchOptions,
     workspace: &Workspace,
 ) -> Result<(Stitched, BaseStats, InsertStats)> {
-    let (base, counts) = base::base(triples, blocks, workspace)?;
+    let (base, counts) = base::base(places, triples, blocks, options.weigh, workspace)?;
     let stats = SharedStats::default();
+    stats.add(&InsertStats {
+        on_a_line: base.flat_candidates,
+        ..InsertStats::default()
+    });
     let interior = Interior::create(workspace, blocks.count())?;
-    let mut pass = Pass::new(&base, &interior, blocks, cos_max_angle, workspace)?;
+    let mut pass = Pass::new(&base, &interior, blocks, options.cos_max_angle, workspace)?;
     workspace.part("insert", || {
         insert(
-            store, &mut pass, &base, &interior, blocks, &stats, workspace,
+            places, &mut pass, &base, &interior, blocks, &stats, workspace,
         )
     })?;
     let crossing = workspace.part("cross", || {
@@ -142,7 +158,7 @@ pub fn stitch(
 /// Inserts inside all blocks, in the order in which the pass across them needs them; whoever has
 /// finished a block takes the pass as far as it goes by then.
 fn insert(
-    store: &PointStore,
+    places: Places<'_>,
     pass: &mut Pass<'_>,
     base: &Base,
     interior: &Interior,
@@ -162,7 +178,7 @@ fn insert(
     let pass = Mutex::new(pass);
     workspace.for_each_unit("stitch: block", order.len(), bytes, |unit| {
         let block = order[unit] as usize;
-        interior::insert(store, base, interior, blocks, block, angle, stats)?;
+        interior::insert(places, base, interior, blocks, block, angle, stats)?;
         done[block].store(true, Ordering::Release);
         workspace.observer.advance(1);
         match pass.try_lock() {

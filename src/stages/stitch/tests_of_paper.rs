@@ -1,7 +1,8 @@
 //! The tests that a T12 triangle must pass (paper, section 3.5): combinatorial I to III and the
 //! geometric one. Test IV is with the callers, who know the components.
 
-use crate::geom::{Point, sub};
+use crate::geom::Point;
+use crate::stages::located::normal;
 use crate::stages::surface::star::{EDGES, Triangle, opposed, others};
 
 /// The mesh around the vertices of a triangle.
@@ -126,18 +127,6 @@ fn makes_excess(t: Triangle, v: u32, view: &impl View, link: &mut Vec<[u32; 2]>)
         node ^= a ^ b;
     }
     !link.is_empty()
-}
-
-/// The exact normal of the triangle `a → b → c`, twice its area long.
-#[must_use]
-pub fn normal(a: Point, b: Point, c: Point) -> [i128; 3] {
-    let (u, v) = (sub(b, a), sub(c, a));
-    // Differences are less than 2^30, so this fits 64 bits.
-    [
-        i128::from(u[1] * v[2] - u[2] * v[1]),
-        i128::from(u[2] * v[0] - u[0] * v[2]),
-        i128::from(u[0] * v[1] - u[1] * v[0]),
-    ]
 }
 
 /// Do `a b c` and its neighbour `b a far` across the edge `a b` agree?

@@ -1,5 +1,7 @@
 //! Surfaces as triangles around the vertices of a block: what stitching and repair share.
 
+pub mod evidence;
 pub mod orient;
 pub mod parity;
 pub mod star;
+mod weigh;

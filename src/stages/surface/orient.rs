@@ -1,7 +1,9 @@
 //! Components and orientation of a surface given block by block.
 
+use super::evidence::{Evidence, Votes};
 use super::parity::ParitySets;
 use super::star::{EDGES, Edges, Triangle, opposed};
+use super::weigh::{vote, weigh_block};
 use crate::error::Result;
 use crate::spill::layouts::{LABELLED, SENT_LABELLED, TRIANGLE};
 use crate::spill::{Exchange, Sections};
@@ -40,13 +42,23 @@ pub struct Oriented {
 #[derive(Debug)]
 pub struct OrientedInside {
     interior: Sections<4>,
-    relations: Sections<6>,
+    relations: Sections<7>,
+    /// Votes of the candidates on global labels, `[a, b, votes]`, by block; if there is evidence.
+    votes: Option<Sections<3>>,
     /// Crossing triangles by the block of their smallest vertex.
     crossing: Sections<3>,
     /// For each block, the number of labels that are global, and of all.
     labels: Vec<(u32, u32)>,
     mobius: u64,
     triangles: u64,
+}
+
+/// The triangles around a block.
+pub struct Around {
+    /// All that touch the block, ascending.
+    pub triangles: Vec<Triangle>,
+    /// What speaks for their orientation; without, the order of triangles decides.
+    pub evidence: Option<Evidence>,
 }
 
 /// Orients a surface: the interior triangles of every block by themselves, ascending; the crossing
@@ -61,9 +73,10 @@ pub struct OrientedInside {
 /// [`crate::Error::Cancelled`].
 pub fn orient_inside(
     name: &str,
-    around: impl Fn(usize) -> Result<Vec<Triangle>> + Sync,
+    around: impl Fn(usize) -> Result<Around> + Sync,
     bytes: impl Fn(usize) -> u64 + Sync,
     blocks: Blocks,
+    evidence: bool,
     workspace: &Workspace,
 ) -> Result<OrientedInside> {
     let count = blocks.count();
@@ -71,15 +84,20 @@ pub fn orient_inside(
     let interior = Sections::with_layout(workspace, &sections("interior"), count, LABELLED)?;
     let border = Sections::with_layout(workspace, &sections("border"), count, TRIANGLE)?;
     let _held = workspace.reserve("exchange", EXCHANGE_BUFFER)?;
-    let exchange = Exchange::<6>::new(workspace, &sections("relations"), EXCHANGE_BUFFER);
+    let exchange = Exchange::<7>::new(workspace, &sections("relations"), EXCHANGE_BUFFER);
+    let votes = evidence
+        .then(|| Sections::create(workspace, &sections("votes"), count))
+        .transpose()?;
     let labels = Mutex::new(vec![(0u32, 0u32); count]);
     let (mobius, triangles) = (AtomicU64::new(0), AtomicU64::new(0));
     workspace.for_each_unit("block", count, &bytes, |block| {
         let around = around(block)?;
         let (inner, crossing): (Vec<Triangle>, Vec<Triangle>) =
-            around.iter().partition(|t| !blocks.crossing(**t));
-        drop(around);
-        let done = orient_block(&inner, &crossing, blocks, block);
+            around.triangles.iter().partition(|t| !blocks.crossing(**t));
+        let done = orient_block(&inner, &crossing, around, blocks, block);
+        if let Some(votes) = &votes {
+            votes.put(block, &done.votes)?;
+        }
         interior.put(block, &done.interior)?;
         exchange.send(&done.relations)?;
         let mine = |t: &&Triangle| blocks.of(t[0]) == block as u32;
@@ -98,6 +116,7 @@ pub fn orient_inside(
     Ok(OrientedInside {
         interior,
         relations: exchange.deliver(workspace, count)?,
+        votes,
         crossing: border,
         labels: labels
             .into_inner()
@@ -147,6 +166,16 @@ impl OrientedInside {
             triangles.retain(|t| gone(t).is_err());
             Ok(triangles)
         };
+        if let Some(votes) = &self.votes {
+            vote(
+                &mut surface,
+                border,
+                &self.relations,
+                votes,
+                blocks,
+                workspace,
+            )?;
+        }
         orient_crossing(
             &mut surface,
             name,
@@ -159,11 +188,12 @@ impl OrientedInside {
     }
 }
 
-struct OrientedBlock {
+pub(super) struct OrientedBlock {
     interior: Vec<[u32; 4]>,
-    /// `[owner block, i, j, k, this block, label << 1 | flip]`: what an interior triangle of this
-    /// block asks of the crossing triangle `i, j, k`.
-    relations: Vec<[u32; 6]>,
+    /// `[owner block, i, j, k, this block, label << 1 | flip, weight]`: what an interior triangle of
+    /// this block asks of the crossing triangle `i, j, k`.
+    relations: Vec<[u32; 7]>,
+    votes: Vec<[u32; 3]>,
     /// Number of labels that occur in relations; they come first.
     global: u32,
     labels: u32,
@@ -198,9 +228,14 @@ impl Asks {
 fn orient_block(
     inner: &[Triangle],
     crossing: &[Triangle],
+    around: Around,
     blocks: Blocks,
     block: usize,
 ) -> OrientedBlock {
+    if let Some(evidence) = around.evidence {
+        return weigh_block(inner, crossing, &around.triangles, &evidence, blocks, block);
+    }
+    drop(around);
     let ids = blocks.ids(block);
     let mut edges = Edges::with_room(ids.clone(), inner);
     let mut sets = ParitySets::new(inner.len());
@@ -223,20 +258,30 @@ fn orient_block(
         edges.add(t, number);
         kept.push(number);
     }
-    let mut relations = Vec::new();
+    let mut bonds = Bonds::default();
     for &c in crossing {
         adjacent(c, &edges, inner, &ids, |other, flip| {
-            relations.push((c, other, flip));
+            bonds.relations.push((c, other, flip, 1));
         });
     }
-    number_labels(inner, &kept, &relations, &mut sets, blocks, block, mobius)
+    number_labels(inner, &kept, bonds, &mut sets, blocks, block, mobius)
+}
+
+/// What speaks for how the sets of a block run.
+#[derive(Default)]
+pub(super) struct Bonds {
+    /// A crossing triangle, an interior one at an edge of it, whether one must be turned against the
+    /// other, and the weight of that.
+    pub relations: Vec<(Triangle, u32, bool, i64)>,
+    /// The same of two interior triangles at a candidate.
+    pub votes: Vec<(u32, u32, bool, i64)>,
 }
 
 /// Gives labels to the sets, those in relations first, both in order of first appearance.
-fn number_labels(
+pub(super) fn number_labels(
     inner: &[Triangle],
     kept: &[u32],
-    relations: &[(Triangle, u32, bool)],
+    bonds: Bonds,
     sets: &mut ParitySets,
     blocks: Blocks,
     block: usize,
@@ -255,12 +300,13 @@ fn number_labels(
         (*label, turned, labels)
     };
     let mut global = 0;
-    let mut sent = Vec::with_capacity(relations.len());
-    for &(c, other, flip) in relations {
+    let mut sent = Vec::with_capacity(bonds.relations.len());
+    for (c, other, flip, weight) in bonds.relations {
         let (label, turned, labels) = find(other);
         global = labels;
         let word = label << 1 | u32::from(flip ^ turned);
-        sent.push([blocks.of(c[0]), c[0], c[1], c[2], block as u32, word]);
+        let owner = blocks.of(c[0]);
+        sent.push([owner, c[0], c[1], c[2], block as u32, word, weight as u32]);
     }
     let mut interior = Vec::with_capacity(kept.len());
     for &number in kept {
@@ -268,9 +314,21 @@ fn number_labels(
         let t = inner[number as usize];
         interior.push([t[0], t[1], t[2], label << 1 | u32::from(turned)]);
     }
+    let mut counted = Votes::default();
+    for (a, b, flip, weight) in bonds.votes {
+        let ((a, turned_a, _), (b, turned_b, _)) = (find(a), find(b));
+        if a < global && b < global {
+            counted.add(a, b, flip ^ turned_a ^ turned_b, weight);
+        }
+    }
+    let votes = counted.counted().into_iter();
+    let votes = votes
+        .map(|(a, b, votes)| [a, b, votes as i32 as u32])
+        .collect();
     OrientedBlock {
         interior,
         relations: sent,
+        votes,
         global,
         labels,
         mobius,
@@ -279,7 +337,7 @@ fn number_labels(
 
 /// Calls `each` with the triangles that share an edge inside the block with `t`, and whether `t`
 /// must be turned against them.
-fn adjacent(
+pub(super) fn adjacent(
     t: Triangle,
     edges: &Edges,
     triangles: &[Triangle],
@@ -312,7 +370,7 @@ fn orient_crossing(
     base: &mut Oriented,
     name: &str,
     border: impl Fn(usize) -> Result<Vec<Triangle>>,
-    relations: &Sections<6>,
+    relations: &Sections<7>,
     blocks: Blocks,
     workspace: &Workspace,
 ) -> Result<()> {
@@ -355,7 +413,7 @@ fn orient_crossing(
 fn orient_one(
     base: &mut Oriented,
     t: Triangle,
-    relations: &[[u32; 6]],
+    relations: &[[u32; 7]],
     group: u32,
     edges: &FxHashMap<(u32, u32), Vec<(Triangle, u32)>>,
 ) -> Option<u32> {

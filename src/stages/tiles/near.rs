@@ -62,6 +62,17 @@ impl Tile {
         &self,
         k: usize,
         search: &mut Search,
+        each: impl FnMut(u32, Point, Option<Query<'_>>),
+    ) {
+        self.for_some_queries(k, search, |_| true, each);
+    }
+
+    /// As [`Tile::for_each_query`] for the points whose ids are `wanted`.
+    pub fn for_some_queries(
+        &self,
+        k: usize,
+        search: &mut Search,
+        wanted: impl Fn(usize) -> bool,
         mut each: impl FnMut(u32, Point, Option<Query<'_>>),
     ) {
         let mut guess = None;
@@ -71,7 +82,8 @@ impl Tile {
             for start in range.clone().step_by(self.leaf) {
                 let group = start..(start + self.leaf).min(range.end);
                 let first = self.id(own.local, start - range.start);
-                if first + group.len() <= self.ids.start || first >= self.ids.end {
+                let asked = |id: usize| self.ids.contains(&id) && wanted(id);
+                if !(first..first + group.len()).any(asked) {
                     continue;
                 }
                 let likely = guess.unwrap_or_else(|| self.limit(group.clone(), k, search));
@@ -79,7 +91,7 @@ impl Tile {
                 search.gather(self, &around, likely.min(own.reach2));
                 let mut farthest = 0;
                 for (id, index) in (first..).zip(group) {
-                    if !self.ids.contains(&id) {
+                    if !asked(id) {
                         continue;
                     }
                     let (point, id) = (self.points[index], id as u32);

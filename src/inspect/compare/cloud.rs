@@ -1,0 +1,62 @@
+//! A cloud as pages of points in curve order.
+
+use super::pages::PageWriter;
+use super::shape::{Items, Kind, Shape, side, unusable, usable};
+use crate::error::{Error, Result};
+use crate::pipeline::order;
+use crate::stages::ingest::ingest;
+use crate::workspace::Workspace;
+use std::path::Path;
+
+/// Points of a page of the store that lies between the files and the pages.
+const STORE_PAGE: usize = 1 << 12;
+
+/// Reads everything that ingest reads; duplicates become one point.
+pub(super) fn read(path: &Path, name: &str, workspace: &Workspace) -> Result<Shape> {
+    let observer = &workspace.observer;
+    observer.begin("read cloud", "points", 0);
+    let spool = ingest(&[path.to_path_buf()], workspace)?;
+    observer.end();
+    let stats = spool.stats();
+    stats.warnings.iter().for_each(|w| observer.warn(w));
+    let kept = stats.kept;
+    if kept == 0 {
+        let found = match stats.read {
+            0 => "none".to_owned(),
+            n => format!("none of {n} usable"),
+        };
+        return Err(Error::input(path, "points", found, "one or more"));
+    }
+    let lattice = spool.choose_lattice(0).map_err(|error| match error {
+        Error::Degenerate { found } => Error::input(path, "points", found, "smaller ones"),
+        other => other,
+    })?;
+    observer.begin("order", "points", kept);
+    let (store, _) = order(spool, &lattice, STORE_PAGE, workspace)?;
+    observer.end();
+
+    let count = store.len() as u64;
+    let mut writer = PageWriter::new(workspace, name, count)?;
+    let _held = workspace.reserve("compare: points at hand", STORE_PAGE as u64 * 12)?;
+    let mut points = Vec::new();
+    for page in 0..store.pages() {
+        workspace.check_cancel()?;
+        points.clear();
+        store.read_pages(page..page + 1, &mut points)?;
+        for point in &points {
+            let position = lattice.position(*point);
+            if !usable(position) {
+                return Err(unusable(path, "points", position));
+            }
+            writer.push(position)?;
+        }
+    }
+    let pages = writer.finish()?;
+    let mut side = side(path, Kind::Cloud, pages.bounds());
+    side.points = count;
+    side.exact = lattice.exact;
+    Ok(Shape {
+        side,
+        items: Items::Cloud(pages),
+    })
+}

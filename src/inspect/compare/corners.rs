@@ -1,0 +1,233 @@
+//! A mesh whose vertices do not fit into memory: corners are sorted to their vertices, take the
+//! position with them, and are sorted back to their triangles.
+
+use super::mesh::{Chooser, keyed, no_vertex, not_triangles, pages, shape, sorter};
+use super::shape::{Choice, Shape, unusable, usable};
+use super::vector::{Box3, V3};
+use crate::error::Result;
+use crate::inspect::ply_mesh::Sink;
+use crate::spill::{Record, Sections, Sorted, Sorter};
+use crate::workspace::Workspace;
+use crate::workspace::memory::Reservation;
+use std::path::Path;
+
+/// Vertices of a section of positions.
+const SECTION: usize = 1 << 14;
+
+/// Vertex, and number of the corner (three times the triangle's number, and 0 to 2) in two words.
+type Corner = Record<3>;
+
+/// Number of the corner in two words, position.
+type Placed = Record<8>;
+
+/// Reads a mesh of any size, its elements in any order.
+pub(super) struct Joined<'a> {
+    path: &'a Path,
+    name: &'a str,
+    workspace: &'a Workspace,
+    sorter: Sorter<3>,
+    held: Reservation,
+    positions: Sections<6>,
+    pending: Vec<Record<6>>,
+    bounds: Box3,
+    vertices: u64,
+    corners: u64,
+    batch: Vec<Corner>,
+}
+
+impl<'a> Joined<'a> {
+    pub(super) fn new(
+        path: &'a Path,
+        name: &'a str,
+        vertices: u64,
+        workspace: &'a Workspace,
+    ) -> Result<Self> {
+        let buffer = workspace.memory.available() / 5;
+        let (sorter, held) = sorter(workspace, &format!("{name}.corners"), buffer)?;
+        Ok(Self {
+            path,
+            name,
+            workspace,
+            sorter,
+            held,
+            positions: Sections::unpacked(workspace, &format!("{name}.positions"), 0)?,
+            pending: Vec::with_capacity(SECTION),
+            bounds: Box3::EMPTY,
+            vertices,
+            corners: 0,
+            batch: Vec::new(),
+        })
+    }
+
+    pub(super) fn finish(self, faces: u64, choice: Choice) -> Result<Shape> {
+        let Self {
+            path,
+            name,
+            workspace,
+            ..
+        } = self;
+        if !self.pending.is_empty() {
+            self.positions.append(&self.pending)?;
+        }
+        let sections = self.positions.count() as u64;
+        let index = workspace.reserve("compare: positions", 64 * sections + (1 << 20))?;
+        let corners = Corners::new(self.sorter.finish(workspace)?);
+
+        let buffer = workspace.memory.available() / 4;
+        let (placed, placed_held) = sorter::<8>(workspace, &format!("{name}.placed"), buffer)?;
+        workspace.observer.begin("corners", "corners", self.corners);
+        let used = place(&corners, &self.positions, &placed, path, workspace)?;
+        workspace.observer.end();
+
+        let buffer = workspace.memory.available() / 2;
+        let (keys, keys_held) = sorter(workspace, &format!("{name}.order"), buffer)?;
+        let mut triangle = [[0.0; 3]; 3];
+        placed.finish(workspace)?.for_each(|record: Placed| {
+            let [high, low, words @ ..] = record;
+            let corner = (u64::from(high) << 32 | u64::from(low)) % 3;
+            triangle[corner as usize] = bytemuck::cast(words);
+            if corner == 2 {
+                keys.push(&[keyed(triangle, &self.bounds)])?;
+            }
+            Ok(())
+        })?;
+        drop(placed_held);
+        let triangles = pages(keys, name, faces, workspace)?;
+        drop(keys_held);
+
+        let mut chooser = Chooser::new(workspace, name, used, triangles.1, choice)?;
+        corners.for_each_vertex(&self.positions, |_, p| chooser.offer(p))?;
+        drop((self.held, index));
+        Ok(shape(path, triangles, [used, faces], chooser.finish()?))
+    }
+}
+
+/// Sends every corner's position back to its triangle; the number of vertices that have corners.
+fn place(
+    corners: &Corners,
+    positions: &Sections<6>,
+    placed: &Sorter<8>,
+    path: &Path,
+    workspace: &Workspace,
+) -> Result<u64> {
+    let mut used = 0;
+    corners.for_each_vertex(positions, |v, p| {
+        used += 1;
+        if usable(p) {
+            workspace.check_cancel()
+        } else {
+            Err(unusable(path, &format!("vertex {v}"), p))
+        }
+    })?;
+    let mut window = Window::new(positions);
+    corners.for_each(|[v, high, low]| {
+        let [a, b, c, d, e, f] = bytemuck::cast::<V3, Record<6>>(window.get(v)?);
+        workspace.observer.advance(1);
+        placed.push(&[[high, low, a, b, c, d, e, f]])
+    })?;
+    Ok(used)
+}
+
+impl Sink for Joined<'_> {
+    fn vertices(&mut self, positions: &[V3]) -> Result<()> {
+        self.workspace.check_cancel()?;
+        let good = positions.iter().filter(|p| usable(**p));
+        self.bounds = good.fold(self.bounds, |b, p| b.with(*p));
+        for p in positions {
+            self.pending.push(bytemuck::cast(*p));
+            if self.pending.len() == SECTION {
+                self.positions.append(&self.pending)?;
+                self.pending.clear();
+            }
+        }
+        self.workspace.observer.advance(positions.len() as u64);
+        Ok(())
+    }
+
+    fn triangles(&mut self, triangles: &[[u32; 3]]) -> Result<()> {
+        self.workspace.check_cancel()?;
+        self.batch.clear();
+        for &v in triangles.iter().flatten() {
+            if u64::from(v) >= self.vertices {
+                return Err(no_vertex(self.path, self.vertices));
+            }
+            let number = self.corners;
+            self.batch.push([v, (number >> 32) as u32, number as u32]);
+            self.corners += 1;
+        }
+        self.sorter.push(&self.batch)?;
+        self.workspace.observer.advance(triangles.len() as u64);
+        Ok(())
+    }
+
+    fn non_triangles(&mut self, count: u64) -> Result<()> {
+        Err(not_triangles(self.path, count))
+    }
+}
+
+/// All corners by vertex; can be gone through more than once.
+enum Corners {
+    Memory(Vec<Corner>),
+    Disk(Sorted<3>),
+}
+
+impl Corners {
+    fn new(sorted: Sorted<3>) -> Self {
+        match sorted.in_memory() {
+            Ok(all) => Self::Memory(all),
+            Err(sorted) => Self::Disk(sorted),
+        }
+    }
+
+    fn for_each(&self, mut each: impl FnMut(Corner) -> Result<()>) -> Result<()> {
+        match self {
+            Self::Memory(all) => all.iter().try_for_each(|c| each(*c)),
+            Self::Disk(sorted) => sorted.for_range(None, None, each),
+        }
+    }
+}
+
+impl Corners {
+    /// Calls `each` with every vertex that has corners, ascending, and its position.
+    fn for_each_vertex(
+        &self,
+        positions: &Sections<6>,
+        mut each: impl FnMut(u32, V3) -> Result<()>,
+    ) -> Result<()> {
+        let mut last = None;
+        let mut window = Window::new(positions);
+        self.for_each(|[v, ..]| {
+            if last == Some(v) {
+                return Ok(());
+            }
+            last = Some(v);
+            each(v, window.get(v)?)
+        })
+    }
+}
+
+/// Positions of ascending vertices.
+struct Window<'a> {
+    positions: &'a Sections<6>,
+    section: usize,
+    records: Vec<Record<6>>,
+}
+
+impl<'a> Window<'a> {
+    fn new(positions: &'a Sections<6>) -> Self {
+        Self {
+            positions,
+            section: usize::MAX,
+            records: Vec::new(),
+        }
+    }
+
+    fn get(&mut self, v: u32) -> Result<V3> {
+        let section = v as usize / SECTION;
+        if section != self.section {
+            self.positions.get_into(section, &mut self.records)?;
+            self.section = section;
+        }
+        Ok(bytemuck::cast(self.records[v as usize % SECTION]))
+    }
+}

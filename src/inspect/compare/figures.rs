@@ -1,0 +1,206 @@
+//! The outcome of a comparison.
+
+use super::measure::Sums;
+use super::shape::{Kind, Side};
+use crate::error::Result;
+use crate::spill::Sorter;
+use crate::workspace::Workspace;
+use serde::Serialize;
+use std::fmt;
+
+/// Directions: of the first side, of the second, of both.
+const WAYS: usize = 3;
+
+/// Shares of the samples whose distance is at most the percentile, in thousandths.
+const SHARES: [u64; 4] = [500, 900, 990, 999];
+
+/// Distances over one set of samples, in the unit of the files or in per cent.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Figures {
+    /// The largest over all samples.
+    pub max: f64,
+    /// Mean. Here and below, vertices of a mesh that has an area do not count.
+    pub mean: f64,
+    /// Root of the mean square.
+    pub rms: f64,
+    /// Median: the smallest distance that at least half of the samples do not exceed.
+    pub p50: f64,
+    /// 90th percentile, likewise.
+    pub p90: f64,
+    /// 99th percentile.
+    pub p99: f64,
+    /// 99.9th percentile.
+    pub p99_9: f64,
+}
+
+/// Distances in one direction, or in both.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Distances {
+    /// Places where the distance was taken.
+    pub samples: u64,
+    /// Of these, vertices that count only in `max`.
+    pub vertex_samples: u64,
+    /// In the unit of the files.
+    #[serde(flatten)]
+    pub figures: Figures,
+    /// A place with the largest distance.
+    pub max_at: [f64; 3],
+    /// In per cent of the diagonal of the first side's box; absent if that is a point.
+    pub percent: Option<Figures>,
+}
+
+/// How far two shapes are from each other.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Comparison {
+    /// The first side.
+    pub a: Side,
+    /// The second side.
+    pub b: Side,
+    /// Diagonal of the first side's box: what `percent` refers to.
+    pub diagonal: f64,
+    /// Most samples that a side could get.
+    pub most_samples: u64,
+    /// Seed of the random choices.
+    pub seed: u64,
+    /// From samples of the first side to the second.
+    pub a_to_b: Distances,
+    /// From samples of the second side to the first.
+    pub b_to_a: Distances,
+    /// Over the samples of both directions together; `max` is the Hausdorff distance, as sampled.
+    pub symmetric: Distances,
+}
+
+/// Counts off percentiles in distances that come in ascending order.
+#[derive(Debug, Clone, Copy, Default)]
+struct Ranks {
+    of: u64,
+    seen: u64,
+    found: [f64; SHARES.len()],
+}
+
+impl Ranks {
+    fn see(&mut self, distance: f64) {
+        self.seen += 1;
+        for (share, found) in SHARES.iter().zip(&mut self.found) {
+            let rank = u128::from(self.of) * u128::from(*share);
+            if u128::from(self.seen) == rank.div_ceil(1000).max(1) {
+                *found = distance;
+            }
+        }
+    }
+}
+
+/// Percentiles of each direction and of both, exactly, out of `sorter`: distance as two words, and
+/// direction.
+pub(super) fn percentiles(
+    sorter: Sorter<3>,
+    sums: [Sums; 2],
+    workspace: &Workspace,
+) -> Result<[[f64; SHARES.len()]; WAYS]> {
+    let mut ranks = [Ranks::default(); WAYS];
+    ranks[0].of = sums[0].counted;
+    ranks[1].of = sums[1].counted;
+    ranks[2].of = sums[0].counted + sums[1].counted;
+    sorter.finish(workspace)?.for_each(|[high, low, way]| {
+        let distance = f64::from_bits(u64::from(high) << 32 | u64::from(low));
+        ranks[usize::from(way == 1)].see(distance);
+        ranks[2].see(distance);
+        Ok(())
+    })?;
+    Ok(ranks.map(|r| r.found))
+}
+
+impl Distances {
+    pub(super) fn new(sums: &Sums, percentiles: [f64; SHARES.len()], diagonal: f64) -> Self {
+        let [p50, p90, p99, p99_9] = percentiles;
+        let counted = sums.counted.max(1) as f64;
+        let figures = Figures {
+            max: sums.max,
+            mean: sums.sum / counted,
+            rms: (sums.squares / counted).sqrt(),
+            p50,
+            p90,
+            p99,
+            p99_9,
+        };
+        Self {
+            samples: sums.samples,
+            vertex_samples: sums.samples - sums.counted,
+            figures,
+            max_at: sums.max_at.unwrap_or_default(),
+            percent: (diagonal > 0.0).then(|| figures.scaled(100.0 / diagonal)),
+        }
+    }
+}
+
+impl Figures {
+    fn scaled(&self, by: f64) -> Self {
+        Self {
+            max: self.max * by,
+            mean: self.mean * by,
+            rms: self.rms * by,
+            p50: self.p50 * by,
+            p90: self.p90 * by,
+            p99: self.p99 * by,
+            p99_9: self.p99_9 * by,
+        }
+    }
+
+    /// Name and value of each.
+    #[must_use]
+    pub fn named(&self) -> [(&'static str, f64); 7] {
+        [
+            ("maximum", self.max),
+            ("mean", self.mean),
+            ("RMS", self.rms),
+            ("50 %", self.p50),
+            ("90 %", self.p90),
+            ("99 %", self.p99),
+            ("99.9 %", self.p99_9),
+        ]
+    }
+}
+
+impl fmt::Display for Side {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: ", self.path.display())?;
+        match self.kind {
+            Kind::Mesh => write!(
+                f,
+                "mesh, {} triangles, {} vertices, area {}",
+                self.triangles, self.points, self.area
+            ),
+            Kind::Cloud => write!(f, "cloud, {} distinct points", self.points),
+        }
+    }
+}
+
+impl fmt::Display for Comparison {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "A  {}\nB  {}", self.a, self.b)?;
+        let ways = [&self.a_to_b, &self.b_to_a, &self.symmetric];
+        writeln!(f, "{:<9}{:>28}{:>28}{:>28}", "", "A to B", "B to A", "both")?;
+        write!(f, "{:<9}", "samples")?;
+        for way in ways {
+            write!(f, "{:>28}", way.samples)?;
+        }
+        write!(f, "\n{:<9}", "vertices")?;
+        for way in ways {
+            write!(f, "{:>28}", way.vertex_samples)?;
+        }
+        for (row, (name, _)) in self.symmetric.figures.named().into_iter().enumerate() {
+            write!(f, "\n{name:<9}")?;
+            for way in ways {
+                let (_, value) = way.figures.named()[row];
+                let percent = way.percent.map(|p| format!("{:.4} %", p.named()[row].1));
+                write!(f, "{value:>15.6e}{:>13}", percent.unwrap_or_default())?;
+            }
+        }
+        write!(
+            f,
+            "\nlengths in the files' unit, and in % of the diagonal of A's box, {}\n\
+             vertices are samples that count in the maximum alone",
+            self.diagonal
+        )
+    }
+}

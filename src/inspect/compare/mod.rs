@@ -1,0 +1,198 @@
+//! How far are two meshes or clouds from each other? Answered in bounded memory, whatever their size.
+//!
+//! Each side is read once and put in curve order, in pages on disk with a tree of boxes in memory
+//! (`pages`). Then distances are taken at *samples* of one side, to the nearest point of the other:
+//! of the surface if that is a mesh, else the nearest of its points. The distance of a sample is
+//! exact up to rounding; only where samples are is a matter of chance.
+//!
+//! * A cloud is sampled at its points, without repetition; if there are more than
+//!   [`Options::samples`], at so many of them, drawn with equal chances.
+//! * A mesh is sampled at the vertices that its triangles use, or if these are more than half of the
+//!   samples at so many of them, drawn likewise; the other samples are points on its faces: the
+//!   area is cut into as many equal parts, along the curve, and each gets one point at random. Mean,
+//!   RMS and percentiles are those of the points on faces, so they do not depend on how the surface
+//!   is cut into triangles; vertices count for the maximum. A mesh without area is sampled at its
+//!   vertices alone, and then these count.
+//!
+//! The result depends on the files, the number of samples and the seed, and on nothing else.
+
+mod cloud;
+mod corners;
+mod figures;
+mod measure;
+mod mesh;
+mod pages;
+mod samples;
+mod shape;
+#[cfg(test)]
+mod tests;
+mod triangle;
+mod vector;
+
+pub use figures::{Comparison, Distances, Figures};
+pub use shape::{Kind, Side};
+
+use crate::error::{Error, Result};
+use crate::spill::Record;
+use crate::workspace::Workspace;
+use measure::Sums;
+use samples::Numbers;
+use shape::{Choice, Shape};
+use std::path::Path;
+
+/// How many samples, and which.
+#[derive(Debug, Clone, Copy)]
+pub struct Options {
+    /// Most samples of each side.
+    pub samples: u64,
+    /// Decides every random choice.
+    pub seed: u64,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            samples: 1_000_000,
+            seed: 0,
+        }
+    }
+}
+
+/// Distances between two shapes, each a mesh (PLY with faces) or a cloud (whatever ingest reads).
+///
+/// # Errors
+/// [`Error::Input`] for a file that cannot be read, is empty, or has faces that are not triangles;
+/// [`Error::Parameter`] without samples; [`Error::Io`], [`Error::Corrupt`] from the scratch folder;
+/// [`Error::Memory`] if the free part of the budget is too small; [`Error::Cancelled`].
+pub fn compare(a: &Path, b: &Path, options: &Options, workspace: &Workspace) -> Result<Comparison> {
+    let Options { samples, seed } = *options;
+    if samples == 0 {
+        return Err(Error::Parameter {
+            name: "--samples",
+            found: "0".into(),
+            expected: "1 or more".into(),
+        });
+    }
+    let choice = Choice { samples, seed };
+    let a = Shape::read(a, "compare.a", choice, workspace)?;
+    let b = Shape::read(b, "compare.b", choice, workspace)?;
+    let numbers = [Numbers::of(&a, samples), Numbers::of(&b, samples)];
+    let bytes = numbers.iter().map(|n| n.all()).sum::<u64>() * size_of::<Record<3>>() as u64;
+    let buffer = bytes.min(workspace.memory.available() / 8) + (1 << 20);
+    let (sorter, _held) = mesh::sorter::<3>(workspace, "compare.distances", buffer)?;
+    let mut sums = [Sums::default(); 2];
+    for (way, (from, to)) in [(&a, &b), (&b, &a)].into_iter().enumerate() {
+        let mut records = Vec::with_capacity(RECORDS);
+        let name = ["compare.a", "compare.b"][way];
+        measure_way(
+            from,
+            to,
+            name,
+            numbers[way],
+            seed,
+            workspace,
+            |sample, distance| {
+                sums[way].add(&sample, distance);
+                if sample.counts {
+                    let bits = distance.to_bits();
+                    records.push([(bits >> 32) as u32, bits as u32, way as u32]);
+                }
+                if records.len() == RECORDS {
+                    sorter.push(&records)?;
+                    records.clear();
+                }
+                Ok(())
+            },
+        )?;
+        sorter.push(&records)?;
+    }
+    let percentiles = figures::percentiles(sorter, sums, workspace)?;
+    let diagonal = shape_diagonal(&a);
+    let distances = |sums: &Sums, way: usize| Distances::new(sums, percentiles[way], diagonal);
+    Ok(Comparison {
+        a_to_b: distances(&sums[0], 0),
+        b_to_a: distances(&sums[1], 1),
+        symmetric: distances(&sums[0].with(sums[1]), 2),
+        a: a.side,
+        b: b.side,
+        diagonal,
+        most_samples: samples,
+        seed,
+    })
+}
+
+/// Distances handed to the sorter at a time.
+const RECORDS: usize = 4096;
+
+fn shape_diagonal(shape: &Shape) -> f64 {
+    let (min, max) = (shape.side.min, shape.side.max);
+    vector::Box3 { min, max }.diagonal()
+}
+
+fn measure_way(
+    from: &Shape,
+    to: &Shape,
+    name: &str,
+    numbers: Numbers,
+    seed: u64,
+    workspace: &Workspace,
+    each: impl FnMut(samples::Sample, f64) -> Result<()>,
+) -> Result<()> {
+    let mut measure = measure::to(to, workspace, each)?;
+    samples::for_each(from, name, numbers, seed, workspace, |sample| {
+        measure.push(sample)
+    })?;
+    measure.finish()?;
+    workspace.observer.end();
+    Ok(())
+}
+
+/// A point of a cloud and its distance to a shape.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Measured {
+    /// Rank among the distinct points of the cloud in curve order, as a reconstruction numbers them.
+    pub index: u64,
+    /// Where it is.
+    pub position: [f64; 3],
+    /// Distance to the nearest point of the other shape.
+    pub distance: f64,
+}
+
+/// Distances of all distinct points of a cloud to a mesh or cloud, in order of their index, and
+/// their number. A mesh as `cloud` is the cloud of its vertices.
+///
+/// # Errors
+/// What `each` returned; see [`compare`].
+pub fn distances(
+    cloud: &Path,
+    to: &Path,
+    workspace: &Workspace,
+    mut each: impl FnMut(Measured) -> Result<()>,
+) -> Result<u64> {
+    let cloud = cloud::read(cloud, "compare.a", workspace)?;
+    let choice = Choice {
+        samples: 0,
+        seed: 0,
+    };
+    let to = Shape::read(to, "compare.b", choice, workspace)?;
+    let numbers = Numbers::of(&cloud, u64::MAX);
+    let mut index = 0;
+    measure_way(
+        &cloud,
+        &to,
+        "compare.a",
+        numbers,
+        0,
+        workspace,
+        |sample, distance| {
+            each(Measured {
+                index,
+                position: sample.position,
+                distance,
+            })?;
+            index += 1;
+            Ok(())
+        },
+    )?;
+    Ok(index)
+}

@@ -1,0 +1,284 @@
+//! What distances are measured to: triangles or points in curve order, in pages on disk, with a tree
+//! of boxes around the pages in memory.
+//!
+//! The size of a page depends on the number of items alone: with more items pages grow, and not
+//! their number, so the tree stays small for any file.
+
+use super::triangle;
+use super::vector::{Box3, V3, dot, sub};
+use crate::error::Result;
+use crate::spill::{Record, Sections};
+use crate::workspace::Workspace;
+use crate::workspace::memory::Reservation;
+use rustc_hash::FxHashMap;
+use std::marker::PhantomData;
+
+/// Fewest items of a page.
+const LEAST: u64 = 64;
+
+/// Most pages.
+const MOST_PAGES: u64 = 1 << 17;
+
+/// Children of a node of the tree.
+const FAN: usize = 8;
+
+/// Items that share a box within a page.
+const LEAF: usize = 8;
+
+/// Something that has a distance from a point; `N` words on disk.
+pub(super) trait Item<const N: usize>: bytemuck::Pod + Send + Sync {
+    fn bounds(&self) -> Box3;
+    fn distance2(&self, p: V3) -> f64;
+}
+
+impl Item<6> for V3 {
+    fn bounds(&self) -> Box3 {
+        Box3::of(&[*self])
+    }
+
+    fn distance2(&self, p: V3) -> f64 {
+        let d = sub(*self, p);
+        dot(d, d)
+    }
+}
+
+impl Item<18> for [V3; 3] {
+    fn bounds(&self) -> Box3 {
+        Box3::of(self)
+    }
+
+    fn distance2(&self, p: V3) -> f64 {
+        triangle::distance2(self, p)
+    }
+}
+
+/// Items in pages.
+#[derive(Debug)]
+pub(super) struct Pages<T, const N: usize> {
+    stored: Sections<N>,
+    /// `levels[0]` has a box for each page, each further level one for `FAN` of the last.
+    levels: Vec<Vec<Box3>>,
+    page: usize,
+    items: PhantomData<T>,
+    _held: Reservation,
+}
+
+impl<T: Item<N>, const N: usize> Pages<T, N> {
+    /// The box around everything.
+    pub(super) fn bounds(&self) -> Box3 {
+        let top = self.levels.last().map_or(&[][..], Vec::as_slice);
+        top.iter().fold(Box3::EMPTY, |a, b| a.union(*b))
+    }
+
+    /// Number of pages.
+    pub(super) fn count(&self) -> usize {
+        self.levels[0].len()
+    }
+
+    /// Bytes of a page in memory, with what reading it takes.
+    pub(super) fn page_bytes(&self) -> u64 {
+        let boxes = self.page.div_ceil(LEAF) * size_of::<Box3>();
+        (2 * self.page * size_of::<T>() + boxes + 128) as u64
+    }
+
+    /// Calls `each` with the items of every page, in order.
+    pub(super) fn for_each_page(&self, mut each: impl FnMut(&[T]) -> Result<()>) -> Result<()> {
+        let mut records = Vec::new();
+        for page in 0..self.count() {
+            self.stored.get_into(page, &mut records)?;
+            let items: Vec<T> = records.iter().map(|r| bytemuck::cast(*r)).collect();
+            each(&items)?;
+        }
+        Ok(())
+    }
+
+    fn load(&self, page: usize) -> Result<Page<T>> {
+        let records = self.stored.get(page)?;
+        let items: Vec<T> = records.iter().map(|r| bytemuck::cast(*r)).collect();
+        let boxes = items.chunks(LEAF).map(|leaf| {
+            let all = leaf.iter().map(T::bounds);
+            all.fold(Box3::EMPTY, Box3::union)
+        });
+        Ok(Page {
+            boxes: boxes.collect(),
+            items,
+        })
+    }
+
+    /// Lowers `best`, a squared distance from `p`, to that of the nearest item, if that is nearer.
+    pub(super) fn nearest(&self, p: V3, best: &mut Best<T>, cache: &mut Cache<T>) -> Result<()> {
+        let top = self.levels.len() - 1;
+        let mut stack = std::mem::take(&mut cache.stack);
+        stack.clear();
+        let roots = 0..self.levels[top].len();
+        self.push_children(&mut stack, top, roots, p, best.distance2);
+        while let Some((distance2, level, node)) = stack.pop() {
+            if distance2 >= best.distance2 {
+                continue;
+            }
+            if level == 0 {
+                cache.page(self, node)?.look(p, best);
+            } else {
+                let children = node * FAN..((node + 1) * FAN).min(self.levels[level - 1].len());
+                self.push_children(&mut stack, level - 1, children, p, best.distance2);
+            }
+        }
+        cache.stack = stack;
+        Ok(())
+    }
+
+    /// Puts the nodes nearer than `limit` on the stack, the nearest on top.
+    fn push_children(
+        &self,
+        stack: &mut Vec<(f64, usize, usize)>,
+        level: usize,
+        nodes: std::ops::Range<usize>,
+        p: V3,
+        limit: f64,
+    ) {
+        let from = stack.len();
+        for node in nodes {
+            let distance2 = self.levels[level][node].distance2(p);
+            if distance2 < limit {
+                stack.push((distance2, level, node));
+            }
+        }
+        stack[from..].sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(b.2.cmp(&a.2)));
+    }
+}
+
+/// The nearest item so far and its squared distance.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Best<T> {
+    pub(super) distance2: f64,
+    pub(super) item: Option<T>,
+}
+
+/// A page in memory.
+#[derive(Debug)]
+struct Page<T> {
+    items: Vec<T>,
+    boxes: Vec<Box3>,
+}
+
+impl<T> Page<T> {
+    fn look<const N: usize>(&self, p: V3, best: &mut Best<T>)
+    where
+        T: Item<N>,
+    {
+        for (leaf, bounds) in self.items.chunks(LEAF).zip(&self.boxes) {
+            if bounds.distance2(p) >= best.distance2 {
+                continue;
+            }
+            for item in leaf {
+                let distance2 = item.distance2(p);
+                if distance2 < best.distance2 {
+                    *best = Best {
+                        distance2,
+                        item: Some(*item),
+                    };
+                }
+            }
+        }
+    }
+}
+
+/// Recently read pages, for one thread.
+#[derive(Debug)]
+pub(super) struct Cache<T> {
+    pages: FxHashMap<usize, Page<T>>,
+    most: usize,
+    stack: Vec<(f64, usize, usize)>,
+}
+
+impl<T> Cache<T> {
+    /// A cache of at most `most` pages.
+    pub(super) fn new(most: usize) -> Self {
+        Self {
+            pages: FxHashMap::default(),
+            most: most.max(1),
+            stack: Vec::new(),
+        }
+    }
+
+    fn page<const N: usize>(&mut self, pages: &Pages<T, N>, page: usize) -> Result<&Page<T>>
+    where
+        T: Item<N>,
+    {
+        if self.pages.len() >= self.most && !self.pages.contains_key(&page) {
+            // Samples come in curve order: soon everything here is new again.
+            self.pages.clear();
+        }
+        match self.pages.entry(page) {
+            std::collections::hash_map::Entry::Occupied(found) => Ok(found.into_mut()),
+            std::collections::hash_map::Entry::Vacant(empty) => Ok(empty.insert(pages.load(page)?)),
+        }
+    }
+}
+
+/// Writes [`Pages`] in order.
+#[derive(Debug)]
+pub(super) struct PageWriter<T, const N: usize> {
+    stored: Sections<N>,
+    page: usize,
+    pending: Vec<Record<N>>,
+    boxes: Vec<Box3>,
+    items: PhantomData<T>,
+    held: Reservation,
+}
+
+impl<T: Item<N>, const N: usize> PageWriter<T, N> {
+    /// Starts the scratch file `name` for `count` items.
+    pub(super) fn new(workspace: &Workspace, name: &str, count: u64) -> Result<Self> {
+        let page = count.div_ceil(MOST_PAGES).max(LEAST) as usize;
+        let pages = count.div_ceil(page as u64);
+        // A box of the tree (an eighth more for the levels above) and a place in the file for each.
+        let index = pages * (2 * size_of::<Box3>() as u64) + (page * 2 * size_of::<T>()) as u64;
+        Ok(Self {
+            held: workspace.reserve("compare: boxes", index + 4096)?,
+            stored: Sections::unpacked(workspace, name, pages as usize)?,
+            page,
+            pending: Vec::with_capacity(page),
+            boxes: Vec::with_capacity(pages as usize),
+            items: PhantomData,
+        })
+    }
+
+    pub(super) fn push(&mut self, item: T) -> Result<()> {
+        self.pending.push(bytemuck::cast(item));
+        if self.pending.len() == self.page {
+            self.flush()?;
+        }
+        Ok(())
+    }
+
+    fn flush(&mut self) -> Result<()> {
+        let bounds = self
+            .pending
+            .iter()
+            .map(|r| bytemuck::cast::<_, T>(*r).bounds());
+        let bounds = bounds.fold(Box3::EMPTY, Box3::union);
+        self.stored.put(self.boxes.len(), &self.pending)?;
+        self.boxes.push(bounds);
+        self.pending.clear();
+        Ok(())
+    }
+
+    pub(super) fn finish(mut self) -> Result<Pages<T, N>> {
+        if !self.pending.is_empty() {
+            self.flush()?;
+        }
+        let mut levels = vec![self.boxes];
+        while let Some(top) = levels.last().filter(|top| top.len() > FAN) {
+            let union = |boxes: &[Box3]| boxes.iter().fold(Box3::EMPTY, |a, b| a.union(*b));
+            levels.push(top.chunks(FAN).map(union).collect());
+        }
+        Ok(Pages {
+            stored: self.stored,
+            levels,
+            page: self.page,
+            items: PhantomData,
+            _held: self.held,
+        })
+    }
+}

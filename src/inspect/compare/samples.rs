@@ -1,0 +1,208 @@
+//! Where distances are taken: positions on one side, in curve order.
+
+use super::mesh::{area, sorter};
+use super::pages::Pages;
+use super::shape::{Items, Shape};
+use super::vector::{Box3, V3, add, scale, sub};
+use crate::error::Result;
+use crate::spill::{Record, Sections, Sorter};
+use crate::workspace::Workspace;
+use oorandom::Rand64;
+
+/// Added to the seed, so that points on faces are not chosen by the numbers that chose vertices.
+const FACES: u128 = 1 << 64;
+const POINTS: u128 = 2 << 64;
+
+/// Samples handed to the sorter at a time.
+const BATCH: usize = 4096;
+
+/// A place at which a distance is taken.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Sample {
+    pub(super) position: V3,
+    /// It counts in the mean and so on; if not, only in the maximum.
+    pub(super) counts: bool,
+}
+
+/// How many samples a shape gets.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Numbers {
+    /// Vertices of a mesh.
+    pub(super) vertices: u64,
+    /// Points of a cloud, or points on the faces of a mesh.
+    pub(super) points: u64,
+}
+
+impl Numbers {
+    /// With at most `most` samples in all.
+    pub(super) fn of(shape: &Shape, most: u64) -> Self {
+        match &shape.items {
+            Items::Cloud(_) => Self {
+                vertices: 0,
+                points: shape.side.points.min(most),
+            },
+            Items::Mesh { vertices, .. } => {
+                let vertices = vertices.total();
+                let points = if shape.side.area > 0.0 {
+                    most - vertices.min(most)
+                } else {
+                    0
+                };
+                Self { vertices, points }
+            }
+        }
+    }
+
+    pub(super) fn all(self) -> u64 {
+        self.vertices + self.points
+    }
+}
+
+/// Calls `each` with every sample of a shape, in an order that depends on nothing but the shape, the
+/// seed and their number. Leaves the stage of the distances begun.
+pub(super) fn for_each(
+    shape: &Shape,
+    name: &str,
+    numbers: Numbers,
+    seed: u64,
+    workspace: &Workspace,
+    mut each: impl FnMut(Sample) -> Result<()>,
+) -> Result<()> {
+    let observer = &workspace.observer;
+    let (triangles, vertices) = match &shape.items {
+        Items::Cloud(points) => {
+            observer.begin("distances", "samples", numbers.all());
+            let mut rng = Rand64::new(u128::from(seed) + POINTS);
+            let (mut left, mut wanted) = (shape.side.points, numbers.points);
+            return points.for_each_page(|page| {
+                for &position in page {
+                    // Knuth's algorithm S: exactly as many as wanted.
+                    let all = wanted == left;
+                    if wanted > 0 && (all || rng.rand_range(0..left) < wanted) {
+                        wanted -= 1;
+                        let counts = true;
+                        each(Sample { position, counts })?;
+                    }
+                    left -= 1;
+                }
+                Ok(())
+            });
+        }
+        Items::Mesh {
+            triangles,
+            vertices,
+        } => (triangles, vertices),
+    };
+    let bounds = triangles.bounds();
+    let bytes = numbers.all() * size_of::<Record<10>>() as u64;
+    let buffer = bytes.min(workspace.memory.available() / 4) + (1 << 20);
+    let (sorter, _held) = sorter::<10>(workspace, &format!("{name}.samples"), buffer)?;
+    observer.begin("sample", "samples", numbers.all());
+    let mut batch = Batch {
+        sorter: &sorter,
+        bounds,
+        workspace,
+        records: Vec::with_capacity(BATCH),
+    };
+    take_vertices(vertices, numbers.points == 0, &mut batch)?;
+    take_faces(triangles, shape.side.area, numbers.points, seed, &mut batch)?;
+    batch.flush()?;
+    observer.end();
+    observer.begin("distances", "samples", numbers.all());
+    sorter.finish(workspace)?.for_each(|record| {
+        let [_, _, _, words @ .., counts] = record;
+        let position = bytemuck::cast::<Record<6>, V3>(words);
+        each(Sample {
+            position,
+            counts: counts == 1,
+        })
+    })
+}
+
+/// Samples on their way to the sorter.
+struct Batch<'a> {
+    sorter: &'a Sorter<10>,
+    bounds: Box3,
+    workspace: &'a Workspace,
+    records: Vec<Record<10>>,
+}
+
+impl Batch<'_> {
+    fn push(&mut self, position: V3, counts: bool) -> Result<()> {
+        let [i, j, k] = self.bounds.key(position);
+        let [a, b, c, d, e, f] = bytemuck::cast::<V3, Record<6>>(position);
+        let record = [i, j, k, a, b, c, d, e, f, u32::from(counts)];
+        self.records.push(record);
+        if self.records.len() == BATCH {
+            self.flush()?;
+        }
+        Ok(())
+    }
+
+    fn flush(&mut self) -> Result<()> {
+        self.workspace.check_cancel()?;
+        self.sorter.push(&self.records)?;
+        self.workspace.observer.advance(self.records.len() as u64);
+        self.records.clear();
+        Ok(())
+    }
+}
+
+fn take_vertices(vertices: &Sections<6>, counts: bool, batch: &mut Batch<'_>) -> Result<()> {
+    let mut records = Vec::new();
+    for section in 0..vertices.count() {
+        vertices.get_into(section, &mut records)?;
+        for record in &records {
+            batch.push(bytemuck::cast(*record), counts)?;
+        }
+    }
+    Ok(())
+}
+
+/// Divides the area into as many equal parts as samples, and puts one at random in each.
+fn take_faces(
+    triangles: &Pages<[V3; 3], 18>,
+    all: f64,
+    wanted: u64,
+    seed: u64,
+    batch: &mut Batch<'_>,
+) -> Result<()> {
+    let mut rng = Rand64::new(u128::from(seed) + FACES);
+    let mut taken = 0;
+    let mut place = |rng: &mut Rand64| {
+        let at = (taken as f64 + rng.rand_float()) / wanted as f64 * all;
+        taken += 1;
+        (taken <= wanted).then_some(at)
+    };
+    let mut next = place(&mut rng);
+    let (mut passed, mut last) = (0.0, None);
+    triangles.for_each_page(|page| {
+        for triangle in page {
+            let area = area(triangle);
+            if area > 0.0 {
+                last = Some(*triangle);
+            }
+            passed += area;
+            while next.is_some_and(|at| at < passed) {
+                batch.push(within(triangle, &mut rng), true)?;
+                next = place(&mut rng);
+            }
+        }
+        Ok(())
+    })?;
+    // Rounding may leave the last one at the very end.
+    while let (Some(_), Some(triangle)) = (next, &last) {
+        batch.push(within(triangle, &mut rng), true)?;
+        next = place(&mut rng);
+    }
+    Ok(())
+}
+
+/// A random point of a triangle.
+fn within([a, b, c]: &[V3; 3], rng: &mut Rand64) -> V3 {
+    let (mut u, mut v) = (rng.rand_float(), rng.rand_float());
+    if u + v > 1.0 {
+        (u, v) = (1.0 - u, 1.0 - v);
+    }
+    add(*a, add(scale(sub(*b, *a), u), scale(sub(*c, *a), v)))
+}

@@ -1,0 +1,109 @@
+//! One side of a comparison, brought into pages.
+
+use super::pages::Pages;
+use super::vector::{Box3, V3};
+use super::{cloud, mesh};
+use crate::error::{Error, Result};
+use crate::inspect::ply_mesh::{PlyMesh, holds_faces};
+use crate::spill::Sections;
+use crate::workspace::Workspace;
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+/// Largest coordinate: up to here no product of four lengths overflows.
+const LARGEST: f64 = 1e70;
+
+/// What one of the two sides is.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Side {
+    /// The file or folder.
+    pub path: PathBuf,
+    /// Mesh or cloud.
+    pub kind: Kind,
+    /// Points of a cloud without repetition; vertices of a mesh that a triangle uses.
+    pub points: u64,
+    /// Triangles; 0 for a cloud.
+    pub triangles: u64,
+    /// Their area in all.
+    pub area: f64,
+    /// Lowest corner of the box around it.
+    pub min: [f64; 3],
+    /// Highest corner.
+    pub max: [f64; 3],
+    /// True if all positions are as in the file. Only a cloud that spans more than 2^30 of its own
+    /// steps is rounded, to 2^-30 of its extent.
+    pub exact: bool,
+}
+
+/// Mesh or cloud.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Kind {
+    /// Triangles: distances are to the nearest point of the surface.
+    Mesh,
+    /// Points: distances are to the nearest point.
+    Cloud,
+}
+
+/// One side, ready to be sampled and measured to.
+pub(super) struct Shape {
+    pub(super) side: Side,
+    pub(super) items: Items,
+}
+
+pub(super) enum Items {
+    Mesh {
+        triangles: Pages<[V3; 3], 18>,
+        /// Vertices chosen as samples.
+        vertices: Sections<6>,
+    },
+    Cloud(Pages<V3, 6>),
+}
+
+/// What to choose of a mesh's vertices.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Choice {
+    pub(super) samples: u64,
+    pub(super) seed: u64,
+}
+
+impl Shape {
+    /// Reads a mesh or a cloud; `name` keeps the scratch files of the two sides apart.
+    pub(super) fn read(
+        path: &Path,
+        name: &str,
+        choice: Choice,
+        workspace: &Workspace,
+    ) -> Result<Self> {
+        if path.is_file() && holds_faces(path)? {
+            mesh::read(PlyMesh::open(path)?, path, name, choice, workspace)
+        } else {
+            cloud::read(path, name, workspace)
+        }
+    }
+}
+
+/// The side of a comparison that these numbers describe.
+pub(super) fn side(path: &Path, kind: Kind, bounds: Box3) -> Side {
+    Side {
+        path: path.to_path_buf(),
+        kind,
+        points: 0,
+        triangles: 0,
+        area: 0.0,
+        min: bounds.min,
+        max: bounds.max,
+        exact: true,
+    }
+}
+
+/// True if distances from this position can be computed.
+pub(super) fn usable(p: V3) -> bool {
+    p.iter().all(|c| c.abs() <= LARGEST)
+}
+
+/// The error for a position that is not [`usable`].
+pub(super) fn unusable(path: &Path, place: &str, p: V3) -> Error {
+    let found = format!("a position {} {} {}", p[0], p[1], p[2]);
+    Error::input(path, place, found, format!("coordinates up to {LARGEST:e}"))
+}

@@ -1,0 +1,107 @@
+use super::triangle::distance2;
+use super::vector::{Box3, V3, add, dot, scale, sub};
+use proptest::prelude::*;
+
+/// The least value of a convex function on `0..=1`.
+fn least(f: impl Fn(f64) -> f64) -> f64 {
+    let (mut low, mut high) = (0.0, 1.0);
+    for _ in 0..100 {
+        let (m, n) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
+        if f(m) <= f(n) {
+            high = n;
+        } else {
+            low = m;
+        }
+    }
+    f(low).min(f(high)).min(f(0.0)).min(f(1.0))
+}
+
+/// A search in a search, along all segments from the first corner: no algebra about regions.
+fn searched([a, b, c]: &[V3; 3], p: V3) -> f64 {
+    let mix = |x: V3, y: V3, t: f64| add(scale(x, 1.0 - t), scale(y, t));
+    let across = |t: f64| {
+        let (from, to) = (mix(*a, *b, t), mix(*a, *c, t));
+        least(|s| {
+            let d = sub(mix(from, to, s), p);
+            dot(d, d)
+        })
+    };
+    least(across).sqrt()
+}
+
+fn check(triangle: &[V3; 3], p: V3) {
+    let got = distance2(triangle, p).sqrt();
+    let want = searched(triangle, p);
+    let size = 1.0
+        + triangle
+            .iter()
+            .flatten()
+            .chain(&p)
+            .fold(0.0, |m: f64, c| m.max(c.abs()));
+    assert!(
+        (got - want).abs() <= 1e-7 * size,
+        "{triangle:?} {p:?}: {got} {want}"
+    );
+}
+
+fn lattice() -> impl Strategy<Value = V3> {
+    prop::array::uniform3(-3i32..4).prop_map(|p| p.map(f64::from))
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(300))]
+    #[test]
+    fn distance_is_that_of_the_nearest_point(
+        triangle in prop::array::uniform3(prop::array::uniform3(-1.0..1.0f64)),
+        p in prop::array::uniform3(-2.0..2.0f64),
+    ) {
+        check(&triangle, p);
+    }
+
+    #[test]
+    fn also_of_segments_and_points(triangle in prop::array::uniform3(lattice()), p in lattice()) {
+        check(&triangle, p);
+    }
+
+    #[test]
+    fn also_of_needles(
+        a in lattice(), b in lattice(), t in -0.5..1.5f64, thin in 1e-12..1e-3f64, p in lattice(),
+    ) {
+        let c = add(add(a, scale(sub(b, a), t)), [0.0, 0.0, thin]);
+        for triangle in [[a, b, c], [b, c, a], [c, a, b]] {
+            check(&triangle, p);
+            // Corners are at no distance at all.
+            prop_assert_eq!(distance2(&triangle, triangle[1]), 0.0);
+        }
+    }
+}
+
+#[test]
+fn every_region_of_a_triangle() {
+    let triangle = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]];
+    let at = |p| distance2(&triangle, p);
+    assert_eq!(at([1.0, 1.0, 3.0]), 9.0);
+    assert_eq!(at([1.0, 1.0, 0.0]), 0.0);
+    assert_eq!(at([-3.0, -4.0, 0.0]), 25.0);
+    assert_eq!(at([7.0, -4.0, 0.0]), 25.0);
+    assert_eq!(at([-3.0, 8.0, 0.0]), 25.0);
+    assert_eq!(at([1.0, -2.0, 1.0]), 5.0);
+    assert_eq!(at([-2.0, 1.0, 1.0]), 5.0);
+    assert_eq!(at([4.0, 4.0, 1.0]), 9.0);
+}
+
+#[test]
+fn a_box_of_any_shape_has_keys() {
+    let shapes = [
+        Box3::of(&[[0.0; 3], [1.0, 2.0, 3.0]]),
+        Box3::of(&[[5.0; 3]]),
+        Box3::of(&[[-1e70; 3], [1e70; 3]]),
+        Box3::EMPTY,
+    ];
+    for bounds in shapes {
+        for p in [[0.0; 3], [1e70; 3], [-1e70; 3], bounds.min, bounds.max] {
+            let key = bounds.key(p);
+            assert!(key.iter().all(|w| *w < 1 << 30));
+        }
+    }
+}

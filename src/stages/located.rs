@@ -1,0 +1,106 @@
+//! Where the vertices of triangles are: those of one block, and some of others.
+
+use super::blocks::Blocks;
+use super::order::PointStore;
+use crate::error::Result;
+use crate::geom::{Point, sub};
+use rustc_hash::FxHashMap;
+use std::ops::Range;
+
+/// Positions by id, twice: those by which points are connected, and those that go into the file.
+/// They are the same store unless points were moved for the connection only.
+#[derive(Debug, Clone, Copy)]
+pub struct Places<'a> {
+    /// To connect by.
+    pub shape: &'a PointStore,
+    /// In the file.
+    pub file: &'a PointStore,
+}
+
+impl Places<'_> {
+    /// True if positions in the file are not those that points are connected by.
+    #[must_use]
+    pub fn differ(&self) -> bool {
+        !std::ptr::eq(self.shape, self.file)
+    }
+}
+
+/// The positions of the vertices of a block and of some others.
+#[derive(Debug, Default)]
+pub struct Located {
+    ids: Range<u32>,
+    own: Vec<Point>,
+    foreign: FxHashMap<u32, Point>,
+}
+
+impl Located {
+    /// Those of `block`, and of `vertices` in any order.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+    pub fn load(
+        store: &PointStore,
+        blocks: Blocks,
+        block: usize,
+        vertices: impl Iterator<Item = u32>,
+    ) -> Result<Self> {
+        let ids = blocks.ids(block);
+        let mut located = Self {
+            own: store.slice(ids.start as usize..ids.end as usize)?,
+            ids,
+            foreign: FxHashMap::default(),
+        };
+        located.add(store, vertices)?;
+        Ok(located)
+    }
+
+    /// Takes in those of `vertices` that are not in the block.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+    pub fn add(&mut self, store: &PointStore, vertices: impl Iterator<Item = u32>) -> Result<()> {
+        let mut far: Vec<u32> = vertices.filter(|v| !self.ids.contains(v)).collect();
+        far.sort_unstable();
+        far.dedup();
+        let mut points = Vec::with_capacity(far.len());
+        store.fetch(&far, &mut points)?;
+        self.foreign.extend(far.into_iter().zip(points));
+        Ok(())
+    }
+
+    /// The position of a vertex that was loaded.
+    #[must_use]
+    #[inline]
+    pub fn at(&self, v: u32) -> Point {
+        if self.ids.contains(&v) {
+            self.own[(v - self.ids.start) as usize]
+        } else {
+            self.foreign[&v]
+        }
+    }
+}
+
+/// The exact normal of the triangle `a → b → c`, twice its area long.
+#[must_use]
+pub fn normal(a: Point, b: Point, c: Point) -> [i128; 3] {
+    small_normal(a, b, c).map(i128::from)
+}
+
+/// As [`normal`]: with coordinates of 30 bits it fits machine words.
+#[must_use]
+#[inline]
+pub fn small_normal(a: Point, b: Point, c: Point) -> [i64; 3] {
+    let (u, v) = (sub(b, a), sub(c, a));
+    [
+        u[1] * v[2] - u[2] * v[1],
+        u[2] * v[0] - u[0] * v[2],
+        u[0] * v[1] - u[1] * v[0],
+    ]
+}
+
+/// True if three points are exactly on a line.
+#[must_use]
+#[inline]
+pub fn on_a_line([a, b, c]: [Point; 3]) -> bool {
+    small_normal(a, b, c) == [0; 3]
+}

@@ -1,0 +1,205 @@
+//! Closing a boundary loop from its sharpest corners, ear by ear, as far as the surface is torn and
+//! no further: where it is open, as at doors and at the outline of a survey, ears would be longer
+//! than the surface is dense.
+
+use super::fill::{Corner, length};
+use crate::geom::{Point, distance2, sub};
+use crate::stages::located::{normal, on_a_line};
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+/// An ear's third side is at most so many times as long as the triangles around are wide.
+const REACH: f64 = 4.0;
+
+/// The cosine of the largest angle between an ear and its neighbours: 100 degrees.
+const COS_FOLD: f64 = -0.17364817766693036;
+
+/// Corners along the loop, either way, that must not lie under an ear.
+const LOOK: usize = 6;
+
+/// What is left of a loop after zipping.
+pub struct Zipped {
+    /// Triangles as they run.
+    pub triangles: Vec<[u32; 3]>,
+    /// The corners that are left, in turn; none if it is closed.
+    pub left: Vec<Corner>,
+}
+
+/// An ear to be: its sharpness as the bits of a positive number, its corner, and the corner's age.
+type Ear = Reverse<(u64, usize, u32)>;
+
+struct Zipper<E> {
+    corners: Vec<Corner>,
+    /// The local width of the triangles along the loop.
+    spacing: Vec<f64>,
+    before: Vec<usize>,
+    after: Vec<usize>,
+    age: Vec<u32>,
+    count: usize,
+    edge: E,
+    chords: rustc_hash::FxHashSet<(u32, u32)>,
+    heap: BinaryHeap<Ear>,
+    out: Vec<[u32; 3]>,
+}
+
+/// Zips the loop of `corners`; `edge(a, b)` tells if the mesh has an edge.
+pub fn zip(corners: Vec<Corner>, edge: impl Fn(u32, u32) -> bool) -> Zipped {
+    let n = corners.len();
+    let mut zipper = Zipper {
+        spacing: spacing(&corners),
+        before: (0..n).map(|x| (x + n - 1) % n).collect(),
+        after: (0..n).map(|x| (x + 1) % n).collect(),
+        age: vec![0; n],
+        count: n,
+        corners,
+        edge,
+        chords: rustc_hash::FxHashSet::default(),
+        heap: BinaryHeap::new(),
+        out: Vec::new(),
+    };
+    (0..n).for_each(|x| zipper.consider(x));
+    let last = zipper.run();
+    let mut left = Vec::new();
+    if zipper.count >= 3 {
+        let mut x = last;
+        for _ in 0..zipper.count {
+            left.push(zipper.corners[x]);
+            x = zipper.after[x];
+        }
+    }
+    Zipped {
+        triangles: zipper.out,
+        left,
+    }
+}
+
+/// For each corner the mean length of the sides of the triangles at its two edges, and those next
+/// to them.
+fn spacing(corners: &[Corner]) -> Vec<f64> {
+    let n = corners.len();
+    let far = |a: Point, b: Point| (distance2(a, b) as f64).sqrt();
+    let own: Vec<f64> = (0..n)
+        .map(|x| {
+            let (from, to) = (&corners[(x + n - 1) % n], &corners[x]);
+            (far(from.at, to.at) + far(to.at, to.apex) + far(from.at, to.apex)) / 3.0
+        })
+        .collect();
+    (0..n)
+        .map(|x| {
+            let near = [(x + n - 1) % n, x, (x + 1) % n, (x + 2) % n];
+            near.iter().map(|&y| own[y]).sum::<f64>() / 4.0
+        })
+        .collect()
+}
+
+impl<E: Fn(u32, u32) -> bool> Zipper<E> {
+    /// Enters the ear at a corner if it may be closed.
+    fn consider(&mut self, x: usize) {
+        if let Some(sharpness) = self.ear(x) {
+            let entry = Reverse((sharpness.to_bits(), x, self.age[x]));
+            self.heap.push(entry);
+        }
+    }
+
+    /// Closes ears until none is left; some corner that is left.
+    fn run(&mut self) -> usize {
+        let mut some = 0;
+        while let Some(Reverse((_, x, age))) = self.heap.pop() {
+            if age != self.age[x] || self.count < 3 || self.ear(x).is_none() {
+                continue;
+            }
+            let (s, e) = (self.before[x], self.after[x]);
+            self.out.push([s, x, e].map(|c| self.corners[c].id));
+            if self.count == 3 {
+                self.count = 0;
+                return some;
+            }
+            let (a, b) = (self.corners[s].id, self.corners[e].id);
+            self.chords.insert((a.min(b), a.max(b)));
+            self.corners[e].apex = self.corners[x].at;
+            self.after[s] = e;
+            self.before[e] = s;
+            self.age[x] = u32::MAX;
+            self.count -= 1;
+            some = s;
+            for y in [s, e] {
+                self.age[y] += 1;
+                self.consider(y);
+            }
+        }
+        some
+    }
+
+    /// How sharp the corner is, less for sharper ones; `None` if its ear must stay open.
+    fn ear(&self, x: usize) -> Option<f64> {
+        let (s, e) = (self.before[x], self.after[x]);
+        let [cs, cx, ce] = [s, x, e].map(|c| &self.corners[c]);
+        if cs.id == ce.id || cs.id == cx.id || cx.id == ce.id {
+            return None;
+        }
+        let closes = self.count == 3;
+        let chord = (distance2(cs.at, ce.at) as f64).sqrt();
+        let way = (distance2(cs.at, cx.at) as f64).sqrt() + (distance2(cx.at, ce.at) as f64).sqrt();
+        if !closes {
+            let spacing = 0.5 * (self.spacing[s] + self.spacing[e]);
+            let key = (cs.id.min(ce.id), cs.id.max(ce.id));
+            if chord > REACH * spacing
+                || cs.pinched && ce.pinched
+                || self.chords.contains(&key)
+                || (self.edge)(cs.id, ce.id)
+            {
+                return None;
+            }
+        }
+        let n = normal(cs.at, cx.at, ce.at);
+        let size = length(n);
+        let fits = |m: [i128; 3]| {
+            let dot: f64 = (0..3).map(|k| (n[k] * m[k]) as f64).sum();
+            dot >= COS_FOLD * size * length(m)
+        };
+        if n == [0; 3]
+            || on_a_line([cs.file, cx.file, ce.file])
+            || !fits(normal(cx.at, cs.at, cx.apex))
+            || !fits(normal(ce.at, cx.at, ce.apex))
+            || closes && !fits(normal(cs.at, ce.at, cs.apex))
+            || !closes && self.covers(s, x, e, n)
+        {
+            return None;
+        }
+        Some(chord / way)
+    }
+
+    /// True if a corner near by along the loop lies under the ear or above it.
+    fn covers(&self, s: usize, x: usize, e: usize, n: [i128; 3]) -> bool {
+        let [a, b, c] = [s, x, e].map(|y| self.corners[y].at);
+        let n = n.map(|v| v as f64);
+        let under = |p: Point| {
+            let side = |from: Point, to: Point| {
+                let (u, v) = (
+                    sub(to, from).map(|d| d as f64),
+                    sub(p, from).map(|d| d as f64),
+                );
+                let cross = [
+                    u[1] * v[2] - u[2] * v[1],
+                    u[2] * v[0] - u[0] * v[2],
+                    u[0] * v[1] - u[1] * v[0],
+                ];
+                cross[0] * n[0] + cross[1] * n[1] + cross[2] * n[2] >= 0.0
+            };
+            side(a, b) && side(b, c) && side(c, a)
+        };
+        let ends = [s, x, e].map(|y| self.corners[y].id);
+        let (mut left, mut right) = (s, e);
+        for _ in 0..LOOK {
+            left = self.before[left];
+            right = self.after[right];
+            for y in [left, right] {
+                let corner = &self.corners[y];
+                if !ends.contains(&corner.id) && under(corner.at) {
+                    return true;
+                }
+            }
+        }
+        false
+    }
+}

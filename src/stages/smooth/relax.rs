@@ -1,0 +1,225 @@
+//! Relaxing: smoothing that decides only which points are connected (scale space; Digne et al., *Scale
+//! space meshing of raw data point sets*, Computer Graphics Forum 30, 2011). The mesh keeps the positions
+//! that were measured.
+//!
+//! Restricted Voronoi cells disagree where points lie off the surface by a part of their spacing. So
+//! points move only there: patches of points that are smooth already cost a look at some of them.
+
+use super::moved;
+use crate::error::Result;
+use crate::geom::Point;
+use crate::spill::Sections;
+use crate::stages::cells::{Fit, TileRanges, fit_in_store, fit_in_tile};
+use crate::stages::order::{PointStore, StoreWriter};
+use crate::stages::tiles::Tile;
+use crate::stages::tiles::near::Search;
+use crate::stages::tiles::walk::PageCache;
+use crate::workspace::Workspace;
+use crate::workspace::memory::Reservation;
+use serde::Serialize;
+use std::ops::Range;
+use std::sync::atomic::{AtomicU16, AtomicU64, Ordering};
+
+/// Ids in a patch: with ids along a curve, a small piece of surface.
+const PATCH: usize = 256;
+
+/// Of a patch every [`SAMPLE`]th run of [`RUN`] ids is looked at first.
+const SAMPLE: usize = 8;
+const RUN: usize = 16;
+
+/// A point is rough if it lies farther from its plane than this part of the local spacing.
+const ROUGH: f64 = 0.2;
+
+/// A patch moves if more than one in so many points that were looked at is rough.
+const SHARE: u32 = 32;
+
+/// Positions to connect the points by.
+#[derive(Debug)]
+pub struct Relaxed {
+    /// As the store's, each moved or not; `None` if none moved.
+    pub store: Option<PointStore>,
+    /// What was done.
+    pub stats: RelaxStats,
+}
+
+/// Counts of this stage.
+#[derive(Debug, Clone, Copy, Default, Serialize, PartialEq, Eq)]
+pub struct RelaxStats {
+    /// Rounds in which points moved.
+    pub rounds: u32,
+    /// Points that moved, each as often as it did.
+    pub moved: u64,
+}
+
+/// Which patches move, and what was seen of them.
+struct Patches {
+    active: Vec<bool>,
+    seen: Vec<AtomicU16>,
+    rough: Vec<AtomicU16>,
+    _held: Reservation,
+}
+
+impl Patches {
+    fn new(points: usize, workspace: &Workspace) -> Result<Self> {
+        let count = points.div_ceil(PATCH);
+        let counters = || (0..count).map(|_| AtomicU16::new(0)).collect();
+        Ok(Self {
+            _held: workspace.reserve("relax: patches", count as u64 * 5)?,
+            active: vec![true; count],
+            seen: counters(),
+            rough: counters(),
+        })
+    }
+
+    fn note(&self, id: usize, rough: bool) {
+        self.seen[id / PATCH].fetch_add(1, Ordering::Relaxed);
+        self.rough[id / PATCH].fetch_add(u16::from(rough), Ordering::Relaxed);
+    }
+
+    /// Patches stay active where enough was rough; the number of those that do.
+    fn settle(&mut self) -> usize {
+        for (active, (seen, rough)) in self
+            .active
+            .iter_mut()
+            .zip(self.seen.iter_mut().zip(&mut self.rough))
+        {
+            let (seen, rough) = (
+                std::mem::take(seen.get_mut()),
+                std::mem::take(rough.get_mut()),
+            );
+            *active &= u32::from(rough) * SHARE > u32::from(seen);
+        }
+        self.active.iter().filter(|a| **a).count()
+    }
+}
+
+/// At most `rounds` rounds of relaxing: points move to the planes of their `neighbors` nearest, in
+/// each round those of the patches that were rough in the round before.
+///
+/// # Errors
+/// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
+/// [`crate::Error::Cancelled`].
+pub fn relax(
+    store: &PointStore,
+    tiles: TileRanges,
+    neighbors: usize,
+    rounds: u32,
+    workspace: &Workspace,
+) -> Result<Relaxed> {
+    let mut relaxed = Relaxed {
+        store: None,
+        stats: RelaxStats::default(),
+    };
+    let mut patches = Patches::new(store.len(), workspace)?;
+    if rounds > 0 {
+        let sampled = |id: usize| (id / RUN).is_multiple_of(SAMPLE);
+        workspace.part("sample", || {
+            let bytes = |tile: usize| Tile::bytes(tiles.ids(tile).len()) + PageCache::bytes(store);
+            workspace.for_each_unit("relax: tile", tiles.count(), bytes, |tile| {
+                let ids = tiles.ids(tile);
+                each_fit(store, ids, neighbors, sampled, |id, point, fit| {
+                    patches.note(id, target(point, &fit, neighbors).1);
+                })
+            })
+        })?;
+    }
+    for round in 1..=rounds {
+        if patches.settle() == 0 {
+            break;
+        }
+        let current = relaxed.store.as_ref().unwrap_or(store);
+        let count = AtomicU64::new(0);
+        let next = one_round(
+            current, tiles, neighbors, round, &patches, &count, workspace,
+        )?;
+        relaxed.store = Some(next);
+        relaxed.stats.rounds = round;
+        relaxed.stats.moved += count.into_inner();
+    }
+    Ok(relaxed)
+}
+
+fn one_round(
+    store: &PointStore,
+    tiles: TileRanges,
+    neighbors: usize,
+    round: u32,
+    patches: &Patches,
+    count: &AtomicU64,
+    workspace: &Workspace,
+) -> Result<PointStore> {
+    let part = Sections::<3>::create(workspace, &format!("relax{round}"), tiles.count())?;
+    let bytes = |tile: usize| {
+        let points = tiles.ids(tile).len();
+        Tile::bytes(points) + PageCache::bytes(store) + points as u64 * 24
+    };
+    workspace.for_each_unit("relax: tile", tiles.count(), bytes, |tile| {
+        let ids = tiles.ids(tile);
+        let mut points = store.slice(ids.clone())?;
+        let wanted = |id: usize| patches.active[id / PATCH];
+        let mut moved = 0;
+        if ids.clone().step_by(RUN).chain([ids.end - 1]).any(wanted) {
+            each_fit(store, ids.clone(), neighbors, wanted, |id, point, fit| {
+                let (to, rough) = target(point, &fit, neighbors);
+                patches.note(id, rough);
+                points[id - ids.start] = to;
+                moved += 1;
+            })?;
+        }
+        count.fetch_add(moved, Ordering::Relaxed);
+        workspace.observer.advance(points.len() as u64);
+        part.put(tile, bytemuck::cast_slice(&points))
+    })?;
+    let name = format!("relaxed{round}");
+    let mut writer = StoreWriter::create(workspace, &name, store.page_size())?;
+    for tile in 0..tiles.count() {
+        workspace.check_cancel()?;
+        writer.push(bytemuck::cast_slice(&part.get(tile)?))?;
+    }
+    writer.finish(workspace)
+}
+
+/// Calls `each` with the plane of every point of a tile whose id is `wanted`.
+fn each_fit(
+    store: &PointStore,
+    ids: Range<usize>,
+    neighbors: usize,
+    wanted: impl Fn(usize) -> bool,
+    mut each: impl FnMut(usize, Point, Fit),
+) -> Result<()> {
+    let tile = Tile::load(store, ids)?;
+    let mut search = Search::default();
+    let mut uncertain = Vec::new();
+    let mut failed = None;
+    tile.for_some_queries(neighbors, &mut search, wanted, |id, point, query| {
+        let fit = query.map(|mut query| fit_in_tile(&mut query, neighbors));
+        match fit.transpose().map(Option::flatten) {
+            Ok(Some(fit)) => each(id as usize, point, fit),
+            Ok(None) => uncertain.push((id, point)),
+            Err(error) => failed = Some(error),
+        }
+    });
+    if let Some(error) = failed {
+        return Err(error);
+    }
+    drop(tile);
+    let mut cache = PageCache::default();
+    for (id, point) in uncertain {
+        if let Some(fit) = fit_in_store(store, &mut cache, id, point, neighbors)? {
+            each(id as usize, point, fit);
+        }
+    }
+    Ok(())
+}
+
+/// Where a point goes, and whether that is far.
+fn target(point: Point, fit: &Fit, neighbors: usize) -> (Point, bool) {
+    let Some(normal) = fit.plane.normal else {
+        return (point, false);
+    };
+    let offset = fit.moments.project(normal);
+    let length2 = offset[0] * offset[0] + offset[1] * offset[1] + offset[2] * offset[2];
+    // On a plane, `neighbors` points lie in the disk up to the last one.
+    let spacing2 = std::f64::consts::PI * fit.last2 as f64 / neighbors as f64;
+    (moved(point, offset), length2 > ROUGH * ROUGH * spacing2)
+}

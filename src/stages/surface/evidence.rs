@@ -1,0 +1,123 @@
+//! What speaks for an orientation: how flat a surface runs from one triangle to the next.
+//!
+//! Where not everything can be oriented alike, the surface should be cut where it is worst and not
+//! where a block happens to end. Inside a block triangles are joined in the order of flatness; parts
+//! that reach other blocks are joined in the order of all that was seen between them.
+
+use super::parity::ParitySets;
+use super::star::{EDGES, Edges, Triangle, opposed};
+use rustc_hash::FxHashMap;
+
+/// Unit normals of triangles, each by its ascending ids.
+#[derive(Debug, Default)]
+pub struct Evidence {
+    /// Of the triangles around a block, in their order.
+    pub normals: Vec<[f64; 3]>,
+    /// Triangles inside the block that may be inserted later, with their normals.
+    pub candidates: Vec<(Triangle, [f64; 3])>,
+}
+
+/// The cosine of the angle between two triangles when they run alike, `flip` if one must be turned
+/// for that.
+#[must_use]
+pub fn cosine(a: [f64; 3], b: [f64; 3], flip: bool) -> f64 {
+    let dot = a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    if flip { -dot } else { dot }
+}
+
+/// Weight of a connection through an edge: 1 for a fold, 16 where it is flat.
+#[must_use]
+pub fn weight(cosine: f64) -> i64 {
+    1 + (cosine.max(0.0) * 15.0) as i64
+}
+
+/// Flatter than this, triangles are joined before all others, in any order.
+const FLAT: f64 = 0.9;
+
+/// Steps of flatness below [`FLAT`].
+const STEPS: usize = 64;
+
+/// Joins `triangles` across the edges inside a block, the flattest first. Of two that would have to
+/// run both ways the later one is marked as dead.
+pub fn join_by_flatness(
+    triangles: &[Triangle],
+    normals: &[[f64; 3]],
+    edges: &Edges,
+    sets: &mut ParitySets,
+) -> Vec<bool> {
+    let mut steps: Vec<Vec<(u32, u32, bool)>> = vec![Vec::new(); STEPS];
+    let mut dead = vec![false; triangles.len()];
+    let mut join = |(n, m, flip): (u32, u32, bool)| {
+        if !sets.join(n, m, flip) {
+            dead[m as usize] = true;
+        }
+    };
+    for (number, t) in triangles.iter().enumerate() {
+        let n = number as u32;
+        for (a, b, ..) in EDGES {
+            for m in edges.at(t[a], t[b]).filter(|m| *m > n) {
+                let flip = opposed(*t, triangles[m as usize], t[a], t[b]);
+                let cosine = cosine(normals[number], normals[m as usize], flip);
+                if cosine > FLAT {
+                    join((n, m, flip));
+                } else {
+                    let step = (FLAT - cosine) / (1.0 + FLAT) * (STEPS - 1) as f64;
+                    steps[(step as usize).min(STEPS - 1)].push((n, m, flip));
+                }
+            }
+        }
+    }
+    steps.into_iter().flatten().for_each(join);
+    dead
+}
+
+/// Votes on how labels run against each other: positive alike, negative turned.
+#[derive(Debug, Default)]
+pub struct Votes {
+    pairs: FxHashMap<(u32, u32), i64>,
+}
+
+impl Votes {
+    /// Adds a vote on labels `a` and `b`; one on a label against itself says nothing.
+    pub fn add(&mut self, a: u32, b: u32, flip: bool, weight: i64) {
+        if a != b {
+            let pair = self.pairs.entry((a.min(b), a.max(b))).or_default();
+            *pair += if flip { -weight } else { weight };
+        }
+    }
+
+    /// Number of pairs.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.pairs.len()
+    }
+
+    /// True if there is no vote.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.pairs.is_empty()
+    }
+
+    /// All pairs with what was decided, ascending.
+    #[must_use]
+    pub fn counted(self) -> Vec<(u32, u32, i64)> {
+        let mut all: Vec<_> = self
+            .pairs
+            .into_iter()
+            .map(|((a, b), n)| (a, b, n))
+            .collect();
+        all.sort_unstable();
+        all
+    }
+
+    /// Joins labels in the order of how clear the votes are.
+    pub fn join(self, sets: &mut ParitySets) {
+        let mut all = self.counted();
+        all.sort_by_key(|&(_, _, votes)| std::cmp::Reverse(votes.unsigned_abs()));
+        for (a, b, votes) in all {
+            if votes != 0 {
+                sets.join(a, b, votes < 0);
+            }
+        }
+    }
+}

@@ -1,0 +1,129 @@
+//! Orientation by evidence: inside a block, and between blocks.
+
+use super::evidence::{Evidence, Votes, cosine, join_by_flatness, weight};
+use super::orient::{Bonds, Oriented, OrientedBlock, adjacent, number_labels};
+use super::parity::ParitySets;
+use super::star::{EDGES, Edges, Triangle, opposed};
+use crate::error::Result;
+use crate::spill::Sections;
+use crate::stages::blocks::Blocks;
+use crate::workspace::Workspace;
+use rustc_hash::FxHashMap;
+
+/// Orients a block by what the evidence says; a triangle that would have to run both ways is removed.
+pub(super) fn weigh_block(
+    inner: &[Triangle],
+    crossing: &[Triangle],
+    all: &[Triangle],
+    evidence: &Evidence,
+    blocks: Blocks,
+    block: usize,
+) -> OrientedBlock {
+    let ids = blocks.ids(block);
+    let mut normals = Vec::with_capacity(inner.len());
+    let mut outer = Vec::with_capacity(crossing.len());
+    for (t, normal) in all.iter().zip(&evidence.normals) {
+        if blocks.crossing(*t) {
+            outer.push(*normal);
+        } else {
+            normals.push(*normal);
+        }
+    }
+    let mut edges = Edges::with_room(ids.clone(), inner);
+    for (number, &t) in inner.iter().enumerate() {
+        edges.add(t, number as u32);
+    }
+    let mut sets = ParitySets::new(inner.len());
+    let dead = join_by_flatness(inner, &normals, &edges, &mut sets);
+    let kept: Vec<u32> = (0..inner.len() as u32)
+        .filter(|n| !dead[*n as usize])
+        .collect();
+    let mut bonds = Bonds::default();
+    for (&c, &normal) in crossing.iter().zip(&outer) {
+        adjacent(c, &edges, inner, &ids, |other, flip| {
+            if !dead[other as usize] {
+                let cosine = cosine(normal, normals[other as usize], flip);
+                bonds.relations.push((c, other, flip, weight(cosine)));
+            }
+        });
+    }
+    for &(c, normal) in &evidence.candidates {
+        let mut asks: [(u32, bool, f64); 3] = [(0, false, 0.0); 3];
+        let mut count = 0;
+        adjacent(c, &edges, inner, &ids, |other, flip| {
+            if !dead[other as usize] && count < 3 {
+                let cosine = cosine(normal, normals[other as usize], flip);
+                asks[count] = (other, flip, cosine);
+                count += 1;
+            }
+        });
+        for x in 1..count {
+            for y in 0..x {
+                let ((a, flip_a, cos_a), (b, flip_b, cos_b)) = (asks[x], asks[y]);
+                let flip = flip_a ^ flip_b;
+                bonds.votes.push((a, b, flip, weight(cos_a.min(cos_b))));
+            }
+        }
+    }
+    let mobius = (inner.len() - kept.len()) as u64;
+    number_labels(inner, &kept, bonds, &mut sets, blocks, block, mobius)
+}
+
+/// Joins the global labels by the votes of all crossing triangles and candidates.
+pub(super) fn vote(
+    surface: &mut Oriented,
+    border: impl Fn(usize) -> Result<Vec<Triangle>>,
+    relations: &Sections<7>,
+    candidates: &Sections<3>,
+    blocks: Blocks,
+    workspace: &Workspace,
+) -> Result<()> {
+    let mut votes = Votes::default();
+    for block in 0..blocks.count() {
+        let first = surface.globals[block].0;
+        for [a, b, count] in candidates.get(block)? {
+            votes.add(first + a, first + b, false, i64::from(count as i32));
+        }
+    }
+    let mut edges: FxHashMap<(u32, u32), Vec<(Triangle, u32)>> = FxHashMap::default();
+    for group in 0..blocks.count() {
+        workspace.check_cancel()?;
+        let relations = relations.get(group)?;
+        for t in border(group)? {
+            let key = [group as u32, t[0], t[1], t[2]];
+            let start = relations.partition_point(|r| r[..4] < key[..]);
+            let mut asks: Vec<(u32, bool, i64)> = relations[start..]
+                .iter()
+                .take_while(|r| r[..4] == key[..])
+                .map(|r| {
+                    let label = surface.globals[r[4] as usize].0 + (r[5] >> 1);
+                    (label, r[5] & 1 == 1, CROSSING * i64::from(r[6]))
+                })
+                .collect();
+            for (a, b, ..) in EDGES {
+                for &(other, word) in edges.get(&(t[a], t[b])).into_iter().flatten() {
+                    let flip = opposed(t, other, t[a], t[b]) ^ (word & 1 == 1);
+                    asks.push((word >> 1, flip, CROSSING * weight(0.0)));
+                }
+            }
+            // It runs as its strongest neighbour asks; the others are votes.
+            let Some(&(label, flip, _)) = asks.iter().rev().max_by_key(|ask| ask.2) else {
+                continue;
+            };
+            for &(other, turned, weight) in &asks {
+                votes.add(label, other, flip ^ turned, weight);
+            }
+            let word = label << 1 | u32::from(flip);
+            for (a, b, ..) in EDGES {
+                edges.entry((t[a], t[b])).or_default().push((t, word));
+            }
+        }
+        edges.retain(|(low, _), _| blocks.of(*low) > group as u32);
+    }
+    let _held = workspace.reserve("votes", votes.len() as u64 * 72)?;
+    votes.join(&mut surface.sets);
+    Ok(())
+}
+
+/// A crossing triangle of the surface counts for so many candidates.
+const CROSSING: i64 = 8;

@@ -1,0 +1,98 @@
+//! The error of a reconstruction where no ground truth is known: some points of a scan are left out,
+//! the others are made into a mesh, and the distance of the left-out points to it is measured.
+//!
+//! `split` draws the points, `measure` takes the distances, `row` prints what came of it as a line
+//! of a Markdown table. All three hold their points in memory.
+
+mod error;
+mod measure;
+mod ply;
+mod read;
+mod row;
+mod split;
+
+use bytesize::ByteSize;
+use clap::{Args, Parser, Subcommand};
+use error::{Error, Result};
+use outcrop::pipeline::{default_memory, default_threads};
+use outcrop::workspace::Workspace;
+use outcrop::workspace::memory::MemoryPool;
+use outcrop::workspace::progress::{Cancel, Silent};
+use std::io::Write;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::Arc;
+
+/// Measures a reconstruction by points that it did not see.
+#[derive(Debug, Parser)]
+#[command(name = "holdout", version, max_term_width = 100)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Leave out random points of a scan
+    Split(split::Split),
+    /// Distance of the points left out to the mesh of the others, in units of the local spacing
+    ///
+    /// The local spacing at a point left out is the mean, over the 8 points nearest to it of those that
+    /// stayed, of the distance from each to the nearest other point that stayed. Percentiles are the
+    /// smallest value that so many points do not exceed.
+    Measure(measure::Measure),
+    /// Print a row of a Markdown table from the JSON files of one run
+    Row(row::Row),
+}
+
+/// Limits of what the library does for this program.
+#[derive(Debug, Args)]
+struct Limits {
+    /// Ceiling for the memory of outcrop's part, e.g. 1GiB; points come on top
+    /// [default: half of what machine and cgroup allow]
+    #[arg(long, value_name = "SIZE")]
+    memory: Option<ByteSize>,
+    /// Worker threads [default: all available]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    threads: Option<u16>,
+    /// Folder for scratch files [default: the system's]
+    #[arg(long, value_name = "DIR")]
+    scratch: Option<PathBuf>,
+}
+
+impl Limits {
+    fn workspace(&self) -> Result<Workspace> {
+        let memory = self.memory.map_or_else(default_memory, |m| m.as_u64());
+        let threads = self.threads.map_or_else(default_threads, usize::from);
+        let scratch = self.scratch.clone().unwrap_or_else(std::env::temp_dir);
+        let pool = MemoryPool::new(memory)?;
+        let silent = Arc::new(Silent);
+        Ok(Workspace::new(
+            &scratch,
+            pool,
+            threads,
+            silent,
+            Cancel::new(),
+        )?)
+    }
+}
+
+fn run(command: &Command) -> Result<()> {
+    let text = match command {
+        Command::Split(split) => split::run(split)?,
+        Command::Measure(measure) => measure::run(measure)?,
+        Command::Row(row) => row::run(row)?,
+    };
+    let mut out = std::io::stdout().lock();
+    writeln!(out, "{text}").map_err(|e| Error::io("standard output", "write", e))
+}
+
+fn main() -> ExitCode {
+    match run(&Arguments::parse().command) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("holdout: {error}");
+            ExitCode::from(2)
+        }
+    }
+}
