@@ -160,3 +160,37 @@ fn too_few_points_have_no_outliers() {
         assert!(count > 8 || left.len() == points.len());
     }
 }
+
+/// Why a point is not compared with the same eight: outliers have outliers for neighbours.
+#[test]
+fn the_eight_nearest_would_not_do() {
+    let cloud = Cloud::new(Kind::Torus).points(4000).outliers(0.05);
+    let generator = cloud.generator().unwrap();
+    let all = points(&generator);
+    let nearest = |i: usize| {
+        let mut near: Vec<_> = (0..all.len())
+            .filter(|&j| j != i)
+            .map(|j| (distance2(all[i], all[j]), j))
+            .collect();
+        near.select_nth_unstable(7);
+        near.truncate(8);
+        near
+    };
+    let near: Vec<_> = (0..all.len()).map(nearest).collect();
+    let spacing = |i: usize| near[i].iter().map(|n| (n.0 as f64).sqrt()).sum::<f64>();
+    let stays = |i: &usize| {
+        let mut around: Vec<f64> = near[*i].iter().map(|n| spacing(n.1)).collect();
+        around.sort_unstable_by(f64::total_cmp);
+        spacing(*i) <= 5.0 * around[4]
+    };
+    let far = |p: &Point| generator.distance(coordinates(*p)) > 150.0;
+    let before = all.iter().filter(|p| far(p)).count();
+    let of_eight = (0..all.len())
+        .filter(stays)
+        .filter(|&i| far(&all[i]))
+        .count();
+    let of_many = kept(&all, 5.0, 1 << 16, 256).0;
+    let of_many = of_many.iter().filter(|p| far(p)).count();
+    let told = format!("{before} far: {of_eight} left by eight, {of_many} by more");
+    assert!(of_eight * 2 > before && of_many * 20 < before, "{told}");
+}
