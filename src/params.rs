@@ -1,6 +1,7 @@
 //! The geometric parameters of a reconstruction, checked once.
 
 use crate::error::{Error, Result};
+use crate::stages::ingest::Classes;
 
 /// Radius of the disks (paper, section 3.4).
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
@@ -60,6 +61,12 @@ impl std::str::FromStr for Method {
 /// bytes.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Params {
+    /// Points to read, by class.
+    pub classes: Classes,
+    /// Keep at most one point in each cube of this side, in the input's unit.
+    pub thin: Option<f64>,
+    /// Drop points whose spacing is this many times as large as around them.
+    pub drop_outliers: Option<f64>,
     /// How the surface is made; [`Params::paper`] sets what goes with the paper's.
     pub method: Method,
     /// Neighbours for planes and smoothing (paper: 30).
@@ -87,12 +94,18 @@ pub struct Params {
 /// The block size that a reconstruction uses unless a test asks for another.
 pub const BLOCK: u32 = 1 << 16;
 
+/// The factor of [`Params::drop_outliers`] that suits most clouds.
+pub const OUTLIER_FACTOR: f64 = 5.0;
+
 /// Largest number of neighbours that can be asked for.
 pub const MAX_NEIGHBORS: usize = 255;
 
 impl Default for Params {
     fn default() -> Self {
         Self {
+            classes: Classes::All,
+            thin: None,
+            drop_outliers: None,
             method: Method::Robust,
             neighbors: 30,
             smooth: 0,
@@ -137,6 +150,16 @@ impl Params {
                 expected: expected.into(),
             })
         };
+        if let Some(side) = self.thin
+            && !(side > 0.0 && side.is_finite())
+        {
+            return error("--thin", side.to_string(), "a positive length");
+        }
+        if let Some(factor) = self.drop_outliers
+            && !(factor >= 1.0 && factor.is_finite())
+        {
+            return error("--drop-outliers", factor.to_string(), "1 or more");
+        }
         if !(3..=MAX_NEIGHBORS).contains(&self.neighbors) {
             return error("--neighbors", self.neighbors.to_string(), "3 to 255");
         }

@@ -1,5 +1,7 @@
 //! The driver: the stages in the order the data flows.
 
+mod points;
+
 use crate::error::{Error, Result};
 use crate::geom::lattice::Lattice;
 use crate::params::{Method, Params, Radius};
@@ -7,9 +9,9 @@ use crate::report::{LatticeReport, PartReport, Report, StageReport};
 use crate::stages::blocks::Blocks;
 use crate::stages::cells::{CellStats, DiskRadius, TileRanges, cells};
 use crate::stages::export::{CoordinateType, export};
-use crate::stages::ingest::{self, READ_BUFFERS, Spool, ingest};
+use crate::stages::ingest::{self, ingest_classes};
 use crate::stages::located::Places;
-use crate::stages::order::{Orderer, PAGE, PointStore};
+use crate::stages::order::{PAGE, PointStore};
 use crate::stages::repair::{RepairOptions, repair};
 use crate::stages::smooth::{relax, smooth};
 use crate::stages::stitch::{StitchOptions, stitch};
@@ -17,6 +19,7 @@ use crate::stages::triples::triples;
 use crate::workspace::memory::MemoryPool;
 use crate::workspace::progress::{Cancel, Observer, Silent};
 use crate::workspace::{Workspace, limits};
+pub(crate) use points::order;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
@@ -240,7 +243,9 @@ impl Reconstruction {
         let params = &self.params;
         let mut clock = Clock::new(workspace);
 
-        let spool = clock.stage("ingest", "points", 0, || ingest(&self.inputs, workspace))?;
+        let spool = clock.stage("ingest", "points", 0, || {
+            ingest_classes(&self.inputs, &params.classes, workspace)
+        })?;
         let input = spool.stats().clone();
         let mut warnings = input.warnings.clone();
         if input.dropped_non_finite > 0 {
@@ -249,7 +254,7 @@ impl Reconstruction {
                 "{count} points left out: a coordinate is NaN or infinite"
             ));
         }
-        room(&self.scratch, input.kept)?;
+        room(&self.scratch, input.kept * self.scratch_per_point())?;
         let coordinates = match spool.source_precision() {
             ingest::CoordinateType::F32 => CoordinateType::Float,
             ingest::CoordinateType::F64 => CoordinateType::Double,
@@ -260,10 +265,8 @@ impl Reconstruction {
             0
         };
         let lattice = spool.choose_lattice(refine)?;
-        let (mut store, duplicates_folded) = clock.stage("order", "points", input.kept, || {
-            order(spool, &lattice, self.page_points, workspace)
-        })?;
-        let points = store.len() as u64;
+        let (store, duplicates_folded, thin) =
+            self.in_order(spool, &lattice, &mut clock, workspace)?;
         if !lattice.exact && duplicates_folded > input.kept / 100 {
             warnings.push(format!(
                 "{duplicates_folded} points fell together: the cloud is so wide that positions had to \
@@ -273,6 +276,12 @@ impl Reconstruction {
         }
         warnings.iter().for_each(|w| self.observer.warn(w));
         enough(&store)?;
+        if params.thin.is_some() {
+            room(&self.scratch, store.len() as u64 * SCRATCH_PER_POINT)?;
+        }
+        let (mut store, outliers) = self.without_outliers(store, &mut clock, workspace)?;
+        enough(&store)?;
+        let points = store.len() as u64;
         let radius = disk_radius(params.radius, &store, &lattice);
         let blocks = Blocks::new(store.len(), params.block);
         let tiles = TileRanges::new(blocks, self.tile_points);
@@ -340,6 +349,8 @@ impl Reconstruction {
             warnings,
             input,
             duplicates_folded,
+            thin,
+            outliers,
             points,
             lattice: LatticeReport {
                 step: lattice.step,
@@ -365,24 +376,6 @@ impl Reconstruction {
             stages: clock.stages,
         })
     }
-}
-
-/// Puts all points of a spool in order; the spool is deleted.
-pub(crate) fn order(
-    spool: Spool,
-    lattice: &Lattice,
-    page: usize,
-    workspace: &Workspace,
-) -> Result<(PointStore, u64)> {
-    // Their buffers must not take much of what is there to sort in.
-    let most = workspace.memory.available() / (8 * READ_BUFFERS);
-    let threads = workspace.threads.min(most as usize).max(1);
-    let held = workspace.reserve("order: frames", threads as u64 * READ_BUFFERS)?;
-    let orderer = Orderer::new(workspace)?;
-    spool.par_for_each(threads, lattice, |points| orderer.push(workspace, points))?;
-    drop(held);
-    drop(spool);
-    orderer.finish(workspace, page)
 }
 
 /// Disks larger than this, in steps, see all of any cloud.
@@ -420,8 +413,7 @@ fn writable(output: &Path) -> Result<()> {
 pub(crate) const SCRATCH_PER_POINT: u64 = 50;
 
 /// Refuses before the long stages what the scratch folder has no room for.
-fn room(scratch: &Path, points: u64) -> Result<()> {
-    let needed = points * SCRATCH_PER_POINT;
+fn room(scratch: &Path, needed: u64) -> Result<()> {
     match limits::disk_free(scratch) {
         Some(free) if free < needed => Err(Error::Disk {
             path: scratch.to_path_buf(),

@@ -4,9 +4,11 @@ use crate::params::Params;
 use crate::stages::cells::CellStats;
 use crate::stages::export::{CoordinateType, MeshStats};
 use crate::stages::ingest::IngestStats;
+use crate::stages::outliers::OutlierStats;
 use crate::stages::repair::RepairStats;
 use crate::stages::smooth::RelaxStats;
 use crate::stages::stitch::{BaseStats, InsertStats};
+use crate::stages::thin::ThinStats;
 use crate::stages::triples::TripleStats;
 use serde::Serialize;
 
@@ -25,7 +27,11 @@ pub struct Report {
     pub input: IngestStats,
     /// Points that share their position with another one and were folded into it.
     pub duplicates_folded: u64,
-    /// Distinct points: what the surface is made from.
+    /// Thinning, if asked for.
+    pub thin: ThinStats,
+    /// Outliers, if they were to be dropped.
+    pub outliers: OutlierStats,
+    /// Points left: what the surface is made from.
     pub points: u64,
     /// The lattice that positions are kept on.
     pub lattice: LatticeReport,

@@ -1,6 +1,7 @@
 //! Flags, as the user gives them.
 
 use crate::params::{Method, Params, Radius};
+use crate::stages::ingest::Classes;
 use clap::{Args as ClapArgs, Parser, Subcommand};
 use std::path::PathBuf;
 
@@ -62,6 +63,63 @@ pub struct Limits {
     pub quiet: bool,
 }
 
+/// Which points are read.
+#[derive(Debug, ClapArgs)]
+#[command(next_help_heading = "Points")]
+pub struct Points {
+    /// Leave out points of these classes (LAS, LAZ), e.g. 7,18 for noise
+    #[arg(
+        long,
+        value_name = "CLASSES",
+        value_delimiter = ',',
+        conflicts_with = "keep_classes"
+    )]
+    pub drop_classes: Vec<u8>,
+    /// Read only points of these classes (LAS, LAZ), e.g. 2,6 for ground and buildings
+    #[arg(long, value_name = "CLASSES", value_delimiter = ',')]
+    pub keep_classes: Vec<u8>,
+}
+
+/// Which points are left of those.
+#[derive(Debug, ClapArgs)]
+#[command(next_help_heading = "Points")]
+pub struct Filters {
+    /// Keep at most one point in each cube of this side, in the cloud's unit: the one nearest to its
+    /// centre
+    #[arg(long, value_name = "LENGTH")]
+    pub thin: Option<f64>,
+    /// Drop points that are FACTOR times as far from their neighbours as the points around them are
+    /// from theirs [without a number: 5]
+    #[arg(
+        long,
+        value_name = "FACTOR",
+        num_args = 0..=1,
+        require_equals = true,
+        default_missing_value = OUTLIER_FACTOR_TEXT
+    )]
+    pub drop_outliers: Option<f64>,
+}
+
+/// [`crate::params::OUTLIER_FACTOR`] as text.
+const OUTLIER_FACTOR_TEXT: &str = "5";
+
+impl Points {
+    /// The classes to read.
+    pub fn classes(&self) -> Classes {
+        let sorted = |classes: &[u8]| {
+            let mut classes = classes.to_vec();
+            classes.sort_unstable();
+            classes.dedup();
+            classes
+        };
+        match (self.keep_classes.as_slice(), self.drop_classes.as_slice()) {
+            ([], []) => Classes::All,
+            ([], dropped) => Classes::Drop(sorted(dropped)),
+            (kept, _) => Classes::Keep(sorted(kept)),
+        }
+    }
+}
+
 /// Geometric parameters.
 #[derive(Debug, ClapArgs)]
 #[command(next_help_heading = "Surface")]
@@ -116,6 +174,10 @@ pub struct Reconstruct {
     #[arg(long, short, value_name = "MESH.ply")]
     pub output: PathBuf,
     #[command(flatten)]
+    pub points: Points,
+    #[command(flatten)]
+    pub filters: Filters,
+    #[command(flatten)]
     pub surface: Surface,
     #[command(flatten)]
     pub repair: Repair,
@@ -139,6 +201,8 @@ pub struct Info {
     #[arg(long)]
     pub json: bool,
     #[command(flatten)]
+    pub points: Points,
+    #[command(flatten, next_help_heading = "Limits")]
     pub limits: Limits,
 }
 
@@ -201,6 +265,9 @@ impl Reconstruct {
             Method::Paper => Params::paper(),
         };
         Params {
+            classes: self.points.classes(),
+            thin: self.filters.thin,
+            drop_outliers: self.filters.drop_outliers,
             neighbors: self.surface.neighbors,
             smooth: self.surface.smooth,
             relax: self.surface.relax.unwrap_or(usual.relax),
@@ -238,6 +305,14 @@ mod tests {
     fn flags_are_well_formed() {
         use clap::CommandFactory;
         Args::command().debug_assert();
+    }
+
+    #[test]
+    fn the_default_factor_is_what_the_library_says() {
+        assert_eq!(
+            OUTLIER_FACTOR_TEXT.parse(),
+            Ok(crate::params::OUTLIER_FACTOR)
+        );
     }
 
     #[test]

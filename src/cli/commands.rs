@@ -144,12 +144,29 @@ fn summary(report: &Report, output: &Path) -> String {
         style::seconds(report.seconds),
         style::bytes(report.peak_resident_bytes),
         style::bytes(report.peak_scratch_bytes),
-    )
+    ) + &left_out(report)
+}
+
+/// A line about the points that options left out, if there are any.
+fn left_out(report: &Report) -> String {
+    let reasons: Vec<String> = [
+        (report.input.dropped_by_class, "of other classes"),
+        (report.thin.dropped, "by thinning"),
+        (report.outliers.dropped, "outliers"),
+    ]
+    .iter()
+    .filter(|(count, _)| *count > 0)
+    .map(|(count, why)| format!("{} {why}", style::grouped(*count)))
+    .collect();
+    match reasons.as_slice() {
+        [] => String::new(),
+        reasons => format!("\npoints left out: {}", reasons.join(", ")),
+    }
 }
 
 fn tell(args: &Info) -> Result<Answer> {
     let workspace = workspace(&args.limits, &std::env::temp_dir())?;
-    let info = info::info(&args.inputs, &workspace)?;
+    let info = info::info(&args.inputs, &args.points.classes(), &workspace)?;
     print(&if args.json {
         json(&info)?
     } else {

@@ -4,7 +4,7 @@ use crate::error::Result;
 use crate::geom::aabb::Aabb;
 use crate::pipeline::{SCRATCH_PER_POINT, order};
 use crate::stages::cells::{AUTO_REACH, CellMaker, DiskRadius};
-use crate::stages::ingest::{IngestStats, ingest};
+use crate::stages::ingest::{Classes, IngestStats, ingest_classes};
 use crate::stages::order::{PAGE, PointStore};
 use crate::stages::tiles::Tile;
 use crate::stages::tiles::near::Search;
@@ -67,15 +67,15 @@ pub struct Info {
     pub seconds: f64,
 }
 
-/// Reads the whole cloud once and samples it.
+/// Reads the whole cloud once, or the points of the wanted classes, and samples it.
 ///
 /// # Errors
 /// As for a reconstruction, but a cloud too small for a surface is no error.
-pub fn info(inputs: &[PathBuf], workspace: &Workspace) -> Result<Info> {
+pub fn info(inputs: &[PathBuf], classes: &Classes, workspace: &Workspace) -> Result<Info> {
     let start = Instant::now();
     let observer = &workspace.observer;
     observer.begin("ingest", "points", 0);
-    let spool = ingest(inputs, workspace)?;
+    let spool = ingest_classes(inputs, classes, workspace)?;
     observer.end();
     let input = spool.stats().clone();
     let lattice = spool.choose_lattice(0)?;
@@ -184,8 +184,11 @@ impl fmt::Display for Info {
         )?;
         writeln!(
             f,
-            "left out     {} duplicates, {} not finite, {} withheld",
-            self.duplicates, self.input.dropped_non_finite, self.input.withheld
+            "left out     {} duplicates, {} not finite, {} withheld, {} of other classes",
+            self.duplicates,
+            self.input.dropped_non_finite,
+            self.input.withheld,
+            self.input.dropped_by_class
         )?;
         writeln!(f, "lowest       {}", three(&self.min))?;
         writeln!(f, "highest      {}", three(&self.max))?;

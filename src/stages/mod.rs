@@ -5,6 +5,10 @@ pub mod order;
 
 pub mod tiles;
 
+pub mod thin;
+
+pub mod outliers;
+
 pub mod smooth;
 
 pub mod cells;

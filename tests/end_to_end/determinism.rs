@@ -138,6 +138,36 @@ fn nor_do_they_with_smoothing() {
 }
 
 #[test]
+fn nor_do_they_with_fewer_points() {
+    let bench = Bench::new();
+    let cloud = nasty(150_000);
+    let path = bench.cloud("cloud.laz", &cloud);
+    let format = Format::from_path(&path).unwrap();
+    let mut parts = cloud
+        .write_split(bench.path("part.laz"), format, 3)
+        .unwrap();
+    parts.reverse();
+    let params = Params {
+        thin: Some(4.3),
+        drop_outliers: Some(3.0),
+        ..Params::default()
+    };
+    let mut ways = settings(&Way::of(&path));
+    ways.push(ways[0].clone().inputs(&parts));
+    one_hash(&bench, &params, &ways);
+    let params = Params {
+        smooth: 1,
+        drop_outliers: Some(3.0),
+        block: 1000,
+        ..Params::default()
+    };
+    let small = bench.cloud("small.laz", &nasty(20_000));
+    let mut ways = settings(&Way::of(&small));
+    ways.push(ways[0].clone().tile(97).page(7));
+    one_hash(&bench, &params, &ways);
+}
+
+#[test]
 fn nor_do_they_where_many_blocks_meet() {
     let bench = Bench::new();
     let cloud = bench.cloud("cloud.laz", &nasty(60_000));

@@ -3,6 +3,7 @@
 mod bad_input;
 mod cli;
 mod determinism;
+mod filters;
 mod library;
 mod report;
 mod scans;

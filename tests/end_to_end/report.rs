@@ -7,6 +7,9 @@ use serde_json::Value;
 /// Every key that a user may rely on.
 const KEYS: &[&str] = &[
     "/version",
+    "/parameters/classes",
+    "/parameters/thin",
+    "/parameters/drop_outliers",
     "/parameters/neighbors",
     "/parameters/smooth",
     "/parameters/radius",
@@ -20,6 +23,7 @@ const KEYS: &[&str] = &[
     "/input/kept",
     "/input/dropped_non_finite",
     "/input/withheld",
+    "/input/dropped_by_class",
     "/input/files/0/path",
     "/input/files/0/format",
     "/input/files/0/bytes",
@@ -27,6 +31,9 @@ const KEYS: &[&str] = &[
     "/input/files/0/points",
     "/input/files/0/kept",
     "/duplicates_folded",
+    "/thin/dropped",
+    "/outliers/dropped",
+    "/outliers/rounds",
     "/points",
     "/lattice/step",
     "/lattice/exact",

@@ -1,6 +1,7 @@
 //! Files of every kind made on the spot, read back as lattice positions.
 
 mod bench;
+mod classes;
 mod damage;
 mod lattices;
 

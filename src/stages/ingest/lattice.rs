@@ -55,11 +55,22 @@ pub(super) fn choose(sources: &[Source], stats: &IngestStats, refine: u32) -> Re
 }
 
 fn no_points(stats: &IngestStats) -> Error {
-    let left_out = match (stats.dropped_non_finite, stats.withheld) {
-        (0, 0) => String::new(),
-        (d, w) => {
-            format!(" ({d} with coordinates that are no numbers, {w} withheld were left out)")
-        }
+    let reasons = [
+        (
+            stats.dropped_non_finite,
+            "with coordinates that are no numbers",
+        ),
+        (stats.withheld, "withheld"),
+        (stats.dropped_by_class, "of classes that are not wanted"),
+    ];
+    let reasons: Vec<String> = reasons
+        .iter()
+        .filter(|(count, _)| *count > 0)
+        .map(|(count, why)| format!("{count} {why}"))
+        .collect();
+    let left_out = match reasons.as_slice() {
+        [] => String::new(),
+        reasons => format!(" ({} were left out)", reasons.join(", ")),
     };
     Error::Degenerate {
         found: format!(

@@ -7,6 +7,7 @@
 //! Formats are told apart by content: LAS 1.0 to 1.4 with point formats 0 to 10, LAZ (COPC
 //! included), PLY, and text with a point a line.
 
+mod classes;
 mod contain;
 mod expand;
 mod format;
@@ -22,6 +23,7 @@ mod stats;
 mod stream;
 mod text;
 
+pub use classes::Classes;
 pub use expand::expand;
 pub use format::Format;
 pub use probe::{Probe, probe};
@@ -67,14 +69,29 @@ pub struct Spool {
 /// [`crate::Error::Input`] for a file that is not what it claims to be; [`crate::Error::Io`],
 /// [`crate::Error::Disk`], [`crate::Error::Memory`], [`crate::Error::Cancelled`].
 pub fn ingest(inputs: &[PathBuf], workspace: &Workspace) -> Result<Spool> {
+    ingest_classes(inputs, &Classes::All, workspace)
+}
+
+/// As [`ingest`], but takes only the points whose class is wanted.
+///
+/// # Errors
+/// See [`ingest`].
+pub fn ingest_classes(
+    inputs: &[PathBuf],
+    classes: &Classes,
+    workspace: &Workspace,
+) -> Result<Spool> {
     let file = SpoolFile::create(workspace)?;
     let mut sources = Vec::new();
     let mut stats = IngestStats::default();
     for path in expand(inputs)? {
         workspace.check_cancel()?;
         let opened = Opened::new(&path, workspace.io.clone())?;
-        let target = SourceWriter::new(workspace, &file, sources.len() as u32);
-        let warnings = opened.read(&target)?;
+        let target = SourceWriter::new(workspace, &file, sources.len() as u32, classes);
+        let mut warnings = opened.read(&target)?;
+        if *classes != Classes::All && opened.las().is_none() {
+            warnings.push("its points have no class, all of them are kept".to_owned());
+        }
         let source = Source {
             native: opened.native(),
             stats: target.into_stats(),
@@ -179,6 +196,7 @@ impl IngestStats {
         self.kept += stats.kept;
         self.dropped_non_finite += stats.dropped;
         self.withheld += stats.withheld;
+        self.dropped_by_class += stats.unwanted;
         let bounds = source.bounds();
         self.files.push(FileStats {
             path: opened.input.path.clone(),
@@ -189,6 +207,7 @@ impl IngestStats {
             kept: stats.kept,
             dropped_non_finite: stats.dropped,
             withheld: stats.withheld,
+            dropped_by_class: stats.unwanted,
             min: bounds.map(|b| b[0]),
             max: bounds.map(|b| b[1]),
         });

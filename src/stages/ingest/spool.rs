@@ -4,6 +4,7 @@
 //! the other header words too. Frames may be appended by several threads; their order has no
 //! meaning.
 
+use super::Classes;
 use super::source::{Native, Source};
 use super::stats::SourceStats;
 use crate::error::{Error, Result};
@@ -122,15 +123,23 @@ pub(super) struct SourceWriter<'a> {
     pub(super) workspace: &'a Workspace,
     file: &'a SpoolFile,
     source: u32,
+    /// Points to take, where they have a class.
+    pub(super) classes: &'a Classes,
     stats: Mutex<SourceStats>,
 }
 
 impl<'a> SourceWriter<'a> {
-    pub(super) fn new(workspace: &'a Workspace, file: &'a SpoolFile, source: u32) -> Self {
+    pub(super) fn new(
+        workspace: &'a Workspace,
+        file: &'a SpoolFile,
+        source: u32,
+        classes: &'a Classes,
+    ) -> Self {
         Self {
             workspace,
             file,
             source,
+            classes,
             stats: Mutex::default(),
         }
     }
@@ -192,6 +201,13 @@ impl<T: Coordinate> Sink<'_, T> {
     pub(super) fn withhold(&mut self) {
         self.stats.read += 1;
         self.stats.withheld += 1;
+    }
+
+    /// Counts a point whose class is not wanted.
+    #[inline]
+    pub(super) fn leave_out(&mut self) {
+        self.stats.read += 1;
+        self.stats.unwanted += 1;
     }
 
     fn flush(&mut self) -> Result<()> {

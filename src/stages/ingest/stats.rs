@@ -15,6 +15,8 @@ pub struct IngestStats {
     pub dropped_non_finite: u64,
     /// Points left out because the file flags them as withheld.
     pub withheld: u64,
+    /// Points left out because their class is not wanted.
+    pub dropped_by_class: u64,
     /// The same, file by file, in the order given.
     pub files: Vec<FileStats>,
     /// What the user should know, one line each.
@@ -40,6 +42,8 @@ pub struct FileStats {
     pub dropped_non_finite: u64,
     /// Points left out because they are flagged as withheld.
     pub withheld: u64,
+    /// Points left out because their class is not wanted.
+    pub dropped_by_class: u64,
     /// Lowest coordinates of the kept points, in the file's unit; none without points.
     pub min: Option<[f64; 3]>,
     /// Highest coordinates of the kept points, in the file's unit; none without points.
@@ -56,6 +60,8 @@ pub(super) struct SourceStats {
     pub(super) kept: u64,
     pub(super) dropped: u64,
     pub(super) withheld: u64,
+    /// Points of classes that are not wanted.
+    pub(super) unwanted: u64,
     pub(super) min: [f64; 3],
     pub(super) max: [f64; 3],
     /// All coordinates are multiples of two to this power; `i32::MAX` if all are zero.
@@ -73,6 +79,7 @@ impl Default for SourceStats {
             kept: 0,
             dropped: 0,
             withheld: 0,
+            unwanted: 0,
             min: [f64::INFINITY; 3],
             max: [f64::NEG_INFINITY; 3],
             exponent: i32::MAX,
@@ -88,6 +95,7 @@ impl SourceStats {
         self.kept += other.kept;
         self.dropped += other.dropped;
         self.withheld += other.withheld;
+        self.unwanted += other.unwanted;
         for axis in 0..3 {
             self.min[axis] = self.min[axis].min(other.min[axis]);
             self.max[axis] = self.max[axis].max(other.max[axis]);

@@ -2,9 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::check::check;
 use crate::error::{Error, Result};
 use crate::generator::Generator;
 use crate::kind::Kind;
+use crate::reference;
+use crate::sampling::Sampling;
 use crate::write::{self, Format};
 
 /// Order of the points.
@@ -45,6 +48,11 @@ pub enum NoiseMode {
 pub struct Cloud {
     /// The surface.
     pub kind: Kind,
+    /// The mesh file, OBJ or PLY, for the kind of that name. It is moved to the origin and scaled
+    /// to the size.
+    pub mesh: Option<PathBuf>,
+    /// How the points lie on the surface.
+    pub sampling: Sampling,
     /// Number of points, outliers and duplicates included.
     pub points: u64,
     /// Seed of all random numbers.
@@ -59,6 +67,10 @@ pub struct Cloud {
     pub outliers: f64,
     /// Fraction of points that are exact copies of an earlier one.
     pub duplicates: f64,
+    /// Copies of the surface that the points are dealt out to.
+    pub layers: u32,
+    /// Distance of each layer from the one before, along the normal.
+    pub layer_offset: f64,
     /// Let the density fall with the squared distance from the scanner.
     pub falloff: bool,
     /// Place of the scanner in fractions of the bounding box; None for a place that suits the kind.
@@ -79,6 +91,8 @@ impl Cloud {
     pub fn new(kind: Kind) -> Self {
         Cloud {
             kind,
+            mesh: None,
+            sampling: Sampling::Uniform,
             points: 100_000,
             seed: 0,
             size: 1000.0,
@@ -86,12 +100,36 @@ impl Cloud {
             noise_mode: NoiseMode::Normal,
             outliers: 0.0,
             duplicates: 0.0,
+            layers: 1,
+            layer_offset: 0.0,
             falloff: false,
             scanner: None,
             scanlines: None,
             rotated: false,
             offset: [0.0; 3],
             order: Order::Random,
+        }
+    }
+
+    /// A clean cloud of 100 000 points of size 1000 on the surface of a mesh file.
+    pub fn of_mesh(path: impl Into<PathBuf>) -> Self {
+        Cloud {
+            mesh: Some(path.into()),
+            ..Cloud::new(Kind::Mesh)
+        }
+    }
+
+    /// Sets how the points lie on the surface.
+    pub fn sampling(self, sampling: Sampling) -> Self {
+        Cloud { sampling, ..self }
+    }
+
+    /// Deals the points out to layers, each `offset` further along the normal.
+    pub fn layers(self, layers: u32, offset: f64) -> Self {
+        Cloud {
+            layers,
+            layer_offset: offset,
+            ..self
         }
     }
 
@@ -173,7 +211,7 @@ impl Cloud {
 
     /// Prepares the surface. This is where impossible settings are refused.
     pub fn generator(&self) -> Result<Generator> {
-        self.check()?;
+        check(self)?;
         Generator::new(self)
     }
 
@@ -203,70 +241,10 @@ impl Cloud {
         Ok(paths)
     }
 
-    fn check(&self) -> Result<()> {
-        let finite = |name, values: &[f64]| match values.iter().find(|v| !v.is_finite()) {
-            Some(value) => Err(Error::parameter(name, value, "a finite number")),
-            None => Ok(()),
-        };
-        let fraction = |name, value: f64| match value {
-            0.0..1.0 => Ok(()),
-            _ => Err(Error::parameter(
-                name,
-                value,
-                "a fraction from 0 to below 1",
-            )),
-        };
-        if self.points > 1 << 48 {
-            return Err(Error::parameter("points", self.points, "at most 2^48"));
-        }
-        if !(1e-100..1e100).contains(&self.size) {
-            return Err(Error::parameter("size", self.size, "a positive number"));
-        }
-        if !(0.0..1e100).contains(&self.noise) {
-            return Err(Error::parameter(
-                "noise",
-                self.noise,
-                "zero or a positive number",
-            ));
-        }
-        fraction("outliers", self.outliers)?;
-        fraction("duplicates", self.duplicates)?;
-        finite("offset", &self.offset)?;
-        finite("scanner", self.scanner.as_ref().map_or(&[], |s| s))?;
-        if let Some(ratio) = self.scanlines
-            && !(1.0..=1e6).contains(&ratio)
-        {
-            return Err(Error::parameter(
-                "scanlines",
-                ratio,
-                "a ratio from 1 to 1e6",
-            ));
-        }
-        if self.scanner.is_some() && !self.falloff {
-            let why = "without falloff the scanner has no effect";
-            return Err(Error::Conflict {
-                first: "scanner",
-                second: "even density",
-                why,
-            });
-        }
-        if self.falloff && self.order == Order::Sorted {
-            let why = "the falloff draws points by chance, in no order";
-            return Err(Error::Conflict {
-                first: "falloff",
-                second: "sorted order",
-                why,
-            });
-        }
-        if self.kind == Kind::Grid && (self.falloff || self.scanlines.is_some()) {
-            let first = if self.falloff { "falloff" } else { "scanlines" };
-            let why = "its nodes are fixed";
-            return Err(Error::Conflict {
-                first,
-                second: "grid",
-                why,
-            });
-        }
-        Ok(())
+    /// Writes the true surface as a PLY mesh, in the coordinates of the points: the first layer,
+    /// without noise. Curved surfaces are met to within `tolerance` of the size, terrain roughly.
+    pub fn write_reference(&self, path: impl AsRef<Path>, tolerance: f64) -> Result<()> {
+        check(self)?;
+        write::write_reference(&reference::reference(self, tolerance)?, path.as_ref())
     }
 }

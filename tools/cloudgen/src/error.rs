@@ -45,6 +45,14 @@ pub enum Error {
         /// The system's reason.
         source: std::io::Error,
     },
+    /// The reference mesh cannot be used.
+    #[error("{path}: cannot use the mesh: {what}", path = path.display())]
+    Mesh {
+        /// The mesh file.
+        path: PathBuf,
+        /// What is wrong with it.
+        what: String,
+    },
     /// The cloud cannot be expressed in LAS.
     #[error("{path}: cannot write LAS: {source}", path = path.display())]
     Las {
@@ -73,6 +81,13 @@ impl Error {
             path: path.to_path_buf(),
             action,
             source,
+        }
+    }
+
+    pub(crate) fn mesh(path: &Path, what: impl Into<String>) -> Self {
+        Error::Mesh {
+            path: path.to_path_buf(),
+            what: what.into(),
         }
     }
 

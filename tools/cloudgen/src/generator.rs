@@ -6,12 +6,11 @@ use crate::cloud::{Cloud, NoiseMode, Order};
 use crate::error::Result;
 use crate::kind::Kind;
 use crate::picker::Picker;
+use crate::reference;
 use crate::rng::{Permutation, Purpose, Rng};
-use crate::surface::{
-    Bumpy, FRAME, Grid, Line, Plane, Room, Sample, Sphere, Surface, Terrain, Torus, box_distance,
-    box_point,
-};
-use crate::vec3::{Vec3, add, dot, length, scale, sub};
+use crate::sampling::{Sampling, choose};
+use crate::surface::{Grid, Line, Sample, Surface, box_distance, box_point, turned, turned_back};
+use crate::vec3::{Vec3, add, length, scale, sub};
 
 /// Draws until a point survives the falloff; far more than any sensible scanner place needs.
 const FALLOFF_TRIES: u32 = 4096;
@@ -29,6 +28,11 @@ enum Source {
     Surface {
         surface: Box<dyn Surface>,
         scan: Option<(Vec<Line>, Picker)>,
+    },
+    /// Points that were chosen beforehand.
+    Chosen {
+        surface: Box<dyn Surface>,
+        samples: Vec<Sample>,
     },
 }
 
@@ -58,24 +62,20 @@ pub struct Generator {
 
 impl Generator {
     pub(crate) fn new(cloud: &Cloud) -> Result<Self> {
-        let size = cloud.size;
-        let surface: Box<dyn Surface> = match cloud.kind {
-            Kind::Sphere => Box::new(Sphere::new(size)),
-            Kind::Torus => Box::new(Torus::new(size)),
-            Kind::Bumpy => Box::new(Bumpy::new(size)),
-            Kind::Terrain => Box::new(Terrain::new(size)),
-            Kind::Room => Box::new(Room::new(size)),
-            Kind::Plane => Box::new(Plane::new(size)),
-            Kind::Grid => {
-                let grid = Grid::new(cloud.points, size, cloud.rotated)?;
-                let bounds = grid.bounds();
-                return Ok(Self::with(cloud, Source::Grid(grid), bounds, [0.0; 3]));
-            }
+        let Some(surface) = reference::surface(cloud)? else {
+            let grid = Grid::new(cloud.points, cloud.size, cloud.rotated)?;
+            let bounds = grid.bounds();
+            return Ok(Self::with(cloud, Source::Grid(grid), bounds, [0.0; 3]));
         };
         let bounds = surface.bounds();
         let scanner = cloud
             .scanner
             .map_or_else(|| surface.scanner(), |s| box_point(bounds, s));
+        if cloud.sampling != Sampling::Uniform {
+            let samples = choose(cloud, surface.as_ref())?;
+            let source = Source::Chosen { surface, samples };
+            return Ok(Self::with(cloud, source, bounds, scanner));
+        }
         let scan = cloud.scanlines.map(|ratio| {
             let spacing = (surface.area() * ratio / cloud.points.max(1) as f64).sqrt();
             let lines = surface.scan_lines(spacing);
@@ -91,7 +91,9 @@ impl Generator {
     }
 
     fn with(cloud: &Cloud, source: Source, bounds: [Vec3; 2], scanner: Vec3) -> Self {
-        let regular = cloud.kind == Kind::Grid || (cloud.scanlines.is_some() && !cloud.falloff);
+        let regular = cloud.kind == Kind::Grid
+            || cloud.sampling != Sampling::Uniform
+            || (cloud.scanlines.is_some() && !cloud.falloff);
         let sweep = match cloud.order {
             Order::Sorted => Sweep::InOrder,
             Order::Random if regular => Sweep::Shuffled(Permutation::new(cloud.points, cloud.seed)),
@@ -162,16 +164,19 @@ impl Generator {
         (0..self.cloud.points).map(|index| self.sample(index).position)
     }
 
-    /// Distance of a position to the true surface: exact for the kinds with a closed form, of
-    /// first order for `bumpy` and `terrain`.
+    /// Distance of a position to the true surface, the first layer: exact for the kinds with a
+    /// closed form and for meshes (where it is slow: it looks at every triangle), of first order
+    /// for `bumpy` and `terrain`.
     pub fn distance(&self, position: [f64; 3]) -> f64 {
         let p = sub(position, self.cloud.offset);
         match &self.source {
             Source::Grid(grid) => grid.distance(p),
-            Source::Surface { surface, .. } => {
-                let frame = frame();
-                let turned = |p: Vec3| frame.map(|axis| dot(axis, p));
-                surface.distance(if self.cloud.rotated { turned(p) } else { p })
+            Source::Surface { surface, .. } | Source::Chosen { surface, .. } => {
+                surface.distance(if self.cloud.rotated {
+                    turned_back(p)
+                } else {
+                    p
+                })
             }
         }
     }
@@ -204,7 +209,8 @@ impl Generator {
             .iter()
             .flatten()
             .fold(0.0, |m: f64, c| m.max(c.abs()));
-        corner * 3f64.sqrt() + 10.0 * self.cloud.noise
+        let layers = f64::from(self.cloud.layers - 1) * self.cloud.layer_offset.abs();
+        corner * 3f64.sqrt() + 10.0 * self.cloud.noise + layers
     }
 
     /// Point `index` unless it is a duplicate.
@@ -240,7 +246,18 @@ impl Generator {
             Source::Surface { surface, scan } => {
                 self.turn(self.on_surface(surface.as_ref(), scan.as_ref(), index))
             }
+            Source::Chosen { samples, .. } => self.turn(
+                samples[match &self.sweep {
+                    Sweep::Shuffled(permutation) => permutation.apply(index),
+                    Sweep::Chance | Sweep::InOrder => index,
+                } as usize],
+            ),
         };
+        if self.cloud.layers > 1 {
+            let layer = (index % u64::from(self.cloud.layers)) as f64;
+            let shift = scale(sample.normal, layer * self.cloud.layer_offset);
+            sample.position = add(sample.position, shift);
+        }
         let sigma = self.cloud.noise;
         if sigma > 0.0 {
             let mut rng = Rng::at(self.cloud.seed, Purpose::Noise, index);
@@ -294,19 +311,9 @@ impl Generator {
         if !self.cloud.rotated || matches!(self.source, Source::Grid(_)) {
             return sample;
         }
-        let frame = frame();
-        let turn = |p: Vec3| {
-            let [a, b, c] = [0, 1, 2].map(|k| scale(frame[k], p[k]));
-            add(add(a, b), c)
-        };
         Sample {
-            position: turn(sample.position),
-            normal: turn(sample.normal),
+            position: turned(sample.position),
+            normal: turned(sample.normal),
         }
     }
-}
-
-/// The rotation as its three unit axes.
-fn frame() -> [Vec3; 3] {
-    FRAME.map(|axis| axis.map(|c| c as f64 / 3.0))
 }

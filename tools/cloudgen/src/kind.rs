@@ -22,11 +22,15 @@ pub enum Kind {
     Plane,
     /// An exact integer grid in a plane.
     Grid,
+    /// Three orthogonal squares that meet at a sharp corner.
+    Corner,
+    /// A given triangle mesh.
+    Mesh,
 }
 
 impl Kind {
-    /// All kinds.
-    pub const ALL: [Kind; 7] = [
+    /// All kinds that need no file.
+    pub const ALL: [Kind; 8] = [
         Kind::Sphere,
         Kind::Torus,
         Kind::Bumpy,
@@ -34,6 +38,7 @@ impl Kind {
         Kind::Room,
         Kind::Plane,
         Kind::Grid,
+        Kind::Corner,
     ];
 
     /// Name as on the command line.
@@ -46,6 +51,8 @@ impl Kind {
             Kind::Room => "room",
             Kind::Plane => "plane",
             Kind::Grid => "grid",
+            Kind::Corner => "corner",
+            Kind::Mesh => "mesh",
         }
     }
 
@@ -56,7 +63,7 @@ impl Kind {
             Kind::Torus => Some(0),
             Kind::Bumpy => Some(-8),
             Kind::Room => Some(-6),
-            Kind::Terrain | Kind::Plane | Kind::Grid => None,
+            Kind::Terrain | Kind::Plane | Kind::Grid | Kind::Corner | Kind::Mesh => None,
         }
     }
 }
@@ -71,9 +78,10 @@ impl FromStr for Kind {
     type Err = Error;
 
     fn from_str(text: &str) -> Result<Self, Error> {
-        let names = Kind::ALL.map(Kind::name).join(", ");
-        Kind::ALL
-            .into_iter()
+        let kinds = || Kind::ALL.into_iter().chain([Kind::Mesh]);
+        let names: Vec<_> = kinds().map(Kind::name).collect();
+        let names = names.join(", ");
+        kinds()
             .find(|kind| kind.name() == text)
             .ok_or_else(|| Error::parameter("kind", text, format!("one of {names}")))
     }

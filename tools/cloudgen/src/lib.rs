@@ -5,18 +5,24 @@
 //! [`Generator`] makes any point on demand, and [`Cloud::write`] streams all of them to a file, in
 //! a few megabytes of memory whatever the number of points.
 //!
+//! Uniform clouds are like that. For other [`Sampling`] all points are chosen first and held in memory.
+//!
 //! Every point is a pure function of the description and its index, and all transcendental
 //! functions come from `libm`: the same description gives the same bytes everywhere.
 //!
 //! Surfaces other than the grid are centred on the origin before the offset; the grid starts at
 //! the origin.
 
+mod check;
 mod cloud;
 mod error;
 mod generator;
 mod kind;
+mod mesh_file;
 mod picker;
+mod reference;
 mod rng;
+mod sampling;
 mod surface;
 mod vec3;
 mod write;
@@ -25,5 +31,6 @@ pub use cloud::{Cloud, NoiseMode, Order};
 pub use error::{Error, Result};
 pub use generator::Generator;
 pub use kind::Kind;
+pub use sampling::{MOST_HELD, Sampling};
 pub use surface::Sample;
 pub use write::{Encoding, Format, LasOptions, PointFormat, Precision};

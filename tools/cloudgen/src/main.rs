@@ -3,14 +3,36 @@
 use std::{path::PathBuf, process::ExitCode};
 
 use clap::{Parser, ValueEnum};
-use outcrop_cloudgen::{Cloud, Format, Kind, LasOptions, NoiseMode, Order, PointFormat, Result};
+use outcrop_cloudgen::{
+    Cloud, Error, Format, Kind, LasOptions, NoiseMode, Order, PointFormat, Result, Sampling,
+};
 
 /// Writes a point cloud with known ground truth. Equal arguments give equal files.
 #[derive(Debug, Parser)]
 #[command(name = "cloudgen", version, allow_negative_numbers = true)]
 struct Args {
-    /// Surface: sphere, torus, bumpy (genus 5), terrain, room (genus 4), plane or grid
+    /// Surface: sphere, torus, bumpy (genus 5), terrain, room (genus 4), plane, grid, corner (three
+    /// orthogonal plates) or mesh (a file)
     kind: Kind,
+
+    /// The mesh to sample, OBJ or PLY, for the kind mesh; it is moved to the origin and scaled to
+    /// the size
+    #[arg(long, value_name = "FILE")]
+    mesh: Option<PathBuf>,
+
+    /// How the points lie on the surface; regular and adaptive hold all points in memory (400 bytes
+    /// each) and take 10 million at most
+    #[arg(long, value_enum, value_name = "PATTERN", default_value = "uniform")]
+    sampling: SamplingArg,
+
+    /// Write the true surface as well, a PLY mesh in the coordinates of the points
+    #[arg(long, value_name = "FILE.ply")]
+    reference: Option<PathBuf>,
+
+    /// Distance of that mesh from curved surfaces, in terms of the size; a millionth takes a million
+    /// triangles for a sphere
+    #[arg(long, value_name = "FRACTION", default_value_t = 1e-6)]
+    reference_tolerance: f64,
 
     /// Number of points, e.g. 1e6, 100k or 10M
     #[arg(short, long, value_name = "N", default_value = "100k", value_parser = parse_count)]
@@ -48,6 +70,14 @@ struct Args {
     /// Fraction of points that are exact copies of others
     #[arg(long, value_name = "FRACTION", default_value_t = 0.0)]
     duplicates: f64,
+
+    /// Deal the points out to N layers, each shifted along the normal
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    layers: u32,
+
+    /// Distance of each layer from the one before
+    #[arg(long, value_name = "UNITS", default_value_t = 0.0)]
+    layer_offset: f64,
 
     /// Let the density fall with the squared distance from a scanner
     #[arg(long)]
@@ -92,6 +122,16 @@ enum NoiseModeArg {
     Normal,
     /// The same in every direction
     Isotropic,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum SamplingArg {
+    /// Each point independent of the others
+    Uniform,
+    /// Evenly spaced without a direction (blue noise)
+    Regular,
+    /// Evenly spaced, closer where the surface is curved
+    Adaptive,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -159,12 +199,19 @@ fn run(args: &Args) -> Result<()> {
         })
         .outliers(args.outliers)
         .duplicates(args.duplicates)
+        .layers(args.layers, args.layer_offset)
+        .sampling(match args.sampling {
+            SamplingArg::Uniform => Sampling::Uniform,
+            SamplingArg::Regular => Sampling::Regular,
+            SamplingArg::Adaptive => Sampling::Adaptive,
+        })
         .falloff(args.falloff)
         .rotated(args.rotated)
         .order(match args.order {
             OrderArg::Random => Order::Random,
             OrderArg::Sorted => Order::Sorted,
         });
+    cloud.mesh.clone_from(&args.mesh);
     cloud.scanner = args.scanner.map(|Triple(place)| place);
     cloud.scanlines = args.scanlines;
     cloud.offset = args.offset.map_or([0.0; 3], |Triple(offset)| offset);
@@ -177,6 +224,16 @@ fn run(args: &Args) -> Result<()> {
         scale: args.scale,
     };
     let format = format.with_las_options(options);
+    if let Some(reference) = &args.reference {
+        if *reference == args.output {
+            return Err(Error::Conflict {
+                first: "reference",
+                second: "output",
+                why: "both would go to the same file",
+            });
+        }
+        cloud.write_reference(reference, args.reference_tolerance)?;
+    }
     match args.split {
         Some(parts) => cloud.write_split(&args.output, format, parts).map(drop),
         None => cloud.write(&args.output, format),

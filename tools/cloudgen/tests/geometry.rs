@@ -1,6 +1,6 @@
 //! The points are where the ground truth says.
 
-use outcrop_cloudgen::{Cloud, Error, Kind, NoiseMode, Order};
+use outcrop_cloudgen::{Cloud, Error, Kind, NoiseMode, Order, Sampling};
 
 fn points(cloud: &Cloud) -> Vec<[f64; 3]> {
     cloud.generator().unwrap().iter().collect()
@@ -165,6 +165,43 @@ fn outliers_and_duplicates_have_their_share() {
 }
 
 #[test]
+fn layers_share_the_points() {
+    for rotated in [false, true] {
+        let cloud = Cloud::new(Kind::Torus)
+            .points(2000)
+            .rotated(rotated)
+            .layers(2, 3.0);
+        let generator = cloud.generator().unwrap();
+        let near = |p: &[f64; 3], at: f64| (generator.distance(*p) - at).abs() < 1e-8;
+        let all: Vec<[f64; 3]> = generator.iter().collect();
+        let count = |at| all.iter().filter(|p| near(p, at)).count();
+        assert_eq!((count(0.0), count(3.0)), (1000, 1000));
+        // The second one is outside.
+        let outside = |p: &[f64; 3]| length(*p) > 0.0 && near(p, 3.0);
+        let farthest = |points: &mut dyn Iterator<Item = &[f64; 3]>| {
+            points.map(|p| length(*p)).fold(0.0, f64::max)
+        };
+        let inner = farthest(&mut all.iter().filter(|p| near(p, 0.0)));
+        assert!(farthest(&mut all.iter().filter(|p| outside(p))) > inner + 2.0);
+    }
+}
+
+#[test]
+fn corner_has_three_equal_plates() {
+    let cloud = Cloud::new(Kind::Corner).points(30_000);
+    let generator = cloud.generator().unwrap();
+    let mut counts = [0; 3];
+    for index in 0..generator.len() {
+        let normal = generator.sample(index).normal;
+        counts[normal.iter().position(|&c| c == 1.0).unwrap()] += 1;
+    }
+    assert!(
+        counts.iter().all(|c| (9700..10_300).contains(c)),
+        "{counts:?}"
+    );
+}
+
+#[test]
 fn falloff_follows_the_squared_distance() {
     let cloud = Cloud::new(Kind::Plane)
         .points(60_000)
@@ -208,6 +245,8 @@ fn few_points_of_any_kind() {
 #[test]
 fn impossible_settings_are_refused() {
     let base = Cloud::new(Kind::Sphere);
+    let mut with_mesh = base.clone();
+    with_mesh.mesh = Some("some.ply".into());
     let bad = [
         base.clone().size(0.0),
         base.clone().size(f64::NAN),
@@ -223,6 +262,16 @@ fn impossible_settings_are_refused() {
         Cloud::new(Kind::Grid).falloff(true),
         Cloud::new(Kind::Grid).scanlines(2.0),
         Cloud::new(Kind::Grid).size(1e60),
+        Cloud::new(Kind::Mesh),
+        base.clone().layers(0, 1.0),
+        base.clone().layers(2, f64::NAN),
+        base.clone().layers(1, 0.5),
+        base.clone().sampling(Sampling::Regular).points(1 << 40),
+        base.clone().sampling(Sampling::Regular).scanlines(4.0),
+        base.clone().sampling(Sampling::Adaptive).falloff(true),
+        Cloud::new(Kind::Plane).sampling(Sampling::Adaptive),
+        Cloud::new(Kind::Grid).sampling(Sampling::Regular),
+        with_mesh,
     ];
     for cloud in bad {
         let error = cloud.generator().unwrap_err();

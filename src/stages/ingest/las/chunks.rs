@@ -6,7 +6,7 @@ use super::super::spool::Sink;
 use super::gps::GpsTimes;
 use super::table::Chunk;
 use super::vlr::{Laszip, layers};
-use super::{Header, Record, position};
+use super::{Header, Record};
 use crate::error::{Error, Result};
 use laz::record::{
     LayeredPointRecordDecompressor, RecordDecompressor, SequentialPointRecordDecompressor,
@@ -19,8 +19,14 @@ const BATCH: usize = 64 << 10;
 
 /// Layers of the point item: x and y, z, class, flags, …
 const POINT_LAYERS: usize = 9;
-/// Layers that are decoded: x and y, z, flags.
+/// The layer of the class, which is decoded only if classes matter.
+const CLASS_LAYER: usize = 2;
+/// Layers that are always decoded: x and y, z, flags.
 const WANTED: [usize; 3] = [0, 1, 3];
+
+fn is_wanted(layer: usize, class: bool) -> bool {
+    WANTED.contains(&layer) || class && layer == CLASS_LAYER
+}
 
 /// The head of a layered chunk: first record, number of points, sizes of the layers.
 pub(super) struct LayerHead {
@@ -64,25 +70,23 @@ impl LayerHead {
         })
     }
 
-    /// Bytes of the layers that are decoded.
-    fn wanted_bytes(&self) -> u64 {
-        WANTED.iter().map(|l| u64::from(self.sizes[*l])).sum()
-    }
-
-    /// A chunk of the point item alone, without the layers that are of no use.
+    /// A chunk of the point item alone, with the `class` or without it, and without the layers that are of no use.
     ///
     /// A layer of no bytes is legal and means that the field keeps its first value.
-    fn reduced(&self, input: &Input) -> Result<Vec<u8>> {
-        let mut chunk = Vec::with_capacity(70 + self.wanted_bytes() as usize);
+    fn reduced(&self, input: &Input, class: bool) -> Result<Vec<u8>> {
+        let wanted = self.sizes.iter().enumerate();
+        let wanted = wanted.filter(|(layer, _)| is_wanted(*layer, class));
+        let bytes: u64 = wanted.map(|(_, size)| u64::from(*size)).sum();
+        let mut chunk = Vec::with_capacity(70 + bytes as usize);
         chunk.extend_from_slice(&self.first);
         chunk.extend_from_slice(&(self.points as u32).to_le_bytes());
         for (layer, size) in self.sizes.iter().enumerate() {
-            let kept = if WANTED.contains(&layer) { *size } else { 0 };
+            let kept = if is_wanted(layer, class) { *size } else { 0 };
             chunk.extend_from_slice(&kept.to_le_bytes());
         }
         let mut at = self.layers_at;
         for (layer, size) in self.sizes.iter().enumerate() {
-            if WANTED.contains(&layer) {
+            if is_wanted(layer, class) {
                 let start = chunk.len();
                 chunk.resize(start + *size as usize, 0);
                 input.read_exact_at(at, &mut chunk[start..], "layer of a LAZ chunk")?;
@@ -98,6 +102,7 @@ pub(super) struct Decoder<'a> {
     pub(super) input: &'a Input,
     pub(super) header: &'a Header,
     pub(super) laszip: &'a Laszip,
+    pub(super) record: Record<'a>,
 }
 
 impl Decoder<'_> {
@@ -111,7 +116,7 @@ impl Decoder<'_> {
                 format!("{} points in {} bytes", chunk.points, chunk.bytes),
             ));
         }
-        let source = Cursor::new(head.reduced(self.input)?);
+        let source = Cursor::new(head.reduced(self.input, self.record.wanted.is_some())?);
         let mut decoder = LayeredPointRecordDecompressor::new(source);
         self.add_item(&mut decoder, &self.laszip.items[0])?;
         self.points(&mut decoder, chunk.at, chunk.points, sink)
@@ -154,7 +159,7 @@ impl Decoder<'_> {
         sink: &mut Sink<'_, i32>,
     ) -> Result<()> {
         let size = decoder.record_size();
-        let record = Record::of(self.header);
+        let record = self.record;
         let most = (BATCH / size).max(1);
         let mut batch = vec![0u8; size * most];
         let mut done = 0u64;
@@ -171,11 +176,7 @@ impl Decoder<'_> {
             let result = result.and_then(|r| r.map_err(|e| reason(&e)));
             result.map_err(|why| self.damaged(at, done + decoded as u64, points, why))?;
             for bytes in batch[..now * size].chunks_exact(size) {
-                if record.is_withheld(bytes) {
-                    sink.withhold();
-                } else {
-                    sink.push(position(bytes))?;
-                }
+                record.take(bytes, sink)?;
             }
             done += now as u64;
         }

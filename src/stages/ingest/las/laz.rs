@@ -2,10 +2,10 @@
 
 use super::super::input::{Input, STREAM_BUFFER};
 use super::super::spool::{SourceWriter, sink_bytes};
-use super::Header;
 use super::chunks::{Decoder, LayerHead};
 use super::table::{self, Chunk, Table};
 use super::vlr::{self, Laszip, Layout};
+use super::{Header, Record};
 use crate::error::Result;
 
 /// Memory of the decoder's models, without those of extra bytes.
@@ -30,6 +30,7 @@ pub(super) fn read(
         input,
         header,
         laszip: &laszip,
+        record: Record::of(header, writer.classes),
     };
     let table = match laszip.layout {
         Layout::Stream => None,

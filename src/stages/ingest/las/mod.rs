@@ -13,9 +13,13 @@ pub(super) use header::Header;
 /// Byte of a record that holds the withheld flag, in all point formats.
 const FLAGS: usize = 15;
 
+/// Byte that holds the class in point formats 6 to 10; before, it shares that of the flags.
+const CLASS: usize = 16;
+
+use super::Classes;
 use super::input::Input;
 use super::source::Native;
-use super::spool::SourceWriter;
+use super::spool::{Sink, SourceWriter};
 use crate::error::Result;
 
 /// Reads a LAS or LAZ file into the spool; returns what the user should know.
@@ -41,26 +45,45 @@ impl Header {
     }
 }
 
-/// How a record says that it is withheld.
+/// Where a record says that it is withheld and of which class it is, and which classes are wanted.
 #[derive(Debug, Clone, Copy)]
-struct Record {
+struct Record<'a> {
     withheld: u8,
+    /// Byte and bits of the class.
+    class: (usize, u8),
+    /// None if all are.
+    wanted: Option<&'a Classes>,
 }
 
-impl Record {
-    fn of(header: &Header) -> Self {
-        let withheld = match (header.point_format, header.version) {
-            (6.., _) => 0x04,
+impl<'a> Record<'a> {
+    fn of(header: &Header, classes: &'a Classes) -> Self {
+        let (withheld, class) = match (header.point_format, header.version) {
+            (6.., _) => (0x04, (CLASS, 0xff)),
             // In LAS 1.0 the whole byte is the class.
-            (_, [1, 0]) => 0,
-            _ => 0x80,
+            (_, [1, 0]) => (0, (FLAGS, 0xff)),
+            _ => (0x80, (FLAGS, 0x1f)),
         };
-        Self { withheld }
+        let wanted = (*classes != Classes::All).then_some(classes);
+        Self {
+            withheld,
+            class,
+            wanted,
+        }
     }
 
+    /// Hands a point on, or counts why not.
     #[inline]
-    fn is_withheld(self, record: &[u8]) -> bool {
-        record[FLAGS] & self.withheld != 0
+    fn take(self, record: &[u8], sink: &mut Sink<'_, i32>) -> Result<()> {
+        if record[FLAGS] & self.withheld != 0 {
+            sink.withhold();
+            return Ok(());
+        }
+        let (byte, bits) = self.class;
+        if self.wanted.is_some_and(|c| !c.wants(record[byte] & bits)) {
+            sink.leave_out();
+            return Ok(());
+        }
+        sink.push(position(record))
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::super::input::Input;
 use super::super::spool::{SourceWriter, sink_bytes};
-use super::{Header, Record, position};
+use super::{Header, Record};
 use crate::error::Result;
 
 /// Bytes of records read at one time.
@@ -18,7 +18,7 @@ pub(super) fn read(
     let points = count(input, header, &mut warnings)?;
     let rows = (SLAB / record_bytes).max(1);
     let units = usize::try_from(points.div_ceil(rows)).unwrap_or(usize::MAX);
-    let record = Record::of(header);
+    let record = Record::of(header, writer.classes);
     let memory = rows * record_bytes + sink_bytes::<i32>();
     writer.workspace.for_each_unit(
         "LAS records",
@@ -32,11 +32,7 @@ pub(super) fn read(
             input.read_exact_at(header.data + first * record_bytes, &mut slab, &what)?;
             let mut sink = writer.sink::<i32>();
             for bytes in slab.chunks_exact(header.record_bytes.into()) {
-                if record.is_withheld(bytes) {
-                    sink.withhold();
-                } else {
-                    sink.push(position(bytes))?;
-                }
+                record.take(bytes, &mut sink)?;
             }
             sink.finish()
         },

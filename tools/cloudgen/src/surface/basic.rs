@@ -2,8 +2,10 @@
 
 use std::f64::consts::{PI, TAU};
 
+use super::refine::{patch, rectangle, refine};
+use super::tessellate::Tessellation;
 use super::{Line, Sample, Surface, box_point, midpoints};
-use crate::vec3::{Vec3, length};
+use crate::vec3::{Vec3, length, normalize, scale};
 
 /// A sphere around the origin.
 #[derive(Debug)]
@@ -59,6 +61,36 @@ impl Surface for Sphere {
     fn distance(&self, p: Vec3) -> f64 {
         (length(p) - self.radius).abs()
     }
+
+    fn reference(&self, tolerance: f64) -> Tessellation {
+        let onto = |p| scale(normalize(p), self.radius);
+        refine(octahedron(self.radius), tolerance, onto)
+    }
+
+    fn curvature(&self, _u: f64, _v: f64) -> Option<f64> {
+        Some(2f64.sqrt() / self.radius)
+    }
+}
+
+/// Anticlockwise as seen from outside.
+fn octahedron(radius: f64) -> Tessellation {
+    let mut mesh = Tessellation::default();
+    for axis in 0..3 {
+        for sign in [radius, -radius] {
+            let mut vertex = [0.0; 3];
+            vertex[axis] = sign;
+            mesh.vertices.push(vertex);
+        }
+    }
+    for octant in 0..8u32 {
+        let corner = |axis: u32| 2 * axis + (octant >> axis & 1);
+        // Every mirror turns the triangle over.
+        let mirrored = octant.count_ones() % 2 == 1;
+        let (second, third) = if mirrored { (2, 1) } else { (1, 2) };
+        mesh.triangles
+            .push([corner(0), corner(second), corner(third)]);
+    }
+    mesh
 }
 
 /// A torus around the z axis.
@@ -141,6 +173,23 @@ impl Surface for Torus {
         let ring = libm::hypot(p[0], p[1]) - self.major;
         (libm::hypot(ring, p[2]) - self.minor).abs()
     }
+
+    fn reference(&self, tolerance: f64) -> Tessellation {
+        // Angle over which an arc leaves its chord by the tolerance.
+        let cells = [self.major + self.minor, self.minor].map(|radius| {
+            let angle = (8.0 * tolerance / radius).sqrt();
+            (TAU / angle).ceil().max(3.0) as usize
+        });
+        patch(cells, [true, true], |u, v| {
+            self.point(TAU * u, TAU * v).position
+        })
+    }
+
+    fn curvature(&self, _u: f64, v: f64) -> Option<f64> {
+        let cosine = libm::cos(Self::tube_angle(v));
+        let around = cosine / (self.major + self.minor * cosine);
+        Some(libm::hypot(1.0 / self.minor, around))
+    }
 }
 
 /// A square in the plane z = 0.
@@ -195,6 +244,13 @@ impl Surface for Plane {
 
     fn distance(&self, p: Vec3) -> f64 {
         super::box_distance(self.bounds(), p)
+    }
+
+    fn reference(&self, _tolerance: f64) -> Tessellation {
+        let mut mesh = Tessellation::default();
+        let [low, _] = self.bounds();
+        rectangle(&mut mesh, low, [self.side, 0.0, 0.0], [0.0, self.side, 0.0]);
+        mesh
     }
 
     fn scanner(&self) -> Vec3 {

@@ -1,6 +1,8 @@
 //! A smooth closed surface of genus 5 with bumps.
 
-use super::{Line, Sample, Surface, tessellate::tessellate};
+use super::refine::{orient, refine};
+use super::tessellate::{Tessellation, tessellate};
+use super::{Line, Sample, Surface, inside};
 use crate::picker::Picker;
 use crate::vec3::{Vec3, add, cross, dot, length, normalize, scale, sub};
 
@@ -24,6 +26,8 @@ const LEVEL: f64 = 10.0;
 const BUMP: f64 = 1.0;
 const BUMP_WAVES: f64 = 4.0;
 const HALF: f64 = 2.5;
+/// Step of the differences that give the curvature.
+const TURN_STEP: f64 = 1e-4;
 const CELLS: usize = 80;
 
 /// Normal of the planes whose cuts are the scan lines, off every symmetry plane.
@@ -132,16 +136,6 @@ fn piece_area([a, b, c]: &[Vec3; 3]) -> f64 {
     area / cosine.max(0.25)
 }
 
-/// Uniform point of a triangle.
-fn inside([a, b, c]: &[Vec3; 3], t: f64, v: f64) -> Vec3 {
-    let root = t.sqrt();
-    let weights = [1.0 - root, root * (1.0 - v), root * v];
-    add(
-        add(scale(*a, weights[0]), scale(*b, weights[1])),
-        scale(*c, weights[2]),
-    )
-}
-
 impl Surface for Bumpy {
     fn area(&self) -> f64 {
         self.picker.total() * self.unit * self.unit
@@ -171,6 +165,33 @@ impl Surface for Bumpy {
         let place = project(inside(&self.triangles[line.patch as usize], t, v));
         let level = (dot(SCAN_NORMAL, place.0) / line.at).round() * line.at;
         self.sample(slide(place.0, level, 3.0 * line.at).unwrap_or(place))
+    }
+
+    fn reference(&self, tolerance: f64) -> Tessellation {
+        let mut coarse = tessellate(value, HALF, CELLS);
+        orient(&mut coarse);
+        let mut mesh = refine(coarse, tolerance / self.unit, |p| project(p).0);
+        for vertex in &mut mesh.vertices {
+            *vertex = scale(*vertex, self.unit);
+        }
+        mesh
+    }
+
+    fn curvature(&self, u: f64, v: f64) -> Option<f64> {
+        let (triangle, t) = self.picker.pick(u);
+        let (place, gradient) = project(inside(&self.triangles[triangle], t, v));
+        let normal = normalize(gradient);
+        let least = [0, 1, 2].map(|k| normal[k].abs());
+        let mut other = [0.0; 3];
+        other[usize::from(least[1] < least[0])] = 1.0;
+        let first = normalize(cross(normal, other));
+        let turn = |along: Vec3| {
+            let [ahead, behind] = [TURN_STEP, -TURN_STEP]
+                .map(|step| normalize(value_and_gradient(add(place, scale(along, step))).1));
+            let turn = scale(sub(ahead, behind), 0.5 / TURN_STEP);
+            dot(turn, turn)
+        };
+        Some((turn(first) + turn(cross(normal, first))).sqrt() / self.unit)
     }
 
     fn distance(&self, p: Vec3) -> f64 {

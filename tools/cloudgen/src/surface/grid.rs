@@ -1,6 +1,8 @@
 //! An exact integer lattice in a plane.
 
 use super::Sample;
+use super::refine::rectangle;
+use super::tessellate::Tessellation;
 use crate::error::{Error, Result};
 use crate::vec3::{Vec3, add, cross, dot, normalize, scale, sub};
 
@@ -76,6 +78,17 @@ impl Grid {
             std::array::from_fn(|k| corners.iter().map(|p| p[k]).reduce(pick).unwrap_or(0.0))
         };
         [fold(f64::min), fold(f64::max)]
+    }
+
+    /// The patch that the grid spans.
+    pub(crate) fn reference(&self) -> Tessellation {
+        let mut mesh = Tessellation::default();
+        let [u, v] = [
+            self.place(self.columns as i64 - 1, 0),
+            self.place(0, self.rows as i64 - 1),
+        ];
+        rectangle(&mut mesh, [0.0; 3], u, v);
+        mesh
     }
 
     /// Distance of a point to the patch that the grid spans.

@@ -2,18 +2,25 @@
 
 mod basic;
 mod bumpy;
+mod corner;
 mod grid;
+mod mesh;
+mod refine;
 mod room;
 mod terrain;
 mod tessellate;
 
 pub(crate) use basic::{Plane, Sphere, Torus};
 pub(crate) use bumpy::Bumpy;
-pub(crate) use grid::{FRAME, Grid};
+pub(crate) use corner::Corner;
+use grid::FRAME;
+pub(crate) use grid::Grid;
+pub(crate) use mesh::Mesh;
 pub(crate) use room::Room;
 pub(crate) use terrain::Terrain;
+pub(crate) use tessellate::Tessellation;
 
-use crate::vec3::{Vec3, length, sub};
+use crate::vec3::{Vec3, add, dot, length, scale, sub};
 
 /// A point of the cloud with the normal of the surface it was taken from.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -53,6 +60,16 @@ pub(crate) trait Surface: std::fmt::Debug + Send + Sync {
     /// The point at fraction `t` of a line; `v` is a spare random number.
     fn on_line(&self, line: &Line, t: f64, v: f64) -> Sample;
 
+    /// The surface as a mesh that is nowhere much further than `tolerance` from it, except that
+    /// the terrain has the same mesh for all.
+    fn reference(&self, tolerance: f64) -> Tessellation;
+
+    /// Curvature where [`at`](Self::at) is: the root of the sum of the squares of both principal
+    /// curvatures, or what stands for it. None if points cannot follow it.
+    fn curvature(&self, _u: f64, _v: f64) -> Option<f64> {
+        None
+    }
+
     /// Distance of a point to the surface, to first order where there is no closed form.
     fn distance(&self, p: Vec3) -> f64;
 
@@ -70,6 +87,33 @@ pub(crate) fn box_point([low, high]: [Vec3; 2], fraction: Vec3) -> Vec3 {
 /// Distance of a point to a box, zero inside.
 pub(crate) fn box_distance([low, high]: [Vec3; 2], p: Vec3) -> f64 {
     length(sub(p, std::array::from_fn(|k| p[k].clamp(low[k], high[k]))))
+}
+
+/// The rotation as its three unit axes.
+fn frame() -> [Vec3; 3] {
+    FRAME.map(|axis| axis.map(|c| c as f64 / 3.0))
+}
+
+/// A point or vector turned by the frame.
+pub(crate) fn turned(p: Vec3) -> Vec3 {
+    let frame = frame();
+    let [a, b, c] = [0, 1, 2].map(|k| scale(frame[k], p[k]));
+    add(add(a, b), c)
+}
+
+/// The point that [`turned`] takes to `p`.
+pub(crate) fn turned_back(p: Vec3) -> Vec3 {
+    frame().map(|axis| dot(axis, p))
+}
+
+/// Uniform point of a triangle.
+pub(crate) fn inside([a, b, c]: &[Vec3; 3], t: f64, v: f64) -> Vec3 {
+    let root = t.sqrt();
+    let weights = [1.0 - root, root * (1.0 - v), root * v];
+    add(
+        add(scale(*a, weights[0]), scale(*b, weights[1])),
+        scale(*c, weights[2]),
+    )
 }
 
 /// Midpoints of equal parts of `0..extent`, about `spacing` apart.

@@ -1,8 +1,10 @@
 //! A furnished box room seen from inside.
 
+use super::refine::rectangle;
+use super::tessellate::Tessellation;
 use super::{Line, Sample, Surface};
 use crate::picker::Picker;
-use crate::vec3::{Vec3, length, sub};
+use crate::vec3::{Vec3, cross, dot, length, sub};
 
 /// Two rooms joined by a doorway, with a pillar and a table: the boundary between the air and the
 /// solids, all faces axis-parallel, in metres before scaling.
@@ -226,6 +228,25 @@ impl Surface for Room {
             .map(nearest)
             .fold(f64::INFINITY, f64::min)
             .sqrt()
+    }
+
+    fn reference(&self, _tolerance: f64) -> Tessellation {
+        let mut mesh = Tessellation::default();
+        for face in &self.faces {
+            let along = |axis: usize| {
+                let mut side = [0.0; 3];
+                side[axis] = face.width(axis);
+                side
+            };
+            let (u, v) = (along(face.run), along(face.across));
+            // Anticlockwise as seen from the air.
+            if dot(cross(u, v), face.normal) > 0.0 {
+                rectangle(&mut mesh, face.low, u, v);
+            } else {
+                rectangle(&mut mesh, face.low, v, u);
+            }
+        }
+        mesh
     }
 
     fn scanner(&self) -> Vec3 {

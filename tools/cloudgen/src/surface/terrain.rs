@@ -1,5 +1,7 @@
 //! A height field: smooth hills with finer roughness.
 
+use super::refine::patch;
+use super::tessellate::Tessellation;
 use super::{Line, Sample, Surface, box_point, midpoints};
 use crate::rng::mix;
 use crate::vec3::{Vec3, normalize};
@@ -28,6 +30,9 @@ const OCTAVES: [(f64, f64); 8] = [
 
 /// Cells per side used to find the lowest and highest point.
 const SURVEY: u32 = 192;
+
+/// Cells per side of the reference. The finest octave has two to three of them for each of its own.
+const REFERENCE: usize = 1024;
 
 impl Terrain {
     pub(crate) fn new(size: f64) -> Self {
@@ -129,6 +134,10 @@ impl Surface for Terrain {
         let ground = self.point(x / self.side + 0.5, y / self.side + 0.5);
         let above = (p[2] - ground.position[2]) * ground.normal[2];
         (above * above + (p[0] - x) * (p[0] - x) + (p[1] - y) * (p[1] - y)).sqrt()
+    }
+
+    fn reference(&self, _tolerance: f64) -> Tessellation {
+        patch([REFERENCE; 2], [false; 2], |u, v| self.point(u, v).position)
     }
 
     fn scanner(&self) -> Vec3 {

@@ -5,8 +5,8 @@ use std::collections::HashMap;
 
 use crate::vec3::{Vec3, add, scale, sub};
 
-/// A welded triangle mesh.
-#[derive(Debug, Default)]
+/// A welded triangle mesh. Marching leaves its triangles in no orientation.
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Tessellation {
     pub vertices: Vec<Vec3>,
     pub triangles: Vec<[u32; 3]>,

@@ -3,9 +3,11 @@
 mod format;
 mod las;
 mod ply;
+mod reference;
 mod xyz;
 
 pub use format::{Encoding, Format, LasOptions, PointFormat, Precision};
+pub(crate) use reference::write_reference;
 
 use std::{
     fs::File,

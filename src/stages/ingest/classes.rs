@@ -1,0 +1,40 @@
+//! Which points are wanted by their class (LAS and LAZ).
+
+use serde::Serialize;
+
+/// Points to read by their classification; points of files without one are always read.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Classes {
+    /// All points.
+    #[default]
+    All,
+    /// Only points of these classes.
+    Keep(Vec<u8>),
+    /// All but points of these classes.
+    Drop(Vec<u8>),
+}
+
+impl Classes {
+    /// Whether points of `class` are wanted.
+    #[must_use]
+    pub fn wants(&self, class: u8) -> bool {
+        match self {
+            Self::All => true,
+            Self::Keep(classes) => classes.contains(&class),
+            Self::Drop(classes) => !classes.contains(&class),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn wants_what_it_says() {
+        assert!(Classes::All.wants(7));
+        assert!(Classes::Keep(vec![2, 6]).wants(6) && !Classes::Keep(vec![2, 6]).wants(7));
+        assert!(Classes::Drop(vec![7]).wants(6) && !Classes::Drop(vec![7]).wants(7));
+    }
+}

@@ -1,0 +1,157 @@
+//! Outliers: points much farther from their neighbours than the points around them are from theirs
+//! (paper: none).
+//!
+//! The *spacing* of a point is the mean distance to its 8 nearest neighbours. A point goes if its
+//! spacing is larger than a factor times the median of the spacings of its 64 nearest neighbours.
+//! The second neighbourhood is much larger than the first, since an outlier's nearest neighbours are
+//! often outliers themselves, alone or in small clusters; the median of many is that of the surface.
+//! Where outliers are so far off that even these 64 are outliers, another round finds them, when
+//! those nearer to the surface are gone.
+
+mod spacing;
+
+use crate::error::Result;
+use crate::geom::Point;
+use crate::spill::Sections;
+use crate::stages::blocks::Blocks;
+use crate::stages::cells::TileRanges;
+use crate::stages::order::{PointStore, StoreWriter};
+use crate::stages::tiles::Tile;
+use crate::stages::tiles::near::Search;
+use crate::stages::tiles::walk::{PageCache, Walk};
+use crate::workspace::Workspace;
+use serde::Serialize;
+use spacing::{SpacingCache, Spacings};
+use std::ops::Range;
+
+/// Neighbours that make the spacing of a point.
+const NEAREST: usize = 8;
+
+/// Neighbours whose spacings it is compared with.
+const AROUND: usize = 64;
+
+/// Rounds at most; the next one is left out if the last one dropped nothing.
+const ROUNDS: u32 = 4;
+
+/// Counts of this stage.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+pub struct OutlierStats {
+    /// Points dropped.
+    pub dropped: u64,
+    /// Rounds, the one that dropped nothing included.
+    pub rounds: u32,
+}
+
+/// What decides which points are outliers, and how they are worked on.
+#[derive(Debug, Clone, Copy)]
+pub struct OutlierOptions {
+    /// How many times as large as around it the spacing of an outlier is.
+    pub factor: f64,
+    /// Ids in a block, and at most in a tile; neither decides anything.
+    pub block: u32,
+    /// See `block`.
+    pub tile: u32,
+}
+
+/// The points that are no outliers, with new ids: their ranks among themselves.
+///
+/// # Errors
+/// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
+/// [`crate::Error::Cancelled`].
+pub fn drop_outliers(
+    mut store: PointStore,
+    options: OutlierOptions,
+    workspace: &Workspace,
+) -> Result<(PointStore, OutlierStats)> {
+    let mut stats = OutlierStats::default();
+    while stats.rounds < ROUNDS && store.len() > NEAREST {
+        stats.rounds += 1;
+        let kept = round(&store, options, stats.rounds, workspace)?;
+        let dropped = (store.len() - kept.len()) as u64;
+        store = kept;
+        stats.dropped += dropped;
+        if dropped == 0 {
+            break;
+        }
+    }
+    Ok((store, stats))
+}
+
+fn round(
+    store: &PointStore,
+    options: OutlierOptions,
+    number: u32,
+    workspace: &Workspace,
+) -> Result<PointStore> {
+    let tiles = TileRanges::new(Blocks::new(store.len(), options.block), options.tile);
+    let spacings = Spacings::measure(store, tiles, number, workspace)?;
+    let name = format!("outliers{number}");
+    let kept = Sections::<3>::unpacked(workspace, &name, tiles.count())?;
+    let bytes = |tile: usize| {
+        let points = tiles.ids(tile).len();
+        Tile::bytes(points) + PageCache::bytes(store) + SpacingCache::BYTES + points as u64 * 12
+    };
+    workspace.for_each_unit("outliers: tile", tiles.count(), bytes, |tile| {
+        let ids = tiles.ids(tile);
+        workspace.observer.advance(ids.len() as u64);
+        let points = one_tile(store, ids, options.factor, SpacingCache::new(&spacings))?;
+        kept.put(tile, bytemuck::cast_slice(&points))
+    })?;
+    let name = format!("points-kept{number}");
+    let mut writer = StoreWriter::create(workspace, &name, store.page_size())?;
+    for tile in 0..tiles.count() {
+        workspace.check_cancel()?;
+        writer.push(bytemuck::cast_slice(&kept.get(tile)?))?;
+    }
+    writer.finish(workspace)
+}
+
+/// The points of a tile that stay.
+fn one_tile(
+    store: &PointStore,
+    ids: Range<usize>,
+    factor: f64,
+    mut spacings: SpacingCache<'_>,
+) -> Result<Vec<Point>> {
+    let around = AROUND.min(store.len() - 1);
+    let tile = Tile::load(store, ids.clone())?;
+    let mut points = Vec::with_capacity(ids.len());
+    let mut stays = vec![true; ids.len()];
+    let mut search = Search::default();
+    let mut uncertain = Vec::new();
+    let mut failed = None;
+    tile.for_each_query(around, &mut search, |id, point, query| {
+        points.push(point);
+        let Some(query) = query else {
+            uncertain.push((id, point));
+            return;
+        };
+        let near = query.near().columns().ids[..around].iter().copied();
+        match spacings.stand_out(id, near, factor) {
+            Ok(out) => stays[id as usize - ids.start] = !out,
+            Err(error) => failed = Some(error),
+        }
+    });
+    if let Some(error) = failed {
+        return Err(error);
+    }
+    drop(tile);
+    let mut cache = PageCache::default();
+    for (id, point) in uncertain {
+        let mut near = Vec::with_capacity(around);
+        let mut walk = Walk::new(store, &mut cache, id, point);
+        while near.len() < around
+            && let Some(next) = walk.next(|_| true)?
+        {
+            near.push(next.id);
+        }
+        let out = spacings.stand_out(id, near.into_iter(), factor)?;
+        stays[id as usize - ids.start] = !out;
+    }
+    let mut stays = stays.into_iter();
+    points.retain(|_| stays.next() == Some(true));
+    Ok(points)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,141 @@
+//! The spacings of all points: a file of them by tile.
+
+use super::NEAREST;
+use crate::error::Result;
+use crate::spill::{Record, Sections};
+use crate::stages::cells::TileRanges;
+use crate::stages::order::PointStore;
+use crate::stages::tiles::Tile;
+use crate::stages::tiles::near::Search;
+use crate::stages::tiles::walk::{PageCache, Walk};
+use crate::workspace::Workspace;
+use rustc_hash::FxHashMap;
+use std::ops::Range;
+
+/// The mean distance of every point to its nearest neighbours, as the bits of an `f32`.
+#[derive(Debug)]
+pub(super) struct Spacings {
+    tiles: TileRanges,
+    sections: Sections<1>,
+}
+
+impl Spacings {
+    /// Measures them all. There are more than [`NEAREST`] points.
+    pub(super) fn measure(
+        store: &PointStore,
+        tiles: TileRanges,
+        round: u32,
+        workspace: &Workspace,
+    ) -> Result<Self> {
+        let name = format!("spacings{round}");
+        let sections = Sections::<1>::unpacked(workspace, &name, tiles.count())?;
+        let bytes = |tile: usize| {
+            let points = tiles.ids(tile).len();
+            Tile::bytes(points) + PageCache::bytes(store) + points as u64 * 4
+        };
+        workspace.for_each_unit("outliers: spacings", tiles.count(), bytes, |tile| {
+            workspace.check_cancel()?;
+            sections.put(tile, &one_tile(store, tiles.ids(tile))?)
+        })?;
+        Ok(Self { tiles, sections })
+    }
+}
+
+fn one_tile(store: &PointStore, ids: Range<usize>) -> Result<Vec<Record<1>>> {
+    let tile = Tile::load(store, ids.clone())?;
+    let mut spacings = vec![[0]; ids.len()];
+    let mut search = Search::default();
+    let mut uncertain = Vec::new();
+    tile.for_each_query(NEAREST, &mut search, |id, point, query| match query {
+        Some(query) => {
+            let near = query.near().columns().distances2[..NEAREST].iter();
+            spacings[id as usize - ids.start] = [mean(near.copied())];
+        }
+        None => uncertain.push((id, point)),
+    });
+    drop(tile);
+    let mut cache = PageCache::default();
+    for (id, point) in uncertain {
+        let mut near = [0; NEAREST];
+        let mut walk = Walk::new(store, &mut cache, id, point);
+        for distance2 in &mut near {
+            *distance2 = walk.next(|_| true)?.map_or(0, |n| n.distance2);
+        }
+        spacings[id as usize - ids.start] = [mean(near.into_iter())];
+    }
+    Ok(spacings)
+}
+
+/// Mean of the distances, nearest first: the order of the sum is always the same.
+fn mean(distances2: impl Iterator<Item = u64>) -> u32 {
+    let sum: f64 = distances2.map(|d2| (d2 as f64).sqrt()).sum();
+    ((sum / NEAREST as f64) as f32).to_bits()
+}
+
+/// Sections of spacings that were looked at.
+#[derive(Debug)]
+pub(super) struct SpacingCache<'a> {
+    spacings: &'a Spacings,
+    sections: FxHashMap<u32, Vec<Record<1>>>,
+    held: usize,
+    around: Vec<u32>,
+}
+
+impl<'a> SpacingCache<'a> {
+    /// Most spacings held; a section of any size comes on top.
+    const HELD: usize = 1 << 20;
+
+    /// Bytes of a full cache: a section more than it holds, which is of a block at most.
+    pub(super) const BYTES: u64 = 4 * (Self::HELD as u64 + (1 << 16)) + (1 << 16);
+
+    pub(super) fn new(spacings: &'a Spacings) -> Self {
+        Self {
+            spacings,
+            sections: FxHashMap::default(),
+            held: 0,
+            around: Vec::new(),
+        }
+    }
+
+    /// The bits of the spacing of a point. Not negative, so they are in the order of the numbers.
+    fn get(&mut self, id: u32) -> Result<u32> {
+        let tiles = &self.spacings.tiles;
+        let tile = tiles.of(id);
+        let place = id as usize - tiles.ids(tile as usize).start;
+        if let Some(section) = self.sections.get(&tile) {
+            return Ok(section[place][0]);
+        }
+        if self.held >= Self::HELD {
+            // Queries come in curve order: soon everything here is new again.
+            self.sections.clear();
+            self.held = 0;
+        }
+        let section = self.spacings.sections.get(tile as usize)?;
+        let found = section[place][0];
+        self.held += section.len();
+        self.sections.insert(tile, section);
+        Ok(found)
+    }
+
+    /// Whether the spacing of a point is larger than `factor` times the median of those `around` it.
+    pub(super) fn stand_out(
+        &mut self,
+        id: u32,
+        around: impl Iterator<Item = u32>,
+        factor: f64,
+    ) -> Result<bool> {
+        let mut found = std::mem::take(&mut self.around);
+        found.clear();
+        for other in around {
+            found.push(self.get(other)?);
+        }
+        let own = f64::from(f32::from_bits(self.get(id)?));
+        let middle = found.len() / 2;
+        let out = middle < found.len() && {
+            let (_, median, _) = found.select_nth_unstable(middle);
+            own > factor * f64::from(f32::from_bits(*median))
+        };
+        self.around = found;
+        Ok(out)
+    }
+}

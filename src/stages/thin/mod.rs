@@ -1,0 +1,126 @@
+//! Thinning: of each cell of a cubic grid at most one point stays, the one nearest to the cell's
+//! centre (paper: none).
+//!
+//! The side of the cells is any length, so cells are not runs of the curve that orders points. All
+//! points are sorted by cell instead, on disk as far as the memory does not suffice, before they
+//! are put in order. The grid is fixed to the zero point of the input's coordinates, so that clouds
+//! beside each other are thinned alike.
+
+mod grid;
+
+pub use grid::Grid;
+use grid::{position, same_cell};
+
+use crate::error::Result;
+use crate::geom::Point;
+use crate::geom::lattice::Lattice;
+use crate::spill::{Record, Sorted, Sorter};
+use crate::stages::ingest::{READ_BUFFERS, Spool};
+use crate::workspace::Workspace;
+use crate::workspace::memory::Reservation;
+use serde::Serialize;
+
+/// Points handed on at a time.
+const BATCH: usize = 1 << 14;
+
+/// Records encoded at a time.
+const CHUNK: usize = 1 << 12;
+
+/// Counts of this stage.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+pub struct ThinStats {
+    /// Distinct points left out, since another one of their cell stays.
+    pub dropped: u64,
+    /// Points that share their position with another one.
+    #[serde(skip)]
+    pub duplicates: u64,
+}
+
+/// All points, sorted by cell.
+#[derive(Debug)]
+pub struct Thinned {
+    sorted: Sorted<6>,
+    grid: Grid,
+    held: Reservation,
+}
+
+/// Sorts the points of a spool by the cells of `grid`; the spool is deleted.
+///
+/// # Errors
+/// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
+/// [`crate::Error::Cancelled`].
+pub fn thin(spool: Spool, lattice: &Lattice, grid: Grid, workspace: &Workspace) -> Result<Thinned> {
+    let most = workspace.memory.available() / (8 * READ_BUFFERS);
+    let threads = workspace.threads.min(most as usize).max(1);
+    let frames = workspace.reserve("thin: frames", threads as u64 * READ_BUFFERS)?;
+    // A quarter, for the points are put in order while these are still there.
+    let buffer = (workspace.memory.available() / 4).max(16 << 20);
+    // Growing a buffer holds the old and the new one for a moment.
+    let held = workspace.reserve("thin: sort buffer", buffer + buffer / 2)?;
+    let sorter = Sorter::new(workspace, "thin", buffer);
+    spool.par_for_each(threads, lattice, |points| {
+        workspace.check_cancel()?;
+        let mut records = Vec::with_capacity(CHUNK.min(points.len()));
+        for part in points.chunks(CHUNK) {
+            records.clear();
+            records.extend(part.iter().map(|&p| grid.record(p)));
+            sorter.push(&records)?;
+        }
+        workspace.observer.advance(points.len() as u64);
+        Ok(())
+    })?;
+    drop(frames);
+    drop(spool);
+    Ok(Thinned {
+        sorted: sorter.finish(workspace)?,
+        grid,
+        held,
+    })
+}
+
+impl Thinned {
+    /// Calls `each` with the points that stay, some at a time.
+    ///
+    /// # Errors
+    /// What `each` returned; [`crate::Error::Io`], [`crate::Error::Corrupt`].
+    pub fn for_each(self, mut each: impl FnMut(&[Point]) -> Result<()>) -> Result<ThinStats> {
+        let Self { sorted, grid, held } = self;
+        let mut stats = ThinStats::default();
+        let mut kept = Vec::with_capacity(BATCH);
+        let mut best: Option<(Record<6>, f64)> = None;
+        let mut last = None;
+        sorted.for_each(|record| {
+            if last == Some(record) {
+                stats.duplicates += 1;
+                return Ok(());
+            }
+            last = Some(record);
+            let distance2 = grid.distance2(record);
+            match &mut best {
+                Some((nearest, least)) if same_cell(*nearest, record) => {
+                    stats.dropped += 1;
+                    // Records of a cell ascend with the position: of equals the first stays.
+                    if distance2 < *least {
+                        (*nearest, *least) = (record, distance2);
+                    }
+                }
+                _ => {
+                    let done = best.replace((record, distance2));
+                    kept.extend(done.map(|(record, _)| position(record)));
+                    if kept.len() == BATCH {
+                        each(&kept)?;
+                        kept.clear();
+                    }
+                }
+            }
+            Ok(())
+        })?;
+        kept.extend(best.map(|(record, _)| position(record)));
+        each(&kept)?;
+        drop(held);
+        Ok(stats)
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,109 @@
+use super::*;
+use crate::geom::lattice::Lattice;
+use proptest::prelude::*;
+use std::collections::BTreeMap;
+
+fn lattice(step: f64, base: [i64; 3]) -> Lattice {
+    Lattice {
+        step,
+        offset: [0.25, -3.0, 1e4],
+        base,
+        exact: true,
+    }
+}
+
+fn workspace() -> Workspace {
+    use crate::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
+    use crate::workspace::progress::{Cancel, Silent};
+    let memory = MemoryPool::new(MINIMUM_BUDGET).unwrap();
+    let folder = std::env::temp_dir();
+    Workspace::new(
+        &folder,
+        memory,
+        2,
+        std::sync::Arc::new(Silent),
+        Cancel::new(),
+    )
+    .unwrap()
+}
+
+/// What stays of points in this order, with a sort buffer of so many bytes.
+fn thinned(grid: &Grid, points: &[Point], buffer: u64) -> (Vec<Point>, ThinStats) {
+    let workspace = workspace();
+    let sorter = Sorter::new(&workspace, "thin", buffer);
+    for &point in points {
+        sorter.push(&[grid.record(point)]).unwrap();
+    }
+    let thinned = Thinned {
+        sorted: sorter.finish(&workspace).unwrap(),
+        grid: grid.clone(),
+        held: workspace.reserve("thin: sort buffer", buffer).unwrap(),
+    };
+    let mut kept = Vec::new();
+    let stats = thinned
+        .for_each(|points| {
+            kept.extend_from_slice(points);
+            Ok(())
+        })
+        .unwrap();
+    (kept, stats)
+}
+
+/// The same by a table of cells.
+fn naive(grid: &Grid, points: &[Point]) -> Vec<Point> {
+    let mut cells: BTreeMap<[i64; 3], (f64, Point)> = BTreeMap::new();
+    for &point in points {
+        let along = grid.lattice().position(point);
+        let cell = along.map(|c| (c / grid.side()).floor() as i64);
+        let square = |k: usize| (along[k] - (cell[k] as f64 + 0.5) * grid.side()).powi(2);
+        let entry = (square(0) + square(1) + square(2), point);
+        let best = cells.entry(cell).or_insert(entry);
+        if entry < *best {
+            *best = entry;
+        }
+    }
+    let mut kept: Vec<Point> = cells.into_values().map(|(_, point)| point).collect();
+    kept.sort_unstable();
+    kept
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(40))]
+    #[test]
+    fn one_point_a_cell_whatever_the_order(
+        points in prop::collection::vec(prop::array::uniform3(0i32..200), 1..800),
+        side in 0.26f64..30.0,
+        base in prop::array::uniform3(-500i64..500),
+    ) {
+        let grid = Grid::new(&lattice(0.25, base), side).unwrap();
+        let (mut kept, stats) = thinned(&grid, &points, 1 << 20);
+        let mut backwards = points.clone();
+        backwards.reverse();
+        let on_disk = thinned(&grid, &backwards, 24 * 64);
+        prop_assert_eq!(&on_disk.0, &kept);
+        prop_assert_eq!(on_disk.1, stats);
+        prop_assert_eq!(points.len() as u64, kept.len() as u64 + stats.dropped + stats.duplicates);
+        kept.sort_unstable();
+        prop_assert_eq!(kept, naive(&grid, &points));
+    }
+}
+
+#[test]
+fn a_cell_of_a_step_holds_one_position() {
+    assert!(Grid::new(&lattice(0.25, [0; 3]), 0.25).is_none());
+    assert!(Grid::new(&lattice(0.25, [0; 3]), 0.2500001).is_some());
+}
+
+#[test]
+fn extreme_sides_and_positions() {
+    let far = (1 << 30) - 1;
+    let points = [[0, 0, 0], [far, far, far], [5, 5, 5], [far, 0, 0]];
+    for base in [[0; 3], [-(1 << 29); 3], [1 << 40; 3]] {
+        for side in [0.250_000_1, 1.0, 1e8, 1e300, f64::MAX] {
+            let grid = Grid::new(&lattice(0.25, base), side).unwrap();
+            let (mut kept, _) = thinned(&grid, &points, 1 << 20);
+            kept.sort_unstable();
+            assert_eq!(kept, naive(&grid, &points), "{base:?} {side}");
+        }
+    }
+}

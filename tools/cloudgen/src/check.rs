@@ -1,0 +1,112 @@
+//! What is impossible in a description.
+
+use crate::cloud::{Cloud, Order};
+use crate::error::{Error, Result};
+use crate::kind::Kind;
+use crate::sampling::Sampling;
+
+/// Most layers of a cloud.
+const MOST_LAYERS: u32 = 100;
+
+/// Refuses numbers out of range and settings that exclude each other.
+pub(crate) fn check(cloud: &Cloud) -> Result<()> {
+    numbers(cloud)?;
+    if cloud.kind == Kind::Mesh && cloud.mesh.is_none() {
+        return Err(Error::parameter("mesh", "nothing", "a mesh file"));
+    }
+    match excluded(cloud) {
+        Some((first, second, why)) => Err(Error::Conflict { first, second, why }),
+        None => Ok(()),
+    }
+}
+
+fn numbers(cloud: &Cloud) -> Result<()> {
+    let finite = |name, values: &[f64]| match values.iter().find(|v| !v.is_finite()) {
+        Some(value) => Err(Error::parameter(name, value, "a finite number")),
+        None => Ok(()),
+    };
+    let fraction = |name, value: f64| match value {
+        0.0..1.0 => Ok(()),
+        _ => Err(Error::parameter(
+            name,
+            value,
+            "a fraction from 0 to below 1",
+        )),
+    };
+    if cloud.points > 1 << 48 {
+        return Err(Error::parameter("points", cloud.points, "at most 2^48"));
+    }
+    if !(1e-100..1e100).contains(&cloud.size) {
+        return Err(Error::parameter("size", cloud.size, "a positive number"));
+    }
+    if !(0.0..1e100).contains(&cloud.noise) {
+        let expected = "zero or a positive number";
+        return Err(Error::parameter("noise", cloud.noise, expected));
+    }
+    if !(1..=MOST_LAYERS).contains(&cloud.layers) {
+        let expected = format!("1 to {MOST_LAYERS}");
+        return Err(Error::parameter("layers", cloud.layers, expected));
+    }
+    if !(-1e100..1e100).contains(&cloud.layer_offset) {
+        let expected = "a finite number";
+        return Err(Error::parameter(
+            "layer-offset",
+            cloud.layer_offset,
+            expected,
+        ));
+    }
+    fraction("outliers", cloud.outliers)?;
+    fraction("duplicates", cloud.duplicates)?;
+    finite("offset", &cloud.offset)?;
+    finite("scanner", cloud.scanner.as_ref().map_or(&[], |s| s))?;
+    match cloud.scanlines {
+        Some(ratio) if !(1.0..=1e6).contains(&ratio) => {
+            let expected = "a ratio from 1 to 1e6";
+            Err(Error::parameter("scanlines", ratio, expected))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Two settings that exclude each other, and why.
+fn excluded(cloud: &Cloud) -> Option<(&'static str, &'static str, &'static str)> {
+    let special = if cloud.falloff {
+        Some("falloff")
+    } else {
+        cloud.scanlines.map(|_| "scanlines")
+    };
+    let chosen = match cloud.sampling {
+        Sampling::Uniform => None,
+        Sampling::Regular => Some("regular sampling"),
+        Sampling::Adaptive => Some("adaptive sampling"),
+    };
+    if cloud.scanner.is_some() && !cloud.falloff {
+        let why = "without falloff the scanner has no effect";
+        return Some(("scanner", "even density", why));
+    }
+    if cloud.falloff && cloud.order == Order::Sorted {
+        let why = "the falloff draws points by chance, in no order";
+        return Some(("falloff", "sorted order", why));
+    }
+    if cloud.mesh.is_some() && cloud.kind != Kind::Mesh {
+        let why = "only the kind mesh takes a file";
+        return Some(("a mesh file", cloud.kind.name(), why));
+    }
+    if cloud.layers == 1 && cloud.layer_offset != 0.0 {
+        let why = "there is no second one to shift";
+        return Some(("layer-offset", "one layer", why));
+    }
+    if let (Some(first), Some(second)) = (special, chosen) {
+        return Some((first, second, "each has its own density"));
+    }
+    if cloud.kind == Kind::Grid
+        && let Some(first) = special.or(chosen)
+    {
+        return Some((first, "grid", "its nodes are fixed"));
+    }
+    if cloud.kind == Kind::Mesh && cloud.scanlines.is_some() {
+        let why = "it has no direction to scan it in";
+        return Some(("scanlines", "mesh", why));
+    }
+    None
+}
