@@ -155,7 +155,7 @@ pub struct Repair {
     /// Fill holes of up to this many edges; 0 fills none
     #[arg(long, value_name = "N", default_value_t = 500)]
     pub max_hole_edges: usize,
-    /// Remove components with fewer triangles [default: a thousandth of the points, from 10 to 100;
+    /// Remove components with fewer triangles [default: one for each 2500 points, from 10 to 1000;
     /// with --method paper 10]
     #[arg(long, value_name = "N")]
     pub min_component: Option<u64>,

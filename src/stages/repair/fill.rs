@@ -21,6 +21,8 @@ pub struct Corner {
 /// What became of a loop.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Filling {
+    /// A single triangle, as it runs: no hole, but what no cell saw.
+    Gap([u32; 3]),
     /// Triangles as they run.
     Filled(Vec<[u32; 3]>),
     /// Triangles that close it in part, and the edges that are left.

@@ -78,10 +78,9 @@ pub fn fill(
     let _fragments = workspace.reserve("fragments", found.fragments.len() as u64 * 120)?;
     for ring in link_up(&found.fragments) {
         workspace.check_cancel()?;
-        settled.stats.holes_found += 1;
         let edges: usize = ring.iter().map(|&f| found.fragments[f].steps).sum();
         let Some(mending) = mending.filter(|m| edges <= m.longest_loop()) else {
-            settled.stats.holes_too_long += 1;
+            settled.too_long();
             continue;
         };
         let filling = fill_across(places, &ring, &found.fragments, &kept, mending)?;
@@ -103,9 +102,8 @@ fn fill_inside(
 ) -> Result<Vec<Fragment>> {
     let (loops, open) = rim.trace();
     for ring in loops {
-        settled.stats.holes_found += 1;
         if ring.len() > mending.longest_loop() {
-            settled.stats.holes_too_long += 1;
+            settled.too_long();
             continue;
         }
         let corners = ring.iter().map(|s| rim.corner(s)).collect();
@@ -137,22 +135,36 @@ struct Settled {
 
 impl Settled {
     fn settle(&mut self, filling: Filling, edges: usize) {
+        if matches!(filling, Filling::Gap(_)) {
+            self.stats.gaps_closed += 1;
+        } else {
+            self.stats.holes_found += 1;
+        }
         match filling {
+            Filling::Gap(t) => self.close(vec![t], edges),
             Filling::Filled(new) => {
                 self.stats.holes_filled += 1;
                 self.stats.hole_triangles += new.len() as u64;
-                self.edges += edges as u64;
-                self.triangles.extend(new.into_iter().map(from_smallest));
+                self.close(new, edges);
             }
             Filling::Zipped(new, left) => {
-                self.stats.hole_triangles += new.len() as u64;
-                self.edges += (edges - left) as u64;
-                self.triangles.extend(new.into_iter().map(from_smallest));
                 self.stats.holes_zipped += 1;
+                self.stats.hole_triangles += new.len() as u64;
+                self.close(new, edges - left);
             }
             Filling::Outline => self.stats.holes_outline += 1,
             Filling::Impossible => self.stats.holes_not_filled += 1,
         }
+    }
+
+    fn close(&mut self, new: Vec<[u32; 3]>, edges: usize) {
+        self.edges += edges as u64;
+        self.triangles.extend(new.into_iter().map(from_smallest));
+    }
+
+    fn too_long(&mut self) {
+        self.stats.holes_found += 1;
+        self.stats.holes_too_long += 1;
     }
 
     /// Adds up all but the triangles.

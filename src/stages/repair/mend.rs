@@ -43,9 +43,11 @@ impl Mending {
             return fill(corners, 0, edge);
         }
         if corners.len() <= self.longest && !is_opening(&corners) {
-            let filling = fill(corners.clone(), SMALL, &edge);
-            if matches!(filling, Filling::Filled(_)) {
-                return filling;
+            if let Filling::Filled(new) = fill(corners.clone(), SMALL, &edge) {
+                return match new[..] {
+                    [gap] => Filling::Gap(gap),
+                    _ => Filling::Filled(new),
+                };
             }
         }
         let zipped = zip(corners, &edge);

@@ -79,6 +79,8 @@ pub struct RepairStats {
     pub components_removed: u64,
     /// Triangles in them.
     pub component_triangles_removed: u64,
+    /// Boundary loops of three edges that were closed before holes are counted: T0 triangles.
+    pub gaps_closed: u64,
     /// Boundary loops before filling.
     pub holes_found: u64,
     /// Holes filled.
@@ -117,6 +119,7 @@ impl RepairStats {
         self.components_found += more.components_found;
         self.components_removed += more.components_removed;
         self.component_triangles_removed += more.component_triangles_removed;
+        self.gaps_closed += more.gaps_closed;
         self.holes_found += more.holes_found;
         self.holes_filled += more.holes_filled;
         self.holes_zipped += more.holes_zipped;

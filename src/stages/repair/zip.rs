@@ -9,7 +9,7 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 /// An ear's third side is at most so many times as long as the triangles around are wide.
-const REACH: f64 = 4.0;
+const REACH: f64 = 6.0;
 
 /// The cosine of the largest angle between an ear and its neighbours: 100 degrees.
 const COS_FOLD: f64 = -0.17364817766693036;

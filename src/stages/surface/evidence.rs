@@ -62,11 +62,7 @@ pub fn join_inside(
     sets: &mut ParitySets,
 ) -> Vec<bool> {
     // Without a contradiction the order of the edges makes no difference.
-    let mut agree = true;
-    each_edge(triangles, edges, |n, m, flip| {
-        agree &= sets.join(n, m, flip)
-    });
-    if agree {
+    if each_edge(triangles, edges, |n, m, flip| sets.join(n, m, flip)) {
         return vec![false; triangles.len()];
     }
     *sets = ParitySets::new(triangles.len());
@@ -74,15 +70,22 @@ pub fn join_inside(
 }
 
 /// Calls `each` with the two triangles at every edge, the earlier one first, and whether one must be
-/// turned against the other.
-fn each_edge(triangles: &[Triangle], edges: &Edges, mut each: impl FnMut(u32, u32, bool)) {
+/// turned against the other, until it returns false; what it returned at last.
+fn each_edge(
+    triangles: &[Triangle],
+    edges: &Edges,
+    mut each: impl FnMut(u32, u32, bool) -> bool,
+) -> bool {
     for (n, t) in (0..).zip(triangles) {
         for (a, b, ..) in EDGES {
             for m in edges.at(t[a], t[b]).filter(|m| *m > n) {
-                each(n, m, opposed(*t, triangles[m as usize], t[a], t[b]));
+                if !each(n, m, opposed(*t, triangles[m as usize], t[a], t[b])) {
+                    return false;
+                }
             }
         }
     }
+    true
 }
 
 fn join_by_flatness(
@@ -107,6 +110,7 @@ fn join_by_flatness(
             let step = (FLAT - cosine) / (1.0 + FLAT) * (STEPS - 1) as f64;
             steps[(step as usize).min(STEPS - 1)].push((n, m, flip));
         }
+        true
     });
     steps.into_iter().flatten().for_each(join);
     dead
