@@ -28,7 +28,7 @@ const SAMPLE: usize = 8;
 const RUN: usize = 16;
 
 /// A point is rough if it lies farther from its plane than this part of the local spacing.
-const ROUGH: f64 = 0.2;
+const ROUGH: f64 = 0.3;
 
 /// A patch moves if more than one in so many points that were looked at is rough.
 const SHARE: u32 = 32;
