@@ -356,5 +356,58 @@ fn robust() {
         min_component: [1, 3, 10][seed as usize % 3],
         ..Settings::robust()
     });
-    println!("{reached:?}");
+    let Reached {
+        rounds,
+        on_a_line,
+        one_sided,
+        voted,
+        outvoted,
+        joints_removed,
+        partly_zipped,
+        zipped_whole,
+        ..
+    } = reached;
+    let parts = [on_a_line, one_sided, voted, outvoted, joints_removed];
+    let mended = [partly_zipped, zipped_whole];
+    let all = parts.iter().chain(&mended).all(|n| *n > 0);
+    assert!(rounds == 3 && all, "parts not reached: {reached:?}");
+}
+
+#[test]
+fn robust_and_smoothed() {
+    run(80..82, |seed| Settings {
+        smooth: 1,
+        relax: 1 + seed as u32 % 2,
+        neighbors: 12,
+        block: [50, 90][seed as usize % 2],
+        ..Settings::robust()
+    });
+}
+
+/// Several patches, of which some move.
+#[test]
+fn robust_on_torn_sheets_and_doors() {
+    let (mut reached, mut some_stayed) = (Reached::default(), 0);
+    for seed in 0..4 {
+        let points = clouds::half_rough(seed, 1000);
+        let settings = Settings {
+            smooth: (seed == 3) as u32,
+            relax: 1 + seed as u32 % 3,
+            neighbors: [12, 20][seed as usize % 2],
+            block: [30, 200, 65_536][seed as usize % 3],
+            ..Settings::robust()
+        };
+        let counts = compare("half rough", &points, &settings, &CUTS);
+        let all = settings.relax as usize * points.len();
+        some_stayed += usize::from(0 < counts.moved && counts.moved < all);
+        reached.add(&counts);
+        let settings = Settings {
+            neighbors: 8,
+            ..settings
+        };
+        reached.add(&compare("door", &clouds::door(seed), &settings, &CUTS));
+    }
+    let parts = [reached.openings, reached.voted, reached.partly_zipped];
+    let parts = parts.iter().all(|n| *n > 0);
+    assert!(parts && some_stayed > 1, "{some_stayed} {reached:?}");
 }

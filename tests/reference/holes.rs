@@ -3,8 +3,8 @@
 use super::big::{Big, Big3, cross, dot, plus, vector};
 use super::insert::normal;
 use super::repair::{ClockwiseAngle, pinched, run};
-use super::{Settings, mend};
 use super::surface::{Component, Edge, Surface, Triangle};
+use super::{Settings, mend};
 use outcrop::geom::{Point, distance2, sub};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -74,7 +74,12 @@ pub fn fill(
     for hole in holes.loops(components) {
         filling.loops += 1;
         if settings.robust {
-            triangles.extend(mend::mend(&holes, &hole, settings.max_hole_edges, &mut filling));
+            triangles.extend(mend::mend(
+                &holes,
+                &hole,
+                settings.max_hole_edges,
+                &mut filling,
+            ));
         } else if hole.len() > settings.max_hole_edges {
             filling.too_long += 1;
         } else if holes.is_outline(&hole, &holes.behind(&hole)) {
