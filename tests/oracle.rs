@@ -4,8 +4,8 @@
 mod reference;
 
 use outcrop::inspect::ply_mesh::{PlyMesh, Sink};
-use outcrop::{Error, Params, Radius, Reconstruction, Report};
-use reference::{Mesh, Settings, clouds};
+use outcrop::{Error, Method, Params, Radius, Reconstruction, Report};
+use reference::{Counts, Mesh, Settings, clouds};
 use std::fmt::Write;
 use std::path::Path;
 
@@ -43,6 +43,21 @@ struct Cut {
     threads: usize,
 }
 
+/// The angle, of those used here, with this cosine.
+fn angle_of(cosine: f64) -> f64 {
+    let has = |max_angle: &f64| {
+        let params = Params {
+            max_angle: *max_angle,
+            ..Params::paper()
+        };
+        params.cos_max_angle() == cosine
+    };
+    [60.0, 120.0, 143.0]
+        .into_iter()
+        .find(has)
+        .expect("a known angle")
+}
+
 fn pipeline(
     points: &[Point],
     settings: &Settings,
@@ -66,10 +81,12 @@ fn pipeline(
             reference::Radius::Percent(x) => Radius::Percent(x),
             reference::Radius::Length(x) => Radius::Length(x),
         },
-        max_angle: if settings.cos_max_angle == 0.5 {
-            60.0
+        max_angle: angle_of(settings.cos_max_angle),
+        relax: settings.relax,
+        method: if settings.robust {
+            Method::Robust
         } else {
-            120.0
+            Method::Paper
         },
         max_hole_edges: settings.max_hole_edges,
         min_component: Some(settings.min_component as u64),
@@ -103,10 +120,14 @@ fn at_origin(points: &[Point]) -> Vec<Point> {
         .collect()
 }
 
-fn compare(name: &str, points: &[Point], settings: &Settings, cuts: &[Cut]) {
+fn compare(name: &str, points: &[Point], settings: &Settings, cuts: &[Cut]) -> Counts {
     let points = at_origin(points);
-    // Smoothing works on a lattice ten times halved.
-    let scale = if settings.smooth > 0 { 1024 } else { 1 };
+    // Moved points lie on a lattice ten times halved.
+    let scale = if settings.smooth + settings.relax > 0 {
+        1024
+    } else {
+        1
+    };
     let fine: Vec<Point> = points.iter().map(|p| p.map(|x| x * scale)).collect();
     let fine_settings = Settings {
         radius: match settings.radius {
@@ -126,6 +147,7 @@ fn compare(name: &str, points: &[Point], settings: &Settings, cuts: &[Cut]) {
             Err(error) => panic!("{what}: {error}"),
         }
     }
+    expected.counts
 }
 
 fn same(what: &str, mesh: &ReadBack, report: &Report, expected: &Mesh, scale: f64) {
@@ -136,7 +158,18 @@ fn same(what: &str, mesh: &ReadBack, report: &Report, expected: &Mesh, scale: f6
         (counts.t3, counts.t2, counts.t1),
         "{what}: triples"
     );
-    assert_eq!(report.base.triangles as usize, counts.base, "{what}: base");
+    let relax = report.relax.unwrap_or_default();
+    assert_eq!(
+        (relax.rounds, relax.moved as usize),
+        (counts.rounds, counts.moved),
+        "{what}: relaxing"
+    );
+    let b = &report.base;
+    assert_eq!(
+        [b.flagged, b.on_a_line, b.mobius, b.triangles].map(|x| x as usize),
+        [counts.flagged, counts.flat, counts.one_sided, counts.base],
+        "{what}: base"
+    );
     let i = &report.insertion;
     assert_eq!(
         [i.unconnected, i.full_edge, i.excess, i.angle, i.orientation].map(|x| x as usize),
@@ -147,8 +180,9 @@ fn same(what: &str, mesh: &ReadBack, report: &Report, expected: &Mesh, scale: f6
         "{what}: rejected"
     );
     assert_eq!(
-        i.joints_removed as usize, counts.joints_removed,
-        "{what}: joints removed"
+        [i.joints_removed, i.on_a_line].map(|x| x as usize),
+        [counts.joints_removed, counts.flat_candidates],
+        "{what}: joints removed, on a line"
     );
     assert_eq!(
         i.accepted as usize,
@@ -172,7 +206,15 @@ fn same(what: &str, mesh: &ReadBack, report: &Report, expected: &Mesh, scale: f6
         r.holes_outline as usize, counts.holes.outlines,
         "{what}: outlines"
     );
-    assert_eq!(mesh.triangles, expected.triangles, "{what}: triangles");
+    assert_eq!(
+        (r.holes_zipped as usize, r.hole_triangles as usize),
+        (counts.holes.zipped, counts.holes.triangles),
+        "{what}: zipped"
+    );
+    let differ = mesh.triangles.iter().zip(&expected.triangles);
+    let first = differ.into_iter().find(|(a, b)| a != b);
+    assert_eq!(first, None, "{what}: the first triangles that differ");
+    assert_eq!(mesh.triangles.len(), expected.triangles.len(), "{what}");
     let position = |id: &u32| {
         // A coordinate in the file is single precision where that is enough for the input.
         expected.ids[*id as usize].map(|x| f64::from(x) / scale)
@@ -203,16 +245,48 @@ const CUTS: [Cut; 3] = [
     },
 ];
 
-fn run(seeds: std::ops::Range<u64>, settings: impl Fn(u64) -> Settings) {
+/// What happened in all runs.
+#[derive(Debug, Default)]
+struct Reached {
+    rounds: u32,
+    on_a_line: usize,
+    one_sided: usize,
+    voted: usize,
+    outvoted: usize,
+    joints_removed: usize,
+    openings: usize,
+    partly_zipped: usize,
+    zipped_whole: usize,
+}
+
+impl Reached {
+    fn add(&mut self, counts: &Counts) {
+        self.rounds = self.rounds.max(counts.rounds);
+        self.on_a_line += counts.flat + counts.flat_candidates;
+        self.one_sided += counts.one_sided;
+        self.voted += counts.voted;
+        self.outvoted += counts.outvoted;
+        self.joints_removed += counts.joints_removed;
+        self.openings += counts.holes.openings;
+        self.partly_zipped += counts.holes.partly;
+        self.zipped_whole += counts.holes.zipped_whole;
+    }
+}
+
+fn run(seeds: std::ops::Range<u64>, settings: impl Fn(u64) -> Settings) -> Reached {
+    let mut reached = Reached::default();
     for seed in seeds {
         for (name, points) in clouds::one_of_each(seed) {
             let settings = settings(seed);
-            if settings.smooth > 0 && points.iter().flatten().any(|x| *x >= 1 << 19) {
+            let moves = settings.smooth + settings.relax > 0;
+            if moves && points.iter().flatten().any(|x| *x >= 1 << 19) {
                 continue;
             }
-            compare(&format!("{name}, seed {seed}"), &points, &settings, &CUTS);
+            let counts = compare(&format!("{name}, seed {seed}"), &points, &settings, &CUTS);
+            reached.add(&counts);
         }
     }
+    reached
 }
 
 #[test]
@@ -272,4 +346,68 @@ fn holes_of_few_edges_and_wide_angles() {
         block: 60,
         ..Settings::default()
     });
+}
+
+#[test]
+fn robust() {
+    let reached = run(60..72, |seed| Settings {
+        relax: seed as u32 % 4,
+        block: [40, 7, 100, 15, 25, 65_536][seed as usize % 6],
+        min_component: [1, 3, 10][seed as usize % 3],
+        ..Settings::robust()
+    });
+    let Reached {
+        rounds,
+        on_a_line,
+        one_sided,
+        voted,
+        outvoted,
+        joints_removed,
+        partly_zipped,
+        zipped_whole,
+        ..
+    } = reached;
+    let parts = [on_a_line, one_sided, voted, outvoted, joints_removed];
+    let mended = [partly_zipped, zipped_whole];
+    let all = parts.iter().chain(&mended).all(|n| *n > 0);
+    assert!(rounds == 3 && all, "parts not reached: {reached:?}");
+}
+
+#[test]
+fn robust_and_smoothed() {
+    run(80..82, |seed| Settings {
+        smooth: 1,
+        relax: 1 + seed as u32 % 2,
+        neighbors: 12,
+        block: [50, 90][seed as usize % 2],
+        ..Settings::robust()
+    });
+}
+
+/// Several patches, of which some move.
+#[test]
+fn robust_on_torn_sheets_and_doors() {
+    let (mut reached, mut some_stayed) = (Reached::default(), 0);
+    for seed in 0..4 {
+        let points = clouds::half_rough(seed, 1000);
+        let settings = Settings {
+            smooth: (seed == 3) as u32,
+            relax: 1 + seed as u32 % 3,
+            neighbors: [12, 20][seed as usize % 2],
+            block: [30, 200, 65_536][seed as usize % 3],
+            ..Settings::robust()
+        };
+        let counts = compare("half rough", &points, &settings, &CUTS);
+        let all = settings.relax as usize * points.len();
+        some_stayed += usize::from(0 < counts.moved && counts.moved < all);
+        reached.add(&counts);
+        let settings = Settings {
+            neighbors: 8,
+            ..settings
+        };
+        reached.add(&compare("door", &clouds::door(seed), &settings, &CUTS));
+    }
+    let parts = [reached.openings, reached.voted, reached.partly_zipped];
+    let parts = parts.iter().all(|n| *n > 0);
+    assert!(parts && some_stayed > 1, "{some_stayed} {reached:?}");
 }

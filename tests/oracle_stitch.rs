@@ -7,7 +7,7 @@ use outcrop::inspect::ply_mesh::{PlyMesh, Sink};
 use outcrop::stages::blocks::Blocks;
 use outcrop::stages::export::{CoordinateType, export};
 use outcrop::stages::located::Places;
-use outcrop::stages::order::{Orderer, PointStore};
+use outcrop::stages::order::{Orderer, PointStore, StoreWriter};
 use outcrop::stages::repair::{RepairOptions, repair};
 use outcrop::stages::stitch::{StitchOptions, stitch};
 use outcrop::stages::triples::Triples;
@@ -16,7 +16,7 @@ use outcrop::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
 use outcrop::workspace::progress::{Cancel, Silent};
 use outcrop::{Error, spill};
 use reference::clouds::Random;
-use reference::{Mesh, Settings, cells, from_triples};
+use reference::{Counts, Settings, cells, connect};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -78,31 +78,41 @@ fn sections(all: &BTreeMap<[u32; 3], u32>, blocks: Blocks, workspace: &Workspace
     Triples { own, visiting }
 }
 
+/// The shape as a store beside that of the file.
+fn shape_of(shape: &[Point], workspace: &Workspace) -> PointStore {
+    let mut writer = StoreWriter::create(workspace, "shape", 16).unwrap();
+    writer.push(shape).unwrap();
+    writer.finish(workspace).unwrap()
+}
+
+/// The triangles, and counts as [`counted`] has them.
 fn pipeline(
+    shape: &[Point],
     points: &[Point],
     all: &BTreeMap<[u32; 3], u32>,
     settings: &Settings,
-) -> outcrop::Result<(Vec<[u32; 3]>, [u64; 3])> {
+) -> outcrop::Result<(Vec<[u32; 3]>, [u64; 7])> {
     let workspace = &workspace();
     let store = store_of(points, workspace);
+    let moved = (shape != points).then(|| shape_of(shape, workspace));
     let blocks = Blocks::new(store.len(), settings.block);
     let triples = sections(all, blocks, workspace);
     let places = Places {
-        shape: &store,
+        shape: moved.as_ref().unwrap_or(&store),
         file: &store,
     };
     let extraction = StitchOptions {
         cos_max_angle: settings.cos_max_angle,
-        weigh: false,
+        weigh: settings.robust,
     };
     let (stitched, base, inserted) = stitch(places, triples, blocks, extraction, workspace)?;
     let options = RepairOptions {
         repair: settings.repair,
         min_component: settings.min_component as u64,
         max_hole_edges: settings.max_hole_edges,
-        zip: false,
+        zip: settings.robust,
     };
-    let (repaired, _) = repair(places, stitched, blocks, options, workspace)?;
+    let (repaired, mended) = repair(places, stitched, blocks, options, workspace)?;
     let lattice = outcrop::geom::lattice::Lattice {
         step: 1.0,
         offset: [0.0; 3],
@@ -122,10 +132,29 @@ fn pipeline(
     )?;
     let mut faces = Faces::default();
     PlyMesh::open(&path)?.read(&mut faces)?;
-    Ok((
-        faces.0,
-        [base.flagged, base.mobius, inserted.joints_removed],
-    ))
+    let counts = [
+        base.flagged,
+        base.on_a_line,
+        base.mobius,
+        inserted.on_a_line,
+        inserted.joints_removed,
+        mended.holes_filled,
+        mended.hole_triangles,
+    ];
+    Ok((faces.0, counts))
+}
+
+fn counted(c: &Counts) -> [u64; 7] {
+    let counts = [
+        c.flagged,
+        c.flat,
+        c.one_sided,
+        c.flat_candidates,
+        c.joints_removed,
+        c.holes.filled,
+        c.holes.triangles,
+    ];
+    counts.map(|x| x as u64)
 }
 
 /// Triples among points that are near in order, as often T3 as `share` says.
@@ -157,51 +186,137 @@ fn random_triples(random: &mut Random, count: usize, share: i64) -> BTreeMap<[u3
     all
 }
 
-#[test]
-fn arbitrary_triples() {
-    let mut reached = [0u64; 3];
-    for seed in 0..400u64 {
+/// Triples of a sheet that closes on itself, with a twist or without, and is torn: its ids are those
+/// along it but for a few, or in no order at all.
+fn twisted_triples(random: &mut Random, count: usize) -> BTreeMap<[u32; 3], u32> {
+    let high = random.integer(3, 7);
+    let wide = count as i64 / high;
+    let mut all = BTreeMap::new();
+    if wide < 4 {
+        return all;
+    }
+    let mut id: Vec<u32> = (0..count as u32).collect();
+    for _ in 0..[0, 4, count][random.integer(0, 3) as usize] {
+        let [a, b] = [0; 2].map(|_: i32| random.integer(0, count as i64) as usize);
+        id.swap(a, b);
+    }
+    let (twist, whole) = (random.integer(0, 3) > 0, random.integer(5, 10));
+    let at = |x: i64, y: i64| {
+        let y = if x >= wide && twist { high - 1 - y } else { y };
+        id[(x % wide * high + y) as usize]
+    };
+    for (x, y) in (0..wide).flat_map(|x| (1..high).map(move |y| (x, y))) {
+        let [a, b, c, d] = [at(x, y - 1), at(x, y), at(x + 1, y - 1), at(x + 1, y)];
+        let halves = match random.integer(0, 2) {
+            0 => [[a, b, c], [b, c, d]],
+            _ => [[a, b, d], [a, c, d]],
+        };
+        for mut t in halves {
+            t.sort_unstable();
+            let seen = match random.integer(0, 10) {
+                n if n < whole => 3,
+                _ => random.integer(0, 3) as u32,
+            };
+            if seen > 0 {
+                all.insert(t, seen);
+            }
+        }
+    }
+    all
+}
+
+/// Compares for many seeds; `shape` moves a point. Sums of the counts that must not stay 0.
+fn compare(
+    seeds: std::ops::Range<u64>,
+    sheets: bool,
+    settings: impl Fn(u64) -> Settings,
+    side: impl Fn(u64) -> i64,
+    shape: impl Fn(Point, &mut Random) -> Point,
+) -> Counts {
+    let mut reached = Counts::default();
+    for seed in seeds {
         let mut random = Random::new(seed);
         let count = random.integer(5, 60) as usize;
         let cloud: Vec<Point> = (0..count)
-            .map(|_| [0; 3].map(|_: i32| random.integer(0, 200) as i32))
+            .map(|_| [0; 3].map(|_: i32| random.integer(0, side(seed)) as i32))
             .collect();
         let points = cells::in_id_order(&cloud);
         let share = random.integer(2, 9);
-        let mut all = random_triples(&mut random, points.len(), share);
+        let mut all = match sheets && seed.is_multiple_of(2) {
+            true => twisted_triples(&mut random, points.len()),
+            false => random_triples(&mut random, points.len(), share),
+        };
+        let shape: Vec<Point> = points.iter().map(|p| shape(*p, &mut random)).collect();
         // Cells never see three points on a line.
         all.retain(|t, _| {
-            let [a, b, c] = t.map(|v| points[v as usize]);
+            let [a, b, c] = t.map(|v| shape[v as usize]);
             outcrop::stages::located::normal(a, b, c) != [0; 3]
         });
-        let settings = Settings {
-            block: [4, 9, 25, 1000][seed as usize % 4],
-            min_component: [1, 3, 10][seed as usize % 3],
-            cos_max_angle: [-1.0, -0.5, 0.5][seed as usize % 3],
-            repair: seed % 5 != 0,
-            ..Settings::default()
-        };
-        let expected: Mesh = from_triples(points.clone(), &all, &settings);
+        let settings = settings(seed);
+        let expected = connect(&shape, points.clone(), &all, &settings);
         let what = format!("seed {seed}, {} points, {settings:?}", points.len());
-        match pipeline(&points, &all, &settings) {
+        match pipeline(&shape, &points, &all, &settings) {
             Ok((triangles, counts)) => {
+                assert_eq!(counts, counted(&expected.counts), "{what}");
                 assert_eq!(triangles, expected.triangles, "{what}");
-                let c = &expected.counts;
-                assert_eq!(
-                    counts.map(|x| x as usize),
-                    [c.flagged, c.one_sided, c.joints_removed],
-                    "{what}"
-                );
-                for (sum, count) in reached.iter_mut().zip(counts) {
-                    *sum += count;
-                }
             }
             Err(Error::NoTriangles { .. }) => assert!(expected.triangles.is_empty(), "{what}"),
             Err(error) => panic!("{what}: {error}"),
         }
+        let c = expected.counts;
+        reached.flagged += c.flagged;
+        reached.one_sided += c.one_sided;
+        reached.joints_removed += c.joints_removed;
+        reached.flat += c.flat;
+        reached.flat_candidates += c.flat_candidates;
+        reached.voted += c.voted;
+        reached.outvoted += c.outvoted;
+        reached.holes.filled += c.holes.filled;
+        reached.holes.partly += c.holes.partly;
+        reached.holes.zipped_whole += c.holes.zipped_whole;
     }
-    assert!(
-        reached.iter().all(|count| *count > 0),
-        "parts not reached: {reached:?}"
-    );
+    reached
+}
+
+fn varied(seed: u64) -> Settings {
+    Settings {
+        block: [4, 9, 25, 1000][seed as usize % 4],
+        min_component: [1, 3, 10][seed as usize % 3],
+        cos_max_angle: [-1.0, -0.5, 0.5][seed as usize % 3],
+        repair: !seed.is_multiple_of(5),
+        ..Settings::default()
+    }
+}
+
+#[test]
+fn arbitrary_triples() {
+    let reached = compare(0..400, false, varied, |_| 200, |p, _| p);
+    let parts = [reached.flagged, reached.one_sided, reached.joints_removed];
+    assert!(parts.iter().all(|n| *n > 0), "parts not reached: {parts:?}");
+}
+
+#[test]
+fn arbitrary_triples_the_robust_way() {
+    let settings = |seed| Settings {
+        block: [4, 9, 25, 1000][seed as usize / 2 % 4],
+        robust: true,
+        ..varied(seed)
+    };
+    // Few positions, so that many triples are on a line in the file and not in the shape.
+    let side = |seed: u64| [200, 20, 6][seed as usize % 3];
+    let shape = |p: Point, random: &mut Random| p.map(|x| 8 * x + random.integer(0, 8) as i32);
+    let reached = compare(1000..1800, true, settings, side, shape);
+    let holes = &reached.holes;
+    let parts = [
+        reached.flagged,
+        reached.one_sided,
+        reached.flat,
+        reached.flat_candidates,
+        reached.voted,
+        reached.outvoted,
+        holes.filled,
+        holes.partly,
+        holes.zipped_whole,
+    ];
+    assert!(parts.iter().all(|n| *n > 0), "parts not reached: {parts:?}");
 }

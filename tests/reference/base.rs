@@ -1,7 +1,10 @@
 //! Section 1.4: the base, from the triples that all three cells see.
 
+use super::evidence::{self, Known};
+use super::homes::Side;
 use super::surface::{Surface, Triangle, fans};
-use std::collections::BTreeSet;
+use outcrop::geom::Point;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// What became of the T3.
 pub struct Base {
@@ -10,6 +13,13 @@ pub struct Base {
     pub flagged: BTreeSet<Triangle>,
     /// They would close a Möbius band: gone for good.
     pub one_sided: BTreeSet<Triangle>,
+    /// The home of each triangle, and how it runs in it.
+    pub sides: BTreeMap<Triangle, Side>,
+    /// Whether a home has a crossing triangle.
+    pub global: Vec<bool>,
+    /// Robust: pairs of labels that votes joined, and that they could not join any more.
+    pub voted: usize,
+    pub outvoted: usize,
 }
 
 /// The triangles at `v`, among the given ones, that `v` flags.
@@ -37,18 +47,77 @@ pub fn is_interior(t: Triangle, block: u32) -> bool {
     t[0] / block == t[2] / block
 }
 
-pub fn base(t3: &BTreeSet<Triangle>, block: u32) -> Base {
+/// By block, the triangles that a vertex of it flags.
+fn flagged_by(t3: &BTreeSet<Triangle>, block: u32) -> BTreeMap<u32, BTreeSet<Triangle>> {
     let all = Surface::of(t3.iter().copied());
-    let mut flagged = BTreeSet::new();
+    let mut flagged: BTreeMap<u32, BTreeSet<Triangle>> = BTreeMap::new();
     for v in all.vertices() {
-        flagged.extend(flagged_at(v, &all.at_vertex(v)));
+        let by = flagged.entry(v / block).or_default();
+        by.extend(flagged_at(v, &all.at_vertex(v)));
     }
+    flagged
+}
+
+/// The base of the paper's method.
+pub fn base(t3: &BTreeSet<Triangle>, block: u32) -> Base {
+    let flagged: BTreeSet<Triangle> = flagged_by(t3, block).into_values().flatten().collect();
     let kept: Vec<Triangle> = t3.difference(&flagged).copied().collect();
     let (surface, one_sided) = without_moebius_bands(&kept, block);
+    let components = surface.components().expect("the base is orientable");
+    let mut global = Vec::new();
+    let mut sides = BTreeMap::new();
+    for (home, component) in components.iter().enumerate() {
+        global.push(component.keys().any(|&t| !is_interior(t, block)));
+        let side = |(&t, &turned)| (t, Side { home, turned });
+        sides.extend(component.iter().map(side));
+    }
     Base {
         surface,
         flagged,
         one_sided,
+        sides,
+        global,
+        voted: 0,
+        outvoted: 0,
+    }
+}
+
+/// The base of the robust method. `open` are the T2 and T1.
+pub fn weighed(
+    points: &[Point],
+    t3: &BTreeSet<Triangle>,
+    open: &BTreeSet<Triangle>,
+    block: u32,
+) -> Base {
+    let by = flagged_by(t3, block);
+    let flagged: BTreeSet<Triangle> = by.values().flatten().copied().collect();
+    let kept: BTreeSet<Triangle> = t3.difference(&flagged).copied().collect();
+    let touches = |t: &Triangle, g: u32| t.iter().any(|v| v / block == g);
+    let crossing: BTreeSet<Triangle> = t3
+        .iter()
+        .copied()
+        .filter(|&t| !is_interior(t, block))
+        .collect();
+    let seen = |(&g, flags): (&u32, &BTreeSet<Triangle>)| {
+        let here = crossing.difference(flags).copied();
+        (g, here.filter(|t| touches(t, g)).collect())
+    };
+    let candidates = open.union(&flagged).copied();
+    let weighed = evidence::orient(Known {
+        points,
+        block,
+        kept: &kept,
+        seen: by.iter().map(seen).collect(),
+        candidates: candidates.filter(|&t| is_interior(t, block)).collect(),
+    });
+    Base {
+        surface: weighed.surface,
+        flagged,
+        one_sided: weighed.one_sided,
+        sides: weighed.sides,
+        global: weighed.global,
+        voted: weighed.voted,
+        outvoted: weighed.outvoted,
     }
 }
 

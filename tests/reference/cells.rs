@@ -27,13 +27,13 @@ pub fn diagonal(points: &[Point]) -> f64 {
 }
 
 /// All ids but `i` by (squared distance, id).
-fn by_distance(points: &[Point], i: usize) -> Vec<usize> {
+pub fn by_distance(points: &[Point], i: usize) -> Vec<usize> {
     let mut others: Vec<usize> = (0..points.len()).filter(|&j| j != i).collect();
     others.sort_by_key(|&j| (distance2(points[i], points[j]), j));
     others
 }
 
-fn plane_of(points: &[Point], i: usize, neighbors: &[usize]) -> (Moments, Plane) {
+pub fn plane_of(points: &[Point], i: usize, neighbors: &[usize]) -> (Moments, Plane) {
     let mut moments = Moments::default();
     for &j in neighbors {
         moments.add(sub(points[j], points[i]));

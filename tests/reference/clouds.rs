@@ -124,6 +124,35 @@ pub fn one_of_each(seed: u64) -> Vec<(&'static str, Vec<Point>)> {
         .collect()
 }
 
+/// A frame around a door too wide to be a hole, its points a little off a grid.
+pub fn door(seed: u64) -> Vec<Point> {
+    let mut random = Random::new(seed);
+    let mut points = Vec::new();
+    for (a, b) in (0..41).flat_map(|a| (0..41).map(move |b| (a, b))) {
+        if !(3..38).contains(&a) || !(3..38).contains(&b) {
+            let base = [20 * a, 20 * b, 0].map(|x| x + 10);
+            points.push(base.map(|x| x + random.integer(-2, 3) as i32));
+        }
+    }
+    points
+}
+
+/// A sheet that is smooth on one side and rough, with some narrow cuts, on the other.
+pub fn half_rough(seed: u64, count: usize) -> Vec<Point> {
+    let mut random = Random::new(seed);
+    let mut points = Vec::new();
+    while points.len() < count {
+        let [x, y, _] = in_box(&mut random, [1000, 1000, 1]);
+        let thick = if x < 400 { 1 } else { x / 20 };
+        let cut = x > 500 && (y % 333 - 160).abs() < 14;
+        if !cut {
+            let z = 60 + x * x / 5000 + random.integer(-thick, thick + 1);
+            points.push([x, y, z].map(|x| x as i32));
+        }
+    }
+    points
+}
+
 fn in_box(r: &mut Random, side: [i64; 3]) -> [i64; 3] {
     side.map(|s| r.integer(0, s))
 }

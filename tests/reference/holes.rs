@@ -4,6 +4,7 @@ use super::big::{Big, Big3, cross, dot, plus, vector};
 use super::insert::normal;
 use super::repair::{ClockwiseAngle, pinched, run};
 use super::surface::{Component, Edge, Surface, Triangle};
+use super::{Settings, mend};
 use outcrop::geom::{Point, distance2, sub};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -16,31 +17,42 @@ pub struct Filling {
     pub not_split: usize,
     pub filled: usize,
     pub triangles: usize,
+    /// Robust: not filled, but looked at for zipping; and how many of them were closed in part.
+    pub zipped: usize,
+    pub partly: usize,
+    /// Robust: filled only after zipping, or closed by zipping alone.
+    pub zipped_whole: usize,
+    /// Robust: short enough to be filled but for being an opening.
+    pub openings: usize,
 }
 
 /// From one vertex to another, in the direction of travel.
 type HalfEdge = (u32, u32);
 
-struct Holes<'a> {
-    points: &'a [Point],
-    surface: &'a Surface,
+pub struct Holes<'a> {
+    pub points: &'a [Point],
+    /// Positions in the file.
+    pub file: &'a [Point],
+    pub surface: &'a Surface,
     /// Triangles as they run, by each of their directed edges.
     half_edges: BTreeMap<HalfEdge, Triangle>,
     turned: Component,
     /// Vertices with several fans (of whatever component).
-    pinched: BTreeSet<u32>,
+    pub pinched: BTreeSet<u32>,
 }
 
 /// The triangles that fill the holes of an oriented surface, as they run. All loops are found and
 /// all chords chosen on the surface as it was before anything was filled.
 pub fn fill(
     points: &[Point],
+    file: &[Point],
     surface: &Surface,
     components: &[Component],
-    longest: usize,
+    settings: &Settings,
 ) -> (Vec<[u32; 3]>, Filling) {
     let mut holes = Holes {
         points,
+        file,
         surface,
         half_edges: BTreeMap::new(),
         turned: components
@@ -61,11 +73,18 @@ pub fn fill(
     let mut triangles = Vec::new();
     for hole in holes.loops(components) {
         filling.loops += 1;
-        if hole.len() > longest {
+        if settings.robust {
+            triangles.extend(mend::mend(
+                &holes,
+                &hole,
+                settings.max_hole_edges,
+                &mut filling,
+            ));
+        } else if hole.len() > settings.max_hole_edges {
             filling.too_long += 1;
-        } else if holes.is_outline(&hole) {
+        } else if holes.is_outline(&hole, &holes.behind(&hole)) {
             filling.outlines += 1;
-        } else if let Some(patch) = holes.patch(&hole) {
+        } else if let Some(patch) = holes.patch(&hole, &BTreeSet::new()) {
             filling.filled += 1;
             filling.triangles += patch.len();
             triangles.extend(patch);
@@ -165,34 +184,51 @@ impl Holes<'_> {
         matched
     }
 
-    /// Whether a loop runs around the outside of its surface. A triangle with two edges in the
-    /// loop counts twice.
-    fn is_outline(&self, hole: &[u32]) -> bool {
+    /// For each edge of a loop, from `hole[k]` to the next, the third corner of its triangle.
+    pub fn behind(&self, hole: &[u32]) -> Vec<u32> {
+        let edge = |k: usize| [hole[k], hole[(k + 1) % hole.len()]];
+        let third = |[from, to]: [u32; 2]| {
+            let t = self.half_edges[&(to, from)];
+            let [a, b, c] = run(t, self.turned[&t]);
+            a + b + c - from - to
+        };
+        (0..hole.len()).map(edge).map(third).collect()
+    }
+
+    /// Twice the vector area of a loop: the sum is the same about any point.
+    pub fn area2(&self, hole: &[u32]) -> Big3<8> {
         let mut area2: Big3<8> = [Big::ZERO; 3];
+        for (k, &from) in hole.iter().enumerate() {
+            let to = hole[(k + 1) % hole.len()];
+            let (a, b) = (self.difference(hole[0], from), self.difference(hole[0], to));
+            area2 = plus(area2, cross(vector(a), vector(b)));
+        }
+        area2
+    }
+
+    /// Whether a loop runs around the outside of its surface; `behind` are the third corners of the
+    /// triangles along it. A triangle with two edges in the loop counts twice.
+    pub fn is_outline(&self, hole: &[u32], behind: &[u32]) -> bool {
+        let area2 = self.area2(hole);
         let mut normals: Big3<8> = [Big::ZERO; 3];
         let mut lengths = 0.0;
         for (k, &from) in hole.iter().enumerate() {
             let to = hole[(k + 1) % hole.len()];
-            // About the loop's first vertex: the sum is the same about any point.
-            let (a, b) = (self.difference(hole[0], from), self.difference(hole[0], to));
-            area2 = plus(area2, cross(vector(a), vector(b)));
-            let t = self.half_edges[&(to, from)];
-            let sign = if self.turned[&t] { -1 } else { 1 };
-            let n = normal(self.points, t);
+            let n = normal(self.points, [to, from, behind[k]]);
             lengths += n
                 .iter()
                 .map(|&x| (x as f64) * (x as f64))
                 .sum::<f64>()
                 .sqrt();
-            normals = plus(normals, vector(n.map(|x| sign * x)));
+            normals = plus(normals, vector(n));
         }
         let size = dot(area2, area2).approximate().sqrt();
         dot(area2, normals).approximate() < -0.5 * size * lengths
     }
 
-    /// The triangles that fill a loop, or nothing.
-    fn patch(&self, hole: &[u32]) -> Option<Vec<[u32; 3]>> {
-        let mut chords = BTreeSet::new();
+    /// The triangles that fill a loop, or nothing; `taken` are edges that are there beside the mesh.
+    pub fn patch(&self, hole: &[u32], taken: &BTreeSet<Edge>) -> Option<Vec<[u32; 3]>> {
+        let mut chords = taken.clone();
         let mut triangles = Vec::new();
         self.split(hole, &mut chords, &mut triangles)
             .then_some(triangles)
@@ -254,7 +290,9 @@ impl Holes<'_> {
             && !(self.pinched.contains(&u) && self.pinched.contains(&v))
     }
 
-    fn collinear(&self, a: u32, b: u32, c: u32) -> bool {
-        normal(self.points, [a, b, c]) == [0; 3]
+    /// Whether three points are on a line, in the shape or in the file.
+    pub fn collinear(&self, a: u32, b: u32, c: u32) -> bool {
+        let flat = |points| normal(points, [a, b, c]) == [0; 3];
+        flat(self.points) || flat(self.file)
     }
 }

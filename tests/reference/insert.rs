@@ -196,6 +196,7 @@ pub struct Inserted {
 pub fn insert(
     points: &[Point],
     triples: &BTreeMap<Triangle, u32>,
+    on_a_line: &BTreeSet<Triangle>,
     base: Base,
     settings: &Settings,
 ) -> Inserted {
@@ -204,20 +205,12 @@ pub fn insert(
         points,
         cos_max_angle: settings.cos_max_angle,
         surface: base.surface,
-        sides: BTreeMap::new(),
+        sides: base.sides,
     };
-    let components = mesh.surface.components().expect("the base is orientable");
-    let mut global = Vec::new();
-    for (home, component) in components.iter().enumerate() {
-        global.push(component.keys().any(|&t| !is_interior(t, block)));
-        mesh.sides.extend(
-            component
-                .iter()
-                .map(|(&t, &turned)| (t, Side { home, turned })),
-        );
-    }
+    let mut global = base.global;
     let mut homes = Homes::apart(global.len());
-    let all = candidates(points, triples, &base.flagged);
+    let mut all = candidates(points, triples, &base.flagged);
+    all.retain(|c| !on_a_line.contains(&c.triangle));
     let (interior, crossing): (BTreeSet<_>, BTreeSet<_>) = all
         .iter()
         .copied()

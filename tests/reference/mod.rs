@@ -12,10 +12,13 @@ pub mod big;
 pub mod cells;
 pub mod check;
 pub mod clouds;
+pub mod evidence;
 pub mod holes;
 pub mod homes;
 pub mod insert;
+pub mod mend;
 pub mod output;
+pub mod relax;
 pub mod repair;
 pub mod surface;
 
@@ -53,6 +56,10 @@ pub struct Settings {
     pub repair: bool,
     /// `B`.
     pub block: u32,
+    /// Most rounds of relaxing.
+    pub relax: u32,
+    /// Orientation by evidence, and mending.
+    pub robust: bool,
 }
 
 impl Default for Settings {
@@ -66,6 +73,20 @@ impl Default for Settings {
             min_component: 10,
             repair: true,
             block: 65_536,
+            relax: 0,
+            robust: false,
+        }
+    }
+}
+
+impl Settings {
+    /// The robust method with its defaults.
+    pub fn robust() -> Self {
+        Self {
+            cos_max_angle: outcrop::Params::default().cos_max_angle(),
+            relax: 3,
+            robust: true,
+            ..Self::default()
         }
     }
 }
@@ -94,10 +115,19 @@ pub struct Counts {
     pub t3: usize,
     pub t2: usize,
     pub t1: usize,
+    /// Rounds of relaxing, and points in patches that moved.
+    pub rounds: u32,
+    pub moved: usize,
+    /// T3 and candidates on a line in the file.
+    pub flat: usize,
+    pub flat_candidates: usize,
     /// T3 flagged in 1.4.
     pub flagged: usize,
     /// T3 that would close a Möbius band.
     pub one_sided: usize,
+    /// Pairs of labels that votes joined, and that they could not join any more.
+    pub voted: usize,
+    pub outvoted: usize,
     /// T3 that are left.
     pub base: usize,
     pub candidates: usize,
@@ -136,8 +166,11 @@ pub fn reconstruct(points: &[Point], settings: &Settings) -> Mesh {
     for _ in 0..settings.smooth {
         points = cells::smooth(&points, settings.neighbors);
     }
-    let triples = cells::triples(&points, settings, diagonal);
-    from_triples(points, &triples, settings)
+    let relaxed = relax::relax(&points, settings.neighbors, settings.relax);
+    let triples = cells::triples(&relaxed.shape, settings, diagonal);
+    let mut mesh = connect(&relaxed.shape, points, &triples, settings);
+    (mesh.counts.rounds, mesh.counts.moved) = (relaxed.rounds, relaxed.moved);
+    mesh
 }
 
 /// Sections 1.4 to 1.7, from points in the order of their ids and the number of cells that see
@@ -148,24 +181,45 @@ pub fn from_triples(
     triples: &BTreeMap<Triangle, u32>,
     settings: &Settings,
 ) -> Mesh {
+    connect(&points.clone(), points, triples, settings)
+}
+
+/// The same with positions to connect by, the shape, and positions in the file.
+pub fn connect(
+    shape: &[Point],
+    file: Vec<Point>,
+    triples: &BTreeMap<Triangle, u32>,
+    settings: &Settings,
+) -> Mesh {
     let mut counts = Counts {
-        points: points.len(),
+        points: file.len(),
         ..Counts::default()
     };
     let seen_by = |n: u32| triples.values().filter(|&&count| count == n).count();
     (counts.t3, counts.t2, counts.t1) = (seen_by(3), seen_by(2), seen_by(1));
 
-    let t3: BTreeSet<Triangle> = triples
-        .iter()
-        .filter(|(_, count)| **count == 3)
-        .map(|(&t, _)| t)
+    let on_a_line: BTreeSet<Triangle> = triples
+        .keys()
+        .copied()
+        .filter(|&t| insert::normal(&file, t) == [0; 3])
         .collect();
-    let base = base::base(&t3, settings.block);
+    let usable = triples.iter().filter(|(t, _)| !on_a_line.contains(*t));
+    let (t3, open): (BTreeMap<_, _>, BTreeMap<_, _>) = usable.partition(|(_, count)| **count == 3);
+    let t3: BTreeSet<Triangle> = t3.into_keys().copied().collect();
+    counts.flat = counts.t3 - t3.len();
+    counts.flat_candidates = on_a_line.len() - counts.flat;
+    let base = if settings.robust {
+        let open = open.into_keys().copied().collect();
+        base::weighed(shape, &t3, &open, settings.block)
+    } else {
+        base::base(&t3, settings.block)
+    };
     counts.flagged = base.flagged.len();
     counts.one_sided = base.one_sided.len();
+    (counts.voted, counts.outvoted) = (base.voted, base.outvoted);
     counts.base = base.surface.triangles().len();
 
-    let inserted = insert::insert(&points, triples, base, settings);
+    let inserted = insert::insert(shape, triples, &on_a_line, base, settings);
     counts.candidates = inserted.candidates;
     counts.inserted_interior = inserted.interior;
     counts.inserted_crossing = inserted.crossing;
@@ -173,11 +227,11 @@ pub fn from_triples(
     counts.rejected = inserted.rejected;
 
     let mut surface = inserted.surface;
-    let turned = repair_and_orient(&points, &mut surface, settings, &mut counts);
+    let turned = repair_and_orient(shape, &file, &mut surface, settings, &mut counts);
     let (vertices, triangles) = output::in_file_order(&surface, &turned, true);
     counts.copies = vertices.len() - surface.vertices().len();
     Mesh {
-        ids: points,
+        ids: file,
         vertices,
         triangles,
         counts,
@@ -187,7 +241,8 @@ pub fn from_triples(
 /// Section 1.6 but for pinched vertices: bridges, small components, which way components face,
 /// holes, in this order. Gives the way the triangles run.
 fn repair_and_orient(
-    points: &[Point],
+    shape: &[Point],
+    file: &[Point],
     surface: &mut Surface,
     settings: &Settings,
     counts: &mut Counts,
@@ -197,14 +252,14 @@ fn repair_and_orient(
         (counts.small_components, counts.small_triangles) =
             repair::remove_small_components(surface, settings.min_component);
     }
-    let components = repair::oriented(points, surface);
+    let components = repair::oriented(shape, surface);
     let mut turned: Component = components
         .iter()
         .flatten()
         .map(|(&t, &turned)| (t, turned))
         .collect();
     if settings.repair {
-        let (filled, filling) = holes::fill(points, surface, &components, settings.max_hole_edges);
+        let (filled, filling) = holes::fill(shape, file, surface, &components, settings);
         counts.holes = filling;
         for corners in filled {
             let mut t = corners;

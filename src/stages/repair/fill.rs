@@ -38,12 +38,8 @@ pub enum Filling {
 /// Loops of more than `sure` edges are first looked at whether they are an outline.
 pub fn fill(mut corners: Vec<Corner>, sure: usize, edge: impl Fn(u32, u32) -> bool) -> Filling {
     let n = corners.len();
-    // Edge x runs from corner x - 1 to corner x; the smallest comes first.
-    let first = (0..n)
-        .min_by_key(|&x| (corners[(x + n - 1) % n].id, corners[x].id))
-        .unwrap_or(0);
-    corners.rotate_left((first + n - 1) % n);
-    if n > sure && is_outline(&corners) {
+    begin_at_smallest(&mut corners);
+    if goes_around_a_triangle(&corners) || n > sure && is_outline(&corners) {
         return Filling::Outline;
     }
     let mut splitter = Splitter {
@@ -57,6 +53,24 @@ pub fn fill(mut corners: Vec<Corner>, sure: usize, edge: impl Fn(u32, u32) -> bo
     } else {
         Filling::Impossible
     }
+}
+
+/// Turns a loop so that its smallest edge, by (from, to), comes first: where a loop was found to
+/// begin must not matter.
+pub fn begin_at_smallest(corners: &mut [Corner]) {
+    let n = corners.len();
+    // Edge x runs from corner x - 1 to corner x.
+    let first = (0..n)
+        .min_by_key(|&x| (corners[(x + n - 1) % n].id, corners[x].id))
+        .unwrap_or(0);
+    if n > 0 {
+        corners.rotate_left((first + n - 1) % n);
+    }
+}
+
+/// True if the loop is that of a triangle that hangs together with no other.
+fn goes_around_a_triangle(corners: &[Corner]) -> bool {
+    matches!(corners, [a, b, c] if b.apex == c.at && c.apex == a.at && a.apex == b.at)
 }
 
 /// True if the loop's vector area looks away from the triangles along it: by more than half of what

@@ -1,7 +1,7 @@
 //! What is done about a boundary loop: filled if it is a hole, closed as far as it is torn if it is
 //! more than that.
 
-use super::fill::{Corner, Filling, fill, length};
+use super::fill::{Corner, Filling, begin_at_smallest, fill, length};
 use super::zip::zip;
 use crate::geom::distance2;
 use crate::stages::located::normal;
@@ -38,10 +38,11 @@ impl Mending {
 
     /// Closes the loop of `corners` if that is what it wants; `edge(a, b)` tells if the mesh has an
     /// edge.
-    pub fn mend(&self, corners: Vec<Corner>, edge: impl Fn(u32, u32) -> bool) -> Filling {
+    pub fn mend(&self, mut corners: Vec<Corner>, edge: impl Fn(u32, u32) -> bool) -> Filling {
         if !self.zip {
             return fill(corners, 0, edge);
         }
+        begin_at_smallest(&mut corners);
         if corners.len() <= self.longest && !is_opening(&corners) {
             if let Filling::Filled(new) = fill(corners.clone(), SMALL, &edge) {
                 return match new[..] {
@@ -78,12 +79,12 @@ fn edges_of(triangles: &[[u32; 3]]) -> FxHashSet<(u32, u32)> {
 fn is_opening(corners: &[Corner]) -> bool {
     let n = corners.len();
     let mut area = [0i128; 3];
-    let mut squares = 0.0;
+    let mut squares = 0u128;
     for x in 0..n {
         let (from, to) = (&corners[(x + n - 1) % n], &corners[x]);
         let part = normal(corners[0].at, from.at, to.at);
         (0..3).for_each(|k| area[k] += part[k]);
-        squares += distance2(from.at, to.at) as f64;
+        squares += u128::from(distance2(from.at, to.at));
     }
-    0.5 * length(area) > OPENING * squares
+    0.5 * length(area) > OPENING * squares as f64
 }

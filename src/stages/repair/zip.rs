@@ -3,7 +3,7 @@
 //! than the surface is dense.
 
 use super::fill::{Corner, length};
-use crate::geom::{Point, distance2, sub};
+use crate::geom::{Point, distance2};
 use crate::stages::located::{normal, on_a_line};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -172,19 +172,10 @@ impl<E: Fn(u32, u32) -> bool> Zipper<E> {
     /// True if a corner near by along the loop lies under the ear or above it.
     fn covers(&self, s: usize, x: usize, e: usize, n: [i128; 3]) -> bool {
         let [a, b, c] = [s, x, e].map(|y| self.corners[y].at);
-        let n = n.map(|v| v as f64);
         let under = |p: Point| {
             let side = |from: Point, to: Point| {
-                let (u, v) = (
-                    sub(to, from).map(|d| d as f64),
-                    sub(p, from).map(|d| d as f64),
-                );
-                let cross = [
-                    u[1] * v[2] - u[2] * v[1],
-                    u[2] * v[0] - u[0] * v[2],
-                    u[0] * v[1] - u[1] * v[0],
-                ];
-                cross[0] * n[0] + cross[1] * n[1] + cross[2] * n[2] >= 0.0
+                let m = normal(from, to, p);
+                m[0] * n[0] + m[1] * n[1] + m[2] * n[2] >= 0
             };
             side(a, b) && side(b, c) && side(c, a)
         };

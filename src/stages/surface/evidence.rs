@@ -97,8 +97,9 @@ fn join_by_flatness(
     let normals: Vec<_> = triangles.iter().map(|t| evidence.normal(*t)).collect();
     let mut steps: Vec<Vec<(u32, u32, bool)>> = vec![Vec::new(); STEPS];
     let mut dead = vec![false; triangles.len()];
+    // What is dead has no edges any more; what it joined stays joined.
     let mut join = |(n, m, flip): (u32, u32, bool)| {
-        if !sets.join(n, m, flip) {
+        if !dead[n as usize] && !dead[m as usize] && !sets.join(n, m, flip) {
             dead[m as usize] = true;
         }
     };
