@@ -203,6 +203,10 @@ fn same(what: &str, mesh: &ReadBack, report: &Report, expected: &Mesh, scale: f6
         "{what}: holes filled"
     );
     assert_eq!(
+        r.gaps_closed as usize, counts.holes.gaps,
+        "{what}: gaps closed"
+    );
+    assert_eq!(
         r.holes_outline as usize, counts.holes.outlines,
         "{what}: outlines"
     );

@@ -28,22 +28,33 @@ pub fn mend(
         return Vec::new();
     }
     let behind = holes.behind(hole);
-    if hole.len() <= longest {
-        if is_opening(holes, hole) {
+    let around = hole.len() > SMALL && holes.is_outline(hole, &behind);
+    let found: u128 = squares(holes, hole);
+    let opening = |rest: &[u32]| is_opening(holes, rest, hole.len(), found);
+    if !around && hole.len() <= longest {
+        if opening(hole) {
             filling.openings += 1;
         } else if let Some(patch) = filled(holes, hole, &behind, &BTreeSet::new()) {
+            if let [gap] = patch[..] {
+                filling.gaps += 1;
+                return vec![gap];
+            }
             filling.filled += 1;
             filling.triangles += patch.len();
             return patch;
         }
     }
+    let whole_loop = hole;
     let mut zipper = Zipper::new(holes, hole, &behind);
     zipper.zip();
     let left = zipper.from_smallest();
     let (hole, behind): (Vec<u32>, Vec<u32>) = left.into_iter().unzip();
     let mut triangles = zipper.closed;
     let mut whole = hole.is_empty();
-    if !whole && !triangles.is_empty() && hole.len() <= longest && !is_opening(holes, &hole) {
+    let fillable = |rest: &[u32]| {
+        !around && rest.len() <= longest && !is_opening(holes, rest, whole_loop.len(), found)
+    };
+    if !whole && !triangles.is_empty() && fillable(&hole) {
         let edges = |&[a, b, c]: &[u32; 3]| [[a, b], [b, c], [c, a]];
         let taken = triangles.iter().flat_map(edges);
         let taken = taken.map(|[a, b]| [a.min(b), a.max(b)]).collect();
@@ -77,13 +88,18 @@ fn filled(
     holes.patch(hole, taken)
 }
 
-/// Whether the vector area is more than eight times the sum of the squared edges.
-fn is_opening(holes: &Holes<'_>, hole: &[u32]) -> bool {
-    let area2 = holes.area2(hole);
+/// Whether the vector area of what is left of a loop is more than eight times its number of edges times
+/// the mean square of the `edges` edges of the loop as it was found.
+fn is_opening(holes: &Holes<'_>, rest: &[u32], edges: usize, squares: u128) -> bool {
+    let area2 = holes.area2(rest);
+    let area = 0.5 * dot(area2, area2).approximate().sqrt();
+    area * edges as f64 > 8.0 * squares as f64 * rest.len() as f64
+}
+
+fn squares(holes: &Holes<'_>, hole: &[u32]) -> u128 {
     let next = |k: usize| hole[(k + 1) % hole.len()];
-    let square = |k: usize| u128::from(square(holes, hole[k], next(k)));
-    let squares: u128 = (0..hole.len()).map(square).sum();
-    0.5 * dot(area2, area2).approximate().sqrt() > 8.0 * squares as f64
+    let one = |k: usize| u128::from(square(holes, hole[k], next(k)));
+    (0..hole.len()).map(one).sum()
 }
 
 fn square(holes: &Holes<'_>, a: u32, b: u32) -> u64 {
@@ -196,7 +212,7 @@ impl<'a> Zipper<'a> {
             let is_edge = !holes.surface.at_edge(edge).is_empty() || self.chords.contains(&edge);
             let pinched = holes.pinched.contains(&s) && holes.pinched.contains(&e);
             let spacing = 0.5 * (cs.spacing + ce.spacing);
-            if is_edge || pinched || chord > 4.0 * spacing || self.covers(k) {
+            if is_edge || pinched || chord > 6.0 * spacing || self.covers(k) {
                 return None;
             }
         }

@@ -31,7 +31,7 @@ fn foot(points: &[Point], i: usize, k: usize) -> (Point, bool) {
     });
     let square = offset[0] * offset[0] + offset[1] * offset[1] + offset[2] * offset[2];
     let spacing2 = std::f64::consts::PI * distance2(points[i], points[last]) as f64 / k as f64;
-    (to, square > 0.2 * 0.2 * spacing2)
+    (to, square > 0.3 * 0.3 * spacing2)
 }
 
 /// Whether a patch moves in the next round, by the points of it that were looked at.

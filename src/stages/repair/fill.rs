@@ -75,7 +75,7 @@ fn goes_around_a_triangle(corners: &[Corner]) -> bool {
 
 /// True if the loop's vector area looks away from the triangles along it: by more than half of what
 /// it would if they were all flat against it.
-fn is_outline(corners: &[Corner]) -> bool {
+pub fn is_outline(corners: &[Corner]) -> bool {
     let n = corners.len();
     let mut area = [0i128; 3];
     let mut normals = [0i128; 3];

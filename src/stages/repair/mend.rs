@@ -1,7 +1,7 @@
 //! What is done about a boundary loop: filled if it is a hole, closed as far as it is torn if it is
 //! more than that.
 
-use super::fill::{Corner, Filling, begin_at_smallest, fill, length};
+use super::fill::{Corner, Filling, begin_at_smallest, fill, is_outline, length};
 use super::zip::zip;
 use crate::geom::distance2;
 use crate::stages::located::normal;
@@ -19,8 +19,8 @@ pub struct Mending {
 /// Longer loops are left alone, so that memory does not follow the boundary.
 const LONGEST_ZIPPED: usize = 100_000;
 
-/// A loop is an opening if its area is larger than so many squares over its edges: a round hole of
-/// some 100 edges.
+/// A loop is an opening if its area is larger than so many mean squares of its edges, for each edge: a
+/// round hole of some 100 edges.
 const OPENING: f64 = 8.0;
 
 /// A loop of so few edges is a hole: pieces with so short an outline were removed.
@@ -43,13 +43,18 @@ impl Mending {
             return fill(corners, 0, edge);
         }
         begin_at_smallest(&mut corners);
-        if corners.len() <= self.longest && !is_opening(&corners) {
-            if let Filling::Filled(new) = fill(corners.clone(), SMALL, &edge) {
-                return match new[..] {
-                    [gap] => Filling::Gap(gap),
-                    _ => Filling::Filled(new),
-                };
-            }
+        let around = corners.len() > SMALL && is_outline(&corners);
+        let found = Width::of(&corners);
+        let fillable = |corners: &[Corner]| {
+            !around && corners.len() <= self.longest && !found.is_opening(corners)
+        };
+        if fillable(&corners)
+            && let Filling::Filled(new) = fill(corners.clone(), usize::MAX, &edge)
+        {
+            return match new[..] {
+                [gap] => Filling::Gap(gap),
+                _ => Filling::Filled(new),
+            };
         }
         let zipped = zip(corners, &edge);
         let (mut triangles, left) = (zipped.triangles, zipped.left);
@@ -57,7 +62,7 @@ impl Mending {
             return Filling::Filled(triangles);
         }
         let edges = left.len();
-        if edges <= self.longest && !triangles.is_empty() && !is_opening(&left) {
+        if !triangles.is_empty() && fillable(&left) {
             let new = edges_of(&triangles);
             let taken = |a: u32, b: u32| edge(a, b) || new.contains(&(a.min(b), a.max(b)));
             if let Filling::Filled(more) = fill(left, SMALL, taken) {
@@ -75,16 +80,33 @@ fn edges_of(triangles: &[[u32; 3]]) -> FxHashSet<(u32, u32)> {
     triangles.iter().flat_map(edges).map(ordered).collect()
 }
 
-/// True if a loop is wide for the length of its edges: a door and not a tear.
-fn is_opening(corners: &[Corner]) -> bool {
-    let n = corners.len();
-    let mut area = [0i128; 3];
-    let mut squares = 0u128;
-    for x in 0..n {
-        let (from, to) = (&corners[(x + n - 1) % n], &corners[x]);
-        let part = normal(corners[0].at, from.at, to.at);
-        (0..3).for_each(|k| area[k] += part[k]);
-        squares += u128::from(distance2(from.at, to.at));
+/// How wide a loop may be: it follows from its edges as it was found, since those that zipping leaves
+/// grow with what was zipped.
+struct Width {
+    edges: usize,
+    squares: u128,
+}
+
+impl Width {
+    fn of(corners: &[Corner]) -> Self {
+        let n = corners.len();
+        let square = |x: usize| u128::from(distance2(corners[(x + n - 1) % n].at, corners[x].at));
+        Self {
+            edges: n,
+            squares: (0..n).map(square).sum(),
+        }
     }
-    0.5 * length(area) > OPENING * squares as f64
+
+    /// True if a loop is wide for its edges: a door and not a tear.
+    fn is_opening(&self, corners: &[Corner]) -> bool {
+        let n = corners.len();
+        let mut area = [0i128; 3];
+        for x in 0..n {
+            let (from, to) = (&corners[(x + n - 1) % n], &corners[x]);
+            let part = normal(corners[0].at, from.at, to.at);
+            (0..3).for_each(|k| area[k] += part[k]);
+        }
+        let limit = OPENING * self.squares as f64 * n as f64;
+        0.5 * length(area) * self.edges as f64 > limit
+    }
 }
