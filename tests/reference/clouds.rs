@@ -128,8 +128,8 @@ pub fn one_of_each(seed: u64) -> Vec<(&'static str, Vec<Point>)> {
 pub fn door(seed: u64) -> Vec<Point> {
     let mut random = Random::new(seed);
     let mut points = Vec::new();
-    for (a, b) in (0..41).flat_map(|a| (0..41).map(move |b| (a, b))) {
-        if !(3..38).contains(&a) || !(3..38).contains(&b) {
+    for (a, b) in (0..61).flat_map(|a| (0..61).map(move |b| (a, b))) {
+        if !(3..58).contains(&a) || !(3..58).contains(&b) {
             let base = [20 * a, 20 * b, 0].map(|x| x + 10);
             points.push(base.map(|x| x + random.integer(-2, 3) as i32));
         }

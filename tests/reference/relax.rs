@@ -16,6 +16,9 @@ pub struct Relaxed {
 /// Ids in a patch.
 const PATCH: usize = 256;
 
+/// Patches in a region.
+const REGION: usize = 256;
+
 /// Where a point goes, and whether it is rough. A point without a plane stays and is not.
 fn foot(points: &[Point], i: usize, k: usize) -> (Point, bool) {
     let others = by_distance(points, i);
@@ -53,6 +56,11 @@ pub fn relax(points: &[Point], k: usize, rounds: u32) -> Relaxed {
         some.map(|id| foot(points, id, k).1).collect()
     };
     let mut moving: Vec<usize> = (0..patches).filter(|&p| uneven(&look(p))).collect();
+    let of_region =
+        |all: &[usize], p: usize| all.iter().filter(|&&q| q / REGION == p / REGION).count();
+    let in_region = |p: usize| (0..patches).filter(|q| q / REGION == p / REGION).count();
+    let rough = moving.clone();
+    moving.retain(|&p| 4 * of_region(&rough, p) >= in_region(p));
     while relaxed.rounds < rounds && !moving.is_empty() {
         let before = relaxed.shape.clone();
         moving.retain(|&patch| {

@@ -33,6 +33,12 @@ const ROUGH: f64 = 0.3;
 /// A patch moves if more than one in so many points that were looked at is rough.
 const SHARE: u32 = 32;
 
+/// Patches in a region.
+const REGION: usize = 256;
+
+/// Nothing moves in a region of which fewer than one patch in so many is rough.
+const EDGES: usize = 4;
+
 /// Positions to connect the points by.
 #[derive(Debug)]
 pub struct Relaxed {
@@ -76,8 +82,8 @@ impl Patches {
         self.rough[id / PATCH].fetch_add(u16::from(rough), Ordering::Relaxed);
     }
 
-    /// Patches stay active where enough was rough; the number of those that do.
-    fn settle(&mut self) -> usize {
+    /// Patches stay active where enough was rough.
+    fn settle(&mut self) {
         for (active, (seen, rough)) in self
             .active
             .iter_mut()
@@ -89,7 +95,16 @@ impl Patches {
             );
             *active &= u32::from(rough) * SHARE > u32::from(seen);
         }
-        self.active.iter().filter(|a| **a).count()
+    }
+
+    /// Where few patches are rough, they lie along edges and not in noise: none of them is active.
+    fn leave_edges(&mut self) {
+        for region in self.active.chunks_mut(REGION) {
+            let active = region.iter().filter(|a| **a).count();
+            if active * EDGES < region.len() {
+                region.fill(false);
+            }
+        }
     }
 }
 
@@ -123,8 +138,13 @@ pub fn relax(
             })
         })?;
     }
+    patches.settle();
+    patches.leave_edges();
     for round in 1..=rounds {
-        if patches.settle() == 0 {
+        if round > 1 {
+            patches.settle();
+        }
+        if !patches.active.contains(&true) {
             break;
         }
         let current = relaxed.store.as_ref().unwrap_or(store);
