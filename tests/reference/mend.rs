@@ -29,7 +29,7 @@ pub fn mend(
     }
     let behind = holes.behind(hole);
     if hole.len() <= longest {
-        if is_opening(holes, hole) {
+        if is_opening(holes, hole, squares(holes, hole)) {
             filling.openings += 1;
         } else if let Some(patch) = filled(holes, hole, &behind, &BTreeSet::new()) {
             filling.filled += 1;
@@ -39,11 +39,13 @@ pub fn mend(
     }
     let mut zipper = Zipper::new(holes, hole, &behind);
     zipper.zip();
+    let squares = zipper.squares();
     let left = zipper.from_smallest();
     let (hole, behind): (Vec<u32>, Vec<u32>) = left.into_iter().unzip();
     let mut triangles = zipper.closed;
     let mut whole = hole.is_empty();
-    if !whole && !triangles.is_empty() && hole.len() <= longest && !is_opening(holes, &hole) {
+    let short = !triangles.is_empty() && hole.len() <= longest;
+    if !whole && short && !is_opening(holes, &hole, squares) {
         let edges = |&[a, b, c]: &[u32; 3]| [[a, b], [b, c], [c, a]];
         let taken = triangles.iter().flat_map(edges);
         let taken = taken.map(|[a, b]| [a.min(b), a.max(b)]).collect();
@@ -77,13 +79,18 @@ fn filled(
     holes.patch(hole, taken)
 }
 
-/// Whether the vector area is more than eight times the sum of the squared edges.
-fn is_opening(holes: &Holes<'_>, hole: &[u32]) -> bool {
-    let area2 = holes.area2(hole);
+/// The sum of the squared edges of a loop.
+fn squares(holes: &Holes<'_>, hole: &[u32]) -> f64 {
     let next = |k: usize| hole[(k + 1) % hole.len()];
     let square = |k: usize| u128::from(square(holes, hole[k], next(k)));
-    let squares: u128 = (0..hole.len()).map(square).sum();
-    0.5 * dot(area2, area2).approximate().sqrt() > 8.0 * squares as f64
+    (0..hole.len()).map(square).sum::<u128>() as f64
+}
+
+/// Whether the vector area is more than eight times the sum of the squared edges, or what counts as
+/// that.
+fn is_opening(holes: &Holes<'_>, hole: &[u32], squares: f64) -> bool {
+    let area2 = holes.area2(hole);
+    0.5 * dot(area2, area2).approximate().sqrt() > 8.0 * squares
 }
 
 fn square(holes: &Holes<'_>, a: u32, b: u32) -> u64 {
@@ -217,6 +224,18 @@ impl<'a> Zipper<'a> {
         (2..8)
             .flat_map(|d| [self.at(k - d).v, self.at(k + d).v])
             .any(|p| ![s, x, e].contains(&p) && over(p))
+    }
+
+    /// For what is left, in the order of the loop as it was found: each edge's length times itself
+    /// or, if that is less, times the mean of the spacings at its ends.
+    fn squares(&self) -> f64 {
+        let mut sum = 0.0;
+        for k in 0..self.ring.len() as isize {
+            let (a, b) = (self.at(k), self.at(k + 1));
+            let edge = length(self.holes, a.v, b.v);
+            sum += edge * edge.min(0.5 * (a.spacing + b.spacing));
+        }
+        sum
     }
 
     /// What is left, with what is behind each edge, from its smallest (from, to) pair on.

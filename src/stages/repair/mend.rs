@@ -43,7 +43,7 @@ impl Mending {
             return fill(corners, 0, edge);
         }
         begin_at_smallest(&mut corners);
-        if corners.len() <= self.longest && !is_opening(&corners) {
+        if corners.len() <= self.longest && !is_opening(&corners, squares(&corners)) {
             let filling = fill(corners.clone(), SMALL, &edge);
             if matches!(filling, Filling::Filled(_)) {
                 return filling;
@@ -55,7 +55,7 @@ impl Mending {
             return Filling::Filled(triangles);
         }
         let edges = left.len();
-        if edges <= self.longest && !triangles.is_empty() && !is_opening(&left) {
+        if edges <= self.longest && !triangles.is_empty() && !is_opening(&left, zipped.squares) {
             let new = edges_of(&triangles);
             let taken = |a: u32, b: u32| edge(a, b) || new.contains(&(a.min(b), a.max(b)));
             if let Filling::Filled(more) = fill(left, SMALL, taken) {
@@ -73,16 +73,21 @@ fn edges_of(triangles: &[[u32; 3]]) -> FxHashSet<(u32, u32)> {
     triangles.iter().flat_map(edges).map(ordered).collect()
 }
 
+/// The sum of the squares over the edges of a loop.
+fn squares(corners: &[Corner]) -> f64 {
+    let next = |x: usize| &corners[(x + 1) % corners.len()];
+    let square = |x: usize| u128::from(distance2(corners[x].at, next(x).at));
+    (0..corners.len()).map(square).sum::<u128>() as f64
+}
+
 /// True if a loop is wide for the length of its edges: a door and not a tear.
-fn is_opening(corners: &[Corner]) -> bool {
+fn is_opening(corners: &[Corner], squares: f64) -> bool {
     let n = corners.len();
     let mut area = [0i128; 3];
-    let mut squares = 0u128;
     for x in 0..n {
         let (from, to) = (&corners[(x + n - 1) % n], &corners[x]);
         let part = normal(corners[0].at, from.at, to.at);
         (0..3).for_each(|k| area[k] += part[k]);
-        squares += u128::from(distance2(from.at, to.at));
     }
-    0.5 * length(area) > OPENING * squares as f64
+    0.5 * length(area) > OPENING * squares
 }

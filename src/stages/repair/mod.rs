@@ -13,6 +13,8 @@ mod mend;
 mod patch;
 mod rim;
 mod surface;
+#[cfg(test)]
+mod tests;
 mod zip;
 
 pub use rim::Outline;

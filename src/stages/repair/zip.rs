@@ -17,12 +17,18 @@ const COS_FOLD: f64 = -0.17364817766693036;
 /// Corners along the loop, either way, that must not lie under an ear.
 const LOOK: usize = 6;
 
+/// The age of a corner whose ear was closed.
+const GONE: u32 = u32::MAX;
+
 /// What is left of a loop after zipping.
 pub struct Zipped {
     /// Triangles as they run.
     pub triangles: Vec<[u32; 3]>,
     /// The corners that are left, in turn; none if it is closed.
     pub left: Vec<Corner>,
+    /// As the sum of the squares over its edges, but one that is longer than the triangles there were
+    /// wide counts by its length only: closing ears makes a loop no more of a tear.
+    pub squares: f64,
 }
 
 /// An ear to be: its sharpness as the bits of a positive number, its corner, and the corner's age.
@@ -58,18 +64,19 @@ pub fn zip(corners: Vec<Corner>, edge: impl Fn(u32, u32) -> bool) -> Zipped {
         out: Vec::new(),
     };
     (0..n).for_each(|x| zipper.consider(x));
-    let last = zipper.run();
+    zipper.run();
     let mut left = Vec::new();
-    if zipper.count >= 3 {
-        let mut x = last;
-        for _ in 0..zipper.count {
-            left.push(zipper.corners[x]);
-            x = zipper.after[x];
-        }
+    let mut squares = 0.0;
+    for x in (0..n).filter(|&x| zipper.count >= 3 && zipper.age[x] != GONE) {
+        left.push(zipper.corners[x]);
+        let y = zipper.after[x];
+        let edge = (distance2(zipper.corners[x].at, zipper.corners[y].at) as f64).sqrt();
+        squares += edge * edge.min(zipper.spacing_between(x, y));
     }
     Zipped {
         triangles: zipper.out,
         left,
+        squares,
     }
 }
 
@@ -101,9 +108,13 @@ impl<E: Fn(u32, u32) -> bool> Zipper<E> {
         }
     }
 
-    /// Closes ears until none is left; some corner that is left.
-    fn run(&mut self) -> usize {
-        let mut some = 0;
+    /// How wide the triangles are at two corners.
+    fn spacing_between(&self, x: usize, y: usize) -> f64 {
+        0.5 * (self.spacing[x] + self.spacing[y])
+    }
+
+    /// Closes ears until none is left.
+    fn run(&mut self) {
         while let Some(Reverse((_, x, age))) = self.heap.pop() {
             if age != self.age[x] || self.count < 3 || self.ear(x).is_none() {
                 continue;
@@ -112,22 +123,20 @@ impl<E: Fn(u32, u32) -> bool> Zipper<E> {
             self.out.push([s, x, e].map(|c| self.corners[c].id));
             if self.count == 3 {
                 self.count = 0;
-                return some;
+                return;
             }
             let (a, b) = (self.corners[s].id, self.corners[e].id);
             self.chords.insert((a.min(b), a.max(b)));
             self.corners[e].apex = self.corners[x].at;
             self.after[s] = e;
             self.before[e] = s;
-            self.age[x] = u32::MAX;
+            self.age[x] = GONE;
             self.count -= 1;
-            some = s;
             for y in [s, e] {
                 self.age[y] += 1;
                 self.consider(y);
             }
         }
-        some
     }
 
     /// How sharp the corner is, less for sharper ones; `None` if its ear must stay open.
@@ -141,7 +150,7 @@ impl<E: Fn(u32, u32) -> bool> Zipper<E> {
         let chord = (distance2(cs.at, ce.at) as f64).sqrt();
         let way = (distance2(cs.at, cx.at) as f64).sqrt() + (distance2(cx.at, ce.at) as f64).sqrt();
         if !closes {
-            let spacing = 0.5 * (self.spacing[s] + self.spacing[e]);
+            let spacing = self.spacing_between(s, e);
             let key = (cs.id.min(ce.id), cs.id.max(ce.id));
             if chord > REACH * spacing
                 || cs.pinched && ce.pinched
