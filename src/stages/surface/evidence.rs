@@ -163,3 +163,6 @@ impl Votes {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;
