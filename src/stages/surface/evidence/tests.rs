@@ -129,3 +129,38 @@ fn clear_votes_come_first_and_ties_by_labels() {
 fn weights_grow_with_flatness() {
     assert_eq!([-1.0, 0.0, 0.5, 1.0].map(weight), [1, 1, 8, 16]);
 }
+
+/// A torn band with a twist. Two edges contradict, both of one triangle: once that is gone, the other
+/// edge is, too.
+#[test]
+fn a_removed_triangle_removes_no_others() {
+    let triangles = [
+        [0, 1, 2],
+        [0, 2, 10],
+        [0, 9, 10],
+        [1, 2, 4],
+        [1, 3, 8],
+        [1, 4, 8],
+        [2, 6, 10],
+        [3, 6, 8],
+        [4, 8, 11],
+        [6, 8, 10],
+        [8, 10, 11],
+    ];
+    let places = [
+        [0, 5, 2],
+        [0, 3, 4],
+        [1, 3, 0],
+        [5, 2, 0],
+        [0, 0, 0],
+        [2, 0, 4],
+        [5, 0, 0],
+        [5, 5, 0],
+        [2, 1, 4],
+        [3, 3, 0],
+        [4, 3, 2],
+        [4, 1, 1],
+    ];
+    let (_, _, dead) = joined(&triangles, &places);
+    assert_eq!(dead.iter().filter(|dead| **dead).count(), 1);
+}
