@@ -82,7 +82,7 @@ pub struct Params {
     /// Fill holes of up to this many edges (paper: 500).
     pub max_hole_edges: usize,
     /// Remove components with fewer triangles (paper: 10); `None`: one for each 2500 points, from 10
-    /// to 1000.
+    /// to 300, or to 1000 with smoothing.
     pub min_component: Option<u64>,
     /// Bridges, holes and small components (paper, section 3.6).
     pub repair: bool,
@@ -137,7 +137,7 @@ impl Params {
     #[must_use]
     pub fn least_component(&self, points: u64) -> u64 {
         self.min_component
-            .unwrap_or_else(|| (points / 2500).clamp(10, 1000))
+            .unwrap_or_else(|| (points / 2500).clamp(10, if self.smooth > 0 { 1000 } else { 300 }))
     }
 
     /// # Errors

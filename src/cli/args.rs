@@ -155,8 +155,8 @@ pub struct Repair {
     /// Fill holes of up to this many edges; 0 fills none
     #[arg(long, value_name = "N", default_value_t = 500)]
     pub max_hole_edges: usize,
-    /// Remove components with fewer triangles [default: one for each 2500 points, from 10 to 1000;
-    /// with --method paper 10]
+    /// Remove components with fewer triangles [default: one for each 2500 points, from 10 to 300,
+    /// or to 1000 with --smooth; with --method paper 10]
     #[arg(long, value_name = "N")]
     pub min_component: Option<u64>,
     /// Leave out bridges, holes and components: the surface as extracted

@@ -54,6 +54,16 @@ impl Located {
         Ok(located)
     }
 
+    /// Points by id, for tests.
+    #[cfg(test)]
+    pub(crate) fn of(points: &[Point]) -> Self {
+        Self {
+            ids: 0..points.len() as u32,
+            own: points.to_vec(),
+            foreign: FxHashMap::default(),
+        }
+    }
+
     /// Takes in those of `vertices` that are not in the block.
     ///
     /// # Errors

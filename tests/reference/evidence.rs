@@ -212,7 +212,7 @@ impl Weigher<'_> {
             for edge in edges(t) {
                 for (&other, &side) in &runs {
                     if edge.iter().all(|v| other.contains(v)) {
-                        let turned = side.turned != !alike(t, other, edge);
+                        let turned = side.turned == alike(t, other, edge);
                         asked.push((Side { turned, ..side }, 1));
                     }
                 }

@@ -308,7 +308,7 @@ fn the_triangle_that_closes_a_moebius_band_is_removed() {
 }
 
 /// Settings that reach different parts of the method.
-fn varied(seed: u64) -> [Settings; 3] {
+fn varied(seed: u64) -> [Settings; 4] {
     let plain = Settings {
         neighbors: 10,
         min_component: 1,
@@ -332,6 +332,13 @@ fn varied(seed: u64) -> [Settings; 3] {
             repair: seed.is_multiple_of(2),
             block: 10,
             ..plain
+        },
+        Settings {
+            neighbors: 10,
+            relax: 1 + seed as u32 % 3,
+            block: [30, 12, 80][seed as usize % 3],
+            min_component: 1 + seed as usize % 2 * 9,
+            ..Settings::robust()
         },
     ]
 }

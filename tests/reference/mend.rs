@@ -47,7 +47,7 @@ pub fn mend(
     let whole_loop = hole;
     let mut zipper = Zipper::new(holes, hole, &behind);
     zipper.zip();
-    let left = zipper.from_smallest();
+    let left = zipper.begin_at_smallest();
     let (hole, behind): (Vec<u32>, Vec<u32>) = left.into_iter().unzip();
     let mut triangles = zipper.closed;
     let mut whole = hole.is_empty();
@@ -236,7 +236,7 @@ impl<'a> Zipper<'a> {
     }
 
     /// What is left, with what is behind each edge, from its smallest (from, to) pair on.
-    fn from_smallest(&self) -> Vec<(u32, u32)> {
+    fn begin_at_smallest(&self) -> Vec<(u32, u32)> {
         let mut left: Vec<(u32, u32)> = self.ring.iter().map(|c| (c.v, c.behind)).collect();
         let pair = |&k: &usize| (left[k].0, left[(k + 1) % left.len()].0);
         let first = (0..left.len()).min_by_key(pair).unwrap_or(0);

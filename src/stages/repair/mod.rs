@@ -13,6 +13,8 @@ mod mend;
 mod patch;
 mod rim;
 mod surface;
+#[cfg(test)]
+mod tests;
 mod zip;
 
 pub use rim::Outline;
@@ -85,7 +87,7 @@ pub struct RepairStats {
     pub holes_found: u64,
     /// Holes filled.
     pub holes_filled: u64,
-    /// Boundary loops closed in part.
+    /// Boundary loops that are torn or open, closed as far as they are torn, which may be nowhere.
     pub holes_zipped: u64,
     /// Boundary loops left alone because they are an outline of the surface.
     pub holes_outline: u64,

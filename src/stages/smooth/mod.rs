@@ -3,6 +3,8 @@
 //! Ids stay as they are; only positions and the boxes around them change.
 
 mod relax;
+#[cfg(test)]
+mod tests;
 
 pub use relax::{RelaxStats, Relaxed, relax};
 

@@ -167,3 +167,6 @@ impl Votes {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

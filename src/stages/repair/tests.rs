@@ -1,0 +1,259 @@
+//! Mending of single loops, on surfaces made for it.
+
+use super::fill::{Corner, Filling};
+use super::mend::Mending;
+use super::zip::zip;
+use crate::geom::Point;
+use proptest::prelude::*;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// A surface in the plane, about, with triangles as they run.
+#[derive(Debug, Clone)]
+struct Sheet {
+    points: Vec<Point>,
+    triangles: Vec<[u32; 3]>,
+}
+
+type HalfEdges = BTreeMap<(u32, u32), u32>;
+
+fn around([a, b, c]: [u32; 3]) -> [(u32, u32, u32); 3] {
+    [(a, b, c), (b, c, a), (c, a, b)]
+}
+
+fn sorted(mut t: [u32; 3]) -> [u32; 3] {
+    t.sort_unstable();
+    t
+}
+
+impl Sheet {
+    /// A grid of `wide` by `high` points ten steps apart, moved by what `off` says, without the
+    /// squares that are in a `gap`.
+    fn grid(
+        [wide, high]: [i32; 2],
+        off: impl Fn(usize) -> Point,
+        gap: impl Fn(i32, i32) -> bool,
+    ) -> Self {
+        let place = |n: i32| {
+            let at = [n % wide * 10 + 50, n / wide * 10 + 50, 50];
+            let off = off(n as usize);
+            std::array::from_fn(|k| at[k] + off[k])
+        };
+        let squares = (0..high - 1).flat_map(|y| (0..wide - 1).map(move |x| (x, y)));
+        let halves = |(x, y): (i32, i32)| {
+            let a = (y * wide + x) as u32;
+            let w = wide as u32;
+            [[a, a + 1, a + w], [a + 1, a + w + 1, a + w]]
+        };
+        Self {
+            points: (0..wide * high).map(place).collect(),
+            triangles: squares
+                .filter(|&(x, y)| !gap(x, y))
+                .flat_map(halves)
+                .collect(),
+        }
+    }
+
+    fn half_edges(&self) -> HalfEdges {
+        let all = self.triangles.iter().flat_map(|t| around(*t));
+        all.map(|(a, b, c)| ((a, b), c)).collect()
+    }
+
+    /// Boundary loops that meet no vertex twice, as they run along the hole.
+    fn loops(&self) -> Vec<Vec<Corner>> {
+        let edges = self.half_edges();
+        let open = edges
+            .iter()
+            .filter(|((a, b), _)| !edges.contains_key(&(*b, *a)));
+        let mut next: BTreeMap<u32, Vec<(u32, u32)>> = BTreeMap::new();
+        for (&(a, b), &apex) in open {
+            next.entry(b).or_default().push((a, apex));
+        }
+        let pinched = |v: u32| next[&v].len() > 1;
+        let mut seen = BTreeSet::new();
+        let mut loops = Vec::new();
+        for &first in next.keys() {
+            let mut ring = Vec::new();
+            let mut v = first;
+            while seen.insert(v) && !pinched(v) {
+                let (to, apex) = next[&v][0];
+                ring.push(Corner {
+                    id: to,
+                    at: self.points[to as usize],
+                    apex: self.points[apex as usize],
+                    file: self.points[to as usize],
+                    pinched: pinched(to),
+                });
+                v = to;
+            }
+            if v == first && ring.len() >= 3 {
+                loops.push(ring);
+            }
+        }
+        loops
+    }
+
+    fn has_edge(&self) -> impl Fn(u32, u32) -> bool + use<> {
+        let edges = self.half_edges();
+        move |a, b| edges.contains_key(&(a, b)) || edges.contains_key(&(b, a))
+    }
+
+    fn area(&self, t: [u32; 3]) -> f64 {
+        let [a, b, c] = t.map(|v| self.points[v as usize]);
+        0.5 * super::fill::length(crate::stages::located::normal(a, b, c))
+    }
+
+    /// The loop with the most edges, mended.
+    fn mend(&self, which: impl Fn(&Vec<Corner>) -> usize) -> (Filling, usize) {
+        let ring = self.loops().into_iter().max_by_key(which).unwrap();
+        let edges = ring.len();
+        (MENDING.mend(ring, self.has_edge()), edges)
+    }
+}
+
+const MENDING: Mending = Mending {
+    longest: 500,
+    zip: true,
+};
+
+/// Sheets with random gaps, more or less off the plane.
+fn torn() -> impl Strategy<Value = Sheet> {
+    let side = 12;
+    let off = prop::collection::vec(prop::array::uniform3(-3..=3), (side * side) as usize);
+    let gaps = prop::collection::vec((1..side - 2, 1..side - 2), 1..50);
+    (off, gaps, 0..8).prop_map(move |(off, gaps, rough)| {
+        let off = |n: usize| [off[n][0], off[n][1], off[n][2] * rough];
+        Sheet::grid([side, side], off, |x, y| gaps.contains(&(x, y)))
+    })
+}
+
+/// Adds the edges of a closed way to those counted, or takes them away.
+fn count(edges: &mut BTreeMap<(u32, u32), i32>, way: &[u32], sign: i32) {
+    for (k, &a) in way.iter().enumerate() {
+        let b = way[(k + 1) % way.len()];
+        *edges.entry((a.min(b), a.max(b))).or_default() += if a < b { sign } else { -sign };
+    }
+}
+
+proptest! {
+    #[test]
+    fn zipping_closes_a_part_of_the_loop_and_leaves_the_rest(sheet in torn()) {
+        for ring in sheet.loops() {
+            let ids: Vec<u32> = ring.iter().map(|c| c.id).collect();
+            let zipped = zip(ring, sheet.has_edge());
+            let left: Vec<u32> = zipped.left.iter().map(|c| c.id).collect();
+
+            let mut chain = BTreeMap::new();
+            count(&mut chain, &ids, 1);
+            count(&mut chain, &left, -1);
+            zipped.triangles.iter().for_each(|t| count(&mut chain, t, -1));
+            prop_assert!(chain.values().all(|n| *n == 0), "{chain:?}");
+
+            let mut edges = sheet.half_edges();
+            for (a, b, c) in zipped.triangles.iter().flat_map(|t| around(*t)) {
+                prop_assert!(edges.insert((a, b), c).is_none(), "two triangles run from {a} to {b}");
+            }
+            let all = sheet.triangles.iter().chain(&zipped.triangles);
+            let mut different = BTreeSet::new();
+            prop_assert!(all.map(|t| sorted(*t)).all(|t| different.insert(t)));
+        }
+    }
+
+    #[test]
+    fn a_loop_is_mended_alike_wherever_it_begins(sheet in torn(), turn in 0usize..100, rough in any::<bool>()) {
+        let mending = Mending { longest: if rough { 3 } else { 500 }, ..MENDING };
+        for mut ring in sheet.loops() {
+            let first = mending.mend(ring.clone(), sheet.has_edge());
+            let turn = turn % ring.len();
+            ring.rotate_left(turn);
+            prop_assert_eq!(mending.mend(ring, sheet.has_edge()), first);
+        }
+    }
+}
+
+/// With all points exactly on a grid every ear is as sharp as many others.
+#[test]
+fn a_loop_on_a_grid_is_mended_alike_wherever_it_begins() {
+    let gap = |x, y| (4..7).contains(&x) && (3..9).contains(&y);
+    let sheet = Sheet::grid([12, 12], |_| [0; 3], gap);
+    let zipping = Mending {
+        longest: 3,
+        ..MENDING
+    };
+    for ring in sheet.loops() {
+        let first = zipping.mend(ring.clone(), sheet.has_edge());
+        for turn in 1..ring.len() {
+            let mut ring = ring.clone();
+            ring.rotate_left(turn);
+            assert_eq!(zipping.mend(ring, sheet.has_edge()), first);
+        }
+    }
+}
+
+#[test]
+fn the_outline_of_a_disk_stays_open() {
+    for count in 7..60 {
+        let turn = |k: i32| f64::from(k) * std::f64::consts::TAU / f64::from(count);
+        let at = |k: i32| {
+            let (sine, cosine) = turn(k).sin_cos();
+            [cosine, sine, 1.0].map(|x| (1000.0 * x) as i32 + 1000)
+        };
+        let middle = count as u32;
+        let sheet = Sheet {
+            points: (0..count).map(at).chain([[1000, 1000, 2000]]).collect(),
+            triangles: (0..middle).map(|k| [middle, k, (k + 1) % middle]).collect(),
+        };
+        let (mended, edges) = sheet.mend(Vec::len);
+        assert_eq!(mended, Filling::Zipped(Vec::new(), edges));
+    }
+}
+
+#[test]
+fn the_outline_of_a_lone_triangle_stays_open() {
+    let sheet = Sheet {
+        points: vec![[0, 0, 0], [9, 0, 0], [0, 9, 1]],
+        triangles: vec![[0, 1, 2]],
+    };
+    let (mended, _) = sheet.mend(Vec::len);
+    assert_eq!(mended, Filling::Zipped(Vec::new(), 3));
+}
+
+#[test]
+fn a_long_narrow_tear_is_closed() {
+    let off = |n: usize| {
+        [
+            (n * 7 % 5) as i32 - 2,
+            (n * 11 % 5) as i32 - 2,
+            (n % 3) as i32,
+        ]
+    };
+    let sheet = Sheet::grid([400, 7], off, |x, y| y == 3 && (1..398).contains(&x));
+    let (mended, edges) = sheet.mend(|ring| usize::from(ring.iter().all(|c| inside(c, 400, 7))));
+    assert!(edges > MENDING.longest);
+    let Filling::Filled(triangles) = mended else {
+        panic!("{mended:?}");
+    };
+    assert_eq!(triangles.len(), edges - 2);
+}
+
+/// True if a corner is not at the outer border of a grid.
+fn inside(corner: &Corner, wide: i32, high: i32) -> bool {
+    let within = |x: i32, count: i32| (55..10 * (count - 1) + 45).contains(&x);
+    within(corner.at[0], wide) && within(corner.at[1], high)
+}
+
+/// Its border is a little rounded and has longer edges after zipping; that makes it no hole.
+#[test]
+fn a_wide_door_stays_open() {
+    let door = |x, y| (5..65).contains(&x) && (5..65).contains(&y);
+    for rough in 0..3 {
+        let off = |n: usize| [0, 0, (n % 3) as i32 * rough];
+        let sheet = Sheet::grid([70, 70], off, door);
+        let (mended, edges) = sheet.mend(|r| usize::from(r.iter().all(|c| inside(c, 70, 70))));
+        let Filling::Zipped(triangles, left) = mended else {
+            panic!("filled");
+        };
+        assert_eq!((edges, left), (240, edges - triangles.len()));
+        let area: f64 = triangles.iter().map(|t| sheet.area(*t)).sum();
+        assert!(area < 0.05 * 600.0 * 600.0, "{area}");
+    }
+}
