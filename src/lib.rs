@@ -36,7 +36,7 @@
 //! | [`stages::thin`] | the spool | the points that stay of each cell of a grid (if asked for) | |
 //! | [`stages::order`] | lattice positions | the ordered store: the rank on the curve is the id | |
 //! | [`stages::outliers`] | the store | the store without outliers (if asked for) | |
-//! | [`stages::smooth`] | the store | the store with points moved (if asked for) | 3.2 |
+//! | [`stages::smooth`] | the store | the store with points moved (if asked for); the shape, by which points are connected | 3.2 |
 //! | [`stages::tiles`] | an id range | its points and those around it, neighbours (used by outliers, smooth and cells) | 3.1 |
 //! | [`stages::cells`] | tiles | triples seen by each tile's cells | 3.3, 3.4 |
 //! | [`stages::triples`] | triples by tile | triples with counts, by block | 3.4 |

@@ -39,7 +39,7 @@ fn foot(points: &[Point], i: usize, k: usize) -> (Point, bool) {
 
 /// Whether a patch moves in the next round, by the points of it that were looked at.
 fn uneven(rough: &[bool]) -> bool {
-    32 * rough.iter().filter(|r| **r).count() > rough.len()
+    16 * rough.iter().filter(|r| **r).count() > rough.len()
 }
 
 /// At most `rounds` rounds.

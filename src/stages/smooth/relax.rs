@@ -31,7 +31,7 @@ const RUN: usize = 16;
 const ROUGH: f64 = 0.3;
 
 /// A patch moves if more than one in so many points that were looked at is rough.
-const SHARE: u32 = 32;
+const SHARE: u32 = 16;
 
 /// Patches in a region.
 const REGION: usize = 256;
