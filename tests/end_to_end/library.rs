@@ -95,7 +95,7 @@ fn a_run_can_be_cancelled_in_every_stage() {
     let bench = Bench::new();
     let input = small(&bench);
     let folder = bench.subfolder("folder");
-    let stages = 8;
+    let stages = 9;
     let points = (0..stages).flat_map(|stage| [(Some(stage), None), (None, Some(stage))]);
     for (cancel_at, cancel_within) in points {
         let notes = Arc::new(Notes {

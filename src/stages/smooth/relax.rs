@@ -132,9 +132,12 @@ pub fn relax(
             let bytes = |tile: usize| Tile::bytes(tiles.ids(tile).len()) + PageCache::bytes(store);
             workspace.for_each_unit("relax: tile", tiles.count(), bytes, |tile| {
                 let ids = tiles.ids(tile);
+                let points = ids.len() as u64;
                 each_fit(store, ids, neighbors, sampled, |id, point, fit| {
                     patches.note(id, target(point, &fit, neighbors).1);
-                })
+                })?;
+                workspace.observer.advance(points);
+                Ok(())
             })
         })?;
     }
@@ -145,6 +148,8 @@ pub fn relax(
             patches.settle();
         }
         if !patches.active.contains(&true) {
+            let left = u64::from(rounds + 1 - round) * store.len() as u64;
+            workspace.observer.advance(left);
             break;
         }
         let current = relaxed.store.as_ref().unwrap_or(store);
