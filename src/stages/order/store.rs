@@ -3,6 +3,7 @@
 use crate::error::{Error, Result};
 use crate::geom::Point;
 use crate::geom::aabb::Aabb;
+use crate::spill::Sections;
 use crate::workspace::memory::Reservation;
 use crate::workspace::{IoCounters, Workspace};
 use rayon::prelude::*;
@@ -232,6 +233,24 @@ impl StoreWriter {
             boxes: Vec::new(),
             io: workspace.io.clone(),
         })
+    }
+
+    /// A whole store from the points of sections, one after the other.
+    ///
+    /// # Errors
+    /// [`Error::Io`], [`Error::Corrupt`], [`Error::Memory`], [`Error::Cancelled`].
+    pub fn gather(
+        workspace: &Workspace,
+        name: &str,
+        page: usize,
+        sections: &Sections<3>,
+    ) -> Result<PointStore> {
+        let mut writer = Self::create(workspace, name, page)?;
+        for section in 0..sections.count() {
+            workspace.check_cancel()?;
+            writer.push(bytemuck::cast_slice(&sections.get(section)?))?;
+        }
+        writer.finish(workspace)
     }
 
     /// Appends points, in order of id.

@@ -98,12 +98,7 @@ fn round(
         kept.put(tile, bytemuck::cast_slice(&points))
     })?;
     let name = format!("points-kept{number}");
-    let mut writer = StoreWriter::create(workspace, &name, store.page_size())?;
-    for tile in 0..tiles.count() {
-        workspace.check_cancel()?;
-        writer.push(bytemuck::cast_slice(&kept.get(tile)?))?;
-    }
-    writer.finish(workspace)
+    StoreWriter::gather(workspace, &name, store.page_size(), &kept)
 }
 
 /// The points of a tile that stay.

@@ -2,6 +2,7 @@
 //!
 //! Ids stay as they are; only positions and the boxes around them change.
 
+mod fits;
 mod relax;
 #[cfg(test)]
 mod tests;
@@ -12,12 +13,12 @@ use crate::error::Result;
 use crate::geom::Point;
 use crate::geom::lattice::COORDINATE_LIMIT;
 use crate::spill::Sections;
-use crate::stages::cells::{Fit, TileRanges, fit_in_store, fit_in_tile};
+use crate::stages::cells::{Fit, TileRanges};
 use crate::stages::order::{PointStore, StoreWriter};
 use crate::stages::tiles::Tile;
-use crate::stages::tiles::near::Search;
 use crate::stages::tiles::walk::PageCache;
 use crate::workspace::Workspace;
+use fits::each_fit;
 use std::ops::Range;
 
 /// One round of smoothing: the same points, each on the plane of its `neighbors` nearest.
@@ -42,37 +43,16 @@ pub fn smooth(
         workspace.observer.advance(points.len() as u64);
         moved.put(tile, bytemuck::cast_slice(&points))
     })?;
-    let mut writer = StoreWriter::create(workspace, &format!("points{round}"), store.page_size())?;
-    for tile in 0..tiles.count() {
-        workspace.check_cancel()?;
-        writer.push(bytemuck::cast_slice(&moved.get(tile)?))?;
-    }
-    writer.finish(workspace)
+    let name = format!("points{round}");
+    StoreWriter::gather(workspace, &name, store.page_size(), &moved)
 }
 
 fn smooth_tile(store: &PointStore, ids: Range<usize>, neighbors: usize) -> Result<Vec<Point>> {
-    let tile = Tile::load(store, ids.clone())?;
-    let mut points = vec![[0; 3]; ids.len()];
-    let mut search = Search::default();
-    let mut uncertain = Vec::new();
-    let mut failed = None;
-    tile.for_each_query(neighbors, &mut search, |id, point, query| {
-        let fit = query.map(|mut query| fit_in_tile(&mut query, neighbors));
-        match fit.transpose().map(Option::flatten) {
-            Ok(Some(fit)) => points[id as usize - ids.start] = project(point, &fit),
-            Ok(None) => uncertain.push((id, point)),
-            Err(error) => failed = Some(error),
-        }
-    });
-    if let Some(error) = failed {
-        return Err(error);
-    }
-    drop(tile);
-    let mut cache = PageCache::default();
-    for (id, point) in uncertain {
-        let fit = fit_in_store(store, &mut cache, id, point, neighbors)?;
-        points[id as usize - ids.start] = fit.map_or(point, |fit| project(point, &fit));
-    }
+    let mut points = store.slice(ids.clone())?;
+    let all = |_: usize| true;
+    each_fit(store, ids.clone(), neighbors, all, |id, point, fit| {
+        points[id - ids.start] = project(point, &fit);
+    })?;
     Ok(points)
 }
 

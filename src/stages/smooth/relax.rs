@@ -5,19 +5,18 @@
 //! Restricted Voronoi cells disagree where points lie off the surface by a part of their spacing. So
 //! points move only there: patches of points that are smooth already cost a look at some of them.
 
+use super::fits::each_fit;
 use super::moved;
 use crate::error::Result;
 use crate::geom::Point;
 use crate::spill::Sections;
-use crate::stages::cells::{Fit, TileRanges, fit_in_store, fit_in_tile};
+use crate::stages::cells::{Fit, TileRanges};
 use crate::stages::order::{PointStore, StoreWriter};
 use crate::stages::tiles::Tile;
-use crate::stages::tiles::near::Search;
 use crate::stages::tiles::walk::PageCache;
 use crate::workspace::Workspace;
 use crate::workspace::memory::Reservation;
 use serde::Serialize;
-use std::ops::Range;
 use std::sync::atomic::{AtomicU16, AtomicU64, Ordering};
 
 /// Ids in a patch: with ids along a curve, a small piece of surface.
@@ -196,45 +195,7 @@ fn one_round(
         part.put(tile, bytemuck::cast_slice(&points))
     })?;
     let name = format!("relaxed{round}");
-    let mut writer = StoreWriter::create(workspace, &name, store.page_size())?;
-    for tile in 0..tiles.count() {
-        workspace.check_cancel()?;
-        writer.push(bytemuck::cast_slice(&part.get(tile)?))?;
-    }
-    writer.finish(workspace)
-}
-
-/// Calls `each` with the plane of every point of a tile whose id is `wanted`.
-fn each_fit(
-    store: &PointStore,
-    ids: Range<usize>,
-    neighbors: usize,
-    wanted: impl Fn(usize) -> bool,
-    mut each: impl FnMut(usize, Point, Fit),
-) -> Result<()> {
-    let tile = Tile::load(store, ids)?;
-    let mut search = Search::default();
-    let mut uncertain = Vec::new();
-    let mut failed = None;
-    tile.for_some_queries(neighbors, &mut search, wanted, |id, point, query| {
-        let fit = query.map(|mut query| fit_in_tile(&mut query, neighbors));
-        match fit.transpose().map(Option::flatten) {
-            Ok(Some(fit)) => each(id as usize, point, fit),
-            Ok(None) => uncertain.push((id, point)),
-            Err(error) => failed = Some(error),
-        }
-    });
-    if let Some(error) = failed {
-        return Err(error);
-    }
-    drop(tile);
-    let mut cache = PageCache::default();
-    for (id, point) in uncertain {
-        if let Some(fit) = fit_in_store(store, &mut cache, id, point, neighbors)? {
-            each(id as usize, point, fit);
-        }
-    }
-    Ok(())
+    StoreWriter::gather(workspace, &name, store.page_size(), &part)
 }
 
 /// Where a point goes, and whether that is far.
