@@ -65,12 +65,12 @@ pub enum Error {
         /// The budget given, in bytes.
         budget: u64,
     },
-    /// The scratch folder's file system is too small.
-    #[error("{path}: not enough space: {needed} bytes are needed, {free} are free", path = path.display())]
+    /// A file system is too small, or full.
+    #[error("{path}: not enough space: {needed} bytes ({mib} MiB) are needed, {free} are free", path = path.display(), mib = needed.div_ceil(1 << 20))]
     Disk {
-        /// Scratch or output folder.
+        /// Scratch or output folder, or the file that could not be written.
         path: PathBuf,
-        /// Bytes the run needs there.
+        /// Bytes the run needs there, beside those it has.
         needed: u64,
         /// Bytes free.
         free: u64,
@@ -95,12 +95,69 @@ pub enum Error {
         /// Largest number supported.
         limit: u64,
     },
+    /// Another run is at work in the scratch folder.
+    #[error("{path}: another run is at work here; wait for it, or choose another --scratch", path = path.display())]
+    Locked {
+        /// The scratch folder.
+        path: PathBuf,
+    },
+    /// There is an unfinished run already.
+    #[error("{path}: an unfinished run is here already; --resume goes on with it, --restart begins again", path = path.display())]
+    Unfinished {
+        /// The scratch folder.
+        path: PathBuf,
+    },
+    /// The unfinished run is not the one that was asked for.
+    #[error("{path}: cannot go on: {what} was {was}, now it is {now}; --restart begins again", path = path.display())]
+    Mismatch {
+        /// The scratch folder.
+        path: PathBuf,
+        /// What changed.
+        what: String,
+        /// As the run began.
+        was: String,
+        /// As it is now.
+        now: String,
+    },
+    /// The folder holds no run that could be resumed.
+    #[error("{path}: {why}", path = path.display())]
+    NotResumable {
+        /// The folder.
+        path: PathBuf,
+        /// What is wrong with it.
+        why: String,
+    },
+    /// The time that the run was given is up.
+    #[error("stopped: the time limit is reached")]
+    TimeLimit,
     /// The run was asked to stop.
     #[error("stopped on request")]
     Cancelled,
 }
 
 impl Error {
+    /// True if a run that ended so can go on from where it was, once the reason is gone.
+    #[must_use]
+    pub fn can_resume(&self) -> bool {
+        match self {
+            Error::Io { .. }
+            | Error::Memory { .. }
+            | Error::Disk { .. }
+            | Error::Corrupt { .. }
+            | Error::TimeLimit
+            | Error::Cancelled => true,
+            Error::Input { .. }
+            | Error::Degenerate { .. }
+            | Error::NoTriangles { .. }
+            | Error::Parameter { .. }
+            | Error::TooManyPoints { .. }
+            | Error::Locked { .. }
+            | Error::Unfinished { .. }
+            | Error::Mismatch { .. }
+            | Error::NotResumable { .. } => false,
+        }
+    }
+
     /// An [`Error::Io`] for `path`; `action` completes "cannot ...".
     pub fn io(path: impl AsRef<Path>, action: impl Into<String>, source: std::io::Error) -> Self {
         Error::Io {

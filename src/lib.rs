@@ -62,7 +62,7 @@ pub mod workspace;
 
 pub use error::{Error, Result};
 pub use params::{Method, Params, Radius};
-pub use pipeline::{Builder, Reconstruction};
+pub use pipeline::{Builder, Reconstruction, Start};
 pub use report::Report;
 pub use stages::ingest::Classes;
 pub use workspace::progress::{Cancel, Observer};

@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use crate::stages::ingest::Classes;
 
 /// Radius of the disks (paper, section 3.4).
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Radius {
     /// Twice the distance of the last neighbour used for the plane: follows the local density.
@@ -36,7 +36,7 @@ impl std::str::FromStr for Radius {
 }
 
 /// How the surface is made.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Method {
     /// The paper's cells on relaxed positions, oriented by evidence, torn boundaries closed.
@@ -59,7 +59,7 @@ impl std::str::FromStr for Method {
 
 /// Everything that decides the mesh. Two runs with equal parameters and equal points give the same
 /// bytes.
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Params {
     /// Points to read, by class.
     pub classes: Classes,

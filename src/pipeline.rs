@@ -1,28 +1,37 @@
 //! The driver: the stages in the order the data flows.
 
+mod attempt;
+mod builder;
+mod checks;
+mod clock;
+mod manifest;
 mod points;
 
-use crate::error::{Error, Result};
-use crate::geom::lattice::Lattice;
-use crate::params::{Method, Params, Radius};
-use crate::report::{LatticeReport, PartReport, Report, StageReport};
+use crate::error::Result;
+use crate::params::{Method, Params};
+use crate::report::{LatticeReport, Report};
 use crate::stages::blocks::Blocks;
-use crate::stages::cells::{CellStats, DiskRadius, TileRanges, cells};
+use crate::stages::cells::{DiskRadius, TileRanges, cells};
 use crate::stages::export::{CoordinateType, export};
 use crate::stages::ingest::{self, ingest_classes};
 use crate::stages::located::Places;
-use crate::stages::order::{PAGE, PointStore};
 use crate::stages::repair::{RepairOptions, repair};
 use crate::stages::smooth::{relax, smooth};
 use crate::stages::stitch::{StitchOptions, stitch};
 use crate::stages::triples::triples;
 use crate::workspace::memory::MemoryPool;
-use crate::workspace::progress::{Cancel, Observer, Silent};
+use crate::workspace::progress::{Cancel, Observer};
 use crate::workspace::{Workspace, limits};
+use attempt::Alarm;
+pub use attempt::Start;
+pub use builder::Builder;
+pub(crate) use checks::{SCRATCH_PER_POINT, disk_radius};
+use checks::{enough, not_a_line, not_an_input, room, writable};
+pub(crate) use clock::Clock;
 pub(crate) use points::order;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Halvings of the lattice step before smoothing, so that rounding does not undo it.
 const SMOOTH_REFINE: u32 = 10;
@@ -31,7 +40,7 @@ const SMOOTH_REFINE: u32 = 10;
 pub struct Reconstruction {
     inputs: Vec<PathBuf>,
     output: PathBuf,
-    scratch: PathBuf,
+    folder: PathBuf,
     params: Params,
     memory: MemoryPool,
     threads: usize,
@@ -39,131 +48,8 @@ pub struct Reconstruction {
     page_points: usize,
     observer: Arc<dyn Observer>,
     cancel: Cancel,
-}
-
-/// Collects what a [`Reconstruction`] needs; everything but inputs and output has a default.
-#[derive(Default)]
-pub struct Builder {
-    inputs: Vec<PathBuf>,
-    output: PathBuf,
-    scratch: Option<PathBuf>,
-    params: Params,
-    memory: Option<u64>,
-    threads: Option<usize>,
-    tile_points: Option<u32>,
-    page_points: Option<usize>,
-    observer: Option<Arc<dyn Observer>>,
-    cancel: Cancel,
-}
-
-impl Builder {
-    /// Adds a file or folder of points; together they are one cloud.
-    #[must_use]
-    pub fn input(mut self, path: impl Into<PathBuf>) -> Self {
-        self.inputs.push(path.into());
-        self
-    }
-
-    /// Where the mesh goes (binary PLY).
-    #[must_use]
-    pub fn output(mut self, path: impl Into<PathBuf>) -> Self {
-        self.output = path.into();
-        self
-    }
-
-    /// Folder for scratch files; default: beside the output.
-    #[must_use]
-    pub fn scratch(mut self, path: impl Into<PathBuf>) -> Self {
-        self.scratch = Some(path.into());
-        self
-    }
-
-    /// Geometric parameters.
-    #[must_use]
-    pub fn params(mut self, params: Params) -> Self {
-        self.params = params;
-        self
-    }
-
-    /// Memory budget in bytes; default: half of what machine and cgroup allow.
-    #[must_use]
-    pub fn memory(mut self, bytes: u64) -> Self {
-        self.memory = Some(bytes);
-        self
-    }
-
-    /// Worker threads; default: all available.
-    #[must_use]
-    pub fn threads(mut self, threads: usize) -> Self {
-        self.threads = Some(threads);
-        self
-    }
-
-    /// Points per tile; does not change the result.
-    #[must_use]
-    pub fn tile_points(mut self, points: u32) -> Self {
-        self.tile_points = Some(points);
-        self
-    }
-
-    /// Points per page of the ordered store; does not change the result.
-    #[must_use]
-    pub fn page_points(mut self, points: usize) -> Self {
-        self.page_points = Some(points);
-        self
-    }
-
-    /// Who is told of progress.
-    #[must_use]
-    pub fn observer(mut self, observer: Arc<dyn Observer>) -> Self {
-        self.observer = Some(observer);
-        self
-    }
-
-    /// The flag that stops the run.
-    #[must_use]
-    pub fn cancel(mut self, cancel: Cancel) -> Self {
-        self.cancel = cancel;
-        self
-    }
-
-    /// Checks everything that can be checked before work starts.
-    ///
-    /// # Errors
-    /// [`Error::Parameter`], [`Error::Memory`].
-    pub fn build(self) -> Result<Reconstruction> {
-        self.params.check()?;
-        let missing = |name, expected: &str| {
-            Err(Error::Parameter {
-                name,
-                found: "nothing".into(),
-                expected: expected.into(),
-            })
-        };
-        if self.inputs.is_empty() {
-            return missing("INPUT", "at least one file or folder");
-        }
-        if self.output.as_os_str().is_empty() {
-            return missing("--output", "the path of the mesh");
-        }
-        let budget = self.memory.unwrap_or_else(default_memory);
-        let parent = self.output.parent().filter(|p| !p.as_os_str().is_empty());
-        let scratch = self
-            .scratch
-            .unwrap_or_else(|| parent.unwrap_or(Path::new(".")).into());
-        Ok(Reconstruction {
-            inputs: self.inputs,
-            output: self.output,
-            scratch,
-            memory: MemoryPool::new(budget)?,
-            threads: self.threads.unwrap_or_else(default_threads),
-            tile_points: self.tile_points.unwrap_or(self.params.block),
-            page_points: self.page_points.unwrap_or(PAGE),
-            params: self.params,
-            observer: self.observer.unwrap_or_else(|| Arc::new(Silent)),
-            cancel: self.cancel,
-        })
-    }
+    start: Start,
+    time_limit: Option<Duration>,
 }
 
 /// Half of the memory that machine and cgroup allow.
@@ -178,46 +64,6 @@ pub fn default_threads() -> usize {
     std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
 }
 
-/// Runs stages and notes what each takes.
-pub(crate) struct Clock<'a> {
-    workspace: &'a Workspace,
-    stages: Vec<StageReport>,
-}
-
-impl<'a> Clock<'a> {
-    pub(crate) fn new(workspace: &'a Workspace) -> Self {
-        Self {
-            workspace,
-            stages: Vec::new(),
-        }
-    }
-
-    pub(crate) fn stage<T>(
-        &mut self,
-        name: &'static str,
-        unit: &'static str,
-        total: u64,
-        work: impl FnOnce() -> Result<T>,
-    ) -> Result<T> {
-        let io = &self.workspace.io;
-        let (start, read, written) = (Instant::now(), io.read(), io.written());
-        self.workspace.observer.begin(name, unit, total);
-        let outcome = work();
-        self.workspace.observer.end();
-        let parts = self.workspace.take_parts().into_iter();
-        self.stages.push(StageReport {
-            name,
-            seconds: start.elapsed().as_secs_f64(),
-            bytes_read: io.read() - read,
-            bytes_written: io.written() - written,
-            parts: parts
-                .map(|(name, seconds)| PartReport { name, seconds })
-                .collect(),
-        });
-        outcome
-    }
-}
-
 impl Reconstruction {
     /// Starts a description of a reconstruction.
     #[must_use]
@@ -225,21 +71,41 @@ impl Reconstruction {
         Builder::default()
     }
 
+    /// The description of the run that was left unfinished in a scratch folder; threads, memory,
+    /// observer, flag and time limit can be set anew.
+    ///
+    /// # Errors
+    /// [`crate::Error::NotResumable`], [`crate::Error::Locked`], [`crate::Error::Io`].
+    pub fn resume(folder: impl AsRef<Path>) -> Result<Builder> {
+        attempt::unfinished(folder.as_ref())
+    }
+
+    /// Where the mesh goes.
+    #[must_use]
+    pub fn output(&self) -> &Path {
+        &self.output
+    }
+
     /// Reconstructs the surface and writes the mesh.
     ///
     /// # Errors
-    /// Any [`Error`]; the output is then untouched and scratch files are gone.
+    /// Any [`crate::Error`]; the output is then untouched. Scratch files are gone, unless the run can be
+    /// resumed, see [`Reconstruction::is_unfinished`].
     pub fn run(&self) -> Result<Report> {
-        let begin = Instant::now();
         writable(&self.output)?;
         not_an_input(&self.output, &self.inputs)?;
-        let workspace = &Workspace::new(
-            &self.scratch,
-            self.memory.clone(),
-            self.threads,
-            self.observer.clone(),
-            self.cancel.clone(),
-        )?;
+        let _alarm = self
+            .time_limit
+            .map(|limit| Alarm::set(limit, self.cancel.clone()));
+        let workspace = self.open()?;
+        let outcome = self.stages(&workspace);
+        self.close(workspace, &outcome);
+        outcome
+    }
+
+    /// All stages, in the order the data flows.
+    fn stages(&self, workspace: &Workspace) -> Result<Report> {
+        let begin = Instant::now();
         let params = &self.params;
         let mut clock = Clock::new(workspace);
 
@@ -254,7 +120,8 @@ impl Reconstruction {
                 "{count} points left out: a coordinate is NaN or infinite"
             ));
         }
-        room(&self.scratch, input.kept * self.scratch_per_point())?;
+        let needed = input.kept * self.scratch_per_point();
+        room(&self.folder, needed, workspace)?;
         let coordinates = match spool.source_precision() {
             ingest::CoordinateType::F32 => CoordinateType::Float,
             ingest::CoordinateType::F64 => CoordinateType::Double,
@@ -277,7 +144,7 @@ impl Reconstruction {
         warnings.iter().for_each(|w| self.observer.warn(w));
         enough(&store)?;
         if params.thin.is_some() {
-            room(&self.scratch, store.len() as u64 * SCRATCH_PER_POINT)?;
+            room(&self.folder, store.len() as u64 * SCRATCH_PER_POINT, workspace)?;
         }
         let (mut store, outliers) = self.without_outliers(store, &mut clock, workspace)?;
         enough(&store)?;
@@ -373,92 +240,8 @@ impl Reconstruction {
             peak_resident_bytes: limits::peak_resident(),
             peak_reserved_bytes: self.memory.peak(),
             peak_scratch_bytes: workspace.io.scratch_peak(),
-            seconds: begin.elapsed().as_secs_f64(),
+            seconds: begin.elapsed().as_secs_f64() + clock.earlier,
             stages: clock.stages,
         })
     }
-}
-
-/// Disks larger than this, in steps, see all of any cloud.
-const LARGEST_RADIUS: f64 = (1u64 << 34) as f64;
-
-/// The radius in lattice steps.
-pub(crate) fn disk_radius(radius: Radius, store: &PointStore, lattice: &Lattice) -> DiskRadius {
-    match radius {
-        Radius::Auto => DiskRadius::Auto,
-        Radius::Length(length) => DiskRadius::Steps((length / lattice.step).min(LARGEST_RADIUS)),
-        Radius::Percent(percent) => {
-            let bounds = store.bounds();
-            let diagonal = (crate::geom::distance2(bounds.min, bounds.max) as f64).sqrt();
-            DiskRadius::Steps((percent / 100.0 * diagonal).min(LARGEST_RADIUS))
-        }
-    }
-}
-
-/// Finds out before any work whether the output's folder takes files.
-fn writable(output: &Path) -> Result<()> {
-    let folder = output
-        .parent()
-        .filter(|p| !p.as_os_str().is_empty())
-        .unwrap_or(Path::new("."));
-    if output.is_dir() {
-        let error = std::io::Error::from(std::io::ErrorKind::IsADirectory);
-        return Err(Error::io(output, "write the mesh", error));
-    }
-    tempfile::tempfile_in(folder)
-        .map(drop)
-        .map_err(|e| Error::io(output, "write the mesh into this folder", e))
-}
-
-/// Scratch bytes a point at the peak, about, after the points were read; measured on real scans.
-pub(crate) const SCRATCH_PER_POINT: u64 = 50;
-
-/// Refuses before the long stages what the scratch folder has no room for.
-fn room(scratch: &Path, needed: u64) -> Result<()> {
-    match limits::disk_free(scratch) {
-        Some(free) if free < needed => Err(Error::Disk {
-            path: scratch.to_path_buf(),
-            needed,
-            free,
-        }),
-        _ => Ok(()),
-    }
-}
-
-/// Refuses to replace a file that the cloud is read from.
-fn not_an_input(output: &Path, inputs: &[PathBuf]) -> Result<()> {
-    let Ok(output) = output.canonicalize() else {
-        return Ok(());
-    };
-    for input in ingest::expand(inputs)? {
-        if input.canonicalize().is_ok_and(|input| input == output) {
-            return Err(Error::Parameter {
-                name: "--output",
-                found: format!("{} (an input)", output.display()),
-                expected: "another file".into(),
-            });
-        }
-    }
-    Ok(())
-}
-
-fn enough(store: &PointStore) -> Result<()> {
-    if store.len() >= 3 {
-        return Ok(());
-    }
-    let found = match store.len() {
-        0 => "no points".to_owned(),
-        1 => "one distinct point".to_owned(),
-        n => format!("{n} distinct points"),
-    };
-    Err(Error::Degenerate { found })
-}
-
-fn not_a_line(stats: &CellStats, points: u64) -> Result<()> {
-    if stats.no_plane < points {
-        return Ok(());
-    }
-    Err(Error::Degenerate {
-        found: format!("{points} distinct points, all on one line"),
-    })
 }

@@ -97,7 +97,7 @@ pub struct StageReport {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PartReport {
     /// Name of the part.
-    pub name: &'static str,
+    pub name: String,
     /// Wall-clock seconds.
     pub seconds: f64,
 }

@@ -1,9 +1,11 @@
 //! Flags, as the user gives them.
 
 use crate::params::{Method, Params, Radius};
+use crate::pipeline::Start;
 use crate::stages::ingest::Classes;
 use clap::{Args as ClapArgs, Parser, Subcommand};
 use std::path::PathBuf;
+use std::time::Duration;
 
 /// Turns point clouds of any size into clean triangle meshes, inside the memory you give it.
 #[derive(Debug, Parser)]
@@ -24,18 +26,23 @@ const EXAMPLES: &str = "Examples:
   outcrop reconstruct scan.laz -o mesh.ply
   outcrop reconstruct tiles/ -o town.ply --memory 4GiB --report town.json
   outcrop reconstruct noisy.las -o smooth.ply --smooth 1
+  outcrop reconstruct scan.laz -o mesh.ply --resume --time-limit 7h30m
+  outcrop resume mesh.ply.outcrop-scratch
   outcrop info scan.laz
   outcrop verify mesh.ply && echo manifold
   outcrop compare mesh.ply scan.laz
   outcrop demo
 
-Exit codes: 0 fine, 1 the answer is no (verify), 2 error, 130 stopped by Ctrl-C.";
+Exit codes: 0 fine, 1 the answer is no (verify), 2 error. A run that was stopped can be resumed: 75 its \
+time limit was reached, 130 Ctrl-C, 143 SIGTERM, 129 SIGHUP.";
 
 /// What to do.
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Make a mesh from points
     Reconstruct(Reconstruct),
+    /// Go on with a run that was stopped, killed, or out of disk
+    Resume(Resume),
     /// Say what is in a cloud and what a run would need
     Info(Info),
     /// Check that a mesh is a manifold: exit 0 yes, 1 no
@@ -55,7 +62,7 @@ pub struct Limits {
     /// Worker threads [default: all available]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub threads: Option<u16>,
-    /// Folder for scratch files, removed at the end [default: beside the output]
+    /// Folder for scratch files, which are removed at the end [default: beside the output]
     #[arg(long, value_name = "DIR")]
     pub scratch: Option<PathBuf>,
     /// No progress, even on a terminal
@@ -183,12 +190,70 @@ pub struct Reconstruct {
     pub repair: Repair,
     #[command(flatten, next_help_heading = "Limits")]
     pub limits: Limits,
-    /// Write what happened as JSON
-    #[arg(long, value_name = "FILE.json")]
-    pub report: Option<PathBuf>,
+    #[command(flatten)]
+    pub again: Again,
+    #[command(flatten)]
+    pub ends: Ends,
     /// Points worked on at a time; does not change the result
     #[arg(long, value_name = "N", hide = true)]
     pub tile_points: Option<u32>,
+    /// Points per block, for tests: the result depends on it
+    #[arg(long, value_name = "N", hide = true, default_value_t = crate::params::BLOCK)]
+    pub block_points: u32,
+}
+
+/// What to do about an unfinished run.
+#[derive(Debug, ClapArgs)]
+#[command(next_help_heading = "Resume")]
+pub struct Again {
+    /// Go on with the unfinished run of this output, if there is one; begin if there is none
+    #[arg(long, conflicts_with = "restart")]
+    pub resume: bool,
+    /// Throw an unfinished run of this output away and begin again
+    #[arg(long)]
+    pub restart: bool,
+}
+
+impl Again {
+    /// The same for the library.
+    pub fn start(&self) -> Start {
+        match (self.resume, self.restart) {
+            (true, _) => Start::Resume,
+            (_, true) => Start::Restart,
+            _ => Start::New,
+        }
+    }
+}
+
+/// How a run ends.
+#[derive(Debug, ClapArgs)]
+#[command(next_help_heading = "Limits")]
+pub struct Ends {
+    /// Stop by itself before this time is over, e.g. 7h30m, to be resumed later
+    #[arg(long, value_name = "TIME", value_parser = time)]
+    pub time_limit: Option<Duration>,
+    /// Write what happened as JSON
+    #[arg(long, value_name = "FILE.json")]
+    pub report: Option<PathBuf>,
+}
+
+/// `outcrop resume`
+#[derive(Debug, ClapArgs)]
+pub struct Resume {
+    /// The scratch folder of the run: MESH.ply.outcrop-scratch beside the mesh, or in --scratch
+    #[arg(value_name = "FOLDER")]
+    pub folder: PathBuf,
+    /// Ceiling for memory, as for reconstruct; need not be what it was
+    #[arg(long, value_name = "SIZE", value_parser = size)]
+    pub memory: Option<u64>,
+    /// Worker threads, as for reconstruct; need not be what they were
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub threads: Option<u16>,
+    #[command(flatten)]
+    pub ends: Ends,
+    /// No progress, even on a terminal
+    #[arg(long, short)]
+    pub quiet: bool,
 }
 
 /// `outcrop info`
@@ -276,6 +341,7 @@ impl Reconstruct {
             max_hole_edges: self.repair.max_hole_edges,
             min_component: self.repair.min_component.or(usual.min_component),
             repair: !self.repair.no_repair,
+            block: self.block_points,
             ..usual
         }
     }
@@ -286,6 +352,13 @@ fn size(text: &str) -> Result<u64, String> {
         .parse()
         .map_err(|_| format!("{text:?} is not a size like 512MiB, 4GiB or 2000000000"))?;
     Ok(size.as_u64())
+}
+
+fn time(text: &str) -> Result<Duration, String> {
+    match humantime::parse_duration(text) {
+        Ok(time) if time > Duration::ZERO => Ok(time),
+        _ => Err(format!("{text:?} is not a time like 90s, 45m or 7h30m")),
+    }
 }
 
 fn count(text: &str) -> Result<u64, String> {

@@ -1,11 +1,11 @@
 //! What each command does.
 
-use super::args::{Command, Compare, Demo, Info, Limits, Reconstruct, Verify};
+use super::args::{Command, Compare, Demo, Ends, Info, Limits, Reconstruct, Resume, Verify};
 use super::progress::{Bars, Warnings};
-use super::{Answer, style};
+use super::{Answer, stop, style};
 use crate::error::{Error, Result};
 use crate::inspect::{compare, info, verify};
-use crate::pipeline::{Reconstruction, default_memory, default_threads};
+use crate::pipeline::{Builder, Reconstruction, Start, default_memory, default_threads};
 use crate::report::Report;
 use crate::workspace::Workspace;
 use crate::workspace::memory::MemoryPool;
@@ -18,6 +18,7 @@ use std::sync::Arc;
 pub fn run(command: Command) -> Result<Answer> {
     match command {
         Command::Reconstruct(args) => reconstruct(&args),
+        Command::Resume(args) => resume(&args),
         Command::Info(args) => tell(&args),
         Command::Verify(args) => check(&args),
         Command::Compare(args) => measure(&args),
@@ -35,20 +36,6 @@ fn observer(quiet: bool) -> Arc<dyn Observer> {
     }
 }
 
-/// A flag that Ctrl-C and a terminating signal raise; a second one ends the program at once.
-fn cancel_on_signal() -> Cancel {
-    let cancel = Cancel::new();
-    let raised = cancel.clone();
-    // Without a handler a signal ends the program, which is no worse than before.
-    let _ = ctrlc::set_handler(move || {
-        if raised.is_cancelled() {
-            std::process::exit(130);
-        }
-        raised.cancel();
-    });
-    cancel
-}
-
 fn threads(limits: &Limits) -> usize {
     limits.threads.map_or_else(default_threads, usize::from)
 }
@@ -61,7 +48,7 @@ fn workspace(limits: &Limits, beside: &Path) -> Result<Workspace> {
         memory,
         threads(limits),
         observer(limits.quiet),
-        cancel_on_signal(),
+        stop::on_signal(),
     )
 }
 
@@ -76,34 +63,11 @@ fn json<T: serde::Serialize>(value: &T) -> Result<String> {
 }
 
 fn reconstruct(args: &Reconstruct) -> Result<Answer> {
-    let report = run_reconstruction(args, cancel_on_signal())?;
-    if !args.limits.quiet && std::io::stdout().is_terminal() {
-        print(&summary(&report, &args.output))?;
-    }
-    Ok(Answer::Yes)
-}
-
-fn run_reconstruction(args: &Reconstruct, cancel: Cancel) -> Result<Report> {
-    if args.report.as_ref() == Some(&args.output) {
-        return Err(Error::Parameter {
-            name: "--report",
-            found: args.output.display().to_string(),
-            expected: "a file other than the mesh".into(),
-        });
-    }
-    let new_report = args.report.as_ref().is_some_and(|path| !path.exists());
-    if let Some(path) = &args.report {
-        // Better now than after hours of work.
-        let mut options = std::fs::File::options();
-        let opened = options.append(true).create(true).open(path);
-        opened.map_err(|e| Error::io(path, "write the report", e))?;
-    }
     let mut builder = Reconstruction::builder()
         .output(&args.output)
         .params(args.params())
         .threads(threads(&args.limits))
-        .observer(observer(args.limits.quiet))
-        .cancel(cancel);
+        .start(args.again.start());
     for input in &args.inputs {
         builder = builder.input(input);
     }
@@ -116,15 +80,55 @@ fn run_reconstruction(args: &Reconstruct, cancel: Cancel) -> Result<Report> {
     if let Some(points) = args.tile_points {
         builder = builder.tile_points(points);
     }
-    let outcome = builder.build().and_then(|r| r.run());
-    match (&outcome, &args.report) {
+    run_reconstruction(builder, &args.ends, args.limits.quiet)
+}
+
+fn resume(args: &Resume) -> Result<Answer> {
+    let mut builder = Reconstruction::resume(&args.folder)?;
+    if let Some(memory) = args.memory {
+        builder = builder.memory(memory);
+    }
+    if let Some(threads) = args.threads {
+        builder = builder.threads(threads.into());
+    }
+    run_reconstruction(builder, &args.ends, args.quiet)
+}
+
+fn run_reconstruction(builder: Builder, ends: &Ends, quiet: bool) -> Result<Answer> {
+    let cancel = stop::on_signal();
+    let mut builder = builder.observer(observer(quiet)).cancel(cancel.clone());
+    if let Some(limit) = ends.time_limit {
+        builder = builder.time_limit(limit);
+    }
+    let run = builder.build()?;
+    if ends.report.as_deref() == Some(run.output()) {
+        return Err(Error::Parameter {
+            name: "--report",
+            found: run.output().display().to_string(),
+            expected: "a file other than the mesh".into(),
+        });
+    }
+    let new_report = ends.report.as_ref().is_some_and(|path| !path.exists());
+    if let Some(path) = &ends.report {
+        // Better now than after hours of work.
+        let mut options = std::fs::File::options();
+        let opened = options.append(true).create(true).open(path);
+        opened.map_err(|e| Error::io(path, "write the report", e))?;
+    }
+    stop::watch(&run, &cancel);
+    let outcome = run.run();
+    match (&outcome, &ends.report) {
         (Ok(report), Some(path)) => std::fs::write(path, json(report)? + "\n")
             .map_err(|e| Error::io(path, "write the report", e))?,
         // No report of a run that did not end.
         (Err(_), Some(path)) if new_report => drop(std::fs::remove_file(path)),
         _ => {}
     }
-    outcome
+    let report = outcome?;
+    if !quiet && std::io::stdout().is_terminal() {
+        print(&summary(&report, run.output()))?;
+    }
+    Ok(Answer::Yes)
 }
 
 fn summary(report: &Report, output: &Path) -> String {
@@ -230,7 +234,8 @@ fn demo(args: &Demo) -> Result<Answer> {
         .output(&mesh)
         .threads(threads(&args.limits))
         .observer(observer)
-        .cancel(cancel_on_signal());
+        .start(Start::Restart)
+        .cancel(stop::on_signal());
     if let Some(memory) = args.limits.memory {
         builder = builder.memory(memory);
     }

@@ -3,13 +3,14 @@
 mod args;
 mod commands;
 mod progress;
+mod stop;
 mod style;
 
 use crate::error::Error;
 use clap::Parser;
 use std::process::ExitCode;
 
-/// Exit code when the answer is no, or a run was stopped.
+/// Exit code when the answer is no.
 const NO: u8 = 1;
 /// Exit code for errors.
 const FAILED: u8 = 2;
@@ -20,7 +21,7 @@ enum Answer {
     No,
 }
 
-/// Runs the command line; 0 fine, 1 the answer is no, 2 error.
+/// Runs the command line; 0 fine, 1 the answer is no, 2 error, 75 time is up, 128 + signal.
 #[must_use]
 pub fn main() -> ExitCode {
     let args = args::Args::parse();
@@ -30,12 +31,17 @@ pub fn main() -> ExitCode {
         Err(error) => {
             // A reader that went away (`| head`) is no error.
             if !style::is_broken_pipe(&error) {
-                eprintln!("outcrop: {error}");
+                let hint = if error.can_resume() {
+                    stop::hint()
+                } else {
+                    String::new()
+                };
+                eprintln!("outcrop: {error}{hint}");
             }
-            ExitCode::from(if matches!(error, Error::Cancelled) {
-                130
-            } else {
-                FAILED
+            ExitCode::from(match error {
+                Error::Cancelled => stop::code(false),
+                Error::TimeLimit => stop::code(true),
+                _ => FAILED,
             })
         }
     }

@@ -22,6 +22,13 @@ pub struct Lattice {
     pub exact: bool,
 }
 
+crate::workspace::persist::persist!(Lattice {
+    step,
+    offset,
+    base,
+    exact
+});
+
 impl Lattice {
     /// The input coordinates of a lattice position.
     #[must_use]

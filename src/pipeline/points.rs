@@ -42,7 +42,9 @@ impl Reconstruction {
         })?;
         let (store, stats) = clock.stage("order", "points", 0, || {
             let orderer = Orderer::new(workspace)?;
-            let stats = thinned.for_each(|points| orderer.push(workspace, points))?;
+            let stats = orderer.take_stream(workspace, |from, stats, each| {
+                thinned.for_each(from, stats, each)
+            })?;
             let (store, _) = orderer.finish(workspace, self.page_points)?;
             Ok((store, stats))
         })?;
@@ -82,8 +84,15 @@ pub(crate) fn order(
     let threads = workspace.threads.min(most as usize).max(1);
     let held = workspace.reserve("order: frames", threads as u64 * READ_BUFFERS)?;
     let orderer = Orderer::new(workspace)?;
-    spool.par_for_each(threads, lattice, |points| orderer.push(workspace, points))?;
+    orderer.take_parts(workspace, &spool.frames(), |frames| {
+        let push = |points: &[_]| orderer.push(workspace, points);
+        spool.par_for_each(threads, lattice, frames, push)
+    })?;
     drop(held);
-    drop(spool);
+    if orderer.is_sorted() || !workspace.is_resumable() {
+        drop(spool);
+        return orderer.finish(workspace, page);
+    }
+    // An attempt that dies has to read again what was only in memory.
     orderer.finish(workspace, page)
 }

@@ -8,19 +8,42 @@ use crate::workspace::Workspace;
 #[derive(Debug)]
 pub struct Exchange<const N: usize> {
     sorter: Sorter<N>,
+    /// What was sent by senders with a number, in a run that can be resumed.
+    sent: Option<Sections<N>>,
     name: String,
     layout: Layout<N>,
 }
 
 impl<const N: usize> Exchange<N> {
-    /// An exchange that sorts in `buffer` bytes of memory, already reserved by the caller.
+    /// An exchange that sorts in `buffer` bytes of memory, already reserved by the caller. What is
+    /// sent does not outlive an attempt: for steps that are done again as a whole.
     #[must_use]
     pub fn new(workspace: &Workspace, name: &str, buffer: u64) -> Self {
         Self {
             sorter: Sorter::new(workspace, name, buffer),
+            sent: None,
             name: name.to_owned(),
             layout: [Word::Above; N],
         }
+    }
+
+    /// An exchange for units of work: what a finished one has sent is there when the run is resumed.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`].
+    pub fn between(
+        workspace: &Workspace,
+        name: &str,
+        buffer: u64,
+        senders: usize,
+        layout: Layout<N>,
+    ) -> Result<Self> {
+        let mut exchange = Self::new(workspace, name, buffer).packed(layout);
+        if workspace.is_resumable() {
+            let name = format!("{name}.letters");
+            exchange.sent = Some(Sections::with_layout(workspace, &name, senders, layout)?);
+        }
+        Ok(exchange)
     }
 
     /// The exchange whose records are delivered packed with this layout.
@@ -33,9 +56,25 @@ impl<const N: usize> Exchange<N> {
     /// Sends records; the first word of each is its receiver.
     ///
     /// # Errors
-    /// [`crate::Error::Io`].
+    /// [`crate::Error::Io`], [`crate::Error::Disk`].
     pub fn send(&self, records: &[Record<N>]) -> Result<()> {
         self.sorter.push(records)
+    }
+
+    /// Sends all records of unit `sender`; the first word of each is its receiver.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], [`crate::Error::Disk`].
+    pub fn send_from(&self, sender: usize, records: &[Record<N>]) -> Result<()> {
+        match &self.sent {
+            Some(sent) => {
+                while sent.count() <= sender {
+                    sent.grow();
+                }
+                sent.put(sender, records)
+            }
+            None => self.send(records),
+        }
     }
 
     /// Delivers: section `r` holds, sorted, all records whose first word is `r`.
@@ -60,27 +99,34 @@ impl<const N: usize> Exchange<N> {
         receivers: usize,
         wanted: impl Fn(Option<&Record<N>>, &Record<N>) -> bool,
     ) -> Result<Sections<N>> {
-        let sections = Sections::with_layout(
-            workspace,
-            &format!("{}.sections", self.name),
-            receivers,
-            self.layout,
-        )?;
-        let mut current: Vec<Record<N>> = Vec::new();
-        self.sorter.finish(workspace)?.for_each(|record| {
-            if current.first().is_some_and(|first| first[0] != record[0]) {
-                sections.put(current[0][0] as usize, &current)?;
-                current.clear();
+        workspace.once("deliver", || {
+            let name = format!("{}.sections", self.name);
+            let sections = Sections::with_layout(workspace, &name, receivers, self.layout)?;
+            if let Some(sent) = self.sent {
+                let mut records = Vec::new();
+                for sender in 0..sent.count() {
+                    workspace.check_cancel()?;
+                    sent.get_into(sender, &mut records)?;
+                    self.sorter.push(&records)?;
+                }
             }
-            if wanted(current.last(), &record) {
-                current.push(record);
+            let mut current: Vec<Record<N>> = Vec::new();
+            self.sorter.finish(workspace)?.for_each(|record| {
+                if current.first().is_some_and(|first| first[0] != record[0]) {
+                    workspace.check_cancel()?;
+                    sections.put(current[0][0] as usize, &current)?;
+                    current.clear();
+                }
+                if wanted(current.last(), &record) {
+                    current.push(record);
+                }
+                Ok(())
+            })?;
+            if let Some(first) = current.first() {
+                sections.put(first[0] as usize, &current)?;
             }
-            Ok(())
-        })?;
-        if let Some(first) = current.first() {
-            sections.put(first[0] as usize, &current)?;
-        }
-        Ok(sections)
+            Ok(sections)
+        })
     }
 }
 

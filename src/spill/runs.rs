@@ -2,13 +2,14 @@
 
 use super::Record;
 use crate::error::{Error, Result};
-use crate::workspace::IoCounters;
+use crate::workspace::Workspace;
+use crate::workspace::file::{Place, ScratchFile, open_existing};
+use crate::workspace::persist::{Persist, Saved};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::fs::File;
-use std::io::{Read, Seek, SeekFrom, Write};
-use std::path::PathBuf;
-use std::sync::Arc;
+use std::io::{Read, Seek, SeekFrom};
+use std::os::unix::fs::FileExt;
 
 /// Records per checksummed frame of a run.
 pub(super) const FRAME: usize = 4096;
@@ -19,18 +20,70 @@ pub(super) const FILE_BUFFER: usize = 1 << 15;
 /// One sorted file of frames: `u32` length in records, `u32` CRC-32, records.
 #[derive(Debug)]
 pub(super) struct Run<const N: usize> {
-    path: PathBuf,
+    file: ScratchFile,
     bytes: u64,
     /// The first record of each frame; all frames but the last are full.
     pub(super) firsts: Vec<Record<N>>,
-    io: Arc<IoCounters>,
+    /// The whole file.
+    place: Place,
 }
 
-impl<const N: usize> Drop for Run<N> {
-    fn drop(&mut self) {
-        self.io.shrink_scratch(self.bytes);
-        // A scratch file that cannot be deleted goes with its folder.
-        let _ = std::fs::remove_file(&self.path);
+/// Bytes of a full frame.
+const fn frame_bytes<const N: usize>() -> u64 {
+    (8 + FRAME * size_of::<Record<N>>()) as u64
+}
+
+impl<const N: usize> Run<N> {
+    /// The name of its file.
+    pub(super) fn name(&self) -> String {
+        self.file.name.to_string()
+    }
+
+    /// True if it outlives an attempt.
+    pub(super) fn is_kept(&self) -> bool {
+        self.file.is_kept()
+    }
+
+    /// Notes the file in the journal.
+    pub(super) fn put(&self) -> Result<()> {
+        self.file.put(0, self.place)
+    }
+
+    /// The run `name` that an earlier attempt wrote. It has no frames if it was deleted since.
+    pub(super) fn reopen(workspace: &Workspace, name: &str) -> Result<Self> {
+        let (mut file, places) = workspace.keep_file(name)?;
+        let place = places.first().map_or(Place::default(), |(_, place)| *place);
+        let bytes = place.bytes as u64;
+        let mut firsts = Vec::new();
+        if !file.is_gone() {
+            let io = |e| Error::io(&file.path, "read", e);
+            let handle = open_existing(&file.path).map_err(io)?;
+            let mut first = [0; N];
+            for frame in 0..bytes.div_ceil(frame_bytes::<N>()) {
+                let at = frame * frame_bytes::<N>() + 8;
+                let first_bytes = bytemuck::cast_slice_mut(&mut first);
+                handle.read_exact_at(first_bytes, at).map_err(io)?;
+                firsts.push(first);
+            }
+            file.close();
+        }
+        Ok(Self {
+            file,
+            bytes,
+            firsts,
+            place,
+        })
+    }
+}
+
+impl<const N: usize> Persist for Run<N> {
+    fn save(&self, out: &mut Vec<u8>) {
+        self.file.name.to_string().save(out);
+    }
+
+    fn load(from: &mut Saved<'_>) -> Result<Self> {
+        let name = String::load(from)?;
+        Self::reopen(from.workspace, &name)
     }
 }
 
@@ -66,23 +119,23 @@ pub(super) fn merge<const N: usize>(
 
 /// Writes a run.
 pub(super) struct RunWriter<const N: usize> {
-    path: PathBuf,
-    file: std::io::BufWriter<File>,
+    file: ScratchFile,
     bytes: u64,
     firsts: Vec<Record<N>>,
-    io: Arc<IoCounters>,
+    /// Of the whole file, if a resumed run may need it.
+    crc: Option<crc32fast::Hasher>,
+    frame: Vec<u8>,
 }
 
 impl<const N: usize> RunWriter<N> {
-    pub(super) fn create(path: PathBuf, io: Arc<IoCounters>) -> Result<Self> {
-        let file = File::create_new(&path).map_err(|e| Error::io(&path, "create", e))?;
-        Ok(Self {
-            path,
-            file: std::io::BufWriter::with_capacity(1 << 16, file),
+    pub(super) fn new(file: ScratchFile, kept: bool) -> Self {
+        Self {
+            file,
             bytes: 0,
             firsts: Vec::new(),
-            io,
-        })
+            crc: kept.then(crc32fast::Hasher::new),
+            frame: Vec::new(),
+        }
     }
 
     pub(super) fn frame(&mut self, records: &[Record<N>]) -> Result<()> {
@@ -92,34 +145,37 @@ impl<const N: usize> RunWriter<N> {
         self.firsts.push(*first);
         let bytes: &[u8] = bytemuck::cast_slice(records);
         let head = [records.len() as u32, crc32fast::hash(bytes)];
-        self.file
-            .write_all(bytemuck::cast_slice(&head))
-            .and_then(|()| self.file.write_all(bytes))
-            .map_err(|e| Error::io(&self.path, format!("write {} bytes", bytes.len()), e))?;
-        let all = bytes.len() as u64 + 8;
-        self.bytes += all;
-        self.io.add_written(all);
-        self.io.grow_scratch(all);
+        self.frame.clear();
+        self.frame.extend_from_slice(bytemuck::cast_slice(&head));
+        self.frame.extend_from_slice(bytes);
+        if let Some(crc) = &mut self.crc {
+            crc.update(&self.frame);
+        }
+        self.file.append(&self.frame)?;
+        self.bytes += self.frame.len() as u64;
         Ok(())
     }
 
-    pub(super) fn finish(self) -> Result<Run<N>> {
-        self.file
-            .into_inner()
-            .map_err(|e| Error::io(&self.path, "flush", e.into_error()))?;
-        Ok(Run {
-            path: self.path,
+    pub(super) fn finish(mut self) -> Run<N> {
+        self.file.close();
+        Run {
+            place: Place {
+                offset: 0,
+                bytes: self.bytes as usize,
+                records: 0,
+                crc: self.crc.map_or(0, crc32fast::Hasher::finalize),
+            },
+            file: self.file,
             bytes: self.bytes,
             firsts: self.firsts,
-            io: self.io,
-        })
+        }
     }
 }
 
 struct RunReader<'a, const N: usize> {
     run: &'a Run<N>,
     to: Option<Record<N>>,
-    file: std::io::BufReader<File>,
+    source: std::io::BufReader<File>,
     offset: u64,
     frame: Vec<Record<N>>,
     at: usize,
@@ -128,18 +184,18 @@ struct RunReader<'a, const N: usize> {
 impl<'a, const N: usize> RunReader<'a, N> {
     /// Stands before the first record that is not below `from`.
     fn open(run: &'a Run<N>, from: Option<Record<N>>, to: Option<Record<N>>) -> Result<Self> {
-        let io = |action: &'static str| move |e| Error::io(&run.path, action, e);
-        let mut file = File::open(&run.path).map_err(io("open"))?;
+        let io = |action: &'static str| move |e| Error::io(&run.file.path, action, e);
+        let mut file = open_existing(&run.file.path).map_err(io("open"))?;
         // The frame before the first that begins at or above `from` may end above it.
         let below = from.map_or(0, |from| run.firsts.partition_point(|f| *f < from));
-        let offset = below.saturating_sub(1) as u64 * (8 + FRAME * size_of::<Record<N>>()) as u64;
+        let offset = below.saturating_sub(1) as u64 * frame_bytes::<N>();
         if offset > 0 {
             file.seek(SeekFrom::Start(offset)).map_err(io("seek in"))?;
         }
         let mut reader = Self {
             run,
             to,
-            file: std::io::BufReader::with_capacity(FILE_BUFFER, file),
+            source: std::io::BufReader::with_capacity(FILE_BUFFER, file),
             offset,
             frame: Vec::new(),
             at: 0,
@@ -167,20 +223,22 @@ impl<'a, const N: usize> RunReader<'a, N> {
     }
 
     fn corrupt(&self, found: String, expected: String) -> Error {
-        Error::Corrupt {
-            path: self.run.path.clone(),
-            offset: self.offset,
-            found,
-            expected,
+        self.run.file.damaged(self.offset, found, expected)
+    }
+
+    fn failed(&self, error: std::io::Error) -> Error {
+        if error.kind() == std::io::ErrorKind::UnexpectedEof {
+            return self.corrupt("the end of the file".into(), "a frame of records".into());
         }
+        Error::io(&self.run.file.path, "read", error)
     }
 
     fn read_frame(&mut self) -> Result<()> {
         let mut head = [0u32; 2];
-        let io = |e| Error::io(&self.run.path, "read", e);
-        self.file
-            .read_exact(bytemuck::cast_slice_mut(&mut head))
-            .map_err(io)?;
+        let read = self
+            .source
+            .read_exact(bytemuck::cast_slice_mut(&mut head));
+        read.map_err(|e| self.failed(e))?;
         if head[0] == 0 || head[0] as usize > FRAME {
             return Err(self.corrupt(
                 format!("a frame of {} records", head[0]),
@@ -189,12 +247,13 @@ impl<'a, const N: usize> RunReader<'a, N> {
         }
         self.frame.resize(head[0] as usize, [0; N]);
         let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut self.frame);
-        self.file.read_exact(bytes).map_err(io)?;
+        let read = self.source.read_exact(bytes);
         let (all, crc) = (bytes.len() as u64 + 8, crc32fast::hash(bytes));
+        read.map_err(|e| self.failed(e))?;
         if crc != head[1] {
             return Err(self.corrupt(format!("checksum {crc:08x}"), format!("{:08x}", head[1])));
         }
-        self.run.io.add_read(all);
+        self.run.file.count_read(all);
         self.offset += all;
         self.at = 0;
         Ok(())

@@ -5,32 +5,19 @@
 
 use super::pack::{pack, unpack};
 use super::{Layout, Record, Word};
-use crate::error::{Error, Result};
-use crate::workspace::{IoCounters, Workspace};
-use std::fs::File;
-use std::os::unix::fs::FileExt;
-use std::path::PathBuf;
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex};
-
-#[derive(Debug, Clone, Copy, Default)]
-struct Place {
-    offset: u64,
-    bytes: usize,
-    records: usize,
-    crc: u32,
-}
+use crate::error::Result;
+use crate::workspace::Workspace;
+use crate::workspace::file::{Place, ScratchFile};
+use crate::workspace::persist::{Persist, Saved};
+use std::sync::Mutex;
 
 /// Numbered sections of `N`-word records in one scratch file, which is deleted on drop.
 #[derive(Debug)]
 pub struct Sections<const N: usize> {
-    path: PathBuf,
-    file: File,
+    file: ScratchFile,
     /// How records are packed, if they are.
     layout: Option<Layout<N>>,
     places: Mutex<Vec<Place>>,
-    end: AtomicU64,
-    io: Arc<IoCounters>,
 }
 
 impl<const N: usize> Sections<N> {
@@ -39,7 +26,7 @@ impl<const N: usize> Sections<N> {
     /// memory as well.
     ///
     /// # Errors
-    /// [`Error::Io`].
+    /// [`crate::Error::Io`], [`crate::Error::Disk`].
     pub fn create(workspace: &Workspace, name: &str, count: usize) -> Result<Self> {
         Self::with_layout(workspace, name, count, [Word::Above; N])
     }
@@ -47,7 +34,7 @@ impl<const N: usize> Sections<N> {
     /// As [`Sections::create`], with the layout that packs the records best.
     ///
     /// # Errors
-    /// [`Error::Io`].
+    /// [`crate::Error::Io`], [`crate::Error::Disk`].
     pub fn with_layout(
         workspace: &Workspace,
         name: &str,
@@ -61,7 +48,7 @@ impl<const N: usize> Sections<N> {
     /// and reading take no further memory.
     ///
     /// # Errors
-    /// [`Error::Io`].
+    /// [`crate::Error::Io`], [`crate::Error::Disk`].
     pub fn unpacked(workspace: &Workspace, name: &str, count: usize) -> Result<Self> {
         Self::new(workspace, name, count, None)
     }
@@ -72,14 +59,16 @@ impl<const N: usize> Sections<N> {
         count: usize,
         layout: Option<Layout<N>>,
     ) -> Result<Self> {
-        let (path, file) = workspace.create_file(name)?;
+        let (file, known) = workspace.keep_file(name)?;
+        let count = known.iter().fold(count, |n, (s, _)| n.max(*s as usize + 1));
+        let mut places = vec![Place::default(); count];
+        for (section, place) in known {
+            places[section as usize] = place;
+        }
         Ok(Self {
-            path,
             file,
             layout,
-            places: Mutex::new(vec![Place::default(); count]),
-            end: AtomicU64::new(0),
-            io: workspace.io.clone(),
+            places: Mutex::new(places),
         })
     }
 
@@ -107,16 +96,19 @@ impl<const N: usize> Sections<N> {
         self.places().iter().map(|p| p.records as u64).sum()
     }
 
+    /// Adds an empty section; its number.
+    pub fn grow(&self) -> usize {
+        let mut places = self.places();
+        places.push(Place::default());
+        places.len() - 1
+    }
+
     /// Writes a further section and gives its number.
     ///
     /// # Errors
-    /// [`Error::Io`].
+    /// [`crate::Error::Io`], [`crate::Error::Disk`].
     pub fn append(&self, records: &[Record<N>]) -> Result<usize> {
-        let section = {
-            let mut places = self.places();
-            places.push(Place::default());
-            places.len() - 1
-        };
+        let section = self.grow();
         self.put(section, records)?;
         Ok(section)
     }
@@ -124,7 +116,7 @@ impl<const N: usize> Sections<N> {
     /// Writes a section; an earlier content of it is forgotten.
     ///
     /// # Errors
-    /// [`Error::Io`].
+    /// [`crate::Error::Io`], [`crate::Error::Disk`].
     pub fn put(&self, section: usize, records: &[Record<N>]) -> Result<()> {
         let mut packed = Vec::new();
         let bytes = match self.layout {
@@ -134,25 +126,20 @@ impl<const N: usize> Sections<N> {
             }
             None => bytemuck::cast_slice(records),
         };
-        let offset = self.end.fetch_add(bytes.len() as u64, Ordering::Relaxed);
-        self.file
-            .write_all_at(bytes, offset)
-            .map_err(|e| Error::io(&self.path, format!("write {} bytes", bytes.len()), e))?;
-        self.io.add_written(bytes.len() as u64);
-        self.io.grow_scratch(bytes.len() as u64);
-        self.places()[section] = Place {
-            offset,
+        let place = Place {
+            offset: self.file.append(bytes)?,
             bytes: bytes.len(),
             records: records.len(),
             crc: crc32fast::hash(bytes),
         };
-        Ok(())
+        self.places()[section] = place;
+        self.file.put(section as u32, place)
     }
 
     /// Reads a section into `records`, which is cleared first.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Corrupt`] if it is not what was written.
+    /// [`crate::Error::Io`]; [`crate::Error::Corrupt`] if it is not what was written.
     pub fn get_into(&self, section: usize, records: &mut Vec<Record<N>>) -> Result<()> {
         let place = self.places()[section];
         records.clear();
@@ -163,29 +150,24 @@ impl<const N: usize> Sections<N> {
         let mut bytes = vec![0; place.bytes];
         self.read(place, &mut bytes)?;
         records.resize(place.records, [0; N]);
-        unpack(&bytes, layout, records).ok_or_else(|| Error::Corrupt {
-            path: self.path.clone(),
-            offset: place.offset,
-            found: format!("{} bytes that do not unpack", place.bytes),
-            expected: format!("{} records", place.records),
+        unpack(&bytes, layout, records).ok_or_else(|| {
+            let found = format!("{} bytes that do not unpack", place.bytes);
+            let expected = format!("{} records", place.records);
+            self.file.damaged(place.offset, found, expected)
         })
     }
 
     fn read(&self, place: Place, bytes: &mut [u8]) -> Result<()> {
-        self.file
-            .read_exact_at(bytes, place.offset)
-            .map_err(|e| Error::io(&self.path, format!("read {} bytes", bytes.len()), e))?;
-        self.io.add_read(bytes.len() as u64);
+        if bytes.is_empty() {
+            return Ok(());
+        }
+        self.file.read_at(bytes, place.offset)?;
         let crc = crc32fast::hash(bytes);
         if crc == place.crc {
             return Ok(());
         }
-        Err(Error::Corrupt {
-            path: self.path.clone(),
-            offset: place.offset,
-            found: format!("checksum {crc:08x}"),
-            expected: format!("{:08x}", place.crc),
-        })
+        let (found, expected) = (format!("checksum {crc:08x}"), format!("{:08x}", place.crc));
+        Err(self.file.damaged(place.offset, found, expected))
     }
 
     /// Reads a section.
@@ -199,17 +181,31 @@ impl<const N: usize> Sections<N> {
     }
 }
 
-impl<const N: usize> Drop for Sections<N> {
-    fn drop(&mut self) {
-        self.io.shrink_scratch(self.end.load(Ordering::Relaxed));
-        // A scratch file that cannot be deleted goes with its folder.
-        let _ = std::fs::remove_file(&self.path);
+impl<const N: usize> Persist for Sections<N> {
+    fn save(&self, out: &mut Vec<u8>) {
+        self.file.name.to_string().save(out);
+        self.count().save(out);
+        let layout = self.layout.map(|layout| layout.map(|word| word as u8));
+        layout.is_some().save(out);
+        layout.unwrap_or([0; N]).save(out);
+    }
+
+    fn load(from: &mut Saved<'_>) -> Result<Self> {
+        let (name, count) = (String::load(from)?, usize::load(from)?);
+        let packed = bool::load(from)?;
+        let words = <[u8; N]>::load(from)?.map(|word| match word {
+            0 => Word::Above,
+            1 => Word::Left,
+            _ => Word::Rising,
+        });
+        Self::new(from.workspace, &name, count, packed.then_some(words))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::error::Error;
 
     #[test]
     fn damage_is_found_and_named() {
@@ -221,12 +217,12 @@ mod tests {
             sections.put(1, &records).unwrap();
             assert_eq!(sections.get(1).unwrap(), records);
             assert!(sections.get(0).unwrap().is_empty());
-            let mut bytes = std::fs::read(&sections.path).unwrap();
+            let mut bytes = std::fs::read(&sections.file.path).unwrap();
             for at in (0..bytes.len()).step_by(997) {
                 bytes[at] ^= 16;
-                std::fs::write(&sections.path, &bytes).unwrap();
+                std::fs::write(&sections.file.path, &bytes).unwrap();
                 match sections.get(1) {
-                    Err(Error::Corrupt { path, .. }) => assert_eq!(path, sections.path),
+                    Err(Error::Corrupt { path, .. }) => assert_eq!(path, sections.file.path),
                     other => panic!("{other:?}"),
                 }
                 bytes[at] ^= 16;

@@ -3,17 +3,23 @@
 use super::runs::{FILE_BUFFER, FRAME, Run, RunWriter, merge};
 use super::{Record, sort};
 use crate::error::Result;
-use crate::workspace::{IoCounters, Workspace};
-use std::path::PathBuf;
-use std::sync::{Arc, Mutex};
+use crate::workspace::Workspace;
+use crate::workspace::file::Maker;
+use crate::workspace::persist::{Persist, Raw, Saved};
+use crate::workspace::steps::Step;
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// Records of a run at most, if the run may be resumed: what is lost with an attempt is not more.
+const MOST_IN_RUN: usize = 1 << 27;
 
 /// Sorts any number of records in a bounded buffer.
 #[derive(Debug)]
 pub struct Sorter<const N: usize> {
     state: Mutex<State<N>>,
     capacity: usize,
-    folder_name: PathBuf,
-    io: Arc<IoCounters>,
+    name: String,
+    files: Maker,
     pool: Arc<rayon::ThreadPool>,
 }
 
@@ -36,10 +42,20 @@ impl<const N: usize> Sorter<N> {
                 made: 0,
             }),
             capacity,
-            folder_name: workspace.file(name),
-            io: workspace.io.clone(),
+            name: name.to_owned(),
+            files: workspace.maker(),
             pool: workspace.pool(),
         }
+    }
+
+    /// Records that fit the buffer.
+    #[must_use]
+    pub fn capacity(&self) -> usize {
+        self.capacity
+    }
+
+    fn state(&self) -> MutexGuard<'_, State<N>> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Takes records in; safe to call from several threads.
@@ -47,10 +63,7 @@ impl<const N: usize> Sorter<N> {
     /// # Errors
     /// [`crate::Error::Io`].
     pub fn push(&self, mut records: &[Record<N>]) -> Result<()> {
-        let mut state = self
-            .state
-            .lock()
-            .unwrap_or_else(std::sync::PoisonError::into_inner);
+        let mut state = self.state();
         while !records.is_empty() {
             let room = self.capacity - state.buffer.len();
             let (now, later) = records.split_at(room.min(records.len()));
@@ -71,33 +84,138 @@ impl<const N: usize> Sorter<N> {
     }
 
     fn spill(&self, state: &mut State<N>) -> Result<()> {
-        self.pool.install(|| sort::sort(&mut state.buffer));
-        let mut writer = self.run_writer(&mut state.made)?;
-        for frame in state.buffer.chunks(FRAME) {
-            writer.frame(frame)?;
-        }
-        state.runs.push(writer.finish()?);
-        state.buffer.clear();
+        let run = self.write_run(state, false)?;
+        state.runs.push(run);
         Ok(())
     }
 
-    fn run_writer(&self, made: &mut usize) -> Result<RunWriter<N>> {
-        let mut name = self.folder_name.clone().into_os_string();
-        name.push(format!(".run{made}"));
+    /// Sorts what is in the buffer and writes it.
+    fn write_run(&self, state: &mut State<N>, kept: bool) -> Result<Run<N>> {
+        self.pool.install(|| sort::sort(&mut state.buffer));
+        let mut writer = self.run_writer(&mut state.made, kept)?;
+        for frame in state.buffer.chunks(FRAME) {
+            writer.frame(frame)?;
+        }
+        state.buffer.clear();
+        Ok(writer.finish())
+    }
+
+    fn run_writer(&self, made: &mut usize, kept: bool) -> Result<RunWriter<N>> {
+        let name = format!("{}.run{made}", self.name);
         *made += 1;
-        RunWriter::create(name.into(), self.io.clone())
+        Ok(RunWriter::new(self.files.make(&name, kept)?, kept))
+    }
+
+    /// Takes in parts of an input, given by their numbers and records, all of which `push` pushes. In a
+    /// run that can be resumed, as many as fit the buffer make a run that is not made again; all that
+    /// fits at once is left in memory, unless it is to be `kept`. How many records there were.
+    ///
+    /// # Errors
+    /// What `push` returned, [`crate::Error::Io`], [`crate::Error::Disk`].
+    pub fn take_parts(
+        &self,
+        workspace: &Workspace,
+        parts: &[(u32, u64)],
+        kept: bool,
+        push: impl Fn(&[u32]) -> Result<()>,
+    ) -> Result<u64> {
+        let all: u64 = parts.iter().map(|part| part.1).sum();
+        if !workspace.is_resumable() {
+            let numbers: Vec<u32> = parts.iter().map(|part| part.0).collect();
+            push(&numbers)?;
+            return Ok(all);
+        }
+        let step = workspace.step("runs")?;
+        let mut left: BTreeMap<u32, u64> = parts.iter().copied().collect();
+        for (number, (name, taken)) in step.finished::<(String, Vec<u32>)>(workspace)? {
+            let mut state = self.state();
+            state.made = state.made.max(number as usize + 1);
+            if taken.iter().all(|part| left.contains_key(part)) {
+                left.retain(|part, _| !taken.contains(part));
+                state.runs.push(Run::reopen(workspace, &name)?);
+            }
+        }
+        let most = self.capacity.min(MOST_IN_RUN) as u64;
+        while !left.is_empty() {
+            let (mut numbers, mut records) = (Vec::new(), 0);
+            for (&number, &more) in &left {
+                if !numbers.is_empty() && records + more > most {
+                    break;
+                }
+                numbers.push(number);
+                records += more;
+            }
+            push(&numbers)?;
+            left.retain(|part, _| !numbers.contains(part));
+            let mut state = self.state();
+            if left.is_empty() && state.runs.is_empty() && !kept {
+                break;
+            }
+            let number = state.made as u64;
+            let run = self.write_run(&mut state, true)?;
+            step.finish(number, &(run.name(), numbers), || run.put())?;
+            state.runs.push(run);
+        }
+        Ok(all)
+    }
+
+    /// True if all that was taken in is on disk.
+    #[must_use]
+    pub fn is_spilled(&self) -> bool {
+        self.state().buffer.is_empty()
+    }
+
+    /// The runs of a step that were made one after the other: each with where it ended, and what else was
+    /// noted with it. Runs after a gap are of no use.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+    pub(crate) fn take_up<T: Persist>(
+        &self,
+        workspace: &Workspace,
+        step: &Step,
+    ) -> Result<Option<T>> {
+        let mut state = self.state();
+        let mut last = None;
+        for (number, (name, note)) in step.finished::<(String, T)>(workspace)? {
+            if number as usize == state.runs.len() {
+                state.runs.push(Run::reopen(workspace, &name)?);
+                last = Some(note);
+            }
+        }
+        state.made = state.runs.len();
+        Ok(last)
+    }
+
+    /// Writes what is in the buffer as the next run of such a step.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], [`crate::Error::Disk`].
+    pub(crate) fn close_run<T: Persist>(&self, step: &Step, note: &T) -> Result<()> {
+        let mut state = self.state();
+        let number = state.made as u64;
+        let run = self.write_run(&mut state, true)?;
+        let mut value = Vec::new();
+        run.name().save(&mut value);
+        note.save(&mut value);
+        step.finish(number, &Raw(value), || run.put())?;
+        state.runs.push(run);
+        Ok(())
+    }
+
+    /// Records in the buffer.
+    pub(crate) fn buffered(&self) -> usize {
+        self.state().buffer.len()
     }
 
     /// Ends input: the records in ascending order, equal ones adjacent.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+    /// [`crate::Error::Io`], [`crate::Error::Disk`], [`crate::Error::Corrupt`],
+    /// [`crate::Error::Cancelled`].
     pub fn finish(self, workspace: &Workspace) -> Result<Sorted<N>> {
         let mut state = {
-            let mut guard = self
-                .state
-                .lock()
-                .unwrap_or_else(std::sync::PoisonError::into_inner);
+            let mut guard = self.state();
             std::mem::replace(
                 &mut *guard,
                 State {
@@ -118,29 +236,54 @@ impl<const N: usize> Sorter<N> {
             self.spill(&mut state)?;
         }
         state.buffer = Vec::new();
+        let step = workspace.step("merges")?;
+        for (number, (name, merged)) in step.finished::<(String, Vec<String>)>(workspace)? {
+            state.made = state.made.max(number as usize + 1);
+            state.runs.retain(|run| !merged.contains(&run.name()));
+            state.runs.push(Run::reopen(workspace, &name)?);
+        }
         // Each open run holds one frame of records and as many bytes of file buffer.
         let fan_in = (self.capacity / (2 * FRAME)).clamp(2, 512);
         while state.runs.len() > fan_in {
-            workspace.check_cancel()?;
             let rest = state.runs.split_off(fan_in.min(state.runs.len()));
             let batch = std::mem::replace(&mut state.runs, rest);
-            let mut writer = self.run_writer(&mut state.made)?;
-            let mut frame = Vec::with_capacity(FRAME);
-            merge(&batch, None, None, |record: Record<N>| {
-                frame.push(record);
-                if frame.len() == FRAME {
-                    writer.frame(&frame)?;
-                    frame.clear();
-                }
-                Ok(())
-            })?;
-            writer.frame(&frame)?;
-            state.runs.push(writer.finish()?);
+            let number = state.made as u64;
+            let run = self.merge_runs(workspace, &batch, &mut state.made)?;
+            if run.is_kept() {
+                let merged: Vec<String> = batch.iter().map(Run::name).collect();
+                step.finish(number, &(run.name(), merged), || run.put())?;
+            }
+            drop(batch);
+            workspace.let_go()?;
+            state.runs.push(run);
         }
         Ok(Sorted {
             buffer: Vec::new(),
             runs: state.runs,
         })
+    }
+
+    /// Makes one run of several.
+    fn merge_runs(
+        &self,
+        workspace: &Workspace,
+        batch: &[Run<N>],
+        made: &mut usize,
+    ) -> Result<Run<N>> {
+        let kept = batch.iter().all(Run::is_kept);
+        let mut writer = self.run_writer(made, kept)?;
+        let mut frame = Vec::with_capacity(FRAME);
+        merge(batch, None, None, |record: Record<N>| {
+            frame.push(record);
+            if frame.len() == FRAME {
+                workspace.check_cancel()?;
+                writer.frame(&frame)?;
+                frame.clear();
+            }
+            Ok(())
+        })?;
+        writer.frame(&frame)?;
+        Ok(writer.finish())
     }
 }
 
@@ -149,6 +292,20 @@ impl<const N: usize> Sorter<N> {
 pub struct Sorted<const N: usize> {
     buffer: Vec<Record<N>>,
     runs: Vec<Run<N>>,
+}
+
+impl<const N: usize> Persist for Sorted<N> {
+    fn save(&self, out: &mut Vec<u8>) {
+        self.runs.save(out);
+        self.buffer.save(out);
+    }
+
+    fn load(from: &mut Saved<'_>) -> Result<Self> {
+        Ok(Self {
+            runs: Persist::load(from)?,
+            buffer: Persist::load(from)?,
+        })
+    }
 }
 
 impl<const N: usize> Sorted<N> {
@@ -173,6 +330,22 @@ impl<const N: usize> Sorted<N> {
             return self.buffer.into_iter().try_for_each(each);
         }
         merge(&self.runs, None, None, &mut each)
+    }
+
+    /// As [`Sorted::for_each`], from the first record on that is not below `from`.
+    ///
+    /// # Errors
+    /// See [`Sorted::for_each`].
+    pub fn for_each_from(
+        self,
+        from: Option<Record<N>>,
+        mut each: impl FnMut(Record<N>) -> Result<()>,
+    ) -> Result<()> {
+        if self.runs.is_empty() {
+            let records = self.buffer.into_iter();
+            return records.filter(|r| Some(*r) >= from).try_for_each(each);
+        }
+        merge(&self.runs, from, None, &mut each)
     }
 
     /// Records that cut what is on disk into parts of about `records` records, more by no more than

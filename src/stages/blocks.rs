@@ -9,6 +9,11 @@ pub struct Blocks {
     size: u32,
 }
 
+crate::workspace::persist::persist!(Blocks {
+    points,
+    size
+});
+
 impl Blocks {
     /// Blocks of `size` ids for `points` points.
     #[must_use]

@@ -2,15 +2,28 @@
 //!
 //! The workspace knows nothing of stages or records; stages ask it for memory, files and threads.
 
+pub mod fault;
+pub mod file;
+mod folder;
+mod history;
+mod journal;
+mod keeper;
 pub mod limits;
 pub mod memory;
+pub mod persist;
 pub mod progress;
+mod recover;
+mod run;
+pub(crate) mod steps;
 mod units;
 
+pub use folder::{Folder, Found};
+pub use recover::MESH;
+
 use crate::error::{Error, Result};
+use file::{Maker, Place, ScratchFile, Shared, open_existing};
 use memory::{MemoryPool, Reservation};
 use progress::{Cancel, Observer};
-use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -47,6 +60,12 @@ impl IoCounters {
         self.scratch.fetch_sub(bytes, Ordering::Relaxed);
     }
 
+    /// Scratch space held now.
+    #[must_use]
+    pub fn scratch(&self) -> u64 {
+        self.scratch.load(Ordering::Relaxed)
+    }
+
     /// Bytes read so far.
     #[must_use]
     pub fn read(&self) -> u64 {
@@ -68,7 +87,9 @@ impl IoCounters {
 
 /// The scratch folder, memory budget, threads, progress and cancellation of one run.
 pub struct Workspace {
-    folder: tempfile::TempDir,
+    folder: PathBuf,
+    /// Removes the folder at the end, unless a later run may go on from there.
+    _temporary: Option<tempfile::TempDir>,
     /// The memory budget.
     pub memory: MemoryPool,
     /// Number of worker threads.
@@ -79,8 +100,19 @@ pub struct Workspace {
     pub observer: Arc<dyn Observer>,
     /// Bytes moved so far.
     pub io: Arc<IoCounters>,
+    shared: Arc<Shared>,
+    numbers: AtomicU64,
     parts: Mutex<Vec<(&'static str, f64)>>,
     pool: Arc<rayon::ThreadPool>,
+}
+
+fn pool(threads: usize, folder: &Path) -> Result<Arc<rayon::ThreadPool>> {
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .thread_name(|i| format!("outcrop-{i}"))
+        .build();
+    pool.map(Arc::new)
+        .map_err(|e| Error::io(folder, "start threads", std::io::Error::other(e)))
 }
 
 impl Workspace {
@@ -102,42 +134,128 @@ impl Workspace {
             .tempdir_in(parent)
             .map_err(|e| Error::io(parent, "make a scratch folder in it", e))?;
         let threads = threads.max(1);
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .thread_name(|i| format!("outcrop-{i}"))
-            .build()
-            .map_err(|e| Error::io(parent, "start threads", std::io::Error::other(e)))?;
+        let shared = Arc::new(Shared::default());
         Ok(Self {
-            folder,
+            pool: pool(threads, parent)?,
+            folder: folder.path().to_path_buf(),
+            _temporary: Some(folder),
             memory,
             threads,
             cancel,
             observer,
-            io: Arc::default(),
+            io: shared.io.clone(),
+            shared,
+            numbers: AtomicU64::new(0),
             parts: Mutex::default(),
-            pool: Arc::new(pool),
+        })
+    }
+
+    /// Works in a folder from which a later run can go on, and goes on from what an earlier one left
+    /// there.
+    ///
+    /// # Errors
+    /// [`Error::Io`], [`Error::Corrupt`], [`Error::Cancelled`].
+    pub fn resumable(
+        folder: Folder,
+        memory: MemoryPool,
+        threads: usize,
+        observer: Arc<dyn Observer>,
+        cancel: Cancel,
+    ) -> Result<Self> {
+        let threads = threads.max(1);
+        let pool = pool(threads, &folder.path)?;
+        let path = folder.path.clone();
+        let io: Arc<IoCounters> = Arc::default();
+        let run = pool.install(|| folder.open(&io, &*observer, &cancel))?;
+        let shared = Arc::new(Shared {
+            io: io.clone(),
+            run: Some(Arc::new(run)),
+            ..Shared::default()
+        });
+        Ok(Self {
+            folder: path,
+            _temporary: None,
+            memory,
+            threads,
+            cancel,
+            observer,
+            io,
+            shared,
+            numbers: AtomicU64::new(0),
+            parts: Mutex::default(),
+            pool,
         })
     }
 
     /// Path of the scratch file `name`.
     #[must_use]
     pub fn file(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
+        self.folder.join(name)
     }
 
-    /// Makes the scratch file `name`, for reading and writing.
+    /// Makes the scratch file `name`.
     ///
     /// # Errors
     /// [`Error::Io`].
-    pub fn create_file(&self, name: &str) -> Result<(PathBuf, File)> {
+    pub fn create_file(&self, name: &str) -> Result<ScratchFile> {
+        self.maker().make(name, false)
+    }
+
+    /// The scratch file `name` of a run that can be resumed, with what earlier attempts put there: new
+    /// in others. Whoever puts something there tells so by [`Workspace::put`].
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn keep_file(&self, name: &str) -> Result<(ScratchFile, Vec<(u32, Place)>)> {
+        let Some(run) = &self.shared.run else {
+            return Ok((self.maker().make(name, false)?, Vec::new()));
+        };
+        let places = run.places(name);
         let path = self.file(name);
-        let file = File::options()
-            .read(true)
-            .write(true)
-            .create_new(true)
-            .open(&path)
-            .map_err(|e| Error::io(&path, "create", e))?;
-        Ok((path, file))
+        let file = if run.is_deleted(name) {
+            ScratchFile::new(name, path, None, true, self.shared.clone())
+        } else if places.is_empty() {
+            self.maker().make(name, true)?
+        } else {
+            let file = open_existing(&path).map_err(|e| Error::io(&path, "open", e))?;
+            ScratchFile::new(name, path, Some(file), true, self.shared.clone())
+        };
+        let end = places.iter().map(|(_, p)| p.offset + p.bytes as u64).max();
+        file.reach(end.unwrap_or(0));
+        Ok((file, places))
+    }
+
+    /// 0, 1, 2 … to tell things apart that are made in one workspace.
+    pub fn number(&self) -> u64 {
+        self.numbers.fetch_add(1, Ordering::Relaxed)
+    }
+
+    /// Makes scratch files on any thread.
+    #[must_use]
+    pub fn maker(&self) -> Maker {
+        Maker {
+            folder: self.folder.clone(),
+            shared: self.shared.clone(),
+        }
+    }
+
+    /// Deletes files that were dropped. Only after a step that did not fail.
+    ///
+    /// # Errors
+    /// [`Error::Io`], [`Error::Disk`].
+    pub fn let_go(&self) -> Result<()> {
+        self.shared.run.as_ref().map_or(Ok(()), |run| run.let_go())
+    }
+
+    /// Says how much scratch the run will take at its peak, for those who run out of it.
+    pub fn expect_scratch(&self, bytes: u64) {
+        self.shared.expected.store(bytes, Ordering::Relaxed);
+    }
+
+    /// Scratch bytes that will be needed beside those that are taken.
+    #[must_use]
+    pub fn more_scratch(&self) -> u64 {
+        self.shared.more()
     }
 
     /// Reserves memory out of the budget.
@@ -179,12 +297,8 @@ impl Workspace {
     }
 
     /// # Errors
-    /// [`Error::Cancelled`] once the run was asked to stop.
+    /// [`Error::Cancelled`] once the run was asked to stop, [`Error::TimeLimit`] once its time is up.
     pub fn check_cancel(&self) -> Result<()> {
-        if self.cancel.is_cancelled() {
-            Err(Error::Cancelled)
-        } else {
-            Ok(())
-        }
+        self.cancel.check()
     }
 }

@@ -1,7 +1,8 @@
 //! What a run tells its caller while it works, and how the caller stops it.
 
+use crate::error::{Error, Result};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicU8, Ordering};
 
 /// Receives the progress of a run. All methods may be called from several threads.
 pub trait Observer: Send + Sync {
@@ -29,7 +30,11 @@ impl Observer for Silent {}
 
 /// A flag that asks a run to stop at its next unit of work.
 #[derive(Debug, Clone, Default)]
-pub struct Cancel(Arc<AtomicBool>);
+pub struct Cancel(Arc<AtomicU8>);
+
+/// States of the flag.
+const STOP: u8 = 1;
+const TIME: u8 = 2;
 
 impl Cancel {
     /// A flag that is not raised.
@@ -40,12 +45,35 @@ impl Cancel {
 
     /// Asks the run to stop.
     pub fn cancel(&self) {
-        self.0.store(true, Ordering::Relaxed);
+        self.0.store(STOP, Ordering::Relaxed);
     }
 
-    /// True once [`Cancel::cancel`] was called.
+    /// Asks the run to stop because its time is up.
+    pub fn expire(&self) {
+        let _ = self
+            .0
+            .compare_exchange(0, TIME, Ordering::Relaxed, Ordering::Relaxed);
+    }
+
+    /// True once the run was asked to stop.
     #[must_use]
     pub fn is_cancelled(&self) -> bool {
-        self.0.load(Ordering::Relaxed)
+        self.0.load(Ordering::Relaxed) != 0
+    }
+
+    /// True once the run was asked to stop because its time is up.
+    #[must_use]
+    pub fn is_expired(&self) -> bool {
+        self.0.load(Ordering::Relaxed) == TIME
+    }
+
+    /// # Errors
+    /// [`Error::Cancelled`] or [`Error::TimeLimit`] once the run was asked to stop.
+    pub fn check(&self) -> Result<()> {
+        match self.0.load(Ordering::Relaxed) {
+            0 => Ok(()),
+            TIME => Err(Error::TimeLimit),
+            _ => Err(Error::Cancelled),
+        }
     }
 }

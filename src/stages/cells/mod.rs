@@ -15,10 +15,10 @@ use crate::stages::tiles::Tile;
 use crate::stages::tiles::near::Search;
 use crate::stages::tiles::walk::PageCache;
 use crate::workspace::Workspace;
+use crate::workspace::persist::persist;
 use fold::Seen;
 use serde::Serialize;
 use std::ops::Range;
-use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Bytes reserved for sorting the triples that leave their tile.
 const EXCHANGE_BUFFER: u64 = 16 << 20;
@@ -103,12 +103,22 @@ impl TileRanges {
     }
 }
 
-#[derive(Default)]
-struct Counters {
-    second_looks: AtomicU64,
-    no_plane: AtomicU64,
-    raw: AtomicU64,
-}
+persist!(CellTriples {
+    tiles,
+    own,
+    received
+});
+persist!(CellStats {
+    second_looks,
+    no_plane,
+    raw_triples
+});
+persist!(TileRanges {
+    blocks,
+    block,
+    size,
+    per_block
+});
 
 /// Computes all cells and collects their triples.
 ///
@@ -124,30 +134,37 @@ pub fn cells(
 ) -> Result<(CellTriples, CellStats)> {
     let own = Sections::with_layout(workspace, "cells.own", tiles.count(), LABELLED)?;
     let held = workspace.reserve("cells: exchange", EXCHANGE_BUFFER)?;
-    let exchange = Exchange::new(workspace, "cells.sent", EXCHANGE_BUFFER).packed(SENT_LABELLED);
-    let counters = Counters::default();
+    let exchange = Exchange::between(
+        workspace,
+        "cells.sent",
+        EXCHANGE_BUFFER,
+        tiles.count(),
+        SENT_LABELLED,
+    )?;
     let bytes = |tile: usize| {
         let points = tiles.ids(tile).len() as u64;
         Tile::bytes(points as usize) + PageCache::bytes(store) + Seen::bytes(points as usize)
     };
-    workspace.for_each_unit("cells: tile", tiles.count(), bytes, |tile| {
+    let work = |tile| {
         let ids = tiles.ids(tile);
         let mut seen = Seen::new(ids.clone());
-        one_tile(store, ids.clone(), neighbors, radius, &counters, &mut seen)?;
-        counters.raw.fetch_add(seen.len() as u64, Ordering::Relaxed);
+        let mut stats = one_tile(store, ids.clone(), neighbors, radius, &mut seen)?;
+        stats.raw_triples = seen.len() as u64;
         let (kept, sent) = seen.fold(&tiles);
         own.put(tile, &kept)?;
-        exchange.send(&sent)?;
+        exchange.send_from(tile, &sent)?;
         workspace.observer.advance(ids.len() as u64);
+        Ok(stats)
+    };
+    let mut stats = CellStats::default();
+    workspace.units("cells: tile", tiles.count(), bytes, work, |_, more| {
+        stats.second_looks += more.second_looks;
+        stats.no_plane += more.no_plane;
+        stats.raw_triples += more.raw_triples;
         Ok(())
     })?;
     let received = exchange.deliver(workspace, tiles.count())?;
     drop(held);
-    let stats = CellStats {
-        second_looks: counters.second_looks.into_inner(),
-        no_plane: counters.no_plane.into_inner(),
-        raw_triples: counters.raw.into_inner(),
-    };
     Ok((
         CellTriples {
             tiles,
@@ -163,9 +180,8 @@ fn one_tile(
     ids: Range<usize>,
     neighbors: usize,
     radius: DiskRadius,
-    counters: &Counters,
     seen: &mut Seen,
-) -> Result<()> {
+) -> Result<CellStats> {
     let tile = Tile::load(store, ids)?;
     let mut maker = CellMaker::new(neighbors, radius);
     let mut search = Search::default();
@@ -195,9 +211,9 @@ fn one_tile(
             no_plane += 1;
         }
     }
-    counters
-        .second_looks
-        .fetch_add(uncertain.len() as u64, Ordering::Relaxed);
-    counters.no_plane.fetch_add(no_plane, Ordering::Relaxed);
-    Ok(())
+    Ok(CellStats {
+        second_looks: uncertain.len() as u64,
+        no_plane,
+        raw_triples: 0,
+    })
 }

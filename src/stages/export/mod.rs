@@ -6,6 +6,7 @@ mod number;
 mod ply;
 
 pub use ply::CoordinateType;
+pub(crate) use ply::{folder_of, temporary};
 
 use crate::error::{Error, Result};
 use crate::geom::lattice::Lattice;
@@ -14,6 +15,7 @@ use crate::stages::blocks::Blocks;
 use crate::stages::order::PointStore;
 use crate::stages::repair::Repaired;
 use crate::workspace::Workspace;
+use crate::workspace::persist::persist;
 use faces::Faces;
 use number::Numbering;
 use serde::Serialize;
@@ -60,16 +62,25 @@ pub fn export(
             why: NO_TRIANGLES.into(),
         });
     }
-    let file = ply::MeshFile::create(output, coordinates, &stats, workspace)?;
+    let file = ply::MeshFile::open(output, coordinates, &stats, workspace)?;
     let bytes = |block| block_bytes(repaired, blocks, block);
-    workspace.for_each_unit("export: block", blocks.count(), bytes, |block| {
+    let work = |block| {
         write_block(store, repaired, &numbering, blocks, lattice, &file, block)?;
         workspace.observer.advance(1);
         Ok(())
-    })?;
+    };
+    workspace.units("export: block", blocks.count(), bytes, work, |_, ()| Ok(()))?;
     file.finish()?;
     Ok(stats)
 }
+
+persist!(MeshStats {
+    vertices,
+    points_used,
+    pinched_copies,
+    triangles,
+    boundary_edges
+});
 
 const NO_TRIANGLES: &str = "no three cells agree on one that belongs to a component large enough; \
     try a larger --radius, --smooth 1 for noisy scans, or a smaller --min-component";
@@ -80,7 +91,7 @@ fn write_block(
     numbering: &Numbering<'_>,
     blocks: Blocks,
     lattice: &Lattice,
-    file: &ply::MeshFile,
+    file: &ply::MeshFile<'_>,
     block: usize,
 ) -> Result<()> {
     let ids = blocks.ids(block);
@@ -89,17 +100,19 @@ fn write_block(
     let mut bytes = Vec::with_capacity(file.vertex_bytes() * ids.len());
     let used = ids.clone().filter(|v| numbering.used(*v));
     used.for_each(|v| file.encode_vertex(at(v), &mut bytes));
-    file.write_vertices(numbering.vertex(ids.start).into(), &bytes)?;
+    // Three parts a block; the number is only a name.
+    let part = 3 * block as u32;
+    file.write_vertices(part, numbering.vertex(ids.start).into(), &bytes)?;
     bytes.clear();
     for copy in numbering.copies.get(block)? {
         file.encode_vertex(at(copy[0]), &mut bytes);
     }
-    file.write_vertices(numbering.first_copy(block), &bytes)?;
+    file.write_vertices(part + 1, numbering.first_copy(block), &bytes)?;
     drop(points);
     bytes.clear();
     let faces = Faces::load(repaired, numbering, ids, block)?;
     faces.encode(&mut bytes);
-    file.write_faces(numbering.first_face(block), &bytes)
+    file.write_faces(part + 2, numbering.first_face(block), &bytes)
 }
 
 type Splits = Sections<7>;

@@ -36,6 +36,8 @@ struct Firsts {
     faces: u64,
 }
 
+crate::workspace::persist::persist!(Firsts { copies, faces });
+
 impl Numbering<'_> {
     /// True if a point is a vertex.
     pub fn used(&self, v: u32) -> bool {
@@ -73,7 +75,8 @@ pub fn number<'a>(
     let outline = &repaired.outline;
     let words = outline.used.len();
     let held = workspace.reserve("export: numbers", (words * 4 + count * 16) as u64)?;
-    let (mut firsts, copies, splits) = split(repaired, blocks, workspace)?;
+    let (mut firsts, copies, splits): (Vec<Firsts>, _, _) =
+        workspace.once("number", || split(repaired, blocks, workspace))?;
     let mut total = Firsts::default();
     for block in &mut firsts {
         let own = *block;

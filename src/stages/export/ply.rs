@@ -2,11 +2,12 @@
 
 use super::MeshStats;
 use crate::error::{Error, Result};
-use crate::workspace::{IoCounters, Workspace, limits};
+use crate::workspace::fault::{self, Event};
+use crate::workspace::file::{Place, Put, failed_write, open_existing, options};
+use crate::workspace::{MESH, Workspace, limits};
 use std::fs::File;
-use std::os::unix::fs::FileExt;
+use std::os::unix::fs::{FileExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 /// Type of the coordinates in the file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
@@ -47,85 +48,116 @@ pub fn encode_face([a, b, c]: [u32; 3], bytes: &mut Vec<u8>) {
     bytes.extend_from_slice(&face);
 }
 
-/// A mesh file under its temporary name; deleted unless finished.
-#[derive(Debug)]
-pub struct MeshFile {
+/// A mesh file under its temporary name. It is deleted unless finished, but for a run that can be
+/// resumed.
+pub struct MeshFile<'a> {
     output: PathBuf,
-    temporary: Option<tempfile::TempPath>,
-    file: File,
+    temporary: PathBuf,
+    /// None if the mesh has its name already.
+    file: Option<File>,
     header: u64,
     vertices: u64,
     coordinates: CoordinateType,
-    io: Arc<IoCounters>,
+    workspace: &'a Workspace,
 }
 
-impl MeshFile {
-    /// Writes the header of a mesh with the counts of `stats` beside `output`.
+/// The mesh's name until it is finished, beside its last one.
+#[must_use]
+pub fn temporary(output: &Path) -> PathBuf {
+    let mut name = std::ffi::OsString::from(".");
+    name.push(output.file_name().unwrap_or_default());
+    name.push(".outcrop-part");
+    folder_of(output).join(name)
+}
+
+/// The number of the header among the parts of the mesh.
+const HEADER: u32 = u32::MAX;
+
+impl<'a> MeshFile<'a> {
+    /// Writes the header of a mesh with the counts of `stats` beside `output`, or opens the file in
+    /// which an earlier attempt at the run did.
     ///
     /// # Errors
     /// [`Error::Io`]; [`Error::Disk`] if there is no room for the whole file.
-    pub fn create(
+    pub fn open(
         output: &Path,
         coordinates: CoordinateType,
         stats: &MeshStats,
-        workspace: &Workspace,
+        workspace: &'a Workspace,
     ) -> Result<Self> {
-        // A file with up to 2^31 vertices can use the index type that every reader knows.
-        let index = if stats.vertices <= 1 << 31 {
-            "int"
-        } else {
-            "uint"
-        };
-        let scalar = coordinates.name();
-        let header = format!(
-            "ply\nformat binary_little_endian 1.0\ncomment made by outcrop {}\n\
-             element vertex {}\nproperty {scalar} x\nproperty {scalar} y\nproperty {scalar} z\n\
-             element face {}\nproperty list uchar {index} vertex_indices\nend_header\n",
-            env!("CARGO_PKG_VERSION"),
-            stats.vertices,
-            stats.triangles,
-        );
+        let header = header(coordinates, stats);
         let bytes =
             header.len() as u64 + stats.vertices * 3 * coordinates.bytes() + stats.triangles * FACE;
-        let folder = folder_of(output);
+        let mut mesh = Self {
+            temporary: temporary(output),
+            output: output.to_path_buf(),
+            file: None,
+            header: header.len() as u64,
+            vertices: stats.vertices,
+            coordinates,
+            workspace,
+        };
+        let known = workspace.places(MESH);
+        if known.is_empty() {
+            mesh.begin(&header, bytes)?;
+        } else {
+            // Every part was checked, in one file or the other.
+            match open_existing(&mesh.temporary) {
+                Ok(file) => {
+                    mesh.file = Some(file);
+                    mesh.write(HEADER, header.as_bytes(), 0)?;
+                }
+                Err(e) if e.kind() == std::io::ErrorKind::NotFound => {}
+                Err(e) => return Err(Error::io(&mesh.temporary, "open", e)),
+            }
+        }
+        Ok(mesh)
+    }
+
+    fn begin(&mut self, header: &str, bytes: u64) -> Result<()> {
+        let folder = folder_of(&self.output);
         if let Some(free) = limits::disk_free(folder).filter(|free| *free < bytes) {
             return Err(Error::Disk {
-                path: output.to_path_buf(),
+                path: self.output.clone(),
                 needed: bytes,
                 free,
             });
         }
-        let io = |action: &'static str| move |e| Error::io(output, action, e);
-        let temporary = tempfile::Builder::new()
-            .prefix(".outcrop-")
-            .suffix(".tmp")
-            .permissions(mode())
-            .tempfile_in(folder)
-            .map_err(io("create a file beside it"))?;
-        let (file, temporary) = temporary.into_parts();
-        file.set_len(bytes).map_err(io("make room for the mesh"))?;
-        file.write_all_at(header.as_bytes(), 0)
-            .map_err(io("write the header"))?;
-        workspace.io.add_written(header.len() as u64);
-        Ok(Self {
-            output: output.to_path_buf(),
-            temporary: Some(temporary),
-            file,
-            header: header.len() as u64,
-            vertices: stats.vertices,
-            coordinates,
-            io: workspace.io.clone(),
-        })
+        // Left by a run that died, and whose scratch folder is gone.
+        let _ = std::fs::remove_file(&self.temporary);
+        let file = options()
+            .mode(0o666)
+            .create_new(true)
+            .open(&self.temporary)
+            .map_err(|e| Error::io(&self.output, "create a file beside it", e))?;
+        let room = fault::write().and_then(|()| file.set_len(bytes));
+        room.map_err(|e| failed_write(&self.output, bytes as usize, bytes, e))?;
+        self.file = Some(file);
+        self.write(HEADER, header.as_bytes(), 0)
     }
 
-    fn write(&self, bytes: &[u8], offset: u64) -> Result<()> {
-        self.io.add_written(bytes.len() as u64);
-        self.file.write_all_at(bytes, offset).map_err(|e| {
-            Error::io(
-                &self.output,
-                format!("write {} bytes at {offset}", bytes.len()),
-                e,
-            )
+    fn write(&self, part: u32, bytes: &[u8], offset: u64) -> Result<()> {
+        let Some(file) = &self.file else {
+            let gone = std::io::ErrorKind::NotFound.into();
+            return Err(Error::io(&self.temporary, "open", gone));
+        };
+        self.workspace.io.add_written(bytes.len() as u64);
+        fault::write()
+            .and_then(|()| file.write_all_at(bytes, offset))
+            .map_err(|e| failed_write(&self.output, bytes.len(), 0, e))?;
+        self.workspace.put(Put {
+            file: MESH.into(),
+            section: part,
+            place: Place {
+                offset,
+                bytes: bytes.len(),
+                records: 0,
+                crc: if self.workspace.is_resumable() {
+                    crc32fast::hash(bytes)
+                } else {
+                    0
+                },
+            },
         })
     }
 
@@ -148,21 +180,21 @@ impl MeshFile {
         }
     }
 
-    /// Writes vertices from number `first` on.
+    /// Writes vertices from number `first` on, as part `part` of the mesh.
     ///
     /// # Errors
     /// [`Error::Io`].
-    pub fn write_vertices(&self, first: u64, bytes: &[u8]) -> Result<()> {
-        self.write(bytes, self.header + first * 3 * self.coordinates.bytes())
+    pub fn write_vertices(&self, part: u32, first: u64, bytes: &[u8]) -> Result<()> {
+        self.write(part, bytes, self.header + first * 3 * self.coordinates.bytes())
     }
 
-    /// Writes triangles from number `first` on, as [`encode_face`] makes them.
+    /// Writes triangles from number `first` on, as part `part` of the mesh, as [`encode_face`] makes them.
     ///
     /// # Errors
     /// [`Error::Io`].
-    pub fn write_faces(&self, first: u64, bytes: &[u8]) -> Result<()> {
+    pub fn write_faces(&self, part: u32, first: u64, bytes: &[u8]) -> Result<()> {
         let faces = self.header + self.vertices * 3 * self.coordinates.bytes();
-        self.write(bytes, faces + first * FACE)
+        self.write(part, bytes, faces + first * FACE)
     }
 
     /// Makes the file durable and gives it its name.
@@ -170,13 +202,13 @@ impl MeshFile {
     /// # Errors
     /// [`Error::Io`].
     pub fn finish(mut self) -> Result<()> {
-        self.file
-            .sync_all()
-            .map_err(|e| Error::io(&self.output, "sync", e))?;
-        if let Some(temporary) = self.temporary.take() {
-            temporary
-                .persist(&self.output)
-                .map_err(|e| Error::io(&self.output, "rename the finished file to it", e.error))?;
+        if let Some(file) = self.file.take() {
+            file.sync_all()
+                .map_err(|e| Error::io(&self.output, "sync", e))?;
+            fault::point(Event::Rename);
+            std::fs::rename(&self.temporary, &self.output)
+                .map_err(|e| Error::io(&self.output, "rename the finished file to it", e))?;
+            fault::point(Event::Renamed);
         }
         let folder = folder_of(&self.output);
         File::open(folder)
@@ -185,15 +217,36 @@ impl MeshFile {
     }
 }
 
+impl Drop for MeshFile<'_> {
+    fn drop(&mut self) {
+        if self.file.is_some() && !self.workspace.is_resumable() {
+            let _ = std::fs::remove_file(&self.temporary);
+        }
+    }
+}
+
+fn header(coordinates: CoordinateType, stats: &MeshStats) -> String {
+    // A file with up to 2^31 vertices can use the index type that every reader knows.
+    let index = if stats.vertices <= 1 << 31 {
+        "int"
+    } else {
+        "uint"
+    };
+    let scalar = coordinates.name();
+    format!(
+        "ply\nformat binary_little_endian 1.0\ncomment made by outcrop {}\n\
+         element vertex {}\nproperty {scalar} x\nproperty {scalar} y\nproperty {scalar} z\n\
+         element face {}\nproperty list uchar {index} vertex_indices\nend_header\n",
+        env!("CARGO_PKG_VERSION"),
+        stats.vertices,
+        stats.triangles,
+    )
+}
+
 /// The folder that holds `path`.
-pub(super) fn folder_of(path: &Path) -> &Path {
+pub(crate) fn folder_of(path: &Path) -> &Path {
     match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),
     }
-}
-
-/// A mesh is an ordinary file, unlike scratch: readable as the user's mask allows.
-fn mode() -> std::fs::Permissions {
-    std::os::unix::fs::PermissionsExt::from_mode(0o666)
 }

@@ -1,9 +1,9 @@
 //! Which points are wanted by their class (LAS and LAZ).
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Points to read by their classification; points of files without one are always read.
-#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Classes {
     /// All points.

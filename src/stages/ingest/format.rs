@@ -3,6 +3,7 @@
 use super::input::Input;
 use super::text::dialect::{self, Dialect};
 use crate::error::Result;
+use crate::workspace::persist::{Persist, Saved};
 use serde::Serialize;
 use std::path::Path;
 
@@ -22,6 +23,26 @@ pub enum Format {
     PlyBinaryBigEndian,
     /// Lines of numbers: XYZ, TXT, CSV, PTS.
     Text,
+}
+
+impl Persist for Format {
+    fn save(&self, out: &mut Vec<u8>) {
+        (*self as u8).save(out);
+    }
+
+    fn load(from: &mut Saved<'_>) -> Result<Self> {
+        let formats = [
+            Self::Las,
+            Self::Laz,
+            Self::PlyAscii,
+            Self::PlyBinaryLittleEndian,
+            Self::PlyBinaryBigEndian,
+            Self::Text,
+        ];
+        let number = u8::load(from)?;
+        let found = formats.into_iter().find(|f| *f as u8 == number);
+        found.ok_or_else(|| from.wrong("a format"))
+    }
 }
 
 impl std::fmt::Display for Format {

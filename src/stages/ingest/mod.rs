@@ -33,6 +33,7 @@ pub use stream::READ_BUFFERS;
 use crate::error::Result;
 use crate::geom::lattice::Lattice;
 use crate::workspace::Workspace;
+use crate::workspace::persist::{Persist, Saved};
 use crate::workspace::progress::Cancel;
 use format::Family;
 use input::Input;
@@ -81,7 +82,8 @@ pub fn ingest_classes(
     classes: &Classes,
     workspace: &Workspace,
 ) -> Result<Spool> {
-    let file = SpoolFile::create(workspace)?;
+    let name = format!("ingest-{}.spool", workspace.number());
+    let file = SpoolFile::open(workspace, &name)?;
     let mut sources = Vec::new();
     let mut stats = IngestStats::default();
     for path in expand(inputs)? {
@@ -186,6 +188,24 @@ impl Opened {
             Kind::Ply(header) => Some(header.claimed()),
             Kind::Text(_) => None,
         }
+    }
+}
+
+impl Persist for Spool {
+    fn save(&self, out: &mut Vec<u8>) {
+        self.file.file.name.to_string().save(out);
+        self.sources.save(out);
+        self.stats.save(out);
+    }
+
+    fn load(from: &mut Saved<'_>) -> Result<Self> {
+        let name = String::load(from)?;
+        Ok(Self {
+            file: SpoolFile::open(from.workspace, &name)?,
+            sources: Persist::load(from)?,
+            stats: Persist::load(from)?,
+            cancel: from.workspace.cancel.clone(),
+        })
     }
 }
 

@@ -1,6 +1,8 @@
 //! A source: the points of one input file in their native form.
 
 use super::stats::{NOT_FIXED, SourceStats};
+use crate::error::Result;
+use crate::workspace::persist::{Persist, Saved, persist};
 
 /// How the spool holds the coordinates of a source.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -12,6 +14,34 @@ pub(super) enum Native {
     /// Double precision.
     F64,
 }
+
+impl Persist for Native {
+    fn save(&self, out: &mut Vec<u8>) {
+        match self {
+            Self::Las { scale, offset } => (0u8, *scale, *offset).save(out),
+            Self::F32 => 1u8.save(out),
+            Self::F64 => 2u8.save(out),
+        }
+    }
+
+    fn load(from: &mut Saved<'_>) -> Result<Self> {
+        match u8::load(from)? {
+            0 => {
+                let (scale, offset) = Persist::load(from)?;
+                Ok(Self::Las { scale, offset })
+            }
+            1 => Ok(Self::F32),
+            2 => Ok(Self::F64),
+            _ => Err(from.wrong("a type of coordinates")),
+        }
+    }
+}
+
+persist!(Source {
+    native,
+    stats,
+    text
+});
 
 /// One input file in the spool.
 #[derive(Debug, Clone)]

@@ -7,13 +7,11 @@
 use super::Classes;
 use super::source::{Native, Source};
 use super::stats::SourceStats;
-use crate::error::{Error, Result};
-use crate::workspace::{IoCounters, Workspace};
-use std::fs::File;
-use std::os::unix::fs::FileExt;
-use std::path::PathBuf;
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use crate::error::Result;
+use crate::workspace::Workspace;
+use crate::workspace::file::{Place, ScratchFile};
+use std::collections::BTreeMap;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Most points in a frame.
 pub(super) const FRAME: usize = 1 << 14;
@@ -74,47 +72,53 @@ impl Coordinate for f64 {
     }
 }
 
-/// Tells the spools of one scratch folder apart.
-static MADE: AtomicU64 = AtomicU64::new(0);
-
 /// The scratch file; it is deleted on drop.
 #[derive(Debug)]
 pub(super) struct SpoolFile {
-    pub(super) path: PathBuf,
-    file: File,
-    end: AtomicU64,
-    io: Arc<IoCounters>,
+    pub(super) file: ScratchFile,
+    /// Frames by number, which has no meaning.
+    frames: Mutex<BTreeMap<u32, Place>>,
 }
 
 impl SpoolFile {
-    pub(super) fn create(workspace: &Workspace) -> Result<Self> {
-        let number = MADE.fetch_add(1, Ordering::Relaxed);
-        let (path, file) = workspace.create_file(&format!("ingest-{number}.spool"))?;
+    /// The spool `name` with the frames that earlier attempts at the run have finished.
+    pub(super) fn open(workspace: &Workspace, name: &str) -> Result<Self> {
+        let (file, frames) = workspace.keep_file(name)?;
         Ok(Self {
-            path,
             file,
-            end: AtomicU64::new(0),
-            io: workspace.io.clone(),
+            frames: Mutex::new(frames.into_iter().collect()),
         })
     }
 
-    fn append(&self, frame: &[u8]) -> Result<()> {
-        let bytes = frame.len() as u64;
-        let offset = self.end.fetch_add(bytes, Ordering::Relaxed);
-        self.io.grow_scratch(bytes);
-        self.file.write_all_at(frame, offset).map_err(|e| {
-            if e.kind() == std::io::ErrorKind::StorageFull {
-                Error::Disk {
-                    path: self.path.clone(),
-                    needed: bytes,
-                    free: crate::workspace::limits::disk_free(&self.path).unwrap_or(0),
-                }
+    fn places(&self) -> MutexGuard<'_, BTreeMap<u32, Place>> {
+        self.frames.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Numbers of all frames and their points.
+    pub(super) fn frames(&self) -> Vec<(u32, u64)> {
+        let places = self.places();
+        let frames = places.iter();
+        frames.map(|(n, place)| (*n, place.records as u64)).collect()
+    }
+
+    fn append(&self, frame: &[u8], points: usize) -> Result<()> {
+        let place = Place {
+            offset: self.file.append(frame)?,
+            bytes: frame.len(),
+            records: points,
+            crc: if self.file.is_kept() {
+                crc32fast::hash(frame)
             } else {
-                Error::io(&self.path, format!("write {bytes} bytes"), e)
-            }
-        })?;
-        self.io.add_written(bytes);
-        Ok(())
+                0
+            },
+        };
+        let number = {
+            let mut places = self.places();
+            let number = places.last_key_value().map_or(0, |(last, _)| last + 1);
+            places.insert(number, place);
+            number
+        };
+        self.file.put(number, place)
     }
 }
 
@@ -144,7 +148,7 @@ impl<'a> SourceWriter<'a> {
         }
     }
 
-    /// A buffer for one thread; its points count once it is finished.
+    /// A buffer for one unit; its points count once it is finished.
     pub(super) fn sink<T: Coordinate>(&self) -> Sink<'_, T> {
         let mut bytes = Vec::with_capacity(HEADER + FRAME * size_of::<[T; 3]>());
         bytes.resize(HEADER, 0);
@@ -157,7 +161,33 @@ impl<'a> SourceWriter<'a> {
         }
     }
 
-    /// Statistics of all finished sinks.
+    /// Reads units of the source on all threads, as [`Workspace::units`]; `work` fills and finishes a
+    /// sink for each.
+    pub(super) fn units(
+        &self,
+        name: &'static str,
+        count: usize,
+        bytes: impl Fn(usize) -> u64 + Sync,
+        work: impl Fn(usize) -> Result<SourceStats> + Sync,
+    ) -> Result<()> {
+        self.workspace.units(name, count, bytes, work, |_, stats| {
+            let mut all = self.stats.lock().unwrap_or_else(PoisonError::into_inner);
+            all.merge(&stats);
+            Ok(())
+        })
+    }
+
+    /// Reads the source as one unit, which takes `bytes` of memory.
+    pub(super) fn whole(
+        &self,
+        name: &'static str,
+        bytes: u64,
+        work: impl Fn() -> Result<SourceStats> + Sync,
+    ) -> Result<()> {
+        self.units(name, 1, |_| bytes, |_| work())
+    }
+
+    /// Statistics of all units.
     pub(super) fn into_stats(self) -> SourceStats {
         self.stats
             .into_inner()
@@ -234,19 +264,15 @@ impl<T: Coordinate> Sink<'_, T> {
             .extend_from_slice(bytemuck::cast_slice(&self.points));
         let crc = frame_crc(&self.bytes[..12], &self.bytes[HEADER..]);
         self.bytes[12..HEADER].copy_from_slice(&crc.to_ne_bytes());
+        let points = self.points.len();
         self.points.clear();
-        self.target.file.append(&self.bytes)
+        self.target.file.append(&self.bytes, points)
     }
 
-    /// Writes the rest and adds the statistics to the source's.
-    pub(super) fn finish(mut self) -> Result<()> {
+    /// Writes the rest; what was seen.
+    pub(super) fn finish(mut self) -> Result<SourceStats> {
         self.flush()?;
-        self.target
-            .stats
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .merge(&self.stats);
-        Ok(())
+        Ok(self.stats)
     }
 }
 
@@ -279,81 +305,53 @@ impl FrameBuffer {
 }
 
 impl SpoolFile {
-    fn damaged(&self, offset: u64, found: String, expected: String) -> Error {
-        Error::Corrupt {
-            path: self.path.clone(),
-            offset,
-            found,
-            expected,
-        }
-    }
-
-    fn read(&self, offset: u64, buffer: &mut [u8]) -> Result<()> {
-        let wanted = buffer.len();
-        self.file.read_exact_at(buffer, offset).map_err(|e| {
-            if e.kind() == std::io::ErrorKind::UnexpectedEof {
-                self.damaged(
-                    offset,
-                    "the end of the file".into(),
-                    format!("{wanted} bytes"),
-                )
-            } else {
-                Error::io(&self.path, format!("read {wanted} bytes"), e)
-            }
-        })?;
-        self.io.add_read(wanted as u64);
-        Ok(())
-    }
-
-    /// Reads the frame at `offset` and returns where the next one starts; `None` at the end.
-    pub(super) fn next_frame(
+    /// Reads a frame.
+    pub(super) fn read_frame(
         &self,
         sources: &[Source],
-        offset: u64,
+        number: u32,
         frame: &mut FrameBuffer,
-    ) -> Result<Option<u64>> {
-        if offset >= self.end.load(Ordering::Relaxed) {
-            return Ok(None);
-        }
+    ) -> Result<()> {
+        let place = self.places().get(&number).copied().unwrap_or_default();
+        let offset = place.offset;
         let mut words = [0u32; 4];
-        self.read(offset, bytemuck::bytes_of_mut(&mut words))?;
+        self.file
+            .read_at(bytemuck::bytes_of_mut(&mut words), offset)?;
         let [magic, source, points, crc] = words;
         let (source, points) = (source as usize, points as usize);
-        if magic != MAGIC || source >= sources.len() || points > FRAME {
-            return Err(self.damaged(
+        let bytes = |source: usize| points * sources[source].native.point_bytes();
+        let fits = magic == MAGIC
+            && source < sources.len()
+            && points <= FRAME
+            && HEADER + bytes(source) == place.bytes;
+        if !fits {
+            return Err(self.file.damaged(
                 offset,
                 format!("frame header {words:08x?}"),
                 format!(
-                    "a frame of at most {FRAME} points of one of {} sources",
+                    "a frame of {} bytes with points of one of {} sources",
+                    place.bytes,
                     sources.len()
                 ),
             ));
         }
-        let bytes = points * sources[source].native.point_bytes();
+        let bytes = bytes(source);
         frame.words.clear();
         frame.words.resize(bytes.div_ceil(8), 0);
         let body = &mut bytemuck::cast_slice_mut::<u64, u8>(&mut frame.words)[..bytes];
-        self.read(offset + HEADER as u64, body)?;
+        self.file.read_at(body, offset + HEADER as u64)?;
         let found = frame_crc(&bytemuck::bytes_of(&words)[..12], body);
         if found != crc {
-            return Err(self.damaged(
-                offset,
+            let (found, expected) = (
                 format!("checksum {found:08x}"),
                 format!("checksum {crc:08x}"),
-            ));
+            );
+            return Err(self.file.damaged(offset, found, expected));
         }
         frame.source = source;
         frame.points = points;
         frame.offset = offset;
-        Ok(Some(offset + (HEADER + bytes) as u64))
-    }
-}
-
-impl Drop for SpoolFile {
-    fn drop(&mut self) {
-        self.io.shrink_scratch(self.end.load(Ordering::Relaxed));
-        // A scratch file that cannot be deleted goes with its folder.
-        let _ = std::fs::remove_file(&self.path);
+        Ok(())
     }
 }
 

@@ -1,6 +1,7 @@
 //! What was read: counts and extents per file and in all.
 
 use super::format::Format;
+use crate::workspace::persist::persist;
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -105,3 +106,38 @@ impl SourceStats {
         self.claimed = self.claimed.saturating_add(other.claimed);
     }
 }
+
+persist!(IngestStats {
+    read,
+    kept,
+    dropped_non_finite,
+    withheld,
+    dropped_by_class,
+    files,
+    warnings
+});
+persist!(FileStats {
+    path,
+    format,
+    bytes,
+    claimed,
+    points,
+    kept,
+    dropped_non_finite,
+    withheld,
+    dropped_by_class,
+    min,
+    max
+});
+persist!(SourceStats {
+    read,
+    kept,
+    dropped,
+    withheld,
+    unwanted,
+    min,
+    max,
+    exponent,
+    decimals,
+    claimed
+});

@@ -20,14 +20,20 @@ struct Buffers {
     points: Vec<Point>,
 }
 
-/// Where the next frame starts; none once a thread has reached the end or failed.
-type Next = Mutex<Option<u64>>;
+/// The frames that are left; none once a thread has failed.
+type Next<'a> = Mutex<std::slice::Iter<'a, u32>>;
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Spool {
+    /// Numbers of the frames that the points are in, and the points in each.
+    #[must_use]
+    pub fn frames(&self) -> Vec<(u32, u64)> {
+        self.file.frames()
+    }
+
     /// Streams all points as positions on `lattice`, one chunk at a time, in memory of
     /// [`READ_BUFFERS`].
     ///
@@ -42,15 +48,15 @@ impl Spool {
         mut each: impl FnMut(&[Point]) -> Result<()>,
     ) -> Result<()> {
         let maps = self.maps(lattice)?;
-        let next = Mutex::new(Some(0));
         let mut buffers = Buffers::default();
-        while self.next(&next, &maps, lattice, &mut buffers)? {
+        for (frame, _) in self.frames() {
+            self.read(frame, &maps, lattice, &mut buffers)?;
             each(&buffers.points)?;
         }
         Ok(())
     }
 
-    /// Like [`Spool::for_each`], on `threads` threads at the same time, each with its own
+    /// Streams the points of some `frames`, on `threads` threads at the same time, each with its own
     /// [`READ_BUFFERS`].
     ///
     /// # Errors
@@ -59,21 +65,25 @@ impl Spool {
         &self,
         threads: usize,
         lattice: &Lattice,
+        frames: &[u32],
         each: impl Fn(&[Point]) -> Result<()> + Sync,
     ) -> Result<()> {
         let maps = self.maps(lattice)?;
-        let next = Mutex::new(Some(0));
+        let next: Next<'_> = Mutex::new(frames.iter());
         let failed = Mutex::new(None);
         let worker = || {
             let mut buffers = Buffers::default();
             let mut work = || -> Result<()> {
-                while self.next(&next, &maps, lattice, &mut buffers)? {
+                loop {
+                    let Some(frame) = lock(&next).next() else {
+                        return Ok(());
+                    };
+                    self.read(*frame, &maps, lattice, &mut buffers)?;
                     each(&buffers.points)?;
                 }
-                Ok(())
             };
             if let Err(error) = work() {
-                *lock(&next) = None;
+                *lock(&next) = [].iter();
                 lock(&failed).get_or_insert(error);
             }
         };
@@ -100,31 +110,18 @@ impl Spool {
         self.sources.iter().map(map).collect()
     }
 
-    /// Reads and converts the next frame; false at the end.
-    fn next(
+    /// Reads and converts a frame.
+    fn read(
         &self,
-        next: &Next,
+        frame: u32,
         maps: &[SourceMap],
         lattice: &Lattice,
         buffers: &mut Buffers,
-    ) -> Result<bool> {
-        if self.cancel.is_cancelled() {
-            return Err(Error::Cancelled);
-        }
-        {
-            let mut at = lock(next);
-            *at = match *at {
-                Some(now) => self
-                    .file
-                    .next_frame(&self.sources, now, &mut buffers.frame)?,
-                None => None,
-            };
-            if at.is_none() {
-                return Ok(false);
-            }
-        }
-        self.convert(maps, lattice, buffers)?;
-        Ok(true)
+    ) -> Result<()> {
+        self.cancel.check()?;
+        self.file
+            .read_frame(&self.sources, frame, &mut buffers.frame)?;
+        self.convert(maps, lattice, buffers)
     }
 
     /// Converts a frame to positions.
@@ -142,12 +139,11 @@ impl Spool {
             .find(|p| !p.iter().all(|c| (0..COORDINATE_LIMIT).contains(c)));
         match outside {
             None => Ok(()),
-            Some(found) => Err(Error::Corrupt {
-                path: self.file.path.clone(),
-                offset: frame.offset,
-                found: format!("position {found:?}"),
-                expected: format!("0 to {}", COORDINATE_LIMIT - 1),
-            }),
+            Some(found) => Err(self.file.file.damaged(
+                frame.offset,
+                format!("position {found:?}"),
+                format!("0 to {}", COORDINATE_LIMIT - 1),
+            )),
         }
     }
 }

@@ -9,6 +9,7 @@ use crate::error::{Error, Result};
 use crate::geom::{Point, hilbert};
 use crate::spill::{Sorted, Sorter};
 use crate::workspace::Workspace;
+use crate::workspace::persist::Persist;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -17,6 +18,16 @@ const CHUNK: usize = 1 << 12;
 
 /// Keys of a merge that one thread takes at a time, or more if there are many runs.
 const PART: usize = 1 << 18;
+
+/// Points of a stream that a run holds at most.
+const MOST_IN_RUN: usize = 1 << 26;
+
+/// What is noted with a run of a stream: the mark after it and the counts up to there; the points so
+/// far, and whether they are all.
+type Note<M, S> = ((Option<M>, S), (u64, bool));
+
+/// Takes points of a stream, the mark after them, and the counts up to there.
+pub type Each<'a, M, S> = &'a mut dyn FnMut(&[Point], Option<M>, S) -> Result<()>;
 
 /// Takes in positions in any order and gives back the ordered store.
 #[derive(Debug)]
@@ -58,6 +69,72 @@ impl Orderer {
         Ok(())
     }
 
+    /// Takes in parts of the input, given by their numbers and points, all of which `push` pushes to it.
+    /// In a run that can be resumed, those that are sorted are not taken in again.
+    ///
+    /// # Errors
+    /// What `push` returned, [`Error::Io`], [`Error::Disk`].
+    pub fn take_parts(
+        &self,
+        workspace: &Workspace,
+        parts: &[(u32, u64)],
+        push: impl Fn(&[u32]) -> Result<()>,
+    ) -> Result<()> {
+        let taken = self.sorter.take_parts(workspace, parts, false, push)?;
+        self.taken.store(taken, Ordering::Relaxed);
+        Ok(())
+    }
+
+    /// Takes in a stream of points that can be begun anywhere between two of its parts. `stream` is
+    /// called with a mark where to begin (none: at the start) and with what was counted before that;
+    /// it hands on points, the mark after them and the counts up to there, and returns the counts of all.
+    ///
+    /// # Errors
+    /// What `stream` returned, [`Error::Io`], [`Error::Disk`], [`Error::Cancelled`].
+    pub fn take_stream<M, S>(
+        &self,
+        workspace: &Workspace,
+        stream: impl FnOnce(Option<M>, S, Each<'_, M, S>) -> Result<S>,
+    ) -> Result<S>
+    where
+        M: Persist,
+        S: Persist + Default,
+    {
+        let step = workspace.step("runs")?;
+        let last: Option<Note<M, S>> = self.sorter.take_up(workspace, &step)?;
+        let ((mark, counts), (taken, complete)) =
+            last.unwrap_or(((None, S::default()), (0, false)));
+        self.taken.store(taken, Ordering::Relaxed);
+        if complete {
+            return Ok(counts);
+        }
+        let mut since = 0;
+        let taken = || self.taken.load(Ordering::Relaxed);
+        let counts = stream(mark, counts, &mut |points, mark, counts| {
+            self.push(workspace, points)?;
+            since += points.len();
+            let full = self.sorter.buffered() + points.len() > self.sorter.capacity();
+            if workspace.is_resumable() && mark.is_some() && (full || since > MOST_IN_RUN) {
+                since = 0;
+                let note: Note<M, S> = ((mark, counts), (taken(), false));
+                self.sorter.close_run(&step, &note)?;
+            }
+            Ok(())
+        })?;
+        if workspace.is_resumable() {
+            let note: Note<M, S> = ((None, counts), (taken(), true));
+            self.sorter.close_run(&step, &note)?;
+            return Ok(note.0.1);
+        }
+        Ok(counts)
+    }
+
+    /// True if all that was taken in is on disk.
+    #[must_use]
+    pub fn is_sorted(&self) -> bool {
+        self.sorter.is_spilled()
+    }
+
     /// The store of all distinct points in curve order, in pages of `page` points, and the number
     /// of duplicates folded.
     ///
@@ -73,7 +150,8 @@ impl Orderer {
         match sorter.finish(workspace)?.in_memory() {
             Ok(mut keys) => {
                 keys.dedup();
-                writer.append(workspace, &keys, |key| hilbert::decode(*key))?;
+                let left = &keys[writer.len().min(keys.len())..];
+                writer.append(workspace, left, |key| hilbert::decode(*key))?;
             }
             Err(sorted) => merge(&sorted, held.bytes(), &mut writer, workspace)?,
         }
@@ -94,6 +172,18 @@ impl Orderer {
 /// Where a part of the keys begins and ends.
 type Part = (Option<hilbert::Key>, Option<hilbert::Key>);
 
+/// The key after this one.
+fn next(mut key: hilbert::Key) -> hilbert::Key {
+    for word in key.iter_mut().rev() {
+        let (sum, over) = word.overflowing_add(1);
+        *word = sum;
+        if !over {
+            break;
+        }
+    }
+    key
+}
+
 /// Writes what is on disk in order, part by part, each merged by one thread, in `memory` bytes.
 fn merge(
     sorted: &Sorted<3>,
@@ -101,8 +191,11 @@ fn merge(
     writer: &mut StoreWriter,
     workspace: &Workspace,
 ) -> Result<()> {
+    // A key is a position, so the last one written says where to go on.
+    let start = writer.last()?.map(|point| next(hilbert::encode(point)));
     let cuts = sorted.cuts(PART).into_iter().map(Some);
-    let ends: Vec<_> = [None].into_iter().chain(cuts).chain([None]).collect();
+    let cuts = cuts.filter(|cut| *cut > start);
+    let ends: Vec<_> = [start].into_iter().chain(cuts).chain([None]).collect();
     let parts: Vec<Part> = ends.windows(2).map(|w| (w[0], w[1])).collect();
     // A part has a frame more of each run at most, and its list grows by doubling.
     let part = 3 * (PART * size_of::<hilbert::Key>()) as u64 + 4 * sorted.merge_bytes();

@@ -1,17 +1,16 @@
 //! The ordered store: positions by id in one file, in pages, with a tree of page boxes in memory.
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::geom::Point;
 use crate::geom::aabb::Aabb;
 use crate::spill::Sections;
+use crate::workspace::Workspace;
+use crate::workspace::file::{Place, ScratchFile};
 use crate::workspace::memory::Reservation;
-use crate::workspace::{IoCounters, Workspace};
+use crate::workspace::persist::{Persist, Saved};
+use crate::workspace::steps::Step;
 use rayon::prelude::*;
-use std::fs::File;
 use std::ops::Range;
-use std::os::unix::fs::FileExt;
-use std::path::PathBuf;
-use std::sync::Arc;
 
 /// Points per page unless a test asks for another number.
 pub const PAGE: usize = 256;
@@ -22,16 +21,19 @@ const FAN: usize = 8;
 /// Positions of all points by id; 12 bytes a point on disk, 28/256 in memory.
 #[derive(Debug)]
 pub struct PointStore {
-    path: PathBuf,
-    file: File,
+    file: ScratchFile,
     len: usize,
     page: usize,
     checks: Vec<u32>,
     /// `levels[0]` has a box for each page, each further level one for `FAN` of the last.
     levels: Vec<Vec<Aabb>>,
-    io: Arc<IoCounters>,
+    /// Checksums and boxes on disk, if a resumed run may need them.
+    _index: Option<Index>,
     _held: Reservation,
 }
+
+/// Of every page its checksum and its box; sections by the first group of pages in them.
+type Index = Sections<7>;
 
 impl PointStore {
     /// Number of points.
@@ -128,26 +130,21 @@ impl PointStore {
     /// Reads a run of pages and appends their points to `points`.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Corrupt`] if a page is not what was written.
+    /// [`crate::Error::Io`]; [`crate::Error::Corrupt`] if a page is not what was written.
     pub fn read_pages(&self, pages: Range<usize>, points: &mut Vec<Point>) -> Result<()> {
         let ids = pages.start * self.page..(pages.end * self.page).min(self.len);
         let before = points.len();
         points.resize(before + ids.len(), [0; 3]);
         let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut points[before..]);
         let offset = ids.start as u64 * 12;
-        self.file
-            .read_exact_at(bytes, offset)
-            .map_err(|e| Error::io(&self.path, format!("read {} bytes", bytes.len()), e))?;
-        self.io.add_read(bytes.len() as u64);
+        self.file.read_at(bytes, offset)?;
         for (page, part) in pages.zip(bytes.chunks(self.page * 12)) {
             let crc = crc32fast::hash(part);
             if crc != self.checks[page] {
-                return Err(Error::Corrupt {
-                    path: self.path.clone(),
-                    offset: (page * self.page * 12) as u64,
-                    found: format!("checksum {crc:08x}"),
-                    expected: format!("{:08x}", self.checks[page]),
-                });
+                let offset = (page * self.page * 12) as u64;
+                let expected = format!("{:08x}", self.checks[page]);
+                let found = format!("checksum {crc:08x}");
+                return Err(self.file.damaged(offset, found, expected));
             }
         }
         Ok(())
@@ -190,11 +187,31 @@ impl PointStore {
     }
 }
 
-impl Drop for PointStore {
-    fn drop(&mut self) {
-        self.io.shrink_scratch(self.len as u64 * 12);
-        // A scratch file that cannot be deleted goes with its folder.
-        let _ = std::fs::remove_file(&self.path);
+impl Persist for PointStore {
+    fn save(&self, out: &mut Vec<u8>) {
+        self.file.name.to_string().save(out);
+        self.len.save(out);
+        self.page.save(out);
+        let bounds = self.bounds();
+        (bounds.min, bounds.max).save(out);
+    }
+
+    fn load(from: &mut Saved<'_>) -> Result<Self> {
+        let name = String::load(from)?;
+        let (len, page) = <(usize, usize)>::load(from)?;
+        let (min, max) = Persist::load(from)?;
+        let workspace = from.workspace;
+        let mut writer = StoreWriter::open(workspace, &name, page)?;
+        let gone = writer.file.is_gone();
+        if !gone && writer.boxes.len() != len.div_ceil(page) {
+            return Err(from.wrong(format!("{len} points of the file {name}")));
+        }
+        writer.len = len;
+        if gone {
+            // Nobody reads its points any more, but where they were is known.
+            writer.boxes = vec![Aabb { min, max }];
+        }
+        writer.into_store(workspace)
     }
 }
 
@@ -204,8 +221,7 @@ const GROUP: usize = 64;
 /// Writes a [`PointStore`] in id order.
 #[derive(Debug)]
 pub struct StoreWriter {
-    path: PathBuf,
-    file: File,
+    file: ScratchFile,
     /// Points written.
     len: usize,
     page: usize,
@@ -213,50 +229,127 @@ pub struct StoreWriter {
     pending: Vec<Point>,
     checks: Vec<u32>,
     boxes: Vec<Aabb>,
-    io: Arc<IoCounters>,
+    /// As [`PointStore`] has it.
+    index: Option<Index>,
+    /// Groups of pages are its units.
+    step: Step,
 }
 
+/// A page's checksum and box.
+type Page = (u32, Aabb);
+
 impl StoreWriter {
-    /// Starts the scratch file `name`.
+    /// Starts the scratch file `name`. What an earlier attempt at the run has written of it is there,
+    /// see [`StoreWriter::len`].
     ///
     /// # Errors
-    /// [`Error::Io`].
+    /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
     pub fn create(workspace: &Workspace, name: &str, page: usize) -> Result<Self> {
-        let (path, file) = workspace.create_file(name)?;
-        Ok(Self {
-            path,
-            file,
+        let mut writer = Self::open(workspace, name, page)?;
+        writer.step = workspace.step("store")?;
+        // The last group may have been cut short by the end of the points; it is written again.
+        let whole = writer.boxes.len() / GROUP * GROUP;
+        writer.checks.truncate(whole);
+        writer.boxes.truncate(whole);
+        writer.len = whole * writer.page;
+        Ok(writer)
+    }
+
+    fn open(workspace: &Workspace, name: &str, page: usize) -> Result<Self> {
+        let index = || Index::unpacked(workspace, &format!("{name}.index"), 0);
+        let mut writer = Self {
+            file: workspace.keep_file(name)?.0,
             len: 0,
             page: page.max(1),
             pending: Vec::new(),
             checks: Vec::new(),
             boxes: Vec::new(),
-            io: workspace.io.clone(),
-        })
+            index: workspace.is_resumable().then(index).transpose()?,
+            step: Step::default(),
+        };
+        writer.take_up()?;
+        Ok(writer)
+    }
+
+    /// Reads the index of what is there.
+    fn take_up(&mut self) -> Result<()> {
+        let Some(index) = self.index.as_ref().filter(|_| !self.file.is_gone()) else {
+            return Ok(());
+        };
+        self.checks.clear();
+        self.boxes.clear();
+        let mut group = 0;
+        while group < index.count() && index.records(group) > 0 {
+            for [crc, bounds @ ..] in index.get(group)? {
+                let [a, b, c, d, e, f] = bounds.map(u32::cast_signed);
+                self.checks.push(crc);
+                self.boxes.push(Aabb {
+                    min: [a, b, c],
+                    max: [d, e, f],
+                });
+            }
+            group += index.records(group).div_ceil(GROUP);
+        }
+        Ok(())
+    }
+
+    /// Points written so far.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.len
+    }
+
+    /// True if nothing was written yet.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
+    /// The last point written.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`].
+    pub fn last(&self) -> Result<Option<Point>> {
+        let Some(last) = self.len.checked_sub(1) else {
+            return Ok(None);
+        };
+        let mut point: Point = [0; 3];
+        let bytes = bytemuck::cast_slice_mut(&mut point);
+        self.file.read_at(bytes, last as u64 * 12)?;
+        Ok(Some(point))
     }
 
     /// A whole store from the points of sections, one after the other.
     ///
     /// # Errors
-    /// [`Error::Io`], [`Error::Corrupt`], [`Error::Memory`], [`Error::Cancelled`].
+    /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`], [`crate::Error::Cancelled`].
     pub fn gather(
         workspace: &Workspace,
         name: &str,
         page: usize,
         sections: &Sections<3>,
     ) -> Result<PointStore> {
-        let mut writer = Self::create(workspace, name, page)?;
-        for section in 0..sections.count() {
-            workspace.check_cancel()?;
-            writer.push(bytemuck::cast_slice(&sections.get(section)?))?;
-        }
-        writer.finish(workspace)
+        workspace.once("gather", || {
+            let mut writer = Self::create(workspace, name, page)?;
+            let mut first = 0;
+            for section in 0..sections.count() {
+                workspace.check_cancel()?;
+                let end = first + sections.records(section);
+                let done = writer.len.clamp(first, end) - first;
+                if first + done < end {
+                    let points = sections.get(section)?;
+                    writer.push(bytemuck::cast_slice(&points[done..]))?;
+                }
+                first = end;
+            }
+            writer.finish(workspace)
+        })
     }
 
     /// Appends points, in order of id.
     ///
     /// # Errors
-    /// [`Error::Io`].
+    /// [`crate::Error::Io`].
     pub fn push(&mut self, mut points: &[Point]) -> Result<()> {
         while !points.is_empty() {
             let room = GROUP * self.page - self.pending.len();
@@ -273,7 +366,7 @@ impl StoreWriter {
     /// Appends the points of `items`, in order of id, on all threads.
     ///
     /// # Errors
-    /// [`Error::Io`], [`Error::Cancelled`].
+    /// [`crate::Error::Io`], [`crate::Error::Cancelled`].
     pub fn append<T: Sync>(
         &mut self,
         workspace: &Workspace,
@@ -284,7 +377,7 @@ impl StoreWriter {
         let (first, rest) = items.split_at(((group - self.pending.len()) % group).min(items.len()));
         let (groups, last) = rest.split_at(rest.len() / group * group);
         self.push(&first.iter().map(&point).collect::<Vec<_>>())?;
-        let written: Result<Vec<Vec<(u32, Aabb)>>> = workspace.install(|| {
+        let written: Result<Vec<(Vec<Page>, Place)>> = workspace.install(|| {
             let parts = groups.par_chunks(group).enumerate();
             let write = |(n, part): (usize, &[T])| {
                 workspace.check_cancel()?;
@@ -294,10 +387,7 @@ impl StoreWriter {
             };
             parts.map(write).collect()
         });
-        for page in written?.into_iter().flatten() {
-            self.checks.push(page.0);
-            self.boxes.push(page.1);
-        }
+        self.note(written?)?;
         self.len += groups.len();
         workspace
             .observer
@@ -305,39 +395,75 @@ impl StoreWriter {
         self.push(&last.iter().map(&point).collect::<Vec<_>>())
     }
 
-    /// Writes pages from point `first` on; their checksums and boxes.
-    fn write(&self, first: usize, points: &[Point]) -> Result<Vec<(u32, Aabb)>> {
+    /// Writes a group of pages from point `first` on; their checksums and boxes, and the place.
+    fn write(&self, first: usize, points: &[Point]) -> Result<(Vec<Page>, Place)> {
         let bytes: &[u8] = bytemuck::cast_slice(points);
-        self.file
-            .write_all_at(bytes, first as u64 * 12)
-            .map_err(|e| Error::io(&self.path, format!("write {} bytes", bytes.len()), e))?;
-        self.io.add_written(bytes.len() as u64);
-        self.io.grow_scratch(bytes.len() as u64);
+        let offset = first as u64 * 12;
+        self.file.write_at(bytes, offset)?;
         let page = |page: &[Point]| {
             let crc = crc32fast::hash(bytemuck::cast_slice(page));
             (crc, Aabb::of(page))
         };
-        Ok(points.chunks(self.page).map(page).collect())
+        let place = Place {
+            offset,
+            bytes: bytes.len(),
+            records: points.len(),
+            crc: self.index.as_ref().map_or(0, |_| crc32fast::hash(bytes)),
+        };
+        Ok((points.chunks(self.page).map(page).collect(), place))
+    }
+
+    /// Takes in groups that were written, for good.
+    fn note(&mut self, groups: Vec<(Vec<Page>, Place)>) -> Result<()> {
+        if groups.is_empty() {
+            return Ok(());
+        }
+        let first = self.boxes.len() / GROUP;
+        if let Some(index) = &self.index {
+            let pages = groups.iter().flat_map(|group| &group.0);
+            let record = |(crc, b): &Page| {
+                let [p, q] = [b.min, b.max].map(|corner| corner.map(i32::cast_unsigned));
+                [*crc, p[0], p[1], p[2], q[0], q[1], q[2]]
+            };
+            let records: Vec<_> = pages.map(record).collect();
+            self.step.finish(first as u64, &(), || {
+                for (group, (_, place)) in (first as u32..).zip(&groups) {
+                    self.file.put(group, *place)?;
+                }
+                while index.count() <= first {
+                    index.grow();
+                }
+                index.put(first, &records)
+            })?;
+        }
+        for (crc, aabb) in groups.into_iter().flat_map(|group| group.0) {
+            self.checks.push(crc);
+            self.boxes.push(aabb);
+        }
+        Ok(())
     }
 
     /// Writes what is pending.
     fn flush(&mut self) -> Result<()> {
-        let pages = self.write(self.len, &self.pending)?;
-        for (crc, aabb) in pages {
-            self.checks.push(crc);
-            self.boxes.push(aabb);
+        if !self.pending.is_empty() {
+            let group = self.write(self.len, &self.pending)?;
+            self.note(vec![group])?;
+            self.len += self.pending.len();
+            self.pending.clear();
         }
-        self.len += self.pending.len();
-        self.pending.clear();
         Ok(())
     }
 
     /// Ends the file and builds the tree of boxes.
     ///
     /// # Errors
-    /// [`Error::Io`], [`Error::Memory`].
+    /// [`crate::Error::Io`], [`crate::Error::Memory`].
     pub fn finish(mut self, workspace: &Workspace) -> Result<PointStore> {
         self.flush()?;
+        self.into_store(workspace)
+    }
+
+    fn into_store(self, workspace: &Workspace) -> Result<PointStore> {
         let held = workspace.reserve("point index", self.boxes.len() as u64 * 32 + 4096)?;
         let mut levels = vec![self.boxes];
         while levels.last().is_some_and(|top| top.len() > FAN) {
@@ -348,13 +474,12 @@ impl StoreWriter {
             levels.push(next);
         }
         Ok(PointStore {
-            path: self.path,
             file: self.file,
             len: self.len,
             page: self.page,
             checks: self.checks,
             levels,
-            io: self.io,
+            _index: self.index,
             _held: held,
         })
     }

@@ -42,6 +42,11 @@ pub struct OutlierStats {
     pub rounds: u32,
 }
 
+crate::workspace::persist::persist!(OutlierStats {
+    dropped,
+    rounds
+});
+
 /// What decides which points are outliers, and how they are worked on.
 #[derive(Debug, Clone, Copy)]
 pub struct OutlierOptions {
@@ -91,12 +96,13 @@ fn round(
         let points = tiles.ids(tile).len();
         Tile::bytes(points) + PageCache::bytes(store) + SpacingCache::BYTES + points as u64 * 12
     };
-    workspace.for_each_unit("outliers: tile", tiles.count(), bytes, |tile| {
+    let work = |tile| {
         let ids = tiles.ids(tile);
         workspace.observer.advance(ids.len() as u64);
         let points = one_tile(store, ids, options.factor, SpacingCache::new(&spacings))?;
         kept.put(tile, bytemuck::cast_slice(&points))
-    })?;
+    };
+    workspace.units("outliers: tile", tiles.count(), bytes, work, |_, ()| Ok(()))?;
     let name = format!("points-kept{number}");
     StoreWriter::gather(workspace, &name, store.page_size(), &kept)
 }

@@ -33,10 +33,9 @@ impl Spacings {
             let points = tiles.ids(tile).len();
             Tile::bytes(points) + PageCache::bytes(store) + points as u64 * 4
         };
-        workspace.for_each_unit("outliers: spacings", tiles.count(), bytes, |tile| {
-            workspace.check_cancel()?;
-            sections.put(tile, &one_tile(store, tiles.ids(tile))?)
-        })?;
+        let work = |tile| sections.put(tile, &one_tile(store, tiles.ids(tile))?);
+        let name = "outliers: spacings";
+        workspace.units(name, tiles.count(), bytes, work, |_, ()| Ok(()))?;
         Ok(Self { tiles, sections })
     }
 }

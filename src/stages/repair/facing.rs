@@ -177,6 +177,8 @@ pub struct Fate {
     pub turn: bool,
 }
 
+crate::workspace::persist::persist!(Fate { keep, turn });
+
 impl Fate {
     /// Until it is judged, all of it is kept as it is.
     pub const UNKNOWN: Self = Self {

@@ -3,17 +3,17 @@
 
 use super::fill::{Corner, Filling};
 use super::mend::Mending;
-use super::rim::{BlockRim, Outline};
+use super::rim::{BlockRim, Outline, RimCounts, RimFiles};
 use super::surface::Surface;
 use super::{EXCHANGE_BUFFER, RepairStats, from_smallest};
 use crate::error::Result;
-use crate::spill::{Exchange, Sections};
+use crate::spill::{Exchange, Sections, Word};
 use crate::stages::blocks::Blocks;
 use crate::stages::located::Places;
 use crate::stages::surface::star::sorted;
 use crate::workspace::Workspace;
+use crate::workspace::persist::persist;
 use rustc_hash::FxHashMap;
-use std::sync::{Mutex, PoisonError};
 
 /// A part of a loop inside one block: it enters at `start` (from, at) and leaves at `end` (at, to).
 #[derive(Debug, Clone, Copy)]
@@ -25,11 +25,27 @@ struct Fragment {
     kept: Option<usize>,
 }
 
+persist!(Fragment {
+    start,
+    end,
+    steps,
+    kept
+});
+
+/// What was found and done in a block.
 struct Found {
     fragments: Vec<Fragment>,
-    settled: Settled,
-    outline: Outline,
+    stats: RepairStats,
+    edges: u64,
+    rim: RimCounts,
 }
+
+persist!(Found {
+    fragments,
+    stats,
+    edges,
+    rim
+});
 
 /// Fills holes as `mending` says, or none; `[block, i, a, b]` for each block that a triangle
 /// touches, and what the boundary looks like.
@@ -46,47 +62,67 @@ pub fn fill(
     workspace: &Workspace,
 ) -> Result<(Sections<4>, Outline)> {
     let _held = workspace.reserve("exchange", EXCHANGE_BUFFER)?;
-    let exchange = Exchange::<4>::new(workspace, "repair.filled", EXCHANGE_BUFFER);
+    let (count, buffer, above) = (blocks.count(), EXCHANGE_BUFFER, [Word::Above; 4]);
+    let exchange = Exchange::between(workspace, "repair.filled", buffer, count, above)?;
     let kept = Sections::<1>::create(workspace, "repair.fragments", 0)?;
-    let found = Mutex::new(Found {
-        fragments: Vec::new(),
-        settled: Settled::default(),
-        outline: Outline::new(blocks, workspace)?,
-    });
+    let files = RimFiles::create(workspace, count)?;
     let bytes =
         |b: usize| 150 * surface.records(b) as u64 + blocks.ids(b).len() as u64 * 40 + (1 << 20);
-    workspace.for_each_unit("repair: block", blocks.count(), bytes, |block| {
+    let work = |block| {
         let rim = BlockRim::load(places, surface, blocks, block)?;
         let mut settled = Settled::default();
         let fragments = match mending {
             Some(mending) => fill_inside(&rim, mending, &kept, &mut settled)?,
             None => Vec::new(),
         };
-        exchange.send(&addressed(&settled.triangles, blocks))?;
-        let mut found = found.lock().unwrap_or_else(PoisonError::into_inner);
-        found.fragments.extend(fragments);
-        found.settled.add(&settled);
-        found.outline.add(block, &blocks.ids(block), &rim);
-        found.outline.pinches.put(block, &rim.pinches)?;
-        found.outline.pinched.put(block, &rim.pinched())?;
-        drop(found);
+        exchange.send_from(block, &addressed(&settled.triangles, blocks))?;
+        let found = Found {
+            fragments,
+            stats: settled.stats,
+            edges: settled.edges,
+            rim: files.put(block, &rim)?,
+        };
         workspace.observer.advance(1);
+        Ok(found)
+    };
+    let mut rims = vec![RimCounts::default(); count];
+    let mut fragments = Vec::new();
+    let mut settled = Settled::default();
+    workspace.units("repair: block", count, bytes, work, |block, found| {
+        fragments.extend(found.fragments);
+        settled.stats.add(&found.stats);
+        settled.edges += found.edges;
+        rims[block] = found.rim;
         Ok(())
     })?;
-    let found = found.into_inner().unwrap_or_else(PoisonError::into_inner);
-    let (mut settled, mut outline) = (found.settled, found.outline);
-    let _fragments = workspace.reserve("fragments", found.fragments.len() as u64 * 120)?;
-    for ring in link_up(&found.fragments) {
+    let mut outline = files.outline(&rims, blocks, workspace)?;
+    // In an order of their own, not in that in which blocks were done.
+    fragments.sort_unstable_by_key(|fragment: &Fragment| fragment.start);
+    let _fragments = workspace.reserve("fragments", fragments.len() as u64 * 120)?;
+    let parts = Fragments {
+        places,
+        mending,
+        fragments: &fragments,
+        kept: &kept,
+    };
+    let step = workspace.step("rings")?;
+    let known: FxHashMap<u64, (RepairStats, u64)> = step.finished(workspace)?.into_iter().collect();
+    let rings = link_up(&fragments);
+    for (number, batch) in (0u64..).zip(rings.chunks(RINGS)) {
         workspace.check_cancel()?;
-        let edges: usize = ring.iter().map(|&f| found.fragments[f].steps).sum();
-        let Some(mending) = mending.filter(|m| edges <= m.longest_loop()) else {
-            settled.too_long();
-            continue;
+        let (stats, edges) = match known.get(&number) {
+            Some(done) => *done,
+            None => {
+                let done = parts.fill(batch, workspace)?;
+                let value = (done.stats, done.edges);
+                let sent = addressed(&done.triangles, blocks);
+                let sender = count + number as usize;
+                step.finish(number, &value, || exchange.send_from(sender, &sent))?;
+                value
+            }
         };
-        let filling = fill_across(places, &ring, &found.fragments, &kept, mending)?;
-        settled.settle(filling, edges);
-        exchange.send(&addressed(&settled.triangles, blocks))?;
-        settled.triangles.clear();
+        settled.stats.add(&stats);
+        settled.edges += edges;
     }
     stats.add(&settled.stats);
     outline.boundary_edges -= settled.edges;
@@ -166,12 +202,6 @@ impl Settled {
         self.stats.holes_found += 1;
         self.stats.holes_too_long += 1;
     }
-
-    /// Adds up all but the triangles.
-    fn add(&mut self, other: &Self) {
-        self.stats.add(&other.stats);
-        self.edges += other.edges;
-    }
 }
 
 fn addressed(triangles: &[[u32; 3]], blocks: Blocks) -> Vec<[u32; 4]> {
@@ -206,6 +236,35 @@ fn link_up(fragments: &[Fragment]) -> Vec<Vec<usize>> {
         }
     }
     loops
+}
+
+/// Loops across blocks that are done at a time.
+const RINGS: usize = 256;
+
+/// Parts of loops, and how these are filled.
+struct Fragments<'a> {
+    places: Places<'a>,
+    mending: Option<Mending>,
+    fragments: &'a [Fragment],
+    kept: &'a Sections<1>,
+}
+
+impl Fragments<'_> {
+    /// Fills some loops.
+    fn fill(&self, rings: &[Vec<usize>], workspace: &Workspace) -> Result<Settled> {
+        let mut settled = Settled::default();
+        for ring in rings {
+            workspace.check_cancel()?;
+            let edges: usize = ring.iter().map(|&f| self.fragments[f].steps).sum();
+            let Some(mending) = self.mending.filter(|m| edges <= m.longest_loop()) else {
+                settled.too_long();
+                continue;
+            };
+            let filling = fill_across(self.places, ring, self.fragments, self.kept, mending)?;
+            settled.settle(filling, edges);
+        }
+        Ok(settled)
+    }
 }
 
 fn fill_across(

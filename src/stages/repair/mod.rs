@@ -26,6 +26,7 @@ use crate::stages::blocks::Blocks;
 use crate::stages::located::Places;
 use crate::stages::stitch::Stitched;
 use crate::workspace::Workspace;
+use crate::workspace::persist::persist;
 use mend::Mending;
 use serde::Serialize;
 
@@ -132,6 +133,26 @@ impl RepairStats {
     }
 }
 
+persist!(Repaired {
+    surface,
+    filled,
+    outline
+});
+persist!(RepairStats {
+    bridges_removed,
+    components_found,
+    components_removed,
+    component_triangles_removed,
+    gaps_closed,
+    holes_found,
+    holes_filled,
+    holes_zipped,
+    holes_outline,
+    holes_too_long,
+    holes_not_filled,
+    hole_triangles
+});
+
 /// Repairs and orients the surface.
 ///
 /// # Errors
@@ -144,15 +165,9 @@ pub fn repair(
     options: RepairOptions,
     workspace: &Workspace,
 ) -> Result<(Repaired, RepairStats)> {
-    let mut stats = RepairStats::default();
-    let surface = surface::build(
-        places.shape,
-        stitched,
-        blocks,
-        options,
-        &mut stats,
-        workspace,
-    )?;
+    let (surface, mut stats) = workspace.once("surface", || {
+        surface::build(places.shape, stitched, blocks, options, workspace)
+    })?;
     let limit = options.filling();
     let (filled, outline) = holes::fill(places, &surface, limit, blocks, &mut stats, workspace)?;
     let repaired = Repaired {

@@ -10,6 +10,7 @@ use crate::stages::located::{Located, Places};
 use crate::stages::surface::star::Star;
 use crate::workspace::Workspace;
 use crate::workspace::memory::Reservation;
+use crate::workspace::persist::{Persist, Saved, persist};
 use std::ops::Range;
 
 /// What the numbers of vertices and triangles follow from.
@@ -25,34 +26,123 @@ pub struct Outline {
     pub pinches: Sections<1>,
     /// All triangles at these vertices before holes were filled, as they run.
     pub pinched: Sections<3>,
+    /// The bits of `used`, by block.
+    bits: Sections<2>,
+    blocks: Blocks,
     _held: Reservation,
 }
 
-impl Outline {
-    pub(super) fn new(blocks: Blocks, workspace: &Workspace) -> Result<Self> {
-        let (words, count) = (blocks.points().div_ceil(64) + 1, blocks.count());
-        let held = workspace.reserve("vertices", (words * 8 + count * 4) as u64)?;
+/// Where blocks leave what they find at their boundary.
+#[derive(Debug)]
+pub(super) struct RimFiles {
+    bits: Sections<2>,
+    pinches: Sections<1>,
+    pinched: Sections<3>,
+}
+
+/// Counts of a block's boundary.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct RimCounts {
+    faces: u32,
+    steps: u64,
+}
+
+persist!(RimCounts { faces, steps });
+
+impl RimFiles {
+    /// Makes the files.
+    pub(super) fn create(workspace: &Workspace, count: usize) -> Result<Self> {
         Ok(Self {
-            used: vec![0; words],
-            faces: vec![0; count],
-            boundary_edges: 0,
+            bits: Sections::unpacked(workspace, "repair.used", count)?,
             pinches: Sections::create(workspace, "repair.pinches", count)?,
             pinched: Sections::create(workspace, "repair.pinched", count)?,
-            _held: held,
         })
     }
 
-    /// Takes in what a block found.
-    pub(super) fn add(&mut self, block: usize, ids: &Range<u32>, found: &BlockRim) {
-        self.faces[block] = found.faces;
-        self.boundary_edges += found.steps.len() as u64;
+    /// Writes what a block found.
+    pub(super) fn put(&self, block: usize, found: &BlockRim) -> Result<RimCounts> {
+        let words = found.used.iter();
+        let words: Vec<_> = words.map(|w| [*w as u32, (*w >> 32) as u32]).collect();
+        self.bits.put(block, &words)?;
+        self.pinches.put(block, &found.pinches)?;
+        self.pinched.put(block, &found.pinched())?;
+        Ok(RimCounts {
+            faces: found.faces,
+            steps: found.steps.len() as u64,
+        })
+    }
+
+    /// All of it together.
+    pub(super) fn outline(
+        self,
+        found: &[RimCounts],
+        blocks: Blocks,
+        workspace: &Workspace,
+    ) -> Result<Outline> {
+        let faces = found.iter().map(|counts| counts.faces).collect();
+        let boundary_edges = found.iter().map(|counts| counts.steps).sum();
+        let (used, held) = bits(&self.bits, blocks, workspace)?;
+        Ok(Outline {
+            used,
+            faces,
+            boundary_edges,
+            pinches: self.pinches,
+            pinched: self.pinched,
+            bits: self.bits,
+            blocks,
+            _held: held,
+        })
+    }
+}
+
+/// The bits of all blocks in a row.
+fn bits(
+    bits: &Sections<2>,
+    blocks: Blocks,
+    workspace: &Workspace,
+) -> Result<(Vec<u64>, Reservation)> {
+    let (words, count) = (blocks.points().div_ceil(64) + 1, blocks.count());
+    let held = workspace.reserve("vertices", (words * 8 + count * 4) as u64)?;
+    let mut used = vec![0u64; words];
+    for block in 0..count {
+        let ids = blocks.ids(block);
         let (first, shift) = (ids.start as usize / 64, ids.start % 64);
-        for (n, word) in found.used.iter().enumerate() {
-            self.used[first + n] |= word << shift;
+        for (n, [low, high]) in bits.get(block)?.into_iter().enumerate() {
+            let word = u64::from(high) << 32 | u64::from(low);
+            used[first + n] |= word << shift;
             if shift > 0 {
-                self.used[first + n + 1] |= word >> (64 - shift);
+                used[first + n + 1] |= word >> (64 - shift);
             }
         }
+    }
+    Ok((used, held))
+}
+
+impl Persist for Outline {
+    fn save(&self, out: &mut Vec<u8>) {
+        self.faces.save(out);
+        self.boundary_edges.save(out);
+        self.pinches.save(out);
+        self.pinched.save(out);
+        self.bits.save(out);
+        self.blocks.save(out);
+    }
+
+    fn load(from: &mut Saved<'_>) -> Result<Self> {
+        let (faces, boundary_edges) = Persist::load(from)?;
+        let (pinches, pinched) = Persist::load(from)?;
+        let (files, blocks) = <(Sections<2>, Blocks)>::load(from)?;
+        let (used, held) = bits(&files, blocks, from.workspace)?;
+        Ok(Self {
+            used,
+            faces,
+            boundary_edges,
+            pinches,
+            pinched,
+            bits: files,
+            blocks,
+            _held: held,
+        })
     }
 }
 

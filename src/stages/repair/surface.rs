@@ -18,6 +18,7 @@ use crate::stages::surface::parity::ParitySets;
 use crate::stages::surface::star::Triangle;
 use crate::workspace::Workspace;
 use crate::workspace::memory::Reservation;
+use crate::workspace::persist::{Persist, Saved};
 use rustc_hash::FxHashMap;
 use std::sync::{Mutex, PoisonError};
 
@@ -141,12 +142,6 @@ struct Build<'a> {
     /// `[owner, i, j, k, block, label << 1 | flip]`: how a block sees a crossing triangle, for the
     /// block of its smallest vertex.
     seen: Exchange<6>,
-    shared: Mutex<Shared>,
-}
-
-struct Shared {
-    globals: Vec<u32>,
-    stats: RepairStats,
 }
 
 /// Builds the surface.
@@ -159,23 +154,27 @@ pub fn build(
     stitched: Stitched,
     blocks: Blocks,
     options: RepairOptions,
-    stats: &mut RepairStats,
     workspace: &Workspace,
-) -> Result<Surface> {
+) -> Result<(Surface, RepairStats)> {
     let held = workspace.reserve("exchanges", 2 * EXCHANGE_BUFFER)?;
     let build = Build::create(store, &stitched, blocks, options, workspace)?;
     let bytes = |b: usize| {
         let records = stitched.interior.records(b) + stitched.added.records(b);
         230 * records as u64 + blocks.ids(b).len() as u64 * 30 + (1 << 20)
     };
-    workspace.for_each_unit("repair: block", blocks.count(), bytes, |block| {
-        build.block(block)?;
+    let work = |block| {
+        let done = build.block(block)?;
         workspace.observer.advance(1);
+        Ok(done)
+    };
+    let mut stats = RepairStats::default();
+    let mut own_globals = vec![0u32; blocks.count()];
+    let name = "repair: block";
+    workspace.units(name, blocks.count(), bytes, work, |block, (own, more)| {
+        own_globals[block] = own;
+        stats.add(&more);
         Ok(())
     })?;
-    let shared = build.shared.into_inner();
-    let shared = shared.unwrap_or_else(PoisonError::into_inner);
-    *stats = shared.stats;
     let bridges = build.bridges.deliver_unique(workspace, blocks.count())?;
     for block in 0..blocks.count() {
         let own = |r: &&[u32; 4]| blocks.of(r[1]) == r[0];
@@ -187,12 +186,11 @@ pub fn build(
     drop(held);
     let mut next = 0;
     let mut globals = Vec::with_capacity(blocks.count());
-    for own in shared.globals {
+    for own in own_globals {
         globals.push((next, own));
         next += own;
     }
-    let bytes = u64::from(next) * 10 + globals.len() as u64 * 8 + 1024;
-    let held = workspace.reserve("labels", bytes)?;
+    let held = workspace.reserve("labels", label_bytes(next as usize, globals.len()))?;
     let sets = join(&seen, &globals, next, workspace)?;
     let parts = Parts {
         store,
@@ -202,8 +200,8 @@ pub fn build(
         globals: &globals,
         sets: &sets,
     };
-    let (components, fates) = parts.judge(options, stats, workspace)?;
-    Ok(Surface {
+    let (components, fates) = parts.judge(options, &mut stats, workspace)?;
+    let surface = Surface {
         triangles,
         runs,
         rims,
@@ -212,7 +210,42 @@ pub fn build(
         components,
         fates,
         _held: held,
-    })
+    };
+    Ok((surface, stats))
+}
+
+/// Bytes that so many global labels of so many blocks take.
+fn label_bytes(labels: usize, blocks: usize) -> u64 {
+    (labels * 10 + blocks * 8 + 1024) as u64
+}
+
+impl Persist for Surface {
+    fn save(&self, out: &mut Vec<u8>) {
+        self.triangles.save(out);
+        self.runs.save(out);
+        self.rims.save(out);
+        self.bridges.save(out);
+        self.globals.save(out);
+        self.components.save(out);
+        self.fates.save(out);
+    }
+
+    fn load(from: &mut Saved<'_>) -> Result<Self> {
+        let (triangles, runs, rims) = Persist::load(from)?;
+        let bridges = Persist::load(from)?;
+        let (globals, components, fates): (Vec<_>, Vec<_>, _) = Persist::load(from)?;
+        let bytes = label_bytes(components.len(), globals.len());
+        Ok(Self {
+            triangles,
+            runs,
+            rims,
+            bridges,
+            _held: from.workspace.reserve("labels", bytes)?,
+            globals,
+            components,
+            fates,
+        })
+    }
 }
 
 impl<'a> Build<'a> {
@@ -223,7 +256,7 @@ impl<'a> Build<'a> {
         options: RepairOptions,
         workspace: &Workspace,
     ) -> Result<Self> {
-        let count = blocks.count();
+        let (count, buffer) = (blocks.count(), EXCHANGE_BUFFER);
         Ok(Self {
             store,
             stitched,
@@ -233,16 +266,13 @@ impl<'a> Build<'a> {
             runs: Sections::unpacked(workspace, "repair.runs", count)?,
             rims: Sections::unpacked(workspace, "repair.rims", count)?,
             sums: Sections::unpacked(workspace, "repair.sums", count)?,
-            bridges: Exchange::new(workspace, "repair.bridges", EXCHANGE_BUFFER).packed(SENT),
-            seen: Exchange::new(workspace, "repair.seen", EXCHANGE_BUFFER).packed(SEEN),
-            shared: Mutex::new(Shared {
-                globals: vec![0; count],
-                stats: RepairStats::default(),
-            }),
+            bridges: Exchange::between(workspace, "repair.bridges", buffer, count, SENT)?,
+            seen: Exchange::between(workspace, "repair.seen", buffer, count, SEEN)?,
         })
     }
 
-    fn block(&self, block: usize) -> Result<()> {
+    /// Works on a block: the number of its global labels, and counts.
+    fn block(&self, block: usize) -> Result<(u32, RepairStats)> {
         let ids = self.blocks.ids(block);
         let triangles = around::load(self.stitched, block)?;
         let patch = Patch::of(ids.clone(), &triangles);
@@ -268,10 +298,7 @@ impl<'a> Build<'a> {
         stats.bridges_removed = bridges.iter().filter(interior).count() as u64;
         self.send(block, &triangles, &patch, &bridges)?;
         self.write(block, triangles, &patch, &bridges, &fates)?;
-        let mut shared = self.shared.lock().unwrap_or_else(PoisonError::into_inner);
-        shared.globals[block] = patch.global;
-        shared.stats.add(&stats);
-        Ok(())
+        Ok((patch.global, stats))
     }
 
     /// Sums over the interior triangles by label.
@@ -326,8 +353,8 @@ impl<'a> Build<'a> {
                 found.extend(others.map(|b| [b, t[0], t[1], t[2]]));
             }
         }
-        self.seen.send(&seen)?;
-        self.bridges.send(&found)
+        self.seen.send_from(block, &seen)?;
+        self.bridges.send_from(block, &found)
     }
 
     /// Writes what stays of the triangles, as they run.

@@ -38,11 +38,12 @@ pub fn smooth(
         let points = tiles.ids(tile).len();
         Tile::bytes(points) + PageCache::bytes(store) + points as u64 * 24
     };
-    workspace.for_each_unit("smooth: tile", tiles.count(), bytes, |tile| {
+    let work = |tile| {
         let points = smooth_tile(store, tiles.ids(tile), neighbors)?;
         workspace.observer.advance(points.len() as u64);
         moved.put(tile, bytemuck::cast_slice(&points))
-    })?;
+    };
+    workspace.units("smooth: tile", tiles.count(), bytes, work, |_, ()| Ok(()))?;
     let name = format!("points{round}");
     StoreWriter::gather(workspace, &name, store.page_size(), &moved)
 }

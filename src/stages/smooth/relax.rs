@@ -16,8 +16,10 @@ use crate::stages::tiles::Tile;
 use crate::stages::tiles::walk::PageCache;
 use crate::workspace::Workspace;
 use crate::workspace::memory::Reservation;
+use crate::workspace::persist::persist;
 use serde::Serialize;
-use std::sync::atomic::{AtomicU16, AtomicU64, Ordering};
+use std::ops::Range;
+use std::sync::atomic::{AtomicU16, Ordering};
 
 /// Ids in a patch: with ids along a curve, a small piece of surface.
 const PATCH: usize = 256;
@@ -56,6 +58,15 @@ pub struct RelaxStats {
     pub moved: u64,
 }
 
+persist!(Relaxed {
+    store,
+    stats
+});
+persist!(RelaxStats {
+    rounds,
+    moved
+});
+
 /// Which patches move, and what was seen of them.
 struct Patches {
     active: Vec<bool>,
@@ -76,9 +87,12 @@ impl Patches {
         })
     }
 
-    fn note(&self, id: usize, rough: bool) {
-        self.seen[id / PATCH].fetch_add(1, Ordering::Relaxed);
-        self.rough[id / PATCH].fetch_add(u16::from(rough), Ordering::Relaxed);
+    /// Takes in what was seen of a tile.
+    fn add(&self, notes: &Notes) {
+        for (patch, &[seen, rough]) in (notes.first..).zip(&notes.counts) {
+            self.seen[patch].fetch_add(seen, Ordering::Relaxed);
+            self.rough[patch].fetch_add(rough, Ordering::Relaxed);
+        }
     }
 
     /// Patches stay active where enough was rough.
@@ -107,6 +121,37 @@ impl Patches {
     }
 }
 
+/// What was seen of the patches of a tile.
+struct Notes {
+    first: usize,
+    /// Points looked at or moved, and the rough ones of them, by patch.
+    counts: Vec<[u16; 2]>,
+    moved: u64,
+}
+
+persist!(Notes {
+    first,
+    counts,
+    moved
+});
+
+impl Notes {
+    fn of(ids: &Range<usize>) -> Self {
+        let patches = ids.end.div_ceil(PATCH) - ids.start / PATCH;
+        Self {
+            first: ids.start / PATCH,
+            counts: vec![[0; 2]; patches],
+            moved: 0,
+        }
+    }
+
+    fn note(&mut self, id: usize, rough: bool) {
+        let [seen, roughs] = &mut self.counts[id / PATCH - self.first];
+        *seen += 1;
+        *roughs += u16::from(rough);
+    }
+}
+
 /// At most `rounds` rounds of relaxing: points move to the planes of their `neighbors` nearest, in
 /// each round those of the patches that were rough in the round before.
 ///
@@ -129,13 +174,18 @@ pub fn relax(
         let sampled = |id: usize| (id / RUN).is_multiple_of(SAMPLE);
         workspace.part("sample", || {
             let bytes = |tile: usize| Tile::bytes(tiles.ids(tile).len()) + PageCache::bytes(store);
-            workspace.for_each_unit("relax: tile", tiles.count(), bytes, |tile| {
+            let work = |tile| {
                 let ids = tiles.ids(tile);
+                let mut notes = Notes::of(&ids);
                 let points = ids.len() as u64;
                 each_fit(store, ids, neighbors, sampled, |id, point, fit| {
-                    patches.note(id, target(point, &fit, neighbors).1);
+                    notes.note(id, target(point, &fit, neighbors).1);
                 })?;
                 workspace.observer.advance(points);
+                Ok(notes)
+            };
+            workspace.units("relax: tile", tiles.count(), bytes, work, |_, notes| {
+                patches.add(&notes);
                 Ok(())
             })
         })?;
@@ -152,13 +202,10 @@ pub fn relax(
             break;
         }
         let current = relaxed.store.as_ref().unwrap_or(store);
-        let count = AtomicU64::new(0);
-        let next = one_round(
-            current, tiles, neighbors, round, &patches, &count, workspace,
-        )?;
+        let (next, moved) = one_round(current, tiles, neighbors, round, &patches, workspace)?;
         relaxed.store = Some(next);
         relaxed.stats.rounds = round;
-        relaxed.stats.moved += count.into_inner();
+        relaxed.stats.moved += moved;
     }
     Ok(relaxed)
 }
@@ -169,33 +216,39 @@ fn one_round(
     neighbors: usize,
     round: u32,
     patches: &Patches,
-    count: &AtomicU64,
     workspace: &Workspace,
-) -> Result<PointStore> {
+) -> Result<(PointStore, u64)> {
     let part = Sections::<3>::create(workspace, &format!("relax{round}"), tiles.count())?;
     let bytes = |tile: usize| {
         let points = tiles.ids(tile).len();
         Tile::bytes(points) + PageCache::bytes(store) + points as u64 * 24
     };
-    workspace.for_each_unit("relax: tile", tiles.count(), bytes, |tile| {
+    let work = |tile| {
         let ids = tiles.ids(tile);
         let mut points = store.slice(ids.clone())?;
         let wanted = |id: usize| patches.active[id / PATCH];
-        let mut moved = 0;
+        let mut notes = Notes::of(&ids);
         if ids.clone().step_by(RUN).chain([ids.end - 1]).any(wanted) {
             each_fit(store, ids.clone(), neighbors, wanted, |id, point, fit| {
                 let (to, rough) = target(point, &fit, neighbors);
-                patches.note(id, rough);
+                notes.note(id, rough);
                 points[id - ids.start] = to;
-                moved += 1;
+                notes.moved += 1;
             })?;
         }
-        count.fetch_add(moved, Ordering::Relaxed);
         workspace.observer.advance(points.len() as u64);
-        part.put(tile, bytemuck::cast_slice(&points))
+        part.put(tile, bytemuck::cast_slice(&points))?;
+        Ok(notes)
+    };
+    let mut moved = 0;
+    workspace.units("relax: tile", tiles.count(), bytes, work, |_, notes| {
+        patches.add(&notes);
+        moved += notes.moved;
+        Ok(())
     })?;
     let name = format!("relaxed{round}");
-    StoreWriter::gather(workspace, &name, store.page_size(), &part)
+    let store = StoreWriter::gather(workspace, &name, store.page_size(), &part)?;
+    Ok((store, moved))
 }
 
 /// Where a point goes, and whether that is far.

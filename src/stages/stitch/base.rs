@@ -12,8 +12,7 @@ use crate::stages::surface::orient::{Around, Oriented, orient_inside};
 use crate::stages::surface::star::{Link, Star, Triangle, has, others};
 use crate::stages::triples::Triples;
 use crate::workspace::Workspace;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicU64, Ordering};
+use crate::workspace::persist::persist;
 
 const EXCHANGE_BUFFER: u64 = 8 << 20;
 
@@ -51,14 +50,11 @@ pub(super) fn base(
 ) -> Result<(Base, BaseStats)> {
     let count = blocks.count();
     let held = workspace.reserve("stitch: exchange", EXCHANGE_BUFFER)?;
+    let buffer = EXCHANGE_BUFFER;
     let look = Look {
         candidates: Sections::with_layout(workspace, "stitch.candidates", count, LABELLED)?,
         crossing: Sections::with_layout(workspace, "stitch.crossing", count, LABELLED)?,
-        flags: Exchange::new(workspace, "stitch.flags", EXCHANGE_BUFFER).packed(SENT),
-        flagged: AtomicU64::new(0),
-        flat: AtomicU64::new(0),
-        flat_candidates: AtomicU64::new(0),
-        spans: Mutex::new(vec![(0, 0); count]),
+        flags: Exchange::between(workspace, "stitch.flags", buffer, count, SENT)?,
         triples: &triples,
         places,
         weigh,
@@ -70,25 +66,28 @@ pub(super) fn base(
     };
     let around = |block| look.block(block);
     let name = "stitch.base";
+    let mut all = Found::default();
+    let mut spans = vec![(0, 0); count];
+    let each = |block: usize, found: Found| {
+        spans[block] = found.span;
+        all.flagged += found.flagged;
+        all.flat += found.flat;
+        all.flat_candidates += found.flat_candidates;
+    };
     let inside = workspace.part("base", || {
-        orient_inside(name, around, bytes, blocks, weigh, workspace)
+        orient_inside(name, around, each, bytes, blocks, weigh, workspace)
     })?;
     let start = std::time::Instant::now();
     let flags = look.flags.deliver_unique(workspace, count)?;
     let (candidates, crossing) = (look.candidates, look.crossing);
-    let spans = look
-        .spans
-        .into_inner()
-        .unwrap_or_else(std::sync::PoisonError::into_inner);
-    let flagged = look.flagged.into_inner() + flags.total();
-    let (flat, flat_candidates) = (look.flat.into_inner(), look.flat_candidates.into_inner());
+    let flagged = all.flagged + flags.total();
     let Triples { own, visiting } = triples;
     drop((own, held));
-    let surface = inside.join(name, &flags, blocks, workspace)?;
+    let surface = workspace.once("join", || inside.join(name, &flags, blocks, workspace))?;
     workspace.note_part("orient", start.elapsed().as_secs_f64());
     let stats = BaseStats {
         flagged,
-        on_a_line: flat,
+        on_a_line: all.flat,
         mobius: surface.mobius,
         triangles: surface.triangles,
     };
@@ -99,7 +98,7 @@ pub(super) fn base(
         visiting,
         flags,
         spans,
-        flat_candidates,
+        flat_candidates: all.flat_candidates,
     };
     Ok((base, stats))
 }
@@ -114,19 +113,33 @@ struct Look<'a> {
     candidates: Sections<4>,
     crossing: Sections<4>,
     flags: Exchange<4>,
-    /// Interior triangles that are flagged.
-    flagged: AtomicU64,
-    /// T3 triangles and interior candidates on a line.
-    flat: AtomicU64,
-    flat_candidates: AtomicU64,
-    spans: Mutex<Vec<(u32, u32)>>,
 }
+
+/// What the look at a block found.
+#[derive(Default)]
+struct Found {
+    /// Interior triangles that are flagged.
+    flagged: u64,
+    /// T3 triangles and interior candidates on a line.
+    flat: u64,
+    flat_candidates: u64,
+    /// The first and the last block that a triple of it touches.
+    span: (u32, u32),
+}
+
+persist!(Found {
+    flagged,
+    flat,
+    flat_candidates,
+    span
+});
 
 impl Look<'_> {
     /// The T3 triangles that touch a block and that no vertex of it flags, ascending.
-    fn block(&self, block: usize) -> Result<Around> {
-        let (mut triangles, mut candidates) = self.part(block)?;
-        self.drop_flat(block, &mut triangles, &mut candidates)?;
+    fn block(&self, block: usize) -> Result<Around<Found>> {
+        let mut found = Found::default();
+        let (mut triangles, mut candidates) = self.part(block, &mut found)?;
+        self.drop_flat(block, &mut triangles, &mut candidates, &mut found)?;
         let star = Star::of(self.blocks.ids(block), &triangles);
         let mut flagged = Vec::new();
         let mut refusing = Refusing::default();
@@ -134,10 +147,10 @@ impl Look<'_> {
             refusing.at(v, &star, &triangles, &mut flagged);
         }
         drop(star);
+        let mut sent = Vec::new();
         if !flagged.is_empty() {
             flagged.sort_unstable();
             flagged.dedup();
-            let mut sent = Vec::new();
             let interior = candidates.len();
             for &number in &flagged {
                 let t = triangles[number as usize];
@@ -147,10 +160,8 @@ impl Look<'_> {
                     candidates.push([t[0], t[1], t[2], 3]);
                 }
             }
-            let interior = (candidates.len() - interior) as u64;
-            self.flagged.fetch_add(interior, Ordering::Relaxed);
+            found.flagged = (candidates.len() - interior) as u64;
             candidates.sort_unstable();
-            self.flags.send(&sent)?;
             let (mut number, mut next) = (0, 0);
             triangles.retain(|_| {
                 let gone = flagged.get(next) == Some(&number);
@@ -159,6 +170,7 @@ impl Look<'_> {
                 !gone
             });
         }
+        self.flags.send_from(block, &sent)?;
         self.candidates.put(block, &candidates)?;
         let evidence = if self.weigh {
             Some(self.evidence(block, &triangles, &candidates)?)
@@ -168,6 +180,7 @@ impl Look<'_> {
         Ok(Around {
             triangles,
             evidence,
+            found,
         })
     }
 
@@ -191,6 +204,7 @@ impl Look<'_> {
         block: usize,
         triangles: &mut Vec<Triangle>,
         candidates: &mut Vec<[u32; 4]>,
+        found: &mut Found,
     ) -> Result<()> {
         if self.places.differ() {
             let vertices = triangles.iter().flatten().copied();
@@ -202,16 +216,19 @@ impl Look<'_> {
                 !flat
             });
             candidates.retain(|r| !on_a_line([r[0], r[1], r[2]].map(|v| file.at(v))));
-            self.flat.fetch_add(t3, Ordering::Relaxed);
-            let open = (open - candidates.len()) as u64;
-            self.flat_candidates.fetch_add(open, Ordering::Relaxed);
+            found.flat = t3;
+            found.flat_candidates = (open - candidates.len()) as u64;
         }
         Ok(())
     }
 
     /// The T3 triangles that touch a block, ascending, and its interior candidates so far. The
     /// crossing triples are put apart.
-    fn part(&self, block: usize) -> Result<(Vec<Triangle>, Vec<[u32; 4]>)> {
+    fn part(
+        &self,
+        block: usize,
+        found: &mut Found,
+    ) -> Result<(Vec<Triangle>, Vec<[u32; 4]>)> {
         let visiting = self.triples.visiting.get(block)?;
         let own = self.triples.own.get(block)?;
         let t3 = visiting.iter().filter(|r| r[4] == 3).count()
@@ -242,9 +259,7 @@ impl Look<'_> {
             }
         }
         self.crossing.put(block, &crossing)?;
-        self.spans
-            .lock()
-            .unwrap_or_else(std::sync::PoisonError::into_inner)[block] = span;
+        found.span = span;
         Ok((triangles, candidates))
     }
 }

@@ -25,6 +25,8 @@ pub struct Crossing {
     pub removed: Sections<4>,
 }
 
+crate::workspace::persist::persist!(Crossing { added, removed });
+
 /// The insertion of what crosses blocks, and of what inside them waits for it. It goes on as far as
 /// the blocks that it needs are done.
 pub struct Pass<'a> {

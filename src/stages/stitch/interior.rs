@@ -4,7 +4,7 @@
 use super::base::Base;
 use super::fans::Fans;
 use super::tests_of_paper::{Adjacent, Candidate, Refusal, View, examine};
-use super::{InsertStats, SharedStats};
+use super::InsertStats;
 use crate::error::Result;
 use crate::geom::Point;
 use crate::spill::layouts::{LABELLED, TRIANGLE};
@@ -100,7 +100,7 @@ pub fn block_bytes(base: &Base, block: usize) -> u64 {
     180 * records as u64 + (4 << 20)
 }
 
-/// Inserts the interior candidates of a block.
+/// Inserts the interior candidates of a block; what became of them.
 ///
 /// # Errors
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
@@ -111,8 +111,7 @@ pub fn insert(
     blocks: Blocks,
     block: usize,
     cos_max_angle: f64,
-    stats: &SharedStats,
-) -> Result<()> {
+) -> Result<InsertStats> {
     let mut work = BlockWork::load(places, base, blocks, block)?;
     let mut counts = InsertStats {
         on_a_line: work.flat,
@@ -120,8 +119,7 @@ pub fn insert(
     };
     let undecided = work.insert_all(cos_max_angle, &mut counts);
     work.write(out, block, &undecided, &mut counts)?;
-    stats.add(&counts);
-    Ok(())
+    Ok(counts)
 }
 
 /// For each vertex of a block: is it in a crossing triple?

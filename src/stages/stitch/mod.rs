@@ -17,6 +17,7 @@ use crate::stages::blocks::Blocks;
 use crate::stages::located::Places;
 use crate::stages::triples::Triples;
 use crate::workspace::Workspace;
+use crate::workspace::persist::persist;
 use base::Base;
 use crossing::Pass;
 use interior::Interior;
@@ -91,26 +92,40 @@ impl InsertStats {
     }
 }
 
-/// Counts that several blocks add to.
-#[derive(Debug, Default)]
-pub(crate) struct SharedStats(Mutex<InsertStats>);
-
-impl SharedStats {
-    fn add(&self, more: &InsertStats) {
-        let mut all = self
-            .0
-            .lock()
-            .unwrap_or_else(std::sync::PoisonError::into_inner);
-        all.accepted += more.accepted;
-        all.unconnected += more.unconnected;
-        all.full_edge += more.full_edge;
-        all.excess += more.excess;
-        all.angle += more.angle;
-        all.orientation += more.orientation;
-        all.on_a_line += more.on_a_line;
-        all.joints_removed += more.joints_removed;
+impl InsertStats {
+    fn add(&mut self, more: &InsertStats) {
+        self.accepted += more.accepted;
+        self.unconnected += more.unconnected;
+        self.full_edge += more.full_edge;
+        self.excess += more.excess;
+        self.angle += more.angle;
+        self.orientation += more.orientation;
+        self.on_a_line += more.on_a_line;
+        self.joints_removed += more.joints_removed;
     }
 }
+
+persist!(Stitched {
+    interior,
+    added,
+    removed
+});
+persist!(BaseStats {
+    flagged,
+    on_a_line,
+    mobius,
+    triangles
+});
+persist!(InsertStats {
+    accepted,
+    unconnected,
+    full_edge,
+    excess,
+    angle,
+    orientation,
+    on_a_line,
+    joints_removed
+});
 
 /// Extracts the manifold.
 ///
@@ -125,28 +140,26 @@ pub fn stitch(
     workspace: &Workspace,
 ) -> Result<(Stitched, BaseStats, InsertStats)> {
     let (base, counts) = base::base(places, triples, blocks, options.weigh, workspace)?;
-    let stats = SharedStats::default();
-    stats.add(&InsertStats {
-        on_a_line: base.flat_candidates,
-        ..InsertStats::default()
-    });
     let interior = Interior::create(workspace, blocks.count())?;
-    let mut pass = Pass::new(&base, &interior, blocks, options.cos_max_angle, workspace)?;
-    workspace.part("insert", || {
-        insert(
-            places, &mut pass, &base, &interior, blocks, &stats, workspace,
-        )
+    // The pass across blocks is short, and begins again when the run is resumed.
+    let (crossing, inserted) = workspace.once("insert", || {
+        let mut stats = InsertStats {
+            on_a_line: base.flat_candidates,
+            ..InsertStats::default()
+        };
+        let angle = options.cos_max_angle;
+        let mut pass = Pass::new(&base, &interior, blocks, angle, workspace)?;
+        let (pass_now, all) = (&mut pass, &mut stats);
+        workspace.part("insert", || {
+            insert(places, pass_now, &base, &interior, blocks, all, workspace)
+        })?;
+        workspace.part("cross", || {
+            pass.advance(|_| true, None)?;
+            let (crossing, more) = pass.finish()?;
+            stats.add(&more);
+            Ok((crossing, stats))
+        })
     })?;
-    let crossing = workspace.part("cross", || {
-        pass.advance(|_| true, None)?;
-        let (crossing, more) = pass.finish()?;
-        stats.add(&more);
-        Ok::<_, crate::Error>(crossing)
-    })?;
-    let inserted = stats
-        .0
-        .into_inner()
-        .unwrap_or_else(std::sync::PoisonError::into_inner);
     let stitched = Stitched {
         interior: interior.mesh,
         added: crossing.added,
@@ -163,7 +176,7 @@ fn insert(
     base: &Base,
     interior: &Interior,
     blocks: Blocks,
-    stats: &SharedStats,
+    stats: &mut InsertStats,
     workspace: &Workspace,
 ) -> Result<()> {
     let order = pass.order();
@@ -176,15 +189,21 @@ fn insert(
     let ready = |block: u32| done[block as usize].load(Ordering::Acquire);
     let angle = pass.cos_max_angle();
     let pass = Mutex::new(pass);
-    workspace.for_each_unit("stitch: block", order.len(), bytes, |unit| {
+    let work = |unit: usize| {
         let block = order[unit] as usize;
-        interior::insert(places, base, interior, blocks, block, angle, stats)?;
+        let counts = interior::insert(places, base, interior, blocks, block, angle)?;
         done[block].store(true, Ordering::Release);
         workspace.observer.advance(1);
         match pass.try_lock() {
-            Ok(mut pass) => pass.advance(ready, Some(spare)),
+            Ok(mut pass) => pass.advance(ready, Some(spare))?,
             // Someone else is at it.
-            Err(_) => Ok(()),
+            Err(_) => {}
         }
+        Ok(counts)
+    };
+    workspace.units("stitch: block", order.len(), bytes, work, |unit, counts| {
+        done[order[unit] as usize].store(true, Ordering::Release);
+        stats.add(&counts);
+        Ok(())
     })
 }

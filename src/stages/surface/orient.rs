@@ -6,12 +6,11 @@ use super::star::{EDGES, Edges, Triangle, opposed};
 use super::weigh::{vote, weigh_block};
 use crate::error::Result;
 use crate::spill::layouts::{LABELLED, SENT_LABELLED, TRIANGLE};
-use crate::spill::{Exchange, Sections};
+use crate::spill::{Exchange, Sections, Word};
 use crate::stages::blocks::Blocks;
 use crate::workspace::Workspace;
+use crate::workspace::persist::{Persist, Saved, persist};
 use rustc_hash::FxHashMap;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicU64, Ordering};
 
 const EXCHANGE_BUFFER: u64 = 8 << 20;
 
@@ -53,12 +52,14 @@ pub struct OrientedInside {
     triangles: u64,
 }
 
-/// The triangles around a block.
-pub struct Around {
+/// The triangles around a block, and what else was found there.
+pub struct Around<T> {
     /// All that touch the block, ascending.
     pub triangles: Vec<Triangle>,
     /// What speaks for their orientation; without, the order of triangles decides.
     pub evidence: Option<Evidence>,
+    /// What the caller wants to know of the block.
+    pub found: T,
 }
 
 /// Orients a surface: the interior triangles of every block by themselves, ascending; the crossing
@@ -66,14 +67,15 @@ pub struct Around {
 /// removed.
 ///
 /// `around(block)` gives all triangles that touch a block, ascending; `bytes(block)` what that
-/// takes in memory.
+/// takes in memory; `each` gets what else was found in each block.
 ///
 /// # Errors
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
 /// [`crate::Error::Cancelled`].
-pub fn orient_inside(
+pub fn orient_inside<T: Persist + Send>(
     name: &str,
-    around: impl Fn(usize) -> Result<Around> + Sync,
+    around: impl Fn(usize) -> Result<Around<T>> + Sync,
+    mut each: impl FnMut(usize, T) + Send,
     bytes: impl Fn(usize) -> u64 + Sync,
     blocks: Blocks,
     evidence: bool,
@@ -84,33 +86,41 @@ pub fn orient_inside(
     let interior = Sections::with_layout(workspace, &sections("interior"), count, LABELLED)?;
     let border = Sections::with_layout(workspace, &sections("border"), count, TRIANGLE)?;
     let _held = workspace.reserve("exchange", EXCHANGE_BUFFER)?;
-    let exchange = Exchange::<7>::new(workspace, &sections("relations"), EXCHANGE_BUFFER);
+    let letters = sections("relations");
+    let above = [Word::Above; 7];
+    let exchange = Exchange::between(workspace, &letters, EXCHANGE_BUFFER, count, above)?;
     let votes = evidence
         .then(|| Sections::create(workspace, &sections("votes"), count))
         .transpose()?;
-    let labels = Mutex::new(vec![(0u32, 0u32); count]);
-    let (mobius, triangles) = (AtomicU64::new(0), AtomicU64::new(0));
-    workspace.for_each_unit("block", count, &bytes, |block| {
+    let work = |block| {
         let around = around(block)?;
         let (inner, crossing): (Vec<Triangle>, Vec<Triangle>) =
             around.triangles.iter().partition(|t| !blocks.crossing(**t));
-        let done = orient_block(&inner, &crossing, around, blocks, block);
+        let Around {
+            evidence, found, ..
+        } = around;
+        let done = orient_block(&inner, &crossing, evidence, blocks, block);
         if let Some(votes) = &votes {
             votes.put(block, &done.votes)?;
         }
         interior.put(block, &done.interior)?;
-        exchange.send(&done.relations)?;
+        exchange.send_from(block, &done.relations)?;
         let mine = |t: &&Triangle| blocks.of(t[0]) == block as u32;
         border.put(
             block,
             &crossing.iter().filter(mine).copied().collect::<Vec<_>>(),
         )?;
-        labels
-            .lock()
-            .unwrap_or_else(std::sync::PoisonError::into_inner)[block] = (done.global, done.labels);
-        mobius.fetch_add(done.mobius, Ordering::Relaxed);
-        triangles.fetch_add(done.interior.len() as u64, Ordering::Relaxed);
         workspace.observer.advance(1);
+        let counts = (done.mobius, done.interior.len());
+        Ok(((done.global, done.labels), counts, found))
+    };
+    let mut labels = vec![(0u32, 0u32); count];
+    let (mut mobius, mut triangles) = (0, 0);
+    workspace.units("block", count, &bytes, work, |block, (own, more, found)| {
+        labels[block] = own;
+        mobius += more.0;
+        triangles += more.1 as u64;
+        each(block, found);
         Ok(())
     })?;
     Ok(OrientedInside {
@@ -118,12 +128,57 @@ pub fn orient_inside(
         relations: exchange.deliver(workspace, count)?,
         votes,
         crossing: border,
-        labels: labels
-            .into_inner()
-            .unwrap_or_else(std::sync::PoisonError::into_inner),
-        mobius: mobius.into_inner(),
-        triangles: triangles.into_inner(),
+        labels,
+        mobius,
+        triangles,
     })
+}
+
+persist!(OrientedInside {
+    interior,
+    relations,
+    votes,
+    crossing,
+    labels,
+    mobius,
+    triangles
+});
+
+impl Persist for Oriented {
+    fn save(&self, out: &mut Vec<u8>) {
+        self.interior.save(out);
+        self.crossing.save(out);
+        self.globals.save(out);
+        self.labels.save(out);
+        self.sets.save(out);
+        self.crosses.save(out);
+        (self.mobius, self.triangles).save(out);
+    }
+
+    fn load(from: &mut Saved<'_>) -> Result<Self> {
+        let (interior, crossing) = Persist::load(from)?;
+        let (globals, labels) = Persist::load(from)?;
+        let sets = ParitySets::load(from)?;
+        let crosses = Persist::load(from)?;
+        let (mobius, triangles) = Persist::load(from)?;
+        let bytes = label_bytes(sets.len());
+        Ok(Self {
+            interior,
+            crossing,
+            globals,
+            labels,
+            _held: from.workspace.reserve("labels", bytes)?,
+            sets,
+            crosses,
+            mobius,
+            triangles,
+        })
+    }
+}
+
+/// Bytes that so many global labels take.
+fn label_bytes(labels: usize) -> u64 {
+    labels as u64 * 16 + 1024
 }
 
 impl OrientedInside {
@@ -147,7 +202,7 @@ impl OrientedInside {
             globals.push((next, *global));
             next += global;
         }
-        let held = workspace.reserve("labels", u64::from(next) * 16 + 1024)?;
+        let held = workspace.reserve("labels", label_bytes(next as usize))?;
         let mut surface = Oriented {
             interior: self.interior,
             crossing: Sections::create(workspace, &format!("{name}.none"), 0)?,
@@ -228,14 +283,13 @@ impl Asks {
 fn orient_block(
     inner: &[Triangle],
     crossing: &[Triangle],
-    around: Around,
+    evidence: Option<Evidence>,
     blocks: Blocks,
     block: usize,
 ) -> OrientedBlock {
-    if let Some(evidence) = around.evidence {
+    if let Some(evidence) = evidence {
         return weigh_block(inner, crossing, &evidence, blocks, block);
     }
-    drop(around);
     let ids = blocks.ids(block);
     let mut edges = Edges::with_room(ids.clone(), inner);
     let mut sets = ParitySets::new(inner.len());

@@ -7,6 +7,8 @@ pub struct ParitySets {
     parent: Vec<u32>,
 }
 
+crate::workspace::persist::persist!(ParitySets { parent });
+
 impl ParitySets {
     /// `count` sets of one label each.
     #[must_use]

@@ -3,6 +3,7 @@
 use crate::geom::Point;
 use crate::geom::lattice::Lattice;
 use crate::spill::Record;
+use crate::workspace::persist::persist;
 
 /// Cubic cells of one side, with a corner at the zero point of the input's coordinates.
 ///
@@ -16,6 +17,12 @@ pub struct Grid {
     /// Along each axis the cell of the lattice's lowest coordinate.
     lowest: [f64; 3],
 }
+
+persist!(Grid {
+    lattice,
+    side,
+    lowest
+});
 
 impl Grid {
     /// Cells of side `length` over the lattice; `None` if they are so small that no two points can

@@ -18,6 +18,7 @@ use crate::spill::{Record, Sorted, Sorter};
 use crate::stages::ingest::{READ_BUFFERS, Spool};
 use crate::workspace::Workspace;
 use crate::workspace::memory::Reservation;
+use crate::workspace::persist::{Persist, Saved, persist};
 use serde::Serialize;
 
 /// Points handed on at a time.
@@ -58,7 +59,7 @@ pub fn thin(spool: Spool, lattice: &Lattice, grid: Grid, workspace: &Workspace) 
     // Growing a buffer holds the old and the new one for a moment.
     let held = workspace.reserve("thin: sort buffer", buffer + buffer / 2)?;
     let sorter = Sorter::new(workspace, "thin", buffer);
-    spool.par_for_each(threads, lattice, |points| {
+    let take = |points: &[Point]| {
         workspace.check_cancel()?;
         let mut records = Vec::with_capacity(CHUNK.min(points.len()));
         for part in points.chunks(CHUNK) {
@@ -68,6 +69,9 @@ pub fn thin(spool: Spool, lattice: &Lattice, grid: Grid, workspace: &Workspace) 
         }
         workspace.observer.advance(points.len() as u64);
         Ok(())
+    };
+    sorter.take_parts(workspace, &spool.frames(), true, |frames| {
+        spool.par_for_each(threads, lattice, frames, take)
     })?;
     drop(frames);
     drop(spool);
@@ -78,18 +82,48 @@ pub fn thin(spool: Spool, lattice: &Lattice, grid: Grid, workspace: &Workspace) 
     })
 }
 
+impl Persist for Thinned {
+    fn save(&self, out: &mut Vec<u8>) {
+        self.sorted.save(out);
+        self.grid.save(out);
+    }
+
+    fn load(from: &mut Saved<'_>) -> Result<Self> {
+        let sorted = Sorted::load(from)?;
+        let bytes = sorted.merge_bytes();
+        Ok(Self {
+            held: from.workspace.reserve("thin: merge", bytes)?,
+            grid: Grid::load(from)?,
+            sorted,
+        })
+    }
+}
+
+persist!(ThinStats {
+    dropped,
+    duplicates
+});
+
+/// Where the points that stay are handed on from: the first record of a cell.
+pub type Mark = Option<Record<6>>;
+
 impl Thinned {
-    /// Calls `each` with the points that stay, some at a time.
+    /// Calls `each` with the points that stay, some at a time, with where the next ones begin and with
+    /// the counts so far; from where an earlier call said, with the counts it said.
     ///
     /// # Errors
     /// What `each` returned; [`crate::Error::Io`], [`crate::Error::Corrupt`].
-    pub fn for_each(self, mut each: impl FnMut(&[Point]) -> Result<()>) -> Result<ThinStats> {
+    pub fn for_each(
+        self,
+        from: Mark,
+        mut stats: ThinStats,
+        each: &mut dyn FnMut(&[Point], Mark, ThinStats) -> Result<()>,
+    ) -> Result<ThinStats> {
         let Self { sorted, grid, held } = self;
-        let mut stats = ThinStats::default();
         let mut kept = Vec::with_capacity(BATCH);
         let mut best: Option<(Record<6>, f64)> = None;
         let mut last = None;
-        sorted.for_each(|record| {
+        sorted.for_each_from(from, |record| {
             if last == Some(record) {
                 stats.duplicates += 1;
                 return Ok(());
@@ -108,7 +142,7 @@ impl Thinned {
                     let done = best.replace((record, distance2));
                     kept.extend(done.map(|(record, _)| position(record)));
                     if kept.len() == BATCH {
-                        each(&kept)?;
+                        each(&kept, Some(record), stats)?;
                         kept.clear();
                     }
                 }
@@ -116,7 +150,7 @@ impl Thinned {
             Ok(())
         })?;
         kept.extend(best.map(|(record, _)| position(record)));
-        each(&kept)?;
+        each(&kept, None, stats)?;
         drop(held);
         Ok(stats)
     }

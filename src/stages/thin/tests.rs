@@ -41,7 +41,7 @@ fn thinned(grid: &Grid, points: &[Point], buffer: u64) -> (Vec<Point>, ThinStats
     };
     let mut kept = Vec::new();
     let stats = thinned
-        .for_each(|points| {
+        .for_each(None, ThinStats::default(), &mut |points, _, _| {
             kept.extend_from_slice(points);
             Ok(())
         })

@@ -6,8 +6,8 @@ use crate::spill::{Exchange, Sections};
 use crate::stages::blocks::Blocks;
 use crate::stages::cells::CellTriples;
 use crate::workspace::Workspace;
+use crate::workspace::persist::persist;
 use serde::Serialize;
-use std::sync::atomic::{AtomicU64, Ordering};
 
 const EXCHANGE_BUFFER: u64 = 16 << 20;
 
@@ -35,6 +35,18 @@ pub struct TripleStats {
     pub crossing: u64,
 }
 
+persist!(Triples {
+    own,
+    visiting
+});
+persist!(TripleStats {
+    triples,
+    t3,
+    t2,
+    t1,
+    crossing
+});
+
 /// Adds up the counts of all tiles.
 ///
 /// # Errors
@@ -47,15 +59,20 @@ pub fn triples(
 ) -> Result<(Triples, TripleStats)> {
     let own = Sections::with_layout(workspace, "triples.own", blocks.count(), LABELLED)?;
     let held = workspace.reserve("triples: exchange", EXCHANGE_BUFFER)?;
-    let exchange = Exchange::new(workspace, "triples.sent", EXCHANGE_BUFFER).packed(SENT_LABELLED);
-    let counts: [AtomicU64; 4] = Default::default();
+    let exchange = Exchange::between(
+        workspace,
+        "triples.sent",
+        EXCHANGE_BUFFER,
+        blocks.count(),
+        SENT_LABELLED,
+    )?;
     let bytes = |block: usize| {
         let tiles = cells.tiles.of_block(block);
         tiles
             .map(|t| 50 * (cells.own.records(t) + cells.received.records(t)) as u64)
             .sum()
     };
-    workspace.for_each_unit("triples: block", blocks.count(), bytes, |block| {
+    let work = |block| {
         let mut all = Vec::new();
         for tile in cells.tiles.of_block(block) {
             let (seen, received) = (cells.own.get(tile)?, cells.received.get(tile)?);
@@ -71,17 +88,19 @@ pub fn triples(
             }
             local[3] += u64::from(blocks.crossing([i, j, k]));
         }
-        for (total, more) in counts.iter().zip(local) {
-            total.fetch_add(more, Ordering::Relaxed);
-        }
         own.put(block, &all)?;
-        exchange.send(&sent)?;
+        exchange.send_from(block, &sent)?;
         workspace.observer.advance(all.len() as u64);
+        Ok(local)
+    };
+    let mut counts = [0u64; 4];
+    workspace.units("triples: block", blocks.count(), bytes, work, |_, more| {
+        counts.iter_mut().zip(more).for_each(|(n, more)| *n += more);
         Ok(())
     })?;
     let visiting = exchange.deliver(workspace, blocks.count())?;
     drop(held);
-    let [t1, t2, t3, crossing] = counts.map(AtomicU64::into_inner);
+    let [t1, t2, t3, crossing] = counts;
     Ok((
         Triples { own, visiting },
         TripleStats {

@@ -93,15 +93,13 @@ fn in_parallel(decoder: &Decoder<'_>, chunks: &[Chunk], writer: &SourceWriter<'_
         }
         sink.finish()
     };
-    writer
-        .workspace
-        .for_each_unit("LAZ chunks", chunks.len(), memory, work)
+    writer.units("LAZ chunks", chunks.len(), memory, work)
 }
 
 /// Decodes a file whose chunks can only be found by decoding what is before them.
 fn one_by_one(decoder: &Decoder<'_>, writer: &SourceWriter<'_>) -> Result<()> {
     let (input, header) = (decoder.input, decoder.header);
-    let (mut at, per_chunk) = match (decoder.laszip.layout, decoder.laszip.chunk_points) {
+    let (start, per_chunk) = match (decoder.laszip.layout, decoder.laszip.chunk_points) {
         (Layout::Stream, _) => (header.data, u64::MAX),
         (_, Some(points)) => (header.data + 8, points),
         (_, None) => {
@@ -113,17 +111,19 @@ fn one_by_one(decoder: &Decoder<'_>, writer: &SourceWriter<'_>) -> Result<()> {
         }
     };
     let memory = models(decoder.laszip) + sink_bytes::<i32>() + STREAM_BUFFER as u64;
-    let _held = writer.workspace.reserve("LAZ stream", memory)?;
-    let mut source = input.stream(at, input.bytes);
-    let mut sink = writer.sink::<i32>();
-    let mut left = header.claimed;
-    while left > 0 {
-        let points = left.min(per_chunk);
-        source = decoder.stream(source, at, points, &mut sink)?;
-        at = source.get_ref().position() - source.buffer().len() as u64;
-        left -= points;
-    }
-    sink.finish()
+    writer.whole("LAZ stream", memory, || {
+        let mut at = start;
+        let mut source = input.stream(at, input.bytes);
+        let mut sink = writer.sink::<i32>();
+        let mut left = header.claimed;
+        while left > 0 {
+            let points = left.min(per_chunk);
+            source = decoder.stream(source, at, points, &mut sink)?;
+            at = source.get_ref().position() - source.buffer().len() as u64;
+            left -= points;
+        }
+        sink.finish()
+    })
 }
 
 /// Makes the chunks hold as many points as the header claims.

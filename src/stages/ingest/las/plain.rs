@@ -20,7 +20,7 @@ pub(super) fn read(
     let units = usize::try_from(points.div_ceil(rows)).unwrap_or(usize::MAX);
     let record = Record::of(header, writer.classes);
     let memory = rows * record_bytes + sink_bytes::<i32>();
-    writer.workspace.for_each_unit(
+    writer.units(
         "LAS records",
         units,
         |_| memory,

@@ -2,6 +2,7 @@
 
 use super::super::input::{Input, Range, STREAM_BUFFER};
 use super::super::spool::{SourceWriter, sink_bytes};
+use super::super::stats::SourceStats;
 use super::super::text::number;
 use super::FromScalar;
 use super::header::{Header, Property, Vertex};
@@ -20,7 +21,15 @@ pub(super) fn read<T: FromScalar>(
         return Ok(());
     };
     let memory = sink_bytes::<T>() + (STREAM_BUFFER + LONGEST_LINE) as u64;
-    let _held = writer.workspace.reserve("PLY lines", memory)?;
+    writer.whole("PLY lines", memory, || vertices::<T>(input, header, vertex, writer))
+}
+
+fn vertices<T: FromScalar>(
+    input: &Input,
+    header: &Header,
+    vertex: &Vertex,
+    writer: &SourceWriter<'_>,
+) -> Result<SourceStats> {
     let mut lines = Lines {
         input,
         source: input.stream(header.data, input.bytes),

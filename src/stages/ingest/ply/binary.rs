@@ -127,9 +127,7 @@ fn fixed<T: FromScalar>(
         }
         sink.finish()
     };
-    writer
-        .workspace
-        .for_each_unit("PLY vertices", units, |_| memory, work)
+    writer.units("PLY vertices", units, |_| memory, work)
 }
 
 fn one_by_one<T: FromScalar>(
@@ -140,16 +138,17 @@ fn one_by_one<T: FromScalar>(
     writer: &SourceWriter<'_>,
 ) -> Result<()> {
     let memory = sink_bytes::<T>() + STREAM_BUFFER as u64;
-    let _held = writer.workspace.reserve("PLY vertices", memory)?;
-    let mut records = Records::new(input, body, start);
-    let mut sink = writer.sink::<T>();
-    for number in 0..vertex.count {
-        let point = records
-            .point(vertex)
-            .map_err(|e| records.error("vertex", number, vertex.count, e))?;
-        sink.push(point)?;
-    }
-    sink.finish()
+    writer.whole("PLY vertices", memory, || {
+        let mut records = Records::new(input, body, start);
+        let mut sink = writer.sink::<T>();
+        for number in 0..vertex.count {
+            let point = records
+                .point(vertex)
+                .map_err(|e| records.error("vertex", number, vertex.count, e))?;
+            sink.push(point)?;
+        }
+        sink.finish()
+    })
 }
 
 /// Reads records with lists, one after the other.

@@ -18,7 +18,7 @@ pub(super) fn read(
 ) -> Result<Vec<String>> {
     let slabs = input.bytes.saturating_sub(dialect.start).div_ceil(SLAB);
     let memory = SLAB + LONGEST_LINE + sink_bytes::<f64>();
-    writer.workspace.for_each_unit(
+    writer.units(
         "text lines",
         usize::try_from(slabs).unwrap_or(usize::MAX),
         |_| memory,

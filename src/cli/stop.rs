@@ -1,0 +1,95 @@
+//! Stopping: signals, time limits, and what the user is told then.
+
+use crate::pipeline::Reconstruction;
+use crate::workspace::progress::Cancel;
+use crate::workspace::fault;
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use signal_hook::iterator::Signals;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicI32, Ordering};
+use std::time::Duration;
+
+/// Exit code of a run whose time is up.
+pub const TIME_IS_UP: u8 = 75;
+
+/// What a run that was asked to stop has to do so by itself. What it has finished is on disk, so it can
+/// be ended at any time after that.
+const PATIENCE: Duration = Duration::from_millis(1500);
+
+/// How often it is looked whether the run was asked to stop.
+const LOOK: Duration = Duration::from_millis(50);
+
+/// The signal that stops the program; 0 if none did.
+static SIGNAL: AtomicI32 = AtomicI32::new(0);
+
+/// The scratch folder of the run, which may be there when it is stopped.
+static FOLDER: Mutex<Option<std::path::PathBuf>> = Mutex::new(None);
+
+/// Exit code of a run that was stopped.
+pub fn code(expired: bool) -> u8 {
+    match SIGNAL.load(Ordering::Relaxed) {
+        0 if expired => TIME_IS_UP,
+        0 => 130,
+        signal => 128 + signal as u8,
+    }
+}
+
+/// A flag that signals raise; a second one ends the program at once.
+pub fn on_signal() -> Cancel {
+    let cancel = Cancel::new();
+    let raised = cancel.clone();
+    // Without a handler a signal ends the program, from which a run resumes as well.
+    if let Ok(mut signals) = Signals::new([SIGINT, SIGTERM, SIGHUP]) {
+        std::thread::spawn(move || {
+            for signal in signals.forever() {
+                if raised.is_cancelled() {
+                    std::process::exit(128 + signal);
+                }
+                SIGNAL.store(signal, Ordering::Relaxed);
+                raised.cancel();
+            }
+        });
+    }
+    cancel
+}
+
+/// Ends the program if the run does not stop soon once its flag is raised.
+pub fn watch(run: &Reconstruction, cancel: &Cancel) {
+    if let Ok(mut folder) = FOLDER.lock() {
+        *folder = Some(run.scratch_folder().to_path_buf());
+    }
+    let cancel = cancel.clone();
+    std::thread::spawn(move || {
+        while !cancel.is_cancelled() {
+            std::thread::sleep(LOOK);
+        }
+        std::thread::sleep(PATIENCE);
+        if let Err(error) = cancel.check() {
+            eprintln!("outcrop: {error}{}", hint());
+        }
+        fault::finish();
+        std::process::exit(code(cancel.is_expired()).into());
+    });
+}
+
+/// How to go on with the run, if that is possible.
+pub fn hint() -> String {
+    let folder = FOLDER.lock().ok().and_then(|folder| folder.clone());
+    match folder {
+        Some(folder) if crate::workspace::Folder::has_progress(&folder) => {
+            format!("; go on with: outcrop resume {}", quoted(&folder))
+        }
+        _ => String::new(),
+    }
+}
+
+/// A path as a shell takes it.
+fn quoted(path: &std::path::Path) -> String {
+    let text = path.display().to_string();
+    let plain = |c: char| c.is_alphanumeric() || "/._-+,@%".contains(c);
+    if text.chars().all(plain) {
+        text
+    } else {
+        format!("'{}'", text.replace('\'', "'\\''"))
+    }
+}

@@ -1,0 +1,143 @@
+//! One attempt at a run: where it begins, when its time is up, what it leaves behind.
+
+use super::manifest::{Asked, Manifest};
+use super::{Reconstruction, builder};
+use crate::error::{Error, Result};
+use crate::stages::export;
+use crate::workspace::progress::Cancel;
+use crate::workspace::{Folder, Found, Workspace, fault};
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::time::Duration;
+
+/// What to do about an unfinished run in the scratch folder.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Start {
+    /// Refuse to begin another one.
+    #[default]
+    New,
+    /// Go on with it; begin if there is none.
+    Resume,
+    /// Throw it away and begin.
+    Restart,
+}
+
+/// The scratch folder of a run with this output: beside it, or in another folder.
+pub(super) fn scratch_folder(output: &Path, parent: Option<&Path>) -> PathBuf {
+    let mut name = output.file_name().unwrap_or_default().to_os_string();
+    let beside = export::folder_of(output);
+    let Some(parent) = parent.filter(|parent| *parent != beside) else {
+        name.push(".outcrop-scratch");
+        return beside.join(name);
+    };
+    // Runs with outputs of one name in several folders may share a folder for scratch.
+    let whole = std::path::absolute(output).unwrap_or_else(|_| output.to_path_buf());
+    let bytes = std::os::unix::ffi::OsStrExt::as_bytes(whole.as_os_str());
+    name.push(format!("-{:08x}.outcrop-scratch", crc32fast::hash(bytes)));
+    parent.join(name)
+}
+
+/// Raises a flag when the time is up, unless it is dropped before.
+#[derive(Debug)]
+pub(super) struct Alarm(#[expect(dead_code, reason = "dropping it is the message")] Sender<()>);
+
+/// The time a run needs to stop, and a bit more.
+fn margin(limit: Duration) -> Duration {
+    Duration::from_secs(5).min(limit / 10)
+}
+
+impl Alarm {
+    pub fn set(limit: Duration, cancel: Cancel) -> Self {
+        let (sender, receiver) = channel();
+        let wait = limit.saturating_sub(margin(limit));
+        std::thread::spawn(move || {
+            if receiver.recv_timeout(wait) == Err(RecvTimeoutError::Timeout) {
+                cancel.expire();
+            }
+        });
+        Self(sender)
+    }
+}
+
+/// The run that was left unfinished in a scratch folder.
+///
+/// # Errors
+/// [`Error::NotResumable`], [`Error::Locked`], [`Error::Io`].
+pub(super) fn unfinished(folder: &Path) -> Result<builder::Builder> {
+    let not = |why: &str| Error::NotResumable {
+        path: folder.to_path_buf(),
+        why: why.to_owned(),
+    };
+    let found = match Folder::find(folder)? {
+        Found::Run(found) => found,
+        Found::Nothing => return Err(not("no unfinished run is here")),
+        Found::Damaged(_) => {
+            return Err(not(
+                "its manifest is damaged; run `outcrop reconstruct` again, with --restart",
+            ));
+        }
+    };
+    let manifest = Manifest::from_bytes(folder, &found.manifest)?;
+    Ok(builder::Builder::of(&manifest, folder))
+}
+
+impl Reconstruction {
+    /// The folder that holds all scratch of this run, and from which it can be resumed.
+    #[must_use]
+    pub fn scratch_folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// True if the run is not finished and can go on from where it was.
+    #[must_use]
+    pub fn is_unfinished(&self) -> bool {
+        Folder::has_progress(&self.folder)
+    }
+
+    pub(super) fn open(&self) -> Result<Workspace> {
+        let manifest = Manifest::of(&Asked {
+            inputs: &self.inputs,
+            output: &self.output,
+            params: &self.params,
+            tile_points: self.tile_points,
+            page_points: self.page_points,
+        })?;
+        let bytes = manifest.to_bytes()?;
+        let found = Folder::find(&self.folder)?;
+        let mut folder = match (found, self.start) {
+            (Found::Nothing, _) => Folder::create(&self.folder, bytes)?,
+            (Found::Run(folder), Start::Resume) => {
+                let was = Manifest::from_bytes(&self.folder, &folder.manifest)?;
+                was.check(&manifest, &self.folder)?;
+                folder
+            }
+            (Found::Run(_) | Found::Damaged(_), Start::New) if self.is_unfinished() => {
+                return Err(Error::Unfinished {
+                    path: self.folder.clone(),
+                });
+            }
+            (Found::Run(folder) | Found::Damaged(folder), _) => folder.restart(bytes)?,
+        };
+        folder.mesh = [export::temporary(&self.output), self.output.clone()];
+        Workspace::resumable(
+            folder,
+            self.memory.clone(),
+            self.threads,
+            self.observer.clone(),
+            self.cancel.clone(),
+        )
+    }
+
+    /// Removes all scratch, unless the run can go on from there.
+    pub(super) fn close<T>(&self, workspace: Workspace, outcome: &Result<T>) {
+        let keep = outcome.as_ref().is_err_and(Error::can_resume) && self.is_unfinished();
+        if !keep {
+            // What cannot be deleted is in nobody's way.
+            let _ = std::fs::remove_dir_all(&self.folder);
+            let _ = std::fs::remove_file(export::temporary(&self.output));
+        }
+        // With the lock, which has to outlive the files.
+        drop(workspace);
+        fault::finish();
+    }
+}

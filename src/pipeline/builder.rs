@@ -1,0 +1,170 @@
+//! What a reconstruction is to do, and the checks before it begins.
+
+use super::attempt::{self, Start};
+use super::manifest::Manifest;
+use super::{Reconstruction, default_memory, default_threads};
+use crate::error::{Error, Result};
+use crate::params::Params;
+use crate::stages::order::PAGE;
+use crate::workspace::memory::MemoryPool;
+use crate::workspace::progress::{Cancel, Observer, Silent};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration;
+
+/// Collects what a [`Reconstruction`] needs; everything but inputs and output has a default.
+#[derive(Default)]
+pub struct Builder {
+    inputs: Vec<PathBuf>,
+    output: PathBuf,
+    scratch: Option<PathBuf>,
+    params: Params,
+    memory: Option<u64>,
+    threads: Option<usize>,
+    tile_points: Option<u32>,
+    page_points: Option<usize>,
+    observer: Option<Arc<dyn Observer>>,
+    cancel: Cancel,
+    start: Start,
+    /// The scratch folder itself, if it is known.
+    folder: Option<PathBuf>,
+    time_limit: Option<Duration>,
+}
+
+impl Builder {
+    /// Adds a file or folder of points; together they are one cloud.
+    #[must_use]
+    pub fn input(mut self, path: impl Into<PathBuf>) -> Self {
+        self.inputs.push(path.into());
+        self
+    }
+
+    /// Where the mesh goes (binary PLY).
+    #[must_use]
+    pub fn output(mut self, path: impl Into<PathBuf>) -> Self {
+        self.output = path.into();
+        self
+    }
+
+    /// Folder for scratch files; default: beside the output.
+    #[must_use]
+    pub fn scratch(mut self, path: impl Into<PathBuf>) -> Self {
+        self.scratch = Some(path.into());
+        self
+    }
+
+    /// Geometric parameters.
+    #[must_use]
+    pub fn params(mut self, params: Params) -> Self {
+        self.params = params;
+        self
+    }
+
+    /// Memory budget in bytes; default: half of what machine and cgroup allow.
+    #[must_use]
+    pub fn memory(mut self, bytes: u64) -> Self {
+        self.memory = Some(bytes);
+        self
+    }
+
+    /// Worker threads; default: all available.
+    #[must_use]
+    pub fn threads(mut self, threads: usize) -> Self {
+        self.threads = Some(threads);
+        self
+    }
+
+    /// Points per tile; does not change the result.
+    #[must_use]
+    pub fn tile_points(mut self, points: u32) -> Self {
+        self.tile_points = Some(points);
+        self
+    }
+
+    /// Points per page of the ordered store; does not change the result.
+    #[must_use]
+    pub fn page_points(mut self, points: usize) -> Self {
+        self.page_points = Some(points);
+        self
+    }
+
+    /// Who is told of progress.
+    #[must_use]
+    pub fn observer(mut self, observer: Arc<dyn Observer>) -> Self {
+        self.observer = Some(observer);
+        self
+    }
+
+    /// The flag that stops the run.
+    #[must_use]
+    pub fn cancel(mut self, cancel: Cancel) -> Self {
+        self.cancel = cancel;
+        self
+    }
+
+    /// What to do about an unfinished run with the same output and scratch folder; default: refuse to
+    /// begin another one.
+    #[must_use]
+    pub fn start(mut self, start: Start) -> Self {
+        self.start = start;
+        self
+    }
+
+    /// Stop by itself before this time is over; the run can be resumed then.
+    #[must_use]
+    pub fn time_limit(mut self, limit: Duration) -> Self {
+        self.time_limit = Some(limit);
+        self
+    }
+
+    /// The run that is described in a scratch folder, to go on with it.
+    pub(super) fn of(manifest: &Manifest, folder: &Path) -> Self {
+        Self {
+            inputs: manifest.inputs().collect(),
+            output: manifest.output(),
+            params: manifest.params(),
+            tile_points: Some(manifest.tile_points()),
+            page_points: Some(manifest.page_points()),
+            start: Start::Resume,
+            folder: Some(folder.to_path_buf()),
+            ..Self::default()
+        }
+    }
+
+    /// Checks everything that can be checked before work starts.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`], [`Error::Memory`].
+    pub fn build(self) -> Result<Reconstruction> {
+        self.params.check()?;
+        let missing = |name, expected: &str| {
+            Err(Error::Parameter {
+                name,
+                found: "nothing".into(),
+                expected: expected.into(),
+            })
+        };
+        if self.inputs.is_empty() {
+            return missing("INPUT", "at least one file or folder");
+        }
+        if self.output.as_os_str().is_empty() {
+            return missing("--output", "the path of the mesh");
+        }
+        let budget = self.memory.unwrap_or_else(default_memory);
+        let folder = || attempt::scratch_folder(&self.output, self.scratch.as_deref());
+        Ok(Reconstruction {
+            folder: self.folder.clone().unwrap_or_else(folder),
+            inputs: self.inputs,
+            output: self.output,
+            memory: MemoryPool::new(budget)?,
+            threads: self.threads.unwrap_or_else(default_threads),
+            tile_points: self.tile_points.unwrap_or(self.params.block),
+            page_points: self.page_points.unwrap_or(PAGE),
+            params: self.params,
+            observer: self.observer.unwrap_or_else(|| Arc::new(Silent)),
+            cancel: self.cancel,
+            start: self.start,
+            time_limit: self.time_limit,
+        })
+    }
+}

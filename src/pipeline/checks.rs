@@ -1,0 +1,97 @@
+//! What is checked between the stages.
+
+use crate::error::{Error, Result};
+use crate::geom::lattice::Lattice;
+use crate::params::Radius;
+use crate::stages::cells::{CellStats, DiskRadius};
+use crate::stages::ingest;
+use crate::stages::order::PointStore;
+use crate::workspace::{Workspace, limits};
+use std::path::{Path, PathBuf};
+
+/// Disks larger than this, in steps, see all of any cloud.
+const LARGEST_RADIUS: f64 = (1u64 << 34) as f64;
+
+/// The radius in lattice steps.
+pub(crate) fn disk_radius(radius: Radius, store: &PointStore, lattice: &Lattice) -> DiskRadius {
+    match radius {
+        Radius::Auto => DiskRadius::Auto,
+        Radius::Length(length) => DiskRadius::Steps((length / lattice.step).min(LARGEST_RADIUS)),
+        Radius::Percent(percent) => {
+            let bounds = store.bounds();
+            let diagonal = (crate::geom::distance2(bounds.min, bounds.max) as f64).sqrt();
+            DiskRadius::Steps((percent / 100.0 * diagonal).min(LARGEST_RADIUS))
+        }
+    }
+}
+
+/// Finds out before any work whether the output's folder takes files.
+pub(super) fn writable(output: &Path) -> Result<()> {
+    let folder = output
+        .parent()
+        .filter(|p| !p.as_os_str().is_empty())
+        .unwrap_or(Path::new("."));
+    if output.is_dir() {
+        let error = std::io::Error::from(std::io::ErrorKind::IsADirectory);
+        return Err(Error::io(output, "write the mesh", error));
+    }
+    tempfile::tempfile_in(folder)
+        .map(drop)
+        .map_err(|e| Error::io(output, "write the mesh into this folder", e))
+}
+
+/// Scratch bytes a point at the peak, about, after the points were read; measured on real scans.
+pub(crate) const SCRATCH_PER_POINT: u64 = 50;
+
+/// Refuses before the long stages what the scratch folder has no room for: `needed` bytes, some of which
+/// may be taken already.
+pub(super) fn room(scratch: &Path, needed: u64, workspace: &Workspace) -> Result<()> {
+    workspace.expect_scratch(needed);
+    let needed = workspace.more_scratch();
+    match limits::disk_free(scratch) {
+        Some(free) if free < needed => Err(Error::Disk {
+            path: scratch.to_path_buf(),
+            needed,
+            free,
+        }),
+        _ => Ok(()),
+    }
+}
+
+/// Refuses to replace a file that the cloud is read from.
+pub(super) fn not_an_input(output: &Path, inputs: &[PathBuf]) -> Result<()> {
+    let Ok(output) = output.canonicalize() else {
+        return Ok(());
+    };
+    for input in ingest::expand(inputs)? {
+        if input.canonicalize().is_ok_and(|input| input == output) {
+            return Err(Error::Parameter {
+                name: "--output",
+                found: format!("{} (an input)", output.display()),
+                expected: "another file".into(),
+            });
+        }
+    }
+    Ok(())
+}
+
+pub(super) fn enough(store: &PointStore) -> Result<()> {
+    if store.len() >= 3 {
+        return Ok(());
+    }
+    let found = match store.len() {
+        0 => "no points".to_owned(),
+        1 => "one distinct point".to_owned(),
+        n => format!("{n} distinct points"),
+    };
+    Err(Error::Degenerate { found })
+}
+
+pub(super) fn not_a_line(stats: &CellStats, points: u64) -> Result<()> {
+    if stats.no_plane < points {
+        return Ok(());
+    }
+    Err(Error::Degenerate {
+        found: format!("{points} distinct points, all on one line"),
+    })
+}

@@ -1,0 +1,82 @@
+//! Stages as steps of a run, and the time they take.
+
+use crate::error::Result;
+use crate::report::{PartReport, StageReport};
+use crate::workspace::Workspace;
+use crate::workspace::persist::{Persist, persist};
+use std::time::Instant;
+
+/// Runs stages and notes what each takes.
+pub(crate) struct Clock<'a> {
+    workspace: &'a Workspace,
+    /// What each stage took, those of earlier attempts too.
+    pub stages: Vec<StageReport>,
+    /// Seconds that stages took which an earlier attempt had finished.
+    pub earlier: f64,
+}
+
+/// What a stage took.
+struct Took {
+    seconds: f64,
+    read: u64,
+    written: u64,
+    parts: Vec<(String, f64)>,
+}
+
+persist!(Took {
+    seconds,
+    read,
+    written,
+    parts
+});
+
+impl<'a> Clock<'a> {
+    pub(crate) fn new(workspace: &'a Workspace) -> Self {
+        Self {
+            workspace,
+            stages: Vec::new(),
+            earlier: 0.0,
+        }
+    }
+
+    pub(crate) fn stage<T: Persist>(
+        &mut self,
+        name: &'static str,
+        unit: &'static str,
+        total: u64,
+        work: impl FnOnce() -> Result<T>,
+    ) -> Result<T> {
+        let workspace = self.workspace;
+        let mut now = false;
+        let (value, took) = workspace.once(name, || {
+            now = true;
+            let io = &workspace.io;
+            let (start, read, written) = (Instant::now(), io.read(), io.written());
+            workspace.observer.begin(name, unit, total);
+            let outcome = work();
+            workspace.observer.end();
+            let parts = workspace.take_parts().into_iter();
+            let took = Took {
+                seconds: start.elapsed().as_secs_f64(),
+                read: io.read() - read,
+                written: io.written() - written,
+                parts: parts.map(|(name, s)| (name.to_owned(), s)).collect(),
+            };
+            Ok((outcome?, took))
+        })?;
+        if !now {
+            self.earlier += took.seconds;
+        }
+        let parts = took.parts.into_iter();
+        self.stages.push(StageReport {
+            name,
+            seconds: took.seconds,
+            bytes_read: took.read,
+            bytes_written: took.written,
+            parts: parts
+                .map(|(name, seconds)| PartReport { name, seconds })
+                .collect(),
+        });
+        Ok(value)
+    }
+}

@@ -1,0 +1,230 @@
+//! What a run is: its parameters, its output, the identity of every input. Bound to the scratch folder,
+//! so that nobody goes on with something else.
+
+use crate::error::{Error, Result};
+use crate::params::Params;
+use crate::stages::ingest;
+use serde::{Deserialize, Serialize};
+use std::ffi::OsString;
+use std::fs::File;
+use std::os::unix::ffi::{OsStrExt, OsStringExt};
+use std::os::unix::fs::{FileExt, MetadataExt};
+use std::path::{Path, PathBuf};
+
+/// The format of scratch folders that this program writes and reads.
+const FORMAT: u32 = 1;
+
+/// Bytes of an input that are looked at in one place.
+const SAMPLE: u64 = 64 << 10;
+
+/// A path, in text if it is one.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+enum Name {
+    Text(String),
+    Bytes(Vec<u8>),
+}
+
+impl Name {
+    /// The path from the root.
+    fn of(path: &Path) -> Result<Self> {
+        let path = std::path::absolute(path).map_err(|e| Error::io(path, "find", e))?;
+        Ok(match path.as_os_str().to_str() {
+            Some(text) => Self::Text(text.to_owned()),
+            None => Self::Bytes(path.as_os_str().as_bytes().to_vec()),
+        })
+    }
+
+    fn path(&self) -> PathBuf {
+        match self {
+            Self::Text(text) => text.into(),
+            Self::Bytes(bytes) => OsString::from_vec(bytes.clone()).into(),
+        }
+    }
+}
+
+/// The identity of an input file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct Identity {
+    path: Name,
+    bytes: u64,
+    /// Seconds and nanoseconds of its last change.
+    modified: (i64, i64),
+    /// CRC-32 of its beginning, its end and two places between.
+    sample: u32,
+}
+
+impl Identity {
+    fn of(path: &Path) -> Result<Self> {
+        let io = |action: &'static str| move |e| Error::io(path, action, e);
+        let file = File::open(path).map_err(io("open"))?;
+        let meta = file.metadata().map_err(io("read the size of"))?;
+        let mut crc = crc32fast::Hasher::new();
+        // A pipe or a device has no places; it is refused later, with a better word.
+        if meta.is_file() {
+            let last = meta.len().saturating_sub(SAMPLE);
+            let mut buffer = vec![0; SAMPLE.min(meta.len()) as usize];
+            for at in [0, last / 3, last / 3 * 2, last] {
+                file.read_exact_at(&mut buffer, at).map_err(io("read"))?;
+                crc.update(&buffer);
+            }
+        }
+        Ok(Self {
+            path: Name::of(path)?,
+            bytes: meta.len(),
+            modified: (meta.mtime(), meta.mtime_nsec()),
+            sample: crc.finalize(),
+        })
+    }
+}
+
+/// A run as it was asked for.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(super) struct Manifest {
+    format: u32,
+    version: String,
+    output: Name,
+    params: Params,
+    block: u32,
+    tile_points: u32,
+    page_points: usize,
+    /// As they were given.
+    inputs: Vec<Name>,
+    files: Vec<Identity>,
+}
+
+/// What a run is made of.
+#[derive(Debug)]
+pub(super) struct Asked<'a> {
+    pub inputs: &'a [PathBuf],
+    pub output: &'a Path,
+    pub params: &'a Params,
+    pub tile_points: u32,
+    pub page_points: usize,
+}
+
+impl Manifest {
+    /// Looks at every input.
+    pub fn of(asked: &Asked<'_>) -> Result<Self> {
+        let files = ingest::expand(asked.inputs)?;
+        Ok(Self {
+            format: FORMAT,
+            version: env!("CARGO_PKG_VERSION").into(),
+            output: Name::of(asked.output)?,
+            params: asked.params.clone(),
+            block: asked.params.block,
+            tile_points: asked.tile_points,
+            page_points: asked.page_points,
+            inputs: asked.inputs.iter().map(|p| Name::of(p)).collect::<Result<_>>()?,
+            files: files.iter().map(|p| Identity::of(p)).collect::<Result<_>>()?,
+        })
+    }
+
+    pub fn to_bytes(&self) -> Result<Vec<u8>> {
+        serde_json::to_vec_pretty(self)
+            .map_err(|e| Error::io(self.output.path(), "write the manifest", e.into()))
+    }
+
+    pub fn from_bytes(folder: &Path, bytes: &[u8]) -> Result<Self> {
+        let not = |why: String| Error::NotResumable {
+            path: folder.to_path_buf(),
+            why,
+        };
+        let value: serde_json::Value = serde_json::from_slice(bytes)
+            .map_err(|e| not(format!("its manifest cannot be read: {e}")))?;
+        if value["format"] != FORMAT {
+            return Err(not(format!(
+                "its format is {}, this program writes and reads {FORMAT}",
+                value["format"]
+            )));
+        }
+        serde_json::from_value(value)
+            .map_err(|e| not(format!("its manifest cannot be read: {e}")))
+    }
+
+    pub fn output(&self) -> PathBuf {
+        self.output.path()
+    }
+
+    pub fn inputs(&self) -> impl Iterator<Item = PathBuf> {
+        self.inputs.iter().map(Name::path)
+    }
+
+    pub fn params(&self) -> Params {
+        Params {
+            block: self.block,
+            ..self.params.clone()
+        }
+    }
+
+    pub fn tile_points(&self) -> u32 {
+        self.tile_points
+    }
+
+    pub fn page_points(&self) -> usize {
+        self.page_points
+    }
+
+    /// # Errors
+    /// [`Error::Mismatch`] with the first thing in which `now` is another run.
+    pub fn check(&self, now: &Self, folder: &Path) -> Result<()> {
+        let differ = |what: String, was: String, now: String| {
+            Err(Error::Mismatch {
+                path: folder.to_path_buf(),
+                what,
+                was,
+                now,
+            })
+        };
+        let (was_json, now_json) = (self.json(), now.json());
+        for key in ["version", "output", "block", "tile_points", "page_points"] {
+            if was_json[key] != now_json[key] {
+                let what = format!("the {}", key.replace('_', " "));
+                return differ(what, was_json[key].to_string(), now_json[key].to_string());
+            }
+        }
+        if let (Some(was), Some(now)) = (
+            was_json["params"].as_object(),
+            now_json["params"].as_object(),
+        ) {
+            for (key, value) in was {
+                if now.get(key) != Some(value) {
+                    let what = format!("the parameter {key}");
+                    let now = now.get(key).map_or("none".into(), ToString::to_string);
+                    return differ(what, value.to_string(), now);
+                }
+            }
+        }
+        for (was, now) in self.files.iter().zip(&now.files) {
+            if was.path != now.path {
+                let shown = |name: &Name| name.path().display().to_string();
+                return differ("an input".into(), shown(&was.path), shown(&now.path));
+            }
+            let path = was.path.path();
+            let file = |what: &str| format!("the {what} of {}", path.display());
+            if was.bytes != now.bytes {
+                let bytes = |n: u64| format!("{n} bytes");
+                return differ(file("size"), bytes(was.bytes), bytes(now.bytes));
+            }
+            if was.sample != now.sample {
+                let sum = |crc: u32| format!("checksum {crc:08x}");
+                return differ(file("content"), sum(was.sample), sum(now.sample));
+            }
+            if was.modified != now.modified {
+                let time = |(s, n): (i64, i64)| format!("{s}.{n:09} s");
+                let what = file("time of last change");
+                return differ(what, time(was.modified), time(now.modified));
+            }
+        }
+        let (was, now) = (self.files.len(), now.files.len());
+        if was != now {
+            return differ("the number of inputs".into(), was.to_string(), now.to_string());
+        }
+        Ok(())
+    }
+
+    fn json(&self) -> serde_json::Value {
+        // Everything in it can be shown as JSON: it came from there or goes there.
+        serde_json::to_value(self).unwrap_or_default()
+    }
+}

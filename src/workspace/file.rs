@@ -1,0 +1,311 @@
+//! Files of the scratch folder: private, never through a symbolic link, every byte counted.
+
+use super::fault;
+use super::run::Run;
+use super::IoCounters;
+use crate::error::{Error, Result};
+use std::fs::{File, OpenOptions};
+use std::os::unix::fs::{FileExt, OpenOptionsExt};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+/// Where a part of a file is, and what it must hold.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Place {
+    /// First byte.
+    pub offset: u64,
+    /// Number of bytes.
+    pub bytes: usize,
+    /// Number of records in them.
+    pub records: usize,
+    /// CRC-32 of the bytes.
+    pub crc: u32,
+}
+
+/// A part of a file that was written.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Put {
+    /// Name of the file.
+    pub file: Arc<str>,
+    /// Number of the part.
+    pub section: u32,
+    /// Where it is.
+    pub place: Place,
+}
+
+/// How scratch files are opened: private, and never through a symbolic link.
+#[must_use]
+pub fn options() -> OpenOptions {
+    let mut options = File::options();
+    options
+        .read(true)
+        .write(true)
+        .mode(0o600)
+        .custom_flags(rustix::fs::OFlags::NOFOLLOW.bits().cast_signed());
+    options
+}
+
+/// Opens an existing scratch file, which must be a regular file.
+///
+/// # Errors
+/// What the system says; an error of kind `InvalidInput` for what is no regular file.
+pub fn open_existing(path: &Path) -> std::io::Result<File> {
+    // Opening a pipe must not wait for someone at its other end.
+    let flags = rustix::fs::OFlags::NOFOLLOW | rustix::fs::OFlags::NONBLOCK;
+    let file = options().custom_flags(flags.bits().cast_signed()).open(path)?;
+    if file.metadata()?.is_file() {
+        Ok(file)
+    } else {
+        Err(std::io::Error::new(
+            std::io::ErrorKind::InvalidInput,
+            "not a regular file",
+        ))
+    }
+}
+
+/// The error of a write of `bytes`, beside which the run will need `more`.
+#[must_use]
+pub fn failed_write(path: &Path, bytes: usize, more: u64, error: std::io::Error) -> Error {
+    use std::io::ErrorKind::{QuotaExceeded, StorageFull};
+    if matches!(error.kind(), StorageFull | QuotaExceeded) {
+        return Error::Disk {
+            path: path.to_path_buf(),
+            needed: more.max(bytes as u64),
+            free: super::limits::disk_free(path).unwrap_or(0),
+        };
+    }
+    Error::io(path, format!("write {bytes} bytes"), error)
+}
+
+/// What the files of a workspace share.
+#[derive(Debug, Default)]
+pub struct Shared {
+    /// Bytes moved.
+    pub io: Arc<IoCounters>,
+    /// Set in a run that can be resumed.
+    pub run: Option<Arc<Run>>,
+    /// Scratch bytes that the run is expected to take at its peak.
+    pub expected: AtomicU64,
+}
+
+impl Shared {
+    /// Scratch bytes that will be needed beside those that are taken, as far as that is known.
+    pub fn more(&self) -> u64 {
+        let expected = self.expected.load(Ordering::Relaxed);
+        expected.saturating_sub(self.io.scratch())
+    }
+}
+
+#[derive(Debug)]
+enum Handle {
+    Open(Arc<File>),
+    /// Written and closed, so that many of them need no handles.
+    Closed,
+    /// It was deleted already: nobody will read it.
+    Gone,
+}
+
+/// Makes scratch files.
+#[derive(Debug, Clone)]
+pub struct Maker {
+    pub(super) folder: PathBuf,
+    pub(super) shared: Arc<Shared>,
+}
+
+impl Maker {
+    /// The scratch file `name`, `kept` if a resumed run needs it.
+    ///
+    /// # Errors
+    /// [`Error::Io`], [`Error::Disk`].
+    pub fn make(&self, name: &str, kept: bool) -> Result<ScratchFile> {
+        let path = self.folder.join(name);
+        if self.shared.run.is_some() {
+            // What an attempt that died was about to write.
+            let _ = std::fs::remove_file(&path);
+        }
+        let file = options().create_new(true).open(&path);
+        let file = file.map_err(|e| Error::io(&path, "create", e))?;
+        let shared = self.shared.clone();
+        Ok(ScratchFile::new(name, path, Some(file), kept, shared))
+    }
+}
+
+/// A scratch file. When it is dropped it is deleted: at once, or, in a run that can be resumed, as soon
+/// as the next step has begun.
+#[derive(Debug)]
+pub struct ScratchFile {
+    /// Its name in the folder.
+    pub name: Arc<str>,
+    /// Where it is.
+    pub path: PathBuf,
+    handle: Handle,
+    /// Written to since it was last synced.
+    dirty: Arc<AtomicBool>,
+    /// Bytes given away so far.
+    end: AtomicU64,
+    /// A resumed run needs it.
+    kept: bool,
+    shared: Arc<Shared>,
+}
+
+impl ScratchFile {
+    pub(super) fn new(
+        name: &str,
+        path: PathBuf,
+        file: Option<File>,
+        kept: bool,
+        shared: Arc<Shared>,
+    ) -> Self {
+        let handle = file.map_or(Handle::Gone, |file| Handle::Open(Arc::new(file)));
+        Self {
+            name: name.into(),
+            path,
+            handle,
+            dirty: Arc::default(),
+            end: AtomicU64::new(0),
+            kept,
+            shared,
+        }
+    }
+
+    /// Notes what was written as part `section`, if a resumed run may ask for it.
+    ///
+    /// # Errors
+    /// [`Error::Io`], [`Error::Disk`].
+    pub fn put(&self, section: u32, place: Place) -> Result<()> {
+        match &self.shared.run {
+            Some(run) if self.kept => run.put(Put {
+                file: self.name.clone(),
+                section,
+                place,
+            }),
+            _ => Ok(()),
+        }
+    }
+
+    /// True if a resumed run needs it.
+    #[must_use]
+    pub fn is_kept(&self) -> bool {
+        self.kept
+    }
+
+    /// True if it was deleted already.
+    #[must_use]
+    pub fn is_gone(&self) -> bool {
+        matches!(self.handle, Handle::Gone)
+    }
+
+    /// Gives the handle back; who reads the file opens it by its path.
+    pub fn close(&mut self) {
+        if !self.is_gone() {
+            self.handle = Handle::Closed;
+        }
+    }
+
+    /// Bytes given away so far.
+    #[must_use]
+    pub fn end(&self) -> u64 {
+        self.end.load(Ordering::Relaxed)
+    }
+
+    /// Notes bytes that were written by an earlier attempt.
+    pub(crate) fn reach(&self, end: u64) {
+        let before = self.end.fetch_max(end, Ordering::Relaxed);
+        if !self.is_gone() {
+            self.shared.io.grow_scratch(end.saturating_sub(before));
+        }
+    }
+
+    /// Writes at the end; where that was.
+    ///
+    /// # Errors
+    /// See [`ScratchFile::write_at`].
+    pub fn append(&self, bytes: &[u8]) -> Result<u64> {
+        let offset = self.end.fetch_add(bytes.len() as u64, Ordering::Relaxed);
+        self.shared.io.grow_scratch(bytes.len() as u64);
+        self.write_counted(bytes, offset)?;
+        Ok(offset)
+    }
+
+    /// Writes at `offset`.
+    ///
+    /// # Errors
+    /// [`Error::Io`]; [`Error::Disk`] if there is no room.
+    pub fn write_at(&self, bytes: &[u8], offset: u64) -> Result<()> {
+        self.reach(offset + bytes.len() as u64);
+        self.write_counted(bytes, offset)
+    }
+
+    fn write_counted(&self, bytes: &[u8], offset: u64) -> Result<()> {
+        // What is left of a step whose outcome is known.
+        let Handle::Open(file) = &self.handle else {
+            return Ok(());
+        };
+        fault::write()
+            .and_then(|()| file.write_all_at(bytes, offset))
+            .map_err(|e| failed_write(&self.path, bytes.len(), self.shared.more(), e))?;
+        self.shared.io.add_written(bytes.len() as u64);
+        if let Some(run) = &self.shared.run
+            && self.kept
+            && !self.dirty.swap(true, Ordering::Relaxed)
+        {
+            run.keeper.sync_later(file, &self.dirty);
+        }
+        Ok(())
+    }
+
+    /// Fills `bytes` from `offset`.
+    ///
+    /// # Errors
+    /// [`Error::Io`]; [`Error::Corrupt`] if the file ends before that.
+    pub fn read_at(&self, bytes: &mut [u8], offset: u64) -> Result<()> {
+        let wanted = bytes.len();
+        let read = match &self.handle {
+            Handle::Open(file) => file.read_exact_at(bytes, offset),
+            Handle::Closed | Handle::Gone => Err(std::io::ErrorKind::UnexpectedEof.into()),
+        };
+        read.map_err(|e| {
+            if e.kind() == std::io::ErrorKind::UnexpectedEof {
+                let found = "the end of the file".to_owned();
+                return self.damaged(offset, found, format!("{wanted} bytes"));
+            }
+            Error::io(&self.path, format!("read {wanted} bytes"), e)
+        })?;
+        self.shared.io.add_read(wanted as u64);
+        Ok(())
+    }
+
+    /// Counts bytes that were read by other means.
+    pub fn count_read(&self, bytes: u64) {
+        self.shared.io.add_read(bytes);
+    }
+
+    /// The error for something else than what was written.
+    #[must_use]
+    pub fn damaged(&self, offset: u64, found: String, expected: String) -> Error {
+        Error::Corrupt {
+            path: self.path.clone(),
+            offset,
+            found,
+            expected,
+        }
+    }
+}
+
+impl Drop for ScratchFile {
+    fn drop(&mut self) {
+        match (&self.shared.run, self.kept) {
+            (Some(run), true) => {
+                if !self.is_gone() {
+                    run.drop_later(&self.name, self.end());
+                }
+            }
+            _ => {
+                self.shared.io.shrink_scratch(self.end());
+                // A scratch file that cannot be deleted goes with its folder.
+                let _ = std::fs::remove_file(&self.path);
+            }
+        }
+    }
+}

@@ -1,0 +1,290 @@
+//! The scratch folder of a run that can be resumed: found again, locked, private.
+
+use super::IoCounters;
+use super::file::{failed_write, open_existing, options};
+use super::journal::{self, Entry, Journal, Record};
+use super::keeper::Keeper;
+use super::progress::{Cancel, Observer};
+use super::recover::{Whereabouts, recover};
+use super::run::Run;
+use crate::error::{Error, Result};
+use std::collections::HashSet;
+use std::fs::File;
+use std::os::unix::fs::{DirBuilderExt, FileExt, MetadataExt};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+const LOCK: &str = "lock";
+const MANIFEST: &str = "manifest";
+
+/// Files that are no data.
+const OURS: [&str; 3] = [LOCK, MANIFEST, journal::NAME];
+
+/// A locked scratch folder.
+#[derive(Debug)]
+pub struct Folder {
+    /// Where it is.
+    pub path: PathBuf,
+    /// The run as it was asked for.
+    pub manifest: Vec<u8>,
+    /// The mesh on its way, and where it goes.
+    pub mesh: [PathBuf; 2],
+    lock: File,
+    entries: Vec<Entry>,
+    /// Where the whole records of the journal end; none without a journal.
+    end: Option<u64>,
+    /// What must be said about its state.
+    warnings: Vec<String>,
+}
+
+/// What is at a path where a run may have been.
+#[derive(Debug)]
+pub enum Found {
+    /// Nothing, or a folder in which no run ever began.
+    Nothing,
+    /// A run that is not finished.
+    Run(Folder),
+    /// A run of which not even its manifest can be read.
+    Damaged(Folder),
+}
+
+fn not_resumable(path: &Path, why: &str) -> Error {
+    Error::NotResumable {
+        path: path.to_path_buf(),
+        why: why.to_owned(),
+    }
+}
+
+/// A manifest with its checksum.
+fn sealed(manifest: &[u8]) -> Vec<u8> {
+    let seal = format!("\n{:08x}\n", crc32fast::hash(manifest));
+    [manifest, seal.as_bytes()].concat()
+}
+
+fn unsealed(bytes: &[u8]) -> Option<Vec<u8>> {
+    let (manifest, _) = bytes.split_at_checked(bytes.len().checked_sub(10)?)?;
+    (sealed(manifest) == bytes).then(|| manifest.to_vec())
+}
+
+impl Folder {
+    /// Looks for a run at `path`, and locks it.
+    ///
+    /// # Errors
+    /// [`Error::Locked`], [`Error::NotResumable`] for a folder that is not private or not ours,
+    /// [`Error::Io`].
+    pub fn find(path: &Path) -> Result<Found> {
+        let io = |action: &'static str| move |e| Error::io(path, action, e);
+        let meta = match path.symlink_metadata() {
+            Ok(meta) => meta,
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(Found::Nothing),
+            Err(e) => return Err(io("look at")(e)),
+        };
+        if !meta.is_dir() {
+            return Err(not_resumable(path, "it is not a folder"));
+        }
+        let own = rustix::process::geteuid().as_raw();
+        if meta.uid() != own || meta.mode() & 0o077 != 0 {
+            let why = "it is open to other users, so what is in it cannot be trusted";
+            return Err(not_resumable(path, why));
+        }
+        let names = listing(path)?;
+        if names.is_empty() {
+            return Ok(Found::Nothing);
+        }
+        if !names.iter().any(|name| OURS.contains(&name.as_str())) {
+            return Err(not_resumable(path, "it is not a scratch folder of outcrop"));
+        }
+        let lock = lock(path)?;
+        let folder = Self {
+            path: path.to_path_buf(),
+            manifest: Vec::new(),
+            mesh: Default::default(),
+            lock,
+            entries: Vec::new(),
+            end: None,
+            warnings: Vec::new(),
+        };
+        folder.read()
+    }
+
+    fn read(mut self) -> Result<Found> {
+        let path = self.path.join(journal::NAME);
+        let read = open_existing(&path).map(|file| journal::read(&path, &file));
+        if let Ok(Some((entries, end))) = read.unwrap_or(Ok(None)) {
+            self.entries = entries;
+            self.end = Some(end);
+        }
+        let in_journal = match self.entries.first().map(|e| &e.record) {
+            Some(Record::Manifest(bytes)) => Some(bytes.clone()),
+            _ => None,
+        };
+        let path = self.path.join(MANIFEST);
+        let bytes = open_existing(&path).and_then(|file| {
+            let mut bytes = vec![0; file.metadata()?.len().min(64 << 20) as usize];
+            file.read_exact_at(&mut bytes, 0)?;
+            Ok(bytes)
+        });
+        let begun = bytes.is_ok() || in_journal.is_some();
+        match (bytes.ok().and_then(|b| unsealed(&b)), in_journal) {
+            (Some(manifest), Some(_)) => self.manifest = manifest,
+            (Some(manifest), None) => {
+                self.manifest = manifest;
+                self.end = None;
+                self.warn_of(journal::NAME, "the run begins again");
+            }
+            (None, Some(manifest)) => {
+                self.manifest = manifest;
+                self.warn_of(MANIFEST, "the journal has what it said");
+                self.write_manifest()?;
+            }
+            (None, None) if begun => {
+                self.warn_of(MANIFEST, "the run begins again");
+                return Ok(Found::Damaged(self));
+            }
+            (None, None) => return Ok(Found::Nothing),
+        }
+        Ok(Found::Run(self))
+    }
+
+    fn warn_of(&mut self, name: &str, what: &str) {
+        let path = self.path.join(name);
+        self.warnings
+            .push(format!("{}: damaged; {what}", path.display()));
+    }
+
+    /// Makes the folder, or empties the one that is there, for a new run.
+    ///
+    /// # Errors
+    /// [`Error::Io`], [`Error::Locked`], [`Error::Disk`].
+    pub fn create(path: &Path, manifest: Vec<u8>) -> Result<Self> {
+        if let Some(parent) = path.parent().filter(|p| !p.as_os_str().is_empty()) {
+            std::fs::create_dir_all(parent)
+                .map_err(|e| Error::io(parent, "make the scratch folder", e))?;
+        }
+        match std::fs::DirBuilder::new().mode(0o700).create(path) {
+            Err(e) if e.kind() != std::io::ErrorKind::AlreadyExists => {
+                return Err(Error::io(path, "make the scratch folder", e));
+            }
+            _ => {}
+        }
+        let folder = Self {
+            path: path.to_path_buf(),
+            manifest,
+            mesh: Default::default(),
+            lock: lock(path)?,
+            entries: Vec::new(),
+            end: None,
+            warnings: Vec::new(),
+        };
+        folder.clean(&HashSet::from([LOCK]))?;
+        folder.write_manifest()?;
+        Ok(folder)
+    }
+
+    /// The same folder for another run, which begins anew.
+    ///
+    /// # Errors
+    /// [`Error::Io`], [`Error::Disk`].
+    pub fn restart(mut self, manifest: Vec<u8>) -> Result<Self> {
+        self.manifest = manifest;
+        self.entries.clear();
+        self.end = None;
+        self.clean(&HashSet::from([LOCK]))?;
+        self.write_manifest()?;
+        Ok(self)
+    }
+
+    fn write_manifest(&self) -> Result<()> {
+        let path = self.path.join(MANIFEST);
+        let _ = std::fs::remove_file(&path);
+        let bytes = sealed(&self.manifest);
+        options()
+            .create_new(true)
+            .open(&path)
+            .and_then(|file| file.write_all_at(&bytes, 0).and_then(|()| file.sync_all()))
+            .map_err(|e| failed_write(&path, bytes.len(), 0, e))
+    }
+
+    /// Removes all files but those of these names.
+    fn clean(&self, but: &HashSet<&str>) -> Result<()> {
+        for name in listing(&self.path)? {
+            if !but.contains(name.as_str()) {
+                let path = self.path.join(&name);
+                std::fs::remove_file(&path).map_err(|e| Error::io(&path, "delete", e))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Goes on from what is there.
+    pub(super) fn open(
+        self,
+        io: &Arc<IoCounters>,
+        observer: &dyn Observer,
+        cancel: &Cancel,
+    ) -> Result<Run> {
+        self.warnings.iter().for_each(|w| observer.warn(w));
+        let path = self.path.join(journal::NAME);
+        let places = Whereabouts {
+            folder: &self.path,
+            mesh: &self.mesh,
+        };
+        let (history, journal) = match self.end {
+            Some(end) => {
+                let (history, end) = recover(&self.entries, end, &places, observer, cancel)?;
+                let file = open_existing(&path).map_err(|e| Error::io(&path, "open", e))?;
+                (history, Journal::go_on(&path, file, end)?)
+            }
+            None => {
+                let _ = std::fs::remove_file(&path);
+                let file = options().create_new(true).open(&path);
+                let file = file.map_err(|e| Error::io(&path, "create", e))?;
+                let journal = Journal::create(&path, file)?;
+                journal.append(&Record::Manifest(self.manifest.clone()))?;
+                (Default::default(), journal)
+            }
+        };
+        self.clean(&history.live().chain(OURS).collect())?;
+        let keeper = Keeper::start(journal.file(), io.clone())
+            .map_err(|e| Error::io(&self.path, "start a thread", e))?;
+        Ok(Run::new(self.path, journal, keeper, history, self.lock))
+    }
+
+    /// True if an earlier attempt has finished anything.
+    #[must_use]
+    pub fn has_progress(path: &Path) -> bool {
+        let path = path.join(journal::NAME);
+        let read = open_existing(&path).map(|file| journal::read(&path, &file));
+        let Ok(Ok(Some((entries, _)))) = read else {
+            return false;
+        };
+        entries
+            .iter()
+            .any(|e| matches!(e.record, Record::Unit { .. }))
+    }
+}
+
+fn listing(path: &Path) -> Result<Vec<String>> {
+    let io = |e| Error::io(path, "list", e);
+    let mut names = Vec::new();
+    for entry in std::fs::read_dir(path).map_err(io)? {
+        let entry = entry.map_err(io)?;
+        // A name that is no text is none of ours.
+        names.extend(entry.file_name().into_string());
+    }
+    Ok(names)
+}
+
+/// Locks a folder; the lock goes with the process.
+fn lock(folder: &Path) -> Result<File> {
+    let path = folder.join(LOCK);
+    let file = options().create(true).truncate(false).open(&path);
+    let file = file.map_err(|e| Error::io(&path, "open", e))?;
+    match file.try_lock() {
+        Ok(()) => Ok(file),
+        Err(std::fs::TryLockError::WouldBlock) => Err(Error::Locked {
+            path: folder.to_path_buf(),
+        }),
+        Err(std::fs::TryLockError::Error(e)) => Err(Error::io(&path, "lock", e)),
+    }
+}

@@ -1,0 +1,214 @@
+//! What the journal says that earlier attempts at a run have done, and what is left of it after damage.
+
+use super::file::Place;
+use super::journal::{Entry, Record};
+use std::collections::{BTreeMap, HashMap, HashSet};
+
+/// Units finished, files and their parts.
+#[derive(Debug, Default)]
+pub struct History {
+    /// Where the payload of each unit of each step is.
+    steps: HashMap<String, BTreeMap<u64, (u64, usize)>>,
+    files: HashMap<String, FileHistory>,
+    /// Stages begun, and where the journal says so.
+    begun: Vec<(String, u64)>,
+}
+
+#[derive(Debug, Default)]
+struct FileHistory {
+    parts: BTreeMap<u32, Part>,
+    /// Where the journal speaks of it first.
+    first: u64,
+    deleted: Option<u64>,
+    /// Steps that put something there.
+    steps: HashSet<String>,
+}
+
+/// A part of a file, and the unit that put it there.
+#[derive(Debug, Clone)]
+struct Part {
+    place: Place,
+    step: String,
+    unit: u64,
+    record: u64,
+}
+
+/// A part of a file that has to be there for the run to go on.
+#[derive(Debug, Clone)]
+pub struct Needed {
+    /// The file.
+    pub file: String,
+    /// Number of the part.
+    pub section: u32,
+    /// What it must hold.
+    pub place: Place,
+}
+
+/// What can be done about damage.
+#[derive(Debug, PartialEq, Eq)]
+pub enum Mending {
+    /// These units are done again; all others count.
+    Redo(Vec<(String, u64)>),
+    /// The journal counts up to here: a stage is done again from its start.
+    Rewind {
+        /// End of what counts.
+        end: u64,
+        /// The stage that comes then.
+        stage: String,
+    },
+}
+
+impl History {
+    /// From the records of a journal.
+    #[must_use]
+    pub fn of(entries: &[Entry]) -> Self {
+        let mut history = Self::default();
+        for entry in entries {
+            history.add(entry);
+        }
+        history
+    }
+
+    fn add(&mut self, entry: &Entry) {
+        match &entry.record {
+            Record::Manifest(_) => {}
+            Record::Begin(stage) => self.begun.push((stage.clone(), entry.offset)),
+            Record::Deleted(name) => {
+                let file = self.files.entry(name.clone()).or_default();
+                file.deleted.get_or_insert(entry.offset);
+            }
+            Record::Unit {
+                step, unit, puts, ..
+            } => {
+                let units = self.steps.entry(step.clone()).or_default();
+                units.insert(*unit, entry.payload);
+                for put in puts {
+                    let file = self.files.entry(put.file.to_string()).or_default();
+                    if file.steps.is_empty() {
+                        file.first = entry.offset;
+                    }
+                    file.steps.insert(step.clone());
+                    let part = Part {
+                        place: put.place,
+                        step: step.clone(),
+                        unit: *unit,
+                        record: entry.offset,
+                    };
+                    file.parts.insert(put.section, part);
+                }
+            }
+        }
+    }
+
+    /// True if an earlier attempt came to the stage.
+    #[must_use]
+    pub fn began(&self, stage: &str) -> bool {
+        self.begun.iter().any(|(name, _)| name == stage)
+    }
+
+    /// Units finished, ascending.
+    #[must_use]
+    pub fn units(&self, step: &str) -> Vec<u64> {
+        let units = self.steps.get(step);
+        units.map_or_else(Vec::new, |units| units.keys().copied().collect())
+    }
+
+    /// Where the payload of a unit is, and its bytes.
+    #[must_use]
+    pub fn payload(&self, step: &str, unit: u64) -> Option<(u64, usize)> {
+        self.steps.get(step)?.get(&unit).copied()
+    }
+
+    /// Parts of a file, ascending.
+    #[must_use]
+    pub fn places(&self, file: &str) -> Vec<(u32, Place)> {
+        let parts = self.files.get(file).map(|file| file.parts.iter());
+        let parts = parts.into_iter().flatten();
+        parts.map(|(section, part)| (*section, part.place)).collect()
+    }
+
+    /// True if the file was deleted.
+    #[must_use]
+    pub fn is_deleted(&self, file: &str) -> bool {
+        self.files.get(file).is_some_and(|f| f.deleted.is_some())
+    }
+
+    /// Names of the files that are there.
+    pub fn live(&self) -> impl Iterator<Item = &str> {
+        let live = self.files.iter().filter(|(_, file)| file.deleted.is_none());
+        live.map(|(name, _)| name.as_str())
+    }
+
+    /// All parts of files that are there.
+    #[must_use]
+    pub fn needed(&self) -> Vec<Needed> {
+        let live = self.files.iter().filter(|(_, file)| file.deleted.is_none());
+        let parts = live.flat_map(|(name, file)| file.parts.iter().map(move |part| (name, part)));
+        parts
+            .map(|(name, (section, part))| Needed {
+                file: name.clone(),
+                section: *section,
+                place: part.place,
+            })
+            .collect()
+    }
+
+    /// What to do about parts that are damaged; `None` if there are none.
+    #[must_use]
+    pub fn mend(&self, damaged: &[Needed]) -> Option<Mending> {
+        let parts: Vec<&Part> = damaged
+            .iter()
+            .filter_map(|d| self.files.get(&d.file)?.parts.get(&d.section))
+            .collect();
+        if parts.is_empty() {
+            return None;
+        }
+        if parts.iter().all(|part| self.can_redo(part)) {
+            let mut units: Vec<_> = parts.iter().map(|p| (p.step.clone(), p.unit)).collect();
+            units.sort();
+            units.dedup();
+            return Some(Mending::Redo(units));
+        }
+        let holds = |start: u64| {
+            let damage = parts.iter().any(|part| part.record < start);
+            let missing = self.files.values().any(|file| {
+                let needed = !file.steps.is_empty() && file.first < start;
+                needed && file.deleted.is_some_and(|at| at >= start)
+            });
+            !damage && !missing
+        };
+        let stage = self.begun.iter().rev().find(|(_, start)| holds(*start));
+        stage.map(|(stage, start)| Mending::Rewind {
+            end: *start,
+            stage: stage.clone(),
+        })
+    }
+
+    /// True if all that the unit was made from is still there: since then only files were deleted that
+    /// its own step or later ones made.
+    fn can_redo(&self, part: &Part) -> bool {
+        !part.step.is_empty()
+            && self.files.values().all(|file| {
+                let later = file.deleted.is_some_and(|at| at > part.record);
+                !later || file.first > part.record || file.steps.contains(&part.step)
+            })
+    }
+
+    /// Forgets that units were finished, and the steps around them.
+    pub fn forget(&mut self, units: &[(String, u64)]) {
+        for (step, unit) in units {
+            if let Some(known) = self.steps.get_mut(step) {
+                known.remove(unit);
+            }
+            for (at, _) in step.match_indices('/').skip(1) {
+                if let Some(around) = self.steps.get_mut(&step[..at]) {
+                    around.remove(&0);
+                }
+            }
+            for file in self.files.values_mut() {
+                file.parts
+                    .retain(|_, part| (&part.step, part.unit) != (step, *unit));
+            }
+        }
+    }
+}

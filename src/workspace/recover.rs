@@ -1,0 +1,132 @@
+//! Going on after a crash: everything that is still needed is read and checked; what is damaged is
+//! done again, as little of it as possible.
+
+use super::file::open_existing;
+use super::history::{History, Mending, Needed};
+use super::journal::Entry;
+use super::progress::{Cancel, Observer};
+use crate::error::Result;
+use rayon::prelude::*;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs::File;
+use std::os::unix::fs::FileExt;
+use std::path::{Path, PathBuf};
+
+/// Bytes checked at a time.
+const CHUNK: usize = 1 << 20;
+
+/// The name that the journal has for the mesh, which is not in the scratch folder.
+pub const MESH: &str = "mesh";
+
+/// Where files may be: the mesh under its temporary name, or its own.
+#[derive(Debug)]
+pub struct Whereabouts<'a> {
+    pub folder: &'a Path,
+    pub mesh: &'a [PathBuf; 2],
+}
+
+/// True if the part holds what the journal says.
+fn is_whole(file: &File, part: &Needed) -> bool {
+    let mut crc = crc32fast::Hasher::new();
+    let mut buffer = vec![0; part.place.bytes.min(CHUNK)];
+    let mut at = part.place.offset;
+    let mut left = part.place.bytes;
+    while left > 0 {
+        let now = &mut buffer[..left.min(CHUNK)];
+        if file.read_exact_at(now, at).is_err() {
+            return false;
+        }
+        crc.update(now);
+        at += now.len() as u64;
+        left -= now.len();
+    }
+    crc.finalize() == part.place.crc
+}
+
+/// The parts that do not hold what the journal says.
+fn damaged(
+    parts: Vec<Needed>,
+    places: &Whereabouts<'_>,
+    observer: &dyn Observer,
+    cancel: &Cancel,
+) -> Result<Vec<Needed>> {
+    let mut by_file: BTreeMap<String, Vec<Needed>> = BTreeMap::new();
+    for part in parts {
+        // A name with a path in it is none of ours.
+        if !part.file.contains('/') {
+            by_file.entry(part.file.clone()).or_default().push(part);
+        }
+    }
+    let total: usize = by_file.values().flatten().map(|p| p.place.bytes).sum();
+    observer.begin("check", "bytes", total as u64);
+    let mut all = Vec::new();
+    for (name, parts) in by_file {
+        let paths = if name == MESH {
+            places.mesh.to_vec()
+        } else {
+            vec![places.folder.join(&name)]
+        };
+        let check = |path: &PathBuf| -> Result<Vec<Needed>> {
+            let Ok(file) = open_existing(path) else {
+                return Ok(parts.clone());
+            };
+            let bad = parts.par_iter().map(|part| {
+                cancel.check()?;
+                let whole = is_whole(&file, part);
+                observer.advance(part.place.bytes as u64);
+                Ok((!whole).then(|| part.clone()))
+            });
+            let bad = bad.collect::<Result<Vec<_>>>()?;
+            Ok(bad.into_iter().flatten().collect())
+        };
+        // The mesh has its own name only when it is finished.
+        let mut bad = check(&paths[0])?;
+        if !bad.is_empty() && paths.len() > 1 && check(&paths[1])?.is_empty() {
+            bad.clear();
+        }
+        all.extend(bad);
+    }
+    observer.end();
+    Ok(all)
+}
+
+/// What counts of a journal's entries, and where they end, given what is left of the files.
+pub fn recover(
+    entries: &[Entry],
+    end: u64,
+    places: &Whereabouts<'_>,
+    observer: &dyn Observer,
+    cancel: &Cancel,
+) -> Result<(History, u64)> {
+    let mut history = History::of(entries);
+    let bad = damaged(history.needed(), places, observer, cancel)?;
+    let names: BTreeSet<&str> = bad.iter().map(|part| part.file.as_str()).collect();
+    let names = names.into_iter().collect::<Vec<_>>().join(", ");
+    match history.mend(&bad) {
+        None => Ok((history, end)),
+        Some(Mending::Redo(units)) => {
+            observer.warn(&format!(
+                "{}: damaged: {names}; {} unit(s) of work are done again",
+                places.folder.display(),
+                units.len()
+            ));
+            history.forget(&units);
+            Ok((history, end))
+        }
+        Some(Mending::Rewind { end, stage }) => {
+            let stage = stage.trim_start_matches('/');
+            let stage = stage.split('#').next().unwrap_or(stage);
+            observer.warn(&format!(
+                "{}: damaged: {names}; what it was made from is gone, so the run goes back to the \
+                 beginning of {stage}",
+                places.folder.display(),
+            ));
+            let kept: Vec<Entry> = entries
+                .iter()
+                .filter(|entry| entry.offset < end)
+                .cloned()
+                .collect();
+            Ok((History::of(&kept), end))
+        }
+    }
+}

@@ -1,0 +1,214 @@
+//! A run that can be resumed: its journal, the steps it has finished, the files it still needs.
+//!
+//! The program is deterministic, so a resumed run is the same program again, in which what the journal
+//! knows is not done a second time. A step is known by where it is in the program: the steps around it,
+//! its name, and how many of that name came before it.
+
+use super::file::{Place, Put};
+use super::history::History;
+use super::journal::{Journal, Record};
+use super::keeper::{Keeper, Leaving};
+use crate::error::Result;
+use std::cell::RefCell;
+use std::collections::HashMap;
+use std::fs::File;
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// What a run that can be resumed keeps beside its files.
+#[derive(Debug)]
+pub struct Run {
+    folder: PathBuf,
+    journal: Journal,
+    /// Syncs and deletes.
+    pub keeper: Keeper,
+    /// What earlier attempts have done.
+    history: History,
+    /// The steps that the program is in, outermost first; the program itself is the first.
+    scopes: Mutex<Vec<Scope>>,
+    /// Files dropped since the last step began.
+    dropped: Mutex<Vec<(Arc<str>, u64)>>,
+    /// Held as long as the run is at work.
+    _lock: File,
+}
+
+#[derive(Debug, Default)]
+struct Scope {
+    path: String,
+    /// Steps begun inside, by name.
+    begun: HashMap<&'static str, u32>,
+}
+
+thread_local! {
+    /// What the work on this thread has put into files, for each unit that it is in.
+    static NOTES: RefCell<Vec<Vec<Put>>> = const { RefCell::new(Vec::new()) };
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Collects what is put into files on this thread until it is finished or dropped.
+#[derive(Debug)]
+pub struct Notes(());
+
+impl Notes {
+    /// Begins to collect.
+    #[must_use]
+    pub fn begin() -> Self {
+        NOTES.with_borrow_mut(|notes| notes.push(Vec::new()));
+        Self(())
+    }
+
+    /// What was put.
+    #[must_use]
+    pub fn finish(self) -> Vec<Put> {
+        let puts = NOTES.with_borrow_mut(Vec::pop).unwrap_or_default();
+        std::mem::forget(self);
+        puts
+    }
+}
+
+impl Drop for Notes {
+    fn drop(&mut self) {
+        NOTES.with_borrow_mut(Vec::pop);
+    }
+}
+
+impl Run {
+    /// A run in a folder that is locked for it.
+    #[must_use]
+    pub fn new(
+        folder: PathBuf,
+        journal: Journal,
+        keeper: Keeper,
+        history: History,
+        lock: File,
+    ) -> Self {
+        Self {
+            folder,
+            journal,
+            keeper,
+            history,
+            scopes: Mutex::new(vec![Scope::default()]),
+            dropped: Mutex::default(),
+            _lock: lock,
+        }
+    }
+
+    /// Notes what was put into a file.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], [`crate::Error::Disk`].
+    pub fn put(&self, put: Put) -> Result<()> {
+        let alone = NOTES.with_borrow_mut(|notes| match notes.last_mut() {
+            Some(puts) => {
+                puts.push(put);
+                None
+            }
+            None => Some(put),
+        });
+        match alone {
+            // Not part of any unit: it counts at once.
+            Some(put) => self.finish("", 0, vec![put], Vec::new()),
+            None => Ok(()),
+        }
+    }
+
+    /// The step `name` that the program comes to now. Files that it does not need any more go.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], [`crate::Error::Disk`].
+    pub fn begin(&self, name: &'static str) -> Result<String> {
+        self.let_go()?;
+        let mut scopes = lock(&self.scopes);
+        let (depth, Some(scope)) = (scopes.len(), scopes.last_mut()) else {
+            return Ok(String::new());
+        };
+        let number = scope.begun.entry(name).or_default();
+        *number += 1;
+        let path = format!("{}/{name}#{number}", scope.path);
+        drop(scopes);
+        if depth == 1 && !self.history.began(&path) {
+            self.journal.append(&Record::Begin(path.clone()))?;
+        }
+        Ok(path)
+    }
+
+    /// Goes into a step.
+    pub fn enter(&self, path: &str) {
+        lock(&self.scopes).push(Scope {
+            path: path.to_owned(),
+            begun: HashMap::new(),
+        });
+    }
+
+    /// Leaves it.
+    pub fn leave(&self) {
+        lock(&self.scopes).pop();
+    }
+
+    /// The units of a step that earlier attempts finished.
+    #[must_use]
+    pub fn finished(&self, step: &str) -> Vec<u64> {
+        self.history.units(step)
+    }
+
+    /// What a finished unit left.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`].
+    pub fn payload(&self, step: &str, unit: u64) -> Result<Option<Vec<u8>>> {
+        match self.history.payload(step, unit) {
+            Some((offset, bytes)) => self.journal.payload(offset, bytes).map(Some),
+            None => Ok(None),
+        }
+    }
+
+    /// A unit is finished.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], [`crate::Error::Disk`].
+    pub fn finish(&self, step: &str, unit: u64, puts: Vec<Put>, payload: Vec<u8>) -> Result<()> {
+        self.journal.append(&Record::Unit {
+            step: step.to_owned(),
+            unit,
+            puts,
+            payload,
+        })
+    }
+
+    /// What earlier attempts put into a file.
+    #[must_use]
+    pub fn places(&self, file: &str) -> Vec<(u32, Place)> {
+        self.history.places(file)
+    }
+
+    /// True if an earlier attempt deleted the file.
+    #[must_use]
+    pub fn is_deleted(&self, file: &str) -> bool {
+        self.history.is_deleted(file)
+    }
+
+    /// Notes that a file was dropped. It is needed again if that is because the run failed; whether it
+    /// did is known when the next step begins.
+    pub fn drop_later(&self, name: &Arc<str>, bytes: u64) {
+        lock(&self.dropped).push((name.clone(), bytes));
+    }
+
+    /// Deletes the files that were dropped.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], [`crate::Error::Disk`].
+    pub fn let_go(&self) -> Result<()> {
+        let dropped = std::mem::take(&mut *lock(&self.dropped));
+        let mut leaving = Vec::with_capacity(dropped.len());
+        for (name, bytes) in dropped {
+            let path = self.folder.join(&*name);
+            self.journal.append(&Record::Deleted(name.to_string()))?;
+            leaving.push(Leaving { path, bytes });
+        }
+        self.keeper.delete_later(leaving);
+        Ok(())
+    }
+}

@@ -1,0 +1,176 @@
+//! Steps that a resumed run does not do again.
+
+use super::Workspace;
+use super::file::{Place, Put};
+use super::persist::{Persist, Saved};
+use super::run::{Notes, Run};
+use crate::error::Result;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// Inside a step as long as it lives.
+struct Inside<'a>(&'a Run);
+
+impl Drop for Inside<'_> {
+    fn drop(&mut self) {
+        self.0.leave();
+    }
+}
+
+fn bytes(value: &impl Persist) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    value.save(&mut bytes);
+    bytes
+}
+
+impl Workspace {
+    /// Does `work`, or, if an earlier attempt at this run has finished it, has its result back.
+    ///
+    /// Steps may be inside steps; only one thread at a time may begin them, in an order that depends
+    /// on nothing but the input and the parameters.
+    ///
+    /// # Errors
+    /// What `work` returned, [`crate::Error::Io`], [`crate::Error::Disk`].
+    pub fn once<T: Persist>(
+        &self,
+        name: &'static str,
+        work: impl FnOnce() -> Result<T>,
+    ) -> Result<T> {
+        let Some(run) = &self.shared.run else {
+            return work();
+        };
+        let path = run.begin(name)?;
+        if let Some(payload) = run.payload(&path, 0)? {
+            return T::load(&mut Saved::new(&payload, self));
+        }
+        let notes = Notes::begin();
+        run.enter(&path);
+        let inside = Inside(run);
+        let value = work()?;
+        drop(inside);
+        run.finish(&path, 0, notes.finish(), bytes(&value))?;
+        run.let_go()?;
+        Ok(value)
+    }
+
+    /// As [`Workspace::for_each_unit`], but units that an earlier attempt at this run has finished are
+    /// not done again. What a unit leaves beside files is what `work` returns; `each` gets it, for
+    /// every unit once, in any order.
+    ///
+    /// # Errors
+    /// See [`Workspace::for_each_unit`]; what `each` returned.
+    pub fn units<T: Persist + Send>(
+        &self,
+        name: &'static str,
+        count: usize,
+        bytes_of: impl Fn(usize) -> u64 + Sync,
+        work: impl Fn(usize) -> Result<T> + Sync,
+        each: impl FnMut(usize, T) -> Result<()> + Send,
+    ) -> Result<()> {
+        let each = Mutex::new(each);
+        let hand_on = |unit, value| {
+            let mut each = each.lock().unwrap_or_else(PoisonError::into_inner);
+            (*each)(unit, value)
+        };
+        let Some(run) = &self.shared.run else {
+            return self.for_each_unit(name, count, bytes_of, |unit| hand_on(unit, work(unit)?));
+        };
+        let step = run.begin(name)?;
+        let mut left: Vec<usize> = Vec::new();
+        let mut finished = run.finished(&step).into_iter().peekable();
+        for unit in 0..count {
+            if finished.next_if_eq(&(unit as u64)).is_none() {
+                left.push(unit);
+                continue;
+            }
+            let payload = run.payload(&step, unit as u64)?.unwrap_or_default();
+            hand_on(unit, T::load(&mut Saved::new(&payload, self))?)?;
+        }
+        let bytes_of = |n: usize| bytes_of(left[n]);
+        self.for_each_unit(name, left.len(), bytes_of, |n| {
+            let unit = left[n];
+            let notes = Notes::begin();
+            let value = work(unit)?;
+            run.finish(&step, unit as u64, notes.finish(), bytes(&value))?;
+            hand_on(unit, value)
+        })
+    }
+
+    /// The step `name` that the program comes to now, for those who keep its units themselves.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], [`crate::Error::Disk`].
+    pub(crate) fn step(&self, name: &'static str) -> Result<Step> {
+        let run = self.shared.run.clone();
+        Ok(Step {
+            path: run.as_ref().map_or(Ok(String::new()), |run| run.begin(name))?,
+            run,
+        })
+    }
+
+    /// Notes what was put into a file that is not in the scratch folder.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], [`crate::Error::Disk`].
+    pub(crate) fn put(&self, put: Put) -> Result<()> {
+        self.run().map_or(Ok(()), |run| run.put(put))
+    }
+
+    /// What earlier attempts put into a file.
+    pub(crate) fn places(&self, file: &str) -> Vec<(u32, Place)> {
+        self.run().map_or_else(Vec::new, |run| run.places(file))
+    }
+
+    pub(super) fn run(&self) -> Option<&Run> {
+        self.shared.run.as_deref()
+    }
+
+    /// True if the run can be resumed.
+    #[must_use]
+    pub fn is_resumable(&self) -> bool {
+        self.shared.run.is_some()
+    }
+}
+
+/// A step whose units are not known beforehand.
+#[derive(Debug, Default)]
+pub(crate) struct Step {
+    run: Option<Arc<Run>>,
+    path: String,
+}
+
+impl Step {
+    /// The units that are finished, and what they left.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+    pub fn finished<T: Persist>(&self, workspace: &Workspace) -> Result<Vec<(u64, T)>> {
+        let Some(run) = &self.run else {
+            return Ok(Vec::new());
+        };
+        let units = run.finished(&self.path).into_iter();
+        units
+            .map(|unit| {
+                let payload = run.payload(&self.path, unit)?.unwrap_or_default();
+                Ok((unit, T::load(&mut Saved::new(&payload, workspace))?))
+            })
+            .collect()
+    }
+
+    /// Notes as one unit what `put` puts into files, and `value`.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], [`crate::Error::Disk`].
+    pub fn finish(
+        &self,
+        unit: u64,
+        value: &impl Persist,
+        put: impl FnOnce() -> Result<()>,
+    ) -> Result<()> {
+        let Some(run) = &self.run else {
+            return put();
+        };
+        let notes = Notes::begin();
+        put()?;
+        run.finish(&self.path, unit, notes.finish(), bytes(value))
+    }
+}
