@@ -144,7 +144,11 @@ impl Reconstruction {
         warnings.iter().for_each(|w| self.observer.warn(w));
         enough(&store)?;
         if params.thin.is_some() {
-            room(&self.folder, store.len() as u64 * SCRATCH_PER_POINT, workspace)?;
+            room(
+                &self.folder,
+                store.len() as u64 * SCRATCH_PER_POINT,
+                workspace,
+            )?;
         }
         let (mut store, outliers) = self.without_outliers(store, &mut clock, workspace)?;
         enough(&store)?;

@@ -1,8 +1,8 @@
 //! Stopping: signals, time limits, and what the user is told then.
 
 use crate::pipeline::Reconstruction;
-use crate::workspace::progress::Cancel;
 use crate::workspace::fault;
+use crate::workspace::progress::Cancel;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 use std::sync::Mutex;

@@ -115,8 +115,15 @@ impl Manifest {
             block: asked.params.block,
             tile_points: asked.tile_points,
             page_points: asked.page_points,
-            inputs: asked.inputs.iter().map(|p| Name::of(p)).collect::<Result<_>>()?,
-            files: files.iter().map(|p| Identity::of(p)).collect::<Result<_>>()?,
+            inputs: asked
+                .inputs
+                .iter()
+                .map(|p| Name::of(p))
+                .collect::<Result<_>>()?,
+            files: files
+                .iter()
+                .map(|p| Identity::of(p))
+                .collect::<Result<_>>()?,
         })
     }
 
@@ -138,8 +145,7 @@ impl Manifest {
                 value["format"]
             )));
         }
-        serde_json::from_value(value)
-            .map_err(|e| not(format!("its manifest cannot be read: {e}")))
+        serde_json::from_value(value).map_err(|e| not(format!("its manifest cannot be read: {e}")))
     }
 
     pub fn output(&self) -> PathBuf {
@@ -218,7 +224,11 @@ impl Manifest {
         }
         let (was, now) = (self.files.len(), now.files.len());
         if was != now {
-            return differ("the number of inputs".into(), was.to_string(), now.to_string());
+            return differ(
+                "the number of inputs".into(),
+                was.to_string(),
+                now.to_string(),
+            );
         }
         Ok(())
     }

@@ -235,9 +235,7 @@ impl<'a, const N: usize> RunReader<'a, N> {
 
     fn read_frame(&mut self) -> Result<()> {
         let mut head = [0u32; 2];
-        let read = self
-            .source
-            .read_exact(bytemuck::cast_slice_mut(&mut head));
+        let read = self.source.read_exact(bytemuck::cast_slice_mut(&mut head));
         read.map_err(|e| self.failed(e))?;
         if head[0] == 0 || head[0] as usize > FRAME {
             return Err(self.corrupt(

@@ -9,10 +9,7 @@ pub struct Blocks {
     size: u32,
 }
 
-crate::workspace::persist::persist!(Blocks {
-    points,
-    size
-});
+crate::workspace::persist::persist!(Blocks { points, size });
 
 impl Blocks {
     /// Blocks of `size` ids for `points` points.

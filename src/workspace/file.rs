@@ -1,8 +1,8 @@
 //! Files of the scratch folder: private, never through a symbolic link, every byte counted.
 
+use super::IoCounters;
 use super::fault;
 use super::run::Run;
-use super::IoCounters;
 use crate::error::{Error, Result};
 use std::fs::{File, OpenOptions};
 use std::os::unix::fs::{FileExt, OpenOptionsExt};
@@ -53,7 +53,9 @@ pub fn options() -> OpenOptions {
 pub fn open_existing(path: &Path) -> std::io::Result<File> {
     // Opening a pipe must not wait for someone at its other end.
     let flags = rustix::fs::OFlags::NOFOLLOW | rustix::fs::OFlags::NONBLOCK;
-    let file = options().custom_flags(flags.bits().cast_signed()).open(path)?;
+    let file = options()
+        .custom_flags(flags.bits().cast_signed())
+        .open(path)?;
     if file.metadata()?.is_file() {
         Ok(file)
     } else {

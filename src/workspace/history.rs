@@ -124,7 +124,9 @@ impl History {
     pub fn places(&self, file: &str) -> Vec<(u32, Place)> {
         let parts = self.files.get(file).map(|file| file.parts.iter());
         let parts = parts.into_iter().flatten();
-        parts.map(|(section, part)| (*section, part.place)).collect()
+        parts
+            .map(|(section, part)| (*section, part.place))
+            .collect()
     }
 
     /// True if the file was deleted.

@@ -12,10 +12,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-/// Time between two rounds of syncing.
-const ROUND: Duration = Duration::from_secs(5);
-/// The same while there are files to delete.
-const SOON: Duration = Duration::from_secs(1);
+/// How often there is a look at what to do.
+const LOOK: Duration = Duration::from_secs(1);
+/// Looks between two rounds of syncing, if no file waits to be deleted.
+const ROUND: u32 = 5;
 
 /// A file that is not needed any more, and its size.
 #[derive(Debug)]
@@ -41,10 +41,7 @@ struct Table {
 
 /// The thread, and what it has to do.
 #[derive(Debug)]
-pub struct Keeper {
-    table: Arc<Table>,
-    thread: Option<std::thread::JoinHandle<()>>,
-}
+pub struct Keeper(Arc<Table>);
 
 impl Table {
     fn state(&self) -> MutexGuard<'_, State> {
@@ -54,10 +51,15 @@ impl Table {
     /// Waits for the time of the next round; false when there is none.
     fn wait(&self) -> bool {
         let mut state = self.state();
-        let pause = if state.leaving.is_empty() { ROUND } else { SOON };
-        if !state.stop {
-            let waited = self.wake.wait_timeout(state, pause);
+        for look in 1.. {
+            if state.stop {
+                return false;
+            }
+            let waited = self.wake.wait_timeout(state, LOOK);
             state = waited.unwrap_or_else(PoisonError::into_inner).0;
+            if look >= ROUND || !state.leaving.is_empty() {
+                break;
+            }
         }
         !state.stop
     }
@@ -71,6 +73,9 @@ impl Table {
             )
         };
         for (file, flag) in dirty {
+            if self.state().stop {
+                return;
+            }
             flag.store(false, Ordering::Relaxed);
             // What did not get to the disk is found by its checksum when the run is resumed.
             let _ = file.sync_data();
@@ -79,6 +84,11 @@ impl Table {
         fault::point(Event::Synced);
         for file in leaving {
             fault::point(Event::Delete);
+            // Once the run is over, the folder may be that of another one.
+            let state = self.state();
+            if state.stop {
+                return;
+            }
             // A scratch file that cannot be deleted goes with its folder.
             let _ = std::fs::remove_file(&file.path);
             io.shrink_scratch(file.bytes);
@@ -100,34 +110,26 @@ impl Keeper {
             }
         };
         let thread = std::thread::Builder::new().name("outcrop-keeper".into());
-        Ok(Self {
-            thread: Some(thread.spawn(work)?),
-            table,
-        })
+        thread.spawn(work)?;
+        Ok(Self(table))
     }
 
     /// Takes in a file that was written to.
     pub fn sync_later(&self, file: &Arc<File>, flag: &Arc<AtomicBool>) {
-        let mut state = self.table.state();
+        let mut state = self.0.state();
         state.dirty.push((file.clone(), flag.clone()));
     }
 
     /// Takes in files that nobody needs; the journal says so already.
     pub fn delete_later(&self, files: Vec<Leaving>) {
-        if !files.is_empty() {
-            self.table.state().leaving.extend(files);
-            self.table.wake.notify_all();
-        }
+        self.0.state().leaving.extend(files);
     }
 }
 
 impl Drop for Keeper {
     fn drop(&mut self) {
-        self.table.state().stop = true;
-        self.table.wake.notify_all();
-        if let Some(thread) = self.thread.take() {
-            // It cannot panic.
-            let _ = thread.join();
-        }
+        // Nobody waits for a sync that is under way.
+        self.0.state().stop = true;
+        self.0.wake.notify_all();
     }
 }

@@ -102,7 +102,9 @@ impl Workspace {
     pub(crate) fn step(&self, name: &'static str) -> Result<Step> {
         let run = self.shared.run.clone();
         Ok(Step {
-            path: run.as_ref().map_or(Ok(String::new()), |run| run.begin(name))?,
+            path: run
+                .as_ref()
+                .map_or(Ok(String::new()), |run| run.begin(name))?,
             run,
         })
     }

@@ -185,7 +185,11 @@ impl<'a> MeshFile<'a> {
     /// # Errors
     /// [`Error::Io`].
     pub fn write_vertices(&self, part: u32, first: u64, bytes: &[u8]) -> Result<()> {
-        self.write(part, bytes, self.header + first * 3 * self.coordinates.bytes())
+        self.write(
+            part,
+            bytes,
+            self.header + first * 3 * self.coordinates.bytes(),
+        )
     }
 
     /// Writes triangles from number `first` on, as part `part` of the mesh, as [`encode_face`] makes them.

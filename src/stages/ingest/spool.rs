@@ -98,7 +98,9 @@ impl SpoolFile {
     pub(super) fn frames(&self) -> Vec<(u32, u64)> {
         let places = self.places();
         let frames = places.iter();
-        frames.map(|(n, place)| (*n, place.records as u64)).collect()
+        frames
+            .map(|(n, place)| (*n, place.records as u64))
+            .collect()
     }
 
     fn append(&self, frame: &[u8], points: usize) -> Result<()> {

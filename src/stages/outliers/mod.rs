@@ -42,10 +42,7 @@ pub struct OutlierStats {
     pub rounds: u32,
 }
 
-crate::workspace::persist::persist!(OutlierStats {
-    dropped,
-    rounds
-});
+crate::workspace::persist::persist!(OutlierStats { dropped, rounds });
 
 /// What decides which points are outliers, and how they are worked on.
 #[derive(Debug, Clone, Copy)]

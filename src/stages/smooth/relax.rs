@@ -58,14 +58,8 @@ pub struct RelaxStats {
     pub moved: u64,
 }
 
-persist!(Relaxed {
-    store,
-    stats
-});
-persist!(RelaxStats {
-    rounds,
-    moved
-});
+persist!(Relaxed { store, stats });
+persist!(RelaxStats { rounds, moved });
 
 /// Which patches move, and what was seen of them.
 struct Patches {

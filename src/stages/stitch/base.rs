@@ -224,11 +224,7 @@ impl Look<'_> {
 
     /// The T3 triangles that touch a block, ascending, and its interior candidates so far. The
     /// crossing triples are put apart.
-    fn part(
-        &self,
-        block: usize,
-        found: &mut Found,
-    ) -> Result<(Vec<Triangle>, Vec<[u32; 4]>)> {
+    fn part(&self, block: usize, found: &mut Found) -> Result<(Vec<Triangle>, Vec<[u32; 4]>)> {
         let visiting = self.triples.visiting.get(block)?;
         let own = self.triples.own.get(block)?;
         let t3 = visiting.iter().filter(|r| r[4] == 3).count()

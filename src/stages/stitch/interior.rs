@@ -1,10 +1,10 @@
 //! T12 insertion inside a block (paper, section 3.5, second part): the candidates whose vertices
 //! are all in one block, each block by itself.
 
+use super::InsertStats;
 use super::base::Base;
 use super::fans::Fans;
 use super::tests_of_paper::{Adjacent, Candidate, Refusal, View, examine};
-use super::InsertStats;
 use crate::error::Result;
 use crate::geom::Point;
 use crate::spill::layouts::{LABELLED, TRIANGLE};

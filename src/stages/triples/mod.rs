@@ -35,10 +35,7 @@ pub struct TripleStats {
     pub crossing: u64,
 }
 
-persist!(Triples {
-    own,
-    visiting
-});
+persist!(Triples { own, visiting });
 persist!(TripleStats {
     triples,
     t3,

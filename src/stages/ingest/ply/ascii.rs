@@ -21,7 +21,9 @@ pub(super) fn read<T: FromScalar>(
         return Ok(());
     };
     let memory = sink_bytes::<T>() + (STREAM_BUFFER + LONGEST_LINE) as u64;
-    writer.whole("PLY lines", memory, || vertices::<T>(input, header, vertex, writer))
+    writer.whole("PLY lines", memory, || {
+        vertices::<T>(input, header, vertex, writer)
+    })
 }
 
 fn vertices<T: FromScalar>(
