@@ -66,7 +66,7 @@ pub enum Error {
         budget: u64,
     },
     /// A file system is too small, or full.
-    #[error("{path}: not enough space: {needed} bytes ({mib} MiB) are needed, {free} are free", path = path.display(), mib = needed.div_ceil(1 << 20))]
+    #[error("{path}: not enough space: {needed} more bytes ({mib} MiB) are needed, {free} are free", path = path.display(), mib = needed.div_ceil(1 << 20))]
     Disk {
         /// Scratch or output folder, or the file that could not be written.
         path: PathBuf,

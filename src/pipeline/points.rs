@@ -86,7 +86,7 @@ pub(crate) fn order(
     let orderer = Orderer::new(workspace)?;
     orderer.take_parts(workspace, &spool.frames(), |frames| {
         let push = |points: &[_]| orderer.push(workspace, points);
-        spool.par_for_each(threads, lattice, frames, push)
+        spool.par_for_frames(threads, lattice, frames, push)
     })?;
     drop(held);
     if orderer.is_sorted() || !workspace.is_resumable() {

@@ -128,9 +128,13 @@ impl Folder {
         match (bytes.ok().and_then(|b| unsealed(&b)), in_journal) {
             (Some(manifest), Some(_)) => self.manifest = manifest,
             (Some(manifest), None) => {
-                self.manifest = manifest;
                 self.end = None;
-                self.warn_of(journal::NAME, "the run begins again");
+                // A journal that was never begun is no loss.
+                let least = manifest.len() as u64;
+                if path_bytes(&self.path.join(journal::NAME)).is_none_or(|bytes| bytes > least) {
+                    self.warn_of(journal::NAME, "the run begins again");
+                }
+                self.manifest = manifest;
             }
             (None, Some(manifest)) => {
                 self.manifest = manifest;
@@ -262,6 +266,10 @@ impl Folder {
             .iter()
             .any(|e| matches!(e.record, Record::Unit { .. }))
     }
+}
+
+fn path_bytes(path: &Path) -> Option<u64> {
+    path.symlink_metadata().ok().map(|meta| meta.len())
 }
 
 fn listing(path: &Path) -> Result<Vec<String>> {

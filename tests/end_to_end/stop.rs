@@ -22,8 +22,9 @@ fn wait(child: &mut Child, what: &str, mut done: impl FnMut(&mut Child) -> bool)
     }
 }
 
-/// Sends `signal` once the scratch folder holds `file`; the program would work for long.
-fn stops(input: &Path, file: &str, signal: Signal) {
+/// Sends `signal` once the scratch folder holds `file`; the program would work for long. What it had
+/// finished stays, if there was something.
+fn stops(input: &Path, file: &str, signal: Signal, code: i32) {
     let bench = Bench::new();
     let scratch = bench.subfolder("scratch");
     let output = bench.subfolder("output");
@@ -58,7 +59,7 @@ fn stops(input: &Path, file: &str, signal: Signal) {
         child.try_wait().unwrap().is_some()
     });
     println!("{file}: stopped after {:?}", start.elapsed());
-    assert_eq!(child.wait().unwrap().code(), Some(130));
+    assert_eq!(child.wait().unwrap().code(), Some(code));
     let (mut out, mut err) = (String::new(), String::new());
     child
         .stdout
@@ -72,11 +73,15 @@ fn stops(input: &Path, file: &str, signal: Signal) {
         .unwrap()
         .read_to_string(&mut err)
         .unwrap();
-    assert_eq!(
-        (out.as_str(), err.as_str()),
-        ("", "outcrop: stopped on request\n")
-    );
-    assert_eq!(util::listing(&scratch), [""; 0]);
+    assert_eq!(out, "");
+    let folders = util::listing(&scratch);
+    if let Some(folder) = folders.first() {
+        let path = scratch.join(folder);
+        let how = format!("; go on with: outcrop resume {}", path.display());
+        assert_eq!(err, format!("outcrop: stopped on request{how}\n"));
+    } else {
+        assert_eq!((file, err.as_str()), ("", "outcrop: stopped on request\n"));
+    }
     assert_eq!(util::listing(&output), ["mesh.ply"]);
     assert_eq!(std::fs::read(&mesh).unwrap(), b"something dear");
 }
@@ -85,10 +90,10 @@ fn stops(input: &Path, file: &str, signal: Signal) {
 fn signals_stop_a_run() {
     let bench = Bench::new();
     let input = bench.cloud("cloud.laz", &Cloud::new(Kind::Terrain).points(300_000));
-    for signal in [Signal::INT, Signal::TERM] {
+    for (signal, code) in [(Signal::INT, 130), (Signal::TERM, 143)] {
         // At once, and in the middle of the work.
         for file in ["", "points"] {
-            stops(&input, file, signal);
+            stops(&input, file, signal, code);
         }
     }
 }

@@ -56,12 +56,27 @@ impl Spool {
         Ok(())
     }
 
-    /// Streams the points of some `frames`, on `threads` threads at the same time, each with its own
+    /// Like [`Spool::for_each`], on `threads` threads at the same time, each with its own
     /// [`READ_BUFFERS`].
     ///
     /// # Errors
     /// See [`Spool::for_each`]; the first error of any thread.
     pub fn par_for_each(
+        &self,
+        threads: usize,
+        lattice: &Lattice,
+        each: impl Fn(&[Point]) -> Result<()> + Sync,
+    ) -> Result<()> {
+        let frames: Vec<u32> = self.frames().into_iter().map(|frame| frame.0).collect();
+        self.par_for_frames(threads, lattice, &frames, each)
+    }
+
+    /// Streams the points of some `frames`, on `threads` threads at the same time, each with its own
+    /// [`READ_BUFFERS`].
+    ///
+    /// # Errors
+    /// See [`Spool::for_each`]; the first error of any thread.
+    pub fn par_for_frames(
         &self,
         threads: usize,
         lattice: &Lattice,

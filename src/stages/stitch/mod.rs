@@ -194,10 +194,9 @@ fn insert(
         let counts = interior::insert(places, base, interior, blocks, block, angle)?;
         done[block].store(true, Ordering::Release);
         workspace.observer.advance(1);
-        match pass.try_lock() {
-            Ok(mut pass) => pass.advance(ready, Some(spare))?,
-            // Someone else is at it.
-            Err(_) => {}
+        // Or someone else is at it.
+        if let Ok(mut pass) = pass.try_lock() {
+            pass.advance(ready, Some(spare))?;
         }
         Ok(counts)
     };

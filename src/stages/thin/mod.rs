@@ -71,7 +71,7 @@ pub fn thin(spool: Spool, lattice: &Lattice, grid: Grid, workspace: &Workspace) 
         Ok(())
     };
     sorter.take_parts(workspace, &spool.frames(), true, |frames| {
-        spool.par_for_each(threads, lattice, frames, take)
+        spool.par_for_frames(threads, lattice, frames, take)
     })?;
     drop(frames);
     drop(spool);
@@ -107,6 +107,9 @@ persist!(ThinStats {
 /// Where the points that stay are handed on from: the first record of a cell.
 pub type Mark = Option<Record<6>>;
 
+/// Takes points that stay, where the next ones begin, and the counts up to there.
+pub type Each<'a> = &'a mut dyn FnMut(&[Point], Mark, ThinStats) -> Result<()>;
+
 impl Thinned {
     /// Calls `each` with the points that stay, some at a time, with where the next ones begin and with
     /// the counts so far; from where an earlier call said, with the counts it said.
@@ -117,7 +120,7 @@ impl Thinned {
         self,
         from: Mark,
         mut stats: ThinStats,
-        each: &mut dyn FnMut(&[Point], Mark, ThinStats) -> Result<()>,
+        each: Each<'_>,
     ) -> Result<ThinStats> {
         let Self { sorted, grid, held } = self;
         let mut kept = Vec::with_capacity(BATCH);

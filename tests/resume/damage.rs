@@ -1,0 +1,129 @@
+//! Scratch files that are damaged, cut short, gone, or something else; disks that are full.
+
+use crate::run::{Case, ROBUST, copy};
+use crate::util;
+use std::collections::BTreeSet;
+use std::path::Path;
+
+/// What can happen to a file.
+fn spoil(path: &Path, how: usize) -> &'static str {
+    let mut bytes = std::fs::read(path).unwrap();
+    match how % 4 {
+        0 if !bytes.is_empty() => {
+            bytes[0] ^= 4;
+            std::fs::write(path, bytes).unwrap();
+            "a bit flipped"
+        }
+        1 => {
+            bytes.truncate(bytes.len() / 2);
+            std::fs::write(path, bytes).unwrap();
+            "cut short"
+        }
+        2 => {
+            std::fs::remove_file(path).unwrap();
+            let victim = path.parent().unwrap().with_file_name("victim");
+            std::fs::write(&victim, "something dear").unwrap();
+            std::os::unix::fs::symlink(&victim, path).unwrap();
+            "a link to elsewhere"
+        }
+        _ => {
+            std::fs::remove_file(path).unwrap();
+            "gone"
+        }
+    }
+}
+
+#[test]
+fn damage_to_any_file_is_found_and_mended() {
+    let case = Case::new(ROBUST);
+    let records = case.events["recorded"];
+    let saved = case.bench.path("saved");
+    let mut named = BTreeSet::new();
+    for (turn, part) in [8, 20, 33, 44, 58, 70, 85, 96].into_iter().enumerate() {
+        case.killed(&format!("recorded:{}", records * part / 100));
+        copy(&case.scratch, &saved);
+        for (number, name) in util::listing(&saved).into_iter().enumerate() {
+            if name == "lock" {
+                continue;
+            }
+            copy(&saved, &case.scratch);
+            let how = spoil(&case.scratch.join(&name), turn + number);
+            let what = format!("{name} {how} at {part} %");
+            let said = case.go_on(&what);
+            // A file that is not needed any more may look as it likes.
+            if said.contains("damaged") {
+                assert!(said.contains(&name), "{what}: {said}");
+                assert_eq!(said.lines().count(), 1, "{what}: {said}");
+                named.insert(name);
+            }
+            let victim = case.bench.path("victim");
+            if victim.exists() {
+                assert_eq!(std::fs::read(victim).unwrap(), b"something dear", "{what}");
+            }
+        }
+    }
+    println!("noticed: {named:?}");
+    for file in [
+        "manifest",
+        "journal",
+        "ingest-0.spool",
+        "points",
+        "relaxed1",
+    ] {
+        assert!(named.contains(file), "{file}");
+    }
+    assert!(named.iter().any(|name| name.ends_with(".index")));
+    assert!(named.len() > 15, "{named:?}");
+}
+
+#[test]
+fn a_damaged_manifest_alone_is_no_loss() {
+    let case = Case::new(ROBUST);
+    case.killed("recorded:120");
+    spoil(&case.scratch.join("manifest"), 0);
+    let said = util::run(["resume".into(), case.scratch.clone().into_os_string()]);
+    case.check(&said, "resume");
+    assert!(said.err.contains("manifest: damaged"), "{}", said.err);
+    // Without manifest and journal nobody knows what the run was.
+    case.killed("recorded:120");
+    spoil(&case.scratch.join("manifest"), 0);
+    spoil(&case.scratch.join("journal"), 0);
+    let said = util::run(["resume".into(), case.scratch.clone().into_os_string()]);
+    assert_eq!(said.code, Some(2));
+    assert!(said.err.contains("--restart"), "{}", said.err);
+    assert!(case.go_on("both").contains("begins again"));
+}
+
+/// One line that names a file, and a run that goes on.
+fn fails(case: &Case, fault: &str, reason: &str) {
+    case.clear();
+    let ended = case.attempt(fault, &["--threads", "2"]);
+    let said = &ended.said;
+    if said.code == Some(0) {
+        return;
+    }
+    assert_eq!(said.code, Some(2), "{fault}: {ended:?}");
+    assert_eq!(said.err.lines().count(), 1, "{fault}: {ended:?}");
+    assert!(said.err.contains(reason), "{fault}: {ended:?}");
+    assert!(said.err.contains("mesh.ply"), "{fault}: {ended:?}");
+    assert!(!case.mesh.exists());
+    if case.scratch.exists() {
+        let how = format!("outcrop resume {}", case.scratch.display());
+        assert!(said.err.contains(&how), "{fault}: {ended:?}");
+        let said = util::run(["resume".as_ref(), case.scratch.as_os_str()]);
+        case.check(&said, fault);
+    }
+}
+
+#[test]
+fn a_full_or_broken_disk_is_told_and_survived() {
+    let case = Case::new(ROBUST);
+    let writes = case.events["write"];
+    for (turn, number) in (1..=writes).step_by(13).enumerate() {
+        if turn % 2 == 0 {
+            fails(&case, &format!("full:{number}"), "more bytes");
+        } else {
+            fails(&case, &format!("eio:{number}"), "Input/output error");
+        }
+    }
+}

@@ -1,0 +1,72 @@
+//! Killed at points where something becomes durable. `scripts/kill-test` has all of them.
+
+use crate::run::{Case, FILTERS, PAPER, ROBUST};
+use crate::util;
+
+/// Kills a run at every `step`th event of some kinds and goes on.
+fn survives(options: &[&str], step: u64, kinds: &[&str]) {
+    let case = Case::new(options);
+    let mut kills = 0;
+    for (kind, start) in kinds.iter().zip([1, 3, 7, 2, 5, 4].iter().cycle()) {
+        let count = case.events[*kind];
+        for number in (*start..=count).step_by(step as usize) {
+            let fault = format!("{kind}:{number}");
+            case.killed(&fault);
+            if case.scratch.exists() {
+                assert_eq!(case.go_on(&fault), "", "{fault}");
+                kills += 1;
+            }
+        }
+    }
+    println!("{options:?}: survived {kills} kills");
+    assert!(kills > 10);
+}
+
+#[test]
+fn killed_anywhere_a_run_goes_on() {
+    survives(ROBUST, 14, &["torn", "recorded", "write"]);
+}
+
+#[test]
+fn killed_anywhere_the_papers_method_goes_on() {
+    survives(PAPER, 16, &["recorded", "torn"]);
+}
+
+#[test]
+fn killed_anywhere_filters_go_on() {
+    survives(FILTERS, 18, &["torn", "recorded"]);
+}
+
+#[test]
+fn killed_while_the_mesh_gets_its_name() {
+    let case = Case::new(ROBUST);
+    for fault in ["rename:1", "renamed:1"] {
+        case.killed(fault);
+        assert!(case.scratch.exists());
+        assert_eq!(case.mesh.exists(), fault == "renamed:1");
+        assert_eq!(case.go_on(fault), "", "{fault}");
+    }
+}
+
+#[test]
+fn killed_again_and_again() {
+    let case = Case::new(ROBUST);
+    case.killed("recorded:9");
+    let mut attempts = 1;
+    // Every attempt is killed after its twentieth record.
+    while case.scratch.exists() {
+        let threads = ["1", "2", "3"][attempts % 3];
+        let more = ["--resume", "--threads", threads];
+        let fault = ["recorded:20", "torn:20"][attempts % 2];
+        let ended = case.attempt(fault, &more);
+        if ended.said.code == Some(0) {
+            case.check(&ended.said, "the last attempt");
+        } else {
+            assert_eq!(ended.signal, Some(9), "{ended:?}");
+        }
+        attempts += 1;
+        assert!(attempts < 40, "the run gets nowhere");
+    }
+    println!("{attempts} attempts");
+    assert!(attempts > 5 && util::listing(case.bench.folder()).contains(&"mesh.ply".into()));
+}

@@ -1,0 +1,140 @@
+//! One small cloud in many blocks and tiles, and runs of it that go wrong.
+
+use crate::util::{self, Bench, Said};
+use outcrop_cloudgen::{Cloud, Kind};
+use std::collections::HashMap;
+use std::os::unix::process::ExitStatusExt;
+use std::path::{Path, PathBuf};
+use std::process::Output;
+
+/// Blocks, and tiles inside them.
+const PARTS: [&str; 4] = ["--block-points", "4096", "--tile-points", "1500"];
+
+/// Options that lead through different stages.
+pub const ROBUST: &[&str] = &[];
+pub const PAPER: &[&str] = &["--method", "paper", "--smooth", "1", "--relax", "1"];
+pub const FILTERS: &[&str] = &["--thin", "6", "--drop-outliers"];
+
+/// A cloud, options, and the mesh of an undisturbed run.
+pub struct Case {
+    pub bench: Bench,
+    pub input: PathBuf,
+    pub mesh: PathBuf,
+    pub scratch: PathBuf,
+    options: Vec<String>,
+    expected: u64,
+    /// How many events there are of each kind in an undisturbed run.
+    pub events: HashMap<String, u64>,
+}
+
+/// How an attempt ended.
+#[derive(Debug)]
+pub struct Ended {
+    pub said: Said,
+    pub signal: Option<i32>,
+}
+
+impl From<Output> for Ended {
+    fn from(output: Output) -> Self {
+        Self {
+            signal: output.status.signal(),
+            said: output.into(),
+        }
+    }
+}
+
+impl Case {
+    /// A noisy terrain with outliers: every stage has something to do.
+    pub fn new(options: &[&str]) -> Self {
+        let bench = Bench::new();
+        let mut cloud = Cloud::new(Kind::Terrain).points(30_000).noise(0.6);
+        cloud.outliers = 0.001;
+        let input = bench.cloud("cloud.laz", &cloud);
+        let mesh = bench.path("mesh.ply");
+        let mut case = Self {
+            scratch: bench.path("mesh.ply.outcrop-scratch"),
+            options: options.iter().map(ToString::to_string).collect(),
+            expected: 0,
+            events: HashMap::new(),
+            bench,
+            input,
+            mesh,
+        };
+        let counts = case.bench.path("counts");
+        let fault = format!("count:{}", counts.display());
+        let ended = case.attempt(&fault, &["--threads", "2"]);
+        assert_eq!(ended.said.code, Some(0), "{ended:?}");
+        case.expected = util::hash(&case.mesh);
+        let counts = std::fs::read_to_string(counts).unwrap();
+        let lines = counts.lines().filter_map(|line| line.split_once(' '));
+        case.events = lines
+            .map(|(name, count)| (name.to_owned(), count.parse().unwrap()))
+            .collect();
+        case.clear();
+        case
+    }
+
+    /// Arguments of a run.
+    pub fn arguments(&self) -> Vec<String> {
+        let paths = [&self.input, &self.mesh].map(|path| path.display().to_string());
+        let fixed = ["reconstruct", &paths[0], "-o", &paths[1]];
+        let fixed = fixed.iter().chain(&PARTS).map(ToString::to_string);
+        fixed.chain(self.options.iter().cloned()).collect()
+    }
+
+    /// Runs the program, in which something goes wrong.
+    pub fn attempt(&self, fault: &str, more: &[&str]) -> Ended {
+        let mut command = util::program(self.arguments());
+        command.args(more).env("OUTCROP_FAULT", fault);
+        command.output().unwrap().into()
+    }
+
+    /// Removes all that runs have left.
+    pub fn clear(&self) {
+        let _ = std::fs::remove_dir_all(&self.scratch);
+        let _ = std::fs::remove_file(&self.mesh);
+    }
+
+    /// Makes a run that is killed at this event; other threads and memory than later on.
+    pub fn killed(&self, fault: &str) {
+        self.clear();
+        let ended = self.attempt(fault, &["--threads", "2", "--memory", "192MiB"]);
+        // The number of events differs a bit from run to run.
+        let alive = ended.said.code == Some(0);
+        assert!(alive || ended.signal == Some(9), "{fault}: {ended:?}");
+    }
+
+    /// Goes on with the run; it must end well. What it said.
+    pub fn go_on(&self, what: &str) -> String {
+        let said = util::run(
+            self.arguments()
+                .into_iter()
+                .chain(["--resume", "--threads", "1", "--memory", "256MiB"].map(String::from)),
+        );
+        self.check(&said, what);
+        said.err
+    }
+
+    /// The run has ended well, and left nothing but the mesh.
+    pub fn check(&self, said: &Said, what: &str) {
+        assert_eq!(said.code, Some(0), "{what}: {said:?}");
+        assert!(
+            util::hash(&self.mesh) == self.expected,
+            "{what}: another mesh"
+        );
+        let left = util::listing(self.bench.folder());
+        let strange = |name: &&String| name.contains("outcrop");
+        assert_eq!(left.iter().find(strange), None, "{what}");
+    }
+}
+
+/// Copies the files of a folder.
+pub fn copy(from: &Path, to: &Path) {
+    let _ = std::fs::remove_dir_all(to);
+    std::fs::create_dir(to).unwrap();
+    let mode = std::os::unix::fs::PermissionsExt::from_mode(0o700);
+    std::fs::set_permissions(to, mode).unwrap();
+    for name in util::listing(from) {
+        std::fs::copy(from.join(&name), to.join(&name)).unwrap();
+    }
+}
