@@ -225,6 +225,12 @@ impl Workspace {
         Ok((file, places))
     }
 
+    /// Tells the observer of progress, and of as much if the unit that does so is found finished later.
+    pub fn advance(&self, items: u64) {
+        run::Notes::advance(items);
+        self.observer.advance(items);
+    }
+
     /// 0, 1, 2 … to tell things apart that are made in one workspace.
     pub fn number(&self) -> u64 {
         self.numbers.fetch_add(1, Ordering::Relaxed)

@@ -41,7 +41,16 @@ struct Scope {
 
 thread_local! {
     /// What the work on this thread has put into files, for each unit that it is in.
-    static NOTES: RefCell<Vec<Vec<Put>>> = const { RefCell::new(Vec::new()) };
+    static NOTES: RefCell<Vec<Noted>> = const { RefCell::new(Vec::new()) };
+}
+
+/// What came of a unit beside its result.
+#[derive(Debug, Default)]
+pub struct Noted {
+    /// Parts of files.
+    pub puts: Vec<Put>,
+    /// Items of the stage's progress.
+    pub items: u64,
 }
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -56,16 +65,25 @@ impl Notes {
     /// Begins to collect.
     #[must_use]
     pub fn begin() -> Self {
-        NOTES.with_borrow_mut(|notes| notes.push(Vec::new()));
+        NOTES.with_borrow_mut(|notes| notes.push(Noted::default()));
         Self(())
     }
 
-    /// What was put.
+    /// What was noted.
     #[must_use]
-    pub fn finish(self) -> Vec<Put> {
-        let puts = NOTES.with_borrow_mut(Vec::pop).unwrap_or_default();
+    pub fn finish(self) -> Noted {
+        let noted = NOTES.with_borrow_mut(Vec::pop).unwrap_or_default();
         std::mem::forget(self);
-        puts
+        noted
+    }
+
+    /// Notes progress.
+    pub fn advance(items: u64) {
+        NOTES.with_borrow_mut(|notes| {
+            if let Some(noted) = notes.last_mut() {
+                noted.items += items;
+            }
+        });
     }
 }
 
@@ -102,8 +120,8 @@ impl Run {
     /// [`crate::Error::Io`], [`crate::Error::Disk`].
     pub fn put(&self, put: Put) -> Result<()> {
         let alone = NOTES.with_borrow_mut(|notes| match notes.last_mut() {
-            Some(puts) => {
-                puts.push(put);
+            Some(noted) => {
+                noted.puts.push(put);
                 None
             }
             None => Some(put),

@@ -47,7 +47,7 @@ impl Workspace {
         let inside = Inside(run);
         let value = work()?;
         drop(inside);
-        run.finish(&path, 0, notes.finish(), bytes(&value))?;
+        run.finish(&path, 0, notes.finish().puts, bytes(&value))?;
         run.let_go()?;
         Ok(value)
     }
@@ -83,14 +83,19 @@ impl Workspace {
                 continue;
             }
             let payload = run.payload(&step, unit as u64)?.unwrap_or_default();
-            hand_on(unit, T::load(&mut Saved::new(&payload, self))?)?;
+            let (items, value) = Persist::load(&mut Saved::new(&payload, self))?;
+            self.observer.advance(items);
+            hand_on(unit, value)?;
         }
         let bytes_of = |n: usize| bytes_of(left[n]);
         self.for_each_unit(name, left.len(), bytes_of, |n| {
             let unit = left[n];
             let notes = Notes::begin();
             let value = work(unit)?;
-            run.finish(&step, unit as u64, notes.finish(), bytes(&value))?;
+            let noted = notes.finish();
+            let mut payload = bytes(&noted.items);
+            value.save(&mut payload);
+            run.finish(&step, unit as u64, noted.puts, payload)?;
             hand_on(unit, value)
         })
     }
@@ -173,6 +178,6 @@ impl Step {
         };
         let notes = Notes::begin();
         put()?;
-        run.finish(&self.path, unit, notes.finish(), bytes(value))
+        run.finish(&self.path, unit, notes.finish().puts, bytes(value))
     }
 }

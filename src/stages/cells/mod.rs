@@ -153,7 +153,7 @@ pub fn cells(
         let (kept, sent) = seen.fold(&tiles);
         own.put(tile, &kept)?;
         exchange.send_from(tile, &sent)?;
-        workspace.observer.advance(ids.len() as u64);
+        workspace.advance(ids.len() as u64);
         Ok(stats)
     };
     let mut stats = CellStats::default();

@@ -66,7 +66,7 @@ pub fn export(
     let bytes = |block| block_bytes(repaired, blocks, block);
     let work = |block| {
         write_block(store, repaired, &numbering, blocks, lattice, &file, block)?;
-        workspace.observer.advance(1);
+        workspace.advance(1);
         Ok(())
     };
     workspace.units("export: block", blocks.count(), bytes, work, |_, ()| Ok(()))?;

@@ -245,7 +245,7 @@ impl<T: Coordinate> Sink<'_, T> {
     fn flush(&mut self) -> Result<()> {
         let workspace = self.target.workspace;
         workspace.check_cancel()?;
-        workspace.observer.advance(self.stats.read - self.reported);
+        workspace.advance(self.stats.read - self.reported);
         self.reported = self.stats.read;
         if self.points.is_empty() {
             return Ok(());

@@ -95,7 +95,7 @@ fn round(
     };
     let work = |tile| {
         let ids = tiles.ids(tile);
-        workspace.observer.advance(ids.len() as u64);
+        workspace.advance(ids.len() as u64);
         let points = one_tile(store, ids, options.factor, SpacingCache::new(&spacings))?;
         kept.put(tile, bytemuck::cast_slice(&points))
     };

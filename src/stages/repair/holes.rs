@@ -82,7 +82,7 @@ pub fn fill(
             edges: settled.edges,
             rim: files.put(block, &rim)?,
         };
-        workspace.observer.advance(1);
+        workspace.advance(1);
         Ok(found)
     };
     let mut rims = vec![RimCounts::default(); count];

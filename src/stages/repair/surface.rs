@@ -164,7 +164,7 @@ pub fn build(
     };
     let work = |block| {
         let done = build.block(block)?;
-        workspace.observer.advance(1);
+        workspace.advance(1);
         Ok(done)
     };
     let mut stats = RepairStats::default();

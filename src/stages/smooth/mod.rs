@@ -40,7 +40,7 @@ pub fn smooth(
     };
     let work = |tile| {
         let points = smooth_tile(store, tiles.ids(tile), neighbors)?;
-        workspace.observer.advance(points.len() as u64);
+        workspace.advance(points.len() as u64);
         moved.put(tile, bytemuck::cast_slice(&points))
     };
     workspace.units("smooth: tile", tiles.count(), bytes, work, |_, ()| Ok(()))?;

@@ -175,7 +175,7 @@ pub fn relax(
                 each_fit(store, ids, neighbors, sampled, |id, point, fit| {
                     notes.note(id, target(point, &fit, neighbors).1);
                 })?;
-                workspace.observer.advance(points);
+                workspace.advance(points);
                 Ok(notes)
             };
             workspace.units("relax: tile", tiles.count(), bytes, work, |_, notes| {
@@ -230,7 +230,7 @@ fn one_round(
                 notes.moved += 1;
             })?;
         }
-        workspace.observer.advance(points.len() as u64);
+        workspace.advance(points.len() as u64);
         part.put(tile, bytemuck::cast_slice(&points))?;
         Ok(notes)
     };

@@ -193,7 +193,7 @@ fn insert(
         let block = order[unit] as usize;
         let counts = interior::insert(places, base, interior, blocks, block, angle)?;
         done[block].store(true, Ordering::Release);
-        workspace.observer.advance(1);
+        workspace.advance(1);
         // Or someone else is at it.
         if let Ok(mut pass) = pass.try_lock() {
             pass.advance(ready, Some(spare))?;

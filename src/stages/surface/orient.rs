@@ -9,7 +9,7 @@ use crate::spill::layouts::{LABELLED, SENT_LABELLED, TRIANGLE};
 use crate::spill::{Exchange, Sections, Word};
 use crate::stages::blocks::Blocks;
 use crate::workspace::Workspace;
-use crate::workspace::persist::{Persist, Saved, persist};
+use crate::workspace::persist::{Persist, Saved};
 use rustc_hash::FxHashMap;
 
 const EXCHANGE_BUFFER: u64 = 8 << 20;
@@ -110,7 +110,7 @@ pub fn orient_inside<T: Persist + Send>(
             block,
             &crossing.iter().filter(mine).copied().collect::<Vec<_>>(),
         )?;
-        workspace.observer.advance(1);
+        workspace.advance(1);
         let counts = (done.mobius, done.interior.len());
         Ok(((done.global, done.labels), counts, found))
     };
@@ -133,16 +133,6 @@ pub fn orient_inside<T: Persist + Send>(
         triangles,
     })
 }
-
-persist!(OrientedInside {
-    interior,
-    relations,
-    votes,
-    crossing,
-    labels,
-    mobius,
-    triangles
-});
 
 impl Persist for Oriented {
     fn save(&self, out: &mut Vec<u8>) {

@@ -116,12 +116,7 @@ impl Thinned {
     ///
     /// # Errors
     /// What `each` returned; [`crate::Error::Io`], [`crate::Error::Corrupt`].
-    pub fn for_each(
-        self,
-        from: Mark,
-        mut stats: ThinStats,
-        each: Each<'_>,
-    ) -> Result<ThinStats> {
+    pub fn for_each(self, from: Mark, mut stats: ThinStats, each: Each<'_>) -> Result<ThinStats> {
         let Self { sorted, grid, held } = self;
         let mut kept = Vec::with_capacity(BATCH);
         let mut best: Option<(Record<6>, f64)> = None;

@@ -87,7 +87,7 @@ pub fn triples(
         }
         own.put(block, &all)?;
         exchange.send_from(block, &sent)?;
-        workspace.observer.advance(all.len() as u64);
+        workspace.advance(all.len() as u64);
         Ok(local)
     };
     let mut counts = [0u64; 4];
