@@ -119,13 +119,17 @@ impl Reconstruction {
             (Found::Run(folder) | Found::Damaged(folder), _) => folder.restart(bytes)?,
         };
         folder.mesh = [export::temporary(&self.output), self.output.clone()];
-        Workspace::resumable(
+        let workspace = Workspace::resumable(
             folder,
             self.memory.clone(),
             self.threads,
             self.observer.clone(),
             self.cancel.clone(),
-        )
+        );
+        if workspace.is_err() && !self.is_unfinished() {
+            let _ = std::fs::remove_dir_all(&self.folder);
+        }
+        workspace
     }
 
     /// Removes all scratch, unless the run can go on from there.

@@ -35,6 +35,8 @@ pub struct Folder {
     end: Option<u64>,
     /// What must be said about its state.
     warnings: Vec<String>,
+    /// The manifest must be written again.
+    rewrite: bool,
 }
 
 /// What is at a path where a run may have been.
@@ -103,6 +105,7 @@ impl Folder {
             entries: Vec::new(),
             end: None,
             warnings: Vec::new(),
+            rewrite: false,
         };
         folder.read()
     }
@@ -139,7 +142,7 @@ impl Folder {
             (None, Some(manifest)) => {
                 self.manifest = manifest;
                 self.warn_of(MANIFEST, "the journal has what it said");
-                self.write_manifest()?;
+                self.rewrite = true;
             }
             (None, None) if begun => {
                 self.warn_of(MANIFEST, "the run begins again");
@@ -179,10 +182,15 @@ impl Folder {
             entries: Vec::new(),
             end: None,
             warnings: Vec::new(),
+            rewrite: false,
         };
-        folder.clean(&HashSet::from([LOCK]))?;
-        folder.write_manifest()?;
-        Ok(folder)
+        let begun = folder
+            .clean(&HashSet::from([LOCK]))
+            .and_then(|()| folder.write_manifest());
+        if begun.is_err() {
+            let _ = std::fs::remove_dir_all(path);
+        }
+        begun.map(|()| folder)
     }
 
     /// The same folder for another run, which begins anew.
@@ -228,6 +236,9 @@ impl Folder {
         cancel: &Cancel,
     ) -> Result<Run> {
         self.warnings.iter().for_each(|w| observer.warn(w));
+        if self.rewrite {
+            self.write_manifest()?;
+        }
         let path = self.path.join(journal::NAME);
         let places = Whereabouts {
             folder: &self.path,

@@ -18,7 +18,7 @@ pub(crate) mod steps;
 mod units;
 
 pub use folder::{Folder, Found};
-pub use recover::MESH;
+pub use recover::{MESH, RENAMED};
 
 use crate::error::{Error, Result};
 use file::{Maker, Place, ScratchFile, Shared, open_existing};

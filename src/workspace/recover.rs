@@ -18,6 +18,9 @@ const CHUNK: usize = 1 << 20;
 /// The name that the journal has for the mesh, which is not in the scratch folder.
 pub const MESH: &str = "mesh";
 
+/// The part of the mesh, without a byte, that says that it is whole and gets its name.
+pub const RENAMED: u32 = u32::MAX - 1;
+
 /// Where files may be: the mesh under its temporary name, or its own.
 #[derive(Debug)]
 pub struct Whereabouts<'a> {
@@ -79,9 +82,10 @@ fn damaged(
             let bad = bad.collect::<Result<Vec<_>>>()?;
             Ok(bad.into_iter().flatten().collect())
         };
-        // The mesh has its own name only when it is finished.
+        let renamed = name == MESH && parts.iter().any(|part| part.section == RENAMED);
         let mut bad = check(&paths[0])?;
-        if !bad.is_empty() && paths.len() > 1 && check(&paths[1])?.is_empty() {
+        // A file of the mesh's own name may be one of another run.
+        if !bad.is_empty() && renamed && check(&paths[1])?.is_empty() {
             bad.clear();
         }
         all.extend(bad);

@@ -352,16 +352,27 @@ fn a_scratch_file_that_cannot_grow() {
         (1000, "write"),
         (2000, "make room for the mesh"),
     ];
+    let mut resumed_runs = 0;
     for (blocks, action) in limits {
         let limit = format!("trap '' XFSZ && ulimit -f {blocks}");
         let said = in_shell(&limit, &[&cloud, Path::new("-o"), &mesh]);
+        let scratch = bench.path("mesh.ply.outcrop-scratch");
         refused(&said, &[action]);
+        // What was finished stays, and without the limit the run goes on.
+        assert_eq!(scratch.exists(), said.err.contains("; go on with: "));
+        if scratch.exists() {
+            resumed_runs += 1;
+            let resumed = util::run(["resume".as_ref(), scratch.as_os_str()]);
+            assert_eq!(resumed.code, Some(0), "{resumed:?}");
+            std::fs::remove_file(&mesh).unwrap();
+        }
         assert_eq!(
             util::listing(bench.folder()),
             ["cloud.laz"],
             "{blocks} blocks"
         );
     }
+    assert!(resumed_runs > 1, "{resumed_runs}");
 }
 
 #[test]
@@ -399,11 +410,16 @@ fn a_scratch_folder_that_is_too_small() {
         return;
     }
     let program = Path::new(env!("CARGO_BIN_EXE_outcrop"));
-    for size in ["64k", "512k", "1m", "2m"] {
+    let mut resumed_runs = 0;
+    for size in ["64k", "512k", "1m", "2m", "4m"] {
+        // Once there is room, it goes on.
         let script = format!(
-            "{} && {{ \"$@\"; code=$?; ls -A '{}'; exit $code; }}",
+            "{} && {{ \"$@\"; code=$?; cd '{}'; mount -o remount,size=64m . || exit 3; \
+             for left in *.outcrop-scratch; do \
+             [ ! -e $left ] || '{}' resume $left --quiet || exit 4; done; ls -A; exit $code; }}",
             mount(size),
-            small.display()
+            small.display(),
+            program.display(),
         );
         let arguments: [&Path; 7] = [
             program,
@@ -414,11 +430,17 @@ fn a_scratch_folder_that_is_too_small() {
             Path::new("--scratch"),
             &small,
         ];
-        refused(&run(&script, &arguments), &["small", "space"]);
+        let said = run(&script, &arguments);
+        refused(&said, &["small", "space", "more bytes"]);
+        let resumed = said.err.contains("; go on with: ");
+        assert_eq!(mesh.exists(), resumed, "{size}: {said:?}");
+        resumed_runs += u32::from(resumed);
+        let _ = std::fs::remove_file(&mesh);
         assert_eq!(
             util::listing(bench.folder()),
             ["cloud.laz", "small"],
             "{size}"
         );
     }
+    assert!(resumed_runs > 1, "{resumed_runs}");
 }

@@ -2,7 +2,7 @@
 
 use crate::util::{self, Bench};
 use outcrop::params::Params;
-use outcrop::{Cancel, Error, Observer, Radius, Reconstruction};
+use outcrop::{Cancel, Error, Observer, Radius, Reconstruction, Start};
 use outcrop_cloudgen::{Cloud, Kind};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
@@ -110,6 +110,7 @@ fn a_run_can_be_cancelled_in_every_stage() {
         )
         .observer(notes.clone())
         .cancel(notes.cancel.clone())
+        .start(Start::Restart)
         .build()
         .unwrap()
         .run();
@@ -128,7 +129,11 @@ fn a_run_can_be_cancelled_in_every_stage() {
             heard.len() <= stopped + 2,
             "went on after {stopped}: {heard:?}"
         );
-        assert_eq!(util::listing(&folder), [""; 0], "{heard:?}");
+        let left = util::listing(&folder);
+        let unfinished = ["mesh.ply.outcrop-scratch", ".mesh.ply.outcrop-part"];
+        for name in left {
+            assert!(unfinished.contains(&name.as_str()), "{name}: {heard:?}");
+        }
     }
 }
 

@@ -42,11 +42,23 @@ fn damage_to_any_file_is_found_and_mended() {
     for (turn, part) in [8, 20, 33, 44, 58, 70, 85, 96].into_iter().enumerate() {
         case.killed(&format!("recorded:{}", records * part / 100));
         copy(&case.scratch, &saved);
+        let (part_file, saved_part) = (
+            case.bench.path(".mesh.ply.outcrop-part"),
+            saved.join("lock"),
+        );
+        if part_file.exists() {
+            // The mesh on its way, in the place of a file that holds nothing.
+            std::fs::rename(&part_file, &saved_part).unwrap();
+        }
         for (number, name) in util::listing(&saved).into_iter().enumerate() {
             if name == "lock" {
                 continue;
             }
             copy(&saved, &case.scratch);
+            let _ = std::fs::remove_file(&case.mesh);
+            if std::fs::metadata(&saved_part).unwrap().len() > 0 {
+                std::fs::copy(&saved_part, &part_file).unwrap();
+            }
             let how = spoil(&case.scratch.join(&name), turn + number);
             let what = format!("{name} {how} at {part} %");
             let said = case.go_on(&what);

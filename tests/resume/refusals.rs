@@ -123,7 +123,7 @@ fn scratch_is_private() {
 fn what_cannot_be_resumed_leaves_nothing() {
     let case = Case::new(ROBUST);
     std::fs::write(&case.input, "1 2 3\n4 5 6\n7 8 9\n").unwrap();
-    refused(&again(&case, &[]), &["on one line"]);
+    refused(&again(&case, &[]), &["format"]);
     assert!(!case.scratch.exists());
 }
 

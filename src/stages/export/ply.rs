@@ -4,7 +4,7 @@ use super::MeshStats;
 use crate::error::{Error, Result};
 use crate::workspace::fault::{self, Event};
 use crate::workspace::file::{Place, Put, failed_write, open_existing, options};
-use crate::workspace::{MESH, Workspace, limits};
+use crate::workspace::{MESH, RENAMED, Workspace, limits};
 use std::fs::File;
 use std::os::unix::fs::{FileExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
@@ -145,19 +145,25 @@ impl<'a> MeshFile<'a> {
         fault::write()
             .and_then(|()| file.write_all_at(bytes, offset))
             .map_err(|e| failed_write(&self.output, bytes.len(), 0, e))?;
-        self.workspace.put(Put {
-            file: MESH.into(),
-            section: part,
-            place: Place {
-                offset,
-                bytes: bytes.len(),
-                records: 0,
-                crc: if self.workspace.is_resumable() {
-                    crc32fast::hash(bytes)
-                } else {
-                    0
-                },
+        let place = Place {
+            offset,
+            bytes: bytes.len(),
+            records: 0,
+            crc: if self.workspace.is_resumable() {
+                crc32fast::hash(bytes)
+            } else {
+                0
             },
+        };
+        self.put(part, place)
+    }
+
+    fn put(&self, section: u32, place: Place) -> Result<()> {
+        let file = MESH.into();
+        self.workspace.put(Put {
+            file,
+            section,
+            place,
         })
     }
 
@@ -209,6 +215,8 @@ impl<'a> MeshFile<'a> {
         if let Some(file) = self.file.take() {
             file.sync_all()
                 .map_err(|e| Error::io(&self.output, "sync", e))?;
+            let step = self.workspace.step("rename")?;
+            step.finish(0, &(), || self.put(RENAMED, Place::default()))?;
             fault::point(Event::Rename);
             std::fs::rename(&self.temporary, &self.output)
                 .map_err(|e| Error::io(&self.output, "rename the finished file to it", e))?;
