@@ -75,19 +75,8 @@ impl Folder {
     /// [`Error::Locked`], [`Error::NotResumable`] for a folder that is not private or not ours,
     /// [`Error::Io`].
     pub fn find(path: &Path) -> Result<Found> {
-        let io = |action: &'static str| move |e| Error::io(path, action, e);
-        let meta = match path.symlink_metadata() {
-            Ok(meta) => meta,
-            Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(Found::Nothing),
-            Err(e) => return Err(io("look at")(e)),
-        };
-        if !meta.is_dir() {
-            return Err(not_resumable(path, "it is not a folder"));
-        }
-        let own = rustix::process::geteuid().as_raw();
-        if meta.uid() != own || meta.mode() & 0o077 != 0 {
-            let why = "it is open to other users, so what is in it cannot be trusted";
-            return Err(not_resumable(path, why));
+        if !is_private(path)? {
+            return Ok(Found::Nothing);
         }
         let names = listing(path)?;
         if names.is_empty() {
@@ -172,8 +161,9 @@ impl Folder {
             Err(e) if e.kind() != std::io::ErrorKind::AlreadyExists => {
                 return Err(Error::io(path, "make the scratch folder", e));
             }
-            _ => {}
-        }
+            // Someone else may have been quicker.
+            _ => is_private(path)?,
+        };
         let folder = Self {
             path: path.to_path_buf(),
             manifest,
@@ -260,8 +250,9 @@ impl Folder {
             }
         };
         self.clean(&history.live().chain(OURS).collect())?;
-        let keeper = Keeper::start(journal.file(), io.clone())
-            .map_err(|e| Error::io(&self.path, "start a thread", e))?;
+        let keeper = File::open(&self.path)
+            .and_then(|folder| Keeper::start(journal.file(), folder, io.clone()))
+            .map_err(|e| Error::io(&self.path, "start a thread for", e))?;
         Ok(Run::new(self.path, journal, keeper, history, self.lock))
     }
 
@@ -277,6 +268,24 @@ impl Folder {
             .iter()
             .any(|e| matches!(e.record, Record::Unit { .. }))
     }
+}
+
+/// False if there is nothing at `path`; an error unless it is a folder that is ours alone.
+fn is_private(path: &Path) -> Result<bool> {
+    let meta = match path.symlink_metadata() {
+        Ok(meta) => meta,
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(false),
+        Err(e) => return Err(Error::io(path, "look at", e)),
+    };
+    if !meta.is_dir() {
+        return Err(not_resumable(path, "it is not a folder"));
+    }
+    let own = rustix::process::geteuid().as_raw();
+    if meta.uid() != own || meta.mode() & 0o077 != 0 {
+        let why = "it is open to other users, so what is in it cannot be trusted";
+        return Err(not_resumable(path, why));
+    }
+    Ok(true)
 }
 
 fn path_bytes(path: &Path) -> Option<u64> {
@@ -304,6 +313,10 @@ fn lock(folder: &Path) -> Result<File> {
         Err(std::fs::TryLockError::WouldBlock) => Err(Error::Locked {
             path: folder.to_path_buf(),
         }),
+        // Some file systems know no locks; a run without one is better than none.
+        Err(std::fs::TryLockError::Error(e)) if e.kind() == std::io::ErrorKind::Unsupported => {
+            Ok(file)
+        }
         Err(std::fs::TryLockError::Error(e)) => Err(Error::io(&path, "lock", e)),
     }
 }

@@ -64,7 +64,7 @@ impl Table {
         !state.stop
     }
 
-    fn round(&self, journal: &File, io: &IoCounters) {
+    fn round(&self, journal: &File, folder: &File, io: &IoCounters) {
         let (dirty, leaving) = {
             let mut state = self.state();
             (
@@ -80,6 +80,8 @@ impl Table {
             // What did not get to the disk is found by its checksum when the run is resumed.
             let _ = file.sync_data();
         }
+        // The names of new files, too.
+        let _ = folder.sync_all();
         let _ = journal.sync_data();
         fault::point(Event::Synced);
         for file in leaving {
@@ -101,12 +103,12 @@ impl Keeper {
     ///
     /// # Errors
     /// What the system says.
-    pub fn start(journal: Arc<File>, io: Arc<IoCounters>) -> std::io::Result<Self> {
+    pub fn start(journal: Arc<File>, folder: File, io: Arc<IoCounters>) -> std::io::Result<Self> {
         let table = Arc::new(Table::default());
         let shared = table.clone();
         let work = move || {
             while shared.wait() {
-                shared.round(&journal, &io);
+                shared.round(&journal, &folder, &io);
             }
         };
         let thread = std::thread::Builder::new().name("outcrop-keeper".into());
