@@ -142,7 +142,7 @@ impl Moments {
 
 /// The nearest `f64`; most sums fit a machine word, whose conversion is one instruction.
 fn rounded(sum: i128) -> f64 {
-    i64::try_from(sum).map_or(sum as f64, |small| small as f64)
+    i64::try_from(sum).map_or_else(|_| sum as f64, |small| small as f64)
 }
 
 fn minors(m: &[f64; 6]) -> f64 {

@@ -68,7 +68,7 @@ impl Source for Walked<'_> {
 
     fn reach(&mut self, count: usize) -> Result<bool> {
         while self.near.len() < count {
-            match self.walk.next(|_| true)? {
+            match self.walk.advance()? {
                 Some(near) => self.near.push(near),
                 None => break,
             }
@@ -202,7 +202,7 @@ impl CellMaker {
         let own = point.map(f64::from);
         loop {
             let cell = &self.cell;
-            let next = walk.next(|bounds| {
+            let next = walk.advance_within(cell.reach2(), |bounds| {
                 cell.may_touch(
                     std::array::from_fn(|k| f64::from(bounds.min[k]) - own[k]),
                     std::array::from_fn(|k| f64::from(bounds.max[k]) - own[k]),

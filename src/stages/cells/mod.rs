@@ -70,6 +70,12 @@ impl TileRanges {
         }
     }
 
+    /// Points of a tile at most.
+    #[must_use]
+    pub fn size(&self) -> u32 {
+        self.size
+    }
+
     /// Number of tiles.
     #[must_use]
     pub fn count(&self) -> usize {

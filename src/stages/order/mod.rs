@@ -1,8 +1,10 @@
 //! Points in curve order: an external sort, duplicates folded; the rank is the id (paper: none;
 //! this is what makes everything after it independent of memory and threads).
 
+mod rewrite;
 mod store;
 
+pub use rewrite::Rewriter;
 pub use store::{PAGE, PointStore, StoreWriter};
 
 use crate::error::{Error, Result};

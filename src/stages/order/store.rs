@@ -201,6 +201,9 @@ impl Drop for PointStore {
 /// Pages written at a time.
 const GROUP: usize = 64;
 
+/// Checksum and box of a page.
+pub(super) type PageEnd = (u32, Aabb);
+
 /// Writes a [`PointStore`] in id order.
 #[derive(Debug)]
 pub struct StoreWriter {
@@ -284,7 +287,7 @@ impl StoreWriter {
         let (first, rest) = items.split_at(((group - self.pending.len()) % group).min(items.len()));
         let (groups, last) = rest.split_at(rest.len() / group * group);
         self.push(&first.iter().map(&point).collect::<Vec<_>>())?;
-        let written: Result<Vec<Vec<(u32, Aabb)>>> = workspace.install(|| {
+        let written: Result<Vec<Vec<PageEnd>>> = workspace.install(|| {
             let parts = groups.par_chunks(group).enumerate();
             let write = |(n, part): (usize, &[T])| {
                 workspace.check_cancel()?;
@@ -306,7 +309,7 @@ impl StoreWriter {
     }
 
     /// Writes pages from point `first` on; their checksums and boxes.
-    fn write(&self, first: usize, points: &[Point]) -> Result<Vec<(u32, Aabb)>> {
+    pub(super) fn write(&self, first: usize, points: &[Point]) -> Result<Vec<PageEnd>> {
         let bytes: &[u8] = bytemuck::cast_slice(points);
         self.file
             .write_all_at(bytes, first as u64 * 12)
@@ -330,6 +333,23 @@ impl StoreWriter {
         self.len += self.pending.len();
         self.pending.clear();
         Ok(())
+    }
+
+    /// Points per page.
+    pub(super) fn page(&self) -> usize {
+        self.page
+    }
+
+    /// As [`StoreWriter::finish`], if `pages` were written to the file without this writer's knowledge.
+    pub(super) fn finish_with(
+        mut self,
+        len: usize,
+        pages: Vec<PageEnd>,
+        workspace: &Workspace,
+    ) -> Result<PointStore> {
+        self.len = len;
+        (self.checks, self.boxes) = pages.into_iter().unzip();
+        self.finish(workspace)
     }
 
     /// Ends the file and builds the tree of boxes.

@@ -3,6 +3,7 @@
 //! Ids stay as they are; only positions and the boxes around them change.
 
 mod fits;
+mod pass;
 mod relax;
 #[cfg(test)]
 mod tests;
@@ -12,14 +13,11 @@ pub use relax::{RelaxStats, Relaxed, relax};
 use crate::error::Result;
 use crate::geom::Point;
 use crate::geom::lattice::COORDINATE_LIMIT;
-use crate::spill::Sections;
 use crate::stages::cells::{Fit, TileRanges};
-use crate::stages::order::{PointStore, StoreWriter};
-use crate::stages::tiles::Tile;
-use crate::stages::tiles::walk::PageCache;
+use crate::stages::order::PointStore;
 use crate::workspace::Workspace;
 use fits::each_fit;
-use std::ops::Range;
+use pass::Pass;
 
 /// One round of smoothing: the same points, each on the plane of its `neighbors` nearest.
 ///
@@ -33,27 +31,17 @@ pub fn smooth(
     round: u32,
     workspace: &Workspace,
 ) -> Result<PointStore> {
-    let moved = Sections::<3>::create(workspace, &format!("smooth{round}"), tiles.count())?;
-    let bytes = |tile: usize| {
-        let points = tiles.ids(tile).len();
-        Tile::bytes(points) + PageCache::bytes(store) + points as u64 * 24
+    let pass = Pass {
+        file: &format!("points{round}"),
+        memory: "smooth: tile",
+        tile: tiles.size(),
     };
-    workspace.for_each_unit("smooth: tile", tiles.count(), bytes, |tile| {
-        let points = smooth_tile(store, tiles.ids(tile), neighbors)?;
-        workspace.observer.advance(points.len() as u64);
-        moved.put(tile, bytemuck::cast_slice(&points))
-    })?;
-    let name = format!("points{round}");
-    StoreWriter::gather(workspace, &name, store.page_size(), &moved)
-}
-
-fn smooth_tile(store: &PointStore, ids: Range<usize>, neighbors: usize) -> Result<Vec<Point>> {
-    let mut points = store.slice(ids.clone())?;
-    let all = |_: usize| true;
-    each_fit(store, ids.clone(), neighbors, all, |id, point, fit| {
-        points[id - ids.start] = project(point, &fit);
-    })?;
-    Ok(points)
+    pass.over(store, workspace, |ids, points| {
+        let all = |_: usize| true;
+        each_fit(store, ids.clone(), neighbors, all, |id, point, fit| {
+            points[id - ids.start] = project(point, &fit);
+        })
+    })
 }
 
 /// The foot of a point on its plane, on the lattice; the point itself if there is no plane.
