@@ -1,27 +1,34 @@
-//! Smoothing: every point is projected on the plane of its neighbours (paper, section 3.2).
+//! Smoothing: every point is projected on the plane of its neighbours (paper, section 3.2), or on a
+//! curved surface ([`Smoothing::Edges`]).
 //!
 //! Ids stay as they are; only positions and the boxes around them change.
 
+mod edges;
 mod fits;
 mod relax;
 #[cfg(test)]
 mod tests;
 
+pub use fits::{each_neighborhood, each_plane};
 pub use relax::{RelaxStats, Relaxed, relax};
 
 use crate::error::Result;
 use crate::geom::Point;
 use crate::geom::lattice::COORDINATE_LIMIT;
+use crate::params::Smoothing;
 use crate::spill::Sections;
 use crate::stages::cells::{Fit, TileRanges};
 use crate::stages::order::{PointStore, StoreWriter};
 use crate::stages::tiles::Tile;
+use crate::stages::tiles::neighbors::Neighbors;
 use crate::stages::tiles::walk::PageCache;
 use crate::workspace::Workspace;
+use edges::Around;
 use fits::each_fit;
 use std::ops::Range;
 
-/// One round of smoothing: the same points, each on the plane of its `neighbors` nearest.
+/// One round of smoothing: the same points, each on the plane of its `neighbors` nearest, or on
+/// what [`Smoothing::Edges`] puts through twice as many.
 ///
 /// # Errors
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
@@ -30,6 +37,7 @@ pub fn smooth(
     store: &PointStore,
     tiles: TileRanges,
     neighbors: usize,
+    smoothing: Smoothing,
     round: u32,
     workspace: &Workspace,
 ) -> Result<PointStore> {
@@ -39,7 +47,7 @@ pub fn smooth(
         Tile::bytes(points) + PageCache::bytes(store) + points as u64 * 24
     };
     workspace.for_each_unit("smooth: tile", tiles.count(), bytes, |tile| {
-        let points = smooth_tile(store, tiles.ids(tile), neighbors)?;
+        let points = smooth_tile(store, tiles.ids(tile), neighbors, smoothing)?;
         workspace.observer.advance(points.len() as u64);
         moved.put(tile, bytemuck::cast_slice(&points))
     })?;
@@ -47,12 +55,29 @@ pub fn smooth(
     StoreWriter::gather(workspace, &name, store.page_size(), &moved)
 }
 
-fn smooth_tile(store: &PointStore, ids: Range<usize>, neighbors: usize) -> Result<Vec<Point>> {
+fn smooth_tile(
+    store: &PointStore,
+    ids: Range<usize>,
+    neighbors: usize,
+    smoothing: Smoothing,
+) -> Result<Vec<Point>> {
     let mut points = store.slice(ids.clone())?;
-    let all = |_: usize| true;
-    each_fit(store, ids.clone(), neighbors, all, |id, point, fit| {
-        points[id - ids.start] = project(point, &fit);
-    })?;
+    match smoothing {
+        Smoothing::Plain => {
+            let all = |_: usize| true;
+            each_fit(store, ids.clone(), neighbors, all, |id, point, fit| {
+                points[id - ids.start] = project(point, &fit);
+            })?;
+        }
+        Smoothing::Edges => {
+            let count = neighbors * edges::SPREAD;
+            let mut around = Around::default();
+            let of = |point: Point, near: &Neighbors| moved(point, around.offset(near, count));
+            each_neighborhood(store, ids.clone(), count, of, |id, _, to| {
+                points[id - ids.start] = to;
+            })?;
+        }
+    }
     Ok(points)
 }
 
