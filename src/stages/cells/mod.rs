@@ -3,7 +3,10 @@
 mod cell;
 mod fold;
 
-pub use cell::{AUTO_REACH, CellMaker, DiskRadius, Fit, Outcome, fit_in_store, fit_in_tile};
+pub use cell::{
+    AUTO_REACH, CellMaker, DiskRadius, Fit, Outcome, Widen, fit_in_store, fit_in_tile,
+    near_in_store,
+};
 
 use crate::error::Result;
 use crate::geom::Point;
@@ -126,6 +129,7 @@ pub fn cells(
     tiles: TileRanges,
     neighbors: usize,
     radius: DiskRadius,
+    widen: Widen,
     workspace: &Workspace,
 ) -> Result<(CellTriples, CellStats)> {
     let own = Sections::with_layout(workspace, "cells.own", tiles.count(), LABELLED)?;
@@ -139,7 +143,15 @@ pub fn cells(
     workspace.for_each_unit("cells: tile", tiles.count(), bytes, |tile| {
         let ids = tiles.ids(tile);
         let mut seen = Seen::new(ids.clone());
-        one_tile(store, ids.clone(), neighbors, radius, &counters, &mut seen)?;
+        let mut maker = CellMaker::new(neighbors, radius, widen);
+        one_tile(
+            store,
+            ids.clone(),
+            neighbors,
+            &mut maker,
+            &counters,
+            &mut seen,
+        )?;
         counters.raw.fetch_add(seen.len() as u64, Ordering::Relaxed);
         let (kept, sent) = seen.fold(&tiles);
         own.put(tile, &kept)?;
@@ -168,12 +180,11 @@ fn one_tile(
     store: &PointStore,
     ids: Range<usize>,
     neighbors: usize,
-    radius: DiskRadius,
+    maker: &mut CellMaker,
     counters: &Counters,
     seen: &mut Seen,
 ) -> Result<()> {
     let tile = Tile::load(store, ids)?;
-    let mut maker = CellMaker::new(neighbors, radius);
     let mut search = Search::default();
     let mut uncertain: Vec<(u32, Point)> = Vec::new();
     let mut no_plane = 0;

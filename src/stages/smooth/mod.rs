@@ -1,25 +1,32 @@
-//! Smoothing: every point is projected on the plane of its neighbours (paper, section 3.2).
+//! Smoothing: every point is projected on the plane of its neighbours (paper, section 3.2), or on a
+//! curved surface ([`Smoothing::Edges`]).
 //!
 //! Ids stay as they are; only positions and the boxes around them change.
 
+mod edges;
 mod fits;
 mod pass;
 mod relax;
 #[cfg(test)]
 mod tests;
 
+pub use fits::{each_neighborhood, each_plane};
 pub use relax::{RelaxStats, Relaxed, relax};
 
 use crate::error::Result;
 use crate::geom::Point;
 use crate::geom::lattice::COORDINATE_LIMIT;
+use crate::params::Smoothing;
 use crate::stages::cells::{Fit, TileRanges};
 use crate::stages::order::PointStore;
+use crate::stages::tiles::neighbors::Neighbors;
 use crate::workspace::Workspace;
+use edges::Around;
 use fits::each_fit;
 use pass::Pass;
 
-/// One round of smoothing: the same points, each on the plane of its `neighbors` nearest.
+/// One round of smoothing: the same points, each on the plane of its `neighbors` nearest, or on
+/// what [`Smoothing::Edges`] puts through twice as many.
 ///
 /// # Errors
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
@@ -28,6 +35,7 @@ pub fn smooth(
     store: &PointStore,
     tiles: TileRanges,
     neighbors: usize,
+    smoothing: Smoothing,
     round: u32,
     workspace: &Workspace,
 ) -> Result<PointStore> {
@@ -36,11 +44,21 @@ pub fn smooth(
         memory: "smooth: tile",
         tile: tiles.size(),
     };
-    pass.over(store, workspace, |ids, points| {
-        let all = |_: usize| true;
-        each_fit(store, ids.clone(), neighbors, all, |id, point, fit| {
-            points[id - ids.start] = project(point, &fit);
-        })
+    pass.over(store, workspace, |ids, points| match smoothing {
+        Smoothing::Plain => {
+            let all = |_: usize| true;
+            each_fit(store, ids.clone(), neighbors, all, |id, point, fit| {
+                points[id - ids.start] = project(point, &fit);
+            })
+        }
+        Smoothing::Edges => {
+            let count = neighbors * edges::SPREAD;
+            let mut around = Around::default();
+            let of = |point: Point, near: &Neighbors| moved(point, around.offset(near, count));
+            each_neighborhood(store, ids.clone(), count, of, |id, _, to| {
+                points[id - ids.start] = to;
+            })
+        }
     })
 }
 
