@@ -61,7 +61,7 @@ pub mod stages;
 pub mod workspace;
 
 pub use error::{Error, Result};
-pub use params::{Method, Params, Radius};
+pub use params::{Method, Params, Radius, Smoothing};
 pub use pipeline::{Builder, Reconstruction, Start};
 pub use report::Report;
 pub use stages::ingest::Classes;

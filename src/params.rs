@@ -57,6 +57,28 @@ impl std::str::FromStr for Method {
     }
 }
 
+/// How points move when they are smoothed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Smoothing {
+    /// To the plane of their neighbours (paper, section 3.2).
+    Plain,
+    /// To a curved surface of those that lie on one with them: keeps edges, does not shrink.
+    Edges,
+}
+
+impl std::str::FromStr for Smoothing {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "plain" => Ok(Smoothing::Plain),
+            "edges" => Ok(Smoothing::Edges),
+            _ => Err(format!("{text:?} is not plain or edges")),
+        }
+    }
+}
+
 /// Everything that decides the mesh. Two runs with equal parameters and equal points give the same
 /// bytes.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -73,6 +95,8 @@ pub struct Params {
     pub neighbors: usize,
     /// Rounds of smoothing (paper: 0 to 2).
     pub smooth: u32,
+    /// How they move.
+    pub smoothing: Smoothing,
     /// Most rounds of relaxing: smoothing that decides only which points are connected.
     pub relax: u32,
     /// Disk radius.
@@ -109,6 +133,7 @@ impl Default for Params {
             method: Method::Robust,
             neighbors: 30,
             smooth: 0,
+            smoothing: Smoothing::Edges,
             relax: 3,
             radius: Radius::Auto,
             max_angle: 143.0,
@@ -126,6 +151,7 @@ impl Params {
     pub fn paper() -> Self {
         Self {
             method: Method::Paper,
+            smoothing: Smoothing::Plain,
             relax: 0,
             max_angle: 60.0,
             min_component: Some(10),

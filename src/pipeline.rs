@@ -11,7 +11,7 @@ use crate::error::Result;
 use crate::params::{Method, Params};
 use crate::report::{LatticeReport, Report};
 use crate::stages::blocks::Blocks;
-use crate::stages::cells::{DiskRadius, TileRanges, cells};
+use crate::stages::cells::{DiskRadius, TileRanges, Widen, cells};
 use crate::stages::export::{CoordinateType, export};
 use crate::stages::ingest::{self, ingest_classes};
 use crate::stages::located::Places;
@@ -158,7 +158,8 @@ impl Reconstruction {
         let tiles = TileRanges::new(blocks, self.tile_points);
         for round in 1..=params.smooth {
             store = clock.stage("smooth", "points", points, || {
-                smooth(&store, tiles, params.neighbors, round, workspace)
+                let (k, smoothing) = (params.neighbors, params.smoothing);
+                smooth(&store, tiles, k, smoothing, round, workspace)
             })?;
         }
         let relaxed = if params.relax > 0 {
@@ -179,7 +180,18 @@ impl Reconstruction {
             file: &store,
         };
         let (seen, cell_stats) = clock.stage("cells", "points", points, || {
-            cells(places.shape, tiles, params.neighbors, radius, workspace)
+            let widen = match params.method {
+                Method::Robust => Widen::OnBands,
+                Method::Paper => Widen::OnLines,
+            };
+            cells(
+                places.shape,
+                tiles,
+                params.neighbors,
+                radius,
+                widen,
+                workspace,
+            )
         })?;
         not_a_line(&cell_stats, points)?;
         let (triples, triple_stats) =

@@ -4,7 +4,7 @@
 mod reference;
 
 use outcrop::inspect::ply_mesh::{PlyMesh, Sink};
-use outcrop::{Error, Method, Params, Radius, Reconstruction, Report};
+use outcrop::{Error, Method, Params, Radius, Reconstruction, Report, Smoothing};
 use reference::{Counts, Mesh, Settings, clouds};
 use std::fmt::Write;
 use std::path::Path;
@@ -80,6 +80,11 @@ fn pipeline(
             reference::Radius::Auto => Radius::Auto,
             reference::Radius::Percent(x) => Radius::Percent(x),
             reference::Radius::Length(x) => Radius::Length(x),
+        },
+        smoothing: if settings.edges {
+            Smoothing::Edges
+        } else {
+            Smoothing::Plain
         },
         max_angle: angle_of(settings.cos_max_angle),
         relax: settings.relax,
@@ -331,8 +336,10 @@ fn few_neighbors_and_fixed_radius() {
 
 #[test]
 fn smoothed() {
-    run(40..42, |seed| Settings {
+    run(40..44, |seed| Settings {
         smooth: 1 + seed as u32 % 2,
+        edges: seed >= 42,
+        neighbors: [30, 10][seed as usize / 2 % 2],
         block: 50,
         ..Settings::default()
     });

@@ -1,6 +1,6 @@
 //! Flags, as the user gives them.
 
-use crate::params::{Method, Params, Radius};
+use crate::params::{Method, Params, Radius, Smoothing};
 use crate::pipeline::Start;
 use crate::stages::ingest::Classes;
 use clap::{Args as ClapArgs, Parser, Subcommand};
@@ -141,6 +141,10 @@ pub struct Surface {
     /// Rounds of smoothing before the surface is made; 1 or 2 help noisy scans
     #[arg(long, value_name = "ROUNDS", default_value_t = 0)]
     pub smooth: u32,
+    /// How smoothing moves points: plain, to the plane of their neighbours, or edges, which keeps
+    /// edges and does not shrink [default: edges; with --method paper plain]
+    #[arg(long, value_name = "plain|edges")]
+    pub smoothing: Option<Smoothing>,
     /// Most rounds of relaxing: smoothing that only decides which points are connected, and leaves
     /// the points where they are [default: 3; with --method paper 0]
     #[arg(long, value_name = "ROUNDS")]
@@ -335,6 +339,7 @@ impl Reconstruct {
             drop_outliers: self.filters.drop_outliers,
             neighbors: self.surface.neighbors,
             smooth: self.surface.smooth,
+            smoothing: self.surface.smoothing.unwrap_or(usual.smoothing),
             relax: self.surface.relax.unwrap_or(usual.relax),
             radius: self.surface.radius,
             max_angle: self.surface.max_angle.unwrap_or(usual.max_angle),

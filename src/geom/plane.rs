@@ -15,6 +15,9 @@ pub const NORMAL_SCALE: f64 = (1 << 24) as f64;
 /// If the middle eigenvalue is below this share of the largest, the points lie on a line.
 const LINE_RATIO: f64 = 1.0 / 400.0;
 
+/// Below this share they lie on a band so narrow that its normal is a matter of chance.
+const BAND_RATIO: f64 = 1.0 / 25.0;
+
 /// Exact first and second moments of differences to a point.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Moments {
@@ -31,6 +34,8 @@ pub struct Plane {
     pub normal: Option<Normal>,
     /// False if the points are so close to a line that the normal means little.
     pub spans: bool,
+    /// False if they are so close to a narrow band that the normal is unsure.
+    pub wide: bool,
 }
 
 impl Moments {
@@ -84,6 +89,7 @@ impl Moments {
             return Plane {
                 normal: None,
                 spans: false,
+                wide: false,
             };
         }
         let m = scatter.map(|x| x / largest);
@@ -104,6 +110,7 @@ impl Moments {
         Plane {
             normal,
             spans: spans && normal.is_some(),
+            wide: middle >= BAND_RATIO * top && normal.is_some(),
         }
     }
 
@@ -142,7 +149,19 @@ impl Moments {
 
 /// The nearest `f64`; most sums fit a machine word, whose conversion is one instruction.
 fn rounded(sum: i128) -> f64 {
-    i64::try_from(sum).map_or(sum as f64, |small| small as f64)
+    i64::try_from(sum).map_or_else(|_| sum as f64, |small| small as f64)
+}
+
+/// The direction in which a scatter (xx, yy, zz, xy, xz, yz) is least, by the steps of
+/// [`Moments::plane`]; `None` without any extent.
+#[must_use]
+pub fn least_direction(scatter: &[f64; 6]) -> Option<Normal> {
+    let largest = scatter[0].max(scatter[1]).max(scatter[2]);
+    if !(largest > 0.0 && largest.is_finite()) {
+        return None;
+    }
+    let m = scatter.map(|x| x / largest);
+    eigenvector(&m, least_eigenvalue(&m))
 }
 
 fn minors(m: &[f64; 6]) -> f64 {
@@ -274,7 +293,8 @@ mod tests {
             moments(&line).plane(),
             Plane {
                 normal: None,
-                spans: false
+                spans: false,
+                wide: false
             }
         );
         assert_eq!(moments(&[]).plane().normal, None);

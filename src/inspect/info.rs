@@ -3,7 +3,7 @@
 use crate::error::Result;
 use crate::geom::aabb::Aabb;
 use crate::pipeline::{SCRATCH_PER_POINT, order};
-use crate::stages::cells::{AUTO_REACH, CellMaker, DiskRadius};
+use crate::stages::cells::{AUTO_REACH, CellMaker, DiskRadius, Widen};
 use crate::stages::ingest::{Classes, IngestStats, ingest_classes};
 use crate::stages::order::{PAGE, PointStore};
 use crate::stages::tiles::Tile;
@@ -115,7 +115,7 @@ struct Sample {
 fn sample(store: &PointStore, workspace: &Workspace) -> Result<Sample> {
     let _held = workspace.reserve("info: sample", 16 << 20)?;
     let mut sample = Sample::default();
-    let mut maker = CellMaker::new(NEIGHBORS, DiskRadius::Auto);
+    let mut maker = CellMaker::new(NEIGHBORS, DiskRadius::Auto, Widen::OnBands);
     let mut search = Search::default();
     let count = SAMPLES.min(store.len().div_ceil(SAMPLE_POINTS));
     for index in 0..count {

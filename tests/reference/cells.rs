@@ -66,7 +66,12 @@ fn corners(points: &[Point], i: usize, settings: &Settings, diagonal: f64) -> Ve
     let (plane, last) = loop {
         let used = &others[..k.min(others.len())];
         let (_, plane) = plane_of(points, i, used);
-        if plane.spans || k >= 8 * settings.neighbors {
+        let enough = if settings.robust {
+            plane.wide
+        } else {
+            plane.spans
+        };
+        if enough || k >= 8 * settings.neighbors {
             break (plane, used.last().copied());
         }
         k *= 2;

@@ -12,6 +12,7 @@ pub mod big;
 pub mod cells;
 pub mod check;
 pub mod clouds;
+pub mod edges;
 pub mod evidence;
 pub mod holes;
 pub mod homes;
@@ -45,6 +46,8 @@ pub struct Settings {
     pub neighbors: usize,
     /// Rounds of smoothing; the lattice is taken as it is.
     pub smooth: u32,
+    /// Smoothing keeps edges.
+    pub edges: bool,
     pub radius: Radius,
     /// Cosine of the largest angle between normals (test G).
     pub cos_max_angle: f64,
@@ -67,6 +70,7 @@ impl Default for Settings {
         Self {
             neighbors: 30,
             smooth: 0,
+            edges: false,
             radius: Radius::Auto,
             cos_max_angle: 0.5,
             max_hole_edges: 500,
@@ -85,6 +89,7 @@ impl Settings {
         Self {
             cos_max_angle: outcrop::Params::default().cos_max_angle(),
             relax: 3,
+            edges: true,
             robust: true,
             ..Self::default()
         }
@@ -164,7 +169,11 @@ pub fn reconstruct(points: &[Point], settings: &Settings) -> Mesh {
     let mut points = cells::in_id_order(points);
     let diagonal = cells::diagonal(&points);
     for _ in 0..settings.smooth {
-        points = cells::smooth(&points, settings.neighbors);
+        let smooth = match settings.edges {
+            true => edges::smooth,
+            false => cells::smooth,
+        };
+        points = smooth(&points, settings.neighbors);
     }
     let relaxed = relax::relax(&points, settings.neighbors, settings.relax);
     let triples = cells::triples(&relaxed.shape, settings, diagonal);

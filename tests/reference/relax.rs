@@ -9,12 +9,15 @@ pub struct Relaxed {
     pub shape: Vec<Point>,
     /// Rounds in which points moved.
     pub rounds: u32,
-    /// Points of patches that moved, once for each round.
+    /// Points that moved, once for each round.
     pub moved: usize,
 }
 
 /// Ids in a patch.
 const PATCH: usize = 256;
+
+/// Ids in a run.
+const RUN: usize = 16;
 
 /// Patches in a region.
 const REGION: usize = 256;
@@ -37,7 +40,7 @@ fn foot(points: &[Point], i: usize, k: usize) -> (Point, bool) {
     (to, square > 0.3 * 0.3 * spacing2)
 }
 
-/// Whether a patch moves in the next round, by the points of it that were looked at.
+/// Whether a patch moves, by the points of it that were looked at.
 fn uneven(rough: &[bool]) -> bool {
     16 * rough.iter().filter(|r| **r).count() > rough.len()
 }
@@ -52,7 +55,7 @@ pub fn relax(points: &[Point], k: usize, rounds: u32) -> Relaxed {
     let patches = points.len().div_ceil(PATCH);
     let ids = |patch: usize| PATCH * patch..points.len().min(PATCH * (patch + 1));
     let look = |patch: usize| -> Vec<bool> {
-        let some = ids(patch).filter(|id| (id / 16).is_multiple_of(8));
+        let some = ids(patch).filter(|id| (id / RUN).is_multiple_of(8));
         some.map(|id| foot(points, id, k).1).collect()
     };
     let mut moving: Vec<usize> = (0..patches).filter(|&p| uneven(&look(p))).collect();
@@ -61,17 +64,27 @@ pub fn relax(points: &[Point], k: usize, rounds: u32) -> Relaxed {
     let in_region = |p: usize| (0..patches).filter(|q| q / REGION == p / REGION).count();
     let rough = moving.clone();
     moving.retain(|&p| 4 * of_region(&rough, p) >= in_region(p));
-    while relaxed.rounds < rounds && !moving.is_empty() {
+    let mut runs: Vec<Vec<usize>> = moving
+        .into_iter()
+        .flat_map(|p| {
+            ids(p)
+                .collect::<Vec<_>>()
+                .chunks(RUN)
+                .map(Vec::from)
+                .collect::<Vec<_>>()
+        })
+        .collect();
+    while relaxed.rounds < rounds && !runs.is_empty() {
         let before = relaxed.shape.clone();
-        moving.retain(|&patch| {
-            let mut rough = Vec::new();
-            for id in ids(patch) {
+        runs.retain(|run| {
+            let mut rough = 0;
+            for &id in run {
                 let (to, far) = foot(&before, id, k);
                 relaxed.shape[id] = to;
-                rough.push(far);
+                rough += usize::from(far);
             }
-            relaxed.moved += rough.len();
-            uneven(&rough)
+            relaxed.moved += run.len();
+            rough >= 1
         });
         relaxed.rounds += 1;
     }

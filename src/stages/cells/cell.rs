@@ -68,7 +68,7 @@ impl Source for Walked<'_> {
 
     fn reach(&mut self, count: usize) -> Result<bool> {
         while self.near.len() < count {
-            match self.walk.next(|_| true)? {
+            match self.walk.advance()? {
                 Some(near) => self.near.push(near),
                 None => break,
             }
@@ -88,8 +88,12 @@ pub struct Fit {
     pub last2: u64,
 }
 
-fn fit_from(source: &mut impl Source, neighbors: usize, widenings: u32) -> Result<Option<Fit>> {
+fn fit_from(source: &mut impl Source, neighbors: usize, widen: Widen) -> Result<Option<Fit>> {
     let level = Level::best();
+    let widenings = match widen {
+        Widen::Never => 0,
+        Widen::OnLines | Widen::OnBands => WIDENINGS,
+    };
     let mut wanted = neighbors;
     for round in 0..=widenings {
         if !source.reach(wanted)? {
@@ -99,7 +103,11 @@ fn fit_from(source: &mut impl Source, neighbors: usize, widenings: u32) -> Resul
         let used = wanted.min(near.len());
         let moments = near.moments(used, level);
         let plane = moments.plane();
-        if plane.spans || used < wanted || round == widenings {
+        let enough = match widen {
+            Widen::OnBands => plane.wide,
+            Widen::Never | Widen::OnLines => plane.spans,
+        };
+        if enough || used < wanted || round == widenings {
             let last2 = near.get(used.wrapping_sub(1)).map_or(0, |n| n.distance2);
             return Ok(Some(Fit {
                 plane,
@@ -112,21 +120,34 @@ fn fit_from(source: &mut impl Source, neighbors: usize, widenings: u32) -> Resul
     Ok(None)
 }
 
+/// When a plane takes in twice the neighbours that it was asked for, up to eight times as many.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Widen {
+    /// Never: exactly these.
+    Never,
+    /// As long as they lie on a line.
+    OnLines,
+    /// As long as they lie on a narrow band, such as two scan lines.
+    OnBands,
+}
+
 /// Makes cells one after the other in the same memory.
 #[derive(Debug)]
 pub struct CellMaker {
     neighbors: usize,
     radius: DiskRadius,
+    widen: Widen,
     cell: Cell,
 }
 
 impl CellMaker {
     /// For planes of `neighbors` neighbours and disks of `radius`.
     #[must_use]
-    pub fn new(neighbors: usize, radius: DiskRadius) -> Self {
+    pub fn new(neighbors: usize, radius: DiskRadius, widen: Widen) -> Self {
         Self {
             neighbors,
             radius,
+            widen,
             cell: Cell::new(0, [0, 0, 1 << 24], 1.0),
         }
     }
@@ -152,7 +173,7 @@ impl CellMaker {
         query: &mut Query<'_>,
         each: impl FnMut(u32, u32),
     ) -> Result<Outcome> {
-        let Some(fit) = fit_from(query, self.neighbors, WIDENINGS)? else {
+        let Some(fit) = fit_from(query, self.neighbors, self.widen)? else {
             return Ok(Outcome::Uncertain);
         };
         if !self.start(query.id(), &fit) {
@@ -187,7 +208,7 @@ impl CellMaker {
             walk: Walk::new(store, cache, id, point),
             near: Neighbors::default(),
         };
-        let Some(fit) = fit_from(&mut source, self.neighbors, WIDENINGS)? else {
+        let Some(fit) = fit_from(&mut source, self.neighbors, self.widen)? else {
             return Ok(Outcome::Uncertain);
         };
         if !self.start(id, &fit) {
@@ -202,7 +223,7 @@ impl CellMaker {
         let own = point.map(f64::from);
         loop {
             let cell = &self.cell;
-            let next = walk.next(|bounds| {
+            let next = walk.advance_within(cell.reach2(), |bounds| {
                 cell.may_touch(
                     std::array::from_fn(|k| f64::from(bounds.min[k]) - own[k]),
                     std::array::from_fn(|k| f64::from(bounds.max[k]) - own[k]),
@@ -220,12 +241,12 @@ impl CellMaker {
     }
 }
 
-/// The plane of exactly the `neighbors` nearest from what the tile knows; `None` if uncertain.
+/// The plane of the `neighbors` nearest from what the tile knows; `None` if uncertain.
 ///
 /// # Errors
 /// None today; see [`fit_in_store`].
-pub fn fit_in_tile(query: &mut Query<'_>, neighbors: usize) -> Result<Option<Fit>> {
-    fit_from(query, neighbors, 0)
+pub fn fit_in_tile(query: &mut Query<'_>, neighbors: usize, widen: Widen) -> Result<Option<Fit>> {
+    fit_from(query, neighbors, widen)
 }
 
 /// As [`fit_in_tile`], from the whole store.
@@ -238,10 +259,30 @@ pub fn fit_in_store(
     id: u32,
     point: Point,
     neighbors: usize,
+    widen: Widen,
 ) -> Result<Option<Fit>> {
     let mut source = Walked {
         walk: Walk::new(store, cache, id, point),
         near: Neighbors::default(),
     };
-    fit_from(&mut source, neighbors, 0)
+    fit_from(&mut source, neighbors, widen)
+}
+
+/// The `count` nearest of a point, or all there are, from the whole store.
+///
+/// # Errors
+/// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+pub fn near_in_store(
+    store: &PointStore,
+    cache: &mut PageCache,
+    id: u32,
+    point: Point,
+    count: usize,
+) -> Result<Neighbors> {
+    let mut source = Walked {
+        walk: Walk::new(store, cache, id, point),
+        near: Neighbors::default(),
+    };
+    source.reach(count)?;
+    Ok(source.near)
 }

@@ -3,7 +3,10 @@
 mod cell;
 mod fold;
 
-pub use cell::{AUTO_REACH, CellMaker, DiskRadius, Fit, Outcome, fit_in_store, fit_in_tile};
+pub use cell::{
+    AUTO_REACH, CellMaker, DiskRadius, Fit, Outcome, Widen, fit_in_store, fit_in_tile,
+    near_in_store,
+};
 
 use crate::error::Result;
 use crate::geom::Point;
@@ -70,6 +73,12 @@ impl TileRanges {
         }
     }
 
+    /// Points of a tile at most.
+    #[must_use]
+    pub fn size(&self) -> u32 {
+        self.size
+    }
+
     /// Number of tiles.
     #[must_use]
     pub fn count(&self) -> usize {
@@ -130,6 +139,7 @@ pub fn cells(
     tiles: TileRanges,
     neighbors: usize,
     radius: DiskRadius,
+    widen: Widen,
     workspace: &Workspace,
 ) -> Result<(CellTriples, CellStats)> {
     let own = Sections::with_layout(workspace, "cells.own", tiles.count(), LABELLED)?;
@@ -148,7 +158,8 @@ pub fn cells(
     let work = |tile| {
         let ids = tiles.ids(tile);
         let mut seen = Seen::new(ids.clone());
-        let mut stats = one_tile(store, ids.clone(), neighbors, radius, &mut seen)?;
+        let mut maker = CellMaker::new(neighbors, radius, widen);
+        let mut stats = one_tile(store, ids.clone(), neighbors, &mut maker, &mut seen)?;
         stats.raw_triples = seen.len() as u64;
         let (kept, sent) = seen.fold(&tiles);
         own.put(tile, &kept)?;
@@ -179,11 +190,10 @@ fn one_tile(
     store: &PointStore,
     ids: Range<usize>,
     neighbors: usize,
-    radius: DiskRadius,
+    maker: &mut CellMaker,
     seen: &mut Seen,
 ) -> Result<CellStats> {
     let tile = Tile::load(store, ids)?;
-    let mut maker = CellMaker::new(neighbors, radius);
     let mut search = Search::default();
     let mut uncertain: Vec<(u32, Point)> = Vec::new();
     let mut no_plane = 0;

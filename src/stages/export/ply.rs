@@ -131,7 +131,10 @@ impl<'a> MeshFile<'a> {
             .open(&self.temporary)
             .map_err(|e| Error::io(&self.output, "create a file beside it", e))?;
         let room = fault::write().and_then(|()| file.set_len(bytes));
-        room.map_err(|e| failed_write(&self.output, bytes as usize, bytes, e))?;
+        room.map_err(|e| match failed_write(&self.output, 0, bytes, e) {
+            Error::Io { source, .. } => Error::io(&self.output, "make room for the mesh", source),
+            full => full,
+        })?;
         self.file = Some(file);
         self.write(HEADER, header.as_bytes(), 0)
     }

@@ -1,9 +1,13 @@
 //! Points in curve order: an external sort, duplicates folded; the rank is the id (paper: none;
 //! this is what makes everything after it independent of memory and threads).
 
+mod rewrite;
 mod store;
+mod writer;
 
-pub use store::{PAGE, PointStore, StoreWriter};
+pub use rewrite::Rewriter;
+pub use store::{PAGE, PointStore};
+pub use writer::StoreWriter;
 
 use crate::error::{Error, Result};
 use crate::geom::{Point, hilbert};

@@ -139,7 +139,7 @@ fn one_tile(
         let mut near = Vec::with_capacity(around);
         let mut walk = Walk::new(store, &mut cache, id, point);
         while near.len() < around
-            && let Some(next) = walk.next(|_| true)?
+            && let Some(next) = walk.advance()?
         {
             near.push(next.id);
         }

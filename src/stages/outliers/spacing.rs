@@ -58,7 +58,7 @@ fn one_tile(store: &PointStore, ids: Range<usize>) -> Result<Vec<Record<1>>> {
         let mut near = [0; NEAREST];
         let mut walk = Walk::new(store, &mut cache, id, point);
         for distance2 in &mut near {
-            *distance2 = walk.next(|_| true)?.map_or(0, |n| n.distance2);
+            *distance2 = walk.advance()?.map_or(0, |n| n.distance2);
         }
         spacings[id as usize - ids.start] = [mean(near.into_iter())];
     }

@@ -1,27 +1,33 @@
-//! Smoothing: every point is projected on the plane of its neighbours (paper, section 3.2).
+//! Smoothing: every point is projected on the plane of its neighbours (paper, section 3.2), or on a
+//! curved surface ([`Smoothing::Edges`]).
 //!
 //! Ids stay as they are; only positions and the boxes around them change.
 
+mod edges;
 mod fits;
+mod pass;
 mod relax;
 #[cfg(test)]
 mod tests;
 
+pub use fits::{each_neighborhood, each_plane};
 pub use relax::{RelaxStats, Relaxed, relax};
 
 use crate::error::Result;
 use crate::geom::Point;
 use crate::geom::lattice::COORDINATE_LIMIT;
-use crate::spill::Sections;
+use crate::params::Smoothing;
 use crate::stages::cells::{Fit, TileRanges};
-use crate::stages::order::{PointStore, StoreWriter};
-use crate::stages::tiles::Tile;
-use crate::stages::tiles::walk::PageCache;
+use crate::stages::order::PointStore;
+use crate::stages::tiles::neighbors::Neighbors;
 use crate::workspace::Workspace;
+use edges::Around;
 use fits::each_fit;
+use pass::Pass;
 use std::ops::Range;
 
-/// One round of smoothing: the same points, each on the plane of its `neighbors` nearest.
+/// One round of smoothing: the same points, each on the plane of its `neighbors` nearest, or on
+/// what [`Smoothing::Edges`] puts through twice as many.
 ///
 /// # Errors
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
@@ -30,31 +36,32 @@ pub fn smooth(
     store: &PointStore,
     tiles: TileRanges,
     neighbors: usize,
+    smoothing: Smoothing,
     round: u32,
     workspace: &Workspace,
 ) -> Result<PointStore> {
-    let moved = Sections::<3>::create(workspace, &format!("smooth{round}"), tiles.count())?;
-    let bytes = |tile: usize| {
-        let points = tiles.ids(tile).len();
-        Tile::bytes(points) + PageCache::bytes(store) + points as u64 * 24
+    let pass = Pass {
+        file: &format!("points{round}"),
+        memory: "smooth: tile",
+        tile: tiles.size(),
     };
-    let work = |tile| {
-        let points = smooth_tile(store, tiles.ids(tile), neighbors)?;
-        workspace.advance(points.len() as u64);
-        moved.put(tile, bytemuck::cast_slice(&points))
+    let work = |ids: Range<usize>, points: &mut [Point]| match smoothing {
+        Smoothing::Plain => {
+            let all = |_: usize| true;
+            each_fit(store, ids.clone(), neighbors, all, |id, point, fit| {
+                points[id - ids.start] = project(point, &fit);
+            })
+        }
+        Smoothing::Edges => {
+            let count = neighbors * edges::SPREAD;
+            let mut around = Around::default();
+            let of = |point: Point, near: &Neighbors| moved(point, around.offset(near, count));
+            each_neighborhood(store, ids.clone(), count, of, |id, _, to| {
+                points[id - ids.start] = to;
+            })
+        }
     };
-    workspace.units("smooth: tile", tiles.count(), bytes, work, |_, ()| Ok(()))?;
-    let name = format!("points{round}");
-    StoreWriter::gather(workspace, &name, store.page_size(), &moved)
-}
-
-fn smooth_tile(store: &PointStore, ids: Range<usize>, neighbors: usize) -> Result<Vec<Point>> {
-    let mut points = store.slice(ids.clone())?;
-    let all = |_: usize| true;
-    each_fit(store, ids.clone(), neighbors, all, |id, point, fit| {
-        points[id - ids.start] = project(point, &fit);
-    })?;
-    Ok(points)
+    pass.over(store, workspace, work, |()| ())
 }
 
 /// The foot of a point on its plane, on the lattice; the point itself if there is no plane.

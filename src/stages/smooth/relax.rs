@@ -7,11 +7,11 @@
 
 use super::fits::each_fit;
 use super::moved;
+use super::pass::{Pass, RUN};
 use crate::error::Result;
 use crate::geom::Point;
-use crate::spill::Sections;
 use crate::stages::cells::{Fit, TileRanges};
-use crate::stages::order::{PointStore, StoreWriter};
+use crate::stages::order::PointStore;
 use crate::stages::tiles::Tile;
 use crate::stages::tiles::walk::PageCache;
 use crate::workspace::Workspace;
@@ -19,26 +19,28 @@ use crate::workspace::memory::Reservation;
 use crate::workspace::persist::persist;
 use serde::Serialize;
 use std::ops::Range;
-use std::sync::atomic::{AtomicU16, Ordering};
+use std::sync::atomic::{AtomicU8, Ordering};
 
-/// Ids in a patch: with ids along a curve, a small piece of surface.
-const PATCH: usize = 256;
+/// Runs in a patch: with ids along a curve, a small piece of surface.
+const PATCH: usize = 16;
 
-/// Of a patch every [`SAMPLE`]th run of [`RUN`] ids is looked at first.
+/// Every so many runs one is looked at first.
 const SAMPLE: usize = 8;
-const RUN: usize = 16;
 
 /// A point is rough if it lies farther from its plane than this part of the local spacing.
 const ROUGH: f64 = 0.3;
 
 /// A patch moves if more than one in so many points that were looked at is rough.
-const SHARE: u32 = 16;
+const SHARE: usize = 16;
 
 /// Patches in a region.
 const REGION: usize = 256;
 
 /// Nothing moves in a region of which fewer than one patch in so many is rough.
 const EDGES: usize = 4;
+
+/// A run that moved moves again if at least so many of its points were rough.
+const RAGGED: u8 = 1;
 
 /// Positions to connect the points by.
 #[derive(Debug)]
@@ -58,96 +60,109 @@ pub struct RelaxStats {
     pub moved: u64,
 }
 
-persist!(Relaxed { store, stats });
-persist!(RelaxStats { rounds, moved });
-
-/// Which patches move, and what was seen of them.
-struct Patches {
+/// Which runs of ids move, and what was seen of them.
+struct Runs {
+    points: usize,
     active: Vec<bool>,
-    seen: Vec<AtomicU16>,
-    rough: Vec<AtomicU16>,
+    /// Rough points of each.
+    rough: Vec<AtomicU8>,
     _held: Reservation,
 }
 
-impl Patches {
+impl Runs {
     fn new(points: usize, workspace: &Workspace) -> Result<Self> {
-        let count = points.div_ceil(PATCH);
-        let counters = || (0..count).map(|_| AtomicU16::new(0)).collect();
+        let count = points.div_ceil(RUN);
         Ok(Self {
-            _held: workspace.reserve("relax: patches", count as u64 * 5)?,
-            active: vec![true; count],
-            seen: counters(),
-            rough: counters(),
+            _held: workspace.reserve("relax: runs", count as u64 * 2)?,
+            points,
+            active: vec![false; count],
+            rough: (0..count).map(|_| AtomicU8::new(0)).collect(),
         })
     }
 
-    /// Takes in what was seen of a tile.
-    fn add(&self, notes: &Notes) {
-        for (patch, &[seen, rough]) in (notes.first..).zip(&notes.counts) {
-            self.seen[patch].fetch_add(seen, Ordering::Relaxed);
-            self.rough[patch].fetch_add(rough, Ordering::Relaxed);
+    fn is_sampled(id: usize) -> bool {
+        (id / RUN).is_multiple_of(SAMPLE)
+    }
+
+    /// Takes in what was seen of a range of ids.
+    fn add(&self, seen: &Seen) {
+        for (rough, more) in self.rough[seen.first..].iter().zip(&seen.rough) {
+            rough.fetch_add(*more, Ordering::Relaxed);
         }
     }
 
-    /// Patches stay active where enough was rough.
-    fn settle(&mut self) {
-        for (active, (seen, rough)) in self
-            .active
-            .iter_mut()
-            .zip(self.seen.iter_mut().zip(&mut self.rough))
-        {
-            let (seen, rough) = (
-                std::mem::take(seen.get_mut()),
-                std::mem::take(rough.get_mut()),
-            );
-            *active &= u32::from(rough) * SHARE > u32::from(seen);
-        }
-    }
-
-    /// Where few patches are rough, they lie along edges and not in noise: none of them is active.
-    fn leave_edges(&mut self) {
-        for region in self.active.chunks_mut(REGION) {
-            let active = region.iter().filter(|a| **a).count();
-            if active * EDGES < region.len() {
-                region.fill(false);
+    /// The patches move in which enough was rough of what was looked at, unless they are few in their
+    /// region: then they lie along edges and not in noise.
+    fn choose(&mut self) {
+        let points = self.points;
+        let regions = self.active.chunks_mut(PATCH * REGION);
+        let rough = self.rough.chunks_mut(PATCH * REGION);
+        for (number, (active, rough)) in regions.zip(rough).enumerate() {
+            let start = number * PATCH * REGION * RUN;
+            let patches = active.chunks_mut(PATCH).zip(rough.chunks_mut(PATCH));
+            let mut moving = 0;
+            for (patch, (active, rough)) in patches.enumerate() {
+                let start = start + patch * PATCH * RUN;
+                let seen =
+                    (start..points.min(start + PATCH * RUN)).filter(|id| Self::is_sampled(*id));
+                let rough: usize = rough
+                    .iter_mut()
+                    .map(|r| usize::from(std::mem::take(r.get_mut())))
+                    .sum();
+                if rough * SHARE > seen.count() {
+                    active.fill(true);
+                    moving += 1;
+                }
+            }
+            if moving * EDGES < active.len().div_ceil(PATCH) {
+                active.fill(false);
             }
         }
     }
+
+    /// Runs move again in which enough was rough.
+    fn settle(&mut self) {
+        for (active, rough) in self.active.iter_mut().zip(&mut self.rough) {
+            *active &= std::mem::take(rough.get_mut()) >= RAGGED;
+        }
+    }
 }
 
-/// What was seen of the patches of a tile.
-struct Notes {
+/// What was seen of a range of ids.
+struct Seen {
+    /// Its first run.
     first: usize,
-    /// Points looked at or moved, and the rough ones of them, by patch.
-    counts: Vec<[u16; 2]>,
+    /// Rough points of each run.
+    rough: Vec<u8>,
     moved: u64,
 }
 
-persist!(Notes {
+persist!(Seen {
     first,
-    counts,
+    rough,
     moved
 });
 
-impl Notes {
+impl Seen {
     fn of(ids: &Range<usize>) -> Self {
-        let patches = ids.end.div_ceil(PATCH) - ids.start / PATCH;
+        let first = ids.start / RUN;
         Self {
-            first: ids.start / PATCH,
-            counts: vec![[0; 2]; patches],
+            first,
+            rough: vec![0; ids.end.div_ceil(RUN) - first],
             moved: 0,
         }
     }
 
     fn note(&mut self, id: usize, rough: bool) {
-        let [seen, roughs] = &mut self.counts[id / PATCH - self.first];
-        *seen += 1;
-        *roughs += u16::from(rough);
+        self.rough[id / RUN - self.first] += u8::from(rough);
     }
 }
 
+persist!(Relaxed { store, stats });
+persist!(RelaxStats { rounds, moved });
+
 /// At most `rounds` rounds of relaxing: points move to the planes of their `neighbors` nearest, in
-/// each round those of the patches that were rough in the round before.
+/// each round those of the runs that were rough in the round before.
 ///
 /// # Errors
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
@@ -163,40 +178,24 @@ pub fn relax(
         store: None,
         stats: RelaxStats::default(),
     };
-    let mut patches = Patches::new(store.len(), workspace)?;
+    let mut runs = Runs::new(store.len(), workspace)?;
     if rounds > 0 {
-        let sampled = |id: usize| (id / RUN).is_multiple_of(SAMPLE);
         workspace.part("sample", || {
-            let bytes = |tile: usize| Tile::bytes(tiles.ids(tile).len()) + PageCache::bytes(store);
-            let work = |tile| {
-                let ids = tiles.ids(tile);
-                let mut notes = Notes::of(&ids);
-                let points = ids.len() as u64;
-                each_fit(store, ids, neighbors, sampled, |id, point, fit| {
-                    notes.note(id, target(point, &fit, neighbors).1);
-                })?;
-                workspace.advance(points);
-                Ok(notes)
-            };
-            workspace.units("relax: tile", tiles.count(), bytes, work, |_, notes| {
-                patches.add(&notes);
-                Ok(())
-            })
+            sample(store, tiles, neighbors, &runs, workspace)
         })?;
+        runs.choose();
     }
-    patches.settle();
-    patches.leave_edges();
     for round in 1..=rounds {
         if round > 1 {
-            patches.settle();
+            runs.settle();
         }
-        if !patches.active.contains(&true) {
+        if !runs.active.contains(&true) {
             let left = u64::from(rounds + 1 - round) * store.len() as u64;
             workspace.observer.advance(left);
             break;
         }
         let current = relaxed.store.as_ref().unwrap_or(store);
-        let (next, moved) = one_round(current, tiles, neighbors, round, &patches, workspace)?;
+        let (next, moved) = one_round(current, tiles, neighbors, round, &runs, workspace)?;
         relaxed.store = Some(next);
         relaxed.stats.rounds = round;
         relaxed.stats.moved += moved;
@@ -204,45 +203,64 @@ pub fn relax(
     Ok(relaxed)
 }
 
+/// Looks at some points of every patch.
+fn sample(
+    store: &PointStore,
+    tiles: TileRanges,
+    neighbors: usize,
+    runs: &Runs,
+    workspace: &Workspace,
+) -> Result<()> {
+    let bytes = |tile: usize| Tile::bytes(tiles.ids(tile).len()) + PageCache::bytes(store);
+    let work = |tile| {
+        let ids = tiles.ids(tile);
+        let mut seen = Seen::of(&ids);
+        let points = ids.len() as u64;
+        each_fit(store, ids, neighbors, Runs::is_sampled, |id, point, fit| {
+            seen.note(id, target(point, &fit, neighbors).1);
+        })?;
+        workspace.advance(points);
+        Ok(seen)
+    };
+    workspace.units("relax: tile", tiles.count(), bytes, work, |_, seen| {
+        runs.add(&seen);
+        Ok(())
+    })
+}
+
+/// Moves the points of all active runs; how many.
 fn one_round(
     store: &PointStore,
     tiles: TileRanges,
     neighbors: usize,
     round: u32,
-    patches: &Patches,
+    runs: &Runs,
     workspace: &Workspace,
 ) -> Result<(PointStore, u64)> {
-    let part = Sections::<3>::create(workspace, &format!("relax{round}"), tiles.count())?;
-    let bytes = |tile: usize| {
-        let points = tiles.ids(tile).len();
-        Tile::bytes(points) + PageCache::bytes(store) + points as u64 * 24
+    let pass = Pass {
+        file: &format!("relaxed{round}"),
+        memory: "relax: tile",
+        tile: tiles.size(),
     };
-    let work = |tile| {
-        let ids = tiles.ids(tile);
-        let mut points = store.slice(ids.clone())?;
-        let wanted = |id: usize| patches.active[id / PATCH];
-        let mut notes = Notes::of(&ids);
-        if ids.clone().step_by(RUN).chain([ids.end - 1]).any(wanted) {
+    let work = |ids: Range<usize>, points: &mut [Point]| {
+        let wanted = |id: usize| runs.active[id / RUN];
+        let mut seen = Seen::of(&ids);
+        if ids.clone().step_by(RUN).any(wanted) {
             each_fit(store, ids.clone(), neighbors, wanted, |id, point, fit| {
                 let (to, rough) = target(point, &fit, neighbors);
-                notes.note(id, rough);
+                seen.note(id, rough);
                 points[id - ids.start] = to;
-                notes.moved += 1;
+                seen.moved += 1;
             })?;
         }
-        workspace.advance(points.len() as u64);
-        part.put(tile, bytemuck::cast_slice(&points))?;
-        Ok(notes)
+        Ok(seen)
     };
     let mut moved = 0;
-    workspace.units("relax: tile", tiles.count(), bytes, work, |_, notes| {
-        patches.add(&notes);
-        moved += notes.moved;
-        Ok(())
+    let next = pass.over(store, workspace, work, |seen: Seen| {
+        runs.add(&seen);
+        moved += seen.moved;
     })?;
-    let name = format!("relaxed{round}");
-    let store = StoreWriter::gather(workspace, &name, store.page_size(), &part)?;
-    Ok((store, moved))
+    Ok((next, moved))
 }
 
 /// Where a point goes, and whether that is far.

@@ -1,4 +1,4 @@
-//! Relaxing on sheets.
+//! Relaxing and smoothing on sheets, edges and spheres.
 
 use super::*;
 use crate::stages::blocks::Blocks;
@@ -25,13 +25,23 @@ fn noise(n: i32) -> i32 {
     ((n ^ n >> 29).wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 40) as i32 % 201 - 100
 }
 
-/// Positions after relaxing with tiles and pages of these sizes, and what was done.
-fn relaxed(points: &[Point], rounds: u32, tile: u32, page: usize) -> (Vec<Point>, RelaxStats) {
-    let workspace = &workspace();
+fn ordered(
+    points: &[Point],
+    tile: u32,
+    page: usize,
+    workspace: &Workspace,
+) -> (PointStore, TileRanges) {
     let orderer = Orderer::new(workspace).unwrap();
     orderer.push(workspace, points).unwrap();
     let store = orderer.finish(workspace, page).unwrap().0;
     let tiles = TileRanges::new(Blocks::new(store.len(), 1000), tile);
+    (store, tiles)
+}
+
+/// Positions after relaxing with tiles and pages of these sizes, and what was done.
+fn relaxed(points: &[Point], rounds: u32, tile: u32, page: usize) -> (Vec<Point>, RelaxStats) {
+    let workspace = &workspace();
+    let (store, tiles) = ordered(points, tile, page, workspace);
     let relaxed = relax(&store, tiles, 12, rounds, workspace).unwrap();
     let shape = relaxed.store.as_ref().unwrap_or(&store);
     (shape.slice(0..store.len()).unwrap(), relaxed.stats)
@@ -84,5 +94,112 @@ fn only_rough_patches_move_and_tiles_do_not_matter() {
         let (shape, same) = relaxed(&points, 3, tile, page);
         assert_eq!(same, stats, "tiles of {tile}, pages of {page}");
         assert!(shape == expected, "tiles of {tile}, pages of {page}");
+    }
+}
+
+/// Positions before and after a round of smoothing with 12 neighbours.
+fn smoothed(
+    points: &[Point],
+    smoothing: Smoothing,
+    tile: u32,
+    page: usize,
+) -> (Vec<Point>, Vec<Point>) {
+    let workspace = &workspace();
+    let (store, tiles) = ordered(points, tile, page, workspace);
+    let after = smooth(&store, tiles, 12, smoothing, 1, workspace).unwrap();
+    let all = |store: &PointStore| store.slice(0..store.len()).unwrap();
+    (all(&store), all(&after))
+}
+
+const BOTH: [Smoothing; 2] = [Smoothing::Plain, Smoothing::Edges];
+
+#[test]
+fn planes_stay_where_they_are() {
+    // Level, and along (2, 1, 2) and (-2, 2, 1).
+    let level = sheet(40, |_, _| 0);
+    let tilted = |n: i32| {
+        let (a, b) = (1000 * (n % 40), 1000 * (n / 40) + 17 * (n % 7));
+        [2 * a - 2 * b + 200_000, a + 2 * b, 2 * a + b]
+    };
+    let tilted: Vec<Point> = (0..1600).map(tilted).collect();
+    for points in [level, tilted] {
+        for smoothing in BOTH {
+            let (before, after) = smoothed(&points, smoothing, 1000, 256);
+            assert!(before == after, "{smoothing:?}");
+        }
+    }
+}
+
+/// Root of the mean of the squares of `off` at the points that are `near`.
+fn off(
+    points: &[(Point, Point)],
+    near: impl Fn(&Point) -> bool,
+    off: impl Fn(&Point) -> f64,
+) -> f64 {
+    let squares = points.iter().filter(|(before, _)| near(before));
+    let squares: Vec<f64> = squares.map(|(_, after)| off(after).powi(2)).collect();
+    (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
+}
+
+#[test]
+fn a_noisy_edge_of_a_cube_stays_sharper() {
+    // Two faces of 40 by 20 steps of 1000, at right angles along z; noise of a tenth of a step.
+    let face = |n: i32| {
+        let (z, far, up) = (1000 * (n % 40), 1000 * (n / 40) + 250, 5000 + noise(n));
+        [[5000 + far, up, z], [up, 5000 + far, z]][n as usize % 2]
+    };
+    let points: Vec<Point> = (0..800).map(face).collect();
+    let faces = |p: &Point| f64::from((p[0] - 5000).min(p[1] - 5000));
+    let [plain, edges] = BOTH.map(|smoothing| {
+        let (before, after) = smoothed(&points, smoothing, 1000, 256);
+        let pairs: Vec<_> = before.into_iter().zip(after).collect();
+        let at_edge = |p: &Point| p[0].max(p[1]) < 7000;
+        (
+            off(&pairs, at_edge, faces),
+            off(&pairs, |p| !at_edge(p), faces),
+        )
+    });
+    assert!(edges.0 < 0.5 * plain.0, "at the edge {edges:?} {plain:?}");
+    // The noise has 58.
+    assert!(edges.1 < 40.0, "on the faces {edges:?} {plain:?}");
+}
+
+#[test]
+fn a_noisy_sphere_shrinks_less() {
+    // Along a spiral of even steps.
+    let (count, radius) = (2000, 100_000.0);
+    let at = |n: i32| {
+        let z = 1.0 - (2.0 * f64::from(n) + 1.0) / f64::from(count);
+        let (angle, r) = (
+            2.399_963 * f64::from(n),
+            radius + 20.0 * f64::from(noise(n)),
+        );
+        let flat = (1.0 - z * z).sqrt();
+        [flat * angle.cos(), flat * angle.sin(), z].map(|c| (200_000.0 + r * c) as i32)
+    };
+    let points: Vec<Point> = (0..count).map(at).collect();
+    let mean = |points: &[Point]| {
+        let length = |p: &Point| {
+            let squares = p.map(|c| f64::from(c - 200_000).powi(2));
+            squares.iter().sum::<f64>().sqrt()
+        };
+        points.iter().map(length).sum::<f64>() / points.len() as f64
+    };
+    let [plain, edges] = BOTH.map(|smoothing| {
+        let (before, after) = smoothed(&points, smoothing, 1000, 256);
+        mean(&before) - mean(&after)
+    });
+    assert!(plain > 0.0 && edges.abs() < 0.2 * plain, "{edges} {plain}");
+}
+
+#[test]
+fn smoothing_does_not_depend_on_tiles() {
+    let points = sheet(50, |x, n| if x < 25 { 0 } else { noise(n) });
+    for smoothing in BOTH {
+        let expected = smoothed(&points, smoothing, 1000, 256).1;
+        for (tile, page) in [(100, 16), (7, 3), (333, 64), (1000, 1)] {
+            let found = smoothed(&points, smoothing, tile, page).1;
+            assert!(found == expected, "tiles of {tile}, pages of {page}");
+        }
     }
 }

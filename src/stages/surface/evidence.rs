@@ -53,6 +53,9 @@ const FLAT: f64 = 0.9;
 /// Steps of flatness below [`FLAT`].
 const STEPS: usize = 64;
 
+/// Two triangles at an edge, the earlier one first, and whether one must be turned against the other.
+type Pair = (u32, u32, bool);
+
 /// Joins `triangles` across the edges inside a block. Of two that would have to run both ways the
 /// later one is marked as dead; to begin with, the flattest edges are joined.
 pub fn join_inside(
@@ -61,49 +64,43 @@ pub fn join_inside(
     evidence: &Evidence,
     sets: &mut ParitySets,
 ) -> Vec<bool> {
+    let mut pairs = Vec::with_capacity(triangles.len() / 2 * 3);
+    each_edge(triangles, edges, |pair| pairs.push(pair));
     // Without a contradiction the order of the edges makes no difference.
-    if each_edge(triangles, edges, |n, m, flip| sets.join(n, m, flip)) {
+    if pairs.iter().all(|&(n, m, flip)| sets.join(n, m, flip)) {
         return vec![false; triangles.len()];
     }
     *sets = ParitySets::new(triangles.len());
-    join_by_flatness(triangles, edges, evidence, sets)
+    join_by_flatness(triangles, &pairs, evidence, sets)
 }
 
-/// Calls `each` with the two triangles at every edge, the earlier one first, and whether one must be
-/// turned against the other, until it returns false; what it returned at last.
-fn each_edge(
-    triangles: &[Triangle],
-    edges: &Edges,
-    mut each: impl FnMut(u32, u32, bool) -> bool,
-) -> bool {
+/// Calls `each` for every edge with two triangles.
+fn each_edge(triangles: &[Triangle], edges: &Edges, mut each: impl FnMut(Pair)) {
     for (n, t) in (0..).zip(triangles) {
         for (a, b, ..) in EDGES {
             for m in edges.at(t[a], t[b]).filter(|m| *m > n) {
-                if !each(n, m, opposed(*t, triangles[m as usize], t[a], t[b])) {
-                    return false;
-                }
+                each((n, m, opposed(*t, triangles[m as usize], t[a], t[b])));
             }
         }
     }
-    true
 }
 
 fn join_by_flatness(
     triangles: &[Triangle],
-    edges: &Edges,
+    pairs: &[Pair],
     evidence: &Evidence,
     sets: &mut ParitySets,
 ) -> Vec<bool> {
     let normals: Vec<_> = triangles.iter().map(|t| evidence.normal(*t)).collect();
-    let mut steps: Vec<Vec<(u32, u32, bool)>> = vec![Vec::new(); STEPS];
+    let mut steps: Vec<Vec<Pair>> = vec![Vec::new(); STEPS];
     let mut dead = vec![false; triangles.len()];
     // What is dead has no edges any more; what it joined stays joined.
-    let mut join = |(n, m, flip): (u32, u32, bool)| {
+    let mut join = |(n, m, flip): Pair| {
         if !dead[n as usize] && !dead[m as usize] && !sets.join(n, m, flip) {
             dead[m as usize] = true;
         }
     };
-    each_edge(triangles, edges, |n, m, flip| {
+    for &(n, m, flip) in pairs {
         let cosine = cosine(normals[n as usize], normals[m as usize], flip);
         if cosine > FLAT {
             join((n, m, flip));
@@ -111,8 +108,7 @@ fn join_by_flatness(
             let step = (FLAT - cosine) / (1.0 + FLAT) * (STEPS - 1) as f64;
             steps[(step as usize).min(STEPS - 1)].push((n, m, flip));
         }
-        true
-    });
+    }
     steps.into_iter().flatten().for_each(join);
     dead
 }

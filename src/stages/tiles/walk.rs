@@ -42,22 +42,25 @@ impl PageCache {
     }
 }
 
-/// What waits in the queue; at equal distance boxes are opened before points are handed out, so
-/// that points of equal distance come in order of id.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Item {
-    Node { level: usize, index: usize },
-    Point { id: u32, at: Point },
-}
+/// Points handed out before the search goes on; then twice as many, and so on.
+const BATCH: usize = 32;
 
-/// Best-first search from one point.
+/// A node of the box tree that is not yet opened: its squared distance, level and index.
+type Node = Reverse<(u64, usize, usize)>;
+
+/// Best-first search from one point, a batch of neighbours at a time.
 #[derive(Debug)]
 pub struct Walk<'a> {
     store: &'a PointStore,
     cache: &'a mut PageCache,
     id: u32,
     point: Point,
-    queue: BinaryHeap<Reverse<(u64, Item)>>,
+    nodes: BinaryHeap<Node>,
+    /// What is handed out next, with squared distance and id, farthest first.
+    ready: Vec<(u64, u32, Point)>,
+    /// Other points of opened pages, in no order.
+    later: Vec<(u64, u32, Point)>,
+    batch: usize,
 }
 
 impl<'a> Walk<'a> {
@@ -65,62 +68,110 @@ impl<'a> Walk<'a> {
     #[must_use]
     pub fn new(store: &'a PointStore, cache: &'a mut PageCache, id: u32, point: Point) -> Self {
         let level = store.tree_levels() - 1;
-        let queue = store
-            .tree_boxes(level)
-            .iter()
-            .enumerate()
-            .map(|(index, b)| Reverse((b.distance2(point), Item::Node { level, index })))
-            .collect();
-        Self {
+        let count = store.tree_boxes(level).len();
+        let mut walk = Self {
             store,
             cache,
             id,
             point,
-            queue,
-        }
+            nodes: BinaryHeap::new(),
+            ready: Vec::new(),
+            later: Vec::new(),
+            batch: BATCH,
+        };
+        (0..count).for_each(|index| walk.wait(level, index));
+        walk
     }
 
-    /// The next neighbour, nearest first by (distance, id), of those in boxes that `wanted` lets
-    /// pass; `None` when there is no more.
+    /// The next neighbour, nearest first by (distance, id), of all; `None` when there is no more.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
-    pub fn next(&mut self, wanted: impl Fn(&Aabb) -> bool) -> Result<Option<Near>> {
-        while let Some(Reverse((distance, item))) = self.queue.pop() {
-            match item {
-                Item::Point { id, at } => {
-                    let difference = sub(at, self.point);
-                    return Ok(Some(Near {
-                        distance2: distance,
-                        id,
-                        difference,
-                    }));
-                }
-                Item::Node { level, index } => {
-                    if !wanted(&self.store.tree_boxes(level)[index]) {
-                        continue;
-                    }
-                    if level == 0 {
-                        let first = self.store.page_ids(index).start as u32;
-                        for (id, &at) in (first..).zip(self.cache.get(self.store, index)?) {
-                            if id != self.id {
-                                let d2 = distance2(at, self.point);
-                                self.queue.push(Reverse((d2, Item::Point { id, at })));
-                            }
-                        }
-                    } else {
-                        for child in self.store.tree_children(level, index) {
-                            let node = Item::Node {
-                                level: level - 1,
-                                index: child,
-                            };
-                            let d2 = self.store.tree_boxes(level - 1)[child].distance2(self.point);
-                            self.queue.push(Reverse((d2, node)));
-                        }
-                    }
+    pub fn advance(&mut self) -> Result<Option<Near>> {
+        self.advance_within(u64::MAX, |_| true)
+    }
+
+    /// As [`Walk::advance`], of those within the squared distance `within2` in boxes that `wanted` lets
+    /// pass, maybe one that is not; what did not pass once is not asked for again.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+    pub fn advance_within(
+        &mut self,
+        within2: u64,
+        wanted: impl Fn(&Aabb) -> bool,
+    ) -> Result<Option<Near>> {
+        if self.ready.is_empty() {
+            self.fill(within2, wanted)?;
+        }
+        Ok(self.ready.pop().map(|(distance2, id, at)| Near {
+            distance2,
+            id,
+            difference: sub(at, self.point),
+        }))
+    }
+
+    /// Makes the nearest of what is left within `within2` ready, at least a batch if there are so
+    /// many, and all that are as far as the last of them.
+    fn fill(&mut self, within2: u64, wanted: impl Fn(&Aabb) -> bool) -> Result<()> {
+        let mut limit = within2;
+        let near = self.later.extract_if(.., |p| p.0 <= limit);
+        self.ready.extend(near);
+        limit = self.narrow(limit);
+        while let Some(&Reverse((distance, level, index))) = self.nodes.peek() {
+            if distance > limit {
+                break;
+            }
+            self.nodes.pop();
+            if !wanted(&self.store.tree_boxes(level)[index]) {
+                continue;
+            }
+            if level > 0 {
+                let children = self.store.tree_children(level, index);
+                children.for_each(|child| self.wait(level - 1, child));
+            } else {
+                self.open(index, limit)?;
+                if self.ready.len() >= 2 * self.batch {
+                    limit = self.narrow(limit);
                 }
             }
         }
-        Ok(None)
+        self.narrow(limit);
+        self.ready.sort_unstable_by(|a, b| b.cmp(a));
+        self.batch *= 2;
+        Ok(())
+    }
+
+    /// If more than a batch is ready, only as far as the batch reaches; the new limit.
+    fn narrow(&mut self, limit: u64) -> u64 {
+        if self.ready.len() <= self.batch {
+            return limit;
+        }
+        let limit = self.ready.select_nth_unstable(self.batch - 1).1.0;
+        let beyond = self.ready.extract_if(self.batch.., |p| p.0 > limit);
+        self.later.extend(beyond);
+        limit
+    }
+
+    /// Takes in a page; its points up to `limit` are ready.
+    fn open(&mut self, page: usize, limit: u64) -> Result<()> {
+        let first = self.store.page_ids(page).start;
+        for (id, &at) in (first as u32..).zip(self.cache.get(self.store, page)?) {
+            let distance = distance2(at, self.point);
+            if id != self.id {
+                let to = if distance <= limit {
+                    &mut self.ready
+                } else {
+                    &mut self.later
+                };
+                to.push((distance, id, at));
+            }
+        }
+        Ok(())
+    }
+
+    fn wait(&mut self, level: usize, index: usize) {
+        let distance = self.store.tree_boxes(level)[index].distance2(self.point);
+        self.nodes.push(Reverse((distance, level, index)));
     }
 }

@@ -152,6 +152,16 @@ impl Generator {
         self.original(index)
     }
 
+    /// Area of the surface, one layer of it; `None` for a grid.
+    pub fn area(&self) -> Option<f64> {
+        match &self.source {
+            Source::Grid(_) => None,
+            Source::Surface { surface, .. } | Source::Chosen { surface, .. } => {
+                Some(surface.area())
+            }
+        }
+    }
+
     /// Fills `out` with the points from `start` on.
     pub fn fill(&self, start: u64, out: &mut [[f64; 3]]) {
         for (index, point) in (start..).zip(out) {

@@ -56,7 +56,7 @@ fn one_tile(store: &PointStore, ids: Range<usize>) -> outcrop::Result<f64> {
         let mut walk = Walk::new(store, &mut cache, id, point);
         let mut last = None;
         for _ in 0..NEIGHBORS {
-            last = walk.next(|_| true)?.or(last);
+            last = walk.advance()?.or(last);
         }
         sum += last.map_or(0.0, |near| (near.distance2 as f64).sqrt());
     }

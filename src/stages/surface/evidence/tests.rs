@@ -58,12 +58,12 @@ proptest! {
         let triangles = band(9, twist, &names, &gone);
         let (edges, mut sets, dead) = joined(&triangles, &places);
         let mut contradicted = vec![false; triangles.len()];
-        each_edge(&triangles, &edges, |n, m, flip| {
+        each_edge(&triangles, &edges, |(n, m, flip)| {
             let fits = sets.relation(n, m) == Some(flip);
             let alive = !dead[n as usize] && !dead[m as usize];
             assert!(fits || !alive, "{n} and {m} are left and contradict");
             contradicted[m as usize] |= !fits;
-            true
+
         });
         for (dead, contradicted) in dead.iter().zip(contradicted) {
             prop_assert!(!dead || contradicted);

@@ -1,0 +1,345 @@
+//! Writes the ordered store: in id order, or, by way of `rewrite`, in any.
+
+use super::store::{FAN, PointStore};
+use crate::error::Result;
+use crate::geom::Point;
+use crate::geom::aabb::Aabb;
+use crate::spill::Sections;
+use crate::workspace::Workspace;
+use crate::workspace::file::{Place, ScratchFile};
+use crate::workspace::persist::{Persist, Saved};
+use crate::workspace::steps::Step;
+use rayon::prelude::*;
+
+/// Of every page its checksum and its box. Pages that were written together are a section, which has the
+/// number of the first of them in terms of [`STEP`].
+pub(super) type Index = Sections<7>;
+
+/// What is written at a time begins with a page whose number is a multiple of this.
+const STEP: usize = 16;
+
+/// Pages written at a time.
+const GROUP: usize = 64;
+
+/// Checksum and box of a page.
+pub(super) type PageEnd = (u32, Aabb);
+
+/// Pages that were written together.
+pub(super) type Written = (Vec<PageEnd>, Place);
+
+/// Writes a [`PointStore`] in id order.
+#[derive(Debug)]
+pub struct StoreWriter {
+    file: ScratchFile,
+    /// Points written.
+    len: usize,
+    page: usize,
+    /// Points not yet written, less than a group of pages.
+    pending: Vec<Point>,
+    checks: Vec<u32>,
+    boxes: Vec<Aabb>,
+    /// As [`PointStore`] has it.
+    index: Option<Index>,
+    /// Groups of pages are its units.
+    step: Step,
+}
+
+impl StoreWriter {
+    /// Starts the scratch file `name`. What an earlier attempt at the run has written of it is there,
+    /// see [`StoreWriter::len`].
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+    pub fn create(workspace: &Workspace, name: &str, page: usize) -> Result<Self> {
+        let mut writer = Self::open(workspace, name, page)?;
+        writer.step = workspace.step("store")?;
+        // The last group may have been cut short by the end of the points; it is written again.
+        let whole = writer.boxes.len() / GROUP * GROUP;
+        writer.checks.truncate(whole);
+        writer.boxes.truncate(whole);
+        writer.len = whole * writer.page;
+        Ok(writer)
+    }
+
+    fn open(workspace: &Workspace, name: &str, page: usize) -> Result<Self> {
+        let index = || Index::unpacked(workspace, &format!("{name}.index"), 0);
+        let mut writer = Self {
+            file: workspace.keep_file(name)?.0,
+            len: 0,
+            page: page.max(1),
+            pending: Vec::new(),
+            checks: Vec::new(),
+            boxes: Vec::new(),
+            index: workspace.is_resumable().then(index).transpose()?,
+            step: Step::default(),
+        };
+        writer.take_up()?;
+        Ok(writer)
+    }
+
+    /// Reads the index of what is there; false if there is none.
+    pub(super) fn take_up(&mut self) -> Result<bool> {
+        let Some(index) = self.index.as_ref().filter(|_| !self.file.is_gone()) else {
+            return Ok(false);
+        };
+        self.checks.clear();
+        self.boxes.clear();
+        let mut at = 0;
+        while at < index.count() && index.records(at) > 0 {
+            for [crc, bounds @ ..] in index.get(at)? {
+                let [a, b, c, d, e, f] = bounds.map(u32::cast_signed);
+                self.checks.push(crc);
+                self.boxes.push(Aabb {
+                    min: [a, b, c],
+                    max: [d, e, f],
+                });
+            }
+            at += index.records(at).div_ceil(STEP);
+        }
+        Ok(true)
+    }
+
+    /// Points written so far.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.len
+    }
+
+    /// True if nothing was written yet.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
+    /// The last point written.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`].
+    pub fn last(&self) -> Result<Option<Point>> {
+        let Some(last) = self.len.checked_sub(1) else {
+            return Ok(None);
+        };
+        let mut point: Point = [0; 3];
+        let bytes = bytemuck::cast_slice_mut(&mut point);
+        self.file.read_at(bytes, last as u64 * 12)?;
+        Ok(Some(point))
+    }
+
+    /// A whole store from the points of sections, one after the other.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`], [`crate::Error::Cancelled`].
+    pub fn gather(
+        workspace: &Workspace,
+        name: &str,
+        page: usize,
+        sections: &Sections<3>,
+    ) -> Result<PointStore> {
+        workspace.once("gather", || {
+            let mut writer = Self::create(workspace, name, page)?;
+            let mut first = 0;
+            for section in 0..sections.count() {
+                workspace.check_cancel()?;
+                let end = first + sections.records(section);
+                let done = writer.len.clamp(first, end) - first;
+                if first + done < end {
+                    let points = sections.get(section)?;
+                    writer.push(bytemuck::cast_slice(&points[done..]))?;
+                }
+                first = end;
+            }
+            writer.finish(workspace)
+        })
+    }
+
+    /// Appends points, in order of id.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`].
+    pub fn push(&mut self, mut points: &[Point]) -> Result<()> {
+        while !points.is_empty() {
+            let room = GROUP * self.page - self.pending.len();
+            let (now, later) = points.split_at(room.min(points.len()));
+            self.pending.extend_from_slice(now);
+            points = later;
+            if self.pending.len() == GROUP * self.page {
+                self.flush()?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Appends the points of `items`, in order of id, on all threads.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], [`crate::Error::Cancelled`].
+    pub fn append<T: Sync>(
+        &mut self,
+        workspace: &Workspace,
+        items: &[T],
+        point: impl Fn(&T) -> Point + Sync,
+    ) -> Result<()> {
+        let group = GROUP * self.page;
+        let (first, rest) = items.split_at(((group - self.pending.len()) % group).min(items.len()));
+        let (groups, last) = rest.split_at(rest.len() / group * group);
+        self.push(&first.iter().map(&point).collect::<Vec<_>>())?;
+        let written: Result<Vec<Written>> = workspace.install(|| {
+            let parts = groups.par_chunks(group).enumerate();
+            let write = |(n, part): (usize, &[T])| {
+                workspace.check_cancel()?;
+                let points: Vec<Point> = part.iter().map(&point).collect();
+                workspace.observer.advance(points.len() as u64);
+                self.write(self.len + n * group, &points)
+            };
+            parts.map(write).collect()
+        });
+        self.note(written?)?;
+        self.len += groups.len();
+        workspace
+            .observer
+            .advance((first.len() + last.len()) as u64);
+        self.push(&last.iter().map(&point).collect::<Vec<_>>())
+    }
+
+    /// Writes a group of pages from point `first` on; their checksums and boxes, and the place.
+    pub(super) fn write(&self, first: usize, points: &[Point]) -> Result<Written> {
+        let bytes: &[u8] = bytemuck::cast_slice(points);
+        let offset = first as u64 * 12;
+        self.file.write_at(bytes, offset)?;
+        let page = |page: &[Point]| {
+            let crc = crc32fast::hash(bytemuck::cast_slice(page));
+            (crc, Aabb::of(page))
+        };
+        let place = Place {
+            offset,
+            bytes: bytes.len(),
+            records: points.len(),
+            crc: self.index.as_ref().map_or(0, |_| crc32fast::hash(bytes)),
+        };
+        Ok((points.chunks(self.page).map(page).collect(), place))
+    }
+
+    /// Notes pages, the first of which is number `first`, for an attempt that comes later.
+    pub(super) fn keep(&self, first: usize, written: &[Written]) -> Result<()> {
+        let Some(index) = &self.index else {
+            return Ok(());
+        };
+        let mut records = Vec::new();
+        for (pages, place) in written {
+            let part = (first + records.len()) / STEP;
+            self.file.put(part as u32, *place)?;
+            records.extend(pages.iter().map(|(crc, b)| {
+                let [p, q] = [b.min, b.max].map(|corner| corner.map(i32::cast_unsigned));
+                [*crc, p[0], p[1], p[2], q[0], q[1], q[2]]
+            }));
+        }
+        while index.count() <= first / STEP {
+            index.grow();
+        }
+        index.put(first / STEP, &records)
+    }
+
+    /// Takes in groups that were written, for good.
+    fn note(&mut self, groups: Vec<Written>) -> Result<()> {
+        if groups.is_empty() {
+            return Ok(());
+        }
+        let first = self.boxes.len();
+        self.step
+            .finish(first as u64, &(), || self.keep(first, &groups))?;
+        for (crc, aabb) in groups.into_iter().flat_map(|group| group.0) {
+            self.checks.push(crc);
+            self.boxes.push(aabb);
+        }
+        Ok(())
+    }
+
+    /// Writes what is pending.
+    fn flush(&mut self) -> Result<()> {
+        if !self.pending.is_empty() {
+            let group = self.write(self.len, &self.pending)?;
+            self.note(vec![group])?;
+            self.len += self.pending.len();
+            self.pending.clear();
+        }
+        Ok(())
+    }
+
+    /// Points per page.
+    pub(super) fn page(&self) -> usize {
+        self.page
+    }
+
+    /// As [`StoreWriter::finish`], if `pages` were written to the file without this writer's knowledge;
+    /// an index knows more of them.
+    pub(super) fn finish_with(
+        mut self,
+        len: usize,
+        pages: Vec<PageEnd>,
+        workspace: &Workspace,
+    ) -> Result<PointStore> {
+        if !self.take_up()? {
+            (self.checks, self.boxes) = pages.into_iter().unzip();
+        }
+        self.len = len;
+        self.into_store(workspace)
+    }
+
+    /// Ends the file and builds the tree of boxes.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], [`crate::Error::Memory`].
+    pub fn finish(mut self, workspace: &Workspace) -> Result<PointStore> {
+        self.flush()?;
+        self.into_store(workspace)
+    }
+
+    fn into_store(self, workspace: &Workspace) -> Result<PointStore> {
+        let held = workspace.reserve("point index", self.boxes.len() as u64 * 32 + 4096)?;
+        let mut levels = vec![self.boxes];
+        while levels.last().is_some_and(|top| top.len() > FAN) {
+            let next = levels[levels.len() - 1]
+                .chunks(FAN)
+                .map(|boxes| boxes.iter().fold(Aabb::EMPTY, |a, b| a.union(*b)))
+                .collect();
+            levels.push(next);
+        }
+        Ok(PointStore {
+            file: self.file,
+            len: self.len,
+            page: self.page,
+            checks: self.checks,
+            levels,
+            _index: self.index,
+            _held: held,
+        })
+    }
+}
+
+impl Persist for PointStore {
+    fn save(&self, out: &mut Vec<u8>) {
+        self.file.name.to_string().save(out);
+        self.len.save(out);
+        self.page.save(out);
+        let bounds = self.bounds();
+        (bounds.min, bounds.max).save(out);
+    }
+
+    fn load(from: &mut Saved<'_>) -> Result<Self> {
+        let name = String::load(from)?;
+        let (len, page) = <(usize, usize)>::load(from)?;
+        let (min, max) = Persist::load(from)?;
+        let workspace = from.workspace;
+        let mut writer = StoreWriter::open(workspace, &name, page)?;
+        let gone = writer.file.is_gone();
+        if !gone && writer.boxes.len() != len.div_ceil(page) {
+            return Err(from.wrong(format!("{len} points of the file {name}")));
+        }
+        writer.len = len;
+        if gone {
+            // Nobody reads its points any more, but where they were is known.
+            writer.boxes = vec![Aabb { min, max }];
+        }
+        writer.into_store(workspace)
+    }
+}

@@ -1,0 +1,190 @@
+//! Smoothing that keeps edges and does not shrink: a point goes to a curved surface through those of its
+//! neighbours that lie on one with it (ARCHITECTURE, section 1.2).
+//!
+//! Sums run over the point and then its neighbours, nearest first, with `+ - * / sqrt` only: the same
+//! bits on every machine, whatever found the neighbours.
+
+use crate::geom::plane::least_direction;
+use crate::stages::tiles::neighbors::Neighbors;
+
+/// Neighbours in terms of those of a plane: a curved surface is surer of itself through more.
+pub(super) const SPREAD: usize = 2;
+
+/// The squared distance at which weights end, in terms of that of the last neighbour.
+const REACH2: f64 = 1.1;
+
+/// The squared height over the first surface at which weights end, in terms of the mean square.
+const HEIGHT2: f64 = 9.0;
+
+/// What holds back a surface that the points do not decide, in terms of their weights.
+const RIDGE: f64 = 1e-3;
+
+/// A mean square height, in terms of the reach, that is rounding and nothing else.
+const EXACT2: f64 = 1e-24;
+
+/// Unknowns of a surface of second order.
+const TERMS: usize = 6;
+
+/// Neighbours of a point in memory that is used again and again.
+#[derive(Debug, Default)]
+pub(super) struct Around {
+    /// Differences to the point, which is the first itself, in terms of the reach.
+    at: Vec<[f64; 3]>,
+    weights: Vec<f64>,
+}
+
+impl Around {
+    /// Where a point goes from where it is, in steps, by the first `count` of its neighbours.
+    pub(super) fn offset(&mut self, near: &Neighbors, count: usize) -> [f64; 3] {
+        let count = count.min(near.len());
+        let last2 = near.get(count.wrapping_sub(1)).map_or(0, |n| n.distance2);
+        let reach = (REACH2 * last2 as f64).sqrt();
+        if last2 == 0 {
+            return [0.0; 3];
+        }
+        self.gather(near, count, reach);
+        let Some(normal) = self.normal() else {
+            return [0.0; 3];
+        };
+        self.reweigh(&self.surface(normal));
+        let normal = self.normal().unwrap_or(normal);
+        let height = self.surface(normal).terms[0] * reach;
+        normal.map(|n| n * height)
+    }
+
+    fn gather(&mut self, near: &Neighbors, count: usize, reach: f64) {
+        self.at.clear();
+        self.at.push([0.0; 3]);
+        let differences = near.iter().take(count).map(|n| n.difference);
+        self.at
+            .extend(differences.map(|d| d.map(|c| c as f64 / reach)));
+        self.weights.clear();
+        self.weights.extend(self.at.iter().map(|&a| {
+            let t = 1.0 - dot(a, a);
+            t * t
+        }));
+    }
+
+    /// The direction in which the points scatter least.
+    fn normal(&self) -> Option<[f64; 3]> {
+        let (mut total, mut sum, mut products) = (0.0, [0.0; 3], [0.0; 6]);
+        for (a, w) in self.at.iter().zip(&self.weights) {
+            let b = a.map(|x| w * x);
+            total += w;
+            (0..3).for_each(|k| sum[k] += b[k]);
+            let pairs = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
+            (0..6).for_each(|k| products[k] += b[pairs[k].0] * a[pairs[k].1]);
+        }
+        let mean = sum.map(|s| s / total);
+        let crossed = [
+            sum[0] * mean[0],
+            sum[1] * mean[1],
+            sum[2] * mean[2],
+            sum[0] * mean[1],
+            sum[0] * mean[2],
+            sum[1] * mean[2],
+        ];
+        let scatter = std::array::from_fn(|k| products[k] - crossed[k]);
+        let normal = least_direction(&scatter)?.map(f64::from);
+        let length = dot(normal, normal).sqrt();
+        Some(normal.map(|n| n / length))
+    }
+
+    /// Takes weight from what lies off a surface, as across an edge or on another layer.
+    fn reweigh(&mut self, surface: &Surface) {
+        let off2 = |a: &[f64; 3]| {
+            let off = surface.off(*a);
+            off * off
+        };
+        let (mut total, mut sum) = (0.0, 0.0);
+        for (a, w) in self.at.iter().zip(&self.weights) {
+            total += w;
+            sum += w * off2(a);
+        }
+        let mean2 = sum / total;
+        if mean2 > EXACT2 {
+            let limit = HEIGHT2 * mean2;
+            for (a, w) in self.at.iter().zip(&mut self.weights) {
+                let t = (1.0 - off2(a) / limit).max(0.0);
+                *w *= t * t;
+            }
+        }
+    }
+
+    /// The best surface of second order over the plane with `normal`.
+    fn surface(&self, normal: [f64; 3]) -> Surface {
+        let [u, v] = frame(normal);
+        let frame = [u, v, normal];
+        // Normal equations, their right sides in the last column.
+        let mut m = [[0.0; TERMS + 1]; TERMS];
+        for (a, w) in self.at.iter().zip(&self.weights) {
+            let row = row(&frame, *a);
+            for (i, equation) in m.iter_mut().enumerate() {
+                let weighted = w * row[i];
+                (0..=TERMS).for_each(|j| equation[j] += weighted * row[j]);
+            }
+        }
+        let ridge = RIDGE * m[0][0];
+        (1..TERMS).for_each(|i| m[i][i] += ridge);
+        // The constant term comes out first. No pivot is smaller than the ridge.
+        for pivot in (1..TERMS).rev() {
+            let from = m[pivot];
+            for equation in &mut m[..pivot] {
+                let factor = equation[pivot] / from[pivot];
+                (0..=TERMS).for_each(|j| equation[j] -= factor * from[j]);
+            }
+        }
+        let mut terms = [0.0; TERMS];
+        for i in 0..TERMS {
+            let known: f64 = (0..i).map(|j| m[i][j] * terms[j]).sum();
+            terms[i] = (m[i][TERMS] - known) / m[i][i];
+        }
+        Surface { frame, terms }
+    }
+}
+
+/// Terms of second order at a place, and its height.
+fn row(frame: &[[f64; 3]; 3], a: [f64; 3]) -> [f64; TERMS + 1] {
+    let [x, y, height] = frame.map(|axis| dot(a, axis));
+    let (xx, yy) = (x * x, y * y);
+    [1.0, x, y, xx + yy, xx - yy, 2.0 * x * y, height]
+}
+
+/// A surface of second order.
+#[derive(Debug, Clone, Copy)]
+struct Surface {
+    /// Two directions along and the normal.
+    frame: [[f64; 3]; 3],
+    terms: [f64; TERMS],
+}
+
+impl Surface {
+    /// How far a place is above it.
+    fn off(&self, a: [f64; 3]) -> f64 {
+        let row = row(&self.frame, a);
+        let on: f64 = (0..TERMS).map(|i| self.terms[i] * row[i]).sum();
+        row[TERMS] - on
+    }
+}
+
+/// Two directions of length 1, at right angles to each other and to `n`.
+fn frame(n: [f64; 3]) -> [[f64; 3]; 2] {
+    // Across x, unless that is nearly the normal.
+    let u = if n[0] * n[0] < 0.5 {
+        [0.0, n[2], -n[1]]
+    } else {
+        [-n[2], 0.0, n[0]]
+    };
+    let length = dot(u, u).sqrt();
+    let u = u.map(|x| x / length);
+    let v = [
+        n[1] * u[2] - n[2] * u[1],
+        n[2] * u[0] - n[0] * u[2],
+        n[0] * u[1] - n[1] * u[0],
+    ];
+    [u, v]
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}

@@ -1,0 +1,58 @@
+//! A pass over all points, each moved or not: the same ids, the same pages, other positions.
+
+use crate::error::Result;
+use crate::geom::Point;
+use crate::stages::order::{PointStore, Rewriter};
+use crate::stages::tiles::Tile;
+use crate::stages::tiles::walk::PageCache;
+use crate::workspace::Workspace;
+use crate::workspace::persist::Persist;
+use std::ops::Range;
+
+/// Ids that follow each other and move by the same rule: pieces of a pass hold whole runs of them.
+pub(super) const RUN: usize = 16;
+
+/// What a pass is called, and how many points it takes at a time.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Pass<'a> {
+    /// Name of the scratch file.
+    pub file: &'a str,
+    /// Name of the memory that it takes.
+    pub memory: &'static str,
+    /// Points at a time, about.
+    pub tile: u32,
+}
+
+impl Pass<'_> {
+    /// Moves the points of `store`: `work` gets a range of ids and their positions to change; `each`
+    /// what it returned.
+    pub fn over<T: Persist + Send>(
+        self,
+        store: &PointStore,
+        workspace: &Workspace,
+        work: impl Fn(Range<usize>, &mut [Point]) -> Result<T> + Sync,
+        mut each: impl FnMut(T) + Send,
+    ) -> Result<PointStore> {
+        let size = (self.tile as usize).next_multiple_of(store.page_size() * RUN);
+        let piece = |number: usize| number * size..((number + 1) * size).min(store.len());
+        let bytes = |number: usize| {
+            let points = piece(number).len();
+            Tile::bytes(points) + PageCache::bytes(store) + points as u64 * 12
+        };
+        let moved = Rewriter::of(store, workspace, self.file)?;
+        let one = |number| {
+            let ids = piece(number);
+            let mut points = store.slice(ids.clone())?;
+            let found = work(ids.clone(), &mut points)?;
+            workspace.advance(points.len() as u64);
+            moved.put(ids.start, &points)?;
+            Ok(found)
+        };
+        let count = store.len().div_ceil(size);
+        workspace.units(self.memory, count, bytes, one, |_, found| {
+            each(found);
+            Ok(())
+        })?;
+        moved.finish(workspace)
+    }
+}

@@ -1,0 +1,159 @@
+//! Smoothing that keeps edges (section 1.2).
+
+use super::cells::by_distance;
+use outcrop::geom::lattice::COORDINATE_LIMIT;
+use outcrop::geom::plane::least_direction;
+use outcrop::geom::{Point, distance2, sub};
+
+type Vec3 = [f64; 3];
+
+/// A point around the one that moves, in terms of the reach, and its weight.
+#[derive(Clone, Copy)]
+struct Weighted {
+    at: Vec3,
+    weight: f64,
+}
+
+/// One round: all points at once.
+pub fn smooth(points: &[Point], k: usize) -> Vec<Point> {
+    (0..points.len()).map(|i| moved(points, i, k)).collect()
+}
+
+fn moved(points: &[Point], i: usize, k: usize) -> Point {
+    let mut others = by_distance(points, i);
+    others.truncate(2 * k);
+    let last2 = others
+        .last()
+        .map_or(0, |&j| distance2(points[i], points[j]));
+    let reach = (1.1 * last2 as f64).sqrt();
+    if last2 == 0 {
+        return points[i];
+    }
+    let mut all = Vec::new();
+    for j in [i].into_iter().chain(others) {
+        let at = sub(points[j], points[i]).map(|c| c as f64 / reach);
+        let weight = (1.0 - dot(at, at)) * (1.0 - dot(at, at));
+        all.push(Weighted { at, weight });
+    }
+    let Some(normal) = least_scatter(&all) else {
+        return points[i];
+    };
+    let first = Surface::best(&all, normal);
+    let off = |a: Vec3| first.off(a);
+    let total: f64 = all.iter().map(|p| p.weight).sum();
+    let squares: f64 = all.iter().map(|p| p.weight * (off(p.at) * off(p.at))).sum();
+    let limit = 9.0 * (squares / total);
+    if squares / total > 1e-24 {
+        for p in &mut all {
+            let rest = (1.0 - off(p.at) * off(p.at) / limit).max(0.0);
+            p.weight *= rest * rest;
+        }
+    }
+    let normal = least_scatter(&all).unwrap_or(normal);
+    let up = Surface::best(&all, normal).terms[0] * reach;
+    std::array::from_fn(|axis| {
+        let to = i64::from(points[i][axis]) + (normal[axis] * up).round() as i64;
+        to.clamp(0, COORDINATE_LIMIT - 1) as i32
+    })
+}
+
+/// The direction in which the weighted points scatter least.
+fn least_scatter(all: &[Weighted]) -> Option<Vec3> {
+    let mut total = 0.0;
+    let mut sum = [0.0; 3];
+    let mut products = [[0.0; 3]; 3];
+    for Weighted { at, weight } in all {
+        total += weight;
+        for a in 0..3 {
+            sum[a] += weight * at[a];
+            for b in a..3 {
+                products[a][b] += weight * at[a] * at[b];
+            }
+        }
+    }
+    let mean = sum.map(|s| s / total);
+    let scatter = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]
+        .map(|(a, b)| products[a][b] - sum[a] * mean[b]);
+    let normal = least_direction(&scatter)?.map(f64::from);
+    let length = dot(normal, normal).sqrt();
+    Some(normal.map(|n| n / length))
+}
+
+/// The surface `c₀ + c₁ x + … + c₅ 2 x y` over a plane.
+struct Surface {
+    along: [Vec3; 2],
+    normal: Vec3,
+    terms: [f64; 6],
+}
+
+fn terms(x: f64, y: f64) -> [f64; 6] {
+    [1.0, x, y, x * x + y * y, x * x - y * y, 2.0 * x * y]
+}
+
+impl Surface {
+    /// That for which the weighted squares of what is left, and the ridge, come to least.
+    fn best(all: &[Weighted], normal: Vec3) -> Self {
+        // Any frame gives the same but for rounding.
+        let least = (0..3).min_by(|&a, &b| normal[a].abs().total_cmp(&normal[b].abs()));
+        let mut axis = [0.0; 3];
+        axis[least.unwrap_or(0)] = 1.0;
+        let across = cross(normal, axis);
+        let length = dot(across, across).sqrt();
+        let u = across.map(|c| c / length);
+        let along = [u, cross(normal, u)];
+        let mut equations = [[0.0; 7]; 6];
+        for Weighted { at, weight } in all {
+            let terms = terms(dot(*at, along[0]), dot(*at, along[1]));
+            for a in 0..6 {
+                for b in 0..6 {
+                    equations[a][b] += weight * terms[a] * terms[b];
+                }
+                equations[a][6] += weight * terms[a] * dot(*at, normal);
+            }
+        }
+        let ridge = 0.001 * equations[0][0];
+        for (term, equation) in equations.iter_mut().enumerate().skip(1) {
+            equation[term] += ridge;
+        }
+        Self {
+            along,
+            normal,
+            terms: solve(equations),
+        }
+    }
+
+    fn off(&self, a: Vec3) -> f64 {
+        let terms = terms(dot(a, self.along[0]), dot(a, self.along[1]));
+        let on: f64 = terms.iter().zip(self.terms).map(|(t, c)| t * c).sum();
+        dot(a, self.normal) - on
+    }
+}
+
+/// Gauss's elimination with the largest pivot of each column.
+fn solve(mut m: [[f64; 7]; 6]) -> [f64; 6] {
+    for column in 0..6 {
+        let largest =
+            (column..6).max_by(|&a, &b| m[a][column].abs().total_cmp(&m[b][column].abs()));
+        m.swap(column, largest.unwrap_or(column));
+        let pivot = m[column];
+        for (_, row) in m.iter_mut().enumerate().filter(|(r, _)| *r != column) {
+            let factor = row[column] / pivot[column];
+            for (x, p) in row.iter_mut().zip(pivot) {
+                *x -= factor * p;
+            }
+        }
+    }
+    std::array::from_fn(|i| m[i][6] / m[i][i])
+}
+
+fn dot(a: Vec3, b: Vec3) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn cross(a: Vec3, b: Vec3) -> Vec3 {
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
+}

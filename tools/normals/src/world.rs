@@ -1,0 +1,197 @@
+//! A cloud as the program sees it, with the true normals.
+
+use crate::Arguments;
+use crate::candidates::Candidate;
+use crate::error::Result;
+use outcrop::geom::Point;
+use outcrop::params::{BLOCK, Params};
+use outcrop::stages::blocks::Blocks;
+use outcrop::stages::cells::{TileRanges, Widen};
+use outcrop::stages::order::{Orderer, PAGE, PointStore};
+use outcrop::stages::smooth::{Relaxed, each_neighborhood, each_plane, relax};
+use outcrop::stages::tiles::neighbors::Neighbors;
+use outcrop::workspace::Workspace;
+use outcrop::workspace::memory::MemoryPool;
+use outcrop::workspace::progress::{Cancel, Silent};
+use outcrop_cloudgen::{Cloud, Generator, Kind};
+use std::collections::HashMap;
+use std::sync::Arc;
+
+/// Steps of the lattice in the size of a cloud.
+const STEPS: f64 = (1u64 << 28) as f64;
+
+/// A cloud, ordered and relaxed.
+pub(crate) struct World {
+    pub(crate) store: PointStore,
+    pub(crate) generator: Generator,
+    pub(crate) workspace: Workspace,
+    /// Root of the area for each point.
+    pub(crate) spacing: f64,
+    relaxed: Relaxed,
+    neighbors: usize,
+    /// True normals by id.
+    truth: Vec<[f64; 3]>,
+}
+
+/// What the world is called in the table.
+pub(crate) fn name(kind: Kind, args: &Arguments) -> String {
+    let mut name = kind.to_string();
+    if let Some(ratio) = args.scanlines {
+        name += &format!(", lines 1:{ratio}");
+    }
+    if let Some(offset) = args.layers {
+        name += &format!(", 2 layers {offset}×");
+    }
+    if args.noise > 0.0 {
+        name += &format!(", noise {}", args.noise);
+    }
+    name
+}
+
+impl World {
+    pub(crate) fn new(kind: Kind, args: &Arguments) -> Result<Self> {
+        let mut cloud = Cloud::new(kind).points(args.points).seed(args.seed);
+        cloud.scanlines = args.scanlines;
+        let area = cloud.generator()?.area().unwrap_or_default();
+        let spacing = (area / args.points.max(1) as f64).sqrt();
+        cloud.noise = args.noise * spacing;
+        if let Some(offset) = args.layers {
+            cloud = cloud.layers(2, offset * spacing);
+        }
+        let generator = cloud.generator()?;
+        let mut normals: HashMap<Point, [f64; 3]> = HashMap::new();
+        let step = cloud.size / STEPS;
+        for index in 0..generator.len() {
+            let sample = generator.sample(index);
+            let place = sample
+                .position
+                .map(|c| ((c + cloud.size) / step).round() as i32);
+            normals.entry(place).or_insert(sample.normal);
+        }
+        let points: Vec<Point> = normals.keys().copied().collect();
+        let pool = MemoryPool::new(outcrop::pipeline::default_memory())?;
+        let threads = outcrop::pipeline::default_threads();
+        let folder = std::env::temp_dir();
+        let workspace = Workspace::new(&folder, pool, threads, Arc::new(Silent), Cancel::new())?;
+        let orderer = Orderer::new(&workspace)?;
+        orderer.push(&workspace, &points)?;
+        let store = orderer.finish(&workspace, PAGE)?.0;
+        let tiles = TileRanges::new(Blocks::new(store.len(), BLOCK), BLOCK);
+        let rounds = Params::default().relax;
+        let relaxed = relax(&store, tiles, args.neighbors, rounds, &workspace)?;
+        let ordered = store.slice(0..store.len())?;
+        let truth = ordered.iter().map(|p| normals.get(p).copied());
+        Ok(Self {
+            truth: truth.map(Option::unwrap_or_default).collect(),
+            neighbors: args.neighbors,
+            relaxed,
+            store,
+            generator,
+            workspace,
+            spacing,
+        })
+    }
+
+    pub(crate) fn tiles(&self) -> TileRanges {
+        TileRanges::new(Blocks::new(self.store.len(), BLOCK), BLOCK)
+    }
+
+    /// Positions of a store in the generator's unit.
+    pub(crate) fn positions(&self, store: &PointStore) -> Result<Vec<[f64; 3]>> {
+        let size = self.generator.cloud().size;
+        let unit = |p: &Point| p.map(|c| f64::from(c) * (size / STEPS) - size);
+        Ok(store.slice(0..store.len())?.iter().map(unit).collect())
+    }
+
+    /// By id: is there one among the neighbours whose true normal makes an angle with `cosine` or less?
+    pub(crate) fn near_edges(&self, cosine: f64) -> Result<Vec<bool>> {
+        let k = self.neighbors;
+        let mut found = vec![false; self.store.len()];
+        let of = |_: Point, near: &Neighbors| -> Vec<u32> {
+            near.iter().take(k).map(|n| n.id).collect()
+        };
+        each_neighborhood(&self.store, 0..self.store.len(), k, of, |id, _, near| {
+            let own = self.truth[id];
+            found[id] = near.iter().any(|&n| {
+                let other = self.truth[n as usize];
+                own[0] * other[0] + own[1] * other[1] + own[2] * other[2] <= cosine
+            });
+        })?;
+        Ok(found)
+    }
+
+    /// The shape that the robust method connects points by.
+    pub(crate) fn shape(&self) -> &PointStore {
+        self.relaxed.store.as_ref().unwrap_or(&self.store)
+    }
+
+    /// Normals of the program's planes.
+    pub(crate) fn planes(&self, store: &PointStore, widen: Widen) -> Result<Vec<Option<[f64; 3]>>> {
+        let mut normals = vec![None; store.len()];
+        each_plane(
+            store,
+            0..store.len(),
+            self.neighbors,
+            widen,
+            |_| true,
+            |id, _, fit| {
+                normals[id] = fit.plane.normal.map(|n| n.map(f64::from));
+            },
+        )?;
+        Ok(normals)
+    }
+
+    /// Normals by a candidate.
+    pub(crate) fn tried(
+        &self,
+        store: &PointStore,
+        candidate: &Candidate,
+    ) -> Result<Vec<Option<[f64; 3]>>> {
+        let mut normals = vec![None; store.len()];
+        let count = candidate.most * self.neighbors;
+        let of = |_: Point, near: &_| (candidate.normal)(near, self.neighbors);
+        each_neighborhood(store, 0..store.len(), count, of, |id, _, normal| {
+            normals[id] = normal;
+        })?;
+        Ok(normals)
+    }
+
+    /// Angles to the true normals in degrees; 90 where there is no normal.
+    pub(crate) fn errors(&self, normals: &[Option<[f64; 3]>]) -> Vec<f64> {
+        let angle = |(n, t): (&Option<[f64; 3]>, &[f64; 3])| {
+            let Some(n) = n else { return 90.0 };
+            let dot = |a: &[f64; 3], b: &[f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+            let cosine = dot(n, t).abs() / (dot(n, n) * dot(t, t)).sqrt();
+            cosine.min(1.0).acos().to_degrees()
+        };
+        normals.iter().zip(&self.truth).map(angle).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+
+    #[test]
+    fn a_plane_has_no_errors_and_a_layer_is_where_it_was_put() {
+        let args =
+            Arguments::parse_from(["normals", "plane", "--points", "2000", "--layers", "0.5"]);
+        let world = World::new(Kind::Plane, &args).unwrap();
+        let truth: Vec<_> = world
+            .truth
+            .iter()
+            .map(|n| Some(n.map(|c| -7.0 * c)))
+            .collect();
+        assert!(world.errors(&truth).iter().all(|e| *e < 1e-5));
+        assert!(world.errors(&vec![None; 2000]).iter().all(|e| *e == 90.0));
+        let positions = world.positions(&world.store).unwrap();
+        let off: Vec<_> = positions
+            .iter()
+            .map(|p| world.generator.distance(*p) / world.spacing)
+            .collect();
+        let near = |d: f64| off.iter().filter(|o| (*o - d).abs() < 1e-3).count();
+        assert_eq!((near(0.0), near(0.5)), (1000, 1000));
+        assert!(world.near_edges(0.866).unwrap().iter().all(|n| !n));
+    }
+}
