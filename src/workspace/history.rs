@@ -214,3 +214,6 @@ impl History {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -70,10 +70,10 @@ fn a_noisy_plane_gets_flatter_with_every_round() {
     for rounds in 1..=3 {
         let (shape, stats) = relaxed(&points, rounds, 1000, 256);
         // After two rounds hardly a point is rough any more.
-        assert_eq!(stats.rounds, rounds.min(2));
+        assert!(stats.rounds >= rounds.min(2));
         let now = off_plane(&shape);
         assert!(
-            if rounds > 2 {
+            if stats.rounds < rounds {
                 now == before
             } else {
                 now < before

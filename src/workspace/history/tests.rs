@@ -1,0 +1,113 @@
+//! What is done again, by what was damaged and what is gone.
+
+use super::super::file::Put;
+use super::*;
+
+/// A journal in short: the offset of a record is its number.
+struct Script(Vec<Entry>);
+
+impl Script {
+    fn push(&mut self, record: Record) {
+        let offset = self.0.len() as u64;
+        self.0.push(Entry {
+            offset,
+            payload: (offset, 0),
+            record,
+        });
+    }
+
+    fn begin(&mut self, stage: &str) {
+        self.push(Record::Begin(stage.into()));
+    }
+
+    fn unit(&mut self, step: &str, unit: u64, files: &[(&str, u32)]) {
+        let put = |(file, section): &(&str, u32)| Put {
+            file: (*file).into(),
+            section: *section,
+            place: Place::default(),
+        };
+        self.push(Record::Unit {
+            step: step.into(),
+            unit,
+            puts: files.iter().map(put).collect(),
+            payload: Vec::new(),
+        });
+    }
+
+    fn deleted(&mut self, file: &str) {
+        self.push(Record::Deleted(file.into()));
+    }
+}
+
+/// Two stages: one makes `a`, the next reads it and makes `b` and `letters`, and of these `c`.
+fn script() -> Script {
+    let mut script = Script(Vec::new());
+    script.begin("/one#1");
+    script.unit("/one#1/tiles#1", 0, &[("a", 0)]);
+    script.unit("/one#1/tiles#1", 1, &[("a", 1)]);
+    script.unit("/one#1", 0, &[]);
+    script.begin("/two#1");
+    script.unit("/two#1/tiles#1", 0, &[("b", 0), ("letters", 0)]);
+    script.unit("/two#1/tiles#1", 1, &[("b", 1), ("letters", 1)]);
+    script.unit("/two#1/deliver#1", 0, &[("c", 0)]);
+    script.deleted("letters");
+    script.unit("/two#1", 0, &[]);
+    script
+}
+
+fn damage(file: &str, section: u32) -> Needed {
+    Needed {
+        file: file.into(),
+        section,
+        place: Place::default(),
+    }
+}
+
+fn rewind(end: u64, stage: &str) -> Option<Mending> {
+    let stage = stage.into();
+    Some(Mending::Rewind { end, stage })
+}
+
+#[test]
+fn nothing_is_done_about_no_damage() {
+    let history = History::of(&script().0);
+    assert_eq!(history.mend(&[]), None);
+    assert_eq!(history.needed().len(), 5);
+    assert!(history.is_deleted("letters") && !history.is_deleted("a"));
+}
+
+#[test]
+fn a_unit_is_done_again_if_its_inputs_are_there() {
+    let mut history = History::of(&script().0);
+    let units = vec![("/two#1/tiles#1".to_owned(), 1)];
+    let found = history.mend(&[damage("b", 1)]);
+    assert_eq!(found, Some(Mending::Redo(units.clone())));
+    history.forget(&units);
+    // The unit, and the stage around it; not what was made of it.
+    assert_eq!(history.units("/two#1/tiles#1"), [0]);
+    assert!(history.units("/two#1").is_empty());
+    assert_eq!(history.units("/two#1/deliver#1"), [0]);
+    assert_eq!(history.units("/one#1"), [0]);
+    assert_eq!(history.places("b").len(), 1);
+}
+
+#[test]
+fn a_stage_begins_again_if_they_are_not() {
+    // What was sent is gone, so it cannot be delivered again.
+    let history = History::of(&script().0);
+    assert_eq!(history.mend(&[damage("c", 0)]), rewind(4, "/two#1"));
+    let mut later = script();
+    later.deleted("a");
+    let history = History::of(&later.0);
+    assert_eq!(history.mend(&[damage("b", 0)]), rewind(0, "/one#1"));
+    assert_eq!(history.mend(&[damage("c", 0)]), rewind(0, "/one#1"));
+}
+
+#[test]
+fn a_unit_that_was_done_again_counts_as_it_is() {
+    let mut again = script();
+    again.unit("/two#1/tiles#1", 1, &[("b", 1), ("letters", 1)]);
+    let history = History::of(&again.0);
+    assert_eq!(history.needed().len(), 5);
+    assert_eq!(history.units("/two#1/tiles#1"), [0, 1]);
+}
