@@ -24,6 +24,27 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
+//! A run that was stopped or killed goes on from where it was, and gives the same file:
+//!
+//! ```no_run
+//! use outcrop::{Error, Reconstruction, Start};
+//! use std::time::Duration;
+//!
+//! let run = Reconstruction::builder()
+//!     .input("scan.laz")
+//!     .output("mesh.ply")
+//!     .start(Start::Resume) // go on if there is something to go on with
+//!     .time_limit(Duration::from_secs(3600))
+//!     .build()?;
+//! match run.run() {
+//!     Err(Error::TimeLimit) => println!("to be continued: {}", run.scratch_folder().display()),
+//!     other => println!("{} triangles", other?.mesh.triangles),
+//! }
+//! // Later: all but threads and memory is known.
+//! Reconstruction::resume("mesh.ply.outcrop-scratch")?.build()?.run()?;
+//! # Ok::<(), Error>(())
+//! ```
+//!
 //! `examples/reconstruct.rs` shows progress ([`Observer`]) and a stop ([`Cancel`]).
 //!
 //! # Stages

@@ -23,6 +23,8 @@ pub struct Case {
     pub scratch: PathBuf,
     options: Vec<String>,
     expected: u64,
+    /// What the report counts.
+    counts: serde_json::Value,
     /// How many events there are of each kind in an undisturbed run.
     pub events: HashMap<String, u64>,
 }
@@ -55,6 +57,7 @@ impl Case {
             scratch: bench.path("mesh.ply.outcrop-scratch"),
             options: options.iter().map(ToString::to_string).collect(),
             expected: 0,
+            counts: serde_json::Value::Null,
             events: HashMap::new(),
             bench,
             input,
@@ -62,9 +65,11 @@ impl Case {
         };
         let counts = case.bench.path("counts");
         let fault = format!("count:{}", counts.display());
-        let ended = case.attempt(&fault, &["--threads", "2"]);
+        let report = case.bench.path("report.json").display().to_string();
+        let ended = case.attempt(&fault, &["--threads", "2", "--report", &report]);
         assert_eq!(ended.said.code, Some(0), "{ended:?}");
         case.expected = util::hash(&case.mesh);
+        case.counts = case.report();
         let counts = std::fs::read_to_string(counts).unwrap();
         let lines = counts.lines().filter_map(|line| line.split_once(' '));
         case.events = lines
@@ -72,6 +77,18 @@ impl Case {
             .collect();
         case.clear();
         case
+    }
+
+    /// What the last report counts: all of it but for limits, peaks and times.
+    fn report(&self) -> serde_json::Value {
+        let text = std::fs::read_to_string(self.bench.path("report.json")).unwrap();
+        let mut report: serde_json::Value = serde_json::from_str(&text).unwrap();
+        let all = report.as_object_mut().unwrap();
+        all.retain(|key, _| {
+            let varies = ["threads", "memory_budget", "seconds", "stages"];
+            !varies.contains(&key.as_str()) && !key.starts_with("peak_")
+        });
+        report
     }
 
     /// Arguments of a run.
@@ -106,12 +123,12 @@ impl Case {
 
     /// Goes on with the run; it must end well. What it said.
     pub fn go_on(&self, what: &str) -> String {
-        let said = util::run(
-            self.arguments()
-                .into_iter()
-                .chain(["--resume", "--threads", "1", "--memory", "256MiB"].map(String::from)),
-        );
+        let report = self.bench.path("report.json").display().to_string();
+        let more = ["--resume", "--threads", "1", "--memory", "256MiB"].map(String::from);
+        let more = more.into_iter().chain(["--report".into(), report]);
+        let said = util::run(self.arguments().into_iter().chain(more));
         self.check(&said, what);
+        assert_eq!(self.report(), self.counts, "{what}");
         said.err
     }
 

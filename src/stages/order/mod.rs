@@ -117,7 +117,8 @@ impl Orderer {
         let counts = stream(mark, counts, &mut |points, mark, counts| {
             self.push(workspace, points)?;
             since += points.len();
-            let full = self.sorter.buffered() + points.len() > self.sorter.capacity();
+            // The next points must not fill the buffer: it would be written, and not for good.
+            let full = self.sorter.buffered() + points.len() >= self.sorter.capacity();
             if workspace.is_resumable() && mark.is_some() && (full || since > MOST_IN_RUN) {
                 since = 0;
                 let note: Note<M, S> = ((mark, counts), (taken(), false));

@@ -1,0 +1,176 @@
+//! The sorter against the standard library, damaged, and in several attempts.
+
+use super::*;
+use crate::error::Error;
+use crate::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
+use crate::workspace::progress::{Cancel, Silent};
+use crate::workspace::{Folder, Found};
+use proptest::prelude::*;
+
+pub(in crate::spill) fn workspace() -> Workspace {
+    let memory = MemoryPool::new(MINIMUM_BUDGET).unwrap();
+    Workspace::new(
+        &std::env::temp_dir(),
+        memory,
+        2,
+        Arc::new(Silent),
+        Cancel::new(),
+    )
+    .unwrap()
+}
+
+fn collect<const N: usize>(sorted: Sorted<N>) -> Vec<Record<N>> {
+    let mut all = Vec::new();
+    sorted
+        .for_each(|r| {
+            all.push(r);
+            Ok(())
+        })
+        .unwrap();
+    all
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+    #[test]
+    fn sorts_like_the_standard_library(
+        mut records in prop::collection::vec([0u32..50, 0u32..9], 0..30_000),
+        buffer in prop::sample::select(vec![16u64, 4096, 100_000, 10_000_000]),
+    ) {
+        // A tiny buffer makes a run of every few records, so it gets few records.
+        if buffer == 16 { records.truncate(900); }
+        let workspace = workspace();
+        let sorter = Sorter::<2>::new(&workspace, "s", buffer);
+        for chunk in records.chunks(1000) { sorter.push(chunk).unwrap(); }
+        let got = collect(sorter.finish(&workspace).unwrap());
+        records.sort_unstable();
+        prop_assert_eq!(got, records);
+    }
+
+    #[test]
+    fn parts_make_the_whole(
+        mut records in prop::collection::vec([0u32..5000, 0u32..2], 1..40_000),
+        part in prop::sample::select(vec![1usize, 9000, 100_000]),
+    ) {
+        let workspace = workspace();
+        let sorter = Sorter::<2>::new(&workspace, "s", 80_000);
+        for chunk in records.chunks(1000) { sorter.push(chunk).unwrap(); }
+        let sorted = sorter.finish(&workspace).unwrap();
+        if let Err(sorted) = sorted.in_memory() {
+            let cuts = sorted.cuts(part);
+            let ends = cuts.iter().copied().map(Some).chain([None]);
+            let mut got = Vec::new();
+            let mut from = None;
+            for to in ends {
+                sorted.for_range(from, to, |r| { got.push(r); Ok(()) }).unwrap();
+                from = to;
+            }
+            records.sort_unstable();
+            prop_assert_eq!(got, records);
+        }
+    }
+}
+
+#[test]
+fn damage_is_found_and_named() {
+    let workspace = workspace();
+    let sorter = Sorter::<2>::new(&workspace, "d", 800);
+    for i in 0..1000u32 {
+        sorter.push(&[[i * 7 % 1000, i]]).unwrap();
+    }
+    let path = workspace.file("d.run3");
+    let mut bytes = std::fs::read(&path).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 4;
+    std::fs::write(&path, bytes).unwrap();
+    let outcome = sorter
+        .finish(&workspace)
+        .and_then(|sorted| sorted.for_each(|_| Ok(())));
+    match outcome {
+        Err(Error::Corrupt { path, .. }) => {
+            assert!(
+                path.to_string_lossy().contains("d.run"),
+                "{}",
+                path.display()
+            );
+        }
+        other => panic!("{other:?}"),
+    }
+}
+
+/// A workspace in which a later one can go on.
+fn attempt(path: &std::path::Path) -> Workspace {
+    let folder = match Folder::find(path).unwrap() {
+        Found::Run(folder) => folder,
+        _ => Folder::create(path, b"{}".to_vec()).unwrap(),
+    };
+    let memory = MemoryPool::new(MINIMUM_BUDGET).unwrap();
+    Workspace::resumable(folder, memory, 2, Arc::new(Silent), Cancel::new()).unwrap()
+}
+
+/// Parts of an input: numbers with gaps, of some records each.
+fn parts() -> Vec<(u32, u64)> {
+    (0..40)
+        .map(|n| (3 * n + n % 2, u64::from(200 + n)))
+        .collect()
+}
+
+fn part(number: u32) -> Vec<Record<2>> {
+    let count = parts().iter().find(|p| p.0 == number).map_or(0, |p| p.1);
+    let word = |n: u32| (number * 5000 + n).wrapping_mul(2_654_435_761) >> 12;
+    (0..count as u32).map(|n| [word(n), number]).collect()
+}
+
+#[test]
+fn goes_on_where_it_was_stopped() {
+    let mut want: Vec<_> = parts().iter().flat_map(|p| part(p.0)).collect();
+    want.sort_unstable();
+    for kept in [false, true] {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run");
+        // Buffers of other sizes every time; the one but last has done it all, and died then.
+        for (stop, buffer) in [(2, 6000), (3, 20_000), (1, 9000), (99, 9000), (99, 500_000)] {
+            let workspace = attempt(&path);
+            let sorter = Sorter::<2>::new(&workspace, "s", buffer);
+            let calls = std::cell::Cell::new(0);
+            let taken = sorter.take_parts(&workspace, &parts(), kept, |numbers| {
+                calls.set(calls.get() + 1);
+                if calls.get() > stop {
+                    return Err(Error::Cancelled);
+                }
+                numbers.iter().try_for_each(|n| sorter.push(&part(*n)))
+            });
+            if stop < 99 {
+                assert!(matches!(taken, Err(Error::Cancelled)), "{taken:?}");
+                continue;
+            }
+            assert_eq!(taken.unwrap(), want.len() as u64);
+            assert!(calls.get() == 0 || buffer == 9000, "{buffer}");
+            let sorted = sorter.finish(&workspace).unwrap();
+            assert!(collect(sorted) == want, "{kept} {buffer}");
+        }
+    }
+}
+
+#[test]
+fn a_run_that_was_damaged_is_made_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run");
+    let mut want: Vec<_> = parts().iter().flat_map(|p| part(p.0)).collect();
+    want.sort_unstable();
+    for damage in [None, Some("s.run1"), Some("s.run0")] {
+        if let Some(name) = damage {
+            let path = path.join(name);
+            let mut bytes = std::fs::read(&path).unwrap();
+            bytes[100] ^= 1;
+            std::fs::write(&path, bytes).unwrap();
+        }
+        let workspace = attempt(&path);
+        let sorter = Sorter::<2>::new(&workspace, "s", 20_000);
+        let push = |numbers: &[u32]| numbers.iter().try_for_each(|n| sorter.push(&part(*n)));
+        sorter.take_parts(&workspace, &parts(), true, push).unwrap();
+        if damage == Some("s.run0") {
+            assert!(collect(sorter.finish(&workspace).unwrap()) == want);
+        }
+    }
+}
