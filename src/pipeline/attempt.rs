@@ -127,7 +127,7 @@ impl Reconstruction {
             self.cancel.clone(),
         );
         if workspace.is_err() && !self.is_unfinished() {
-            let _ = std::fs::remove_dir_all(&self.folder);
+            Folder::remove(&self.folder, false);
         }
         workspace
     }
@@ -136,8 +136,8 @@ impl Reconstruction {
     pub(super) fn close<T>(&self, workspace: Workspace, outcome: &Result<T>) {
         let keep = outcome.as_ref().is_err_and(Error::can_resume) && self.is_unfinished();
         if !keep {
-            // What cannot be deleted is in nobody's way.
-            let _ = std::fs::remove_dir_all(&self.folder);
+            workspace.remove(outcome.is_ok());
+            // A mesh that is not finished; what cannot be deleted is in nobody's way.
             let _ = std::fs::remove_file(export::temporary(&self.output));
         }
         // With the lock, which has to outlive the files.

@@ -84,6 +84,12 @@ impl<const N: usize> Sections<N> {
         self.places().len()
     }
 
+    /// True if the file was deleted by an earlier attempt at the run.
+    #[must_use]
+    pub fn is_gone(&self) -> bool {
+        self.file.is_gone()
+    }
+
     /// Number of records in a section.
     #[must_use]
     pub fn records(&self, section: usize) -> usize {

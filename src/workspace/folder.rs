@@ -1,6 +1,7 @@
 //! The scratch folder of a run that can be resumed: found again, locked, private.
 
 use super::IoCounters;
+use super::fault::{self, Event};
 use super::file::{failed_write, open_existing, options};
 use super::journal::{self, Entry, Journal, Record};
 use super::keeper::Keeper;
@@ -178,7 +179,7 @@ impl Folder {
             .clean(&HashSet::from([LOCK]))
             .and_then(|()| folder.write_manifest());
         if begun.is_err() {
-            let _ = std::fs::remove_dir_all(path);
+            Self::remove(path, false);
         }
         begun.map(|()| folder)
     }
@@ -216,6 +217,26 @@ impl Folder {
             }
         }
         Ok(())
+    }
+
+    /// Removes a folder, in an order in which it can be interrupted: what is left is a folder of a run
+    /// that begins, or, if the journal knows that the data is gone, of one that is finished.
+    pub fn remove(path: &Path, finished: bool) {
+        let delete = |name: &str| {
+            fault::point(Event::Delete);
+            // What cannot be deleted is in nobody's way.
+            let _ = std::fs::remove_file(path.join(name));
+        };
+        if !finished {
+            delete(journal::NAME);
+            delete(MANIFEST);
+        }
+        let names = listing(path).unwrap_or_default().into_iter();
+        names
+            .filter(|name| !OURS.contains(&name.as_str()))
+            .for_each(|name| delete(&name));
+        [MANIFEST, journal::NAME, LOCK].into_iter().for_each(delete);
+        let _ = std::fs::remove_dir(path);
     }
 
     /// Goes on from what is there.
@@ -290,6 +311,13 @@ fn is_private(path: &Path) -> Result<bool> {
 
 fn path_bytes(path: &Path) -> Option<u64> {
     path.symlink_metadata().ok().map(|meta| meta.len())
+}
+
+/// Files of the folder that are data.
+pub(super) fn data(path: &Path) -> Result<Vec<String>> {
+    let mut names = listing(path)?;
+    names.retain(|name| !OURS.contains(&name.as_str()));
+    Ok(names)
 }
 
 fn listing(path: &Path) -> Result<Vec<String>> {

@@ -245,6 +245,12 @@ impl Workspace {
         }
     }
 
+    /// Removes the folder of a run that is `finished`, or that nobody can go on with.
+    pub fn remove(&self, finished: bool) {
+        let finished = finished && self.shared.run.as_ref().is_some_and(|r| r.retire().is_ok());
+        Folder::remove(&self.folder, finished);
+    }
+
     /// Deletes files that were dropped. Only after a step that did not fail.
     ///
     /// # Errors

@@ -214,6 +214,17 @@ impl Run {
         lock(&self.dropped).push((name.clone(), bytes));
     }
 
+    /// Notes that the run is finished: nobody needs its files any more.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], [`crate::Error::Disk`].
+    pub fn retire(&self) -> Result<()> {
+        let names = super::folder::data(&self.folder)?.into_iter();
+        names
+            .map(Record::Deleted)
+            .try_for_each(|record| self.journal.append(&record))
+    }
+
     /// Deletes the files that were dropped.
     ///
     /// # Errors

@@ -372,7 +372,7 @@ fn a_scratch_file_that_cannot_grow() {
             "{blocks} blocks"
         );
     }
-    assert!(resumed_runs > 1, "{resumed_runs}");
+    assert!(resumed_runs > 0);
 }
 
 #[test]
@@ -442,5 +442,5 @@ fn a_scratch_folder_that_is_too_small() {
             "{size}"
         );
     }
-    assert!(resumed_runs > 1, "{resumed_runs}");
+    assert!(resumed_runs > 0);
 }

@@ -49,6 +49,19 @@ fn killed_while_the_mesh_gets_its_name() {
 }
 
 #[test]
+fn killed_while_scratch_is_removed() {
+    let case = Case::new(ROBUST);
+    for number in (1..=case.events["delete"]).step_by(3) {
+        let fault = format!("delete:{number}");
+        case.killed(&fault);
+        assert!(case.mesh.exists() && case.scratch.exists(), "{fault}");
+        let said = case.go_on(&fault);
+        // The manifest goes first of what the run is known by.
+        assert!(said.is_empty() || said.contains("manifest"), "{said}");
+    }
+}
+
+#[test]
 fn killed_again_and_again() {
     let case = Case::new(ROBUST);
     case.killed("recorded:9");

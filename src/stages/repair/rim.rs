@@ -104,6 +104,8 @@ fn bits(
     let (words, count) = (blocks.points().div_ceil(64) + 1, blocks.count());
     let held = workspace.reserve("vertices", (words * 8 + count * 4) as u64)?;
     let mut used = vec![0u64; words];
+    // A run that is finished reads nothing any more.
+    let count = if bits.is_gone() { 0 } else { count };
     for block in 0..count {
         let ids = blocks.ids(block);
         let (first, shift) = (ids.start as usize / 64, ids.start % 64);
