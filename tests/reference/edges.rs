@@ -21,7 +21,7 @@ pub fn smooth(points: &[Point], k: usize) -> Vec<Point> {
 
 fn moved(points: &[Point], i: usize, k: usize) -> Point {
     let mut others = by_distance(points, i);
-    others.truncate(2 * k);
+    others.truncate(3 * k);
     let last2 = others
         .last()
         .map_or(0, |&j| distance2(points[i], points[j]));
@@ -42,7 +42,7 @@ fn moved(points: &[Point], i: usize, k: usize) -> Point {
     let off = |a: Vec3| first.off(a);
     let total: f64 = all.iter().map(|p| p.weight).sum();
     let squares: f64 = all.iter().map(|p| p.weight * (off(p.at) * off(p.at))).sum();
-    let limit = 9.0 * (squares / total);
+    let limit = 4.0 * (squares / total);
     if squares / total > 1e-24 {
         for p in &mut all {
             let rest = (1.0 - off(p.at) * off(p.at) / limit).max(0.0);
@@ -50,7 +50,16 @@ fn moved(points: &[Point], i: usize, k: usize) -> Point {
         }
     }
     let normal = least_scatter(&all).unwrap_or(normal);
-    let up = Surface::best(&all, normal).terms[0] * reach;
+    let curved = Surface::best(&all, normal);
+    let sum = |of: &dyn Fn(Vec3) -> f64| all.iter().map(|p| p.weight * of(p.at)).sum::<f64>();
+    let (total, heights) = (sum(&|_| 1.0), sum(&|a| dot(a, normal)));
+    let over_plane = sum(&|a| dot(a, normal) * dot(a, normal)) - heights * heights / total;
+    let flat = over_plane <= 1.25 * sum(&|a| curved.off(a) * curved.off(a));
+    let up = if flat {
+        heights / total
+    } else {
+        curved.terms[0]
+    } * reach;
     std::array::from_fn(|axis| {
         let to = i64::from(points[i][axis]) + (normal[axis] * up).round() as i64;
         to.clamp(0, COORDINATE_LIMIT - 1) as i32

@@ -8,19 +8,22 @@ use crate::geom::plane::least_direction;
 use crate::stages::tiles::neighbors::Neighbors;
 
 /// Neighbours in terms of those of a plane: a curved surface is surer of itself through more.
-pub(super) const SPREAD: usize = 2;
+pub(super) const SPREAD: usize = 3;
 
 /// The squared distance at which weights end, in terms of that of the last neighbour.
 const REACH2: f64 = 1.1;
 
 /// The squared height over the first surface at which weights end, in terms of the mean square.
-const HEIGHT2: f64 = 9.0;
+const HEIGHT2: f64 = 4.0;
 
 /// What holds back a surface that the points do not decide, in terms of their weights.
 const RIDGE: f64 = 1e-3;
 
 /// A mean square height, in terms of the reach, that is rounding and nothing else.
 const EXACT2: f64 = 1e-24;
+
+/// A curved surface must leave so much less of the square heights over it than a plane.
+const GAIN: f64 = 1.25;
 
 /// Unknowns of a surface of second order.
 const TERMS: usize = 6;
@@ -48,7 +51,7 @@ impl Around {
         };
         self.reweigh(&self.surface(normal));
         let normal = self.normal().unwrap_or(normal);
-        let height = self.surface(normal).terms[0] * reach;
+        let height = self.height(normal) * reach;
         normal.map(|n| n * height)
     }
 
@@ -108,6 +111,26 @@ impl Around {
                 let t = (1.0 - off2(a) / limit).max(0.0);
                 *w *= t * t;
             }
+        }
+    }
+
+    /// How far the surface is above the point: a plane, unless a curved one fits far better.
+    fn height(&self, normal: [f64; 3]) -> f64 {
+        let curved = self.surface(normal);
+        let (mut total, mut sum, mut square, mut left) = (0.0, 0.0, 0.0, 0.0);
+        for (a, w) in self.at.iter().zip(&self.weights) {
+            let height = dot(*a, normal);
+            let off = curved.off(*a);
+            total += w;
+            sum += w * height;
+            square += w * height * height;
+            left += w * off * off;
+        }
+        let mean = sum / total;
+        if square - sum * mean <= GAIN * left {
+            mean
+        } else {
+            curved.terms[0]
         }
     }
 

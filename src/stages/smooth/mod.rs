@@ -27,7 +27,7 @@ use pass::Pass;
 use std::ops::Range;
 
 /// One round of smoothing: the same points, each on the plane of its `neighbors` nearest, or on
-/// what [`Smoothing::Edges`] puts through twice as many.
+/// what [`Smoothing::Edges`] puts through three times as many.
 ///
 /// # Errors
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],

@@ -69,17 +69,9 @@ fn a_noisy_plane_gets_flatter_with_every_round() {
     let mut before = first;
     for rounds in 1..=3 {
         let (shape, stats) = relaxed(&points, rounds, 1000, 256);
-        // After two rounds hardly a point is rough any more.
-        assert!(stats.rounds >= rounds.min(2));
+        assert_eq!(stats.rounds, rounds);
         let now = off_plane(&shape);
-        assert!(
-            if stats.rounds < rounds {
-                now == before
-            } else {
-                now < before
-            },
-            "{now} after {before}"
-        );
+        assert!(now < before, "{now} after {before}");
         before = now;
     }
     assert!(before < 0.3 * first, "{before} of {first}");
@@ -159,7 +151,7 @@ fn a_noisy_edge_of_a_cube_stays_sharper() {
             off(&pairs, |p| !at_edge(p), faces),
         )
     });
-    assert!(edges.0 < 0.5 * plain.0, "at the edge {edges:?} {plain:?}");
+    assert!(edges.0 < 0.6 * plain.0, "at the edge {edges:?} {plain:?}");
     // The noise has 58.
     assert!(edges.1 < 40.0, "on the faces {edges:?} {plain:?}");
 }
