@@ -202,7 +202,7 @@ impl Workspace {
     }
 
     /// The scratch file `name` of a run that can be resumed, with what earlier attempts put there: new
-    /// in others. Whoever puts something there tells so by [`Workspace::put`].
+    /// in others. Whoever puts something there tells so by [`ScratchFile::put`].
     ///
     /// # Errors
     /// [`Error::Io`].

@@ -79,7 +79,8 @@ impl StoreWriter {
 
     /// Reads the index of what is there; false if there is none.
     pub(super) fn take_up(&mut self) -> Result<bool> {
-        let Some(index) = self.index.as_ref().filter(|_| !self.file.is_gone()) else {
+        let index = self.index.as_ref().filter(|_| !self.is_gone());
+        let Some(index) = index else {
             return Ok(false);
         };
         self.checks.clear();
@@ -97,6 +98,11 @@ impl StoreWriter {
             at += index.records(at).div_ceil(STEP);
         }
         Ok(true)
+    }
+
+    /// True if an earlier attempt has deleted it.
+    fn is_gone(&self) -> bool {
+        self.file.is_gone() || self.index.as_ref().is_some_and(Index::is_gone)
     }
 
     /// Points written so far.
@@ -331,7 +337,7 @@ impl Persist for PointStore {
         let (min, max) = Persist::load(from)?;
         let workspace = from.workspace;
         let mut writer = StoreWriter::open(workspace, &name, page)?;
-        let gone = writer.file.is_gone();
+        let gone = writer.is_gone();
         if !gone && writer.boxes.len() != len.div_ceil(page) {
             return Err(from.wrong(format!("{len} points of the file {name}")));
         }
