@@ -77,14 +77,18 @@ impl Tile {
     ) {
         let mut guess = None;
         for own in &self.own {
-            search.leaves.set(self, own);
             let range = self.range(own.local);
+            let mut set = false;
             for start in range.clone().step_by(self.leaf) {
                 let group = start..(start + self.leaf).min(range.end);
                 let first = self.id(own.local, start - range.start);
                 let asked = |id: usize| self.ids.contains(&id) && wanted(id);
                 if !(first..first + group.len()).any(asked) {
                     continue;
+                }
+                if !set {
+                    search.leaves.set(self, own);
+                    set = true;
                 }
                 let likely = guess.unwrap_or_else(|| self.limit(group.clone(), k, search));
                 let around = Aabb::of(&self.points[group.clone()]);
