@@ -77,7 +77,7 @@ fn each_found<T>(
     mut in_store: impl FnMut(&mut PageCache, u32, Point) -> Result<Option<T>>,
     mut each: impl FnMut(usize, Point, T),
 ) -> Result<()> {
-    let tile = Tile::load(store, ids)?;
+    let tile = Tile::load_some(store, ids, &wanted)?;
     let mut search = Search::default();
     let mut uncertain = Vec::new();
     let mut failed = None;

@@ -73,8 +73,25 @@ impl Tile {
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
     pub fn load(store: &PointStore, ids: Range<usize>) -> Result<Self> {
+        Self::load_some(store, ids, |_| true)
+    }
+
+    /// As [`Tile::load`], but only pages with points that are `wanted`, and what surrounds these: others
+    /// cannot be asked for.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+    pub fn load_some(
+        store: &PointStore,
+        ids: Range<usize>,
+        wanted: impl Fn(usize) -> bool,
+    ) -> Result<Self> {
         let page = store.page_size();
-        let own_pages = ids.start / page..ids.end.div_ceil(page);
+        let own_pages = (ids.start / page..ids.end.div_ceil(page)).filter(|&number| {
+            let Range { start, end } = store.page_ids(number);
+            (start.max(ids.start)..end.min(ids.end)).any(&wanted)
+        });
+        let own_pages: Vec<usize> = own_pages.collect();
         let (wanted, reaches) = halo(store, &own_pages);
         let mut points = Vec::with_capacity(wanted.len() * page);
         let mut start = 0;
@@ -147,13 +164,13 @@ type Reach = (usize, u64, Vec<usize>);
 
 /// All pages of a tile, and the reaches of its own ones; shorter than usual where the halo would
 /// outgrow the tile, as it would around scattered outliers.
-fn halo(store: &PointStore, own: &Range<usize>) -> (Vec<usize>, Vec<Reach>) {
+fn halo(store: &PointStore, own: &[usize]) -> (Vec<usize>, Vec<Reach>) {
     let most = own.len() * (1 + MOST_HALO) + MOST_NEAR;
     let mut shrink = 1;
     loop {
-        let mut wanted: Vec<usize> = own.clone().collect();
+        let mut wanted = own.to_vec();
         let mut reaches = Vec::with_capacity(own.len());
-        for number in own.clone() {
+        for &number in own {
             let (reach2, near) = near_pages(store, number, shrink);
             wanted.extend_from_slice(&near);
             reaches.push((number, reach2, near));
