@@ -160,8 +160,12 @@ impl ScratchFile {
         shared: Arc<Shared>,
     ) -> Self {
         let handle = file.map_or(Handle::Gone, |file| Handle::Open(Arc::new(file)));
+        let name: Arc<str> = name.into();
+        if let (Some(run), true, Handle::Open(_)) = (&shared.run, kept, &handle) {
+            run.hold(&name);
+        }
         Self {
-            name: name.into(),
+            name,
             path,
             handle,
             dirty: Arc::default(),
@@ -302,8 +306,8 @@ impl Drop for ScratchFile {
     fn drop(&mut self) {
         match (&self.shared.run, self.kept) {
             (Some(run), true) => {
-                if !self.is_gone() {
-                    run.drop_later(&self.name, self.end());
+                if !self.is_gone() && !run.drop_later(&self.name, self.end()) {
+                    self.shared.io.shrink_scratch(self.end());
                 }
             }
             _ => {

@@ -28,6 +28,8 @@ pub struct Run {
     scopes: Mutex<Vec<Scope>>,
     /// Files dropped since the last step began.
     dropped: Mutex<Vec<(Arc<str>, u64)>>,
+    /// How many have each file.
+    held: Mutex<HashMap<Arc<str>, usize>>,
     /// Held as long as the run is at work.
     _lock: File,
 }
@@ -110,6 +112,7 @@ impl Run {
             history,
             scopes: Mutex::new(vec![Scope::default()]),
             dropped: Mutex::default(),
+            held: Mutex::default(),
             _lock: lock,
         }
     }
@@ -208,10 +211,24 @@ impl Run {
         self.history.is_deleted(file)
     }
 
-    /// Notes that a file was dropped. It is needed again if that is because the run failed; whether it
-    /// did is known when the next step begins.
-    pub fn drop_later(&self, name: &Arc<str>, bytes: u64) {
-        lock(&self.dropped).push((name.clone(), bytes));
+    /// Notes that someone has a file. What a finished step took in and gives back is there twice for a
+    /// moment: as it was before the step, and as it is known to have come out.
+    pub fn hold(&self, name: &Arc<str>) {
+        *lock(&self.held).entry(name.clone()).or_default() += 1;
+    }
+
+    /// Notes that a file was dropped; false if someone else has it. It is needed again if that is because
+    /// the run failed; whether it did is known when the next step begins.
+    pub fn drop_later(&self, name: &Arc<str>, bytes: u64) -> bool {
+        let mut held = lock(&self.held);
+        let holders = held.entry(name.clone()).or_insert(1);
+        *holders = holders.saturating_sub(1);
+        let last = *holders == 0;
+        if last {
+            held.remove(name);
+            lock(&self.dropped).push((name.clone(), bytes));
+        }
+        last
     }
 
     /// Notes that the run is finished: nobody needs its files any more.
