@@ -4,6 +4,7 @@ use crate::error::{Error, Result};
 use crate::geom::lattice::Lattice;
 use crate::params::Radius;
 use crate::stages::cells::{CellStats, DiskRadius};
+use crate::stages::export::folder_of;
 use crate::stages::ingest;
 use crate::stages::order::PointStore;
 use crate::workspace::{Workspace, limits};
@@ -27,15 +28,11 @@ pub(crate) fn disk_radius(radius: Radius, store: &PointStore, lattice: &Lattice)
 
 /// Finds out before any work whether the output's folder takes files.
 pub(super) fn writable(output: &Path) -> Result<()> {
-    let folder = output
-        .parent()
-        .filter(|p| !p.as_os_str().is_empty())
-        .unwrap_or(Path::new("."));
     if output.is_dir() {
         let error = std::io::Error::from(std::io::ErrorKind::IsADirectory);
         return Err(Error::io(output, "write the mesh", error));
     }
-    tempfile::tempfile_in(folder)
+    tempfile::tempfile_in(folder_of(output))
         .map(drop)
         .map_err(|e| Error::io(output, "write the mesh into this folder", e))
 }

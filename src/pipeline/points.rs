@@ -89,10 +89,8 @@ pub(crate) fn order(
         spool.par_for_frames(threads, lattice, frames, push)
     })?;
     drop(held);
-    if orderer.is_sorted() || !workspace.is_resumable() {
-        drop(spool);
-        return orderer.finish(workspace, page);
-    }
     // An attempt that dies has to read again what was only in memory.
+    let read_again = workspace.is_resumable() && !orderer.is_sorted();
+    let _spool = read_again.then_some(spool);
     orderer.finish(workspace, page)
 }

@@ -14,11 +14,11 @@ use crate::error::Result;
 use crate::geom::Point;
 use crate::spill::Sections;
 use crate::stages::blocks::Blocks;
-use crate::stages::cells::TileRanges;
+use crate::stages::cells::{TileRanges, near_in_store};
 use crate::stages::order::{PointStore, StoreWriter};
 use crate::stages::tiles::Tile;
 use crate::stages::tiles::near::Search;
-use crate::stages::tiles::walk::{PageCache, Walk};
+use crate::stages::tiles::walk::PageCache;
 use crate::workspace::Workspace;
 use serde::Serialize;
 use spacing::{SpacingCache, Spacings};
@@ -136,14 +136,9 @@ fn one_tile(
     drop(tile);
     let mut cache = PageCache::default();
     for (id, point) in uncertain {
-        let mut near = Vec::with_capacity(around);
-        let mut walk = Walk::new(store, &mut cache, id, point);
-        while near.len() < around
-            && let Some(next) = walk.advance()?
-        {
-            near.push(next.id);
-        }
-        let out = spacings.stand_out(id, near.into_iter(), factor)?;
+        let near = near_in_store(store, &mut cache, id, point, around)?;
+        let near = near.iter().take(around).map(|n| n.id);
+        let out = spacings.stand_out(id, near, factor)?;
         stays[id as usize - ids.start] = !out;
     }
     let mut stays = stays.into_iter();
