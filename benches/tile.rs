@@ -38,3 +38,23 @@ fn neighbors(bencher: Bencher<'_, '_>, k: usize) {
             });
         });
 }
+
+#[divan::bench(args = [10, 30], sample_count = 30)]
+fn sums(bencher: Bencher<'_, '_>, k: usize) {
+    let workspace = util::workspace();
+    let store = util::store(POINTS, &workspace);
+    let tile = Tile::load(&store, TILE).expect("scratch file");
+    let mut search = Search::default();
+    bencher
+        .counter(ItemsCount::new(TILE.len()))
+        .bench_local(|| {
+            tile.for_some_sums(
+                k,
+                &mut search,
+                |_| true,
+                |_, _, sums| {
+                    black_box(sums.map_or(0, |sums| sums.last2));
+                },
+            );
+        });
+}

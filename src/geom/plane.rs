@@ -18,6 +18,9 @@ const LINE_RATIO: f64 = 1.0 / 400.0;
 /// Below this share they lie on a band so narrow that its normal is a matter of chance.
 const BAND_RATIO: f64 = 1.0 / 25.0;
 
+/// The axes of second moments, in their order.
+const PAIRS: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
+
 /// Exact first and second moments of differences to a point.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Moments {
@@ -43,8 +46,7 @@ impl Moments {
     pub fn add(&mut self, d: [i64; 3]) {
         self.count += 1;
         self.shift(d);
-        let pairs = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
-        for (product, (a, b)) in self.products.iter_mut().zip(pairs) {
+        for (product, (a, b)) in self.products.iter_mut().zip(PAIRS) {
             *product += i128::from(d[a]) * i128::from(d[b]);
         }
     }
@@ -67,17 +69,28 @@ impl Moments {
 
     /// Covariance times the number of points (the point itself among them), in squared steps.
     fn scatter(&self) -> [f64; 6] {
+        // Machine words where everything fits: almost always.
+        if let Some((sum, products)) = self.small() {
+            let m = self.count + 1;
+            let crossed = PAIRS.map(|(a, b)| sum[a] * sum[b]);
+            return std::array::from_fn(|i| (m * products[i] - crossed[i]) as f64);
+        }
+        self.wide_scatter().map(|x| x as f64)
+    }
+
+    /// The sums, if those of [`Moments::scatter`] stay below 2^63.
+    fn small(&self) -> Option<([i64; 3], [i64; 6])> {
+        let m = self.count + 1;
+        let most = (1i64 << 62) / m;
+        let fits = |p: &i128| (-i128::from(most)..=i128::from(most)).contains(p);
+        let small = self.sum.iter().all(|s| s.abs() < 1 << 31) && self.products.iter().all(fits);
+        small.then(|| (self.sum, self.products.map(|p| p as i64)))
+    }
+
+    fn wide_scatter(&self) -> [i128; 6] {
         let m = i128::from(self.count + 1);
         let s = self.sum.map(i128::from);
-        let crossed = [
-            s[0] * s[0],
-            s[1] * s[1],
-            s[2] * s[2],
-            s[0] * s[1],
-            s[0] * s[2],
-            s[1] * s[2],
-        ];
-        std::array::from_fn(|i| rounded(m * self.products[i] - crossed[i]))
+        std::array::from_fn(|i| m * self.products[i] - s[PAIRS[i].0] * s[PAIRS[i].1])
     }
 
     /// The best-fitting plane of the point and its neighbours.
@@ -116,17 +129,7 @@ impl Moments {
 
     /// True if the point and all its neighbours are exactly on a line: the scatter has rank one.
     fn collinear(&self) -> bool {
-        let m = i128::from(self.count + 1);
-        let s = self.sum.map(i128::from);
-        let p = &self.products;
-        let c = [
-            m * p[0] - s[0] * s[0],
-            m * p[1] - s[1] * s[1],
-            m * p[2] - s[2] * s[2],
-            m * p[3] - s[0] * s[1],
-            m * p[4] - s[0] * s[2],
-            m * p[5] - s[1] * s[2],
-        ];
+        let c = self.wide_scatter();
         let zero = |a: i128, b: i128, ab: i128| match (a.checked_mul(b), ab.checked_mul(ab)) {
             (Some(x), Some(y)) => x == y,
             // Too large for exact arithmetic: equal in floating point is equal enough.
@@ -147,9 +150,12 @@ impl Moments {
     }
 }
 
-/// The nearest `f64`; most sums fit a machine word, whose conversion is one instruction.
-fn rounded(sum: i128) -> f64 {
-    i64::try_from(sum).map_or_else(|_| sum as f64, |small| small as f64)
+/// The nearest integer, away from zero in the middle, as `round` has it, without a call.
+#[inline]
+fn rounded(x: f64) -> i32 {
+    let whole = x as i32;
+    let rest = x - f64::from(whole);
+    whole + i32::from(rest >= 0.5) - i32::from(rest <= -0.5)
 }
 
 /// The direction in which a scatter (xx, yy, zz, xy, xz, yz) is least, by the steps of
@@ -219,7 +225,7 @@ fn eigenvector(m: &[f64; 6], lambda: f64) -> Option<Normal> {
     }
     let length = length2(best).sqrt();
     if length > 0.0 && length.is_finite() {
-        return Some(best.map(|x| (x / length * NORMAL_SCALE).round() as i32));
+        return Some(best.map(|x| rounded(x / length * NORMAL_SCALE)));
     }
     // All rows are parallel (points almost on a line): any direction across the longest row.
     let mut row = rows[0];
@@ -233,7 +239,7 @@ fn eigenvector(m: &[f64; 6], lambda: f64) -> Option<Normal> {
     axis[least] = 1.0;
     let across = cross(row, axis);
     let length = length2(across).sqrt();
-    (length > 0.0).then(|| across.map(|x| (x / length * NORMAL_SCALE).round() as i32))
+    (length > 0.0).then(|| across.map(|x| rounded(x / length * NORMAL_SCALE)))
 }
 
 #[cfg(test)]
@@ -264,6 +270,24 @@ mod tests {
                 let dot = (0..3).map(|i| got[i] * n[i]).sum::<f64>();
                 let len = |x: [f64; 3]| x.iter().map(|c| c * c).sum::<f64>().sqrt();
                 prop_assert!((dot.abs() / (len(got) * len(n)) - 1.0).abs() < 1e-9, "{got:?} {n:?}");
+            }
+        }
+
+        #[test]
+        fn scatter_is_that_of_wide_words(
+            points in prop::collection::vec(prop::array::uniform3(-(1i64 << 30)..1 << 30), 1..40),
+            shift in 0u32..31,
+        ) {
+            let points: Vec<_> = points.iter().map(|p| p.map(|c| c >> shift)).collect();
+            let m = moments(&points);
+            prop_assert_eq!(m.scatter(), m.wide_scatter().map(|x| x as f64));
+        }
+
+        #[test]
+        fn rounding_is_to_the_nearest(x in -(1 << 24)..=1i32 << 24, part in -1.0f64..1.0) {
+            for x in [f64::from(x) + part, f64::from(x) + 0.5, 0.499_999_999_999_999_94] {
+                prop_assert_eq!(rounded(x), x.round() as i32);
+                prop_assert_eq!(rounded(-x), (-x).round() as i32);
             }
         }
 

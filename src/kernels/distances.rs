@@ -1,4 +1,4 @@
-//! Approximate squared distances, and which of them are within a limit.
+//! Approximate squared distances, and how many of them are within a limit.
 
 use super::kernel;
 
@@ -29,34 +29,6 @@ pub(crate) fn count_body(numbers: &[f32], limit: f32) -> usize {
     numbers.iter().map(|d| u32::from(*d <= limit)).sum::<u32>() as usize
 }
 
-kernel! {
-    /// Where the numbers that are at most `limit` stand, ascending, in place of what is in `out`.
-    pub fn keep_within(numbers: &[f32], limit: f32, out: &mut Vec<u32>) = keep_body
-}
-
-#[inline(always)]
-pub(crate) fn keep_body(numbers: &[f32], limit: f32, out: &mut Vec<u32>) {
-    /// Numbers whose comparisons are held in one word.
-    const WORD: usize = 64;
-    out.clear();
-    for (word, numbers) in numbers.chunks(WORD).enumerate() {
-        let mut kept = 0u64;
-        if let Ok(numbers) = <&[f32; WORD]>::try_from(numbers) {
-            for (bit, d) in numbers.iter().enumerate() {
-                kept |= u64::from(*d <= limit) << bit;
-            }
-        } else {
-            for (bit, d) in numbers.iter().enumerate() {
-                kept |= u64::from(*d <= limit) << bit;
-            }
-        }
-        while kept != 0 {
-            out.push((word * WORD) as u32 + kept.trailing_zeros());
-            kept &= kept - 1;
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::Level;
@@ -76,20 +48,13 @@ mod tests {
             let mut expected = vec![0.0; points.len()];
             distances_body(&x, &y, &z, p, &mut expected);
             let limit = share * expected.iter().copied().fold(0.0, f32::max);
-            let mut kept = Vec::new();
-            keep_body(&expected, limit, &mut kept);
-            let plain: Vec<u32> =
-                (0..points.len() as u32).filter(|&i| expected[i as usize] <= limit).collect();
-            prop_assert_eq!(&kept, &plain);
+            let within = expected.iter().filter(|d| **d <= limit).count();
             for level in Level::all() {
                 let mut got = vec![0.0; points.len()];
                 distances(level, &x, &y, &z, p, &mut got);
                 let bits = |d: &[f32]| d.iter().map(|d| d.to_bits()).collect::<Vec<_>>();
                 prop_assert_eq!(bits(&got), bits(&expected));
-                prop_assert_eq!(count_within(level, &got, limit), kept.len());
-                let mut out = vec![7];
-                keep_within(level, &got, limit, &mut out);
-                prop_assert_eq!(&out, &kept);
+                prop_assert_eq!(count_within(level, &got, limit), within);
             }
             for (q, d) in points.iter().zip(&expected) {
                 let exact = distance2(*q, p) as f64;

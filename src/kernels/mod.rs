@@ -10,17 +10,22 @@ mod boxes;
 mod corners;
 mod distances;
 pub(crate) mod eight;
+mod pick;
 mod ranks;
 mod sums;
 
+pub(crate) use boxes::point_box_body;
 pub use boxes::{Boxes, box_distances};
 pub(crate) use corners::SLACK;
 pub use corners::{CornerGroup, Frame, LANES, Line, LineGroup, bisectors, cut_corners, farthest};
 pub(crate) use corners::{bisectors_body, cut_body, farthest_body};
-pub(crate) use distances::{count_body, distances_body, keep_body};
-pub use distances::{count_within, distances, keep_within};
+pub(crate) use distances::{count_body, distances_body};
+pub use distances::{count_within, distances};
+pub use pick::pick_column;
+pub(crate) use pick::{BLOCK, Pick, pick_body};
 pub use ranks::ranks;
-pub(crate) use ranks::ranks_body;
+pub(crate) use ranks::{RANKED, ranks_body};
+pub(crate) use sums::{MOST_SUMMED, SUMMED_LIMIT2};
 pub use sums::{SecondMoments, second_moments};
 
 /// A set of vector instructions that this machine has.

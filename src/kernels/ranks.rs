@@ -6,29 +6,36 @@ kernel! {
     /// For each key how many are smaller: its place once sorted, if all keys are different. Keys are
     /// not negative.
     /// Quadratic, without a branch: faster than sorting up to about a hundred keys.
-    pub fn ranks(keys: &[i64], out: &mut [u32]) = ranks_body
+    pub fn ranks(keys: &[i64], out: &mut [u32]) = ranks_of
 }
 
 #[inline(always)]
-pub(crate) fn ranks_body(keys: &[i64], out: &mut [u32]) {
-    /// Keys whose counts are kept in registers.
-    const BLOCK: usize = 8;
-    let mut blocks = keys.chunks_exact(BLOCK);
-    let mut outs = out.chunks_exact_mut(BLOCK);
-    for (block, out) in blocks.by_ref().zip(outs.by_ref()) {
-        let mut smaller = [0i64; BLOCK];
-        for other in keys {
+fn ranks_of(keys: &[i64], out: &mut [u32]) {
+    let count = keys.len();
+    let mut padded = keys.to_vec();
+    padded.resize(count.next_multiple_of(RANKED), i64::MAX);
+    let mut places = vec![0; padded.len()];
+    ranks_body(&padded, count, &mut places);
+    out.copy_from_slice(&places[..count]);
+}
+
+/// Keys whose counts are kept in registers: columns of keys are this many or a multiple long.
+pub(crate) const RANKED: usize = 8;
+
+/// As [`ranks`], of the first `count` keys.
+#[inline(always)]
+pub(crate) fn ranks_body(keys: &[i64], count: usize, out: &mut [u32]) {
+    let blocks = keys.as_chunks::<RANKED>().0;
+    let outs = out.as_chunks_mut::<RANKED>().0;
+    for (block, out) in blocks.iter().zip(outs) {
+        let mut smaller = [0i64; RANKED];
+        for other in &keys[..count] {
             for (smaller, key) in smaller.iter_mut().zip(block) {
                 // The sign of the difference, without a comparison.
                 *smaller += ((other - key) as u64 >> 63) as i64;
             }
         }
-        for (out, smaller) in out.iter_mut().zip(smaller) {
-            *out = smaller as u32;
-        }
-    }
-    for (key, out) in blocks.remainder().iter().zip(outs.into_remainder()) {
-        *out = keys.iter().map(|other| u32::from(other < key)).sum();
+        *out = smaller.map(|smaller| smaller as u32);
     }
 }
 

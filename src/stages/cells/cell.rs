@@ -6,7 +6,7 @@ use crate::geom::clip::Cell;
 use crate::geom::plane::{Moments, Plane};
 use crate::kernels::Level;
 use crate::stages::order::PointStore;
-use crate::stages::tiles::near::Query;
+use crate::stages::tiles::near::{Query, Sums};
 use crate::stages::tiles::neighbors::Neighbors;
 use crate::stages::tiles::walk::{PageCache, Walk};
 
@@ -86,6 +86,18 @@ pub struct Fit {
     pub moments: Moments,
     /// Squared distance of the last neighbour used.
     pub last2: u64,
+}
+
+impl Fit {
+    /// The plane of neighbours that are summed up.
+    #[must_use]
+    pub fn of(sums: Sums) -> Self {
+        Self {
+            plane: sums.moments.plane(),
+            moments: sums.moments,
+            last2: sums.last2,
+        }
+    }
 }
 
 fn fit_from(source: &mut impl Source, neighbors: usize, widen: Widen) -> Result<Option<Fit>> {

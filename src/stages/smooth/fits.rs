@@ -5,7 +5,7 @@ use crate::geom::Point;
 use crate::stages::cells::{Fit, Widen, fit_in_store, fit_in_tile, near_in_store};
 use crate::stages::order::PointStore;
 use crate::stages::tiles::Tile;
-use crate::stages::tiles::near::{Query, Search};
+use crate::stages::tiles::near::Search;
 use crate::stages::tiles::neighbors::Neighbors;
 use crate::stages::tiles::walk::PageCache;
 use std::cell::RefCell;
@@ -35,11 +35,23 @@ pub fn each_plane(
     wanted: impl Fn(usize) -> bool,
     each: impl FnMut(usize, Point, Fit),
 ) -> Result<()> {
-    let in_tile = |query: &mut Query<'_>, _: Point| fit_in_tile(query, neighbors, widen);
+    let look = |tile: &Tile, found: &mut Found<'_, Fit>| {
+        let mut search = Search::default();
+        if widen == Widen::Never {
+            tile.for_some_sums(neighbors, &mut search, &wanted, |id, point, sums| {
+                found(id, point, Ok(sums.map(Fit::of)));
+            });
+        } else {
+            tile.for_some_queries(neighbors, &mut search, &wanted, |id, point, query| {
+                let fit = query.map(|mut query| fit_in_tile(&mut query, neighbors, widen));
+                found(id, point, fit.transpose().map(Option::flatten));
+            });
+        }
+    };
     let in_store = |cache: &mut PageCache, id: u32, point: Point| {
         fit_in_store(store, cache, id, point, neighbors, widen)
     };
-    each_found(store, ids, neighbors, wanted, in_tile, in_store, each)
+    each_found(store, ids, &wanted, look, in_store, each)
 }
 
 /// Calls `each` with what `of` makes of the neighbours of every point of a tile: at least the `count`
@@ -55,39 +67,42 @@ pub fn each_neighborhood<T>(
     each: impl FnMut(usize, Point, T),
 ) -> Result<()> {
     let of = RefCell::new(of);
-    let in_tile = |query: &mut Query<'_>, point: Point| {
-        let known = query.extend_to(count);
-        Ok(known.then(|| (of.borrow_mut())(point, query.near())))
+    let look = |tile: &Tile, found: &mut Found<'_, T>| {
+        tile.for_each_query(count, &mut Search::default(), |id, point, query| {
+            let known = query.and_then(|mut query| {
+                let known = query.extend_to(count);
+                known.then(|| (of.borrow_mut())(point, query.near()))
+            });
+            found(id, point, Ok(known));
+        });
     };
     let in_store = |cache: &mut PageCache, id: u32, point: Point| {
         let near = near_in_store(store, cache, id, point, count)?;
         Ok(Some((of.borrow_mut())(point, &near)))
     };
-    each_found(store, ids, count, |_| true, in_tile, in_store, each)
+    each_found(store, ids, &|_| true, look, in_store, each)
 }
 
-/// Calls `each` with what is found around every `wanted` point: in the tile if that knows enough, else
-/// in the whole store.
+/// Takes in what was found around a point; `None` if the tile does not know enough.
+type Found<'a, T> = dyn FnMut(u32, Point, Result<Option<T>>) + 'a;
+
+/// Calls `each` with what is found around every `wanted` point: by `look` in the tile if that knows
+/// enough, else in the whole store.
 fn each_found<T>(
     store: &PointStore,
     ids: Range<usize>,
-    neighbors: usize,
-    wanted: impl Fn(usize) -> bool,
-    mut in_tile: impl FnMut(&mut Query<'_>, Point) -> Result<Option<T>>,
+    wanted: &impl Fn(usize) -> bool,
+    look: impl FnOnce(&Tile, &mut Found<'_, T>),
     mut in_store: impl FnMut(&mut PageCache, u32, Point) -> Result<Option<T>>,
     mut each: impl FnMut(usize, Point, T),
 ) -> Result<()> {
-    let tile = Tile::load_some(store, ids, &wanted)?;
-    let mut search = Search::default();
+    let tile = Tile::load_some(store, ids, wanted)?;
     let mut uncertain = Vec::new();
     let mut failed = None;
-    tile.for_some_queries(neighbors, &mut search, wanted, |id, point, query| {
-        let found = query.map(|mut query| in_tile(&mut query, point));
-        match found.transpose().map(Option::flatten) {
-            Ok(Some(found)) => each(id as usize, point, found),
-            Ok(None) => uncertain.push((id, point)),
-            Err(error) => failed = Some(error),
-        }
+    look(&tile, &mut |id, point, found| match found {
+        Ok(Some(found)) => each(id as usize, point, found),
+        Ok(None) => uncertain.push((id, point)),
+        Err(error) => failed = Some(error),
     });
     if let Some(error) = failed {
         return Err(error);

@@ -4,13 +4,19 @@
 //! before. Guesses decide only how much is looked at: a query is answered when what was gathered
 //! proves the answer, and else gathers for itself.
 
-use super::candidates::{Candidates, PageLeaves};
+use super::candidates::{Candidates, Columns, PageLeaves};
 use super::neighbors::Neighbors;
 use super::{Near, OwnPage, Tile};
 use crate::geom::aabb::Aabb;
 use crate::geom::{Point, distance2, sub};
-use crate::kernels::{Level, count_body, distances_body, keep_body, kernel, ranks_body};
+use crate::kernels::{
+    BLOCK, Level, Pick, RANKED, count_body, distances_body, kernel, pick_body, ranks_body,
+};
 use std::ops::Range;
+
+mod sums;
+
+pub use sums::Sums;
 
 /// Up to this number, keys are sorted by counting.
 const MOST_RANKED: usize = 96;
@@ -35,12 +41,15 @@ pub struct Search {
     spare: Candidates,
     /// Approximate squared distances of the candidates to the query.
     distances: Vec<f32>,
-    kept: Vec<u32>,
+    /// The nearest candidates and some more, in order of id, numbered by it or with their distances.
+    picked: Columns,
     keys: Vec<i64>,
     places: Vec<u32>,
     long_keys: Vec<(u64, u32)>,
     window: Vec<u64>,
     near: Neighbors,
+    /// About how far the last neighbour of the query before was, if it was summed.
+    last: f32,
 }
 
 /// The neighbours of one point, nearest first, as far as they are known.
@@ -75,6 +84,35 @@ impl Tile {
         wanted: impl Fn(usize) -> bool,
         mut each: impl FnMut(u32, Point, Option<Query<'_>>),
     ) {
+        self.for_groups(k, search, wanted, |own, index, id, search| {
+            let point = self.points[index];
+            let Some(complete2) = self.nearest(own, index, id, k, search) else {
+                each(id, point, None);
+                return 0;
+            };
+            let farthest = search.near.get(k - 1).map_or(0, |n| n.distance2);
+            let query = Query {
+                tile: self,
+                own,
+                search,
+                point,
+                id,
+                complete2,
+            };
+            each(id, point, Some(query));
+            farthest
+        });
+    }
+
+    /// Gathers the candidates for each leaf with `wanted` ids and calls `one` with the page, the
+    /// index and the id of every one of them; it returns the squared distance that it needed.
+    fn for_groups(
+        &self,
+        k: usize,
+        search: &mut Search,
+        wanted: impl Fn(usize) -> bool,
+        mut one: impl FnMut(&OwnPage, usize, u32, &mut Search) -> u64,
+    ) {
         let mut guess = None;
         for own in &self.own {
             let range = self.range(own.local);
@@ -95,30 +133,10 @@ impl Tile {
                 search.gather(self, &around, likely.min(own.reach2));
                 let mut farthest = 0;
                 for (id, index) in (first..).zip(group) {
-                    if !asked(id) {
-                        continue;
-                    }
-                    let (point, id) = (self.points[index], id as u32);
-                    let Some(complete2) = self.nearest(own, index, id, k, search) else {
+                    if asked(id) {
+                        farthest = one(own, index, id as u32, search).max(farthest);
                         search.swap_back();
-                        each(id, point, None);
-                        continue;
-                    };
-                    farthest = search
-                        .near
-                        .get(k - 1)
-                        .map_or(0, |n| n.distance2)
-                        .max(farthest);
-                    let query = Query {
-                        tile: self,
-                        own,
-                        search,
-                        point,
-                        id,
-                        complete2,
-                    };
-                    each(id, point, Some(query));
-                    search.swap_back();
+                    }
                 }
                 if farthest > 0 {
                     // A little farther than the leaf before needed.
@@ -182,6 +200,12 @@ impl Search {
         }
     }
 
+    /// Whole blocks of distances; those behind the last candidate are infinite.
+    #[inline(always)]
+    fn measured(&self) -> &[f32] {
+        &self.distances[..self.candidates.len.next_multiple_of(BLOCK)]
+    }
+
     fn gather(&mut self, tile: &Tile, around: &Aabb, d2: u64) {
         self.leaves
             .gather(self.level, tile, around, d2, &mut self.candidates);
@@ -202,53 +226,67 @@ impl Search {
         }
     }
 
-    /// Candidates are in order of id, so distance and place in one word sort as they must.
+    /// What is picked is in order of id, so distance and place in one word sort as they must.
     #[inline(always)]
-    fn list_short(&mut self, point: Point, own: u32, complete2: u64, bits: u32) {
-        let (x, y, z, ids) = self.candidates.columns();
-        let most = self.kept.len();
-        self.keys.resize(most.max(self.keys.len()), 0);
-        let keys = &mut self.keys[..most];
+    fn list_short(&mut self, picked: usize, point: Point, own: u32, complete2: u64, bits: u32) {
+        let [x, y, z] = self.picked.coordinates(picked);
+        let ids = self.picked.numbers(picked);
+        let room = picked.next_multiple_of(RANKED);
+        self.keys.resize(room.max(self.keys.len()), 0);
+        let keys = &mut self.keys[..room];
+        keys[picked..].fill(i64::MAX);
         let mut count = 0;
-        for &place in &self.kept {
-            let at = place as usize;
-            let d2 = distance2([x[at], y[at], z[at]], point);
-            keys[count] = (d2 << bits | u64::from(place)) as i64;
-            count += usize::from(d2 <= complete2 && ids[at] != own);
+        let picks = x.iter().zip(y).zip(z).zip(ids);
+        for (place, (key, (((x, y), z), id))) in (0i64..).zip(keys.iter_mut().zip(picks)) {
+            let d2 = distance2([*x, *y, *z], point);
+            let listed = (d2 <= complete2) & (*id != own);
+            // The others are behind all that are listed.
+            *key = if listed {
+                (d2 << bits) as i64 | place
+            } else {
+                i64::MAX
+            };
+            count += i64::from(listed);
         }
-        let keys = &mut keys[..count];
-        self.places.resize(count.max(self.places.len()), 0);
-        let places = &mut self.places[..count];
-        if count <= MOST_RANKED {
-            ranks_body(keys, places);
+        let near = self.near.resize(picked);
+        let mask = (1i64 << bits) - 1;
+        if picked <= MOST_RANKED {
+            self.places.resize(room.max(self.places.len()), 0);
+            let places = &mut self.places[..room];
+            ranks_body(keys, picked, places);
+            let picks = x.iter().zip(y).zip(z).zip(ids);
+            for ((key, to), (((x, y), z), id)) in keys.iter().zip(places).zip(picks) {
+                let to = *to as usize;
+                near.distances2[to] = (key >> bits) as u64;
+                near.ids[to] = *id;
+                near.x[to] = x - point[0];
+                near.y[to] = y - point[1];
+                near.z[to] = z - point[2];
+            }
         } else {
             keys.sort_unstable();
-            (0..)
-                .zip(places.iter_mut())
-                .for_each(|(n, place)| *place = n);
+            for (to, key) in keys[..count as usize].iter().enumerate() {
+                let at = (key & mask) as usize;
+                near.distances2[to] = (key >> bits) as u64;
+                near.ids[to] = ids[at];
+                near.x[to] = x[at] - point[0];
+                near.y[to] = y[at] - point[1];
+                near.z[to] = z[at] - point[2];
+            }
         }
-        let near = self.near.resize(count);
-        let mask = (1i64 << bits) - 1;
-        for (&key, &to) in keys.iter().zip(places.iter()) {
-            let (to, at) = (to as usize, (key & mask) as usize);
-            near.distances2[to] = (key >> bits) as u64;
-            near.ids[to] = ids[at];
-            near.x[to] = x[at] - point[0];
-            near.y[to] = y[at] - point[1];
-            near.z[to] = z[at] - point[2];
-        }
+        self.near.resize(count as usize);
     }
 
     #[cold]
-    fn list_long(&mut self, point: Point, own: u32, complete2: u64) {
-        let (x, y, z, ids) = self.candidates.columns();
-        let within = |&place: &u32| {
-            let at = place as usize;
+    fn list_long(&mut self, picked: usize, point: Point, own: u32, complete2: u64) {
+        let [x, y, z] = self.picked.coordinates(picked);
+        let ids = self.picked.numbers(picked);
+        let within = |at: usize| {
             let d2 = distance2([x[at], y[at], z[at]], point);
-            (d2 <= complete2 && ids[at] != own).then_some((d2, place))
+            (d2 <= complete2 && ids[at] != own).then_some((d2, at as u32))
         };
         self.long_keys.clear();
-        self.long_keys.extend(self.kept.iter().filter_map(within));
+        self.long_keys.extend((0..picked).filter_map(within));
         self.long_keys.sort_unstable();
         self.near.clear();
         for &(distance2, place) in &self.long_keys {
@@ -266,37 +304,58 @@ kernel! {
     /// Measures the candidates from `point` and lists the `k` nearest neighbours, and some more;
     /// the squared distance up to which all are listed. `None` if there are fewer than `k` as far as
     /// the candidates are complete.
-    fn list_nearest(search: &mut Search, point: Point, own: u32, k: usize) -> Option<u64> = nearest_body
+    fn list_nearest(search: &mut Search, point: Point, own: u32, k: usize) -> Option<u64> = nearest_body<Eight>
 }
 
 #[inline(always)]
-fn nearest_body(search: &mut Search, point: Point, own: u32, k: usize) -> Option<u64> {
+fn nearest_body<P: Pick>(search: &mut Search, point: Point, own: u32, k: usize) -> Option<u64> {
     measure_body(search, point);
     let most = above(search.candidates.complete2);
     // The neighbours of the query before are about as far.
     let last = search.near.get(k.wrapping_sub(1));
-    let mut limit = last.map_or(most, |n| (n.distance2 as f32 * MARGIN).max(1.0).min(most));
-    // The point itself is a candidate; one more, for those that are not sure to be within.
-    let wanted = k + 2;
-    for correction in 0.. {
-        let count = count_body(&search.distances, limit);
-        if count >= wanted || limit >= most {
-            if count > 2 * wanted && correction < CORRECTIONS {
-                limit *= (wanted + 6) as f32 / count as f32;
-                continue;
-            }
-            let complete2 = list_body(search, point, own, limit);
-            if search.near.len() >= k {
-                return Some(complete2);
-            }
-            if limit >= most {
-                return None;
-            }
+    let mut limit = last.map_or(0.0, |n| n.distance2 as f32);
+    let mut corrections = CORRECTIONS;
+    loop {
+        // The point itself is a candidate; one more, for those that are not sure to be within.
+        limit = reach_body(search.measured(), k + 2, limit, most, &mut corrections);
+        let complete2 = list_body::<P>(search, point, own, limit);
+        if search.near.len() >= k {
+            return Some(complete2);
         }
-        let grow = (wanted + 4) as f32 / (count.max(1) as f32);
-        limit = (limit * grow.clamp(1.1, 8.0) + 4.0).min(most);
+        if limit >= most {
+            return None;
+        }
+        corrections = corrections.saturating_sub(1);
     }
-    None
+}
+
+/// A limit up to `most` within which `wanted` of the distances are and not many more, or `most` if
+/// there are not so many; from one that is a little smaller, `0.0` if nothing is known.
+#[inline(always)]
+fn reach_body(
+    distances: &[f32],
+    wanted: usize,
+    last: f32,
+    most: f32,
+    corrections: &mut usize,
+) -> f32 {
+    let mut limit = if last > 0.0 {
+        (last * MARGIN).max(1.0).min(most)
+    } else {
+        most
+    };
+    loop {
+        let count = count_body(distances, limit);
+        if count > 2 * wanted && *corrections > 0 {
+            *corrections -= 1;
+            limit *= (wanted + 6) as f32 / count as f32;
+        } else if count >= wanted || limit >= most {
+            return limit;
+        } else {
+            let grow = (wanted + 4) as f32 / (count.max(1) as f32);
+            limit = (limit * grow.clamp(1.1, 8.0) + 4.0).min(most);
+        }
+    }
 }
 
 kernel! {
@@ -306,27 +365,36 @@ kernel! {
 
 #[inline(always)]
 fn measure_body(search: &mut Search, point: Point) {
-    let Candidates { x, y, z, .. } = &search.candidates;
-    search.distances.resize(x.len(), 0.0);
-    distances_body(x, y, z, point, &mut search.distances);
+    let candidates = &search.candidates;
+    let room = candidates.len.next_multiple_of(BLOCK);
+    search
+        .distances
+        .resize(room.max(search.distances.len()), 0.0);
+    search.picked.reserve(candidates.len);
+    let [x, y, z] = candidates.columns.coordinates(room);
+    let distances = &mut search.distances[..room];
+    distances_body(x, y, z, point, distances);
+    distances[candidates.len..].fill(f32::INFINITY);
 }
 
 kernel! {
     /// Lists the measured candidates whose approximate squared distance is at most `limit` in order
     /// of (distance, id); the squared distance up to which all are listed.
-    fn list(search: &mut Search, point: Point, own: u32, limit: f32) -> u64 = list_body
+    fn list(search: &mut Search, point: Point, own: u32, limit: f32) -> u64 = list_body<Eight>
 }
 
 #[inline(always)]
-fn list_body(search: &mut Search, point: Point, own: u32, limit: f32) -> u64 {
+fn list_body<P: Pick>(search: &mut Search, point: Point, own: u32, limit: f32) -> u64 {
     let below = (f64::from(limit) * (1.0 - APPROXIMATE)) as u64;
     let complete2 = below.min(search.candidates.complete2);
-    keep_body(&search.distances, limit, &mut search.kept);
-    let bits = usize::BITS - search.candidates.x.len().leading_zeros();
+    let distances = &search.distances[..search.measured().len()];
+    let from = search.candidates.columns.slices();
+    let picked = pick_body::<P, 4>(distances, limit, from, search.picked.slices_mut());
+    let bits = usize::BITS - picked.leading_zeros();
     if bits < 32 && complete2 < 1 << (63 - bits) {
-        search.list_short(point, own, complete2, bits);
+        search.list_short(picked, point, own, complete2, bits);
     } else {
-        search.list_long(point, own, complete2);
+        search.list_long(picked, point, own, complete2);
     }
     complete2
 }

@@ -3,10 +3,7 @@
 use super::Near;
 use crate::geom::clip::Nearest;
 use crate::geom::plane::Moments;
-use crate::kernels::{Level, second_moments};
-
-/// Below this squared distance, differences are small enough for sums in 64 bits.
-const NEAR_LIMIT2: u64 = 1 << 54;
+use crate::kernels::{Level, MOST_SUMMED, SUMMED_LIMIT2, second_moments};
 
 /// Neighbours by (squared distance, id).
 #[derive(Debug, Clone, Default)]
@@ -110,7 +107,7 @@ impl Neighbors {
     /// Exact sums over the first `count`.
     #[must_use]
     pub fn moments(&self, count: usize, level: Level) -> Moments {
-        let small = count <= 256 && self.distances2[..count].last() < Some(&NEAR_LIMIT2);
+        let small = count <= MOST_SUMMED && self.distances2[..count].last() < Some(&SUMMED_LIMIT2);
         if small {
             let (sum, products) =
                 second_moments(level, &self.x[..count], &self.y[..count], &self.z[..count]);

@@ -1,0 +1,183 @@
+//! Picking out of columns what is within a limit: what the compiler does not widen by itself.
+//!
+//! [`Base`] is the definition. The others do the same with an instruction or a table.
+
+use super::eight::Base;
+use super::kernel;
+
+/// Numbers that are looked at together; columns to pick from are this many or a multiple long.
+pub(crate) const BLOCK: usize = 16;
+
+/// What is done with each block.
+pub(crate) trait Pick {
+    /// Bit `k` is set if number `k` is at most `limit`.
+    fn within(numbers: &[f32; BLOCK], limit: f32) -> u32;
+
+    /// The values whose bits are set, in their order, at the front of `to`; what is behind them there
+    /// has no meaning.
+    fn pack(values: &[u32; BLOCK], bits: u32, to: &mut [u32; BLOCK]);
+}
+
+impl Pick for Base {
+    #[inline(always)]
+    fn within(numbers: &[f32; BLOCK], limit: f32) -> u32 {
+        let bit = |bits, (k, x): (usize, &f32)| bits | u32::from(*x <= limit) << k;
+        numbers.iter().enumerate().fold(0, bit)
+    }
+
+    #[inline(always)]
+    fn pack(values: &[u32; BLOCK], mut bits: u32, to: &mut [u32; BLOCK]) {
+        for to in to {
+            if bits == 0 {
+                break;
+            }
+            *to = values[bits.trailing_zeros() as usize % BLOCK];
+            bits &= bits - 1;
+        }
+    }
+}
+
+/// Packs columns: the values that stand where the numbers are at most `limit`, in their order; how many.
+/// Numbers beyond the last whole block are not looked at; each `to` has room for all and a block.
+#[inline(always)]
+pub(crate) fn pick_body<P: Pick, const N: usize>(
+    numbers: &[f32],
+    limit: f32,
+    from: [&[u32]; N],
+    mut to: [&mut [u32]; N],
+) -> usize {
+    let from = from.map(|column| column.as_chunks::<BLOCK>().0);
+    let mut count = 0;
+    for (block, numbers) in numbers.as_chunks::<BLOCK>().0.iter().enumerate() {
+        let bits = P::within(numbers, limit);
+        for (from, to) in from.iter().zip(&mut to) {
+            if let Some(to) = to[count..].first_chunk_mut() {
+                P::pack(&from[block], bits, to);
+            }
+        }
+        count += bits.count_ones() as usize;
+    }
+    count
+}
+
+kernel! {
+    /// Packs one column as [`pick_body`] does.
+    pub fn pick_column(numbers: &[f32], limit: f32, from: &[u32], to: &mut [u32]) -> usize = pick_one_body<Eight>
+}
+
+#[inline(always)]
+fn pick_one_body<P: Pick>(numbers: &[f32], limit: f32, from: &[u32], to: &mut [u32]) -> usize {
+    pick_body::<P, 1>(numbers, limit, [from], [to])
+}
+
+#[cfg(target_arch = "x86_64")]
+#[allow(
+    unsafe_code,
+    reason = "instructions that were looked for; unaligned loads and stores"
+)]
+mod wide {
+    use super::{BLOCK, Pick};
+    use crate::kernels::eight::{Avx2, Avx512};
+    use std::arch::x86_64::*;
+
+    /// For each pattern of eight bits where the set ones stand.
+    static PLACES: [[u32; 8]; 256] = places();
+
+    const fn places() -> [[u32; 8]; 256] {
+        let mut all = [[0; 8]; 256];
+        let mut bits = 0;
+        while bits < 256 {
+            let (mut count, mut k) = (0, 0);
+            while k < 8 {
+                if bits >> k & 1 == 1 {
+                    all[bits][count] = k as u32;
+                    count += 1;
+                }
+                k += 1;
+            }
+            bits += 1;
+        }
+        all
+    }
+
+    // SAFETY (all of both): the types are named only by the versions of a kernel that are compiled for
+    // these instructions, and those are called only after `Level` found them on the machine. Loads
+    // and stores are within an array of sixteen and need no alignment.
+    impl Pick for Avx2 {
+        #[inline(always)]
+        fn within(numbers: &[f32; BLOCK], limit: f32) -> u32 {
+            // SAFETY: see above.
+            unsafe {
+                let (p, limit) = (numbers.as_ptr(), _mm256_set1_ps(limit));
+                let low = _mm256_cmp_ps::<_CMP_LE_OQ>(_mm256_loadu_ps(p), limit);
+                let high = _mm256_cmp_ps::<_CMP_LE_OQ>(_mm256_loadu_ps(p.add(8)), limit);
+                (_mm256_movemask_ps(low) | _mm256_movemask_ps(high) << 8) as u32
+            }
+        }
+
+        #[inline(always)]
+        fn pack(values: &[u32; BLOCK], bits: u32, to: &mut [u32; BLOCK]) {
+            let (low, high) = (bits as usize & 0xff, bits as usize >> 8 & 0xff);
+            // SAFETY: see above; the second store begins at most eight behind the first.
+            unsafe {
+                let (p, to) = (values.as_ptr().cast::<__m256i>(), to.as_mut_ptr());
+                let packed = |half: usize, bits: usize| {
+                    let places = _mm256_loadu_si256(PLACES[bits].as_ptr().cast());
+                    _mm256_permutevar8x32_epi32(_mm256_loadu_si256(p.add(half)), places)
+                };
+                _mm256_storeu_si256(to.cast(), packed(0, low));
+                let behind = to.add(low.count_ones() as usize);
+                _mm256_storeu_si256(behind.cast(), packed(1, high));
+            }
+        }
+    }
+
+    impl Pick for Avx512 {
+        #[inline(always)]
+        fn within(numbers: &[f32; BLOCK], limit: f32) -> u32 {
+            // SAFETY: see above.
+            unsafe {
+                let numbers = _mm512_loadu_ps(numbers.as_ptr());
+                let limit = _mm512_set1_ps(limit);
+                u32::from(_mm512_cmp_ps_mask::<_CMP_LE_OQ>(numbers, limit))
+            }
+        }
+
+        #[inline(always)]
+        fn pack(values: &[u32; BLOCK], bits: u32, to: &mut [u32; BLOCK]) {
+            // SAFETY: see above. Packing in a register and storing all of it is faster than packing
+            // into memory.
+            unsafe {
+                let values = _mm512_loadu_si512(values.as_ptr().cast());
+                let packed = _mm512_maskz_compress_epi32(bits as u16, values);
+                _mm512_storeu_si512(to.as_mut_ptr().cast(), packed);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Level;
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn every_level_picks_the_same(
+            mut numbers in prop::collection::vec(0.0f32..100.0, 0..200),
+            limit in 0.0f32..110.0,
+        ) {
+            numbers.extend([f32::INFINITY, f32::NAN, limit]);
+            numbers.resize(numbers.len().next_multiple_of(BLOCK), f32::INFINITY);
+            let from: Vec<u32> = (0..numbers.len() as u32).map(|n| n.wrapping_mul(77)).collect();
+            let within = |&n: &usize| numbers[n] <= limit;
+            let expected: Vec<u32> = (0..numbers.len()).filter(within).map(|n| from[n]).collect();
+            for level in Level::all() {
+                let mut to = vec![0; numbers.len() + BLOCK];
+                let count = pick_column(level, &numbers, limit, &from, &mut to);
+                prop_assert_eq!(&to[..count], &expected[..]);
+            }
+        }
+    }
+}
