@@ -160,13 +160,23 @@ impl Tile {
         if let Some(complete2) = list_nearest(search.level, search, point, id, k) {
             return Some(complete2);
         }
-        if search.candidates.complete2 >= own.reach2 {
+        if !self.gather_for_one(own, index, k, search) {
             return None;
+        }
+        list_nearest(search.level, search, point, id, k)
+    }
+
+    /// Gathers candidates that are enough for the `k` nearest neighbours of point `index`, or as far
+    /// as the page reaches; false if it reached so far already.
+    fn gather_for_one(&self, own: &OwnPage, index: usize, k: usize, search: &mut Search) -> bool {
+        if search.candidates.complete2 >= own.reach2 {
+            return false;
         }
         let limit = self.limit(index..index + 1, k, search);
         search.step_aside();
-        search.gather(self, &Aabb::of(&[point]), limit.min(own.reach2));
-        list_nearest(search.level, search, point, id, k)
+        let around = Aabb::of(&self.points[index..=index]);
+        search.gather(self, &around, limit.min(own.reach2));
+        true
     }
 
     /// An upper bound of the squared distance of the `k`th neighbour of each point of a group,

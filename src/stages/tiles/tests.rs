@@ -3,6 +3,7 @@
 use super::near::Search;
 use super::*;
 use crate::geom::distance2;
+use crate::geom::plane::Moments;
 use crate::kernels::Level;
 use crate::stages::order::Orderer;
 use crate::workspace::Workspace;
@@ -86,6 +87,24 @@ fn check(points: &[Point], tile: &Tile, k: usize, search: &mut Search) {
     assert_eq!(next, tile.ids().end);
 }
 
+/// Sums over the nearest are those of a list of all; some are asked for.
+fn check_sums(points: &[Point], tile: &Tile, k: usize, search: &mut Search) {
+    let wanted = |id: usize| !id.is_multiple_of(3);
+    let mut next: Vec<usize> = tile.ids().filter(|id| wanted(*id)).rev().collect();
+    tile.for_some_sums(k, search, wanted, |id, point, sums| {
+        assert_eq!(Some(id as usize), next.pop());
+        assert_eq!(point, points[id as usize]);
+        let Some(sums) = sums else { return };
+        let nearest = &all_near(points, id as usize)[..k];
+        let mut moments = Moments::default();
+        for (_, near) in nearest {
+            moments.add(crate::geom::sub(points[*near as usize], point));
+        }
+        assert_eq!((sums.moments, sums.last2), (moments, nearest[k - 1].0));
+    });
+    assert!(next.is_empty());
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(96))]
     #[test]
@@ -106,6 +125,7 @@ proptest! {
             let tile = Tile::load(&store, ids).unwrap();
             for level in Level::all() {
                 check(&points, &tile, k, &mut Search::at(level));
+                check_sums(&points, &tile, k, &mut Search::at(level));
             }
         }
     }

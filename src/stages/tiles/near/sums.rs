@@ -4,9 +4,7 @@
 use super::{APPROXIMATE, CORRECTIONS, OwnPage, Search, above, measure_body, reach_body};
 use crate::geom::Point;
 use crate::geom::plane::Moments;
-use crate::kernels::{
-    BLOCK, MOST_SUMMED, Pick, SUMMED_LIMIT2, SecondMoments, count_body, kernel, pick_body,
-};
+use crate::kernels::{BLOCK, MOST_SUMMED, Pick, SUMMED_LIMIT2, kernel, pick_body};
 use crate::stages::tiles::Tile;
 
 /// How often a limit that divides the nearest from the others is corrected.
@@ -49,28 +47,41 @@ impl Tile {
         k: usize,
         search: &mut Search,
     ) -> Option<Sums> {
-        if let Some((sums, last2)) = sum_nearest(search.level, search, self.points[index], k) {
-            let moments = Moments::from_sums(k, sums.0, sums.1);
-            return Some(Sums { moments, last2 });
+        let point = self.points[index];
+        let mut summed = sum_nearest(search.level, search, point, k);
+        if summed == Err(Unknown::Few) && self.gather_for_one(own, index, k, search) {
+            summed = sum_nearest(search.level, search, point, k);
         }
-        // Ties at the last place are decided by id, and far neighbours may be outside of the halo.
-        self.nearest(own, index, id, k, search)?;
-        Some(Sums {
-            moments: search.near.moments(k, search.level),
-            last2: search.near.get(k.checked_sub(1)?)?.distance2,
-        })
+        match summed {
+            Ok(sums) => Some(sums),
+            Err(Unknown::Few) => None,
+            Err(Unknown::Close) => {
+                self.nearest(own, index, id, k, search)?;
+                Some(Sums {
+                    moments: search.near.moments(k, search.level),
+                    last2: search.near.get(k.checked_sub(1)?)?.distance2,
+                })
+            }
+        }
     }
 }
 
+/// Why there are no sums.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Unknown {
+    /// There are fewer neighbours as far as the candidates are complete.
+    Few,
+    /// Ties at the last place, which are decided by id, or distances too close or too large to tell.
+    Close,
+}
+
 kernel! {
-    /// Measures the candidates from `point` and sums over the `k` nearest neighbours; with the
-    /// squared distance of the last. `None` if approximate distances do not tell which they are, if
-    /// there are fewer as far as the candidates are complete, or if they are too far for these sums.
-    fn sum_nearest(search: &mut Search, point: Point, k: usize) -> Option<(SecondMoments, u64)> = sum_body<Eight>
+    /// Measures the candidates from `point` and sums over the `k` nearest neighbours.
+    fn sum_nearest(search: &mut Search, point: Point, k: usize) -> Result<Sums, Unknown> = sum_body<Eight>
 }
 
 #[inline(always)]
-fn sum_body<P: Pick>(search: &mut Search, point: Point, k: usize) -> Option<(SecondMoments, u64)> {
+fn sum_body<P: Pick>(search: &mut Search, point: Point, k: usize) -> Result<Sums, Unknown> {
     measure_body(search, point);
     let most = above(search.candidates.complete2);
     let mut corrections = CORRECTIONS;
@@ -96,63 +107,65 @@ fn sum_body<P: Pick>(search: &mut Search, point: Point, k: usize) -> Option<(Sec
     numbers[picked..room].fill(f32::INFINITY.to_bits());
     let distances = bytemuck::cast_slice(search.picked.numbers(room));
     // The point itself is one of them, and adds nothing to the sums.
-    let limit = divide_body(distances, k + 1, limit)?;
+    if picked <= k {
+        return Err(Unknown::Few);
+    }
+    let limit = divide_body(distances, picked, k + 1, limit).ok_or(Unknown::Close)?;
     search.last = limit;
     let certain = f64::from(limit) * (1.0 + 2.0 * APPROXIMATE);
     let exact = k < MOST_SUMMED && certain < SUMMED_LIMIT2 as f64;
     if !exact || certain > search.candidates.complete2 as f64 {
-        return None;
+        return Err(Unknown::Close);
     }
     let [x, y, z] = search.picked.coordinates(room);
-    Some(sums_within(x, y, z, point, distances, limit))
+    let (sum, products, last2) = sums_within([x, y, z], point, distances, limit);
+    Ok(Sums {
+        moments: Moments::from_sums(k, sum, products),
+        last2,
+    })
 }
 
-/// A limit within which exactly `wanted` numbers are, so that no other is close to it; they are
-/// about evenly spread up to `most`.
+/// A limit within which exactly `wanted` of `count` numbers are, so that no other is close to it; they
+/// are about evenly spread up to `most`.
 #[inline(always)]
-fn divide_body(numbers: &[f32], wanted: usize, most: f32) -> Option<f32> {
-    let (mut low, mut below) = (0.0f32, 0usize);
-    let (mut high, mut within) = (most, count_body(numbers, most));
-    let mut limit = most;
+fn divide_body(numbers: &[f32], count: usize, wanted: usize, most: f32) -> Option<f32> {
+    let (mut low, mut high) = (0.0, most);
+    let between = most / count as f32;
+    let (mut limit, mut count) = (most, count);
     for division in 0..DIVISIONS {
-        let count = if limit == most {
-            within
-        } else {
-            count_body(numbers, limit)
-        };
+        // As if they were spread evenly; in the middle where that leads nowhere.
+        limit += (wanted as f32 + 0.5 - count as f32) * between;
+        if division % 4 == 3 || limit <= low || limit >= high {
+            limit = 0.5 * (low + high);
+        }
+        let certain = limit * GAP;
+        let (within, close) = numbers.iter().fold((0u32, 0u32), |(within, close), d| {
+            (
+                within + u32::from(*d <= limit),
+                close + u32::from(*d <= certain),
+            )
+        });
+        count = within as usize;
         if count == wanted {
-            return (count_body(numbers, limit * GAP) == wanted).then_some(limit);
+            return (close == within).then_some(limit);
         }
         if count < wanted {
-            (low, below) = (limit, count);
+            low = limit;
         } else {
-            (high, within) = (limit, count);
+            high = limit;
         }
-        if within < wanted || below >= within {
-            return None;
-        }
-        // Where it is if they are spread evenly; now and then in the middle, in case they are not.
-        let share = (wanted as f32 + 0.5 - below as f32) / (within - below) as f32;
-        let share = if division % 3 == 2 {
-            0.5
-        } else {
-            share.min(0.9)
-        };
-        limit = low + (high - low) * share;
     }
     None
 }
 
-/// Sums over the points within `limit`, and the largest squared distance.
+/// First and second sums over the points within `limit`, and the largest squared distance.
 #[inline(always)]
 fn sums_within(
-    x: &[i32],
-    y: &[i32],
-    z: &[i32],
+    [x, y, z]: [&[i32]; 3],
     point: Point,
     distances: &[f32],
     limit: f32,
-) -> (SecondMoments, u64) {
+) -> ([i64; 3], [i64; 6], u64) {
     let mut sum = [0i64; 3];
     let mut products = [0i64; 6];
     let mut last2 = 0i64;
@@ -172,5 +185,5 @@ fn sums_within(
         products[5] += y * z;
         last2 = last2.max(squares[0] + squares[1] + squares[2]);
     }
-    ((sum, products), last2 as u64)
+    (sum, products, last2 as u64)
 }
