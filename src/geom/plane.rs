@@ -63,28 +63,28 @@ impl Moments {
         Self {
             count: count as i64,
             sum,
-            products: products.map(i128::from),
+            products: std::array::from_fn(|i| i128::from(products[i])),
         }
     }
 
     /// Covariance times the number of points (the point itself among them), in squared steps.
     fn scatter(&self) -> [f64; 6] {
         // Machine words where everything fits: almost always.
-        if let Some((sum, products)) = self.small() {
-            let m = self.count + 1;
-            let crossed = PAIRS.map(|(a, b)| sum[a] * sum[b]);
-            return std::array::from_fn(|i| (m * products[i] - crossed[i]) as f64);
+        let m = self.count + 1;
+        let most = 1i64 << (62 - m.ilog2() - 1);
+        let mut fits = self.sum.iter().all(|s| s.unsigned_abs() < 1 << 31);
+        let mut scatter = [0.0; 6];
+        for (i, (a, b)) in PAIRS.into_iter().enumerate() {
+            let product = self.products[i];
+            fits &= product.unsigned_abs() < most as u128;
+            let scaled = (product as i64).wrapping_mul(m);
+            let crossed = self.sum[a].wrapping_mul(self.sum[b]);
+            scatter[i] = scaled.wrapping_sub(crossed) as f64;
+        }
+        if fits {
+            return scatter;
         }
         self.wide_scatter().map(|x| x as f64)
-    }
-
-    /// The sums, if those of [`Moments::scatter`] stay below 2^63.
-    fn small(&self) -> Option<([i64; 3], [i64; 6])> {
-        let m = self.count + 1;
-        let most = (1i64 << 62) / m;
-        let fits = |p: &i128| (-i128::from(most)..=i128::from(most)).contains(p);
-        let small = self.sum.iter().all(|s| s.abs() < 1 << 31) && self.products.iter().all(fits);
-        small.then(|| (self.sum, self.products.map(|p| p as i64)))
     }
 
     fn wide_scatter(&self) -> [i128; 6] {
