@@ -34,6 +34,9 @@ fn is_whole(file: &File, part: &Needed) -> bool {
     let mut buffer = vec![0; part.place.bytes.min(CHUNK)];
     let mut at = part.place.offset;
     let mut left = part.place.bytes;
+    if part.place.end().is_none() {
+        return false;
+    }
     while left > 0 {
         let now = &mut buffer[..left.min(CHUNK)];
         if file.read_exact_at(now, at).is_err() {
@@ -60,8 +63,8 @@ fn damaged(
             by_file.entry(part.file.clone()).or_default().push(part);
         }
     }
-    let total: usize = by_file.values().flatten().map(|p| p.place.bytes).sum();
-    observer.begin("check", "bytes", total as u64);
+    let sizes = by_file.values().flatten().map(|p| p.place.bytes as u64);
+    observer.begin("check", "bytes", sizes.fold(0, u64::saturating_add));
     let mut all = Vec::new();
     for (name, parts) in by_file {
         let paths = if name == MESH {
