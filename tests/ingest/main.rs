@@ -5,6 +5,7 @@ mod bench;
 mod bombs;
 mod classes;
 mod damage;
+mod formats;
 mod lattices;
 mod numbers;
 mod ply_headers;
