@@ -257,4 +257,27 @@ mod tests {
             }
         }
     }
+
+    /// Found by fuzzing a journal whose checksums are right.
+    #[test]
+    fn places_that_cannot_be_ask_for_no_memory() {
+        let workspace = crate::spill::sorter::tests::workspace();
+        let packed = Sections::<3>::create(&workspace, "packed", 1).unwrap();
+        let unpacked = Sections::<3>::unpacked(&workspace, "unpacked", 1).unwrap();
+        for sections in [packed, unpacked] {
+            sections.put(0, &[[1, 2, 3]; 100]).unwrap();
+            for records in [101 * 8, usize::MAX / 16, usize::MAX] {
+                sections.places()[0].records = records;
+                let error = sections.get(0).unwrap_err();
+                assert!(matches!(error, Error::Corrupt { .. }), "{error}");
+            }
+        }
+        let mut saved = Vec::new();
+        String::from("table").save(&mut saved);
+        (1usize << 58).save(&mut saved);
+        false.save(&mut saved);
+        [0u8; 3].save(&mut saved);
+        let loaded = Sections::<3>::load(&mut Saved::new(&saved, &workspace));
+        assert!(matches!(loaded, Err(Error::Memory { .. })));
+    }
 }

@@ -137,3 +137,36 @@ pub fn recover(
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::file::Place;
+    use super::*;
+
+    /// Found by fuzzing a journal whose checksums are right.
+    #[test]
+    fn a_part_beyond_the_end_of_all_files_is_damaged() {
+        let file = tempfile::tempfile().unwrap();
+        file.write_all_at(b"0123456789", 0).unwrap();
+        let part = |offset, bytes| Needed {
+            file: "a".into(),
+            section: 0,
+            place: Place {
+                offset,
+                bytes,
+                records: 0,
+                crc: crc32fast::hash(b"234"),
+            },
+        };
+        assert!(is_whole(&file, &part(2, 3)));
+        for (offset, bytes) in [
+            (2, 4),
+            (9, 3),
+            (u64::MAX, 3),
+            (2, usize::MAX),
+            (u64::MAX, usize::MAX),
+        ] {
+            assert!(!is_whole(&file, &part(offset, bytes)), "{offset} {bytes}");
+        }
+    }
+}
