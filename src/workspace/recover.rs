@@ -109,7 +109,13 @@ pub fn recover(
     let bad = damaged(history.needed(), places, observer, cancel)?;
     let names: BTreeSet<&str> = bad.iter().map(|part| part.file.as_str()).collect();
     let names = names.into_iter().collect::<Vec<_>>().join(", ");
-    match history.mend(&bad) {
+    // A journal that speaks of parts before any stage is not of this program: nothing of it counts.
+    let first = || Mending::Rewind {
+        end: entries.get(1).map_or(end, |entry| entry.offset),
+        stage: "ingest".into(),
+    };
+    let mending = history.mend(&bad).or_else(|| (!bad.is_empty()).then(first));
+    match mending {
         None => Ok((history, end)),
         Some(Mending::Redo(units)) => {
             observer.warn(&format!(
@@ -140,10 +146,52 @@ pub fn recover(
 
 #[cfg(test)]
 mod tests {
-    use super::super::file::Place;
+    use super::super::file::{Place, Put};
+    use super::super::journal::Record;
+    use super::super::progress::Silent;
     use super::*;
 
-    /// Found by fuzzing a journal whose checksums are right.
+    /// Found by fuzzing: parts of no stage were believed, damaged or not, and memory was asked for by
+    /// their sizes.
+    #[test]
+    fn damage_before_any_stage_leaves_nothing_that_counts() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("a"), "0123").unwrap();
+        let put = Put {
+            file: "a".into(),
+            section: 0,
+            place: Place {
+                offset: 0,
+                bytes: 1 << 40,
+                records: 1 << 38,
+                crc: 0,
+            },
+        };
+        let unit = Record::Unit {
+            step: "/step#1".into(),
+            unit: 0,
+            puts: vec![put],
+            payload: Vec::new(),
+        };
+        let gone = Record::Deleted("b".into());
+        let records = [Record::Manifest(Vec::new()), unit, gone];
+        let entries = records.into_iter().zip(0..);
+        let entries: Vec<Entry> = entries
+            .map(|(record, offset)| Entry {
+                offset,
+                payload: (offset, 0),
+                record,
+            })
+            .collect();
+        let places = Whereabouts {
+            folder: folder.path(),
+            mesh: &Default::default(),
+        };
+        let (history, end) = recover(&entries, 3, &places, &Silent, &Cancel::new()).unwrap();
+        assert!(history.places("a").is_empty() && history.units("/step#1").is_empty());
+        assert_eq!(end, 1);
+    }
+
     #[test]
     fn a_part_beyond_the_end_of_all_files_is_damaged() {
         let file = tempfile::tempfile().unwrap();

@@ -122,17 +122,11 @@ fn lists_of_absurd_length() {
             &["vertex 0 at byte", found],
         );
     }
-    for length in ["99999999999999999999", "1e300", "-3", "nan", "7"] {
+    for length in ["99999999999999999999", "1e300", "-3", "1.5", "nan", "7"] {
         let among = format!("element vertex 1\nproperty list uchar int b\n{XYZ}");
         let body = format!("{length} 1 2 3\n");
         let words = ["vertex 0", "expected 4 numbers"];
-        if length == "-3" || length == "nan" {
-            // As if the list were empty: the numbers after it are the point.
-            let path = bench.write("short.ply", header("ascii", &among) + &body);
-            assert_eq!(bench.read(&[path]).unwrap().points(), 1);
-        } else {
-            refused(&bench, &header("ascii", &among), body.as_bytes(), &words);
-        }
+        refused(&bench, &header("ascii", &among), body.as_bytes(), &words);
     }
     for kind in ["float", "double", "quad"] {
         let among = format!("element vertex 1\nproperty list {kind} int b\n{XYZ}");
