@@ -1,6 +1,7 @@
 //! No target: writes the files that fuzzing starts with into the folder `SEEDS`, and ends. It is built as
 //! the targets are, since they are built with what only libFuzzer can link.
 #![no_main]
+#![allow(unreachable_code, reason = "the program ends before there is an input")]
 
 libfuzzer_sys::fuzz_target!(
     init: {
