@@ -11,6 +11,9 @@ use crate::workspace::file::{Place, ScratchFile};
 use crate::workspace::persist::{Persist, Saved};
 use std::sync::Mutex;
 
+/// Sections of which a table is not made unasked.
+const LARGE: usize = 1 << 20;
+
 /// Numbered sections of `N`-word records in one scratch file, which is deleted on drop.
 #[derive(Debug)]
 pub struct Sections<const N: usize> {
@@ -61,6 +64,11 @@ impl<const N: usize> Sections<N> {
     ) -> Result<Self> {
         let (file, known) = workspace.keep_file(name)?;
         let count = known.iter().fold(count, |n, (s, _)| n.max(*s as usize + 1));
+        if count > LARGE {
+            // More than the budget holds comes from a journal that speaks of something else.
+            let bytes = (count as u64).saturating_mul(size_of::<Place>() as u64);
+            drop(workspace.reserve("table of sections", bytes)?);
+        }
         let mut places = vec![Place::default(); count];
         for (section, place) in known {
             places[section as usize] = place;
@@ -149,6 +157,11 @@ impl<const N: usize> Sections<N> {
     pub fn get_into(&self, section: usize, records: &mut Vec<Record<N>>) -> Result<()> {
         let place = self.places()[section];
         records.clear();
+        if !self.fits(place) {
+            let found = format!("{} bytes", place.bytes);
+            let expected = format!("{} records of {N} words", place.records);
+            return Err(self.file.damaged(place.offset, found, expected));
+        }
         let Some(layout) = self.layout else {
             records.resize(place.records, [0; N]);
             return self.read(place, bytemuck::cast_slice_mut(records));
@@ -161,6 +174,15 @@ impl<const N: usize> Sections<N> {
             let expected = format!("{} records", place.records);
             self.file.damaged(place.offset, found, expected)
         })
+    }
+
+    /// True if so many records can take so many bytes.
+    fn fits(&self, place: Place) -> bool {
+        match self.layout {
+            // Packed, a word takes at least the two bits of its length.
+            Some(_) => place.records.saturating_mul(N).div_ceil(4) <= place.bytes,
+            None => place.records.checked_mul(size_of::<Record<N>>()) == Some(place.bytes),
+        }
     }
 
     fn read(&self, place: Place, bytes: &mut [u8]) -> Result<()> {
@@ -234,5 +256,28 @@ mod tests {
                 bytes[at] ^= 16;
             }
         }
+    }
+
+    /// Found by fuzzing a journal whose checksums are right.
+    #[test]
+    fn places_that_cannot_be_ask_for_no_memory() {
+        let workspace = crate::spill::sorter::tests::workspace();
+        let packed = Sections::<3>::create(&workspace, "packed", 1).unwrap();
+        let unpacked = Sections::<3>::unpacked(&workspace, "unpacked", 1).unwrap();
+        for sections in [packed, unpacked] {
+            sections.put(0, &[[1, 2, 3]; 100]).unwrap();
+            for records in [101 * 8, usize::MAX / 16, usize::MAX] {
+                sections.places()[0].records = records;
+                let error = sections.get(0).unwrap_err();
+                assert!(matches!(error, Error::Corrupt { .. }), "{error}");
+            }
+        }
+        let mut saved = Vec::new();
+        String::from("table").save(&mut saved);
+        (1usize << 58).save(&mut saved);
+        false.save(&mut saved);
+        [0u8; 3].save(&mut saved);
+        let loaded = Sections::<3>::load(&mut Saved::new(&saved, &workspace));
+        assert!(matches!(loaded, Err(Error::Memory { .. })));
     }
 }

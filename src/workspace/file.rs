@@ -23,6 +23,15 @@ pub struct Place {
     pub crc: u32,
 }
 
+impl Place {
+    /// Where it ends; none if no file can reach so far.
+    #[must_use]
+    pub fn end(&self) -> Option<u64> {
+        let end = self.offset.checked_add(self.bytes as u64)?;
+        i64::try_from(end).ok().map(i64::cast_unsigned)
+    }
+}
+
 /// A part of a file that was written.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Put {

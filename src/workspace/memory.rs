@@ -91,7 +91,7 @@ impl MemoryPool {
     /// [`Error::Memory`], naming the current holders.
     pub fn reserve(&self, name: &'static str, bytes: u64) -> Result<Reservation> {
         let mut state = self.state();
-        if state.used + bytes > self.0.capacity {
+        if state.used.saturating_add(bytes) > self.0.capacity {
             let held: Vec<String> = state
                 .holders
                 .iter()
@@ -103,7 +103,7 @@ impl MemoryPool {
                 } else {
                     format!("{name} (beside {})", held.join(", "))
                 },
-                needed: state.used + bytes + OVERHEAD,
+                needed: (state.used + OVERHEAD).saturating_add(bytes),
                 budget: self.0.budget,
             });
         }
@@ -122,7 +122,8 @@ impl MemoryPool {
     /// [`Error::Memory`] if it does not fit although no other holder of `name` is left to wait for.
     pub fn reserve_waiting(&self, name: &'static str, bytes: u64) -> Result<Reservation> {
         let mut state = self.state();
-        while state.used + bytes > self.0.capacity && state.holders.contains_key(name) {
+        while state.used.saturating_add(bytes) > self.0.capacity && state.holders.contains_key(name)
+        {
             state = self
                 .0
                 .freed
@@ -194,6 +195,28 @@ mod tests {
         assert_eq!(pool.available(), 0);
         drop(all);
         assert_eq!(pool.available(), pool.capacity());
+    }
+
+    /// Found by fuzzing: the sum was taken modulo 2^64, and so this was granted.
+    #[test]
+    fn refuses_what_has_no_sum_with_what_is_held() {
+        let pool = MemoryPool::new(MINIMUM_BUDGET).unwrap();
+        let _held = pool.reserve("held", 4096).unwrap();
+        for bytes in [u64::MAX, u64::MAX - 100, u64::MAX - 4095] {
+            let error = pool.reserve("huge", bytes).unwrap_err();
+            assert!(
+                matches!(
+                    error,
+                    Error::Memory {
+                        needed: u64::MAX,
+                        ..
+                    }
+                ),
+                "{error}"
+            );
+            assert!(pool.reserve_waiting("huge", bytes).is_err());
+        }
+        assert_eq!(pool.peak(), 4096);
     }
 
     #[test]

@@ -220,7 +220,7 @@ impl Workspace {
             let file = open_existing(&path).map_err(|e| Error::io(&path, "open", e))?;
             ScratchFile::new(name, path, Some(file), true, self.shared.clone())
         };
-        let end = places.iter().map(|(_, p)| p.offset + p.bytes as u64).max();
+        let end = places.iter().filter_map(|(_, p)| p.end()).max();
         file.reach(end.unwrap_or(0));
         Ok((file, places))
     }

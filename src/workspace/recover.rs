@@ -34,6 +34,9 @@ fn is_whole(file: &File, part: &Needed) -> bool {
     let mut buffer = vec![0; part.place.bytes.min(CHUNK)];
     let mut at = part.place.offset;
     let mut left = part.place.bytes;
+    if part.place.end().is_none() {
+        return false;
+    }
     while left > 0 {
         let now = &mut buffer[..left.min(CHUNK)];
         if file.read_exact_at(now, at).is_err() {
@@ -60,8 +63,8 @@ fn damaged(
             by_file.entry(part.file.clone()).or_default().push(part);
         }
     }
-    let total: usize = by_file.values().flatten().map(|p| p.place.bytes).sum();
-    observer.begin("check", "bytes", total as u64);
+    let sizes = by_file.values().flatten().map(|p| p.place.bytes as u64);
+    observer.begin("check", "bytes", sizes.fold(0, u64::saturating_add));
     let mut all = Vec::new();
     for (name, parts) in by_file {
         let paths = if name == MESH {
@@ -106,7 +109,13 @@ pub fn recover(
     let bad = damaged(history.needed(), places, observer, cancel)?;
     let names: BTreeSet<&str> = bad.iter().map(|part| part.file.as_str()).collect();
     let names = names.into_iter().collect::<Vec<_>>().join(", ");
-    match history.mend(&bad) {
+    // A journal that speaks of parts before any stage is not of this program: nothing of it counts.
+    let first = || Mending::Rewind {
+        end: entries.get(1).map_or(end, |entry| entry.offset),
+        stage: "ingest".into(),
+    };
+    let mending = history.mend(&bad).or_else(|| (!bad.is_empty()).then(first));
+    match mending {
         None => Ok((history, end)),
         Some(Mending::Redo(units)) => {
             observer.warn(&format!(
@@ -131,6 +140,81 @@ pub fn recover(
                 .cloned()
                 .collect();
             Ok((History::of(&kept), end))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::file::{Place, Put};
+    use super::super::journal::Record;
+    use super::super::progress::Silent;
+    use super::*;
+
+    /// Found by fuzzing: parts of no stage were believed, damaged or not, and memory was asked for by
+    /// their sizes.
+    #[test]
+    fn damage_before_any_stage_leaves_nothing_that_counts() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("a"), "0123").unwrap();
+        let put = Put {
+            file: "a".into(),
+            section: 0,
+            place: Place {
+                offset: 0,
+                bytes: 1 << 40,
+                records: 1 << 38,
+                crc: 0,
+            },
+        };
+        let unit = Record::Unit {
+            step: "/step#1".into(),
+            unit: 0,
+            puts: vec![put],
+            payload: Vec::new(),
+        };
+        let gone = Record::Deleted("b".into());
+        let records = [Record::Manifest(Vec::new()), unit, gone];
+        let entries = records.into_iter().zip(0..);
+        let entries: Vec<Entry> = entries
+            .map(|(record, offset)| Entry {
+                offset,
+                payload: (offset, 0),
+                record,
+            })
+            .collect();
+        let places = Whereabouts {
+            folder: folder.path(),
+            mesh: &Default::default(),
+        };
+        let (history, end) = recover(&entries, 3, &places, &Silent, &Cancel::new()).unwrap();
+        assert!(history.places("a").is_empty() && history.units("/step#1").is_empty());
+        assert_eq!(end, 1);
+    }
+
+    #[test]
+    fn a_part_beyond_the_end_of_all_files_is_damaged() {
+        let file = tempfile::tempfile().unwrap();
+        file.write_all_at(b"0123456789", 0).unwrap();
+        let part = |offset, bytes| Needed {
+            file: "a".into(),
+            section: 0,
+            place: Place {
+                offset,
+                bytes,
+                records: 0,
+                crc: crc32fast::hash(b"234"),
+            },
+        };
+        assert!(is_whole(&file, &part(2, 3)));
+        for (offset, bytes) in [
+            (2, 4),
+            (9, 3),
+            (u64::MAX, 3),
+            (2, usize::MAX),
+            (u64::MAX, usize::MAX),
+        ] {
+            assert!(!is_whole(&file, &part(offset, bytes)), "{offset} {bytes}");
         }
     }
 }

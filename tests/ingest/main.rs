@@ -1,9 +1,14 @@
 //! Files of every kind made on the spot, read back as lattice positions.
 
+mod belong;
 mod bench;
+mod bombs;
 mod classes;
 mod damage;
+mod formats;
 mod lattices;
+mod numbers;
+mod ply_headers;
 
 use bench::{Bench, based, cloud, ply, positions, write_las};
 use outcrop::Error;

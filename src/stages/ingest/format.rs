@@ -64,7 +64,7 @@ pub(super) const READABLE: &str = "LAS, LAZ, PLY or text (XYZ, CSV, PTS)";
 /// Bytes at the start of a file that decide its format.
 const HEAD: usize = 64 << 10;
 
-/// The same for a file with a very long first line.
+/// The same for a file with a very long first line, or many lines without a point.
 const LONG_HEAD: usize = 1 << 20;
 
 /// A file's family of formats, with what was learnt on the way.
@@ -91,6 +91,9 @@ pub(super) fn family(path: &Path, head: &[u8], whole: bool) -> Family {
     }
     if is_ply(head) {
         return Family::Ply;
+    }
+    if head.strip_prefix(b"\xef\xbb\xbf").is_some_and(is_ply) {
+        return Family::Unknown("PLY behind a byte order mark".into());
     }
     if head.starts_with(b"ASTM-E57") {
         return Family::Foreign("E57");
@@ -137,12 +140,16 @@ pub(super) fn has_extension(path: &Path, extensions: &[&str]) -> bool {
 
 /// The family of an open file.
 pub(super) fn family_of(input: &Input) -> Result<Family> {
-    let mut head = input.head(HEAD)?;
-    if !head.iter().any(|b| matches!(b, b'\n' | b'\r')) {
-        // The first line is longer.
-        head = input.head(LONG_HEAD)?;
+    let head = input.head(HEAD)?;
+    let whole = |head: &[u8]| head.len() as u64 == input.bytes;
+    match family(&input.path, &head, whole(&head)) {
+        // A long first line, or many lines of comments.
+        Family::Unknown(_) if !whole(&head) && !head.contains(&0) => {
+            let head = input.head(LONG_HEAD)?;
+            Ok(family(&input.path, &head, whole(&head)))
+        }
+        found => Ok(found),
     }
-    Ok(family(&input.path, &head, head.len() as u64 == input.bytes))
 }
 
 /// The error for a file of a family that is not read.

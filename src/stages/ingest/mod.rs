@@ -7,6 +7,7 @@
 //! Formats are told apart by content: LAS 1.0 to 1.4 with point formats 0 to 10, LAZ (COPC
 //! included), PLY, and text with a point a line.
 
+mod belong;
 mod classes;
 mod contain;
 mod expand;
@@ -85,6 +86,7 @@ pub fn ingest_classes(
     let name = format!("ingest-{}.spool", workspace.number());
     let file = SpoolFile::open(workspace, &name)?;
     let mut sources = Vec::new();
+    let mut systems = Vec::new();
     let mut stats = IngestStats::default();
     for path in expand(inputs)? {
         workspace.check_cancel()?;
@@ -103,8 +105,12 @@ pub fn ingest_classes(
         let shown = |w: String| format!("{}: {w}", path.display());
         stats.warnings.extend(warnings.into_iter().map(shown));
         stats.add(&opened, &source);
+        systems.push(opened.crs());
         sources.push(source);
     }
+    stats
+        .warnings
+        .extend(belong::warnings(&stats.files, &systems));
     Ok(Spool {
         file,
         sources,
@@ -180,6 +186,11 @@ impl Opened {
             Kind::Las(header) => Some(header),
             Kind::Ply(_) | Kind::Text(_) => None,
         }
+    }
+
+    /// The reference system that the file names.
+    fn crs(&self) -> Option<las::Crs> {
+        las::crs::read(&self.input, self.las()?)
     }
 
     fn claimed(&self) -> Option<u64> {

@@ -338,7 +338,11 @@ impl Persist for PointStore {
         let workspace = from.workspace;
         let mut writer = StoreWriter::open(workspace, &name, page)?;
         let gone = writer.is_gone();
-        if !gone && writer.boxes.len() != len.div_ceil(page) {
+        let whole = || {
+            let bytes = (len as u64).saturating_mul(size_of::<Point>() as u64);
+            writer.boxes.len() == len.div_ceil(page.max(1)) && bytes <= writer.file.end()
+        };
+        if page == 0 || !gone && !whole() {
             return Err(from.wrong(format!("{len} points of the file {name}")));
         }
         writer.len = len;

@@ -31,6 +31,8 @@ pub(in super::super) struct Header {
     pub(in super::super) data_end: u64,
     /// Where the variable-length records start.
     pub(in super::super) vlrs: u64,
+    /// Where the extended records start, and how many there are.
+    pub(in super::super) extended: Option<(u64, u32)>,
     pub(in super::super) scale: [f64; 3],
     pub(in super::super) offset: [f64; 3],
     pub(in super::super) warnings: Vec<String>,
@@ -74,6 +76,7 @@ impl Header {
             data: u64::from(u32_at(&head, 96)),
             data_end: input.bytes,
             vlrs: header_bytes.max(SMALLEST) as u64,
+            extended: full.then(|| (u64_at(&head, 235), u32_at(&head, 243))),
             scale: [131, 139, 147].map(|at| f64_at(&head, at)),
             offset: [155, 163, 171].map(|at| f64_at(&head, at)),
             warnings,
@@ -87,7 +90,7 @@ impl Header {
             }
         }
         header.check_layout(input, head[104])?;
-        header.find_end(input, &head, header_bytes, full);
+        header.find_end(input, &head, header_bytes);
         if header.claimed > 0 || header.data < header.data_end {
             header.check_transform(input)?;
         }
@@ -120,10 +123,10 @@ impl Header {
     }
 
     /// Ends the points where something else is known to start.
-    fn find_end(&mut self, input: &Input, head: &[u8], header_bytes: usize, full: bool) {
+    fn find_end(&mut self, input: &Input, head: &[u8], header_bytes: usize) {
         let mut starts = Vec::new();
-        if full && u32_at(head, 243) > 0 {
-            starts.push(u64_at(head, 235));
+        if let Some((start, 1..)) = self.extended {
+            starts.push(start);
         }
         // The waveform packets, if they are in this file, are an extended record too.
         if self.version[1] >= 3 && header_bytes >= 235 && head.len() >= 235 {

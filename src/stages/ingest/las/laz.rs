@@ -14,6 +14,11 @@ const MODELS: u64 = 1 << 20;
 const MODELS_PER_BYTE: u64 = 4 << 10;
 /// Chunks of whole points up to this size are decoded from memory.
 const IN_MEMORY: u64 = 8 << 20;
+/// Points that a byte of a file may stand for, and points that are believed whatever the size. Scans
+/// take some bytes a point, and rows of a grid, or points that are all alike, a twenty-fifth of one: a
+/// small file could claim any number of them.
+const PER_BYTE: u64 = 64;
+const FEW: u64 = 1 << 23;
 
 pub(super) fn read(
     input: &Input,
@@ -26,6 +31,7 @@ pub(super) fn read(
     if header.claimed == 0 && header.data + 8 > input.bytes {
         return Ok(warnings);
     }
+    plausible(input, header.claimed)?;
     let decoder = Decoder {
         input,
         header,
@@ -47,6 +53,19 @@ pub(super) fn read(
     limit(input, header, &laszip, &mut table, &mut warnings)?;
     in_parallel(&decoder, &table.chunks, writer)?;
     Ok(warnings)
+}
+
+/// Refuses a number of points that no scan can have in a file of this size.
+fn plausible(input: &Input, points: u64) -> Result<()> {
+    let most = FEW + PER_BYTE * input.bytes;
+    if points <= most {
+        return Ok(());
+    }
+    Err(input.error(
+        "point count",
+        format!("{points} points in {} compressed bytes", input.bytes),
+        format!("at most {most}; if they are really so much alike, give them as LAS"),
+    ))
 }
 
 /// Memory of the models that decode all items.
@@ -166,7 +185,7 @@ fn limit(
         warnings.push(format!(
             "the header claims 0 points, the {present} in the chunks are read"
         ));
-        return Ok(());
+        return plausible(input, present);
     }
     let full = laszip.chunk_points.unwrap_or(1);
     if present - claimed >= full {

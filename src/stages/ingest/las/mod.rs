@@ -1,6 +1,7 @@
 //! LAS 1.0 to 1.4 and LAZ.
 
 mod chunks;
+pub(super) mod crs;
 mod gps;
 mod header;
 mod laz;
@@ -8,6 +9,7 @@ mod plain;
 mod table;
 mod vlr;
 
+pub(super) use crs::Crs;
 pub(super) use header::Header;
 
 /// Byte of a record that holds the withheld flag, in all point formats.

@@ -120,7 +120,10 @@ impl Lines<'_> {
             };
             if let Property::List { .. } = property {
                 let mut none = 0;
-                let items = number::parse(word, false, &mut none).unwrap_or(0.0);
+                let items = number::parse(word, false, &mut none);
+                let Some(items) = items.filter(|n| *n >= 0.0 && n.fract() == 0.0) else {
+                    break;
+                };
                 for _ in 0..items as u64 {
                     if words.next().is_none() {
                         break;

@@ -215,6 +215,14 @@ impl<'a> Parser<'a> {
         let Some(body) = self.body else {
             return Err(self.error("end_header", "a line \"format\" before it"));
         };
+        let named = self.elements.iter().filter(|e| e.name == "vertex").count();
+        if named > 1 {
+            return Err(self.input.error(
+                "PLY header",
+                format!("{named} elements named vertex"),
+                "one",
+            ));
+        }
         let at = self.elements.iter().position(|e| e.name == "vertex");
         let vertex = match at {
             Some(at) => Some(self.vertex(&self.elements[at])?),
@@ -233,6 +241,14 @@ impl<'a> Parser<'a> {
     fn vertex(&self, element: &Element) -> Result<Vertex> {
         let mut coordinates = [(0, Scalar::F32); 3];
         for (to, name) in coordinates.iter_mut().zip(["x", "y", "z"]) {
+            let named = element.names.iter().filter(|n| *n == name).count();
+            if named > 1 {
+                return Err(self.input.error(
+                    "PLY header, element vertex",
+                    format!("{named} properties named {name}"),
+                    "one",
+                ));
+            }
             let at = element.names.iter().position(|n| n == name);
             *to = match at.map(|at| (at, element.properties[at])) {
                 Some((at, Property::One(scalar))) => (at, scalar),

@@ -141,7 +141,13 @@ pub(in super::super) fn guess(head: &[u8], whole: bool) -> Result<Dialect, Strin
     };
     let lines = lines(&head[mark..], whole);
     let Some(&(_, first_end, first)) = lines.first() else {
-        return Err("no line with numbers".into());
+        return Err(
+            match head.iter().any(|b| matches!(b, b'\n' | b'\r')) || whole {
+                true if whole => "no line with numbers".into(),
+                true => format!("no line with numbers in the first {} bytes", head.len()),
+                false => format!("no line end in the first {} bytes", head.len()),
+            },
+        );
     };
     let styles = [
         (Separator::Space, false),

@@ -1,0 +1,222 @@
+//! Do the files belong together? Warnings about reference systems, units and places that do not fit.
+
+use super::las::Crs;
+use super::stats::FileStats;
+
+/// How many times as far apart points of one file are, and how many times as large its box is, that
+/// the unit is asked for. A small piece of a survey has few points: its box is small, and they are no
+/// closer to each other.
+const LARGER: f64 = 100.0;
+
+/// Fewest points of a file that is compared in size.
+const FEWEST: u64 = 100;
+
+/// How many times the largest file a stretch without files is, that it is asked about.
+const FARTHER: f64 = 100.0;
+
+/// At most one line about reference systems, and one about sizes or places.
+pub(super) fn warnings(files: &[FileStats], systems: &[Option<Crs>]) -> Vec<String> {
+    let boxes: Vec<Extent<'_>> = files.iter().filter_map(Extent::of).collect();
+    let places = far_apart(&boxes).or_else(|| unlike_sizes(&boxes));
+    let systems = unlike_systems(files, systems);
+    systems.into_iter().chain(places).collect()
+}
+
+/// The first file with a reference system, and the first whose system is another.
+fn unlike_systems(files: &[FileStats], systems: &[Option<Crs>]) -> Option<String> {
+    let mut known = files
+        .iter()
+        .zip(systems)
+        .filter_map(|(f, s)| Some((f, s.as_ref()?)));
+    let (first, system) = known.next()?;
+    let (other, another) = known.find(|(_, s)| s.differs(system))?;
+    Some(format!(
+        "{}: its reference system is {another}, that of {} is {system}; coordinates are taken as they \
+         are, is that meant?",
+        other.path.display(),
+        first.path.display()
+    ))
+}
+
+/// The box of a file.
+struct Extent<'a> {
+    file: &'a FileStats,
+    min: [f64; 3],
+    max: [f64; 3],
+    diagonal: f64,
+}
+
+impl<'a> Extent<'a> {
+    fn of(file: &'a FileStats) -> Option<Self> {
+        let (min, max) = (file.min?, file.max?);
+        let sides = (0..3).map(|axis| max[axis] - min[axis]);
+        Some(Self {
+            file,
+            min,
+            max,
+            diagonal: sides.map(|s| s * s).sum::<f64>().sqrt(),
+        })
+    }
+
+    /// About how far apart points are, if they lie on a surface.
+    fn spacing(&self) -> f64 {
+        self.diagonal / (self.file.kept as f64).sqrt()
+    }
+}
+
+/// Two files with a long stretch between them, along an axis, in which there is no other.
+fn far_apart(boxes: &[Extent<'_>]) -> Option<String> {
+    let largest = boxes.iter().map(|b| b.diagonal).fold(0.0, f64::max);
+    if largest == 0.0 {
+        return None;
+    }
+    for axis in 0..3 {
+        let mut order: Vec<&Extent<'_>> = boxes.iter().collect();
+        order.sort_by(|a, b| a.min[axis].total_cmp(&b.min[axis]));
+        let mut reach = *order.first()?;
+        for next in order {
+            let gap = next.min[axis] - reach.max[axis];
+            if gap > FARTHER * largest {
+                return Some(format!(
+                    "{}: it is {} away from {}, {:.0} times the size of the largest file; do they \
+                     belong together?",
+                    next.file.path.display(),
+                    rounded(gap),
+                    reach.file.path.display(),
+                    gap / largest
+                ));
+            }
+            if next.max[axis] > reach.max[axis] {
+                reach = next;
+            }
+        }
+    }
+    None
+}
+
+/// The largest and the smallest file, if one seems to be in another unit.
+fn unlike_sizes(boxes: &[Extent<'_>]) -> Option<String> {
+    let filled = || {
+        boxes
+            .iter()
+            .filter(|b| b.file.kept >= FEWEST && b.diagonal > 0.0)
+    };
+    let large = filled().max_by(|a, b| a.diagonal.total_cmp(&b.diagonal))?;
+    let small = filled().min_by(|a, b| a.diagonal.total_cmp(&b.diagonal))?;
+    let (size, spacing) = (
+        large.diagonal / small.diagonal,
+        large.spacing() / small.spacing(),
+    );
+    (size > LARGER && spacing > LARGER).then(|| {
+        format!(
+            "{}: it is {size:.0} times as large as {}, and its points are {spacing:.0} times as far apart; \
+             are they in the same unit?",
+            large.file.path.display(),
+            small.file.path.display()
+        )
+    })
+}
+
+/// A length with three digits.
+fn rounded(length: f64) -> f64 {
+    let unit = 10f64.powf(length.log10().floor() - 2.0);
+    if unit >= 1.0 && unit.is_finite() {
+        (length / unit).round() * unit
+    } else {
+        length
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stages::ingest::Format;
+
+    fn file(name: &str, kept: u64, min: [f64; 3], max: [f64; 3]) -> FileStats {
+        FileStats {
+            path: name.into(),
+            format: Format::Las,
+            bytes: 0,
+            claimed: None,
+            points: kept,
+            kept,
+            dropped_non_finite: 0,
+            withheld: 0,
+            dropped_by_class: 0,
+            min: (kept > 0).then_some(min),
+            max: (kept > 0).then_some(max),
+        }
+    }
+
+    fn said(files: &[FileStats]) -> Vec<String> {
+        warnings(files, &vec![None; files.len()])
+    }
+
+    /// A square of `side` with its corner at `x`, `y`, with points at a distance of `spacing`.
+    fn square(name: &str, [x, y]: [f64; 2], side: f64, spacing: f64) -> FileStats {
+        let points = (side / spacing).powi(2) as u64;
+        file(name, points, [x, y, 0.0], [x + side, y + side, side / 10.0])
+    }
+
+    #[test]
+    fn tiles_of_a_survey_belong_together() {
+        let mut tiles = Vec::new();
+        for row in 0..30 {
+            for column in 0..30 {
+                let corner = [
+                    4e5 + 1000.0 * f64::from(row),
+                    5e6 + 1000.0 * f64::from(column),
+                ];
+                tiles.push(square("tile", corner, 1000.0, 0.5));
+            }
+        }
+        // At its border a tile may hold next to nothing, or nothing.
+        tiles.push(file(
+            "sliver",
+            150,
+            [4.3e5, 5e6, 0.0],
+            [4.3e5 + 3.0, 5e6 + 4.0, 1.0],
+        ));
+        tiles.push(file("single", 1, [4.3e5, 5e6, 0.0], [4.3e5, 5e6, 0.0]));
+        tiles.push(file("empty", 0, [0.0; 3], [0.0; 3]));
+        // Some tiles of many, far from each other.
+        tiles.push(square("island", [4.9e5, 5.05e6], 1000.0, 0.5));
+        assert_eq!(said(&tiles), [""; 0]);
+        tiles.reverse();
+        assert_eq!(said(&tiles), [""; 0]);
+        assert_eq!(said(&[]), [""; 0]);
+    }
+
+    #[test]
+    fn a_detail_in_a_wider_scan_belongs_there() {
+        let street = square("street", [0.0, 0.0], 300.0, 0.02);
+        let statue = square("statue", [100.0, 100.0], 4.0, 0.001);
+        assert_eq!(said(&[street, statue]), [""; 0]);
+    }
+
+    #[test]
+    fn metres_and_millimetres_do_not() {
+        let metres = square("m.las", [0.0, 0.0], 20.0, 0.01);
+        let millimetres = square("mm.las", [0.0, 0.0], 15_000.0, 10.0);
+        let lines = said(&[metres, millimetres]);
+        assert_eq!(lines.len(), 1);
+        assert!(
+            lines[0].starts_with("mm.las: it is 750 times as large as m.las"),
+            "{lines:?}"
+        );
+    }
+
+    #[test]
+    fn local_and_national_coordinates_do_not() {
+        let mut files: Vec<FileStats> = (0..5)
+            .map(|i| square("national", [4e5 + 100.0 * f64::from(i), 5e6], 100.0, 0.1))
+            .collect();
+        files.push(square("local", [0.0, 0.0], 100.0, 0.1));
+        let lines = said(&files);
+        assert_eq!(lines.len(), 1);
+        assert!(
+            lines[0].contains("national") && lines[0].contains("away from local"),
+            "{lines:?}"
+        );
+    }
+}

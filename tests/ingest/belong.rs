@@ -1,0 +1,134 @@
+//! Warnings about files that do not belong together.
+
+use crate::bench::{Bench, cloud, write_las};
+use std::path::{Path, PathBuf};
+
+/// A file with these records of its reference system.
+fn with_records(path: &Path, records: &[(u16, Vec<u8>)], extended: bool) {
+    let mut builder = las::Builder::from((1, 4));
+    builder.point_format = las::point::Format::new(6).unwrap();
+    let records = records.iter().map(|(record_id, data)| las::Vlr {
+        user_id: "LASF_Projection".into(),
+        record_id: *record_id,
+        description: String::new(),
+        data: data.clone(),
+    });
+    if extended {
+        builder.evlrs.extend(records);
+    } else {
+        builder.vlrs.extend(records);
+    }
+    let mut writer = las::Writer::from_path(path, builder.into_header().unwrap()).unwrap();
+    for i in 0..200 {
+        let t = f64::from(i);
+        let [x, y, z] = [t % 14.0, t / 14.0, 0.0];
+        writer
+            .write_point(las::Point {
+                x,
+                y,
+                z,
+                gps_time: Some(t),
+                ..Default::default()
+            })
+            .unwrap();
+    }
+    writer.close().unwrap();
+}
+
+/// The keys of a projected system.
+fn keys(code: u16) -> Vec<(u16, Vec<u8>)> {
+    let words = [1u16, 1, 0, 2, 1024, 0, 1, 1, 3072, 0, 1, code];
+    vec![(34735, words.map(u16::to_le_bytes).concat())]
+}
+
+fn text(code: u16) -> Vec<(u16, Vec<u8>)> {
+    let text = format!("PROJCS[\"a\",GEOGCS[\"b\"],AUTHORITY[\"EPSG\",\"{code}\"]]\0");
+    vec![(2112, text.into_bytes())]
+}
+
+#[test]
+fn files_of_two_reference_systems_are_told_apart() {
+    let bench = Bench::new();
+    let mut number = 0;
+    let mut file = |records: &[(u16, Vec<u8>)], extended| {
+        number += 1;
+        let path = bench.path(&format!("{number}.laz"));
+        with_records(&path, records, extended);
+        path
+    };
+    let utm = file(&keys(26917), false);
+    let same = [
+        file(&keys(26917), false),
+        file(&text(26917), false),
+        file(&text(26917), true),
+        file(&[], false),
+    ];
+    let other = [
+        file(&keys(32617), false),
+        file(&text(32617), false),
+        file(&text(32617), true),
+    ];
+    let warnings = |paths: &[PathBuf]| bench.read(paths).unwrap().stats().warnings.clone();
+    let plain = bench.write("a.xyz", "1 2 0\n3 4 0\n");
+    let mut fine = vec![utm.clone(), plain];
+    fine.extend_from_slice(&same);
+    assert_eq!(warnings(&fine), [""; 0]);
+    for other in other {
+        let mut files = fine.clone();
+        files.push(other.clone());
+        let said = warnings(&files);
+        let expected = format!(
+            "{}: its reference system is EPSG:32617, that of {} is EPSG:26917;",
+            other.display(),
+            utm.display()
+        );
+        assert!(
+            said.len() == 1 && said[0].starts_with(&expected),
+            "{said:?}"
+        );
+    }
+}
+
+#[test]
+fn files_in_two_units_or_places_are_told_apart() {
+    let bench = Bench::new();
+    let write = |name: &str, scale: f64, offset: f64| {
+        let path = bench.path(name);
+        write_las(
+            &path,
+            (1, 2),
+            0,
+            (scale, [offset, 0.0, 0.0]),
+            &cloud(2000, 3),
+            false,
+        );
+        path
+    };
+    let metres = write("metres.las", 0.001, 0.0);
+    let beside = write("beside.las", 0.001, 200.0);
+    let millimetres = write("millimetres.las", 1.0, 0.0);
+    let elsewhere = write("elsewhere.las", 0.001, 5e6);
+    let warnings = |paths: &[&PathBuf]| {
+        let paths: Vec<PathBuf> = paths.iter().map(|p| (*p).clone()).collect();
+        bench.read(&paths).unwrap().stats().warnings.clone()
+    };
+    assert_eq!(warnings(&[&metres, &beside]), [""; 0]);
+    let said = warnings(&[&metres, &beside, &millimetres]);
+    assert!(
+        said.len() == 1 && said[0].contains("are they in the same unit?"),
+        "{said:?}"
+    );
+    assert!(
+        said[0].contains("millimetres.las: it is 1000 times as large as"),
+        "{said:?}"
+    );
+    let said = warnings(&[&elsewhere, &metres, &beside]);
+    assert!(
+        said.len() == 1 && said[0].contains("do they belong together?"),
+        "{said:?}"
+    );
+    assert!(
+        said[0].contains("elsewhere.las") && said[0].contains("beside.las"),
+        "{said:?}"
+    );
+}

@@ -1,0 +1,405 @@
+//! The kinds of files: how to make them, and which of other programs are of them.
+
+use super::{las, ply, text};
+use crate::bench::Bench;
+use std::path::PathBuf;
+
+/// Makes files of a kind.
+pub type Kind = fn(&Bench) -> Vec<PathBuf>;
+
+/// All kinds.
+pub const KINDS: &[(&str, Kind)] = &[
+    ("LAS 1.0, point formats 0 and 1", |b| {
+        las::all(b, &[0], 0..=1, "las")
+    }),
+    ("LAS 1.1, point formats 0 and 1", |b| {
+        las::all(b, &[1], 0..=1, "las")
+    }),
+    ("LAS 1.2, point formats 0 to 3", |b| {
+        las::all(b, &[2], 0..=3, "las")
+    }),
+    ("LAS 1.3, point formats 0 to 5", |b| {
+        las::all(b, &[3], 0..=5, "las")
+    }),
+    ("LAS 1.4, point formats 0 to 10", |b| {
+        las::all(b, &[4], 0..=10, "las")
+    }),
+    ("LAZ 1.0 to 1.3, point formats 0 to 5", las::old_laz),
+    ("LAZ 1.4, point formats 0 to 10", |b| {
+        las::all(b, &[4], 0..=10, "laz")
+    }),
+    ("COPC", las::copc),
+    ("extra bytes, described or not", las::extra_bytes),
+    (
+        "a name that says LAS for LAZ, or the other way round",
+        las::misnamed,
+    ),
+    (
+        "LAZ whose chunk table is missing, chunks of one size or point formats 6 to 10",
+        las::no_table,
+    ),
+    ("a box in the header that is wrong", las::boxes),
+    ("bytes after the points", las::trailing),
+    ("points flagged as withheld", las::withheld),
+    ("no points", las::none),
+    ("version 1.5", |b| las::patched(b, &[(25, &[5])])),
+    ("a count of 0 in the header, and points", |b| {
+        las::patched(b, &[(107, &[0; 4])])
+    }),
+    ("a count in the header that is too small", |b| {
+        las::patched(b, &[(107, &[50, 0, 0, 0])])
+    }),
+    ("a negative scale", |b| {
+        las::patched(b, &[(131, &(-0.01f64).to_le_bytes())])
+    }),
+    ("version 2.0", |b| las::patched(b, &[(24, &[2, 0])])),
+    ("point format 42", |b| las::patched(b, &[(104, &[42])])),
+    ("a record length below that of the point format", |b| {
+        las::patched(b, &[(105, &[19, 0])])
+    }),
+    ("a scale that is 0 or not a number", |b| {
+        let zero = las::patched(b, &[(139, &0f64.to_le_bytes())]);
+        [zero, las::patched(b, &[(147, &f64::NAN.to_le_bytes())])].concat()
+    }),
+    ("an offset that is infinite", |b| {
+        las::patched(b, &[(155, &f64::INFINITY.to_le_bytes())])
+    }),
+    ("points that start outside the file", |b| {
+        let after = las::patched(b, &[(96, &u32::MAX.to_le_bytes())]);
+        [after, las::patched(b, &[(96, &[10, 0, 0, 0])])].concat()
+    }),
+    ("a count in the header that is too large", las::too_many),
+    ("LAS that ends early", |b| las::cut(b, "las", &[60, 99])),
+    ("LAZ that ends early", |b| las::cut(b, "laz", &[60])),
+    ("a header that ends early", las::short_header),
+    ("a name that says LAS, and other content", |b| {
+        vec![b.write("a.las", "1 2 3\n"), b.write("b.laz", [1, 2, 3])]
+    }),
+    ("LAZ without its laszip record", las::no_record),
+    (
+        "LAZ with chunks of different sizes and no chunk table, point formats 0 to 5",
+        las::variable_without_table,
+    ),
+    (
+        "LAZ that claims more points than its size allows",
+        las::bomb,
+    ),
+    ("text, little-endian and big-endian", ply::bodies),
+    (
+        "coordinates that are `float`, `double` or whole numbers",
+        ply::types,
+    ),
+    (
+        "lists among the properties, and elements before the vertices",
+        ply::lists,
+    ),
+    (
+        "headers whose lines end with LF, CR LF or CR",
+        ply::line_ends,
+    ),
+    ("coordinates that are not finite", ply::not_finite),
+    ("no element vertex", |b| {
+        ply::header(b, "element face 0\n", "")
+    }),
+    ("no property z", |b| {
+        ply::header(
+            b,
+            "element vertex 1\nproperty float x\nproperty float y\n",
+            "1 2\n",
+        )
+    }),
+    ("a list called x", |b| {
+        let elements = "element vertex 1\nproperty list uchar float x\n\
+                        property float y\nproperty float z\n";
+        ply::header(b, elements, "1 1 2 3\n")
+    }),
+    ("two elements vertex, or two properties x", ply::twice),
+    ("a count that is negative or 2^64", ply::bad_counts),
+    (
+        "a binary body that ends early, or a count that is too large",
+        ply::short_binary,
+    ),
+    ("text that ends early", |b| {
+        ply::counted(b, "5", "1 2 3\n4 5 6\n")
+    }),
+    ("a list that is longer than the file", ply::long_list),
+    (
+        "a header without end, or of more than 1 MiB",
+        ply::endless_header,
+    ),
+    ("a type or a line that PLY does not have", ply::unknown),
+    ("a byte order mark before the first line", |b| {
+        let text = ply::text("1", "1 2 3\n");
+        vec![b.write("a.ply", format!("\u{feff}{text}"))]
+    }),
+    (
+        "spaces, tabs, commas or semicolons between numbers",
+        text::separators,
+    ),
+    (
+        "decimal commas, with spaces or semicolons",
+        text::decimal_commas,
+    ),
+    (
+        "a line of names, also with x, y and z in other places",
+        text::names,
+    ),
+    (
+        "comments behind `#` or `//`, and blank lines",
+        text::comments,
+    ),
+    ("PTS: lines that count the points after them", text::counts),
+    (
+        "lines that end with LF, CR LF or CR, and a UTF-8 byte order mark",
+        text::line_ends,
+    ),
+    ("any name, if the content is such a list", text::any_name),
+    (
+        "numbers that are not finite, or too large for a double",
+        |b| vec![b.write("a.xyz", "nan 1 2\n1 inf 2\n1e999 1 2\n3 4 5\n")],
+    ),
+    ("a line that is no point", |b| {
+        vec![
+            b.write("a.xyz", "1 2 3\n4 5 6\n7 8\n"),
+            b.write("b.csv", "1,2,3\n4,5,6\n7,eight,9\n"),
+        ]
+    }),
+    ("a count in PTS that is too large", |b| {
+        vec![b.write("a.pts", "5\n1 2 3\n4 5 6\n")]
+    }),
+    ("a first line of more than 1 MiB", |b| {
+        vec![b.write("a.xyz", "1 ".repeat(600_000) + "\n1 2 3\n")]
+    }),
+    ("a later line of more than 1 MiB", |b| {
+        vec![b.write("a.xyz", "1 2 3\n".to_owned() + &"1 ".repeat(3 << 20))]
+    }),
+    ("UTF-16", text::utf16),
+    ("binary data", |b| {
+        vec![b.write("a.xyz", [1, 2, 0, 3]), b.write("b", [0; 5000])]
+    }),
+    ("prose", |b| {
+        vec![b.write("a.txt", "It was a dark night.\n".repeat(20))]
+    }),
+    ("nothing but comments", |b| {
+        vec![b.write("a.txt", "# nothing\n\n//\n")]
+    }),
+    ("an empty file", |b| {
+        ["a.las", "a.laz", "a.ply", "a.xyz", "a"]
+            .map(|name| b.write(name, ""))
+            .into()
+    }),
+    ("E57", |b| vec![b.write("a.e57", "ASTM-E57 and more")]),
+    ("PCD", |b| {
+        vec![b.write("a.pcd", "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z\n")]
+    }),
+    ("PTX", |b| {
+        let head = "1\n1\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n";
+        vec![b.write("a.ptx", head.to_owned() + "1 2 3 0.5\n")]
+    }),
+    ("OBJ", |b| {
+        vec![b.write("a.obj", "v 1 2 3\nv 4 5 6\nv 7 8 9\nf 1 2 3\n")]
+    }),
+    ("STL as text", |b| {
+        vec![b.write("a.stl", "solid a\nfacet normal 0 0 1\n")]
+    }),
+    ("what is no regular file", |_| vec!["/dev/null".into()]),
+];
+
+/// Files of other programs by the kind that they are of.
+pub const ZOO: &[(&str, &[&str])] = &[
+    (
+        "LAS 1.2, point formats 0 to 3",
+        &["generated/pf0.las", "generated/pf3.las"],
+    ),
+    (
+        "LAS 1.3, point formats 0 to 5",
+        &["generated/pf4.las", "generated/pf5.las"],
+    ),
+    (
+        "LAS 1.4, point formats 0 to 10",
+        &[
+            "generated/pf6.las",
+            "generated/pf8.las",
+            "generated/pf10.las",
+            "generated/v1.4_pf1.las",
+        ],
+    ),
+    (
+        "LAS 1.0, point formats 0 and 1",
+        &["generated/v1.0_pf1.las"],
+    ),
+    (
+        "LAS 1.1, point formats 0 and 1",
+        &["generated/v1.1_pf1.las"],
+    ),
+    (
+        "LAZ 1.0 to 1.3, point formats 0 to 5",
+        &["generated/pf1.laz", "laz-rs/point-time-color.laz"],
+    ),
+    (
+        "LAZ 1.4, point formats 0 to 10",
+        &[
+            "generated/pf6.laz",
+            "generated/pf9.laz",
+            "generated/pf10.laz",
+        ],
+    ),
+    ("COPC", &["laspy/simple.copc.laz"]),
+    (
+        "extra bytes, described or not",
+        &[
+            "generated/extra_bytes.laz",
+            "generated/reclen_long_undeclared.las",
+            "laz-rs/extra-bytes.laz",
+        ],
+    ),
+    (
+        "a name that says LAS for LAZ, or the other way round",
+        &["generated/las_named.laz", "generated/laz_named.las"],
+    ),
+    (
+        "a box in the header that is wrong",
+        &[
+            "generated/bbox_zero.las",
+            "generated/bbox_nan.las",
+            "generated/bbox_inverted.las",
+        ],
+    ),
+    (
+        "bytes after the points",
+        &["generated/trailing_garbage.las"],
+    ),
+    (
+        "no points",
+        &[
+            "generated/empty.las",
+            "generated/empty.laz",
+            "generated/empty14.laz",
+        ],
+    ),
+    ("version 1.5", &["generated/v1.5_future.las"]),
+    (
+        "a count of 0 in the header, and points",
+        &["generated/count_zero.las"],
+    ),
+    (
+        "a count in the header that is too small",
+        &["generated/count_too_small.las"],
+    ),
+    ("a negative scale", &["generated/scale_neg.las"]),
+    ("point format 42", &["generated/bad_pointformat42.las"]),
+    (
+        "a record length below that of the point format",
+        &["generated/reclen_zero.las", "generated/reclen_short.las"],
+    ),
+    (
+        "a scale that is 0 or not a number",
+        &["generated/scale_zero.las", "generated/scale_nan.las"],
+    ),
+    ("an offset that is infinite", &["generated/offset_inf.las"]),
+    (
+        "points that start outside the file",
+        &[
+            "generated/dataoffset_past_eof.las",
+            "generated/dataoffset_in_header.las",
+        ],
+    ),
+    (
+        "a count in the header that is too large",
+        &["generated/count_too_big.las", "generated/count_4e9.las"],
+    ),
+    (
+        "LAS that ends early",
+        &["generated/trunc60.las", "generated/trunc99.las"],
+    ),
+    ("LAZ that ends early", &["generated/trunc60.laz"]),
+    (
+        "a header that ends early",
+        &["generated/trunc_header.las", "generated/magic_only.las"],
+    ),
+    (
+        "a name that says LAS, and other content",
+        &["generated/random.las", "generated/text_named.las"],
+    ),
+    (
+        "text, little-endian and big-endian",
+        &[
+            "generated/ascii.ply",
+            "generated/le_f32.ply",
+            "generated/be_f32.ply",
+        ],
+    ),
+    (
+        "coordinates that are `float`, `double` or whole numbers",
+        &["generated/le_f64.ply", "generated/int_coords.ply"],
+    ),
+    (
+        "lists among the properties, and elements before the vertices",
+        &[
+            "generated/list_before_vertex.ply",
+            "generated/with_faces_normals.ply",
+        ],
+    ),
+    (
+        "headers whose lines end with LF, CR LF or CR",
+        &["generated/ascii_crlf.ply", "generated/bin_crlf_header.ply"],
+    ),
+    (
+        "coordinates that are not finite",
+        &["generated/nan_inf.ply", "generated/nan_ascii.ply"],
+    ),
+    ("no property z", &["generated/no_z.ply"]),
+    (
+        "a count that is negative or 2^64",
+        &["generated/count_neg.ply"],
+    ),
+    (
+        "a binary body that ends early, or a count that is too large",
+        &["generated/short_body.ply", "generated/count_4e9.ply"],
+    ),
+    (
+        "spaces, tabs, commas or semicolons between numbers",
+        &[
+            "generated/space.xyz",
+            "generated/tab.xyz",
+            "generated/comma.xyz",
+            "generated/semicolon.xyz",
+        ],
+    ),
+    (
+        "decimal commas, with spaces or semicolons",
+        &["generated/decimal_comma.xyz"],
+    ),
+    (
+        "a line of names, also with x, y and z in other places",
+        &["generated/header.xyz", "generated/slashheader.xyz"],
+    ),
+    (
+        "comments behind `#` or `//`, and blank lines",
+        &["generated/hash.xyz"],
+    ),
+    (
+        "PTS: lines that count the points after them",
+        &["generated/pts_count.pts"],
+    ),
+    (
+        "lines that end with LF, CR LF or CR, and a UTF-8 byte order mark",
+        &[
+            "generated/crlf.xyz",
+            "generated/cr_only.xyz",
+            "generated/bom.xyz",
+        ],
+    ),
+    (
+        "any name, if the content is such a list",
+        &["generated/xyz_named.ply"],
+    ),
+    ("a line that is no point", &["generated/ragged.xyz"]),
+    ("UTF-16", &["generated/utf16.xyz"]),
+    ("an empty file", &["generated/empty_file.las"]),
+    (
+        "E57",
+        &["e57/bunnyFloat.e57", "generated/two_scans_pose.e57"],
+    ),
+    ("PTX", &["generated/two_scans.ptx"]),
+];

@@ -1,0 +1,4 @@
+//! Uncompressed LAS, by its name.
+#![no_main]
+
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| outcrop_fuzz::cloud::read("las", bytes));

@@ -1,0 +1,4 @@
+//! LAZ, by its name.
+#![no_main]
+
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| outcrop_fuzz::cloud::read("laz", bytes));

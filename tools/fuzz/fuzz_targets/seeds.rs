@@ -1,0 +1,13 @@
+//! No target: writes the files that fuzzing starts with into the folder `SEEDS`, and ends. It is built as
+//! the targets are, since they are built with what only libFuzzer can link.
+#![no_main]
+#![allow(unreachable_code, reason = "the program ends before there is an input")]
+
+libfuzzer_sys::fuzz_target!(
+    init: {
+        let folder = std::env::var_os("SEEDS").expect("the folder SEEDS");
+        outcrop_fuzz::seeds::write(folder.as_ref()).expect("seeds");
+        std::process::exit(0);
+    },
+    |_bytes: &[u8]| {}
+);

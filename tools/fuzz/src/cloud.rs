@@ -1,0 +1,56 @@
+//! Input files of all formats.
+
+use crate::{Bench, check_error};
+use outcrop::Error;
+use outcrop::stages::ingest::{Spool, ingest, probe};
+
+/// Reads a file of this extension, and streams its points on their lattice.
+pub fn read(extension: &str, bytes: &[u8]) {
+    let bench = Bench::get();
+    let path = bench.write(&format!("cloud.{extension}"), bytes);
+    let folder = path.parent().expect("the folder of a file").to_path_buf();
+    if let Err(error) = probe(&path) {
+        check_error(&error, &folder);
+    }
+    match ingest(&[path], &bench.workspace) {
+        Ok(spool) => check(&spool),
+        Err(error) => check_error(&error, &folder),
+    }
+    bench.check_memory();
+}
+
+/// Checks what must hold of every cloud.
+pub fn check(spool: &Spool) {
+    let stats = spool.stats();
+    let left_out = stats.dropped_non_finite + stats.withheld + stats.dropped_by_class;
+    assert_eq!(stats.read, stats.kept + left_out);
+    for warning in &stats.warnings {
+        assert!(!warning.contains('\n'), "{warning:?} is more than one line");
+    }
+    let _ = spool.source_precision();
+    for refine in [0, 10] {
+        let lattice = match spool.choose_lattice(refine) {
+            Ok(lattice) => lattice,
+            Err(Error::Degenerate { .. }) => {
+                assert_eq!(spool.points(), 0);
+                return;
+            }
+            Err(other) => panic!("no lattice: {other:?}"),
+        };
+        assert!(
+            lattice.step > 0.0 && lattice.step.is_finite(),
+            "{lattice:?}"
+        );
+        let mut count = 0;
+        let mut low = [i32::MAX; 3];
+        let streamed = spool.for_each(&lattice, |points| {
+            count += points.len() as u64;
+            for point in points {
+                low = std::array::from_fn(|axis| low[axis].min(point[axis]));
+            }
+            Ok(())
+        });
+        streamed.expect("points that were just written");
+        assert_eq!((count, low), (spool.points(), [0; 3]), "{lattice:?}");
+    }
+}

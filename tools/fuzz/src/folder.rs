@@ -1,0 +1,68 @@
+//! Several files as one cloud.
+
+use crate::{Bench, check_error, cloud};
+use outcrop::Classes;
+use outcrop::inspect::info::info;
+use outcrop::stages::ingest::{expand, ingest_classes, probe};
+
+/// What is between two files.
+pub const BETWEEN: &[u8] = b"\n=====\n";
+
+/// The extensions of files, by their first byte.
+pub const EXTENSIONS: [&str; 10] = [
+    "las", "laz", "ply", "xyz", "txt", "csv", "pts", "asc", "bin", "dat",
+];
+
+/// Most points of which [`info`] is asked.
+const FEW: u64 = 2000;
+
+/// Reads the files in `bytes`: the first byte of each says of which extension it is.
+pub fn read(bytes: &[u8]) {
+    let bench = Bench::get();
+    let folder = bench.path("folder");
+    let _ = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir(&folder).expect("a folder for files");
+    for (number, file) in split(bytes).into_iter().take(8).enumerate() {
+        let Some((kind, content)) = file.split_first() else {
+            continue;
+        };
+        let extension = EXTENSIONS[usize::from(*kind) % EXTENSIONS.len()];
+        bench.write(&format!("folder/{number}.{extension}"), content);
+    }
+    let classes = match bytes.len() % 3 {
+        0 => Classes::Drop([7, 18].into()),
+        _ => Classes::All,
+    };
+    match expand(std::slice::from_ref(&folder)) {
+        Ok(files) => files.iter().for_each(|file| {
+            if let Err(error) = probe(file) {
+                check_error(&error, &folder);
+            }
+        }),
+        Err(error) => check_error(&error, &folder),
+    }
+    let inputs = [folder.clone()];
+    match ingest_classes(&inputs, &classes, &bench.workspace) {
+        Ok(spool) => {
+            cloud::check(&spool);
+            let few = (1..FEW).contains(&spool.points());
+            drop(spool);
+            if few {
+                info(&inputs, &classes, &bench.workspace).expect("a cloud that was read once");
+            }
+        }
+        Err(error) => check_error(&error, &folder),
+    }
+    bench.check_memory();
+}
+
+fn split(bytes: &[u8]) -> Vec<&[u8]> {
+    let mut files = Vec::new();
+    let mut rest = bytes;
+    while let Some(at) = rest.windows(BETWEEN.len()).position(|w| w == BETWEEN) {
+        files.push(&rest[..at]);
+        rest = &rest[at + BETWEEN.len()..];
+    }
+    files.push(rest);
+    files
+}
