@@ -15,8 +15,10 @@ mod sums;
 
 pub use boxes::{Boxes, box_distances};
 pub(crate) use corners::SLACK;
-pub use corners::{CornerGroup, Frame, LANES, Line, LineGroup, bisectors, cut_corners, farthest};
-pub(crate) use corners::{bisectors_body, cut_body, farthest_body};
+pub use corners::{
+    CornerGroup, Frame, LANES, Line, LineGroup, bisectors, cut_corners, farthest, touching_lines,
+};
+pub(crate) use corners::{bisectors_body, cut_body, farthest_body, touching_body};
 pub(crate) use distances::{count_body, distances_body, keep_body};
 pub use distances::{count_within, distances, keep_within};
 pub use ranks::ranks;

@@ -60,14 +60,21 @@ impl PageLeaves {
         }
     }
 
-    /// Collects the points of all leaves within `d2` of `around`, a box inside the page, for `d2` up
-    /// to the page's squared reach.
+    #[inline]
+    fn bounds(&self, leaf: usize) -> Aabb {
+        let (min, max) = self.boxes.get(leaf);
+        Aabb { min, max }
+    }
+
+    /// Collects the points of all `wanted` leaves within `d2` of `around`, a box inside the page, for
+    /// `d2` up to the page's squared reach.
     pub fn gather(
         &mut self,
         level: Level,
         tile: &Tile,
         around: &Aabb,
         d2: u64,
+        wanted: impl Fn(&Aabb) -> bool,
         out: &mut Candidates,
     ) {
         out.complete2 = d2;
@@ -79,8 +86,9 @@ impl PageLeaves {
         let Aabb { min, max } = *around;
         box_distances(level, &self.boxes, min, max, &mut self.distances);
         let limit = above(d2);
-        for (&(start, count, id), distance2) in self.leaves.iter().zip(&self.distances) {
-            if *distance2 > limit {
+        let leaves = self.leaves.iter().zip(&self.distances);
+        for (leaf, (&(start, count, id), distance2)) in leaves.enumerate() {
+            if *distance2 > limit || !wanted(&self.bounds(leaf)) {
                 continue;
             }
             let points = &tile.points[start as usize..(start + count) as usize];
