@@ -255,6 +255,7 @@ impl Reconstruction {
             coordinates,
             peak_resident_bytes: limits::peak_resident(),
             peak_reserved_bytes: self.memory.peak(),
+            reserved_at_peak: self.memory.at_peak(),
             peak_scratch_bytes: workspace.io.scratch_peak(),
             seconds: begin.elapsed().as_secs_f64() + clock.earlier,
             stages: clock.stages,

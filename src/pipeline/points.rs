@@ -41,7 +41,7 @@ impl Reconstruction {
             thin(spool, lattice, grid, workspace)
         })?;
         let (store, stats) = clock.stage("order", "points", 0, || {
-            let orderer = Orderer::new(workspace)?;
+            let orderer = Orderer::for_points(workspace, points)?;
             let stats = orderer.take_stream(workspace, |from, stats, each| {
                 thinned.for_each(from, stats, each)
             })?;
@@ -83,7 +83,7 @@ pub(crate) fn order(
     let most = workspace.memory.available() / (8 * READ_BUFFERS);
     let threads = workspace.threads.min(most as usize).max(1);
     let held = workspace.reserve("order: frames", threads as u64 * READ_BUFFERS)?;
-    let orderer = Orderer::new(workspace)?;
+    let orderer = Orderer::for_points(workspace, spool.points())?;
     orderer.take_parts(workspace, &spool.frames(), |frames| {
         let push = |points: &[_]| orderer.push(workspace, points);
         spool.par_for_frames(threads, lattice, frames, push)
