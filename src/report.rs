@@ -1,6 +1,7 @@
 //! What happened in a run, for machines: the content of `--report`.
 
 use crate::params::Params;
+use crate::pipeline::DiskEstimate;
 use crate::stages::cells::CellStats;
 use crate::stages::export::{CoordinateType, MeshStats};
 use crate::stages::ingest::IngestStats;
@@ -62,6 +63,12 @@ pub struct Report {
     pub peak_reserved_bytes: u64,
     /// What it consisted of.
     pub reserved_at_peak: BTreeMap<&'static str, u64>,
+    /// Disk space as the headers of the inputs let expect; none if one cannot be read by itself.
+    pub estimated_first: Option<DiskEstimate>,
+    /// Peak of the scratch space as estimated when the points were read and relaxed, in bytes.
+    pub estimated_scratch_bytes: u64,
+    /// Size of the mesh as estimated then.
+    pub estimated_output_bytes: u64,
     /// Peak of the scratch space in bytes.
     pub peak_scratch_bytes: u64,
     /// Seconds in all.

@@ -14,9 +14,9 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 /// How often there is a look at what to do.
-const LOOK: Duration = Duration::from_secs(1);
+const LOOK: Duration = Duration::from_millis(250);
 /// Looks between two rounds of syncing, if no file waits to be deleted.
-const ROUND: u32 = 5;
+const ROUND: u32 = 20;
 
 /// A file that is not needed any more, and its size.
 #[derive(Debug)]
