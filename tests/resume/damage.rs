@@ -82,7 +82,7 @@ fn damage_to_any_file_is_found_and_mended() {
         "journal",
         "ingest-0.spool",
         "points",
-        "relaxed1",
+        "relaxed3",
     ] {
         assert!(named.contains(file), "{file}");
     }
