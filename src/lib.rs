@@ -83,7 +83,7 @@ pub mod workspace;
 
 pub use error::{Error, Result};
 pub use params::{Method, Params, Radius, Smoothing};
-pub use pipeline::{Builder, Reconstruction, Start};
+pub use pipeline::{Builder, DiskEstimate, Reconstruction, Start};
 pub use report::Report;
 pub use stages::ingest::Classes;
 pub use workspace::progress::{Cancel, Observer};

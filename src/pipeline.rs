@@ -4,6 +4,7 @@ mod attempt;
 mod builder;
 mod checks;
 mod clock;
+mod disk;
 mod manifest;
 mod points;
 
@@ -25,9 +26,11 @@ use crate::workspace::{Workspace, limits};
 use attempt::Alarm;
 pub use attempt::Start;
 pub use builder::Builder;
-pub(crate) use checks::{SCRATCH_PER_POINT, disk_radius};
+pub(crate) use checks::disk_radius;
 use checks::{enough, not_a_line, not_an_input, room, writable};
 pub(crate) use clock::Clock;
+pub use disk::DiskEstimate;
+pub(crate) use disk::Known;
 pub(crate) use points::order;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -108,6 +111,9 @@ impl Reconstruction {
         let begin = Instant::now();
         let params = &self.params;
         let mut clock = Clock::new(workspace);
+        let fits = |estimate| room(&self.folder, &self.output, estimate, workspace);
+        let first = Known::from_headers(&self.inputs).map(|known| known.estimate(params));
+        first.map_or(Ok(()), fits)?;
 
         let spool = clock.stage("ingest", "points", 0, || {
             ingest_classes(&self.inputs, &params.classes, workspace)
@@ -120,12 +126,22 @@ impl Reconstruction {
                 "{count} points left out: a coordinate is NaN or infinite"
             ));
         }
-        let needed = input.kept * self.scratch_per_point();
-        room(&self.folder, needed, workspace)?;
         let coordinates = match spool.source_precision() {
             ingest::CoordinateType::F32 => CoordinateType::Float,
             ingest::CoordinateType::F64 => CoordinateType::Double,
         };
+        let mut known = Known {
+            read: input.kept,
+            spool: spool.bytes(),
+            points: input.kept,
+            double: Some(coordinates == CoordinateType::Double),
+            moved: None,
+        };
+        if params.thin.is_some() {
+            // Nobody knows how many stay.
+            known.points = 0;
+        }
+        fits(known.estimate(params))?;
         let refine = if params.smooth + params.relax > 0 {
             SMOOTH_REFINE
         } else {
@@ -143,13 +159,8 @@ impl Reconstruction {
         }
         warnings.iter().for_each(|w| self.observer.warn(w));
         enough(&store)?;
-        if params.thin.is_some() {
-            room(
-                &self.folder,
-                store.len() as u64 * SCRATCH_PER_POINT,
-                workspace,
-            )?;
-        }
+        known.points = store.len() as u64;
+        fits(known.estimate(params))?;
         let (mut store, outliers) = self.without_outliers(store, &mut clock, workspace)?;
         enough(&store)?;
         let points = store.len() as u64;
@@ -172,6 +183,10 @@ impl Reconstruction {
         } else {
             None
         };
+        known.points = points;
+        known.moved = relaxed.as_ref().map(|r| r.store.is_some());
+        let estimate = known.estimate(params);
+        fits(estimate)?;
         let places = Places {
             shape: relaxed
                 .as_ref()
@@ -255,6 +270,10 @@ impl Reconstruction {
             coordinates,
             peak_resident_bytes: limits::peak_resident(),
             peak_reserved_bytes: self.memory.peak(),
+            reserved_at_peak: self.memory.at_peak(),
+            estimated_first: first,
+            estimated_scratch_bytes: estimate.scratch,
+            estimated_output_bytes: estimate.output,
             peak_scratch_bytes: workspace.io.scratch_peak(),
             seconds: begin.elapsed().as_secs_f64() + clock.earlier,
             stages: clock.stages,

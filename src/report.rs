@@ -1,6 +1,7 @@
 //! What happened in a run, for machines: the content of `--report`.
 
 use crate::params::Params;
+use crate::pipeline::DiskEstimate;
 use crate::stages::cells::CellStats;
 use crate::stages::export::{CoordinateType, MeshStats};
 use crate::stages::ingest::IngestStats;
@@ -11,6 +12,7 @@ use crate::stages::stitch::{BaseStats, InsertStats};
 use crate::stages::thin::ThinStats;
 use crate::stages::triples::TripleStats;
 use serde::Serialize;
+use std::collections::BTreeMap;
 
 /// Everything a run counts and measures. Keys are stable; new ones may be added.
 #[derive(Debug, Clone, Serialize)]
@@ -59,6 +61,14 @@ pub struct Report {
     pub peak_resident_bytes: u64,
     /// Peak of the memory reserved by name in bytes.
     pub peak_reserved_bytes: u64,
+    /// What it consisted of.
+    pub reserved_at_peak: BTreeMap<&'static str, u64>,
+    /// Disk space as the headers of the inputs let expect; none if one cannot be read by itself.
+    pub estimated_first: Option<DiskEstimate>,
+    /// Peak of the scratch space as estimated when the points were read and relaxed, in bytes.
+    pub estimated_scratch_bytes: u64,
+    /// Size of the mesh as estimated then.
+    pub estimated_output_bytes: u64,
     /// Peak of the scratch space in bytes.
     pub peak_scratch_bytes: u64,
     /// Seconds in all.
@@ -89,6 +99,8 @@ pub struct StageReport {
     pub bytes_read: u64,
     /// Bytes written to files.
     pub bytes_written: u64,
+    /// Peak of the scratch space while it was at work, in bytes.
+    pub scratch_bytes: u64,
     /// What the stage did one after the other, if it says so.
     pub parts: Vec<PartReport>,
 }

@@ -2,9 +2,10 @@
 
 use crate::error::Result;
 use crate::geom::aabb::Aabb;
-use crate::pipeline::{SCRATCH_PER_POINT, order};
+use crate::params::Params;
+use crate::pipeline::{Known, order};
 use crate::stages::cells::{AUTO_REACH, CellMaker, DiskRadius, Widen};
-use crate::stages::ingest::{Classes, IngestStats, ingest_classes};
+use crate::stages::ingest::{Classes, CoordinateType, IngestStats, ingest_classes};
 use crate::stages::order::{PAGE, PointStore};
 use crate::stages::tiles::Tile;
 use crate::stages::tiles::near::Search;
@@ -79,6 +80,8 @@ pub fn info(inputs: &[PathBuf], classes: &Classes, workspace: &Workspace) -> Res
     observer.end();
     let input = spool.stats().clone();
     let lattice = spool.choose_lattice(0)?;
+    let double = spool.source_precision() == CoordinateType::F64;
+    let spool_bytes = spool.bytes();
     observer.begin("order", "points", input.kept);
     let (store, duplicates) = order(spool, &lattice, PAGE, workspace)?;
     observer.end();
@@ -87,6 +90,14 @@ pub fn info(inputs: &[PathBuf], classes: &Classes, workspace: &Workspace) -> Res
     let Aabb { min, max } = store.bounds();
     let points = store.len() as u64;
     let cells = sample.seconds / sample.points.max(1) as f64 * points as f64;
+    let known = Known {
+        read: input.kept,
+        spool: spool_bytes,
+        points,
+        double: Some(double),
+        moved: None,
+    };
+    let disk = known.estimate(&Params::default());
     Ok(Info {
         duplicates,
         points,
@@ -97,8 +108,8 @@ pub fn info(inputs: &[PathBuf], classes: &Classes, workspace: &Workspace) -> Res
         spacing: percentiles(sample.nearest, lattice.step),
         auto_radius: percentiles(sample.radius, lattice.step),
         memory_minimum: MINIMUM_BUDGET,
-        scratch_bytes: points * SCRATCH_PER_POINT,
-        output_bytes: points * (24 + 26),
+        scratch_bytes: disk.scratch,
+        output_bytes: disk.output,
         seconds: read + cells / workspace.threads as f64 * (1.0 + OTHER_STAGES),
         input,
     })

@@ -24,6 +24,14 @@ impl Boxes {
         }
     }
 
+    /// Box number `index`, from its lowest corner to its highest.
+    #[must_use]
+    #[inline]
+    pub fn get(&self, index: usize) -> ([i32; 3], [i32; 3]) {
+        let corner = |columns: &[Vec<i32>; 3]| std::array::from_fn(|axis| columns[axis][index]);
+        (corner(&self.min), corner(&self.max))
+    }
+
     /// Number of boxes.
     #[must_use]
     pub fn len(&self) -> usize {

@@ -162,6 +162,30 @@ pub(crate) fn cut_body<E: Eight>(corners: &[CornerGroup], line: &Line) -> (u64, 
 }
 
 kernel! {
+    /// Bit `k` is set unless [`cut_corners`] finds nothing, cut off or in doubt, with line `k`.
+    pub fn touching_lines(corners: &[CornerGroup], lines: &LineGroup) -> u64 = touching_body<Eight>
+}
+
+#[inline(always)]
+pub(crate) fn touching_body<E: Eight>(corners: &[CornerGroup], lines: &LineGroup) -> u64 {
+    let (u, v) = (E::load(&lines.x), E::load(&lines.y));
+    let (offset, length) = (E::load(&lines.offset), E::load(&lines.length));
+    let least = E::splat(SLACK).mul(offset);
+    let mut clear = 0xff;
+    for corners in corners {
+        for k in 0..LANES {
+            let (x, y) = (corners.x[k], corners.y[k]);
+            // As in `cut_body`.
+            let depth = u.mul(E::splat(x)).add(v.mul(E::splat(y))).sub(offset);
+            let error = corners.error[k] + SLACK * (x.abs() + y.abs());
+            let bound = length.mul(E::splat(error)).add(least);
+            clear &= E::splat(0.0).sub(depth).greater(bound);
+        }
+    }
+    !clear & 0xff
+}
+
+kernel! {
     /// The largest of the corners' squared reaches.
     pub fn farthest(corners: &[CornerGroup]) -> f64 = farthest_body<Eight>
 }
@@ -219,8 +243,19 @@ mod tests {
                 let surely = depth.abs() > bound;
                 prop_assert_eq!(doubt >> k & 1 == 0, surely);
             }
+            let lines = LineGroup {
+                x: std::array::from_fn(|k| f64::from(k as i32 - 3)),
+                y: std::array::from_fn(|k| line.line[k % 2]),
+                offset: std::array::from_fn(|k| offset * k as f64),
+                length: [8.0; LANES],
+            };
             for level in Level::all() {
                 prop_assert_eq!(cut_corners(level, &corners, &line), (cut, doubt));
+                let touching = touching_lines(level, &corners, &lines);
+                for k in 0..LANES {
+                    let (cut, doubt) = cut_body::<Base>(&corners, &lines.get(k));
+                    prop_assert_eq!(touching >> k & 1 == 1, cut | doubt != 0);
+                }
                 prop_assert_eq!(farthest(level, &corners).to_bits(), farthest_body::<Base>(&corners).to_bits());
             }
         }

@@ -17,8 +17,10 @@ mod sums;
 pub(crate) use boxes::point_box_body;
 pub use boxes::{Boxes, box_distances};
 pub(crate) use corners::SLACK;
-pub use corners::{CornerGroup, Frame, LANES, Line, LineGroup, bisectors, cut_corners, farthest};
-pub(crate) use corners::{bisectors_body, cut_body, farthest_body};
+pub use corners::{
+    CornerGroup, Frame, LANES, Line, LineGroup, bisectors, cut_corners, farthest, touching_lines,
+};
+pub(crate) use corners::{bisectors_body, cut_body, farthest_body, touching_body};
 pub(crate) use distances::{count_body, distances_body};
 pub use distances::{count_within, distances};
 pub use pick::pick_column;

@@ -1,5 +1,6 @@
 //! What is checked between the stages.
 
+use super::disk::DiskEstimate;
 use crate::error::{Error, Result};
 use crate::geom::lattice::Lattice;
 use crate::params::Radius;
@@ -8,6 +9,7 @@ use crate::stages::export::folder_of;
 use crate::stages::ingest;
 use crate::stages::order::PointStore;
 use crate::workspace::{Workspace, limits};
+use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
 /// Disks larger than this, in steps, see all of any cloud.
@@ -37,12 +39,20 @@ pub(super) fn writable(output: &Path) -> Result<()> {
         .map_err(|e| Error::io(output, "write the mesh into this folder", e))
 }
 
-/// Scratch bytes a point at the peak, about, after the points were read; measured on real scans.
-pub(crate) const SCRATCH_PER_POINT: u64 = 50;
-
-/// Refuses before the long stages what the scratch folder has no room for: `needed` bytes, some of which
-/// may be taken already.
-pub(super) fn room(scratch: &Path, needed: u64, workspace: &Workspace) -> Result<()> {
+/// Refuses before long stages what the scratch folder, which may share its disk with the mesh, has no
+/// room for; some of it may be taken already.
+pub(super) fn room(
+    scratch: &Path,
+    output: &Path,
+    estimate: DiskEstimate,
+    workspace: &Workspace,
+) -> Result<()> {
+    let device = |path: &Path| Some(path.metadata().ok()?.dev());
+    let shared = device(scratch) == device(folder_of(output));
+    let needed = match shared {
+        true => estimate.together,
+        false => estimate.scratch,
+    };
     workspace.expect_scratch(needed);
     let needed = workspace.more_scratch();
     match limits::disk_free(scratch) {

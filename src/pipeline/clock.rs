@@ -20,6 +20,7 @@ struct Took {
     seconds: f64,
     read: u64,
     written: u64,
+    scratch: u64,
     parts: Vec<(String, f64)>,
 }
 
@@ -27,6 +28,7 @@ persist!(Took {
     seconds,
     read,
     written,
+    scratch,
     parts
 });
 
@@ -52,6 +54,7 @@ impl<'a> Clock<'a> {
             now = true;
             let io = &workspace.io;
             let (start, read, written) = (Instant::now(), io.read(), io.written());
+            io.begin_stage();
             workspace.observer.begin(name, unit, total);
             let outcome = work();
             workspace.observer.end();
@@ -60,6 +63,7 @@ impl<'a> Clock<'a> {
                 seconds: start.elapsed().as_secs_f64(),
                 read: io.read() - read,
                 written: io.written() - written,
+                scratch: io.stage_peak(),
                 parts: parts.map(|(name, s)| (name.to_owned(), s)).collect(),
             };
             Ok((outcome?, took))
@@ -73,6 +77,7 @@ impl<'a> Clock<'a> {
             seconds: took.seconds,
             bytes_read: took.read,
             bytes_written: took.written,
+            scratch_bytes: took.scratch,
             parts: parts
                 .map(|(name, seconds)| PartReport { name, seconds })
                 .collect(),

@@ -1,6 +1,6 @@
 //! From the spool to the ordered store: the stages that decide which points there are.
 
-use super::{Clock, Reconstruction, SCRATCH_PER_POINT};
+use super::{Clock, Reconstruction};
 use crate::error::Result;
 use crate::geom::lattice::Lattice;
 use crate::stages::ingest::{READ_BUFFERS, Spool};
@@ -9,18 +9,7 @@ use crate::stages::outliers::{OutlierOptions, OutlierStats, drop_outliers};
 use crate::stages::thin::{Grid, ThinStats, thin};
 use crate::workspace::Workspace;
 
-/// Scratch bytes a point until it is known which ones stay: sorted by cell.
-const THINNING: u64 = 24;
-
 impl Reconstruction {
-    /// Scratch bytes that each point takes that was read, about.
-    pub(super) fn scratch_per_point(&self) -> u64 {
-        match self.params.thin {
-            Some(_) => THINNING,
-            None => SCRATCH_PER_POINT,
-        }
-    }
-
     /// The points in order, thinned if asked for; duplicates folded.
     pub(super) fn in_order(
         &self,
@@ -41,7 +30,7 @@ impl Reconstruction {
             thin(spool, lattice, grid, workspace)
         })?;
         let (store, stats) = clock.stage("order", "points", 0, || {
-            let orderer = Orderer::new(workspace)?;
+            let orderer = Orderer::for_points(workspace, points)?;
             let stats = orderer.take_stream(workspace, |from, stats, each| {
                 thinned.for_each(from, stats, each)
             })?;
@@ -83,7 +72,7 @@ pub(crate) fn order(
     let most = workspace.memory.available() / (8 * READ_BUFFERS);
     let threads = workspace.threads.min(most as usize).max(1);
     let held = workspace.reserve("order: frames", threads as u64 * READ_BUFFERS)?;
-    let orderer = Orderer::new(workspace)?;
+    let orderer = Orderer::for_points(workspace, spool.points())?;
     orderer.take_parts(workspace, &spool.frames(), |frames| {
         let push = |points: &[_]| orderer.push(workspace, points);
         spool.par_for_frames(threads, lattice, frames, push)

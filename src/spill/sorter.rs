@@ -48,6 +48,13 @@ impl<const N: usize> Sorter<N> {
         }
     }
 
+    /// Takes the whole buffer at once, so that it never has to grow.
+    #[must_use]
+    pub fn whole(self) -> Self {
+        self.state().buffer.reserve_exact(self.capacity);
+        self
+    }
+
     /// Records that fit the buffer.
     #[must_use]
     pub fn capacity(&self) -> usize {

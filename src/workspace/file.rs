@@ -137,8 +137,11 @@ impl Maker {
         }
         let file = options().create_new(true).open(&path);
         let file = file.map_err(|e| Error::io(&path, "create", e))?;
-        let shared = self.shared.clone();
-        Ok(ScratchFile::new(name, path, Some(file), kept, shared))
+        let file = ScratchFile::new(name, path, Some(file), kept, self.shared.clone());
+        if let (Some(run), true) = (&self.shared.run, kept) {
+            run.keeper.made(&file.name);
+        }
+        Ok(file)
     }
 }
 
@@ -268,7 +271,7 @@ impl ScratchFile {
             && self.kept
             && !self.dirty.swap(true, Ordering::Relaxed)
         {
-            run.keeper.sync_later(file, &self.dirty);
+            run.keeper.sync_later(&self.name, file, &self.dirty);
         }
         Ok(())
     }

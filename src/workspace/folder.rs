@@ -18,6 +18,9 @@ use std::sync::Arc;
 const LOCK: &str = "lock";
 const MANIFEST: &str = "manifest";
 
+/// What a journal and its first record have beside the manifest, at most.
+const FIRST_RECORD: u64 = 64;
+
 /// Files that are no data.
 const OURS: [&str; 3] = [LOCK, MANIFEST, journal::NAME];
 
@@ -121,12 +124,14 @@ impl Folder {
         match (bytes.ok().and_then(|b| unsealed(&b)), in_journal) {
             (Some(manifest), Some(_)) => self.manifest = manifest,
             (Some(manifest), None) => {
-                self.end = None;
-                // A journal that was never begun is no loss.
-                let least = manifest.len() as u64;
-                if path_bytes(&self.path.join(journal::NAME)).is_none_or(|bytes| bytes > least) {
-                    self.warn_of(journal::NAME, "the run begins again");
+                // A journal that was never begun, or ends within its first record, is no loss.
+                let first = manifest.len() as u64 + FIRST_RECORD;
+                let bytes = path_bytes(&self.path.join(journal::NAME));
+                if bytes.is_none_or(|bytes| bytes <= first) && data(&self.path)?.is_empty() {
+                    return Ok(Found::Nothing);
                 }
+                self.end = None;
+                self.warn_of(journal::NAME, "the run begins again");
                 self.manifest = manifest;
             }
             (None, Some(manifest)) => {

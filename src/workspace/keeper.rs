@@ -6,6 +6,7 @@
 
 use super::IoCounters;
 use super::fault::{self, Event};
+use std::collections::HashSet;
 use std::fs::File;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -13,22 +14,43 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 /// How often there is a look at what to do.
-const LOOK: Duration = Duration::from_secs(1);
+const LOOK: Duration = Duration::from_millis(250);
 /// Looks between two rounds of syncing, if no file waits to be deleted.
-const ROUND: u32 = 5;
+const ROUND: u32 = 20;
 
 /// A file that is not needed any more, and its size.
 #[derive(Debug)]
 pub struct Leaving {
+    /// Its name.
+    pub name: Arc<str>,
     /// Where it is.
     pub path: PathBuf,
     /// Bytes of scratch that go with it.
     pub bytes: u64,
 }
 
+impl Leaving {
+    fn delete(&self, io: &IoCounters) {
+        fault::point(Event::Delete);
+        // A scratch file that cannot be deleted goes with its folder.
+        let _ = std::fs::remove_file(&self.path);
+        io.shrink_scratch(self.bytes);
+    }
+}
+
+/// A file that was written to.
+#[derive(Debug)]
+struct Dirty {
+    name: Arc<str>,
+    file: Arc<File>,
+    flag: Arc<AtomicBool>,
+}
+
 #[derive(Debug, Default)]
 struct State {
-    dirty: Vec<(Arc<File>, Arc<AtomicBool>)>,
+    dirty: Vec<Dirty>,
+    /// Files of this attempt of which nothing was synced yet.
+    fresh: HashSet<Arc<str>>,
     leaving: Vec<Leaving>,
     stop: bool,
 }
@@ -41,7 +63,10 @@ struct Table {
 
 /// The thread, and what it has to do.
 #[derive(Debug)]
-pub struct Keeper(Arc<Table>);
+pub struct Keeper {
+    table: Arc<Table>,
+    io: Arc<IoCounters>,
+}
 
 impl Table {
     fn state(&self) -> MutexGuard<'_, State> {
@@ -67,12 +92,13 @@ impl Table {
     fn round(&self, journal: &File, folder: &File, io: &IoCounters) {
         let (dirty, leaving) = {
             let mut state = self.state();
-            (
-                std::mem::take(&mut state.dirty),
-                std::mem::take(&mut state.leaving),
-            )
+            let dirty = std::mem::take(&mut state.dirty);
+            for file in &dirty {
+                state.fresh.remove(&file.name);
+            }
+            (dirty, std::mem::take(&mut state.leaving))
         };
-        for (file, flag) in dirty {
+        for Dirty { file, flag, .. } in dirty {
             if self.state().stop {
                 return;
             }
@@ -85,15 +111,12 @@ impl Table {
         let _ = journal.sync_data();
         fault::point(Event::Synced);
         for file in leaving {
-            fault::point(Event::Delete);
             // Once the run is over, the folder may be that of another one.
             let state = self.state();
             if state.stop {
                 return;
             }
-            // A scratch file that cannot be deleted goes with its folder.
-            let _ = std::fs::remove_file(&file.path);
-            io.shrink_scratch(file.bytes);
+            file.delete(io);
         }
     }
 }
@@ -105,33 +128,53 @@ impl Keeper {
     /// What the system says.
     pub fn start(journal: Arc<File>, folder: File, io: Arc<IoCounters>) -> std::io::Result<Self> {
         let table = Arc::new(Table::default());
-        let shared = table.clone();
+        let (shared, counters) = (table.clone(), io.clone());
         let work = move || {
             while shared.wait() {
-                shared.round(&journal, &folder, &io);
+                shared.round(&journal, &folder, &counters);
             }
         };
         let thread = std::thread::Builder::new().name("outcrop-keeper".into());
         thread.spawn(work)?;
-        Ok(Self(table))
+        Ok(Self { table, io })
+    }
+
+    /// Takes in a new file.
+    pub fn made(&self, name: &Arc<str>) {
+        self.table.state().fresh.insert(name.clone());
     }
 
     /// Takes in a file that was written to.
-    pub fn sync_later(&self, file: &Arc<File>, flag: &Arc<AtomicBool>) {
-        let mut state = self.0.state();
-        state.dirty.push((file.clone(), flag.clone()));
+    pub fn sync_later(&self, name: &Arc<str>, file: &Arc<File>, flag: &Arc<AtomicBool>) {
+        self.table.state().dirty.push(Dirty {
+            name: name.clone(),
+            file: file.clone(),
+            flag: flag.clone(),
+        });
     }
 
-    /// Takes in files that nobody needs; the journal says so already.
-    pub fn delete_later(&self, files: Vec<Leaving>) {
-        self.0.state().leaving.extend(files);
+    /// Takes in files that nobody needs; the journal says so already. One that was never synced would
+    /// not outlive a loss of power anyway, so it is deleted at once.
+    pub fn delete(&self, files: Vec<Leaving>) {
+        let mut now = Vec::new();
+        let mut state = self.table.state();
+        for file in files {
+            if state.fresh.remove(&file.name) {
+                state.dirty.retain(|dirty| dirty.name != file.name);
+                now.push(file);
+            } else {
+                state.leaving.push(file);
+            }
+        }
+        drop(state);
+        now.iter().for_each(|file| file.delete(&self.io));
     }
 }
 
 impl Drop for Keeper {
     fn drop(&mut self) {
         // Nobody waits for a sync that is under way.
-        self.0.state().stop = true;
-        self.0.wake.notify_all();
+        self.table.state().stop = true;
+        self.table.wake.notify_all();
     }
 }

@@ -8,7 +8,9 @@ use std::path::{Path, PathBuf};
 #[must_use]
 pub fn memory_allowed() -> u64 {
     let physical = meminfo("MemTotal:").unwrap_or(4 << 30);
-    cgroup_limits().into_iter().fold(physical, u64::min)
+    let groups = fs::read_to_string("/proc/self/cgroup").unwrap_or_default();
+    let limits = cgroup_limits(&groups, Path::new("/sys/fs/cgroup"));
+    limits.into_iter().fold(physical, u64::min)
 }
 
 /// Peak resident memory of this process so far, in bytes (`VmHWM`).
@@ -56,33 +58,37 @@ fn status(key: &str) -> Option<u64> {
     kib_field(&fs::read_to_string("/proc/self/status").ok()?, key)
 }
 
-fn cgroup_limits() -> Vec<u64> {
-    let membership = fs::read_to_string("/proc/self/cgroup").unwrap_or_default();
-    limit_files(&membership)
+/// All limits on the way from the groups in the text of `/proc/self/cgroup` to the root of their
+/// hierarchies, which are mounted at or below `root`.
+fn cgroup_limits(groups: &str, root: &Path) -> Vec<u64> {
+    // No limit is a word in v2 and does not parse, and a large number in v1.
+    limit_files(groups, root)
         .iter()
         .filter_map(|file| fs::read_to_string(file).ok()?.trim().parse().ok())
         .collect()
 }
 
-/// The files that may hold a limit, from the text of `/proc/self/cgroup`.
-fn limit_files(membership: &str) -> Vec<PathBuf> {
+/// The files that may hold a limit.
+fn limit_files(groups: &str, root: &Path) -> Vec<PathBuf> {
     let mut files = Vec::new();
-    for line in membership.lines() {
+    for line in groups.lines() {
         let mut parts = line.splitn(3, ':').skip(1);
         let (Some(controllers), Some(path)) = (parts.next(), parts.next()) else {
             continue;
         };
-        let (roots, file): (&[&str], &str) = if controllers.is_empty() {
-            (&["/sys/fs/cgroup", "/sys/fs/cgroup/unified"], "memory.max")
+        // Beyond `memory.high` a process is slowed down until it is of no use.
+        let (mounts, names): (&[&str], &[&str]) = if controllers.is_empty() {
+            (&["", "unified"], &["memory.max", "memory.high"])
         } else if controllers.split(',').any(|c| c == "memory") {
-            (&["/sys/fs/cgroup/memory"], "memory.limit_in_bytes")
+            (&["memory"], &["memory.limit_in_bytes"])
         } else {
             continue;
         };
-        for root in roots {
+        for mount in mounts {
             for folder in Path::new(path).ancestors() {
                 let relative = folder.strip_prefix("/").unwrap_or(folder);
-                files.push(Path::new(root).join(relative).join(file));
+                let folder = root.join(mount).join(relative);
+                files.extend(names.iter().map(|name| folder.join(name)));
             }
         }
     }
@@ -93,21 +99,84 @@ fn limit_files(membership: &str) -> Vec<PathBuf> {
 mod tests {
     use super::*;
 
+    /// Files of a fake hierarchy, and what is in them.
+    fn tree(files: &[(&str, &str)]) -> tempfile::TempDir {
+        let root = tempfile::tempdir().unwrap();
+        for (name, text) in files {
+            let path = root.path().join(name);
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            fs::write(path, text).unwrap();
+        }
+        root
+    }
+
+    fn least(groups: &str, files: &[(&str, &str)]) -> Option<u64> {
+        cgroup_limits(groups, tree(files).path()).into_iter().min()
+    }
+
     #[test]
-    fn finds_limit_files_of_both_versions() {
-        let v1 = limit_files("9:cpu:/\n4:memory:/batch/job7\n");
+    fn the_first_version_counts_all_groups_above() {
+        let files = [
+            ("memory/memory.limit_in_bytes", "9223372036854771712\n"),
+            ("memory/batch/memory.limit_in_bytes", "1073741824\n"),
+            ("memory/batch/job7/memory.limit_in_bytes", "4294967296\n"),
+            ("memory/other/memory.limit_in_bytes", "1\n"),
+            ("cpu/memory.limit_in_bytes", "2\n"),
+        ];
+        let groups = "9:cpu:/\n4:name=systemd,memory:/batch/job7\n";
+        assert_eq!(least(groups, &files), Some(1 << 30));
+        assert_eq!(least("4:memory:/batch\n", &files), Some(1 << 30));
         assert_eq!(
-            v1,
-            [
-                "/sys/fs/cgroup/memory/batch/job7/memory.limit_in_bytes",
-                "/sys/fs/cgroup/memory/batch/memory.limit_in_bytes",
-                "/sys/fs/cgroup/memory/memory.limit_in_bytes",
-            ]
-            .map(PathBuf::from)
+            least("4:memory:/\n", &files),
+            Some(9_223_372_036_854_771_712)
         );
-        let v2 = limit_files("0::/user.slice\n");
-        assert!(v2.contains(&PathBuf::from("/sys/fs/cgroup/user.slice/memory.max")));
-        assert!(v2.contains(&PathBuf::from("/sys/fs/cgroup/memory.max")));
+        assert_eq!(least("9:cpu:/\n", &files), None);
+    }
+
+    #[test]
+    fn the_second_version_counts_all_groups_above() {
+        let files = [
+            ("user.slice/memory.max", "max\n"),
+            ("user.slice/memory.high", "max\n"),
+            ("user.slice/shell/memory.max", "2147483648\n"),
+            ("user.slice/shell/job/memory.max", "max\n"),
+            ("user.slice/shell/job/memory.high", "max\n"),
+        ];
+        let groups = "0::/user.slice/shell/job\n";
+        assert_eq!(least(groups, &files), Some(2 << 30));
+        assert_eq!(least("0::/user.slice\n", &files), None);
+        // A group of a container sees itself as the root.
+        assert_eq!(
+            least("0::/\n", &[("memory.max", "536870912\n")]),
+            Some(512 << 20)
+        );
+        // Groups may be named that cannot be seen.
+        assert_eq!(
+            least("0::/../other/job\n", &[("memory.max", "536870912\n")]),
+            Some(512 << 20)
+        );
+    }
+
+    #[test]
+    fn what_slows_down_is_a_limit_too() {
+        let files = [
+            ("job/memory.max", "2147483648\n"),
+            ("job/memory.high", "1073741824\n"),
+            ("job/step/memory.max", "1610612736\n"),
+        ];
+        assert_eq!(least("0::/job/step\n", &files), Some(1 << 30));
+    }
+
+    #[test]
+    fn both_versions_side_by_side() {
+        let files = [
+            ("unified/job/memory.max", "3221225472\n"),
+            ("memory/job/memory.limit_in_bytes", "1073741824\n"),
+        ];
+        assert_eq!(least("4:memory:/job\n0::/job\n", &files), Some(1 << 30));
+        assert_eq!(least("0::/job\n", &files), Some(3 << 30));
+        assert_eq!(least("", &files), None);
+        assert_eq!(least("no lines\n:::\n", &files), None);
     }
 
     #[test]

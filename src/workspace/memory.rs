@@ -7,14 +7,22 @@ use std::sync::{Arc, Condvar, Mutex};
 /// Smallest budget a run accepts, in bytes.
 pub const MINIMUM_BUDGET: u64 = 192 << 20;
 
-/// Part of the budget kept for what is not reserved by name: code, stacks, allocator slack.
-pub const OVERHEAD: u64 = 48 << 20;
+/// Part of the budget that the program takes before it has anything to do: code, tables, stacks.
+pub const PROGRAM: u64 = 8 << 20;
+
+/// Part of the budget kept for what is not reserved by name: small buffers, allocator slack.
+pub const SLACK: u64 = 40 << 20;
+
+/// Part of the budget that no stage can reserve.
+pub const OVERHEAD: u64 = PROGRAM + SLACK;
 
 #[derive(Debug)]
 struct State {
     used: u64,
     peak: u64,
     holders: BTreeMap<&'static str, u64>,
+    /// Who held what at the peak.
+    at_peak: BTreeMap<&'static str, u64>,
 }
 
 #[derive(Debug)]
@@ -44,11 +52,12 @@ impl MemoryPool {
         }
         Ok(Self(Arc::new(Shared {
             budget,
-            capacity: budget - OVERHEAD,
+            capacity: budget - SLACK,
             state: Mutex::new(State {
-                used: 0,
-                peak: 0,
-                holders: BTreeMap::new(),
+                used: PROGRAM,
+                peak: PROGRAM,
+                holders: BTreeMap::from([("program", PROGRAM)]),
+                at_peak: BTreeMap::from([("program", PROGRAM)]),
             }),
             freed: Condvar::new(),
         })))
@@ -63,7 +72,7 @@ impl MemoryPool {
     /// Bytes that can be reserved when nothing is held.
     #[must_use]
     pub fn capacity(&self) -> u64 {
-        self.0.capacity
+        self.0.capacity - PROGRAM
     }
 
     /// Bytes not reserved now.
@@ -72,10 +81,16 @@ impl MemoryPool {
         self.0.capacity - self.state().used
     }
 
-    /// Largest number of bytes reserved at one time so far.
+    /// Largest number of bytes reserved at one time so far, the program's own among them.
     #[must_use]
     pub fn peak(&self) -> u64 {
         self.state().peak
+    }
+
+    /// What was reserved at the peak, by name.
+    #[must_use]
+    pub fn at_peak(&self) -> BTreeMap<&'static str, u64> {
+        self.state().at_peak.clone()
     }
 
     fn state(&self) -> std::sync::MutexGuard<'_, State> {
@@ -95,6 +110,7 @@ impl MemoryPool {
             let held: Vec<String> = state
                 .holders
                 .iter()
+                .filter(|(name, _)| **name != "program")
                 .map(|(n, b)| format!("{n}: {b}"))
                 .collect();
             return Err(Error::Memory {
@@ -103,7 +119,7 @@ impl MemoryPool {
                 } else {
                     format!("{name} (beside {})", held.join(", "))
                 },
-                needed: (state.used + OVERHEAD).saturating_add(bytes),
+                needed: (state.used + SLACK).saturating_add(bytes),
                 budget: self.0.budget,
             });
         }
@@ -140,8 +156,11 @@ impl MemoryPool {
 
     fn grant(state: &mut State, name: &'static str, bytes: u64) {
         state.used += bytes;
-        state.peak = state.peak.max(state.used);
         *state.holders.entry(name).or_insert(0) += bytes;
+        if state.used > state.peak {
+            state.peak = state.used;
+            state.at_peak.clone_from(&state.holders);
+        }
     }
 }
 

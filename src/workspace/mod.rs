@@ -36,6 +36,7 @@ pub struct IoCounters {
     written: AtomicU64,
     scratch: AtomicU64,
     scratch_peak: AtomicU64,
+    stage_peak: AtomicU64,
 }
 
 impl IoCounters {
@@ -53,6 +54,18 @@ impl IoCounters {
     pub fn grow_scratch(&self, bytes: u64) {
         let now = self.scratch.fetch_add(bytes, Ordering::Relaxed) + bytes;
         self.scratch_peak.fetch_max(now, Ordering::Relaxed);
+        self.stage_peak.fetch_max(now, Ordering::Relaxed);
+    }
+
+    /// Begins to look for another peak, see [`IoCounters::stage_peak`].
+    pub fn begin_stage(&self) {
+        self.stage_peak.store(self.scratch(), Ordering::Relaxed);
+    }
+
+    /// Largest scratch space held at one time since the stage began.
+    #[must_use]
+    pub fn stage_peak(&self) -> u64 {
+        self.stage_peak.load(Ordering::Relaxed)
     }
 
     /// Counts `bytes` of scratch space given back.

@@ -252,9 +252,9 @@ impl Run {
         for (name, bytes) in dropped {
             let path = self.folder.join(&*name);
             self.journal.append(&Record::Deleted(name.to_string()))?;
-            leaving.push(Leaving { path, bytes });
+            leaving.push(Leaving { name, path, bytes });
         }
-        self.keeper.delete_later(leaving);
+        self.keeper.delete(leaving);
         Ok(())
     }
 }

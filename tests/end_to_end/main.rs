@@ -5,6 +5,7 @@ mod cli;
 mod determinism;
 mod filters;
 mod library;
+mod odd;
 mod report;
 mod scans;
 mod stop;

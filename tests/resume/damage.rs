@@ -65,7 +65,8 @@ fn damage_to_any_file_is_found_and_mended() {
             let said = case.go_on(&what);
             // A file that is not needed any more may look as it likes.
             if said.contains("damaged") {
-                assert!(said.contains(&name), "{what}: {said}");
+                // A journal that was cut short names files that it does not know to be deleted.
+                assert!(said.contains(&name) || name == "journal", "{what}: {said}");
                 assert_eq!(said.lines().count(), 1, "{what}: {said}");
                 named.insert(name);
             }
@@ -81,7 +82,7 @@ fn damage_to_any_file_is_found_and_mended() {
         "journal",
         "ingest-0.spool",
         "points",
-        "relaxed1",
+        "relaxed3",
     ] {
         assert!(named.contains(file), "{file}");
     }

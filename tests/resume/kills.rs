@@ -54,7 +54,8 @@ fn killed_while_scratch_is_removed() {
     for number in (1..=case.events["delete"]).step_by(3) {
         let fault = format!("delete:{number}");
         case.killed(&fault);
-        assert!(case.mesh.exists() && case.scratch.exists(), "{fault}");
+        // The first files are deleted while the run is at work, the rest when the mesh is there.
+        assert!(case.scratch.exists(), "{fault}");
         let said = case.go_on(&fault);
         // The manifest goes first of what the run is known by.
         assert!(said.is_empty() || said.contains("manifest"), "{said}");

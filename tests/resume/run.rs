@@ -85,7 +85,13 @@ impl Case {
         let mut report: serde_json::Value = serde_json::from_str(&text).unwrap();
         let all = report.as_object_mut().unwrap();
         all.retain(|key, _| {
-            let varies = ["threads", "memory_budget", "seconds", "stages"];
+            let varies = [
+                "threads",
+                "memory_budget",
+                "seconds",
+                "stages",
+                "reserved_at_peak",
+            ];
             !varies.contains(&key.as_str()) && !key.starts_with("peak_")
         });
         report

@@ -13,6 +13,7 @@ use super::predicate::{Neighbor, cuts_corner, cuts_parallel};
 use crate::kernels::eight::{Base, Eight};
 use crate::kernels::{
     CornerGroup, Frame, LANES, Level, Line, SLACK, bisectors_body, cut_body, farthest_body, kernel,
+    touching_body,
 };
 use rim::{RIM, RIM_CORNERS, RIM_DISTANCE, RIM_PLACES, RIM_SIDES};
 
@@ -421,20 +422,32 @@ kernel! {
 #[inline(always)]
 fn clip_nearest_body<E: Eight>(cell: &mut Cell, near: Nearest<'_>, mut next: usize) -> usize {
     let count = near.distances2.len();
+    // After eight lines that changed nothing, most will change nothing.
+    let mut quiet = false;
     while next < count {
         let group = next..(next + LANES).min(count);
         let (x, y) = (&near.x[group.clone()], &near.y[group.clone()]);
         let z = &near.z[group.clone()];
         let lines = bisectors_body::<E>(x, y, z, &cell.frame);
+        let sides = cell.sides.len();
+        let touching = match quiet && near.distances2[group.end - 1] <= cell.secure2 {
+            true => touching_body::<E>(&cell.corners, &lines),
+            false => 0xff,
+        };
         for (k, number) in group.enumerate() {
             if near.distances2[number] > cell.secure2 {
                 return number;
+            }
+            if touching >> k & 1 == 0 && cell.sides.len() == sides {
+                next += 1;
+                continue;
             }
             let difference = [i64::from(x[k]), i64::from(y[k]), i64::from(z[k])];
             let id = near.ids[number];
             cell.clip_line::<E>(lines.get(k), Neighbor { difference, id });
             next += 1;
         }
+        quiet = cell.sides.len() == sides;
     }
     next
 }

@@ -2,6 +2,7 @@
 
 use crate::error::Result;
 use crate::geom::Point;
+use crate::geom::aabb::Aabb;
 use crate::geom::clip::Cell;
 use crate::geom::plane::{Moments, Plane};
 use crate::kernels::Level;
@@ -191,6 +192,7 @@ impl CellMaker {
         if !self.start(query.id(), &fit) {
             return Ok(Outcome::NoPlane);
         }
+        let own = query.point().map(f64::from);
         let mut next = 0;
         loop {
             next = self.cell.clip_nearest(query.near().columns(), next);
@@ -198,8 +200,11 @@ impl CellMaker {
                 self.cell.triples(each);
                 return Ok(Outcome::Complete);
             }
-            if !query.extend(self.cell.reach2()) {
-                return Ok(Outcome::Uncertain);
+            // On scan lines thousands of points are nearer than what can touch the cell.
+            let touches = |bounds: &Aabb| touches(&self.cell, own, bounds);
+            match query.extend_where(self.cell.reach2(), touches) {
+                Some(first) => next = first,
+                None => return Ok(Outcome::Uncertain),
             }
         }
     }
@@ -235,12 +240,8 @@ impl CellMaker {
         let own = point.map(f64::from);
         loop {
             let cell = &self.cell;
-            let next = walk.advance_within(cell.reach2(), |bounds| {
-                cell.may_touch(
-                    std::array::from_fn(|k| f64::from(bounds.min[k]) - own[k]),
-                    std::array::from_fn(|k| f64::from(bounds.max[k]) - own[k]),
-                )
-            })?;
+            let touches = |bounds: &Aabb| touches(cell, own, bounds);
+            let next = walk.advance_within(cell.reach2(), touches)?;
             match next {
                 Some(near) if near.distance2 <= self.cell.reach2() => {
                     self.cell.clip(near.difference, near.id);
@@ -251,6 +252,12 @@ impl CellMaker {
         self.cell.triples(each);
         Ok(Outcome::Complete)
     }
+}
+
+/// False if no point in a box can change the cell of the point `own`.
+fn touches(cell: &Cell, own: [f64; 3], bounds: &Aabb) -> bool {
+    let from = |at: Point| std::array::from_fn(|k| f64::from(at[k]) - own[k]);
+    cell.may_touch(from(bounds.min), from(bounds.max))
 }
 
 /// The plane of the `neighbors` nearest from what the tile knows; `None` if uncertain.

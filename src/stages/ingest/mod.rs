@@ -252,6 +252,13 @@ impl Spool {
         &self.stats
     }
 
+    /// Bytes of the points in the spool, about.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        let bytes = |source: &Source| source.stats.kept * source.native.point_bytes() as u64;
+        self.sources.iter().map(bytes).sum()
+    }
+
     /// Number of points in the spool.
     #[must_use]
     pub fn points(&self) -> u64 {

@@ -23,6 +23,9 @@ const CHUNK: usize = 1 << 12;
 /// Keys of a merge that one thread takes at a time, or more if there are many runs.
 const PART: usize = 1 << 18;
 
+/// Room in the sort buffer beside all points.
+const SPARE: u64 = 1 << 17;
+
 /// Points of a stream that a run holds at most.
 const MOST_IN_RUN: usize = 1 << 26;
 
@@ -47,11 +50,24 @@ impl Orderer {
     /// # Errors
     /// [`Error::Memory`].
     pub fn new(workspace: &Workspace) -> Result<Self> {
-        let buffer = (workspace.memory.available() / 3).max(16 << 20);
-        // Growing a buffer holds the old and the new one for a moment.
-        let held = workspace.reserve("order: sort buffer", buffer + buffer / 2)?;
+        Self::for_points(workspace, u64::MAX)
+    }
+
+    /// Sorts up to so many points in about a third of the memory that is free now, or in less if they
+    /// fit.
+    ///
+    /// # Errors
+    /// [`Error::Memory`].
+    pub fn for_points(workspace: &Workspace, most: u64) -> Result<Self> {
+        let third = (workspace.memory.available() / 3).max(16 << 20);
+        // A buffer that is full is written: there is room for more than there are.
+        let all = most
+            .saturating_add(SPARE)
+            .saturating_mul(size_of::<hilbert::Key>() as u64);
+        let buffer = third.min(all);
+        let held = workspace.reserve("order: sort buffer", buffer)?;
         Ok(Self {
-            sorter: Sorter::new(workspace, "order", buffer),
+            sorter: Sorter::new(workspace, "order", buffer).whole(),
             taken: AtomicU64::new(0),
             held,
         })

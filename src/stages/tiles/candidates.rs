@@ -103,25 +103,31 @@ impl PageLeaves {
         }
     }
 
-    /// Collects the points within `d2` of `around`, a box inside the page, for `d2` up to the page's
-    /// squared reach.
+    #[inline]
+    fn bounds(&self, leaf: usize) -> Aabb {
+        let (min, max) = self.boxes.get(leaf);
+        Aabb { min, max }
+    }
+
+    /// Collects the points of all `wanted` leaves within `d2` of `around`, a box inside the page, for
+    /// `d2` up to the page's squared reach.
     pub fn gather(
         &mut self,
         level: Level,
         tile: &Tile,
         around: &Aabb,
         d2: u64,
+        wanted: impl Fn(&Aabb) -> bool,
         out: &mut Candidates,
     ) {
         let limit = above(d2);
         let near = self.near(level, around, limit);
+        self.points.reserve(near * tile.leaf);
         let mut count = 0;
-        let points: usize = self.near[..near]
-            .iter()
-            .map(|&leaf| self.leaves[leaf as usize].1 as usize)
-            .sum();
-        self.points.reserve(points);
         for &leaf in &self.near[..near] {
+            if !wanted(&self.bounds(leaf as usize)) {
+                continue;
+            }
             let (start, size, id) = self.leaves[leaf as usize];
             let points = &tile.points[start as usize..(start + size) as usize];
             self.points.write(count, points, id);

@@ -21,6 +21,12 @@ const LEAVES: usize = 16;
 /// Most pages that the reach of one page may touch; an outlier's page shrinks its reach instead.
 const MOST_NEAR: usize = 96;
 
+/// Where a reach touches no more pages it is made longer,
+const FEW_NEAR: usize = 20;
+
+/// up to so many times.
+const MOST_TIMES: u64 = 4;
+
 /// Most halo pages for each page of the tile itself.
 const MOST_HALO: usize = 4;
 
@@ -188,6 +194,10 @@ fn halo(store: &PointStore, own: &[usize]) -> (Vec<usize>, Vec<Reach>) {
 fn near_pages(store: &PointStore, page: usize, shrink: i64) -> (u64, Vec<usize>) {
     let bounds = store.page_box(page);
     let mut reach = (bounds.longest_side() * 7 / 8 / shrink).max(1) as u64;
+    if shrink == 1 {
+        // Along a line neighbours are far, and pages few.
+        reach *= lonely(store, bounds, reach);
+    }
     loop {
         let mut near = Vec::new();
         store.pages_near(bounds, reach * reach, &mut |p| {
@@ -202,6 +212,21 @@ fn near_pages(store: &PointStore, page: usize, shrink: i64) -> (u64, Vec<usize>)
         }
         reach /= 2;
     }
+}
+
+/// How many times as far a page can reach and still touch few pages.
+fn lonely(store: &PointStore, bounds: &Aabb, reach: u64) -> u64 {
+    for times in [MOST_TIMES, MOST_TIMES / 2] {
+        let (mut count, reach) = (0, reach * times);
+        store.pages_near(bounds, reach * reach, &mut |_| {
+            count += 1;
+            count <= FEW_NEAR
+        });
+        if count <= FEW_NEAR {
+            return times;
+        }
+    }
+    1
 }
 
 #[cfg(test)]

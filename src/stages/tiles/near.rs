@@ -30,6 +30,9 @@ const MARGIN: f32 = 1.08;
 /// How often the limit of a query is corrected before one that is too large is taken.
 const CORRECTIONS: usize = 6;
 
+/// How much farther than usual, squared, a query looks because the one before did.
+const MOST_WIDER: u64 = 32;
+
 /// The candidates and the sorted neighbours of one query, in memory that is used again and again.
 #[derive(Debug, Default)]
 pub struct Search {
@@ -50,6 +53,11 @@ pub struct Search {
     near: Neighbors,
     /// About how far the last neighbour of the query before was, if it was summed.
     last: f32,
+    /// What the last query that took in more neighbours ended with: how many, and within which
+    /// squared distance.
+    widened: (usize, u64),
+    /// The largest such distance in the leaf that is looked at.
+    wider2: u64,
 }
 
 /// The neighbours of one point, nearest first, as far as they are known.
@@ -132,6 +140,7 @@ impl Tile {
                 let around = Aabb::of(&self.points[group.clone()]);
                 search.gather(self, &around, likely.min(own.reach2));
                 let mut farthest = 0;
+                search.wider2 = 0;
                 for (id, index) in (first..).zip(group) {
                     if asked(id) {
                         farthest = one(own, index, id as u32, search).max(farthest);
@@ -140,7 +149,8 @@ impl Tile {
                 }
                 if farthest > 0 {
                     // A little farther than the leaf before needed.
-                    guess = Some(farthest + farthest / 4);
+                    let wider = search.wider2.min(farthest.saturating_mul(MOST_WIDER));
+                    guess = Some(wider.max(farthest + farthest / 4));
                 }
             }
         }
@@ -217,8 +227,19 @@ impl Search {
     }
 
     fn gather(&mut self, tile: &Tile, around: &Aabb, d2: u64) {
+        self.gather_where(tile, around, d2, |_| true);
+    }
+
+    fn gather_where(
+        &mut self,
+        tile: &Tile,
+        around: &Aabb,
+        d2: u64,
+        wanted: impl Fn(&Aabb) -> bool,
+    ) {
+        let out = &mut self.candidates;
         self.leaves
-            .gather(self.level, tile, around, d2, &mut self.candidates);
+            .gather(self.level, tile, around, d2, wanted, out);
     }
 
     /// Keeps the group's candidates for later, so that others can be gathered.
@@ -356,7 +377,9 @@ fn reach_body(
     };
     loop {
         let count = count_body(distances, limit);
-        if count > 2 * wanted && *corrections > 0 {
+        // What is picked is sorted, which is more than counting where it is much.
+        let too_many = wanted + wanted.min(MOST_RANKED / 2);
+        if count > too_many && *corrections > 0 {
             *corrections -= 1;
             limit *= (wanted + 6) as f32 / count as f32;
         } else if count >= wanted || limit >= most {
@@ -421,6 +444,12 @@ impl Query<'_> {
         self.id
     }
 
+    /// The query's own position.
+    #[must_use]
+    pub fn point(&self) -> Point {
+        self.point
+    }
+
     /// The neighbours known so far, nearest first, none left out between them.
     #[must_use]
     pub fn near(&self) -> &Neighbors {
@@ -448,23 +477,70 @@ impl Query<'_> {
             search.gather(self.tile, &Aabb::of(&[self.point]), distance2);
             measure(search.level, search, self.point);
         }
+        self.list_to(distance2);
+        true
+    }
+
+    /// Lists all neighbours up to a squared distance, of those farther than was known before only those
+    /// in boxes that `wanted` lets pass, and maybe others; the number of the first that was not listed
+    /// before. `None` if the halo does not reach that far.
+    #[must_use]
+    pub fn extend_where(
+        &mut self,
+        distance2: u64,
+        wanted: impl Fn(&Aabb) -> bool,
+    ) -> Option<usize> {
+        let (known, listed) = (self.complete2, self.near().len());
+        let search = &mut *self.search;
+        if distance2 <= search.candidates.complete2 {
+            return self.extend(distance2).then_some(listed);
+        }
+        if distance2 > self.own.reach2 {
+            return None;
+        }
+        search.step_aside();
+        let around = Aabb::of(&[self.point]);
+        search.gather_where(self.tile, &around, distance2, wanted);
+        measure(search.level, search, self.point);
+        self.list_to(distance2);
+        let farther = self.near().columns().distances2;
+        Some(farther.partition_point(|d2| *d2 <= known))
+    }
+
+    /// Lists what was gathered and measured, up to a squared distance.
+    fn list_to(&mut self, distance2: u64) {
+        let search = &mut *self.search;
         // Twice the slack: what is within `distance2` is surely listed.
         let limit = (distance2 as f64 * (1.0 + 3.0 * APPROXIMATE) + 1.0) as f32;
         self.complete2 = list(search.level, search, self.point, self.id, limit);
         debug_assert!(self.complete2 >= distance2);
-        true
     }
 
     /// Lists at least `count` neighbours. False if the halo does not reach that far.
     #[must_use]
     pub fn extend_to(&mut self, count: usize) -> bool {
         while self.near().len() < count {
-            // On a surface, twice the distance holds four times the points.
+            // On a surface, twice the distance holds four times the points. On a line it holds twice
+            // as many; there what the query before needed is the better guess.
             let next = self.complete2.saturating_mul(3).saturating_add(1);
-            if !self.extend(next.min(self.own.reach2.max(self.complete2 + 1))) {
+            let search = &mut *self.search;
+            let (most, before2) = search.widened;
+            let next = next.max(before2.min(next.saturating_mul(MOST_WIDER)));
+            let next = next.min(self.own.reach2.max(self.complete2 + 1));
+            if next > self.own.reach2 {
                 return false;
             }
+            if next > search.candidates.complete2 {
+                search.step_aside();
+                search.gather(self.tile, &Aabb::of(&[self.point]), next);
+            }
+            let most = count.max(most);
+            let listed = list_nearest(search.level, search, self.point, self.id, most);
+            self.complete2 = listed.unwrap_or(search.candidates.complete2);
         }
+        let last = self.near().get(count - 1).map_or(0, |n| n.distance2);
+        self.search.widened = (count, last + last / 4);
+        self.search.wider2 = self.search.wider2.max(self.search.widened.1);
         true
     }
 }

@@ -104,6 +104,9 @@ fn excluded(cloud: &Cloud) -> Option<(&'static str, &'static str, &'static str)>
     {
         return Some((first, "grid", "its nodes are fixed"));
     }
+    if let (Kind::Odd(odd), Some(first)) = (cloud.kind, special.or(chosen)) {
+        return Some((first, odd.name(), "it has a density of its own"));
+    }
     if cloud.kind == Kind::Mesh && cloud.scanlines.is_some() {
         let why = "it has no direction to scan it in";
         return Some(("scanlines", "mesh", why));

@@ -5,6 +5,7 @@ use std::thread;
 use crate::cloud::{Cloud, NoiseMode, Order};
 use crate::error::Result;
 use crate::kind::Kind;
+use crate::odd::Odd;
 use crate::picker::Picker;
 use crate::reference;
 use crate::rng::{Permutation, Purpose, Rng};
@@ -25,6 +26,7 @@ const PARALLEL_FROM: usize = 4096;
 #[derive(Debug)]
 enum Source {
     Grid(Grid),
+    Odd(Odd),
     Surface {
         surface: Box<dyn Surface>,
         scan: Option<(Vec<Line>, Picker)>,
@@ -62,6 +64,11 @@ pub struct Generator {
 
 impl Generator {
     pub(crate) fn new(cloud: &Cloud) -> Result<Self> {
+        if let Kind::Odd(odd) = cloud.kind {
+            let half = [odd.reach(cloud.points, cloud.size); 3];
+            let bounds = [scale(half, -1.0), half];
+            return Ok(Self::with(cloud, Source::Odd(odd), bounds, [0.0; 3]));
+        }
         let Some(surface) = reference::surface(cloud)? else {
             let grid = Grid::new(cloud.points, cloud.size, cloud.rotated)?;
             let bounds = grid.bounds();
@@ -152,10 +159,10 @@ impl Generator {
         self.original(index)
     }
 
-    /// Area of the surface, one layer of it; `None` for a grid.
+    /// Area of the surface, one layer of it; `None` for a grid and where there is none.
     pub fn area(&self) -> Option<f64> {
         match &self.source {
-            Source::Grid(_) => None,
+            Source::Grid(_) | Source::Odd(_) => None,
             Source::Surface { surface, .. } | Source::Chosen { surface, .. } => {
                 Some(surface.area())
             }
@@ -176,11 +183,12 @@ impl Generator {
 
     /// Distance of a position to the true surface, the first layer: exact for the kinds with a
     /// closed form and for meshes (where it is slow: it looks at every triangle), of first order
-    /// for `bumpy` and `terrain`.
+    /// for `bumpy` and `terrain`; not a number where there is no surface.
     pub fn distance(&self, position: [f64; 3]) -> f64 {
         let p = sub(position, self.cloud.offset);
         match &self.source {
             Source::Grid(grid) => grid.distance(p),
+            Source::Odd(_) => f64::NAN,
             Source::Surface { surface, .. } | Source::Chosen { surface, .. } => {
                 surface.distance(if self.cloud.rotated {
                     turned_back(p)
@@ -253,6 +261,12 @@ impl Generator {
                 Sweep::Shuffled(permutation) => permutation.apply(index),
                 Sweep::Chance | Sweep::InOrder => index,
             }),
+            Source::Odd(odd) => {
+                let mut rng = Rng::at(self.cloud.seed, Purpose::Position, index);
+                let position = odd.point(index, self.cloud.points, self.cloud.size, &mut rng);
+                let normal = [0.0; 3];
+                self.turn(Sample { position, normal })
+            }
             Source::Surface { surface, scan } => {
                 self.turn(self.on_surface(surface.as_ref(), scan.as_ref(), index))
             }

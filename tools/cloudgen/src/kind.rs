@@ -3,6 +3,7 @@
 use std::{fmt, str::FromStr};
 
 use crate::error::Error;
+use crate::odd::Odd;
 
 /// A surface with known geometry and topology.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -26,10 +27,12 @@ pub enum Kind {
     Corner,
     /// A given triangle mesh.
     Mesh,
+    /// A cloud without a surface, or with one that is not fit to be reconstructed.
+    Odd(Odd),
 }
 
 impl Kind {
-    /// All kinds that need no file.
+    /// All kinds that have a surface and need no file.
     pub const ALL: [Kind; 8] = [
         Kind::Sphere,
         Kind::Torus,
@@ -53,6 +56,7 @@ impl Kind {
             Kind::Grid => "grid",
             Kind::Corner => "corner",
             Kind::Mesh => "mesh",
+            Kind::Odd(odd) => odd.name(),
         }
     }
 
@@ -63,7 +67,9 @@ impl Kind {
             Kind::Torus => Some(0),
             Kind::Bumpy => Some(-8),
             Kind::Room => Some(-6),
-            Kind::Terrain | Kind::Plane | Kind::Grid | Kind::Corner | Kind::Mesh => None,
+            Kind::Terrain | Kind::Plane | Kind::Grid | Kind::Corner | Kind::Mesh | Kind::Odd(_) => {
+                None
+            }
         }
     }
 }
@@ -78,7 +84,8 @@ impl FromStr for Kind {
     type Err = Error;
 
     fn from_str(text: &str) -> Result<Self, Error> {
-        let kinds = || Kind::ALL.into_iter().chain([Kind::Mesh]);
+        let odd = || Odd::ALL.into_iter().map(Kind::Odd);
+        let kinds = || Kind::ALL.into_iter().chain([Kind::Mesh]).chain(odd());
         let names: Vec<_> = kinds().map(Kind::name).collect();
         let names = names.join(", ");
         kinds()

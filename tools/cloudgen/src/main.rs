@@ -12,7 +12,9 @@ use outcrop_cloudgen::{
 #[command(name = "cloudgen", version, allow_negative_numbers = true)]
 struct Args {
     /// Surface: sphere, torus, bumpy (genus 5), terrain, room (genus 4), plane, grid, corner (three
-    /// orthogonal plates) or mesh (a file)
+    /// orthogonal plates) or mesh (a file); without a surface: two-clusters, line-grid, cube-grid,
+    /// one-place, few-places, icosahedron, line, volume, powers, dense-in-sparse, scan-line, wheel,
+    /// shell or patches
     kind: Kind,
 
     /// The mesh to sample, OBJ or PLY, for the kind mesh; it is moved to the origin and scaled to

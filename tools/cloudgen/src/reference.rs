@@ -27,7 +27,7 @@ pub(crate) fn surface(cloud: &Cloud) -> Result<Option<Box<dyn Surface>>> {
             let path = cloud.mesh.as_deref().unwrap_or_else(|| "".as_ref());
             Box::new(Mesh::new(&mesh_file::read(path)?, size, path)?)
         }
-        Kind::Grid => return Ok(None),
+        Kind::Grid | Kind::Odd(_) => return Ok(None),
     }))
 }
 
@@ -36,6 +36,13 @@ pub(crate) fn reference(cloud: &Cloud, tolerance: f64) -> Result<Tessellation> {
     if !(LEAST_TOLERANCE..1.0).contains(&tolerance) {
         let expected = format!("{LEAST_TOLERANCE:e} to below 1");
         return Err(Error::parameter("reference-tolerance", tolerance, expected));
+    }
+    if matches!(cloud.kind, Kind::Odd(_)) {
+        return Err(Error::Conflict {
+            first: "reference",
+            second: cloud.kind.name(),
+            why: "it has no surface",
+        });
     }
     let tolerance = tolerance * cloud.size;
     let (mut mesh, turn) = match surface(cloud)? {
