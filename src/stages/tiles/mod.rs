@@ -98,7 +98,7 @@ impl Tile {
             (start.max(ids.start)..end.min(ids.end)).any(&wanted)
         });
         let own_pages: Vec<usize> = own_pages.collect();
-        let (wanted, reaches) = halo(store, &own_pages);
+        let (wanted, reaches) = halo(store, &own_pages, ids.len().div_ceil(page));
         let mut points = Vec::with_capacity(wanted.len() * page);
         let mut start = 0;
         while start < wanted.len() {
@@ -168,10 +168,10 @@ impl Tile {
 /// A page, its squared reach and the pages within it.
 type Reach = (usize, u64, Vec<usize>);
 
-/// All pages of a tile, and the reaches of its own ones; shorter than usual where the halo would
-/// outgrow the tile, as it would around scattered outliers.
-fn halo(store: &PointStore, own: &[usize]) -> (Vec<usize>, Vec<Reach>) {
-    let most = own.len() * (1 + MOST_HALO) + MOST_NEAR;
+/// All pages of a tile of `size` pages, of which `own` are asked for, and the reaches of these; shorter
+/// than usual where the halo would outgrow the tile, as it would around scattered outliers.
+fn halo(store: &PointStore, own: &[usize], size: usize) -> (Vec<usize>, Vec<Reach>) {
+    let most = size * (1 + MOST_HALO) + MOST_NEAR;
     let mut shrink = 1;
     loop {
         let mut wanted = own.to_vec();

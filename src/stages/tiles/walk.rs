@@ -137,7 +137,7 @@ impl<'a> Walk<'a> {
             }
         }
         self.narrow(limit);
-        self.ready.sort_unstable_by(|a, b| b.cmp(a));
+        self.ready.sort_unstable_by_key(|p| Reverse((p.0, p.1)));
         self.batch *= 2;
         Ok(())
     }
@@ -147,7 +147,9 @@ impl<'a> Walk<'a> {
         if self.ready.len() <= self.batch {
             return limit;
         }
-        let limit = self.ready.select_nth_unstable(self.batch - 1).1.0;
+        let nearest = |p: &(u64, u32, Point)| p.0;
+        let at = self.batch - 1;
+        let limit = self.ready.select_nth_unstable_by_key(at, nearest).1.0;
         let beyond = self.ready.extract_if(self.batch.., |p| p.0 > limit);
         self.later.extend(beyond);
         limit
