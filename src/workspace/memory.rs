@@ -235,7 +235,7 @@ mod tests {
             );
             assert!(pool.reserve_waiting("huge", bytes).is_err());
         }
-        assert_eq!(pool.peak(), 4096);
+        assert_eq!(pool.peak(), PROGRAM + 4096);
     }
 
     #[test]
