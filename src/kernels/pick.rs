@@ -61,7 +61,8 @@ pub(crate) fn pick_body<P: Pick, const N: usize>(
 }
 
 kernel! {
-    /// Packs one column as [`pick_body`] does.
+    /// Packs a column: the values that stand where the numbers are at most `limit`, in their order; how
+    /// many. Numbers beyond the last whole sixteen are not looked at; `to` has room for all and sixteen.
     pub fn pick_column(numbers: &[f32], limit: f32, from: &[u32], to: &mut [u32]) -> usize = pick_one_body<Eight>
 }
 
