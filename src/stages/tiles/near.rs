@@ -6,26 +6,20 @@
 
 use super::candidates::{Candidates, Columns, PageLeaves};
 use super::neighbors::Neighbors;
-use super::{Near, OwnPage, Tile};
+use super::{OwnPage, Tile};
 use crate::geom::aabb::Aabb;
-use crate::geom::{Point, distance2, sub};
-use crate::kernels::{
-    BLOCK, Level, Pick, RANKED, count_body, distances_body, kernel, pick_body, ranks_body,
-};
+use crate::geom::{Point, distance2};
+use crate::kernels::{BLOCK, Level};
 use std::ops::Range;
 
+mod list;
 mod sums;
 
+use list::{list, list_nearest, measure};
 pub use sums::Sums;
-
-/// Up to this number, keys are sorted by counting.
-const MOST_RANKED: usize = 96;
 
 /// Bound on the relative error of approximate squared distances, and then some.
 pub(super) const APPROXIMATE: f64 = 1.0 / (1 << 20) as f64;
-
-/// The limit of a query against the last distance of the query before.
-const MARGIN: f32 = 1.08;
 
 /// How often the limit of a query is corrected before one that is too large is taken.
 const CORRECTIONS: usize = 6;
@@ -256,180 +250,6 @@ impl Search {
             self.spare = std::mem::replace(&mut self.candidates, group);
         }
     }
-
-    /// What is picked is in order of id, so distance and place in one word sort as they must.
-    #[inline(always)]
-    fn list_short(&mut self, picked: usize, point: Point, own: u32, complete2: u64, bits: u32) {
-        let [x, y, z] = self.picked.coordinates(picked);
-        let ids = self.picked.numbers(picked);
-        let room = picked.next_multiple_of(RANKED);
-        self.keys.resize(room.max(self.keys.len()), 0);
-        let keys = &mut self.keys[..room];
-        keys[picked..].fill(i64::MAX);
-        let mut count = 0;
-        let picks = x.iter().zip(y).zip(z).zip(ids);
-        for (place, (key, (((x, y), z), id))) in (0i64..).zip(keys.iter_mut().zip(picks)) {
-            let d2 = distance2([*x, *y, *z], point);
-            let listed = (d2 <= complete2) & (*id != own);
-            // The others are behind all that are listed.
-            *key = if listed {
-                (d2 << bits) as i64 | place
-            } else {
-                i64::MAX
-            };
-            count += i64::from(listed);
-        }
-        let near = self.near.resize(picked);
-        let mask = (1i64 << bits) - 1;
-        if picked <= MOST_RANKED {
-            self.places.resize(room.max(self.places.len()), 0);
-            let places = &mut self.places[..room];
-            ranks_body(keys, picked, places);
-            let picks = x.iter().zip(y).zip(z).zip(ids);
-            for ((key, to), (((x, y), z), id)) in keys.iter().zip(places).zip(picks) {
-                let to = *to as usize;
-                near.distances2[to] = (key >> bits) as u64;
-                near.ids[to] = *id;
-                near.x[to] = x - point[0];
-                near.y[to] = y - point[1];
-                near.z[to] = z - point[2];
-            }
-        } else {
-            keys.sort_unstable();
-            for (to, key) in keys[..count as usize].iter().enumerate() {
-                let at = (key & mask) as usize;
-                near.distances2[to] = (key >> bits) as u64;
-                near.ids[to] = ids[at];
-                near.x[to] = x[at] - point[0];
-                near.y[to] = y[at] - point[1];
-                near.z[to] = z[at] - point[2];
-            }
-        }
-        self.near.resize(count as usize);
-    }
-
-    #[cold]
-    fn list_long(&mut self, picked: usize, point: Point, own: u32, complete2: u64) {
-        let [x, y, z] = self.picked.coordinates(picked);
-        let ids = self.picked.numbers(picked);
-        let within = |at: usize| {
-            let d2 = distance2([x[at], y[at], z[at]], point);
-            (d2 <= complete2 && ids[at] != own).then_some((d2, at as u32))
-        };
-        self.long_keys.clear();
-        self.long_keys.extend((0..picked).filter_map(within));
-        self.long_keys.sort_unstable();
-        self.near.clear();
-        for &(distance2, place) in &self.long_keys {
-            let at = place as usize;
-            self.near.push(Near {
-                distance2,
-                id: ids[at],
-                difference: sub([x[at], y[at], z[at]], point),
-            });
-        }
-    }
-}
-
-kernel! {
-    /// Measures the candidates from `point` and lists the `k` nearest neighbours, and some more;
-    /// the squared distance up to which all are listed. `None` if there are fewer than `k` as far as
-    /// the candidates are complete.
-    fn list_nearest(search: &mut Search, point: Point, own: u32, k: usize) -> Option<u64> = nearest_body<Eight>
-}
-
-#[inline(always)]
-fn nearest_body<P: Pick>(search: &mut Search, point: Point, own: u32, k: usize) -> Option<u64> {
-    measure_body(search, point);
-    let most = above(search.candidates.complete2);
-    // The neighbours of the query before are about as far.
-    let last = search.near.get(k.wrapping_sub(1));
-    let mut limit = last.map_or(0.0, |n| n.distance2 as f32);
-    let mut corrections = CORRECTIONS;
-    loop {
-        // The point itself is a candidate; one more, for those that are not sure to be within.
-        limit = reach_body(search.measured(), k + 2, limit, most, &mut corrections);
-        let complete2 = list_body::<P>(search, point, own, limit);
-        if search.near.len() >= k {
-            return Some(complete2);
-        }
-        if limit >= most {
-            return None;
-        }
-        corrections = corrections.saturating_sub(1);
-    }
-}
-
-/// A limit up to `most` within which `wanted` of the distances are and not many more, or `most` if
-/// there are not so many; from one that is a little smaller, `0.0` if nothing is known.
-#[inline(always)]
-fn reach_body(
-    distances: &[f32],
-    wanted: usize,
-    last: f32,
-    most: f32,
-    corrections: &mut usize,
-) -> f32 {
-    let mut limit = if last > 0.0 {
-        (last * MARGIN).max(1.0).min(most)
-    } else {
-        most
-    };
-    loop {
-        let count = count_body(distances, limit);
-        // What is picked is sorted, which is more than counting where it is much.
-        let too_many = wanted + wanted.min(MOST_RANKED / 2);
-        if count > too_many && *corrections > 0 {
-            *corrections -= 1;
-            limit *= (wanted + 6) as f32 / count as f32;
-        } else if count >= wanted || limit >= most {
-            return limit;
-        } else {
-            let grow = (wanted + 4) as f32 / (count.max(1) as f32);
-            limit = (limit * grow.clamp(1.1, 8.0) + 4.0).min(most);
-        }
-    }
-}
-
-kernel! {
-    /// Measures the candidates from `point`.
-    fn measure(search: &mut Search, point: Point) = measure_body
-}
-
-#[inline(always)]
-fn measure_body(search: &mut Search, point: Point) {
-    let candidates = &search.candidates;
-    let room = candidates.len.next_multiple_of(BLOCK);
-    search
-        .distances
-        .resize(room.max(search.distances.len()), 0.0);
-    search.picked.reserve(candidates.len);
-    let [x, y, z] = candidates.columns.coordinates(room);
-    let distances = &mut search.distances[..room];
-    distances_body(x, y, z, point, distances);
-    distances[candidates.len..].fill(f32::INFINITY);
-}
-
-kernel! {
-    /// Lists the measured candidates whose approximate squared distance is at most `limit` in order
-    /// of (distance, id); the squared distance up to which all are listed.
-    fn list(search: &mut Search, point: Point, own: u32, limit: f32) -> u64 = list_body<Eight>
-}
-
-#[inline(always)]
-fn list_body<P: Pick>(search: &mut Search, point: Point, own: u32, limit: f32) -> u64 {
-    let below = (f64::from(limit) * (1.0 - APPROXIMATE)) as u64;
-    let complete2 = below.min(search.candidates.complete2);
-    let distances = &search.distances[..search.measured().len()];
-    let from = search.candidates.columns.slices();
-    let picked = pick_body::<P, 4>(distances, limit, from, search.picked.slices_mut());
-    let bits = usize::BITS - picked.leading_zeros();
-    if bits < 32 && complete2 < 1 << (63 - bits) {
-        search.list_short(picked, point, own, complete2, bits);
-    } else {
-        search.list_long(picked, point, own, complete2);
-    }
-    complete2
 }
 
 /// An approximate squared distance that is not below any of points within `d2`.

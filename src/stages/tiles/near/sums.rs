@@ -1,7 +1,8 @@
 //! Sums over the nearest neighbours of many points: which they are matters, in what order they
 //! stand does not, so nothing is sorted.
 
-use super::{APPROXIMATE, CORRECTIONS, OwnPage, Search, above, measure_body, reach_body};
+use super::list::{measure_body, reach_body};
+use super::{APPROXIMATE, CORRECTIONS, OwnPage, Search, above};
 use crate::geom::Point;
 use crate::geom::plane::Moments;
 use crate::kernels::{BLOCK, MOST_SUMMED, Pick, SUMMED_LIMIT2, kernel, pick_body};
