@@ -157,7 +157,13 @@ impl<const N: usize> Sections<N> {
     pub fn get_into(&self, section: usize, records: &mut Vec<Record<N>>) -> Result<()> {
         let place = self.places()[section];
         records.clear();
-        if !self.fits(place) {
+        let mut bytes = Vec::new();
+        let packed = self.layout.map_or(0, |_| place.bytes);
+        // What a journal says about sizes is not believed as far as to end the program.
+        let room = bytes.try_reserve_exact(packed).is_ok()
+            && self.fits(place)
+            && records.try_reserve(place.records).is_ok();
+        if !room {
             let found = format!("{} bytes", place.bytes);
             let expected = format!("{} records of {N} words", place.records);
             return Err(self.file.damaged(place.offset, found, expected));
@@ -166,7 +172,7 @@ impl<const N: usize> Sections<N> {
             records.resize(place.records, [0; N]);
             return self.read(place, bytemuck::cast_slice_mut(records));
         };
-        let mut bytes = vec![0; place.bytes];
+        bytes.resize(place.bytes, 0);
         self.read(place, &mut bytes)?;
         records.resize(place.records, [0; N]);
         unpack(&bytes, layout, records).ok_or_else(|| {
