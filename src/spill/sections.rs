@@ -277,6 +277,11 @@ mod tests {
                 let error = sections.get(0).unwrap_err();
                 assert!(matches!(error, Error::Corrupt { .. }), "{error}");
             }
+            // As many bytes as that many records take, and no memory has.
+            sections.places()[0].records = 1 << 57;
+            sections.places()[0].bytes = 12 << 57;
+            let error = sections.get(0).unwrap_err();
+            assert!(matches!(error, Error::Corrupt { .. }), "{error}");
         }
         let mut saved = Vec::new();
         String::from("table").save(&mut saved);
