@@ -15,6 +15,12 @@ fn main() {
     divan::main();
 }
 
+fn tile() -> Tile {
+    let workspace = util::workspace();
+    let store = util::store(POINTS, &workspace);
+    Tile::load(&store, TILE).expect("scratch file")
+}
+
 #[divan::bench]
 fn load(bencher: Bencher<'_, '_>) {
     let workspace = util::workspace();
@@ -26,9 +32,7 @@ fn load(bencher: Bencher<'_, '_>) {
 
 #[divan::bench(args = [10, 30], sample_count = 30)]
 fn neighbors(bencher: Bencher<'_, '_>, k: usize) {
-    let workspace = util::workspace();
-    let store = util::store(POINTS, &workspace);
-    let tile = Tile::load(&store, TILE).expect("scratch file");
+    let tile = tile();
     let mut search = Search::default();
     bencher
         .counter(ItemsCount::new(TILE.len()))
@@ -41,9 +45,7 @@ fn neighbors(bencher: Bencher<'_, '_>, k: usize) {
 
 #[divan::bench(args = [10, 30], sample_count = 30)]
 fn sums(bencher: Bencher<'_, '_>, k: usize) {
-    let workspace = util::workspace();
-    let store = util::store(POINTS, &workspace);
-    let tile = Tile::load(&store, TILE).expect("scratch file");
+    let tile = tile();
     let mut search = Search::default();
     bencher
         .counter(ItemsCount::new(TILE.len()))

@@ -285,20 +285,7 @@ impl Query<'_> {
     /// Lists all neighbours up to a squared distance. False if the halo does not reach that far.
     #[must_use]
     pub fn extend(&mut self, distance2: u64) -> bool {
-        if distance2 <= self.complete2 {
-            return true;
-        }
-        if distance2 > self.own.reach2 {
-            return false;
-        }
-        let search = &mut *self.search;
-        if distance2 > search.candidates.complete2 {
-            search.step_aside();
-            search.gather(self.tile, &Aabb::of(&[self.point]), distance2);
-            measure(search.level, search, self.point);
-        }
-        self.list_to(distance2);
-        true
+        self.extend_where(distance2, |_| true).is_some()
     }
 
     /// Lists all neighbours up to a squared distance, of those farther than was known before only those
@@ -310,30 +297,26 @@ impl Query<'_> {
         distance2: u64,
         wanted: impl Fn(&Aabb) -> bool,
     ) -> Option<usize> {
-        let (known, listed) = (self.complete2, self.near().len());
-        let search = &mut *self.search;
-        if distance2 <= search.candidates.complete2 {
-            return self.extend(distance2).then_some(listed);
+        let known = self.complete2;
+        if distance2 <= known {
+            return Some(self.near().len());
         }
         if distance2 > self.own.reach2 {
             return None;
         }
-        search.step_aside();
-        let around = Aabb::of(&[self.point]);
-        search.gather_where(self.tile, &around, distance2, wanted);
-        measure(search.level, search, self.point);
-        self.list_to(distance2);
-        let farther = self.near().columns().distances2;
-        Some(farther.partition_point(|d2| *d2 <= known))
-    }
-
-    /// Lists what was gathered and measured, up to a squared distance.
-    fn list_to(&mut self, distance2: u64) {
         let search = &mut *self.search;
+        if distance2 > search.candidates.complete2 {
+            search.step_aside();
+            let around = Aabb::of(&[self.point]);
+            search.gather_where(self.tile, &around, distance2, wanted);
+            measure(search.level, search, self.point);
+        }
         // Twice the slack: what is within `distance2` is surely listed.
         let limit = (distance2 as f64 * (1.0 + 3.0 * APPROXIMATE) + 1.0) as f32;
         self.complete2 = list(search.level, search, self.point, self.id, limit);
         debug_assert!(self.complete2 >= distance2);
+        let listed = self.near().columns().distances2;
+        Some(listed.partition_point(|d2| *d2 <= known))
     }
 
     /// Lists at least `count` neighbours. False if the halo does not reach that far.

@@ -26,6 +26,16 @@ pub(super) struct Columns<'a> {
     pub z: &'a mut [i32],
 }
 
+impl Columns<'_> {
+    /// Writes the neighbour that stands at place `to`.
+    #[inline(always)]
+    pub fn put(&mut self, to: usize, distance2: u64, id: u32, [x, y, z]: [i32; 3]) {
+        self.distances2[to] = distance2;
+        self.ids[to] = id;
+        (self.x[to], self.y[to], self.z[to]) = (x, y, z);
+    }
+}
+
 impl Neighbors {
     /// How many there are.
     #[must_use]
@@ -76,12 +86,10 @@ impl Neighbors {
     /// Puts in one that is no nearer than those there.
     pub fn push(&mut self, near: Near) {
         let last = self.len;
-        let columns = self.resize(last + 1);
-        columns.distances2[last] = near.distance2;
-        columns.ids[last] = near.id;
         // Differences of coordinates in 0..2^30 fit 32 bits.
-        let [x, y, z] = near.difference.map(|c| c as i32);
-        (columns.x[last], columns.y[last], columns.z[last]) = (x, y, z);
+        let difference = near.difference.map(|c| c as i32);
+        self.resize(last + 1)
+            .put(last, near.distance2, near.id, difference);
     }
 
     /// Makes it `len` neighbours; what they are, the caller writes.

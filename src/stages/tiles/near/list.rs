@@ -36,7 +36,7 @@ impl Search {
             };
             count += i64::from(listed);
         }
-        let near = self.near.resize(picked);
+        let mut near = self.near.resize(picked);
         let mask = (1i64 << bits) - 1;
         if picked <= MOST_RANKED {
             self.places.resize(room.max(self.places.len()), 0);
@@ -44,22 +44,15 @@ impl Search {
             ranks_body(keys, picked, places);
             let picks = x.iter().zip(y).zip(z).zip(ids);
             for ((key, to), (((x, y), z), id)) in keys.iter().zip(places).zip(picks) {
-                let to = *to as usize;
-                near.distances2[to] = (key >> bits) as u64;
-                near.ids[to] = *id;
-                near.x[to] = x - point[0];
-                near.y[to] = y - point[1];
-                near.z[to] = z - point[2];
+                let difference = [x - point[0], y - point[1], z - point[2]];
+                near.put(*to as usize, (key >> bits) as u64, *id, difference);
             }
         } else {
             keys.sort_unstable();
             for (to, key) in keys[..count as usize].iter().enumerate() {
                 let at = (key & mask) as usize;
-                near.distances2[to] = (key >> bits) as u64;
-                near.ids[to] = ids[at];
-                near.x[to] = x[at] - point[0];
-                near.y[to] = y[at] - point[1];
-                near.z[to] = z[at] - point[2];
+                let difference = [x[at] - point[0], y[at] - point[1], z[at] - point[2]];
+                near.put(to, (key >> bits) as u64, ids[at], difference);
             }
         }
         self.near.resize(count as usize);
