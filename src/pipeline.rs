@@ -223,6 +223,7 @@ impl Reconstruction {
             repair: params.repair,
             min_component: params.least_component(points),
             max_hole_edges: params.max_hole_edges,
+            flip: params.method == Method::Robust,
             zip: params.method == Method::Robust,
         };
         let (repaired, repair) = clock.stage("repair", "blocks", 2 * count, || {

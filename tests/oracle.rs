@@ -195,6 +195,7 @@ fn same(what: &str, mesh: &ReadBack, report: &Report, expected: &Mesh, scale: f6
         "{what}: accepted"
     );
     let r = &report.repair;
+    assert_eq!(r.edges_flipped as usize, counts.flips, "{what}: flips");
     assert_eq!(
         r.bridges_removed as usize, counts.bridges,
         "{what}: bridges"
@@ -263,6 +264,7 @@ struct Reached {
     voted: usize,
     outvoted: usize,
     joints_removed: usize,
+    flips: usize,
     openings: usize,
     partly_zipped: usize,
     zipped_whole: usize,
@@ -276,6 +278,7 @@ impl Reached {
         self.voted += counts.voted;
         self.outvoted += counts.outvoted;
         self.joints_removed += counts.joints_removed;
+        self.flips += counts.flips;
         self.openings += counts.holes.openings;
         self.partly_zipped += counts.holes.partly;
         self.zipped_whole += counts.holes.zipped_whole;
@@ -374,12 +377,13 @@ fn robust() {
         voted,
         outvoted,
         joints_removed,
+        flips,
         partly_zipped,
         zipped_whole,
         ..
     } = reached;
     let parts = [on_a_line, one_sided, voted, outvoted, joints_removed];
-    let mended = [partly_zipped, zipped_whole];
+    let mended = [flips, partly_zipped, zipped_whole];
     let all = parts.iter().chain(&mended).all(|n| *n > 0);
     assert!(rounds == 3 && all, "parts not reached: {reached:?}");
 }

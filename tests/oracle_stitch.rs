@@ -110,6 +110,7 @@ fn pipeline(
         repair: settings.repair,
         min_component: settings.min_component as u64,
         max_hole_edges: settings.max_hole_edges,
+        flip: settings.robust,
         zip: settings.robust,
     };
     let (repaired, mended) = repair(places, stitched, blocks, options, workspace)?;
@@ -271,6 +272,7 @@ fn compare(
         reached.flat_candidates += c.flat_candidates;
         reached.voted += c.voted;
         reached.outvoted += c.outvoted;
+        reached.flips += c.flips;
         reached.holes.filled += c.holes.filled;
         reached.holes.partly += c.holes.partly;
         reached.holes.zipped_whole += c.holes.zipped_whole;
@@ -314,6 +316,7 @@ fn arbitrary_triples_the_robust_way() {
         reached.flat_candidates,
         reached.voted,
         reached.outvoted,
+        reached.flips,
         holes.filled,
         holes.partly,
         holes.zipped_whole,

@@ -14,6 +14,7 @@ pub mod check;
 pub mod clouds;
 pub mod edges;
 pub mod evidence;
+pub mod flips;
 pub mod holes;
 pub mod homes;
 pub mod insert;
@@ -143,6 +144,7 @@ pub struct Counts {
     pub joints: usize,
     pub joints_removed: usize,
     pub rejected: Rejected,
+    pub flips: usize,
     pub bridges: usize,
     pub small_components: usize,
     /// Triangles of the small components.
@@ -247,7 +249,7 @@ pub fn connect(
     }
 }
 
-/// Section 1.6 but for pinched vertices: bridges, small components, which way components face,
+/// Section 1.6 but for pinched vertices: flips, bridges, small components, which way components face,
 /// holes, in this order. Gives the way the triangles run.
 fn repair_and_orient(
     shape: &[Point],
@@ -257,6 +259,9 @@ fn repair_and_orient(
     counts: &mut Counts,
 ) -> Component {
     if settings.repair {
+        if settings.robust {
+            counts.flips = flips::flip(file, shape, surface, settings.block);
+        }
         counts.bridges = repair::remove_bridges(surface);
         (counts.small_components, counts.small_triangles) =
             repair::remove_small_components(surface, settings.min_component);

@@ -21,7 +21,7 @@ pub fn load(stitched: &Stitched, block: usize) -> Result<Vec<Triangle>> {
 }
 
 /// Merges ascending triangles into ascending ones, in place and from behind.
-fn merge(
+pub fn merge(
     into: &mut Vec<Triangle>,
     more: impl DoubleEndedIterator<Item = Triangle> + ExactSizeIterator,
 ) {

@@ -1,12 +1,14 @@
-//! Post-processing (paper, section 3.6): bridges, small components, facing, holes.
+//! Post-processing (paper, section 3.6): bridges, small components, facing, holes; and flips of edges.
 //!
 //! Everything here looks only at triangles and positions, block by block; how the triangles were
 //! chosen is not its business.
 
 mod around;
 mod bridges;
+mod by_end;
 mod facing;
 mod fill;
+mod flips;
 mod holes;
 mod loops;
 mod mend;
@@ -67,6 +69,8 @@ pub struct RepairOptions {
     pub min_component: u64,
     /// Fill holes of up to this many edges.
     pub max_hole_edges: usize,
+    /// Flip edges where the surface bends less for it.
+    pub flip: bool,
     /// Close torn boundaries of any length as far as they are torn; do not fill openings.
     pub zip: bool,
 }
@@ -74,6 +78,8 @@ pub struct RepairOptions {
 /// Counts of this stage.
 #[derive(Debug, Clone, Copy, Default, Serialize, PartialEq, Eq)]
 pub struct RepairStats {
+    /// Edges flipped.
+    pub edges_flipped: u64,
     /// Bridge triangles removed.
     pub bridges_removed: u64,
     /// Edge-connected components before small ones are removed.
@@ -118,6 +124,7 @@ impl RepairOptions {
 
 impl RepairStats {
     fn add(&mut self, more: &Self) {
+        self.edges_flipped += more.edges_flipped;
         self.bridges_removed += more.bridges_removed;
         self.components_found += more.components_found;
         self.components_removed += more.components_removed;
@@ -139,6 +146,7 @@ persist!(Repaired {
     outline
 });
 persist!(RepairStats {
+    edges_flipped,
     bridges_removed,
     components_found,
     components_removed,
@@ -166,7 +174,7 @@ pub fn repair(
     workspace: &Workspace,
 ) -> Result<(Repaired, RepairStats)> {
     let (surface, mut stats) = workspace.once("surface", || {
-        surface::build(places.shape, stitched, blocks, options, workspace)
+        surface::build(places, stitched, blocks, options, workspace)
     })?;
     let limit = options.filling();
     let (filled, outline) = holes::fill(places, &surface, limit, blocks, &mut stats, workspace)?;

@@ -4,6 +4,7 @@
 //! No edge has more than two triangles and the surface is orientable; so it does not matter in
 //! which order edges are looked at.
 
+use super::by_end::ByLowerEnd;
 use crate::stages::surface::parity::ParitySets;
 use crate::stages::surface::star::{EDGES, Triangle};
 use std::ops::Range;
@@ -64,28 +65,10 @@ impl Builder<'_> {
     /// The edges with both ends in the block, by their lower ends.
     fn inside(&mut self) {
         let size = self.ids.len() as u32;
-        let local = |v: u32| v.wrapping_sub(self.ids.start);
-        // Triangles whose upper edge lies inside, by their middle vertex.
-        let middle = |t: &Triangle| (local(t[1]) < size && local(t[2]) < size).then(|| local(t[1]));
-        let mut starts = vec![0u32; size as usize + 1];
-        for v in self.triangles.iter().filter_map(middle) {
-            starts[v as usize] += 1;
-        }
-        let mut sum = 0;
-        for start in &mut starts {
-            sum += *start;
-            *start = sum;
-        }
-        let mut list = vec![0u32; sum as usize];
-        for (number, t) in self.triangles.iter().enumerate().rev() {
-            if let Some(v) = middle(t) {
-                starts[v as usize] -= 1;
-                list[starts[v as usize] as usize] = number as u32;
-            }
-        }
-        let mut next = self.triangles.partition_point(|t| t[0] < self.ids.start);
+        let edges = ByLowerEnd::of(self.ids.clone(), self.triangles);
+        let mut next = edges.first();
         for v in 0..size {
-            let upper = &list[starts[v as usize] as usize..starts[v as usize + 1] as usize];
+            let upper = edges.upper(v);
             let first = next;
             let mut single = 0;
             for &number in upper {

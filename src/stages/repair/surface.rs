@@ -6,12 +6,15 @@
 
 use super::facing::{Fate, SUMS, Sums, judge};
 use super::patch::Patch;
-use super::{EXCHANGE_BUFFER, OrientedTriangle, RepairOptions, RepairStats, around, bridges};
+use super::{
+    EXCHANGE_BUFFER, OrientedTriangle, RepairOptions, RepairStats, around, bridges, flips,
+};
 use crate::error::Result;
 use crate::geom::Point;
 use crate::spill::layouts::{ORIENTED, SENT};
 use crate::spill::{Exchange, Layout, Sections, Word};
 use crate::stages::blocks::Blocks;
+use crate::stages::located::Places;
 use crate::stages::order::PointStore;
 use crate::stages::stitch::Stitched;
 use crate::stages::surface::parity::ParitySets;
@@ -129,7 +132,7 @@ impl Surface {
 
 /// Files that the blocks leave, and what they add up to.
 struct Build<'a> {
-    store: &'a PointStore,
+    places: Places<'a>,
     stitched: &'a Stitched,
     blocks: Blocks,
     options: RepairOptions,
@@ -150,14 +153,14 @@ struct Build<'a> {
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
 /// [`crate::Error::Cancelled`].
 pub fn build(
-    store: &PointStore,
+    places: Places<'_>,
     stitched: Stitched,
     blocks: Blocks,
     options: RepairOptions,
     workspace: &Workspace,
 ) -> Result<(Surface, RepairStats)> {
     let held = workspace.reserve("exchanges", 2 * EXCHANGE_BUFFER)?;
-    let build = Build::create(store, &stitched, blocks, options, workspace)?;
+    let build = Build::create(places, &stitched, blocks, options, workspace)?;
     let bytes = |b: usize| {
         let records = stitched.interior.records(b) + stitched.added.records(b);
         230 * records as u64 + blocks.ids(b).len() as u64 * 30 + (1 << 20)
@@ -193,7 +196,7 @@ pub fn build(
     let held = workspace.reserve("labels", label_bytes(next as usize, globals.len()))?;
     let sets = join(&seen, &globals, next, workspace)?;
     let parts = Parts {
-        store,
+        store: places.shape,
         seen: &seen,
         sums: &sums,
         bridges: &bridges,
@@ -250,7 +253,7 @@ impl Persist for Surface {
 
 impl<'a> Build<'a> {
     fn create(
-        store: &'a PointStore,
+        places: Places<'a>,
         stitched: &'a Stitched,
         blocks: Blocks,
         options: RepairOptions,
@@ -258,7 +261,7 @@ impl<'a> Build<'a> {
     ) -> Result<Self> {
         let (count, buffer) = (blocks.count(), EXCHANGE_BUFFER);
         Ok(Self {
-            store,
+            places,
             stitched,
             blocks,
             options,
@@ -274,7 +277,14 @@ impl<'a> Build<'a> {
     /// Works on a block: the number of its global labels, and counts.
     fn block(&self, block: usize) -> Result<(u32, RepairStats)> {
         let ids = self.blocks.ids(block);
-        let triangles = around::load(self.stitched, block)?;
+        let mut triangles = around::load(self.stitched, block)?;
+        let mut stats = RepairStats::default();
+        if self.options.repair && self.options.flip && self.places.differ() {
+            let range = ids.start as usize..ids.end as usize;
+            let points = self.places.file.slice(range.clone())?;
+            let shape = self.places.shape.slice(range)?;
+            stats.edges_flipped = flips::flip(ids.clone(), &mut triangles, &points, &shape);
+        }
         let patch = Patch::of(ids.clone(), &triangles);
         let bridges = if self.options.repair {
             bridges::find(ids.clone(), &triangles, &patch)
@@ -290,7 +300,6 @@ impl<'a> Build<'a> {
         let (global, local) = sums.split_at(patch.global as usize);
         let global: Vec<[u32; SUMS]> = global.iter().map(Sums::words).collect();
         self.sums.put(block, &global)?;
-        let mut stats = RepairStats::default();
         let least = self.options.least();
         let fates: Vec<Fate> = local.iter().map(|s| judge(s, least, &mut stats)).collect();
         drop(sums);
@@ -310,7 +319,10 @@ impl<'a> Build<'a> {
         bridges: &[u32],
     ) -> Result<Vec<Sums>> {
         let ids = self.blocks.ids(block);
-        let points = self.store.slice(ids.start as usize..ids.end as usize)?;
+        let points = self
+            .places
+            .shape
+            .slice(ids.start as usize..ids.end as usize)?;
         let mut sums = vec![Sums::default(); patch.labels as usize];
         let mut bridges = bridges.iter().peekable();
         for (number, t) in triangles.iter().enumerate() {

@@ -1,9 +1,11 @@
-//! Mending of single loops, on surfaces made for it.
+//! Mending of single loops and flips of edges, on surfaces made for them.
 
 use super::fill::{Corner, Filling};
+use super::flips::flip;
 use super::mend::Mending;
 use super::zip::zip;
 use crate::geom::Point;
+use crate::stages::surface::star::Triangle;
 use proptest::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -256,4 +258,69 @@ fn a_wide_door_stays_open() {
         let area: f64 = triangles.iter().map(|t| sheet.area(*t)).sum();
         assert!(area < 0.05 * 600.0 * 600.0, "{area}");
     }
+}
+
+/// A roof of four rows of five points, its ridge between the second and the third column of
+/// squares, each cut by the diagonal that `up` says.
+fn roof(up: bool) -> (Vec<Point>, Vec<Triangle>) {
+    let height = |x: i32| 10 * x.min(4 - x);
+    let point = |n: i32| [10 * (n % 5 + n / 5), 10 * (n / 5), height(n % 5)];
+    let squares = (0..3).flat_map(|y| (0..4).map(move |x| y * 5 + x));
+    let halves = |a: u32| match up {
+        true => [[a, a + 1, a + 6], [a, a + 5, a + 6]],
+        false => [[a, a + 1, a + 5], [a + 1, a + 5, a + 6]],
+    };
+    let mut triangles: Vec<Triangle> = squares.flat_map(halves).collect();
+    triangles.sort_unstable();
+    ((0..20).map(point).collect(), triangles)
+}
+
+/// Two triangles over a ridge become two on its sides.
+#[test]
+fn a_ridge_is_not_crossed() {
+    let points = [[0, 0, 0], [10, 0, 10], [10, 10, 10], [20, 0, 0]];
+    // With what lies beside them, which tells where the ridge is.
+    let beside = [[0, 10, 0], [20, 10, 0], [10, -10, 10], [10, 20, 10]];
+    let points: Vec<Point> = points.into_iter().chain(beside).collect();
+    let mut triangles = vec![
+        [0, 1, 6],
+        [0, 1, 3],
+        [0, 2, 3],
+        [0, 2, 4],
+        [1, 3, 6],
+        [2, 3, 5],
+        [2, 4, 7],
+        [2, 5, 7],
+    ];
+    triangles.sort_unstable();
+    let still = triangles.clone();
+    assert_eq!(flip(0..8, &mut triangles, &points, &points), 0);
+    assert_eq!(triangles, still);
+    let moved: Vec<Point> = points.iter().map(|p| [p[0], p[1], 5]).collect();
+    assert_eq!(flip(0..8, &mut triangles, &points, &moved), 1);
+    let has = |t: Triangle| triangles.contains(&t);
+    assert!(has([0, 1, 2]) && has([1, 2, 3]), "{triangles:?}");
+    assert!(triangles.is_sorted());
+    assert_eq!(flip(0..8, &mut triangles, &points, &moved), 0);
+}
+
+/// On a roof every diagonal lies in a plane: none is better.
+#[test]
+fn flat_quadrilaterals_stay() {
+    for up in [true, false] {
+        let (points, mut triangles) = roof(up);
+        let moved: Vec<Point> = points.iter().map(|p| [p[0], p[1], p[2] + 1]).collect();
+        let still = triangles.clone();
+        assert_eq!(flip(0..20, &mut triangles, &points, &moved), 0);
+        assert_eq!(triangles, still);
+    }
+}
+
+/// Of a larger surface only what lies inside is changed, and no edge is made at its rim.
+#[test]
+fn what_reaches_out_of_the_block_stays() {
+    let points = [[0, 0, 0], [10, 0, 10], [10, 10, 10], [20, 0, 0]];
+    let moved = points.map(|p| [p[0], p[1], 5]);
+    let mut triangles = vec![[0, 1, 3], [0, 2, 3], [1, 3, 9]];
+    assert_eq!(flip(0..4, &mut triangles, &points, &moved), 0);
 }

@@ -1,0 +1,469 @@
+//! Flips of edges, until the surface bends no less for another.
+//!
+//! Of the two ways to cut a quadrilateral into triangles, the points alone say which is nearer to the
+//! surface: the one with smaller angles between the normals of triangles side by side (Dyn, Levin and
+//! Rippa, *Data dependent triangulations for piecewise linear interpolation*, 1990). Cells do not
+//! look at that, and relaxed positions know less of it than those in the file.
+//!
+//! Only what lies inside the block is changed, triangle by triangle in ascending order, so that it
+//! follows from the block alone. Boundary edges, components and fans stay what they are.
+
+use super::around::merge;
+use super::by_end::ByLowerEnd;
+use crate::geom::{Point, sub};
+use crate::stages::located::small_normal;
+use crate::stages::surface::star::Triangle;
+use std::ops::Range;
+
+/// Bends at the five edges of a quadrilateral, added up, below which it is flat enough.
+const FLAT: f32 = 1.2;
+/// What a flip must save of this sum.
+const GAIN: f32 = 0.1;
+/// Twice the area over the two longest sides: triangles below it, and below what was there, are not
+/// made. About the sine of the smallest angle.
+const SLENDER: f64 = 0.2;
+
+/// Most sweeps over a block.
+const SWEEPS: usize = 3;
+
+/// An edge without a triangle inside the block behind it.
+const NONE: u32 = u32::MAX;
+
+/// Flips edges of the `triangles`, ascending, that touch the vertices `ids`; how many. `points` are
+/// the positions in the file, `shape` those that points were connected by: triangles none of whose
+/// points were moved stay.
+pub fn flip(
+    ids: Range<u32>,
+    triangles: &mut Vec<Triangle>,
+    points: &[Point],
+    shape: &[Point],
+) -> u64 {
+    let moved: Vec<bool> = points.iter().zip(shape).map(|(p, s)| p != s).collect();
+    let inside = |t: &Triangle| ids.contains(&t[0]) && ids.contains(&t[2]);
+    let moved = |t: &Triangle| t.iter().any(|v| moved[(v - ids.start) as usize]);
+    let mut fixed = vec![false; ids.len()];
+    let mut numbers = Vec::new();
+    let mut these: Vec<Triangle> = Vec::new();
+    for (number, t) in triangles.iter().enumerate() {
+        if inside(t) && moved(t) {
+            numbers.push(number as u32);
+            these.push(t.map(|v| v - ids.start));
+        } else {
+            for v in t.iter().filter(|v| ids.contains(v)) {
+                fixed[(v - ids.start) as usize] = true;
+            }
+        }
+    }
+    let mut sheet = Sheet::of(these, fixed, points);
+    let mut flips = 0;
+    for _ in 0..SWEEPS {
+        let more = sheet.sweep();
+        flips += more;
+        if more == 0 {
+            break;
+        }
+    }
+    if flips > 0 {
+        sheet.write(ids.start, &numbers, triangles);
+    }
+    flips
+}
+
+/// The triangles of a block that may change, and what is behind their edges.
+struct Sheet<'a> {
+    points: &'a [Point],
+    /// Corners by place in the block, as they run.
+    corners: Vec<[u32; 3]>,
+    /// Opposite each corner: the triangle behind the edge, and which of its corners is opposite.
+    across: Vec<[u32; 3]>,
+    /// Unit normals.
+    normals: Vec<[f32; 3]>,
+    /// Opposite each corner: how far the surface bends there, the distance of two unit normals.
+    bends: Vec<[f32; 3]>,
+    /// Vertices that get no new edge: not all is known around them.
+    fixed: Vec<bool>,
+    /// Edges to look at, 16 triangles a word, four bits each: bit `k` for the edge opposite corner `k`.
+    due: Vec<u64>,
+    flipped: Vec<bool>,
+}
+
+/// A flip that pays.
+struct Flip {
+    normals: [[f32; 3]; 2],
+    /// Of the new edge, and of the sides `cu`, `ud`, `dv`, `vc`.
+    bends: [f32; 5],
+}
+
+impl<'a> Sheet<'a> {
+    /// Triangles by place in the block, ascending.
+    fn of(corners: Vec<[u32; 3]>, fixed: Vec<bool>, points: &'a [Point]) -> Self {
+        let count = corners.len();
+        let mut sheet = Self {
+            points,
+            across: vec![[NONE; 3]; count],
+            normals: Vec::new(),
+            bends: vec![[0.0; 3]; count],
+            fixed,
+            due: vec![0; count.div_ceil(16)],
+            flipped: vec![false; count],
+            corners,
+        };
+        sheet.pair();
+        sheet.fix();
+        sheet.normals = sheet
+            .corners
+            .iter()
+            .map(|t| unit(sheet.normal(*t)))
+            .collect();
+        sheet.bend();
+        sheet
+    }
+
+    /// Finds what is behind each edge.
+    fn pair(&mut self) {
+        let size = self.points.len() as u32;
+        let edges = ByLowerEnd::of(0..size, &self.corners);
+        // For each vertex, the last lower end that its edge to was seen from, plus one, and whose.
+        let mut seen = vec![(0u32, 0u32); size as usize];
+        let mut next = 0;
+        for v in 0..size {
+            let mut visit = |y: u32, number: u32, corner: u32| {
+                let place = &mut seen[y as usize];
+                let this = number << 2 | corner;
+                if place.0 == v + 1 {
+                    self.across[number as usize][corner as usize] = place.1;
+                    self.across[(place.1 >> 2) as usize][(place.1 & 3) as usize] = this;
+                } else {
+                    *place = (v + 1, this);
+                }
+            };
+            for &number in edges.upper(v) {
+                visit(self.corners[number as usize][2], number, 0);
+            }
+            while let Some(t) = self.corners.get(next).filter(|t| t[0] == v) {
+                visit(t[1], next as u32, 2);
+                visit(t[2], next as u32, 1);
+                next += 1;
+            }
+        }
+    }
+
+    /// Fixes vertices with several fans: they have four boundary edges or more.
+    fn fix(&mut self) {
+        let mut rims = vec![0u8; self.points.len()];
+        for (t, across) in self.corners.iter().zip(&self.across) {
+            for k in (0..3).filter(|&k| across[k] == NONE) {
+                for v in [t[(k + 1) % 3], t[(k + 2) % 3]] {
+                    rims[v as usize] = rims[v as usize].saturating_add(1);
+                }
+            }
+        }
+        for (fixed, rims) in self.fixed.iter_mut().zip(rims) {
+            *fixed |= rims >= 4;
+        }
+    }
+
+    /// Measures how far the surface bends, and which edges there is anything to gain at.
+    fn bend(&mut self) {
+        for number in 0..self.corners.len() {
+            for k in 0..3 {
+                let behind = self.across[number][k];
+                if behind != NONE && number < (behind >> 2) as usize {
+                    let other = self.seen_from(number, k, behind);
+                    let bend = distance(self.normals[number], other);
+                    self.bends[number][k] = bend;
+                    self.bends[(behind >> 2) as usize][(behind & 3) as usize] = bend;
+                }
+            }
+        }
+        for (number, across) in self.across.iter().enumerate() {
+            let mut bits = 0;
+            for (k, &behind) in across.iter().enumerate() {
+                let own = behind != NONE && number < (behind >> 2) as usize;
+                bits |= u64::from(own && self.around(number, k, behind) >= FLAT) << k;
+            }
+            self.due[number / 16] |= bits << (number % 16 * 4);
+        }
+    }
+
+    /// How far the surface bends at an edge and around it.
+    #[inline]
+    fn around(&self, number: usize, k: usize, behind: u32) -> f32 {
+        let (other, corner) = ((behind >> 2) as usize, (behind & 3) as usize);
+        let (mine, theirs) = (&self.bends[number], &self.bends[other]);
+        mine[k] + (mine[next(k)] + mine[last(k)]) + (theirs[next(corner)] + theirs[last(corner)])
+    }
+
+    /// The normal of the triangle `behind` the edge opposite corner `k` of triangle `number`, turned
+    /// so that both face the same way.
+    #[inline]
+    fn seen_from(&self, number: usize, k: usize, behind: u32) -> [f32; 3] {
+        let (other, corner) = ((behind >> 2) as usize, (behind & 3) as usize);
+        let same_way = self.corners[number][next(k)] == self.corners[other][next(corner)];
+        let normal = self.normals[other];
+        if same_way { normal.map(|x| -x) } else { normal }
+    }
+
+    /// The normal of a triangle.
+    #[inline]
+    fn normal(&self, [a, b, c]: [u32; 3]) -> [f32; 3] {
+        let at = |v: u32| self.points[v as usize];
+        let (u, v) = (side(at(a), at(b)), side(at(a), at(c)));
+        [
+            u[1] * v[2] - u[2] * v[1],
+            u[2] * v[0] - u[0] * v[2],
+            u[0] * v[1] - u[1] * v[0],
+        ]
+    }
+
+    /// Looks at the edges that are due, in order, and flips those where it pays; how many.
+    fn sweep(&mut self) -> u64 {
+        let mut flips = 0;
+        for word in 0..self.due.len() {
+            let mut ahead = u64::MAX;
+            loop {
+                // What a flip makes due further on is looked at now, what is behind in the next sweep.
+                let bits = self.due[word] & ahead;
+                if bits == 0 {
+                    break;
+                }
+                let bit = bits.trailing_zeros();
+                self.due[word] &= !(1 << bit);
+                ahead = u64::MAX.checked_shl(bit + 1).unwrap_or(0);
+                let (number, k) = (word * 16 + bit as usize / 4, bit as usize % 4);
+                // Seen from the smaller of the two numbers only; there is none beyond the last.
+                let Some(across) = self.across.get(number) else {
+                    break;
+                };
+                let behind = across[k];
+                if behind != NONE
+                    && number < (behind >> 2) as usize
+                    && let Some(flip) = self.gain(number, k, behind)
+                {
+                    self.turn(number, k, behind, flip);
+                    flips += 1;
+                }
+            }
+        }
+        flips
+    }
+
+    /// What flipping the edge opposite corner `k` of `number` makes, if it pays.
+    #[inline]
+    fn gain(&self, number: usize, k: usize, behind: u32) -> Option<Flip> {
+        let was = self.around(number, k, behind);
+        if was < FLAT {
+            return None;
+        }
+        let (other, corner) = ((behind >> 2) as usize, (behind & 3) as usize);
+        let (c, u, v) = self.named(number, k);
+        let d = self.corners[other][corner];
+        if self.fixed[c as usize] || self.fixed[d as usize] {
+            return None;
+        }
+        let (one, two) = (self.normal([u, d, c]), self.normal([d, v, c]));
+        let (mine, theirs) = (self.normals[number], self.seen_from(number, k, behind));
+        let both: [f32; 3] = std::array::from_fn(|i| mine[i] + theirs[i]);
+        if !(dot(one, both) > 0.0 && dot(two, both) > 0.0) {
+            return None;
+        }
+        let (one, two) = (unit(one), unit(two));
+        let sides = self.sides(number, k, behind);
+        let bend = |normal, side: Option<[f32; 3]>| side.map_or(0.0, |s| distance(normal, s));
+        let bends = [
+            distance(one, two),
+            bend(one, sides[0]),
+            bend(one, sides[1]),
+            bend(two, sides[2]),
+            bend(two, sides[3]),
+        ];
+        let is = bends[0] + (bends[1] + bends[2]) + (bends[3] + bends[4]);
+        let pays = was - is > GAIN && !self.too_slender([c, u, d, v]) && !self.meets(number, k, d);
+        pays.then_some(Flip {
+            normals: [one, two],
+            bends,
+        })
+    }
+
+    /// Corner `k` of a triangle, and the two after it as they run.
+    #[inline]
+    fn named(&self, number: usize, k: usize) -> (u32, u32, u32) {
+        let t = self.corners[number];
+        (t[k], t[next(k)], t[last(k)])
+    }
+
+    /// What is behind the sides `cu`, `ud`, `dv`, `vc` of the quadrilateral of an edge.
+    #[inline]
+    fn behind(&self, number: usize, k: usize, behind: u32) -> [u32; 4] {
+        let (other, corner) = ((behind >> 2) as usize, (behind & 3) as usize);
+        let (mine, theirs) = (&self.across[number], &self.across[other]);
+        let u = self.corners[number][next(k)];
+        // Opposite `u` is the side `dv`.
+        let (ud, dv) = if self.corners[other][next(corner)] == u {
+            (last(corner), next(corner))
+        } else {
+            (next(corner), last(corner))
+        };
+        [mine[last(k)], theirs[ud], theirs[dv], mine[next(k)]]
+    }
+
+    /// The normals of the triangles behind these sides, facing as `number` does.
+    #[inline]
+    fn sides(&self, number: usize, k: usize, behind: u32) -> [Option<[f32; 3]>; 4] {
+        let (c, u, v) = self.named(number, k);
+        let d = self.corners[(behind >> 2) as usize][(behind & 3) as usize];
+        let all = self.behind(number, k, behind);
+        let from = [c, u, d, v];
+        std::array::from_fn(|i| {
+            (all[i] != NONE).then(|| {
+                let (other, corner) = ((all[i] >> 2) as usize, (all[i] & 3) as usize);
+                let normal = self.normals[other];
+                // The quadrilateral runs c, u, d, v; a neighbour that faces alike runs back.
+                if self.corners[other][next(corner)] == from[i] {
+                    normal.map(|x| -x)
+                } else {
+                    normal
+                }
+            })
+        })
+    }
+
+    /// True if one of the two new triangles has no area, or is slender and more so than both old ones.
+    fn too_slender(&self, [c, u, d, v]: [u32; 4]) -> bool {
+        let shape = |t: [u32; 3]| slenderness(t.map(|v| self.points[v as usize]));
+        let made = shape([u, d, c]).min(shape([d, v, c]));
+        made == 0.0 || made < SLENDER * SLENDER && made < shape([c, u, v]).min(shape([d, v, u]))
+    }
+
+    /// True if corner `k` of a triangle has an edge to `d` already.
+    fn meets(&self, number: usize, k: usize, d: u32) -> bool {
+        let c = self.corners[number][k];
+        let all_around = |begin: usize| {
+            let (mut at, mut through) = (number, begin);
+            loop {
+                let behind = self.across[at][through];
+                if behind == NONE {
+                    return (false, false);
+                }
+                let (other, corner) = ((behind >> 2) as usize, (behind & 3) as usize);
+                if other == number {
+                    return (false, true);
+                }
+                if self.corners[other][corner] == d {
+                    return (true, true);
+                }
+                // Out again through the other edge at c: opposite the end of the one we came through.
+                at = other;
+                through = if self.corners[other][next(corner)] == c {
+                    last(corner)
+                } else {
+                    next(corner)
+                };
+            }
+        };
+        let (found, whole) = all_around(next(k));
+        found || (!whole && all_around(last(k)).0)
+    }
+
+    /// Flips.
+    fn turn(&mut self, number: usize, k: usize, behind: u32, flip: Flip) {
+        let other = (behind >> 2) as usize;
+        let (c, u, v) = self.named(number, k);
+        let d = self.corners[other][(behind & 3) as usize];
+        let [cu, ud, dv, vc] = self.behind(number, k, behind);
+        let [one, two] = [number as u32, other as u32];
+        self.corners[number] = [u, d, c];
+        self.corners[other] = [d, v, c];
+        self.across[number] = [two << 2 | 1, cu, ud];
+        self.across[other] = [vc, one << 2, dv];
+        [self.normals[number], self.normals[other]] = flip.normals;
+        let [inner, at_cu, at_ud, at_dv, at_vc] = flip.bends;
+        self.bends[number] = [inner, at_cu, at_ud];
+        self.bends[other] = [at_vc, inner, at_dv];
+        let sides = [
+            (cu, one << 2 | 1, at_cu),
+            (ud, one << 2 | 2, at_ud),
+            (dv, two << 2 | 2, at_dv),
+            (vc, two << 2, at_vc),
+        ];
+        for (side, mine, bend) in sides {
+            if side != NONE {
+                let (triangle, corner) = ((side >> 2) as usize, (side & 3) as usize);
+                self.across[triangle][corner] = mine;
+                self.bends[triangle][corner] = bend;
+            }
+        }
+        for triangle in [number, other] {
+            self.flipped[triangle] = true;
+            for k in 0..3 {
+                let behind = self.across[triangle][k];
+                let owner = (triangle as u32) << 2 | k as u32;
+                let owner = owner.min(behind) as usize;
+                self.due[owner / 64] |= 1 << (owner % 64);
+            }
+        }
+    }
+
+    /// Puts the flipped triangles in their places.
+    fn write(&self, first: u32, numbers: &[u32], triangles: &mut Vec<Triangle>) {
+        let mut new: Vec<Triangle> = Vec::new();
+        let mut gone = Vec::new();
+        for (number, _) in self.flipped.iter().enumerate().filter(|(_, f)| **f) {
+            let mut t = self.corners[number].map(|v| v + first);
+            t.sort_unstable();
+            new.push(t);
+            gone.push(numbers[number]);
+        }
+        new.sort_unstable();
+        let (mut number, mut gone) = (0, gone.into_iter().peekable());
+        triangles.retain(|_| {
+            number += 1;
+            gone.next_if_eq(&(number - 1)).is_none()
+        });
+        merge(triangles, new.into_iter());
+    }
+}
+
+#[inline]
+fn next(k: usize) -> usize {
+    [1, 2, 0][k]
+}
+
+#[inline]
+fn last(k: usize) -> usize {
+    [2, 0, 1][k]
+}
+
+#[inline]
+fn distance(a: [f32; 3], b: [f32; 3]) -> f32 {
+    let [x, y, z] = [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
+    (x * x + y * y + z * z).sqrt()
+}
+
+/// One long; not a number if the vector is zero.
+#[inline]
+fn unit([x, y, z]: [f32; 3]) -> [f32; 3] {
+    let inverse = 1.0 / (x * x + y * y + z * z).sqrt();
+    [x * inverse, y * inverse, z * inverse]
+}
+
+#[inline]
+fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// The way from `a` to `b`.
+#[inline]
+fn side(a: Point, b: Point) -> [f32; 3] {
+    std::array::from_fn(|k| (i64::from(b[k]) - i64::from(a[k])) as f32)
+}
+
+/// The square of twice a triangle's area over its two longest sides; zero only without an area.
+fn slenderness([a, b, c]: [Point; 3]) -> f64 {
+    let square = |v: [i64; 3]| {
+        let [x, y, z] = v.map(|x| x as f64);
+        x * x + y * y + z * z
+    };
+    let (ab, bc, ca) = (square(sub(b, a)), square(sub(c, b)), square(sub(a, c)));
+    square(small_normal(a, b, c)) * ab.min(bc).min(ca) / (ab * bc * ca)
+}
