@@ -42,7 +42,7 @@ pub fn flip(file: &[Point], shape: &[Point], surface: &mut Surface, block: u32) 
     flips
 }
 
-/// Vertices that get no new edge: those with other triangles, and those with several fans.
+/// Vertices whose triangles stay: those with other triangles, and those at a boundary.
 fn shut(surface: &Surface, runs: &[Run]) -> BTreeSet<u32> {
     let all: BTreeSet<u32> = runs.iter().flatten().copied().collect();
     let closed = |v: &u32| {
@@ -50,13 +50,13 @@ fn shut(surface: &Surface, runs: &[Run]) -> BTreeSet<u32> {
             .triangles()
             .iter()
             .any(|t| t.contains(v) && !runs.contains(t));
-        let boundary = runs
-            .iter()
-            .filter(|t| t.contains(v))
-            .flat_map(|t| edges(*t))
-            .filter(|e| e.contains(v) && surface.is_boundary(*e))
-            .count();
-        others || boundary >= 4
+        let mut own = runs.iter().filter(|t| t.contains(v));
+        others
+            || own.any(|t| {
+                edges(*t)
+                    .iter()
+                    .any(|e| e.contains(v) && surface.is_boundary(*e))
+            })
     };
     all.into_iter().filter(closed).collect()
 }
@@ -172,7 +172,7 @@ impl Sheet<'_> {
         let t = self.runs[n];
         let (c, u, v) = (t[k], t[(k + 1) % 3], t[(k + 2) % 3]);
         let d = self.runs[other][self.corner(n, k, other)];
-        if was < FLAT || self.shut.contains(&c) || self.shut.contains(&d) {
+        if was < FLAT || [c, u, d, v].iter().any(|v| self.shut.contains(v)) {
             return None;
         }
         let meet = self.runs.iter().any(|t| t.contains(&c) && t.contains(&d));

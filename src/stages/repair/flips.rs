@@ -41,7 +41,7 @@ pub fn flip(
     let moved: Vec<bool> = points.iter().zip(shape).map(|(p, s)| p != s).collect();
     let inside = |t: &Triangle| ids.contains(&t[0]) && ids.contains(&t[2]);
     let moved = |t: &Triangle| t.iter().any(|v| moved[(v - ids.start) as usize]);
-    let mut fixed = vec![false; ids.len()];
+    let mut shut = vec![false; ids.len()];
     let mut numbers = Vec::new();
     let mut these: Vec<Triangle> = Vec::new();
     for (number, t) in triangles.iter().enumerate() {
@@ -50,11 +50,11 @@ pub fn flip(
             these.push(t.map(|v| v - ids.start));
         } else {
             for v in t.iter().filter(|v| ids.contains(v)) {
-                fixed[(v - ids.start) as usize] = true;
+                shut[(v - ids.start) as usize] = true;
             }
         }
     }
-    let mut sheet = Sheet::of(these, fixed, points);
+    let mut sheet = Sheet::of(these, shut, points);
     let mut flips = 0;
     for _ in 0..SWEEPS {
         let more = sheet.sweep();
@@ -80,8 +80,8 @@ struct Sheet<'a> {
     normals: Vec<[f32; 3]>,
     /// Opposite each corner: how far the surface bends there, the distance of two unit normals.
     bends: Vec<[f32; 3]>,
-    /// Vertices that get no new edge: not all is known around them.
-    fixed: Vec<bool>,
+    /// Vertices whose triangles stay: some of them are others, or there is a boundary.
+    shut: Vec<bool>,
     /// Edges to look at, 16 triangles a word, four bits each: bit `k` for the edge opposite corner `k`.
     due: Vec<u64>,
     flipped: Vec<bool>,
@@ -96,20 +96,20 @@ struct Flip {
 
 impl<'a> Sheet<'a> {
     /// Triangles by place in the block, ascending.
-    fn of(corners: Vec<[u32; 3]>, fixed: Vec<bool>, points: &'a [Point]) -> Self {
+    fn of(corners: Vec<[u32; 3]>, shut: Vec<bool>, points: &'a [Point]) -> Self {
         let count = corners.len();
         let mut sheet = Self {
             points,
             across: vec![[NONE; 3]; count],
             normals: Vec::new(),
             bends: vec![[0.0; 3]; count],
-            fixed,
+            shut,
             due: vec![0; count.div_ceil(16)],
             flipped: vec![false; count],
             corners,
         };
         sheet.pair();
-        sheet.fix();
+        sheet.shut();
         sheet.normals = sheet
             .corners
             .iter()
@@ -148,18 +148,14 @@ impl<'a> Sheet<'a> {
         }
     }
 
-    /// Fixes vertices with several fans: they have four boundary edges or more.
-    fn fix(&mut self) {
-        let mut rims = vec![0u8; self.points.len()];
+    /// Shuts vertices with an edge that has nothing behind it.
+    fn shut(&mut self) {
         for (t, across) in self.corners.iter().zip(&self.across) {
             for k in (0..3).filter(|&k| across[k] == NONE) {
-                for v in [t[(k + 1) % 3], t[(k + 2) % 3]] {
-                    rims[v as usize] = rims[v as usize].saturating_add(1);
+                for v in [t[next(k)], t[last(k)]] {
+                    self.shut[v as usize] = true;
                 }
             }
-        }
-        for (fixed, rims) in self.fixed.iter_mut().zip(rims) {
-            *fixed |= rims >= 4;
         }
     }
 
@@ -258,7 +254,7 @@ impl<'a> Sheet<'a> {
         let (other, corner) = ((behind >> 2) as usize, (behind & 3) as usize);
         let (c, u, v) = self.named(number, k);
         let d = self.corners[other][corner];
-        if self.fixed[c as usize] || self.fixed[d as usize] {
+        if [c, u, d, v].into_iter().any(|v| self.shut[v as usize]) {
             return None;
         }
         let (one, two) = (self.normal([u, d, c]), self.normal([d, v, c]));

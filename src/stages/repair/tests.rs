@@ -260,67 +260,65 @@ fn a_wide_door_stays_open() {
     }
 }
 
-/// A roof of four rows of five points, its ridge between the second and the third column of
-/// squares, each cut by the diagonal that `up` says.
-fn roof(up: bool) -> (Vec<Point>, Vec<Triangle>) {
-    let height = |x: i32| 10 * x.min(4 - x);
-    let point = |n: i32| [10 * (n % 5 + n / 5), 10 * (n / 5), height(n % 5)];
-    let squares = (0..3).flat_map(|y| (0..4).map(move |x| y * 5 + x));
-    let halves = |a: u32| match up {
-        true => [[a, a + 1, a + 6], [a, a + 5, a + 6]],
-        false => [[a, a + 1, a + 5], [a + 1, a + 5, a + 6]],
+/// A valley along the diagonal of a grid of six by six points, every square cut across it or along.
+fn valley(across: bool) -> (Vec<Point>, Vec<Triangle>) {
+    let point = |n: i32| [10 * (n % 6), 10 * (n / 6), 10 * (n % 6 - n / 6).abs()];
+    let squares = (0..5).flat_map(|y| (0..5).map(move |x| y * 6 + x));
+    let halves = |a: u32| match across {
+        true => [[a, a + 1, a + 6], [a + 1, a + 6, a + 7]],
+        false => [[a, a + 1, a + 7], [a, a + 6, a + 7]],
     };
     let mut triangles: Vec<Triangle> = squares.flat_map(halves).collect();
     triangles.sort_unstable();
-    ((0..20).map(point).collect(), triangles)
+    ((0..36).map(point).collect(), triangles)
 }
 
-/// Two triangles over a ridge become two on its sides.
+/// As if they had been relaxed.
+fn lifted(points: &[Point]) -> Vec<Point> {
+    points.iter().map(|p| [p[0], p[1], p[2] + 1]).collect()
+}
+
 #[test]
-fn a_ridge_is_not_crossed() {
-    let points = [[0, 0, 0], [10, 0, 10], [10, 10, 10], [20, 0, 0]];
-    // With what lies beside them, which tells where the ridge is.
-    let beside = [[0, 10, 0], [20, 10, 0], [10, -10, 10], [10, 20, 10]];
-    let points: Vec<Point> = points.into_iter().chain(beside).collect();
-    let mut triangles = vec![
-        [0, 1, 6],
-        [0, 1, 3],
-        [0, 2, 3],
-        [0, 2, 4],
-        [1, 3, 6],
-        [2, 3, 5],
-        [2, 4, 7],
-        [2, 5, 7],
-    ];
-    triangles.sort_unstable();
+fn edges_across_a_valley_are_flipped() {
+    let (points, mut triangles) = valley(true);
     let still = triangles.clone();
-    assert_eq!(flip(0..8, &mut triangles, &points, &points), 0);
-    assert_eq!(triangles, still);
-    let moved: Vec<Point> = points.iter().map(|p| [p[0], p[1], 5]).collect();
-    assert_eq!(flip(0..8, &mut triangles, &points, &moved), 1);
-    let has = |t: Triangle| triangles.contains(&t);
-    assert!(has([0, 1, 2]) && has([1, 2, 3]), "{triangles:?}");
-    assert!(triangles.is_sorted());
-    assert_eq!(flip(0..8, &mut triangles, &points, &moved), 0);
-}
-
-/// On a roof every diagonal lies in a plane: none is better.
-#[test]
-fn flat_quadrilaterals_stay() {
-    for up in [true, false] {
-        let (points, mut triangles) = roof(up);
-        let moved: Vec<Point> = points.iter().map(|p| [p[0], p[1], p[2] + 1]).collect();
-        let still = triangles.clone();
-        assert_eq!(flip(0..20, &mut triangles, &points, &moved), 0);
-        assert_eq!(triangles, still);
+    assert_eq!(flip(0..36, &mut triangles, &points, &points), 0);
+    assert_eq!(triangles, still, "nothing was moved");
+    // The squares at the two ends are at the boundary.
+    assert_eq!(flip(0..36, &mut triangles, &points, &lifted(&points)), 3);
+    for a in [7, 14, 21] {
+        assert!(triangles.contains(&[a, a + 1, a + 7]), "{triangles:?}");
+        assert!(triangles.contains(&[a, a + 6, a + 7]), "{triangles:?}");
     }
+    assert!(triangles.is_sorted());
+    assert_eq!(triangles.len(), still.len());
 }
 
-/// Of a larger surface only what lies inside is changed, and no edge is made at its rim.
 #[test]
-fn what_reaches_out_of_the_block_stays() {
-    let points = [[0, 0, 0], [10, 0, 10], [10, 10, 10], [20, 0, 0]];
-    let moved = points.map(|p| [p[0], p[1], 5]);
-    let mut triangles = vec![[0, 1, 3], [0, 2, 3], [1, 3, 9]];
-    assert_eq!(flip(0..4, &mut triangles, &points, &moved), 0);
+fn what_bends_no_more_than_it_must_stays() {
+    let (points, mut triangles) = valley(false);
+    let still = triangles.clone();
+    assert_eq!(flip(0..36, &mut triangles, &points, &lifted(&points)), 0);
+    assert_eq!(triangles, still);
+}
+
+/// The middle of the valley is at the border of the block.
+#[test]
+fn what_reaches_out_of_the_block_is_not_flipped() {
+    let (points, all) = valley(true);
+    for ids in [0..14u32, 15..36] {
+        let touches = |t: &&Triangle| t.iter().any(|v| ids.contains(v));
+        let mut triangles: Vec<Triangle> = all.iter().filter(touches).copied().collect();
+        let own = &points[ids.start as usize..ids.end as usize];
+        let before = triangles.clone();
+        flip(ids.clone(), &mut triangles, own, &lifted(own));
+        let crossing = |t: &&Triangle| !t.iter().all(|v| ids.contains(v));
+        assert!(
+            before
+                .iter()
+                .filter(crossing)
+                .eq(triangles.iter().filter(crossing))
+        );
+        assert!(triangles.contains(&[14, 15, 20]) == before.contains(&[14, 15, 20]));
+    }
 }
