@@ -6,6 +6,7 @@
 
 use crate::stages::surface::parity::ParitySets;
 use crate::stages::surface::star::{EDGES, Triangle};
+use crate::workspace::memory::{Holding, bytes_of, hold};
 use std::ops::Range;
 
 /// What is known of a block's triangles.
@@ -21,6 +22,7 @@ pub struct Patch {
     pub open: Vec<bool>,
     /// For each vertex of the block, the number of boundary edges at it, up to 255.
     pub rims: Vec<u8>,
+    _held: Holding,
 }
 
 /// A triangle without a label.
@@ -53,10 +55,12 @@ impl Patch {
             ids,
             triangles,
         };
+        let lists = bytes_of(&builder.words) + bytes_of(&builder.open) + bytes_of(&builder.rims);
+        let held = hold(lists);
         builder.inside();
         builder.seen = Vec::new();
         builder.across();
-        builder.number()
+        builder.number(held)
     }
 }
 
@@ -77,6 +81,7 @@ impl Builder<'_> {
             *start = sum;
         }
         let mut list = vec![0u32; sum as usize];
+        let mut held = hold(bytes_of(&starts) + bytes_of(&list) + bytes_of(&self.seen));
         for (number, t) in self.triangles.iter().enumerate().rev() {
             if let Some(v) = middle(t) {
                 starts[v as usize] -= 1;
@@ -111,6 +116,8 @@ impl Builder<'_> {
                 self.note_single(v, upper, first..next);
             }
         }
+        let labels = 4 * self.sets.len() as u64;
+        held.set(bytes_of(&starts) + bytes_of(&list) + bytes_of(&self.seen) + labels);
     }
 
     /// Sees triangle `number` at the edge from `v` to `y`; 1 for the edge's first, -1 for its second.
@@ -208,9 +215,10 @@ impl Builder<'_> {
     }
 
     /// Numbers the labels, those of triangles that are not interior first.
-    fn number(mut self) -> Patch {
+    fn number(mut self, held: Holding) -> Patch {
         self.sets.flatten();
         let mut numbers = vec![NONE; self.sets.len()];
+        let _numbers = hold(2 * bytes_of(&numbers));
         let mut labels = 0;
         let mut number = |label: u32| {
             let (root, flip) = self.sets.look(label);
@@ -236,6 +244,7 @@ impl Builder<'_> {
             global,
             open: self.open,
             rims: self.rims,
+            _held: held,
         }
     }
 }
