@@ -27,6 +27,8 @@ impl Workspace {
         let next = AtomicUsize::new(0);
         let stop = AtomicBool::new(false);
         let failed: Mutex<Option<(usize, Error)>> = Mutex::new(None);
+        // What a thread has held counts until all have ended, also of those that end first.
+        let slots = Mutex::new(Vec::new());
         let worker = || {
             let mut slot = Slot::new(&self.memory, name);
             while !stop.load(Ordering::Relaxed) {
@@ -54,6 +56,10 @@ impl Workspace {
                     }
                 }
             }
+            slots
+                .lock()
+                .unwrap_or_else(std::sync::PoisonError::into_inner)
+                .push(slot);
         };
         // Always the same threads: what the allocator keeps for one is of no use to another.
         self.pool.broadcast(|_| worker());
