@@ -20,7 +20,7 @@ use crate::stages::repair::{RepairOptions, repair};
 use crate::stages::smooth::{relax, smooth};
 use crate::stages::stitch::{StitchOptions, stitch};
 use crate::stages::triples::triples;
-use crate::workspace::memory::MemoryPool;
+use crate::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
 use crate::workspace::progress::{Cancel, Observer};
 use crate::workspace::{Workspace, limits};
 use attempt::Alarm;
@@ -58,7 +58,12 @@ pub struct Reconstruction {
 /// Half of the memory that machine and cgroup allow.
 #[must_use]
 pub fn default_memory() -> u64 {
-    limits::memory_allowed() / 2
+    share_of(limits::memory_allowed())
+}
+
+/// Half of what is allowed, but no less than the least budget if that is allowed.
+fn share_of(allowed: u64) -> u64 {
+    (allowed / 2).max(allowed.min(MINIMUM_BUDGET))
 }
 
 /// All threads the system offers to this process.
@@ -270,6 +275,9 @@ impl Reconstruction {
             mesh,
             coordinates,
             peak_resident_bytes: limits::peak_resident(),
+            resident_file_bytes: limits::resident_file(),
+            peak_held_bytes: self.memory.peak_held(),
+            held_at_peak: self.memory.held_at_peak(),
             peak_reserved_bytes: self.memory.peak(),
             reserved_at_peak: self.memory.at_peak(),
             estimated_first: first,
@@ -279,5 +287,20 @@ impl Reconstruction {
             seconds: begin.elapsed().as_secs_f64() + clock.earlier,
             stages: clock.stages,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_default_is_half_but_enough() {
+        let mib = |n: u64| n << 20;
+        assert_eq!(share_of(mib(1024)), mib(512));
+        assert_eq!(share_of(mib(256)), mib(192));
+        assert_eq!(share_of(mib(192)), mib(192));
+        // Too little is refused, with what is the least.
+        assert_eq!(share_of(mib(100)), mib(100));
     }
 }

@@ -59,7 +59,13 @@ pub struct Report {
     pub coordinates: CoordinateType,
     /// Peak resident memory of the process in bytes.
     pub peak_resident_bytes: u64,
-    /// Peak of the memory reserved by name in bytes.
+    /// Pages of mapped files among the resident memory: the program's code and its libraries.
+    pub resident_file_bytes: u64,
+    /// Peak of the memory held by name in bytes, the program's own among it.
+    pub peak_held_bytes: u64,
+    /// What it consisted of.
+    pub held_at_peak: BTreeMap<&'static str, u64>,
+    /// Peak of the memory reserved by name in bytes: what might have been taken at most.
     pub peak_reserved_bytes: u64,
     /// What it consisted of.
     pub reserved_at_peak: BTreeMap<&'static str, u64>,
@@ -101,6 +107,8 @@ pub struct StageReport {
     pub bytes_written: u64,
     /// Peak of the scratch space while it was at work, in bytes.
     pub scratch_bytes: u64,
+    /// Peak of the memory held while it was at work, in bytes.
+    pub held_bytes: u64,
     /// What the stage did one after the other, if it says so.
     pub parts: Vec<PartReport>,
 }

@@ -56,7 +56,7 @@ pub enum Command {
 /// Limits of a run.
 #[derive(Debug, ClapArgs)]
 pub struct Limits {
-    /// Ceiling for memory, e.g. 512MiB or 4GiB [default: half of what machine and cgroup allow]
+    /// Ceiling for memory, e.g. 512MiB or 4GiB [default: half of what machine and cgroup allow, or 192MiB]
     #[arg(long, value_name = "SIZE", value_parser = size)]
     pub memory: Option<u64>,
     /// Worker threads [default: all available]

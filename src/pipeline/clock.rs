@@ -21,6 +21,7 @@ struct Took {
     read: u64,
     written: u64,
     scratch: u64,
+    held: u64,
     parts: Vec<(String, f64)>,
 }
 
@@ -29,6 +30,7 @@ persist!(Took {
     read,
     written,
     scratch,
+    held,
     parts
 });
 
@@ -55,6 +57,8 @@ impl<'a> Clock<'a> {
             let io = &workspace.io;
             let (start, read, written) = (Instant::now(), io.read(), io.written());
             io.begin_stage();
+            // What was held before is not its own.
+            let _ = workspace.memory.take_held();
             workspace.observer.begin(name, unit, total);
             let outcome = work();
             workspace.observer.end();
@@ -64,6 +68,7 @@ impl<'a> Clock<'a> {
                 read: io.read() - read,
                 written: io.written() - written,
                 scratch: io.stage_peak(),
+                held: workspace.memory.take_held(),
                 parts: parts.map(|(name, s)| (name.to_owned(), s)).collect(),
             };
             Ok((outcome?, took))
@@ -78,6 +83,7 @@ impl<'a> Clock<'a> {
             bytes_read: took.read,
             bytes_written: took.written,
             scratch_bytes: took.scratch,
+            held_bytes: took.held,
             parts: parts
                 .map(|(name, seconds)| PartReport { name, seconds })
                 .collect(),

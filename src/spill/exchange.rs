@@ -15,22 +15,25 @@ pub struct Exchange<const N: usize> {
 }
 
 impl<const N: usize> Exchange<N> {
-    /// An exchange that sorts in `buffer` bytes of memory, already reserved by the caller. What is
-    /// sent does not outlive an attempt: for steps that are done again as a whole.
-    #[must_use]
-    pub fn new(workspace: &Workspace, name: &str, buffer: u64) -> Self {
-        Self {
-            sorter: Sorter::new(workspace, name, buffer),
+    /// An exchange that sorts in `buffer` bytes of memory. What is sent does not outlive an attempt: for
+    /// steps that are done again as a whole.
+    ///
+    /// # Errors
+    /// [`crate::Error::Memory`].
+    pub fn new(workspace: &Workspace, name: &str, buffer: u64) -> Result<Self> {
+        let held = workspace.promise("exchange", buffer)?;
+        Ok(Self {
+            sorter: Sorter::new(workspace, name, buffer).telling(held),
             sent: None,
             name: name.to_owned(),
             layout: [Word::Above; N],
-        }
+        })
     }
 
     /// An exchange for units of work: what a finished one has sent is there when the run is resumed.
     ///
     /// # Errors
-    /// [`crate::Error::Io`].
+    /// [`crate::Error::Io`], [`crate::Error::Memory`].
     pub fn between(
         workspace: &Workspace,
         name: &str,
@@ -38,7 +41,7 @@ impl<const N: usize> Exchange<N> {
         senders: usize,
         layout: Layout<N>,
     ) -> Result<Self> {
-        let mut exchange = Self::new(workspace, name, buffer).packed(layout);
+        let mut exchange = Self::new(workspace, name, buffer)?.packed(layout);
         if workspace.is_resumable() {
             let name = format!("{name}.letters");
             exchange.sent = Some(Sections::with_layout(workspace, &name, senders, layout)?);
@@ -137,7 +140,7 @@ mod tests {
     #[test]
     fn delivers_sorted_to_each_receiver() {
         let workspace = crate::spill::sorter::tests::workspace();
-        let exchange = Exchange::<2>::new(&workspace, "mail", 64);
+        let exchange = Exchange::<2>::new(&workspace, "mail", 64).unwrap();
         for i in (0..100u32).rev() {
             exchange.send(&[[i % 7, i]]).unwrap();
         }

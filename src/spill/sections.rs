@@ -8,6 +8,7 @@ use super::{Layout, Record, Word};
 use crate::error::Result;
 use crate::workspace::Workspace;
 use crate::workspace::file::{Place, ScratchFile};
+use crate::workspace::memory::{bytes_of, hold};
 use crate::workspace::persist::{Persist, Saved};
 use std::sync::Mutex;
 
@@ -136,6 +137,7 @@ impl<const N: usize> Sections<N> {
         let bytes = match self.layout {
             Some(layout) => {
                 pack(records, layout, &mut packed);
+                drop(hold(bytes_of(&packed)));
                 &packed
             }
             None => bytemuck::cast_slice(records),
@@ -173,6 +175,7 @@ impl<const N: usize> Sections<N> {
             return self.read(place, bytemuck::cast_slice_mut(records));
         };
         bytes.resize(place.bytes, 0);
+        let _held = hold(bytes_of(&bytes));
         self.read(place, &mut bytes)?;
         records.resize(place.records, [0; N]);
         unpack(&bytes, layout, records).ok_or_else(|| {

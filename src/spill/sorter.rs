@@ -5,6 +5,7 @@ use super::{Record, sort};
 use crate::error::Result;
 use crate::workspace::Workspace;
 use crate::workspace::file::Maker;
+use crate::workspace::memory::{Reservation, bytes_of};
 use crate::workspace::persist::{Persist, Raw, Saved};
 use crate::workspace::steps::Step;
 use std::collections::BTreeMap;
@@ -28,6 +29,8 @@ struct State<const N: usize> {
     buffer: Vec<Record<N>>,
     runs: Vec<Run<N>>,
     made: usize,
+    /// What is told how large the buffer is.
+    held: Option<Reservation>,
 }
 
 impl<const N: usize> Sorter<N> {
@@ -40,12 +43,20 @@ impl<const N: usize> Sorter<N> {
                 buffer: Vec::new(),
                 runs: Vec::new(),
                 made: 0,
+                held: None,
             }),
             capacity,
             name: name.to_owned(),
             files: workspace.maker(),
             pool: workspace.pool(),
         }
+    }
+
+    /// The sorter that tells how much its buffer takes of what is reserved for it.
+    #[must_use]
+    pub fn telling(self, held: Reservation) -> Self {
+        self.state().held = Some(held);
+        self
     }
 
     /// Takes the whole buffer at once, so that it never has to grow.
@@ -80,6 +91,10 @@ impl<const N: usize> Sorter<N> {
                 let target = wanted.max(2 * state.buffer.len()).min(self.capacity);
                 let more = target - state.buffer.len();
                 state.buffer.reserve_exact(more);
+                let taken = bytes_of(&state.buffer);
+                if let Some(held) = &mut state.held {
+                    held.set_held(taken);
+                }
             }
             state.buffer.extend_from_slice(now);
             records = later;
@@ -230,6 +245,7 @@ impl<const N: usize> Sorter<N> {
                     buffer: Vec::new(),
                     runs: Vec::new(),
                     made: 0,
+                    held: None,
                 },
             )
         };
@@ -238,12 +254,16 @@ impl<const N: usize> Sorter<N> {
             return Ok(Sorted {
                 buffer: state.buffer,
                 runs: Vec::new(),
+                _held: state.held,
             });
         }
         if !state.buffer.is_empty() {
             self.spill(&mut state)?;
         }
         state.buffer = Vec::new();
+        if let Some(held) = &mut state.held {
+            held.set_held(0);
+        }
         let step = workspace.step("merges")?;
         for (number, (name, merged)) in step.finished::<(String, Vec<String>)>(workspace)? {
             state.made = state.made.max(number as usize + 1);
@@ -268,6 +288,7 @@ impl<const N: usize> Sorter<N> {
         Ok(Sorted {
             buffer: Vec::new(),
             runs: state.runs,
+            _held: state.held,
         })
     }
 
@@ -300,6 +321,7 @@ impl<const N: usize> Sorter<N> {
 pub struct Sorted<const N: usize> {
     buffer: Vec<Record<N>>,
     runs: Vec<Run<N>>,
+    _held: Option<Reservation>,
 }
 
 impl<const N: usize> Persist for Sorted<N> {
@@ -312,6 +334,7 @@ impl<const N: usize> Persist for Sorted<N> {
         Ok(Self {
             runs: Persist::load(from)?,
             buffer: Persist::load(from)?,
+            _held: None,
         })
     }
 }

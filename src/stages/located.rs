@@ -4,6 +4,7 @@ use super::blocks::Blocks;
 use super::order::PointStore;
 use crate::error::Result;
 use crate::geom::{Point, sub};
+use crate::workspace::memory::{Holding, bytes_of, hold, table_bytes};
 use rustc_hash::FxHashMap;
 use std::ops::Range;
 
@@ -31,6 +32,7 @@ pub struct Located {
     ids: Range<u32>,
     own: Vec<Point>,
     foreign: FxHashMap<u32, Point>,
+    held: Holding,
 }
 
 impl Located {
@@ -49,6 +51,7 @@ impl Located {
             own: store.slice(ids.start as usize..ids.end as usize)?,
             ids,
             foreign: FxHashMap::default(),
+            held: Holding::default(),
         };
         located.add(store, vertices)?;
         Ok(located)
@@ -61,6 +64,7 @@ impl Located {
             ids: 0..points.len() as u32,
             own: points.to_vec(),
             foreign: FxHashMap::default(),
+            held: Holding::default(),
         }
     }
 
@@ -70,11 +74,14 @@ impl Located {
     /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
     pub fn add(&mut self, store: &PointStore, vertices: impl Iterator<Item = u32>) -> Result<()> {
         let mut far: Vec<u32> = vertices.filter(|v| !self.ids.contains(v)).collect();
+        let _far = hold(bytes_of(&far));
         far.sort_unstable();
         far.dedup();
         let mut points = Vec::with_capacity(far.len());
         store.fetch(&far, &mut points)?;
         self.foreign.extend(far.into_iter().zip(points));
+        self.held
+            .set(bytes_of(&self.own) + table_bytes(&self.foreign));
         Ok(())
     }
 

@@ -25,6 +25,13 @@ pub fn resident() -> u64 {
     status("VmRSS:").unwrap_or(0)
 }
 
+/// Resident pages of mapped files now, in bytes (`RssFile`): the program's code and its libraries,
+/// since no other file is mapped.
+#[must_use]
+pub fn resident_file() -> u64 {
+    status("RssFile:").unwrap_or(0)
+}
+
 /// Bytes free for this user on the file system that holds `path` (or its nearest existing parent).
 #[must_use]
 pub fn disk_free(path: &Path) -> Option<u64> {

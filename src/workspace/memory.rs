@@ -1,4 +1,15 @@
 //! The memory budget: one pool, named reservations.
+//!
+//! Two figures are kept. What is *reserved* is the most that may be taken, and decides what may
+//! start. What is *held* is what was taken: a unit of work says it of its large buffers with
+//! [`hold`], an exchange as its buffer grows; other reservations are held whole. What a unit held at
+//! most counts for its thread until the loop over the units ends, since the allocator keeps it for the
+//! next one.
+
+mod unit;
+
+pub use unit::{Holding, bytes_of, give_back, hold, table_bytes};
+pub(super) use unit::{Slot, Unit};
 
 use crate::error::{Error, Result};
 use std::collections::BTreeMap;
@@ -8,10 +19,14 @@ use std::sync::{Arc, Condvar, Mutex};
 pub const MINIMUM_BUDGET: u64 = 192 << 20;
 
 /// Part of the budget that the program takes before it has anything to do: code, tables, stacks.
-pub const PROGRAM: u64 = 8 << 20;
+pub const PROGRAM: u64 = 7 << 20;
+
+/// What a thread that has worked holds beside its units: its stack, small lists, and the pieces that
+/// the allocator keeps for it between larger ones. Paid from [`SLACK`].
+const THREAD: u64 = 9 << 18;
 
 /// Part of the budget kept for what is not reserved by name: small buffers, allocator slack.
-pub const SLACK: u64 = 40 << 20;
+pub const SLACK: u64 = 41 << 20;
 
 /// Part of the budget that no stage can reserve.
 pub const OVERHEAD: u64 = PROGRAM + SLACK;
@@ -21,8 +36,51 @@ struct State {
     used: u64,
     peak: u64,
     holders: BTreeMap<&'static str, u64>,
-    /// Who held what at the peak.
+    /// Who had reserved what at the peak.
     at_peak: BTreeMap<&'static str, u64>,
+    held: Ledger,
+    /// Threads that do units now, and that did so at one time at most.
+    threads: (u64, u64),
+}
+
+/// What is held, by name.
+#[derive(Debug, Default)]
+struct Ledger {
+    now: BTreeMap<&'static str, u64>,
+    sum: u64,
+    peak: u64,
+    at_peak: BTreeMap<&'static str, u64>,
+    /// The peak since it was last asked for.
+    lately: u64,
+}
+
+impl Ledger {
+    fn add(&mut self, name: &'static str, bytes: u64) {
+        if bytes == 0 {
+            return;
+        }
+        self.sum += bytes;
+        *self.now.entry(name).or_insert(0) += bytes;
+        self.lately = self.lately.max(self.sum);
+        if self.sum > self.peak {
+            self.peak = self.sum;
+            self.at_peak.clone_from(&self.now);
+        }
+    }
+
+    fn take(&mut self, name: &'static str, bytes: u64) {
+        self.sum -= bytes;
+        take(&mut self.now, name, bytes);
+    }
+}
+
+fn take(all: &mut BTreeMap<&'static str, u64>, name: &'static str, bytes: u64) {
+    if let Some(now) = all.get_mut(name) {
+        *now -= bytes;
+        if *now == 0 {
+            all.remove(name);
+        }
+    }
 }
 
 #[derive(Debug)]
@@ -50,6 +108,8 @@ impl MemoryPool {
                 budget,
             });
         }
+        let mut held = Ledger::default();
+        held.add("program", PROGRAM);
         Ok(Self(Arc::new(Shared {
             budget,
             capacity: budget - SLACK,
@@ -58,6 +118,8 @@ impl MemoryPool {
                 peak: PROGRAM,
                 holders: BTreeMap::from([("program", PROGRAM)]),
                 at_peak: BTreeMap::from([("program", PROGRAM)]),
+                held,
+                threads: (0, 0),
             }),
             freed: Condvar::new(),
         })))
@@ -93,6 +155,25 @@ impl MemoryPool {
         self.state().at_peak.clone()
     }
 
+    /// Largest number of bytes held at one time so far, the program's own among them.
+    #[must_use]
+    pub fn peak_held(&self) -> u64 {
+        self.state().held.peak
+    }
+
+    /// What was held at that time, by name.
+    #[must_use]
+    pub fn held_at_peak(&self) -> BTreeMap<&'static str, u64> {
+        self.state().held.at_peak.clone()
+    }
+
+    /// Largest number of bytes held at one time since this was last asked for.
+    #[must_use]
+    pub fn take_held(&self) -> u64 {
+        let held = &mut self.state().held;
+        std::mem::replace(&mut held.lately, held.sum)
+    }
+
     fn state(&self) -> std::sync::MutexGuard<'_, State> {
         self.0
             .state
@@ -105,6 +186,17 @@ impl MemoryPool {
     /// # Errors
     /// [`Error::Memory`], naming the current holders.
     pub fn reserve(&self, name: &'static str, bytes: u64) -> Result<Reservation> {
+        let mut reservation = self.promise(name, bytes)?;
+        self.state().held.add(name, bytes);
+        reservation.held = bytes;
+        Ok(reservation)
+    }
+
+    /// Reserves `bytes` of which nothing is held yet.
+    ///
+    /// # Errors
+    /// As [`MemoryPool::reserve`].
+    pub fn promise(&self, name: &'static str, bytes: u64) -> Result<Reservation> {
         let mut state = self.state();
         if state.used.saturating_add(bytes) > self.0.capacity {
             let held: Vec<String> = state
@@ -129,14 +221,15 @@ impl MemoryPool {
             pool: self.clone(),
             name,
             bytes,
+            held: 0,
         })
     }
 
-    /// Like [`MemoryPool::reserve`], but waits while others of the same name hold memory.
+    /// Like [`MemoryPool::promise`], but waits while others of the same name hold memory.
     ///
     /// # Errors
     /// [`Error::Memory`] if it does not fit although no other holder of `name` is left to wait for.
-    pub fn reserve_waiting(&self, name: &'static str, bytes: u64) -> Result<Reservation> {
+    pub fn promise_waiting(&self, name: &'static str, bytes: u64) -> Result<Reservation> {
         let mut state = self.state();
         while state.used.saturating_add(bytes) > self.0.capacity && state.holders.contains_key(name)
         {
@@ -148,8 +241,8 @@ impl MemoryPool {
         }
         drop(state);
         // A race for the freed bytes can only be lost to a holder of the same name.
-        match self.reserve(name, bytes) {
-            Err(_) if self.state().holders.contains_key(name) => self.reserve_waiting(name, bytes),
+        match self.promise(name, bytes) {
+            Err(_) if self.state().holders.contains_key(name) => self.promise_waiting(name, bytes),
             other => other,
         }
     }
@@ -164,19 +257,45 @@ impl MemoryPool {
     }
 }
 
-/// Bytes held out of a [`MemoryPool`]; dropping it gives them back.
+/// Bytes reserved out of a [`MemoryPool`]; dropping it gives them back.
 #[derive(Debug)]
 pub struct Reservation {
     pool: MemoryPool,
     name: &'static str,
     bytes: u64,
+    held: u64,
 }
 
 impl Reservation {
-    /// Bytes held.
+    /// Bytes reserved.
     #[must_use]
     pub fn bytes(&self) -> u64 {
         self.bytes
+    }
+
+    /// Tells how many bytes are taken of what was promised.
+    pub fn set_held(&mut self, bytes: u64) {
+        let mut state = self.pool.state();
+        state.held.add(self.name, bytes.saturating_sub(self.held));
+        state.held.take(self.name, self.held.saturating_sub(bytes));
+        self.held = bytes;
+    }
+
+    /// Reserves so many bytes less: they will not be taken.
+    pub fn give_back(&mut self, bytes: u64) {
+        let bytes = bytes.min(self.bytes);
+        let mut state = self.pool.state();
+        state.used -= bytes;
+        take(&mut state.holders, self.name, bytes);
+        self.bytes -= bytes;
+        // Whoever waits for others of the name must find one as long as there is one.
+        if self.bytes == 0 && bytes > 0 {
+            state.used += 1;
+            *state.holders.entry(self.name).or_insert(0) += 1;
+            self.bytes = 1;
+        }
+        drop(state);
+        self.pool.0.freed.notify_all();
     }
 }
 
@@ -184,12 +303,8 @@ impl Drop for Reservation {
     fn drop(&mut self) {
         let mut state = self.pool.state();
         state.used -= self.bytes;
-        if let Some(held) = state.holders.get_mut(self.name) {
-            *held -= self.bytes;
-            if *held == 0 {
-                state.holders.remove(self.name);
-            }
-        }
+        take(&mut state.holders, self.name, self.bytes);
+        state.held.take(self.name, self.held);
         drop(state);
         self.pool.0.freed.notify_all();
     }
@@ -233,9 +348,53 @@ mod tests {
                 ),
                 "{error}"
             );
-            assert!(pool.reserve_waiting("huge", bytes).is_err());
+            assert!(pool.promise_waiting("huge", bytes).is_err());
         }
         assert_eq!(pool.peak(), PROGRAM + 4096);
+    }
+
+    #[test]
+    fn what_is_held_is_what_was_said() {
+        let pool = MemoryPool::new(MINIMUM_BUDGET).unwrap();
+        let mut promised = pool.promise("promised", 5 << 20).unwrap();
+        assert_eq!(pool.peak_held(), PROGRAM);
+        promised.set_held(3 << 20);
+        promised.set_held(1 << 20);
+        let whole = pool.reserve("whole", 1 << 20).unwrap();
+        assert_eq!(pool.peak_held(), PROGRAM + (3 << 20));
+        assert_eq!(pool.held_at_peak()["promised"], 3 << 20);
+        assert_eq!(pool.peak(), PROGRAM + (6 << 20));
+        promised.give_back(4 << 20);
+        assert_eq!(pool.available(), pool.capacity() - (2 << 20));
+        // It is known as a holder for as long as it is one.
+        promised.give_back(u64::MAX);
+        assert_eq!(promised.bytes(), 1);
+        drop((promised, whole));
+        assert_eq!(pool.available(), pool.capacity());
+        assert_eq!(pool.take_held(), PROGRAM + (3 << 20));
+        assert_eq!(pool.take_held(), PROGRAM);
+    }
+
+    #[test]
+    fn a_thread_counts_for_its_largest_unit() {
+        let pool = MemoryPool::new(MINIMUM_BUDGET).unwrap();
+        let mut slot = Slot::new(&pool, "unit");
+        for bytes in [3 << 20, 5 << 20, 2 << 20] {
+            let at_work = Unit::begin(pool.promise_waiting("unit", 8 << 20).unwrap());
+            let first = hold(bytes / 2);
+            let second = hold(bytes / 2);
+            drop(first);
+            give_back(1 << 20);
+            assert_eq!(pool.available(), pool.capacity() - (7 << 20));
+            drop((second, hold(7)));
+            slot.ended(at_work.most().unwrap());
+        }
+        assert_eq!(pool.held_at_peak()["unit"], 5 << 20);
+        assert_eq!(pool.peak_held(), PROGRAM + THREAD + (5 << 20));
+        drop(slot);
+        assert_eq!(pool.available(), pool.capacity());
+        let silent = Unit::begin(pool.promise_waiting("unit", 1).unwrap());
+        assert_eq!(silent.most(), None);
     }
 
     #[test]
@@ -253,7 +412,7 @@ mod tests {
         let peak = std::thread::scope(|scope| {
             for _ in 0..4 {
                 let pool = pool.clone();
-                scope.spawn(move || drop(pool.reserve_waiting("unit", most).unwrap()));
+                scope.spawn(move || drop(pool.promise_waiting("unit", most).unwrap()));
             }
             pool.peak()
         });

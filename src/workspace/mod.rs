@@ -291,6 +291,14 @@ impl Workspace {
         self.memory.reserve(name, bytes)
     }
 
+    /// Reserves memory of which nothing is taken yet.
+    ///
+    /// # Errors
+    /// See [`MemoryPool::promise`].
+    pub fn promise(&self, name: &'static str, bytes: u64) -> Result<Reservation> {
+        self.memory.promise(name, bytes)
+    }
+
     /// The run's threads, for rayon.
     #[must_use]
     pub fn pool(&self) -> Arc<rayon::ThreadPool> {

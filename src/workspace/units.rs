@@ -1,6 +1,7 @@
 //! Units of work on all threads, as many at a time as the memory budget allows.
 
 use super::Workspace;
+use super::memory::{Slot, Unit};
 use crate::error::{Error, Result};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -9,7 +10,8 @@ impl Workspace {
     /// Runs `work(unit)` for every unit in `0..count`, on all threads, in ascending order of start.
     ///
     /// Before a unit starts, `bytes(unit)` are reserved as `name`, waiting for other units to end;
-    /// so the budget, not the number of threads, bounds what is in memory. The first error (that
+    /// so the budget, not the number of threads, bounds what is in memory. A unit may give back what it
+    /// does not need once its sizes are known, and says what it holds ([`super::memory`]). The first error (that
     /// of the lowest unit) ends the loop and is returned.
     ///
     /// # Errors
@@ -25,7 +27,10 @@ impl Workspace {
         let next = AtomicUsize::new(0);
         let stop = AtomicBool::new(false);
         let failed: Mutex<Option<(usize, Error)>> = Mutex::new(None);
+        // What a thread has held counts until all have ended, also of those that end first.
+        let slots = Mutex::new(Vec::new());
         let worker = || {
+            let mut slot = Slot::new(&self.memory, name);
             while !stop.load(Ordering::Relaxed) {
                 let unit = next.fetch_add(1, Ordering::Relaxed);
                 if unit >= count {
@@ -33,8 +38,14 @@ impl Workspace {
                 }
                 let outcome = self
                     .check_cancel()
-                    .and_then(|()| self.memory.reserve_waiting(name, bytes(unit)))
-                    .and_then(|_held| work(unit));
+                    .and_then(|()| self.memory.promise_waiting(name, bytes(unit)))
+                    .and_then(|reserved| {
+                        let most = reserved.bytes();
+                        let at_work = Unit::begin(reserved);
+                        let outcome = work(unit);
+                        slot.ended(at_work.most().unwrap_or(most));
+                        outcome
+                    });
                 if let Err(error) = outcome {
                     stop.store(true, Ordering::Relaxed);
                     let mut first = failed
@@ -45,13 +56,13 @@ impl Workspace {
                     }
                 }
             }
+            slots
+                .lock()
+                .unwrap_or_else(std::sync::PoisonError::into_inner)
+                .push(slot);
         };
-        std::thread::scope(|scope| {
-            for _ in 1..self.threads.min(count) {
-                scope.spawn(worker);
-            }
-            worker();
-        });
+        // Always the same threads: what the allocator keeps for one is of no use to another.
+        self.pool.broadcast(|_| worker());
         match failed
             .into_inner()
             .unwrap_or_else(std::sync::PoisonError::into_inner)

@@ -79,6 +79,8 @@ const KEYS: &[&str] = &[
     "/mesh/boundary_edges",
     "/coordinates",
     "/peak_resident_bytes",
+    "/resident_file_bytes",
+    "/peak_held_bytes",
     "/peak_reserved_bytes",
     "/peak_scratch_bytes",
     "/seconds",
@@ -230,6 +232,12 @@ fn the_numbers_agree_with_each_other_and_with_the_files() {
 
     let budget = n("/memory_budget");
     assert!(n("/peak_reserved_bytes") > 0 && n("/peak_reserved_bytes") <= budget);
+    let held = n("/peak_held_bytes");
+    let parts = json["held_at_peak"].as_object().unwrap().values();
+    assert_eq!(held, parts.map(|v| v.as_u64().unwrap()).sum::<u64>());
+    let stages_held = stages.iter().map(|s| s["held_bytes"].as_u64().unwrap());
+    assert_eq!(Some(held), stages_held.max());
+    assert!(n("/resident_file_bytes") > 0);
     let resident = n("/peak_resident_bytes");
     assert!(
         resident > 1 << 20 && resident < budget,

@@ -91,6 +91,8 @@ impl Case {
                 "seconds",
                 "stages",
                 "reserved_at_peak",
+                "held_at_peak",
+                "resident_file_bytes",
             ];
             !varies.contains(&key.as_str()) && !key.starts_with("peak_")
         });

@@ -1,6 +1,7 @@
 //! The triples seen by the cells of a tile, each once with its count (paper, section 3.4).
 
 use super::TileRanges;
+use crate::workspace::memory::{Holding, bytes_of};
 use std::ops::Range;
 
 /// Triples as the cells of one tile see them, and the memory to put them in order.
@@ -12,6 +13,7 @@ pub(super) struct Seen {
     /// How many of `here` begin with each vertex.
     begins: Vec<u32>,
     elsewhere: Vec<[u32; 3]>,
+    held: Holding,
 }
 
 /// Triples with counts: `[i, j, k, count]` of the tile, `[tile, i, j, k, count]` for others, both
@@ -27,12 +29,21 @@ impl Seen {
 
     /// For the cells of the points `ids`.
     pub fn new(ids: Range<usize>) -> Self {
-        Self {
+        let mut seen = Self {
             here: Vec::with_capacity(ids.len() * 6),
             begins: vec![0; ids.len() + 1],
             elsewhere: Vec::new(),
+            held: Holding::default(),
             ids,
-        }
+        };
+        seen.tell(0);
+        seen
+    }
+
+    /// Tells what the lists take, and `more` bytes.
+    fn tell(&mut self, more: u64) {
+        let lists = bytes_of(&self.here) + bytes_of(&self.begins) + bytes_of(&self.elsewhere);
+        self.held.set(lists + more);
     }
 
     /// Number of triples so far, each as often as it was seen.
@@ -56,8 +67,9 @@ impl Seen {
 
     /// Equal triples as one record with a count.
     pub fn fold(mut self, tiles: &TileRanges) -> Folded {
+        self.tell(self.here.len() as u64 * 8);
         // By smallest vertex with one pass of counting, then in order by hand: half a dozen each.
-        let mut start = self.begins;
+        let mut start = std::mem::take(&mut self.begins);
         for rank in 1..start.len() {
             start[rank] += start[rank - 1];
         }
@@ -67,7 +79,7 @@ impl Seen {
             sorted[*place as usize] = u64::from(j) << 32 | u64::from(k);
             *place += 1;
         }
-        drop(self.here);
+        self.here = Vec::new();
         let mut kept: Vec<[u32; 4]> = Vec::with_capacity(sorted.len() / 2);
         let mut begin = 0;
         for (i, end) in (self.ids.start as u32..).zip(&start[..self.ids.len()]) {
@@ -80,6 +92,8 @@ impl Seen {
                 kept.push([i, j, k, group.len() as u32]);
             }
         }
+        self.tell(bytes_of(&sorted) + bytes_of(&kept));
+        drop(sorted);
         self.elsewhere.sort_unstable();
         let sent = self.elsewhere.chunk_by(|a, b| a == b).map(|group| {
             let [i, j, k] = group[0];

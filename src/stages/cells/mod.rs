@@ -18,6 +18,7 @@ use crate::stages::tiles::Tile;
 use crate::stages::tiles::near::Search;
 use crate::stages::tiles::walk::PageCache;
 use crate::workspace::Workspace;
+use crate::workspace::memory::{bytes_of, hold};
 use crate::workspace::persist::persist;
 use fold::Seen;
 use serde::Serialize;
@@ -143,7 +144,6 @@ pub fn cells(
     workspace: &Workspace,
 ) -> Result<(CellTriples, CellStats)> {
     let own = Sections::with_layout(workspace, "cells.own", tiles.count(), LABELLED)?;
-    let held = workspace.reserve("cells: exchange", EXCHANGE_BUFFER)?;
     let exchange = Exchange::between(
         workspace,
         "cells.sent",
@@ -162,6 +162,7 @@ pub fn cells(
         let mut stats = one_tile(store, ids.clone(), neighbors, &mut maker, &mut seen)?;
         stats.raw_triples = seen.len() as u64;
         let (kept, sent) = seen.fold(&tiles);
+        let _held = hold(bytes_of(&kept) + bytes_of(&sent));
         own.put(tile, &kept)?;
         exchange.send_from(tile, &sent)?;
         workspace.advance(ids.len() as u64);
@@ -175,7 +176,6 @@ pub fn cells(
         Ok(())
     })?;
     let received = exchange.deliver(workspace, tiles.count())?;
-    drop(held);
     Ok((
         CellTriples {
             tiles,

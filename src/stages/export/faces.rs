@@ -5,6 +5,7 @@ use super::ply::{FACE, encode_face};
 use crate::error::Result;
 use crate::stages::repair::Repaired;
 use crate::stages::surface::star::sorted;
+use crate::workspace::memory::bytes_of;
 use std::ops::Range;
 
 /// The triangles whose smallest vertex is in a block.
@@ -42,6 +43,12 @@ impl<'a> Faces<'a> {
             filled,
             splits: numbering.splits.get(block)?,
         })
+    }
+
+    /// Bytes that its lists take.
+    pub fn taken(&self) -> u64 {
+        let triangles = bytes_of(&self.triangles) + bytes_of(&self.filled);
+        triangles + bytes_of(&self.numbers) + bytes_of(&self.splits)
     }
 
     /// Appends all triangles, ascending by sorted ids, to `bytes`.

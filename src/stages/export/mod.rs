@@ -15,6 +15,7 @@ use crate::stages::blocks::Blocks;
 use crate::stages::order::PointStore;
 use crate::stages::repair::Repaired;
 use crate::workspace::Workspace;
+use crate::workspace::memory::{bytes_of, hold};
 use crate::workspace::persist::persist;
 use faces::Faces;
 use number::Numbering;
@@ -98,6 +99,7 @@ fn write_block(
     let points = store.slice(ids.start as usize..ids.end as usize)?;
     let at = |v: u32| lattice.position(points[(v - ids.start) as usize]);
     let mut bytes = Vec::with_capacity(file.vertex_bytes() * ids.len());
+    let mut held = hold(bytes_of(&points) + bytes_of(&bytes));
     let used = ids.clone().filter(|v| numbering.used(*v));
     used.for_each(|v| file.encode_vertex(at(v), &mut bytes));
     // Three parts a block; the number is only a name.
@@ -112,6 +114,7 @@ fn write_block(
     bytes.clear();
     let faces = Faces::load(repaired, numbering, ids, block)?;
     faces.encode(&mut bytes);
+    held.set(faces.taken() + bytes_of(&bytes));
     file.write_faces(part + 2, numbering.first_face(block), &bytes)
 }
 

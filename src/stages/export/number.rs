@@ -124,8 +124,7 @@ fn split(
     workspace: &Workspace,
 ) -> Result<(Vec<Firsts>, Sections<1>, Splits)> {
     let outline = &repaired.outline;
-    let _held = workspace.reserve("exchange", EXCHANGE_BUFFER)?;
-    let exchange = Exchange::<7>::new(workspace, "export.splits", EXCHANGE_BUFFER);
+    let exchange = Exchange::<7>::new(workspace, "export.splits", EXCHANGE_BUFFER)?;
     let copies = Sections::create(workspace, "export.copies", blocks.count())?;
     let mut firsts = Vec::with_capacity(blocks.count());
     for block in 0..blocks.count() {

@@ -9,6 +9,7 @@ use crate::stages::tiles::Tile;
 use crate::stages::tiles::near::Search;
 use crate::stages::tiles::walk::{PageCache, Walk};
 use crate::workspace::Workspace;
+use crate::workspace::memory::Holding;
 use rustc_hash::FxHashMap;
 use std::ops::Range;
 
@@ -78,6 +79,7 @@ pub(super) struct SpacingCache<'a> {
     sections: FxHashMap<u32, Vec<Record<1>>>,
     held: usize,
     around: Vec<u32>,
+    taken: Holding,
 }
 
 impl<'a> SpacingCache<'a> {
@@ -93,6 +95,7 @@ impl<'a> SpacingCache<'a> {
             sections: FxHashMap::default(),
             held: 0,
             around: Vec::new(),
+            taken: Holding::default(),
         }
     }
 
@@ -112,6 +115,7 @@ impl<'a> SpacingCache<'a> {
         let section = self.spacings.sections.get(tile as usize)?;
         let found = section[place][0];
         self.held += section.len();
+        self.taken.set(4 * self.held as u64);
         self.sections.insert(tile, section);
         Ok(found)
     }

@@ -1,6 +1,7 @@
 //! The edges inside a block, by their lower ends.
 
 use crate::stages::surface::star::Triangle;
+use crate::workspace::memory::bytes_of;
 use std::ops::Range;
 
 /// For each vertex of a block, the triangles with an edge up from it that lies inside the block.
@@ -42,6 +43,12 @@ impl ByLowerEnd {
             list,
             before: triangles.partition_point(|t| t[0] < ids.start),
         }
+    }
+
+    /// Bytes of its lists.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        bytes_of(&self.starts) + bytes_of(&self.list)
     }
 
     /// Number of the first triangle whose smallest vertex is in the block.

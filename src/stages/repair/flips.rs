@@ -13,6 +13,7 @@ use super::by_end::ByLowerEnd;
 use crate::geom::{Point, sub};
 use crate::stages::located::small_normal;
 use crate::stages::surface::star::Triangle;
+use crate::workspace::memory::{bytes_of, hold};
 use std::ops::Range;
 
 /// Bends at the five edges of a quadrilateral, added up, below which it is flat enough.
@@ -55,6 +56,7 @@ pub fn flip(
         }
     }
     let mut sheet = Sheet::of(these, shut, points);
+    let _held = hold(sheet.bytes() + bytes_of(&numbers));
     let mut flips = 0;
     for _ in 0..SWEEPS {
         let more = sheet.sweep();
@@ -117,6 +119,13 @@ impl<'a> Sheet<'a> {
             .collect();
         sheet.bend();
         sheet
+    }
+
+    /// Bytes of its lists.
+    fn bytes(&self) -> u64 {
+        let lists = bytes_of(&self.corners) + bytes_of(&self.across);
+        let bends = bytes_of(&self.normals) + bytes_of(&self.bends);
+        lists + bends + bytes_of(&self.shut) + bytes_of(&self.due) + bytes_of(&self.flipped)
     }
 
     /// Finds what is behind each edge.

@@ -61,7 +61,6 @@ pub fn fill(
     stats: &mut RepairStats,
     workspace: &Workspace,
 ) -> Result<(Sections<4>, Outline)> {
-    let _held = workspace.reserve("exchange", EXCHANGE_BUFFER)?;
     let (count, buffer, above) = (blocks.count(), EXCHANGE_BUFFER, [Word::Above; 4]);
     let exchange = Exchange::between(workspace, "repair.filled", buffer, count, above)?;
     let kept = Sections::<1>::create(workspace, "repair.fragments", 0)?;

@@ -7,6 +7,7 @@
 use super::by_end::ByLowerEnd;
 use crate::stages::surface::parity::ParitySets;
 use crate::stages::surface::star::{EDGES, Triangle};
+use crate::workspace::memory::{Holding, bytes_of, hold};
 use std::ops::Range;
 
 /// What is known of a block's triangles.
@@ -22,6 +23,7 @@ pub struct Patch {
     pub open: Vec<bool>,
     /// For each vertex of the block, the number of boundary edges at it, up to 255.
     pub rims: Vec<u8>,
+    _held: Holding,
 }
 
 /// A triangle without a label.
@@ -54,10 +56,12 @@ impl Patch {
             ids,
             triangles,
         };
+        let lists = bytes_of(&builder.words) + bytes_of(&builder.open) + bytes_of(&builder.rims);
+        let held = hold(lists);
         builder.inside();
         builder.seen = Vec::new();
         builder.across();
-        builder.number()
+        builder.number(held)
     }
 }
 
@@ -67,6 +71,8 @@ impl Builder<'_> {
         let size = self.ids.len() as u32;
         let edges = ByLowerEnd::of(self.ids.clone(), self.triangles);
         let mut next = edges.first();
+        let lists = edges.bytes();
+        let mut held = hold(lists + bytes_of(&self.seen));
         for v in 0..size {
             let upper = edges.upper(v);
             let first = next;
@@ -94,6 +100,8 @@ impl Builder<'_> {
                 self.note_single(v, upper, first..next);
             }
         }
+        let labels = 4 * self.sets.len() as u64;
+        held.set(lists + bytes_of(&self.seen) + labels);
     }
 
     /// Sees triangle `number` at the edge from `v` to `y`; 1 for the edge's first, -1 for its second.
@@ -191,9 +199,10 @@ impl Builder<'_> {
     }
 
     /// Numbers the labels, those of triangles that are not interior first.
-    fn number(mut self) -> Patch {
+    fn number(mut self, held: Holding) -> Patch {
         self.sets.flatten();
         let mut numbers = vec![NONE; self.sets.len()];
+        let _numbers = hold(2 * bytes_of(&numbers));
         let mut labels = 0;
         let mut number = |label: u32| {
             let (root, flip) = self.sets.look(label);
@@ -219,6 +228,7 @@ impl Builder<'_> {
             global,
             open: self.open,
             rims: self.rims,
+            _held: held,
         }
     }
 }

@@ -9,7 +9,7 @@ use crate::stages::blocks::Blocks;
 use crate::stages::located::{Located, Places};
 use crate::stages::surface::star::Star;
 use crate::workspace::Workspace;
-use crate::workspace::memory::Reservation;
+use crate::workspace::memory::{Holding, Reservation, bytes_of, hold};
 use crate::workspace::persist::{Persist, Saved, persist};
 use std::ops::Range;
 
@@ -165,6 +165,7 @@ pub struct BlockRim {
     pub steps: Vec<Step>,
     /// Vertices with several fans, ascending.
     pub pinches: Vec<[u32; 1]>,
+    held: Holding,
 }
 
 impl BlockRim {
@@ -185,6 +186,7 @@ impl BlockRim {
             file: None,
             steps: Vec::new(),
             pinches: Vec::new(),
+            held: Holding::default(),
             ids: ids.clone(),
         };
         rim.pick(surface, block, &rims)?;
@@ -211,12 +213,15 @@ impl BlockRim {
         let vertices = ids.clone().filter(on_rim);
         rim.steps = steps(vertices, &rim.star, &rim.triangles, position, pinch);
         rim.pinches = pinches;
+        rim.held
+            .set(bytes_of(&rim.triangles) + bytes_of(&rim.steps) + bytes_of(&rim.used));
         Ok(rim)
     }
 
     /// Goes through all triangles and picks those at vertices with a boundary edge.
     fn pick(&mut self, surface: &Surface, block: usize, rims: &[[u32; 1]]) -> Result<()> {
         let (triangles, runs) = surface.load(block)?;
+        let mut held = hold(bytes_of(&triangles) + bytes_of(&runs));
         let size = self.ids.len() as u32;
         let mut rest = &triangles[..];
         for run in runs {
@@ -237,6 +242,7 @@ impl BlockRim {
                 }
             }
         }
+        held.set(bytes_of(&triangles) + bytes_of(&self.triangles));
         Ok(())
     }
 

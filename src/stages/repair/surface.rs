@@ -20,7 +20,7 @@ use crate::stages::stitch::Stitched;
 use crate::stages::surface::parity::ParitySets;
 use crate::stages::surface::star::Triangle;
 use crate::workspace::Workspace;
-use crate::workspace::memory::Reservation;
+use crate::workspace::memory::{Reservation, bytes_of, hold, table_bytes};
 use crate::workspace::persist::{Persist, Saved};
 use rustc_hash::FxHashMap;
 use std::sync::{Mutex, PoisonError};
@@ -159,16 +159,14 @@ pub fn build(
     options: RepairOptions,
     workspace: &Workspace,
 ) -> Result<(Surface, RepairStats)> {
-    let held = workspace.reserve("exchanges", 2 * EXCHANGE_BUFFER)?;
     let build = Build::create(places, &stitched, blocks, options, workspace)?;
     let bytes = |b: usize| {
         let records = stitched.interior.records(b) + stitched.added.records(b);
         230 * records as u64 + blocks.ids(b).len() as u64 * 30 + (1 << 20)
     };
     let work = |block| {
-        let done = build.block(block)?;
-        workspace.advance(1);
-        Ok(done)
+        let done = build.block(block);
+        done.inspect(|_| workspace.advance(1))
     };
     let mut stats = RepairStats::default();
     let mut own_globals = vec![0u32; blocks.count()];
@@ -186,7 +184,6 @@ pub fn build(
     let seen = build.seen.deliver(workspace, blocks.count())?;
     let (triangles, runs, rims, sums) = (build.triangles, build.runs, build.rims, build.sums);
     drop(stitched);
-    drop(held);
     let mut next = 0;
     let mut globals = Vec::with_capacity(blocks.count());
     for own in own_globals {
@@ -278,11 +275,13 @@ impl<'a> Build<'a> {
     fn block(&self, block: usize) -> Result<(u32, RepairStats)> {
         let ids = self.blocks.ids(block);
         let mut triangles = around::load(self.stitched, block)?;
+        let _held = hold(bytes_of(&triangles));
         let mut stats = RepairStats::default();
         if self.options.repair && self.options.flip && self.places.differ() {
             let range = ids.start as usize..ids.end as usize;
             let points = self.places.file.slice(range.clone())?;
             let shape = self.places.shape.slice(range)?;
+            let _held = hold(bytes_of(&points) + bytes_of(&shape));
             stats.edges_flipped = flips::flip(ids.clone(), &mut triangles, &points, &shape);
         }
         let patch = Patch::of(ids.clone(), &triangles);
@@ -299,10 +298,11 @@ impl<'a> Build<'a> {
         let sums = self.sum(block, &triangles, &patch, &bridges)?;
         let (global, local) = sums.split_at(patch.global as usize);
         let global: Vec<[u32; SUMS]> = global.iter().map(Sums::words).collect();
+        let held = hold(bytes_of(&sums) + bytes_of(&global));
         self.sums.put(block, &global)?;
         let least = self.options.least();
         let fates: Vec<Fate> = local.iter().map(|s| judge(s, least, &mut stats)).collect();
-        drop(sums);
+        drop((sums, global, held));
         let interior = |n: &&u32| !self.blocks.crossing(triangles[**n as usize]);
         stats.bridges_removed = bridges.iter().filter(interior).count() as u64;
         self.send(block, &triangles, &patch, &bridges)?;
@@ -324,6 +324,7 @@ impl<'a> Build<'a> {
             .shape
             .slice(ids.start as usize..ids.end as usize)?;
         let mut sums = vec![Sums::default(); patch.labels as usize];
+        let _held = hold(bytes_of(&points) + bytes_of(&sums));
         let mut bridges = bridges.iter().peekable();
         for (number, t) in triangles.iter().enumerate() {
             let sum = &mut sums[(patch.words[number] >> 1) as usize];
@@ -494,6 +495,7 @@ impl Parts<'_> {
         ids.dedup();
         let mut points: Vec<Point> = Vec::with_capacity(ids.len());
         self.store.fetch(&ids, &mut points)?;
+        let _held = hold(table_bytes(&own) + bytes_of(&seen) + bytes_of(&ids) + bytes_of(&points));
         for same in seen.chunk_by(|a, b| a[1..4] == b[1..4]) {
             let r = same[0];
             if bridges.binary_search(&[r[0], r[1], r[2], r[3]]).is_ok() {

@@ -6,6 +6,7 @@ use crate::stages::order::{PointStore, Rewriter};
 use crate::stages::tiles::Tile;
 use crate::stages::tiles::walk::PageCache;
 use crate::workspace::Workspace;
+use crate::workspace::memory::{bytes_of, hold};
 use crate::workspace::persist::Persist;
 use std::ops::Range;
 
@@ -43,6 +44,7 @@ impl Pass<'_> {
         let one = |number| {
             let ids = piece(number);
             let mut points = store.slice(ids.clone())?;
+            let _held = hold(bytes_of(&points));
             let found = work(ids.clone(), &mut points)?;
             workspace.advance(points.len() as u64);
             moved.put(ids.start, &points)?;

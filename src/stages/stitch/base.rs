@@ -12,6 +12,7 @@ use crate::stages::surface::orient::{Around, Oriented, orient_inside};
 use crate::stages::surface::star::{Link, Star, Triangle, has, others};
 use crate::stages::triples::Triples;
 use crate::workspace::Workspace;
+use crate::workspace::memory::{bytes_of, hold};
 use crate::workspace::persist::persist;
 
 const EXCHANGE_BUFFER: u64 = 8 << 20;
@@ -49,7 +50,6 @@ pub(super) fn base(
     workspace: &Workspace,
 ) -> Result<(Base, BaseStats)> {
     let count = blocks.count();
-    let held = workspace.reserve("stitch: exchange", EXCHANGE_BUFFER)?;
     let buffer = EXCHANGE_BUFFER;
     let look = Look {
         candidates: Sections::with_layout(workspace, "stitch.candidates", count, LABELLED)?,
@@ -82,7 +82,7 @@ pub(super) fn base(
     let (candidates, crossing) = (look.candidates, look.crossing);
     let flagged = all.flagged + flags.total();
     let Triples { own, visiting } = triples;
-    drop((own, held));
+    drop(own);
     let surface = workspace.once("join", || inside.join(name, &flags, blocks, workspace))?;
     workspace.note_part("orient", start.elapsed().as_secs_f64());
     let stats = BaseStats {
@@ -139,6 +139,7 @@ impl Look<'_> {
     fn block(&self, block: usize) -> Result<Around<Found>> {
         let mut found = Found::default();
         let (mut triangles, mut candidates) = self.part(block, &mut found)?;
+        let mut held = hold(bytes_of(&triangles) + bytes_of(&candidates));
         self.drop_flat(block, &mut triangles, &mut candidates, &mut found)?;
         let star = Star::of(self.blocks.ids(block), &triangles);
         let mut flagged = Vec::new();
@@ -172,15 +173,18 @@ impl Look<'_> {
         }
         self.flags.send_from(block, &sent)?;
         self.candidates.put(block, &candidates)?;
+        held.set(bytes_of(&triangles) + bytes_of(&candidates) + bytes_of(&flagged));
         let evidence = if self.weigh {
             Some(self.evidence(block, &triangles, &candidates)?)
         } else {
             None
         };
+        held.set(bytes_of(&triangles));
         Ok(Around {
             triangles,
             evidence,
             found,
+            held,
         })
     }
 
@@ -192,9 +196,12 @@ impl Look<'_> {
         candidates: &[[u32; 4]],
     ) -> Result<Evidence> {
         let vertices = triangles.iter().flatten().copied();
+        let places = Located::load(self.places.shape, self.blocks, block, vertices)?;
+        let candidates: Vec<Triangle> = candidates.iter().map(|r| [r[0], r[1], r[2]]).collect();
         Ok(Evidence {
-            places: Located::load(self.places.shape, self.blocks, block, vertices)?,
-            candidates: candidates.iter().map(|r| [r[0], r[1], r[2]]).collect(),
+            held: hold(bytes_of(&candidates)),
+            places,
+            candidates,
         })
     }
 
@@ -254,6 +261,8 @@ impl Look<'_> {
                 candidates.push([i, j, k, count]);
             }
         }
+        let read = bytes_of(&visiting) + bytes_of(&own) + bytes_of(&crossing);
+        drop(hold(read + bytes_of(&triangles) + bytes_of(&candidates)));
         self.crossing.put(block, &crossing)?;
         found.span = span;
         Ok((triangles, candidates))

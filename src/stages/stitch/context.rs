@@ -3,7 +3,8 @@
 
 use super::InsertStats;
 use super::base::Base;
-use super::interior::{Home, Interior, NOTHING};
+use super::home::Home;
+use super::interior::{Interior, NOTHING};
 use super::tests_of_paper::{Adjacent, Candidate, Refusal, View, examine};
 use crate::error::Result;
 use crate::geom::Point;
@@ -12,7 +13,7 @@ use crate::stages::surface::orient::{Asks, consistent};
 use crate::stages::surface::parity::ParitySets;
 use crate::stages::surface::star::{Triangle, others};
 use crate::workspace::Workspace;
-use crate::workspace::memory::Reservation;
+use crate::workspace::memory::{Reservation, bytes_of, table_bytes};
 use rustc_hash::FxHashMap;
 
 /// A triangle near a border.
@@ -48,6 +49,7 @@ pub struct Context<'a> {
     loaded: FxHashMap<u32, Loaded>,
     /// Bytes reserved for the blocks that are loaded.
     held: u64,
+    told: Reservation,
 }
 
 /// What a loaded block holds on to.
@@ -78,8 +80,8 @@ impl<'a> Context<'a> {
         interior: &'a Interior,
         blocks: Blocks,
         workspace: &'a Workspace,
-    ) -> Self {
-        Self {
+    ) -> Result<Self> {
+        Ok(Self {
             base,
             interior,
             blocks,
@@ -92,7 +94,8 @@ impl<'a> Context<'a> {
             workspace,
             loaded: FxHashMap::default(),
             held: 0,
-        }
+            told: workspace.promise("stitch: borders", 0)?,
+        })
     }
 
     /// Loads the surroundings of a block's borders; false if that would take more than `most` bytes.
@@ -109,7 +112,7 @@ impl<'a> Context<'a> {
         if most.is_some_and(|most| self.held + bytes > most) {
             return Ok(false);
         }
-        let held = self.workspace.reserve("stitch: borders", bytes)?;
+        let held = self.workspace.promise("stitch: borders", bytes)?;
         self.held += bytes;
         let near = interior.context.get(section)?;
         for &v in &context {
@@ -156,7 +159,23 @@ impl<'a> Context<'a> {
             _held: held,
         };
         self.loaded.insert(block, loaded);
+        let read = (triangles * 20) as u64 + bytes_of(&context);
+        self.tell(read);
         Ok(true)
+    }
+
+    /// Tells what the surroundings take, and `more` bytes.
+    fn tell(&mut self, more: u64) {
+        let lists: u64 = self
+            .around
+            .values()
+            .map(|a| bytes_of(&a.triangles) + 16)
+            .sum();
+        let located: u64 = self.loaded.values().map(|l| bytes_of(&l.located)).sum();
+        let tables = table_bytes(&self.around) + table_bytes(&self.positions);
+        let triangles = bytes_of(&self.tris) + bytes_of(&self.free) + table_bytes(&self.crossing);
+        self.told
+            .set_held(lists + located + tables + triangles + more);
     }
 
     fn put(&mut self, tri: Tri) -> u32 {

@@ -11,7 +11,6 @@ use crate::spill::layouts::SENT;
 use crate::spill::{Exchange, Sections};
 use crate::stages::blocks::Blocks;
 use crate::workspace::Workspace;
-use crate::workspace::memory::Reservation;
 
 const EXCHANGE_BUFFER: u64 = 8 << 20;
 
@@ -40,7 +39,6 @@ pub struct Pass<'a> {
     added: Exchange<4>,
     removed: Exchange<4>,
     cos_max_angle: f64,
-    _held: Reservation,
 }
 
 impl<'a> Pass<'a> {
@@ -55,17 +53,18 @@ impl<'a> Pass<'a> {
         cos_max_angle: f64,
         workspace: &'a Workspace,
     ) -> Result<Self> {
-        let exchange = |name| Exchange::new(workspace, name, EXCHANGE_BUFFER).packed(SENT);
+        let exchange = |name| -> Result<Exchange<4>> {
+            Ok(Exchange::new(workspace, name, EXCHANGE_BUFFER)?.packed(SENT))
+        };
         Ok(Self {
-            context: Context::new(base, interior, blocks, workspace),
+            context: Context::new(base, interior, blocks, workspace)?,
             lives: Lives::of(&base.spans),
             pending: Vec::new(),
             counts: InsertStats::default(),
             group: 0,
             loaded: 0,
-            _held: workspace.reserve("stitch: exchanges", 2 * EXCHANGE_BUFFER)?,
-            added: exchange("stitch.added"),
-            removed: exchange("stitch.removed"),
+            added: exchange("stitch.added")?,
+            removed: exchange("stitch.removed")?,
             cos_max_angle,
         })
     }

@@ -1,6 +1,7 @@
 //! The triangles around those vertices of a block at which something may be inserted.
 
 use crate::stages::surface::star::{Triangle, others};
+use crate::workspace::memory::{Holding, bytes_of, hold};
 use std::ops::Range;
 
 /// For each active vertex its triangles; what the tests look at lies together.
@@ -12,6 +13,7 @@ pub struct Fans {
     others: Vec<[u32; 2]>,
     /// The number of the same triangle.
     numbers: Vec<u32>,
+    _held: Holding,
 }
 
 /// A vertex.
@@ -40,18 +42,19 @@ impl Fans {
                 }
             }
         }
-        let mut room = 0;
+        let mut room_for = 0;
         for slot in &mut slots {
-            slot.start = room;
-            slot.used = room;
-            room += slot.end;
-            slot.end = room;
+            slot.start = room_for;
+            slot.used = room_for;
+            room_for += slot.end;
+            slot.end = room_for;
         }
         Self {
             first: ids.start,
+            _held: hold(bytes_of(&slots) + u64::from(room_for) * 12),
             slots,
-            others: vec![[0; 2]; room as usize],
-            numbers: vec![0; room as usize],
+            others: vec![[0; 2]; room_for as usize],
+            numbers: vec![0; room_for as usize],
         }
     }
 

@@ -4,6 +4,7 @@
 use super::InsertStats;
 use super::base::Base;
 use super::fans::Fans;
+use super::home::Home;
 use super::tests_of_paper::{Adjacent, Candidate, Refusal, View, examine};
 use crate::error::Result;
 use crate::geom::Point;
@@ -15,6 +16,7 @@ use crate::stages::surface::orient::{Asks, consistent};
 use crate::stages::surface::parity::ParitySets;
 use crate::stages::surface::star::Triangle;
 use crate::workspace::Workspace;
+use crate::workspace::memory::{Holding, bytes_of, hold};
 use rustc_hash::FxHashMap;
 use std::ops::Range;
 
@@ -62,36 +64,6 @@ impl Interior {
 /// Placeholder in a joint.
 pub const NOTHING: u32 = u32::MAX;
 
-/// A home as a word: `number << 2 | local << 1 | flip`; `number` is a global label, or a number
-/// within the block if `local`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Home {
-    /// Global label, or number within the block.
-    pub number: u32,
-    /// Whose number it is.
-    pub local: bool,
-    /// Orientation of the triangle relative to its home.
-    pub flip: bool,
-}
-
-impl Home {
-    /// As one word.
-    #[must_use]
-    pub fn word(self) -> u32 {
-        self.number << 2 | u32::from(self.local) << 1 | u32::from(self.flip)
-    }
-
-    /// From a word.
-    #[must_use]
-    pub fn from_word(word: u32) -> Self {
-        Self {
-            number: word >> 2,
-            local: word & 2 != 0,
-            flip: word & 1 != 0,
-        }
-    }
-}
-
 /// Bytes that the work on a block takes.
 pub fn block_bytes(base: &Base, block: usize) -> u64 {
     let triangles = base.surface.interior.records(block) + base.surface.crossing.records(block);
@@ -118,6 +90,7 @@ pub fn insert(
         ..InsertStats::default()
     };
     let undecided = work.insert_all(cos_max_angle, &mut counts);
+    let _undecided = hold(bytes_of(&undecided));
     work.write(out, block, &undecided, &mut counts)?;
     Ok(counts)
 }
@@ -174,6 +147,7 @@ struct BlockWork {
     border: Vec<u8>,
     /// Crossing candidates that would be on a line in the file.
     flat: u64,
+    held: Holding,
 }
 
 impl View for BlockWork {
@@ -228,12 +202,23 @@ impl BlockWork {
             located,
             border,
             flat: 0,
+            held: Holding::default(),
             ids,
         };
         work.add_base(&interior, &crossing, &active, base, block);
+        work.tell(bytes_of(&interior) + bytes_of(&crossing) + bytes_of(&active));
         drop((interior, crossing));
         work.see_crossing(places, base, blocks, block)?;
         Ok(work)
+    }
+
+    /// Tells what its lists take, and `more` bytes.
+    fn tell(&mut self, more: u64) {
+        let triangles = bytes_of(&self.mesh) + bytes_of(&self.triangles) + bytes_of(&self.homes);
+        let candidates = bytes_of(&self.candidates) + bytes_of(&self.crossing_candidates);
+        let homes = bytes_of(&self.global) * 3 + bytes_of(&self.joints);
+        self.held
+            .set(triangles + candidates + homes + bytes_of(&self.border) + more);
     }
 
     /// Takes in which crossing triples are candidates, and where their vertices are.
@@ -268,6 +253,7 @@ impl BlockWork {
             Candidate::new(t, count, t.map(|v| self.position(v)))
         };
         self.crossing_candidates = candidates.iter().map(new).collect();
+        self.tell(bytes_of(&candidates));
         Ok(())
     }
 
@@ -442,6 +428,7 @@ impl BlockWork {
             }
         }
         ranked.sort_unstable();
+        self.tell(bytes_of(&ranked) + 20 * ranked.len() as u64);
         let ranked: Vec<_> = ranked.iter().map(Candidate::record).collect();
         out.ranked.put(block, &ranked)?;
         drop(ranked);
@@ -454,6 +441,8 @@ impl BlockWork {
         inserted.sort_unstable();
         let mut mesh = std::mem::take(&mut self.mesh);
         mesh.extend_from_slice(inserted);
+        // The sort takes as much again.
+        self.tell(2 * bytes_of(&mesh));
         // Two ascending runs: this sort merges them.
         mesh.sort();
         out.mesh.put(block, &mesh)

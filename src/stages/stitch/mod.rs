@@ -8,6 +8,7 @@ mod base;
 mod context;
 mod crossing;
 mod fans;
+mod home;
 mod interior;
 mod tests_of_paper;
 

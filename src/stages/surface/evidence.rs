@@ -7,6 +7,7 @@
 use super::parity::ParitySets;
 use super::star::{EDGES, Edges, Triangle, opposed};
 use crate::stages::located::{Located, small_normal};
+use crate::workspace::memory::{Holding, bytes_of, hold};
 use rustc_hash::FxHashMap;
 
 /// Where triangles lie, and what may be inserted between them later.
@@ -16,6 +17,8 @@ pub struct Evidence {
     pub places: Located,
     /// Candidates inside the block.
     pub candidates: Vec<Triangle>,
+    /// What they hold.
+    pub held: Holding,
 }
 
 impl Evidence {
@@ -66,6 +69,7 @@ pub fn join_inside(
 ) -> Vec<bool> {
     let mut pairs = Vec::with_capacity(triangles.len() / 2 * 3);
     each_edge(triangles, edges, |pair| pairs.push(pair));
+    let _held = hold(bytes_of(&pairs));
     // Without a contradiction the order of the edges makes no difference.
     if pairs.iter().all(|&(n, m, flip)| sets.join(n, m, flip)) {
         return vec![false; triangles.len()];
@@ -109,6 +113,8 @@ fn join_by_flatness(
             steps[(step as usize).min(STEPS - 1)].push((n, m, flip));
         }
     }
+    let stepped: u64 = steps.iter().map(bytes_of).sum();
+    let _held = hold(bytes_of(&normals) + stepped);
     steps.into_iter().flatten().for_each(join);
     dead
 }

@@ -9,6 +9,7 @@ use crate::spill::layouts::{LABELLED, SENT_LABELLED, TRIANGLE};
 use crate::spill::{Exchange, Sections, Word};
 use crate::stages::blocks::Blocks;
 use crate::workspace::Workspace;
+use crate::workspace::memory::{Holding, bytes_of, hold};
 use crate::workspace::persist::{Persist, Saved};
 use rustc_hash::FxHashMap;
 
@@ -60,6 +61,8 @@ pub struct Around<T> {
     pub evidence: Option<Evidence>,
     /// What the caller wants to know of the block.
     pub found: T,
+    /// What it holds.
+    pub held: Holding,
 }
 
 /// Orients a surface: the interior triangles of every block by themselves, ascending; the crossing
@@ -85,7 +88,6 @@ pub fn orient_inside<T: Persist + Send>(
     let sections = |part: &str| format!("{name}.{part}");
     let interior = Sections::with_layout(workspace, &sections("interior"), count, LABELLED)?;
     let border = Sections::with_layout(workspace, &sections("border"), count, TRIANGLE)?;
-    let _held = workspace.reserve("exchange", EXCHANGE_BUFFER)?;
     let letters = sections("relations");
     let above = [Word::Above; 7];
     let exchange = Exchange::between(workspace, &letters, EXCHANGE_BUFFER, count, above)?;
@@ -93,12 +95,14 @@ pub fn orient_inside<T: Persist + Send>(
         .then(|| Sections::create(workspace, &sections("votes"), count))
         .transpose()?;
     let work = |block| {
-        let around = around(block)?;
-        let (inner, crossing): (Vec<Triangle>, Vec<Triangle>) =
-            around.triangles.iter().partition(|t| !blocks.crossing(**t));
         let Around {
-            evidence, found, ..
-        } = around;
+            triangles: mut inner,
+            evidence,
+            found,
+            held: _held,
+        } = around(block)?;
+        let crossing: Vec<Triangle> = inner.extract_if(.., |t| blocks.crossing(*t)).collect();
+        let _crossing = hold(bytes_of(&crossing));
         let done = orient_block(&inner, &crossing, evidence, blocks, block);
         if let Some(votes) = &votes {
             votes.put(block, &done.votes)?;
@@ -111,8 +115,8 @@ pub fn orient_inside<T: Persist + Send>(
             &crossing.iter().filter(mine).copied().collect::<Vec<_>>(),
         )?;
         workspace.advance(1);
-        let counts = (done.mobius, done.interior.len());
-        Ok(((done.global, done.labels), counts, found))
+        let own = (done.global, done.labels);
+        Ok((own, (done.mobius, done.interior.len()), found))
     };
     let mut labels = vec![(0u32, 0u32); count];
     let (mut mobius, mut triangles) = (0, 0);
@@ -185,7 +189,6 @@ impl OrientedInside {
         blocks: Blocks,
         workspace: &Workspace,
     ) -> Result<Oriented> {
-        let _exchange = workspace.reserve("exchange", EXCHANGE_BUFFER)?;
         let mut globals = Vec::with_capacity(self.labels.len());
         let mut next = 0u32;
         for (global, _) in &self.labels {
@@ -243,6 +246,7 @@ pub(super) struct OrientedBlock {
     global: u32,
     labels: u32,
     mobius: u64,
+    _held: Holding,
 }
 
 /// What the triangles adjacent to one ask for: their label, and if the triangle must be turned
@@ -284,7 +288,7 @@ fn orient_block(
     let mut edges = Edges::with_room(ids.clone(), inner);
     let mut sets = ParitySets::new(inner.len());
     let mut kept = Vec::with_capacity(inner.len());
-    let mut mobius = 0;
+    let (_held, mut mobius) = (hold(8 * inner.len() as u64), 0);
     for (number, &t) in inner.iter().enumerate() {
         let number = number as u32;
         // Either all adjacent triangles agree and are joined, or the triangle goes.
@@ -358,6 +362,7 @@ pub(super) fn number_labels(
         let t = inner[number as usize];
         interior.push([t[0], t[1], t[2], label << 1 | u32::from(turned)]);
     }
+    let mut held = hold(4 * inner.len() as u64 + bytes_of(&interior) + bytes_of(&sent));
     let mut counted = Votes::default();
     for (a, b, flip, weight) in bonds.votes {
         let ((a, turned_a, _), (b, turned_b, _)) = (find(a), find(b));
@@ -369,7 +374,9 @@ pub(super) fn number_labels(
     let votes = votes
         .map(|(a, b, votes)| [a, b, votes as i32 as u32])
         .collect();
+    held.set(bytes_of(&interior) + bytes_of(&sent));
     OrientedBlock {
+        _held: held,
         interior,
         relations: sent,
         votes,
@@ -418,7 +425,7 @@ fn orient_crossing(
     blocks: Blocks,
     workspace: &Workspace,
 ) -> Result<()> {
-    let exchange = Exchange::<5>::new(workspace, &format!("{name}.crossing"), EXCHANGE_BUFFER)
+    let exchange = Exchange::<5>::new(workspace, &format!("{name}.crossing"), EXCHANGE_BUFFER)?
         .packed(SENT_LABELLED);
     let mut edges: FxHashMap<(u32, u32), Vec<(Triangle, u32)>> = FxHashMap::default();
     for group in 0..blocks.count() {

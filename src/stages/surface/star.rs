@@ -1,5 +1,6 @@
 //! Triangles around the vertices of a block, and what a vertex or an edge sees of them.
 
+use crate::workspace::memory::{Holding, bytes_of, hold};
 use std::ops::Range;
 
 /// A triangle by ascending ids.
@@ -52,6 +53,7 @@ pub struct Star {
     start: Vec<u32>,
     len: Vec<u32>,
     list: Vec<u32>,
+    _held: Holding,
 }
 
 impl Star {
@@ -70,6 +72,7 @@ impl Star {
         }
         let list = vec![0; start[ids.len()] as usize];
         Self {
+            _held: hold(2 * bytes_of(&start) + bytes_of(&list)),
             len: vec![0; ids.len()],
             ids,
             start,
@@ -121,6 +124,7 @@ pub struct Edges {
     len: Vec<u32>,
     /// Higher vertex and triangle.
     list: Vec<(u32, u32)>,
+    _held: Holding,
 }
 
 impl Edges {
@@ -139,8 +143,10 @@ impl Edges {
         for v in 0..ids.len() {
             start[v + 1] += start[v];
         }
+        let list = vec![(0, 0); start[ids.len()] as usize];
         Self {
-            list: vec![(0, 0); start[ids.len()] as usize],
+            _held: hold(2 * bytes_of(&start) + bytes_of(&list)),
+            list,
             len: vec![0; ids.len()],
             ids,
             start,

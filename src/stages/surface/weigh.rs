@@ -8,6 +8,7 @@ use crate::error::Result;
 use crate::spill::Sections;
 use crate::stages::blocks::Blocks;
 use crate::workspace::Workspace;
+use crate::workspace::memory::{bytes_of, hold};
 use rustc_hash::FxHashMap;
 
 /// Orients a block by what the evidence says; a triangle that would have to run both ways is removed.
@@ -24,10 +25,12 @@ pub(super) fn weigh_block(
         edges.add(t, number as u32);
     }
     let mut sets = ParitySets::new(inner.len());
+    let mut held = hold(5 * inner.len() as u64);
     let dead = join_inside(inner, &edges, evidence, &mut sets);
     let kept: Vec<u32> = (0..inner.len() as u32)
         .filter(|n| !dead[*n as usize])
         .collect();
+    held.set(5 * inner.len() as u64 + bytes_of(&kept));
     let mut bonds = Bonds::default();
     for &c in crossing {
         let normal = evidence.normal(c);
@@ -61,6 +64,8 @@ pub(super) fn weigh_block(
             }
         }
     }
+    let bonded = bytes_of(&bonds.relations) + bytes_of(&bonds.votes);
+    held.set(5 * inner.len() as u64 + bytes_of(&kept) + bonded);
     let mobius = (inner.len() - kept.len()) as u64;
     number_labels(inner, &kept, bonds, &mut sets, blocks, block, mobius)
 }

@@ -13,6 +13,7 @@ use crate::error::Result;
 use crate::geom::Point;
 use crate::geom::aabb::Aabb;
 use crate::stages::order::PointStore;
+use crate::workspace::memory::{Holding, bytes_of, give_back};
 use std::ops::Range;
 
 /// Leaves per page: the unit in which candidates are gathered and queries answered.
@@ -65,6 +66,7 @@ pub struct Tile {
     leaf_boxes: Vec<Aabb>,
     own: Vec<OwnPage>,
     near: Vec<usize>,
+    held: Holding,
 }
 
 impl Tile {
@@ -121,9 +123,18 @@ impl Tile {
             leaf_boxes: Vec::new(),
             own: Vec::new(),
             near: Vec::new(),
+            held: Holding::default(),
         };
         tile.index(reaches);
+        tile.held.set(tile.taken());
+        give_back(Self::bytes(tile.ids.len()).saturating_sub(tile.taken()));
         Ok(tile)
+    }
+
+    /// Bytes that its lists take.
+    fn taken(&self) -> u64 {
+        let lists = bytes_of(&self.pages) + bytes_of(&self.points) + bytes_of(&self.page_boxes);
+        lists + bytes_of(&self.leaf_boxes) + bytes_of(&self.own) + bytes_of(&self.near)
     }
 
     fn index(&mut self, reaches: Vec<(usize, u64, Vec<usize>)>) {

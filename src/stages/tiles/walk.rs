@@ -6,6 +6,7 @@ use crate::error::Result;
 use crate::geom::aabb::Aabb;
 use crate::geom::{Point, distance2, sub};
 use crate::stages::order::PointStore;
+use crate::workspace::memory::Holding;
 use rustc_hash::FxHashMap;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -17,6 +18,7 @@ const CACHED_PAGES: usize = 1024;
 #[derive(Debug, Default)]
 pub struct PageCache {
     pages: FxHashMap<usize, Vec<Point>>,
+    held: Holding,
 }
 
 impl PageCache {
@@ -31,6 +33,8 @@ impl PageCache {
             // Queries come in curve order: soon everything here is new again.
             self.pages.clear();
         }
+        self.held
+            .set((self.pages.len() + 1) as u64 * store.page_size() as u64 * 12);
         match self.pages.entry(page) {
             std::collections::hash_map::Entry::Occupied(found) => Ok(found.into_mut()),
             std::collections::hash_map::Entry::Vacant(empty) => {

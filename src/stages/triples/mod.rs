@@ -6,6 +6,7 @@ use crate::spill::{Exchange, Sections};
 use crate::stages::blocks::Blocks;
 use crate::stages::cells::CellTriples;
 use crate::workspace::Workspace;
+use crate::workspace::memory::{Holding, bytes_of};
 use crate::workspace::persist::persist;
 use serde::Serialize;
 
@@ -55,7 +56,6 @@ pub fn triples(
     workspace: &Workspace,
 ) -> Result<(Triples, TripleStats)> {
     let own = Sections::with_layout(workspace, "triples.own", blocks.count(), LABELLED)?;
-    let held = workspace.reserve("triples: exchange", EXCHANGE_BUFFER)?;
     let exchange = Exchange::between(
         workspace,
         "triples.sent",
@@ -71,10 +71,12 @@ pub fn triples(
     };
     let work = |block| {
         let mut all = Vec::new();
+        let mut held = Holding::default();
         for tile in cells.tiles.of_block(block) {
             let (seen, received) = (cells.own.get(tile)?, cells.received.get(tile)?);
             all.reserve_exact(seen.len() + received.len());
             merge(&seen, &received, &mut all);
+            held.set(bytes_of(&all) + bytes_of(&seen) + bytes_of(&received));
         }
         let mut sent = Vec::new();
         let mut local = [0u64; 4];
@@ -85,6 +87,7 @@ pub fn triples(
             }
             local[3] += u64::from(blocks.crossing([i, j, k]));
         }
+        held.set(bytes_of(&all) + bytes_of(&sent));
         own.put(block, &all)?;
         exchange.send_from(block, &sent)?;
         workspace.advance(all.len() as u64);
@@ -96,7 +99,6 @@ pub fn triples(
         Ok(())
     })?;
     let visiting = exchange.deliver(workspace, blocks.count())?;
-    drop(held);
     let [t1, t2, t3, crossing] = counts;
     Ok((
         Triples { own, visiting },

@@ -33,6 +33,7 @@ fn joined(triangles: &[Triangle], places: &[Point]) -> (Edges, ParitySets, Vec<b
     let mut edges = Edges::with_room(ids, triangles);
     (0..).zip(triangles).for_each(|(n, t)| edges.add(*t, n));
     let evidence = Evidence {
+        held: Default::default(),
         places: Located::of(places),
         candidates: Vec::new(),
     };
