@@ -185,6 +185,33 @@ fn planes_grids_and_steps() {
     }
 }
 
+/// Vertices and cells with hundreds of neighbours: what surrounds a point, at about the same distance.
+#[test]
+fn hubs_of_circles() {
+    let circle = |count: usize, radius: f64, part: f64| {
+        let at = move |k: usize| {
+            let (sin, cos) = (std::f64::consts::TAU * part * k as f64 / count as f64).sin_cos();
+            let rough = f64::from((k * k % 11) as u32) * 1e-6;
+            [radius * cos + rough, radius * sin, rough * 1e-3]
+        };
+        (0..count).map(at)
+    };
+    let centre = || std::iter::once([0.0; 3]);
+    let clouds: [Vec<[f64; 3]>; 3] = [
+        centre().chain(circle(700, 1.0, 0.4)).collect(),
+        centre()
+            .chain(circle(500, 1.0, 1.0))
+            .chain(circle(500, 0.5, 1.0))
+            .collect(),
+        circle(20, 1e-4, 1.0).chain(circle(900, 1.0, 1.0)).collect(),
+    ];
+    let bench = Bench::new();
+    for (number, points) in clouds.iter().enumerate() {
+        let cloud = bench.points(&format!("{number}.xyz"), points);
+        println!("{number}: {:?}", every_option(&bench, &cloud));
+    }
+}
+
 /// Steps of 1e-4 at coordinates of 1e7 need double precision, from the file to the mesh.
 #[test]
 fn far_from_zero_in_fine_steps() {

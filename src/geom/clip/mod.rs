@@ -6,15 +6,20 @@
 //! all corners at once ([`crate::kernels::cut_corners`]), and else decided exactly
 //! ([`super::predicate`]).
 
+mod lines;
+mod many;
 mod rim;
+mod touch;
 
 use super::plane::Normal;
 use super::predicate::{Neighbor, cuts_corner, cuts_parallel};
 use crate::kernels::eight::{Base, Eight};
 use crate::kernels::{
-    CornerGroup, Frame, LANES, Level, Line, SLACK, bisectors_body, cut_body, farthest_body, kernel,
+    CornerGroup, Frame, LANES, Level, Line, bisectors_body, cut_body, farthest_body, kernel,
     touching_body,
 };
+use lines::{Corner, error_of_meeting, frame, meet};
+use many::{MANY, Many};
 use rim::{RIM, RIM_CORNERS, RIM_DISTANCE, RIM_PLACES, RIM_SIDES};
 
 /// Id of a line that is part of the disk's rim and not a bisector.
@@ -25,16 +30,6 @@ const RIM_ID: u32 = u32::MAX;
 struct Side {
     line: Line,
     neighbor: Neighbor,
-}
-
-/// A corner of the polygon.
-#[derive(Debug, Clone, Copy, Default)]
-struct Corner {
-    at: [f64; 2],
-    /// Bound on the distance of `at` from the true corner.
-    error: f64,
-    /// Squared distance of the true corner from the centre, at most.
-    reach2: f64,
 }
 
 /// Neighbours of a cell's point in columns, nearest first.
@@ -76,6 +71,14 @@ pub struct Cell {
     /// Four times that, rounded up.
     secure2: u64,
     hidden: bool,
+    /// True if floating point had the last word on a corner of the rim.
+    unsure: bool,
+    /// Of a cell of many corners.
+    many: Option<Box<Many>>,
+    /// Cells with more corners are handled as such with many.
+    most: usize,
+    #[cfg(test)]
+    looks: usize,
 }
 
 #[derive(Debug, Clone, Copy, Default)]
@@ -116,6 +119,11 @@ impl Cell {
             reach2: 0.0,
             secure2: 0,
             hidden: false,
+            unsure: false,
+            many: None,
+            most: MANY,
+            #[cfg(test)]
+            looks: 0,
         };
         cell.start(own, normal, radius);
         cell
@@ -127,6 +135,10 @@ impl Cell {
         self.normal = normal;
         self.frame = frame(normal);
         self.hidden = false;
+        self.unsure = false;
+        if self.many.is_some() {
+            self.forget_many();
+        }
         self.sides.truncate(RIM_CORNERS);
         for side in &mut self.sides {
             side.line.offset = radius * RIM_DISTANCE;
@@ -221,28 +233,46 @@ impl Cell {
 
     #[inline(always)]
     fn clip_line<E: Eight>(&mut self, line: Line, neighbor: Neighbor) {
-        if neighbor.difference == [0; 3] {
-            // Of two points in one place the heavier, with the lower id, has the cell.
-            self.hidden |= neighbor.id < self.own;
+        if self.shares_place(&neighbor) {
             return;
         }
+        let side = Side { line, neighbor };
+        if let Some((first, last)) = self.scan(&side, cut_body::<E>) {
+            self.replace(first, last, side);
+            self.set_reach(farthest_body::<E>(&self.corners));
+        }
+    }
+
+    /// True for a point in the same place, which has no bisector.
+    #[inline(always)]
+    fn shares_place(&mut self, neighbor: &Neighbor) -> bool {
+        let same = neighbor.difference == [0; 3];
+        // Of two points in one place the heavier, with the lower id, has the cell.
+        self.hidden |= same && neighbor.id < self.own;
+        same
+    }
+
+    /// The run of corners that `side` cuts off, after a look at all of them.
+    #[inline(always)]
+    fn scan(
+        &mut self,
+        side: &Side,
+        cut_corners: impl Fn(&[CornerGroup], &Line) -> (u64, u64),
+    ) -> Option<(u32, u32)> {
         let (mut doubts, mut all) = (0, 0);
         let words = self.cut.iter_mut().zip(&mut self.doubt);
         for (corners, (cut, doubt)) in self.corners.chunks(64 / LANES).zip(words) {
-            (*cut, *doubt) = cut_body::<E>(corners, &line);
+            (*cut, *doubt) = cut_corners(corners, &side.line);
             doubts |= *doubt;
             all |= *cut | *doubt;
         }
         if all == 0 {
-            return;
+            return None;
         }
-        let side = Side { line, neighbor };
         if doubts != 0 {
-            self.settle_doubts(&side);
+            self.settle_doubts(side);
         }
-        if let Some((first, last)) = self.arc(&side) {
-            self.replace::<E>(first, last, side);
-        }
+        self.arc(side)
     }
 
     /// Decides the corners that floating point does not.
@@ -253,27 +283,43 @@ impl Cell {
             while doubt != 0 {
                 let bit = doubt.trailing_zeros();
                 doubt &= doubt - 1;
-                let cut = self.cuts(word * 64 + bit as usize, side);
+                let k = word * 64 + bit as usize;
+                let cut = self.cuts(k, side).unwrap_or_else(|| {
+                    self.unsure |= !self.is_certain(k, side);
+                    self.depth(k, side) > 0.0
+                });
                 self.cut[word] |= u64::from(cut) << bit;
             }
         }
     }
 
-    /// Whether `side` cuts off corner `k`: exact, but for corners on the rim.
-    fn cuts(&self, k: usize, side: &Side) -> bool {
-        let a = self.sides[self.links[k].side as usize].neighbor;
-        let next = self.links[k].next as usize;
-        let b = self.sides[self.links[next].side as usize].neighbor;
+    /// Whether `side` cuts off corner `k`: exact, or `None` for a corner on the rim.
+    fn cuts(&self, k: usize, side: &Side) -> Option<bool> {
+        let [a, b] = self.sides_at(k).map(|side| side.neighbor);
         let c = side.neighbor;
-        let exact = match (a.id == RIM_ID, b.id == RIM_ID) {
+        match (a.id == RIM_ID, b.id == RIM_ID) {
             (false, false) => Some(cuts_corner(self.normal, self.own, a, b, c)),
             (true, true) => None,
             (a_is_rim, _) => {
                 let other = if a_is_rim { b } else { a };
                 cuts_parallel(self.normal, self.own, other, c)
             }
-        };
-        exact.unwrap_or_else(|| self.depth(k, side) > 0.0)
+        }
+    }
+
+    /// True if rounding has no part in the depth of corner `k` being above or below zero: its own bound
+    /// is far too large where the lengths of its lines differ, as those of the rim and others do.
+    fn is_certain(&self, k: usize, side: &Side) -> bool {
+        let [a, b] = self.sides_at(k).map(|side| &side.line);
+        let [x, y] = self.corner(k).at;
+        let bound = side.line.bound(x, y, error_of_meeting(a, b, [x, y]));
+        self.depth(k, side).abs() > bound
+    }
+
+    /// The sides before and after corner `k`.
+    fn sides_at(&self, k: usize) -> [&Side; 2] {
+        let next = self.links[k].next as usize;
+        [k, next].map(|k| &self.sides[self.links[k].side as usize])
     }
 
     #[inline(always)]
@@ -332,9 +378,10 @@ impl Cell {
         (count < self.count).then_some((first, last, count))
     }
 
-    /// Puts `side` in place of the corners from `first` to `last`, and the sides between them.
+    /// Puts `side` in place of the corners from `first` to `last`, and the sides between them; it ends at
+    /// the corner that is returned.
     #[inline(always)]
-    fn replace<E: Eight>(&mut self, first: u32, last: u32, side: Side) {
+    fn replace(&mut self, first: u32, last: u32, side: Side) -> u32 {
         let start = self.links[first as usize];
         let end = self.links[last as usize];
         let mut gone = first;
@@ -361,7 +408,7 @@ impl Cell {
         self.count += 1;
         self.head = first;
         self.sides.push(side);
-        self.set_reach(farthest_body::<E>(&self.corners));
+        second
     }
 
     fn free_place(&mut self) -> u32 {
@@ -381,23 +428,6 @@ impl Cell {
         .map(|k| k as usize)
     }
 
-    /// False if no point in a box, given relative to the cell's point, can change the cell: a point
-    /// cuts off a corner only if it is nearer to the corner than the cell's own point.
-    #[must_use]
-    pub fn may_touch(&self, low: [f64; 3], high: [f64; 3]) -> bool {
-        let [u, v] = self.frame;
-        self.ring().any(|k| {
-            let corner = self.corner(k);
-            let mut distance2 = 0.0;
-            for axis in 0..3 {
-                let x = corner.at[0] * u[axis] + corner.at[1] * v[axis];
-                let gap = (low[axis] - x).max(x - high[axis]).max(0.0);
-                distance2 += gap * gap;
-            }
-            distance2 <= corner.reach2 * (1.0 + 1e-9)
-        })
-    }
-
     /// Calls `each` with the ids of the two bisectors at every corner between bisectors, in turn
     /// around the cell: with the cell's own id, the triples it sees.
     pub fn triples(&self, mut each: impl FnMut(u32, u32)) {
@@ -405,8 +435,7 @@ impl Cell {
             return;
         }
         for k in self.ring() {
-            let next = self.links[k].next as usize;
-            let [a, b] = [k, next].map(|k| self.sides[self.links[k].side as usize].neighbor.id);
+            let [a, b] = self.sides_at(k).map(|side| side.neighbor.id);
             if a != RIM_ID && b != RIM_ID {
                 each(a, b);
             }
@@ -425,6 +454,12 @@ fn clip_nearest_body<E: Eight>(cell: &mut Cell, near: Nearest<'_>, mut next: usi
     // After eight lines that changed nothing, most will change nothing.
     let mut quiet = false;
     while next < count {
+        if cell.count > cell.most || cell.many.is_some() {
+            next = cell.clip_many(near, next);
+            if next == count {
+                break;
+            }
+        }
         let group = next..(next + LANES).min(count);
         let (x, y) = (&near.x[group.clone()], &near.y[group.clone()]);
         let z = &near.z[group.clone()];
@@ -450,49 +485,6 @@ fn clip_nearest_body<E: Eight>(cell: &mut Cell, near: Nearest<'_>, mut next: usi
         quiet = cell.sides.len() == sides;
     }
     next
-}
-
-/// Two unit vectors that span the plane across `normal`.
-fn frame(normal: Normal) -> Frame {
-    let n = normal.map(f64::from);
-    let unit = |v: [f64; 3]| {
-        let length = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
-        v.map(|x| x / length)
-    };
-    let cross = |a: [f64; 3], b: [f64; 3]| {
-        [
-            a[1] * b[2] - a[2] * b[1],
-            a[2] * b[0] - a[0] * b[2],
-            a[0] * b[1] - a[1] * b[0],
-        ]
-    };
-    let mut axis = [0.0; 3];
-    let mut least = 0;
-    for k in 1..3 {
-        if n[k].abs() < n[least].abs() {
-            least = k;
-        }
-    }
-    axis[least] = 1.0;
-    let u = unit(cross(n, axis));
-    [u, cross(unit(n), u)]
-}
-
-/// Where two lines meet.
-#[inline(always)]
-fn meet(a: &Line, b: &Line) -> Corner {
-    let determinant = a.line[0] * b.line[1] - a.line[1] * b.line[0];
-    let inverse = 1.0 / determinant;
-    let x = (a.offset * b.line[1] - b.offset * a.line[1]) * inverse;
-    let y = (b.offset * a.line[0] - a.offset * b.line[0]) * inverse;
-    let distance = x.abs() + y.abs();
-    let lengths = a.length + b.length;
-    let error = SLACK * lengths * inverse.abs() * (a.offset + b.offset + lengths * distance);
-    Corner {
-        at: [x, y],
-        error,
-        reach2: (x * x + y * y) * (1.0 + SLACK) + error * (2.0 * distance + error),
-    }
 }
 
 #[cfg(test)]

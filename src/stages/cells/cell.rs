@@ -44,6 +44,9 @@ trait Source {
     fn near(&self) -> &Neighbors;
     /// Makes `count` neighbours known, or all there are; false if that cannot be certified.
     fn reach(&mut self, count: usize) -> Result<bool>;
+    /// The sums over the `count` nearest neighbours, or over all if there are fewer, and how many
+    /// those are; `None` if that cannot be certified.
+    fn sums(&mut self, count: usize) -> Result<Option<(Sums, usize)>>;
 }
 
 impl Source for Query<'_> {
@@ -53,6 +56,10 @@ impl Source for Query<'_> {
 
     fn reach(&mut self, count: usize) -> Result<bool> {
         Ok(self.extend_to(count))
+    }
+
+    fn sums(&mut self, count: usize) -> Result<Option<(Sums, usize)>> {
+        Ok(Query::sums(self, count).map(|sums| (sums, count)))
     }
 }
 
@@ -75,6 +82,12 @@ impl Source for Walked<'_> {
             }
         }
         Ok(true)
+    }
+
+    fn sums(&mut self, count: usize) -> Result<Option<(Sums, usize)>> {
+        self.reach(count)?;
+        let used = count.min(self.near.len());
+        Ok(Some((self.near.sums(used, Level::best()), used)))
     }
 }
 
@@ -102,35 +115,30 @@ impl Fit {
 }
 
 fn fit_from(source: &mut impl Source, neighbors: usize, widen: Widen) -> Result<Option<Fit>> {
-    let level = Level::best();
-    let widenings = match widen {
-        Widen::Never => 0,
-        Widen::OnLines | Widen::OnBands => WIDENINGS,
-    };
-    let mut wanted = neighbors;
-    for round in 0..=widenings {
-        if !source.reach(wanted)? {
-            return Ok(None);
-        }
-        let near = source.near();
-        let used = wanted.min(near.len());
-        let moments = near.moments(used, level);
-        let plane = moments.plane();
-        let enough = match widen {
-            Widen::OnBands => plane.wide,
-            Widen::Never | Widen::OnLines => plane.spans,
-        };
-        if enough || used < wanted || round == widenings {
-            let last2 = near.get(used.wrapping_sub(1)).map_or(0, |n| n.distance2);
-            return Ok(Some(Fit {
-                plane,
-                moments,
-                last2,
-            }));
-        }
-        wanted *= 2;
+    if !source.reach(neighbors)? {
+        return Ok(None);
     }
-    Ok(None)
+    let mut used = neighbors.min(source.near().len());
+    let mut fit = Fit::of(source.near().sums(used, Level::best()));
+    let mut wanted = neighbors;
+    for _ in 0..WIDENINGS {
+        let enough = match widen {
+            Widen::Never => true,
+            Widen::OnLines => fit.plane.spans,
+            Widen::OnBands => fit.plane.wide,
+        };
+        if enough || used < wanted {
+            break;
+        }
+        // Which they are matters here, and not yet in what order.
+        wanted *= 2;
+        let Some((sums, count)) = source.sums(wanted)? else {
+            return Ok(None);
+        };
+        used = count;
+        fit = Fit::of(sums);
+    }
+    Ok(Some(fit))
 }
 
 /// When a plane takes in twice the neighbours that it was asked for, up to eight times as many.
@@ -192,19 +200,21 @@ impl CellMaker {
         if !self.start(query.id(), &fit) {
             return Ok(Outcome::NoPlane);
         }
-        let own = query.point().map(f64::from);
-        let mut next = 0;
+        let point = query.point();
+        let own = point.map(f64::from);
         loop {
-            next = self.cell.clip_nearest(query.near().columns(), next);
+            let next = self.cell.clip_nearest(query.near().columns(), 0);
             if next < query.near().len() || self.cell.reach2() <= query.complete2() {
                 self.cell.triples(each);
                 return Ok(Outcome::Complete);
             }
             // On scan lines thousands of points are nearer than what can touch the cell.
             let touches = |bounds: &Aabb| touches(&self.cell, own, bounds);
-            match query.extend_where(self.cell.reach2(), touches) {
-                Some(first) => next = first,
-                None => return Ok(Outcome::Uncertain),
+            let pick = |columns: [&[i32]; 3], places: &mut Vec<u32>| {
+                self.cell.touching(columns, point, places);
+            };
+            if !query.extend_where(self.cell.reach2(), touches, pick) {
+                return Ok(Outcome::Uncertain);
             }
         }
     }

@@ -78,6 +78,12 @@ impl Fans {
         self.slots[(v - self.first) as usize].changed
     }
 
+    /// How many triangles there are at an active vertex.
+    pub fn count(&self, v: u32) -> usize {
+        let slot = self.slots[(v - self.first) as usize];
+        (slot.used - slot.start) as usize
+    }
+
     /// Triangles at an active vertex, in order of insertion: numbers and other two vertices.
     pub fn at(&self, v: u32) -> impl Iterator<Item = (u32, [u32; 2])> + '_ {
         let slot = self.slots[(v - self.first) as usize];

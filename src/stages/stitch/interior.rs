@@ -155,6 +155,10 @@ impl View for BlockWork {
         self.fans.at(v)
     }
 
+    fn count(&self, v: u32) -> usize {
+        self.fans.count(v)
+    }
+
     fn position(&self, v: u32) -> Point {
         self.located.at(v)
     }
@@ -177,15 +181,10 @@ impl BlockWork {
         let interior = base.surface.interior.get(block)?;
         let crossing = base.surface.crossing.get(block)?;
         let border = border(base, &crossing, &ids, block)?;
-        let fans = Fans::with_room(
-            ids.clone(),
-            &active,
-            interior
-                .iter()
-                .map(|r| [r[0], r[1], r[2]])
-                .chain(crossing.iter().map(|r| [r[1], r[2], r[3]]))
-                .chain(candidates.iter().map(|c| c.ids)),
-        );
+        let inside = interior.iter().map(|r| [r[0], r[1], r[2]]);
+        let across = crossing.iter().map(|r| [r[1], r[2], r[3]]);
+        let all = inside.chain(across).chain(candidates.iter().map(|c| c.ids));
+        let fans = Fans::with_room(ids.clone(), &active, all);
         let mut work = Self {
             mesh: Vec::with_capacity(interior.len()),
             fans,
@@ -332,9 +331,9 @@ impl BlockWork {
             let before = self.triangles.len();
             pending.retain_mut(|candidate| {
                 let t = candidate.ids;
-                // Test I looks at nothing but the triangles at these vertices.
-                let changed = |v: &u32| self.fans.changed(*v) > candidate.tried;
-                if candidate.tried > 0 && !t.iter().any(changed) {
+                // What fails test I needs a triangle at another of its edges.
+                let changed = t.map(|v| u8::from(self.fans.changed(v) > candidate.tried));
+                if candidate.tried > 0 && changed.iter().sum::<u8>() < 2 {
                     return true;
                 }
                 candidate.tried = self.now();

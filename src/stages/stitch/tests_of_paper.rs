@@ -4,11 +4,14 @@
 use crate::geom::Point;
 use crate::stages::located::normal;
 use crate::stages::surface::star::{EDGES, Triangle, opposed, others};
+use rustc_hash::FxHashMap;
 
 /// The mesh around the vertices of a triangle.
 pub trait View {
     /// All triangles at `v`: their number and their other two vertices, ascending.
     fn around(&self, v: u32) -> impl Iterator<Item = (u32, [u32; 2])>;
+    /// How many these are.
+    fn count(&self, v: u32) -> usize;
     /// The position of a vertex of a triangle of the mesh or of a candidate.
     fn position(&self, v: u32) -> Point;
 }
@@ -26,6 +29,9 @@ pub enum Refusal {
     Angle,
 }
 
+/// A vertex with more triangles is a hub: it is not gone through where another one will do.
+const HUB: usize = 64;
+
 /// A triangle adjacent to a candidate: its number, and whether the candidate must be turned
 /// against it.
 pub type Adjacent = (u32, bool);
@@ -41,28 +47,8 @@ pub fn examine(
     cos_max_angle: f64,
     link: &mut Vec<[u32; 2]>,
 ) -> Result<[Option<Adjacent>; 3], Refusal> {
-    // At each edge the number of a triangle and its third vertex.
-    let mut found: [Option<(u32, u32)>; 3] = [None; 3];
-    let mut counts = [0usize; 3];
-    let mut used = [false; 3];
-    // Does the triangle with `other` beside its first vertex have the edge to `end`?
-    let mut see = |edge: usize, number: u32, [a, b]: [u32; 2], end: u32| {
-        if a == end || b == end {
-            counts[edge] += 1;
-            found[edge] = Some((number, if a == end { b } else { a }));
-        }
-    };
-    // The edges are (0,1), (0,2) and (1,2); the first two are seen from vertex 0.
-    for (number, other) in view.around(t[0]) {
-        used[0] = true;
-        see(0, number, other, t[1]);
-        see(1, number, other, t[2]);
-    }
-    for (number, other) in view.around(t[1]) {
-        used[1] = true;
-        see(2, number, other, t[2]);
-    }
-    used[2] = view.around(t[2]).next().is_some();
+    let (counts, found) = at_edges(t, view, HUB);
+    let used = t.map(|v| view.count(v) > 0);
     let connected = counts.iter().filter(|c| **c > 0).count();
     let lone = (0..3).find(|&e| counts[e] > 0);
     match (connected, lone) {
@@ -73,8 +59,11 @@ pub fn examine(
     if counts.iter().any(|c| *c > 1) {
         return Err(Refusal::FullEdge);
     }
-    if t.iter().any(|&v| makes_excess(t, v, view, link)) {
-        return Err(Refusal::Excess);
+    // Where an edge is new, a component of the link ends there and goes on, and none is closed.
+    for (v, [e, f]) in t.into_iter().zip([[0, 1], [0, 2], [1, 2]]) {
+        if counts[e] + counts[f] == 2 && makes_excess(t, v, view, link) {
+            return Err(Refusal::Excess);
+        }
     }
     let mut adjacent = [None; 3];
     for (edge, (a, b, c, _)) in EDGES.into_iter().enumerate() {
@@ -94,6 +83,41 @@ pub fn examine(
     Ok(adjacent)
 }
 
+/// For each edge of `t`, how many triangles of the mesh it has, and the number and third vertex of one;
+/// with an eye on vertices of more than `hub` triangles.
+fn at_edges(t: Triangle, view: &impl View, hub: usize) -> ([usize; 3], [Option<(u32, u32)>; 3]) {
+    let mut found: [Option<(u32, u32)>; 3] = [None; 3];
+    let mut counts = [0usize; 3];
+    // Does the triangle with `other` beside its first vertex have the edge to `end`?
+    let mut see = |edge: usize, number: u32, [a, b]: [u32; 2], end: u32| {
+        if a == end || b == end {
+            counts[edge] += 1;
+            found[edge] = Some((number, if a == end { b } else { a }));
+        }
+    };
+    // The edges are (0,1), (0,2) and (1,2).
+    if t[..2].iter().all(|v| view.count(*v) <= hub) {
+        for (number, other) in view.around(t[0]) {
+            see(0, number, other, t[1]);
+            see(1, number, other, t[2]);
+        }
+        for (number, other) in view.around(t[1]) {
+            see(2, number, other, t[2]);
+        }
+    } else {
+        for (edge, (a, b, ..)) in EDGES.into_iter().enumerate() {
+            let (mut from, mut end) = (t[a], t[b]);
+            if view.count(from) > view.count(end) {
+                std::mem::swap(&mut from, &mut end);
+            }
+            for (number, other) in view.around(from) {
+                see(edge, number, other, end);
+            }
+        }
+    }
+    (counts, found)
+}
+
 /// The triangle of an edge `low < high` and a third vertex.
 fn with_edge(low: u32, high: u32, third: u32) -> Triangle {
     if third < low {
@@ -105,20 +129,15 @@ fn with_edge(low: u32, high: u32, third: u32) -> Triangle {
     }
 }
 
-/// True if with `t` the link of `v` would have a closed cycle and another component.
+/// True if with `t`, both of whose edges at `v` have one triangle, the link of `v` would have a closed
+/// cycle and another component.
 fn makes_excess(t: Triangle, v: u32, view: &impl View, link: &mut Vec<[u32; 2]>) -> bool {
     link.clear();
     link.extend(view.around(v).map(|(_, other)| other));
-    let edges = link.len();
-    if edges == 0 {
-        return false;
-    }
-    // A link without ends is closed already.
-    let degree = |node: u32| link.iter().filter(|e| e[0] == node || e[1] == node).count();
-    if link.iter().flatten().all(|&node| degree(node) == 2) {
-        return true;
-    }
     let [from, goal] = others(t, v);
+    if link.len() > HUB {
+        return closes_part(link, from, goal);
+    }
     let mut node = from;
     while node != goal {
         let next = link.iter().position(|e| e[0] == node || e[1] == node);
@@ -127,6 +146,32 @@ fn makes_excess(t: Triangle, v: u32, view: &impl View, link: &mut Vec<[u32; 2]>)
         node ^= a ^ b;
     }
     !link.is_empty()
+}
+
+/// True if the path from `from`, an end of it, leads to `goal` and not through the whole link.
+fn closes_part(link: &[[u32; 2]], from: u32, goal: u32) -> bool {
+    // No node has more than two edges: their other ends, combined, lead on from either.
+    let mut beside: FxHashMap<u32, (u32, u32)> = FxHashMap::default();
+    for [a, b] in link {
+        for (node, other) in [(a, b), (b, a)] {
+            let (both, count) = beside.entry(*node).or_default();
+            *both ^= other;
+            *count += 1;
+        }
+    }
+    let (mut before, mut node) = (0, from);
+    for length in 0..link.len() {
+        match beside.get(&node) {
+            _ if node == goal => return true,
+            Some((both, count)) if length == 0 || *count > 1 => {
+                (before, node) = (node, both ^ before);
+            }
+            // Another end.
+            _ => return false,
+        }
+    }
+    // All of the link.
+    false
 }
 
 /// Do `a b c` and its neighbour `b a far` across the edge `a b` agree?
@@ -176,5 +221,101 @@ impl Candidate {
             ids: [i, j, k],
             tried: 0,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// Triangles around their vertices; `looks` counts those that were looked at.
+    struct Mesh {
+        triangles: Vec<Triangle>,
+        looks: std::cell::Cell<usize>,
+    }
+
+    impl View for Mesh {
+        fn around(&self, v: u32) -> impl Iterator<Item = (u32, [u32; 2])> {
+            let at = (0..)
+                .zip(&self.triangles)
+                .filter(move |(_, t)| t.contains(&v));
+            at.map(move |(number, t)| {
+                self.looks.set(self.looks.get() + 1);
+                (number, others(*t, v))
+            })
+        }
+
+        fn count(&self, v: u32) -> usize {
+            self.triangles.iter().filter(|t| t.contains(&v)).count()
+        }
+
+        fn position(&self, v: u32) -> Point {
+            [v as i32, (v * v % 7) as i32, 0]
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn edges_seen_from_either_end_are_the_same(
+            triangles in prop::collection::btree_set(prop::collection::btree_set(0u32..9, 3), 0..20),
+            t in prop::collection::btree_set(0u32..9, 3),
+        ) {
+            let triangle = |t: &std::collections::BTreeSet<u32>| -> Triangle {
+                let t: Vec<u32> = t.iter().copied().collect();
+                [t[0], t[1], t[2]]
+            };
+            let triangles = triangles.iter().map(triangle).collect();
+            let mesh = Mesh { triangles, looks: 0.into() };
+            let (plain, hubs) = (at_edges(triangle(&t), &mesh, 99), at_edges(triangle(&t), &mesh, 0));
+            prop_assert_eq!(plain.0, hubs.0);
+            for edge in (0..3).filter(|e| plain.0[*e] < 2) {
+                prop_assert_eq!(plain.1[edge], hubs.1[edge]);
+            }
+        }
+
+        /// Links of paths and cycles: a path is closed by an edge between its ends.
+        #[test]
+        fn a_path_that_is_closed_leaves_others_or_not(
+            lengths in prop::collection::vec((1u32..6, any::<bool>()), 1..5),
+            pick in any::<prop::sample::Index>(),
+            with_other in any::<prop::sample::Index>(),
+        ) {
+            let (mut link, mut ends, mut next) = (Vec::new(), Vec::new(), 0);
+            for &(length, cycle) in &lengths {
+                let length = if cycle { length + 2 } else { length };
+                link.extend((next..next + length).map(|k| [k, k + 1]));
+                if cycle {
+                    link.push([next, next + length]);
+                } else {
+                    ends.push((next, next + length));
+                }
+                next += length + 1;
+            }
+            link.reverse();
+            prop_assume!(!ends.is_empty());
+            let (from, to) = *pick.get(&ends);
+            let (_, other) = *with_other.get(&ends);
+            prop_assert_eq!(closes_part(&link, from, to), lengths.len() > 1);
+            prop_assert_eq!(closes_part(&link, to, from), lengths.len() > 1);
+            if other != to {
+                prop_assert!(!closes_part(&link, from, other));
+            }
+        }
+    }
+
+    /// Many triangles around one vertex are not gone through for each that is tried there.
+    #[test]
+    fn a_hub_is_not_gone_through() {
+        let triangles = (1..1000).map(|k| [0, k, k + 1]).collect();
+        let mesh = Mesh {
+            triangles,
+            looks: 0.into(),
+        };
+        let mut link = Vec::new();
+        for t in [[0, 1000, 1001], [0, 500, 2000], [0, 1, 3000]] {
+            let _ = examine(t, &mesh, -1.0, &mut link);
+        }
+        assert!(mesh.looks.get() < 20, "{}", mesh.looks.get());
     }
 }

@@ -28,6 +28,13 @@ impl Columns {
         [0, 1, 2].map(|axis| bytemuck::cast_slice(&self.0[axis][..count]))
     }
 
+    /// A point and its number.
+    #[inline(always)]
+    pub fn get(&self, place: usize) -> (Point, u32) {
+        let at = [0, 1, 2].map(|axis| self.0[axis][place] as i32);
+        (at, self.0[3][place])
+    }
+
     /// The numbers of the first `count`.
     #[inline(always)]
     pub fn numbers(&self, count: usize) -> &[u32] {
@@ -89,6 +96,7 @@ impl PageLeaves {
         self.leaves.clear();
         let around = &tile.page_boxes[own.local];
         for &local in &tile.near[own.near.clone()] {
+            let local = local as usize;
             let range = tile.range(local);
             let boxes = &tile.leaf_boxes[local * LEAVES..];
             for (leaf, start) in range.clone().step_by(tile.leaf).enumerate() {

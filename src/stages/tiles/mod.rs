@@ -5,6 +5,7 @@
 //! beyond its reach, it asks of the whole store ([`walk::Walk`]).
 
 mod candidates;
+mod halo;
 pub mod near;
 pub mod neighbors;
 pub mod walk;
@@ -14,19 +15,11 @@ use crate::geom::Point;
 use crate::geom::aabb::Aabb;
 use crate::stages::order::PointStore;
 use crate::workspace::memory::{Holding, bytes_of, give_back};
+use halo::{Reach, halo};
 use std::ops::Range;
 
 /// Leaves per page: the unit in which candidates are gathered and queries answered.
 const LEAVES: usize = 16;
-
-/// Most pages that the reach of one page may touch; an outlier's page shrinks its reach instead.
-const MOST_NEAR: usize = 96;
-
-/// Where a reach touches no more pages it is made longer,
-const FEW_NEAR: usize = 20;
-
-/// up to so many times.
-const MOST_TIMES: u64 = 4;
 
 /// Most halo pages for each page of the tile itself.
 const MOST_HALO: usize = 4;
@@ -65,7 +58,7 @@ pub struct Tile {
     page_boxes: Vec<Aabb>,
     leaf_boxes: Vec<Aabb>,
     own: Vec<OwnPage>,
-    near: Vec<usize>,
+    near: Vec<u32>,
     held: Holding,
 }
 
@@ -73,7 +66,7 @@ impl Tile {
     /// Bytes that a tile of `points` points takes with the largest halo.
     #[must_use]
     pub fn bytes(points: usize) -> u64 {
-        (points as u64 + 256) * (1 + MOST_HALO as u64) * 15 + (1 << 20)
+        (points as u64 + 256) * (1 + MOST_HALO as u64) * 15 + (3 << 20)
     }
 
     /// Loads the tile of the points `ids`.
@@ -137,22 +130,23 @@ impl Tile {
         lists + bytes_of(&self.leaf_boxes) + bytes_of(&self.own) + bytes_of(&self.near)
     }
 
-    fn index(&mut self, reaches: Vec<(usize, u64, Vec<usize>)>) {
+    fn index(&mut self, reaches: Vec<Reach>) {
         for local in 0..self.pages.len() {
             let points = &self.points[self.range(local)];
             self.leaf_boxes
                 .extend(points.chunks(self.leaf).map(Aabb::of));
             self.leaf_boxes.resize((local + 1) * LEAVES, Aabb::EMPTY);
         }
-        for (number, reach2, near) in reaches {
+        for reach in reaches {
             let begin = self.near.len();
-            self.near
-                .extend(near.iter().filter_map(|p| self.pages.binary_search(p).ok()));
-            if let Ok(local) = self.pages.binary_search(&number) {
+            let local = |page: &u32| self.pages.binary_search(&(*page as usize)).ok();
+            let near = reach.near.iter().filter_map(local);
+            self.near.extend(near.map(|local| local as u32));
+            if let Ok(local) = self.pages.binary_search(&reach.page) {
                 self.own.push(OwnPage {
                     local,
                     near: begin..self.near.len(),
-                    reach2,
+                    reach2: reach.reach2,
                 });
             }
         }
@@ -174,70 +168,6 @@ impl Tile {
     pub fn ids(&self) -> Range<usize> {
         self.ids.clone()
     }
-}
-
-/// A page, its squared reach and the pages within it.
-type Reach = (usize, u64, Vec<usize>);
-
-/// All pages of a tile of `size` pages, of which `own` are asked for, and the reaches of these; shorter
-/// than usual where the halo would outgrow the tile, as it would around scattered outliers.
-fn halo(store: &PointStore, own: &[usize], size: usize) -> (Vec<usize>, Vec<Reach>) {
-    let most = size * (1 + MOST_HALO) + MOST_NEAR;
-    let mut shrink = 1;
-    loop {
-        let mut wanted = own.to_vec();
-        let mut reaches = Vec::with_capacity(own.len());
-        for &number in own {
-            let (reach2, near) = near_pages(store, number, shrink);
-            wanted.extend_from_slice(&near);
-            reaches.push((number, reach2, near));
-        }
-        wanted.sort_unstable();
-        wanted.dedup();
-        if wanted.len() <= most || shrink > 1 << 40 {
-            return (wanted, reaches);
-        }
-        shrink *= 2;
-    }
-}
-
-/// Squared reach of a page and the pages within it.
-fn near_pages(store: &PointStore, page: usize, shrink: i64) -> (u64, Vec<usize>) {
-    let bounds = store.page_box(page);
-    let mut reach = (bounds.longest_side() * 7 / 8 / shrink).max(1) as u64;
-    if shrink == 1 {
-        // Along a line neighbours are far, and pages few.
-        reach *= lonely(store, bounds, reach);
-    }
-    loop {
-        let mut near = Vec::new();
-        store.pages_near(bounds, reach * reach, &mut |p| {
-            near.push(p);
-            near.len() <= MOST_NEAR
-        });
-        if near.len() <= MOST_NEAR || reach <= 1 {
-            if near.len() <= MOST_NEAR {
-                return (reach * reach, near);
-            }
-            return (0, vec![page]);
-        }
-        reach /= 2;
-    }
-}
-
-/// How many times as far a page can reach and still touch few pages.
-fn lonely(store: &PointStore, bounds: &Aabb, reach: u64) -> u64 {
-    for times in [MOST_TIMES, MOST_TIMES / 2] {
-        let (mut count, reach) = (0, reach * times);
-        store.pages_near(bounds, reach * reach, &mut |_| {
-            count += 1;
-            count <= FEW_NEAR
-        });
-        if count <= FEW_NEAR {
-            return times;
-        }
-    }
-    1
 }
 
 #[cfg(test)]

@@ -15,7 +15,7 @@ use std::ops::Range;
 mod list;
 mod sums;
 
-use list::{list, list_nearest, measure};
+use list::list_nearest;
 pub use sums::Sums;
 
 /// Bound on the relative error of approximate squared distances, and then some.
@@ -47,6 +47,8 @@ pub struct Search {
     near: Neighbors,
     /// About how far the last neighbour of the query before was, if it was summed.
     last: f32,
+    /// The same for those that took in more, by how many these were.
+    lasts: Vec<(usize, f32)>,
     /// What the last query that took in more neighbours ended with: how many, and within which
     /// squared distance.
     widened: (usize, u64),
@@ -245,6 +247,12 @@ impl Search {
         }
     }
 
+    /// Takes in that a query needed `count` neighbours, the last of them this far.
+    fn note_wider(&mut self, count: usize, last2: u64) {
+        self.widened = (count, last2 + last2 / 4);
+        self.wider2 = self.wider2.max(self.widened.1);
+    }
+
     fn swap_back(&mut self) {
         if let Some(group) = self.aside.take() {
             self.spare = std::mem::replace(&mut self.candidates, group);
@@ -282,68 +290,71 @@ impl Query<'_> {
         self.complete2
     }
 
-    /// Lists all neighbours up to a squared distance. False if the halo does not reach that far.
-    #[must_use]
-    pub fn extend(&mut self, distance2: u64) -> bool {
-        self.extend_where(distance2, |_| true).is_some()
-    }
-
-    /// Lists all neighbours up to a squared distance, of those farther than was known before only those
-    /// in boxes that `wanted` lets pass, and maybe others; the number of the first that was not listed
-    /// before. `None` if the halo does not reach that far.
+    /// Lists the neighbours beyond [`Query::complete2`] up to a squared distance, instead of those
+    /// known so far: of those in boxes that `wanted` lets pass, and maybe others, the ones whose places
+    /// in the columns of their coordinates `pick` puts down, in order. False if the halo does not
+    /// reach that far.
     #[must_use]
     pub fn extend_where(
         &mut self,
         distance2: u64,
         wanted: impl Fn(&Aabb) -> bool,
-    ) -> Option<usize> {
-        let known = self.complete2;
-        if distance2 <= known {
-            return Some(self.near().len());
-        }
-        if distance2 > self.own.reach2 {
-            return None;
+        pick: impl FnOnce([&[i32]; 3], &mut Vec<u32>),
+    ) -> bool {
+        if distance2 > self.own.reach2.max(self.complete2) {
+            return false;
         }
         let search = &mut *self.search;
         if distance2 > search.candidates.complete2 {
             search.step_aside();
             let around = Aabb::of(&[self.point]);
             search.gather_where(self.tile, &around, distance2, wanted);
-            measure(search.level, search, self.point);
         }
-        // Twice the slack: what is within `distance2` is surely listed.
-        let limit = (distance2 as f64 * (1.0 + 3.0 * APPROXIMATE) + 1.0) as f32;
-        self.complete2 = list(search.level, search, self.point, self.id, limit);
-        debug_assert!(self.complete2 >= distance2);
-        let listed = self.near().columns().distances2;
-        Some(listed.partition_point(|d2| *d2 <= known))
+        search.places.clear();
+        let candidates = &search.candidates;
+        let columns = candidates.columns.coordinates(candidates.len);
+        pick(columns, &mut search.places);
+        let beyond = self.complete2.saturating_add(1);
+        search.list_places(self.point, self.id, beyond..=distance2);
+        self.complete2 = self.complete2.max(distance2);
+        true
     }
 
     /// Lists at least `count` neighbours. False if the halo does not reach that far.
     #[must_use]
     pub fn extend_to(&mut self, count: usize) -> bool {
         while self.near().len() < count {
-            // On a surface, twice the distance holds four times the points. On a line it holds twice
-            // as many; there what the query before needed is the better guess.
-            let next = self.complete2.saturating_mul(3).saturating_add(1);
-            let search = &mut *self.search;
-            let (most, before2) = search.widened;
-            let next = next.max(before2.min(next.saturating_mul(MOST_WIDER)));
-            let next = next.min(self.own.reach2.max(self.complete2 + 1));
+            let next = self.farther(self.complete2);
             if next > self.own.reach2 {
                 return false;
             }
-            if next > search.candidates.complete2 {
-                search.step_aside();
-                search.gather(self.tile, &Aabb::of(&[self.point]), next);
+            if next > self.search.candidates.complete2 {
+                self.gather(next);
             }
-            let most = count.max(most);
+            let search = &mut *self.search;
+            let most = count.max(search.widened.0);
             let listed = list_nearest(search.level, search, self.point, self.id, most);
             self.complete2 = listed.unwrap_or(search.candidates.complete2);
         }
         let last = self.near().get(count - 1).map_or(0, |n| n.distance2);
-        self.search.widened = (count, last + last / 4);
-        self.search.wider2 = self.search.wider2.max(self.search.widened.1);
+        self.search.note_wider(count, last);
         true
+    }
+
+    /// How far to look, squared, when what is within `known` is too little.
+    fn farther(&self, known: u64) -> u64 {
+        // On a surface, twice the distance holds four times the points. On a line it holds twice as
+        // many; there what the query before needed is the better guess.
+        let next = known.saturating_mul(3).saturating_add(1);
+        let (_, before2) = self.search.widened;
+        let next = next.max(before2.min(next.saturating_mul(MOST_WIDER)));
+        next.min(self.own.reach2.max(known + 1))
+    }
+
+    /// Gathers the candidates within a squared distance of this point.
+    fn gather(&mut self, d2: u64) {
+        self.search.step_aside();
+        let around = Aabb::of(&[self.point]);
+        self.search.gather(self.tile, &around, d2);
     }
 }

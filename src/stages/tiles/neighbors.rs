@@ -1,6 +1,7 @@
 //! The neighbours of one point in columns, nearest first.
 
 use super::Near;
+use super::near::Sums;
 use crate::geom::clip::Nearest;
 use crate::geom::plane::Moments;
 use crate::kernels::{Level, MOST_SUMMED, SUMMED_LIMIT2, second_moments};
@@ -109,6 +110,16 @@ impl Neighbors {
             x: &mut self.x[..len],
             y: &mut self.y[..len],
             z: &mut self.z[..len],
+        }
+    }
+
+    /// [`Neighbors::moments`] of the first `count`, and how far the last of them is.
+    #[must_use]
+    pub fn sums(&self, count: usize, level: Level) -> Sums {
+        let last = self.get(count.wrapping_sub(1));
+        Sums {
+            moments: self.moments(count, level),
+            last2: last.map_or(0, |near| near.distance2),
         }
     }
 

@@ -70,21 +70,64 @@ fn check(points: &[Point], tile: &Tile, k: usize, search: &mut Search) {
         };
         agrees(&query);
         assert!(query.near().len() >= k);
+        for count in [k, 2 * k, 4 * k] {
+            let nearest = expected.get(..count);
+            if let Some(sums) = query.sums(count) {
+                assert_eq!(
+                    Some(sums),
+                    nearest.map(|near| sums_over(points, point, near))
+                );
+            }
+            agrees(&query);
+        }
         for near in query.near().iter() {
             let there = points[near.id as usize];
             assert_eq!(near.difference, crate::geom::sub(there, point));
-        }
-        let farther = query.complete2() * 2 + 1;
-        if query.extend(farther) {
-            assert!(query.complete2() >= farther);
-            agrees(&query);
         }
         if query.extend_to(2 * k) {
             assert!(query.near().len() >= 2 * k);
         }
         agrees(&query);
+        // Of those farther, the ones in a half of space, and of these every third one at least.
+        let known = query.complete2();
+        let farther = known * 2 + 1;
+        let half = |p: &Point| p[0] >= point[0];
+        let picked = |p: &Point| (p[0] ^ p[1] ^ p[2]) % 3 == 0;
+        let pick = |[x, y, z]: [&[i32]; 3], places: &mut Vec<u32>| {
+            let is_picked = |place: &u32| {
+                let place = *place as usize;
+                picked(&[x[place], y[place], z[place]])
+            };
+            places.extend((0..x.len() as u32).filter(is_picked));
+        };
+        if query.extend_where(farther, |bounds| half(&bounds.max), pick) {
+            assert!(query.complete2() >= farther);
+            let got: Vec<_> = query.near().iter().map(|n| (n.distance2, n.id)).collect();
+            assert!(got.is_sorted());
+            let beyond = expected
+                .iter()
+                .filter(|(d2, _)| (known + 1..=farther).contains(d2));
+            let beyond = beyond
+                .filter(|(_, id)| picked(&points[*id as usize]))
+                .copied();
+            let beyond: Vec<_> = beyond.collect();
+            assert!(got.iter().all(|near| beyond.contains(near)));
+            let wanted = beyond.iter().filter(|(_, id)| half(&points[*id as usize]));
+            assert!(wanted.into_iter().all(|near| got.contains(near)));
+        }
     });
     assert_eq!(next, tile.ids().end);
+}
+
+fn sums_over(points: &[Point], point: Point, nearest: &[(u64, u32)]) -> near::Sums {
+    let mut moments = Moments::default();
+    for (_, near) in nearest {
+        moments.add(crate::geom::sub(points[*near as usize], point));
+    }
+    near::Sums {
+        moments,
+        last2: nearest.last().map_or(0, |last| last.0),
+    }
 }
 
 /// Sums over the nearest are those of a list of all; some are asked for.
@@ -96,11 +139,7 @@ fn check_sums(points: &[Point], tile: &Tile, k: usize, search: &mut Search) {
         assert_eq!(point, points[id as usize]);
         let Some(sums) = sums else { return };
         let nearest = &all_near(points, id as usize)[..k];
-        let mut moments = Moments::default();
-        for (_, near) in nearest {
-            moments.add(crate::geom::sub(points[*near as usize], point));
-        }
-        assert_eq!((sums.moments, sums.last2), (moments, nearest[k - 1].0));
+        assert_eq!(sums, sums_over(points, point, nearest));
     });
     assert!(next.is_empty());
 }

@@ -6,6 +6,9 @@ use crate::kernels::{
     BLOCK, Pick, RANKED, count_body, distances_body, kernel, pick_body, ranks_body,
 };
 use crate::stages::tiles::Near;
+use crate::stages::tiles::candidates::Columns;
+use crate::stages::tiles::neighbors::Neighbors;
+use std::ops::RangeInclusive;
 
 /// Up to this number, keys are sorted by counting.
 const MOST_RANKED: usize = 96;
@@ -60,24 +63,50 @@ impl Search {
 
     #[cold]
     fn list_long(&mut self, picked: usize, point: Point, own: u32, complete2: u64) {
-        let [x, y, z] = self.picked.coordinates(picked);
-        let ids = self.picked.numbers(picked);
-        let within = |at: usize| {
-            let d2 = distance2([x[at], y[at], z[at]], point);
-            (d2 <= complete2 && ids[at] != own).then_some((d2, at as u32))
-        };
         self.long_keys.clear();
-        self.long_keys.extend((0..picked).filter_map(within));
-        self.long_keys.sort_unstable();
-        self.near.clear();
-        for &(distance2, place) in &self.long_keys {
-            let at = place as usize;
-            self.near.push(Near {
-                distance2,
-                id: ids[at],
-                difference: sub([x[at], y[at], z[at]], point),
-            });
-        }
+        let columns = &self.picked;
+        let keys = (0..picked as u32).filter_map(key(columns, point, own, 0..=complete2));
+        self.long_keys.extend(keys);
+        list_keys(&mut self.near, &mut self.long_keys, columns, point);
+    }
+
+    /// Lists of the candidates at `places`, ascending, those `within` these squared distances.
+    pub(super) fn list_places(&mut self, point: Point, own: u32, within: RangeInclusive<u64>) {
+        self.long_keys.clear();
+        let columns = &self.candidates.columns;
+        let places = self.places.iter().copied();
+        self.long_keys
+            .extend(places.filter_map(key(columns, point, own, within)));
+        list_keys(&mut self.near, &mut self.long_keys, columns, point);
+    }
+}
+
+/// What points, in order of id, are sorted by: squared distance and place in the columns; `None` unless
+/// the distance is `within` these. A point is no neighbour of its own.
+#[inline(always)]
+fn key<'a>(
+    columns: &'a Columns,
+    point: Point,
+    own: u32,
+    within: RangeInclusive<u64>,
+) -> impl Fn(u32) -> Option<(u64, u32)> + 'a {
+    move |place| {
+        let (at, id) = columns.get(place as usize);
+        let d2 = distance2(at, point);
+        (within.contains(&d2) && id != own).then_some((d2, place))
+    }
+}
+
+fn list_keys(near: &mut Neighbors, keys: &mut [(u64, u32)], columns: &Columns, point: Point) {
+    keys.sort_unstable();
+    near.clear();
+    for &mut (distance2, place) in keys {
+        let (at, id) = columns.get(place as usize);
+        near.push(Near {
+            distance2,
+            id,
+            difference: sub(at, point),
+        });
     }
 }
 
@@ -141,11 +170,7 @@ pub(super) fn reach_body(
     }
 }
 
-kernel! {
-    /// Measures the candidates from `point`.
-    pub(super) fn measure(search: &mut Search, point: Point) = measure_body
-}
-
+/// Measures the candidates from `point`.
 #[inline(always)]
 pub(super) fn measure_body(search: &mut Search, point: Point) {
     let candidates = &search.candidates;
@@ -160,12 +185,8 @@ pub(super) fn measure_body(search: &mut Search, point: Point) {
     distances[candidates.len..].fill(f32::INFINITY);
 }
 
-kernel! {
-    /// Lists the measured candidates whose approximate squared distance is at most `limit` in order
-    /// of (distance, id); the squared distance up to which all are listed.
-    pub(super) fn list(search: &mut Search, point: Point, own: u32, limit: f32) -> u64 = list_body<Eight>
-}
-
+/// Lists the measured candidates whose approximate squared distance is at most `limit` in order of
+/// (distance, id); the squared distance up to which all are listed.
 #[inline(always)]
 fn list_body<P: Pick>(search: &mut Search, point: Point, own: u32, limit: f32) -> u64 {
     let below = (f64::from(limit) * (1.0 - APPROXIMATE)) as u64;

@@ -2,7 +2,7 @@
 //! stand does not, so nothing is sorted.
 
 use super::list::{measure_body, reach_body};
-use super::{APPROXIMATE, CORRECTIONS, OwnPage, Search, above};
+use super::{APPROXIMATE, CORRECTIONS, OwnPage, Query, Search, above};
 use crate::geom::Point;
 use crate::geom::plane::Moments;
 use crate::kernels::{BLOCK, MOST_SUMMED, Pick, SUMMED_LIMIT2, kernel, pick_body};
@@ -58,10 +58,43 @@ impl Tile {
             Err(Unknown::Few) => None,
             Err(Unknown::Close) => {
                 self.nearest(own, index, id, k, search)?;
-                Some(Sums {
-                    moments: search.near.moments(k, search.level),
-                    last2: search.near.get(k.checked_sub(1)?)?.distance2,
-                })
+                Some(search.near.sums(k, search.level))
+            }
+        }
+    }
+}
+
+impl Query<'_> {
+    /// Sums over the `count` nearest neighbours, for less than a list of them. `None` if the halo does
+    /// not reach that far.
+    #[must_use]
+    pub fn sums(&mut self, count: usize) -> Option<Sums> {
+        loop {
+            let search = &mut *self.search;
+            let before = search.lasts.iter().position(|(k, _)| *k == count);
+            let before = before.unwrap_or_else(|| {
+                search.lasts.push((count, 0.0));
+                search.lasts.len() - 1
+            });
+            std::mem::swap(&mut search.last, &mut search.lasts[before].1);
+            let summed = sum_nearest(search.level, search, self.point, count);
+            std::mem::swap(&mut search.last, &mut search.lasts[before].1);
+            match summed {
+                Ok(sums) => {
+                    search.note_wider(count, sums.last2);
+                    return Some(sums);
+                }
+                Err(Unknown::Few) => {
+                    let next = self.farther(self.search.candidates.complete2);
+                    if next > self.own.reach2 {
+                        return None;
+                    }
+                    self.gather(next);
+                }
+                Err(Unknown::Close) => {
+                    let listed = self.extend_to(count);
+                    return listed.then(|| self.near().sums(count, self.search.level));
+                }
             }
         }
     }

@@ -1,0 +1,65 @@
+//! Lines in a disk's plane and where they meet.
+
+use super::Normal;
+use crate::kernels::{Frame, Line, SLACK};
+
+/// A corner of the polygon.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Corner {
+    pub at: [f64; 2],
+    /// Bound on the distance of `at` from the true corner.
+    pub error: f64,
+    /// Squared distance of the true corner from the centre, at most.
+    pub reach2: f64,
+}
+
+/// Two unit vectors that span the plane across `normal`.
+pub(super) fn frame(normal: Normal) -> Frame {
+    let n = normal.map(f64::from);
+    let unit = |v: [f64; 3]| {
+        let length = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
+        v.map(|x| x / length)
+    };
+    let cross = |a: [f64; 3], b: [f64; 3]| {
+        [
+            a[1] * b[2] - a[2] * b[1],
+            a[2] * b[0] - a[0] * b[2],
+            a[0] * b[1] - a[1] * b[0],
+        ]
+    };
+    let mut axis = [0.0; 3];
+    let mut least = 0;
+    for k in 1..3 {
+        if n[k].abs() < n[least].abs() {
+            least = k;
+        }
+    }
+    axis[least] = 1.0;
+    let u = unit(cross(n, axis));
+    [u, cross(unit(n), u)]
+}
+
+/// Where two lines meet.
+#[inline(always)]
+pub(super) fn meet(a: &Line, b: &Line) -> Corner {
+    let determinant = a.line[0] * b.line[1] - a.line[1] * b.line[0];
+    let inverse = 1.0 / determinant;
+    let x = (a.offset * b.line[1] - b.offset * a.line[1]) * inverse;
+    let y = (b.offset * a.line[0] - a.offset * b.line[0]) * inverse;
+    let distance = x.abs() + y.abs();
+    let lengths = a.length + b.length;
+    let error = SLACK * lengths * inverse.abs() * (a.offset + b.offset + lengths * distance);
+    Corner {
+        at: [x, y],
+        error,
+        reach2: (x * x + y * y) * (1.0 + SLACK) + error * (2.0 * distance + error),
+    }
+}
+
+/// A closer bound on the distance of `at`, where [`meet`] has two lines meet, from the true corner.
+pub(super) fn error_of_meeting(a: &Line, b: &Line, at: [f64; 2]) -> f64 {
+    let determinant = a.line[0] * b.line[1] - a.line[1] * b.line[0];
+    let distance = at[0].abs() + at[1].abs();
+    let crossed = a.offset * b.length + b.offset * a.length;
+    SLACK * (crossed + 2.0 * a.length * b.length * distance) / determinant.abs()
+}

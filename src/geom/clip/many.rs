@@ -1,0 +1,359 @@
+//! Cells of hundreds of corners and more, as that of a point that many others lie around.
+//!
+//! A bisector is compared with the one corner that lies farthest in its direction, which an index of
+//! the sides by their directions finds, and then with those beside it until one stays. As long as
+//! every decision was exact or certain the corners are those of a convex polygon, and the outcome is
+//! that of a look at all corners. Once floating point had the last word on a corner of the rim, or
+//! would have it now, all are looked at, as in a small cell.
+
+use super::{Cell, Nearest, RIM_CORNERS, RIM_ID, Side};
+use crate::geom::predicate::{Neighbor, turn};
+use crate::kernels::{Line, SLACK, bisectors, cut_corners};
+use std::cell::OnceCell;
+use std::collections::{BTreeMap, BinaryHeap};
+
+/// Cells of more corners are handled as such with many.
+pub(super) const MANY: usize = 256;
+
+/// Sides that the index leads past at most, where directions are too close for it to tell.
+const STEPS: usize = 64;
+
+/// Balls in a ball.
+const FAN: usize = 8;
+
+/// What a cell of many corners has besides them.
+#[derive(Debug, Clone)]
+pub(super) struct Many {
+    /// The sides by their directions, as far as floating point tells: where they end.
+    ends: BTreeMap<(u64, u32), u32>,
+    /// How far corners reach, as bits, also such as are gone.
+    reaches: BinaryHeap<(u64, u32)>,
+    /// The corners on the rim.
+    rim: Vec<u32>,
+    /// What the spheres around the corners fill, if anyone asked since the last cut.
+    balls: OnceCell<Balls>,
+}
+
+/// A cell's corners in boxes, in boxes of boxes, and so on.
+#[derive(Debug, Clone)]
+struct Balls {
+    levels: Vec<Vec<Ball>>,
+}
+
+/// Spheres around points in a box.
+#[derive(Debug, Clone, Copy)]
+struct Ball {
+    low: [f64; 3],
+    high: [f64; 3],
+    /// Squared radius of the largest.
+    reach2: f64,
+}
+
+impl Cell {
+    /// As [`Cell::clip_nearest`], as long as the cell has many corners.
+    #[cold]
+    pub(super) fn clip_many(&mut self, near: Nearest<'_>, mut next: usize) -> usize {
+        if self.many.is_none() {
+            self.index();
+        }
+        while next < near.ids.len() && near.distances2[next] <= self.secure2 {
+            let [x, y, z] = [near.x, near.y, near.z].map(|column| &column[next..=next]);
+            let line = bisectors(self.level, x, y, z, &self.frame).get(0);
+            let difference = [x, y, z].map(|c| i64::from(c[0]));
+            let id = near.ids[next];
+            self.clip_one_of_many(line, Neighbor { difference, id });
+            next += 1;
+            if self.count <= self.most / 2 {
+                self.many = None;
+                break;
+            }
+        }
+        next
+    }
+
+    fn clip_one_of_many(&mut self, line: Line, neighbor: Neighbor) {
+        if self.shares_place(&neighbor) {
+            return;
+        }
+        let side = Side { line, neighbor };
+        let run = self.run_around(&side).unwrap_or_else(|| {
+            let level = self.level;
+            #[cfg(test)]
+            {
+                self.looks += self.places();
+            }
+            self.scan(&side, |corners, line| cut_corners(level, corners, line))
+        });
+        if let Some((first, last)) = run {
+            self.unlist(first, last);
+            let second = self.replace(first, last, side);
+            self.list(first, second);
+        }
+    }
+
+    /// The run of corners that `side` cuts off; `None` if only a look at all of them can tell.
+    fn run_around(&mut self, side: &Side) -> Option<Option<(u32, u32)>> {
+        if self.unsure {
+            return None;
+        }
+        let many = self.many.as_ref()?;
+        for k in &many.rim {
+            self.surely_cuts(*k, side)?;
+        }
+        let seed = self.support(many, side)?;
+        if !self.surely_cuts(seed, side)? {
+            return Some(None);
+        }
+        let (mut first, mut last, mut count) = (seed, seed, 1);
+        while count < self.count && self.surely_cuts(self.links[first as usize].before, side)? {
+            first = self.links[first as usize].before;
+            count += 1;
+        }
+        while count < self.count && self.surely_cuts(self.links[last as usize].next, side)? {
+            last = self.links[last as usize].next;
+            count += 1;
+        }
+        #[cfg(test)]
+        {
+            self.looks += count + 2;
+        }
+        Some((count < self.count).then_some((first, last)))
+    }
+
+    /// Whether `side` cuts off corner `k`; `None` if that is a matter of rounding.
+    fn surely_cuts(&self, k: u32, side: &Side) -> Option<bool> {
+        let corner = self.corner(k as usize);
+        let [x, y] = corner.at;
+        let depth = side.line.depth(x, y);
+        if depth.abs() > side.line.bound(x, y, corner.error) {
+            return Some(depth > 0.0);
+        }
+        let certain = || self.is_certain(k as usize, side).then_some(depth > 0.0);
+        self.cuts(k as usize, side).or_else(certain)
+    }
+
+    /// The corner that is farthest in the direction of `side`: the one between the directions of its
+    /// own sides.
+    fn support(&self, many: &Many, side: &Side) -> Option<u32> {
+        let from = (key(&side.line), 0);
+        let after = many
+            .ends
+            .range(from..)
+            .next()
+            .or(many.ends.first_key_value());
+        let mut k = self.links[*after?.1 as usize].before;
+        for _ in 0..STEPS {
+            let [before, after] = self.sides_at(k as usize);
+            if self.turn(before, side)? < 0 {
+                k = self.links[k as usize].before;
+            } else if self.turn(after, side)? > 0 {
+                k = self.links[k as usize].next;
+            } else {
+                return Some(k);
+            }
+        }
+        None
+    }
+
+    /// Which way the direction of `to` turns from that of `from`, a side of the cell; `None` if that is
+    /// a matter of rounding.
+    fn turn(&self, from: &Side, to: &Side) -> Option<i32> {
+        let (a, b) = (&from.line, &to.line);
+        let cross = a.line[0] * b.line[1] - a.line[1] * b.line[0];
+        if cross.abs() > 4.0 * SLACK * a.length * b.length {
+            return Some(if cross > 0.0 { 1 } else { -1 });
+        }
+        let [a, b] = [from, to].map(|side| side.neighbor.difference);
+        (from.neighbor.id != RIM_ID).then(|| turn(self.normal, a, b))
+    }
+
+    /// The sides between the corners from `first` to `last` go.
+    fn unlist(&mut self, first: u32, last: u32) {
+        let Some(many) = &mut self.many else { return };
+        many.rim.retain(|k| *k != first);
+        let mut gone = first;
+        while gone != last {
+            gone = self.links[gone as usize].next;
+            let number = self.links[gone as usize].side;
+            let line = &self.sides[number as usize].line;
+            many.ends.remove(&(key(line), number));
+            many.rim.retain(|k| *k != gone);
+        }
+    }
+
+    /// Takes in a new side and the corners where it begins and ends.
+    fn list(&mut self, begin: u32, end: u32) {
+        let number = self.links[end as usize].side;
+        let line = self.sides[number as usize].line;
+        let new = [begin, end].map(|k| (k, self.corner(k as usize).reach2, self.is_rim(k)));
+        let Some(mut many) = self.many.take() else {
+            return;
+        };
+        many.ends.insert((key(&line), number), end);
+        many.balls.take();
+        for (k, reach2, is_rim) in new {
+            many.note(reach2, k);
+            many.rim.extend(is_rim.then_some(k));
+        }
+        let reach2 = self.farthest(&mut many.reaches);
+        let stale = many.reaches.len() > 4 * self.count;
+        self.many = Some(many);
+        self.set_reach(reach2);
+        if stale || self.sides.len() > 2 * self.count + RIM_CORNERS {
+            self.index();
+        }
+    }
+
+    /// True for a corner on the rim.
+    fn is_rim(&self, k: u32) -> bool {
+        let sides = self.sides_at(k as usize);
+        sides.iter().any(|side| side.neighbor.id == RIM_ID)
+    }
+
+    /// The largest reach of a corner, after those on top that are of none any more are gone.
+    fn farthest(&self, reaches: &mut BinaryHeap<(u64, u32)>) -> f64 {
+        while let Some(&(bits, k)) = reaches.peek() {
+            if self.corner(k as usize).reach2.to_bits() == bits {
+                return f64::from_bits(bits);
+            }
+            reaches.pop();
+        }
+        0.0
+    }
+
+    /// Makes the index anew, and forgets sides that are no longer part of the polygon.
+    fn index(&mut self) {
+        let mut sides = self.sides[..RIM_CORNERS].to_vec();
+        let ring: Vec<u32> = self.ring().map(|k| k as u32).collect();
+        for k in &ring {
+            let number = &mut self.links[*k as usize].side;
+            if *number as usize >= RIM_CORNERS {
+                sides.push(self.sides[*number as usize]);
+                *number = sides.len() as u32 - 1;
+            }
+        }
+        self.sides = sides;
+        let end = |k: &u32| {
+            let number = self.links[*k as usize].side;
+            ((key(&self.sides[number as usize].line), number), *k)
+        };
+        let mut many = Many {
+            ends: ring.iter().map(end).collect(),
+            reaches: BinaryHeap::with_capacity(ring.len()),
+            rim: ring.iter().copied().filter(|k| self.is_rim(*k)).collect(),
+            balls: OnceCell::new(),
+        };
+        for k in ring {
+            many.note(self.corner(k as usize).reach2, k);
+        }
+        self.many = Some(Box::new(many));
+        #[cfg(test)]
+        {
+            self.looks += self.count;
+        }
+    }
+
+    /// Gives the memory of many corners back.
+    #[cold]
+    pub(super) fn forget_many(&mut self) {
+        self.many = None;
+        self.sides.truncate(RIM_CORNERS);
+        self.sides.shrink_to_fit();
+        self.corners = Vec::new();
+        self.links = Vec::new();
+        self.free = Vec::new();
+        (self.cut, self.doubt) = (Vec::new(), Vec::new());
+    }
+}
+
+impl Many {
+    fn note(&mut self, reach2: f64, k: u32) {
+        // What is not a number does not count as the largest; bits of the others, none of which is
+        // negative, are in the order of the numbers.
+        if !reach2.is_nan() {
+            self.reaches.push((reach2.to_bits(), k));
+        }
+    }
+
+    /// See [`Cell::may_touch`].
+    pub fn may_touch(&self, cell: &Cell, low: [f64; 3], high: [f64; 3]) -> bool {
+        let balls = self.balls.get_or_init(|| Balls::of(cell));
+        balls.touch(balls.levels.len() - 1, 0, low, high)
+    }
+}
+
+impl Balls {
+    fn of(cell: &Cell) -> Self {
+        let corners: Vec<Ball> = cell.ring().map(|k| Ball::around(cell, k)).collect();
+        // Eight corners in a box say enough.
+        let mut levels = vec![Ball::joined(&corners)];
+        while let Some(below) = levels.last().filter(|below| below.len() > 1) {
+            let above = Ball::joined(below);
+            levels.push(above);
+        }
+        Self { levels }
+    }
+
+    /// Whether a box may meet a sphere of those in ball `number` of a level.
+    fn touch(&self, level: usize, number: usize, low: [f64; 3], high: [f64; 3]) -> bool {
+        let Some(ball) = self.levels[level].get(number) else {
+            return false;
+        };
+        let below = FAN * number..FAN * (number + 1);
+        ball.meets(low, high)
+            && (level == 0
+                || below
+                    .into_iter()
+                    .any(|k| self.touch(level - 1, k, low, high)))
+    }
+}
+
+impl Ball {
+    fn around(cell: &Cell, k: usize) -> Self {
+        let [u, v] = cell.frame;
+        let corner = cell.corner(k);
+        let at = std::array::from_fn(|axis| corner.at[0] * u[axis] + corner.at[1] * v[axis]);
+        Self {
+            low: at,
+            high: at,
+            reach2: corner.reach2,
+        }
+    }
+
+    /// Each few together.
+    fn joined(balls: &[Self]) -> Vec<Self> {
+        let both = |a: &Self, b: &Self| Self {
+            low: std::array::from_fn(|axis| a.low[axis].min(b.low[axis])),
+            high: std::array::from_fn(|axis| a.high[axis].max(b.high[axis])),
+            reach2: a.reach2.max(b.reach2),
+        };
+        let few = balls.chunks(FAN);
+        few.map(|few| few[1..].iter().fold(few[0], |a, b| both(&a, b)))
+            .collect()
+    }
+
+    /// False if no sphere around a point of the ball meets the box; rounding is monotone, so no
+    /// sphere that does is lost.
+    fn meets(&self, low: [f64; 3], high: [f64; 3]) -> bool {
+        let mut distance2 = 0.0;
+        for axis in 0..3 {
+            let gap = (low[axis] - self.high[axis])
+                .max(self.low[axis] - high[axis])
+                .max(0.0);
+            distance2 += gap * gap;
+        }
+        distance2 <= self.reach2 * (1.0 + 1e-9)
+    }
+}
+
+/// Directions in turn, for floating point: bits that grow with the angle.
+fn key(line: &Line) -> u64 {
+    let [x, y] = line.line;
+    let part = y / (x.abs() + y.abs());
+    let turned = if x >= 0.0 { part } else { 2.0 - part };
+    // From one to five; of no direction at all any number will do.
+    (turned + 2.0).to_bits()
+}
+
+#[cfg(test)]
+mod tests;
