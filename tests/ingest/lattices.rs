@@ -134,3 +134,16 @@ fn floats_lie_on_a_power_of_two() {
     assert_eq!((lattice.step, lattice.exact), (2f64.powi(-20), false));
     assert_eq!(spool.source_precision(), CoordinateType::F64);
 }
+
+/// Found by fuzzing: the lattice is chosen without files of which no point is kept, and need not have a
+/// place for them.
+#[test]
+fn a_file_without_points_may_be_anywhere() {
+    let bench = Bench::new();
+    let far = bench.path("far.las");
+    write_las(&far, (1, 2), 0, (0.01, [1e300, 0.0, 0.0]), &[], false);
+    let near = bench.write("near.xyz", "1.5 2 -3.25\n1 2 3\n");
+    let spool = bench.read(&[far, near]).unwrap();
+    let lattice = spool.choose_lattice(0).unwrap();
+    assert_eq!(positions(&spool, &lattice).len(), 2);
+}

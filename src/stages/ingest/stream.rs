@@ -114,9 +114,15 @@ impl Spool {
         }
     }
 
-    fn maps(&self, lattice: &Lattice) -> Result<Vec<SourceMap>> {
+    /// How positions of each source become positions on `lattice`. The lattice was chosen without a
+    /// look at sources of which no point was kept, and may not have a place for them.
+    fn maps(&self, lattice: &Lattice) -> Result<Vec<Option<SourceMap>>> {
         let map = |source: &Source| {
-            SourceMap::new(source, lattice.step, lattice.offset).ok_or_else(|| Error::Parameter {
+            if source.stats.kept == 0 {
+                return Ok(None);
+            }
+            let map = SourceMap::new(source, lattice.step, lattice.offset);
+            map.map(Some).ok_or_else(|| Error::Parameter {
                 name: "lattice",
                 found: format!("a step of {}", lattice.step),
                 expected: "a lattice chosen for this spool".into(),
@@ -129,7 +135,7 @@ impl Spool {
     fn read(
         &self,
         frame: u32,
-        maps: &[SourceMap],
+        maps: &[Option<SourceMap>],
         lattice: &Lattice,
         buffers: &mut Buffers,
     ) -> Result<()> {
@@ -140,13 +146,23 @@ impl Spool {
     }
 
     /// Converts a frame to positions.
-    fn convert(&self, maps: &[SourceMap], lattice: &Lattice, buffers: &mut Buffers) -> Result<()> {
+    fn convert(
+        &self,
+        maps: &[Option<SourceMap>],
+        lattice: &Lattice,
+        buffers: &mut Buffers,
+    ) -> Result<()> {
         let Buffers {
             frame,
             wide,
             points,
         } = buffers;
-        maps[frame.source].apply(self.sources[frame.source].native, frame, lattice.base, wide);
+        let Some(map) = &maps[frame.source] else {
+            let found = format!("points of source {}", frame.source);
+            let expected = "none of it were kept".into();
+            return Err(self.file.file.damaged(frame.offset, found, expected));
+        };
+        map.apply(self.sources[frame.source].native, frame, lattice.base, wide);
         points.clear();
         points.extend(wide.iter().map(|p| p.map(|c| c as i32)));
         let outside = wide

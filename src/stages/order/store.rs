@@ -125,6 +125,13 @@ impl PointStore {
     /// # Errors
     /// [`crate::Error::Io`]; [`crate::Error::Corrupt`] if a page is not what was written.
     pub fn read_pages(&self, pages: Range<usize>, points: &mut Vec<Point>) -> Result<()> {
+        if pages.end > self.checks.len() {
+            let offset = (self.checks.len() * self.page * 12) as u64;
+            let found = format!("{} pages", self.checks.len());
+            return Err(self
+                .file
+                .damaged(offset, found, format!("page {}", pages.end)));
+        }
         let ids = pages.start * self.page..(pages.end * self.page).min(self.len);
         let before = points.len();
         points.resize(before + ids.len(), [0; 3]);
@@ -177,5 +184,37 @@ impl PointStore {
         points.truncate(range.end - first);
         points.drain(..range.start - first);
         Ok(points)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::error::Error;
+    use crate::stages::order::Orderer;
+    use crate::workspace::Workspace;
+    use crate::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
+    use crate::workspace::progress::{Cancel, Silent};
+    use std::sync::Arc;
+
+    /// Found by fuzzing: a journal that says of a file that is gone how many points it had, and a stage
+    /// that reads it all the same.
+    #[test]
+    fn a_store_whose_file_is_gone_is_not_read() {
+        let memory = MemoryPool::new(MINIMUM_BUDGET).unwrap();
+        let folder = std::env::temp_dir();
+        let workspace =
+            Workspace::new(&folder, memory, 1, Arc::new(Silent), Cancel::new()).unwrap();
+        let orderer = Orderer::new(&workspace).unwrap();
+        let points: Vec<Point> = (0..10).map(|k| [k, k * k, 1]).collect();
+        orderer.push(&workspace, &points).unwrap();
+        let (mut store, _) = orderer.finish(&workspace, 4).unwrap();
+        assert_eq!(store.slice(0..10).unwrap().len(), 10);
+        store.checks.clear();
+        store.len = usize::MAX / 64;
+        for range in [0..1, 5..store.len] {
+            assert!(matches!(store.slice(range), Err(Error::Corrupt { .. })));
+        }
+        assert!(store.fetch(&[3], &mut Vec::new()).is_err());
     }
 }
