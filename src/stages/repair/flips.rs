@@ -55,7 +55,8 @@ pub fn flip(
             }
         }
     }
-    let mut sheet = Sheet::of(these, shut, points);
+    let mut sheet = Sheet::of(&these, shut, points);
+    drop(these);
     let _held = hold(sheet.bytes() + bytes_of(&numbers));
     let mut flips = 0;
     for _ in 0..SWEEPS {
@@ -71,17 +72,23 @@ pub fn flip(
     flips
 }
 
-/// The triangles of a block that may change, and what is behind their edges.
+/// A triangle that may change, and what is behind its edges.
+#[derive(Debug, Clone, Copy)]
+struct Slot {
+    /// Corners by place in the block, as they run.
+    corners: [u32; 3],
+    /// Opposite each corner: the triangle behind the edge, and which of its corners is opposite.
+    across: [u32; 3],
+    /// One long.
+    normal: [f32; 3],
+    /// Opposite each corner: how far the surface bends there, the distance of two unit normals.
+    bends: [f32; 3],
+}
+
+/// The triangles of a block that may change.
 struct Sheet<'a> {
     points: &'a [Point],
-    /// Corners by place in the block, as they run.
-    corners: Vec<[u32; 3]>,
-    /// Opposite each corner: the triangle behind the edge, and which of its corners is opposite.
-    across: Vec<[u32; 3]>,
-    /// Unit normals.
-    normals: Vec<[f32; 3]>,
-    /// Opposite each corner: how far the surface bends there, the distance of two unit normals.
-    bends: Vec<[f32; 3]>,
+    slots: Vec<Slot>,
     /// Vertices whose triangles stay: some of them are others, or there is a boundary.
     shut: Vec<bool>,
     /// Edges to look at, 16 triangles a word, four bits each: bit `k` for the edge opposite corner `k`.
@@ -98,40 +105,35 @@ struct Flip {
 
 impl<'a> Sheet<'a> {
     /// Triangles by place in the block, ascending.
-    fn of(corners: Vec<[u32; 3]>, shut: Vec<bool>, points: &'a [Point]) -> Self {
-        let count = corners.len();
+    fn of(these: &[Triangle], shut: Vec<bool>, points: &'a [Point]) -> Self {
+        let slot = |t: &Triangle| Slot {
+            corners: *t,
+            across: [NONE; 3],
+            normal: unit(normal(points, *t)),
+            bends: [0.0; 3],
+        };
         let mut sheet = Self {
             points,
-            across: vec![[NONE; 3]; count],
-            normals: Vec::new(),
-            bends: vec![[0.0; 3]; count],
+            slots: these.iter().map(slot).collect(),
             shut,
-            due: vec![0; count.div_ceil(16)],
-            flipped: vec![false; count],
-            corners,
+            due: vec![0; these.len().div_ceil(16)],
+            flipped: vec![false; these.len()],
         };
-        sheet.pair();
+        sheet.pair(these);
         sheet.shut();
-        sheet.normals = sheet
-            .corners
-            .iter()
-            .map(|t| unit(sheet.normal(*t)))
-            .collect();
         sheet.bend();
         sheet
     }
 
     /// Bytes of its lists.
     fn bytes(&self) -> u64 {
-        let lists = bytes_of(&self.corners) + bytes_of(&self.across);
-        let bends = bytes_of(&self.normals) + bytes_of(&self.bends);
-        lists + bends + bytes_of(&self.shut) + bytes_of(&self.due) + bytes_of(&self.flipped)
+        bytes_of(&self.slots) + bytes_of(&self.shut) + bytes_of(&self.due) + bytes_of(&self.flipped)
     }
 
     /// Finds what is behind each edge.
-    fn pair(&mut self) {
+    fn pair(&mut self, these: &[Triangle]) {
         let size = self.points.len() as u32;
-        let edges = ByLowerEnd::of(0..size, &self.corners);
+        let edges = ByLowerEnd::of(0..size, these);
         // For each vertex, the last lower end that its edge to was seen from, plus one, and whose.
         let mut seen = vec![(0u32, 0u32); size as usize];
         let mut next = 0;
@@ -140,16 +142,16 @@ impl<'a> Sheet<'a> {
                 let place = &mut seen[y as usize];
                 let this = number << 2 | corner;
                 if place.0 == v + 1 {
-                    self.across[number as usize][corner as usize] = place.1;
-                    self.across[(place.1 >> 2) as usize][(place.1 & 3) as usize] = this;
+                    self.slots[number as usize].across[corner as usize] = place.1;
+                    self.slots[(place.1 >> 2) as usize].across[(place.1 & 3) as usize] = this;
                 } else {
                     *place = (v + 1, this);
                 }
             };
             for &number in edges.upper(v) {
-                visit(self.corners[number as usize][2], number, 0);
+                visit(these[number as usize][2], number, 0);
             }
-            while let Some(t) = self.corners.get(next).filter(|t| t[0] == v) {
+            while let Some(t) = these.get(next).filter(|t| t[0] == v) {
                 visit(t[1], next as u32, 2);
                 visit(t[2], next as u32, 1);
                 next += 1;
@@ -159,9 +161,9 @@ impl<'a> Sheet<'a> {
 
     /// Shuts vertices with an edge that has nothing behind it.
     fn shut(&mut self) {
-        for (t, across) in self.corners.iter().zip(&self.across) {
-            for k in (0..3).filter(|&k| across[k] == NONE) {
-                for v in [t[next(k)], t[last(k)]] {
+        for slot in &self.slots {
+            for k in (0..3).filter(|&k| slot.across[k] == NONE) {
+                for v in [slot.corners[next(k)], slot.corners[last(k)]] {
                     self.shut[v as usize] = true;
                 }
             }
@@ -170,20 +172,20 @@ impl<'a> Sheet<'a> {
 
     /// Measures how far the surface bends, and which edges there is anything to gain at.
     fn bend(&mut self) {
-        for number in 0..self.corners.len() {
+        for number in 0..self.slots.len() {
             for k in 0..3 {
-                let behind = self.across[number][k];
+                let behind = self.slots[number].across[k];
                 if behind != NONE && number < (behind >> 2) as usize {
                     let other = self.seen_from(number, k, behind);
-                    let bend = distance(self.normals[number], other);
-                    self.bends[number][k] = bend;
-                    self.bends[(behind >> 2) as usize][(behind & 3) as usize] = bend;
+                    let bend = distance(self.slots[number].normal, other);
+                    self.slots[number].bends[k] = bend;
+                    self.slots[(behind >> 2) as usize].bends[(behind & 3) as usize] = bend;
                 }
             }
         }
-        for (number, across) in self.across.iter().enumerate() {
+        for (number, slot) in self.slots.iter().enumerate() {
             let mut bits = 0;
-            for (k, &behind) in across.iter().enumerate() {
+            for (k, &behind) in slot.across.iter().enumerate() {
                 let own = behind != NONE && number < (behind >> 2) as usize;
                 bits |= u64::from(own && self.around(number, k, behind) >= FLAT) << k;
             }
@@ -195,7 +197,7 @@ impl<'a> Sheet<'a> {
     #[inline]
     fn around(&self, number: usize, k: usize, behind: u32) -> f32 {
         let (other, corner) = ((behind >> 2) as usize, (behind & 3) as usize);
-        let (mine, theirs) = (&self.bends[number], &self.bends[other]);
+        let (mine, theirs) = (&self.slots[number].bends, &self.slots[other].bends);
         mine[k] + (mine[next(k)] + mine[last(k)]) + (theirs[next(corner)] + theirs[last(corner)])
     }
 
@@ -204,21 +206,10 @@ impl<'a> Sheet<'a> {
     #[inline]
     fn seen_from(&self, number: usize, k: usize, behind: u32) -> [f32; 3] {
         let (other, corner) = ((behind >> 2) as usize, (behind & 3) as usize);
-        let same_way = self.corners[number][next(k)] == self.corners[other][next(corner)];
-        let normal = self.normals[other];
+        let same_way =
+            self.slots[number].corners[next(k)] == self.slots[other].corners[next(corner)];
+        let normal = self.slots[other].normal;
         if same_way { normal.map(|x| -x) } else { normal }
-    }
-
-    /// The normal of a triangle.
-    #[inline]
-    fn normal(&self, [a, b, c]: [u32; 3]) -> [f32; 3] {
-        let at = |v: u32| self.points[v as usize];
-        let (u, v) = (side(at(a), at(b)), side(at(a), at(c)));
-        [
-            u[1] * v[2] - u[2] * v[1],
-            u[2] * v[0] - u[0] * v[2],
-            u[0] * v[1] - u[1] * v[0],
-        ]
     }
 
     /// Looks at the edges that are due, in order, and flips those where it pays; how many.
@@ -237,10 +228,10 @@ impl<'a> Sheet<'a> {
                 ahead = u64::MAX.checked_shl(bit + 1).unwrap_or(0);
                 let (number, k) = (word * 16 + bit as usize / 4, bit as usize % 4);
                 // Seen from the smaller of the two numbers only; there is none beyond the last.
-                let Some(across) = self.across.get(number) else {
+                let Some(slot) = self.slots.get(number) else {
                     break;
                 };
-                let behind = across[k];
+                let behind = slot.across[k];
                 if behind != NONE
                     && number < (behind >> 2) as usize
                     && let Some(flip) = self.gain(number, k, behind)
@@ -262,12 +253,15 @@ impl<'a> Sheet<'a> {
         }
         let (other, corner) = ((behind >> 2) as usize, (behind & 3) as usize);
         let (c, u, v) = self.named(number, k);
-        let d = self.corners[other][corner];
+        let d = self.slots[other].corners[corner];
         if [c, u, d, v].into_iter().any(|v| self.shut[v as usize]) {
             return None;
         }
-        let (one, two) = (self.normal([u, d, c]), self.normal([d, v, c]));
-        let (mine, theirs) = (self.normals[number], self.seen_from(number, k, behind));
+        let (one, two) = (
+            normal(self.points, [u, d, c]),
+            normal(self.points, [d, v, c]),
+        );
+        let (mine, theirs) = (self.slots[number].normal, self.seen_from(number, k, behind));
         let both: [f32; 3] = std::array::from_fn(|i| mine[i] + theirs[i]);
         if !(dot(one, both) > 0.0 && dot(two, both) > 0.0) {
             return None;
@@ -293,7 +287,7 @@ impl<'a> Sheet<'a> {
     /// Corner `k` of a triangle, and the two after it as they run.
     #[inline]
     fn named(&self, number: usize, k: usize) -> (u32, u32, u32) {
-        let t = self.corners[number];
+        let t = self.slots[number].corners;
         (t[k], t[next(k)], t[last(k)])
     }
 
@@ -301,10 +295,10 @@ impl<'a> Sheet<'a> {
     #[inline]
     fn behind(&self, number: usize, k: usize, behind: u32) -> [u32; 4] {
         let (other, corner) = ((behind >> 2) as usize, (behind & 3) as usize);
-        let (mine, theirs) = (&self.across[number], &self.across[other]);
-        let u = self.corners[number][next(k)];
+        let (mine, theirs) = (&self.slots[number].across, &self.slots[other].across);
+        let u = self.slots[number].corners[next(k)];
         // Opposite `u` is the side `dv`.
-        let (ud, dv) = if self.corners[other][next(corner)] == u {
+        let (ud, dv) = if self.slots[other].corners[next(corner)] == u {
             (last(corner), next(corner))
         } else {
             (next(corner), last(corner))
@@ -316,15 +310,15 @@ impl<'a> Sheet<'a> {
     #[inline]
     fn sides(&self, number: usize, k: usize, behind: u32) -> [Option<[f32; 3]>; 4] {
         let (c, u, v) = self.named(number, k);
-        let d = self.corners[(behind >> 2) as usize][(behind & 3) as usize];
+        let d = self.slots[(behind >> 2) as usize].corners[(behind & 3) as usize];
         let all = self.behind(number, k, behind);
         let from = [c, u, d, v];
         std::array::from_fn(|i| {
             (all[i] != NONE).then(|| {
                 let (other, corner) = ((all[i] >> 2) as usize, (all[i] & 3) as usize);
-                let normal = self.normals[other];
+                let normal = self.slots[other].normal;
                 // The quadrilateral runs c, u, d, v; a neighbour that faces alike runs back.
-                if self.corners[other][next(corner)] == from[i] {
+                if self.slots[other].corners[next(corner)] == from[i] {
                     normal.map(|x| -x)
                 } else {
                     normal
@@ -342,11 +336,11 @@ impl<'a> Sheet<'a> {
 
     /// True if corner `k` of a triangle has an edge to `d` already.
     fn meets(&self, number: usize, k: usize, d: u32) -> bool {
-        let c = self.corners[number][k];
+        let c = self.slots[number].corners[k];
         let all_around = |begin: usize| {
             let (mut at, mut through) = (number, begin);
             loop {
-                let behind = self.across[at][through];
+                let behind = self.slots[at].across[through];
                 if behind == NONE {
                     return (false, false);
                 }
@@ -354,12 +348,12 @@ impl<'a> Sheet<'a> {
                 if other == number {
                     return (false, true);
                 }
-                if self.corners[other][corner] == d {
+                if self.slots[other].corners[corner] == d {
                     return (true, true);
                 }
                 // Out again through the other edge at c: opposite the end of the one we came through.
                 at = other;
-                through = if self.corners[other][next(corner)] == c {
+                through = if self.slots[other].corners[next(corner)] == c {
                     last(corner)
                 } else {
                     next(corner)
@@ -374,17 +368,17 @@ impl<'a> Sheet<'a> {
     fn turn(&mut self, number: usize, k: usize, behind: u32, flip: Flip) {
         let other = (behind >> 2) as usize;
         let (c, u, v) = self.named(number, k);
-        let d = self.corners[other][(behind & 3) as usize];
+        let d = self.slots[other].corners[(behind & 3) as usize];
         let [cu, ud, dv, vc] = self.behind(number, k, behind);
         let [one, two] = [number as u32, other as u32];
-        self.corners[number] = [u, d, c];
-        self.corners[other] = [d, v, c];
-        self.across[number] = [two << 2 | 1, cu, ud];
-        self.across[other] = [vc, one << 2, dv];
-        [self.normals[number], self.normals[other]] = flip.normals;
+        self.slots[number].corners = [u, d, c];
+        self.slots[other].corners = [d, v, c];
+        self.slots[number].across = [two << 2 | 1, cu, ud];
+        self.slots[other].across = [vc, one << 2, dv];
+        [self.slots[number].normal, self.slots[other].normal] = flip.normals;
         let [inner, at_cu, at_ud, at_dv, at_vc] = flip.bends;
-        self.bends[number] = [inner, at_cu, at_ud];
-        self.bends[other] = [at_vc, inner, at_dv];
+        self.slots[number].bends = [inner, at_cu, at_ud];
+        self.slots[other].bends = [at_vc, inner, at_dv];
         let sides = [
             (cu, one << 2 | 1, at_cu),
             (ud, one << 2 | 2, at_ud),
@@ -394,14 +388,14 @@ impl<'a> Sheet<'a> {
         for (side, mine, bend) in sides {
             if side != NONE {
                 let (triangle, corner) = ((side >> 2) as usize, (side & 3) as usize);
-                self.across[triangle][corner] = mine;
-                self.bends[triangle][corner] = bend;
+                self.slots[triangle].across[corner] = mine;
+                self.slots[triangle].bends[corner] = bend;
             }
         }
         for triangle in [number, other] {
             self.flipped[triangle] = true;
             for k in 0..3 {
-                let behind = self.across[triangle][k];
+                let behind = self.slots[triangle].across[k];
                 let owner = (triangle as u32) << 2 | k as u32;
                 let owner = owner.min(behind) as usize;
                 self.due[owner / 64] |= 1 << (owner % 64);
@@ -414,7 +408,7 @@ impl<'a> Sheet<'a> {
         let mut new: Vec<Triangle> = Vec::new();
         let mut gone = Vec::new();
         for (number, _) in self.flipped.iter().enumerate().filter(|(_, f)| **f) {
-            let mut t = self.corners[number].map(|v| v + first);
+            let mut t = self.slots[number].corners.map(|v| v + first);
             t.sort_unstable();
             new.push(t);
             gone.push(numbers[number]);
@@ -443,6 +437,18 @@ fn last(k: usize) -> usize {
 fn distance(a: [f32; 3], b: [f32; 3]) -> f32 {
     let [x, y, z] = [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
     (x * x + y * y + z * z).sqrt()
+}
+
+/// The normal of a triangle.
+#[inline]
+fn normal(points: &[Point], [a, b, c]: [u32; 3]) -> [f32; 3] {
+    let at = |v: u32| points[v as usize];
+    let (u, v) = (side(at(a), at(b)), side(at(a), at(c)));
+    [
+        u[1] * v[2] - u[2] * v[1],
+        u[2] * v[0] - u[0] * v[2],
+        u[0] * v[1] - u[1] * v[0],
+    ]
 }
 
 /// One long; not a number if the vector is zero.
