@@ -205,11 +205,20 @@ impl<'a> Sheet<'a> {
     /// so that both face the same way.
     #[inline]
     fn seen_from(&self, number: usize, k: usize, behind: u32) -> [f32; 3] {
+        self.facing(behind, self.slots[number].corners[next(k)])
+    }
+
+    /// The normal of the triangle `behind` an edge, as one sees it whose edge begins at `from`: a
+    /// neighbour that faces alike runs back.
+    #[inline]
+    fn facing(&self, behind: u32, from: u32) -> [f32; 3] {
         let (other, corner) = ((behind >> 2) as usize, (behind & 3) as usize);
-        let same_way =
-            self.slots[number].corners[next(k)] == self.slots[other].corners[next(corner)];
-        let normal = self.slots[other].normal;
-        if same_way { normal.map(|x| -x) } else { normal }
+        let slot = &self.slots[other];
+        if slot.corners[next(corner)] == from {
+            slot.normal.map(|x| -x)
+        } else {
+            slot.normal
+        }
     }
 
     /// Looks at the edges that are due, in order, and flips those where it pays; how many.
@@ -313,18 +322,8 @@ impl<'a> Sheet<'a> {
         let d = self.slots[(behind >> 2) as usize].corners[(behind & 3) as usize];
         let all = self.behind(number, k, behind);
         let from = [c, u, d, v];
-        std::array::from_fn(|i| {
-            (all[i] != NONE).then(|| {
-                let (other, corner) = ((all[i] >> 2) as usize, (all[i] & 3) as usize);
-                let normal = self.slots[other].normal;
-                // The quadrilateral runs c, u, d, v; a neighbour that faces alike runs back.
-                if self.slots[other].corners[next(corner)] == from[i] {
-                    normal.map(|x| -x)
-                } else {
-                    normal
-                }
-            })
-        })
+        // The quadrilateral runs c, u, d, v.
+        std::array::from_fn(|i| (all[i] != NONE).then(|| self.facing(all[i], from[i])))
     }
 
     /// True if one of the two new triangles has no area, or is slender and more so than both old ones.

@@ -276,12 +276,13 @@ impl<'a> Build<'a> {
         let ids = self.blocks.ids(block);
         let mut triangles = around::load(self.stitched, block)?;
         let _held = hold(bytes_of(&triangles));
+        let range = ids.start as usize..ids.end as usize;
+        let shape = self.places.shape.slice(range.clone())?;
+        let _shape = hold(bytes_of(&shape));
         let mut stats = RepairStats::default();
         if self.options.repair && self.options.flip && self.places.differ() {
-            let range = ids.start as usize..ids.end as usize;
-            let points = self.places.file.slice(range.clone())?;
-            let shape = self.places.shape.slice(range)?;
-            let _held = hold(bytes_of(&points) + bytes_of(&shape));
+            let points = self.places.file.slice(range)?;
+            let _held = hold(bytes_of(&points));
             stats.edges_flipped = flips::flip(ids.clone(), &mut triangles, &points, &shape);
         }
         let patch = Patch::of(ids.clone(), &triangles);
@@ -295,7 +296,7 @@ impl<'a> Build<'a> {
             rims[v / 32][0] |= 1 << (v % 32);
         }
         self.rims.put(block, &rims)?;
-        let sums = self.sum(block, &triangles, &patch, &bridges)?;
+        let sums = self.sum(block, &shape, &triangles, &patch, &bridges);
         let (global, local) = sums.split_at(patch.global as usize);
         let global: Vec<[u32; SUMS]> = global.iter().map(Sums::words).collect();
         let held = hold(bytes_of(&sums) + bytes_of(&global));
@@ -314,17 +315,14 @@ impl<'a> Build<'a> {
     fn sum(
         &self,
         block: usize,
+        points: &[Point],
         triangles: &[Triangle],
         patch: &Patch,
         bridges: &[u32],
-    ) -> Result<Vec<Sums>> {
+    ) -> Vec<Sums> {
         let ids = self.blocks.ids(block);
-        let points = self
-            .places
-            .shape
-            .slice(ids.start as usize..ids.end as usize)?;
         let mut sums = vec![Sums::default(); patch.labels as usize];
-        let _held = hold(bytes_of(&points) + bytes_of(&sums));
+        let _held = hold(bytes_of(&sums));
         let mut bridges = bridges.iter().peekable();
         for (number, t) in triangles.iter().enumerate() {
             let sum = &mut sums[(patch.words[number] >> 1) as usize];
@@ -339,7 +337,7 @@ impl<'a> Build<'a> {
                 sum.add(*t, corners, patch.words[number] & 1 == 1);
             }
         }
-        Ok(sums)
+        sums
     }
 
     /// Tells other blocks of crossing triangles: their labels here, and which are bridges.
