@@ -4,8 +4,8 @@ mod util;
 
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
-use outcrop::geom::plane::Moments;
-use outcrop::kernels::Level;
+use outcrop::geom::plane::{Moments, planes};
+use outcrop::kernels::{LANES, Level};
 use outcrop::stages::tiles::neighbors::Neighbors;
 
 const POINTS: usize = 20_000;
@@ -38,6 +38,17 @@ fn fit(bencher: Bencher<'_, '_>) {
     bencher.counter(ItemsCount::new(all.len())).bench_local(|| {
         for moments in &all {
             black_box(black_box(moments).plane());
+        }
+    });
+}
+
+#[divan::bench]
+fn fit_several(bencher: Bencher<'_, '_>) {
+    let all: Vec<Moments> = neighbors().iter().map(|(_, near)| sums(near)).collect();
+    let level = Level::best();
+    bencher.counter(ItemsCount::new(all.len())).bench_local(|| {
+        for moments in all.as_chunks::<LANES>().0 {
+            black_box(planes(level, black_box(moments)));
         }
     });
 }

@@ -3,6 +3,12 @@
 //! Sums are exact integers, so they do not depend on the order of the neighbours; from there on
 //! one fixed sequence of `+ - * / sqrt` (all correctly rounded) leads to the normal.
 
+mod spread;
+
+use crate::kernels::eight::Eight;
+use crate::kernels::{LANES, kernel};
+use spread::{Spread, extent, rounded};
+
 /// A direction as an integer vector; its longest component is about [`NORMAL_SCALE`].
 ///
 /// Rounding the normal costs less than a ten-millionth of a radian and makes the disk's plane
@@ -11,12 +17,6 @@ pub type Normal = [i32; 3];
 
 /// Length, in integer units, of a [`Normal`].
 pub const NORMAL_SCALE: f64 = (1 << 24) as f64;
-
-/// If the middle eigenvalue is below this share of the largest, the points lie on a line.
-const LINE_RATIO: f64 = 1.0 / 400.0;
-
-/// Below this share they lie on a band so narrow that its normal is a matter of chance.
-const BAND_RATIO: f64 = 1.0 / 25.0;
 
 /// The axes of second moments, in their order.
 const PAIRS: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
@@ -39,6 +39,14 @@ pub struct Plane {
     pub spans: bool,
     /// False if they are so close to a narrow band that the normal is unsure.
     pub wide: bool,
+}
+
+impl Plane {
+    const NONE: Self = Self {
+        normal: None,
+        spans: false,
+        wide: false,
+    };
 }
 
 impl Moments {
@@ -97,33 +105,21 @@ impl Moments {
     #[must_use]
     pub fn plane(&self) -> Plane {
         let scatter = self.scatter();
-        let largest = scatter[0].max(scatter[1]).max(scatter[2]);
-        if largest <= 0.0 {
-            return Plane {
-                normal: None,
-                spans: false,
-                wide: false,
-            };
+        if extent(&scatter) <= 0.0 {
+            return Plane::NONE;
         }
-        let m = scatter.map(|x| x / largest);
-        let least = least_eigenvalue(&m);
-        let trace = m[0] + m[1] + m[2];
-        // The two others, from the trace and the sum of the principal minors.
-        let rest = trace - least;
-        let product = (minors(&m) - least * rest).max(0.0);
-        let top = 0.5 * (rest + (rest * rest - 4.0 * product).max(0.0).sqrt());
-        let middle = if top > 0.0 { product / top } else { 0.0 };
-        let spans = middle >= LINE_RATIO * top;
+        let spread = Spread::of(scatter);
+        let spans = spread.on_lines() & 1 == 0;
         // Points that span a plane are not on a line.
         let normal = if !spans && self.collinear() {
             None
         } else {
-            eigenvector(&m, least)
+            spread.normal()
         };
         Plane {
             normal,
             spans: spans && normal.is_some(),
-            wide: middle >= BAND_RATIO * top && normal.is_some(),
+            wide: spread.on_bands() & 1 == 0 && normal.is_some(),
         }
     }
 
@@ -150,101 +146,63 @@ impl Moments {
     }
 }
 
-/// The nearest integer, away from zero in the middle, as `round` has it, without a call.
-#[inline]
-fn rounded(x: f64) -> i32 {
-    let whole = x as i32;
-    let rest = x - f64::from(whole);
-    whole + i32::from(rest >= 0.5) - i32::from(rest <= -0.5)
-}
-
 /// The direction in which a scatter (xx, yy, zz, xy, xz, yz) is least, by the steps of
 /// [`Moments::plane`]; `None` without any extent.
 #[must_use]
 pub fn least_direction(scatter: &[f64; 6]) -> Option<Normal> {
-    let largest = scatter[0].max(scatter[1]).max(scatter[2]);
-    if !(largest > 0.0 && largest.is_finite()) {
-        return None;
+    let largest = extent(scatter);
+    if largest > 0.0 && largest.is_finite() {
+        Spread::of(*scatter).normal()
+    } else {
+        None
     }
-    let m = scatter.map(|x| x / largest);
-    eigenvector(&m, least_eigenvalue(&m))
 }
 
-fn minors(m: &[f64; 6]) -> f64 {
-    (m[0] * m[1] - m[3] * m[3]) + (m[0] * m[2] - m[4] * m[4]) + (m[1] * m[2] - m[5] * m[5])
+kernel! {
+    /// The planes of several moments at a time: the same as [`Moments::plane`] of each.
+    pub fn planes(moments: &[Moments; LANES]) -> [Plane; LANES] = planes_body<Eight>
 }
 
-/// Newton's method from below on the characteristic polynomial, which is monotone up to its
-/// least root.
-fn least_eigenvalue(m: &[f64; 6]) -> f64 {
-    let trace = m[0] + m[1] + m[2];
-    let minors = minors(m);
-    let determinant = m[0] * (m[1] * m[2] - m[5] * m[5]) - m[3] * (m[3] * m[2] - m[5] * m[4])
-        + m[4] * (m[3] * m[5] - m[1] * m[4]);
-    let mut x = 0.0f64;
-    for _ in 0..40 {
-        let value = ((trace - x) * x - minors) * x + determinant;
-        let slope = (2.0 * trace - 3.0 * x) * x - minors;
-        if value <= 0.0 || slope >= 0.0 {
-            break;
-        }
-        let next = x - value / slope;
-        if next <= x {
-            break;
-        }
-        x = next;
-    }
-    x
-}
-
-/// The direction that `m - lambda` maps to nothing: the longest cross product of its rows.
-fn eigenvector(m: &[f64; 6], lambda: f64) -> Option<Normal> {
-    let rows = [
-        [m[0] - lambda, m[3], m[4]],
-        [m[3], m[1] - lambda, m[5]],
-        [m[4], m[5], m[2] - lambda],
-    ];
-    let cross = |a: [f64; 3], b: [f64; 3]| {
-        [
-            a[1] * b[2] - a[2] * b[1],
-            a[2] * b[0] - a[0] * b[2],
-            a[0] * b[1] - a[1] * b[0],
-        ]
-    };
-    let length2 = |v: [f64; 3]| v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
-    let candidates = [
-        cross(rows[0], rows[1]),
-        cross(rows[0], rows[2]),
-        cross(rows[1], rows[2]),
-    ];
-    let mut best = candidates[0];
-    for candidate in candidates {
-        if length2(candidate) > length2(best) {
-            best = candidate;
+#[inline(always)]
+fn planes_body<F: Eight>(moments: &[Moments; LANES]) -> [Plane; LANES] {
+    let mut columns = [[0.0; LANES]; 6];
+    for (lane, moments) in moments.iter().enumerate() {
+        let scatter = moments.scatter();
+        for (column, x) in columns.iter_mut().zip(scatter) {
+            column[lane] = x;
         }
     }
-    let length = length2(best).sqrt();
-    if length > 0.0 && length.is_finite() {
-        return Some(best.map(|x| rounded(x / length * NORMAL_SCALE)));
+    let columns = columns.each_ref().map(F::load);
+    let spread = Spread::of(columns);
+    let (direction, length) = spread.direction();
+    let some = extent(&columns).greater(F::splat(0.0)) & length.greater(F::splat(0.0));
+    let known = some & F::splat(f64::INFINITY).greater(length) & !spread.on_lines();
+    let narrow = spread.on_bands();
+    let mut directions = [[0.0; LANES]; 3];
+    for (to, x) in directions.iter_mut().zip(direction) {
+        x.store(to);
     }
-    // All rows are parallel (points almost on a line): any direction across the longest row.
-    let mut row = rows[0];
-    for candidate in rows {
-        if length2(candidate) > length2(row) {
-            row = candidate;
+    let mut planes = [Plane::NONE; LANES];
+    for (lane, plane) in planes.iter_mut().enumerate() {
+        // Lines, and points without extent: seldom, and more than one formula.
+        if known >> lane & 1 == 0 {
+            *plane = moments[lane].plane();
+            continue;
         }
+        let [x, y, z] = [0, 1, 2].map(|axis: usize| rounded(directions[axis][lane]));
+        *plane = Plane {
+            normal: Some([x, y, z]),
+            spans: true,
+            wide: narrow >> lane & 1 == 0,
+        };
     }
-    let least = (0..3).min_by(|&a, &b| row[a].abs().total_cmp(&row[b].abs()))?;
-    let mut axis = [0.0; 3];
-    axis[least] = 1.0;
-    let across = cross(row, axis);
-    let length = length2(across).sqrt();
-    (length > 0.0).then(|| across.map(|x| rounded(x / length * NORMAL_SCALE)))
+    planes
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::kernels::Level;
     use proptest::prelude::*;
 
     fn moments(points: &[[i64; 3]]) -> Moments {
@@ -284,10 +242,20 @@ mod tests {
         }
 
         #[test]
-        fn rounding_is_to_the_nearest(x in -(1 << 24)..=1i32 << 24, part in -1.0f64..1.0) {
-            for x in [f64::from(x) + part, f64::from(x) + 0.5, 0.499_999_999_999_999_94] {
-                prop_assert_eq!(rounded(x), x.round() as i32);
-                prop_assert_eq!(rounded(-x), (-x).round() as i32);
+        fn several_planes_are_those_of_each(
+            points in prop::collection::vec(prop::array::uniform3(-(1i64 << 30)..1 << 30), 8..120),
+            shift in prop::array::uniform3(0u32..32),
+            step in 1i64..4,
+        ) {
+            // Flat, on lines, at one place, or all over.
+            let points: Vec<_> = points.iter().map(|p| {
+                std::array::from_fn(|axis| (p[axis] >> shift[axis]) / step * step)
+            }).collect();
+            let some: [Moments; LANES] =
+                std::array::from_fn(|lane| moments(&points[..points.len() * lane / (LANES - 1)]));
+            let expected = some.map(|m| m.plane());
+            for level in Level::all() {
+                prop_assert_eq!(planes(level, &some), expected);
             }
         }
 

@@ -2,28 +2,81 @@
 //!
 //! [`Base`] is the definition. The others do the same operations in wider registers.
 
-/// Eight numbers; every operation is that of each number by itself.
-pub(crate) trait Eight: Copy {
-    /// From memory.
-    fn load(from: &[f64; 8]) -> Self;
-    /// From integers, exactly.
-    fn convert(from: &[i32; 8]) -> Self;
-    /// One number eight times.
+use std::ops::{Add, Div, Mul, Sub};
+
+/// A number, or several; every operation is that of each number by itself.
+pub(crate) trait Numbers:
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
+{
+    /// A bit for each number.
+    const ALL: u64;
+    /// The same number everywhere.
     fn splat(x: f64) -> Self;
-    /// To memory.
-    fn store(self, to: &mut [f64; 8]);
-    /// Sums.
-    fn add(self, other: Self) -> Self;
-    /// Differences.
-    fn sub(self, other: Self) -> Self;
-    /// Products.
-    fn mul(self, other: Self) -> Self;
-    /// Absolute values.
-    fn abs(self) -> Self;
+    /// Square roots.
+    fn sqrt(self) -> Self;
     /// Bit `k` is set if number `k` is greater than the other one (false for NaN).
     fn greater(self, other: Self) -> u64;
     /// Of each pair the first if it is greater, else the second.
     fn larger(self, other: Self) -> Self;
+    /// Of each pair the first if its bit is set, else the second; several with the same bits.
+    fn choose<const N: usize>(bits: u64, first: [Self; N], second: [Self; N]) -> [Self; N];
+}
+
+/// Eight numbers.
+pub(crate) trait Eight: Numbers {
+    /// From memory.
+    fn load(from: &[f64; 8]) -> Self;
+    /// From integers, exactly.
+    fn convert(from: &[i32; 8]) -> Self;
+    /// To memory.
+    fn store(self, to: &mut [f64; 8]);
+    /// Absolute values.
+    fn abs(self) -> Self;
+}
+
+/// One number.
+impl Numbers for f64 {
+    const ALL: u64 = 1;
+
+    #[inline(always)]
+    fn splat(x: f64) -> Self {
+        x
+    }
+
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        self.sqrt()
+    }
+
+    #[inline(always)]
+    fn greater(self, other: Self) -> u64 {
+        u64::from(self > other)
+    }
+
+    #[inline(always)]
+    fn larger(self, other: Self) -> Self {
+        if self > other { self } else { other }
+    }
+
+    #[inline(always)]
+    fn choose<const N: usize>(bits: u64, first: [Self; N], second: [Self; N]) -> [Self; N] {
+        if bits != 0 { first } else { second }
+    }
+}
+
+/// Makes operators of a type out of what they do.
+macro_rules! operators {
+    ($type:ident: $($trait:ident $name:ident($a:ident, $b:ident) = $does:expr;)*) => {
+        $(impl $trait for $type {
+            type Output = Self;
+
+            #[inline(always)]
+            fn $name(self, $b: Self) -> Self {
+                let $a = self;
+                $does
+            }
+        })*
+    };
 }
 
 /// The definition.
@@ -34,6 +87,48 @@ impl Base {
     #[inline(always)]
     fn zip(self, other: Self, op: impl Fn(f64, f64) -> f64) -> Self {
         Self(std::array::from_fn(|k| op(self.0[k], other.0[k])))
+    }
+}
+
+operators! { Base:
+    Add add(a, b) = a.zip(b, |a, b| a + b);
+    Sub sub(a, b) = a.zip(b, |a, b| a - b);
+    Mul mul(a, b) = a.zip(b, |a, b| a * b);
+    Div div(a, b) = a.zip(b, |a, b| a / b);
+}
+
+impl Numbers for Base {
+    const ALL: u64 = 0xff;
+
+    #[inline(always)]
+    fn splat(x: f64) -> Self {
+        Self([x; 8])
+    }
+
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self(self.0.map(f64::sqrt))
+    }
+
+    #[inline(always)]
+    fn greater(self, other: Self) -> u64 {
+        (0..8).fold(0, |bits, k| bits | u64::from(self.0[k] > other.0[k]) << k)
+    }
+
+    #[inline(always)]
+    fn larger(self, other: Self) -> Self {
+        self.zip(other, |a, b| if a > b { a } else { b })
+    }
+
+    #[inline(always)]
+    fn choose<const N: usize>(bits: u64, first: [Self; N], second: [Self; N]) -> [Self; N] {
+        let mut chosen = second;
+        for (chosen, first) in chosen.iter_mut().zip(first) {
+            for (k, (chosen, first)) in chosen.0.iter_mut().zip(first.0).enumerate() {
+                *chosen = if bits >> k & 1 == 1 { first } else { *chosen };
+            }
+        }
+        chosen
     }
 }
 
@@ -49,43 +144,13 @@ impl Eight for Base {
     }
 
     #[inline(always)]
-    fn splat(x: f64) -> Self {
-        Self([x; 8])
-    }
-
-    #[inline(always)]
     fn store(self, to: &mut [f64; 8]) {
         *to = self.0;
     }
 
     #[inline(always)]
-    fn add(self, other: Self) -> Self {
-        self.zip(other, |a, b| a + b)
-    }
-
-    #[inline(always)]
-    fn sub(self, other: Self) -> Self {
-        self.zip(other, |a, b| a - b)
-    }
-
-    #[inline(always)]
-    fn mul(self, other: Self) -> Self {
-        self.zip(other, |a, b| a * b)
-    }
-
-    #[inline(always)]
     fn abs(self) -> Self {
         Self(self.0.map(f64::abs))
-    }
-
-    #[inline(always)]
-    fn greater(self, other: Self) -> u64 {
-        (0..8).fold(0, |bits, k| bits | u64::from(self.0[k] > other.0[k]) << k)
-    }
-
-    #[inline(always)]
-    fn larger(self, other: Self) -> Self {
-        self.zip(other, |a, b| if a > b { a } else { b })
     }
 }
 
@@ -98,8 +163,9 @@ pub(crate) use wide::{Avx2, Avx512};
     reason = "instructions that were looked for; unaligned loads and stores"
 )]
 mod wide {
-    use super::Eight;
+    use super::{Eight, Numbers};
     use std::arch::x86_64::*;
+    use std::ops::{Add, Div, Mul, Sub};
 
     /// Two registers of 256 bits.
     #[derive(Debug, Clone, Copy)]
@@ -112,25 +178,27 @@ mod wide {
     // SAFETY (all of both): the types are named only by the versions of a kernel that are compiled for
     // these instructions, and those are called only after `Level` found them on the machine. Loads
     // and stores are within an array of eight and need no alignment.
-    impl Eight for Avx2 {
-        #[inline(always)]
-        fn load(from: &[f64; 8]) -> Self {
+    operators! { Avx2:
+        Add add(a, b) = {
             // SAFETY: see above.
-            unsafe {
-                let p = from.as_ptr();
-                Self(_mm256_loadu_pd(p), _mm256_loadu_pd(p.add(4)))
-            }
-        }
+            unsafe { Self(_mm256_add_pd(a.0, b.0), _mm256_add_pd(a.1, b.1)) }
+        };
+        Sub sub(a, b) = {
+            // SAFETY: see above.
+            unsafe { Self(_mm256_sub_pd(a.0, b.0), _mm256_sub_pd(a.1, b.1)) }
+        };
+        Mul mul(a, b) = {
+            // SAFETY: see above.
+            unsafe { Self(_mm256_mul_pd(a.0, b.0), _mm256_mul_pd(a.1, b.1)) }
+        };
+        Div div(a, b) = {
+            // SAFETY: see above.
+            unsafe { Self(_mm256_div_pd(a.0, b.0), _mm256_div_pd(a.1, b.1)) }
+        };
+    }
 
-        #[inline(always)]
-        fn convert(from: &[i32; 8]) -> Self {
-            // SAFETY: see above.
-            unsafe {
-                let p = from.as_ptr().cast::<__m128i>();
-                let (low, high) = (_mm_loadu_si128(p), _mm_loadu_si128(p.add(1)));
-                Self(_mm256_cvtepi32_pd(low), _mm256_cvtepi32_pd(high))
-            }
-        }
+    impl Numbers for Avx2 {
+        const ALL: u64 = 0xff;
 
         #[inline(always)]
         fn splat(x: f64) -> Self {
@@ -139,58 +207,9 @@ mod wide {
         }
 
         #[inline(always)]
-        fn store(self, to: &mut [f64; 8]) {
+        fn sqrt(self) -> Self {
             // SAFETY: see above.
-            unsafe {
-                let p = to.as_mut_ptr();
-                _mm256_storeu_pd(p, self.0);
-                _mm256_storeu_pd(p.add(4), self.1);
-            }
-        }
-
-        #[inline(always)]
-        fn add(self, other: Self) -> Self {
-            // SAFETY: see above.
-            unsafe {
-                Self(
-                    _mm256_add_pd(self.0, other.0),
-                    _mm256_add_pd(self.1, other.1),
-                )
-            }
-        }
-
-        #[inline(always)]
-        fn sub(self, other: Self) -> Self {
-            // SAFETY: see above.
-            unsafe {
-                Self(
-                    _mm256_sub_pd(self.0, other.0),
-                    _mm256_sub_pd(self.1, other.1),
-                )
-            }
-        }
-
-        #[inline(always)]
-        fn mul(self, other: Self) -> Self {
-            // SAFETY: see above.
-            unsafe {
-                Self(
-                    _mm256_mul_pd(self.0, other.0),
-                    _mm256_mul_pd(self.1, other.1),
-                )
-            }
-        }
-
-        #[inline(always)]
-        fn abs(self) -> Self {
-            // SAFETY: see above.
-            unsafe {
-                let sign = _mm256_set1_pd(-0.0);
-                Self(
-                    _mm256_andnot_pd(sign, self.0),
-                    _mm256_andnot_pd(sign, self.1),
-                )
-            }
+            unsafe { Self(_mm256_sqrt_pd(self.0), _mm256_sqrt_pd(self.1)) }
         }
 
         #[inline(always)]
@@ -213,6 +232,121 @@ mod wide {
                 )
             }
         }
+
+        #[inline(always)]
+        fn choose<const N: usize>(bits: u64, first: [Self; N], second: [Self; N]) -> [Self; N] {
+            // SAFETY: see above.
+            unsafe {
+                let all = _mm256_set1_epi64x(bits as i64);
+                let (low, high) = (
+                    _mm256_setr_epi64x(1, 2, 4, 8),
+                    _mm256_setr_epi64x(16, 32, 64, 128),
+                );
+                let mask =
+                    |at| _mm256_castsi256_pd(_mm256_cmpeq_epi64(_mm256_and_si256(all, at), at));
+                let (low, high) = (mask(low), mask(high));
+                let mut chosen = second;
+                for (chosen, first) in chosen.iter_mut().zip(first) {
+                    chosen.0 = _mm256_blendv_pd(chosen.0, first.0, low);
+                    chosen.1 = _mm256_blendv_pd(chosen.1, first.1, high);
+                }
+                chosen
+            }
+        }
+    }
+
+    impl Eight for Avx2 {
+        #[inline(always)]
+        fn load(from: &[f64; 8]) -> Self {
+            // SAFETY: see above.
+            unsafe {
+                let p = from.as_ptr();
+                Self(_mm256_loadu_pd(p), _mm256_loadu_pd(p.add(4)))
+            }
+        }
+
+        #[inline(always)]
+        fn convert(from: &[i32; 8]) -> Self {
+            // SAFETY: see above.
+            unsafe {
+                let p = from.as_ptr().cast::<__m128i>();
+                let (low, high) = (_mm_loadu_si128(p), _mm_loadu_si128(p.add(1)));
+                Self(_mm256_cvtepi32_pd(low), _mm256_cvtepi32_pd(high))
+            }
+        }
+
+        #[inline(always)]
+        fn store(self, to: &mut [f64; 8]) {
+            // SAFETY: see above.
+            unsafe {
+                let p = to.as_mut_ptr();
+                _mm256_storeu_pd(p, self.0);
+                _mm256_storeu_pd(p.add(4), self.1);
+            }
+        }
+
+        #[inline(always)]
+        fn abs(self) -> Self {
+            // SAFETY: see above.
+            unsafe {
+                let sign = _mm256_set1_pd(-0.0);
+                Self(
+                    _mm256_andnot_pd(sign, self.0),
+                    _mm256_andnot_pd(sign, self.1),
+                )
+            }
+        }
+    }
+
+    operators! { Avx512:
+        // SAFETY: see above.
+        Add add(a, b) = unsafe { Self(_mm512_add_pd(a.0, b.0)) };
+        // SAFETY: see above.
+        Sub sub(a, b) = unsafe { Self(_mm512_sub_pd(a.0, b.0)) };
+        // SAFETY: see above.
+        Mul mul(a, b) = unsafe { Self(_mm512_mul_pd(a.0, b.0)) };
+        // SAFETY: see above.
+        Div div(a, b) = unsafe { Self(_mm512_div_pd(a.0, b.0)) };
+    }
+
+    impl Numbers for Avx512 {
+        const ALL: u64 = 0xff;
+
+        #[inline(always)]
+        fn splat(x: f64) -> Self {
+            // SAFETY: see above.
+            unsafe { Self(_mm512_set1_pd(x)) }
+        }
+
+        #[inline(always)]
+        fn sqrt(self) -> Self {
+            // SAFETY: see above.
+            unsafe { Self(_mm512_sqrt_pd(self.0)) }
+        }
+
+        #[inline(always)]
+        fn greater(self, other: Self) -> u64 {
+            // SAFETY: see above.
+            unsafe { u64::from(_mm512_cmp_pd_mask::<_CMP_GT_OQ>(self.0, other.0)) }
+        }
+
+        #[inline(always)]
+        fn larger(self, other: Self) -> Self {
+            // SAFETY: see above. The instruction gives its second operand unless the first is greater.
+            unsafe { Self(_mm512_max_pd(self.0, other.0)) }
+        }
+
+        #[inline(always)]
+        fn choose<const N: usize>(bits: u64, first: [Self; N], second: [Self; N]) -> [Self; N] {
+            // SAFETY: see above.
+            unsafe {
+                let mut chosen = second;
+                for (chosen, first) in chosen.iter_mut().zip(first) {
+                    chosen.0 = _mm512_mask_blend_pd(bits as u8, chosen.0, first.0);
+                }
+                chosen
+            }
+        }
     }
 
     impl Eight for Avx512 {
@@ -229,51 +363,15 @@ mod wide {
         }
 
         #[inline(always)]
-        fn splat(x: f64) -> Self {
-            // SAFETY: see above.
-            unsafe { Self(_mm512_set1_pd(x)) }
-        }
-
-        #[inline(always)]
         fn store(self, to: &mut [f64; 8]) {
             // SAFETY: see above.
             unsafe { _mm512_storeu_pd(to.as_mut_ptr(), self.0) }
         }
 
         #[inline(always)]
-        fn add(self, other: Self) -> Self {
-            // SAFETY: see above.
-            unsafe { Self(_mm512_add_pd(self.0, other.0)) }
-        }
-
-        #[inline(always)]
-        fn sub(self, other: Self) -> Self {
-            // SAFETY: see above.
-            unsafe { Self(_mm512_sub_pd(self.0, other.0)) }
-        }
-
-        #[inline(always)]
-        fn mul(self, other: Self) -> Self {
-            // SAFETY: see above.
-            unsafe { Self(_mm512_mul_pd(self.0, other.0)) }
-        }
-
-        #[inline(always)]
         fn abs(self) -> Self {
             // SAFETY: see above.
             unsafe { Self(_mm512_abs_pd(self.0)) }
-        }
-
-        #[inline(always)]
-        fn greater(self, other: Self) -> u64 {
-            // SAFETY: see above.
-            unsafe { u64::from(_mm512_cmp_pd_mask::<_CMP_GT_OQ>(self.0, other.0)) }
-        }
-
-        #[inline(always)]
-        fn larger(self, other: Self) -> Self {
-            // SAFETY: see above. The instruction gives its second operand unless the first is greater.
-            unsafe { Self(_mm512_max_pd(self.0, other.0)) }
         }
     }
 }

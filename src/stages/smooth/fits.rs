@@ -2,10 +2,12 @@
 
 use crate::error::Result;
 use crate::geom::Point;
+use crate::geom::plane::planes;
+use crate::kernels::{LANES, Level};
 use crate::stages::cells::{Fit, Widen, fit_in_store, fit_in_tile, near_in_store};
 use crate::stages::order::PointStore;
 use crate::stages::tiles::Tile;
-use crate::stages::tiles::near::Search;
+use crate::stages::tiles::near::{Search, Sums};
 use crate::stages::tiles::neighbors::Neighbors;
 use crate::stages::tiles::walk::PageCache;
 use std::cell::RefCell;
@@ -38,9 +40,17 @@ pub fn each_plane(
     let look = |tile: &Tile, found: &mut Found<'_, Fit>| {
         let mut search = Search::default();
         if widen == Widen::Never {
-            tile.for_some_sums(neighbors, &mut search, &wanted, |id, point, sums| {
-                found(id, point, Ok(sums.map(Fit::of)));
-            });
+            let mut several = Several::default();
+            tile.for_some_sums(
+                neighbors,
+                &mut search,
+                &wanted,
+                |id, point, sums| match sums {
+                    Some(sums) => several.add(id, point, sums, found),
+                    None => found(id, point, Ok(None)),
+                },
+            );
+            several.fit(found);
         } else {
             tile.for_some_queries(neighbors, &mut search, &wanted, |id, point, query| {
                 let fit = query.map(|mut query| fit_in_tile(&mut query, neighbors, widen));
@@ -81,6 +91,31 @@ pub fn each_neighborhood<T>(
         Ok(Some((of.borrow_mut())(point, &near)))
     };
     each_found(store, ids, &|_| true, look, in_store, each)
+}
+
+/// Points whose neighbours are summed up, until their planes are found together.
+#[derive(Default)]
+struct Several {
+    level: Level,
+    points: Vec<(u32, Point, Sums)>,
+}
+
+impl Several {
+    fn add(&mut self, id: u32, point: Point, sums: Sums, found: &mut Found<'_, Fit>) {
+        self.points.push((id, point, sums));
+        if self.points.len() == LANES {
+            self.fit(found);
+        }
+    }
+
+    fn fit(&mut self, found: &mut Found<'_, Fit>) {
+        let moments = |lane: usize| self.points.get(lane).map(|p| p.2.moments);
+        let moments = std::array::from_fn(|lane| moments(lane).unwrap_or_default());
+        let planes = planes(self.level, &moments);
+        for ((id, point, sums), plane) in self.points.drain(..).zip(planes) {
+            found(id, point, Ok(Some(Fit::on(plane, sums))));
+        }
+    }
 }
 
 /// Takes in what was found around a point; `None` if the tile does not know enough.
