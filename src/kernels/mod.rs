@@ -24,7 +24,7 @@ pub(crate) use corners::{bisectors_body, cut_body, farthest_body, touching_body}
 pub(crate) use distances::{count_body, distances_body};
 pub use distances::{count_within, distances};
 pub use pick::pick_column;
-pub(crate) use pick::{BLOCK, Pick, pick_body};
+pub(crate) use pick::{BLOCK, Pick, first_bits, pick_body};
 pub use ranks::ranks;
 pub(crate) use ranks::{RANKED, ranks_body};
 pub(crate) use sums::{MOST_SUMMED, SUMMED_LIMIT2};

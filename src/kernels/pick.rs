@@ -8,6 +8,12 @@ use super::kernel;
 /// Numbers that are looked at together; columns to pick from are this many or a multiple long.
 pub(crate) const BLOCK: usize = 16;
 
+/// The lowest `count` bits of a block, or all.
+#[inline(always)]
+pub(crate) fn first_bits(count: usize) -> u32 {
+    (1u32 << count.min(BLOCK)) - 1
+}
+
 /// What is done with each block.
 pub(crate) trait Pick {
     /// Bit `k` is set if number `k` is at most `limit`.

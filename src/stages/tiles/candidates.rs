@@ -1,11 +1,12 @@
 //! The points that may be among the neighbours of a query, in columns.
 
 use super::near::above;
+use super::points::Points;
 use super::{LEAVES, OwnPage, Tile};
 use crate::geom::Point;
 use crate::geom::aabb::Aabb;
 use crate::kernels::{
-    BLOCK, Boxes, Level, Pick, box_distances, kernel, pick_body, pick_column, point_box_body,
+    BLOCK, Boxes, Level, Pick, box_distances, first_bits, kernel, pick_column, point_box_body,
 };
 
 /// x, y, z, and a number that goes with the point. The columns are whole blocks long, with
@@ -41,6 +42,14 @@ impl Columns {
         &self.0[3][..count]
     }
 
+    /// Whole blocks of the first `count`, a multiple of a block.
+    #[inline(always)]
+    pub fn blocks(&self, count: usize) -> [&[[u32; BLOCK]]; 4] {
+        self.0
+            .each_ref()
+            .map(|column| column[..count].as_chunks().0)
+    }
+
     #[inline(always)]
     pub fn slices(&self) -> [&[u32]; 4] {
         self.0.each_ref().map(Vec::as_slice)
@@ -49,18 +58,6 @@ impl Columns {
     #[inline(always)]
     pub fn slices_mut(&mut self) -> [&mut [u32]; 4] {
         self.0.each_mut().map(Vec::as_mut_slice)
-    }
-
-    /// Writes points from place `start` on, numbered from `first`.
-    #[inline(always)]
-    fn write(&mut self, start: usize, points: &[Point], first: u32) {
-        let range = start..start + points.len();
-        let [x, y, z, ids] = self.slices_mut().map(|column| &mut column[range.clone()]);
-        for (n, point) in points.iter().enumerate() {
-            // Coordinates are in 0..2^30.
-            (x[n], y[n], z[n]) = (point[0] as u32, point[1] as u32, point[2] as u32);
-            ids[n] = first + n as u32;
-        }
     }
 }
 
@@ -75,18 +72,25 @@ pub(super) struct Candidates {
     pub complete2: u64,
 }
 
+/// Points that lie together.
+#[derive(Debug, Clone, Copy)]
+struct Leaf {
+    /// The first in the tile.
+    start: u32,
+    len: u32,
+    /// The first id.
+    id: u32,
+}
+
 /// The leaves within reach of one page, in order of id.
 #[derive(Debug, Default)]
 pub(super) struct PageLeaves {
     boxes: Boxes,
-    /// Of each its first point in the tile, how many there are, and the first id.
-    leaves: Vec<(u32, u32, u32)>,
+    leaves: Vec<Leaf>,
     /// 0, 1, 2 …
     places: Vec<u32>,
     near: Vec<u32>,
     distances: Vec<f32>,
-    /// The points of the leaves that are near.
-    points: Columns,
 }
 
 impl PageLeaves {
@@ -104,9 +108,11 @@ impl PageLeaves {
                     continue;
                 }
                 self.boxes.push(boxes[leaf].min, boxes[leaf].max);
-                let count = tile.leaf.min(range.end - start);
-                let id = tile.id(local, start - range.start);
-                self.leaves.push((start as u32, count as u32, id as u32));
+                self.leaves.push(Leaf {
+                    start: start as u32,
+                    len: tile.leaf.min(range.end - start) as u32,
+                    id: tile.id(local, start - range.start) as u32,
+                });
             }
         }
     }
@@ -129,28 +135,18 @@ impl PageLeaves {
         out: &mut Candidates,
     ) {
         let limit = above(d2);
-        let near = self.near(level, around, limit);
-        self.points.reserve(near * tile.leaf);
-        let mut count = 0;
-        for &leaf in &self.near[..near] {
-            if !wanted(&self.bounds(leaf as usize)) {
-                continue;
+        let count = self.near(level, around, limit);
+        let mut kept = 0;
+        for place in 0..count {
+            let leaf = self.near[place];
+            if wanted(&self.bounds(leaf as usize)) {
+                self.near[kept] = leaf;
+                kept += 1;
             }
-            let (start, size, id) = self.leaves[leaf as usize];
-            let points = &tile.points[start as usize..(start + size) as usize];
-            self.points.write(count, points, id);
-            count += size as usize;
         }
-        out.columns.reserve(count);
-        out.len = trim(
-            level,
-            &self.points,
-            count,
-            around,
-            limit,
-            &mut self.distances,
-            out,
-        );
+        out.columns.reserve(kept * tile.leaf);
+        let leaves = (&self.leaves[..], &self.near[..kept]);
+        out.len = pick_leaves(level, &tile.points, leaves, around, limit, &mut out.columns);
         out.complete2 = d2;
     }
 
@@ -170,31 +166,47 @@ impl PageLeaves {
 }
 
 kernel! {
-    /// Takes over the first `count` points whose approximate squared distance to `around` is at most
-    /// `limit`; how many.
-    fn trim(
-        points: &Columns,
-        count: usize,
+    /// Takes over the points of leaves, of all those that are listed second, whose approximate squared
+    /// distance to `around` is at most `limit`; how many.
+    fn pick_leaves(
+        points: &Points,
+        leaves: (&[Leaf], &[u32]),
         around: &Aabb,
         limit: f32,
-        distances: &mut Vec<f32>,
-        out: &mut Candidates,
-    ) -> usize = trim_body<Eight>
+        out: &mut Columns,
+    ) -> usize = pick_leaves_body<Eight>
 }
 
 #[inline(always)]
-fn trim_body<P: Pick>(
-    points: &Columns,
-    count: usize,
+fn pick_leaves_body<P: Pick>(
+    points: &Points,
+    (leaves, near): (&[Leaf], &[u32]),
     around: &Aabb,
     limit: f32,
-    distances: &mut Vec<f32>,
-    out: &mut Candidates,
+    out: &mut Columns,
 ) -> usize {
-    let room = count.next_multiple_of(BLOCK);
-    distances.resize(room.max(distances.len()), 0.0);
-    let distances = &mut distances[..room];
-    point_box_body(points.coordinates(room), around.min, around.max, distances);
-    distances[count..].fill(f32::INFINITY);
-    pick_body::<P, 4>(distances, limit, points.slices(), out.columns.slices_mut())
+    let mut to = out.slices_mut();
+    let mut count = 0;
+    for &leaf in near {
+        let leaf = leaves[leaf as usize];
+        for first in (0..leaf.len).step_by(BLOCK) {
+            let Some(columns) = points.block((leaf.start + first) as usize) else {
+                break;
+            };
+            let mut distances = [0.0; BLOCK];
+            let [x, y, z] = columns.map(<[i32; BLOCK]>::as_slice);
+            point_box_body([x, y, z], around.min, around.max, &mut distances);
+            let within = P::within(&distances, limit) & first_bits((leaf.len - first) as usize);
+            let mut ids = [leaf.id + first; BLOCK];
+            (0..).zip(&mut ids).for_each(|(n, id)| *id += n);
+            let [x, y, z] = columns.map(bytemuck::cast_ref);
+            for (from, to) in [x, y, z, &ids].into_iter().zip(&mut to) {
+                if let Some(to) = to[count..].first_chunk_mut() {
+                    P::pack(from, within, to);
+                }
+            }
+            count += within.count_ones() as usize;
+        }
+    }
+    count
 }

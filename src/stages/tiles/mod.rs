@@ -8,14 +8,15 @@ mod candidates;
 mod halo;
 pub mod near;
 pub mod neighbors;
+mod points;
 pub mod walk;
 
 use crate::error::Result;
-use crate::geom::Point;
 use crate::geom::aabb::Aabb;
 use crate::stages::order::PointStore;
 use crate::workspace::memory::{Holding, bytes_of, give_back};
 use halo::{Reach, halo};
+use points::Points;
 use std::ops::Range;
 
 /// Leaves per page: the unit in which candidates are gathered and queries answered.
@@ -54,7 +55,7 @@ pub struct Tile {
     leaf: usize,
     /// Ascending page numbers.
     pages: Vec<usize>,
-    points: Vec<Point>,
+    points: Points,
     page_boxes: Vec<Aabb>,
     leaf_boxes: Vec<Aabb>,
     own: Vec<OwnPage>,
@@ -94,14 +95,17 @@ impl Tile {
         });
         let own_pages: Vec<usize> = own_pages.collect();
         let (wanted, reaches) = halo(store, &own_pages, ids.len().div_ceil(page));
-        let mut points = Vec::with_capacity(wanted.len() * page);
+        let mut points = Points::with_capacity(wanted.len() * page);
+        let mut read = Vec::new();
         let mut start = 0;
         while start < wanted.len() {
             let mut end = start + 1;
             while end < wanted.len() && wanted[end] == wanted[end - 1] + 1 {
                 end += 1;
             }
-            store.read_pages(wanted[start]..wanted[end - 1] + 1, &mut points)?;
+            read.clear();
+            store.read_pages(wanted[start]..wanted[end - 1] + 1, &mut read)?;
+            points.extend(&read);
             start = end;
         }
         let leaf = page.div_ceil(LEAVES);
@@ -126,15 +130,17 @@ impl Tile {
 
     /// Bytes that its lists take.
     fn taken(&self) -> u64 {
-        let lists = bytes_of(&self.pages) + bytes_of(&self.points) + bytes_of(&self.page_boxes);
+        let lists = bytes_of(&self.pages) + self.points.bytes() + bytes_of(&self.page_boxes);
         lists + bytes_of(&self.leaf_boxes) + bytes_of(&self.own) + bytes_of(&self.near)
     }
 
     fn index(&mut self, reaches: Vec<Reach>) {
         for local in 0..self.pages.len() {
-            let points = &self.points[self.range(local)];
+            let range = self.range(local);
+            let leaves = range.clone().step_by(self.leaf);
+            let leaf = |start: usize| start..(start + self.leaf).min(range.end);
             self.leaf_boxes
-                .extend(points.chunks(self.leaf).map(Aabb::of));
+                .extend(leaves.map(|start| self.points.bounds(leaf(start))));
             self.leaf_boxes.resize((local + 1) * LEAVES, Aabb::EMPTY);
         }
         for reach in reaches {

@@ -89,7 +89,7 @@ impl Tile {
         mut each: impl FnMut(u32, Point, Option<Query<'_>>),
     ) {
         self.for_groups(k, search, wanted, |own, index, id, search| {
-            let point = self.points[index];
+            let point = self.points.get(index);
             let Some(complete2) = self.nearest(own, index, id, k, search) else {
                 each(id, point, None);
                 return 0;
@@ -133,7 +133,7 @@ impl Tile {
                     set = true;
                 }
                 let likely = guess.unwrap_or_else(|| self.limit(group.clone(), k, search));
-                let around = Aabb::of(&self.points[group.clone()]);
+                let around = self.points.bounds(group.clone());
                 search.gather(self, &around, likely.min(own.reach2));
                 let mut farthest = 0;
                 search.wider2 = 0;
@@ -162,7 +162,7 @@ impl Tile {
         k: usize,
         search: &mut Search,
     ) -> Option<u64> {
-        let point = self.points[index];
+        let point = self.points.get(index);
         if let Some(complete2) = list_nearest(search.level, search, point, id, k) {
             return Some(complete2);
         }
@@ -180,7 +180,7 @@ impl Tile {
         }
         let limit = self.limit(index..index + 1, k, search);
         search.step_aside();
-        let around = Aabb::of(&self.points[index..=index]);
+        let around = self.points.bounds(index..index + 1);
         search.gather(self, &around, limit.min(own.reach2));
         true
     }
@@ -194,11 +194,13 @@ impl Tile {
             return u64::MAX;
         }
         let window = &mut search.window;
+        let columns = self.points.coordinates();
         let limit = |index: usize| {
-            let point = self.points[index];
-            let near = self.points[around.clone()].iter();
+            let point = self.points.get(index);
+            let [x, y, z] = columns.map(|column| &column[around.clone()]);
+            let near = x.iter().zip(y).zip(z);
             window.clear();
-            window.extend(near.map(|&p| distance2(p, point)));
+            window.extend(near.map(|((x, y), z)| distance2([*x, *y, *z], point)));
             // The point itself is among them, at distance 0.
             *window.select_nth_unstable(k).1
         };

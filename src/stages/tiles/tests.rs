@@ -2,8 +2,8 @@
 
 use super::near::Search;
 use super::*;
-use crate::geom::distance2;
 use crate::geom::plane::Moments;
+use crate::geom::{Point, distance2};
 use crate::kernels::Level;
 use crate::stages::order::Orderer;
 use crate::workspace::Workspace;
@@ -90,7 +90,7 @@ fn check(points: &[Point], tile: &Tile, k: usize, search: &mut Search) {
         agrees(&query);
         // Of those farther, the ones in a half of space, and of these every third one at least.
         let known = query.complete2();
-        let farther = known * 2 + 1;
+        let farther = known.saturating_mul(2).saturating_add(1);
         let half = |p: &Point| p[0] >= point[0];
         let picked = |p: &Point| (p[0] ^ p[1] ^ p[2]) % 3 == 0;
         let pick = |[x, y, z]: [&[i32]; 3], places: &mut Vec<u32>| {
@@ -106,7 +106,7 @@ fn check(points: &[Point], tile: &Tile, k: usize, search: &mut Search) {
             assert!(got.is_sorted());
             let beyond = expected
                 .iter()
-                .filter(|(d2, _)| (known + 1..=farther).contains(d2));
+                .filter(|(d2, _)| known < *d2 && *d2 <= farther);
             let beyond = beyond
                 .filter(|(_, id)| picked(&points[*id as usize]))
                 .copied();

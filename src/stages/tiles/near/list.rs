@@ -3,7 +3,7 @@
 use super::{APPROXIMATE, CORRECTIONS, Search, above};
 use crate::geom::{Point, distance2, sub};
 use crate::kernels::{
-    BLOCK, Pick, RANKED, count_body, distances_body, kernel, pick_body, ranks_body,
+    BLOCK, Pick, RANKED, count_body, distances_body, first_bits, kernel, pick_body, ranks_body,
 };
 use crate::stages::tiles::Near;
 use crate::stages::tiles::candidates::Columns;
@@ -13,10 +13,34 @@ use std::ops::RangeInclusive;
 /// Up to this number, keys are sorted by counting.
 const MOST_RANKED: usize = 96;
 
-/// The limit of a query against the last distance of the query before.
+/// The limit of a query against the last distance of the query before: what is picked is sorted.
 const MARGIN: f32 = 1.08;
 
 impl Search {
+    /// Picks the measured candidates whose approximate squared distance is at most `limit`, in order of
+    /// id; how many.
+    #[inline(always)]
+    fn pick_measured<P: Pick>(&mut self, limit: f32) -> usize {
+        let distances = &self.distances[..self.measured().len()];
+        let from = self.candidates.columns.slices();
+        pick_body::<P, 4>(distances, limit, from, self.picked.slices_mut())
+    }
+
+    /// Lists those picked within `limit` in order of (distance, id); the squared distance up to which
+    /// all are listed.
+    #[inline(always)]
+    fn list_picked(&mut self, picked: usize, point: Point, own: u32, limit: f32) -> u64 {
+        let below = (f64::from(limit) * (1.0 - APPROXIMATE)) as u64;
+        let complete2 = below.min(self.candidates.complete2);
+        let bits = usize::BITS - picked.leading_zeros();
+        if bits < 32 && complete2 < 1 << (63 - bits) {
+            self.list_short(picked, point, own, complete2, bits);
+        } else {
+            self.list_long(picked, point, own, complete2);
+        }
+        complete2
+    }
+
     /// What is picked is in order of id, so distance and place in one word sort as they must.
     #[inline(always)]
     fn list_short(&mut self, picked: usize, point: Point, own: u32, complete2: u64, bits: u32) {
@@ -119,16 +143,21 @@ kernel! {
 
 #[inline(always)]
 fn nearest_body<P: Pick>(search: &mut Search, point: Point, own: u32, k: usize) -> Option<u64> {
-    measure_body(search, point);
     let most = above(search.candidates.complete2);
+    // The point itself is a candidate; one more, for those that are not sure to be within.
+    let wanted = k + 2;
     // The neighbours of the query before are about as far.
     let last = search.near.get(k.wrapping_sub(1));
-    let mut limit = last.map_or(0.0, |n| n.distance2 as f32);
+    let mut limit = likely_body(last.map_or(0.0, |n| n.distance2 as f32) * MARGIN, most);
+    let mut picked = pick_near_body::<P, false>(search, point, limit);
     let mut corrections = CORRECTIONS;
+    if !suits_body(picked, wanted, limit, most) {
+        measure_body(search, point);
+        limit = reach_body(search.measured(), wanted, limit, most, &mut corrections);
+        picked = search.pick_measured::<P>(limit);
+    }
     loop {
-        // The point itself is a candidate; one more, for those that are not sure to be within.
-        limit = reach_body(search.measured(), k + 2, limit, most, &mut corrections);
-        let complete2 = list_body::<P>(search, point, own, limit);
+        let complete2 = search.list_picked(picked, point, own, limit);
         if search.near.len() >= k {
             return Some(complete2);
         }
@@ -136,29 +165,50 @@ fn nearest_body<P: Pick>(search: &mut Search, point: Point, own: u32, k: usize) 
             return None;
         }
         corrections = corrections.saturating_sub(1);
+        measure_body(search, point);
+        let wider = likely_body(limit * MARGIN, most);
+        limit = reach_body(search.measured(), wanted, wider, most, &mut corrections);
+        picked = search.pick_measured::<P>(limit);
     }
 }
 
+/// A limit to begin with, up to `most`: somewhat more than the last of so many was far in the query
+/// before, `0.0` if nothing is known.
+#[inline(always)]
+pub(super) fn likely_body(last: f32, most: f32) -> f32 {
+    if last > 0.0 {
+        last.max(1.0).min(most)
+    } else {
+        most
+    }
+}
+
+/// What is picked is sorted or divided, which is more than counting where it is much.
+#[inline(always)]
+fn too_many_body(wanted: usize) -> usize {
+    wanted + wanted.min(MOST_RANKED / 2)
+}
+
+/// True if `count` within `limit` are enough, or all there are, and not many more.
+#[inline(always)]
+pub(super) fn suits_body(count: usize, wanted: usize, limit: f32, most: f32) -> bool {
+    (count >= wanted || limit >= most) && count <= too_many_body(wanted)
+}
+
 /// A limit up to `most` within which `wanted` of the distances are and not many more, or `most` if
-/// there are not so many; from one that is a little smaller, `0.0` if nothing is known.
+/// there are not so many; from one that is likely.
 #[inline(always)]
 pub(super) fn reach_body(
     distances: &[f32],
     wanted: usize,
-    last: f32,
+    likely: f32,
     most: f32,
     corrections: &mut usize,
 ) -> f32 {
-    let mut limit = if last > 0.0 {
-        (last * MARGIN).max(1.0).min(most)
-    } else {
-        most
-    };
+    let mut limit = likely;
     loop {
         let count = count_body(distances, limit);
-        // What is picked is sorted, which is more than counting where it is much.
-        let too_many = wanted + wanted.min(MOST_RANKED / 2);
-        if count > too_many && *corrections > 0 {
+        if count > too_many_body(wanted) && *corrections > 0 {
             *corrections -= 1;
             limit *= (wanted + 6) as f32 / count as f32;
         } else if count >= wanted || limit >= most {
@@ -168,6 +218,42 @@ pub(super) fn reach_body(
             limit = (limit * grow.clamp(1.1, 8.0) + 4.0).min(most);
         }
     }
+}
+
+/// Picks the candidates whose approximate squared distance to `point` is at most `limit`, in order of id,
+/// with their ids or with these distances; how many. Nothing is measured for later.
+#[inline(always)]
+pub(super) fn pick_near_body<P: Pick, const DISTANCES: bool>(
+    search: &mut Search,
+    point: Point,
+    limit: f32,
+) -> usize {
+    let candidates = &search.candidates;
+    search.picked.reserve(candidates.len);
+    let room = candidates.len.next_multiple_of(BLOCK);
+    let from = candidates.columns.blocks(room);
+    let mut to = search.picked.slices_mut();
+    let mut count = 0;
+    let mut left = candidates.len;
+    for (((x, y), z), ids) in from[0].iter().zip(from[1]).zip(from[2]).zip(from[3]) {
+        let mut distances = [0.0; BLOCK];
+        let at: [&[i32; BLOCK]; 3] = [x, y, z].map(bytemuck::cast_ref);
+        distances_body(at[0], at[1], at[2], point, &mut distances);
+        let within = P::within(&distances, limit) & first_bits(left);
+        let numbers = if DISTANCES {
+            bytemuck::cast_ref(&distances)
+        } else {
+            ids
+        };
+        for (from, to) in [x, y, z, numbers].into_iter().zip(&mut to) {
+            if let Some(to) = to[count..].first_chunk_mut() {
+                P::pack(from, within, to);
+            }
+        }
+        count += within.count_ones() as usize;
+        left = left.saturating_sub(BLOCK);
+    }
+    count
 }
 
 /// Measures the candidates from `point`.
@@ -183,22 +269,4 @@ pub(super) fn measure_body(search: &mut Search, point: Point) {
     let distances = &mut search.distances[..room];
     distances_body(x, y, z, point, distances);
     distances[candidates.len..].fill(f32::INFINITY);
-}
-
-/// Lists the measured candidates whose approximate squared distance is at most `limit` in order of
-/// (distance, id); the squared distance up to which all are listed.
-#[inline(always)]
-fn list_body<P: Pick>(search: &mut Search, point: Point, own: u32, limit: f32) -> u64 {
-    let below = (f64::from(limit) * (1.0 - APPROXIMATE)) as u64;
-    let complete2 = below.min(search.candidates.complete2);
-    let distances = &search.distances[..search.measured().len()];
-    let from = search.candidates.columns.slices();
-    let picked = pick_body::<P, 4>(distances, limit, from, search.picked.slices_mut());
-    let bits = usize::BITS - picked.leading_zeros();
-    if bits < 32 && complete2 < 1 << (63 - bits) {
-        search.list_short(picked, point, own, complete2, bits);
-    } else {
-        search.list_long(picked, point, own, complete2);
-    }
-    complete2
 }

@@ -1,7 +1,7 @@
 //! Sums over the nearest neighbours of many points: which they are matters, in what order they
 //! stand does not, so nothing is sorted.
 
-use super::list::{measure_body, reach_body};
+use super::list::{likely_body, measure_body, pick_near_body, reach_body, suits_body};
 use super::{APPROXIMATE, CORRECTIONS, OwnPage, Query, Search, above};
 use crate::geom::Point;
 use crate::geom::plane::Moments;
@@ -10,6 +10,9 @@ use crate::stages::tiles::Tile;
 
 /// How often a limit that divides the nearest from the others is corrected.
 const DIVISIONS: usize = 16;
+
+/// The limit of a query against that of the query before: what is picked is only divided.
+const MARGIN: f32 = 1.25;
 
 /// No number up to this many times the limit: then approximate distances tell inside from outside.
 const GAP: f32 = 1.0 + 8.0 * APPROXIMATE as f32;
@@ -35,7 +38,7 @@ impl Tile {
     ) {
         self.for_groups(k, search, wanted, |own, index, id, search| {
             let sums = self.sums(own, index, id, k, search);
-            each(id, self.points[index], sums);
+            each(id, self.points.get(index), sums);
             sums.map_or(0, |sums| sums.last2)
         });
     }
@@ -48,7 +51,7 @@ impl Tile {
         k: usize,
         search: &mut Search,
     ) -> Option<Sums> {
-        let point = self.points[index];
+        let point = self.points.get(index);
         let mut summed = sum_nearest(search.level, search, point, k);
         if summed == Err(Unknown::Few) && self.gather_for_one(own, index, k, search) {
             summed = sum_nearest(search.level, search, point, k);
@@ -116,26 +119,23 @@ kernel! {
 
 #[inline(always)]
 fn sum_body<P: Pick>(search: &mut Search, point: Point, k: usize) -> Result<Sums, Unknown> {
-    measure_body(search, point);
     let most = above(search.candidates.complete2);
-    let mut corrections = CORRECTIONS;
     let wanted = k + 2;
-    let limit = reach_body(
-        search.measured(),
-        wanted,
-        search.last,
-        most,
-        &mut corrections,
-    );
-    let measured = search.measured().len();
-    let [x, y, z, _] = search.candidates.columns.slices();
-    let from = [x, y, z, bytemuck::cast_slice(&search.distances)];
-    let picked = pick_body::<P, 4>(
-        &search.distances[..measured],
-        limit,
-        from,
-        search.picked.slices_mut(),
-    );
+    let mut limit = likely_body(search.last * MARGIN, most);
+    let mut picked = pick_near_body::<P, true>(search, point, limit);
+    if !suits_body(picked, wanted, limit, most) {
+        measure_body(search, point);
+        limit = reach_body(search.measured(), wanted, limit, most, &mut { CORRECTIONS });
+        let measured = search.measured().len();
+        let [x, y, z, _] = search.candidates.columns.slices();
+        let from = [x, y, z, bytemuck::cast_slice(&search.distances)];
+        picked = pick_body::<P, 4>(
+            &search.distances[..measured],
+            limit,
+            from,
+            search.picked.slices_mut(),
+        );
+    }
     let room = picked.next_multiple_of(BLOCK);
     let [_, _, _, numbers] = search.picked.slices_mut();
     numbers[picked..room].fill(f32::INFINITY.to_bits());
