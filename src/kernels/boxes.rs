@@ -1,70 +1,161 @@
 //! Which of many boxes come near another box.
 
 use super::kernel;
+use super::pick::{BLOCK, Pick, first_bits};
 
-/// Boxes in columns.
+/// Boxes in columns, each with a number. The columns are a block longer than there are boxes, with
+/// anything behind the last.
 #[derive(Debug, Clone, Default)]
 pub struct Boxes {
-    min: [Vec<i32>; 3],
-    max: [Vec<i32>; 3],
+    /// The lowest corners, the highest, the numbers.
+    columns: [Vec<u32>; 7],
+    len: usize,
 }
 
 impl Boxes {
     /// Forgets all boxes.
     pub fn clear(&mut self) {
-        self.min.iter_mut().for_each(Vec::clear);
-        self.max.iter_mut().for_each(Vec::clear);
+        self.len = 0;
     }
 
-    /// Puts in the box from `min` to `max`, not empty, of coordinates in `0..2^30`.
-    pub fn push(&mut self, min: [i32; 3], max: [i32; 3]) {
-        for axis in 0..3 {
-            self.min[axis].push(min[axis]);
-            self.max[axis].push(max[axis]);
+    /// Makes room for `count` in all.
+    pub fn reserve(&mut self, count: usize) {
+        let room = count.next_multiple_of(BLOCK) + BLOCK;
+        if self.columns[0].len() < room {
+            let grow = |column: &mut Vec<u32>| column.resize(room, 0);
+            self.columns.iter_mut().for_each(grow);
         }
+    }
+
+    /// Puts in the box from `min` to `max`, of coordinates in `0..2^30`.
+    pub fn push(&mut self, min: [i32; 3], max: [i32; 3], number: u32) {
+        if self.len.is_multiple_of(BLOCK) {
+            self.reserve((self.len + BLOCK).next_power_of_two());
+        }
+        let words = min.into_iter().chain(max).map(i32::cast_unsigned);
+        for (column, word) in self.columns.iter_mut().zip(words.chain([number])) {
+            column[self.len] = word;
+        }
+        self.len += 1;
     }
 
     /// Box number `index`, from its lowest corner to its highest.
     #[must_use]
     #[inline]
     pub fn get(&self, index: usize) -> ([i32; 3], [i32; 3]) {
-        let corner = |columns: &[Vec<i32>; 3]| std::array::from_fn(|axis| columns[axis][index]);
-        (corner(&self.min), corner(&self.max))
+        let corner =
+            |first: usize| [0, 1, 2].map(|axis: usize| self.columns[first + axis][index] as i32);
+        (corner(0), corner(3))
     }
 
     /// Number of boxes.
     #[must_use]
     pub fn len(&self) -> usize {
-        self.min[0].len()
+        self.len
     }
 
     /// True if there is no box.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.min[0].is_empty()
+        self.len == 0
     }
+
+    /// Bytes that they take.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        self.columns.iter().map(|c| 4 * c.capacity() as u64).sum()
+    }
+
+    #[inline(always)]
+    fn block(&self, start: usize) -> Option<[&[u32; BLOCK]; 7]> {
+        let [a, b, c, d, e, f, numbers] = &self.columns;
+        Some([
+            a.get(start..)?.first_chunk()?,
+            b.get(start..)?.first_chunk()?,
+            c.get(start..)?.first_chunk()?,
+            d.get(start..)?.first_chunk()?,
+            e.get(start..)?.first_chunk()?,
+            f.get(start..)?.first_chunk()?,
+            numbers.get(start..)?.first_chunk()?,
+        ])
+    }
+}
+
+/// The box from its lowest corner to its highest, and the largest squared distance to it, of which
+/// those of boxes are known to a relative error below 2^-21.
+#[derive(Debug, Clone, Copy)]
+pub struct Around {
+    /// Lowest corner.
+    pub min: [i32; 3],
+    /// Highest corner.
+    pub max: [i32; 3],
+    /// Squared distance.
+    pub limit: f32,
 }
 
 kernel! {
-    /// Squared distances of `boxes` to the box from `min` to `max`, to a relative error below 2^-21.
-    /// `out` is as long as there are boxes.
-    pub fn box_distances(boxes: &Boxes, min: [i32; 3], max: [i32; 3], out: &mut [f32]) = box_distances_body
+    /// The numbers of the `boxes` that come near, in their order, at the front of `to`, which is longer by
+    /// a block than there are boxes; how many.
+    pub fn near_boxes(boxes: &Boxes, around: Around, to: &mut [u32]) -> usize = near_body<Eight>
 }
 
 #[inline(always)]
-fn box_distances_body(boxes: &Boxes, min: [i32; 3], max: [i32; 3], out: &mut [f32]) {
-    let n = out.len();
-    let ([x0, y0, z0], [x1, y1, z1]) = (&boxes.min, &boxes.max);
-    let (x0, y0, z0) = (&x0[..n], &y0[..n], &z0[..n]);
-    let (x1, y1, z1) = (&x1[..n], &y1[..n], &z1[..n]);
-    let gap =
-        |low: i32, high: i32, axis: usize| (low - max[axis]).max(min[axis] - high).max(0) as f32;
-    for i in 0..n {
+fn near_body<P: Pick>(boxes: &Boxes, around: Around, to: &mut [u32]) -> usize {
+    let mut count = 0;
+    for start in (0..boxes.len).step_by(BLOCK) {
+        let Some(block) = boxes.block(start) else {
+            break;
+        };
+        let within = within_body::<P>(block, around) & first_bits(boxes.len - start);
+        if let Some(to) = to[count..].first_chunk_mut() {
+            P::pack(block[6], within, to);
+        }
+        count += within.count_ones() as usize;
+    }
+    count
+}
+
+kernel! {
+    /// Takes over the boxes that come near, out of `blocks` of 16, of which the first so many are meant.
+    pub fn take_boxes(from: &Boxes, blocks: &[(u32, u32)], around: Around, to: &mut Boxes) = take_body<Eight>
+}
+
+#[inline(always)]
+fn take_body<P: Pick>(from: &Boxes, blocks: &[(u32, u32)], around: Around, to: &mut Boxes) {
+    to.reserve(to.len + blocks.len() * BLOCK);
+    for &(number, meant) in blocks {
+        let Some(block) = from.block(number as usize * BLOCK) else {
+            break;
+        };
+        let within = within_body::<P>(block, around) & first_bits(meant as usize);
+        if within == 0 {
+            continue;
+        }
+        for (from, to_column) in block.iter().zip(&mut to.columns) {
+            if let Some(to) = to_column[to.len..].first_chunk_mut() {
+                P::pack(from, within, to);
+            }
+        }
+        to.len += within.count_ones() as usize;
+    }
+}
+
+#[inline(always)]
+fn within_body<P: Pick>(block: [&[u32; BLOCK]; 7], around: Around) -> u32 {
+    let [x0, y0, z0, x1, y1, z1, _] = block;
+    let gap = |low: u32, high: u32, axis: usize| {
+        let below = (low as i32).wrapping_sub(around.max[axis]);
+        let above = around.min[axis].wrapping_sub(high as i32);
+        below.max(above).max(0) as f32
+    };
+    let mut distances = [0.0; BLOCK];
+    for (i, out) in distances.iter_mut().enumerate() {
         let dx = gap(x0[i], x1[i], 0);
         let dy = gap(y0[i], y1[i], 1);
         let dz = gap(z0[i], z1[i], 2);
-        out[i] = dx * dx + dy * dy + dz * dz;
+        *out = dx * dx + dy * dy + dz * dz;
     }
+    P::within(&distances, around.limit)
 }
 
 /// Squared distances of points in columns to the box from `min` to `max`, to a relative error
@@ -94,24 +185,38 @@ mod tests {
 
     proptest! {
         #[test]
-        fn every_level_gives_the_same_bits(
+        fn those_near_are_found_at_every_level(
             corners in prop::collection::vec(prop::array::uniform6(0i32..1 << 30), 1..70),
+            share in 0.0f64..1.1,
         ) {
             let all: Vec<Aabb> = corners.iter()
                 .map(|c| Aabb::of(&[[c[0], c[1], c[2]], [c[3], c[4], c[5]]])).collect();
             let mut boxes = Boxes::default();
-            all.iter().for_each(|b| boxes.push(b.min, b.max));
+            (100..).zip(&all).for_each(|(number, b)| boxes.push(b.min, b.max, number));
             let Aabb { min, max } = all[0];
-            let mut expected = vec![0.0; all.len()];
-            box_distances_body(&boxes, min, max, &mut expected);
+            let exact = |b: &Aabb| b.distance2_box(&all[0]) as f64;
+            let limit = (share * all.iter().map(exact).fold(0.0, f64::max)) as f32;
+            let around = Around { min, max, limit };
+            let blocks: Vec<(u32, u32)> = (0..all.len() as u32).step_by(BLOCK)
+                .map(|start| (start / BLOCK as u32, all.len() as u32 - start)).collect();
+            let error = f64::from(limit) / f64::from(1 << 21);
             for level in Level::all() {
-                let mut got = vec![0.0; all.len()];
-                box_distances(level, &boxes, min, max, &mut got);
-                for ((got, expected), b) in got.iter().zip(&expected).zip(&all) {
-                    prop_assert_eq!(got.to_bits(), expected.to_bits());
-                    let exact = b.distance2_box(&all[0]) as f64;
-                    prop_assert!((f64::from(*got) - exact).abs() <= exact / f64::from(1 << 21));
+                let mut numbers = vec![0; all.len() + BLOCK];
+                let count = near_boxes(level, &boxes, around, &mut numbers);
+                let numbers = &numbers[..count];
+                prop_assert!(numbers.is_sorted());
+                for (number, b) in (100..).zip(&all) {
+                    let off = exact(b) - f64::from(limit);
+                    let near = numbers.contains(&number);
+                    prop_assert!(off.abs() <= error || near == (off < 0.0));
                 }
+                let mut taken = Boxes::default();
+                take_boxes(level, &boxes, &blocks, around, &mut taken);
+                let taken: Vec<_> = (0..taken.len())
+                    .map(|i| (taken.get(i), taken.columns[6][i])).collect();
+                let expected: Vec<_> = numbers.iter()
+                    .map(|&n| (boxes.get(n as usize - 100), n)).collect();
+                prop_assert_eq!(taken, expected);
             }
         }
     }

@@ -106,14 +106,8 @@ impl Fit {
     /// The plane of neighbours that are summed up.
     #[must_use]
     pub fn of(sums: Sums) -> Self {
-        Self::on(sums.moments.plane(), sums)
-    }
-
-    /// Neighbours that are summed up, and their plane.
-    #[must_use]
-    pub fn on(plane: Plane, sums: Sums) -> Self {
         Self {
-            plane,
+            plane: sums.moments.plane(),
             moments: sums.moments,
             last2: sums.last2,
         }

@@ -2,7 +2,7 @@
 
 use crate::error::Result;
 use crate::geom::Point;
-use crate::geom::plane::planes;
+use crate::geom::plane::{Moments, planes};
 use crate::kernels::{LANES, Level};
 use crate::stages::cells::{Fit, Widen, fit_in_store, fit_in_tile, near_in_store};
 use crate::stages::order::PointStore;
@@ -97,24 +97,41 @@ pub fn each_neighborhood<T>(
 #[derive(Default)]
 struct Several {
     level: Level,
-    points: Vec<(u32, Point, Sums)>,
+    count: usize,
+    points: [(u32, Point); LANES],
+    moments: [Moments; LANES],
+    /// Squared distances of the last neighbours.
+    lasts: [u64; LANES],
 }
 
 impl Several {
     fn add(&mut self, id: u32, point: Point, sums: Sums, found: &mut Found<'_, Fit>) {
-        self.points.push((id, point, sums));
-        if self.points.len() == LANES {
+        self.points[self.count] = (id, point);
+        self.moments[self.count] = sums.moments;
+        self.lasts[self.count] = sums.last2;
+        self.count += 1;
+        if self.count == LANES {
             self.fit(found);
         }
     }
 
+    /// Hands them out.
     fn fit(&mut self, found: &mut Found<'_, Fit>) {
-        let moments = |lane: usize| self.points.get(lane).map(|p| p.2.moments);
-        let moments = std::array::from_fn(|lane| moments(lane).unwrap_or_default());
-        let planes = planes(self.level, &moments);
-        for ((id, point, sums), plane) in self.points.drain(..).zip(planes) {
-            found(id, point, Ok(Some(Fit::on(plane, sums))));
+        let planes = planes(self.level, &self.moments);
+        for (lane, plane) in planes.into_iter().enumerate().take(self.count) {
+            let (id, point) = self.points[lane];
+            let (moments, last2) = (self.moments[lane], self.lasts[lane]);
+            found(
+                id,
+                point,
+                Ok(Some(Fit {
+                    plane,
+                    moments,
+                    last2,
+                })),
+            );
         }
+        self.count = 0;
     }
 }
 

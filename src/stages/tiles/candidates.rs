@@ -1,12 +1,11 @@
 //! The points that may be among the neighbours of a query, in columns.
 
 use super::near::above;
-use super::points::Points;
 use super::{LEAVES, OwnPage, Tile};
 use crate::geom::Point;
 use crate::geom::aabb::Aabb;
 use crate::kernels::{
-    BLOCK, Boxes, Level, Pick, box_distances, first_bits, kernel, pick_column, point_box_body,
+    Around, BLOCK, Boxes, Level, Pick, first_bits, kernel, near_boxes, point_box_body, take_boxes,
 };
 
 /// x, y, z, and a number that goes with the point. The columns are whole blocks long, with
@@ -72,55 +71,37 @@ pub(super) struct Candidates {
     pub complete2: u64,
 }
 
-/// Points that lie together.
-#[derive(Debug, Clone, Copy)]
-struct Leaf {
-    /// The first in the tile.
-    start: u32,
-    len: u32,
-    /// The first id.
-    id: u32,
-}
-
 /// The leaves within reach of one page, in order of id.
 #[derive(Debug, Default)]
 pub(super) struct PageLeaves {
+    /// With their numbers in the tile.
     boxes: Boxes,
-    leaves: Vec<Leaf>,
-    /// 0, 1, 2 …
-    places: Vec<u32>,
+    /// Pages, and how many leaves they have.
+    pages: Vec<(u32, u32)>,
     near: Vec<u32>,
-    distances: Vec<f32>,
 }
 
 impl PageLeaves {
     /// Those within reach of `own`.
-    pub fn set(&mut self, tile: &Tile, own: &OwnPage) {
+    pub fn set(&mut self, level: Level, tile: &Tile, own: &OwnPage) {
+        let page = |local: &u32| {
+            let leaves = tile.range(*local as usize).len().div_ceil(tile.leaf);
+            (*local, leaves as u32)
+        };
+        self.pages.clear();
+        self.pages
+            .extend(tile.near[own.near.clone()].iter().map(page));
         self.boxes.clear();
-        self.leaves.clear();
-        let around = &tile.page_boxes[own.local];
-        for &local in &tile.near[own.near.clone()] {
-            let local = local as usize;
-            let range = tile.range(local);
-            let boxes = &tile.leaf_boxes[local * LEAVES..];
-            for (leaf, start) in range.clone().step_by(tile.leaf).enumerate() {
-                if boxes[leaf].distance2_box(around) > own.reach2 {
-                    continue;
-                }
-                self.boxes.push(boxes[leaf].min, boxes[leaf].max);
-                self.leaves.push(Leaf {
-                    start: start as u32,
-                    len: tile.leaf.min(range.end - start) as u32,
-                    id: tile.id(local, start - range.start) as u32,
-                });
-            }
-        }
-    }
-
-    #[inline]
-    fn bounds(&self, leaf: usize) -> Aabb {
-        let (min, max) = self.boxes.get(leaf);
-        Aabb { min, max }
+        let around = within(&tile.page_boxes[own.local], own.reach2);
+        take_boxes(
+            level,
+            &tile.leaf_boxes,
+            &self.pages,
+            around,
+            &mut self.boxes,
+        );
+        self.near
+            .resize((self.boxes.len() + BLOCK).max(self.near.len()), 0);
     }
 
     /// Collects the points of all `wanted` leaves within `d2` of `around`, a box inside the page, for
@@ -134,70 +115,62 @@ impl PageLeaves {
         wanted: impl Fn(&Aabb) -> bool,
         out: &mut Candidates,
     ) {
-        let limit = above(d2);
-        let count = self.near(level, around, limit);
+        let limit = within(around, d2);
+        let count = near_boxes(level, &self.boxes, limit, &mut self.near);
         let mut kept = 0;
         for place in 0..count {
             let leaf = self.near[place];
-            if wanted(&self.bounds(leaf as usize)) {
+            let (min, max) = tile.leaf_boxes.get(leaf as usize);
+            if wanted(&Aabb { min, max }) {
                 self.near[kept] = leaf;
                 kept += 1;
             }
         }
         out.columns.reserve(kept * tile.leaf);
-        let leaves = (&self.leaves[..], &self.near[..kept]);
-        out.len = pick_leaves(level, &tile.points, leaves, around, limit, &mut out.columns);
+        let leaves = &self.near[..kept];
+        out.len = pick_leaves(level, tile, leaves, limit, &mut out.columns);
         out.complete2 = d2;
     }
+}
 
-    /// Lists the leaves whose approximate squared distance to `around` is at most `limit`; how many.
-    fn near(&mut self, level: Level, around: &Aabb, limit: f32) -> usize {
-        let count = self.boxes.len();
-        let room = count.next_multiple_of(BLOCK);
-        self.places.extend(self.places.len() as u32..room as u32);
-        self.near.resize((room + BLOCK).max(self.near.len()), 0);
-        self.distances.resize(room.max(self.distances.len()), 0.0);
-        let distances = &mut self.distances[..room];
-        let Aabb { min, max } = *around;
-        box_distances(level, &self.boxes, min, max, &mut distances[..count]);
-        distances[count..].fill(f32::INFINITY);
-        pick_column(level, distances, limit, &self.places, &mut self.near)
+/// What is within a squared distance of a box, and maybe more.
+fn within(bounds: &Aabb, d2: u64) -> Around {
+    Around {
+        min: bounds.min,
+        max: bounds.max,
+        limit: above(d2),
     }
 }
 
 kernel! {
-    /// Takes over the points of leaves, of all those that are listed second, whose approximate squared
-    /// distance to `around` is at most `limit`; how many.
-    fn pick_leaves(
-        points: &Points,
-        leaves: (&[Leaf], &[u32]),
-        around: &Aabb,
-        limit: f32,
-        out: &mut Columns,
-    ) -> usize = pick_leaves_body<Eight>
+    /// Takes over the points of `leaves` that are `around`; how many.
+    fn pick_leaves(tile: &Tile, leaves: &[u32], around: Around, out: &mut Columns) -> usize = pick_leaves_body<Eight>
 }
 
 #[inline(always)]
 fn pick_leaves_body<P: Pick>(
-    points: &Points,
-    (leaves, near): (&[Leaf], &[u32]),
-    around: &Aabb,
-    limit: f32,
+    tile: &Tile,
+    leaves: &[u32],
+    around: Around,
     out: &mut Columns,
 ) -> usize {
     let mut to = out.slices_mut();
     let mut count = 0;
-    for &leaf in near {
-        let leaf = leaves[leaf as usize];
-        for first in (0..leaf.len).step_by(BLOCK) {
-            let Some(columns) = points.block((leaf.start + first) as usize) else {
+    for &leaf in leaves {
+        let Some(range) = tile.leaf(leaf as usize) else {
+            continue;
+        };
+        let local = leaf as usize / LEAVES;
+        let first = tile.id(local, range.start - tile.range(local).start) as u32;
+        for start in range.clone().step_by(BLOCK) {
+            let Some(columns) = tile.points.block(start) else {
                 break;
             };
             let mut distances = [0.0; BLOCK];
             let [x, y, z] = columns.map(<[i32; BLOCK]>::as_slice);
             point_box_body([x, y, z], around.min, around.max, &mut distances);
-            let within = P::within(&distances, limit) & first_bits((leaf.len - first) as usize);
-            let mut ids = [leaf.id + first; BLOCK];
+            let within = P::within(&distances, around.limit) & first_bits(range.end - start);
+            let mut ids = [first + (start - range.start) as u32; BLOCK];
             (0..).zip(&mut ids).for_each(|(n, id)| *id += n);
             let [x, y, z] = columns.map(bytemuck::cast_ref);
             for (from, to) in [x, y, z, &ids].into_iter().zip(&mut to) {

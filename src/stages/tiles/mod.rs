@@ -13,14 +13,16 @@ pub mod walk;
 
 use crate::error::Result;
 use crate::geom::aabb::Aabb;
+use crate::kernels::{BLOCK, Boxes};
 use crate::stages::order::PointStore;
 use crate::workspace::memory::{Holding, bytes_of, give_back};
 use halo::{Reach, halo};
 use points::Points;
 use std::ops::Range;
 
-/// Leaves per page: the unit in which candidates are gathered and queries answered.
-const LEAVES: usize = 16;
+/// Leaves per page: the unit in which candidates are gathered and queries answered. Their boxes are a
+/// block of the kernels.
+const LEAVES: usize = BLOCK;
 
 /// Most halo pages for each page of the tile itself.
 const MOST_HALO: usize = 4;
@@ -57,7 +59,8 @@ pub struct Tile {
     pages: Vec<usize>,
     points: Points,
     page_boxes: Vec<Aabb>,
-    leaf_boxes: Vec<Aabb>,
+    /// So many for each page, of which the last may have less.
+    leaf_boxes: Boxes,
     own: Vec<OwnPage>,
     near: Vec<u32>,
     held: Holding,
@@ -117,7 +120,7 @@ impl Tile {
             pages: wanted,
             points,
             page_boxes,
-            leaf_boxes: Vec::new(),
+            leaf_boxes: Boxes::default(),
             own: Vec::new(),
             near: Vec::new(),
             held: Holding::default(),
@@ -131,17 +134,16 @@ impl Tile {
     /// Bytes that its lists take.
     fn taken(&self) -> u64 {
         let lists = bytes_of(&self.pages) + self.points.bytes() + bytes_of(&self.page_boxes);
-        lists + bytes_of(&self.leaf_boxes) + bytes_of(&self.own) + bytes_of(&self.near)
+        lists + self.leaf_boxes.bytes() + bytes_of(&self.own) + bytes_of(&self.near)
     }
 
     fn index(&mut self, reaches: Vec<Reach>) {
-        for local in 0..self.pages.len() {
-            let range = self.range(local);
-            let leaves = range.clone().step_by(self.leaf);
-            let leaf = |start: usize| start..(start + self.leaf).min(range.end);
-            self.leaf_boxes
-                .extend(leaves.map(|start| self.points.bounds(leaf(start))));
-            self.leaf_boxes.resize((local + 1) * LEAVES, Aabb::EMPTY);
+        self.leaf_boxes.reserve(self.pages.len() * LEAVES);
+        for number in 0..self.pages.len() * LEAVES {
+            // Leaves without points stand in as a place that nobody looks at.
+            let bounds = self.leaf(number).map(|leaf| self.points.bounds(leaf));
+            let Aabb { min, max } = bounds.unwrap_or(Aabb::of(&[[0; 3]]));
+            self.leaf_boxes.push(min, max, number as u32);
         }
         for reach in reaches {
             let begin = self.near.len();
@@ -162,6 +164,14 @@ impl Tile {
     fn range(&self, local: usize) -> Range<usize> {
         let start = local * self.page;
         start..(start + self.page).min(self.points.len())
+    }
+
+    /// Where the points of a leaf lie, numbered page by page; `None` if it has none.
+    #[inline(always)]
+    fn leaf(&self, number: usize) -> Option<Range<usize>> {
+        let page = self.range(number / LEAVES);
+        let start = page.start + number % LEAVES * self.leaf;
+        (start < page.end).then(|| start..(start + self.leaf).min(page.end))
     }
 
     /// The id of point `index` of a page.

@@ -129,7 +129,7 @@ impl Tile {
                     continue;
                 }
                 if !set {
-                    search.leaves.set(self, own);
+                    search.leaves.set(search.level, self, own);
                     set = true;
                 }
                 let likely = guess.unwrap_or_else(|| self.limit(group.clone(), k, search));
