@@ -368,6 +368,7 @@ fn robust() {
         relax: seed as u32 % 4,
         block: [40, 7, 100, 15, 25, 65_536][seed as usize % 6],
         min_component: [1, 3, 10][seed as usize % 3],
+        max_hole_edges: [500, 500, 0, 500, 4][seed as usize % 5],
         ..Settings::robust()
     });
     let Reached {

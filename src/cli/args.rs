@@ -163,7 +163,8 @@ pub struct Surface {
 #[derive(Debug, ClapArgs)]
 #[command(next_help_heading = "Repair")]
 pub struct Repair {
-    /// Fill holes of up to this many edges; 0 fills none
+    /// Fill holes of up to this many edges; 0 fills none (single triangles that are missing are no
+    /// holes: but for --method paper they are put in all the same)
     #[arg(long, value_name = "N", default_value_t = 500)]
     pub max_hole_edges: usize,
     /// Remove components with fewer triangles [default: one for each 2500 points, from 10 to 300,

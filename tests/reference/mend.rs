@@ -20,10 +20,15 @@ pub fn mend(
     longest: usize,
     filling: &mut Filling,
 ) -> Vec<[u32; 3]> {
-    if longest < 3 {
-        return Vec::new();
-    }
-    if hole.len() > longest.max(LONGEST) {
+    let only_gaps = longest < 3;
+    let longest = longest.max(3);
+    if hole.len()
+        > if only_gaps {
+            longest
+        } else {
+            longest.max(LONGEST)
+        }
+    {
         filling.too_long += 1;
         return Vec::new();
     }
@@ -43,6 +48,10 @@ pub fn mend(
             filling.triangles += patch.len();
             return patch;
         }
+    }
+    if only_gaps {
+        filling.not_split += 1;
+        return Vec::new();
     }
     let whole_loop = hole;
     let mut zipper = Zipper::new(holes, hole, &behind);

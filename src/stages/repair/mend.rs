@@ -10,7 +10,7 @@ use rustc_hash::FxHashSet;
 /// How boundary loops are treated.
 #[derive(Debug, Clone, Copy)]
 pub struct Mending {
-    /// Most edges of a hole that is filled.
+    /// Most edges of a hole that is filled; with less than three none is.
     pub longest: usize,
     /// Zip what is not filled, and leave openings open.
     pub zip: bool,
@@ -23,17 +23,27 @@ const LONGEST_ZIPPED: usize = 100_000;
 /// round hole of some 100 edges.
 const OPENING: f64 = 8.0;
 
+/// Edges of a loop that one triangle closes: what no cell saw, and not a hole. It is closed even where no
+/// hole is to be filled.
+const GAP: usize = 3;
+
 /// A loop of so few edges is a hole: pieces with so short an outline were removed.
 const SMALL: usize = 6;
 
 impl Mending {
     /// The longest loop that is looked at.
     pub fn longest_loop(&self) -> usize {
-        if self.zip {
+        if self.only_gaps() {
+            GAP
+        } else if self.zip {
             self.longest.max(LONGEST_ZIPPED)
         } else {
             self.longest
         }
+    }
+
+    fn only_gaps(&self) -> bool {
+        self.zip && self.longest < GAP
     }
 
     /// Closes the loop of `corners` if that is what it wants; `edge(a, b)` tells if the mesh has an
@@ -46,7 +56,7 @@ impl Mending {
         let around = corners.len() > SMALL && is_outline(&corners);
         let found = Width::of(&corners);
         let fillable = |corners: &[Corner]| {
-            !around && corners.len() <= self.longest && !found.is_opening(corners)
+            !around && corners.len() <= self.longest.max(GAP) && !found.is_opening(corners)
         };
         if fillable(&corners)
             && let Filling::Filled(new) = fill(corners.clone(), usize::MAX, &edge)
@@ -55,6 +65,9 @@ impl Mending {
                 [gap] => Filling::Gap(gap),
                 _ => Filling::Filled(new),
             };
+        }
+        if self.only_gaps() {
+            return Filling::Impossible;
         }
         let zipped = zip(corners, &edge);
         let (mut triangles, left) = (zipped.triangles, zipped.left);

@@ -88,7 +88,8 @@ pub struct RepairStats {
     pub components_removed: u64,
     /// Triangles in them.
     pub component_triangles_removed: u64,
-    /// Boundary loops of three edges that were closed before holes are counted: T0 triangles.
+    /// Boundary loops of three edges that were closed before holes are counted: T0 triangles, which
+    /// belong to the surface whether holes are filled or not.
     pub gaps_closed: u64,
     /// Boundary loops before filling.
     pub holes_found: u64,
@@ -112,13 +113,13 @@ impl RepairOptions {
         if self.repair { self.min_component } else { 0 }
     }
 
-    /// Which holes are filled; `None` if none is.
+    /// How boundary loops are treated; `None` if they all stay as they are.
     fn filling(&self) -> Option<Mending> {
         let filling = Mending {
             longest: self.max_hole_edges,
             zip: self.zip,
         };
-        Some(filling).filter(|f| self.repair && f.longest >= 3)
+        Some(filling).filter(|f| self.repair && (f.zip || f.longest >= 3))
     }
 }
 
