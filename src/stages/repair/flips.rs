@@ -30,6 +30,18 @@ const SWEEPS: usize = 3;
 /// An edge without a triangle inside the block behind it.
 const NONE: u32 = u32::MAX;
 
+/// An edge of a triangle as one word: the one opposite a corner.
+#[inline]
+fn side(triangle: u32, corner: u32) -> u32 {
+    triangle << 2 | corner
+}
+
+/// The triangle and the corner of [`side`].
+#[inline]
+fn parts(side: u32) -> (usize, usize) {
+    ((side >> 2) as usize, (side & 3) as usize)
+}
+
 /// Flips edges of the `triangles`, ascending, that touch the vertices `ids`; how many. `points` are
 /// the positions in the file, `shape` those that points were connected by: triangles none of whose
 /// points were moved stay.
@@ -140,10 +152,11 @@ impl<'a> Sheet<'a> {
         for v in 0..size {
             let mut visit = |y: u32, number: u32, corner: u32| {
                 let place = &mut seen[y as usize];
-                let this = number << 2 | corner;
+                let this = side(number, corner);
                 if place.0 == v + 1 {
                     self.slots[number as usize].across[corner as usize] = place.1;
-                    self.slots[(place.1 >> 2) as usize].across[(place.1 & 3) as usize] = this;
+                    let (other, opposite) = parts(place.1);
+                    self.slots[other].across[opposite] = this;
                 } else {
                     *place = (v + 1, this);
                 }
@@ -175,18 +188,19 @@ impl<'a> Sheet<'a> {
         for number in 0..self.slots.len() {
             for k in 0..3 {
                 let behind = self.slots[number].across[k];
-                if behind != NONE && number < (behind >> 2) as usize {
-                    let other = self.seen_from(number, k, behind);
-                    let bend = distance(self.slots[number].normal, other);
+                let (other, corner) = parts(behind);
+                if behind != NONE && number < other {
+                    let seen = self.seen_from(number, k, behind);
+                    let bend = distance(self.slots[number].normal, seen);
                     self.slots[number].bends[k] = bend;
-                    self.slots[(behind >> 2) as usize].bends[(behind & 3) as usize] = bend;
+                    self.slots[other].bends[corner] = bend;
                 }
             }
         }
         for (number, slot) in self.slots.iter().enumerate() {
             let mut bits = 0;
             for (k, &behind) in slot.across.iter().enumerate() {
-                let own = behind != NONE && number < (behind >> 2) as usize;
+                let own = behind != NONE && number < parts(behind).0;
                 bits |= u64::from(own && self.around(number, k, behind) >= FLAT) << k;
             }
             self.due[number / 16] |= bits << (number % 16 * 4);
@@ -196,7 +210,7 @@ impl<'a> Sheet<'a> {
     /// How far the surface bends at an edge and around it.
     #[inline]
     fn around(&self, number: usize, k: usize, behind: u32) -> f32 {
-        let (other, corner) = ((behind >> 2) as usize, (behind & 3) as usize);
+        let (other, corner) = parts(behind);
         let (mine, theirs) = (&self.slots[number].bends, &self.slots[other].bends);
         mine[k] + (mine[next(k)] + mine[last(k)]) + (theirs[next(corner)] + theirs[last(corner)])
     }
@@ -212,7 +226,7 @@ impl<'a> Sheet<'a> {
     /// neighbour that faces alike runs back.
     #[inline]
     fn facing(&self, behind: u32, from: u32) -> [f32; 3] {
-        let (other, corner) = ((behind >> 2) as usize, (behind & 3) as usize);
+        let (other, corner) = parts(behind);
         let slot = &self.slots[other];
         if slot.corners[next(corner)] == from {
             slot.normal.map(|x| -x)
@@ -242,7 +256,7 @@ impl<'a> Sheet<'a> {
                 };
                 let behind = slot.across[k];
                 if behind != NONE
-                    && number < (behind >> 2) as usize
+                    && number < parts(behind).0
                     && let Some(flip) = self.gain(number, k, behind)
                 {
                     self.turn(number, k, behind, flip);
@@ -260,7 +274,7 @@ impl<'a> Sheet<'a> {
         if was < FLAT {
             return None;
         }
-        let (other, corner) = ((behind >> 2) as usize, (behind & 3) as usize);
+        let (other, corner) = parts(behind);
         let (c, u, v) = self.named(number, k);
         let d = self.slots[other].corners[corner];
         if [c, u, d, v].into_iter().any(|v| self.shut[v as usize]) {
@@ -303,7 +317,7 @@ impl<'a> Sheet<'a> {
     /// What is behind the sides `cu`, `ud`, `dv`, `vc` of the quadrilateral of an edge.
     #[inline]
     fn behind(&self, number: usize, k: usize, behind: u32) -> [u32; 4] {
-        let (other, corner) = ((behind >> 2) as usize, (behind & 3) as usize);
+        let (other, corner) = parts(behind);
         let (mine, theirs) = (&self.slots[number].across, &self.slots[other].across);
         let u = self.slots[number].corners[next(k)];
         // Opposite `u` is the side `dv`.
@@ -319,7 +333,8 @@ impl<'a> Sheet<'a> {
     #[inline]
     fn sides(&self, number: usize, k: usize, behind: u32) -> [Option<[f32; 3]>; 4] {
         let (c, u, v) = self.named(number, k);
-        let d = self.slots[(behind >> 2) as usize].corners[(behind & 3) as usize];
+        let (other, corner) = parts(behind);
+        let d = self.slots[other].corners[corner];
         let all = self.behind(number, k, behind);
         let from = [c, u, d, v];
         // The quadrilateral runs c, u, d, v.
@@ -343,7 +358,7 @@ impl<'a> Sheet<'a> {
                 if behind == NONE {
                     return (false, false);
                 }
-                let (other, corner) = ((behind >> 2) as usize, (behind & 3) as usize);
+                let (other, corner) = parts(behind);
                 if other == number {
                     return (false, true);
                 }
@@ -365,28 +380,28 @@ impl<'a> Sheet<'a> {
 
     /// Flips.
     fn turn(&mut self, number: usize, k: usize, behind: u32, flip: Flip) {
-        let other = (behind >> 2) as usize;
+        let (other, corner) = parts(behind);
         let (c, u, v) = self.named(number, k);
-        let d = self.slots[other].corners[(behind & 3) as usize];
+        let d = self.slots[other].corners[corner];
         let [cu, ud, dv, vc] = self.behind(number, k, behind);
         let [one, two] = [number as u32, other as u32];
         self.slots[number].corners = [u, d, c];
         self.slots[other].corners = [d, v, c];
-        self.slots[number].across = [two << 2 | 1, cu, ud];
-        self.slots[other].across = [vc, one << 2, dv];
+        self.slots[number].across = [side(two, 1), cu, ud];
+        self.slots[other].across = [vc, side(one, 0), dv];
         [self.slots[number].normal, self.slots[other].normal] = flip.normals;
         let [inner, at_cu, at_ud, at_dv, at_vc] = flip.bends;
         self.slots[number].bends = [inner, at_cu, at_ud];
         self.slots[other].bends = [at_vc, inner, at_dv];
         let sides = [
-            (cu, one << 2 | 1, at_cu),
-            (ud, one << 2 | 2, at_ud),
-            (dv, two << 2 | 2, at_dv),
-            (vc, two << 2, at_vc),
+            (cu, side(one, 1), at_cu),
+            (ud, side(one, 2), at_ud),
+            (dv, side(two, 2), at_dv),
+            (vc, side(two, 0), at_vc),
         ];
         for (side, mine, bend) in sides {
             if side != NONE {
-                let (triangle, corner) = ((side >> 2) as usize, (side & 3) as usize);
+                let (triangle, corner) = parts(side);
                 self.slots[triangle].across[corner] = mine;
                 self.slots[triangle].bends[corner] = bend;
             }
@@ -395,7 +410,7 @@ impl<'a> Sheet<'a> {
             self.flipped[triangle] = true;
             for k in 0..3 {
                 let behind = self.slots[triangle].across[k];
-                let owner = (triangle as u32) << 2 | k as u32;
+                let owner = side(triangle as u32, k as u32);
                 let owner = owner.min(behind) as usize;
                 self.due[owner / 64] |= 1 << (owner % 64);
             }
@@ -442,7 +457,7 @@ fn distance(a: [f32; 3], b: [f32; 3]) -> f32 {
 #[inline]
 fn normal(points: &[Point], [a, b, c]: [u32; 3]) -> [f32; 3] {
     let at = |v: u32| points[v as usize];
-    let (u, v) = (side(at(a), at(b)), side(at(a), at(c)));
+    let (u, v) = (difference(at(a), at(b)), difference(at(a), at(c)));
     [
         u[1] * v[2] - u[2] * v[1],
         u[2] * v[0] - u[0] * v[2],
@@ -464,7 +479,7 @@ fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
 
 /// The way from `a` to `b`.
 #[inline]
-fn side(a: Point, b: Point) -> [f32; 3] {
+fn difference(a: Point, b: Point) -> [f32; 3] {
     std::array::from_fn(|k| (i64::from(b[k]) - i64::from(a[k])) as f32)
 }
 

@@ -6,6 +6,7 @@
 mod around;
 mod bridges;
 mod by_end;
+mod components;
 mod facing;
 mod fill;
 mod flips;

@@ -4,6 +4,7 @@
 //! labels, turns those of components that it has to itself, and leaves out the small ones. The
 //! labels of components that reach further are joined by the triangles that several blocks see.
 
+use super::components::{Parts, join};
 use super::facing::{Fate, SUMS, Sums, judge};
 use super::patch::Patch;
 use super::{
@@ -15,15 +16,11 @@ use crate::spill::layouts::{ORIENTED, SENT};
 use crate::spill::{Exchange, Layout, Sections, Word};
 use crate::stages::blocks::Blocks;
 use crate::stages::located::Places;
-use crate::stages::order::PointStore;
 use crate::stages::stitch::Stitched;
-use crate::stages::surface::parity::ParitySets;
 use crate::stages::surface::star::Triangle;
 use crate::workspace::Workspace;
-use crate::workspace::memory::{Reservation, bytes_of, hold, table_bytes};
+use crate::workspace::memory::{Reservation, bytes_of, hold};
 use crate::workspace::persist::{Persist, Saved};
-use rustc_hash::FxHashMap;
-use std::sync::{Mutex, PoisonError};
 
 /// `[owner, i, j, k, block, label << 1 | flip]`, ascending.
 const SEEN: Layout<6> = [
@@ -403,109 +400,5 @@ impl<'a> Build<'a> {
         }
         self.triangles.put(block, &triangles[..kept])?;
         self.runs.put(block, &runs)
-    }
-}
-
-/// Joins global labels of which a triangle has both.
-fn join(
-    seen: &Sections<6>,
-    globals: &[(u32, u32)],
-    labels: u32,
-    workspace: &Workspace,
-) -> Result<ParitySets> {
-    let mut sets = ParitySets::new(labels as usize);
-    for block in 0..globals.len() {
-        workspace.check_cancel()?;
-        let _held = workspace.reserve("labels seen", seen.records(block) as u64 * 24)?;
-        let all = seen.get(block)?;
-        for same in all.chunk_by(|a, b| a[1..4] == b[1..4]) {
-            let global = |r: &[u32; 6]| globals[r[4] as usize].0 + (r[5] >> 1);
-            for other in &same[1..] {
-                let turned = (same[0][5] ^ other[5]) & 1 == 1;
-                sets.join(global(&same[0]), global(other), turned);
-            }
-        }
-    }
-    sets.flatten();
-    Ok(sets)
-}
-
-/// What the components of global labels are put together from.
-struct Parts<'a> {
-    store: &'a PointStore,
-    seen: &'a Sections<6>,
-    sums: &'a Sections<SUMS>,
-    bridges: &'a Sections<4>,
-    globals: &'a [(u32, u32)],
-    sets: &'a ParitySets,
-}
-
-impl Parts<'_> {
-    /// The component and the fate of each global label.
-    fn judge(
-        &self,
-        options: RepairOptions,
-        stats: &mut RepairStats,
-        workspace: &Workspace,
-    ) -> Result<(Vec<u32>, Vec<Fate>)> {
-        let all: Mutex<FxHashMap<u32, Sums>> = Mutex::default();
-        let bytes = |block: usize| {
-            let labels = self.globals[block].1;
-            self.seen.records(block) as u64 * 150 + u64::from(labels) * 500 + (1 << 16)
-        };
-        workspace.for_each_unit("repair: borders", self.globals.len(), bytes, |block| {
-            let own = self.sum(block)?;
-            let mut all = all.lock().unwrap_or_else(PoisonError::into_inner);
-            for (root, sums) in own {
-                all.entry(root).or_default().merge(&sums, false);
-            }
-            Ok(())
-        })?;
-        let all = all.into_inner().unwrap_or_else(PoisonError::into_inner);
-        let _held = workspace.reserve("components", all.len() as u64 * 500)?;
-        let fates: FxHashMap<u32, Fate> = all
-            .iter()
-            .map(|(root, sums)| (*root, judge(sums, options.least(), stats)))
-            .collect();
-        let labels = (0..self.sets.len() as u32).map(|label| {
-            let (root, turned) = self.sets.look(label);
-            // Every label has sums.
-            let fate = fates.get(&root).copied().unwrap_or(Fate::UNKNOWN);
-            let turn = fate.turn ^ turned;
-            (root, Fate { turn, ..fate })
-        });
-        Ok(labels.unzip())
-    }
-
-    /// Sums over a block's interior triangles and the crossing ones that it owns, by the roots of
-    /// their labels.
-    fn sum(&self, block: usize) -> Result<FxHashMap<u32, Sums>> {
-        let mut own: FxHashMap<u32, Sums> = FxHashMap::default();
-        for (label, words) in (self.globals[block].0..).zip(self.sums.get(block)?) {
-            let (root, turned) = self.sets.look(label);
-            let sums = Sums::from_words(&words);
-            own.entry(root).or_default().merge(&sums, turned);
-        }
-        let seen = self.seen.get(block)?;
-        let bridges = self.bridges.get(block)?;
-        let mut ids: Vec<u32> = seen.iter().flat_map(|r| [r[1], r[2], r[3]]).collect();
-        ids.sort_unstable();
-        ids.dedup();
-        let mut points: Vec<Point> = Vec::with_capacity(ids.len());
-        self.store.fetch(&ids, &mut points)?;
-        let _held = hold(table_bytes(&own) + bytes_of(&seen) + bytes_of(&ids) + bytes_of(&points));
-        for same in seen.chunk_by(|a, b| a[1..4] == b[1..4]) {
-            let r = same[0];
-            if bridges.binary_search(&[r[0], r[1], r[2], r[3]]).is_ok() {
-                continue;
-            }
-            let t = [r[1], r[2], r[3]];
-            let (root, turned) = self.sets.look(self.globals[r[4] as usize].0 + (r[5] >> 1));
-            // Every corner was fetched.
-            let corners = t.map(|v| points[ids.partition_point(|id| *id < v)]);
-            let flip = turned ^ (r[5] & 1 == 1);
-            own.entry(root).or_default().add(t, corners, flip);
-        }
-        Ok(own)
     }
 }
