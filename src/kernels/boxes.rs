@@ -10,6 +10,13 @@ pub struct Boxes {
 }
 
 impl Boxes {
+    /// Bytes that they have room for.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        let room = self.min.iter().chain(&self.max).map(Vec::capacity);
+        (room.sum::<usize>() * size_of::<i32>()) as u64
+    }
+
     /// Forgets all boxes.
     pub fn clear(&mut self) {
         self.min.iter_mut().for_each(Vec::clear);

@@ -15,7 +15,7 @@ use crate::stages::surface::orient::{Asks, consistent};
 use crate::stages::surface::parity::ParitySets;
 use crate::stages::surface::star::{Triangle, others};
 use crate::workspace::Workspace;
-use crate::workspace::memory::{Reservation, bytes_of, table_bytes};
+use crate::workspace::memory::{Holding, Reservation, bytes_of, table_bytes};
 use rustc_hash::FxHashMap;
 
 /// A triangle at a vertex of a candidate.
@@ -60,6 +60,8 @@ pub struct Context<'a> {
     changes: Mail<13>,
     pub workspace: &'a Workspace,
     reserved: Vec<Reservation>,
+    /// What is told of a turn that is taken within a unit of work: it has what the unit had.
+    held: Option<Holding>,
     told: Reservation,
 }
 
@@ -105,6 +107,7 @@ impl<'a> Context<'a> {
             changes: Mail::new(workspace, "stitch.changes", blocks.count(), CHANGES)?,
             workspace,
             reserved: Vec::new(),
+            held: None,
             told: workspace.promise("stitch: borders", 0)?,
         })
     }
@@ -117,6 +120,7 @@ impl<'a> Context<'a> {
         wanted.dedup();
         let lists = bytes_of(&wanted) + size_of_val(tried) as u64;
         let blocks = self.blocks;
+        self.held = most.map(|_| Holding::default());
         let mut fits = self.reserve(2 * lists, most)?;
         for part in wanted.chunk_by(|v, w| blocks.of(*v) == blocks.of(*w)) {
             self.workspace.check_cancel()?;
@@ -261,9 +265,12 @@ impl<'a> Context<'a> {
             .values()
             .map(|a| bytes_of(&a.triangles) + 16)
             .sum();
-        let tables = table_bytes(&self.around) + table_bytes(&self.locals) + self.changes.bytes();
-        self.told
-            .set_held(lists + tables + bytes_of(&self.tris) + more);
+        let turn = lists + table_bytes(&self.around) + bytes_of(&self.tris) + more;
+        let tables = table_bytes(&self.locals) + self.changes.bytes();
+        match &mut self.held {
+            Some(held) => held.set(turn),
+            None => self.told.set_held(turn + tables),
+        }
     }
 
     /// Enters a triangle at the vertices of candidates in `block`; its number.
@@ -285,6 +292,7 @@ impl<'a> Context<'a> {
         self.tris = Vec::new();
         self.around = FxHashMap::default();
         self.inserted.clear();
+        self.held = None;
         self.tell(0);
         self.reserved.clear();
     }

@@ -73,10 +73,16 @@ impl<const N: usize> Mail<N> {
 mod tests {
     use super::*;
     use crate::spill::Word;
+    use crate::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
+    use crate::workspace::progress::{Cancel, Silent};
+    use std::sync::Arc;
 
     #[test]
     fn what_was_sent_comes_in_order() {
-        let workspace = crate::spill::sorter::tests::workspace();
+        let memory = MemoryPool::new(MINIMUM_BUDGET).unwrap();
+        let folder = std::env::temp_dir();
+        let workspace =
+            Workspace::new(&folder, memory, 1, Arc::new(Silent), Cancel::new()).unwrap();
         let mut mail = Mail::new(&workspace, "mail", 3, [Word::Above; 2]).unwrap();
         for i in 0..90u32 {
             let records: Vec<_> = (0..i % 4).map(|k| [i, k]).collect();

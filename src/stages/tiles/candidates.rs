@@ -7,6 +7,7 @@ use crate::geom::aabb::Aabb;
 use crate::kernels::{
     BLOCK, Boxes, Level, Pick, box_distances, kernel, pick_body, pick_column, point_box_body,
 };
+use crate::workspace::memory::bytes_of;
 
 /// x, y, z, and a number that goes with the point. The columns are whole blocks long, with
 /// anything behind the last point.
@@ -20,6 +21,11 @@ impl Columns {
         if self.0[0].len() < room {
             self.0.iter_mut().for_each(|column| column.resize(room, 0));
         }
+    }
+
+    /// Bytes that they have room for.
+    pub fn bytes(&self) -> u64 {
+        self.0.iter().map(bytes_of).sum()
     }
 
     /// Coordinates of the first `count`.
@@ -109,6 +115,12 @@ impl PageLeaves {
                 self.leaves.push((start as u32, count as u32, id as u32));
             }
         }
+    }
+
+    /// Bytes that its lists have room for.
+    pub fn bytes(&self) -> u64 {
+        let leaves = self.boxes.bytes() + bytes_of(&self.leaves) + bytes_of(&self.places);
+        leaves + bytes_of(&self.near) + bytes_of(&self.distances) + self.points.bytes()
     }
 
     #[inline]
