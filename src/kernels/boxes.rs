@@ -29,8 +29,8 @@ impl Boxes {
 
     /// Puts in the box from `min` to `max`, of coordinates in `0..2^30`.
     pub fn push(&mut self, min: [i32; 3], max: [i32; 3], number: u32) {
-        if self.len.is_multiple_of(BLOCK) {
-            self.reserve((self.len + BLOCK).next_power_of_two());
+        if self.columns[0].len() <= self.len + BLOCK {
+            self.reserve((self.len + 1).next_power_of_two());
         }
         let words = min.into_iter().chain(max).map(i32::cast_unsigned);
         for (column, word) in self.columns.iter_mut().zip(words.chain([number])) {
@@ -60,7 +60,7 @@ impl Boxes {
         self.len == 0
     }
 
-    /// Bytes that they take.
+    /// Bytes that they have room for.
     #[must_use]
     pub fn bytes(&self) -> u64 {
         self.columns.iter().map(|c| 4 * c.capacity() as u64).sum()

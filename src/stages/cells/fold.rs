@@ -41,7 +41,7 @@ impl Seen {
     }
 
     /// Tells what the lists take, and `more` bytes.
-    fn tell(&mut self, more: u64) {
+    pub fn tell(&mut self, more: u64) {
         let lists = bytes_of(&self.here) + bytes_of(&self.begins) + bytes_of(&self.elsewhere);
         self.held.set(lists + more);
     }

@@ -213,6 +213,8 @@ fn one_tile(
     if let Some(error) = failed {
         return Err(error);
     }
+    // It has grown beside the tile and the search.
+    seen.tell(0);
     drop(tile);
     let mut cache = PageCache::default();
     for &(id, point) in &uncertain {

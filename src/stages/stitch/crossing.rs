@@ -1,10 +1,11 @@
 //! T12 insertion across blocks (paper, section 3.5, second part): block by block in ascending
-//! order, with only the surroundings of borders that are still needed in memory.
+//! order. What a turn leaves for later ones is on disk.
 
 use super::InsertStats;
 use super::base::Base;
 use super::context::Context;
-use super::interior::Interior;
+use super::interior::{Interior, RANKED};
+use super::mail::Mail;
 use super::tests_of_paper::Candidate;
 use crate::error::Result;
 use crate::spill::layouts::SENT;
@@ -31,11 +32,12 @@ crate::workspace::persist::persist!(Crossing { added, removed });
 pub struct Pass<'a> {
     context: Context<'a>,
     lives: Lives,
-    pending: Vec<Candidate>,
+    /// Candidates that wait for the turn of a later block.
+    waiting: Mail<5>,
     counts: InsertStats,
-    /// The block whose turn is next, and how many of those it needs first are loaded.
+    /// The block whose turn is next, and how many of those it needs first are ready.
     group: usize,
-    loaded: usize,
+    ready: usize,
     added: Exchange<4>,
     removed: Exchange<4>,
     cos_max_angle: f64,
@@ -59,10 +61,10 @@ impl<'a> Pass<'a> {
         Ok(Self {
             context: Context::new(base, interior, blocks, workspace)?,
             lives: Lives::of(&base.spans),
-            pending: Vec::new(),
+            waiting: Mail::new(workspace, "stitch.waiting", blocks.count(), RANKED)?,
             counts: InsertStats::default(),
             group: 0,
-            loaded: 0,
+            ready: 0,
             added: exchange("stitch.added")?,
             removed: exchange("stitch.removed")?,
             cos_max_angle,
@@ -79,8 +81,8 @@ impl<'a> Pass<'a> {
         self.lives.begin.concat()
     }
 
-    /// Takes all turns for which the blocks that are `ready` suffice. Within `most` bytes for what
-    /// is loaded, or as many as there are if it is `None`; otherwise it waits to be called again.
+    /// Takes all turns for which the blocks that are `ready` suffice. Within `most` bytes for a turn,
+    /// or as many as there are if it is `None`; otherwise it waits to be called again.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
@@ -89,51 +91,57 @@ impl<'a> Pass<'a> {
         while self.group < self.lives.begin.len() {
             self.context.workspace.check_cancel()?;
             let needed = &self.lives.begin[self.group];
-            while let Some(&block) = needed.get(self.loaded) {
-                if !ready(block) || !self.context.load(block, most)? {
+            while let Some(&block) = needed.get(self.ready) {
+                if !ready(block) {
                     return Ok(());
                 }
-                self.loaded += 1;
+                self.ready += 1;
             }
-            self.turn(self.group)?;
+            if !self.turn(self.group, most)? {
+                return Ok(());
+            }
             self.group += 1;
-            self.loaded = 0;
+            self.ready = 0;
             self.context.workspace.observer.advance(1);
         }
         Ok(())
     }
 
-    /// The turn of a block.
-    fn turn(&mut self, group: usize) -> Result<()> {
+    /// The turn of a block; false if it would take more than `most` bytes.
+    fn turn(&mut self, group: usize, most: Option<u64>) -> Result<bool> {
         let blocks = self.context.blocks;
+        let mut tried = self.waiting.get(group)?;
+        tried.append(&mut self.context.interior.ranked.get(group)?);
+        let mut tried: Vec<_> = tried.into_iter().map(Candidate::from_record).collect();
+        if !self.context.gather(&tried, most)? {
+            return Ok(false);
+        }
         let gone = self.context.joints(group)?;
         self.counts.joints_removed += gone.len() as u64;
         self.removed.send(&gone)?;
-        let here = |c: &Candidate| c.ids.iter().any(|v| blocks.of(*v) == group as u32);
-        let (mut tried, mut waiting): (Vec<_>, Vec<_>) = std::mem::take(&mut self.pending)
-            .into_iter()
-            .partition(here);
-        tried.iter_mut().for_each(|c| c.tried = 0);
-        let ranked = self.context.interior.ranked.get(group)?;
-        tried.extend(ranked.into_iter().map(Candidate::from_record));
         // Ascending runs: this sort merges them.
         tried.sort();
         let (angle, counts) = (self.cos_max_angle, &mut self.counts);
         let new = self.context.rounds(&mut tried, angle, counts);
         self.added.send(&new)?;
         // What has no vertex in a later block will not be tried again.
+        let mut waiting = Vec::new();
         for candidate in tried {
-            if blocks.of(candidate.ids[2]) > group as u32 {
-                waiting.push(candidate);
-            } else {
-                self.counts.unconnected += 1;
+            let of = candidate.ids.map(|v| blocks.of(v));
+            match of.into_iter().find(|b| *b > group as u32) {
+                Some(next) => waiting.push((next, candidate.record())),
+                None => self.counts.unconnected += 1,
             }
         }
-        self.pending = waiting;
-        for &block in &self.lives.end[group] {
-            self.context.unload(block);
+        waiting.sort_unstable();
+        for part in waiting.chunk_by(|a, b| a.0 == b.0) {
+            let records: Vec<_> = part.iter().map(|(_, record)| *record).collect();
+            self.waiting.send(part[0].0, &records)?;
         }
-        Ok(())
+        let last = &self.lives.last;
+        self.context
+            .end(|block| last[block as usize] > group as u32)?;
+        Ok(true)
     }
 
     /// Ends the pass once all turns were taken.
@@ -160,19 +168,20 @@ impl<'a> Pass<'a> {
 /// When the surroundings of each block are needed: from the first to the last group that has a
 /// candidate at one of its vertices.
 struct Lives {
+    /// The blocks that a group is the first to need.
     begin: Vec<Vec<u32>>,
-    end: Vec<Vec<u32>>,
+    /// The last group that needs a block.
+    last: Vec<u32>,
 }
 
 impl Lives {
     fn of(spans: &[(u32, u32)]) -> Self {
         let mut lives = Self {
             begin: vec![Vec::new(); spans.len()],
-            end: vec![Vec::new(); spans.len()],
+            last: spans.iter().map(|span| span.1).collect(),
         };
-        for (block, &(first, last)) in spans.iter().enumerate() {
+        for (block, &(first, _)) in spans.iter().enumerate() {
             lives.begin[first as usize].push(block as u32);
-            lives.end[last as usize].push(block as u32);
         }
         lives
     }

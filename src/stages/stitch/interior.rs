@@ -44,22 +44,24 @@ impl Interior {
     /// # Errors
     /// [`crate::Error::Io`].
     pub fn create(workspace: &Workspace, count: usize) -> Result<Self> {
-        let ranked = [
-            Word::Above,
-            Word::Above,
-            Word::Above,
-            Word::Rising,
-            Word::Rising,
-        ];
         Ok(Self {
             mesh: Sections::with_layout(workspace, "stitch.mesh", count, TRIANGLE)?,
             joints: Sections::create(workspace, "stitch.joints", count)?,
             context: Sections::with_layout(workspace, "stitch.context", count, LABELLED)?,
             vertices: Sections::create(workspace, "stitch.vertices", count)?,
-            ranked: Sections::with_layout(workspace, "stitch.ranked", count, ranked)?,
+            ranked: Sections::with_layout(workspace, "stitch.ranked", count, RANKED)?,
         })
     }
 }
+
+/// How records of candidates are packed.
+pub const RANKED: [Word; 5] = [
+    Word::Above,
+    Word::Above,
+    Word::Above,
+    Word::Rising,
+    Word::Rising,
+];
 
 /// Placeholder in a joint.
 pub const NOTHING: u32 = u32::MAX;

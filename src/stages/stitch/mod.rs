@@ -10,6 +10,7 @@ mod crossing;
 mod fans;
 mod home;
 mod interior;
+mod mail;
 mod tests_of_paper;
 
 use crate::error::Result;
@@ -182,7 +183,7 @@ fn insert(
 ) -> Result<()> {
     let order = pass.order();
     let bytes = |unit: usize| interior::block_bytes(base, order[unit] as usize);
-    // The pass takes only what the blocks at work cannot need.
+    // A turn of the pass takes only what the blocks at work cannot need.
     let most = (0..order.len()).map(bytes).max().unwrap_or(0);
     let spare = workspace.memory.available();
     let spare = spare.saturating_sub(most * workspace.threads as u64);

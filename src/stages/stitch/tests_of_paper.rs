@@ -14,6 +14,10 @@ pub trait View {
     fn count(&self, v: u32) -> usize;
     /// The position of a vertex of a triangle of the mesh or of a candidate.
     fn position(&self, v: u32) -> Point;
+    /// The position of `v`, a vertex of the triangle `number` of the mesh.
+    fn third(&self, _number: u32, v: u32) -> Point {
+        self.position(v)
+    }
 }
 
 /// Why a candidate is not inserted.
@@ -72,7 +76,7 @@ pub fn examine(
         };
         if !angle_fits(
             [t[a], t[b], t[c]].map(|v| view.position(v)),
-            view.position(far),
+            view.third(number, far),
             cos_max_angle,
         ) {
             return Err(Refusal::Angle);

@@ -7,6 +7,7 @@ use crate::geom::aabb::Aabb;
 use crate::kernels::{
     Around, BLOCK, Boxes, Level, Pick, first_bits, kernel, near_boxes, point_box_body, take_boxes,
 };
+use crate::workspace::memory::bytes_of;
 
 /// x, y, z, and a number that goes with the point. The columns are whole blocks long, with
 /// anything behind the last point.
@@ -20,6 +21,11 @@ impl Columns {
         if self.0[0].len() < room {
             self.0.iter_mut().for_each(|column| column.resize(room, 0));
         }
+    }
+
+    /// Bytes that they have room for.
+    pub fn bytes(&self) -> u64 {
+        self.0.iter().map(bytes_of).sum()
     }
 
     /// Coordinates of the first `count`.
@@ -102,6 +108,11 @@ impl PageLeaves {
         );
         self.near
             .resize((self.boxes.len() + BLOCK).max(self.near.len()), 0);
+    }
+
+    /// Bytes that its lists have room for.
+    pub fn bytes(&self) -> u64 {
+        self.boxes.bytes() + bytes_of(&self.pages) + bytes_of(&self.near)
     }
 
     /// Collects the points of all `wanted` leaves within `d2` of `around`, a box inside the page, for

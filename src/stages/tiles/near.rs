@@ -10,6 +10,7 @@ use super::{OwnPage, Tile};
 use crate::geom::aabb::Aabb;
 use crate::geom::{Point, distance2};
 use crate::kernels::{BLOCK, Level};
+use crate::workspace::memory::{Holding, bytes_of};
 use std::ops::Range;
 
 mod list;
@@ -54,6 +55,7 @@ pub struct Search {
     widened: (usize, u64),
     /// The largest such distance in the leaf that is looked at.
     wider2: u64,
+    held: Holding,
 }
 
 /// The neighbours of one point, nearest first, as far as they are known.
@@ -149,6 +151,7 @@ impl Tile {
                     guess = Some(wider.max(farthest + farthest / 4));
                 }
             }
+            search.tell();
         }
     }
 
@@ -216,6 +219,21 @@ impl Search {
             level,
             ..Self::default()
         }
+    }
+
+    /// Tells what its lists take.
+    fn tell(&mut self) {
+        let candidates = [
+            Some(&self.candidates),
+            self.aside.as_ref(),
+            Some(&self.spare),
+        ];
+        let candidates = candidates.into_iter().flatten().map(|c| c.columns.bytes());
+        let picked = self.picked.bytes() + bytes_of(&self.keys) + bytes_of(&self.places);
+        let lists = bytes_of(&self.distances) + bytes_of(&self.long_keys) + bytes_of(&self.window);
+        let bytes = candidates.sum::<u64>() + picked + lists;
+        self.held
+            .set(bytes + self.leaves.bytes() + self.near.bytes());
     }
 
     /// Whole blocks of distances; those behind the last candidate are infinite.

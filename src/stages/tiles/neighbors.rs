@@ -5,6 +5,7 @@ use super::near::Sums;
 use crate::geom::clip::Nearest;
 use crate::geom::plane::Moments;
 use crate::kernels::{Level, MOST_SUMMED, SUMMED_LIMIT2, second_moments};
+use crate::workspace::memory::bytes_of;
 
 /// Neighbours by (squared distance, id).
 #[derive(Debug, Clone, Default)]
@@ -38,6 +39,13 @@ impl Columns<'_> {
 }
 
 impl Neighbors {
+    /// Bytes that its columns have room for.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        let words = bytes_of(&self.ids) + bytes_of(&self.x) + bytes_of(&self.y) + bytes_of(&self.z);
+        words + bytes_of(&self.distances2)
+    }
+
     /// How many there are.
     #[must_use]
     pub fn len(&self) -> usize {

@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::geom::aabb::Aabb;
 use crate::geom::{Point, distance2, sub};
 use crate::stages::order::PointStore;
-use crate::workspace::memory::Holding;
+use crate::workspace::memory::{Holding, bytes_of};
 use rustc_hash::FxHashMap;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -65,6 +65,7 @@ pub struct Walk<'a> {
     /// Other points of opened pages, in no order.
     later: Vec<(u64, u32, Point)>,
     batch: usize,
+    held: Holding,
 }
 
 impl<'a> Walk<'a> {
@@ -82,6 +83,7 @@ impl<'a> Walk<'a> {
             ready: Vec::new(),
             later: Vec::new(),
             batch: BATCH,
+            held: Holding::default(),
         };
         (0..count).for_each(|index| walk.wait(level, index));
         walk
@@ -142,6 +144,9 @@ impl<'a> Walk<'a> {
         }
         self.narrow(limit);
         self.ready.sort_unstable_by_key(|p| Reverse((p.0, p.1)));
+        let nodes = self.nodes.capacity() * size_of::<Node>();
+        self.held
+            .set(nodes as u64 + bytes_of(&self.ready) + bytes_of(&self.later));
         self.batch *= 2;
         Ok(())
     }
