@@ -67,10 +67,11 @@ pub struct Tile {
 }
 
 impl Tile {
-    /// Bytes that a tile of `points` points takes with the largest halo.
+    /// Bytes that a tile of `points` points takes with the largest halo, and a search in it.
     #[must_use]
     pub fn bytes(points: usize) -> u64 {
-        (points as u64 + 256) * (1 + MOST_HALO as u64) * 15 + (3 << 20)
+        let most = (points as u64 + 256) * (1 + MOST_HALO as u64);
+        most * (15 + near::CANDIDATE) + (3 << 20)
     }
 
     /// Loads the tile of the points `ids`.
@@ -127,8 +128,15 @@ impl Tile {
         };
         tile.index(reaches);
         tile.held.set(tile.taken());
-        give_back(Self::bytes(tile.ids.len()).saturating_sub(tile.taken()));
+        let needed = tile.taken() + tile.searched();
+        give_back(Self::bytes(tile.ids.len()).saturating_sub(needed));
         Ok(tile)
+    }
+
+    /// Bytes that a search takes at most, if all that is near a page is near one of its points.
+    fn searched(&self) -> u64 {
+        let pages = self.own.iter().map(|own| own.near.len()).max();
+        (pages.unwrap_or(0) * self.page) as u64 * near::CANDIDATE
     }
 
     /// Bytes that its lists take.

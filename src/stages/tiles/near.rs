@@ -22,6 +22,10 @@ pub use sums::Sums;
 /// Bound on the relative error of approximate squared distances, and then some.
 pub(super) const APPROXIMATE: f64 = 1.0 / (1 << 20) as f64;
 
+/// Bytes that a search takes for each candidate: three times its columns, what is picked, distances and
+/// keys.
+pub(super) const CANDIDATE: u64 = 3 * 16 + 16 + 4 + 24;
+
 /// How often the limit of a query is corrected before one that is too large is taken.
 const CORRECTIONS: usize = 6;
 
