@@ -9,9 +9,9 @@
 //! follows from the block alone. Boundary edges, components and fans stay what they are.
 
 use super::around::merge;
-use super::by_end::ByLowerEnd;
 use crate::geom::{Point, sub};
 use crate::stages::located::small_normal;
+use crate::stages::surface::sides::{NONE, across, parts, side};
 use crate::stages::surface::star::Triangle;
 use crate::workspace::memory::{bytes_of, hold};
 use std::ops::Range;
@@ -26,21 +26,6 @@ const SLENDER: f64 = 0.2;
 
 /// Most sweeps over a block.
 const SWEEPS: usize = 3;
-
-/// An edge without a triangle inside the block behind it.
-const NONE: u32 = u32::MAX;
-
-/// An edge of a triangle as one word: the one opposite a corner.
-#[inline]
-fn side(triangle: u32, corner: u32) -> u32 {
-    triangle << 2 | corner
-}
-
-/// The triangle and the corner of [`side`].
-#[inline]
-fn parts(side: u32) -> (usize, usize) {
-    ((side >> 2) as usize, (side & 3) as usize)
-}
 
 /// Flips edges of the `triangles`, ascending, that touch the vertices `ids`; how many. `points` are
 /// the positions in the file, `shape` those that points were connected by: triangles none of whose
@@ -118,20 +103,21 @@ struct Flip {
 impl<'a> Sheet<'a> {
     /// Triangles by place in the block, ascending.
     fn of(these: &[Triangle], shut: Vec<bool>, points: &'a [Point]) -> Self {
-        let slot = |t: &Triangle| Slot {
+        let across = across(0..points.len() as u32, these);
+        let _held = hold(bytes_of(&across));
+        let slot = |(t, across): (&Triangle, &[u32; 3])| Slot {
             corners: *t,
-            across: [NONE; 3],
+            across: *across,
             normal: unit(normal(points, *t)),
             bends: [0.0; 3],
         };
         let mut sheet = Self {
             points,
-            slots: these.iter().map(slot).collect(),
+            slots: these.iter().zip(&across).map(slot).collect(),
             shut,
             due: vec![0; these.len().div_ceil(16)],
             flipped: vec![false; these.len()],
         };
-        sheet.pair(these);
         sheet.shut();
         sheet.bend();
         sheet
@@ -140,36 +126,6 @@ impl<'a> Sheet<'a> {
     /// Bytes of its lists.
     fn bytes(&self) -> u64 {
         bytes_of(&self.slots) + bytes_of(&self.shut) + bytes_of(&self.due) + bytes_of(&self.flipped)
-    }
-
-    /// Finds what is behind each edge.
-    fn pair(&mut self, these: &[Triangle]) {
-        let size = self.points.len() as u32;
-        let edges = ByLowerEnd::of(0..size, these);
-        // For each vertex, the last lower end that its edge to was seen from, plus one, and whose.
-        let mut seen = vec![(0u32, 0u32); size as usize];
-        let mut next = 0;
-        for v in 0..size {
-            let mut visit = |y: u32, number: u32, corner: u32| {
-                let place = &mut seen[y as usize];
-                let this = side(number, corner);
-                if place.0 == v + 1 {
-                    self.slots[number as usize].across[corner as usize] = place.1;
-                    let (other, opposite) = parts(place.1);
-                    self.slots[other].across[opposite] = this;
-                } else {
-                    *place = (v + 1, this);
-                }
-            };
-            for &number in edges.upper(v) {
-                visit(these[number as usize][2], number, 0);
-            }
-            while let Some(t) = these.get(next).filter(|t| t[0] == v) {
-                visit(t[1], next as u32, 2);
-                visit(t[2], next as u32, 1);
-                next += 1;
-            }
-        }
     }
 
     /// Shuts vertices with an edge that has nothing behind it.

@@ -5,7 +5,6 @@
 
 mod around;
 mod bridges;
-mod by_end;
 mod components;
 mod facing;
 mod fill;

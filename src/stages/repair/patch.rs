@@ -4,7 +4,7 @@
 //! No edge has more than two triangles and the surface is orientable; so it does not matter in
 //! which order edges are looked at.
 
-use super::by_end::ByLowerEnd;
+use crate::stages::surface::by_end::ByLowerEnd;
 use crate::stages::surface::parity::ParitySets;
 use crate::stages::surface::star::{EDGES, Triangle};
 use crate::workspace::memory::{Holding, bytes_of, hold};

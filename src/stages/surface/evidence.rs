@@ -5,10 +5,12 @@
 //! that reach other blocks are joined in the order of all that was seen between them.
 
 use super::parity::ParitySets;
-use super::star::{EDGES, Edges, Triangle, opposed};
+use super::sides::{NONE, across, parts};
+use super::star::{EDGES, Triangle, opposed};
 use crate::stages::located::{Located, small_normal};
 use crate::workspace::memory::{Holding, bytes_of, hold};
 use rustc_hash::FxHashMap;
+use std::ops::Range;
 
 /// Where triangles lie, and what may be inserted between them later.
 #[derive(Debug, Default)]
@@ -59,39 +61,39 @@ const STEPS: usize = 64;
 /// Two triangles at an edge, the earlier one first, and whether one must be turned against the other.
 type Pair = (u32, u32, bool);
 
-/// Joins `triangles` across the edges inside a block. Of two that would have to run both ways the
-/// later one is marked as dead; to begin with, the flattest edges are joined.
+/// Joins the `triangles` of the block of `ids`, all inside it, across their edges. Of two that would have
+/// to run both ways the later one is marked as dead; to begin with, the flattest edges are joined.
 pub fn join_inside(
+    ids: Range<u32>,
     triangles: &[Triangle],
-    edges: &Edges,
     evidence: &Evidence,
     sets: &mut ParitySets,
 ) -> Vec<bool> {
-    let mut pairs = Vec::with_capacity(triangles.len() / 2 * 3);
-    each_edge(triangles, edges, |pair| pairs.push(pair));
-    let _held = hold(bytes_of(&pairs));
+    let across = across(ids, triangles);
+    let _held = hold(bytes_of(&across));
     // Without a contradiction the order of the edges makes no difference.
-    if pairs.iter().all(|&(n, m, flip)| sets.join(n, m, flip)) {
+    if pairs(triangles, &across).all(|(n, m, flip)| sets.join(n, m, flip)) {
         return vec![false; triangles.len()];
     }
     *sets = ParitySets::new(triangles.len());
-    join_by_flatness(triangles, &pairs, evidence, sets)
+    join_by_flatness(triangles, &across, evidence, sets)
 }
 
-/// Calls `each` for every edge with two triangles.
-fn each_edge(triangles: &[Triangle], edges: &Edges, mut each: impl FnMut(Pair)) {
-    for (n, t) in (0..).zip(triangles) {
-        for (a, b, ..) in EDGES {
-            for m in edges.at(t[a], t[b]).filter(|m| *m > n) {
-                each((n, m, opposed(*t, triangles[m as usize], t[a], t[b])));
-            }
-        }
-    }
+/// The triangles at each edge with two of them.
+fn pairs<'a>(triangles: &'a [Triangle], across: &'a [[u32; 3]]) -> impl Iterator<Item = Pair> + 'a {
+    let all = (0..).zip(triangles.iter().zip(across));
+    all.flat_map(move |(n, (t, across))| {
+        EDGES.into_iter().filter_map(move |(a, b, opposite, _)| {
+            let (m, _) = parts(across[opposite]);
+            let both = across[opposite] != NONE && m > n as usize;
+            both.then(|| (n, m as u32, opposed(*t, triangles[m], t[a], t[b])))
+        })
+    })
 }
 
 fn join_by_flatness(
     triangles: &[Triangle],
-    pairs: &[Pair],
+    across: &[[u32; 3]],
     evidence: &Evidence,
     sets: &mut ParitySets,
 ) -> Vec<bool> {
@@ -104,7 +106,7 @@ fn join_by_flatness(
             dead[m as usize] = true;
         }
     };
-    for &(n, m, flip) in pairs {
+    for (n, m, flip) in pairs(triangles, across) {
         let cosine = cosine(normals[n as usize], normals[m as usize], flip);
         if cosine > FLAT {
             join((n, m, flip));

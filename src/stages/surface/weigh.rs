@@ -26,7 +26,7 @@ pub(super) fn weigh_block(
     }
     let mut sets = ParitySets::new(inner.len());
     let mut held = hold(5 * inner.len() as u64);
-    let dead = join_inside(inner, &edges, evidence, &mut sets);
+    let dead = join_inside(ids.clone(), inner, evidence, &mut sets);
     let kept: Vec<u32> = (0..inner.len() as u32)
         .filter(|n| !dead[*n as usize])
         .collect();

@@ -28,18 +28,16 @@ fn band(wide: usize, twist: bool, names: &[u32], gone: &[usize]) -> Vec<Triangle
 }
 
 /// Joins them, in one block, with their points where `places` says.
-fn joined(triangles: &[Triangle], places: &[Point]) -> (Edges, ParitySets, Vec<bool>) {
+fn joined(triangles: &[Triangle], places: &[Point]) -> (ParitySets, Vec<bool>) {
     let ids = 0..places.len() as u32;
-    let mut edges = Edges::with_room(ids, triangles);
-    (0..).zip(triangles).for_each(|(n, t)| edges.add(*t, n));
     let evidence = Evidence {
         held: Default::default(),
         places: Located::of(places),
         candidates: Vec::new(),
     };
     let mut sets = ParitySets::new(triangles.len());
-    let dead = join_inside(triangles, &edges, &evidence, &mut sets);
-    (edges, sets, dead)
+    let dead = join_inside(ids, triangles, &evidence, &mut sets);
+    (sets, dead)
 }
 
 /// Ids in some order, and places.
@@ -57,15 +55,15 @@ proptest! {
         gone in prop::collection::vec(0usize..36, 0..9),
     ) {
         let triangles = band(9, twist, &names, &gone);
-        let (edges, mut sets, dead) = joined(&triangles, &places);
+        let (mut sets, dead) = joined(&triangles, &places);
+        let across = across(0..places.len() as u32, &triangles);
         let mut contradicted = vec![false; triangles.len()];
-        each_edge(&triangles, &edges, |(n, m, flip)| {
+        for (n, m, flip) in pairs(&triangles, &across) {
             let fits = sets.relation(n, m) == Some(flip);
             let alive = !dead[n as usize] && !dead[m as usize];
             assert!(fits || !alive, "{n} and {m} are left and contradict");
             contradicted[m as usize] |= !fits;
-
-        });
+        }
         for (dead, contradicted) in dead.iter().zip(contradicted) {
             prop_assert!(!dead || contradicted);
         }
@@ -85,7 +83,7 @@ fn the_surface_is_cut_where_it_is_folded() {
             [(along + 7) % 12 * 10, across * 10, along % 2]
         })
         .collect();
-    let (_, _, dead) = joined(&triangles, &places);
+    let (_, dead) = joined(&triangles, &places);
     let removed = (0..triangles.len()).filter(|&n| dead[n]);
     let removed: Vec<Triangle> = removed.map(|n| triangles[n]).collect();
     assert!(!removed.is_empty());
@@ -163,6 +161,6 @@ fn a_removed_triangle_removes_no_others() {
         [4, 3, 2],
         [4, 1, 1],
     ];
-    let (_, _, dead) = joined(&triangles, &places);
+    let (_, dead) = joined(&triangles, &places);
     assert_eq!(dead.iter().filter(|dead| **dead).count(), 1);
 }

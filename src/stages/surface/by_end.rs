@@ -1,6 +1,6 @@
 //! The edges inside a block, by their lower ends.
 
-use crate::stages::surface::star::Triangle;
+use super::star::Triangle;
 use crate::workspace::memory::bytes_of;
 use std::ops::Range;
 
