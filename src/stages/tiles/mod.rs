@@ -27,6 +27,9 @@ const LEAVES: usize = BLOCK;
 /// Most halo pages for each page of the tile itself.
 const MOST_HALO: usize = 4;
 
+/// Pages that are read at a time, if they follow each other.
+const READ: usize = 16;
+
 /// A neighbour of a point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Near {
@@ -104,7 +107,8 @@ impl Tile {
         let mut start = 0;
         while start < wanted.len() {
             let mut end = start + 1;
-            while end < wanted.len() && wanted[end] == wanted[end - 1] + 1 {
+            let next = |end: usize| wanted[end] == wanted[end - 1] + 1;
+            while end < wanted.len() && end - start < READ && next(end) {
                 end += 1;
             }
             read.clear();

@@ -9,29 +9,38 @@ use std::ops::Range;
 /// Points in columns, with a block more than there are points: a whole block can be read anywhere.
 #[derive(Debug)]
 pub(super) struct Points {
-    columns: [Vec<i32>; 3],
+    /// The columns one after the other: one list, so that the allocator has one to find room for.
+    words: Vec<i32>,
+    /// Words of a column.
+    column: usize,
     len: usize,
 }
 
 impl Points {
     /// None yet, with room for `count`.
     pub fn with_capacity(count: usize) -> Self {
+        let column = count + BLOCK;
         Self {
-            columns: [0; 3].map(|_| vec![0; count + BLOCK]),
+            words: vec![0; 3 * column],
+            column,
             len: 0,
         }
     }
 
-    /// Adds points.
+    /// Adds points, for which there is room.
     pub fn extend(&mut self, points: &[Point]) {
         let end = self.len + points.len();
-        for (axis, column) in self.columns.iter_mut().enumerate() {
-            column.resize(column.len().max(end + BLOCK), 0);
+        for (axis, column) in self.words.chunks_exact_mut(self.column).enumerate() {
             for (to, point) in column[self.len..end].iter_mut().zip(points) {
                 *to = point[axis];
             }
         }
         self.len = end;
+    }
+
+    #[inline(always)]
+    fn columns(&self) -> [&[i32]; 3] {
+        [0, 1, 2].map(|axis: usize| &self.words[axis * self.column..][..self.column])
     }
 
     /// How many there are.
@@ -41,13 +50,13 @@ impl Points {
 
     #[inline(always)]
     pub fn get(&self, index: usize) -> Point {
-        [0, 1, 2].map(|axis: usize| self.columns[axis][index])
+        self.columns().map(|column| column[index])
     }
 
     /// The smallest box around some of them.
     pub fn bounds(&self, range: Range<usize>) -> Aabb {
         let mut bounds = Aabb::EMPTY;
-        for (axis, column) in self.columns.iter().enumerate() {
+        for (axis, column) in self.columns().into_iter().enumerate() {
             let column = &column[range.clone()];
             let (min, max) = (&mut bounds.min[axis], &mut bounds.max[axis]);
             *min = column.iter().fold(*min, |a, b| a.min(*b));
@@ -59,13 +68,13 @@ impl Points {
     /// Their coordinates.
     #[inline(always)]
     pub fn coordinates(&self) -> [&[i32]; 3] {
-        self.columns.each_ref().map(|column| &column[..self.len])
+        self.columns().map(|column| &column[..self.len])
     }
 
     /// The coordinates of a block of points, some of which may be none.
     #[inline(always)]
     pub fn block(&self, start: usize) -> Option<[&[i32; BLOCK]; 3]> {
-        let [x, y, z] = &self.columns;
+        let [x, y, z] = self.columns();
         Some([
             x.get(start..)?.first_chunk()?,
             y.get(start..)?.first_chunk()?,
@@ -75,6 +84,6 @@ impl Points {
 
     /// Bytes that they take.
     pub fn bytes(&self) -> u64 {
-        self.columns.iter().map(bytes_of).sum()
+        bytes_of(&self.words)
     }
 }
