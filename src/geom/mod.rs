@@ -6,6 +6,7 @@ pub mod hilbert;
 pub mod lattice;
 pub mod plane;
 pub mod predicate;
+pub(crate) mod round;
 
 /// A position on the lattice, each coordinate in `0..2^30`.
 pub type Point = [i32; 3];

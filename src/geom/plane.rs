@@ -7,7 +7,7 @@ mod spread;
 
 use crate::kernels::eight::Eight;
 use crate::kernels::{LANES, kernel};
-use spread::{Spread, extent, rounded};
+use spread::{Spread, extent, normal};
 
 /// A direction as an integer vector; its longest component is about [`NORMAL_SCALE`].
 ///
@@ -76,6 +76,7 @@ impl Moments {
     }
 
     /// Covariance times the number of points (the point itself among them), in squared steps.
+    #[inline(always)]
     fn scatter(&self) -> [f64; 6] {
         // Machine words where everything fits: almost always.
         let m = self.count + 1;
@@ -95,6 +96,7 @@ impl Moments {
         self.wide_scatter().map(|x| x as f64)
     }
 
+    #[cold]
     fn wide_scatter(&self) -> [i128; 6] {
         let m = i128::from(self.count + 1);
         let s = self.sum.map(i128::from);
@@ -136,13 +138,15 @@ impl Moments {
 
     /// Offset from the point to its foot on the plane with `normal` through the centroid, in steps.
     #[must_use]
-    pub fn project(&self, normal: Normal) -> [f64; 3] {
-        let n = normal.map(f64::from);
+    #[inline]
+    pub fn project(&self, [x, y, z]: Normal) -> [f64; 3] {
+        let n = [f64::from(x), f64::from(y), f64::from(z)];
         let m = (self.count + 1) as f64;
-        let c = self.sum.map(|s| s as f64 / m);
+        let [x, y, z] = self.sum;
+        let c = [x as f64 / m, y as f64 / m, z as f64 / m];
         let along =
             (c[0] * n[0] + c[1] * n[1] + c[2] * n[2]) / (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
-        n.map(|x| x * along)
+        [n[0] * along, n[1] * along, n[2] * along]
     }
 }
 
@@ -189,9 +193,9 @@ fn planes_body<F: Eight>(moments: &[Moments; LANES]) -> [Plane; LANES] {
             *plane = moments[lane].plane();
             continue;
         }
-        let [x, y, z] = [0, 1, 2].map(|axis: usize| rounded(directions[axis][lane]));
+        let [x, y, z] = &directions;
         *plane = Plane {
-            normal: Some([x, y, z]),
+            normal: Some(normal([x[lane], y[lane], z[lane]])),
             spans: true,
             wide: narrow >> lane & 1 == 0,
         };

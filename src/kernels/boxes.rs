@@ -43,9 +43,10 @@ impl Boxes {
     #[must_use]
     #[inline]
     pub fn get(&self, index: usize) -> ([i32; 3], [i32; 3]) {
-        let corner =
-            |first: usize| [0, 1, 2].map(|axis: usize| self.columns[first + axis][index] as i32);
-        (corner(0), corner(3))
+        let [x0, y0, z0, x1, y1, z1, _] = &self.columns;
+        let min = [x0[index] as i32, y0[index] as i32, z0[index] as i32];
+        let max = [x1[index] as i32, y1[index] as i32, z1[index] as i32];
+        (min, max)
     }
 
     /// Number of boxes.

@@ -2,6 +2,7 @@
 //! eight at a time.
 
 use super::{NORMAL_SCALE, Normal};
+use crate::geom::round::rounded;
 use crate::kernels::eight::Numbers;
 
 /// If the middle eigenvalue is below this share of the largest, the points lie on a line.
@@ -106,8 +107,7 @@ impl Spread<f64> {
     pub fn normal(&self) -> Option<Normal> {
         let (direction, length) = self.direction();
         if length > 0.0 && length.is_finite() {
-            let [x, y, z] = direction;
-            return Some([rounded(x), rounded(y), rounded(z)]);
+            return Some(normal(direction));
         }
         self.across()
     }
@@ -127,7 +127,7 @@ impl Spread<f64> {
         axis[least] = 1.0;
         let across = cross(row, axis);
         let length = length2(across).sqrt();
-        (length > 0.0).then(|| across.map(|x| rounded(x / length * NORMAL_SCALE)))
+        (length > 0.0).then(|| normal(across.map(|x| x / length * NORMAL_SCALE)))
     }
 }
 
@@ -178,26 +178,8 @@ fn least_eigenvalue<F: Numbers>(m: &[F; 6]) -> F {
     x
 }
 
-/// The nearest integer, away from zero in the middle, as `round` has it, without a call.
+/// A direction of the length of a [`Normal`] as one.
 #[inline]
-pub(super) fn rounded(x: f64) -> i32 {
-    let whole = x as i32;
-    let rest = x - f64::from(whole);
-    whole + i32::from(rest >= 0.5) - i32::from(rest <= -0.5)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    proptest! {
-        #[test]
-        fn rounding_is_to_the_nearest(x in -(1 << 24)..=1i32 << 24, part in -1.0f64..1.0) {
-            for x in [f64::from(x) + part, f64::from(x) + 0.5, 0.499_999_999_999_999_94] {
-                prop_assert_eq!(rounded(x), x.round() as i32);
-                prop_assert_eq!(rounded(-x), (-x).round() as i32);
-            }
-        }
-    }
+pub(super) fn normal([x, y, z]: [f64; 3]) -> Normal {
+    [rounded(x) as i32, rounded(y) as i32, rounded(z) as i32]
 }

@@ -16,6 +16,7 @@ pub use relax::{RelaxStats, Relaxed, relax};
 use crate::error::Result;
 use crate::geom::Point;
 use crate::geom::lattice::COORDINATE_LIMIT;
+use crate::geom::round::rounded;
 use crate::params::Smoothing;
 use crate::stages::cells::{Fit, TileRanges};
 use crate::stages::order::PointStore;
@@ -74,7 +75,7 @@ fn project(point: Point, fit: &Fit) -> Point {
 
 fn moved(point: Point, offset: [f64; 3]) -> Point {
     std::array::from_fn(|axis| {
-        let moved = i64::from(point[axis]) + offset[axis].round() as i64;
+        let moved = i64::from(point[axis]).saturating_add(rounded(offset[axis]));
         moved.clamp(0, COORDINATE_LIMIT - 1) as i32
     })
 }

@@ -31,14 +31,20 @@ impl Columns {
     /// Coordinates of the first `count`.
     #[inline(always)]
     pub fn coordinates(&self, count: usize) -> [&[i32]; 3] {
-        [0, 1, 2].map(|axis| bytemuck::cast_slice(&self.0[axis][..count]))
+        let [x, y, z, _] = &self.0;
+        [
+            bytemuck::cast_slice(&x[..count]),
+            bytemuck::cast_slice(&y[..count]),
+            bytemuck::cast_slice(&z[..count]),
+        ]
     }
 
     /// A point and its number.
     #[inline(always)]
     pub fn get(&self, place: usize) -> (Point, u32) {
-        let at = [0, 1, 2].map(|axis| self.0[axis][place] as i32);
-        (at, self.0[3][place])
+        let [x, y, z, numbers] = &self.0;
+        let at = [x[place] as i32, y[place] as i32, z[place] as i32];
+        (at, numbers[place])
     }
 
     /// The numbers of the first `count`.
@@ -50,19 +56,25 @@ impl Columns {
     /// Whole blocks of the first `count`, a multiple of a block.
     #[inline(always)]
     pub fn blocks(&self, count: usize) -> [&[[u32; BLOCK]]; 4] {
-        self.0
-            .each_ref()
-            .map(|column| column[..count].as_chunks().0)
+        let [x, y, z, numbers] = &self.0;
+        [
+            x[..count].as_chunks().0,
+            y[..count].as_chunks().0,
+            z[..count].as_chunks().0,
+            numbers[..count].as_chunks().0,
+        ]
     }
 
     #[inline(always)]
     pub fn slices(&self) -> [&[u32]; 4] {
-        self.0.each_ref().map(Vec::as_slice)
+        let [x, y, z, numbers] = &self.0;
+        [x, y, z, numbers]
     }
 
     #[inline(always)]
     pub fn slices_mut(&mut self) -> [&mut [u32]; 4] {
-        self.0.each_mut().map(Vec::as_mut_slice)
+        let [x, y, z, numbers] = &mut self.0;
+        [x, y, z, numbers]
     }
 }
 
@@ -178,12 +190,12 @@ fn pick_leaves_body<P: Pick>(
                 break;
             };
             let mut distances = [0.0; BLOCK];
-            let [x, y, z] = columns.map(<[i32; BLOCK]>::as_slice);
+            let [x, y, z] = columns;
             point_box_body([x, y, z], around.min, around.max, &mut distances);
             let within = P::within(&distances, around.limit) & first_bits(range.end - start);
             let mut ids = [first + (start - range.start) as u32; BLOCK];
             (0..).zip(&mut ids).for_each(|(n, id)| *id += n);
-            let [x, y, z] = columns.map(bytemuck::cast_ref);
+            let [x, y, z] = [x, y, z].map(bytemuck::cast_ref);
             for (from, to) in [x, y, z, &ids].into_iter().zip(&mut to) {
                 if let Some(to) = to[count..].first_chunk_mut() {
                     P::pack(from, within, to);

@@ -40,7 +40,9 @@ impl Points {
 
     #[inline(always)]
     fn columns(&self) -> [&[i32]; 3] {
-        [0, 1, 2].map(|axis: usize| &self.words[axis * self.column..][..self.column])
+        let (x, others) = self.words.split_at(self.column);
+        let (y, z) = others.split_at(self.column);
+        [x, y, z]
     }
 
     /// How many there are.
@@ -50,7 +52,8 @@ impl Points {
 
     #[inline(always)]
     pub fn get(&self, index: usize) -> Point {
-        self.columns().map(|column| column[index])
+        let [x, y, z] = self.columns();
+        [x[index], y[index], z[index]]
     }
 
     /// The smallest box around some of them.
@@ -68,7 +71,8 @@ impl Points {
     /// Their coordinates.
     #[inline(always)]
     pub fn coordinates(&self) -> [&[i32]; 3] {
-        self.columns().map(|column| &column[..self.len])
+        let [x, y, z] = self.columns();
+        [&x[..self.len], &y[..self.len], &z[..self.len]]
     }
 
     /// The coordinates of a block of points, some of which may be none.
