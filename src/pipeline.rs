@@ -179,12 +179,11 @@ impl Reconstruction {
             })?;
         }
         let relaxed = if params.relax > 0 {
-            Some(clock.stage(
-                "relax",
-                "points",
-                points * u64::from(params.relax + 1),
-                || relax(&store, tiles, params.neighbors, params.relax, workspace),
-            )?)
+            Some(
+                clock.stage("relax", "points", points * u64::from(params.relax), || {
+                    relax(&store, tiles, params.neighbors, params.relax, workspace)
+                })?,
+            )
         } else {
             None
         };

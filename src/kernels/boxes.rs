@@ -108,9 +108,7 @@ fn near_body<P: Pick>(boxes: &Boxes, around: Around, to: &mut [u32]) -> usize {
             break;
         };
         let within = within_body::<P>(block, around) & first_bits(boxes.len - start);
-        if let Some(to) = to[count..].first_chunk_mut() {
-            P::pack(block[6], within, to);
-        }
+        P::pack_at(block[6], within, to, count);
         count += within.count_ones() as usize;
     }
     count
@@ -133,9 +131,7 @@ fn take_body<P: Pick>(from: &Boxes, blocks: &[(u32, u32)], around: Around, to: &
             continue;
         }
         for (from, to_column) in block.iter().zip(&mut to.columns) {
-            if let Some(to) = to_column[to.len..].first_chunk_mut() {
-                P::pack(from, within, to);
-            }
+            P::pack_at(from, within, to_column, to.len);
         }
         to.len += within.count_ones() as usize;
     }

@@ -22,6 +22,14 @@ pub(crate) trait Pick {
     /// The values whose bits are set, in their order, at the front of `to`; what is behind them there
     /// has no meaning.
     fn pack(values: &[u32; BLOCK], bits: u32, to: &mut [u32; BLOCK]);
+
+    /// As [`Pick::pack`], at place `at` of a column that has room for a block there.
+    #[inline(always)]
+    fn pack_at(values: &[u32; BLOCK], bits: u32, to: &mut [u32], at: usize) {
+        if let Some(to) = to[at..].first_chunk_mut() {
+            Self::pack(values, bits, to);
+        }
+    }
 }
 
 impl Pick for Base {
@@ -57,9 +65,7 @@ pub(crate) fn pick_body<P: Pick, const N: usize>(
     for (block, numbers) in numbers.as_chunks::<BLOCK>().0.iter().enumerate() {
         let bits = P::within(numbers, limit);
         for (from, to) in from.iter().zip(&mut to) {
-            if let Some(to) = to[count..].first_chunk_mut() {
-                P::pack(&from[block], bits, to);
-            }
+            P::pack_at(&from[block], bits, to, count);
         }
         count += bits.count_ones() as usize;
     }

@@ -38,20 +38,10 @@ pub fn each_plane(
     each: impl FnMut(usize, Point, Fit),
 ) -> Result<()> {
     let look = |tile: &Tile, found: &mut Found<'_, Fit>| {
-        let mut search = Search::default();
         if widen == Widen::Never {
-            let mut several = Several::default();
-            tile.for_some_sums(
-                neighbors,
-                &mut search,
-                &wanted,
-                |id, point, sums| match sums {
-                    Some(sums) => several.add(id, point, sums, found),
-                    None => found(id, point, Ok(None)),
-                },
-            );
-            several.fit(found);
+            each_sum(tile, neighbors, &wanted, found);
         } else {
+            let mut search = Search::default();
             tile.for_some_queries(neighbors, &mut search, &wanted, |id, point, query| {
                 let fit = query.map(|mut query| fit_in_tile(&mut query, neighbors, widen));
                 found(id, point, fit.transpose().map(Option::flatten));
@@ -62,6 +52,61 @@ pub fn each_plane(
         fit_in_store(store, cache, id, point, neighbors, widen)
     };
     each_found(store, ids, &wanted, look, in_store, each)
+}
+
+/// A tile that is asked for planes more than once, of exactly the nearest neighbours.
+pub(super) struct Planes<'a> {
+    store: &'a PointStore,
+    tile: Tile,
+    neighbors: usize,
+}
+
+impl<'a> Planes<'a> {
+    /// The tile of the points `ids`, and so many neighbours.
+    pub fn load(store: &'a PointStore, ids: Range<usize>, neighbors: usize) -> Result<Self> {
+        Ok(Self {
+            store,
+            tile: Tile::load(store, ids)?,
+            neighbors,
+        })
+    }
+
+    /// Calls `each` with the plane of every point whose id is `wanted`.
+    pub fn each(
+        &self,
+        wanted: impl Fn(usize) -> bool,
+        mut each: impl FnMut(usize, Point, Fit),
+    ) -> Result<()> {
+        let look = |tile: &Tile, found: &mut Found<'_, Fit>| {
+            each_sum(tile, self.neighbors, &wanted, found);
+        };
+        let uncertain = look_in_tile(&self.tile, look, &mut each)?;
+        let in_store = |cache: &mut PageCache, id: u32, point: Point| {
+            fit_in_store(self.store, cache, id, point, self.neighbors, Widen::Never)
+        };
+        look_in_store(&uncertain, in_store, each)
+    }
+}
+
+/// Calls `found` with the planes of the `wanted` points.
+fn each_sum(
+    tile: &Tile,
+    neighbors: usize,
+    wanted: impl Fn(usize) -> bool,
+    found: &mut Found<'_, Fit>,
+) {
+    let mut several = Several::default();
+    let mut search = Search::default();
+    tile.for_some_sums(
+        neighbors,
+        &mut search,
+        wanted,
+        |id, point, sums| match sums {
+            Some(sums) => several.add(id, point, sums, found),
+            None => found(id, point, Ok(None)),
+        },
+    );
+    several.fit(found);
 }
 
 /// Calls `each` with what `of` makes of the neighbours of every point of a tile: at least the `count`
@@ -105,7 +150,7 @@ struct Several {
 }
 
 impl Several {
-    fn add(&mut self, id: u32, point: Point, sums: Sums, found: &mut Found<'_, Fit>) {
+    fn add(&mut self, id: u32, point: Point, sums: &Sums, found: &mut Found<'_, Fit>) {
         self.points[self.count] = (id, point);
         self.moments[self.count] = sums.moments;
         self.lasts[self.count] = sums.last2;
@@ -145,23 +190,39 @@ fn each_found<T>(
     ids: Range<usize>,
     wanted: &impl Fn(usize) -> bool,
     look: impl FnOnce(&Tile, &mut Found<'_, T>),
-    mut in_store: impl FnMut(&mut PageCache, u32, Point) -> Result<Option<T>>,
+    in_store: impl FnMut(&mut PageCache, u32, Point) -> Result<Option<T>>,
     mut each: impl FnMut(usize, Point, T),
 ) -> Result<()> {
     let tile = Tile::load_some(store, ids, wanted)?;
+    let uncertain = look_in_tile(&tile, look, &mut each)?;
+    drop(tile);
+    look_in_store(&uncertain, in_store, each)
+}
+
+/// Calls `each` with what `look` finds; the points of which the tile does not know enough.
+fn look_in_tile<T>(
+    tile: &Tile,
+    look: impl FnOnce(&Tile, &mut Found<'_, T>),
+    mut each: impl FnMut(usize, Point, T),
+) -> Result<Vec<(u32, Point)>> {
     let mut uncertain = Vec::new();
     let mut failed = None;
-    look(&tile, &mut |id, point, found| match found {
+    look(tile, &mut |id, point, found| match found {
         Ok(Some(found)) => each(id as usize, point, found),
         Ok(None) => uncertain.push((id, point)),
         Err(error) => failed = Some(error),
     });
-    if let Some(error) = failed {
-        return Err(error);
-    }
-    drop(tile);
+    failed.map_or(Ok(uncertain), Err)
+}
+
+/// Calls `each` with what is found around these points in the whole store.
+fn look_in_store<T>(
+    points: &[(u32, Point)],
+    mut in_store: impl FnMut(&mut PageCache, u32, Point) -> Result<Option<T>>,
+    mut each: impl FnMut(usize, Point, T),
+) -> Result<()> {
     let mut cache = PageCache::default();
-    for (id, point) in uncertain {
+    for &(id, point) in points {
         if let Some(found) = in_store(&mut cache, id, point)? {
             each(id as usize, point, found);
         }

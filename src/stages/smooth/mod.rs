@@ -4,6 +4,7 @@
 //! Ids stay as they are; only positions and the boxes around them change.
 
 mod edges;
+mod first;
 mod fits;
 mod pass;
 mod relax;
@@ -24,7 +25,7 @@ use crate::stages::tiles::neighbors::Neighbors;
 use crate::workspace::Workspace;
 use edges::Around;
 use fits::each_fit;
-use pass::Pass;
+use pass::{Pass, RUN};
 use std::ops::Range;
 
 /// One round of smoothing: the same points, each on the plane of its `neighbors` nearest, or on
@@ -45,6 +46,8 @@ pub fn smooth(
         file: &format!("points{round}"),
         memory: "smooth: tile",
         tile: tiles.size(),
+        whole: RUN,
+        bytes: 0,
     };
     let work = |ids: Range<usize>, points: &mut [Point]| match smoothing {
         Smoothing::Plain => {

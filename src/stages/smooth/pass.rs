@@ -22,6 +22,10 @@ pub(super) struct Pass<'a> {
     pub memory: &'static str,
     /// Points at a time, about.
     pub tile: u32,
+    /// Points that are not divided: a multiple of [`RUN`].
+    pub whole: usize,
+    /// Bytes for each point beside its tile and its place.
+    pub bytes: u64,
 }
 
 impl Pass<'_> {
@@ -34,11 +38,12 @@ impl Pass<'_> {
         work: impl Fn(Range<usize>, &mut [Point]) -> Result<T> + Sync,
         mut each: impl FnMut(T) + Send,
     ) -> Result<PointStore> {
-        let size = (self.tile as usize).next_multiple_of(store.page_size() * RUN);
+        let whole = common_multiple(store.page_size() * RUN, self.whole);
+        let size = (self.tile as usize).next_multiple_of(whole);
         let piece = |number: usize| number * size..((number + 1) * size).min(store.len());
         let bytes = |number: usize| {
             let points = piece(number).len();
-            Tile::bytes(points) + PageCache::bytes(store) + points as u64 * 12
+            Tile::bytes(points) + PageCache::bytes(store) + points as u64 * (12 + self.bytes)
         };
         let moved = Rewriter::of(store, workspace, self.file)?;
         let one = |number| {
@@ -57,4 +62,12 @@ impl Pass<'_> {
         })?;
         moved.finish(workspace)
     }
+}
+
+fn common_multiple(a: usize, b: usize) -> usize {
+    let (mut larger, mut rest) = (a, b);
+    while rest > 0 {
+        (larger, rest) = (rest, larger % rest);
+    }
+    a / larger.max(1) * b
 }

@@ -5,6 +5,7 @@
 //! Restricted Voronoi cells disagree where points lie off the surface by a part of their spacing. So
 //! points move only there: patches of points that are smooth already cost a look at some of them.
 
+use super::first;
 use super::fits::each_fit;
 use super::moved;
 use super::pass::{Pass, RUN};
@@ -12,32 +13,14 @@ use crate::error::Result;
 use crate::geom::Point;
 use crate::stages::cells::{Fit, TileRanges};
 use crate::stages::order::PointStore;
-use crate::stages::tiles::Tile;
-use crate::stages::tiles::walk::PageCache;
 use crate::workspace::Workspace;
 use crate::workspace::memory::Reservation;
 use crate::workspace::persist::persist;
 use serde::Serialize;
 use std::ops::Range;
-use std::sync::atomic::{AtomicU8, Ordering};
-
-/// Runs in a patch: with ids along a curve, a small piece of surface.
-const PATCH: usize = 16;
-
-/// Every so many runs one is looked at first.
-const SAMPLE: usize = 8;
 
 /// A point is rough if it lies farther from its plane than this part of the local spacing.
 const ROUGH: f64 = 0.3;
-
-/// A patch moves if more than one in so many points that were looked at is rough.
-const SHARE: usize = 16;
-
-/// Patches in a region.
-const REGION: usize = 256;
-
-/// Nothing moves in a region of which fewer than one patch in so many is rough.
-const EDGES: usize = 4;
 
 /// A run that moved moves again if at least so many of its points were rough.
 const RAGGED: u8 = 1;
@@ -62,10 +45,9 @@ pub struct RelaxStats {
 
 /// Which runs of ids move, and what was seen of them.
 struct Runs {
-    points: usize,
     active: Vec<bool>,
     /// Rough points of each.
-    rough: Vec<AtomicU8>,
+    rough: Vec<u8>,
     _held: Reservation,
 }
 
@@ -74,67 +56,26 @@ impl Runs {
         let count = points.div_ceil(RUN);
         Ok(Self {
             _held: workspace.reserve("relax: runs", count as u64 * 2)?,
-            points,
             active: vec![false; count],
-            rough: (0..count).map(|_| AtomicU8::new(0)).collect(),
+            rough: vec![0; count],
         })
-    }
-
-    fn is_sampled(id: usize) -> bool {
-        (id / RUN).is_multiple_of(SAMPLE)
-    }
-
-    /// Takes in what was seen of a range of ids.
-    fn add(&self, seen: &Seen) {
-        for (rough, more) in self.rough[seen.first..].iter().zip(&seen.rough) {
-            rough.fetch_add(*more, Ordering::Relaxed);
-        }
-    }
-
-    /// The patches move in which enough was rough of what was looked at, unless they are few in their
-    /// region: then they lie along edges and not in noise.
-    fn choose(&mut self) {
-        let points = self.points;
-        let regions = self.active.chunks_mut(PATCH * REGION);
-        let rough = self.rough.chunks_mut(PATCH * REGION);
-        for (number, (active, rough)) in regions.zip(rough).enumerate() {
-            let start = number * PATCH * REGION * RUN;
-            let patches = active.chunks_mut(PATCH).zip(rough.chunks_mut(PATCH));
-            let mut moving = 0;
-            for (patch, (active, rough)) in patches.enumerate() {
-                let start = start + patch * PATCH * RUN;
-                let seen =
-                    (start..points.min(start + PATCH * RUN)).filter(|id| Self::is_sampled(*id));
-                let rough: usize = rough
-                    .iter_mut()
-                    .map(|r| usize::from(std::mem::take(r.get_mut())))
-                    .sum();
-                if rough * SHARE > seen.count() {
-                    active.fill(true);
-                    moving += 1;
-                }
-            }
-            if moving * EDGES < active.len().div_ceil(PATCH) {
-                active.fill(false);
-            }
-        }
     }
 
     /// Runs move again in which enough was rough.
     fn settle(&mut self) {
         for (active, rough) in self.active.iter_mut().zip(&mut self.rough) {
-            *active &= std::mem::take(rough.get_mut()) >= RAGGED;
+            *active &= std::mem::take(rough) >= RAGGED;
         }
     }
 }
 
 /// What was seen of a range of ids.
-struct Seen {
+pub(super) struct Seen {
     /// Its first run.
     first: usize,
     /// Rough points of each run.
     rough: Vec<u8>,
-    moved: u64,
+    pub(super) moved: u64,
 }
 
 persist!(Seen {
@@ -144,7 +85,7 @@ persist!(Seen {
 });
 
 impl Seen {
-    fn of(ids: &Range<usize>) -> Self {
+    pub(super) fn of(ids: &Range<usize>) -> Self {
         let first = ids.start / RUN;
         Self {
             first,
@@ -153,8 +94,13 @@ impl Seen {
         }
     }
 
-    fn note(&mut self, id: usize, rough: bool) {
+    pub(super) fn note(&mut self, id: usize, rough: bool) {
         self.rough[id / RUN - self.first] += u8::from(rough);
+    }
+
+    /// Takes over what was seen of each run.
+    fn put(self, rough: &mut [u8]) {
+        rough[self.first..][..self.rough.len()].copy_from_slice(&self.rough);
     }
 }
 
@@ -179,53 +125,58 @@ pub fn relax(
         stats: RelaxStats::default(),
     };
     let mut runs = Runs::new(store.len(), workspace)?;
-    if rounds > 0 {
-        workspace.part("sample", || {
-            sample(store, tiles, neighbors, &runs, workspace)
-        })?;
-        runs.choose();
-    }
     for round in 1..=rounds {
-        if round > 1 {
-            runs.settle();
+        let current = relaxed.store.as_ref().unwrap_or(store);
+        let (next, moved) = if round == 1 {
+            first_round(current, tiles, neighbors, &mut runs, workspace)?
+        } else {
+            one_round(current, tiles, neighbors, round, &mut runs, workspace)?
+        };
+        if moved > 0 {
+            relaxed.store = Some(next);
+            relaxed.stats.rounds = round;
+            relaxed.stats.moved += moved;
         }
+        runs.settle();
         if !runs.active.contains(&true) {
-            let left = u64::from(rounds + 1 - round) * store.len() as u64;
+            let left = u64::from(rounds - round) * store.len() as u64;
             workspace.observer.advance(left);
             break;
         }
-        let current = relaxed.store.as_ref().unwrap_or(store);
-        let (next, moved) = one_round(current, tiles, neighbors, round, &runs, workspace)?;
-        relaxed.store = Some(next);
-        relaxed.stats.rounds = round;
-        relaxed.stats.moved += moved;
     }
     Ok(relaxed)
 }
 
-/// Looks at some points of every patch.
-fn sample(
+/// Looks at some points of every patch and moves the points of those that are rough; how many.
+fn first_round(
     store: &PointStore,
     tiles: TileRanges,
     neighbors: usize,
-    runs: &Runs,
+    runs: &mut Runs,
     workspace: &Workspace,
-) -> Result<()> {
-    let bytes = |tile: usize| Tile::bytes(tiles.ids(tile).len()) + PageCache::bytes(store);
-    let work = |tile| {
-        let ids = tiles.ids(tile);
-        let mut seen = Seen::of(&ids);
-        let points = ids.len() as u64;
-        each_fit(store, ids, neighbors, Runs::is_sampled, |id, point, fit| {
-            seen.note(id, target(point, &fit, neighbors).1);
-        })?;
-        workspace.advance(points);
-        Ok(seen)
+) -> Result<(PointStore, u64)> {
+    let pass = Pass {
+        file: "relaxed1",
+        memory: "relax: tile",
+        tile: tiles.size(),
+        whole: first::SPAN,
+        bytes: first::BYTES,
     };
-    workspace.units("relax: tile", tiles.count(), bytes, work, |_, seen| {
-        runs.add(&seen);
-        Ok(())
-    })
+    let work = |ids: Range<usize>, points: &mut [Point]| {
+        first::look_and_move(store, ids, neighbors, points)
+    };
+    let mut moved = 0;
+    let next = pass.over(
+        store,
+        workspace,
+        work,
+        |(active, seen): (Vec<bool>, Seen)| {
+            runs.active[seen.first..][..active.len()].copy_from_slice(&active);
+            moved += seen.moved;
+            seen.put(&mut runs.rough);
+        },
+    )?;
+    Ok((next, moved))
 }
 
 /// Moves the points of all active runs; how many.
@@ -234,16 +185,19 @@ fn one_round(
     tiles: TileRanges,
     neighbors: usize,
     round: u32,
-    runs: &Runs,
+    runs: &mut Runs,
     workspace: &Workspace,
 ) -> Result<(PointStore, u64)> {
     let pass = Pass {
         file: &format!("relaxed{round}"),
         memory: "relax: tile",
         tile: tiles.size(),
+        whole: RUN,
+        bytes: 0,
     };
+    let Runs { active, rough, .. } = runs;
     let work = |ids: Range<usize>, points: &mut [Point]| {
-        let wanted = |id: usize| runs.active[id / RUN];
+        let wanted = |id: usize| active[id / RUN];
         let mut seen = Seen::of(&ids);
         if ids.clone().step_by(RUN).any(wanted) {
             each_fit(store, ids.clone(), neighbors, wanted, |id, point, fit| {
@@ -257,14 +211,14 @@ fn one_round(
     };
     let mut moved = 0;
     let next = pass.over(store, workspace, work, |seen: Seen| {
-        runs.add(&seen);
         moved += seen.moved;
+        seen.put(rough);
     })?;
     Ok((next, moved))
 }
 
 /// Where a point goes, and whether that is far.
-fn target(point: Point, fit: &Fit, neighbors: usize) -> (Point, bool) {
+pub(super) fn target(point: Point, fit: &Fit, neighbors: usize) -> (Point, bool) {
     let Some(normal) = fit.plane.normal else {
         return (point, false);
     };

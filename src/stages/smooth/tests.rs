@@ -89,6 +89,37 @@ fn only_rough_patches_move_and_tiles_do_not_matter() {
     }
 }
 
+#[test]
+fn regions_move_by_themselves_however_they_are_divided() {
+    let in_order = |points: &[Point]| {
+        let workspace = &workspace();
+        let (store, _) = ordered(points, 1, 256, workspace);
+        store.slice(0..store.len()).unwrap()
+    };
+    // Two regions and a rest; of the second too little is noisy.
+    let span = first::SPAN;
+    let mut points = in_order(&sheet(390, |_, _| 0));
+    for (id, point) in points.iter_mut().enumerate() {
+        if id / span != 1 || id % span > span * 9 / 10 {
+            point[2] += noise(id as i32);
+        }
+    }
+    let before = in_order(&points);
+    let (shape, stats) = relaxed(&points, 2, 1000, 256);
+    let moved = [0, 1, 2].map(|region| {
+        let ids = region * span..before.len().min((region + 1) * span);
+        ids.filter(|&id| before[id] != shape[id]).count()
+    });
+    assert!(
+        moved[0] > 1000 && moved[1] < 300 && moved[2] > 1000,
+        "{moved:?}"
+    );
+    // Pages of 100 put all of it into one piece.
+    let (same, same_stats) = relaxed(&points, 2, 1000, 100);
+    assert_eq!(stats, same_stats);
+    assert!(shape == same);
+}
+
 /// Positions before and after a round of smoothing with 12 neighbours.
 fn smoothed(
     points: &[Point],

@@ -71,10 +71,17 @@ impl Columns {
         [x, y, z, numbers]
     }
 
+    /// The columns, of one length: the compiler sees that and checks places once.
     #[inline(always)]
     pub fn slices_mut(&mut self) -> [&mut [u32]; 4] {
         let [x, y, z, numbers] = &mut self.0;
-        [x, y, z, numbers]
+        let room = x.len().min(y.len()).min(z.len()).min(numbers.len());
+        [
+            &mut x[..room],
+            &mut y[..room],
+            &mut z[..room],
+            &mut numbers[..room],
+        ]
     }
 }
 
@@ -127,37 +134,46 @@ impl PageLeaves {
         self.boxes.bytes() + bytes_of(&self.pages) + bytes_of(&self.near)
     }
 
-    /// Collects the points of all `wanted` leaves within `d2` of `around`, a box inside the page, for
-    /// `d2` up to the page's squared reach.
+    /// Collects the points of all leaves within `d2` of `around`, a box inside the page, for `d2` up to
+    /// the page's squared reach; only of those that are `wanted`, if that is asked.
     pub fn gather(
         &mut self,
         level: Level,
         tile: &Tile,
         around: &Aabb,
         d2: u64,
-        wanted: impl Fn(&Aabb) -> bool,
+        wanted: Option<&dyn Fn(&Aabb) -> bool>,
         out: &mut Candidates,
     ) {
         let limit = within(around, d2);
-        let count = near_boxes(level, &self.boxes, limit, &mut self.near);
-        let mut kept = 0;
-        for place in 0..count {
-            let leaf = self.near[place];
-            let (min, max) = tile.leaf_boxes.get(leaf as usize);
-            if wanted(&Aabb { min, max }) {
-                self.near[kept] = leaf;
-                kept += 1;
-            }
+        let mut count = near_boxes(level, &self.boxes, limit, &mut self.near);
+        if let Some(wanted) = wanted {
+            count = keep(&mut self.near[..count], |leaf| {
+                let (min, max) = tile.leaf_boxes.get(leaf as usize);
+                wanted(&Aabb { min, max })
+            });
         }
-        out.columns.reserve(kept * tile.leaf);
-        let leaves = &self.near[..kept];
+        out.columns.reserve(count * tile.leaf);
+        let leaves = &self.near[..count];
         out.len = pick_leaves(level, tile, leaves, limit, &mut out.columns);
         out.complete2 = d2;
     }
 }
 
+/// Moves those that are `wanted` to the front; how many.
+fn keep(numbers: &mut [u32], wanted: impl Fn(u32) -> bool) -> usize {
+    let mut kept = 0;
+    for place in 0..numbers.len() {
+        if wanted(numbers[place]) {
+            numbers[kept] = numbers[place];
+            kept += 1;
+        }
+    }
+    kept
+}
+
 /// What is within a squared distance of a box, and maybe more.
-fn within(bounds: &Aabb, d2: u64) -> Around {
+pub(super) fn within(bounds: &Aabb, d2: u64) -> Around {
     Around {
         min: bounds.min,
         max: bounds.max,
@@ -177,7 +193,7 @@ fn pick_leaves_body<P: Pick>(
     around: Around,
     out: &mut Columns,
 ) -> usize {
-    let mut to = out.slices_mut();
+    let [to_x, to_y, to_z, to_ids] = out.slices_mut();
     let mut count = 0;
     for &leaf in leaves {
         let Some(range) = tile.leaf(leaf as usize) else {
@@ -195,12 +211,10 @@ fn pick_leaves_body<P: Pick>(
             let within = P::within(&distances, around.limit) & first_bits(range.end - start);
             let mut ids = [first + (start - range.start) as u32; BLOCK];
             (0..).zip(&mut ids).for_each(|(n, id)| *id += n);
-            let [x, y, z] = [x, y, z].map(bytemuck::cast_ref);
-            for (from, to) in [x, y, z, &ids].into_iter().zip(&mut to) {
-                if let Some(to) = to[count..].first_chunk_mut() {
-                    P::pack(from, within, to);
-                }
-            }
+            P::pack_at(bytemuck::cast_ref(x), within, to_x, count);
+            P::pack_at(bytemuck::cast_ref(y), within, to_y, count);
+            P::pack_at(bytemuck::cast_ref(z), within, to_z, count);
+            P::pack_at(&ids, within, to_ids, count);
             count += within.count_ones() as usize;
         }
     }

@@ -2,7 +2,9 @@
 //! what is found in the tile.
 
 use super::MOST_HALO;
+use super::candidates::within;
 use crate::geom::aabb::Aabb;
+use crate::kernels::{BLOCK, Boxes, Level, near_boxes};
 use crate::stages::order::PointStore;
 
 /// Most pages that the reach of one page may touch; it is made shorter where it touches more,
@@ -21,6 +23,9 @@ const FEW_NEAR: usize = 20;
 /// up to so many times.
 const MOST_TIMES: u64 = 4;
 
+/// So many pages at most, for each of a tile, are put on a list to look for near ones.
+const MOST_AROUND: usize = 8;
+
 /// How far a page reaches.
 #[derive(Debug)]
 pub(super) struct Reach {
@@ -35,9 +40,13 @@ pub(super) struct Reach {
 /// than usual where the halo would outgrow the tile, as it would around scattered outliers.
 pub(super) fn halo(store: &PointStore, own: &[usize], size: usize) -> (Vec<usize>, Vec<Reach>) {
     let most = size * (1 + MOST_HALO) + MOST_NEAR;
+    let mut around = Around::of(store, own, size);
     let mut shrink = 1;
     loop {
-        let near = |&page: &usize| near_pages(store, page, reach(store, page, shrink), MOST_NEAR);
+        let near = |&page: &usize| {
+            let reach = reach(&mut around, page, shrink);
+            near_pages(&mut around, page, reach, MOST_NEAR)
+        };
         let mut reaches: Vec<_> = own.iter().map(near).collect();
         let mut wanted = own.to_vec();
         let near = reaches.iter().flat_map(|reach| &reach.near);
@@ -46,7 +55,7 @@ pub(super) fn halo(store: &PointStore, own: &[usize], size: usize) -> (Vec<usize
         wanted.dedup();
         if wanted.len() <= most || shrink > 1 << 40 {
             if shrink == 1 {
-                share(store, &mut wanted, &mut reaches, most);
+                share(&mut around, &mut wanted, &mut reaches, most);
             }
             return (wanted, reaches);
         }
@@ -56,16 +65,15 @@ pub(super) fn halo(store: &PointStore, own: &[usize], size: usize) -> (Vec<usize
 
 /// Makes reaches long again that touched too many pages, where these are the tile's already or
 /// serve many: around a dense middle all pages farther out reach over the same ones.
-fn share(store: &PointStore, wanted: &mut Vec<usize>, reaches: &mut [Reach], most: usize) {
-    let full = |page: usize| reach(store, page, 1);
+fn share(around: &mut Around<'_>, wanted: &mut Vec<usize>, reaches: &mut [Reach], most: usize) {
     let short: Vec<_> = (reaches.iter_mut())
-        .filter(|reach| reach.reach2 < full(reach.page).pow(2))
+        .filter(|short| short.reach2 < reach(around, short.page, 1).pow(2))
         .collect();
     let mut left = (short.len() * MOST_MORE).min(most.saturating_sub(wanted.len()));
     for short in short {
-        let mut reach = full(short.page);
+        let mut reach = reach(around, short.page, 1);
         while reach * reach > short.reach2 {
-            let longer = near_pages(store, short.page, reach, MOST_SHARED);
+            let longer = near_pages(around, short.page, reach, MOST_SHARED);
             let pages = longer.near.iter().map(|page| *page as usize);
             let mut more: Vec<_> = pages.filter(|p| wanted.binary_search(p).is_err()).collect();
             if more.len() <= left {
@@ -81,31 +89,33 @@ fn share(store: &PointStore, wanted: &mut Vec<usize>, reaches: &mut [Reach], mos
 }
 
 /// How far a page should reach.
-fn reach(store: &PointStore, page: usize, shrink: i64) -> u64 {
-    let bounds = store.page_box(page);
-    let reach = (bounds.longest_side() * 7 / 8 / shrink).max(1) as u64;
+fn reach(around: &mut Around<'_>, page: usize, shrink: u64) -> u64 {
+    let reach = full(around.store.page_box(page).longest_side());
     if shrink == 1 {
         // Along a line neighbours are far, and pages few.
-        return reach * lonely(store, bounds, reach);
+        return reach * lonely(around, page, reach);
     }
-    reach
+    (reach / shrink).max(1)
+}
+
+/// How far a page of this longest side reaches where nothing is special.
+fn full(longest: i64) -> u64 {
+    (longest * 7 / 8).max(1) as u64
 }
 
 /// How far a page may reach, at most `reach`, to touch at most `most` pages.
-fn near_pages(store: &PointStore, page: usize, mut reach: u64, most: usize) -> Reach {
-    let bounds = store.page_box(page);
+fn near_pages(around: &mut Around<'_>, page: usize, mut reach: u64, most: usize) -> Reach {
     loop {
-        let mut near = Vec::new();
-        store.pages_near(bounds, reach * reach, &mut |p| {
-            near.push(p as u32);
-            near.len() <= most
-        });
-        let fits = near.len() <= most;
-        if fits || reach <= 1 {
+        let (near, all) = around.pages(page, reach, most);
+        if all || reach <= 1 {
             return Reach {
                 page,
-                reach2: if fits { reach * reach } else { 0 },
-                near: if fits { near } else { vec![page as u32] },
+                reach2: if all { reach * reach } else { 0 },
+                near: if all {
+                    near.to_vec()
+                } else {
+                    vec![page as u32]
+                },
             };
         }
         reach /= 2;
@@ -113,16 +123,73 @@ fn near_pages(store: &PointStore, page: usize, mut reach: u64, most: usize) -> R
 }
 
 /// How many times as far a page can reach and still touch few pages.
-fn lonely(store: &PointStore, bounds: &Aabb, reach: u64) -> u64 {
+fn lonely(around: &mut Around<'_>, page: usize, reach: u64) -> u64 {
     for times in [MOST_TIMES, MOST_TIMES / 2] {
-        let (mut count, reach) = (0, reach * times);
-        store.pages_near(bounds, reach * reach, &mut |_| {
-            count += 1;
-            count <= FEW_NEAR
-        });
-        if count <= FEW_NEAR {
+        if around.pages(page, reach * times, FEW_NEAR).1 {
             return times;
         }
     }
     1
+}
+
+/// The pages that any page of a tile may reach, if they are not too many, so that the whole tree need
+/// not be asked for each.
+struct Around<'a> {
+    store: &'a PointStore,
+    level: Level,
+    /// The pages within `reach` of the box around the tile; with their numbers.
+    boxes: Boxes,
+    reach: u64,
+    found: Vec<u32>,
+}
+
+impl<'a> Around<'a> {
+    fn of(store: &'a PointStore, own: &[usize], size: usize) -> Self {
+        let boxes = || own.iter().map(|page| store.page_box(*page));
+        let all = boxes().fold(Aabb::EMPTY, |all, page| all.union(*page));
+        let mut sides: Vec<_> = boxes().map(Aabb::longest_side).collect();
+        let (at, none) = (sides.len() * 3 / 4, sides.is_empty());
+        let longest = if none {
+            0
+        } else {
+            *sides.select_nth_unstable(at).1
+        };
+        let mut around = Self {
+            store,
+            level: Level::best(),
+            boxes: Boxes::default(),
+            reach: full(longest) * MOST_TIMES,
+            found: Vec::new(),
+        };
+        let most = MOST_AROUND * size;
+        let square = around.reach.pow(2);
+        store.pages_near(&all, square, &mut |page| {
+            let Aabb { min, max } = *store.page_box(page);
+            around.boxes.push(min, max, page as u32);
+            around.boxes.len() <= most
+        });
+        if around.boxes.len() > most {
+            around.reach = 0;
+        }
+        around
+    }
+
+    /// The pages within `reach` of one of the tile, ascending, if there are at most `most`; else some,
+    /// and false.
+    fn pages(&mut self, page: usize, reach: u64, most: usize) -> (&[u32], bool) {
+        let bounds = self.store.page_box(page);
+        if reach <= self.reach {
+            let limit = within(bounds, reach * reach);
+            self.found.resize(self.boxes.len() + BLOCK, 0);
+            let count = near_boxes(self.level, &self.boxes, limit, &mut self.found);
+            return (&self.found[..count], count <= most);
+        }
+        let found = &mut self.found;
+        found.clear();
+        self.store.pages_near(bounds, reach * reach, &mut |page| {
+            found.push(page as u32);
+            found.len() <= most
+        });
+        (&*found, found.len() <= most)
+    }
 }

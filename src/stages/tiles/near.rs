@@ -247,7 +247,7 @@ impl Search {
     }
 
     fn gather(&mut self, tile: &Tile, around: &Aabb, d2: u64) {
-        self.gather_where(tile, around, d2, |_| true);
+        self.gather_where(tile, around, d2, None);
     }
 
     fn gather_where(
@@ -255,7 +255,7 @@ impl Search {
         tile: &Tile,
         around: &Aabb,
         d2: u64,
-        wanted: impl Fn(&Aabb) -> bool,
+        wanted: Option<&dyn Fn(&Aabb) -> bool>,
     ) {
         let out = &mut self.candidates;
         self.leaves
@@ -332,7 +332,7 @@ impl Query<'_> {
         if distance2 > search.candidates.complete2 {
             search.step_aside();
             let around = Aabb::of(&[self.point]);
-            search.gather_where(self.tile, &around, distance2, wanted);
+            search.gather_where(self.tile, &around, distance2, Some(&wanted));
         }
         search.places.clear();
         let candidates = &search.candidates;

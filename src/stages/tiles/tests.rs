@@ -139,7 +139,7 @@ fn check_sums(points: &[Point], tile: &Tile, k: usize, search: &mut Search) {
         assert_eq!(point, points[id as usize]);
         let Some(sums) = sums else { return };
         let nearest = &all_near(points, id as usize)[..k];
-        assert_eq!(sums, sums_over(points, point, nearest));
+        assert_eq!(*sums, sums_over(points, point, nearest));
     });
     assert!(next.is_empty());
 }

@@ -150,8 +150,12 @@ fn nearest_body<P: Pick>(search: &mut Search, point: Point, own: u32, k: usize) 
     let last = search.near.get(k.wrapping_sub(1));
     let mut limit = likely_body(last.map_or(0.0, |n| n.distance2 as f32) * MARGIN, most);
     let mut picked = pick_near_body::<P, false>(search, point, limit);
+    while picked < wanted && limit < most {
+        limit = wider_body(limit, picked, wanted, most);
+        picked = pick_near_body::<P, false>(search, point, limit);
+    }
     let mut corrections = CORRECTIONS;
-    if !suits_body(picked, wanted, limit, most) {
+    if picked > too_many_body(wanted) {
         measure_body(search, point);
         limit = reach_body(search.measured(), wanted, limit, most, &mut corrections);
         picked = search.pick_measured::<P>(limit);
@@ -189,16 +193,17 @@ fn too_many_body(wanted: usize) -> usize {
     wanted + wanted.min(MOST_RANKED / 2)
 }
 
-/// True if `count` within `limit` are enough, or all there are, and not many more.
+/// A limit up to `most` to try after one within which only `count` are.
 #[inline(always)]
-pub(super) fn suits_body(count: usize, wanted: usize, limit: f32, most: f32) -> bool {
-    (count >= wanted || limit >= most) && count <= too_many_body(wanted)
+pub(super) fn wider_body(limit: f32, count: usize, wanted: usize, most: f32) -> f32 {
+    let grow = (wanted + 4) as f32 / (count.max(1) as f32);
+    (limit * grow.clamp(1.1, 8.0) + 4.0).min(most)
 }
 
 /// A limit up to `most` within which `wanted` of the distances are and not many more, or `most` if
 /// there are not so many; from one that is likely.
 #[inline(always)]
-pub(super) fn reach_body(
+fn reach_body(
     distances: &[f32],
     wanted: usize,
     likely: f32,
@@ -214,8 +219,7 @@ pub(super) fn reach_body(
         } else if count >= wanted || limit >= most {
             return limit;
         } else {
-            let grow = (wanted + 4) as f32 / (count.max(1) as f32);
-            limit = (limit * grow.clamp(1.1, 8.0) + 4.0).min(most);
+            limit = wider_body(limit, count, wanted, most);
         }
     }
 }
@@ -232,7 +236,7 @@ pub(super) fn pick_near_body<P: Pick, const DISTANCES: bool>(
     search.picked.reserve(candidates.len);
     let room = candidates.len.next_multiple_of(BLOCK);
     let from = candidates.columns.blocks(room);
-    let mut to = search.picked.slices_mut();
+    let [to_x, to_y, to_z, to_numbers] = search.picked.slices_mut();
     let mut count = 0;
     let mut left = candidates.len;
     for (((x, y), z), ids) in from[0].iter().zip(from[1]).zip(from[2]).zip(from[3]) {
@@ -245,11 +249,10 @@ pub(super) fn pick_near_body<P: Pick, const DISTANCES: bool>(
         } else {
             ids
         };
-        for (from, to) in [x, y, z, numbers].into_iter().zip(&mut to) {
-            if let Some(to) = to[count..].first_chunk_mut() {
-                P::pack(from, within, to);
-            }
-        }
+        P::pack_at(x, within, to_x, count);
+        P::pack_at(y, within, to_y, count);
+        P::pack_at(z, within, to_z, count);
+        P::pack_at(numbers, within, to_numbers, count);
         count += within.count_ones() as usize;
         left = left.saturating_sub(BLOCK);
     }
@@ -258,7 +261,7 @@ pub(super) fn pick_near_body<P: Pick, const DISTANCES: bool>(
 
 /// Measures the candidates from `point`.
 #[inline(always)]
-pub(super) fn measure_body(search: &mut Search, point: Point) {
+fn measure_body(search: &mut Search, point: Point) {
     let candidates = &search.candidates;
     let room = candidates.len.next_multiple_of(BLOCK);
     search

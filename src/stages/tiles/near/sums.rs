@@ -1,24 +1,24 @@
 //! Sums over the nearest neighbours of many points: which they are matters, in what order they
 //! stand does not, so nothing is sorted.
 
-use super::list::{likely_body, measure_body, pick_near_body, reach_body, suits_body};
-use super::{APPROXIMATE, CORRECTIONS, OwnPage, Query, Search, above};
+use super::list::{likely_body, pick_near_body, wider_body};
+use super::{APPROXIMATE, OwnPage, Query, Search, above};
 use crate::geom::Point;
 use crate::geom::plane::Moments;
-use crate::kernels::{BLOCK, MOST_SUMMED, Pick, SUMMED_LIMIT2, kernel, pick_body};
+use crate::kernels::{BLOCK, MOST_SUMMED, Pick, SUMMED_LIMIT2, kernel};
 use crate::stages::tiles::Tile;
 
 /// How often a limit that divides the nearest from the others is corrected.
 const DIVISIONS: usize = 16;
 
 /// The limit of a query against that of the query before: what is picked is only divided.
-const MARGIN: f32 = 1.25;
+const MARGIN: f32 = 1.3;
 
 /// No number up to this many times the limit: then approximate distances tell inside from outside.
 const GAP: f32 = 1.0 + 8.0 * APPROXIMATE as f32;
 
 /// The nearest neighbours of a point, summed up.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Sums {
     /// Exact sums over their differences to the point.
     pub moments: Moments,
@@ -34,15 +34,19 @@ impl Tile {
         k: usize,
         search: &mut Search,
         wanted: impl Fn(usize) -> bool,
-        mut each: impl FnMut(u32, Point, Option<Sums>),
+        mut each: impl FnMut(u32, Point, Option<&Sums>),
     ) {
+        let mut sums = Sums::default();
         self.for_groups(k, search, wanted, |own, index, id, search| {
-            let sums = self.sums(own, index, id, k, search);
+            let known = self.sums(own, index, id, k, search, &mut sums);
+            let sums = known.then_some(&sums);
             each(id, self.points.get(index), sums);
             sums.map_or(0, |sums| sums.last2)
         });
     }
 
+    /// Sums over the `k` nearest neighbours of point `index`; false if the halo cannot certify which
+    /// they are.
     fn sums(
         &self,
         own: &OwnPage,
@@ -50,18 +54,22 @@ impl Tile {
         id: u32,
         k: usize,
         search: &mut Search,
-    ) -> Option<Sums> {
+        sums: &mut Sums,
+    ) -> bool {
         let point = self.points.get(index);
-        let mut summed = sum_nearest(search.level, search, point, k);
+        let mut summed = sum_nearest(search.level, search, point, k, sums);
         if summed == Err(Unknown::Few) && self.gather_for_one(own, index, k, search) {
-            summed = sum_nearest(search.level, search, point, k);
+            summed = sum_nearest(search.level, search, point, k, sums);
         }
         match summed {
-            Ok(sums) => Some(sums),
-            Err(Unknown::Few) => None,
+            Ok(()) => true,
+            Err(Unknown::Few) => false,
             Err(Unknown::Close) => {
-                self.nearest(own, index, id, k, search)?;
-                Some(search.near.sums(k, search.level))
+                let known = self.nearest(own, index, id, k, search).is_some();
+                if known {
+                    *sums = search.near.sums(k, search.level);
+                }
+                known
             }
         }
     }
@@ -72,6 +80,7 @@ impl Query<'_> {
     /// not reach that far.
     #[must_use]
     pub fn sums(&mut self, count: usize) -> Option<Sums> {
+        let mut sums = Sums::default();
         loop {
             let search = &mut *self.search;
             let before = search.lasts.iter().position(|(k, _)| *k == count);
@@ -80,10 +89,10 @@ impl Query<'_> {
                 search.lasts.len() - 1
             });
             std::mem::swap(&mut search.last, &mut search.lasts[before].1);
-            let summed = sum_nearest(search.level, search, self.point, count);
+            let summed = sum_nearest(search.level, search, self.point, count, &mut sums);
             std::mem::swap(&mut search.last, &mut search.lasts[before].1);
             match summed {
-                Ok(sums) => {
+                Ok(()) => {
                     search.note_wider(count, sums.last2);
                     return Some(sums);
                 }
@@ -114,27 +123,23 @@ enum Unknown {
 
 kernel! {
     /// Measures the candidates from `point` and sums over the `k` nearest neighbours.
-    fn sum_nearest(search: &mut Search, point: Point, k: usize) -> Result<Sums, Unknown> = sum_body<Eight>
+    fn sum_nearest(search: &mut Search, point: Point, k: usize, sums: &mut Sums) -> Result<(), Unknown> = sum_body<Eight>
 }
 
 #[inline(always)]
-fn sum_body<P: Pick>(search: &mut Search, point: Point, k: usize) -> Result<Sums, Unknown> {
+fn sum_body<P: Pick>(
+    search: &mut Search,
+    point: Point,
+    k: usize,
+    sums: &mut Sums,
+) -> Result<(), Unknown> {
     let most = above(search.candidates.complete2);
     let wanted = k + 2;
     let mut limit = likely_body(search.last * MARGIN, most);
     let mut picked = pick_near_body::<P, true>(search, point, limit);
-    if !suits_body(picked, wanted, limit, most) {
-        measure_body(search, point);
-        limit = reach_body(search.measured(), wanted, limit, most, &mut { CORRECTIONS });
-        let measured = search.measured().len();
-        let [x, y, z, _] = search.candidates.columns.slices();
-        let from = [x, y, z, bytemuck::cast_slice(&search.distances)];
-        picked = pick_body::<P, 4>(
-            &search.distances[..measured],
-            limit,
-            from,
-            search.picked.slices_mut(),
-        );
+    while picked < wanted && limit < most {
+        limit = wider_body(limit, picked, wanted, most);
+        picked = pick_near_body::<P, true>(search, point, limit);
     }
     let room = picked.next_multiple_of(BLOCK);
     let [_, _, _, numbers] = search.picked.slices_mut();
@@ -144,7 +149,7 @@ fn sum_body<P: Pick>(search: &mut Search, point: Point, k: usize) -> Result<Sums
     if picked <= k {
         return Err(Unknown::Few);
     }
-    let limit = divide_body(distances, picked, k + 1, limit).ok_or(Unknown::Close)?;
+    let limit = divide_body::<P>(distances, picked, k + 1, limit).ok_or(Unknown::Close)?;
     search.last = limit;
     let certain = f64::from(limit) * (1.0 + 2.0 * APPROXIMATE);
     let exact = k < MOST_SUMMED && certain < SUMMED_LIMIT2 as f64;
@@ -153,16 +158,17 @@ fn sum_body<P: Pick>(search: &mut Search, point: Point, k: usize) -> Result<Sums
     }
     let [x, y, z] = search.picked.coordinates(room);
     let (sum, products, last2) = sums_within([x, y, z], point, distances, limit);
-    Ok(Sums {
+    *sums = Sums {
         moments: Moments::from_sums(k, sum, products),
         last2,
-    })
+    };
+    Ok(())
 }
 
 /// A limit within which exactly `wanted` of `count` numbers are, so that no other is close to it; they
 /// are about evenly spread up to `most`.
 #[inline(always)]
-fn divide_body(numbers: &[f32], count: usize, wanted: usize, most: f32) -> Option<f32> {
+fn divide_body<P: Pick>(numbers: &[f32], count: usize, wanted: usize, most: f32) -> Option<f32> {
     let (mut low, mut high) = (0.0, most);
     let between = most / count as f32;
     let (mut limit, mut count) = (most, count);
@@ -172,16 +178,9 @@ fn divide_body(numbers: &[f32], count: usize, wanted: usize, most: f32) -> Optio
         if division % 4 == 3 || limit <= low || limit >= high {
             limit = 0.5 * (low + high);
         }
-        let certain = limit * GAP;
-        let (within, close) = numbers.iter().fold((0u32, 0u32), |(within, close), d| {
-            (
-                within + u32::from(*d <= limit),
-                close + u32::from(*d <= certain),
-            )
-        });
-        count = within as usize;
+        count = count_within_body::<P>(numbers, limit);
         if count == wanted {
-            return (close == within).then_some(limit);
+            return (count_within_body::<P>(numbers, limit * GAP) == wanted).then_some(limit);
         }
         if count < wanted {
             low = limit;
@@ -190,6 +189,14 @@ fn divide_body(numbers: &[f32], count: usize, wanted: usize, most: f32) -> Optio
         }
     }
     None
+}
+
+/// How many of whole blocks of numbers are at most `limit`.
+#[inline(always)]
+fn count_within_body<P: Pick>(numbers: &[f32], limit: f32) -> usize {
+    let blocks = numbers.as_chunks::<BLOCK>().0.iter();
+    let within = blocks.map(|block| P::within(block, limit).count_ones());
+    within.sum::<u32>() as usize
 }
 
 /// First and second sums over the points within `limit`, and the largest squared distance.
