@@ -150,7 +150,7 @@ impl<'a> Context<'a> {
         let (section, ids) = (block as usize, self.blocks.ids(block as usize));
         let (interior, surface) = (self.interior, &self.base.surface);
         let files = [
-            (interior.vertices.records(section), 20),
+            (interior.vertices.records(section), 16),
             (interior.context.records(section), 16),
             (surface.crossing.records(section), 20),
             (self.changes.records(section), 52),
@@ -200,7 +200,7 @@ impl<'a> Context<'a> {
             } else {
                 vertices.partition_point(|r| r[0] < v)
             };
-            let [_, _, x, y, z] = vertices[place];
+            let [_, x, y, z] = vertices[place];
             [x, y, z].map(|c| c as i32)
         };
         self.around.reserve(wanted.len());

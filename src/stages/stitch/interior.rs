@@ -30,9 +30,8 @@ pub struct Interior {
     pub joints: Sections<6>,
     /// Interior triangles that touch a context vertex: `[i, j, k, home]`, see [`Home`].
     pub context: Sections<4>,
-    /// Vertices of these, of the crossing base and the context vertices, ascending: `[v, 1 for a
-    /// context vertex, x, y, z]`.
-    pub vertices: Sections<5>,
+    /// Vertices of these, of the crossing base and the context vertices, ascending: `[v, x, y, z]`.
+    pub vertices: Sections<4>,
     /// Crossing candidates with their smallest vertex in the block, and interior ones that failed
     /// only test I and touch a crossing triple; ascending, see [`Candidate::record`].
     pub ranked: Sections<5>,
@@ -471,7 +470,7 @@ impl BlockWork {
     }
 
     /// The vertices whose positions the crossing candidates may need.
-    fn located(&self, context: &[bool], around: &[[u32; 4]]) -> Vec<[u32; 5]> {
+    fn located(&self, context: &[bool], around: &[[u32; 4]]) -> Vec<[u32; 4]> {
         let in_context = |v: &u32| self.ids.contains(v) && context[(v - self.ids.start) as usize];
         let crossing = self.triangles[self.interior_base..self.base].iter();
         let touching = crossing.filter(|t| t.iter().any(in_context));
@@ -483,7 +482,7 @@ impl BlockWork {
         ids.into_iter()
             .map(|v| {
                 let [x, y, z] = self.position(v).map(|c| c as u32);
-                [v, u32::from(in_context(&v)), x, y, z]
+                [v, x, y, z]
             })
             .collect()
     }
