@@ -281,6 +281,18 @@ impl Reservation {
         self.held = bytes;
     }
 
+    /// Reserves more, unless there are as many as `bytes` already.
+    ///
+    /// # Errors
+    /// [`Error::Memory`]; what is reserved stays.
+    pub fn at_least(&mut self, bytes: u64) -> Result<()> {
+        if bytes > self.bytes {
+            let mut more = self.pool.promise(self.name, bytes - self.bytes)?;
+            self.bytes += std::mem::take(&mut more.bytes);
+        }
+        Ok(())
+    }
+
     /// Reserves so many bytes less: they will not be taken.
     pub fn give_back(&mut self, bytes: u64) {
         let bytes = bytes.min(self.bytes);
@@ -369,6 +381,12 @@ mod tests {
         // It is known as a holder for as long as it is one.
         promised.give_back(u64::MAX);
         assert_eq!(promised.bytes(), 1);
+        // It grows as far as there is room.
+        promised.at_least(2 << 20).unwrap();
+        promised.at_least(1 << 20).unwrap();
+        assert_eq!(promised.bytes(), 2 << 20);
+        assert!(promised.at_least(pool.capacity()).is_err());
+        assert_eq!(pool.available(), pool.capacity() - (3 << 20));
         drop((promised, whole));
         assert_eq!(pool.available(), pool.capacity());
         assert_eq!(pool.take_held(), PROGRAM + (3 << 20));

@@ -142,6 +142,12 @@ impl Votes {
         self.pairs.len()
     }
 
+    /// Bytes that they are reckoned to take, in order as well.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        self.len() as u64 * 72
+    }
+
     /// True if there is no vote.
     #[must_use]
     pub fn is_empty(&self) -> bool {

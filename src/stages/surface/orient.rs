@@ -1,5 +1,6 @@
 //! Components and orientation of a surface given block by block.
 
+use super::border::Border;
 use super::evidence::{Evidence, Votes};
 use super::parity::ParitySets;
 use super::star::{EDGES, Edges, Triangle, opposed};
@@ -11,7 +12,6 @@ use crate::stages::blocks::Blocks;
 use crate::workspace::Workspace;
 use crate::workspace::memory::{Holding, bytes_of, hold};
 use crate::workspace::persist::{Persist, Saved};
-use rustc_hash::FxHashMap;
 
 const EXCHANGE_BUFFER: u64 = 8 << 20;
 
@@ -427,26 +427,25 @@ fn orient_crossing(
 ) -> Result<()> {
     let exchange = Exchange::<5>::new(workspace, &format!("{name}.crossing"), EXCHANGE_BUFFER)?
         .packed(SENT_LABELLED);
-    let mut edges: FxHashMap<(u32, u32), Vec<(Triangle, u32)>> = FxHashMap::default();
+    let mut edges = Border::new(workspace)?;
     for group in 0..blocks.count() {
         workspace.check_cancel()?;
         let relations = relations.get(group)?;
         let mut sent = Vec::new();
-        for t in border(group)? {
+        let triangles = border(group)?;
+        edges.make_room(triangles.len())?;
+        for t in triangles {
             let Some(word) = orient_one(base, t, &relations, group as u32, &edges) else {
                 base.mobius += 1;
                 continue;
             };
             base.triangles += 1;
-            for (a, b, ..) in EDGES {
-                edges.entry((t[a], t[b])).or_default().push((t, word));
-            }
+            edges.put(t, word);
             sent.push([blocks.of(t[0]), t[0], t[1], t[2], word]);
             sent.extend(blocks.visited(t).map(|b| [b, t[0], t[1], t[2], word]));
         }
         exchange.send(&sent)?;
-        // A triangle at an edge has its smallest vertex at or below the edge's.
-        edges.retain(|(low, _), _| blocks.of(*low) > group as u32);
+        edges.end(group, blocks);
     }
     base.crossing = exchange.deliver(workspace, blocks.count())?;
     base.sets.flatten();
@@ -466,7 +465,7 @@ fn orient_one(
     t: Triangle,
     relations: &[[u32; 7]],
     group: u32,
-    edges: &FxHashMap<(u32, u32), Vec<(Triangle, u32)>>,
+    edges: &Border,
 ) -> Option<u32> {
     let key = [group, t[0], t[1], t[2]];
     let start = relations.partition_point(|r| r[..4] < key[..]);
@@ -475,12 +474,7 @@ fn orient_one(
         .take_while(|r| r[..4] == key[..])
         .map(|r| (base.globals[r[4] as usize].0 + (r[5] >> 1), r[5] & 1 == 1))
         .collect();
-    for (a, b, ..) in EDGES {
-        for &(other, word) in edges.get(&(t[a], t[b])).into_iter().flatten() {
-            let flip = opposed(t, other, t[a], t[b]) ^ (word & 1 == 1);
-            asks.push((word >> 1, flip));
-        }
-    }
+    asks.extend(edges.asks(t));
     if !consistent(&mut base.sets, &asks) {
         return None;
     }

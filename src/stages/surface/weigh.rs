@@ -1,15 +1,15 @@
 //! Orientation by evidence: inside a block, and between blocks.
 
+use super::border::Border;
 use super::evidence::{Evidence, Votes, cosine, join_inside, weight};
 use super::orient::{Bonds, Oriented, OrientedBlock, adjacent, number_labels};
 use super::parity::ParitySets;
-use super::star::{EDGES, Edges, Triangle, opposed};
+use super::star::{Edges, Triangle};
 use crate::error::Result;
 use crate::spill::Sections;
 use crate::stages::blocks::Blocks;
 use crate::workspace::Workspace;
 use crate::workspace::memory::{bytes_of, hold};
-use rustc_hash::FxHashMap;
 
 /// Orients a block by what the evidence says; a triangle that would have to run both ways is removed.
 pub(super) fn weigh_block(
@@ -80,17 +80,21 @@ pub(super) fn vote(
     workspace: &Workspace,
 ) -> Result<()> {
     let mut votes = Votes::default();
+    let mut reserved = workspace.promise("votes", 0)?;
     for block in 0..blocks.count() {
         let first = surface.globals[block].0;
         for [a, b, count] in candidates.get(block)? {
             votes.add(first + a, first + b, false, i64::from(count as i32));
         }
+        reserved.at_least(votes.bytes())?;
     }
-    let mut edges: FxHashMap<(u32, u32), Vec<(Triangle, u32)>> = FxHashMap::default();
+    let mut edges = Border::new(workspace)?;
     for group in 0..blocks.count() {
         workspace.check_cancel()?;
         let relations = relations.get(group)?;
-        for t in border(group)? {
+        let triangles = border(group)?;
+        edges.make_room(triangles.len())?;
+        for t in triangles {
             let key = [group as u32, t[0], t[1], t[2]];
             let start = relations.partition_point(|r| r[..4] < key[..]);
             let mut asks: Vec<(u32, bool, i64)> = relations[start..]
@@ -101,12 +105,8 @@ pub(super) fn vote(
                     (label, r[5] & 1 == 1, CROSSING * i64::from(r[6]))
                 })
                 .collect();
-            for (a, b, ..) in EDGES {
-                for &(other, word) in edges.get(&(t[a], t[b])).into_iter().flatten() {
-                    let flip = opposed(t, other, t[a], t[b]) ^ (word & 1 == 1);
-                    asks.push((word >> 1, flip, CROSSING * weight(0.0)));
-                }
-            }
+            let crossing = edges.asks(t);
+            asks.extend(crossing.map(|(label, flip)| (label, flip, CROSSING * weight(0.0))));
             // It runs as its strongest neighbour asks; the others are votes.
             let Some(&(label, flip, _)) = asks.iter().rev().max_by_key(|ask| ask.2) else {
                 continue;
@@ -114,14 +114,13 @@ pub(super) fn vote(
             for &(other, turned, weight) in &asks {
                 votes.add(label, other, flip ^ turned, weight);
             }
-            let word = label << 1 | u32::from(flip);
-            for (a, b, ..) in EDGES {
-                edges.entry((t[a], t[b])).or_default().push((t, word));
-            }
+            edges.put(t, label << 1 | u32::from(flip));
         }
-        edges.retain(|(low, _), _| blocks.of(*low) > group as u32);
+        edges.end(group, blocks);
+        reserved.at_least(votes.bytes())?;
     }
-    let _held = workspace.reserve("votes", votes.len() as u64 * 72)?;
+    drop(edges);
+    reserved.set_held(votes.bytes());
     votes.join(&mut surface.sets);
     Ok(())
 }

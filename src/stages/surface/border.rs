@@ -1,0 +1,106 @@
+//! The edges of crossing triangles, while these are gone through in ascending order.
+
+use super::star::{EDGES, Triangle, opposed};
+use crate::error::Result;
+use crate::stages::blocks::Blocks;
+use crate::workspace::Workspace;
+use crate::workspace::memory::{Reservation, table_bytes};
+use rustc_hash::FxHashMap;
+
+/// What an edge is reckoned to take: its place in a table, which is there twice while it grows, and its
+/// list.
+const EDGE: u64 = 128 + LIST;
+
+/// The triangles at an edge: room for four, and what the allocator takes.
+const LIST: u64 = 80;
+
+/// The triangles so far at the edges that later ones may have.
+pub(super) struct Border {
+    edges: FxHashMap<(u32, u32), Vec<(Triangle, u32)>>,
+    reserved: Reservation,
+}
+
+impl Border {
+    /// No edges.
+    pub(super) fn new(workspace: &Workspace) -> Result<Self> {
+        Ok(Self {
+            edges: FxHashMap::default(),
+            reserved: workspace.promise("stitch: edges", 0)?,
+        })
+    }
+
+    /// Makes room for the edges of so many triangles more.
+    pub(super) fn make_room(&mut self, triangles: usize) -> Result<()> {
+        let edges = (self.edges.len() + 3 * triangles) as u64;
+        self.reserved.at_least(edges * EDGE)
+    }
+
+    /// Puts in a triangle with `label << 1 | flip`; room must have been made.
+    pub(super) fn put(&mut self, t: Triangle, word: u32) {
+        for (a, b, ..) in EDGES {
+            let at = self.edges.entry((t[a], t[b])).or_default();
+            at.push((t, word));
+        }
+    }
+
+    /// What the triangles at its edges ask of `t`: their label, and if `t` must be turned against it.
+    pub(super) fn asks(&self, t: Triangle) -> impl Iterator<Item = (u32, bool)> + '_ {
+        EDGES.into_iter().flat_map(move |(a, b, ..)| {
+            let at = self.edges.get(&(t[a], t[b])).into_iter().flatten();
+            at.map(move |&(other, word)| {
+                let flip = opposed(t, other, t[a], t[b]) ^ (word & 1 == 1);
+                (word >> 1, flip)
+            })
+        })
+    }
+
+    /// Forgets what triangles of blocks after `group` cannot touch.
+    pub(super) fn end(&mut self, group: usize, blocks: Blocks) {
+        let lists = self.edges.len() as u64 * LIST;
+        self.reserved.set_held(table_bytes(&self.edges) + lists);
+        // A triangle at an edge has its smallest vertex at or below the edge's.
+        self.edges
+            .retain(|(low, _), _| blocks.of(*low) > group as u32);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::error::Error;
+    use crate::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
+    use crate::workspace::progress::{Cancel, Silent};
+    use std::sync::Arc;
+
+    #[test]
+    fn takes_no_more_than_is_reserved() {
+        let memory = MemoryPool::new(MINIMUM_BUDGET).unwrap();
+        let folder = std::env::temp_dir();
+        let workspace =
+            Workspace::new(&folder, memory, 1, Arc::new(Silent), Cancel::new()).unwrap();
+        let pool = &workspace.memory;
+        let mut border = Border::new(&workspace).unwrap();
+        let blocks = Blocks::new(1000, 10);
+        for group in 0..90u32 {
+            let first = group * 10;
+            let new: Vec<Triangle> = (10..19)
+                .map(|n| [first, first + n, first + n + 10])
+                .collect();
+            border.make_room(new.len()).unwrap();
+            for t in new {
+                border.put(t, 2 * group);
+                let asks: Vec<_> = border.asks(t).collect();
+                assert!(asks.contains(&(group, true)), "{asks:?}");
+            }
+            border.end(group as usize, blocks);
+            let kept = border.edges.keys().all(|(low, _)| *low >= first + 10);
+            assert!(kept && border.edges.len() == 9);
+        }
+        assert!(pool.held_at_peak()["stitch: edges"] <= border.reserved.bytes());
+        let least = pool.capacity() / (3 * EDGE) + 1;
+        let refused = border.make_room(least as usize);
+        assert!(matches!(refused, Err(Error::Memory { .. })), "{refused:?}");
+        drop(border);
+        assert_eq!(pool.available(), pool.capacity());
+    }
+}
