@@ -186,3 +186,6 @@ impl Lives {
         lives
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,103 @@
+//! Turns that are given up for want of memory, and taken again.
+
+use super::super::base::base;
+use super::super::interior::insert;
+use super::*;
+use crate::geom::Point;
+use crate::stages::cells::{DiskRadius, TileRanges, Widen, cells};
+use crate::stages::located::Places;
+use crate::stages::order::Orderer;
+use crate::stages::triples::triples;
+use crate::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
+use crate::workspace::progress::{Cancel, Silent};
+use std::sync::Arc;
+
+/// Points in a row of the sheet, and in a block.
+const SIDE: i32 = 50;
+const BLOCK: u32 = 100;
+
+/// A square sheet, up to a spacing off its plane: there is something to insert everywhere.
+fn sheet() -> Vec<Point> {
+    let noise = |n: i32| {
+        let n = (n as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        ((n ^ n >> 29).wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 40) as i32 % 100
+    };
+    let at = |n: i32| [100 * (n % SIDE), 100 * (n / SIDE), 500 + noise(n)];
+    (0..SIDE * SIDE).map(at).collect()
+}
+
+/// What a pass leaves for each block, and its counts.
+#[derive(Debug, PartialEq)]
+struct Left {
+    added: Vec<Vec<[u32; 4]>>,
+    removed: Vec<Vec<[u32; 4]>>,
+    counts: InsertStats,
+}
+
+/// Takes the pass across the sheet, each turn first within no memory at all and then within more and more
+/// if it is to be `starved`; how many turns there were, and how often one was given up.
+fn across(starved: bool) -> (Left, [usize; 2]) {
+    let memory = MemoryPool::new(MINIMUM_BUDGET).unwrap();
+    let folder = std::env::temp_dir();
+    let workspace = &Workspace::new(&folder, memory, 1, Arc::new(Silent), Cancel::new()).unwrap();
+    let orderer = Orderer::new(workspace).unwrap();
+    orderer.push(workspace, &sheet()).unwrap();
+    let store = orderer.finish(workspace, 64).unwrap().0;
+    let blocks = Blocks::new(store.len(), BLOCK);
+    let tiles = TileRanges::new(blocks, BLOCK);
+    let (radius, widen) = (DiskRadius::Auto, Widen::OnLines);
+    let seen = cells(&store, tiles, 12, radius, widen, workspace)
+        .unwrap()
+        .0;
+    let triples = triples(seen, blocks, workspace).unwrap().0;
+    let places = Places {
+        shape: &store,
+        file: &store,
+    };
+    let (base, _) = base(places, triples, blocks, true, workspace).unwrap();
+    let interior = Interior::create(workspace, blocks.count()).unwrap();
+    for block in 0..blocks.count() {
+        insert(places, &base, &interior, blocks, block, -0.5).unwrap();
+    }
+    let mut pass = Pass::new(&base, &interior, blocks, -0.5, workspace).unwrap();
+    let (mut turns, mut given_up) = (0, 0);
+    while pass.group < blocks.count() {
+        let group = pass.group;
+        // No further than this turn.
+        let ready = |block: u32| base.spans[block as usize].0 as usize <= group;
+        let mut most = starved.then_some(0);
+        let free = workspace.memory.available();
+        loop {
+            pass.advance(ready, most).unwrap();
+            if pass.group > group {
+                break;
+            }
+            given_up += 1;
+            assert_eq!(workspace.memory.available(), free, "of group {group}");
+            most = most.map(|most| most + most / 4 + 256);
+        }
+        turns += 1;
+    }
+    let (crossing, counts) = pass.finish().unwrap();
+    let all = |sections: &Sections<4>| {
+        let all = 0..blocks.count();
+        all.map(|block| sections.get(block).unwrap()).collect()
+    };
+    let left = Left {
+        added: all(&crossing.added),
+        removed: all(&crossing.removed),
+        counts,
+    };
+    (left, [turns, given_up])
+}
+
+#[test]
+fn a_turn_that_is_given_up_is_taken_again() {
+    let (want, [_, given_up]) = across(false);
+    assert_eq!(given_up, 0);
+    assert!(want.counts.accepted > 50, "{:?}", want.counts);
+    let (got, [turns, given_up]) = across(true);
+    // At once, when a block is to be read, and when its triangles are to be kept.
+    assert!(given_up > 10 * turns, "{given_up} of {turns}");
+    assert_eq!(got, want);
+}
