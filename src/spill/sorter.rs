@@ -5,7 +5,7 @@ use super::{Record, sort};
 use crate::error::Result;
 use crate::workspace::Workspace;
 use crate::workspace::file::Maker;
-use crate::workspace::memory::{Reservation, bytes_of};
+use crate::workspace::memory::Reservation;
 use crate::workspace::persist::{Persist, Raw, Saved};
 use crate::workspace::steps::Step;
 use std::collections::BTreeMap;
@@ -29,8 +29,28 @@ struct State<const N: usize> {
     buffer: Vec<Record<N>>,
     runs: Vec<Run<N>>,
     made: usize,
-    /// What is told how large the buffer is.
+    /// Records that the buffer had at most: what is behind them was never touched.
+    touched: usize,
+    /// What is told how much of the buffer is taken.
     held: Option<Reservation>,
+}
+
+impl<const N: usize> State<N> {
+    fn new() -> Self {
+        Self {
+            buffer: Vec::new(),
+            runs: Vec::new(),
+            made: 0,
+            touched: 0,
+            held: None,
+        }
+    }
+
+    fn tell(&mut self, bytes: u64) {
+        if let Some(held) = &mut self.held {
+            held.set_held(bytes);
+        }
+    }
 }
 
 impl<const N: usize> Sorter<N> {
@@ -39,12 +59,7 @@ impl<const N: usize> Sorter<N> {
     pub fn new(workspace: &Workspace, name: &str, buffer: u64) -> Self {
         let capacity = (buffer as usize / size_of::<Record<N>>()).max(2);
         Self {
-            state: Mutex::new(State {
-                buffer: Vec::new(),
-                runs: Vec::new(),
-                made: 0,
-                held: None,
-            }),
+            state: Mutex::new(State::new()),
             capacity,
             name: name.to_owned(),
             files: workspace.maker(),
@@ -90,13 +105,17 @@ impl<const N: usize> Sorter<N> {
                 // Doubling, but never past what was reserved.
                 let target = wanted.max(2 * state.buffer.len()).min(self.capacity);
                 let more = target - state.buffer.len();
+                // The old one and its copy.
+                let both = 2 * size_of_val(state.buffer.as_slice()) as u64;
                 state.buffer.reserve_exact(more);
-                let taken = bytes_of(&state.buffer);
-                if let Some(held) = &mut state.held {
-                    held.set_held(taken);
-                }
+                state.tell(both);
             }
             state.buffer.extend_from_slice(now);
+            if state.buffer.len() > state.touched {
+                state.touched = state.buffer.len();
+                let taken = size_of_val(state.buffer.as_slice()) as u64;
+                state.tell(taken);
+            }
             records = later;
             if state.buffer.len() == self.capacity {
                 self.spill(&mut state)?;
@@ -239,31 +258,21 @@ impl<const N: usize> Sorter<N> {
     pub fn finish(self, workspace: &Workspace) -> Result<Sorted<N>> {
         let mut state = {
             let mut guard = self.state();
-            std::mem::replace(
-                &mut *guard,
-                State {
-                    buffer: Vec::new(),
-                    runs: Vec::new(),
-                    made: 0,
-                    held: None,
-                },
-            )
+            std::mem::replace(&mut *guard, State::new())
         };
         if state.runs.is_empty() {
             self.pool.install(|| sort::sort(&mut state.buffer));
             return Ok(Sorted {
                 buffer: state.buffer,
                 runs: Vec::new(),
-                _held: state.held,
+                held: state.held,
             });
         }
         if !state.buffer.is_empty() {
             self.spill(&mut state)?;
         }
         state.buffer = Vec::new();
-        if let Some(held) = &mut state.held {
-            held.set_held(0);
-        }
+        state.tell(0);
         let step = workspace.step("merges")?;
         for (number, (name, merged)) in step.finished::<(String, Vec<String>)>(workspace)? {
             state.made = state.made.max(number as usize + 1);
@@ -276,6 +285,7 @@ impl<const N: usize> Sorter<N> {
             let rest = state.runs.split_off(fan_in.min(state.runs.len()));
             let batch = std::mem::replace(&mut state.runs, rest);
             let number = state.made as u64;
+            state.tell(merge_bytes(&batch));
             let run = self.merge_runs(workspace, &batch, &mut state.made)?;
             if run.is_kept() {
                 let merged: Vec<String> = batch.iter().map(Run::name).collect();
@@ -285,11 +295,13 @@ impl<const N: usize> Sorter<N> {
             workspace.let_go()?;
             state.runs.push(run);
         }
-        Ok(Sorted {
+        let mut sorted = Sorted {
             buffer: Vec::new(),
             runs: state.runs,
-            _held: state.held,
-        })
+            held: state.held,
+        };
+        sorted.tell(sorted.merge_bytes());
+        Ok(sorted)
     }
 
     /// Makes one run of several.
@@ -316,12 +328,20 @@ impl<const N: usize> Sorter<N> {
     }
 }
 
+/// Sorted records, and what is reserved for them.
+pub type InMemory<const N: usize> = (Vec<Record<N>>, Option<Reservation>);
+
 /// The output of a [`Sorter`].
 #[derive(Debug)]
 pub struct Sorted<const N: usize> {
     buffer: Vec<Record<N>>,
     runs: Vec<Run<N>>,
-    _held: Option<Reservation>,
+    held: Option<Reservation>,
+}
+
+/// Memory that merging runs takes, in bytes.
+fn merge_bytes<const N: usize>(runs: &[Run<N>]) -> u64 {
+    (runs.len() * (FRAME * size_of::<Record<N>>() + FILE_BUFFER)) as u64
 }
 
 impl<const N: usize> Persist for Sorted<N> {
@@ -334,21 +354,36 @@ impl<const N: usize> Persist for Sorted<N> {
         Ok(Self {
             runs: Persist::load(from)?,
             buffer: Persist::load(from)?,
-            _held: None,
+            held: None,
         })
     }
 }
 
 impl<const N: usize> Sorted<N> {
-    /// All records in ascending order if they are in memory.
+    /// All records in ascending order if they are in memory, with what is reserved for them.
     ///
     /// # Errors
     /// The records as they were, on disk.
-    pub fn in_memory(self) -> std::result::Result<Vec<Record<N>>, Self> {
+    pub fn in_memory(self) -> std::result::Result<InMemory<N>, Self> {
         if self.runs.is_empty() {
-            Ok(self.buffer)
+            Ok((self.buffer, self.held))
         } else {
             Err(self)
+        }
+    }
+
+    /// These, in memory that is reserved.
+    #[must_use]
+    pub fn holding(mut self, reserved: Reservation) -> Self {
+        self.held = Some(reserved);
+        self
+    }
+
+    /// Tells how much is taken of what is reserved. Merging by [`Sorted::for_range`] is for the caller to
+    /// tell; all else is told.
+    pub fn tell(&mut self, bytes: u64) {
+        if let Some(held) = &mut self.held {
+            held.set_held(bytes);
         }
     }
 
@@ -409,7 +444,7 @@ impl<const N: usize> Sorted<N> {
     /// Memory that merging takes, in bytes.
     #[must_use]
     pub fn merge_bytes(&self) -> u64 {
-        (self.runs.len() * (FRAME * size_of::<Record<N>>() + FILE_BUFFER)) as u64
+        merge_bytes(&self.runs)
     }
 }
 

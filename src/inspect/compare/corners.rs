@@ -174,7 +174,7 @@ enum Corners {
 impl Corners {
     fn new(sorted: Sorted<3>) -> Self {
         match sorted.in_memory() {
-            Ok(all) => Self::Memory(all),
+            Ok((all, _)) => Self::Memory(all),
             Err(sorted) => Self::Disk(sorted),
         }
     }

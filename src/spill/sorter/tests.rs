@@ -72,6 +72,42 @@ proptest! {
 }
 
 #[test]
+fn only_what_was_filled_is_held() {
+    let workspace = workspace();
+    let pool = &workspace.memory;
+    let before = pool.peak_held();
+    for whole in [true, false] {
+        let reserved = workspace.promise("sorted", 1 << 20).unwrap();
+        let sorter = Sorter::<2>::new(&workspace, "h", 1 << 20).telling(reserved);
+        let sorter = if whole { sorter.whole() } else { sorter };
+        let _ = pool.take_held();
+        for n in 0..30_000u32 {
+            sorter.push(&[[n % 100, n]]).unwrap();
+        }
+        // To grow takes the old one and its copy.
+        let most = if whole { 30_000 } else { 2 << 14 };
+        assert_eq!(pool.take_held(), before + most * 8);
+        let (all, held) = sorter.finish(&workspace).unwrap().in_memory().unwrap();
+        assert_eq!(all.len(), 30_000);
+        let _ = pool.take_held();
+        assert_eq!(pool.take_held(), before + 30_000 * 8);
+        drop(held);
+    }
+    // What is merged takes frames, and not the buffer that it went through.
+    let reserved = workspace.promise("sorted", 1 << 20).unwrap();
+    let sorter = Sorter::<2>::new(&workspace, "m", 1 << 20).telling(reserved);
+    for n in 0..300_000u32 {
+        sorter.push(&[[n % 100, n]]).unwrap();
+    }
+    assert_eq!(pool.take_held(), before + (1 << 20));
+    let sorted = sorter.finish(&workspace).unwrap();
+    let _ = pool.take_held();
+    assert_eq!(pool.take_held(), before + sorted.merge_bytes());
+    drop(sorted);
+    assert_eq!(pool.available(), pool.capacity());
+}
+
+#[test]
 fn damage_is_found_and_named() {
     let workspace = workspace();
     let sorter = Sorter::<2>::new(&workspace, "d", 800);

@@ -41,7 +41,8 @@ pub type Each<'a, M, S> = &'a mut dyn FnMut(&[Point], Option<M>, S) -> Result<()
 pub struct Orderer {
     sorter: Sorter<3>,
     taken: AtomicU64,
-    held: crate::workspace::memory::Reservation,
+    /// Bytes of the sort buffer.
+    buffer: u64,
 }
 
 impl Orderer {
@@ -65,11 +66,12 @@ impl Orderer {
             .saturating_add(SPARE)
             .saturating_mul(size_of::<hilbert::Key>() as u64);
         let buffer = third.min(all);
-        let held = workspace.reserve("order: sort buffer", buffer)?;
+        let held = workspace.promise("order: sort buffer", buffer)?;
+        let sorter = Sorter::new(workspace, "order", buffer);
         Ok(Self {
-            sorter: Sorter::new(workspace, "order", buffer).whole(),
+            sorter: sorter.telling(held).whole(),
             taken: AtomicU64::new(0),
-            held,
+            buffer,
         })
     }
 
@@ -165,18 +167,17 @@ impl Orderer {
         let Self {
             sorter,
             taken,
-            held,
+            buffer,
         } = self;
         let mut writer = StoreWriter::create(workspace, "points", page)?;
         match sorter.finish(workspace)?.in_memory() {
-            Ok(mut keys) => {
+            Ok((mut keys, _held)) => {
                 keys.dedup();
                 let left = &keys[writer.len().min(keys.len())..];
                 writer.append(workspace, left, |key| hilbert::decode(*key))?;
             }
-            Err(sorted) => merge(&sorted, held.bytes(), &mut writer, workspace)?,
+            Err(sorted) => merge(sorted, buffer, &mut writer, workspace)?,
         }
-        drop(held);
         let store = writer.finish(workspace)?;
         let limit = u64::from(u32::MAX) - 1;
         if store.len() as u64 > limit {
@@ -207,7 +208,7 @@ fn next(mut key: hilbert::Key) -> hilbert::Key {
 
 /// Writes what is on disk in order, part by part, each merged by one thread, in `memory` bytes.
 fn merge(
-    sorted: &Sorted<3>,
+    mut sorted: Sorted<3>,
     memory: u64,
     writer: &mut StoreWriter,
     workspace: &Workspace,
@@ -219,8 +220,12 @@ fn merge(
     let ends: Vec<_> = [start].into_iter().chain(cuts).chain([None]).collect();
     let parts: Vec<Part> = ends.windows(2).map(|w| (w[0], w[1])).collect();
     // A part has a frame more of each run at most, and its list grows by doubling.
-    let part = 3 * (PART * size_of::<hilbert::Key>()) as u64 + 4 * sorted.merge_bytes();
-    let threads = (memory / part).clamp(1, workspace.threads as u64) as usize;
+    let (list, merging) = (
+        (PART * size_of::<hilbert::Key>()) as u64,
+        sorted.merge_bytes(),
+    );
+    let threads = (memory / (3 * list + 4 * merging)).clamp(1, workspace.threads as u64) as usize;
+    sorted.tell(threads as u64 * (list + merging));
     let one = |&(from, to): &Part| {
         workspace.check_cancel()?;
         let mut keys = Vec::with_capacity(PART);

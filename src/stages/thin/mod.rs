@@ -17,7 +17,6 @@ use crate::geom::lattice::Lattice;
 use crate::spill::{Record, Sorted, Sorter};
 use crate::stages::ingest::{READ_BUFFERS, Spool};
 use crate::workspace::Workspace;
-use crate::workspace::memory::Reservation;
 use crate::workspace::persist::{Persist, Saved, persist};
 use serde::Serialize;
 
@@ -42,7 +41,6 @@ pub struct ThinStats {
 pub struct Thinned {
     sorted: Sorted<6>,
     grid: Grid,
-    held: Reservation,
 }
 
 /// Sorts the points of a spool by the cells of `grid`; the spool is deleted.
@@ -57,8 +55,8 @@ pub fn thin(spool: Spool, lattice: &Lattice, grid: Grid, workspace: &Workspace) 
     // A quarter, for the points are put in order while these are still there.
     let buffer = (workspace.memory.available() / 4).max(16 << 20);
     // Growing a buffer holds the old and the new one for a moment.
-    let held = workspace.reserve("thin: sort buffer", buffer + buffer / 2)?;
-    let sorter = Sorter::new(workspace, "thin", buffer);
+    let held = workspace.promise("thin: sort buffer", buffer + buffer / 2)?;
+    let sorter = Sorter::new(workspace, "thin", buffer).telling(held);
     let take = |points: &[Point]| {
         workspace.check_cancel()?;
         let mut records = Vec::with_capacity(CHUNK.min(points.len()));
@@ -78,7 +76,6 @@ pub fn thin(spool: Spool, lattice: &Lattice, grid: Grid, workspace: &Workspace) 
     Ok(Thinned {
         sorted: sorter.finish(workspace)?,
         grid,
-        held,
     })
 }
 
@@ -90,11 +87,12 @@ impl Persist for Thinned {
 
     fn load(from: &mut Saved<'_>) -> Result<Self> {
         let sorted = Sorted::load(from)?;
-        let bytes = sorted.merge_bytes();
+        let held = from
+            .workspace
+            .reserve("thin: merge", sorted.merge_bytes())?;
         Ok(Self {
-            held: from.workspace.reserve("thin: merge", bytes)?,
+            sorted: sorted.holding(held),
             grid: Grid::load(from)?,
-            sorted,
         })
     }
 }
@@ -117,7 +115,7 @@ impl Thinned {
     /// # Errors
     /// What `each` returned; [`crate::Error::Io`], [`crate::Error::Corrupt`].
     pub fn for_each(self, from: Mark, mut stats: ThinStats, each: Each<'_>) -> Result<ThinStats> {
-        let Self { sorted, grid, held } = self;
+        let Self { sorted, grid } = self;
         let mut kept = Vec::with_capacity(BATCH);
         let mut best: Option<(Record<6>, f64)> = None;
         let mut last = None;
@@ -149,7 +147,6 @@ impl Thinned {
         })?;
         kept.extend(best.map(|(record, _)| position(record)));
         each(&kept, None, stats)?;
-        drop(held);
         Ok(stats)
     }
 }

@@ -37,7 +37,6 @@ fn thinned(grid: &Grid, points: &[Point], buffer: u64) -> (Vec<Point>, ThinStats
     let thinned = Thinned {
         sorted: sorter.finish(&workspace).unwrap(),
         grid: grid.clone(),
-        held: workspace.reserve("thin: sort buffer", buffer).unwrap(),
     };
     let mut kept = Vec::new();
     let stats = thinned
