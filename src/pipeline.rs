@@ -172,6 +172,7 @@ impl Reconstruction {
         let radius = disk_radius(params.radius, &store, &lattice);
         let blocks = Blocks::new(store.len(), params.block);
         let tiles = TileRanges::new(blocks, self.tile_points);
+        workspace.trim();
         for round in 1..=params.smooth {
             store = clock.stage("smooth", "points", points, || {
                 let (k, smoothing) = (params.neighbors, params.smoothing);
@@ -198,6 +199,7 @@ impl Reconstruction {
                 .unwrap_or(&store),
             file: &store,
         };
+        workspace.trim();
         let (seen, cell_stats) = clock.stage("cells", "points", points, || {
             let widen = match params.method {
                 Method::Robust => Widen::OnBands,
@@ -213,6 +215,7 @@ impl Reconstruction {
             )
         })?;
         not_a_line(&cell_stats, points)?;
+        workspace.trim();
         let (triples, triple_stats) =
             clock.stage("triples", "triples", 0, || triples(seen, blocks, workspace))?;
         let count = blocks.count() as u64;

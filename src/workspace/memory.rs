@@ -6,6 +6,7 @@
 //! most counts for its thread until the loop over the units ends, since the allocator keeps it for the
 //! next one.
 
+mod trim;
 mod unit;
 
 pub use unit::{Holding, bytes_of, give_back, hold, table_bytes};
@@ -21,8 +22,8 @@ pub const MINIMUM_BUDGET: u64 = 192 << 20;
 /// Part of the budget that the program takes before it has anything to do: code, tables, stacks.
 pub const PROGRAM: u64 = 7 << 20;
 
-/// What a thread that has worked holds beside its units: its stack, small lists, and the pieces that
-/// the allocator keeps for it between larger ones. Paid from [`SLACK`].
+/// What a thread that has worked holds beside its units until memory is trimmed: its stack, small lists,
+/// and the pieces that the allocator keeps for it between larger ones. Paid from [`SLACK`].
 const THREAD: u64 = 9 << 18;
 
 /// Part of the budget kept for what is not reserved by name: small buffers, allocator slack.
@@ -39,7 +40,7 @@ struct State {
     /// Who had reserved what at the peak.
     at_peak: BTreeMap<&'static str, u64>,
     held: Ledger,
-    /// Threads that do units now, and that did so at one time at most.
+    /// Threads that do units now, and that did so at one time at most since memory was trimmed.
     threads: (u64, u64),
 }
 
@@ -172,6 +173,17 @@ impl MemoryPool {
     pub fn take_held(&self) -> u64 {
         let held = &mut self.state().held;
         std::mem::replace(&mut held.lately, held.sum)
+    }
+
+    /// Gives back to the system what the allocator keeps of what was freed, by `threads` above all. For
+    /// when none of them is at work, and what comes next is large and has other sizes.
+    pub fn trim(&self, threads: &rayon::ThreadPool) {
+        if trim::trim(threads) {
+            let mut state = self.state();
+            let (now, most) = state.threads;
+            state.held.take("threads", (most - now) * THREAD);
+            state.threads.1 = now;
+        }
     }
 
     fn state(&self) -> std::sync::MutexGuard<'_, State> {
@@ -411,6 +423,12 @@ mod tests {
         assert_eq!(pool.peak_held(), PROGRAM + THREAD + (5 << 20));
         drop(slot);
         assert_eq!(pool.available(), pool.capacity());
+        // Where memory cannot be trimmed a thread keeps what it has.
+        pool.trim(&rayon::ThreadPoolBuilder::new().build().unwrap());
+        let _ = pool.take_held();
+        let kept = pool.take_held() - PROGRAM;
+        let trimmed = cfg!(all(target_os = "linux", target_env = "gnu"));
+        assert_eq!(kept, if trimmed { 0 } else { THREAD });
         let silent = Unit::begin(pool.promise_waiting("unit", 1).unwrap());
         assert_eq!(silent.most(), None);
     }

@@ -299,6 +299,12 @@ impl Workspace {
         self.memory.promise(name, bytes)
     }
 
+    /// Gives back to the system what stages have freed. For before those whose lists are large and of other
+    /// sizes; no unit may be at work.
+    pub fn trim(&self) {
+        self.memory.trim(&self.pool);
+    }
+
     /// The run's threads, for rayon.
     #[must_use]
     pub fn pool(&self) -> Arc<rayon::ThreadPool> {

@@ -107,7 +107,7 @@ impl Slot {
         if !self.used {
             self.used = true;
             state.threads.0 += 1;
-            // A thread that has worked keeps that as long as it lives.
+            // A thread that has worked keeps that until memory is trimmed.
             if state.threads.0 > state.threads.1 {
                 state.threads.1 += 1;
                 state.held.add("threads", THREAD);
