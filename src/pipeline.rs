@@ -233,6 +233,7 @@ impl Reconstruction {
             flip: params.method == Method::Robust,
             zip: params.method == Method::Robust,
         };
+        workspace.trim();
         let (repaired, repair) = clock.stage("repair", "blocks", 2 * count, || {
             repair(places, stitched, blocks, options, workspace)
         })?;

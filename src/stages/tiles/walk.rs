@@ -14,10 +14,14 @@ use std::collections::BinaryHeap;
 /// Pages kept in memory by a [`PageCache`].
 const CACHED_PAGES: usize = 1024;
 
-/// Recently read pages of the store.
+/// Recently read pages of the store, one behind the other: the allocator has one list to find room for.
 #[derive(Debug, Default)]
 pub struct PageCache {
-    pages: FxHashMap<usize, Vec<Point>>,
+    points: Vec<Point>,
+    /// Where the points of each page begin, and how many they are.
+    pages: FxHashMap<usize, (usize, usize)>,
+    /// Points that there were at one time.
+    most: usize,
     held: Holding,
 }
 
@@ -29,20 +33,24 @@ impl PageCache {
     }
 
     fn get(&mut self, store: &PointStore, page: usize) -> Result<&[Point]> {
-        if self.pages.len() >= CACHED_PAGES && !self.pages.contains_key(&page) {
+        if let Some(&(start, len)) = self.pages.get(&page) {
+            return Ok(&self.points[start..start + len]);
+        }
+        if self.pages.len() >= CACHED_PAGES {
             // Queries come in curve order: soon everything here is new again.
             self.pages.clear();
+            self.points.clear();
         }
-        self.held
-            .set((self.pages.len() + 1) as u64 * store.page_size() as u64 * 12);
-        match self.pages.entry(page) {
-            std::collections::hash_map::Entry::Occupied(found) => Ok(found.into_mut()),
-            std::collections::hash_map::Entry::Vacant(empty) => {
-                let mut points = Vec::new();
-                store.read_pages(page..page + 1, &mut points)?;
-                Ok(empty.insert(points))
-            }
+        if self.points.capacity() == 0 {
+            // As far as it is not filled it is not there.
+            self.points.reserve_exact(CACHED_PAGES * store.page_size());
         }
+        let start = self.points.len();
+        store.read_pages(page..page + 1, &mut self.points)?;
+        self.most = self.most.max(self.points.len());
+        self.held.set(self.most as u64 * 12);
+        self.pages.insert(page, (start, self.points.len() - start));
+        Ok(&self.points[start..])
     }
 }
 
