@@ -22,9 +22,15 @@ pub const MINIMUM_BUDGET: u64 = 192 << 20;
 /// Part of the budget that the program takes before it has anything to do: code, tables, stacks.
 pub const PROGRAM: u64 = 7 << 20;
 
-/// What a thread that has worked holds beside its units until memory is trimmed: its stack, small lists,
-/// and the pieces that the allocator keeps for it between larger ones. Paid from [`SLACK`].
+/// What a thread that has worked holds beside its units: its stack, small lists, and the pieces that the
+/// allocator keeps for it between larger ones. Paid from [`SLACK`].
 const THREAD: u64 = 9 << 18;
+
+/// The same where memory is tight.
+const TIGHT_THREAD: u64 = 7 << 18;
+
+/// Below this budget memory is tight: what is freed goes back to the system, for some per cent of the time.
+const TIGHT: u64 = 1 << 30;
 
 /// Part of the budget kept for what is not reserved by name: small buffers, allocator slack.
 pub const SLACK: u64 = 41 << 20;
@@ -40,7 +46,7 @@ struct State {
     /// Who had reserved what at the peak.
     at_peak: BTreeMap<&'static str, u64>,
     held: Ledger,
-    /// Threads that do units now, and that did so at one time at most since memory was trimmed.
+    /// Threads that do units now, and that did so at one time at most.
     threads: (u64, u64),
 }
 
@@ -175,14 +181,25 @@ impl MemoryPool {
         std::mem::replace(&mut held.lately, held.sum)
     }
 
-    /// Gives back to the system what the allocator keeps of what was freed, by `threads` above all. For
-    /// when none of them is at work, and what comes next is large and has other sizes.
+    /// Gives back to the system what the allocator keeps of what was freed, by `threads` above all, if
+    /// memory is tight. For when none of them is at work, and what comes next is large and has other sizes.
     pub fn trim(&self, threads: &rayon::ThreadPool) {
-        if trim::trim(threads) {
-            let mut state = self.state();
-            let (now, most) = state.threads;
-            state.held.take("threads", (most - now) * THREAD);
-            state.threads.1 = now;
+        if self.is_tight() {
+            trim::trim(threads);
+        }
+    }
+
+    /// True if the budget is so small that freed memory goes back to the system, so that what is held now
+    /// is what counts; else a thread keeps what its largest unit took.
+    fn is_tight(&self) -> bool {
+        trim::CAN && self.0.budget < TIGHT
+    }
+
+    fn thread(&self) -> u64 {
+        if self.is_tight() {
+            TIGHT_THREAD
+        } else {
+            THREAD
         }
     }
 
@@ -406,8 +423,33 @@ mod tests {
     }
 
     #[test]
-    fn a_thread_counts_for_its_largest_unit() {
+    fn where_memory_is_tight_what_is_held_now_counts() {
         let pool = MemoryPool::new(MINIMUM_BUDGET).unwrap();
+        if !pool.is_tight() {
+            return;
+        }
+        let mut slot = Slot::new(&pool, "unit");
+        let at_work = Unit::begin(pool.promise_waiting("unit", 8 << 20).unwrap());
+        let first = hold(3 << 20);
+        drop(hold(2 << 20));
+        let _ = pool.take_held();
+        assert_eq!(pool.take_held(), PROGRAM + (3 << 20));
+        let second = hold(4 << 20);
+        drop((first, second));
+        assert_eq!(pool.peak_held(), PROGRAM + (7 << 20));
+        slot.ended(at_work);
+        let _ = pool.take_held();
+        assert_eq!(pool.take_held(), PROGRAM + TIGHT_THREAD);
+        // What says nothing has taken all that it reserved.
+        let silent = Unit::begin(pool.promise_waiting("unit", 9 << 20).unwrap());
+        slot.ended(silent);
+        assert_eq!(pool.peak_held(), PROGRAM + TIGHT_THREAD + (9 << 20));
+        assert_eq!(pool.available(), pool.capacity());
+    }
+
+    #[test]
+    fn a_thread_counts_for_its_largest_unit() {
+        let pool = MemoryPool::new(TIGHT).unwrap();
         let mut slot = Slot::new(&pool, "unit");
         for bytes in [3 << 20, 5 << 20, 2 << 20] {
             let at_work = Unit::begin(pool.promise_waiting("unit", 8 << 20).unwrap());
@@ -417,20 +459,12 @@ mod tests {
             give_back(1 << 20);
             assert_eq!(pool.available(), pool.capacity() - (7 << 20));
             drop((second, hold(7)));
-            slot.ended(at_work.most().unwrap());
+            slot.ended(at_work);
         }
         assert_eq!(pool.held_at_peak()["unit"], 5 << 20);
         assert_eq!(pool.peak_held(), PROGRAM + THREAD + (5 << 20));
         drop(slot);
         assert_eq!(pool.available(), pool.capacity());
-        // Where memory cannot be trimmed a thread keeps what it has.
-        pool.trim(&rayon::ThreadPoolBuilder::new().build().unwrap());
-        let _ = pool.take_held();
-        let kept = pool.take_held() - PROGRAM;
-        let trimmed = cfg!(all(target_os = "linux", target_env = "gnu"));
-        assert_eq!(kept, if trimmed { 0 } else { THREAD });
-        let silent = Unit::begin(pool.promise_waiting("unit", 1).unwrap());
-        assert_eq!(silent.most(), None);
     }
 
     #[test]

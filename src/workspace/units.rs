@@ -40,10 +40,9 @@ impl Workspace {
                     .check_cancel()
                     .and_then(|()| self.memory.promise_waiting(name, bytes(unit)))
                     .and_then(|reserved| {
-                        let most = reserved.bytes();
                         let at_work = Unit::begin(reserved);
                         let outcome = work(unit);
-                        slot.ended(at_work.most().unwrap_or(most));
+                        slot.ended(at_work);
                         outcome
                     });
                 if let Err(error) = outcome {

@@ -40,10 +40,10 @@ impl Seen {
         seen
     }
 
-    /// Tells what the lists take, and `more` bytes.
+    /// Tells what the lists take, and `more` bytes. Room that was never written to takes none.
     pub fn tell(&mut self, more: u64) {
-        let lists = bytes_of(&self.here) + bytes_of(&self.begins) + bytes_of(&self.elsewhere);
-        self.held.set(lists + more);
+        let lists = size_of_val(&*self.here) + size_of_val(&*self.elsewhere);
+        self.held.set(lists as u64 + bytes_of(&self.begins) + more);
     }
 
     /// Number of triples so far, each as often as it was seen.
@@ -92,7 +92,7 @@ impl Seen {
                 kept.push([i, j, k, group.len() as u32]);
             }
         }
-        self.tell(bytes_of(&sorted) + bytes_of(&kept));
+        self.tell((size_of_val(&*sorted) + size_of_val(&*kept)) as u64);
         drop(sorted);
         self.elsewhere.sort_unstable();
         let sent = self.elsewhere.chunk_by(|a, b| a == b).map(|group| {

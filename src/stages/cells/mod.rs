@@ -18,7 +18,7 @@ use crate::stages::tiles::Tile;
 use crate::stages::tiles::near::Search;
 use crate::stages::tiles::walk::PageCache;
 use crate::workspace::Workspace;
-use crate::workspace::memory::{bytes_of, hold};
+use crate::workspace::memory::hold;
 use crate::workspace::persist::persist;
 use fold::Seen;
 use serde::Serialize;
@@ -162,7 +162,7 @@ pub fn cells(
         let mut stats = one_tile(store, ids.clone(), neighbors, &mut maker, &mut seen)?;
         stats.raw_triples = seen.len() as u64;
         let (kept, sent) = seen.fold(&tiles);
-        let _held = hold(bytes_of(&kept) + bytes_of(&sent));
+        let _held = hold((size_of_val(&*kept) + size_of_val(&*sent)) as u64);
         own.put(tile, &kept)?;
         exchange.send_from(tile, &sent)?;
         workspace.advance(ids.len() as u64);

@@ -1,18 +1,17 @@
 //! Memory that the allocator keeps for later.
 
+/// True if the allocator can be told; others are left alone.
+pub(super) const CAN: bool = cfg!(all(target_os = "linux", target_env = "gnu"));
+
 /// Gives back to the system what was freed on `threads` and elsewhere: what a stage has freed is of little
-/// use to the next one, whose lists have other sizes. True if it was done.
+/// use to the next one, whose lists have other sizes. From then on large lists go back at once.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
-pub(super) fn trim(threads: &rayon::ThreadPool) -> bool {
+pub(super) fn trim(threads: &rayon::ThreadPool) {
     glibc::trim(threads);
-    true
 }
 
-/// Other allocators are left alone.
 #[cfg(not(all(target_os = "linux", target_env = "gnu")))]
-pub(super) fn trim(_: &rayon::ThreadPool) -> bool {
-    false
-}
+pub(super) fn trim(_: &rayon::ThreadPool) {}
 
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 #[allow(
@@ -24,11 +23,10 @@ mod glibc {
     use std::hint::black_box;
 
     /// Larger lists go back at once when they are freed, and need no copy to grow.
-    const MAPPED: c_int = 8 << 20;
+    const MAPPED: c_int = 1 << 20;
 
-    /// What is free at the end of a thread's heap stays while stages are at work, as it does where glibc
-    /// sets this by itself: to give it back after every unit costs a twentieth of the time.
-    const KEPT: c_int = 64 << 20;
+    /// What is free at the end of a thread's heap stays up to this.
+    const KEPT: c_int = 4 << 20;
 
     /// Freeing a list so large makes glibc look at the end of the thread's heap.
     const NOTICED: usize = 96 << 10;

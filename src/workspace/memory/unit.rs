@@ -1,12 +1,17 @@
 //! What the unit of work on this thread holds.
 
-use super::{MemoryPool, Reservation, THREAD};
+use super::{MemoryPool, Reservation};
 use std::cell::{Cell, RefCell};
 use std::collections::HashMap;
+
+/// Changes below this are told later.
+const STEP: u64 = 64 << 10;
 
 thread_local! {
     static NOW: Cell<u64> = const { Cell::new(0) };
     static MOST: Cell<u64> = const { Cell::new(0) };
+    /// What the pool knows of it; `None` if it is told only when the unit has ended.
+    static TOLD: Cell<Option<u64>> = const { Cell::new(None) };
     static RESERVED: RefCell<Option<Reservation>> = const { RefCell::new(None) };
 }
 
@@ -19,14 +24,27 @@ impl Holding {
     pub fn set(&mut self, bytes: u64) {
         let now = NOW.get().saturating_sub(self.0).saturating_add(bytes);
         self.0 = bytes;
-        NOW.set(now);
         MOST.set(MOST.get().max(now));
+        change(now);
     }
 }
 
 impl Drop for Holding {
     fn drop(&mut self) {
-        NOW.set(NOW.get().saturating_sub(self.0));
+        change(NOW.get().saturating_sub(self.0));
+    }
+}
+
+/// Now the unit on this thread holds so much.
+fn change(now: u64) {
+    NOW.set(now);
+    if TOLD.get().is_some_and(|told| told.abs_diff(now) >= STEP) {
+        TOLD.set(Some(now));
+        RESERVED.with_borrow_mut(|reserved| {
+            if let Some(reserved) = reserved {
+                reserved.set_held(now);
+            }
+        });
     }
 }
 
@@ -66,18 +84,23 @@ impl Unit {
     pub(in crate::workspace) fn begin(reserved: Reservation) -> Self {
         NOW.set(0);
         MOST.set(0);
+        TOLD.set(reserved.pool.is_tight().then_some(0));
         RESERVED.set(Some(reserved));
         Self
     }
 
-    /// What it held at most, if it said anything.
-    pub(in crate::workspace) fn most(&self) -> Option<u64> {
-        Some(MOST.get()).filter(|most| *most > 0)
+    /// What it held at most; all that it reserved, if it said nothing.
+    fn most(&self) -> u64 {
+        match MOST.get() {
+            0 => RESERVED.with_borrow(|reserved| reserved.as_ref().map_or(0, Reservation::bytes)),
+            most => most,
+        }
     }
 }
 
 impl Drop for Unit {
     fn drop(&mut self) {
+        TOLD.set(None);
         RESERVED.set(None);
     }
 }
@@ -100,19 +123,28 @@ impl Slot {
         }
     }
 
-    /// A unit has ended that held so much.
-    pub(in crate::workspace) fn ended(&mut self, bytes: u64) {
-        let more = bytes.saturating_sub(self.most);
+    /// A unit has ended.
+    pub(in crate::workspace) fn ended(&mut self, unit: Unit) {
+        let (most, said) = (unit.most(), MOST.get() > 0);
+        drop(unit);
         let mut state = self.pool.state();
         if !self.used {
             self.used = true;
             state.threads.0 += 1;
-            // A thread that has worked keeps that until memory is trimmed.
+            // A thread that has worked keeps that as long as it lives.
             if state.threads.0 > state.threads.1 {
                 state.threads.1 += 1;
-                state.held.add("threads", THREAD);
+                state.held.add("threads", self.pool.thread());
             }
         }
+        if self.pool.is_tight() {
+            // The pool was told, if there was anything to tell.
+            let silent = if said { 0 } else { most };
+            state.held.add(self.name, silent);
+            state.held.take(self.name, silent);
+            return;
+        }
+        let more = most.saturating_sub(self.most);
         state.held.add(self.name, more);
         self.most += more;
     }
