@@ -40,7 +40,7 @@ fn damage_to_any_file_is_found_and_mended() {
     let records = case.events["recorded"] - case.events["delete"];
     let saved = case.bench.path("saved");
     let mut named = BTreeSet::new();
-    for (turn, part) in [2, 20, 33, 44, 58, 70, 85, 96].into_iter().enumerate() {
+    for (turn, part) in [3, 20, 33, 44, 58, 70, 85, 96].into_iter().enumerate() {
         case.killed(&format!("recorded:{}", records * part / 100));
         copy(&case.scratch, &saved);
         let (part_file, saved_part) = (
