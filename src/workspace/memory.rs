@@ -30,7 +30,7 @@ const THREAD: u64 = 9 << 18;
 const TIGHT_THREAD: u64 = 7 << 18;
 
 /// Below this budget memory is tight: what is freed goes back to the system, for some per cent of the time.
-const TIGHT: u64 = 1 << 30;
+const TIGHT: u64 = 512 << 20;
 
 /// Part of the budget kept for what is not reserved by name: small buffers, allocator slack.
 pub const SLACK: u64 = 41 << 20;
