@@ -259,6 +259,7 @@ const CUTS: [Cut; 3] = [
 #[derive(Debug, Default)]
 struct Reached {
     rounds: u32,
+    curved: usize,
     on_a_line: usize,
     one_sided: usize,
     voted: usize,
@@ -273,6 +274,7 @@ struct Reached {
 impl Reached {
     fn add(&mut self, counts: &Counts) {
         self.rounds = self.rounds.max(counts.rounds);
+        self.curved += counts.curved;
         self.on_a_line += counts.flat + counts.flat_candidates;
         self.one_sided += counts.one_sided;
         self.voted += counts.voted;
@@ -364,8 +366,9 @@ fn holes_of_few_edges_and_wide_angles() {
 
 #[test]
 fn robust() {
-    let reached = run(60..72, |seed| Settings {
+    let reached = run(100..112, |seed| Settings {
         relax: seed as u32 % 4,
+        neighbors: [30, 12][seed as usize / 6 % 2],
         block: [40, 7, 100, 15, 25, 65_536][seed as usize % 6],
         min_component: [1, 3, 10][seed as usize % 3],
         max_hole_edges: [500, 500, 0, 500, 4][seed as usize % 5],
@@ -373,6 +376,7 @@ fn robust() {
     });
     let Reached {
         rounds,
+        curved,
         on_a_line,
         one_sided,
         voted,
@@ -383,7 +387,14 @@ fn robust() {
         zipped_whole,
         ..
     } = reached;
-    let parts = [on_a_line, one_sided, voted, outvoted, joints_removed];
+    let parts = [
+        curved,
+        on_a_line,
+        one_sided,
+        voted,
+        outvoted,
+        joints_removed,
+    ];
     let mended = [flips, partly_zipped, zipped_whole];
     let all = parts.iter().chain(&mended).all(|n| *n > 0);
     assert!(rounds == 3 && all, "parts not reached: {reached:?}");

@@ -66,6 +66,30 @@ fn moved(points: &[Point], i: usize, k: usize) -> Point {
     })
 }
 
+/// Whether a surface of second order leaves less than half of the square heights over the plane, all
+/// points alike.
+pub fn is_curved(points: &[Point], i: usize, k: usize) -> bool {
+    let mut others = by_distance(points, i);
+    others.truncate(k);
+    let last2 = others
+        .last()
+        .map_or(0, |&j| distance2(points[i], points[j]));
+    let reach = (1.1 * last2 as f64).sqrt();
+    let weighted = |j: usize| Weighted {
+        at: sub(points[j], points[i]).map(|c| c as f64 / reach),
+        weight: 1.0,
+    };
+    let all: Vec<Weighted> = [i].into_iter().chain(others).map(weighted).collect();
+    let Some(normal) = least_scatter(&all) else {
+        return false;
+    };
+    let curved = Surface::best(&all, normal);
+    let mean = all.iter().map(|p| dot(p.at, normal)).sum::<f64>() / all.len() as f64;
+    let squares = all.iter().map(|p| (dot(p.at, normal) - mean).powi(2));
+    let left = all.iter().map(|p| curved.off(p.at).powi(2));
+    left.sum::<f64>() < 0.5 * squares.sum::<f64>()
+}
+
 /// The direction in which the weighted points scatter least.
 fn least_scatter(all: &[Weighted]) -> Option<Vec3> {
     let mut total = 0.0;

@@ -124,6 +124,8 @@ pub struct Counts {
     /// Rounds of relaxing, and points in patches that moved.
     pub rounds: u32,
     pub moved: usize,
+    /// Rough patches that stayed because their region is curved.
+    pub curved: usize,
     /// T3 and candidates on a line in the file.
     pub flat: usize,
     pub flat_candidates: usize,
@@ -181,6 +183,7 @@ pub fn reconstruct(points: &[Point], settings: &Settings) -> Mesh {
     let triples = cells::triples(&relaxed.shape, settings, diagonal);
     let mut mesh = connect(&relaxed.shape, points, &triples, settings);
     (mesh.counts.rounds, mesh.counts.moved) = (relaxed.rounds, relaxed.moved);
+    mesh.counts.curved = relaxed.curved;
     mesh
 }
 

@@ -1,6 +1,7 @@
 //! Relaxing (section 1.2): the shape, positions that decide which points are connected.
 
 use super::cells::{by_distance, plane_of};
+use super::edges::is_curved;
 use outcrop::geom::lattice::COORDINATE_LIMIT;
 use outcrop::geom::{Point, distance2};
 
@@ -11,6 +12,8 @@ pub struct Relaxed {
     pub rounds: u32,
     /// Points that moved, once for each round.
     pub moved: usize,
+    /// Rough patches that stay because most of the rough ones of their region are curved.
+    pub curved: usize,
 }
 
 /// Ids in a patch.
@@ -37,12 +40,19 @@ fn foot(points: &[Point], i: usize, k: usize) -> (Point, bool) {
     });
     let square = offset[0] * offset[0] + offset[1] * offset[1] + offset[2] * offset[2];
     let spacing2 = std::f64::consts::PI * distance2(points[i], points[last]) as f64 / k as f64;
-    (to, square > 0.3 * 0.3 * spacing2)
+    (to, square > 0.2 * 0.2 * spacing2)
 }
 
 /// Whether a patch moves, by the points of it that were looked at.
 fn uneven(rough: &[bool]) -> bool {
     16 * rough.iter().filter(|r| **r).count() > rough.len()
+}
+
+/// Whether a rough patch is one by noise, by its first rough points that were looked at.
+fn noisy(points: &[Point], ids: impl Iterator<Item = usize>, k: usize) -> bool {
+    let telling: Vec<usize> = ids.filter(|&id| foot(points, id, k).1).take(3).collect();
+    let curved = telling.iter().filter(|&&id| is_curved(points, id, k));
+    2 * curved.count() < telling.len()
 }
 
 /// At most `rounds` rounds.
@@ -51,19 +61,26 @@ pub fn relax(points: &[Point], k: usize, rounds: u32) -> Relaxed {
         shape: points.to_vec(),
         rounds: 0,
         moved: 0,
+        curved: 0,
     };
     let patches = points.len().div_ceil(PATCH);
     let ids = |patch: usize| PATCH * patch..points.len().min(PATCH * (patch + 1));
-    let look = |patch: usize| -> Vec<bool> {
-        let some = ids(patch).filter(|id| (id / RUN).is_multiple_of(8));
-        some.map(|id| foot(points, id, k).1).collect()
-    };
+    let some = |patch: usize| ids(patch).filter(|id| (id / RUN).is_multiple_of(8));
+    let look =
+        |patch: usize| -> Vec<bool> { some(patch).map(|id| foot(points, id, k).1).collect() };
     let mut moving: Vec<usize> = (0..patches).filter(|&p| uneven(&look(p))).collect();
     let of_region =
         |all: &[usize], p: usize| all.iter().filter(|&&q| q / REGION == p / REGION).count();
     let in_region = |p: usize| (0..patches).filter(|q| q / REGION == p / REGION).count();
     let rough = moving.clone();
-    moving.retain(|&p| 4 * of_region(&rough, p) >= in_region(p));
+    let mut noise = rough.clone();
+    noise.retain(|&p| noisy(points, some(p), k));
+    moving.retain(|&p| {
+        let (noise, rough) = (of_region(&noise, p), of_region(&rough, p));
+        let moves = 8 * noise >= in_region(p) && 5 * noise >= 2 * rough;
+        relaxed.curved += usize::from(!moves && 8 * rough >= in_region(p));
+        moves
+    });
     let mut runs: Vec<Vec<usize>> = moving
         .into_iter()
         .flat_map(|p| {

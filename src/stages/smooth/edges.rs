@@ -25,6 +25,9 @@ const EXACT2: f64 = 1e-24;
 /// A curved surface must leave so much less of the square heights over it than a plane.
 const GAIN: f64 = 1.25;
 
+/// A surface is curved if a curved one leaves less than this part of the square heights over a plane.
+const CURVED: f64 = 0.5;
+
 /// Unknowns of a surface of second order.
 const TERMS: usize = 6;
 
@@ -53,6 +56,22 @@ impl Around {
         let normal = self.normal().unwrap_or(normal);
         let height = self.height(normal) * reach;
         normal.map(|n| n * height)
+    }
+
+    /// True if a curved surface is what lies off the plane of a point and `count` of its neighbours,
+    /// which count alike: of the square heights over the plane it leaves less than half.
+    pub(super) fn is_curved(&mut self, near: &Neighbors, count: usize) -> bool {
+        let count = count.min(near.len());
+        let last2 = near.get(count.wrapping_sub(1)).map_or(0, |n| n.distance2);
+        if last2 == 0 {
+            return false;
+        }
+        self.gather(near, count, (REACH2 * last2 as f64).sqrt());
+        self.weights.fill(1.0);
+        self.normal().is_some_and(|normal| {
+            let heights = self.heights(normal, &self.surface(normal));
+            heights.left < CURVED * heights.square
+        })
     }
 
     fn gather(&mut self, near: &Neighbors, count: usize, reach: f64) {
@@ -117,6 +136,16 @@ impl Around {
     /// How far the surface is above the point: a plane, unless a curved one fits far better.
     fn height(&self, normal: [f64; 3]) -> f64 {
         let curved = self.surface(normal);
+        let heights = self.heights(normal, &curved);
+        if heights.square <= GAIN * heights.left {
+            heights.mean
+        } else {
+            curved.terms[0]
+        }
+    }
+
+    /// Heights over the plane with `normal` and over a curved surface.
+    fn heights(&self, normal: [f64; 3], curved: &Surface) -> Heights {
         let (mut total, mut sum, mut square, mut left) = (0.0, 0.0, 0.0, 0.0);
         for (a, w) in self.at.iter().zip(&self.weights) {
             let height = dot(*a, normal);
@@ -127,10 +156,10 @@ impl Around {
             left += w * off * off;
         }
         let mean = sum / total;
-        if square - sum * mean <= GAIN * left {
-            mean
-        } else {
-            curved.terms[0]
+        Heights {
+            mean,
+            square: square - sum * mean,
+            left,
         }
     }
 
@@ -164,6 +193,15 @@ impl Around {
         }
         Surface { frame, terms }
     }
+}
+
+/// Weighted heights over the best plane.
+struct Heights {
+    mean: f64,
+    /// The sum of the squares of what they differ from the mean.
+    square: f64,
+    /// The sum of the squares of heights over a curved surface.
+    left: f64,
 }
 
 /// Terms of second order at a place, and its height.

@@ -86,6 +86,42 @@ impl<'a> Planes<'a> {
         };
         look_in_store(&uncertain, in_store, each)
     }
+
+    /// Calls `each` with what `of` makes of the neighbours of every point whose id is `wanted`.
+    pub fn each_neighborhood<T>(
+        &self,
+        wanted: impl Fn(usize) -> bool,
+        of: impl FnMut(Point, &Neighbors) -> T,
+        mut each: impl FnMut(usize, Point, T),
+    ) -> Result<()> {
+        let (of, count) = (RefCell::new(of), self.neighbors);
+        let look = |tile: &Tile, found: &mut Found<'_, T>| {
+            each_near(tile, count, wanted, &of, found);
+        };
+        let uncertain = look_in_tile(&self.tile, look, &mut each)?;
+        let in_store = |cache: &mut PageCache, id: u32, point: Point| {
+            let near = near_in_store(self.store, cache, id, point, count)?;
+            Ok(Some((of.borrow_mut())(point, &near)))
+        };
+        look_in_store(&uncertain, in_store, each)
+    }
+}
+
+/// Calls `found` with what `of` makes of the neighbours of the `wanted` points.
+fn each_near<T>(
+    tile: &Tile,
+    count: usize,
+    wanted: impl Fn(usize) -> bool,
+    of: &RefCell<impl FnMut(Point, &Neighbors) -> T>,
+    found: &mut Found<'_, T>,
+) {
+    tile.for_some_queries(count, &mut Search::default(), wanted, |id, point, query| {
+        let known = query.and_then(|mut query| {
+            let known = query.extend_to(count);
+            known.then(|| (of.borrow_mut())(point, query.near()))
+        });
+        found(id, point, Ok(known));
+    });
 }
 
 /// Calls `found` with the planes of the `wanted` points.
@@ -123,13 +159,7 @@ pub fn each_neighborhood<T>(
 ) -> Result<()> {
     let of = RefCell::new(of);
     let look = |tile: &Tile, found: &mut Found<'_, T>| {
-        tile.for_each_query(count, &mut Search::default(), |id, point, query| {
-            let known = query.and_then(|mut query| {
-                let known = query.extend_to(count);
-                known.then(|| (of.borrow_mut())(point, query.near()))
-            });
-            found(id, point, Ok(known));
-        });
+        each_near(tile, count, |_| true, &of, found);
     };
     let in_store = |cache: &mut PageCache, id: u32, point: Point| {
         let near = near_in_store(store, cache, id, point, count)?;

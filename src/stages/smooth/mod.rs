@@ -8,6 +8,7 @@ mod first;
 mod fits;
 mod pass;
 mod relax;
+mod seen;
 #[cfg(test)]
 mod tests;
 

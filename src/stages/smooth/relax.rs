@@ -7,20 +7,17 @@
 
 use super::first;
 use super::fits::each_fit;
-use super::moved;
 use super::pass::{Pass, RUN};
+use super::seen::{Seen, target};
 use crate::error::Result;
 use crate::geom::Point;
-use crate::stages::cells::{Fit, TileRanges};
+use crate::stages::cells::TileRanges;
 use crate::stages::order::PointStore;
 use crate::workspace::Workspace;
 use crate::workspace::memory::Reservation;
 use crate::workspace::persist::persist;
 use serde::Serialize;
 use std::ops::Range;
-
-/// A point is rough if it lies farther from its plane than this part of the local spacing.
-const ROUGH: f64 = 0.3;
 
 /// A run that moved moves again if at least so many of its points were rough.
 const RAGGED: u8 = 1;
@@ -66,41 +63,6 @@ impl Runs {
         for (active, rough) in self.active.iter_mut().zip(&mut self.rough) {
             *active &= std::mem::take(rough) >= RAGGED;
         }
-    }
-}
-
-/// What was seen of a range of ids.
-pub(super) struct Seen {
-    /// Its first run.
-    first: usize,
-    /// Rough points of each run.
-    rough: Vec<u8>,
-    pub(super) moved: u64,
-}
-
-persist!(Seen {
-    first,
-    rough,
-    moved
-});
-
-impl Seen {
-    pub(super) fn of(ids: &Range<usize>) -> Self {
-        let first = ids.start / RUN;
-        Self {
-            first,
-            rough: vec![0; ids.end.div_ceil(RUN) - first],
-            moved: 0,
-        }
-    }
-
-    pub(super) fn note(&mut self, id: usize, rough: bool) {
-        self.rough[id / RUN - self.first] += u8::from(rough);
-    }
-
-    /// Takes over what was seen of each run.
-    fn put(self, rough: &mut [u8]) {
-        rough[self.first..][..self.rough.len()].copy_from_slice(&self.rough);
     }
 }
 
@@ -215,16 +177,4 @@ fn one_round(
         seen.put(rough);
     })?;
     Ok((next, moved))
-}
-
-/// Where a point goes, and whether that is far.
-pub(super) fn target(point: Point, fit: &Fit, neighbors: usize) -> (Point, bool) {
-    let Some(normal) = fit.plane.normal else {
-        return (point, false);
-    };
-    let offset = fit.moments.project(normal);
-    let length2 = offset[0] * offset[0] + offset[1] * offset[1] + offset[2] * offset[2];
-    // On a plane, `neighbors` points lie in the disk up to the last one.
-    let spacing2 = std::f64::consts::PI * fit.last2 as f64 / neighbors as f64;
-    (moved(point, offset), length2 > ROUGH * ROUGH * spacing2)
 }

@@ -78,6 +78,43 @@ fn a_noisy_plane_gets_flatter_with_every_round() {
 }
 
 #[test]
+fn edges_are_rough_and_stay() {
+    // Roofs, 45 degrees steep, of eight points from the gutter to the ridge.
+    let roof = |x: i32| 100 * (x % 16 - 8).abs();
+    let points = sheet(64, |x, _| roof(x));
+    let (same, stats) = relaxed(&points, 3, 1000, 256);
+    assert_eq!(stats, RelaxStats::default());
+    let rough = rough_points(&points);
+    assert!(rough > points.len() / 10, "{rough}");
+    // With noise on them they move, however they are divided.
+    let noisy = sheet(64, |x, n| roof(x) + noise(n));
+    let (expected, stats) = relaxed(&noisy, 3, 1000, 256);
+    assert!(stats.moved > points.len() as u64 && expected != same);
+    for (tile, page) in [(100, 16), (333, 64)] {
+        assert!(relaxed(&noisy, 3, tile, page) == (expected.clone(), stats));
+    }
+}
+
+/// How many points a look at all of them finds rough.
+fn rough_points(points: &[Point]) -> usize {
+    let workspace = &workspace();
+    let (store, _) = ordered(points, 1000, 256, workspace);
+    let mut rough = 0;
+    let all = 0..store.len();
+    each_fit(
+        &store,
+        all,
+        12,
+        |_| true,
+        |_, point, fit| {
+            rough += usize::from(seen::target(point, &fit, 12).1);
+        },
+    )
+    .unwrap();
+    rough
+}
+
+#[test]
 fn only_rough_patches_move_and_tiles_do_not_matter() {
     let points = sheet(50, |x, n| if x < 25 { 0 } else { noise(n) });
     let (expected, stats) = relaxed(&points, 3, 1000, 256);
