@@ -26,6 +26,8 @@ pub(super) fn choose(sources: &[Source], stats: &IngestStats, refine: u32) -> Re
         Some(step) => refine_for_floats(&sources, offset, step),
         None => float_step(&sources),
     };
+    // A scale in a forged spool may be nothing, and twice nothing is no more.
+    step = step.max(f64::MIN_POSITIVE);
     let placed = loop {
         match place(&sources, step, offset) {
             Some(placed) => break placed,
@@ -237,4 +239,36 @@ fn float_step(sources: &[&Source]) -> f64 {
 
 fn pow2(exponent: i32) -> f64 {
     2f64.powi(exponent.clamp(-1074, 1023))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::source::Native;
+    use super::super::stats::SourceStats;
+    use super::*;
+
+    #[test]
+    fn a_forged_scale_of_nothing_or_beyond_all_numbers_ends() {
+        for scale in [0.0, -0.0, 5e-324, f64::MAX, f64::INFINITY, f64::NAN] {
+            for max in [0.0, 1.0, 1e300] {
+                let source = Source {
+                    native: Native::Las {
+                        scale: [scale, 0.01, 0.01],
+                        offset: [0.0; 3],
+                    },
+                    stats: SourceStats {
+                        kept: 2,
+                        min: [0.0; 3],
+                        max: [max; 3],
+                        ..SourceStats::default()
+                    },
+                    text: false,
+                };
+                let found = choose(&[source], &IngestStats::default(), 3);
+                if let Ok(lattice) = found {
+                    assert!(lattice.step.is_normal(), "{scale:e}, {max:e}: {lattice:?}");
+                }
+            }
+        }
+    }
 }
