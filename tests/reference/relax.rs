@@ -77,7 +77,7 @@ pub fn relax(points: &[Point], k: usize, rounds: u32) -> Relaxed {
     noise.retain(|&p| noisy(points, some(p), k));
     moving.retain(|&p| {
         let (noise, rough) = (of_region(&noise, p), of_region(&rough, p));
-        let moves = 8 * noise >= in_region(p) && 5 * noise >= 2 * rough;
+        let moves = 8 * noise >= in_region(p) && 10 * noise >= 3 * rough;
         relaxed.curved += usize::from(!moves && 8 * rough >= in_region(p));
         moves
     });

@@ -27,7 +27,7 @@ const REGION: usize = 256;
 /// Nothing moves in a region of which fewer than one patch in so many is noisy,
 const NOISE: usize = 8;
 /// or where fewer than so many in so many of its rough patches are.
-const EDGES: (usize, usize) = (2, 5);
+const EDGES: (usize, usize) = (3, 10);
 /// Points in a region.
 pub(super) const SPAN: usize = REGION * PATCH * RUN;
 
