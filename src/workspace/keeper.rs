@@ -13,10 +13,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-/// How often there is a look at what to do.
-const LOOK: Duration = Duration::from_millis(250);
-/// Looks between two rounds of syncing, if no file waits to be deleted.
-const ROUND: u32 = 20;
+/// Between two rounds of syncing, if no file waits to be deleted. One that does is room that the run
+/// may need, so it does not wait for the time of a round.
+const ROUND: Duration = Duration::from_secs(5);
 
 /// A file that is not needed any more, and its size.
 #[derive(Debug)]
@@ -73,20 +72,11 @@ impl Table {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Waits for the time of the next round; false when there is none.
+    /// Waits for the time of the next round, or for a file to be deleted; false when there is none.
     fn wait(&self) -> bool {
-        let mut state = self.state();
-        for look in 1.. {
-            if state.stop {
-                return false;
-            }
-            let waited = self.wake.wait_timeout(state, LOOK);
-            state = waited.unwrap_or_else(PoisonError::into_inner).0;
-            if look >= ROUND || !state.leaving.is_empty() {
-                break;
-            }
-        }
-        !state.stop
+        let idle = |state: &mut State| !state.stop && state.leaving.is_empty();
+        let waited = self.wake.wait_timeout_while(self.state(), ROUND, idle);
+        !waited.unwrap_or_else(PoisonError::into_inner).0.stop
     }
 
     fn round(&self, journal: &File, folder: &File, io: &IoCounters) {
@@ -159,14 +149,19 @@ impl Keeper {
         let mut now = Vec::new();
         let mut state = self.table.state();
         for file in files {
+            // Nobody will read it, so it need not be synced any more either.
+            state.dirty.retain(|dirty| dirty.name != file.name);
             if state.fresh.remove(&file.name) {
-                state.dirty.retain(|dirty| dirty.name != file.name);
                 now.push(file);
             } else {
                 state.leaving.push(file);
             }
         }
+        let waits = !state.leaving.is_empty();
         drop(state);
+        if waits {
+            self.table.wake.notify_all();
+        }
         now.iter().for_each(|file| file.delete(&self.io));
     }
 }
@@ -176,5 +171,35 @@ impl Drop for Keeper {
         // Nobody waits for a sync that is under way.
         self.table.state().stop = true;
         self.table.wake.notify_all();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::time::Instant;
+
+    #[test]
+    fn a_file_that_may_have_been_synced_goes_without_waiting_for_a_round() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = |name: &str| {
+            let path = folder.path().join(name);
+            (File::create(&path).unwrap(), path)
+        };
+        let (journal, (_, path)) = (file("journal").0, file("left"));
+        let io = Arc::new(IoCounters::default());
+        io.grow_scratch(7);
+        let opened = File::open(folder.path()).unwrap();
+        let keeper = Keeper::start(Arc::new(journal), opened, io.clone()).unwrap();
+        let start = Instant::now();
+        keeper.delete(vec![Leaving {
+            name: "left".into(),
+            path: path.clone(),
+            bytes: 7,
+        }]);
+        while path.exists() || io.scratch() > 0 {
+            assert!(start.elapsed() < ROUND / 2);
+            std::thread::sleep(Duration::from_millis(1));
+        }
     }
 }
