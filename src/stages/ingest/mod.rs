@@ -292,17 +292,22 @@ impl Spool {
         let largest = bounds
             .flat_map(|b| b.into_iter().flatten())
             .fold(0.0, |m: f64, c| m.max(c.abs()));
-        // Rounding to single precision moves a coordinate by at most 2^-24 of the power of two at
-        // or below it.
-        let half_unit = if largest == 0.0 {
-            0.0
-        } else {
-            largest.log2().floor().exp2() * 2f64.powi(-24)
-        };
-        if half_unit < lattice.step / 10.0 {
-            CoordinateType::F32
-        } else {
-            CoordinateType::F64
-        }
+        enough_for(lattice.step, largest)
+    }
+}
+
+/// The precision in which multiples of `step` up to `largest` should be written.
+pub(crate) fn enough_for(step: f64, largest: f64) -> CoordinateType {
+    // Rounding to single precision moves a coordinate by at most 2^-24 of the power of two at or
+    // below it.
+    let half_unit = if largest == 0.0 {
+        0.0
+    } else {
+        largest.log2().floor().exp2() * 2f64.powi(-24)
+    };
+    if half_unit < step / 10.0 {
+        CoordinateType::F32
+    } else {
+        CoordinateType::F64
     }
 }

@@ -26,6 +26,8 @@ pub struct Probe {
     pub scale: Option<[f64; 3]>,
     /// Offset of each axis of LAS and LAZ, in the file's unit.
     pub offset: Option<[f64; 3]>,
+    /// Smallest and largest coordinates that the header of LAS and LAZ claims.
+    pub bounds: Option<[[f64; 3]; 2]>,
     /// Bytes a point takes in the scratch folder.
     pub spool_bytes_per_point: u64,
 }
@@ -51,6 +53,7 @@ pub fn probe(path: &Path) -> Result<Probe> {
         point_format: las.map(|h| h.point_format),
         scale,
         offset,
+        bounds: las.map(|h| h.bounds),
         spool_bytes_per_point: native.point_bytes() as u64,
     })
 }

@@ -35,6 +35,8 @@ pub(in super::super) struct Header {
     pub(in super::super) extended: Option<(u64, u32)>,
     pub(in super::super) scale: [f64; 3],
     pub(in super::super) offset: [f64; 3],
+    /// Smallest and largest coordinates that the header claims. Nothing but estimates relies on them.
+    pub(in super::super) bounds: [[f64; 3]; 2],
     pub(in super::super) warnings: Vec<String>,
 }
 
@@ -79,6 +81,7 @@ impl Header {
             extended: full.then(|| (u64_at(&head, 235), u32_at(&head, 243))),
             scale: [131, 139, 147].map(|at| f64_at(&head, at)),
             offset: [155, 163, 171].map(|at| f64_at(&head, at)),
+            bounds: [[187, 203, 219], [179, 195, 211]].map(|ends| ends.map(|at| f64_at(&head, at))),
             warnings,
         };
         if full {
