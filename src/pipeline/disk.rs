@@ -1,7 +1,7 @@
 //! How much disk a run will take: before it starts, when the points are read, and when they are relaxed.
 //!
-//! At its peak, which is where triples are put together, scratch holds one or two stores of positions and
-//! all triples twice. How many triples there are depends on noise, which shows when the points are
+//! At its peak, which is where triples are put together and stitched, scratch holds one or two stores of
+//! positions and all triples twice. How many triples there are depends on noise, which shows when the points are
 //! relaxed: noisy ones move, and then there is a second store. That store is all that headers cannot
 //! tell: where noise makes more triples it makes fewer triangles, so scratch and mesh together are the
 //! same otherwise, and half a store is off by 6 bytes a point either way.
