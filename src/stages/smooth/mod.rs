@@ -26,7 +26,7 @@ use crate::stages::tiles::neighbors::Neighbors;
 use crate::workspace::Workspace;
 use edges::Around;
 use fits::each_fit;
-use pass::{Pass, RUN};
+use pass::Pass;
 use std::ops::Range;
 
 /// One round of smoothing: the same points, each on the plane of its `neighbors` nearest, or on
@@ -43,13 +43,8 @@ pub fn smooth(
     round: u32,
     workspace: &Workspace,
 ) -> Result<PointStore> {
-    let pass = Pass {
-        file: &format!("points{round}"),
-        memory: "smooth: tile",
-        tile: tiles.size(),
-        whole: RUN,
-        bytes: 0,
-    };
+    let file = format!("points{round}");
+    let pass = Pass::new(&file, "smooth: tile", tiles);
     let work = |ids: Range<usize>, points: &mut [Point]| match smoothing {
         Smoothing::Plain => {
             let all = |_: usize| true;

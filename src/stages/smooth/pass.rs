@@ -2,6 +2,7 @@
 
 use crate::error::Result;
 use crate::geom::Point;
+use crate::stages::cells::TileRanges;
 use crate::stages::order::{PointStore, Rewriter};
 use crate::stages::tiles::Tile;
 use crate::stages::tiles::walk::PageCache;
@@ -28,7 +29,18 @@ pub(super) struct Pass<'a> {
     pub bytes: u64,
 }
 
-impl Pass<'_> {
+impl<'a> Pass<'a> {
+    /// A pass that may divide points between any two runs and keeps nothing beside them.
+    pub fn new(file: &'a str, memory: &'static str, tiles: TileRanges) -> Self {
+        Self {
+            file,
+            memory,
+            tile: tiles.size(),
+            whole: RUN,
+            bytes: 0,
+        }
+    }
+
     /// Moves the points of `store`: `work` gets a range of ids and their positions to change; `each`
     /// what it returned.
     pub fn over<T: Persist + Send>(

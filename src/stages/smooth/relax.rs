@@ -118,11 +118,9 @@ fn first_round(
     workspace: &Workspace,
 ) -> Result<(PointStore, u64)> {
     let pass = Pass {
-        file: "relaxed1",
-        memory: "relax: tile",
-        tile: tiles.size(),
         whole: first::SPAN,
         bytes: first::BYTES,
+        ..Pass::new("relaxed1", "relax: tile", tiles)
     };
     let work = |ids: Range<usize>, points: &mut [Point]| {
         first::look_and_move(store, ids, neighbors, points)
@@ -150,13 +148,8 @@ fn one_round(
     runs: &mut Runs,
     workspace: &Workspace,
 ) -> Result<(PointStore, u64)> {
-    let pass = Pass {
-        file: &format!("relaxed{round}"),
-        memory: "relax: tile",
-        tile: tiles.size(),
-        whole: RUN,
-        bytes: 0,
-    };
+    let file = format!("relaxed{round}");
+    let pass = Pass::new(&file, "relax: tile", tiles);
     let Runs { active, rough, .. } = runs;
     let work = |ids: Range<usize>, points: &mut [Point]| {
         let wanted = |id: usize| active[id / RUN];

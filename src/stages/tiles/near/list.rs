@@ -148,12 +148,9 @@ fn nearest_body<P: Pick>(search: &mut Search, point: Point, own: u32, k: usize) 
     let wanted = k + 2;
     // The neighbours of the query before are about as far.
     let last = search.near.get(k.wrapping_sub(1));
-    let mut limit = likely_body(last.map_or(0.0, |n| n.distance2 as f32) * MARGIN, most);
-    let mut picked = pick_near_body::<P, false>(search, point, limit);
-    while picked < wanted && limit < most {
-        limit = wider_body(limit, picked, wanted, most);
-        picked = pick_near_body::<P, false>(search, point, limit);
-    }
+    let likely = likely_body(last.map_or(0.0, |n| n.distance2 as f32) * MARGIN, most);
+    let (mut picked, mut limit) =
+        pick_enough_body::<P, false>(search, point, wanted, likely..=most);
     let mut corrections = CORRECTIONS;
     if picked > too_many_body(wanted) {
         measure_body(search, point);
@@ -195,7 +192,7 @@ fn too_many_body(wanted: usize) -> usize {
 
 /// A limit up to `most` to try after one within which only `count` are.
 #[inline(always)]
-pub(super) fn wider_body(limit: f32, count: usize, wanted: usize, most: f32) -> f32 {
+fn wider_body(limit: f32, count: usize, wanted: usize, most: f32) -> f32 {
     let grow = (wanted + 4) as f32 / (count.max(1) as f32);
     (limit * grow.clamp(1.1, 8.0) + 4.0).min(most)
 }
@@ -224,10 +221,28 @@ fn reach_body(
     }
 }
 
+/// Picks as [`pick_near_body`] within a limit that is likely to hold `wanted`, or a wider one, up to the
+/// end of the `limits`; how many, and within which.
+#[inline(always)]
+pub(super) fn pick_enough_body<P: Pick, const DISTANCES: bool>(
+    search: &mut Search,
+    point: Point,
+    wanted: usize,
+    limits: RangeInclusive<f32>,
+) -> (usize, f32) {
+    let (mut limit, most) = limits.into_inner();
+    let mut picked = pick_near_body::<P, DISTANCES>(search, point, limit);
+    while picked < wanted && limit < most {
+        limit = wider_body(limit, picked, wanted, most);
+        picked = pick_near_body::<P, DISTANCES>(search, point, limit);
+    }
+    (picked, limit)
+}
+
 /// Picks the candidates whose approximate squared distance to `point` is at most `limit`, in order of id,
 /// with their ids or with these distances; how many. Nothing is measured for later.
 #[inline(always)]
-pub(super) fn pick_near_body<P: Pick, const DISTANCES: bool>(
+fn pick_near_body<P: Pick, const DISTANCES: bool>(
     search: &mut Search,
     point: Point,
     limit: f32,

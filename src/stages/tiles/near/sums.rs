@@ -1,7 +1,7 @@
 //! Sums over the nearest neighbours of many points: which they are matters, in what order they
 //! stand does not, so nothing is sorted.
 
-use super::list::{likely_body, pick_near_body, wider_body};
+use super::list::{likely_body, pick_enough_body};
 use super::{APPROXIMATE, OwnPage, Query, Search, above};
 use crate::geom::Point;
 use crate::geom::plane::Moments;
@@ -134,13 +134,8 @@ fn sum_body<P: Pick>(
     sums: &mut Sums,
 ) -> Result<(), Unknown> {
     let most = above(search.candidates.complete2);
-    let wanted = k + 2;
-    let mut limit = likely_body(search.last * MARGIN, most);
-    let mut picked = pick_near_body::<P, true>(search, point, limit);
-    while picked < wanted && limit < most {
-        limit = wider_body(limit, picked, wanted, most);
-        picked = pick_near_body::<P, true>(search, point, limit);
-    }
+    let limits = likely_body(search.last * MARGIN, most)..=most;
+    let (picked, limit) = pick_enough_body::<P, true>(search, point, k + 2, limits);
     let room = picked.next_multiple_of(BLOCK);
     let [_, _, _, numbers] = search.picked.slices_mut();
     numbers[picked..room].fill(f32::INFINITY.to_bits());
