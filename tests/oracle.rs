@@ -374,30 +374,17 @@ fn robust() {
         max_hole_edges: [500, 500, 0, 500, 4][seed as usize % 5],
         ..Settings::robust()
     });
-    let Reached {
-        rounds,
-        curved,
-        on_a_line,
-        one_sided,
-        voted,
-        outvoted,
-        joints_removed,
-        flips,
-        partly_zipped,
-        zipped_whole,
-        ..
-    } = reached;
     let parts = [
-        curved,
-        on_a_line,
-        one_sided,
-        voted,
-        outvoted,
-        joints_removed,
+        reached.curved,
+        reached.on_a_line,
+        reached.one_sided,
+        reached.voted,
+        reached.outvoted,
+        reached.joints_removed,
     ];
-    let mended = [flips, partly_zipped, zipped_whole];
+    let mended = [reached.flips, reached.partly_zipped, reached.zipped_whole];
     let all = parts.iter().chain(&mended).all(|n| *n > 0);
-    assert!(rounds == 3 && all, "parts not reached: {reached:?}");
+    assert!(reached.rounds == 3 && all, "parts not reached: {reached:?}");
 }
 
 #[test]

@@ -42,13 +42,9 @@ pub(super) struct Around {
 impl Around {
     /// Where a point goes from where it is, in steps, by the first `count` of its neighbours.
     pub(super) fn offset(&mut self, near: &Neighbors, count: usize) -> [f64; 3] {
-        let count = count.min(near.len());
-        let last2 = near.get(count.wrapping_sub(1)).map_or(0, |n| n.distance2);
-        let reach = (REACH2 * last2 as f64).sqrt();
-        if last2 == 0 {
+        let Some(reach) = self.gather(near, count) else {
             return [0.0; 3];
-        }
-        self.gather(near, count, reach);
+        };
         let Some(normal) = self.normal() else {
             return [0.0; 3];
         };
@@ -61,12 +57,9 @@ impl Around {
     /// True if a curved surface is what lies off the plane of a point and `count` of its neighbours,
     /// which count alike: of the square heights over the plane it leaves less than half.
     pub(super) fn is_curved(&mut self, near: &Neighbors, count: usize) -> bool {
-        let count = count.min(near.len());
-        let last2 = near.get(count.wrapping_sub(1)).map_or(0, |n| n.distance2);
-        if last2 == 0 {
+        if self.gather(near, count).is_none() {
             return false;
         }
-        self.gather(near, count, (REACH2 * last2 as f64).sqrt());
         self.weights.fill(1.0);
         self.normal().is_some_and(|normal| {
             let heights = self.heights(normal, &self.surface(normal));
@@ -74,7 +67,15 @@ impl Around {
         })
     }
 
-    fn gather(&mut self, near: &Neighbors, count: usize, reach: f64) {
+    /// Takes in the first `count` neighbours, with weights by distance; the reach, `None` if all of them
+    /// are at the point itself.
+    fn gather(&mut self, near: &Neighbors, count: usize) -> Option<f64> {
+        let count = count.min(near.len());
+        let last2 = near.get(count.wrapping_sub(1)).map_or(0, |n| n.distance2);
+        if last2 == 0 {
+            return None;
+        }
+        let reach = (REACH2 * last2 as f64).sqrt();
         self.at.clear();
         self.at.push([0.0; 3]);
         let differences = near.iter().take(count).map(|n| n.difference);
@@ -85,6 +86,7 @@ impl Around {
             let t = 1.0 - dot(a, a);
             t * t
         }));
+        Some(reach)
     }
 
     /// The direction in which the points scatter least.

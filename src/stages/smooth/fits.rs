@@ -54,7 +54,7 @@ pub fn each_plane(
     each_found(store, ids, &wanted, look, in_store, each)
 }
 
-/// A tile that is asked for planes more than once, of exactly the nearest neighbours.
+/// A tile that is asked for planes of exactly the nearest neighbours, or for these, any number of times.
 pub(super) struct Planes<'a> {
     store: &'a PointStore,
     tile: Tile,
@@ -96,7 +96,14 @@ impl<'a> Planes<'a> {
     ) -> Result<()> {
         let (of, count) = (RefCell::new(of), self.neighbors);
         let look = |tile: &Tile, found: &mut Found<'_, T>| {
-            each_near(tile, count, wanted, &of, found);
+            let mut search = Search::default();
+            tile.for_some_queries(count, &mut search, wanted, |id, point, query| {
+                let known = query.and_then(|mut query| {
+                    let known = query.extend_to(count);
+                    known.then(|| (of.borrow_mut())(point, query.near()))
+                });
+                found(id, point, Ok(known));
+            });
         };
         let uncertain = look_in_tile(&self.tile, look, &mut each)?;
         let in_store = |cache: &mut PageCache, id: u32, point: Point| {
@@ -105,23 +112,6 @@ impl<'a> Planes<'a> {
         };
         look_in_store(&uncertain, in_store, each)
     }
-}
-
-/// Calls `found` with what `of` makes of the neighbours of the `wanted` points.
-fn each_near<T>(
-    tile: &Tile,
-    count: usize,
-    wanted: impl Fn(usize) -> bool,
-    of: &RefCell<impl FnMut(Point, &Neighbors) -> T>,
-    found: &mut Found<'_, T>,
-) {
-    tile.for_some_queries(count, &mut Search::default(), wanted, |id, point, query| {
-        let known = query.and_then(|mut query| {
-            let known = query.extend_to(count);
-            known.then(|| (of.borrow_mut())(point, query.near()))
-        });
-        found(id, point, Ok(known));
-    });
 }
 
 /// Calls `found` with the planes of the `wanted` points.
@@ -157,15 +147,7 @@ pub fn each_neighborhood<T>(
     of: impl FnMut(Point, &Neighbors) -> T,
     each: impl FnMut(usize, Point, T),
 ) -> Result<()> {
-    let of = RefCell::new(of);
-    let look = |tile: &Tile, found: &mut Found<'_, T>| {
-        each_near(tile, count, |_| true, &of, found);
-    };
-    let in_store = |cache: &mut PageCache, id: u32, point: Point| {
-        let near = near_in_store(store, cache, id, point, count)?;
-        Ok(Some((of.borrow_mut())(point, &near)))
-    };
-    each_found(store, ids, &|_| true, look, in_store, each)
+    Planes::load(store, ids, count)?.each_neighborhood(|_| true, of, each)
 }
 
 /// Points whose neighbours are summed up, until their planes are found together.
