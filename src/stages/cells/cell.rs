@@ -10,6 +10,7 @@ use crate::stages::order::PointStore;
 use crate::stages::tiles::near::{Query, Sums};
 use crate::stages::tiles::neighbors::Neighbors;
 use crate::stages::tiles::walk::{PageCache, Walk};
+use crate::stages::tiles::wanted::Wanted;
 
 /// How often the neighbourhood is doubled when it lies on a line.
 const WIDENINGS: u32 = 3;
@@ -200,8 +201,6 @@ impl CellMaker {
         if !self.start(query.id(), &fit) {
             return Ok(Outcome::NoPlane);
         }
-        let point = query.point();
-        let own = point.map(f64::from);
         loop {
             let next = self.cell.clip_nearest(query.near().columns(), 0);
             if next < query.near().len() || self.cell.reach2() <= query.complete2() {
@@ -209,11 +208,11 @@ impl CellMaker {
                 return Ok(Outcome::Complete);
             }
             // On scan lines thousands of points are nearer than what can touch the cell.
-            let touches = |bounds: &Aabb| touches(&self.cell, own, bounds);
-            let pick = |columns: [&[i32]; 3], places: &mut Vec<u32>| {
-                self.cell.touching(columns, point, places);
+            let touching = Touching {
+                cell: &self.cell,
+                own: query.point(),
             };
-            if !query.extend_where(self.cell.reach2(), touches, pick) {
+            if !query.extend_where(self.cell.reach2(), &touching) {
                 return Ok(Outcome::Uncertain);
             }
         }
@@ -241,33 +240,34 @@ impl CellMaker {
         if !self.start(id, &fit) {
             return Ok(Outcome::NoPlane);
         }
-        let Walked { mut walk, near } = source;
-        for near in near.iter() {
-            if near.distance2 <= self.cell.reach2() {
-                self.cell.clip(near.difference, near.id);
-            }
-        }
-        let own = point.map(f64::from);
-        loop {
-            let cell = &self.cell;
-            let touches = |bounds: &Aabb| touches(cell, own, bounds);
-            let next = walk.advance_within(cell.reach2(), touches)?;
-            match next {
-                Some(near) if near.distance2 <= self.cell.reach2() => {
-                    self.cell.clip(near.difference, near.id);
-                }
-                _ => break,
-            }
+        let Walked { mut walk, mut near } = source;
+        while !near.is_empty() && self.cell.clip_nearest(near.columns(), 0) == near.len() {
+            let touching = Touching {
+                cell: &self.cell,
+                own: point,
+            };
+            walk.list_where(self.cell.reach2(), &touching, &mut near)?;
         }
         self.cell.triples(each);
         Ok(Outcome::Complete)
     }
 }
 
-/// False if no point in a box can change the cell of the point `own`.
-fn touches(cell: &Cell, own: [f64; 3], bounds: &Aabb) -> bool {
-    let from = |at: Point| std::array::from_fn(|k| f64::from(at[k]) - own[k]);
-    cell.may_touch(from(bounds.min), from(bounds.max))
+/// What can change the cell of the point `own`.
+struct Touching<'a> {
+    cell: &'a Cell,
+    own: Point,
+}
+
+impl Wanted for Touching<'_> {
+    fn may_be_in(&self, bounds: &Aabb) -> bool {
+        let from = |at: Point| std::array::from_fn(|k| f64::from(at[k]) - f64::from(self.own[k]));
+        self.cell.may_touch(from(bounds.min), from(bounds.max))
+    }
+
+    fn pick(&self, columns: [&[i32]; 3], places: &mut Vec<u32>) {
+        self.cell.touching(columns, self.own, places);
+    }
 }
 
 /// The plane of the `neighbors` nearest from what the tile knows; `None` if uncertain.

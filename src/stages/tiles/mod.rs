@@ -10,6 +10,7 @@ pub mod near;
 pub mod neighbors;
 mod points;
 pub mod walk;
+pub mod wanted;
 
 use crate::error::Result;
 use crate::geom::aabb::Aabb;

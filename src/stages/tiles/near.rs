@@ -6,6 +6,7 @@
 
 use super::candidates::{Candidates, Columns, PageLeaves};
 use super::neighbors::Neighbors;
+use super::wanted::Wanted;
 use super::{OwnPage, Tile};
 use crate::geom::aabb::Aabb;
 use crate::geom::{Point, distance2};
@@ -315,16 +316,9 @@ impl Query<'_> {
     }
 
     /// Lists the neighbours beyond [`Query::complete2`] up to a squared distance, instead of those
-    /// known so far: of those in boxes that `wanted` lets pass, and maybe others, the ones whose places
-    /// in the columns of their coordinates `pick` puts down, in order. False if the halo does not
-    /// reach that far.
+    /// known so far, if they are `wanted`. False if the halo does not reach that far.
     #[must_use]
-    pub fn extend_where(
-        &mut self,
-        distance2: u64,
-        wanted: impl Fn(&Aabb) -> bool,
-        pick: impl FnOnce([&[i32]; 3], &mut Vec<u32>),
-    ) -> bool {
+    pub fn extend_where(&mut self, distance2: u64, wanted: &impl Wanted) -> bool {
         if distance2 > self.own.reach2.max(self.complete2) {
             return false;
         }
@@ -332,12 +326,13 @@ impl Query<'_> {
         if distance2 > search.candidates.complete2 {
             search.step_aside();
             let around = Aabb::of(&[self.point]);
-            search.gather_where(self.tile, &around, distance2, Some(&wanted));
+            let in_box = |bounds: &Aabb| wanted.may_be_in(bounds);
+            search.gather_where(self.tile, &around, distance2, Some(&in_box));
         }
         search.places.clear();
         let candidates = &search.candidates;
         let columns = candidates.columns.coordinates(candidates.len);
-        pick(columns, &mut search.places);
+        wanted.pick(columns, &mut search.places);
         let beyond = self.complete2.saturating_add(1);
         search.list_places(self.point, self.id, beyond..=distance2);
         self.complete2 = self.complete2.max(distance2);

@@ -1,6 +1,9 @@
 //! The search of a tile against all distances, for every level of the kernels.
 
 use super::near::Search;
+use super::neighbors::Neighbors;
+use super::walk::{PageCache, Walk};
+use super::wanted::Wanted;
 use super::*;
 use crate::geom::plane::Moments;
 use crate::geom::{Point, distance2};
@@ -54,6 +57,29 @@ fn clouds() -> impl Strategy<Value = Vec<Point>> {
     ]
 }
 
+fn picked(p: &Point) -> bool {
+    (p[0] ^ p[1] ^ p[2]) % 3 == 0
+}
+
+/// Boxes that reach into a half of space, and of their points every third one.
+struct Half {
+    from: Point,
+}
+
+impl Wanted for Half {
+    fn may_be_in(&self, bounds: &Aabb) -> bool {
+        bounds.max[0] >= self.from[0]
+    }
+
+    fn pick(&self, [x, y, z]: [&[i32]; 3], places: &mut Vec<u32>) {
+        let is_picked = |place: &u32| {
+            let place = *place as usize;
+            picked(&[x[place], y[place], z[place]])
+        };
+        places.extend((0..x.len() as u32).filter(is_picked));
+    }
+}
+
 /// Asks for everything that a query offers; what it does not know must not be claimed.
 fn check(points: &[Point], tile: &Tile, k: usize, search: &mut Search) {
     let mut next = tile.ids().start;
@@ -92,15 +118,7 @@ fn check(points: &[Point], tile: &Tile, k: usize, search: &mut Search) {
         let known = query.complete2();
         let farther = known.saturating_mul(2).saturating_add(1);
         let half = |p: &Point| p[0] >= point[0];
-        let picked = |p: &Point| (p[0] ^ p[1] ^ p[2]) % 3 == 0;
-        let pick = |[x, y, z]: [&[i32]; 3], places: &mut Vec<u32>| {
-            let is_picked = |place: &u32| {
-                let place = *place as usize;
-                picked(&[x[place], y[place], z[place]])
-            };
-            places.extend((0..x.len() as u32).filter(is_picked));
-        };
-        if query.extend_where(farther, |bounds| half(&bounds.max), pick) {
+        if query.extend_where(farther, &Half { from: point }) {
             assert!(query.complete2() >= farther);
             let got: Vec<_> = query.near().iter().map(|n| (n.distance2, n.id)).collect();
             assert!(got.is_sorted());
@@ -166,6 +184,53 @@ proptest! {
                 check(&points, &tile, k, &mut Search::at(level));
                 check_sums(&points, &tile, k, &mut Search::at(level));
             }
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+    #[test]
+    fn a_walk_leaves_out_what_is_not_wanted_and_nothing_else(
+        cloud in clouds(),
+        known in 0usize..80,
+        page in prop::sample::select(vec![1usize, 5, 16, 64, 256]),
+        within in 0.0f64..1.2,
+    ) {
+        let workspace = workspace();
+        let store = store(&cloud, page, &workspace);
+        let points = store.slice(0..store.len()).unwrap();
+        let mut cache = PageCache::default();
+        let mut near = Neighbors::default();
+        for id in (0..points.len()).step_by(37) {
+            let point = points[id];
+            let all = all_near(&points, id);
+            let mut walk = Walk::new(&store, &mut cache, id as u32, point);
+            for expected in all.iter().take(known) {
+                let next = walk.advance().unwrap().unwrap();
+                prop_assert_eq!((next.distance2, next.id), *expected);
+            }
+            let rest = &all[known.min(all.len())..];
+            let place = (rest.len() as f64 * within) as usize;
+            let within2 = rest.get(place).map_or(u64::MAX, |near| near.0);
+            let mut got = Vec::new();
+            loop {
+                walk.list_where(within2, &Half { from: point }, &mut near).unwrap();
+                if near.is_empty() {
+                    break;
+                }
+                got.extend(near.iter().map(|n| (n.distance2, n.id)));
+            }
+            prop_assert!(got.is_sorted());
+            prop_assert!(got.iter().all(|near| rest.contains(near)));
+            let wanted = |(d2, id): &&(u64, u32)| {
+                let at = &points[*id as usize];
+                *d2 <= within2 && picked(at) && at[0] >= point[0]
+            };
+            prop_assert!(rest.iter().filter(wanted).all(|near| got.contains(near)));
+            // What was ready from the walk before is not asked about.
+            let asked = got.iter().all(|(_, id)| picked(&points[*id as usize]));
+            prop_assert!(asked || known > 0);
         }
     }
 }

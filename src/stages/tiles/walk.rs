@@ -2,8 +2,9 @@
 //! points whose halo does not prove enough.
 
 use super::Near;
+use super::neighbors::Neighbors;
+use super::wanted::{All, Wanted};
 use crate::error::Result;
-use crate::geom::aabb::Aabb;
 use crate::geom::{Point, distance2, sub};
 use crate::stages::order::PointStore;
 use crate::workspace::memory::{Holding, bytes_of};
@@ -17,10 +18,12 @@ const CACHED_PAGES: usize = 1024;
 /// Recently read pages of the store, one behind the other: the allocator has one list to find room for.
 #[derive(Debug, Default)]
 pub struct PageCache {
-    points: Vec<Point>,
-    /// Where the points of each page begin, and how many they are.
+    /// Coordinates of each page: all along x, then y, then z.
+    words: Vec<i32>,
+    /// Where the words of each page begin, and how many points it has.
     pages: FxHashMap<usize, (usize, usize)>,
-    /// Points that there were at one time.
+    read: Vec<Point>,
+    /// Words that there were at one time.
     most: usize,
     held: Holding,
 }
@@ -32,25 +35,37 @@ impl PageCache {
         (CACHED_PAGES * store.page_size() * 12) as u64
     }
 
-    fn get(&mut self, store: &PointStore, page: usize) -> Result<&[Point]> {
-        if let Some(&(start, len)) = self.pages.get(&page) {
-            return Ok(&self.points[start..start + len]);
-        }
+    /// The coordinates of a page's points.
+    fn get(&mut self, store: &PointStore, page: usize) -> Result<[&[i32]; 3]> {
+        let (start, len) = match self.pages.get(&page) {
+            Some(found) => *found,
+            None => self.take_in(store, page)?,
+        };
+        let column = |axis| &self.words[start + axis * len..][..len];
+        Ok([0, 1, 2].map(column))
+    }
+
+    fn take_in(&mut self, store: &PointStore, page: usize) -> Result<(usize, usize)> {
         if self.pages.len() >= CACHED_PAGES {
             // Queries come in curve order: soon everything here is new again.
             self.pages.clear();
-            self.points.clear();
+            self.words.clear();
         }
-        if self.points.capacity() == 0 {
+        if self.words.capacity() == 0 {
             // As far as it is not filled it is not there.
-            self.points.reserve_exact(CACHED_PAGES * store.page_size());
+            let room = CACHED_PAGES * store.page_size() * 3;
+            self.words.reserve_exact(room);
         }
-        let start = self.points.len();
-        store.read_pages(page..page + 1, &mut self.points)?;
-        self.most = self.most.max(self.points.len());
-        self.held.set(self.most as u64 * 12);
-        self.pages.insert(page, (start, self.points.len() - start));
-        Ok(&self.points[start..])
+        self.read.clear();
+        store.read_pages(page..page + 1, &mut self.read)?;
+        let found = (self.words.len(), self.read.len());
+        for axis in 0..3 {
+            self.words.extend(self.read.iter().map(|at| at[axis]));
+        }
+        self.most = self.most.max(self.words.len());
+        self.held.set(self.most as u64 * 4);
+        self.pages.insert(page, found);
+        Ok(found)
     }
 }
 
@@ -72,6 +87,8 @@ pub struct Walk<'a> {
     ready: Vec<(u64, u32, Point)>,
     /// Other points of opened pages, in no order.
     later: Vec<(u64, u32, Point)>,
+    /// Places of points of a page.
+    places: Vec<u32>,
     batch: usize,
     held: Holding,
 }
@@ -90,6 +107,7 @@ impl<'a> Walk<'a> {
             nodes: BinaryHeap::new(),
             ready: Vec::new(),
             later: Vec::new(),
+            places: Vec::new(),
             batch: BATCH,
             held: Holding::default(),
         };
@@ -102,49 +120,61 @@ impl<'a> Walk<'a> {
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
     pub fn advance(&mut self) -> Result<Option<Near>> {
-        self.advance_within(u64::MAX, |_| true)
+        if self.ready.is_empty() {
+            self.fill(u64::MAX, &All)?;
+        }
+        Ok(self.next_ready())
     }
 
-    /// As [`Walk::advance`], of those within the squared distance `within2` in boxes that `wanted` lets
-    /// pass, maybe one that is not; what did not pass once is not asked for again.
+    /// Lists the neighbours that follow, nearest first, instead of those in `near`: of what is left
+    /// within the squared distance `within2` and `wanted`, and maybe others, some at least; none when
+    /// there is no more. What was not wanted once is not asked for again.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
-    pub fn advance_within(
+    pub fn list_where(
         &mut self,
         within2: u64,
-        wanted: impl Fn(&Aabb) -> bool,
-    ) -> Result<Option<Near>> {
+        wanted: &impl Wanted,
+        near: &mut Neighbors,
+    ) -> Result<()> {
         if self.ready.is_empty() {
             self.fill(within2, wanted)?;
         }
-        Ok(self.ready.pop().map(|(distance2, id, at)| Near {
+        near.clear();
+        while let Some(next) = self.next_ready() {
+            near.push(next);
+        }
+        Ok(())
+    }
+
+    fn next_ready(&mut self) -> Option<Near> {
+        self.ready.pop().map(|(distance2, id, at)| Near {
             distance2,
             id,
             difference: sub(at, self.point),
-        }))
+        })
     }
 
     /// Makes the nearest of what is left within `within2` ready, at least a batch if there are so
     /// many, and all that are as far as the last of them.
-    fn fill(&mut self, within2: u64, wanted: impl Fn(&Aabb) -> bool) -> Result<()> {
+    fn fill(&mut self, within2: u64, wanted: &impl Wanted) -> Result<()> {
         let mut limit = within2;
-        let near = self.later.extract_if(.., |p| p.0 <= limit);
-        self.ready.extend(near);
+        self.take_later(limit, wanted);
         limit = self.narrow(limit);
         while let Some(&Reverse((distance, level, index))) = self.nodes.peek() {
             if distance > limit {
                 break;
             }
             self.nodes.pop();
-            if !wanted(&self.store.tree_boxes(level)[index]) {
+            if !wanted.may_be_in(&self.store.tree_boxes(level)[index]) {
                 continue;
             }
             if level > 0 {
                 let children = self.store.tree_children(level, index);
                 children.for_each(|child| self.wait(level - 1, child));
             } else {
-                self.open(index, limit)?;
+                self.open(index, limit, wanted)?;
                 if self.ready.len() >= 2 * self.batch {
                     limit = self.narrow(limit);
                 }
@@ -172,10 +202,29 @@ impl<'a> Walk<'a> {
         limit
     }
 
-    /// Takes in a page; its points up to `limit` are ready.
-    fn open(&mut self, page: usize, limit: u64) -> Result<()> {
-        let first = self.store.page_ids(page).start;
-        for (id, &at) in (first as u32..).zip(self.cache.get(self.store, page)?) {
+    /// Makes those `wanted` of the points of opened pages ready that are up to `limit`.
+    fn take_later(&mut self, limit: u64, wanted: &impl Wanted) {
+        self.ready
+            .extend(self.later.extract_if(.., |p| p.0 <= limit));
+        let column = |axis: usize| self.ready.iter().map(|p| p.2[axis]).collect::<Vec<_>>();
+        let [x, y, z] = [0, 1, 2].map(column);
+        self.places.clear();
+        wanted.pick([&x, &y, &z], &mut self.places);
+        for (to, from) in self.places.iter().enumerate() {
+            self.ready.swap(to, *from as usize);
+        }
+        self.ready.truncate(self.places.len());
+    }
+
+    /// Takes in those `wanted` of a page's points; those up to `limit` are ready.
+    fn open(&mut self, page: usize, limit: u64, wanted: &impl Wanted) -> Result<()> {
+        let first = self.store.page_ids(page).start as u32;
+        let columns = self.cache.get(self.store, page)?;
+        self.places.clear();
+        wanted.pick(columns, &mut self.places);
+        for &place in &self.places {
+            let id = first + place;
+            let at = columns.map(|column| column[place as usize]);
             let distance = distance2(at, self.point);
             if id != self.id {
                 let to = if distance <= limit {
