@@ -184,11 +184,9 @@ impl<'a> Sheet<'a> {
     fn facing(&self, behind: u32, from: u32) -> [f32; 3] {
         let (other, corner) = parts(behind);
         let slot = &self.slots[other];
-        if slot.corners[next(corner)] == from {
-            slot.normal.map(|x| -x)
-        } else {
-            slot.normal
-        }
+        // As often one way as the other: a sign, not a branch.
+        let sign = u32::from(slot.corners[next(corner)] == from) << 31;
+        slot.normal.map(|x| f32::from_bits(x.to_bits() ^ sign))
     }
 
     /// Looks at the edges that are due, in order, and flips those where it pays; how many.
@@ -246,6 +244,10 @@ impl<'a> Sheet<'a> {
             return None;
         }
         let (one, two) = (unit(one), unit(two));
+        // The new edge alone tells of most.
+        if was - distance(one, two) <= GAIN {
+            return None;
+        }
         let sides = self.sides(number, k, behind);
         let bend = |normal, side: Option<[f32; 3]>| side.map_or(0.0, |s| distance(normal, s));
         let bends = [
@@ -393,14 +395,16 @@ impl<'a> Sheet<'a> {
     }
 }
 
+/// The corner after corner `k` as a triangle runs: two bits for each.
 #[inline]
 fn next(k: usize) -> usize {
-    [1, 2, 0][k]
+    0b00_10_01 >> (2 * k) & 3
 }
 
+/// The corner before it.
 #[inline]
 fn last(k: usize) -> usize {
-    [2, 0, 1][k]
+    0b01_00_10 >> (2 * k) & 3
 }
 
 #[inline]

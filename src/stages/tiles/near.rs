@@ -151,9 +151,10 @@ impl Tile {
                     }
                 }
                 if farthest > 0 {
-                    // A little farther than the leaf before needed.
+                    // Somewhat farther than the leaf before needed: one point that gathers for itself
+                    // costs as much as a leaf.
                     let wider = search.wider2.min(farthest.saturating_mul(MOST_WIDER));
-                    guess = Some(wider.max(farthest + farthest / 4));
+                    guess = Some(wider.max(farthest + farthest / 2));
                 }
             }
             search.tell();
