@@ -244,14 +244,15 @@ impl<'a> Sheet<'a> {
             return None;
         }
         let (one, two) = (unit(one), unit(two));
+        let inner = distance(one, two);
         // The new edge alone tells of most.
-        if was - distance(one, two) <= GAIN {
+        if was - inner <= GAIN {
             return None;
         }
         let sides = self.sides(number, k, behind);
         let bend = |normal, side: Option<[f32; 3]>| side.map_or(0.0, |s| distance(normal, s));
         let bends = [
-            distance(one, two),
+            inner,
             bend(one, sides[0]),
             bend(one, sides[1]),
             bend(two, sides[2]),

@@ -21,10 +21,14 @@ fn workspace() -> Workspace {
     Workspace::new(&folder, memory, 1, Arc::new(Silent), Cancel::new()).unwrap()
 }
 
-fn store(points: &[Point], page: usize, workspace: &Workspace) -> PointStore {
-    let orderer = Orderer::new(workspace).unwrap();
-    orderer.push(workspace, points).unwrap();
-    orderer.finish(workspace, page).unwrap().0
+/// A store of a cloud in pages of so many points, where it lies, and its points by id.
+fn ordered(cloud: &[Point], page: usize) -> (Workspace, PointStore, Vec<Point>) {
+    let workspace = workspace();
+    let orderer = Orderer::new(&workspace).unwrap();
+    orderer.push(&workspace, cloud).unwrap();
+    let store = orderer.finish(&workspace, page).unwrap().0;
+    let points = store.slice(0..store.len()).unwrap();
+    (workspace, store, points)
 }
 
 /// All other points as (squared distance, id), ascending.
@@ -171,9 +175,7 @@ proptest! {
         page in prop::sample::select(vec![1usize, 5, 16, 64, 256]),
         cut in 0.0f64..1.0,
     ) {
-        let workspace = workspace();
-        let store = store(&cloud, page, &workspace);
-        let points = store.slice(0..store.len()).unwrap();
+        let (_workspace, store, points) = ordered(&cloud, page);
         let cut = (store.len() as f64 * cut) as usize;
         for ids in [0..cut, cut..store.len()] {
             if ids.is_empty() {
@@ -197,9 +199,7 @@ proptest! {
         page in prop::sample::select(vec![1usize, 5, 16, 64, 256]),
         within in 0.0f64..1.2,
     ) {
-        let workspace = workspace();
-        let store = store(&cloud, page, &workspace);
-        let points = store.slice(0..store.len()).unwrap();
+        let (_workspace, store, points) = ordered(&cloud, page);
         let mut cache = PageCache::default();
         let mut near = Neighbors::default();
         for id in (0..points.len()).step_by(37) {
