@@ -17,7 +17,7 @@ use crate::stages::export::{CoordinateType, export};
 use crate::stages::ingest::{self, ingest_classes};
 use crate::stages::located::Places;
 use crate::stages::repair::{RepairOptions, repair};
-use crate::stages::smooth::{relax, smooth};
+use crate::stages::smooth::{Relaxing, relax, smooth};
 use crate::stages::stitch::{StitchOptions, stitch};
 use crate::stages::triples::triples;
 use crate::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
@@ -179,10 +179,15 @@ impl Reconstruction {
                 smooth(&store, tiles, k, smoothing, round, workspace)
             })?;
         }
+        let relaxing = Relaxing {
+            neighbors: params.neighbors,
+            rounds: params.relax,
+            smoothed: params.smooth > 0,
+        };
         let relaxed = if params.relax > 0 {
             Some(
                 clock.stage("relax", "points", points * u64::from(params.relax), || {
-                    relax(&store, tiles, params.neighbors, params.relax, workspace)
+                    relax(&store, tiles, relaxing, workspace)
                 })?,
             )
         } else {

@@ -260,6 +260,7 @@ const CUTS: [Cut; 3] = [
 struct Reached {
     rounds: u32,
     curved: usize,
+    clean: usize,
     on_a_line: usize,
     one_sided: usize,
     voted: usize,
@@ -267,6 +268,7 @@ struct Reached {
     joints_removed: usize,
     flips: usize,
     openings: usize,
+    spanned: usize,
     partly_zipped: usize,
     zipped_whole: usize,
 }
@@ -275,6 +277,7 @@ impl Reached {
     fn add(&mut self, counts: &Counts) {
         self.rounds = self.rounds.max(counts.rounds);
         self.curved += counts.curved;
+        self.clean += counts.clean;
         self.on_a_line += counts.flat + counts.flat_candidates;
         self.one_sided += counts.one_sided;
         self.voted += counts.voted;
@@ -282,6 +285,7 @@ impl Reached {
         self.joints_removed += counts.joints_removed;
         self.flips += counts.flips;
         self.openings += counts.holes.openings;
+        self.spanned += counts.holes.spanned;
         self.partly_zipped += counts.holes.partly;
         self.zipped_whole += counts.holes.zipped_whole;
     }
@@ -382,7 +386,12 @@ fn robust() {
         reached.outvoted,
         reached.joints_removed,
     ];
-    let mended = [reached.flips, reached.partly_zipped, reached.zipped_whole];
+    let mended = [
+        reached.flips,
+        reached.partly_zipped,
+        reached.zipped_whole,
+        reached.spanned,
+    ];
     let all = parts.iter().chain(&mended).all(|n| *n > 0);
     assert!(reached.rounds == 3 && all, "parts not reached: {reached:?}");
 }
@@ -420,8 +429,20 @@ fn robust_on_torn_sheets_and_doors() {
             ..settings
         };
         reached.add(&compare("door", &clouds::door(seed), &settings, &CUTS));
+        let settings = Settings {
+            neighbors: 30,
+            smooth: 0,
+            ..settings
+        };
+        let pillars = clouds::pillars(seed);
+        reached.add(&compare("pillars", &pillars, &settings, &CUTS));
     }
-    let parts = [reached.openings, reached.voted, reached.partly_zipped];
+    let parts = [
+        reached.openings,
+        reached.clean,
+        reached.voted,
+        reached.partly_zipped,
+    ];
     let parts = parts.iter().all(|n| *n > 0);
     assert!(parts && some_stayed > 1, "{some_stayed} {reached:?}");
 }

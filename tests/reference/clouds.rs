@@ -124,6 +124,17 @@ pub fn one_of_each(seed: u64) -> Vec<(&'static str, Vec<Point>)> {
         .collect()
 }
 
+/// Pillars of six by six points, each of another height: rough for many neighbours, not for few.
+pub fn pillars(seed: u64) -> Vec<Point> {
+    let mut random = Random::new(seed);
+    let heights: Vec<i32> = (0..16).map(|_| random.integer(0, 1200) as i32).collect();
+    let height = |a: i32, b: i32| heights[(a / 6 + 4 * (b / 6)) as usize];
+    (0..24)
+        .flat_map(|a| (0..24).map(move |b| (a, b)))
+        .map(|(a, b)| [100 * a, 100 * b, height(a, b)])
+        .collect()
+}
+
 /// A frame around a door too wide to be a hole, its points a little off a grid.
 pub fn door(seed: u64) -> Vec<Point> {
     let mut random = Random::new(seed);

@@ -69,6 +69,24 @@ fn moved(points: &[Point], i: usize, k: usize) -> Point {
 /// Whether a surface of second order leaves less than half of the square heights over the plane, all
 /// points alike.
 pub fn is_curved(points: &[Point], i: usize, k: usize) -> bool {
+    heights(points, i, k).is_some_and(|(over_plane, left)| left < 0.5 * over_plane)
+}
+
+/// Whether no noise shows: over a surface of second order through a point and the twelve nearest, the
+/// others are high by less than 0.03 of the local spacing, seven degrees of freedom.
+pub fn is_clean(points: &[Point], i: usize, k: usize) -> bool {
+    let others = by_distance(points, i);
+    let last = others[..k.min(others.len())].last();
+    let last2 = last.map_or(0, |&j| distance2(points[i], points[j]));
+    let spacing2 = std::f64::consts::PI * last2 as f64 / k as f64;
+    others.len() >= 12
+        && k >= 12
+        && heights(points, i, 12).is_some_and(|(_, left)| left < 7.0 * 0.03 * 0.03 * spacing2)
+}
+
+/// The square heights of a point and `k` others over their plane, and over a surface of second order, all
+/// points alike.
+fn heights(points: &[Point], i: usize, k: usize) -> Option<(f64, f64)> {
     let mut others = by_distance(points, i);
     others.truncate(k);
     let last2 = others
@@ -80,14 +98,13 @@ pub fn is_curved(points: &[Point], i: usize, k: usize) -> bool {
         weight: 1.0,
     };
     let all: Vec<Weighted> = [i].into_iter().chain(others).map(weighted).collect();
-    let Some(normal) = least_scatter(&all) else {
-        return false;
-    };
+    let normal = least_scatter(&all)?;
     let curved = Surface::best(&all, normal);
     let mean = all.iter().map(|p| dot(p.at, normal)).sum::<f64>() / all.len() as f64;
     let squares = all.iter().map(|p| (dot(p.at, normal) - mean).powi(2));
     let left = all.iter().map(|p| curved.off(p.at).powi(2));
-    left.sum::<f64>() < 0.5 * squares.sum::<f64>()
+    let unit = reach * reach;
+    Some((squares.sum::<f64>() * unit, left.sum::<f64>() * unit))
 }
 
 /// The direction in which the weighted points scatter least.

@@ -24,6 +24,8 @@ pub struct Filling {
     pub zipped_whole: usize,
     /// Robust: short enough to be filled but for being an opening.
     pub openings: usize,
+    /// Robust: likewise, but seen only when it is filled.
+    pub spanned: usize,
     /// Robust: loops of three edges, closed before holes are counted.
     pub gaps: usize,
 }

@@ -35,11 +35,19 @@ pub fn mend(
     let behind = holes.behind(hole);
     let around = hole.len() > SMALL && holes.is_outline(hole, &behind);
     let found: u128 = squares(holes, hole);
-    let opening = |rest: &[u32]| is_opening(holes, rest, hole.len(), found);
+    let is_wide = |area: f64, rest: usize| {
+        let limit = 4.0 * found as f64 * rest as f64;
+        area * hole.len() as f64 > limit
+    };
+    let is_opening = |rest: &[u32]| is_wide(vector_area(holes, rest), rest.len());
+    let is_spanned = |rest: &[u32], patch: &[[u32; 3]]| is_wide(area(holes, patch), rest.len());
     if !around && hole.len() <= longest {
-        if opening(hole) {
+        let patch = filled(holes, hole, &behind, &BTreeSet::new());
+        if is_opening(hole) {
             filling.openings += 1;
-        } else if let Some(patch) = filled(holes, hole, &behind, &BTreeSet::new()) {
+        } else if patch.as_ref().is_some_and(|patch| is_spanned(hole, patch)) {
+            filling.spanned += 1;
+        } else if let Some(patch) = patch {
             if let [gap] = patch[..] {
                 filling.gaps += 1;
                 return vec![gap];
@@ -53,21 +61,20 @@ pub fn mend(
         filling.not_split += 1;
         return Vec::new();
     }
-    let whole_loop = hole;
     let mut zipper = Zipper::new(holes, hole, &behind);
     zipper.zip();
     let left = zipper.begin_at_smallest();
-    let (hole, behind): (Vec<u32>, Vec<u32>) = left.into_iter().unzip();
+    let (left, behind): (Vec<u32>, Vec<u32>) = left.into_iter().unzip();
     let mut triangles = zipper.closed;
-    let mut whole = hole.is_empty();
-    let fillable = |rest: &[u32]| {
-        !around && rest.len() <= longest && !is_opening(holes, rest, whole_loop.len(), found)
-    };
-    if !whole && !triangles.is_empty() && fillable(&hole) {
+    let mut whole = left.is_empty();
+    let fillable = |rest: &[u32]| !around && rest.len() <= longest && !is_opening(rest);
+    if !whole && !triangles.is_empty() && fillable(&left) {
         let edges = |&[a, b, c]: &[u32; 3]| [[a, b], [b, c], [c, a]];
         let taken = triangles.iter().flat_map(edges);
         let taken = taken.map(|[a, b]| [a.min(b), a.max(b)]).collect();
-        if let Some(patch) = filled(holes, &hole, &behind, &taken) {
+        if let Some(patch) = filled(holes, &left, &behind, &taken)
+            && !is_spanned(&left, &patch)
+        {
             triangles.extend(patch);
             whole = true;
         }
@@ -97,12 +104,18 @@ fn filled(
     holes.patch(hole, taken)
 }
 
-/// Whether the vector area of what is left of a loop is more than eight times its number of edges times
-/// the mean square of the `edges` edges of the loop as it was found.
-fn is_opening(holes: &Holes<'_>, rest: &[u32], edges: usize, squares: u128) -> bool {
-    let area2 = holes.area2(rest);
-    let area = 0.5 * dot(area2, area2).approximate().sqrt();
-    area * edges as f64 > 8.0 * squares as f64 * rest.len() as f64
+fn vector_area(holes: &Holes<'_>, hole: &[u32]) -> f64 {
+    let area2 = holes.area2(hole);
+    0.5 * dot(area2, area2).approximate().sqrt()
+}
+
+/// The sum of the areas of some triangles.
+fn area(holes: &Holes<'_>, triangles: &[[u32; 3]]) -> f64 {
+    let one = |&t: &[u32; 3]| {
+        let n = normal(holes.points, t);
+        0.5 * (product(n, n) as f64).sqrt()
+    };
+    triangles.iter().map(one).sum()
 }
 
 fn squares(holes: &Holes<'_>, hole: &[u32]) -> u128 {

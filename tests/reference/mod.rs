@@ -126,6 +126,8 @@ pub struct Counts {
     pub moved: usize,
     /// Rough patches that stayed because their region is curved.
     pub curved: usize,
+    /// Rough patches that stayed because no noise shows in their region.
+    pub clean: usize,
     /// T3 and candidates on a line in the file.
     pub flat: usize,
     pub flat_candidates: usize,
@@ -179,11 +181,16 @@ pub fn reconstruct(points: &[Point], settings: &Settings) -> Mesh {
         };
         points = smooth(&points, settings.neighbors);
     }
-    let relaxed = relax::relax(&points, settings.neighbors, settings.relax);
+    let relaxed = relax::relax(
+        &points,
+        settings.neighbors,
+        settings.relax,
+        settings.smooth > 0,
+    );
     let triples = cells::triples(&relaxed.shape, settings, diagonal);
     let mut mesh = connect(&relaxed.shape, points, &triples, settings);
     (mesh.counts.rounds, mesh.counts.moved) = (relaxed.rounds, relaxed.moved);
-    mesh.counts.curved = relaxed.curved;
+    (mesh.counts.curved, mesh.counts.clean) = (relaxed.curved, relaxed.clean);
     mesh
 }
 

@@ -1,7 +1,7 @@
 //! Relaxing (section 1.2): the shape, positions that decide which points are connected.
 
 use super::cells::{by_distance, plane_of};
-use super::edges::is_curved;
+use super::edges::{is_clean, is_curved};
 use outcrop::geom::lattice::COORDINATE_LIMIT;
 use outcrop::geom::{Point, distance2};
 
@@ -14,6 +14,8 @@ pub struct Relaxed {
     pub moved: usize,
     /// Rough patches that stay because most of the rough ones of their region are curved.
     pub curved: usize,
+    /// Rough patches that stay because no noise shows in their region.
+    pub clean: usize,
 }
 
 /// Ids in a patch.
@@ -48,20 +50,20 @@ fn uneven(rough: &[bool]) -> bool {
     16 * rough.iter().filter(|r| **r).count() > rough.len()
 }
 
-/// Whether a rough patch is one by noise, by its first rough points that were looked at.
-fn noisy(points: &[Point], ids: impl Iterator<Item = usize>, k: usize) -> bool {
-    let telling: Vec<usize> = ids.filter(|&id| foot(points, id, k).1).take(3).collect();
+/// Whether a rough patch is one by noise, by its points that tell.
+fn noisy(points: &[Point], telling: &[usize], k: usize) -> bool {
     let curved = telling.iter().filter(|&&id| is_curved(points, id, k));
     2 * curved.count() < telling.len()
 }
 
-/// At most `rounds` rounds.
-pub fn relax(points: &[Point], k: usize, rounds: u32) -> Relaxed {
+/// At most `rounds` rounds; of points that were smoothed none is clean.
+pub fn relax(points: &[Point], k: usize, rounds: u32, smoothed: bool) -> Relaxed {
     let mut relaxed = Relaxed {
         shape: points.to_vec(),
         rounds: 0,
         moved: 0,
         curved: 0,
+        clean: 0,
     };
     let patches = points.len().div_ceil(PATCH);
     let ids = |patch: usize| PATCH * patch..points.len().min(PATCH * (patch + 1));
@@ -73,13 +75,34 @@ pub fn relax(points: &[Point], k: usize, rounds: u32) -> Relaxed {
         |all: &[usize], p: usize| all.iter().filter(|&&q| q / REGION == p / REGION).count();
     let in_region = |p: usize| (0..patches).filter(|q| q / REGION == p / REGION).count();
     let rough = moving.clone();
+    // The first rough points of a patch that were looked at.
+    let telling = |p: usize| -> Vec<usize> {
+        some(p)
+            .filter(|&id| foot(points, id, k).1)
+            .take(3)
+            .collect()
+    };
     let mut noise = rough.clone();
-    noise.retain(|&p| noisy(points, some(p), k));
+    noise.retain(|&p| noisy(points, &telling(p), k));
+    let is_clean_region = |p: usize| {
+        let of_region = rough.iter().filter(|&&q| q / REGION == p / REGION);
+        let telling: Vec<usize> = of_region.flat_map(|&q| telling(q)).collect();
+        let clean = telling
+            .iter()
+            .filter(|&&id| !smoothed && is_clean(points, id, k));
+        let clean = clean.count();
+        10 * clean >= telling.len() && 10 * clean <= 7 * telling.len()
+    };
+    let regions = patches.div_ceil(REGION);
+    let clean: Vec<bool> = (0..regions)
+        .map(|region| is_clean_region(REGION * region))
+        .collect();
     moving.retain(|&p| {
         let (noise, rough) = (of_region(&noise, p), of_region(&rough, p));
         let moves = 8 * noise >= in_region(p) && 10 * noise >= 3 * rough;
         relaxed.curved += usize::from(!moves && 8 * rough >= in_region(p));
-        moves
+        relaxed.clean += usize::from(moves && clean[p / REGION]);
+        moves && !clean[p / REGION]
     });
     let mut runs: Vec<Vec<usize>> = moving
         .into_iter()

@@ -3,9 +3,9 @@
 
 use super::fill::{Corner, Filling, begin_at_smallest, fill, is_outline, length};
 use super::zip::zip;
-use crate::geom::distance2;
+use crate::geom::{Point, distance2};
 use crate::stages::located::normal;
-use rustc_hash::FxHashSet;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 /// How boundary loops are treated.
 #[derive(Debug, Clone, Copy)]
@@ -19,9 +19,9 @@ pub struct Mending {
 /// Longer loops are left alone, so that memory does not follow the boundary.
 const LONGEST_ZIPPED: usize = 100_000;
 
-/// A loop is an opening if its area is larger than so many mean squares of its edges, for each edge: a
-/// round hole of some 100 edges.
-const OPENING: f64 = 8.0;
+/// A loop is an opening if its area, or that of the triangles that would fill it, is larger than so many
+/// mean squares of its edges, for each edge: a round hole of some 50 edges.
+const OPENING: f64 = 4.0;
 
 /// Edges of a loop that one triangle closes: what no cell saw, and not a hole. It is closed even where no
 /// hole is to be filled.
@@ -60,6 +60,7 @@ impl Mending {
         };
         if fillable(&corners)
             && let Filling::Filled(new) = fill(corners.clone(), usize::MAX, &edge)
+            && !found.is_spanned(&corners, &new)
         {
             return match new[..] {
                 [gap] => Filling::Gap(gap),
@@ -78,7 +79,9 @@ impl Mending {
         if !triangles.is_empty() && fillable(&left) {
             let new = edges_of(&triangles);
             let taken = |a: u32, b: u32| edge(a, b) || new.contains(&(a.min(b), a.max(b)));
-            if let Filling::Filled(more) = fill(left, SMALL, taken) {
+            if let Filling::Filled(more) = fill(left.clone(), SMALL, taken)
+                && !found.is_spanned(&left, &more)
+            {
                 triangles.extend(more);
                 return Filling::Filled(triangles);
             }
@@ -119,7 +122,21 @@ impl Width {
             let part = normal(corners[0].at, from.at, to.at);
             (0..3).for_each(|k| area[k] += part[k]);
         }
-        let limit = OPENING * self.squares as f64 * n as f64;
-        0.5 * length(area) * self.edges as f64 > limit
+        self.is_wide(0.5 * length(area), n)
+    }
+
+    /// True if the triangles that fill a loop are too large for its edges, as where it goes around a body
+    /// and its vector area is small for that.
+    fn is_spanned(&self, corners: &[Corner], filling: &[[u32; 3]]) -> bool {
+        let at: FxHashMap<u32, Point> = corners.iter().map(|c| (c.id, c.at)).collect();
+        let area = |t: &[u32; 3]| {
+            let [a, b, c] = t.map(|v| at[&v]);
+            0.5 * length(normal(a, b, c))
+        };
+        self.is_wide(filling.iter().map(area).sum(), corners.len())
+    }
+
+    fn is_wide(&self, area: f64, edges: usize) -> bool {
+        area * self.edges as f64 > OPENING * self.squares as f64 * edges as f64
     }
 }

@@ -4,7 +4,7 @@ use super::fill::{Corner, Filling};
 use super::flips::flip;
 use super::mend::Mending;
 use super::zip::zip;
-use crate::geom::Point;
+use crate::geom::{Point, distance2};
 use crate::stages::surface::star::Triangle;
 use proptest::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
@@ -189,6 +189,38 @@ fn a_loop_on_a_grid_is_mended_alike_wherever_it_begins() {
             assert_eq!(zipping.mend(ring, sheet.has_edge()), first);
         }
     }
+}
+
+/// A sheet rolled to a tube with a slit: its one boundary goes around both ends, one against the other.
+#[test]
+fn the_ends_of_a_slit_tube_stay_open() {
+    let (long, high) = (60, 8);
+    let roll = |n: usize| {
+        let (x, y) = (n as i32 % long, n as i32 / long);
+        let (sine, cosine) = (f64::from(x) * std::f64::consts::TAU / 60.0).sin_cos();
+        let [a, b] = [cosine, sine].map(|c| (95.0 * c).round() as i32 + 200);
+        [a - 10 * x, b - 10 * y, 10 * y]
+    };
+    let tube = Sheet::grid([long, high], roll, |_, _| false);
+    let ring = tube.loops().remove(0);
+    assert_eq!(ring.len() as i32, 2 * (long - 1) + 2 * (high - 1));
+    let longest = |filling: Filling| {
+        let (Filling::Filled(new) | Filling::Zipped(new, _)) = filling else {
+            return 0.0;
+        };
+        let edges = new.iter().flat_map(|t| around(*t));
+        let length = |(a, b, _): (u32, u32, u32)| {
+            let [a, b] = [a, b].map(|v| tube.points[v as usize]);
+            (distance2(a, b) as f64).sqrt()
+        };
+        edges.map(length).fold(0.0, f64::max)
+    };
+    let plain = Mending {
+        zip: false,
+        ..MENDING
+    };
+    assert!(longest(plain.mend(ring.clone(), tube.has_edge())) > 150.0);
+    assert!(longest(MENDING.mend(ring, tube.has_edge())) < 80.0);
 }
 
 #[test]

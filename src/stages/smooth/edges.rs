@@ -4,6 +4,7 @@
 //! Sums run over the point and then its neighbours, nearest first, with `+ - * / sqrt` only: the same
 //! bits on every machine, whatever found the neighbours.
 
+use super::seen::spacing2;
 use crate::geom::plane::least_direction;
 use crate::stages::tiles::neighbors::Neighbors;
 
@@ -27,6 +28,13 @@ const GAIN: f64 = 1.25;
 
 /// A surface is curved if a curved one leaves less than this part of the square heights over a plane.
 const CURVED: f64 = 0.5;
+
+/// Nearest neighbours of a point that show what noise there is, whatever the surface.
+const NEAREST: usize = 12;
+
+/// Noise that does not show: the root of the mean square height over a curved surface through the
+/// nearest neighbours, for each degree of freedom, in terms of the local spacing.
+const CLEAN: f64 = 0.03;
 
 /// Unknowns of a surface of second order.
 const TERMS: usize = 6;
@@ -57,14 +65,32 @@ impl Around {
     /// True if a curved surface is what lies off the plane of a point and `count` of its neighbours,
     /// which count alike: of the square heights over the plane it leaves less than half.
     pub(super) fn is_curved(&mut self, near: &Neighbors, count: usize) -> bool {
-        if self.gather(near, count).is_none() {
+        self.gather(near, count).is_some()
+            && self
+                .heights_alike()
+                .is_some_and(|heights| heights.left < CURVED * heights.square)
+    }
+
+    /// True if no noise shows in the nearest neighbours of a point: they lie on a curved surface. `count`
+    /// neighbours tell the local spacing.
+    pub(super) fn is_clean(&mut self, near: &Neighbors, count: usize) -> bool {
+        let Some(last) = near.iter().take(count).last() else {
             return false;
-        }
+        };
+        let freedom = (NEAREST + 1 - TERMS) as f64;
+        let limit = freedom * CLEAN * CLEAN * spacing2(last.distance2, count);
+        near.len() >= NEAREST
+            && self.gather(near, NEAREST).is_some_and(|reach| {
+                let heights = self.heights_alike();
+                heights.is_some_and(|heights| heights.left * (reach * reach) < limit)
+            })
+    }
+
+    /// Heights over a plane and a curved surface for which all points count alike.
+    fn heights_alike(&mut self) -> Option<Heights> {
         self.weights.fill(1.0);
-        self.normal().is_some_and(|normal| {
-            let heights = self.heights(normal, &self.surface(normal));
-            heights.left < CURVED * heights.square
-        })
+        let normal = self.normal()?;
+        Some(self.heights(normal, &self.surface(normal)))
     }
 
     /// Takes in the first `count` neighbours, with weights by distance; the reach, `None` if all of them

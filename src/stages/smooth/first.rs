@@ -4,11 +4,11 @@
 use super::edges::Around;
 use super::fits::Planes;
 use super::pass::RUN;
+use super::relax::Relaxing;
 use super::seen::{Seen, target};
 use crate::error::Result;
 use crate::geom::Point;
 use crate::stages::order::PointStore;
-use crate::stages::tiles::neighbors::Neighbors;
 use crate::workspace::memory::{bytes_of, hold};
 use std::ops::Range;
 
@@ -26,8 +26,11 @@ const TELLING: usize = 3;
 const REGION: usize = 256;
 /// Nothing moves in a region of which fewer than one patch in so many is noisy,
 const NOISE: usize = 8;
-/// or where fewer than so many in so many of its rough patches are.
+/// or where fewer than so many in so many of its rough patches are,
 const EDGES: (usize, usize) = (3, 10);
+/// or where so many in so many points that tell are clean, but not nearly all of them, as between layers.
+const CLEAN: (usize, usize) = (1, 10);
+const LAYERS: (usize, usize) = (7, 10);
 /// Points in a region.
 pub(super) const SPAN: usize = REGION * PATCH * RUN;
 
@@ -41,13 +44,14 @@ type Target = (u32, Point, bool);
 pub(super) fn look_and_move(
     store: &PointStore,
     ids: Range<usize>,
-    neighbors: usize,
+    relaxing: Relaxing,
     points: &mut [Point],
 ) -> Result<(Vec<bool>, Seen)> {
+    let neighbors = relaxing.neighbors;
     let planes = Planes::load(store, ids.clone(), neighbors)?;
     let looked = look(&planes, neighbors, ids.len())?;
     let _held = hold(bytes_of(&looked));
-    let active = choose(&planes, neighbors, &looked, &ids)?;
+    let active = choose(&planes, relaxing, &looked, &ids)?;
     let mut seen = Seen::of(&ids);
     let moves = |id: usize| active[(id - ids.start) / RUN];
     let mut put = |id: usize, to, rough| {
@@ -82,22 +86,20 @@ fn look(planes: &Planes<'_>, neighbors: usize, points: usize) -> Result<Vec<Targ
     Ok(looked)
 }
 
-/// The runs of rough patches move, unless few patches of their region are noisy: then what is rough are
-/// edges.
+/// The runs of rough patches move if it is noise that makes their region rough.
 fn choose(
     planes: &Planes<'_>,
-    neighbors: usize,
+    relaxing: Relaxing,
     looked: &[Target],
     ids: &Range<usize>,
 ) -> Result<Vec<bool>> {
     let rough = rough_patches(looked, ids);
-    let noisy = noisy_patches(planes, neighbors, looked, ids, &rough)?;
+    let told = ask(planes, relaxing, looked, ids, &rough)?;
+    let _held = hold(bytes_of(&told));
     let mut active = vec![false; ids.len().div_ceil(RUN)];
-    let of_patches = rough.chunks(REGION).zip(noisy.chunks(REGION));
-    for (runs, (rough, noisy)) in active.chunks_mut(PATCH * REGION).zip(of_patches) {
-        let (rough_ones, noisy_ones) = (count(rough), count(noisy));
-        let few = noisy_ones * NOISE < rough.len();
-        if !few && noisy_ones * EDGES.1 >= rough_ones * EDGES.0 {
+    let of_patches = rough.chunks(REGION).zip(told.chunks(REGION));
+    for (runs, (rough, told)) in active.chunks_mut(PATCH * REGION).zip(of_patches) {
+        if is_noise(rough, told) {
             for (runs, rough) in runs.chunks_mut(PATCH).zip(rough) {
                 runs.fill(*rough);
             }
@@ -132,27 +134,62 @@ fn count(patches: &[bool]) -> usize {
     patches.iter().filter(|patch| **patch).count()
 }
 
-/// Rough patches of which most of the first rough points have no curved surface through their
-/// neighbours.
-fn noisy_patches(
+/// What some rough points of a patch tell.
+#[derive(Debug, Clone, Copy, Default)]
+struct Told {
+    points: u8,
+    /// With a curved surface through their neighbours.
+    curved: u8,
+    /// Without noise in the nearest of these.
+    clean: u8,
+}
+
+impl Told {
+    fn is_noisy(self) -> bool {
+        2 * self.curved < self.points
+    }
+}
+
+/// True if it is noise that makes patches of a region rough, not its edges or details that are too fine
+/// for the points.
+fn is_noise(rough: &[bool], told: &[Told]) -> bool {
+    let sum = |of: fn(&Told) -> u8| told.iter().map(|t| usize::from(of(t))).sum::<usize>();
+    let noisy = told.iter().filter(|told| told.is_noisy()).count();
+    let (points, clean) = (sum(|t| t.points), sum(|t| t.clean));
+    let is_clean = clean * CLEAN.1 >= points * CLEAN.0 && clean * LAYERS.1 <= points * LAYERS.0;
+    let is_edges = noisy * EDGES.1 < count(rough) * EDGES.0;
+    noisy * NOISE >= rough.len() && !is_edges && !is_clean
+}
+
+/// Asks the first rough points of every rough patch.
+fn ask(
     planes: &Planes<'_>,
-    neighbors: usize,
+    relaxing: Relaxing,
     looked: &[Target],
     ids: &Range<usize>,
     rough: &[bool],
-) -> Result<Vec<bool>> {
+) -> Result<Vec<Told>> {
+    let neighbors = relaxing.neighbors;
     let telling = telling_points(looked, ids, rough);
     let _held = hold(bytes_of(&telling));
-    // So many more points without one than with one, of each patch.
-    let mut balance = vec![0; rough.len()];
+    let mut told = vec![Told::default(); rough.len()];
     let mut around = Around::default();
-    let is_curved = |_: Point, near: &Neighbors| around.is_curved(near, neighbors);
     planes.each_neighborhood(
         |id| telling[id - ids.start],
-        is_curved,
-        |id, _, curved| balance[patch(id as u32, ids)] += if curved { -1 } else { 1 },
+        |_, near| {
+            let curved = around.is_curved(near, neighbors);
+            let clean = !relaxing.smoothed && around.is_clean(near, neighbors);
+            (curved, clean)
+        },
+        |id, _, known| {
+            let told = &mut told[patch(id as u32, ids)];
+            let (curved, clean) = known;
+            told.points += 1;
+            told.curved += u8::from(curved);
+            told.clean += u8::from(clean);
+        },
     )?;
-    Ok(balance.into_iter().map(|more| more > 0).collect())
+    Ok(told)
 }
 
 /// The first rough ones, by id, of the points of every rough patch that were looked at.

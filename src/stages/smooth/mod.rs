@@ -13,7 +13,7 @@ mod seen;
 mod tests;
 
 pub use fits::{each_neighborhood, each_plane};
-pub use relax::{RelaxStats, Relaxed, relax};
+pub use relax::{RelaxStats, Relaxed, Relaxing, relax};
 
 use crate::error::Result;
 use crate::geom::Point;

@@ -22,6 +22,17 @@ use std::ops::Range;
 /// A run that moved moves again if at least so many of its points were rough.
 const RAGGED: u8 = 1;
 
+/// How points are relaxed.
+#[derive(Debug, Clone, Copy)]
+pub struct Relaxing {
+    /// Whose plane a point moves to.
+    pub neighbors: usize,
+    /// At most so many rounds.
+    pub rounds: u32,
+    /// The points were smoothed: noisy ones, even where it does not show any more.
+    pub smoothed: bool,
+}
+
 /// Positions to connect the points by.
 #[derive(Debug)]
 pub struct Relaxed {
@@ -69,8 +80,8 @@ impl Runs {
 persist!(Relaxed { store, stats });
 persist!(RelaxStats { rounds, moved });
 
-/// At most `rounds` rounds of relaxing: points move to the planes of their `neighbors` nearest, in
-/// each round those of the runs that were rough in the round before.
+/// Rounds of relaxing: points move to the planes of their nearest neighbours, in each round those of the
+/// runs that were rough in the round before.
 ///
 /// # Errors
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
@@ -78,10 +89,10 @@ persist!(RelaxStats { rounds, moved });
 pub fn relax(
     store: &PointStore,
     tiles: TileRanges,
-    neighbors: usize,
-    rounds: u32,
+    relaxing: Relaxing,
     workspace: &Workspace,
 ) -> Result<Relaxed> {
+    let rounds = relaxing.rounds;
     let mut relaxed = Relaxed {
         store: None,
         stats: RelaxStats::default(),
@@ -90,8 +101,9 @@ pub fn relax(
     for round in 1..=rounds {
         let current = relaxed.store.as_ref().unwrap_or(store);
         let (next, moved) = if round == 1 {
-            first_round(current, tiles, neighbors, &mut runs, workspace)?
+            first_round(current, tiles, relaxing, &mut runs, workspace)?
         } else {
+            let neighbors = relaxing.neighbors;
             one_round(current, tiles, neighbors, round, &mut runs, workspace)?
         };
         if moved > 0 {
@@ -113,7 +125,7 @@ pub fn relax(
 fn first_round(
     store: &PointStore,
     tiles: TileRanges,
-    neighbors: usize,
+    relaxing: Relaxing,
     runs: &mut Runs,
     workspace: &Workspace,
 ) -> Result<(PointStore, u64)> {
@@ -123,7 +135,7 @@ fn first_round(
         ..Pass::new("relaxed1", "relax: tile", tiles)
     };
     let work = |ids: Range<usize>, points: &mut [Point]| {
-        first::look_and_move(store, ids, neighbors, points)
+        first::look_and_move(store, ids, relaxing, points)
     };
     let mut moved = 0;
     let next = pass.over(

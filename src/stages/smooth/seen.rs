@@ -52,7 +52,12 @@ pub(super) fn target(point: Point, fit: &Fit, neighbors: usize) -> (Point, bool)
     };
     let offset = fit.moments.project(normal);
     let length2 = offset[0] * offset[0] + offset[1] * offset[1] + offset[2] * offset[2];
-    // On a plane, `neighbors` points lie in the disk up to the last one.
-    let spacing2 = std::f64::consts::PI * fit.last2 as f64 / neighbors as f64;
-    (moved(point, offset), length2 > ROUGH * ROUGH * spacing2)
+    let limit = ROUGH * ROUGH * spacing2(fit.last2, neighbors);
+    (moved(point, offset), length2 > limit)
+}
+
+/// The square of the local spacing: on a plane, so many neighbours lie in the disk up to the last one,
+/// which is so far away.
+pub(super) fn spacing2(last2: u64, neighbors: usize) -> f64 {
+    std::f64::consts::PI * last2 as f64 / neighbors as f64
 }

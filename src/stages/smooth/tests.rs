@@ -40,9 +40,23 @@ fn ordered(
 
 /// Positions after relaxing with tiles and pages of these sizes, and what was done.
 fn relaxed(points: &[Point], rounds: u32, tile: u32, page: usize) -> (Vec<Point>, RelaxStats) {
+    let relaxing = Relaxing {
+        neighbors: 12,
+        rounds,
+        smoothed: false,
+    };
+    relaxed_as(points, relaxing, tile, page)
+}
+
+fn relaxed_as(
+    points: &[Point],
+    relaxing: Relaxing,
+    tile: u32,
+    page: usize,
+) -> (Vec<Point>, RelaxStats) {
     let workspace = &workspace();
     let (store, tiles) = ordered(points, tile, page, workspace);
-    let relaxed = relax(&store, tiles, 12, rounds, workspace).unwrap();
+    let relaxed = relax(&store, tiles, relaxing, workspace).unwrap();
     let shape = relaxed.store.as_ref().unwrap_or(&store);
     (shape.slice(0..store.len()).unwrap(), relaxed.stats)
 }
@@ -93,6 +107,29 @@ fn edges_are_rough_and_stay() {
     for (tile, page) in [(100, 16), (333, 64)] {
         assert!(relaxed(&noisy, 3, tile, page) == (expected.clone(), stats));
     }
+}
+
+#[test]
+fn details_too_fine_for_the_points_stay_unless_there_is_noise() {
+    // Pillars of six by six points, each of another height.
+    let pillar = |x: i32, n: i32| 6 * noise(x / 6 + 100 * (n / 96 / 6));
+    let points = sheet(96, pillar);
+    let relaxing = Relaxing {
+        neighbors: 30,
+        rounds: 1,
+        smoothed: false,
+    };
+    assert_eq!(relaxed_as(&points, relaxing, 1000, 256).1.moved, 0);
+    // What was smoothed has no noise to show.
+    let smoothed = Relaxing {
+        smoothed: true,
+        ..relaxing
+    };
+    let (_, stats) = relaxed_as(&points, smoothed, 1000, 256);
+    assert!(stats.moved as usize > points.len() / 2, "{stats:?}");
+    let noisy = sheet(96, |x, n| pillar(x, n) + noise(n) / 4);
+    let (_, stats) = relaxed_as(&noisy, relaxing, 1000, 256);
+    assert!(stats.moved as usize > points.len() / 2, "{stats:?}");
 }
 
 /// How many points a look at all of them finds rough.

@@ -8,7 +8,7 @@ use outcrop::params::{BLOCK, Params};
 use outcrop::stages::blocks::Blocks;
 use outcrop::stages::cells::{TileRanges, Widen};
 use outcrop::stages::order::{Orderer, PAGE, PointStore};
-use outcrop::stages::smooth::{Relaxed, each_neighborhood, each_plane, relax};
+use outcrop::stages::smooth::{Relaxed, Relaxing, each_neighborhood, each_plane, relax};
 use outcrop::stages::tiles::neighbors::Neighbors;
 use outcrop::workspace::Workspace;
 use outcrop::workspace::memory::MemoryPool;
@@ -77,8 +77,12 @@ impl World {
         orderer.push(&workspace, &points)?;
         let store = orderer.finish(&workspace, PAGE)?.0;
         let tiles = TileRanges::new(Blocks::new(store.len(), BLOCK), BLOCK);
-        let rounds = Params::default().relax;
-        let relaxed = relax(&store, tiles, args.neighbors, rounds, &workspace)?;
+        let relaxing = Relaxing {
+            neighbors: args.neighbors,
+            rounds: Params::default().relax,
+            smoothed: false,
+        };
+        let relaxed = relax(&store, tiles, relaxing, &workspace)?;
         let ordered = store.slice(0..store.len())?;
         let truth = ordered.iter().map(|p| normals.get(p).copied());
         Ok(Self {
