@@ -1,10 +1,10 @@
 //! The first round of relaxing, a region at a time: a look at some points of every patch, and those that
 //! are rough move if it is noise that makes them so.
 
+use super::Relaxing;
 use super::edges::Around;
 use super::fits::Planes;
 use super::pass::RUN;
-use super::relax::Relaxing;
 use super::seen::{Seen, target};
 use crate::error::Result;
 use crate::geom::Point;
@@ -28,8 +28,9 @@ const REGION: usize = 256;
 const NOISE: usize = 8;
 /// or where fewer than so many in so many of its rough patches are,
 const EDGES: (usize, usize) = (3, 10);
-/// or where so many in so many points that tell are clean, but not nearly all of them, as between layers.
+/// or where so many in so many of the points that tell are clean:
 const CLEAN: (usize, usize) = (1, 10);
+/// but where more than so many are, they lie in layers, which are to be one surface.
 const LAYERS: (usize, usize) = (7, 10);
 /// Points in a region.
 pub(super) const SPAN: usize = REGION * PATCH * RUN;

@@ -13,7 +13,7 @@ mod seen;
 mod tests;
 
 pub use fits::{each_neighborhood, each_plane};
-pub use relax::{RelaxStats, Relaxed, Relaxing, relax};
+pub use relax::{RelaxStats, Relaxed, relax};
 
 use crate::error::Result;
 use crate::geom::Point;
@@ -28,6 +28,17 @@ use edges::Around;
 use fits::each_fit;
 use pass::Pass;
 use std::ops::Range;
+
+/// How points are relaxed.
+#[derive(Debug, Clone, Copy)]
+pub struct Relaxing {
+    /// Whose plane a point moves to.
+    pub neighbors: usize,
+    /// At most so many rounds.
+    pub rounds: u32,
+    /// The points were smoothed: noisy ones, even where it does not show any more.
+    pub smoothed: bool,
+}
 
 /// One round of smoothing: the same points, each on the plane of its `neighbors` nearest, or on
 /// what [`Smoothing::Edges`] puts through three times as many.

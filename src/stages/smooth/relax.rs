@@ -5,6 +5,7 @@
 //! Restricted Voronoi cells disagree where points lie off the surface by a part of their spacing. So
 //! points move only there: patches of points that are smooth already cost a look at some of them.
 
+use super::Relaxing;
 use super::first;
 use super::fits::each_fit;
 use super::pass::{Pass, RUN};
@@ -21,17 +22,6 @@ use std::ops::Range;
 
 /// A run that moved moves again if at least so many of its points were rough.
 const RAGGED: u8 = 1;
-
-/// How points are relaxed.
-#[derive(Debug, Clone, Copy)]
-pub struct Relaxing {
-    /// Whose plane a point moves to.
-    pub neighbors: usize,
-    /// At most so many rounds.
-    pub rounds: u32,
-    /// The points were smoothed: noisy ones, even where it does not show any more.
-    pub smoothed: bool,
-}
 
 /// Positions to connect the points by.
 #[derive(Debug)]
