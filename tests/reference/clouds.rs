@@ -131,7 +131,11 @@ pub fn pillars(seed: u64) -> Vec<Point> {
     let height = |a: i32, b: i32| heights[(a / 6 + 4 * (b / 6)) as usize];
     (0..24)
         .flat_map(|a| (0..24).map(move |b| (a, b)))
-        .map(|(a, b)| [100 * a, 100 * b, height(a, b)])
+        .map(|(a, b)| {
+            let [x, y] = [100 * a, 100 * b].map(|c| c + random.integer(0, 30) as i32);
+            // Their tops slope.
+            [x, y, height(a, b) + (3 * x + 5 * y) / 10]
+        })
         .collect()
 }
 

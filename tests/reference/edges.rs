@@ -4,6 +4,7 @@ use super::cells::by_distance;
 use outcrop::geom::lattice::COORDINATE_LIMIT;
 use outcrop::geom::plane::least_direction;
 use outcrop::geom::{Point, distance2, sub};
+use std::collections::BTreeSet;
 
 type Vec3 = [f64; 3];
 
@@ -73,7 +74,8 @@ pub fn is_curved(points: &[Point], i: usize, k: usize) -> bool {
 }
 
 /// Whether no noise shows: over a surface of second order through a point and the twelve nearest, the
-/// others are high by less than 0.03 of the local spacing, seven degrees of freedom.
+/// others are high by less than 0.03 of the local spacing, seven degrees of freedom, and of each coordinate
+/// there are nine values and more.
 pub fn is_clean(points: &[Point], i: usize, k: usize) -> bool {
     let others = by_distance(points, i);
     let last = others[..k.min(others.len())].last();
@@ -81,6 +83,11 @@ pub fn is_clean(points: &[Point], i: usize, k: usize) -> bool {
     let spacing2 = std::f64::consts::PI * last2 as f64 / k as f64;
     others.len() >= 12
         && k >= 12
+        && (0..3).all(|axis| {
+            let all = [i].into_iter().chain(others[..12].iter().copied());
+            let values: BTreeSet<i32> = all.map(|j| points[j][axis]).collect();
+            values.len() >= 9
+        })
         && heights(points, i, 12).is_some_and(|(_, left)| left < 7.0 * 0.03 * 0.03 * spacing2)
 }
 

@@ -36,7 +36,7 @@ pub fn mend(
     let around = hole.len() > SMALL && holes.is_outline(hole, &behind);
     let found: u128 = squares(holes, hole);
     let is_wide = |area: f64, rest: usize| {
-        let limit = 4.0 * found as f64 * rest as f64;
+        let limit = 4.5 * found as f64 * rest as f64;
         area * hole.len() as f64 > limit
     };
     let is_opening = |rest: &[u32]| is_wide(vector_area(holes, rest), rest.len());

@@ -20,8 +20,8 @@ pub struct Mending {
 const LONGEST_ZIPPED: usize = 100_000;
 
 /// A loop is an opening if its area, or that of the triangles that would fill it, is larger than so many
-/// mean squares of its edges, for each edge: a round hole of some 50 edges.
-const OPENING: f64 = 4.0;
+/// mean squares of its edges, for each edge: a round hole of some 55 edges.
+const OPENING: f64 = 4.5;
 
 /// Edges of a loop that one triangle closes: what no cell saw, and not a hole. It is closed even where no
 /// hole is to be filled.

@@ -32,6 +32,10 @@ const CURVED: f64 = 0.5;
 /// Nearest neighbours of a point that show what noise there is, whatever the surface.
 const NEAREST: usize = 12;
 
+/// So many of their positions and the point's must differ in each coordinate: what is rounded coarsely
+/// lies in layers, which are smooth.
+const DIFFERENT: usize = 9;
+
 /// Noise that does not show: the root of the mean square height over a curved surface through the
 /// nearest neighbours, for each degree of freedom, in terms of the local spacing.
 const CLEAN: f64 = 0.03;
@@ -80,6 +84,7 @@ impl Around {
         let freedom = (NEAREST + 1 - TERMS) as f64;
         let limit = freedom * CLEAN * CLEAN * spacing2(last.distance2, count);
         near.len() >= NEAREST
+            && is_fine(near)
             && self.gather(near, NEAREST).is_some_and(|reach| {
                 let heights = self.heights_alike();
                 heights.is_some_and(|heights| heights.left * (reach * reach) < limit)
@@ -221,6 +226,18 @@ impl Around {
         }
         Surface { frame, terms }
     }
+}
+
+/// True if the nearest neighbours are not in few layers.
+fn is_fine(near: &Neighbors) -> bool {
+    (0..3).all(|axis| {
+        let mut along = [0; NEAREST + 1];
+        for (c, n) in along[1..].iter_mut().zip(near.iter()) {
+            *c = n.difference[axis];
+        }
+        along.sort_unstable();
+        along.windows(2).filter(|pair| pair[0] != pair[1]).count() + 1 >= DIFFERENT
+    })
 }
 
 /// Weighted heights over the best plane.
