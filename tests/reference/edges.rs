@@ -74,21 +74,20 @@ pub fn is_curved(points: &[Point], i: usize, k: usize) -> bool {
 }
 
 /// Whether no noise shows: over a surface of second order through a point and the twelve nearest, the
-/// others are high by less than 0.03 of the local spacing, seven degrees of freedom, and of each coordinate
-/// there are nine values and more.
-pub fn is_clean(points: &[Point], i: usize, k: usize) -> bool {
+/// others are high by less than 0.03 of the local spacing, seven degrees of freedom. It cannot be told
+/// without twelve of the `k` neighbours and nine values of each coordinate.
+pub fn is_clean(points: &[Point], i: usize, k: usize) -> Option<bool> {
     let others = by_distance(points, i);
-    let last = others[..k.min(others.len())].last();
-    let last2 = last.map_or(0, |&j| distance2(points[i], points[j]));
-    let spacing2 = std::f64::consts::PI * last2 as f64 / k as f64;
-    others.len() >= 12
-        && k >= 12
-        && (0..3).all(|axis| {
-            let all = [i].into_iter().chain(others[..12].iter().copied());
-            let values: BTreeSet<i32> = all.map(|j| points[j][axis]).collect();
-            values.len() >= 9
-        })
-        && heights(points, i, 12).is_some_and(|(_, left)| left < 7.0 * 0.03 * 0.03 * spacing2)
+    let last = *others[..k.min(others.len())].last()?;
+    let spacing2 = std::f64::consts::PI * distance2(points[i], points[last]) as f64 / k as f64;
+    let nearest = others[..k.min(others.len())].get(..12)?;
+    let is_fine = (0..3).all(|axis| {
+        let all = [i].into_iter().chain(nearest.iter().copied());
+        let values: BTreeSet<i32> = all.map(|j| points[j][axis]).collect();
+        values.len() >= 9
+    });
+    let (_, left) = heights(points, i, 12).filter(|_| is_fine)?;
+    Some(left < 7.0 * 0.03 * 0.03 * spacing2)
 }
 
 /// The square heights of a point and `k` others over their plane, and over a surface of second order, all

@@ -87,11 +87,10 @@ pub fn relax(points: &[Point], k: usize, rounds: u32, smoothed: bool) -> Relaxed
     let is_clean_region = |p: usize| {
         let of_region = rough.iter().filter(|&&q| q / REGION == p / REGION);
         let telling: Vec<usize> = of_region.flat_map(|&q| telling(q)).collect();
-        let clean = telling
-            .iter()
-            .filter(|&&id| !smoothed && is_clean(points, id, k));
-        let clean = clean.count();
-        10 * clean >= telling.len() && 10 * clean <= 7 * telling.len()
+        let told = telling.iter().filter_map(|&id| is_clean(points, id, k));
+        let told: Vec<bool> = told.collect();
+        let (fine, clean) = (told.len(), told.iter().filter(|c| **c).count());
+        !smoothed && 4 * fine >= telling.len() && 10 * clean >= fine && 10 * clean <= 7 * fine
     };
     let regions = patches.div_ceil(REGION);
     let clean: Vec<bool> = (0..regions)

@@ -33,7 +33,7 @@ const CURVED: f64 = 0.5;
 const NEAREST: usize = 12;
 
 /// So many of their positions and the point's must differ in each coordinate: what is rounded coarsely
-/// lies in layers, which are smooth.
+/// lies in layers, which are smooth, and does not tell.
 const DIFFERENT: usize = 9;
 
 /// Noise that does not show: the root of the mean square height over a curved surface through the
@@ -76,19 +76,17 @@ impl Around {
     }
 
     /// True if no noise shows in the nearest neighbours of a point: they lie on a curved surface. `count`
-    /// neighbours tell the local spacing.
-    pub(super) fn is_clean(&mut self, near: &Neighbors, count: usize) -> bool {
-        let Some(last) = near.iter().take(count).last() else {
-            return false;
-        };
+    /// neighbours tell the local spacing. `None` if there are too few, or in few layers.
+    pub(super) fn is_clean(&mut self, near: &Neighbors, count: usize) -> Option<bool> {
+        let last = near.iter().take(count).last()?;
+        if near.len() < NEAREST || in_layers(near) {
+            return None;
+        }
         let freedom = (NEAREST + 1 - TERMS) as f64;
         let limit = freedom * CLEAN * CLEAN * spacing2(last.distance2, count);
-        near.len() >= NEAREST
-            && is_fine(near)
-            && self.gather(near, NEAREST).is_some_and(|reach| {
-                let heights = self.heights_alike();
-                heights.is_some_and(|heights| heights.left * (reach * reach) < limit)
-            })
+        let reach = self.gather(near, NEAREST)?;
+        let heights = self.heights_alike()?;
+        Some(heights.left * (reach * reach) < limit)
     }
 
     /// Heights over a plane and a curved surface for which all points count alike.
@@ -228,15 +226,16 @@ impl Around {
     }
 }
 
-/// True if the nearest neighbours are not in few layers.
-fn is_fine(near: &Neighbors) -> bool {
-    (0..3).all(|axis| {
+/// True if the nearest neighbours and the point are in few layers across an axis.
+fn in_layers(near: &Neighbors) -> bool {
+    (0..3).any(|axis| {
         let mut along = [0; NEAREST + 1];
         for (c, n) in along[1..].iter_mut().zip(near.iter()) {
             *c = n.difference[axis];
         }
         along.sort_unstable();
-        along.windows(2).filter(|pair| pair[0] != pair[1]).count() + 1 >= DIFFERENT
+        let different = 1 + along.windows(2).filter(|pair| pair[0] != pair[1]).count();
+        different < DIFFERENT
     })
 }
 

@@ -28,10 +28,12 @@ const REGION: usize = 256;
 const NOISE: usize = 8;
 /// or where fewer than so many in so many of its rough patches are,
 const EDGES: (usize, usize) = (3, 10);
-/// or where so many in so many of the points that tell are clean:
+/// or where so many in so many of the points that tell are clean, of those whose positions are fine:
 const CLEAN: (usize, usize) = (1, 10);
-/// but where more than so many are, they lie in layers, which are to be one surface.
+/// but where more than so many are, they lie in layers, which are to be one surface;
 const LAYERS: (usize, usize) = (7, 10);
+/// and fewer fine ones than one in so many say nothing.
+const FINE: usize = 4;
 /// Points in a region.
 pub(super) const SPAN: usize = REGION * PATCH * RUN;
 
@@ -100,7 +102,7 @@ fn choose(
     let mut active = vec![false; ids.len().div_ceil(RUN)];
     let of_patches = rough.chunks(REGION).zip(told.chunks(REGION));
     for (runs, (rough, told)) in active.chunks_mut(PATCH * REGION).zip(of_patches) {
-        if is_noise(rough, told) {
+        if is_noise(rough, told, relaxing.smoothed) {
             for (runs, rough) in runs.chunks_mut(PATCH).zip(rough) {
                 runs.fill(*rough);
             }
@@ -141,7 +143,9 @@ struct Told {
     points: u8,
     /// With a curved surface through their neighbours.
     curved: u8,
-    /// Without noise in the nearest of these.
+    /// With the nearest of these in more than few layers, as rounding makes them.
+    fine: u8,
+    /// Of these, without noise in the nearest.
     clean: u8,
 }
 
@@ -153,13 +157,15 @@ impl Told {
 
 /// True if it is noise that makes patches of a region rough, not its edges or details that are too fine
 /// for the points.
-fn is_noise(rough: &[bool], told: &[Told]) -> bool {
+fn is_noise(rough: &[bool], told: &[Told], smoothed: bool) -> bool {
     let sum = |of: fn(&Told) -> u8| told.iter().map(|t| usize::from(of(t))).sum::<usize>();
     let noisy = told.iter().filter(|told| told.is_noisy()).count();
-    let (points, clean) = (sum(|t| t.points), sum(|t| t.clean));
-    let is_clean = clean * CLEAN.1 >= points * CLEAN.0 && clean * LAYERS.1 <= points * LAYERS.0;
+    let (fine, clean) = (sum(|t| t.fine), sum(|t| t.clean));
+    let is_clean = fine * FINE >= sum(|t| t.points)
+        && clean * CLEAN.1 >= fine * CLEAN.0
+        && clean * LAYERS.1 <= fine * LAYERS.0;
     let is_edges = noisy * EDGES.1 < count(rough) * EDGES.0;
-    noisy * NOISE >= rough.len() && !is_edges && !is_clean
+    noisy * NOISE >= rough.len() && !is_edges && (smoothed || !is_clean)
 }
 
 /// Asks the first rough points of every rough patch.
@@ -179,15 +185,15 @@ fn ask(
         |id| telling[id - ids.start],
         |_, near| {
             let curved = around.is_curved(near, neighbors);
-            let clean = !relaxing.smoothed && around.is_clean(near, neighbors);
-            (curved, clean)
+            (curved, around.is_clean(near, neighbors))
         },
         |id, _, known| {
             let told = &mut told[patch(id as u32, ids)];
             let (curved, clean) = known;
             told.points += 1;
             told.curved += u8::from(curved);
-            told.clean += u8::from(clean);
+            told.fine += u8::from(clean.is_some());
+            told.clean += u8::from(clean == Some(true));
         },
     )?;
     Ok(told)
