@@ -105,8 +105,8 @@ pub struct Params {
     pub max_angle: f64,
     /// Fill holes of up to this many edges (paper: 500).
     pub max_hole_edges: usize,
-    /// Remove components with fewer triangles (paper: 10); `None`: 10, and for each 2500 points beyond
-    /// 100 000 one more, up to 300, or 1000 with smoothing.
+    /// Remove components with fewer triangles (paper: 10); `None`: 10, but where points were relaxed, as
+    /// in noise, one for each 2500 points, from 10 to 300, or to 1000 with smoothing.
     pub min_component: Option<u64>,
     /// Bridges, holes and small components (paper, section 3.6).
     pub repair: bool,
@@ -159,12 +159,17 @@ impl Params {
         }
     }
 
-    /// The least triangles of a component that stays, in a cloud of so many points.
+    /// The least triangles of a component that stays, in a cloud of so many points; `noisy` if some were
+    /// relaxed.
     #[must_use]
-    pub fn least_component(&self, points: u64) -> u64 {
-        let most = if self.smooth > 0 { 1000 } else { 300 };
-        let usual = || (10 + points.saturating_sub(100_000) / 2500).min(most);
-        self.min_component.unwrap_or_else(usual)
+    pub fn least_component(&self, points: u64, noisy: bool) -> u64 {
+        let most = match (self.smooth > 0, noisy) {
+            (true, _) => 1000,
+            (false, true) => 300,
+            (false, false) => 10,
+        };
+        self.min_component
+            .unwrap_or_else(|| (points / 2500).clamp(10, most))
     }
 
     /// # Errors

@@ -233,7 +233,7 @@ impl Reconstruction {
         })?;
         let options = RepairOptions {
             repair: params.repair,
-            min_component: params.least_component(points),
+            min_component: params.least_component(points, places.differ()),
             max_hole_edges: params.max_hole_edges,
             flip: params.method == Method::Robust,
             zip: params.method == Method::Robust,

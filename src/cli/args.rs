@@ -167,8 +167,8 @@ pub struct Repair {
     /// holes: but for --method paper they are put in all the same)
     #[arg(long, value_name = "N", default_value_t = 500)]
     pub max_hole_edges: usize,
-    /// Remove components with fewer triangles [default: 10, and for each 2500 points beyond 100 000
-    /// one more, up to 300, or 1000 with --smooth; with --method paper 10]
+    /// Remove components with fewer triangles [default: 10; in noise one for each 2500 points, from
+    /// 10 to 300, or to 1000 with --smooth; with --method paper 10]
     #[arg(long, value_name = "N")]
     pub min_component: Option<u64>,
     /// Leave out bridges, holes and components: the surface as extracted
