@@ -105,8 +105,8 @@ pub struct Params {
     pub max_angle: f64,
     /// Fill holes of up to this many edges (paper: 500).
     pub max_hole_edges: usize,
-    /// Remove components with fewer triangles (paper: 10); `None`: 10, but where points were relaxed, as
-    /// in noise, one for each 2500 points, from 10 to 300, or to 1000 with smoothing.
+    /// Remove components with fewer triangles (paper: 10); `None`: 10, but in noise, where many
+    /// points were relaxed, one for each 2500 points, from 10 to 300, or to 1000 with smoothing.
     pub min_component: Option<u64>,
     /// Bridges, holes and small components (paper, section 3.6).
     pub repair: bool,
@@ -159,7 +159,7 @@ impl Params {
         }
     }
 
-    /// The least triangles of a component that stays, in a cloud of so many points; `noisy` if some were
+    /// The least triangles of a component that stays, in a cloud of so many points; `noisy` if many were
     /// relaxed.
     #[must_use]
     pub fn least_component(&self, points: u64, noisy: bool) -> u64 {

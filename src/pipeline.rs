@@ -195,6 +195,7 @@ impl Reconstruction {
         };
         known.points = points;
         known.moved = relaxed.as_ref().map(|r| r.store.is_some());
+        let noisy = relaxed.as_ref().is_some_and(|r| r.is_noisy(points));
         let estimate = known.estimate(params);
         fits(estimate)?;
         let places = Places {
@@ -233,7 +234,7 @@ impl Reconstruction {
         })?;
         let options = RepairOptions {
             repair: params.repair,
-            min_component: params.least_component(points, places.differ()),
+            min_component: params.least_component(points, noisy),
             max_hole_edges: params.max_hole_edges,
             flip: params.method == Method::Robust,
             zip: params.method == Method::Robust,

@@ -32,6 +32,15 @@ pub struct Relaxed {
     pub stats: RelaxStats,
 }
 
+impl Relaxed {
+    /// True if of so many points at least half moved, each counted as often as it did: not a clean cloud
+    /// that is noisy in places.
+    #[must_use]
+    pub fn is_noisy(&self, points: u64) -> bool {
+        2 * self.stats.moved >= points
+    }
+}
+
 /// Counts of this stage.
 #[derive(Debug, Clone, Copy, Default, Serialize, PartialEq, Eq)]
 pub struct RelaxStats {
