@@ -1,8 +1,9 @@
 //! What is impossible in a description.
 
-use crate::cloud::{Cloud, Order};
+use crate::cloud::{Cloud, DEFAULT_SIZE, Order};
 use crate::error::{Error, Result};
 use crate::kind::Kind;
+use crate::outdoor::{HIGHEST_WALL, MOST_TREES, MOST_WIRES, Objects};
 use crate::sampling::Sampling;
 
 /// Most layers of a cloud.
@@ -11,10 +12,11 @@ const MOST_LAYERS: u32 = 100;
 /// Refuses numbers out of range and settings that exclude each other.
 pub(crate) fn check(cloud: &Cloud) -> Result<()> {
     numbers(cloud)?;
+    objects(&cloud.objects)?;
     if cloud.kind == Kind::Mesh && cloud.mesh.is_none() {
         return Err(Error::parameter("mesh", "nothing", "a mesh file"));
     }
-    match excluded(cloud) {
+    match excluded(cloud).or_else(|| excluded_outdoors(cloud)) {
         Some((first, second, why)) => Err(Error::Conflict { first, second, why }),
         None => Ok(()),
     }
@@ -68,6 +70,22 @@ fn numbers(cloud: &Cloud) -> Result<()> {
     }
 }
 
+fn objects(objects: &Objects) -> Result<()> {
+    let few = |name, found, most| match found <= most {
+        true => Ok(()),
+        false => Err(Error::parameter(name, found, format!("at most {most}"))),
+    };
+    few("trees", objects.trees, MOST_TREES)?;
+    few("wires", objects.wires, MOST_WIRES)?;
+    match objects.wall_height {
+        Some(height) if !(0.0..=HIGHEST_WALL).contains(&height) => {
+            let expected = format!("0 to {HIGHEST_WALL}");
+            Err(Error::parameter("wall-height", height, expected))
+        }
+        _ => Ok(()),
+    }
+}
+
 /// Two settings that exclude each other, and why.
 fn excluded(cloud: &Cloud) -> Option<(&'static str, &'static str, &'static str)> {
     let special = if cloud.falloff {
@@ -112,4 +130,24 @@ fn excluded(cloud: &Cloud) -> Option<(&'static str, &'static str, &'static str)>
         return Some(("scanlines", "mesh", why));
     }
     None
+}
+
+/// The same for the outdoor world.
+fn excluded_outdoors(cloud: &Cloud) -> Option<(&'static str, &'static str, &'static str)> {
+    if cloud.kind != Kind::Outdoor {
+        let why = "only the kind outdoor has them";
+        let plain = cloud.objects == Objects::default();
+        return (!plain).then_some(("trees, wires or wall-height", cloud.kind.name(), why));
+    }
+    let density = "it has a density of its own";
+    [
+        (cloud.size != DEFAULT_SIZE, "size", "it is always 400 wide"),
+        (cloud.rotated, "rotated", "its ground must face up"),
+        (cloud.layers > 1, "layers", "it is no surface to be shifted"),
+        (cloud.falloff, "falloff", density),
+        (cloud.scanlines.is_some(), "scanlines", density),
+        (cloud.sampling != Sampling::Uniform, "sampling", density),
+    ]
+    .into_iter()
+    .find_map(|(set, first, why)| set.then_some((first, Kind::Outdoor.name(), why)))
 }

@@ -6,9 +6,13 @@ use crate::check::check;
 use crate::error::{Error, Result};
 use crate::generator::Generator;
 use crate::kind::Kind;
+use crate::outdoor::{self, GroundReport, Land, Objects};
 use crate::reference;
 use crate::sampling::Sampling;
 use crate::write::{self, Format};
+
+/// Diagonal of the bounding box where none is given.
+pub(crate) const DEFAULT_SIZE: f64 = 1000.0;
 
 /// Order of the points.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -57,13 +61,14 @@ pub struct Cloud {
     pub points: u64,
     /// Seed of all random numbers.
     pub seed: u64,
-    /// Diagonal of the bounding box.
+    /// Diagonal of the bounding box. The outdoor world has a size of its own.
     pub size: f64,
     /// Standard deviation of the noise.
     pub noise: f64,
     /// Direction of the noise.
     pub noise_mode: NoiseMode,
-    /// Fraction of points placed anywhere in a box 1.5 times the size.
+    /// Fraction of points placed anywhere in a box 1.5 times the size; outdoors in the air, up to
+    /// 30 above the ground.
     pub outliers: f64,
     /// Fraction of points that are exact copies of an earlier one.
     pub duplicates: f64,
@@ -84,6 +89,8 @@ pub struct Cloud {
     pub offset: [f64; 3],
     /// Order of the points.
     pub order: Order,
+    /// Objects of the outdoor world.
+    pub objects: Objects,
 }
 
 impl Cloud {
@@ -95,7 +102,7 @@ impl Cloud {
             sampling: Sampling::Uniform,
             points: 100_000,
             seed: 0,
-            size: 1000.0,
+            size: DEFAULT_SIZE,
             noise: 0.0,
             noise_mode: NoiseMode::Normal,
             outliers: 0.0,
@@ -108,6 +115,7 @@ impl Cloud {
             rotated: false,
             offset: [0.0; 3],
             order: Order::Random,
+            objects: Objects::default(),
         }
     }
 
@@ -204,6 +212,11 @@ impl Cloud {
         Cloud { order, ..self }
     }
 
+    /// Sets the objects of the outdoor world.
+    pub fn objects(self, objects: Objects) -> Self {
+        Cloud { objects, ..self }
+    }
+
     /// Euler characteristic of the surface if it is closed: 2 - 2 * genus.
     pub fn euler_characteristic(&self) -> Option<i64> {
         self.kind.euler_characteristic()
@@ -246,5 +259,35 @@ impl Cloud {
     pub fn write_reference(&self, path: impl AsRef<Path>, tolerance: f64) -> Result<()> {
         check(self)?;
         write::write_reference(&reference::reference(self, tolerance)?, path.as_ref())
+    }
+
+    /// Discs (x, y, radius) around the houses, trees and walls of the outdoor world, with a margin,
+    /// in the coordinates of the points. They depend on seed, objects and offset only.
+    pub fn discs(&self) -> Result<Vec<[f64; 3]>> {
+        let mut discs = self.land_discs("discs")?;
+        for disc in &mut discs {
+            disc[0] += self.offset[0];
+            disc[1] += self.offset[1];
+        }
+        Ok(discs)
+    }
+
+    /// Measures how a mesh of the outdoor world, a binary PLY file, meets the ground. Of the
+    /// description only seed, objects and offset matter.
+    pub fn measure_mesh(&self, path: impl AsRef<Path>) -> Result<GroundReport> {
+        let discs = self.land_discs("measuring a mesh")?;
+        outdoor::measure(&discs, self.offset, path.as_ref())
+    }
+
+    fn land_discs(&self, purpose: &'static str) -> Result<Vec<[f64; 3]>> {
+        check(self)?;
+        if self.kind != Kind::Outdoor {
+            return Err(Error::Conflict {
+                first: purpose,
+                second: self.kind.name(),
+                why: "only the kind outdoor has open ground",
+            });
+        }
+        Ok(Land::new(self.seed, &self.objects).discs())
     }
 }

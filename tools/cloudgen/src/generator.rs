@@ -6,6 +6,7 @@ use crate::cloud::{Cloud, NoiseMode, Order};
 use crate::error::Result;
 use crate::kind::Kind;
 use crate::odd::Odd;
+use crate::outdoor::{Land, Outdoor};
 use crate::picker::Picker;
 use crate::reference;
 use crate::rng::{Permutation, Purpose, Rng};
@@ -27,6 +28,7 @@ const PARALLEL_FROM: usize = 4096;
 enum Source {
     Grid(Grid),
     Odd(Odd),
+    Outdoor(Outdoor),
     Surface {
         surface: Box<dyn Surface>,
         scan: Option<(Vec<Line>, Picker)>,
@@ -69,6 +71,11 @@ impl Generator {
             let bounds = [scale(half, -1.0), half];
             return Ok(Self::with(cloud, Source::Odd(odd), bounds, [0.0; 3]));
         }
+        if cloud.kind == Kind::Outdoor {
+            let land = Land::new(cloud.seed, &cloud.objects);
+            let source = Source::Outdoor(Outdoor::new(&land, cloud.points));
+            return Ok(Self::with(cloud, source, Outdoor::bounds(), [0.0; 3]));
+        }
         let Some(surface) = reference::surface(cloud)? else {
             let grid = Grid::new(cloud.points, cloud.size, cloud.rotated)?;
             let bounds = grid.bounds();
@@ -98,7 +105,7 @@ impl Generator {
     }
 
     fn with(cloud: &Cloud, source: Source, bounds: [Vec3; 2], scanner: Vec3) -> Self {
-        let regular = cloud.kind == Kind::Grid
+        let regular = matches!(cloud.kind, Kind::Grid | Kind::Outdoor)
             || cloud.sampling != Sampling::Uniform
             || (cloud.scanlines.is_some() && !cloud.falloff);
         let sweep = match cloud.order {
@@ -159,10 +166,10 @@ impl Generator {
         self.original(index)
     }
 
-    /// Area of the surface, one layer of it; `None` for a grid and where there is none.
+    /// Area of the surface, one layer of it; `None` for a grid and where there is no single surface.
     pub fn area(&self) -> Option<f64> {
         match &self.source {
-            Source::Grid(_) | Source::Odd(_) => None,
+            Source::Grid(_) | Source::Odd(_) | Source::Outdoor(_) => None,
             Source::Surface { surface, .. } | Source::Chosen { surface, .. } => {
                 Some(surface.area())
             }
@@ -176,6 +183,14 @@ impl Generator {
         }
     }
 
+    /// Side of the square of the outdoor world that has one point on a roof; None for other kinds.
+    pub fn outdoor_spacing(&self) -> Option<f64> {
+        match &self.source {
+            Source::Outdoor(outdoor) => Some(outdoor.spacing()),
+            _ => None,
+        }
+    }
+
     /// All points in order.
     pub fn iter(&self) -> impl Iterator<Item = [f64; 3]> + '_ {
         (0..self.cloud.points).map(|index| self.sample(index).position)
@@ -183,12 +198,12 @@ impl Generator {
 
     /// Distance of a position to the true surface, the first layer: exact for the kinds with a
     /// closed form and for meshes (where it is slow: it looks at every triangle), of first order
-    /// for `bumpy` and `terrain`; not a number where there is no surface.
+    /// for `bumpy` and `terrain`; not a number where there is no single surface.
     pub fn distance(&self, position: [f64; 3]) -> f64 {
         let p = sub(position, self.cloud.offset);
         match &self.source {
             Source::Grid(grid) => grid.distance(p),
-            Source::Odd(_) => f64::NAN,
+            Source::Odd(_) | Source::Outdoor(_) => f64::NAN,
             Source::Surface { surface, .. } | Source::Chosen { surface, .. } => {
                 surface.distance(if self.cloud.rotated {
                     turned_back(p)
@@ -248,7 +263,10 @@ impl Generator {
         if rng.uniform() >= self.cloud.outliers {
             return None;
         }
-        let place = box_point(self.outlier_box, std::array::from_fn(|_| rng.uniform()));
+        let place = match &self.source {
+            Source::Outdoor(_) => Outdoor::outlier(&mut rng),
+            _ => box_point(self.outlier_box, std::array::from_fn(|_| rng.uniform())),
+        };
         Some(self.turn(Sample {
             position: place,
             normal: [0.0; 3],
@@ -257,10 +275,11 @@ impl Generator {
 
     fn noisy(&self, index: u64) -> Sample {
         let mut sample = match &self.source {
-            Source::Grid(grid) => grid.node(match &self.sweep {
-                Sweep::Shuffled(permutation) => permutation.apply(index),
-                Sweep::Chance | Sweep::InOrder => index,
-            }),
+            Source::Grid(grid) => grid.node(self.rank(index)),
+            Source::Outdoor(outdoor) => {
+                let rank = self.rank(index);
+                outdoor.point(rank, &mut Rng::at(self.cloud.seed, Purpose::Position, rank))
+            }
             Source::Odd(odd) => {
                 let mut rng = Rng::at(self.cloud.seed, Purpose::Position, index);
                 let position = odd.point(index, self.cloud.points, self.cloud.size, &mut rng);
@@ -270,12 +289,7 @@ impl Generator {
             Source::Surface { surface, scan } => {
                 self.turn(self.on_surface(surface.as_ref(), scan.as_ref(), index))
             }
-            Source::Chosen { samples, .. } => self.turn(
-                samples[match &self.sweep {
-                    Sweep::Shuffled(permutation) => permutation.apply(index),
-                    Sweep::Chance | Sweep::InOrder => index,
-                } as usize],
-            ),
+            Source::Chosen { samples, .. } => self.turn(samples[self.rank(index) as usize]),
         };
         if self.cloud.layers > 1 {
             let layer = (index % u64::from(self.cloud.layers)) as f64;
@@ -292,6 +306,14 @@ impl Generator {
             sample.position = add(sample.position, shift);
         }
         sample
+    }
+
+    /// Place of point `index` in the order of the source.
+    fn rank(&self, index: u64) -> u64 {
+        match &self.sweep {
+            Sweep::Shuffled(permutation) => permutation.apply(index),
+            Sweep::Chance | Sweep::InOrder => index,
+        }
     }
 
     fn on_surface(

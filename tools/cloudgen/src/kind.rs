@@ -27,12 +27,14 @@ pub enum Kind {
     Corner,
     /// A given triangle mesh.
     Mesh,
+    /// Hilly ground with houses, trees, walls and wires, from the air; always 400 x 400.
+    Outdoor,
     /// A cloud without a surface, or with one that is not fit to be reconstructed.
     Odd(Odd),
 }
 
 impl Kind {
-    /// All kinds that have a surface and need no file.
+    /// All kinds that have one surface and need no file.
     pub const ALL: [Kind; 8] = [
         Kind::Sphere,
         Kind::Torus,
@@ -56,6 +58,7 @@ impl Kind {
             Kind::Grid => "grid",
             Kind::Corner => "corner",
             Kind::Mesh => "mesh",
+            Kind::Outdoor => "outdoor",
             Kind::Odd(odd) => odd.name(),
         }
     }
@@ -67,9 +70,13 @@ impl Kind {
             Kind::Torus => Some(0),
             Kind::Bumpy => Some(-8),
             Kind::Room => Some(-6),
-            Kind::Terrain | Kind::Plane | Kind::Grid | Kind::Corner | Kind::Mesh | Kind::Odd(_) => {
-                None
-            }
+            Kind::Terrain
+            | Kind::Plane
+            | Kind::Grid
+            | Kind::Corner
+            | Kind::Mesh
+            | Kind::Outdoor
+            | Kind::Odd(_) => None,
         }
     }
 }
@@ -85,7 +92,12 @@ impl FromStr for Kind {
 
     fn from_str(text: &str) -> Result<Self, Error> {
         let odd = || Odd::ALL.into_iter().map(Kind::Odd);
-        let kinds = || Kind::ALL.into_iter().chain([Kind::Mesh]).chain(odd());
+        let kinds = || {
+            Kind::ALL
+                .into_iter()
+                .chain([Kind::Mesh, Kind::Outdoor])
+                .chain(odd())
+        };
         let names: Vec<_> = kinds().map(Kind::name).collect();
         let names = names.join(", ");
         kinds()

@@ -10,8 +10,10 @@
 //! Every point is a pure function of the description and its index, and all transcendental
 //! functions come from `libm`: the same description gives the same bytes everywhere.
 //!
-//! Surfaces other than the grid are centred on the origin before the offset; the grid starts at
-//! the origin.
+//! Surfaces other than the grid are centred on the origin before the offset; the grid and the
+//! outdoor world start at the origin.
+//!
+//! [`Cloud::measure_mesh`] tells how a mesh of the outdoor world meets its ground.
 
 mod check;
 mod cloud;
@@ -20,7 +22,9 @@ mod generator;
 mod kind;
 mod mesh_file;
 mod odd;
+mod outdoor;
 mod picker;
+mod ply_stream;
 mod reference;
 mod rng;
 mod sampling;
@@ -33,6 +37,7 @@ pub use error::{Error, Result};
 pub use generator::Generator;
 pub use kind::Kind;
 pub use odd::Odd;
+pub use outdoor::{GroundReport, OUTDOOR_SIDE, Objects};
 pub use sampling::{MOST_HELD, Sampling};
 pub use surface::Sample;
 pub use write::{Encoding, Format, LasOptions, PointFormat, Precision};

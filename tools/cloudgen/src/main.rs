@@ -1,10 +1,15 @@
 //! Command line of the cloud generator.
 
-use std::{path::PathBuf, process::ExitCode};
+use std::{
+    io::{self, Write},
+    path::{Path, PathBuf},
+    process::ExitCode,
+};
 
 use clap::{Parser, ValueEnum};
 use outcrop_cloudgen::{
-    Cloud, Error, Format, Kind, LasOptions, NoiseMode, Order, PointFormat, Result, Sampling,
+    Cloud, Error, Format, Kind, LasOptions, NoiseMode, Objects, Order, PointFormat, Result,
+    Sampling,
 };
 
 /// Writes a point cloud with known ground truth. Equal arguments give equal files.
@@ -12,7 +17,8 @@ use outcrop_cloudgen::{
 #[command(name = "cloudgen", version, allow_negative_numbers = true)]
 struct Args {
     /// Surface: sphere, torus, bumpy (genus 5), terrain, room (genus 4), plane, grid, corner (three
-    /// orthogonal plates) or mesh (a file); without a surface: two-clusters, line-grid, cube-grid,
+    /// orthogonal plates) or mesh (a file); many surfaces: outdoor (ground with houses, trees and
+    /// walls, from 0 to 400 along x and y); without a surface: two-clusters, line-grid, cube-grid,
     /// one-place, few-places, icosahedron, line, volume, powers, dense-in-sparse, scan-line, wheel,
     /// shell or patches
     kind: Kind,
@@ -41,8 +47,24 @@ struct Args {
     points: u64,
 
     /// Output file; its extension decides on the format: .las, .laz, .ply, .xyz
-    #[arg(short, long, value_name = "FILE")]
-    output: PathBuf,
+    #[arg(
+        short,
+        long,
+        value_name = "FILE",
+        required_unless_present = "check_mesh"
+    )]
+    output: Option<PathBuf>,
+
+    /// Write no cloud, but measure a mesh of the outdoor world with the same seed, trees and offset,
+    /// a binary PLY file, and print one line of JSON: the share of the near-horizontal area that
+    /// faces down, in all and on open ground (away from houses, trees, walls and the border),
+    /// boundary edges there, and the area of triangles there that are more than 1 off the ground
+    #[arg(
+        long,
+        value_name = "FILE.ply",
+        conflicts_with_all = ["output", "split", "reference", "format"]
+    )]
+    check_mesh: Option<PathBuf>,
 
     /// Format: las, laz, ply-{le,be,ascii}-{f32,f64} or xyz [default: by extension; .ply is
     /// ply-le-f64]
@@ -57,7 +79,7 @@ struct Args {
     #[arg(long, value_name = "UNITS", default_value_t = 1000.0)]
     size: f64,
 
-    /// Standard deviation of gaussian noise
+    /// Standard deviation of gaussian noise, in the units of the coordinates
     #[arg(long, value_name = "SIGMA", default_value_t = 0.0)]
     noise: f64,
 
@@ -65,7 +87,7 @@ struct Args {
     #[arg(long, value_enum, value_name = "MODE", default_value = "normal")]
     noise_mode: NoiseModeArg,
 
-    /// Fraction of points anywhere in an inflated box
+    /// Fraction of points anywhere in an inflated box; outdoors in the air, up to 30 above ground
     #[arg(long, value_name = "FRACTION", default_value_t = 0.0)]
     outliers: f64,
 
@@ -80,6 +102,18 @@ struct Args {
     /// Distance of each layer from the one before
     #[arg(long, value_name = "UNITS", default_value_t = 0.0)]
     layer_offset: f64,
+
+    /// Trees of the outdoor world [default: 400]
+    #[arg(long, value_name = "N")]
+    trees: Option<u32>,
+
+    /// Power lines of the outdoor world
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    wires: u32,
+
+    /// Height of the free-standing walls of the outdoor world [default: from 1 to 3]
+    #[arg(long, value_name = "UNITS")]
+    wall_height: Option<f64>,
 
     /// Let the density fall with the squared distance from a scanner
     #[arg(long)]
@@ -189,7 +223,8 @@ fn parse_point_format(text: &str) -> Result<PointFormat, String> {
     }
 }
 
-fn run(args: &Args) -> Result<()> {
+/// The cloud that the arguments describe.
+fn cloud(args: &Args) -> Cloud {
     let mut cloud = Cloud::new(args.kind)
         .points(args.points)
         .seed(args.seed)
@@ -207,6 +242,11 @@ fn run(args: &Args) -> Result<()> {
             SamplingArg::Regular => Sampling::Regular,
             SamplingArg::Adaptive => Sampling::Adaptive,
         })
+        .objects(Objects {
+            trees: args.trees.unwrap_or(Objects::default().trees),
+            wires: args.wires,
+            wall_height: args.wall_height,
+        })
         .falloff(args.falloff)
         .rotated(args.rotated)
         .order(match args.order {
@@ -217,9 +257,29 @@ fn run(args: &Args) -> Result<()> {
     cloud.scanner = args.scanner.map(|Triple(place)| place);
     cloud.scanlines = args.scanlines;
     cloud.offset = args.offset.map_or([0.0; 3], |Triple(offset)| offset);
+    cloud
+}
+
+fn run(args: &Args) -> Result<()> {
+    let cloud = cloud(args);
+    if let Some(mesh) = &args.check_mesh {
+        let json = cloud.measure_mesh(mesh)?.to_json();
+        writeln!(io::stdout(), "{json}").map_err(|source| Error::Io {
+            path: PathBuf::from("standard output"),
+            action: "write",
+            source,
+        })?;
+    }
+    match &args.output {
+        Some(output) => write(args, &cloud, output),
+        None => Ok(()),
+    }
+}
+
+fn write(args: &Args, cloud: &Cloud, output: &Path) -> Result<()> {
     let format = match args.format {
         Some(format) => format,
-        None => Format::from_path(&args.output)?,
+        None => Format::from_path(output)?,
     };
     let options = LasOptions {
         point_format: args.point_format,
@@ -227,7 +287,7 @@ fn run(args: &Args) -> Result<()> {
     };
     let format = format.with_las_options(options);
     if let Some(reference) = &args.reference {
-        if *reference == args.output {
+        if reference == output {
             return Err(Error::Conflict {
                 first: "reference",
                 second: "output",
@@ -237,8 +297,8 @@ fn run(args: &Args) -> Result<()> {
         cloud.write_reference(reference, args.reference_tolerance)?;
     }
     match args.split {
-        Some(parts) => cloud.write_split(&args.output, format, parts).map(drop),
-        None => cloud.write(&args.output, format),
+        Some(parts) => cloud.write_split(output, format, parts).map(drop),
+        None => cloud.write(output, format),
     }
 }
 

@@ -27,7 +27,7 @@ pub(crate) fn surface(cloud: &Cloud) -> Result<Option<Box<dyn Surface>>> {
             let path = cloud.mesh.as_deref().unwrap_or_else(|| "".as_ref());
             Box::new(Mesh::new(&mesh_file::read(path)?, size, path)?)
         }
-        Kind::Grid | Kind::Odd(_) => return Ok(None),
+        Kind::Grid | Kind::Outdoor | Kind::Odd(_) => return Ok(None),
     }))
 }
 
@@ -37,11 +37,11 @@ pub(crate) fn reference(cloud: &Cloud, tolerance: f64) -> Result<Tessellation> {
         let expected = format!("{LEAST_TOLERANCE:e} to below 1");
         return Err(Error::parameter("reference-tolerance", tolerance, expected));
     }
-    if matches!(cloud.kind, Kind::Odd(_)) {
+    if matches!(cloud.kind, Kind::Outdoor | Kind::Odd(_)) {
         return Err(Error::Conflict {
             first: "reference",
             second: cloud.kind.name(),
-            why: "it has no surface",
+            why: "it has no surface of its own",
         });
     }
     let tolerance = tolerance * cloud.size;

@@ -26,6 +26,7 @@ pub(crate) enum Purpose {
     Duplicate,
     Split,
     Permutation,
+    Object,
 }
 
 /// A splitmix64 stream.

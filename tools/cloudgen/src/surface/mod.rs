@@ -28,7 +28,7 @@ pub struct Sample {
     /// The position, noise included.
     pub position: [f64; 3],
     /// Outward unit normal of the surface (up for open surfaces, towards the free space in a room),
-    /// or zero for an outlier.
+    /// or zero where there is none: for outliers and wires.
     pub normal: [f64; 3],
 }
 
