@@ -82,8 +82,9 @@ pub mod stages;
 pub mod workspace;
 
 pub use error::{Error, Result};
-pub use params::{Method, Params, Radius, Smoothing};
+pub use params::{MaxWidth, Method, Params, Radius, Smoothing};
 pub use pipeline::{Builder, DiskEstimate, Reconstruction, Start};
 pub use report::Report;
 pub use stages::ingest::Classes;
+pub use stages::surface::evidence::Division;
 pub use workspace::progress::{Cancel, Observer};

@@ -2,6 +2,8 @@
 
 use crate::error::{Error, Result};
 use crate::stages::ingest::Classes;
+use crate::stages::spacing::{Limits, Width};
+use crate::stages::surface::evidence::Division;
 
 /// Radius of the disks (paper, section 3.4).
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -79,6 +81,47 @@ impl std::str::FromStr for Smoothing {
     }
 }
 
+/// A limit of length.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum MaxWidth {
+    /// In units of the local spacing of points on the surface.
+    Spacings(f64),
+    /// A length in the input's unit.
+    Length(f64),
+    /// No limit.
+    None,
+}
+
+impl std::str::FromStr for MaxWidth {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let text = text.trim();
+        let number = |t: &str| match t.trim().parse::<f64>() {
+            Ok(x) if x > 0.0 && x.is_finite() => Ok(x),
+            _ => Err(format!(
+                "{text:?} is not none, a positive length, or one in local spacings like 25x"
+            )),
+        };
+        match text.strip_suffix('x') {
+            _ if text == "none" => Ok(Self::None),
+            Some(spacings) => number(spacings).map(Self::Spacings),
+            None => number(text).map(Self::Length),
+        }
+    }
+}
+
+impl std::fmt::Display for MaxWidth {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Spacings(spacings) => write!(f, "{spacings}x"),
+            Self::Length(length) => write!(f, "{length}"),
+            Self::None => f.write_str("none"),
+        }
+    }
+}
+
 /// Everything that decides the mesh. Two runs with equal parameters and equal points give the same
 /// bytes.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -108,11 +151,21 @@ pub struct Params {
     /// Remove components with fewer triangles (paper: 10); `None`: 10, but in noise, where many
     /// points were relaxed, one for each 2500 points, from 10 to 300, or to 1000 with smoothing.
     pub min_component: Option<u64>,
+    /// Keep points that are off the surface: far from their neighbours for how dense these are. The paper's
+    /// method keeps them, and has no limits of length, whatever is said here.
+    pub keep_all: bool,
+    /// Longest side of a triangle; longer ones stay if the surface is as sparse at one of their ends.
+    pub max_edge: MaxWidth,
+    /// Longest side of a triangle that fills a hole, likewise.
+    pub max_fill: MaxWidth,
     /// Bridges, holes and small components (paper, section 3.6).
     pub repair: bool,
     /// Points per block, the unit in which T12 triangles are decided; part of the result.
     #[serde(skip)]
     pub block: u32,
+    /// How blocks are divided while they are oriented; part of the result.
+    #[serde(skip)]
+    pub division: Division,
 }
 
 /// The block size that a reconstruction uses unless a test asks for another.
@@ -139,8 +192,12 @@ impl Default for Params {
             max_angle: 143.0,
             max_hole_edges: 500,
             min_component: None,
+            keep_all: false,
+            max_edge: MaxWidth::Spacings(11.0),
+            max_fill: MaxWidth::Spacings(25.0),
             repair: true,
             block: BLOCK,
+            division: Division::default(),
         }
     }
 }
@@ -154,8 +211,32 @@ impl Params {
             smoothing: Smoothing::Plain,
             relax: 0,
             max_angle: 60.0,
+            keep_all: true,
+            max_edge: MaxWidth::None,
+            max_fill: MaxWidth::None,
             min_component: Some(10),
             ..Self::default()
+        }
+    }
+
+    /// True if points off the surface are left out.
+    #[must_use]
+    pub fn off_surface(&self) -> bool {
+        self.method == Method::Robust && !self.keep_all
+    }
+
+    /// What is too far apart to be one surface, on a lattice of this step.
+    #[must_use]
+    pub fn limits(&self, step: f64) -> Limits {
+        let width = |max| match max {
+            MaxWidth::Spacings(spacings) => Width::Spacings(spacings),
+            MaxWidth::Length(length) => Width::Steps(length / step),
+            MaxWidth::None => Width::Any,
+        };
+        Limits {
+            off_surface: self.off_surface(),
+            edge: width(self.max_edge),
+            fill: width(self.max_fill),
         }
     }
 
@@ -201,6 +282,14 @@ impl Params {
                 self.max_angle.to_string(),
                 "more than 0, up to 180",
             );
+        }
+        let widths = [("--max-edge", self.max_edge), ("--max-fill", self.max_fill)];
+        for (name, width) in widths {
+            if let MaxWidth::Spacings(x) | MaxWidth::Length(x) = width
+                && !(x > 0.0 && x.is_finite())
+            {
+                return error(name, x.to_string(), "a positive number");
+            }
         }
         if self.smooth > 100 {
             return error("--smooth", self.smooth.to_string(), "0 to 100");

@@ -18,6 +18,7 @@ use crate::stages::ingest::{self, ingest_classes};
 use crate::stages::located::Places;
 use crate::stages::repair::{RepairOptions, repair};
 use crate::stages::smooth::{Relaxing, relax, smooth};
+use crate::stages::spacing::Density;
 use crate::stages::stitch::{StitchOptions, stitch};
 use crate::stages::triples::triples;
 use crate::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
@@ -183,13 +184,15 @@ impl Reconstruction {
             neighbors: params.neighbors,
             rounds: params.relax,
             smoothed: params.smooth > 0,
+            off_surface: params.off_surface(),
         };
-        let relaxed = if params.relax > 0 {
-            Some(
-                clock.stage("relax", "points", points * u64::from(params.relax), || {
-                    relax(&store, tiles, relaxing, workspace)
-                })?,
-            )
+        let relaxed = if params.relax > 0 || params.method == Method::Robust {
+            Some(clock.stage(
+                "relax",
+                "points",
+                points * u64::from(params.relax.max(1)),
+                || relax(&store, tiles, relaxing, workspace),
+            )?)
         } else {
             None
         };
@@ -198,12 +201,19 @@ impl Reconstruction {
         let noisy = relaxed.as_ref().is_some_and(|r| r.is_noisy(points));
         let estimate = known.estimate(params);
         fits(estimate)?;
+        let robust = relaxed.as_ref().filter(|_| params.method == Method::Robust);
+        let density = robust.map(|relaxed| Density {
+            spacings: &relaxed.spacings,
+            neighbors: params.neighbors,
+            limits: params.limits(lattice.step),
+        });
         let places = Places {
             shape: relaxed
                 .as_ref()
                 .and_then(|r| r.store.as_ref())
                 .unwrap_or(&store),
             file: &store,
+            density,
         };
         workspace.trim();
         let (seen, cell_stats) = clock.stage("cells", "points", points, || {
@@ -217,6 +227,7 @@ impl Reconstruction {
                 params.neighbors,
                 radius,
                 widen,
+                density,
                 workspace,
             )
         })?;
@@ -227,7 +238,7 @@ impl Reconstruction {
         let count = blocks.count() as u64;
         let extraction = StitchOptions {
             cos_max_angle: params.cos_max_angle(),
-            weigh: params.method == Method::Robust,
+            weigh: (params.method == Method::Robust).then_some(params.division),
         };
         let (stitched, base, insertion) = clock.stage("stitch", "blocks", 3 * count, || {
             stitch(places, triples, blocks, extraction, workspace)

@@ -1,6 +1,6 @@
 //! Flags, as the user gives them.
 
-use crate::params::{Method, Params, Radius, Smoothing};
+use crate::params::{MaxWidth, Method, Params, Radius, Smoothing};
 use crate::pipeline::Start;
 use crate::stages::ingest::Classes;
 use clap::{Args as ClapArgs, Parser, Subcommand};
@@ -40,7 +40,7 @@ time limit was reached, 130 Ctrl-C, 143 SIGTERM, 129 SIGHUP.";
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Make a mesh from points
-    Reconstruct(Reconstruct),
+    Reconstruct(Box<Reconstruct>),
     /// Go on with a run that was stopped, killed, or out of disk
     Resume(Resume),
     /// Say what is in a cloud and what a run would need
@@ -157,6 +157,14 @@ pub struct Surface {
     /// [default: 143; with --method paper 60]
     #[arg(long, value_name = "DEGREES")]
     pub max_angle: Option<f64>,
+    /// Keep points that are off the surface: whose neighbours are more than five times as far as is
+    /// usual around them, such as birds, dust and wires
+    #[arg(long)]
+    pub keep_all: bool,
+    /// Longest side of a triangle: a length in the cloud's unit, a number of local spacings like 11x, or
+    /// none [default: 11x; with --method paper none]
+    #[arg(long, value_name = "LENGTH|Nx|none")]
+    pub max_edge: Option<MaxWidth>,
 }
 
 /// Post-processing.
@@ -167,6 +175,10 @@ pub struct Repair {
     /// holes: but for --method paper they are put in all the same)
     #[arg(long, value_name = "N", default_value_t = 500)]
     pub max_hole_edges: usize,
+    /// Leave holes open that would take triangles with longer sides: a length in the cloud's unit, a
+    /// number of local spacings like 25x, or none [default: 25x; with --method paper none]
+    #[arg(long, value_name = "LENGTH|Nx|none")]
+    pub max_fill: Option<MaxWidth>,
     /// Remove components with fewer triangles [default: 10; in noise one for each 2500 points, from
     /// 10 to 300, or to 1000 with --smooth; with --method paper 10]
     #[arg(long, value_name = "N")]
@@ -344,6 +356,9 @@ impl Reconstruct {
             relax: self.surface.relax.unwrap_or(usual.relax),
             radius: self.surface.radius,
             max_angle: self.surface.max_angle.unwrap_or(usual.max_angle),
+            keep_all: self.surface.keep_all || usual.keep_all,
+            max_edge: self.surface.max_edge.unwrap_or(usual.max_edge),
+            max_fill: self.repair.max_fill.unwrap_or(usual.max_fill),
             max_hole_edges: self.repair.max_hole_edges,
             min_component: self.repair.min_component.or(usual.min_component),
             repair: !self.repair.no_repair,

@@ -126,7 +126,7 @@ struct Sample {
 fn sample(store: &PointStore, workspace: &Workspace) -> Result<Sample> {
     let _held = workspace.reserve("info: sample", 16 << 20)?;
     let mut sample = Sample::default();
-    let mut maker = CellMaker::new(NEIGHBORS, DiskRadius::Auto, Widen::OnBands);
+    let mut maker = CellMaker::new(NEIGHBORS, DiskRadius::Auto, Widen::OnBands, None);
     let mut search = Search::default();
     let count = SAMPLES.min(store.len().div_ceil(SAMPLE_POINTS));
     for index in 0..count {

@@ -4,6 +4,7 @@
 use crate::error::{Error, Result};
 use crate::params::Params;
 use crate::stages::ingest;
+use crate::stages::surface::evidence::Division;
 use serde::{Deserialize, Serialize};
 use std::ffi::OsString;
 use std::fs::File;
@@ -86,6 +87,7 @@ pub(super) struct Manifest {
     output: Name,
     params: Params,
     block: u32,
+    division: Division,
     tile_points: u32,
     page_points: usize,
     /// As they were given.
@@ -113,6 +115,7 @@ impl Manifest {
             output: Name::of(asked.output)?,
             params: asked.params.clone(),
             block: asked.params.block,
+            division: asked.params.division,
             tile_points: asked.tile_points,
             page_points: asked.page_points,
             inputs: asked
@@ -159,6 +162,7 @@ impl Manifest {
     pub fn params(&self) -> Params {
         Params {
             block: self.block,
+            division: self.division,
             ..self.params.clone()
         }
     }
@@ -183,7 +187,14 @@ impl Manifest {
             })
         };
         let (was_json, now_json) = (self.json(), now.json());
-        for key in ["version", "output", "block", "tile_points", "page_points"] {
+        for key in [
+            "version",
+            "output",
+            "block",
+            "division",
+            "tile_points",
+            "page_points",
+        ] {
             if was_json[key] != now_json[key] {
                 let what = format!("the {}", key.replace('_', " "));
                 return differ(what, was_json[key].to_string(), now_json[key].to_string());

@@ -2,6 +2,7 @@
 
 use super::blocks::Blocks;
 use super::order::PointStore;
+use super::spacing::Density;
 use crate::error::Result;
 use crate::geom::{Point, sub};
 use crate::workspace::memory::{Holding, bytes_of, hold, table_bytes};
@@ -16,6 +17,8 @@ pub struct Places<'a> {
     pub shape: &'a PointStore,
     /// In the file.
     pub file: &'a PointStore,
+    /// How dense the surface is, if edges that are too long for it are left out.
+    pub density: Option<Density<'a>>,
 }
 
 impl Places<'_> {
@@ -23,6 +26,12 @@ impl Places<'_> {
     #[must_use]
     pub fn differ(&self) -> bool {
         !std::ptr::eq(self.shape, self.file)
+    }
+
+    /// True if a triangle, with its corners where they are in the file, is on a line or too long.
+    #[must_use]
+    pub fn unfit(&self, t: [u32; 3], at: [Point; 3]) -> bool {
+        on_a_line(at) || self.density.is_some_and(|density| density.is_long(t, at))
     }
 }
 

@@ -10,6 +10,7 @@ pub mod thin;
 pub mod outliers;
 
 pub mod smooth;
+pub mod spacing;
 
 pub mod cells;
 

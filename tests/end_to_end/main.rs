@@ -6,6 +6,7 @@ mod determinism;
 mod filters;
 mod library;
 mod odd;
+mod outdoor;
 mod report;
 mod scans;
 mod stop;

@@ -3,6 +3,7 @@
 use super::evidence::{self, Known};
 use super::homes::Side;
 use super::surface::{Surface, Triangle, fans};
+use super::{Settings, Weighing};
 use outcrop::geom::Point;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -17,9 +18,8 @@ pub struct Base {
     pub sides: BTreeMap<Triangle, Side>,
     /// Whether a home has a crossing triangle.
     pub global: Vec<bool>,
-    /// Robust: pairs of labels that votes joined, and that they could not join any more.
-    pub voted: usize,
-    pub outvoted: usize,
+    /// Robust: how it was oriented.
+    pub met: Weighing,
 }
 
 /// The triangles at `v`, among the given ones, that `v` flags.
@@ -77,8 +77,7 @@ pub fn base(t3: &BTreeSet<Triangle>, block: u32) -> Base {
         one_sided,
         sides,
         global,
-        voted: 0,
-        outvoted: 0,
+        met: Weighing::default(),
     }
 }
 
@@ -87,8 +86,9 @@ pub fn weighed(
     points: &[Point],
     t3: &BTreeSet<Triangle>,
     open: &BTreeSet<Triangle>,
-    block: u32,
+    settings: &Settings,
 ) -> Base {
+    let block = settings.block;
     let by = flagged_by(t3, block);
     let flagged: BTreeSet<Triangle> = by.values().flatten().copied().collect();
     let kept: BTreeSet<Triangle> = t3.difference(&flagged).copied().collect();
@@ -105,7 +105,7 @@ pub fn weighed(
     let candidates = open.union(&flagged).copied();
     let weighed = evidence::orient(Known {
         points,
-        block,
+        settings,
         kept: &kept,
         seen: by.iter().map(seen).collect(),
         candidates: candidates.filter(|&t| is_interior(t, block)).collect(),
@@ -116,8 +116,7 @@ pub fn weighed(
         one_sided: weighed.one_sided,
         sides: weighed.sides,
         global: weighed.global,
-        voted: weighed.voted,
-        outvoted: weighed.outvoted,
+        met: weighed.met,
     }
 }
 

@@ -1,5 +1,6 @@
 //! Sections 1.1 to 1.3: ids, neighbours, planes, cells and the triples they see.
 
+use super::spacing::Density;
 use super::surface::Triangle;
 use super::{Radius, Settings};
 use outcrop::geom::clip::Cell;
@@ -59,6 +60,13 @@ pub fn smooth(points: &[Point], k: usize) -> Vec<Point> {
     (0..points.len()).map(moved).collect()
 }
 
+/// True if a point lies too far from its neighbours for a point of the surface.
+fn is_off_surface(points: &[Point], i: usize, settings: &Settings, density: &Density) -> bool {
+    let others = by_distance(points, i);
+    let last = others[..settings.neighbors.min(others.len())].last();
+    last.is_some_and(|&j| density.is_off_surface(i, distance2(points[i], points[j])))
+}
+
 /// The pairs that the cell of `i` makes triples with. `diagonal` is that of the whole cloud.
 fn corners(points: &[Point], i: usize, settings: &Settings, diagonal: f64) -> Vec<(u32, u32)> {
     let others = by_distance(points, i);
@@ -97,18 +105,30 @@ fn corners(points: &[Point], i: usize, settings: &Settings, diagonal: f64) -> Ve
     seen
 }
 
-/// How many of its three cells see each triple.
-pub fn triples(points: &[Point], settings: &Settings, diagonal: f64) -> BTreeMap<Triangle, u32> {
+/// How many of its three cells see each triple; none with a point off the surface. And how many points
+/// are that.
+pub fn triples(
+    points: &[Point],
+    settings: &Settings,
+    diagonal: f64,
+    density: Option<&Density>,
+) -> (BTreeMap<Triangle, u32>, usize) {
+    let off: Vec<bool> = (0..points.len())
+        .map(|i| density.is_some_and(|d| is_off_surface(points, i, settings, d)))
+        .collect();
     let mut cells_of: BTreeMap<Triangle, BTreeSet<u32>> = BTreeMap::new();
-    for i in 0..points.len() {
+    for i in (0..points.len()).filter(|&i| !off[i]) {
         for (j, l) in corners(points, i, settings, diagonal) {
             let mut triple = [i as u32, j, l];
             triple.sort_unstable();
+            if triple.iter().any(|&v| off[v as usize]) {
+                continue;
+            }
             cells_of.entry(triple).or_default().insert(i as u32);
         }
     }
-    cells_of
+    let counted = cells_of
         .into_iter()
-        .map(|(triple, cells)| (triple, cells.len() as u32))
-        .collect()
+        .map(|(triple, cells)| (triple, cells.len() as u32));
+    (counted.collect(), off.iter().filter(|off| **off).count())
 }

@@ -83,6 +83,7 @@ pub const KINDS: &[(&str, Maker)] = &[
     ("moebius band", moebius),
     ("bridge", bridge),
     ("tube", tube),
+    ("walls", walls),
 ];
 
 /// A cloud of about `size` points of the kind with this index, moved to coordinates of at least 0.
@@ -359,4 +360,19 @@ fn tube(r: &mut Random, n: usize) -> Raw {
         ]
     };
     (0..n).map(|_| point()).collect()
+}
+
+/// Thin walls on a ground, one of them across its middle: the surface has T-shaped junctions.
+fn walls(r: &mut Random, n: usize) -> Raw {
+    let side = (6.0 * (n as f64).sqrt()) as i64 + 10;
+    let point = |k: usize| {
+        let [x, y, z] = in_box(r, [side; 3]);
+        let thick = r.integer(0, 2);
+        match k % 6 {
+            0 => [x, side / 2 + thick, z / 2],
+            1 => [side / 3 + thick, y / 2, z / 3],
+            _ => [x, y, thick],
+        }
+    };
+    (0..n).map(point).collect()
 }

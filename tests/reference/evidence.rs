@@ -1,25 +1,25 @@
 //! Orientation by evidence (section 1.4, robust): the surface is cut where it is least sure.
 
 use super::base::is_interior;
+use super::contract::Graph;
 use super::homes::{Homes, Side};
-use super::insert::normal;
+use super::patches::{Block, cosine, highest, unit_normal, weight};
 use super::surface::{Edge, Surface, Triangle, alike, edges};
+use super::{Settings, Weighing};
 use outcrop::geom::Point;
-use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// What is known of the T3 before they are oriented.
 pub struct Known<'a> {
     /// The shape.
     pub points: &'a [Point],
-    /// `B`.
-    pub block: u32,
+    pub settings: &'a Settings,
     /// The T3 that no vertex flags.
     pub kept: &'a BTreeSet<Triangle>,
     /// By block, the crossing T3 that touch it and that none of its own vertices flags.
     pub seen: BTreeMap<u32, BTreeSet<Triangle>>,
     /// Interior candidates.
-    pub candidates: Vec<Triangle>,
+    pub candidates: BTreeSet<Triangle>,
 }
 
 /// The oriented base.
@@ -30,27 +30,7 @@ pub struct Weighed {
     pub sides: BTreeMap<Triangle, Side>,
     /// Whether a home has a crossing triangle.
     pub global: Vec<bool>,
-    /// Pairs of labels joined by votes, and how many sums contradicted those before.
-    pub voted: usize,
-    pub outvoted: usize,
-}
-
-/// The normal of the run i → j → k, of length one.
-fn unit_normal(points: &[Point], t: Triangle) -> [f64; 3] {
-    let n = normal(points, t).map(|x| x as f64);
-    let length = (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]).sqrt();
-    n.map(|x| if length > 0.0 { x / length } else { x })
-}
-
-/// The cosine of the angle between two triangles at an edge, run alike.
-fn cosine(points: &[Point], a: Triangle, b: Triangle, edge: Edge) -> f64 {
-    let (n, m) = (unit_normal(points, a), unit_normal(points, b));
-    let dot = n[0] * m[0] + n[1] * m[1] + n[2] * m[2];
-    if alike(a, b, edge) { dot } else { -dot }
-}
-
-fn weight(cosine: f64) -> i64 {
-    1 + (15.0 * cosine.max(0.0)).floor() as i64
+    pub met: Weighing,
 }
 
 /// Everything while it is worked on. A triangle's number is its place among those that no vertex
@@ -58,26 +38,44 @@ fn weight(cosine: f64) -> i64 {
 struct Weigher<'a> {
     known: Known<'a>,
     number: BTreeMap<Triangle, usize>,
+    /// Triangles that run as is decided.
     sets: Homes,
     /// What is there so far: first the interior triangles, then crossing ones, too.
     surface: Surface,
-    one_sided: BTreeSet<Triangle>,
+    removed: BTreeSet<Triangle>,
+    /// The nodes between blocks.
+    graph: Graph,
+    /// The nodes of the triangles of global labels, and whether they are turned there.
+    nodes: BTreeMap<Triangle, Side>,
+    /// The edges that step 5 left.
+    seams: Vec<(Triangle, Triangle, Edge)>,
+    met: Weighing,
 }
 
 pub fn orient(known: Known<'_>) -> Weighed {
-    let inside = |t: &&Triangle| is_interior(**t, known.block);
+    let block = known.settings.block;
+    let inside = |t: &&Triangle| is_interior(**t, block);
     let interior: BTreeSet<Triangle> = known.kept.iter().filter(inside).copied().collect();
+    let blocks: BTreeSet<u32> = interior.iter().map(|t| t[0] / block).collect();
     let mut weigher = Weigher {
         number: known.kept.iter().copied().zip(0..).collect(),
         sets: Homes::apart(known.kept.len()),
         surface: Surface::of(interior),
-        one_sided: BTreeSet::new(),
+        removed: BTreeSet::new(),
+        graph: Graph::default(),
+        nodes: BTreeMap::new(),
+        seams: Vec::new(),
+        met: Weighing::default(),
         known,
     };
-    weigher.join_by_flatness();
-    let (voted, outvoted) = weigher.join_by_votes();
+    let highest = highest(weigher.known.points);
+    for g in blocks {
+        weigher.orient_block(g, &highest);
+    }
+    weigher.settle();
     weigher.add_crossing();
-    weigher.finish(voted, outvoted)
+    weigher.cut_seams();
+    weigher.finish()
 }
 
 impl Weigher<'_> {
@@ -97,150 +95,167 @@ impl Weigher<'_> {
         }
     }
 
-    /// All that the surface so far asks of `t`, with the triangles that ask, in order of its edges.
-    fn asked(&self, t: Triangle) -> Vec<(Triangle, Edge, Side)> {
-        let mut all = Vec::new();
-        for edge in edges(t) {
-            for other in self.surface.at_edge(edge).into_iter().filter(|o| *o != t) {
-                all.push((other, edge, self.asks(other, t, edge)));
-            }
-        }
-        all
+    fn interior(&self, t: &Triangle) -> bool {
+        is_interior(*t, self.known.settings.block)
     }
 
-    /// Step 1. No edge of two interior triangles is in two blocks, so all blocks are one here.
-    fn join_by_flatness(&mut self) {
-        let mut joints = Vec::new();
-        for &t in self.surface.triangles() {
-            for (other, edge, _) in self.asked(t) {
-                let cosine = cosine(self.known.points, t, other, edge);
-                let step = match cosine {
-                    c if c > 0.9 => 0,
-                    c => 1 + (((0.9 - c) / 1.9 * 63.0) as usize).min(63),
-                };
-                if t < other {
-                    joints.push((step, t, other, edge));
-                }
-            }
+    /// The crossing triangles that no vertex flags, ascending.
+    fn crossing(&self) -> Vec<Triangle> {
+        let all = self.known.kept.iter().copied();
+        all.filter(|t| !self.interior(t)).collect()
+    }
+
+    fn remove(&mut self, t: Triangle) {
+        self.surface.remove(t);
+        self.removed.insert(t);
+    }
+
+    /// Steps 1 to 5 in a block.
+    fn orient_block(&mut self, g: u32, highest: &BTreeSet<u32>) {
+        let settings = self.known.settings;
+        let here = |t: &&Triangle| t[0] / settings.block == g && self.interior(t);
+        let block = Block {
+            points: self.known.points,
+            surface: Surface::of(self.known.kept.iter().filter(here).copied()),
+            crossing: self.known.seen[&g].clone(),
+            candidates: self.known.candidates.iter().filter(here).copied().collect(),
+            highest,
+            run: settings.patch,
+        };
+        for t in block.crossing.difference(self.known.kept) {
+            let asks = |edge: Edge| !block.surface.at_edge(edge).is_empty();
+            self.met.flagged_elsewhere += usize::from(edges(*t).into_iter().any(asks));
         }
-        // Those of a step in the order in which they were found.
-        joints.sort_by_key(|joint| joint.0);
-        for (_, t, other, edge) in joints {
-            if self.one_sided.contains(&t) || self.one_sided.contains(&other) {
+        let mut patches = block.patches(&mut self.met);
+        let clusters = patches
+            .graph
+            .contract(Some(settings.cluster), &mut self.met);
+        let of: BTreeMap<Triangle, Side> = patches
+            .of
+            .iter()
+            .map(|(&t, &side)| (t, clusters.seen_from_label(side)))
+            .collect();
+        self.cut_clusters(&block, &of);
+        self.add_labels(&patches.graph, &of);
+    }
+
+    /// Step 5: the cuts.
+    fn cut_clusters(&mut self, block: &Block<'_>, of: &BTreeMap<Triangle, Side>) {
+        for (t, other, edge) in block.joints() {
+            let (a, b) = (of[&t], of[&other]);
+            if a.home != b.home {
+                self.seams.push((t, other, edge));
                 continue;
             }
-            let (a, b) = (self.own(t), self.asks(other, t, edge));
-            if self.sets.conflict(&[a, b]) {
-                self.one_sided.insert(other);
-            } else {
-                self.sets.join(a, b);
+            let alike = (a.turned == b.turned) == alike(t, other, edge);
+            let gone = |t| self.removed.contains(t);
+            if !alike && !gone(&t) && !gone(&other) {
+                self.remove(other);
+                self.met.cut_inside += 1;
             }
-        }
-        for &t in &self.one_sided {
-            self.surface.remove(t);
         }
     }
 
-    /// Labels that are voted on, by their sets, numbered from block to block and in each in the order
-    /// in which its crossing triangles meet them.
-    fn labels(&self) -> BTreeMap<usize, usize> {
-        let mut numbers = BTreeMap::new();
-        for (&g, seen) in &self.known.seen {
-            for &t in seen {
-                let inside = |other: &Triangle| other[0] / self.known.block == g;
-                for (_, _, side) in self.asked(t).into_iter().filter(|ask| inside(&ask.0)) {
-                    let next = numbers.len();
-                    numbers.entry(self.sets.label(side.home)).or_insert(next);
+    /// Step 5: the labels of a block; and of step 6 the nodes of the global ones. `graph` has the clusters,
+    /// and `of` tells the cluster of each triangle.
+    fn add_labels(&mut self, graph: &Graph, of: &BTreeMap<Triangle, Side>) {
+        let clusters: BTreeSet<usize> = of.values().map(|side| side.home).collect();
+        let mut nodes: BTreeMap<usize, usize> = BTreeMap::new();
+        for cluster in clusters {
+            let left = |t: &&Triangle| of[*t].home == cluster && !self.removed.contains(*t);
+            let triangles: Vec<Triangle> = of.keys().filter(left).copied().collect();
+            for &t in &triangles[1..] {
+                let turned = of[&t].turned != of[&triangles[0]].turned;
+                let other = self.own(t);
+                self.sets
+                    .join(self.own(triangles[0]), Side { turned, ..other });
+            }
+            if !graph.connected(cluster) {
+                continue;
+            }
+            let home = self.graph.push();
+            self.graph.nodes[home].up = graph.nodes[cluster].up;
+            nodes.insert(cluster, home);
+            for t in triangles {
+                let turned = of[&t].turned;
+                self.nodes.insert(t, Side { home, turned });
+            }
+        }
+        for ([a, b], sum) in &graph.sums {
+            self.graph.sums.insert([nodes[a], nodes[b]], *sum);
+        }
+    }
+
+    /// Step 6: how labels run against each other.
+    fn settle(&mut self) {
+        let labels = self.nodes.clone();
+        self.add_crossing_nodes();
+        self.graph.push_sky();
+        let settled = self.graph.contract(None, &mut self.met);
+        // All triangles of a label are joined by now.
+        let mut first: BTreeMap<usize, (Triangle, bool)> = BTreeMap::new();
+        for (t, side) in labels {
+            let side = settled.seen_from_label(side);
+            let (with, turned) = *first.entry(side.home).or_insert((t, side.turned));
+            let turned = turned != side.turned;
+            let other = self.own(t);
+            self.sets.join(self.own(with), Side { turned, ..other });
+        }
+    }
+
+    /// Step 6: the nodes of the crossing triangles, and the sums at their edges.
+    fn add_crossing_nodes(&mut self) {
+        let exact = |t| unit_normal(self.known.points, t);
+        let rounded = |t| exact(t).map(|x| f64::from(x as f32));
+        let mut before: BTreeSet<Triangle> = BTreeSet::new();
+        for t in self.crossing() {
+            // The sides that others ask of it, with the weights of the edges; interior ones first.
+            let mut asked: Vec<(Side, i64)> = Vec::new();
+            let mut ask = |other: Triangle, edge: Edge, cosine: f64| {
+                let side = self.nodes[&other];
+                let turned = side.turned == alike(t, other, edge);
+                asked.push((Side { turned, ..side }, weight(cosine)));
+            };
+            for edge in edges(t) {
+                for other in self.surface.at_edge(edge) {
+                    ask(other, edge, cosine(exact, t, other, edge));
                 }
-            }
-        }
-        numbers
-    }
-
-    /// Step 2: how many pairs of labels were joined, and how many contradicted.
-    fn join_by_votes(&mut self) -> (usize, usize) {
-        let numbers = self.labels();
-        let mut votes: BTreeMap<[usize; 2], i64> = BTreeMap::new();
-        let mut vote = |a: Side, b: Side, weight: i64| {
-            if let (Some(&x), Some(&y)) = (numbers.get(&a.home), numbers.get(&b.home))
-                && x != y
-            {
-                let sign = if a.turned == b.turned { 1 } else { -1 };
-                *votes.entry([x.min(y), x.max(y)]).or_default() += sign * weight;
-            }
-        };
-        for &t in &self.known.candidates {
-            let mut asked = self.asked(t);
-            asked.truncate(3);
-            for (n, &(other, edge, a)) in asked.iter().enumerate() {
-                for &(another, far, b) in &asked[..n] {
-                    let flat = |other, edge| cosine(self.known.points, t, other, edge);
-                    let least = flat(other, edge).min(flat(another, far));
-                    let [a, b] = [a, b].map(|side| self.sets.seen_from_label(side));
-                    vote(a, b, weight(least));
-                }
-            }
-        }
-        self.crossing_votes(&mut vote);
-        let sets_of: BTreeMap<usize, usize> = numbers.iter().map(|(&set, &n)| (n, set)).collect();
-        let mut pairs: Vec<_> = votes.into_iter().filter(|(_, sum)| *sum != 0).collect();
-        pairs.sort_by_key(|&(pair, sum)| (Reverse(sum.abs()), pair));
-        let mut outvoted = 0;
-        for ([x, y], sum) in &pairs {
-            let [a, b] = [(x, false), (y, *sum < 0)].map(|(label, turned)| Side {
-                home: sets_of[label],
-                turned,
-            });
-            if self.sets.conflict(&[a, b]) {
-                outvoted += 1;
-            } else {
-                self.sets.join(a, b);
-            }
-        }
-        (pairs.len() - outvoted, outvoted)
-    }
-
-    /// The votes of the crossing triangles, ascending.
-    fn crossing_votes(&self, vote: &mut impl FnMut(Side, Side, i64)) {
-        let mut runs: BTreeMap<Triangle, Side> = BTreeMap::new();
-        for &t in self.known.kept.iter().filter(|t| !self.interior(t)) {
-            let mut asked = Vec::new();
-            for (other, edge, side) in self.asked(t) {
-                let weight = weight(cosine(self.known.points, t, other, edge));
-                asked.push((self.sets.seen_from_label(side), weight));
             }
             for edge in edges(t) {
-                for (&other, &side) in &runs {
-                    if edge.iter().all(|v| other.contains(v)) {
-                        let turned = side.turned == alike(t, other, edge);
-                        asked.push((Side { turned, ..side }, 1));
+                let at = |other: &&Triangle| edge.iter().all(|v| other.contains(v));
+                for &other in before.iter().filter(at) {
+                    ask(other, edge, cosine(rounded, t, other, edge));
+                }
+            }
+            let own = match asked.first() {
+                Some((side, _)) => *side,
+                None => {
+                    self.met.own_nodes += 1;
+                    Side {
+                        home: self.graph.push(),
+                        turned: false,
                     }
                 }
+            };
+            for (side, weight) in asked {
+                self.graph.add(own, side, 8 * weight);
             }
-            let greatest = asked.iter().map(|ask| ask.1).max();
-            let first = asked.iter().find(|ask| Some(ask.1) == greatest);
-            if let Some(&(side, _)) = first {
-                runs.insert(t, side);
-                for &(other, weight) in &asked {
-                    vote(side, other, 8 * weight);
-                }
-            }
+            self.nodes.insert(t, own);
+            before.insert(t);
         }
     }
 
-    fn interior(&self, t: &Triangle) -> bool {
-        is_interior(*t, self.known.block)
-    }
-
-    /// Step 3.
+    /// Step 7: the crossing triangles.
     fn add_crossing(&mut self) {
-        for &t in self.known.kept {
-            if self.interior(&t) {
-                continue;
+        for t in self.crossing() {
+            let mut asked = Vec::new();
+            for edge in edges(t) {
+                let others = self.surface.at_edge(edge).into_iter();
+                asked.extend(others.map(|other| self.asks(other, t, edge)));
             }
-            let asked: Vec<Side> = self.asked(t).iter().map(|ask| ask.2).collect();
             if self.sets.conflict(&asked) {
-                self.one_sided.insert(t);
+                self.removed.insert(t);
+                self.met.cut_crossing += 1;
                 continue;
             }
             for side in asked {
@@ -250,8 +265,25 @@ impl Weigher<'_> {
         }
     }
 
+    /// Step 7: the edges between labels.
+    fn cut_seams(&mut self) {
+        for (t, other, edge) in std::mem::take(&mut self.seams) {
+            let gone = |t| self.removed.contains(t);
+            if gone(&t) || gone(&other) {
+                continue;
+            }
+            let asked = [self.own(t), self.asks(other, t, edge)];
+            let [a, b] = asked.map(|side| self.sets.label(side.home));
+            assert_eq!(a, b, "an edge between labels that were not contracted");
+            if self.sets.conflict(&asked) {
+                self.remove(other);
+                self.met.cut_between += 1;
+            }
+        }
+    }
+
     /// Homes are the sets; one without a crossing triangle is cut up into its parts in each block.
-    fn finish(self, voted: usize, outvoted: usize) -> Weighed {
+    fn finish(self) -> Weighed {
         let seen: BTreeMap<Triangle, Side> = self
             .surface
             .triangles()
@@ -265,7 +297,7 @@ impl Weigher<'_> {
         let mut sides = BTreeMap::new();
         for (t, side) in seen {
             let crosses = crossed.contains(&side.home);
-            let part = (!crosses).then(|| t[0] / self.known.block);
+            let part = (!crosses).then(|| t[0] / self.known.settings.block);
             let home = *homes.entry((side.home, part)).or_insert_with(|| {
                 global.push(crosses);
                 global.len() - 1
@@ -274,11 +306,10 @@ impl Weigher<'_> {
         }
         Weighed {
             surface: self.surface,
-            one_sided: self.one_sided,
+            one_sided: self.removed,
             sides,
             global,
-            voted,
-            outvoted,
+            met: self.met,
         }
     }
 }

@@ -3,6 +3,7 @@
 use super::big::{Big, Big3, cross, dot, plus, vector};
 use super::insert::normal;
 use super::repair::{ClockwiseAngle, pinched, run};
+use super::spacing::Density;
 use super::surface::{Component, Edge, Surface, Triangle};
 use super::{Settings, mend};
 use outcrop::geom::{Point, distance2, sub};
@@ -26,6 +27,8 @@ pub struct Filling {
     pub openings: usize,
     /// Robust: likewise, but seen only when it is filled.
     pub spanned: usize,
+    /// Robust: likewise, but a triangle would be too long.
+    pub wide: usize,
     /// Robust: loops of three edges, closed before holes are counted.
     pub gaps: usize,
 }
@@ -37,6 +40,7 @@ pub struct Holes<'a> {
     pub points: &'a [Point],
     /// Positions in the file.
     pub file: &'a [Point],
+    pub density: Option<&'a Density>,
     pub surface: &'a Surface,
     /// Triangles as they run, by each of their directed edges.
     half_edges: BTreeMap<HalfEdge, Triangle>,
@@ -50,6 +54,7 @@ pub struct Holes<'a> {
 pub fn fill(
     points: &[Point],
     file: &[Point],
+    density: Option<&Density>,
     surface: &Surface,
     components: &[Component],
     settings: &Settings,
@@ -57,6 +62,7 @@ pub fn fill(
     let mut holes = Holes {
         points,
         file,
+        density,
         surface,
         half_edges: BTreeMap::new(),
         turned: components

@@ -263,7 +263,10 @@ fn of_points_in_one_place_only_the_first_is_seen() {
             let mut points = cells::in_id_order(&points);
             let count = points.len();
             points.extend_from_within(..count / 2);
-            for triple in cells::triples(&points, &varied(seed)[1], 1000.0).keys() {
+            for triple in cells::triples(&points, &varied(seed)[1], 1000.0, None)
+                .0
+                .keys()
+            {
                 assert!((triple[2] as usize) < count, "{name} {seed} {triple:?}");
             }
         }
@@ -279,7 +282,7 @@ fn triples_with_any_counts_make_manifolds() {
         for (name, points) in clouds::one_of_each(seed) {
             let [settings, ..] = varied(seed);
             let points = cells::in_id_order(&points);
-            let mut triples = cells::triples(&points, &settings, 0.0);
+            let (mut triples, _) = cells::triples(&points, &settings, 0.0, None);
             triples
                 .values_mut()
                 .for_each(|count| *count = random.integer(1, 4) as u32);
@@ -337,6 +340,8 @@ fn varied(seed: u64) -> [Settings; 4] {
             neighbors: 10,
             relax: 1 + seed as u32 % 3,
             block: [30, 12, 80][seed as usize % 3],
+            patch: [8, 256][seed as usize % 2],
+            cluster: [3, 20, 1024][seed as usize % 3],
             min_component: 1 + seed as usize % 2 * 9,
             ..Settings::robust()
         },

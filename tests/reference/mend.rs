@@ -41,12 +41,18 @@ pub fn mend(
     };
     let is_opening = |rest: &[u32]| is_wide(vector_area(holes, rest), rest.len());
     let is_spanned = |rest: &[u32], patch: &[[u32; 3]]| is_wide(area(holes, patch), rest.len());
+    let is_too_wide = |patch: &[[u32; 3]]| {
+        let wide = |t: &[u32; 3]| holes.density.is_some_and(|d| d.is_wide(*t, holes.file));
+        patch.iter().any(wide)
+    };
     if !around && hole.len() <= longest {
         let patch = filled(holes, hole, &behind, &BTreeSet::new());
         if is_opening(hole) {
             filling.openings += 1;
         } else if patch.as_ref().is_some_and(|patch| is_spanned(hole, patch)) {
             filling.spanned += 1;
+        } else if patch.as_ref().is_some_and(|patch| is_too_wide(patch)) {
+            filling.wide += 1;
         } else if let Some(patch) = patch {
             if let [gap] = patch[..] {
                 filling.gaps += 1;
@@ -74,6 +80,7 @@ pub fn mend(
         let taken = taken.map(|[a, b]| [a.min(b), a.max(b)]).collect();
         if let Some(patch) = filled(holes, &left, &behind, &taken)
             && !is_spanned(&left, &patch)
+            && !is_too_wide(&patch)
         {
             triangles.extend(patch);
             whole = true;

@@ -12,6 +12,7 @@ pub mod big;
 pub mod cells;
 pub mod check;
 pub mod clouds;
+pub mod contract;
 pub mod edges;
 pub mod evidence;
 pub mod flips;
@@ -20,14 +21,19 @@ pub mod homes;
 pub mod insert;
 pub mod mend;
 pub mod output;
+pub mod patches;
 pub mod relax;
 pub mod repair;
+pub mod spacing;
 pub mod surface;
+pub mod weighing;
 
 use holes::Filling;
 use outcrop::geom::Point;
+use spacing::Density;
 use std::collections::{BTreeMap, BTreeSet};
 use surface::{Component, Surface, Triangle};
+use weighing::Weighing;
 
 /// The radius of the disks.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -60,10 +66,19 @@ pub struct Settings {
     pub repair: bool,
     /// `B`.
     pub block: u32,
+    /// `P`.
+    pub patch: u32,
+    /// `C`.
+    pub cluster: usize,
     /// Most rounds of relaxing.
     pub relax: u32,
     /// Orientation by evidence, and mending.
     pub robust: bool,
+    /// Points off the surface stay.
+    pub keep_all: bool,
+    /// Longest side of a triangle, and of one that fills a hole, in local spacings.
+    pub max_edge: f64,
+    pub max_fill: f64,
 }
 
 impl Default for Settings {
@@ -78,8 +93,13 @@ impl Default for Settings {
             min_component: 10,
             repair: true,
             block: 65_536,
+            patch: 256,
+            cluster: 1024,
             relax: 0,
             robust: false,
+            keep_all: true,
+            max_edge: f64::INFINITY,
+            max_fill: f64::INFINITY,
         }
     }
 }
@@ -92,6 +112,9 @@ impl Settings {
             relax: 3,
             edges: true,
             robust: true,
+            keep_all: false,
+            max_edge: 11.0,
+            max_fill: 25.0,
             ..Self::default()
         }
     }
@@ -128,16 +151,17 @@ pub struct Counts {
     pub curved: usize,
     /// Rough patches that stayed because no noise shows in their region.
     pub clean: usize,
-    /// T3 and candidates on a line in the file.
+    /// Points off the surface.
+    pub off_surface: usize,
+    /// T3 and candidates on a line in the file, or too long.
     pub flat: usize,
     pub flat_candidates: usize,
     /// T3 flagged in 1.4.
     pub flagged: usize,
     /// T3 that would close a Möbius band.
     pub one_sided: usize,
-    /// Pairs of labels that votes joined, and that they could not join any more.
-    pub voted: usize,
-    pub outvoted: usize,
+    /// Robust: how they were oriented.
+    pub met: Weighing,
     /// T3 that are left.
     pub base: usize,
     pub candidates: usize,
@@ -181,14 +205,18 @@ pub fn reconstruct(points: &[Point], settings: &Settings) -> Mesh {
         };
         points = smooth(&points, settings.neighbors);
     }
+    let density = settings.robust.then(|| spacing::measure(&points, settings));
+    let density = density.as_ref();
     let relaxed = relax::relax(
         &points,
         settings.neighbors,
         settings.relax,
         settings.smooth > 0,
+        density,
     );
-    let triples = cells::triples(&relaxed.shape, settings, diagonal);
-    let mut mesh = connect(&relaxed.shape, points, &triples, settings);
+    let (triples, off_surface) = cells::triples(&relaxed.shape, settings, diagonal, density);
+    let mut mesh = connect(&relaxed.shape, points, &triples, density, settings);
+    mesh.counts.off_surface = off_surface;
     (mesh.counts.rounds, mesh.counts.moved) = (relaxed.rounds, relaxed.moved);
     (mesh.counts.curved, mesh.counts.clean) = (relaxed.curved, relaxed.clean);
     mesh
@@ -202,7 +230,7 @@ pub fn from_triples(
     triples: &BTreeMap<Triangle, u32>,
     settings: &Settings,
 ) -> Mesh {
-    connect(&points.clone(), points, triples, settings)
+    connect(&points.clone(), points, triples, None, settings)
 }
 
 /// The same with positions to connect by, the shape, and positions in the file.
@@ -210,6 +238,7 @@ pub fn connect(
     shape: &[Point],
     file: Vec<Point>,
     triples: &BTreeMap<Triangle, u32>,
+    density: Option<&Density>,
     settings: &Settings,
 ) -> Mesh {
     let mut counts = Counts {
@@ -222,7 +251,9 @@ pub fn connect(
     let on_a_line: BTreeSet<Triangle> = triples
         .keys()
         .copied()
-        .filter(|&t| insert::normal(&file, t) == [0; 3])
+        .filter(|&t| {
+            insert::normal(&file, t) == [0; 3] || density.is_some_and(|d| d.is_long(t, &file))
+        })
         .collect();
     let usable = triples.iter().filter(|(t, _)| !on_a_line.contains(*t));
     let (t3, open): (BTreeMap<_, _>, BTreeMap<_, _>) = usable.partition(|(_, count)| **count == 3);
@@ -231,13 +262,13 @@ pub fn connect(
     counts.flat_candidates = on_a_line.len() - counts.flat;
     let base = if settings.robust {
         let open = open.into_keys().copied().collect();
-        base::weighed(shape, &t3, &open, settings.block)
+        base::weighed(shape, &t3, &open, settings)
     } else {
         base::base(&t3, settings.block)
     };
     counts.flagged = base.flagged.len();
     counts.one_sided = base.one_sided.len();
-    (counts.voted, counts.outvoted) = (base.voted, base.outvoted);
+    counts.met = base.met;
     counts.base = base.surface.triangles().len();
 
     let inserted = insert::insert(shape, triples, &on_a_line, base, settings);
@@ -248,7 +279,7 @@ pub fn connect(
     counts.rejected = inserted.rejected;
 
     let mut surface = inserted.surface;
-    let turned = repair_and_orient(shape, &file, &mut surface, settings, &mut counts);
+    let turned = repair_and_orient(shape, &file, density, &mut surface, settings, &mut counts);
     let (vertices, triangles) = output::in_file_order(&surface, &turned, true);
     counts.copies = vertices.len() - surface.vertices().len();
     Mesh {
@@ -264,6 +295,7 @@ pub fn connect(
 fn repair_and_orient(
     shape: &[Point],
     file: &[Point],
+    density: Option<&Density>,
     surface: &mut Surface,
     settings: &Settings,
     counts: &mut Counts,
@@ -283,7 +315,7 @@ fn repair_and_orient(
         .map(|(&t, &turned)| (t, turned))
         .collect();
     if settings.repair {
-        let (filled, filling) = holes::fill(shape, file, surface, &components, settings);
+        let (filled, filling) = holes::fill(shape, file, density, surface, &components, settings);
         counts.holes = filling;
         for corners in filled {
             let mut t = corners;

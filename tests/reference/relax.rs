@@ -2,6 +2,7 @@
 
 use super::cells::{by_distance, plane_of};
 use super::edges::{is_clean, is_curved};
+use super::spacing::Density;
 use outcrop::geom::lattice::COORDINATE_LIMIT;
 use outcrop::geom::{Point, distance2};
 
@@ -27,21 +28,26 @@ const RUN: usize = 16;
 /// Patches in a region.
 const REGION: usize = 256;
 
-/// Where a point goes, and whether it is rough. A point without a plane stays and is not.
-fn foot(points: &[Point], i: usize, k: usize) -> (Point, bool) {
+/// Where a point goes, and whether it is rough. A point without a plane, or off the surface, stays and is
+/// not.
+fn foot(points: &[Point], i: usize, k: usize, density: Option<&Density>) -> (Point, bool) {
     let others = by_distance(points, i);
     let used = &others[..k.min(others.len())];
     let (moments, plane) = plane_of(points, i, used);
     let (Some(normal), Some(&last)) = (plane.normal, used.last()) else {
         return (points[i], false);
     };
+    let last2 = distance2(points[i], points[last]);
+    if density.is_some_and(|d| d.is_off_surface(i, last2)) {
+        return (points[i], false);
+    }
     let offset = moments.project(normal);
     let to = std::array::from_fn(|axis| {
         let moved = i64::from(points[i][axis]) + offset[axis].round() as i64;
         moved.clamp(0, COORDINATE_LIMIT - 1) as i32
     });
     let square = offset[0] * offset[0] + offset[1] * offset[1] + offset[2] * offset[2];
-    let spacing2 = std::f64::consts::PI * distance2(points[i], points[last]) as f64 / k as f64;
+    let spacing2 = std::f64::consts::PI * last2 as f64 / k as f64;
     (to, square > 0.2 * 0.2 * spacing2)
 }
 
@@ -57,7 +63,14 @@ fn noisy(points: &[Point], telling: &[usize], k: usize) -> bool {
 }
 
 /// At most `rounds` rounds; of points that were smoothed none is clean.
-pub fn relax(points: &[Point], k: usize, rounds: u32, smoothed: bool) -> Relaxed {
+pub fn relax(
+    points: &[Point],
+    k: usize,
+    rounds: u32,
+    smoothed: bool,
+    density: Option<&Density>,
+) -> Relaxed {
+    let foot = |points: &[Point], id: usize, k: usize| foot(points, id, k, density);
     let mut relaxed = Relaxed {
         shape: points.to_vec(),
         rounds: 0,

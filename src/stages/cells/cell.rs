@@ -7,6 +7,7 @@ use crate::geom::clip::Cell;
 use crate::geom::plane::{Moments, Plane};
 use crate::kernels::Level;
 use crate::stages::order::PointStore;
+use crate::stages::spacing::Density;
 use crate::stages::tiles::near::{Query, Sums};
 use crate::stages::tiles::neighbors::Neighbors;
 use crate::stages::tiles::walk::{PageCache, Walk};
@@ -37,6 +38,8 @@ pub enum Outcome {
     Uncertain,
     /// All its neighbours are on one line: no plane, no cell.
     NoPlane,
+    /// It lies far off the surface that its neighbours are on: no cell.
+    OffSurface,
 }
 
 /// Where the neighbours of a point come from.
@@ -101,6 +104,8 @@ pub struct Fit {
     pub moments: Moments,
     /// Squared distance of the last neighbour used.
     pub last2: u64,
+    /// Squared distance of the last of the neighbours asked for, before there were more.
+    pub near2: u64,
 }
 
 impl Fit {
@@ -111,6 +116,7 @@ impl Fit {
             plane: sums.moments.plane(),
             moments: sums.moments,
             last2: sums.last2,
+            near2: sums.last2,
         }
     }
 }
@@ -137,7 +143,10 @@ fn fit_from(source: &mut impl Source, neighbors: usize, widen: Widen) -> Result<
             return Ok(None);
         };
         used = count;
-        fit = Fit::of(sums);
+        fit = Fit {
+            near2: fit.near2,
+            ..Fit::of(sums)
+        };
     }
     Ok(Some(fit))
 }
@@ -155,35 +164,49 @@ pub enum Widen {
 
 /// Makes cells one after the other in the same memory.
 #[derive(Debug)]
-pub struct CellMaker {
+pub struct CellMaker<'a> {
     neighbors: usize,
     radius: DiskRadius,
     widen: Widen,
+    /// Points off the surface get no cell.
+    density: Option<Density<'a>>,
     cell: Cell,
 }
 
-impl CellMaker {
+impl<'a> CellMaker<'a> {
     /// For planes of `neighbors` neighbours and disks of `radius`.
     #[must_use]
-    pub fn new(neighbors: usize, radius: DiskRadius, widen: Widen) -> Self {
+    pub fn new(
+        neighbors: usize,
+        radius: DiskRadius,
+        widen: Widen,
+        density: Option<Density<'a>>,
+    ) -> Self {
         Self {
             neighbors,
             radius,
             widen,
+            density,
             cell: Cell::new(0, [0, 0, 1 << 24], 1.0),
         }
     }
 
-    fn start(&mut self, id: u32, fit: &Fit) -> bool {
+    /// Begins the cell of a point; why it gets none.
+    fn start(&mut self, id: u32, fit: &Fit) -> Option<Outcome> {
         let Some(normal) = fit.plane.normal else {
-            return false;
+            return Some(Outcome::NoPlane);
         };
+        if let Some(density) = self.density
+            && density.is_off_surface(id, fit.near2)
+        {
+            return Some(Outcome::OffSurface);
+        }
         let radius = match self.radius {
             DiskRadius::Auto => AUTO_REACH * (fit.last2 as f64).sqrt(),
             DiskRadius::Steps(steps) => steps,
         };
         self.cell.start(id, normal, radius);
-        true
+        None
     }
 
     /// The cell of a point from what its tile knows; `each` gets the ids at its corners.
@@ -198,8 +221,8 @@ impl CellMaker {
         let Some(fit) = fit_from(query, self.neighbors, self.widen)? else {
             return Ok(Outcome::Uncertain);
         };
-        if !self.start(query.id(), &fit) {
-            return Ok(Outcome::NoPlane);
+        if let Some(outcome) = self.start(query.id(), &fit) {
+            return Ok(outcome);
         }
         loop {
             let next = self.cell.clip_nearest(query.near().columns(), 0);
@@ -237,8 +260,8 @@ impl CellMaker {
         let Some(fit) = fit_from(&mut source, self.neighbors, self.widen)? else {
             return Ok(Outcome::Uncertain);
         };
-        if !self.start(id, &fit) {
-            return Ok(Outcome::NoPlane);
+        if let Some(outcome) = self.start(id, &fit) {
+            return Ok(outcome);
         }
         let Walked { mut walk, mut near } = source;
         while !near.is_empty() && self.cell.clip_nearest(near.columns(), 0) == near.len() {

@@ -14,6 +14,7 @@ use crate::spill::layouts::{LABELLED, SENT_LABELLED};
 use crate::spill::{Exchange, Sections};
 use crate::stages::blocks::Blocks;
 use crate::stages::order::PointStore;
+use crate::stages::spacing::Density;
 use crate::stages::tiles::Tile;
 use crate::stages::tiles::near::Search;
 use crate::stages::tiles::walk::PageCache;
@@ -38,6 +39,8 @@ pub struct CellTriples {
     pub own: Sections<4>,
     /// Triples seen by the cells of later tiles.
     pub received: Sections<5>,
+    /// Points of each tile that lie off the surface of their neighbours, ascending.
+    pub off: Sections<1>,
 }
 
 /// Counts of this stage.
@@ -47,6 +50,8 @@ pub struct CellStats {
     pub second_looks: u64,
     /// Points without a plane: all their neighbours are on one line.
     pub no_plane: u64,
+    /// Points off the surface that their neighbours are on; they are not in the mesh.
+    pub off_surface: u64,
     /// Corners of cells: triples, each as often as it was seen.
     pub raw_triples: u64,
 }
@@ -116,11 +121,13 @@ impl TileRanges {
 persist!(CellTriples {
     tiles,
     own,
-    received
+    received,
+    off
 });
 persist!(CellStats {
     second_looks,
     no_plane,
+    off_surface,
     raw_triples
 });
 persist!(TileRanges {
@@ -141,9 +148,11 @@ pub fn cells(
     neighbors: usize,
     radius: DiskRadius,
     widen: Widen,
+    density: Option<Density<'_>>,
     workspace: &Workspace,
 ) -> Result<(CellTriples, CellStats)> {
     let own = Sections::with_layout(workspace, "cells.own", tiles.count(), LABELLED)?;
+    let off = Sections::create(workspace, "cells.off", tiles.count())?;
     let exchange = Exchange::between(
         workspace,
         "cells.sent",
@@ -158,8 +167,11 @@ pub fn cells(
     let work = |tile| {
         let ids = tiles.ids(tile);
         let mut seen = Seen::new(ids.clone());
-        let mut maker = CellMaker::new(neighbors, radius, widen);
-        let mut stats = one_tile(store, ids.clone(), neighbors, &mut maker, &mut seen)?;
+        let mut maker = CellMaker::new(neighbors, radius, widen, density);
+        let (mut stats, mut no_cell) =
+            one_tile(store, ids.clone(), neighbors, &mut maker, &mut seen)?;
+        no_cell.sort_unstable();
+        off.put(tile, &no_cell)?;
         stats.raw_triples = seen.len() as u64;
         let (kept, sent) = seen.fold(&tiles);
         let _held = hold((size_of_val(&*kept) + size_of_val(&*sent)) as u64);
@@ -172,6 +184,7 @@ pub fn cells(
     workspace.units("cells: tile", tiles.count(), bytes, work, |_, more| {
         stats.second_looks += more.second_looks;
         stats.no_plane += more.no_plane;
+        stats.off_surface += more.off_surface;
         stats.raw_triples += more.raw_triples;
         Ok(())
     })?;
@@ -181,6 +194,7 @@ pub fn cells(
             tiles,
             own,
             received,
+            off,
         },
         stats,
     ))
@@ -190,13 +204,14 @@ fn one_tile(
     store: &PointStore,
     ids: Range<usize>,
     neighbors: usize,
-    maker: &mut CellMaker,
+    maker: &mut CellMaker<'_>,
     seen: &mut Seen,
-) -> Result<CellStats> {
+) -> Result<(CellStats, Vec<[u32; 1]>)> {
     let tile = Tile::load(store, ids)?;
     let mut search = Search::default();
     let mut uncertain: Vec<(u32, Point)> = Vec::new();
     let mut no_plane = 0;
+    let mut off = Vec::new();
     let mut failed = None;
     tile.for_each_query(neighbors, &mut search, |id, point, query| {
         let outcome = match query {
@@ -206,6 +221,7 @@ fn one_tile(
         match outcome {
             Ok(Outcome::Complete) => {}
             Ok(Outcome::NoPlane) => no_plane += 1,
+            Ok(Outcome::OffSurface) => off.push([id]),
             Ok(Outcome::Uncertain) => uncertain.push((id, point)),
             Err(error) => failed = Some(error),
         }
@@ -219,13 +235,17 @@ fn one_tile(
     let mut cache = PageCache::default();
     for &(id, point) in &uncertain {
         let each = |a, b| seen.see(id, a, b);
-        if maker.from_store(store, &mut cache, id, point, each)? == Outcome::NoPlane {
-            no_plane += 1;
+        match maker.from_store(store, &mut cache, id, point, each)? {
+            Outcome::NoPlane => no_plane += 1,
+            Outcome::OffSurface => off.push([id]),
+            Outcome::Complete | Outcome::Uncertain => {}
         }
     }
-    Ok(CellStats {
+    let stats = CellStats {
         second_looks: uncertain.len() as u64,
         no_plane,
+        off_surface: off.len() as u64,
         raw_triples: 0,
-    })
+    };
+    Ok((stats, off))
 }

@@ -56,7 +56,7 @@ persist!(Found {
 pub fn fill(
     places: Places<'_>,
     surface: &Surface,
-    mending: Option<Mending>,
+    mending: Option<Mending<'_>>,
     blocks: Blocks,
     stats: &mut RepairStats,
     workspace: &Workspace,
@@ -131,7 +131,7 @@ pub fn fill(
 /// Fills the holes that lie in a block by themselves, and keeps the parts of the others.
 fn fill_inside(
     rim: &BlockRim,
-    mending: Mending,
+    mending: Mending<'_>,
     kept: &Sections<1>,
     settled: &mut Settled,
 ) -> Result<Vec<Fragment>> {
@@ -243,7 +243,7 @@ const RINGS: usize = 256;
 /// Parts of loops, and how these are filled.
 struct Fragments<'a> {
     places: Places<'a>,
-    mending: Option<Mending>,
+    mending: Option<Mending<'a>>,
     fragments: &'a [Fragment],
     kept: &'a Sections<1>,
 }
@@ -271,7 +271,7 @@ fn fill_across(
     ring: &[usize],
     fragments: &[Fragment],
     kept: &Sections<1>,
-    mending: Mending,
+    mending: Mending<'_>,
 ) -> Result<Filling> {
     let mut parts: Vec<(u32, u32, bool)> = Vec::new();
     let mut edges: FxHashMap<u32, Vec<u32>> = FxHashMap::default();

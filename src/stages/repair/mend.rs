@@ -5,11 +5,14 @@ use super::fill::{Corner, Filling, begin_at_smallest, fill, is_outline, length};
 use super::zip::zip;
 use crate::geom::{Point, distance2};
 use crate::stages::located::normal;
+use crate::stages::spacing::Density;
 use rustc_hash::{FxHashMap, FxHashSet};
 
 /// How boundary loops are treated.
 #[derive(Debug, Clone, Copy)]
-pub struct Mending {
+pub struct Mending<'a> {
+    /// How dense the surface is, if holes that are too wide for it stay open.
+    pub density: Option<Density<'a>>,
     /// Most edges of a hole that is filled; with less than three none is.
     pub longest: usize,
     /// Zip what is not filled, and leave openings open.
@@ -30,7 +33,7 @@ const GAP: usize = 3;
 /// A loop of so few edges is a hole: pieces with so short an outline were removed.
 const SMALL: usize = 6;
 
-impl Mending {
+impl Mending<'_> {
     /// The longest loop that is looked at.
     pub fn longest_loop(&self) -> usize {
         if self.only_gaps() {
@@ -40,6 +43,15 @@ impl Mending {
         } else {
             self.longest
         }
+    }
+
+    /// True if a filling has a side that is too long for the surface at both of its ends.
+    fn too_wide(&self, corners: &[Corner], filling: &[[u32; 3]]) -> bool {
+        self.density.is_some_and(|density| {
+            let at: FxHashMap<u32, Point> = corners.iter().map(|c| (c.id, c.file)).collect();
+            let wide = |t: &[u32; 3]| density.is_wide(*t, t.map(|v| at[&v]));
+            filling.iter().any(wide)
+        })
     }
 
     fn only_gaps(&self) -> bool {
@@ -61,6 +73,7 @@ impl Mending {
         if fillable(&corners)
             && let Filling::Filled(new) = fill(corners.clone(), usize::MAX, &edge)
             && !found.is_spanned(&corners, &new)
+            && !self.too_wide(&corners, &new)
         {
             return match new[..] {
                 [gap] => Filling::Gap(gap),
@@ -81,6 +94,7 @@ impl Mending {
             let taken = |a: u32, b: u32| edge(a, b) || new.contains(&(a.min(b), a.max(b)));
             if let Filling::Filled(more) = fill(left.clone(), SMALL, taken)
                 && !found.is_spanned(&left, &more)
+                && !self.too_wide(&left, &more)
             {
                 triangles.extend(more);
                 return Filling::Filled(triangles);

@@ -114,8 +114,9 @@ impl RepairOptions {
     }
 
     /// How boundary loops are treated; `None` if they all stay as they are.
-    fn filling(&self) -> Option<Mending> {
+    fn filling<'a>(&self, places: Places<'a>) -> Option<Mending<'a>> {
         let filling = Mending {
+            density: places.density,
             longest: self.max_hole_edges,
             zip: self.zip,
         };
@@ -177,7 +178,7 @@ pub fn repair(
     let (surface, mut stats) = workspace.once("surface", || {
         surface::build(places, stitched, blocks, options, workspace)
     })?;
-    let limit = options.filling();
+    let limit = options.filling(places);
     let (filled, outline) = holes::fill(places, &surface, limit, blocks, &mut stats, workspace)?;
     let repaired = Repaired {
         surface,

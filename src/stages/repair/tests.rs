@@ -112,7 +112,8 @@ impl Sheet {
     }
 }
 
-const MENDING: Mending = Mending {
+const MENDING: Mending<'static> = Mending {
+    density: None,
     longest: 500,
     zip: true,
 };

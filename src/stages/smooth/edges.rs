@@ -4,8 +4,8 @@
 //! Sums run over the point and then its neighbours, nearest first, with `+ - * / sqrt` only: the same
 //! bits on every machine, whatever found the neighbours.
 
-use super::seen::spacing2;
 use crate::geom::plane::least_direction;
+use crate::stages::spacing::spacing2;
 use crate::stages::tiles::neighbors::Neighbors;
 
 /// Neighbours in terms of those of a plane: a curved surface is surer of itself through more.

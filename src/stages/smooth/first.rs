@@ -5,15 +5,17 @@ use super::Relaxing;
 use super::edges::Around;
 use super::fits::Planes;
 use super::pass::RUN;
-use super::seen::{Seen, target};
+use super::seen::Seen;
 use crate::error::Result;
 use crate::geom::Point;
 use crate::stages::order::PointStore;
+use crate::stages::spacing::{self, is_far};
 use crate::workspace::memory::{bytes_of, hold};
+use crate::workspace::persist::persist;
 use std::ops::Range;
 
-/// Runs in a patch: with ids along a curve, a small piece of surface.
-const PATCH: usize = 16;
+/// Runs in a patch.
+const PATCH: usize = spacing::PATCH / RUN;
 
 /// Every so many runs one is looked at first.
 const SAMPLE: usize = 8;
@@ -23,7 +25,7 @@ const SHARE: usize = 16;
 /// So many rough points of a patch tell whether it is curved.
 const TELLING: usize = 3;
 /// Patches in a region.
-const REGION: usize = 256;
+const REGION: usize = spacing::REGION;
 /// Nothing moves in a region of which fewer than one patch in so many is noisy,
 const NOISE: usize = 8;
 /// or where fewer than so many in so many of its rough patches are,
@@ -38,23 +40,51 @@ const FINE: usize = 4;
 pub(super) const SPAN: usize = REGION * PATCH * RUN;
 
 /// Bytes for each point of a region: what was seen of the samples, which of them tell, and some.
-pub(super) const BYTES: u64 = (size_of::<Target>() / SAMPLE + 2) as u64;
+pub(super) const BYTES: u64 = ((size_of::<Target>() + size_of::<Sample>()) / SAMPLE + 4) as u64;
 
 /// Where a sampled point would go, and whether that is far.
 type Target = (u32, Point, bool);
 
-/// Moves `points`, which are those of the regions `ids`: which runs move, and what was seen of them.
+/// A look at the samples of some regions.
+struct Looked {
+    /// Where each would go.
+    targets: Vec<Target>,
+    /// How far the neighbours of points usually reach, squared, by patch.
+    usual2: Vec<u64>,
+}
+
+/// What became of the points of some regions.
+pub(super) struct Done {
+    /// Which runs move.
+    pub active: Vec<bool>,
+    /// What was seen of them.
+    pub seen: Seen,
+    /// See [`Spacings`](crate::stages::spacing::Spacings).
+    pub usual2: Vec<u64>,
+}
+
+persist!(Done {
+    active,
+    seen,
+    usual2
+});
+
+/// Moves `points`, which are those of the regions `ids`.
 pub(super) fn look_and_move(
     store: &PointStore,
     ids: Range<usize>,
     relaxing: Relaxing,
     points: &mut [Point],
-) -> Result<(Vec<bool>, Seen)> {
+) -> Result<Done> {
     let neighbors = relaxing.neighbors;
     let planes = Planes::load(store, ids.clone(), neighbors)?;
-    let looked = look(&planes, neighbors, ids.len())?;
-    let _held = hold(bytes_of(&looked));
-    let active = choose(&planes, relaxing, &looked, &ids)?;
+    let Looked { targets, usual2 } = look(&planes, relaxing, &ids)?;
+    let _held = hold(bytes_of(&targets) + bytes_of(&usual2));
+    let active = if relaxing.rounds > 0 {
+        choose(&planes, relaxing, &targets, &ids)?
+    } else {
+        vec![false; ids.len().div_ceil(RUN)]
+    };
     let mut seen = Seen::of(&ids);
     let moves = |id: usize| active[(id - ids.start) / RUN];
     let mut put = |id: usize, to, rough| {
@@ -62,31 +92,96 @@ pub(super) fn look_and_move(
         points[id - ids.start] = to;
         seen.moved += 1;
     };
-    for (id, to, rough) in looked {
+    for (id, to, rough) in targets {
         if moves(id as usize) {
             put(id as usize, to, rough);
         }
     }
     let others = |id: usize| moves(id) && !is_sampled(id);
     planes.each(others, |id, point, fit| {
-        let (to, rough) = target(point, &fit, neighbors);
+        let usual2 = usual2[patch(id as u32, &ids)];
+        let (to, rough) = relaxing.target(point, &fit, usual2);
         put(id, to, rough);
     })?;
-    Ok((active, seen))
+    Ok(Done {
+        active,
+        seen,
+        usual2,
+    })
 }
 
 fn is_sampled(id: usize) -> bool {
     (id / RUN).is_multiple_of(SAMPLE)
 }
 
-/// Where the sampled ones of so many points would go.
-fn look(planes: &Planes<'_>, neighbors: usize, points: usize) -> Result<Vec<Target>> {
-    let mut looked = Vec::with_capacity(points / SAMPLE + RUN);
+/// Looks at the samples.
+fn look(planes: &Planes<'_>, relaxing: Relaxing, ids: &Range<usize>) -> Result<Looked> {
+    let mut samples: Vec<Sample> = Vec::with_capacity(ids.len() / SAMPLE + RUN);
     planes.each(is_sampled, |id, point, fit| {
-        let (to, rough) = target(point, &fit, neighbors);
-        looked.push((id as u32, to, rough));
+        // As if it were on the surface: how far that reaches is not known yet.
+        let (to, rough) = relaxing.target(point, &fit, fit.last2);
+        let fills = |normal| fit.moments.fill_space(normal);
+        samples.push(Sample {
+            point,
+            target: (id as u32, to, rough),
+            last2: fit.last2,
+            fills: fit.plane.normal.is_some_and(fills),
+        });
     })?;
-    Ok(looked)
+    let _held = hold(bytes_of(&samples));
+    let usual2 = usual_reach(&samples, ids);
+    let target = |sample: &Sample| {
+        let id = sample.target.0;
+        if relaxing.off_surface && is_far(sample.last2, usual2[patch(id, ids)]) {
+            (id, sample.point, false)
+        } else {
+            sample.target
+        }
+    };
+    Ok(Looked {
+        targets: samples.iter().map(target).collect(),
+        usual2,
+    })
+}
+
+/// A point that is looked at first.
+struct Sample {
+    point: Point,
+    target: Target,
+    /// Squared distance of the last of its neighbours.
+    last2: u64,
+    /// It and its neighbours fill space.
+    fills: bool,
+}
+
+/// For each patch how far the neighbours of its points usually reach, squared: the lower quartile of those
+/// looked at. Where these fill space and reach far for their region they are strewn in the air, and what is
+/// usual is what is so in the region.
+fn usual_reach(samples: &[Sample], ids: &Range<usize>) -> Vec<u64> {
+    let patches = ids.len().div_ceil(PATCH * RUN);
+    let mut reach: Vec<Vec<u64>> = vec![Vec::new(); patches];
+    let mut filling = vec![0; patches];
+    for sample in samples {
+        let patch = patch(sample.target.0, ids);
+        reach[patch].push(sample.last2);
+        filling[patch] += usize::from(sample.fills);
+    }
+    let mut usual2: Vec<u64> = reach.iter().cloned().map(lower_quartile).collect();
+    let counts = filling.chunks(REGION).zip(reach.chunks(REGION));
+    for (usual2, (filling, reach)) in usual2.chunks_mut(REGION).zip(counts) {
+        let region2 = lower_quartile(usual2.to_vec());
+        for (usual2, (filling, reach)) in usual2.iter_mut().zip(filling.iter().zip(reach)) {
+            if 2 * filling >= reach.len() && is_far(*usual2, region2) {
+                *usual2 = region2;
+            }
+        }
+    }
+    usual2
+}
+
+fn lower_quartile(mut all: Vec<u64>) -> u64 {
+    all.sort_unstable();
+    all.get(all.len() / 4).copied().unwrap_or(0)
 }
 
 /// The runs of rough patches move if it is noise that makes their region rough.

@@ -185,6 +185,7 @@ impl Several {
                     plane,
                     moments,
                     last2,
+                    near2: last2,
                 })),
             );
         }

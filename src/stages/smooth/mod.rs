@@ -38,6 +38,8 @@ pub struct Relaxing {
     pub rounds: u32,
     /// The points were smoothed: noisy ones, even where it does not show any more.
     pub smoothed: bool,
+    /// Points off the surface stay where they are.
+    pub off_surface: bool,
 }
 
 /// One round of smoothing: the same points, each on the plane of its `neighbors` nearest, or on

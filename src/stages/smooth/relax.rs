@@ -6,14 +6,15 @@
 //! points move only there: patches of points that are smooth already cost a look at some of them.
 
 use super::Relaxing;
-use super::first;
+use super::first::{self, Done};
 use super::fits::each_fit;
 use super::pass::{Pass, RUN};
-use super::seen::{Seen, target};
+use super::seen::Seen;
 use crate::error::Result;
 use crate::geom::Point;
 use crate::stages::cells::TileRanges;
 use crate::stages::order::PointStore;
+use crate::stages::spacing::{PATCH, Spacings};
 use crate::workspace::Workspace;
 use crate::workspace::memory::Reservation;
 use crate::workspace::persist::persist;
@@ -28,11 +29,22 @@ const RAGGED: u8 = 1;
 pub struct Relaxed {
     /// As the store's, each moved or not; `None` if none moved.
     pub store: Option<PointStore>,
+    /// How dense the surface is.
+    pub spacings: Spacings,
     /// What was done.
     pub stats: RelaxStats,
 }
 
 impl Relaxed {
+    /// Takes over where points are after a round, and how many moved.
+    fn take(&mut self, round: u32, (store, moved): (PointStore, u64)) {
+        if moved > 0 {
+            self.store = Some(store);
+            self.stats.rounds = round;
+            self.stats.moved += moved;
+        }
+    }
+
     /// True if of so many points at least half moved, each counted as often as it did: not a clean cloud
     /// that is noisy in places.
     #[must_use]
@@ -76,7 +88,11 @@ impl Runs {
     }
 }
 
-persist!(Relaxed { store, stats });
+persist!(Relaxed {
+    store,
+    spacings,
+    stats
+});
 persist!(RelaxStats { rounds, moved });
 
 /// Rounds of relaxing: points move to the planes of their nearest neighbours, in each round those of the
@@ -91,31 +107,30 @@ pub fn relax(
     relaxing: Relaxing,
     workspace: &Workspace,
 ) -> Result<Relaxed> {
-    let rounds = relaxing.rounds;
+    let held = workspace.reserve("patch spacings", Spacings::bytes(store.len()))?;
+    let mut runs = Runs::new(store.len(), workspace)?;
+    let mut usual2 = vec![0; store.len().div_ceil(PATCH)];
+    let first = first_round(store, tiles, relaxing, &mut runs, &mut usual2, workspace)?;
     let mut relaxed = Relaxed {
         store: None,
+        spacings: Spacings::new(usual2, held),
         stats: RelaxStats::default(),
     };
-    let mut runs = Runs::new(store.len(), workspace)?;
-    for round in 1..=rounds {
-        let current = relaxed.store.as_ref().unwrap_or(store);
-        let (next, moved) = if round == 1 {
-            first_round(current, tiles, relaxing, &mut runs, workspace)?
-        } else {
-            let neighbors = relaxing.neighbors;
-            one_round(current, tiles, neighbors, round, &mut runs, workspace)?
-        };
-        if moved > 0 {
-            relaxed.store = Some(next);
-            relaxed.stats.rounds = round;
-            relaxed.stats.moved += moved;
-        }
-        runs.settle();
+    relaxed.take(1, first);
+    runs.settle();
+    for round in 2..=relaxing.rounds {
         if !runs.active.contains(&true) {
-            let left = u64::from(rounds - round) * store.len() as u64;
+            let left = u64::from(relaxing.rounds + 1 - round) * store.len() as u64;
             workspace.observer.advance(left);
             break;
         }
+        let current = relaxed.store.as_ref().unwrap_or(store);
+        let spacings = &relaxed.spacings;
+        let next = one_round(
+            current, tiles, relaxing, round, &mut runs, spacings, workspace,
+        )?;
+        relaxed.take(round, next);
+        runs.settle();
     }
     Ok(relaxed)
 }
@@ -126,6 +141,7 @@ fn first_round(
     tiles: TileRanges,
     relaxing: Relaxing,
     runs: &mut Runs,
+    usual2: &mut [u64],
     workspace: &Workspace,
 ) -> Result<(PointStore, u64)> {
     let pass = Pass {
@@ -137,16 +153,13 @@ fn first_round(
         first::look_and_move(store, ids, relaxing, points)
     };
     let mut moved = 0;
-    let next = pass.over(
-        store,
-        workspace,
-        work,
-        |(active, seen): (Vec<bool>, Seen)| {
-            runs.active[seen.first..][..active.len()].copy_from_slice(&active);
-            moved += seen.moved;
-            seen.put(&mut runs.rough);
-        },
-    )?;
+    let next = pass.over(store, workspace, work, |done: Done| {
+        let patch = done.seen.first * RUN / PATCH;
+        usual2[patch..][..done.usual2.len()].copy_from_slice(&done.usual2);
+        runs.active[done.seen.first..][..done.active.len()].copy_from_slice(&done.active);
+        moved += done.seen.moved;
+        done.seen.put(&mut runs.rough);
+    })?;
     Ok((next, moved))
 }
 
@@ -154,9 +167,10 @@ fn first_round(
 fn one_round(
     store: &PointStore,
     tiles: TileRanges,
-    neighbors: usize,
+    relaxing: Relaxing,
     round: u32,
     runs: &mut Runs,
+    spacings: &Spacings,
     workspace: &Workspace,
 ) -> Result<(PointStore, u64)> {
     let file = format!("relaxed{round}");
@@ -165,9 +179,10 @@ fn one_round(
     let work = |ids: Range<usize>, points: &mut [Point]| {
         let wanted = |id: usize| active[id / RUN];
         let mut seen = Seen::of(&ids);
+        let neighbors = relaxing.neighbors;
         if ids.clone().step_by(RUN).any(wanted) {
             each_fit(store, ids.clone(), neighbors, wanted, |id, point, fit| {
-                let (to, rough) = target(point, &fit, neighbors);
+                let (to, rough) = relaxing.target(point, &fit, spacings.usual2(id as u32));
                 seen.note(id, rough);
                 points[id - ids.start] = to;
                 seen.moved += 1;

@@ -1,9 +1,10 @@
 //! What is seen of a point when its plane is known, and of many.
 
-use super::moved;
 use super::pass::RUN;
+use super::{Relaxing, moved};
 use crate::geom::Point;
 use crate::stages::cells::Fit;
+use crate::stages::spacing::{is_far, spacing2};
 use crate::workspace::persist::persist;
 use std::ops::Range;
 
@@ -45,19 +46,17 @@ impl Seen {
     }
 }
 
-/// Where a point goes, and whether that is far.
-pub(super) fn target(point: Point, fit: &Fit, neighbors: usize) -> (Point, bool) {
-    let Some(normal) = fit.plane.normal else {
-        return (point, false);
-    };
-    let offset = fit.moments.project(normal);
-    let length2 = offset[0] * offset[0] + offset[1] * offset[1] + offset[2] * offset[2];
-    let limit = ROUGH * ROUGH * spacing2(fit.last2, neighbors);
-    (moved(point, offset), length2 > limit)
-}
-
-/// The square of the local spacing: on a plane, so many neighbours lie in the disk up to the last one,
-/// which is so far away.
-pub(super) fn spacing2(last2: u64, neighbors: usize) -> f64 {
-    std::f64::consts::PI * last2 as f64 / neighbors as f64
+impl Relaxing {
+    /// Where a point goes, and whether that is far. Where neighbours usually reach as far as `usual2`, a point
+    /// off the surface stays.
+    pub(super) fn target(&self, point: Point, fit: &Fit, usual2: u64) -> (Point, bool) {
+        let off_surface = self.off_surface && is_far(fit.last2, usual2);
+        let Some(normal) = fit.plane.normal.filter(|_| !off_surface) else {
+            return (point, false);
+        };
+        let offset = fit.moments.project(normal);
+        let length2 = offset[0] * offset[0] + offset[1] * offset[1] + offset[2] * offset[2];
+        let limit = ROUGH * ROUGH * spacing2(fit.last2, self.neighbors);
+        (moved(point, offset), length2 > limit)
+    }
 }

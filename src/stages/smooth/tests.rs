@@ -44,6 +44,7 @@ fn relaxed(points: &[Point], rounds: u32, tile: u32, page: usize) -> (Vec<Point>
         neighbors: 12,
         rounds,
         smoothed: false,
+        off_surface: true,
     };
     relaxed_as(points, relaxing, tile, page)
 }
@@ -130,6 +131,7 @@ fn details_too_fine_for_the_points_stay_unless_there_is_noise() {
         neighbors: 30,
         rounds: 1,
         smoothed: false,
+        off_surface: true,
     };
     let moved = |points: &[Point], relaxing| {
         let moved = relaxed_as(points, relaxing, 1000, 256).1.moved as usize;
@@ -155,6 +157,12 @@ fn rough_points(points: &[Point]) -> usize {
     let workspace = &workspace();
     let (store, _) = ordered(points, 1000, 256, workspace);
     let mut rough = 0;
+    let relaxing = Relaxing {
+        neighbors: 12,
+        rounds: 1,
+        smoothed: false,
+        off_surface: true,
+    };
     let all = 0..store.len();
     each_fit(
         &store,
@@ -162,7 +170,7 @@ fn rough_points(points: &[Point]) -> usize {
         12,
         |_| true,
         |_, point, fit| {
-            rough += usize::from(seen::target(point, &fit, 12).1);
+            rough += usize::from(relaxing.target(point, &fit, fit.last2).1);
         },
     )
     .unwrap();

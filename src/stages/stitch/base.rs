@@ -6,8 +6,9 @@ use crate::error::Result;
 use crate::spill::layouts::{LABELLED, SENT};
 use crate::spill::{Exchange, Sections};
 use crate::stages::blocks::Blocks;
-use crate::stages::located::{Located, Places, on_a_line};
-use crate::stages::surface::evidence::Evidence;
+use crate::stages::located::{Located, Places};
+use crate::stages::surface::columns;
+use crate::stages::surface::evidence::{Division, Evidence};
 use crate::stages::surface::orient::{Around, Oriented, orient_inside};
 use crate::stages::surface::star::{Link, Star, Triangle, has, others};
 use crate::stages::triples::Triples;
@@ -46,18 +47,24 @@ pub(super) fn base(
     places: Places<'_>,
     triples: Triples,
     blocks: Blocks,
-    weigh: bool,
+    division: Option<Division>,
     workspace: &Workspace,
 ) -> Result<(Base, BaseStats)> {
     let count = blocks.count();
     let buffer = EXCHANGE_BUFFER;
+    let highest = || columns::highest(places.shape, blocks, workspace);
+    let by_evidence = match division {
+        Some(division) => Some((division, workspace.once("columns", highest)?)),
+        None => None,
+    };
+    let weigh = by_evidence.is_some();
     let look = Look {
         candidates: Sections::with_layout(workspace, "stitch.candidates", count, LABELLED)?,
         crossing: Sections::with_layout(workspace, "stitch.crossing", count, LABELLED)?,
         flags: Exchange::between(workspace, "stitch.flags", buffer, count, SENT)?,
         triples: &triples,
         places,
-        weigh,
+        by_evidence,
         blocks,
     };
     let bytes = |block: usize| {
@@ -87,7 +94,7 @@ pub(super) fn base(
     workspace.note_part("orient", start.elapsed().as_secs_f64());
     let stats = BaseStats {
         flagged,
-        on_a_line: all.flat,
+        unfit: all.flat,
         mobius: surface.mobius,
         triangles: surface.triangles,
     };
@@ -107,8 +114,8 @@ pub(super) fn base(
 struct Look<'a> {
     triples: &'a Triples,
     places: Places<'a>,
-    /// Gather evidence for the orientation.
-    weigh: bool,
+    /// How blocks are divided and the highest points of columns, if they are oriented by evidence.
+    by_evidence: Option<(Division, Sections<1>)>,
     blocks: Blocks,
     candidates: Sections<4>,
     crossing: Sections<4>,
@@ -174,10 +181,9 @@ impl Look<'_> {
         self.flags.send_from(block, &sent)?;
         self.candidates.put(block, &candidates)?;
         held.set(bytes_of(&triangles) + bytes_of(&candidates) + bytes_of(&flagged));
-        let evidence = if self.weigh {
-            Some(self.evidence(block, &triangles, &candidates)?)
-        } else {
-            None
+        let evidence = match &self.by_evidence {
+            Some(by) => Some(self.evidence(block, &triangles, &candidates, by)?),
+            None => None,
         };
         held.set(bytes_of(&triangles));
         Ok(Around {
@@ -194,11 +200,14 @@ impl Look<'_> {
         block: usize,
         triangles: &[Triangle],
         candidates: &[[u32; 4]],
+        (division, highest): &(Division, Sections<1>),
     ) -> Result<Evidence> {
         let vertices = triangles.iter().flatten().copied();
         let places = Located::load(self.places.shape, self.blocks, block, vertices)?;
         let candidates: Vec<Triangle> = candidates.iter().map(|r| [r[0], r[1], r[2]]).collect();
         Ok(Evidence {
+            division: *division,
+            highest: highest.get(block)?.into_iter().flatten().collect(),
             held: hold(bytes_of(&candidates)),
             places,
             candidates,
@@ -213,16 +222,19 @@ impl Look<'_> {
         candidates: &mut Vec<[u32; 4]>,
         found: &mut Found,
     ) -> Result<()> {
-        if self.places.differ() {
+        if self.places.differ() || self.places.density.is_some() {
             let vertices = triangles.iter().flatten().copied();
             let file = Located::load(self.places.file, self.blocks, block, vertices)?;
             let (mut t3, open) = (0, candidates.len());
             triangles.retain(|t| {
-                let flat = on_a_line(t.map(|v| file.at(v)));
+                let flat = self.places.unfit(*t, t.map(|v| file.at(v)));
                 t3 += u64::from(flat && self.blocks.of(t[0]) == block as u32);
                 !flat
             });
-            candidates.retain(|r| !on_a_line([r[0], r[1], r[2]].map(|v| file.at(v))));
+            candidates.retain(|r| {
+                let t = [r[0], r[1], r[2]];
+                !self.places.unfit(t, t.map(|v| file.at(v)))
+            });
             found.flat = t3;
             found.flat_candidates = (open - candidates.len()) as u64;
         }

@@ -11,7 +11,7 @@ use crate::geom::Point;
 use crate::spill::layouts::{LABELLED, TRIANGLE};
 use crate::spill::{Sections, Word};
 use crate::stages::blocks::Blocks;
-use crate::stages::located::{Located, Places, on_a_line};
+use crate::stages::located::{Located, Places};
 use crate::stages::surface::orient::{Asks, consistent};
 use crate::stages::surface::parity::ParitySets;
 use crate::stages::surface::star::Triangle;
@@ -87,7 +87,8 @@ pub fn insert(
 ) -> Result<InsertStats> {
     let mut work = BlockWork::load(places, base, blocks, block)?;
     let mut counts = InsertStats {
-        on_a_line: work.flat,
+        unfit: work.flat,
+        cut: work.cut,
         ..InsertStats::default()
     };
     let undecided = work.insert_all(cos_max_angle, &mut counts);
@@ -146,6 +147,8 @@ struct BlockWork {
     located: Located,
     /// For each vertex of the block [`BORDER`] and [`OPEN`].
     border: Vec<u8>,
+    /// Triangles of the base that went because the labels at an edge run against each other.
+    cut: u64,
     /// Crossing candidates that would be on a line in the file.
     flat: u64,
     held: Holding,
@@ -179,7 +182,7 @@ impl BlockWork {
         for v in candidates.iter().flat_map(|c| c.ids) {
             active[(v - ids.start) as usize] = true;
         }
-        let interior = base.surface.interior.get(block)?;
+        let (interior, cut) = base.surface.inside(block)?;
         let crossing = base.surface.crossing.get(block)?;
         let border = border(base, &crossing, &ids, block)?;
         let inside = interior.iter().map(|r| [r[0], r[1], r[2]]);
@@ -201,6 +204,7 @@ impl BlockWork {
             joints: Vec::new(),
             located,
             border,
+            cut,
             flat: 0,
             held: Holding::default(),
             ids,
@@ -239,11 +243,14 @@ impl BlockWork {
             let base = self.triangles[self.interior_base..].iter().flatten();
             open.chain(base.copied()).collect()
         };
-        if places.differ() {
+        if places.differ() || places.density.is_some() {
             let all = vertices(&candidates).into_iter();
             let file = Located::load(places.file, blocks, block, all)?;
             let before = candidates.len();
-            candidates.retain(|r| !on_a_line([r[0], r[1], r[2]].map(|v| file.at(v))));
+            candidates.retain(|r| {
+                let t = [r[0], r[1], r[2]];
+                !places.unfit(t, t.map(|v| file.at(v)))
+            });
             self.flat = (before - candidates.len()) as u64;
         }
         let all = vertices(&candidates).into_iter();

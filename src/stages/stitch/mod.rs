@@ -17,6 +17,7 @@ use crate::error::Result;
 use crate::spill::Sections;
 use crate::stages::blocks::Blocks;
 use crate::stages::located::Places;
+use crate::stages::surface::evidence::Division;
 use crate::stages::triples::Triples;
 use crate::workspace::Workspace;
 use crate::workspace::persist::persist;
@@ -45,8 +46,8 @@ pub struct Stitched {
 pub struct StitchOptions {
     /// Cosine of the largest angle between the normals of a T12 triangle and its neighbours.
     pub cos_max_angle: f64,
-    /// Orient by evidence instead of in the order of triangles.
-    pub weigh: bool,
+    /// Orient by evidence, divided like this, instead of in the order of triangles.
+    pub weigh: Option<Division>,
 }
 
 /// Counts of the base.
@@ -54,9 +55,10 @@ pub struct StitchOptions {
 pub struct BaseStats {
     /// T3 triangles flagged at non-manifold edges and vertices by excess.
     pub flagged: u64,
-    /// T3 triangles left out because their points are on a line in the file.
-    pub on_a_line: u64,
-    /// T3 triangles removed because they close a Möbius band.
+    /// T3 triangles left out because their points are on a line in the file, or a side is too long for the
+    /// surface.
+    pub unfit: u64,
+    /// T3 triangles removed so that the rest can be oriented: they close a Möbius band.
     pub mobius: u64,
     /// Triangles of the base.
     pub triangles: u64,
@@ -77,10 +79,13 @@ pub struct InsertStats {
     pub angle: u64,
     /// Test IV: would close a Möbius band.
     pub orientation: u64,
-    /// Not tried: its points are on a line in the file.
-    pub on_a_line: u64,
+    /// Not tried: its points are on a line in the file, or a side is too long for the surface.
+    pub unfit: u64,
     /// Of the accepted, those taken out again because blocks joined components differently.
     pub joints_removed: u64,
+    /// Triangles of the base that were cut; counted with those of the base.
+    #[serde(skip)]
+    cut: u64,
 }
 
 impl InsertStats {
@@ -102,8 +107,9 @@ impl InsertStats {
         self.excess += more.excess;
         self.angle += more.angle;
         self.orientation += more.orientation;
-        self.on_a_line += more.on_a_line;
+        self.unfit += more.unfit;
         self.joints_removed += more.joints_removed;
+        self.cut += more.cut;
     }
 }
 
@@ -114,7 +120,7 @@ persist!(Stitched {
 });
 persist!(BaseStats {
     flagged,
-    on_a_line,
+    unfit,
     mobius,
     triangles
 });
@@ -125,8 +131,9 @@ persist!(InsertStats {
     excess,
     angle,
     orientation,
-    on_a_line,
-    joints_removed
+    unfit,
+    joints_removed,
+    cut
 });
 
 /// Extracts the manifold.
@@ -141,12 +148,12 @@ pub fn stitch(
     options: StitchOptions,
     workspace: &Workspace,
 ) -> Result<(Stitched, BaseStats, InsertStats)> {
-    let (base, counts) = base::base(places, triples, blocks, options.weigh, workspace)?;
+    let (base, mut counts) = base::base(places, triples, blocks, options.weigh, workspace)?;
     let interior = Interior::create(workspace, blocks.count())?;
     // The pass across blocks is short, and begins again when the run is resumed.
     let (crossing, inserted) = workspace.once("insert", || {
         let mut stats = InsertStats {
-            on_a_line: base.flat_candidates,
+            unfit: base.flat_candidates,
             ..InsertStats::default()
         };
         let angle = options.cos_max_angle;
@@ -162,6 +169,8 @@ pub fn stitch(
             Ok((crossing, stats))
         })
     })?;
+    counts.mobius += inserted.cut;
+    counts.triangles -= inserted.cut;
     let stitched = Stitched {
         interior: interior.mesh,
         added: crossing.added,

@@ -12,11 +12,14 @@ use rustc_hash::FxHashMap;
 const EDGE: u64 = 128 + LIST;
 
 /// The triangles at an edge: room for four, and what the allocator takes.
-const LIST: u64 = 80;
+const LIST: u64 = 128;
+
+/// A triangle, `label << 1 | flip`, and its unit normal if anyone asks for it.
+type Entry = (Triangle, u32, [f32; 3]);
 
 /// The triangles so far at the edges that later ones may have.
 pub(super) struct Border {
-    edges: FxHashMap<(u32, u32), Vec<(Triangle, u32)>>,
+    edges: FxHashMap<(u32, u32), Vec<Entry>>,
     reserved: Reservation,
 }
 
@@ -36,20 +39,31 @@ impl Border {
     }
 
     /// Puts in a triangle with `label << 1 | flip`; room must have been made.
-    pub(super) fn put(&mut self, t: Triangle, word: u32) {
+    pub(super) fn put(&mut self, t: Triangle, word: u32, normal: [f64; 3]) {
+        let normal = normal.map(|x| x as f32);
         for (a, b, ..) in EDGES {
             let at = self.edges.entry((t[a], t[b])).or_default();
-            at.push((t, word));
+            at.push((t, word, normal));
         }
     }
 
     /// What the triangles at its edges ask of `t`: their label, and if `t` must be turned against it.
     pub(super) fn asks(&self, t: Triangle) -> impl Iterator<Item = (u32, bool)> + '_ {
+        self.asks_with_normals(t)
+            .map(|(label, flip, ..)| (label, flip))
+    }
+
+    /// As [`Border::asks`], and if `t` must be turned against the triangle itself, and its normal.
+    pub(super) fn asks_with_normals(
+        &self,
+        t: Triangle,
+    ) -> impl Iterator<Item = (u32, bool, bool, [f64; 3])> + '_ {
         EDGES.into_iter().flat_map(move |(a, b, ..)| {
             let at = self.edges.get(&(t[a], t[b])).into_iter().flatten();
-            at.map(move |&(other, word)| {
-                let flip = opposed(t, other, t[a], t[b]) ^ (word & 1 == 1);
-                (word >> 1, flip)
+            at.map(move |&(other, word, normal)| {
+                let opposed = opposed(t, other, t[a], t[b]);
+                let flip = opposed ^ (word & 1 == 1);
+                (word >> 1, flip, opposed, normal.map(f64::from))
             })
         })
     }
@@ -88,7 +102,7 @@ mod tests {
                 .collect();
             border.make_room(new.len()).unwrap();
             for t in new {
-                border.put(t, 2 * group);
+                border.put(t, 2 * group, [0.0; 3]);
                 let asks: Vec<_> = border.asks(t).collect();
                 assert!(asks.contains(&(group, true)), "{asks:?}");
             }

@@ -1,10 +1,12 @@
 //! Components and orientation of a surface given block by block.
 
+use super::across::settle;
 use super::border::Border;
-use super::evidence::{Evidence, Votes};
+use super::evidence::Evidence;
 use super::parity::ParitySets;
+use super::patches::Joint;
 use super::star::{EDGES, Edges, Triangle, opposed};
-use super::weigh::{vote, weigh_block};
+use super::weigh::weigh_block;
 use crate::error::Result;
 use crate::spill::layouts::{LABELLED, SENT_LABELLED, TRIANGLE};
 use crate::spill::{Exchange, Sections, Word};
@@ -31,6 +33,9 @@ pub struct Oriented {
     pub sets: ParitySets,
     /// Which roots have a crossing triangle.
     pub crosses: Vec<bool>,
+    /// For each block the edges between triangles of different labels, `[a, b << 1 | flip]` by places in
+    /// `interior`, if there is evidence: where the two run against each other in the end, `b` goes.
+    pub seams: Option<Sections<2>>,
     /// Triangles removed because they close a Möbius band.
     pub mobius: u64,
     /// Triangles that are left.
@@ -43,14 +48,38 @@ pub struct Oriented {
 pub struct OrientedInside {
     interior: Sections<4>,
     relations: Sections<7>,
-    /// Votes of the candidates on global labels, `[a, b, votes]`, by block; if there is evidence.
-    votes: Option<Sections<3>>,
+    weighed: Option<Weighed>,
     /// Crossing triangles by the block of their smallest vertex.
     crossing: Sections<3>,
     /// For each block, the number of labels that are global, and of all.
     labels: Vec<(u32, u32)>,
     mobius: u64,
     triangles: u64,
+}
+
+/// What blocks leave where there is evidence, by block.
+#[derive(Debug)]
+pub(super) struct Weighed {
+    /// Sums of pairs of global labels, `[a, b, sum]`, the sum in two words.
+    pub pairs: Sections<4>,
+    /// Evidence that global labels face up, `[label, up]`, the evidence in two words.
+    pub ups: Sections<3>,
+    /// See [`Oriented::seams`].
+    seams: Sections<2>,
+    /// Unit normals of the crossing triangles, in their order, as `f32`.
+    pub normals: Sections<3>,
+}
+
+impl Weighed {
+    fn create(workspace: &Workspace, name: &str, count: usize) -> Result<Self> {
+        let sections = |part: &str| format!("{name}.{part}");
+        Ok(Self {
+            pairs: Sections::create(workspace, &sections("pairs"), count)?,
+            ups: Sections::create(workspace, &sections("ups"), count)?,
+            seams: Sections::create(workspace, &sections("seams"), count)?,
+            normals: Sections::unpacked(workspace, &sections("normals"), count)?,
+        })
+    }
 }
 
 /// The triangles around a block, and what else was found there.
@@ -91,8 +120,8 @@ pub fn orient_inside<T: Persist + Send>(
     let letters = sections("relations");
     let above = [Word::Above; 7];
     let exchange = Exchange::between(workspace, &letters, EXCHANGE_BUFFER, count, above)?;
-    let votes = evidence
-        .then(|| Sections::create(workspace, &sections("votes"), count))
+    let weighed = evidence
+        .then(|| Weighed::create(workspace, name, count))
         .transpose()?;
     let work = |block| {
         let Around {
@@ -103,17 +132,20 @@ pub fn orient_inside<T: Persist + Send>(
         } = around(block)?;
         let crossing: Vec<Triangle> = inner.extract_if(.., |t| blocks.crossing(*t)).collect();
         let _crossing = hold(bytes_of(&crossing));
-        let done = orient_block(&inner, &crossing, evidence, blocks, block);
-        if let Some(votes) = &votes {
-            votes.put(block, &done.votes)?;
-        }
+        let done = orient_block(&inner, &crossing, evidence.as_ref(), blocks, block);
         interior.put(block, &done.interior)?;
         exchange.send_from(block, &done.relations)?;
-        let mine = |t: &&Triangle| blocks.of(t[0]) == block as u32;
-        border.put(
-            block,
-            &crossing.iter().filter(mine).copied().collect::<Vec<_>>(),
-        )?;
+        let mine = |t: &Triangle| blocks.of(t[0]) == block as u32;
+        let mine: Vec<Triangle> = crossing.iter().copied().filter(mine).collect();
+        border.put(block, &mine)?;
+        if let (Some(weighed), Some(evidence)) = (&weighed, &evidence) {
+            weighed.pairs.put(block, &done.pairs)?;
+            weighed.ups.put(block, &done.ups)?;
+            weighed.seams.put(block, &done.seams)?;
+            let normal = |t: &Triangle| evidence.normal(*t).map(|x| (x as f32).to_bits());
+            let normals: Vec<_> = mine.iter().map(normal).collect();
+            weighed.normals.put(block, &normals)?;
+        }
         workspace.advance(1);
         let own = (done.global, done.labels);
         Ok((own, (done.mobius, done.interior.len()), found))
@@ -130,12 +162,50 @@ pub fn orient_inside<T: Persist + Send>(
     Ok(OrientedInside {
         interior,
         relations: exchange.deliver(workspace, count)?,
-        votes,
+        weighed,
         crossing: border,
         labels,
         mobius,
         triangles,
     })
+}
+
+impl Oriented {
+    /// The interior triangles of a block, `[i, j, k, label << 1 | flip]`, without those that are cut where
+    /// labels run against each other; and how many these are.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+    pub fn inside(&self, block: usize) -> Result<(Vec<[u32; 4]>, u64)> {
+        let mut interior = self.interior.get(block)?;
+        let Some(seams) = &self.seams else {
+            return Ok((interior, 0));
+        };
+        let (first, globals) = self.globals[block];
+        // Labels at seams are global.
+        let turned = |r: &[u32; 4]| {
+            let label = r[3] >> 1;
+            debug_assert!(label < globals, "a seam at a label of the block alone");
+            self.sets.look(first + label).1 ^ (r[3] & 1 == 1)
+        };
+        let mut gone = Vec::new();
+        let mut cut = vec![false; interior.len()];
+        for [a, b] in seams.get(block)? {
+            let (a, b, flip) = (a as usize, (b >> 1) as usize, b & 1 == 1);
+            if !cut[a] && !cut[b] && turned(&interior[a]) ^ turned(&interior[b]) != flip {
+                cut[b] = true;
+                gone.push(b);
+            }
+        }
+        if !gone.is_empty() {
+            let mut number = 0;
+            interior.retain(|_| {
+                number += 1;
+                !cut[number - 1]
+            });
+        }
+        Ok((interior, gone.len() as u64))
+    }
 }
 
 impl Persist for Oriented {
@@ -146,6 +216,7 @@ impl Persist for Oriented {
         self.labels.save(out);
         self.sets.save(out);
         self.crosses.save(out);
+        self.seams.save(out);
         (self.mobius, self.triangles).save(out);
     }
 
@@ -153,7 +224,7 @@ impl Persist for Oriented {
         let (interior, crossing) = Persist::load(from)?;
         let (globals, labels) = Persist::load(from)?;
         let sets = ParitySets::load(from)?;
-        let crosses = Persist::load(from)?;
+        let (crosses, seams) = Persist::load(from)?;
         let (mobius, triangles) = Persist::load(from)?;
         let bytes = label_bytes(sets.len());
         Ok(Self {
@@ -164,6 +235,7 @@ impl Persist for Oriented {
             _held: from.workspace.reserve("labels", bytes)?,
             sets,
             crosses,
+            seams,
             mobius,
             triangles,
         })
@@ -203,27 +275,42 @@ impl OrientedInside {
             labels: self.labels.into_iter().map(|(_, all)| all).collect(),
             sets: ParitySets::new(next as usize),
             crosses: vec![false; next as usize],
+            seams: None,
             mobius: self.mobius,
             triangles: self.triangles,
             _held: held,
         };
-        let border = |block: usize| {
-            let mut triangles = self.crossing.get(block)?;
-            let removed = removed.get(block)?;
-            let gone = |t: &Triangle| removed.binary_search(&[block as u32, t[0], t[1], t[2]]);
-            triangles.retain(|t| gone(t).is_err());
-            Ok(triangles)
+        let present = |block: usize, t: &Triangle, removed: &[[u32; 4]]| {
+            removed
+                .binary_search(&[block as u32, t[0], t[1], t[2]])
+                .is_err()
         };
-        if let Some(votes) = &self.votes {
-            vote(
+        if let Some(weighed) = &self.weighed {
+            let border = |block: usize| {
+                let (triangles, removed) = (self.crossing.get(block)?, removed.get(block)?);
+                let normals = weighed.normals.get(block)?;
+                let with_normals = triangles.into_iter().zip(normals);
+                let with_normals = with_normals
+                    .map(|(t, normal)| (t, normal.map(|x| f64::from(f32::from_bits(x)))));
+                Ok(with_normals
+                    .filter(|(t, _)| present(block, t, &removed))
+                    .collect())
+            };
+            settle(
                 &mut surface,
                 border,
                 &self.relations,
-                votes,
+                weighed,
                 blocks,
                 workspace,
             )?;
         }
+        let border = |block: usize| {
+            let mut triangles = self.crossing.get(block)?;
+            let removed = removed.get(block)?;
+            triangles.retain(|t| present(block, t, &removed));
+            Ok(triangles)
+        };
         orient_crossing(
             &mut surface,
             name,
@@ -232,6 +319,8 @@ impl OrientedInside {
             blocks,
             workspace,
         )?;
+        // Not before: what is dropped while a step is at work may be gone when it is done again.
+        surface.seams = self.weighed.map(|weighed| weighed.seams);
         Ok(surface)
     }
 }
@@ -241,8 +330,10 @@ pub(super) struct OrientedBlock {
     /// `[owner block, i, j, k, this block, label << 1 | flip, weight]`: what an interior triangle of
     /// this block asks of the crossing triangle `i, j, k`.
     relations: Vec<[u32; 7]>,
-    votes: Vec<[u32; 3]>,
-    /// Number of labels that occur in relations; they come first.
+    pairs: Vec<[u32; 4]>,
+    ups: Vec<[u32; 3]>,
+    seams: Vec<[u32; 2]>,
+    /// Number of labels that occur in relations or pairs; they come first.
     global: u32,
     labels: u32,
     mobius: u64,
@@ -277,12 +368,12 @@ impl Asks {
 fn orient_block(
     inner: &[Triangle],
     crossing: &[Triangle],
-    evidence: Option<Evidence>,
+    evidence: Option<&Evidence>,
     blocks: Blocks,
     block: usize,
 ) -> OrientedBlock {
     if let Some(evidence) = evidence {
-        return weigh_block(inner, crossing, &evidence, blocks, block);
+        return weigh_block(inner, crossing, evidence, blocks, block);
     }
     let ids = blocks.ids(block);
     let mut edges = Edges::with_room(ids.clone(), inner);
@@ -309,6 +400,7 @@ fn orient_block(
     let mut bonds = Bonds::default();
     for &c in crossing {
         adjacent(c, &edges, inner, &ids, |other, flip| {
+            bonds.first.push(other);
             bonds.relations.push((c, other, flip, 1));
         });
     }
@@ -318,14 +410,20 @@ fn orient_block(
 /// What speaks for how the sets of a block run.
 #[derive(Default)]
 pub(super) struct Bonds {
+    /// A triangle of each set that the rest of the cloud may be connected with, in the order of labels.
+    pub first: Vec<u32>,
     /// A crossing triangle, an interior one at an edge of it, whether one must be turned against the
     /// other, and the weight of that.
     pub relations: Vec<(Triangle, u32, bool, i64)>,
-    /// The same of two interior triangles at a candidate.
-    pub votes: Vec<(u32, u32, bool, i64)>,
+    /// A triangle of each of two sets, and the sum of weights for running alike.
+    pub pairs: Vec<(u32, u32, i64)>,
+    /// A triangle of a set, and the evidence that the set faces up as this triangle runs.
+    pub ups: Vec<(u32, i64)>,
+    /// Edges between sets.
+    pub seams: Vec<Joint>,
 }
 
-/// Gives labels to the sets, those in relations first, both in order of first appearance.
+/// Gives labels to the sets: first those that the rest of the cloud may be connected with.
 pub(super) fn number_labels(
     inner: &[Triangle],
     kept: &[u32],
@@ -348,13 +446,29 @@ pub(super) fn number_labels(
         (*label, turned, labels)
     };
     let mut global = 0;
+    for triangle in bonds.first {
+        global = find(triangle).2;
+    }
     let mut sent = Vec::with_capacity(bonds.relations.len());
     for (c, other, flip, weight) in bonds.relations {
-        let (label, turned, labels) = find(other);
-        global = labels;
+        let (label, turned, _) = find(other);
         let word = label << 1 | u32::from(flip ^ turned);
         let owner = blocks.of(c[0]);
         sent.push([owner, c[0], c[1], c[2], block as u32, word, weight as u32]);
+    }
+    let mut pairs = Vec::with_capacity(bonds.pairs.len());
+    for (a, b, sum) in bonds.pairs {
+        let ((a, turned_a, _), (b, turned_b, _)) = (find(a), find(b));
+        let sum = if turned_a ^ turned_b { -sum } else { sum };
+        pairs.push([a, b, sum as u32, (sum >> 32) as u32]);
+    }
+    let mut ups = Vec::with_capacity(bonds.ups.len());
+    for (a, up) in bonds.ups {
+        let (label, turned, _) = find(a);
+        if label < global {
+            let up = if turned { -up } else { up };
+            ups.push([label, up as u32, (up >> 32) as u32]);
+        }
     }
     let mut interior = Vec::with_capacity(kept.len());
     for &number in kept {
@@ -362,24 +476,17 @@ pub(super) fn number_labels(
         let t = inner[number as usize];
         interior.push([t[0], t[1], t[2], label << 1 | u32::from(turned)]);
     }
-    let mut held = hold(4 * inner.len() as u64 + bytes_of(&interior) + bytes_of(&sent));
-    let mut counted = Votes::default();
-    for (a, b, flip, weight) in bonds.votes {
-        let ((a, turned_a, _), (b, turned_b, _)) = (find(a), find(b));
-        if a < global && b < global {
-            counted.add(a, b, flip ^ turned_a ^ turned_b, weight);
-        }
-    }
-    let votes = counted.counted().into_iter();
-    let votes = votes
-        .map(|(a, b, votes)| [a, b, votes as i32 as u32])
-        .collect();
-    held.set(bytes_of(&interior) + bytes_of(&sent));
+    let place = |n: u32| kept.partition_point(|k| *k < n) as u32;
+    let seam = |j: &Joint| [place(j.a), place(j.b) << 1 | u32::from(j.flip)];
+    let seams: Vec<_> = bonds.seams.iter().map(seam).collect();
+    let held = bytes_of(&interior) + bytes_of(&sent) + bytes_of(&pairs) + bytes_of(&seams);
     OrientedBlock {
-        _held: held,
+        _held: hold(held),
         interior,
         relations: sent,
-        votes,
+        pairs,
+        ups,
+        seams,
         global,
         labels,
         mobius,
@@ -440,7 +547,7 @@ fn orient_crossing(
                 continue;
             };
             base.triangles += 1;
-            edges.put(t, word);
+            edges.put(t, word, [0.0; 3]);
             sent.push([blocks.of(t[0]), t[0], t[1], t[2], word]);
             sent.extend(blocks.visited(t).map(|b| [b, t[0], t[1], t[2], word]));
         }

@@ -1,17 +1,19 @@
-//! Orientation by evidence: inside a block, and between blocks.
+//! Orientation by evidence inside a block: which of its patches run alike, as far as that can be said
+//! without the rest of the cloud.
 
-use super::border::Border;
-use super::evidence::{Evidence, Votes, cosine, join_inside, weight};
-use super::orient::{Bonds, Oriented, OrientedBlock, adjacent, number_labels};
-use super::parity::ParitySets;
+use super::contract::{Graph, Limit};
+use super::evidence::{Evidence, FLATTEST, cosine, weight};
+use super::orient::{Bonds, OrientedBlock, adjacent, number_labels};
+use super::patches::Patches;
 use super::star::{Edges, Triangle};
-use crate::error::Result;
-use crate::spill::Sections;
 use crate::stages::blocks::Blocks;
-use crate::workspace::Workspace;
 use crate::workspace::memory::{bytes_of, hold};
+use std::ops::Range;
 
-/// Orients a block by what the evidence says; a triangle that would have to run both ways is removed.
+/// An edge between two triangles of the base counts for so many candidates.
+pub(super) const BASE: i64 = 8;
+
+/// Orients a block by what the evidence says.
 pub(super) fn weigh_block(
     inner: &[Triangle],
     crossing: &[Triangle],
@@ -20,32 +22,121 @@ pub(super) fn weigh_block(
     block: usize,
 ) -> OrientedBlock {
     let ids = blocks.ids(block);
-    let mut edges = Edges::with_room(ids.clone(), inner);
-    for (number, &t) in inner.iter().enumerate() {
-        edges.add(t, number as u32);
-    }
-    let mut sets = ParitySets::new(inner.len());
-    let mut held = hold(5 * inner.len() as u64);
-    let dead = join_inside(ids.clone(), inner, evidence, &mut sets);
+    let division = evidence.division;
+    let mut weigher = Weigher {
+        patches: Patches::of(ids.clone(), inner, evidence, division.patch),
+        graph: Graph::default(),
+        inner,
+        evidence,
+        ids,
+    };
+    weigher.add_patches();
+    let mut bonds = Bonds::default();
+    weigher.add_connections(crossing, &mut bonds);
+    let _graph = hold(weigher.graph.bytes());
+    weigher.contract(division.cluster, &mut bonds);
+    let dead = weigher.cut();
     let kept: Vec<u32> = (0..inner.len() as u32)
         .filter(|n| !dead[*n as usize])
         .collect();
-    held.set(5 * inner.len() as u64 + bytes_of(&kept));
-    let mut bonds = Bonds::default();
-    for &c in crossing {
-        let normal = evidence.normal(c);
-        adjacent(c, &edges, inner, &ids, |other, flip| {
-            if !dead[other as usize] {
-                let cosine = cosine(normal, evidence.normal(inner[other as usize]), flip);
-                bonds.relations.push((c, other, flip, weight(cosine)));
-            }
-        });
+    bonds.relations.retain(|r| !dead[r.1 as usize]);
+    bonds.seams = std::mem::take(&mut weigher.patches.joints);
+    bonds
+        .seams
+        .retain(|j| !dead[j.a as usize] && !dead[j.b as usize]);
+    let bonded = bytes_of(&bonds.relations) + bytes_of(&bonds.pairs) + bytes_of(&bonds.seams);
+    let _held = hold(9 * inner.len() as u64 + bytes_of(&kept) + bonded);
+    let removed = (inner.len() - kept.len()) as u64;
+    let sets = &mut weigher.patches.sets;
+    number_labels(inner, &kept, bonds, sets, blocks, block, removed)
+}
+
+/// The patches of a block while it is decided how they run.
+struct Weigher<'a> {
+    patches: Patches,
+    graph: Graph,
+    inner: &'a [Triangle],
+    evidence: &'a Evidence,
+    ids: Range<u32>,
+}
+
+fn signed(flip: bool, weight: i64) -> i64 {
+    if flip { -weight } else { weight }
+}
+
+impl Weigher<'_> {
+    /// The patch of a triangle, and whether the triangle is turned against it.
+    fn patch(&self, triangle: u32) -> (u32, bool) {
+        let (_, turned) = self.patches.sets.look(triangle);
+        (self.patches.of[triangle as usize], turned)
     }
-    for &c in &evidence.candidates {
+
+    /// Adds to the sum of the patches of two triangles, of which one must be turned if `flip`.
+    fn connect(&mut self, a: u32, b: u32, flip: bool, weight: i64) {
+        let ((of_a, up_a), (of_b, up_b)) = (self.patch(a), self.patch(b));
+        self.graph
+            .add(of_a, of_b, signed(flip ^ up_a ^ up_b, weight));
+    }
+
+    /// Makes patches nodes, with the evidence that they face up.
+    fn add_patches(&mut self) {
+        self.graph = Graph::new(self.patches.roots.len());
+        for (node, (_, triangles)) in (0..).zip(&self.patches.roots) {
+            self.graph.add_triangles(node, u64::from(*triangles));
+        }
+        for (number, t) in (0..).zip(self.inner) {
+            let highest = |v: &&u32| self.evidence.highest.binary_search(v).is_ok();
+            let count = t.iter().filter(highest).count() as i64;
+            if count > 0 {
+                let z = self.evidence.normal(*t)[2];
+                let up = count * (z * FLATTEST as f64) as i64;
+                let (of, turned) = self.patch(number);
+                self.graph.add_up(of, signed(turned, up));
+            }
+        }
+    }
+
+    /// Adds up what connects patches: edges, candidates, and crossing triangles as far as they are known
+    /// here.
+    fn add_connections(&mut self, crossing: &[Triangle], bonds: &mut Bonds) {
+        for n in 0..self.patches.joints.len() {
+            let joint = self.patches.joints[n];
+            let weight = BASE * i64::from(joint.weight);
+            self.connect(joint.a, joint.b, joint.flip, weight);
+        }
+        let mut edges = Edges::with_room(self.ids.clone(), self.inner);
+        for (number, &t) in self.inner.iter().enumerate() {
+            edges.add(t, number as u32);
+        }
+        for &c in crossing {
+            let mut asks = Vec::new();
+            let mut note = |other, flip| asks.push((other, flip));
+            adjacent(c, &edges, self.inner, &self.ids, &mut note);
+            for (other, flip) in asks {
+                let weight = self.weight(c, other, flip);
+                bonds.relations.push((c, other, flip, weight));
+                // As much as the other two edges of the crossing triangle can weigh.
+                let of = self.patches.of[other as usize];
+                self.graph.add_outside(of, 2 * BASE * FLATTEST);
+            }
+        }
+        for &c in &self.evidence.candidates {
+            self.vote(c, &edges);
+        }
+    }
+
+    /// The weight of the edge between two triangles.
+    fn weight(&self, t: Triangle, other: u32, flip: bool) -> i64 {
+        let other = self.evidence.normal(self.inner[other as usize]);
+        weight(cosine(self.evidence.normal(t), other, flip))
+    }
+
+    /// A candidate connects each two of the first three triangles at its edges.
+    fn vote(&mut self, c: Triangle, edges: &Edges) {
         let mut asks = [(0, false); 3];
         let mut count = 0;
-        adjacent(c, &edges, inner, &ids, |other, flip| {
-            if !dead[other as usize] && count < 3 {
+        adjacent(c, edges, self.inner, &self.ids, |other, flip| {
+            if count < 3 {
                 asks[count] = (other, flip);
                 count += 1;
             }
@@ -53,77 +144,48 @@ pub(super) fn weigh_block(
         for x in 1..count {
             for y in 0..x {
                 let ((a, flip_a), (b, flip_b)) = (asks[x], asks[y]);
-                if sets.find(a).0 != sets.find(b).0 {
-                    let normal = evidence.normal(c);
-                    let flat = |(other, flip): (u32, bool)| {
-                        cosine(normal, evidence.normal(inner[other as usize]), flip)
-                    };
-                    let weight = weight(flat(asks[x]).min(flat(asks[y])));
-                    bonds.votes.push((a, b, flip_a ^ flip_b, weight));
+                if self.patches.of[a as usize] != self.patches.of[b as usize] {
+                    let weight = self.weight(c, a, flip_a).min(self.weight(c, b, flip_b));
+                    self.connect(a, b, flip_a ^ flip_b, weight);
                 }
             }
         }
     }
-    let bonded = bytes_of(&bonds.relations) + bytes_of(&bonds.votes);
-    held.set(5 * inner.len() as u64 + bytes_of(&kept) + bonded);
-    let mobius = (inner.len() - kept.len()) as u64;
-    number_labels(inner, &kept, bonds, &mut sets, blocks, block, mobius)
-}
 
-/// Joins the global labels by the votes of all crossing triangles and candidates.
-pub(super) fn vote(
-    surface: &mut Oriented,
-    border: impl Fn(usize) -> Result<Vec<Triangle>>,
-    relations: &Sections<7>,
-    candidates: &Sections<3>,
-    blocks: Blocks,
-    workspace: &Workspace,
-) -> Result<()> {
-    let mut votes = Votes::default();
-    let mut reserved = workspace.promise("votes", 0)?;
-    for block in 0..blocks.count() {
-        let first = surface.globals[block].0;
-        for [a, b, count] in candidates.get(block)? {
-            votes.add(first + a, first + b, false, i64::from(count as i32));
+    /// Contracts patches to clusters, as far as that is safe inside the block.
+    fn contract(&mut self, cluster: u64, bonds: &mut Bonds) {
+        let clusters = self.graph.contract(Limit::Triangles(cluster));
+        let root = |patch: u32| self.patches.roots[patch as usize].0;
+        for patch in 0..self.patches.roots.len() as u32 {
+            let (of, flip) = clusters.look(patch);
+            let (of, patch) = (root(of), root(patch));
+            self.patches.sets.join(of, patch, flip);
         }
-        reserved.at_least(votes.bytes())?;
+        bonds.first = self.graph.connected().map(root).collect();
+        let pairs = self.graph.pairs();
+        bonds.pairs = pairs.map(|(a, b, sum)| (root(a), root(b), sum)).collect();
+        bonds.pairs.sort_unstable();
+        let ups = self.graph.ups();
+        bonds.ups = ups.map(|(node, up)| (root(node), up)).collect();
+        self.graph = Graph::default();
     }
-    let mut edges = Border::new(workspace)?;
-    for group in 0..blocks.count() {
-        workspace.check_cancel()?;
-        let relations = relations.get(group)?;
-        let triangles = border(group)?;
-        edges.make_room(triangles.len())?;
-        for t in triangles {
-            let key = [group as u32, t[0], t[1], t[2]];
-            let start = relations.partition_point(|r| r[..4] < key[..]);
-            let mut asks: Vec<(u32, bool, i64)> = relations[start..]
-                .iter()
-                .take_while(|r| r[..4] == key[..])
-                .map(|r| {
-                    let label = surface.globals[r[4] as usize].0 + (r[5] >> 1);
-                    (label, r[5] & 1 == 1, CROSSING * i64::from(r[6]))
-                })
-                .collect();
-            let crossing = edges.asks(t);
-            asks.extend(crossing.map(|(label, flip)| (label, flip, CROSSING * weight(0.0))));
-            // It runs as its strongest neighbour asks; the others are votes.
-            let Some(&(label, flip, _)) = asks.iter().rev().max_by_key(|ask| ask.2) else {
-                continue;
-            };
-            for &(other, turned, weight) in &asks {
-                votes.add(label, other, flip ^ turned, weight);
+
+    /// Cuts the edges inside clusters whose triangles run against each other: the later triangle goes,
+    /// unless the earlier one is gone. Edges between clusters are left.
+    fn cut(&mut self) -> Vec<bool> {
+        let mut dead = vec![false; self.inner.len()];
+        let Patches { sets, joints, .. } = &mut self.patches;
+        joints.retain(|joint| match sets.relation(joint.a, joint.b) {
+            None => true,
+            Some(flip) if flip == joint.flip => false,
+            Some(_) => {
+                dead[joint.b as usize] |= !dead[joint.a as usize];
+                false
             }
-            edges.put(t, label << 1 | u32::from(flip));
-        }
-        edges.end(group, blocks);
-        reserved.at_least(votes.bytes())?;
+        });
+        dead
     }
-    drop(edges);
-    reserved.set_held(votes.bytes());
-    votes.join(&mut surface.sets);
-    Ok(())
 }
 
-/// A crossing triangle of the surface counts for so many candidates.
-const CROSSING: i64 = 8;
+#[cfg(test)]
+mod tests;

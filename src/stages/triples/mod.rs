@@ -63,6 +63,13 @@ pub fn triples(
         blocks.count(),
         SENT_LABELLED,
     )?;
+    let count: u64 = cells.off.total();
+    let _off = workspace.reserve("off the surface", 4 * count)?;
+    let mut off: Vec<u32> = Vec::with_capacity(count as usize);
+    for tile in 0..cells.off.count() {
+        off.extend(cells.off.get(tile)?.into_iter().flatten());
+    }
+    let is_off = |v: &u32| off.binary_search(v).is_ok();
     let bytes = |block: usize| {
         let tiles = cells.tiles.of_block(block);
         tiles
@@ -77,6 +84,9 @@ pub fn triples(
             all.reserve_exact(seen.len() + received.len());
             merge(&seen, &received, &mut all);
             held.set(bytes_of(&all) + bytes_of(&seen) + bytes_of(&received));
+        }
+        if !off.is_empty() {
+            all.retain(|r| !r[..3].iter().any(is_off));
         }
         let mut sent = Vec::new();
         let mut local = [0u64; 4];

@@ -81,6 +81,7 @@ impl World {
             neighbors: args.neighbors,
             rounds: Params::default().relax,
             smoothed: false,
+            off_surface: true,
         };
         let relaxed = relax(&store, tiles, relaxing, &workspace)?;
         let ordered = store.slice(0..store.len())?;

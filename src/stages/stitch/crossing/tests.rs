@@ -46,15 +46,17 @@ fn across(starved: bool) -> (Left, [usize; 2]) {
     let blocks = Blocks::new(store.len(), BLOCK);
     let tiles = TileRanges::new(blocks, BLOCK);
     let (radius, widen) = (DiskRadius::Auto, Widen::OnLines);
-    let seen = cells(&store, tiles, 12, radius, widen, workspace)
+    let seen = cells(&store, tiles, 12, radius, widen, None, workspace)
         .unwrap()
         .0;
     let triples = triples(seen, blocks, workspace).unwrap().0;
     let places = Places {
         shape: &store,
         file: &store,
+        density: None,
     };
-    let (base, _) = base(places, triples, blocks, true, workspace).unwrap();
+    let division = Some(crate::Division::default());
+    let (base, _) = base(places, triples, blocks, division, workspace).unwrap();
     let interior = Interior::create(workspace, blocks.count()).unwrap();
     for block in 0..blocks.count() {
         insert(places, &base, &interior, blocks, block, -0.5).unwrap();

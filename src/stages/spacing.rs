@@ -1,0 +1,141 @@
+//! How dense the surface is, patch by patch, and what is too far apart for that.
+
+use crate::error::Result;
+use crate::geom::Point;
+use crate::geom::distance2;
+use crate::workspace::memory::Reservation;
+use crate::workspace::persist::{Persist, Saved};
+
+/// Ids in a patch: with ids along a curve, a small piece of surface.
+pub const PATCH: usize = 256;
+
+/// Patches in a region.
+pub const REGION: usize = 256;
+
+/// A point is off the surface if its neighbours reach more than so many times as far as is usual in its
+/// patch. With 4, three times as many points of terrestrial scans are left out; with 6, points strewn in
+/// the air are joined over a twentieth of the ground of a generated world.
+const FAR: u128 = 5;
+
+/// A limit of length.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Width {
+    /// In local spacings.
+    Spacings(f64),
+    /// In lattice steps.
+    Steps(f64),
+    /// None.
+    Any,
+}
+
+/// What is too far apart to be one surface.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Limits {
+    /// Points off the surface are left out.
+    pub off_surface: bool,
+    /// Sides of triangles.
+    pub edge: Width,
+    /// Sides of triangles that fill holes.
+    pub fill: Width,
+}
+
+/// For each patch the squared distance that the `k` nearest neighbours of a point usually reach.
+#[derive(Debug)]
+pub struct Spacings {
+    usual2: Vec<u64>,
+    _held: Reservation,
+}
+
+/// How dense the surface is, and what that limits.
+#[derive(Debug, Clone, Copy)]
+pub struct Density<'a> {
+    /// By patch.
+    pub spacings: &'a Spacings,
+    /// `k`.
+    pub neighbors: usize,
+    /// What is too far apart.
+    pub limits: Limits,
+}
+
+/// True if neighbours that reach as far as `last2` reach farther than a surface does where `usual2` is
+/// usual.
+#[must_use]
+pub fn is_far(last2: u64, usual2: u64) -> bool {
+    u128::from(last2) > FAR * FAR * u128::from(usual2)
+}
+
+/// The square of the local spacing: on a plane, so many neighbours lie in the disk up to the last one,
+/// which is so far away.
+#[must_use]
+pub fn spacing2(last2: u64, neighbors: usize) -> f64 {
+    std::f64::consts::PI * last2 as f64 / neighbors as f64
+}
+
+impl Spacings {
+    /// Takes over what was measured.
+    #[must_use]
+    pub fn new(usual2: Vec<u64>, held: Reservation) -> Self {
+        Self {
+            usual2,
+            _held: held,
+        }
+    }
+
+    /// Bytes for so many points.
+    #[must_use]
+    pub fn bytes(points: usize) -> u64 {
+        8 * points.div_ceil(PATCH) as u64
+    }
+
+    /// The squared distance that the nearest neighbours of a point usually reach.
+    #[must_use]
+    pub fn usual2(&self, id: u32) -> u64 {
+        self.usual2[id as usize / PATCH]
+    }
+}
+
+impl Density<'_> {
+    /// True if a point is off the surface: its `k` nearest neighbours reach as far as `last2`.
+    #[must_use]
+    pub fn is_off_surface(&self, id: u32, last2: u64) -> bool {
+        self.limits.off_surface && is_far(last2, self.spacings.usual2(id))
+    }
+
+    /// True if a triangle has a side that is too long for the surface at both of its ends.
+    #[must_use]
+    pub fn is_long(&self, t: [u32; 3], at: [Point; 3]) -> bool {
+        self.exceeds(self.limits.edge, t, at)
+    }
+
+    /// The same for a triangle that fills a hole.
+    #[must_use]
+    pub fn is_wide(&self, t: [u32; 3], at: [Point; 3]) -> bool {
+        self.exceeds(self.limits.fill, t, at)
+    }
+
+    fn exceeds(&self, width: Width, t: [u32; 3], at: [Point; 3]) -> bool {
+        let limit2 = |a: usize, b: usize| match width {
+            Width::Any => f64::INFINITY,
+            Width::Steps(steps) => steps * steps,
+            Width::Spacings(spacings) => {
+                let usual2 = self.spacings.usual2(t[a]).max(self.spacings.usual2(t[b]));
+                spacings * spacings * spacing2(usual2, self.neighbors)
+            }
+        };
+        let long = |(a, b): (usize, usize)| distance2(at[a], at[b]) as f64 > limit2(a, b);
+        width != Width::Any && [(0, 1), (0, 2), (1, 2)].into_iter().any(long)
+    }
+}
+
+impl Persist for Spacings {
+    fn save(&self, out: &mut Vec<u8>) {
+        self.usual2.save(out);
+    }
+
+    fn load(from: &mut Saved<'_>) -> Result<Self> {
+        let usual2: Vec<u64> = Persist::load(from)?;
+        let bytes = 8 * usual2.len() as u64;
+        let held = from.workspace.reserve("patch spacings", bytes)?;
+        Ok(Self::new(usual2, held))
+    }
+}

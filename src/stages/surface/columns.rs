@@ -1,0 +1,95 @@
+//! Points seen from above: the highest one of each column of space.
+//!
+//! What is topmost in its column faces up: ground, roofs, crowns of trees, and the outside of any closed
+//! body. A column has a square base; there is about one for every [`POINTS`] points.
+
+use crate::error::Result;
+use crate::geom::Point;
+use crate::spill::Sections;
+use crate::stages::blocks::Blocks;
+use crate::stages::order::PointStore;
+use crate::workspace::Workspace;
+use crate::workspace::memory::{bytes_of, hold};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Points for each column, if they covered the whole box around the cloud.
+pub const POINTS: u64 = 64;
+
+/// Division of the box around a cloud into columns.
+#[derive(Debug, Clone, Copy)]
+struct Columns {
+    origin: [i32; 2],
+    /// The side of a column is a power of two.
+    shift: u32,
+    wide: usize,
+    deep: usize,
+}
+
+impl Columns {
+    /// The narrowest columns of which there are no more than one for each [`POINTS`] points.
+    fn of(store: &PointStore) -> Self {
+        let bounds = store.bounds();
+        let origin = [bounds.min[0], bounds.min[1]];
+        let extent =
+            [0, 1].map(|axis| (i64::from(bounds.max[axis]) - i64::from(bounds.min[axis])) as u64);
+        let most = (store.len() as u64 / POINTS).max(1);
+        let count = |shift: u32| extent.map(|e| (e >> shift) + 1);
+        let fits = |shift: &u32| {
+            let [wide, deep] = count(*shift);
+            wide * deep <= most
+        };
+        let shift = (0..32).find(fits).unwrap_or(32);
+        let [wide, deep] = count(shift).map(|n| n as usize);
+        Self {
+            origin,
+            shift,
+            wide,
+            deep,
+        }
+    }
+
+    fn at(&self, p: Point) -> usize {
+        let [x, y] = [0, 1].map(|axis| ((p[axis] - self.origin[axis]) as usize) >> self.shift);
+        y * self.wide + x
+    }
+}
+
+/// For each block the ids of its points that are the highest in their columns, ascending. Of equally
+/// high ones the smallest id.
+///
+/// # Errors
+/// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
+/// [`crate::Error::Cancelled`].
+pub fn highest(store: &PointStore, blocks: Blocks, workspace: &Workspace) -> Result<Sections<1>> {
+    let columns = Columns::of(store);
+    let count = columns.wide * columns.deep;
+    let reserved = workspace.reserve("columns", 8 * count as u64)?;
+    // Height in the upper half, so that the larger is the higher; in the lower one a smaller id is larger.
+    let highest: Vec<AtomicU64> = (0..count).map(|_| AtomicU64::new(0)).collect();
+    let bytes = |block: usize| 12 * blocks.ids(block).len() as u64;
+    workspace.for_each_unit("columns: block", blocks.count(), bytes, |block| {
+        let ids = blocks.ids(block);
+        let points = store.slice(ids.start as usize..ids.end as usize)?;
+        let _held = hold(bytes_of(&points));
+        for (id, p) in ids.zip(&points) {
+            let place = (p[2] as u64) << 32 | u64::from(!id);
+            highest[columns.at(*p)].fetch_max(place, Ordering::Relaxed);
+        }
+        Ok(())
+    })?;
+    let mut ids: Vec<u32> = highest
+        .iter()
+        .map(|place| place.load(Ordering::Relaxed))
+        .filter(|place| *place != 0)
+        .map(|place| !(place as u32))
+        .collect();
+    drop((highest, reserved));
+    let _held = workspace.reserve("columns", bytes_of(&ids))?;
+    ids.sort_unstable();
+    let sections = Sections::create(workspace, "stitch.highest", blocks.count())?;
+    for part in ids.chunk_by(|a, b| blocks.of(*a) == blocks.of(*b)) {
+        let records: Vec<[u32; 1]> = part.iter().map(|id| [*id]).collect();
+        sections.put(blocks.of(part[0]) as usize, &records)?;
+    }
+    Ok(sections)
+}

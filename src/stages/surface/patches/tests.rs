@@ -1,0 +1,133 @@
+//! Patches of bands with folds.
+
+use super::super::evidence::Division;
+use super::*;
+use crate::geom::Point;
+use crate::stages::located::Located;
+use proptest::prelude::*;
+
+/// The triangles of a sheet `wide` long and three points high that closes on itself, with a twist or
+/// without, in the order of their ids; `names` are the ids of its points, and `gone` are missing.
+pub(in super::super) fn band(
+    wide: usize,
+    twist: bool,
+    names: &[u32],
+    gone: &[usize],
+) -> Vec<Triangle> {
+    let at = |x: usize, y: usize| {
+        let y = if x >= wide && twist { 2 - y } else { y };
+        names[x % wide * 3 + y]
+    };
+    let squares = (0..wide).flat_map(|x| [(x, 0), (x, 1)]);
+    let halves = squares.flat_map(|(x, y)| {
+        let [a, b, c, d] = [at(x, y), at(x, y + 1), at(x + 1, y), at(x + 1, y + 1)];
+        [[a, b, c], [b, c, d]]
+    });
+    let mut all: Vec<Triangle> = halves.collect();
+    all.iter_mut().for_each(|t| t.sort_unstable());
+    let mut number = 0;
+    all.retain(|_| {
+        number += 1;
+        !gone.contains(&(number - 1))
+    });
+    all.sort_unstable();
+    all
+}
+
+/// Evidence of how triangles lie, and nothing else.
+pub(in super::super) fn evidence(places: &[Point], division: Division) -> Evidence {
+    Evidence {
+        places: Located::of(places),
+        division,
+        ..Evidence::default()
+    }
+}
+
+/// Ids in some order, and places.
+pub(in super::super) fn points(count: usize) -> impl Strategy<Value = (Vec<u32>, Vec<Point>)> {
+    let names: Vec<u32> = (0..count as u32).collect();
+    let places = prop::collection::vec(prop::array::uniform3(0..50), count);
+    // Flat, or not at all.
+    let places = (places, any::<bool>()).prop_map(|(mut places, flat)| {
+        let flatten = |p: &mut Point| p[2] = if flat { p[2] / 25 } else { p[2] };
+        places.iter_mut().for_each(flatten);
+        places
+    });
+    (Just(names).prop_shuffle(), places)
+}
+
+proptest! {
+    #[test]
+    fn patches_are_flat_parts_of_runs_and_nothing_is_lost(
+        (names, places) in points(27),
+        twist in any::<bool>(),
+        gone in prop::collection::vec(0usize..36, 0..9),
+        patch in 1u32..30,
+    ) {
+        let triangles = band(9, twist, &names, &gone);
+        let evidence = evidence(&places, Division { patch, cluster: 0 });
+        let ids = 0..places.len() as u32;
+        let mut patches = Patches::of(ids.clone(), &triangles, &evidence, patch);
+        let mut joints = patches.joints.clone();
+        for (n, sides) in across(ids, &triangles).into_iter().enumerate() {
+            for (a, b, opposite, _) in EDGES {
+                let (m, _) = parts(sides[opposite]);
+                if sides[opposite] == NONE || m < n {
+                    continue;
+                }
+                let (t, other) = (triangles[n], triangles[m]);
+                let flip = opposed(t, other, t[a], t[b]);
+                let cosine = cosine(evidence.normal(t), evidence.normal(other), flip);
+                let weight = weight(cosine) as u8;
+                let one = patches.of[n] == patches.of[m];
+                let near = t[0] / patch == other[0] / patch;
+                prop_assert!(one || !near || cosine <= FLAT, "{:?} {:?}", t, other);
+                prop_assert!(!one || near);
+                if !one || patches.sets.relation(n as u32, m as u32) != Some(flip) {
+                    let joint = Joint { a: n as u32, b: m as u32, flip, weight };
+                    prop_assert_eq!(joints.remove(0), joint);
+                }
+            }
+        }
+        prop_assert_eq!(joints, []);
+        let mut first: Vec<u32> = Vec::new();
+        for (n, of) in (0..).zip(&patches.of) {
+            prop_assert!(*of as usize <= first.len());
+            if *of as usize == first.len() {
+                first.push(n);
+            }
+            prop_assert_eq!(patches.sets.find(n).0, first[*of as usize]);
+        }
+        let roots: Vec<u32> = patches.roots.iter().map(|(root, _)| *root).collect();
+        prop_assert_eq!(roots, first);
+        let count: u32 = patches.roots.iter().map(|(_, count)| count).sum();
+        prop_assert_eq!(count as usize, triangles.len());
+    }
+}
+
+/// A flat sheet that is folded once.
+#[test]
+fn a_patch_ends_at_a_fold_and_where_its_run_ends() {
+    let names: Vec<u32> = (0..30).collect();
+    // The last strip closes the band.
+    let triangles: Vec<Triangle> = band(10, false, &names, &[36, 37, 38, 39]);
+    let places: Vec<Point> = (0..30)
+        .map(|id: i32| {
+            [
+                id / 3 * 10,
+                id % 3 * 10,
+                if id < 15 { 0 } else { 20 * (id / 3 - 4) },
+            ]
+        })
+        .collect();
+    for (patch, firsts) in [(30, vec![0, 12]), (18, vec![0, 12, 18])] {
+        let evidence = evidence(&places, Division { patch, cluster: 0 });
+        let patches = Patches::of(0..30, &triangles, &evidence, patch);
+        let found: Vec<u32> = patches
+            .roots
+            .iter()
+            .map(|(root, _)| triangles[*root as usize][0])
+            .collect();
+        assert_eq!(found, firsts);
+    }
+}

@@ -1,0 +1,131 @@
+//! Where a block is cut.
+
+use super::super::evidence::Division;
+use super::super::parity::ParitySets;
+use super::super::patches::tests::{band, evidence, points};
+use super::super::sides::{NONE, across, parts};
+use super::super::star::{EDGES, opposed};
+use super::*;
+use crate::geom::Point;
+use proptest::prelude::*;
+
+/// Orients them, in one block, with their points where `places` says.
+fn oriented(
+    triangles: &[Triangle],
+    places: &[Point],
+    division: Division,
+) -> (ParitySets, Vec<bool>) {
+    let ids = 0..places.len() as u32;
+    let evidence = &evidence(places, division);
+    let mut weigher = Weigher {
+        patches: Patches::of(ids.clone(), triangles, evidence, division.patch),
+        graph: Graph::default(),
+        inner: triangles,
+        evidence,
+        ids,
+    };
+    let mut bonds = Bonds::default();
+    weigher.add_patches();
+    weigher.add_connections(&[], &mut bonds);
+    weigher.contract(division.cluster, &mut bonds);
+    let dead = weigher.cut();
+    assert!(weigher.patches.joints.is_empty(), "all is one cluster");
+    (weigher.patches.sets, dead)
+}
+
+proptest! {
+    #[test]
+    fn what_is_left_can_be_oriented_and_what_is_removed_could_not(
+        (names, places) in points(27),
+        twist in any::<bool>(),
+        gone in prop::collection::vec(0usize..36, 0..9),
+        patch in 1u32..30,
+    ) {
+        let triangles = band(9, twist, &names, &gone);
+        let division = Division { patch, cluster: 1000 };
+        let (mut sets, dead) = oriented(&triangles, &places, division);
+        let mut contradicted = vec![false; triangles.len()];
+        for (n, sides) in across(0..27, &triangles).into_iter().enumerate() {
+            for (a, b, opposite, _) in EDGES {
+                let (m, _) = parts(sides[opposite]);
+                if sides[opposite] == NONE || m < n {
+                    continue;
+                }
+                let (t, other) = (triangles[n], triangles[m]);
+                let flip = opposed(t, other, t[a], t[b]);
+                let fits = sets.relation(n as u32, m as u32) == Some(flip);
+                prop_assert!(fits || dead[n] || dead[m], "{} and {} are left and contradict", n, m);
+                contradicted[m] |= !fits;
+            }
+        }
+        for (dead, contradicted) in dead.iter().zip(contradicted) {
+            prop_assert!(!dead || contradicted);
+        }
+        let flat = places.iter().all(|p| p[2] < 2);
+        prop_assert!(twist || flat || !dead.contains(&true) || patch < 30);
+    }
+}
+
+/// A band with a twist lies flat but for one place, and that is not where its ids end. The later triangle
+/// goes of each edge that is cut, so it may be one beside the fold.
+#[test]
+fn the_surface_is_cut_where_it_is_folded() {
+    let names: Vec<u32> = (0..36).collect();
+    let triangles = band(12, true, &names, &[]);
+    let places: Vec<Point> = (0..36)
+        .map(|id: i32| {
+            let (along, across) = (id / 3, id % 3);
+            let across = if along < 5 { 2 - across } else { across };
+            [(along + 7) % 12 * 10, across * 10, along % 2]
+        })
+        .collect();
+    for patch in [256, 7] {
+        let division = Division {
+            patch,
+            cluster: 1000,
+        };
+        let (_, dead) = oriented(&triangles, &places, division);
+        let removed = (0..triangles.len()).filter(|&n| dead[n]);
+        let removed: Vec<Triangle> = removed.map(|n| triangles[n]).collect();
+        assert!(!removed.is_empty());
+        for t in removed {
+            let along = t.map(|v| v / 3);
+            assert!(along.contains(&4) || along.contains(&5), "{t:?}");
+        }
+    }
+}
+
+/// A torn band with a twist. Two edges contradict, both of one triangle: once that is gone, the other
+/// edge is, too.
+#[test]
+fn a_removed_triangle_removes_no_others() {
+    let triangles = [
+        [0, 1, 2],
+        [0, 2, 10],
+        [0, 9, 10],
+        [1, 2, 4],
+        [1, 3, 8],
+        [1, 4, 8],
+        [2, 6, 10],
+        [3, 6, 8],
+        [4, 8, 11],
+        [6, 8, 10],
+        [8, 10, 11],
+    ];
+    let places = [
+        [0, 5, 2],
+        [0, 3, 4],
+        [1, 3, 0],
+        [5, 2, 0],
+        [0, 0, 0],
+        [2, 0, 4],
+        [5, 0, 0],
+        [5, 5, 0],
+        [2, 1, 4],
+        [3, 3, 0],
+        [4, 3, 2],
+        [4, 1, 1],
+    ];
+    let (_, dead) = oriented(&triangles, &places, Division::default());
+    assert_eq!(dead.iter().filter(|dead| **dead).count(), 1);
+}

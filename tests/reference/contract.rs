@@ -1,0 +1,170 @@
+//! A graph of patches or labels that is contracted pair by pair (section 1.4, robust, step 4).
+
+use super::Weighing;
+use super::homes::{Homes, Side};
+use std::cmp::Reverse;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// What is known of a node.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Node {
+    pub triangles: usize,
+    pub outside: i64,
+    /// Evidence that it faces up as it runs.
+    pub up: i64,
+}
+
+/// Two nodes, the smaller number first.
+pub type Pair = [usize; 2];
+
+/// Nodes are numbered; one that was contracted with another keeps its number, but has no pairs.
+#[derive(Debug, Clone, Default)]
+pub struct Graph {
+    pub nodes: Vec<Node>,
+    pub sums: BTreeMap<Pair, i64>,
+    /// The node that faces up.
+    pub sky: Option<usize>,
+}
+
+fn pair(a: usize, b: usize) -> Pair {
+    [a.min(b), a.max(b)]
+}
+
+impl Graph {
+    /// Adds a node; its number.
+    pub fn push(&mut self) -> usize {
+        self.nodes.push(Node::default());
+        self.nodes.len() - 1
+    }
+
+    /// Adds a weight for that both sides are one orientation; nothing if they have the same node.
+    pub fn add(&mut self, a: Side, b: Side, weight: i64) {
+        if a.home != b.home {
+            let sign = if a.turned == b.turned { 1 } else { -1 };
+            *self.sums.entry(pair(a.home, b.home)).or_default() += sign * weight;
+        }
+    }
+
+    /// Adds the sky, and a pair with each node that has evidence.
+    pub fn push_sky(&mut self) {
+        let sky = self.push();
+        self.sky = Some(sky);
+        for node in 0..sky {
+            if self.nodes[node].up != 0 {
+                self.sums.insert([node, sky], 0);
+            }
+        }
+    }
+
+    /// The upward weight of a node.
+    fn upward(&self, node: usize) -> i64 {
+        let size = self.nodes[node].up.abs();
+        let root = (0..).find(|x| (x + 1) * (x + 1) > size).expect("a root");
+        16 * root
+    }
+
+    /// The sum of a pair; one with the sky counts with the upward weight of the other node.
+    fn sum(&self, pair: Pair) -> i64 {
+        let sum = self.sums[&pair];
+        match self.sky {
+            Some(sky) if pair[1] == sky => {
+                sum + self.nodes[pair[0]].up.signum() * self.upward(pair[0])
+            }
+            _ => sum,
+        }
+    }
+
+    fn pairs_of(&self, node: usize) -> Vec<Pair> {
+        let all = self.sums.keys().copied();
+        all.filter(|pair| pair.contains(&node)).collect()
+    }
+
+    /// True if the node has a pair or an outside.
+    pub fn connected(&self, node: usize) -> bool {
+        self.nodes[node].outside > 0 || !self.pairs_of(node).is_empty()
+    }
+
+    /// All that connects a node.
+    fn total(&self, node: usize) -> i64 {
+        let pairs = self.pairs_of(node).into_iter();
+        let sums: i64 = pairs.map(|pair| self.sum(pair).abs()).sum();
+        sums + self.nodes[node].outside + self.upward(node)
+    }
+
+    /// Whether a pair may be contracted to a cluster with up to `most` triangles, or more if it
+    /// dominates.
+    fn may(&self, pair: Pair, most: usize, met: &mut Weighing) -> bool {
+        let sum = self.sum(pair);
+        let dominates = pair.iter().any(|&node| 2 * sum.abs() >= self.total(node));
+        let both: usize = pair.iter().map(|&node| self.nodes[node].triangles).sum();
+        if !dominates && both > most {
+            met.capped += 1;
+            return false;
+        }
+        let [a, b] = pair.map(|node| self.nodes[node].up);
+        let differ = (a < 0) != ((if sum < 0 { -b } else { b }) < 0);
+        if differ && sum.abs() < self.upward(pair[0]).min(self.upward(pair[1])) {
+            met.against += 1;
+            return false;
+        }
+        met.dominated += usize::from(both > most);
+        true
+    }
+
+    /// The node that gives a cluster its number and its run, and the other one.
+    fn named([a, b]: Pair, graph: &Self) -> (usize, usize) {
+        let [of_a, of_b] = [a, b].map(|node| graph.pairs_of(node).len());
+        if graph.sky == Some(b) || graph.sky != Some(a) && of_b > of_a {
+            (b, a)
+        } else {
+            (a, b)
+        }
+    }
+
+    /// Makes one node a part of another; the pairs that it renamed or added to.
+    fn merge(&mut self, stays: usize, goes: usize, turned: bool) -> Vec<Pair> {
+        self.sums.remove(&pair(stays, goes));
+        let part = std::mem::take(&mut self.nodes[goes]);
+        let node = &mut self.nodes[stays];
+        node.triangles += part.triangles;
+        node.outside += part.outside;
+        node.up += if turned { -part.up } else { part.up };
+        let mut changed = Vec::new();
+        for old in self.pairs_of(goes) {
+            let sum = self.sums.remove(&old).expect("a pair");
+            let other = if old[0] == goes { old[1] } else { old[0] };
+            let new = pair(stays, other);
+            *self.sums.entry(new).or_default() += if turned { -sum } else { sum };
+            changed.push(new);
+        }
+        changed
+    }
+
+    /// Contracts pairs, without `most` all of them, else those that may be. Gives the cluster of each
+    /// node, by the number of the node that it is called after, and whether the node is turned in it.
+    pub fn contract(&mut self, most: Option<usize>, met: &mut Weighing) -> Homes {
+        let mut clusters = Homes::apart(self.nodes.len());
+        let mut due: BTreeSet<Pair> = self.sums.keys().copied().collect();
+        loop {
+            let first = |pair: &Pair| (self.sum(*pair).abs(), Reverse(*pair));
+            let Some(pair) = due.iter().copied().max_by_key(first) else {
+                return clusters;
+            };
+            due.remove(&pair);
+            if let Some(most) = most
+                && !self.may(pair, most, met)
+            {
+                continue;
+            }
+            let sum = self.sum(pair);
+            let (stays, goes) = Self::named(pair, self);
+            met.contracted(sum, stays > goes, self.sky == Some(stays));
+            let [a, b] =
+                [(stays, false), (goes, sum < 0)].map(|(home, turned)| Side { home, turned });
+            clusters.join(a, b);
+            let changed = self.merge(stays, goes, sum < 0);
+            due.retain(|pair| !pair.contains(&goes));
+            due.extend(changed);
+        }
+    }
+}

@@ -1,0 +1,216 @@
+//! Patches of a block and what connects them (section 1.4, robust, steps 1 to 3).
+
+use super::Weighing;
+use super::contract::Graph;
+use super::homes::{Homes, Side};
+use super::insert::normal;
+use super::surface::{Edge, Surface, Triangle, alike, edges};
+use outcrop::geom::Point;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// The normal of the run i → j → k, of length one.
+pub fn unit_normal(points: &[Point], t: Triangle) -> [f64; 3] {
+    let n = normal(points, t).map(|x| x as f64);
+    let length = (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]).sqrt();
+    n.map(|x| if length > 0.0 { x / length } else { x })
+}
+
+/// The cosine between two triangles at an edge, run alike, by the normals that `unit` gives.
+pub fn cosine(unit: impl Fn(Triangle) -> [f64; 3], a: Triangle, b: Triangle, edge: Edge) -> f64 {
+    let (n, m) = (unit(a), unit(b));
+    let dot = n[0] * m[0] + n[1] * m[1] + n[2] * m[2];
+    if alike(a, b, edge) { dot } else { -dot }
+}
+
+/// The weight of an edge.
+pub fn weight(cosine: f64) -> i64 {
+    1 + (15.0 * cosine.max(0.0)).floor() as i64
+}
+
+/// Step 2: the points that are the highest of their columns.
+pub fn highest(points: &[Point]) -> BTreeSet<u32> {
+    let least = |axis: usize| points.iter().map(|p| i64::from(p[axis])).min();
+    let most = |axis: usize| points.iter().map(|p| i64::from(p[axis])).max();
+    let (Some(x), Some(y)) = (least(0), least(1)) else {
+        return BTreeSet::new();
+    };
+    let (wide, deep) = (most(0).expect("points") - x, most(1).expect("points") - y);
+    let allowed = (points.len() as i64 / 64).max(1);
+    let mut side = 1;
+    while (wide / side + 1) * (deep / side + 1) > allowed {
+        side *= 2;
+    }
+    let mut highest: BTreeMap<[i64; 2], u32> = BTreeMap::new();
+    for (id, p) in (0..).zip(points) {
+        let column = [(i64::from(p[0]) - x) / side, (i64::from(p[1]) - y) / side];
+        let best = highest.entry(column).or_insert(id);
+        // Of equally high ones the smallest id was first.
+        if p[2] > points[*best as usize][2] {
+            *best = id;
+        }
+    }
+    highest.into_values().collect()
+}
+
+/// What there is of a block.
+pub struct Block<'a> {
+    /// Of the shape.
+    pub points: &'a [Point],
+    /// Its interior triangles.
+    pub surface: Surface,
+    /// The crossing T3 that no vertex of it flags.
+    pub crossing: BTreeSet<Triangle>,
+    /// Its interior candidates.
+    pub candidates: BTreeSet<Triangle>,
+    /// The highest points of columns.
+    pub highest: &'a BTreeSet<u32>,
+    /// `P`.
+    pub run: u32,
+}
+
+/// The patches of a block.
+pub struct Patches {
+    /// The patch of each triangle, and whether it is turned in it.
+    pub of: BTreeMap<Triangle, Side>,
+    pub graph: Graph,
+}
+
+impl Block<'_> {
+    /// The edges between its triangles, by the smaller triangle, then in the order of its edges:
+    /// smaller and larger triangle, and the edge.
+    pub fn joints(&self) -> Vec<(Triangle, Triangle, Edge)> {
+        let mut joints = Vec::new();
+        for &t in self.surface.triangles() {
+            for edge in edges(t) {
+                let others = self.surface.at_edge(edge).into_iter();
+                joints.extend(others.filter(|o| t < *o).map(|other| (t, other, edge)));
+            }
+        }
+        joints
+    }
+
+    fn cosine(&self, a: Triangle, b: Triangle, edge: Edge) -> f64 {
+        cosine(|t| unit_normal(self.points, t), a, b, edge)
+    }
+
+    /// Steps 1 to 3.
+    pub fn patches(&self, met: &mut Weighing) -> Patches {
+        let mut patches = Patches {
+            of: self.joined(met),
+            graph: Graph::default(),
+        };
+        let count = patches.of.values().map(|side| side.home + 1).max();
+        (0..count.unwrap_or(0)).for_each(|_| _ = patches.graph.push());
+        self.add_evidence(&mut patches);
+        self.add_edges(&mut patches);
+        self.add_outside(&mut patches);
+        for &c in &self.candidates {
+            self.add_votes(c, &mut patches, met);
+        }
+        patches
+    }
+
+    /// Step 1. A patch runs as its smallest triangle does.
+    fn joined(&self, met: &mut Weighing) -> BTreeMap<Triangle, Side> {
+        let all: Vec<Triangle> = self.surface.triangles().iter().copied().collect();
+        let number = |t| Side {
+            home: all.iter().position(|u| *u == t).expect("a triangle"),
+            turned: false,
+        };
+        let mut sets = Homes::apart(all.len());
+        for (t, other, edge) in self.joints() {
+            let near = t[0] / self.run == other[0] / self.run;
+            if near && self.cosine(t, other, edge) > 0.9 {
+                let turned = !alike(t, other, edge);
+                let asks = [
+                    number(t),
+                    Side {
+                        turned,
+                        ..number(other)
+                    },
+                ];
+                if sets.conflict(&asks) {
+                    met.folded += 1;
+                } else {
+                    sets.join(asks[0], asks[1]);
+                }
+            }
+        }
+        // Patches so far, each with the side of its smallest triangle.
+        let mut patches: Vec<Side> = Vec::new();
+        let mut of = BTreeMap::new();
+        for &t in &all {
+            let side = sets.seen_from_label(number(t));
+            let known = patches.iter().position(|first| first.home == side.home);
+            let home = known.unwrap_or_else(|| {
+                patches.push(side);
+                patches.len() - 1
+            });
+            let turned = side.turned != patches[home].turned;
+            of.insert(t, Side { home, turned });
+        }
+        of
+    }
+
+    /// Step 2, and the numbers of triangles.
+    fn add_evidence(&self, patches: &mut Patches) {
+        for (&t, side) in &patches.of {
+            let node = &mut patches.graph.nodes[side.home];
+            node.triangles += 1;
+            for v in t {
+                if self.highest.contains(&v) {
+                    let up = (16.0 * unit_normal(self.points, t)[2]).trunc() as i64;
+                    node.up += if side.turned { -up } else { up };
+                }
+            }
+        }
+    }
+
+    /// Step 3: edges.
+    fn add_edges(&self, patches: &mut Patches) {
+        for (t, other, edge) in self.joints() {
+            let weight = 8 * weight(self.cosine(t, other, edge));
+            let (a, b) = (patches.of[&t], self.asks(patches, other, t, edge));
+            patches.graph.add(a, b, weight);
+        }
+    }
+
+    /// The orientation that `other` asks of `t`.
+    fn asks(&self, patches: &Patches, other: Triangle, t: Triangle, edge: Edge) -> Side {
+        let side = patches.of[&other];
+        Side {
+            turned: side.turned == alike(t, other, edge),
+            ..side
+        }
+    }
+
+    /// Step 3: edges to crossing triangles.
+    fn add_outside(&self, patches: &mut Patches) {
+        for &c in &self.crossing {
+            for edge in edges(c) {
+                for t in self.surface.at_edge(edge) {
+                    patches.graph.nodes[patches.of[&t].home].outside += 256;
+                }
+            }
+        }
+    }
+
+    /// Step 3: the votes of a candidate.
+    fn add_votes(&self, c: Triangle, patches: &mut Patches, met: &mut Weighing) {
+        let mut asked = Vec::new();
+        for edge in edges(c) {
+            for t in self.surface.at_edge(edge) {
+                let weight = weight(self.cosine(c, t, edge));
+                asked.push((self.asks(patches, t, c, edge), weight));
+            }
+        }
+        met.crowded += usize::from(asked.len() > 3);
+        asked.truncate(3);
+        for (n, &(a, of_a)) in asked.iter().enumerate() {
+            for &(b, of_b) in &asked[..n] {
+                met.votes += usize::from(a.home != b.home);
+                patches.graph.add(a, b, of_a.min(of_b));
+            }
+        }
+    }
+}

@@ -1,0 +1,106 @@
+//! What is met while the base is oriented by evidence: tests ask that everything is.
+
+/// How often things happened.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Weighing {
+    /// Step 1: joins of triangles that contradicted those before.
+    pub folded: usize,
+    /// Step 3: pairs of patches that candidates voted on, and candidates with more than three triangles.
+    pub votes: usize,
+    pub crowded: usize,
+    /// Step 3: crossing T3 at an edge of a block that only vertices of other blocks flag.
+    pub flagged_elsewhere: usize,
+    /// Step 4: contracted only because the pair dominates; not contracted because of the number of
+    /// triangles; and because facing up was against it.
+    pub dominated: usize,
+    pub capped: usize,
+    pub against: usize,
+    /// Steps 4 and 6: contracted with a sum of 0, and called by the larger number.
+    pub zero: usize,
+    pub renamed: usize,
+    /// Step 5: triangles removed.
+    pub cut_inside: usize,
+    /// Step 6: crossing triangles with a node of their own.
+    pub own_nodes: usize,
+    /// Step 6: nodes contracted with the sky, and those of them that were turned.
+    pub under_sky: usize,
+    pub turned_by_sky: usize,
+    /// Step 7: crossing triangles removed, and triangles at edges between labels.
+    pub cut_crossing: usize,
+    pub cut_between: usize,
+}
+
+impl Weighing {
+    /// Counts a contraction.
+    pub fn contracted(&mut self, sum: i64, larger_number: bool, sky: bool) {
+        self.zero += usize::from(sum == 0);
+        self.renamed += usize::from(larger_number && !sky);
+        self.under_sky += usize::from(sky);
+        self.turned_by_sky += usize::from(sky && sum < 0);
+    }
+
+    /// All counts with their names.
+    pub fn all(&self) -> [(&'static str, usize); 15] {
+        [
+            ("folded", self.folded),
+            ("votes", self.votes),
+            ("crowded", self.crowded),
+            ("flagged elsewhere", self.flagged_elsewhere),
+            ("dominated", self.dominated),
+            ("capped", self.capped),
+            ("against", self.against),
+            ("zero", self.zero),
+            ("renamed", self.renamed),
+            ("cut inside", self.cut_inside),
+            ("own nodes", self.own_nodes),
+            ("under sky", self.under_sky),
+            ("turned by sky", self.turned_by_sky),
+            ("cut crossing", self.cut_crossing),
+            ("cut between", self.cut_between),
+        ]
+    }
+
+    /// Adds the counts of another run.
+    pub fn add(&mut self, more: &Self) {
+        let Self {
+            folded,
+            votes,
+            crowded,
+            flagged_elsewhere,
+            dominated,
+            capped,
+            against,
+            zero,
+            renamed,
+            cut_inside,
+            own_nodes,
+            under_sky,
+            turned_by_sky,
+            cut_crossing,
+            cut_between,
+        } = more;
+        self.folded += folded;
+        self.votes += votes;
+        self.crowded += crowded;
+        self.flagged_elsewhere += flagged_elsewhere;
+        self.dominated += dominated;
+        self.capped += capped;
+        self.against += against;
+        self.zero += zero;
+        self.renamed += renamed;
+        self.cut_inside += cut_inside;
+        self.own_nodes += own_nodes;
+        self.under_sky += under_sky;
+        self.turned_by_sky += turned_by_sky;
+        self.cut_crossing += cut_crossing;
+        self.cut_between += cut_between;
+    }
+
+    /// The names of those that never happened, but for the given ones.
+    pub fn missing(&self, but: &[&str]) -> Vec<&'static str> {
+        let all = self.all().into_iter();
+        all.filter(|(name, count)| *count == 0 && !but.contains(name))
+            .map(|(name, _)| name)
+            .collect()
+    }
+}
