@@ -28,6 +28,12 @@ impl Places<'_> {
         !std::ptr::eq(self.shape, self.file)
     }
 
+    /// True if positions in the file may make triangles unfit that were fit to be seen by cells.
+    #[must_use]
+    pub fn limit_triangles(&self) -> bool {
+        self.differ() || self.density.is_some()
+    }
+
     /// True if a triangle, with its corners where they are in the file, is on a line or too long.
     #[must_use]
     pub fn unfit(&self, t: [u32; 3], at: [Point; 3]) -> bool {

@@ -147,7 +147,9 @@ impl Look<'_> {
         let mut found = Found::default();
         let (mut triangles, mut candidates) = self.part(block, &mut found)?;
         let mut held = hold(bytes_of(&triangles) + bytes_of(&candidates));
-        self.drop_flat(block, &mut triangles, &mut candidates, &mut found)?;
+        let file = self.drop_unfit(block, &mut triangles, &mut candidates, &mut found)?;
+        // Where no point was moved the same positions tell how triangles lie.
+        let located = file.filter(|_| self.by_evidence.is_some() && !self.places.differ());
         let star = Star::of(self.blocks.ids(block), &triangles);
         let mut flagged = Vec::new();
         let mut refusing = Refusing::default();
@@ -182,7 +184,7 @@ impl Look<'_> {
         self.candidates.put(block, &candidates)?;
         held.set(bytes_of(&triangles) + bytes_of(&candidates) + bytes_of(&flagged));
         let evidence = match &self.by_evidence {
-            Some(by) => Some(self.evidence(block, &triangles, &candidates, by)?),
+            Some(by) => Some(self.evidence(block, located, &triangles, &candidates, by)?),
             None => None,
         };
         held.set(bytes_of(&triangles));
@@ -194,16 +196,20 @@ impl Look<'_> {
         })
     }
 
-    /// How the triangles around a block and its candidates lie.
+    /// How the triangles around a block and its candidates lie; `located` if their positions are known.
     fn evidence(
         &self,
         block: usize,
+        located: Option<Located>,
         triangles: &[Triangle],
         candidates: &[[u32; 4]],
         (division, highest): &(Division, Sections<1>),
     ) -> Result<Evidence> {
         let vertices = triangles.iter().flatten().copied();
-        let places = Located::load(self.places.shape, self.blocks, block, vertices)?;
+        let places = match located {
+            Some(located) => located,
+            None => Located::load(self.places.shape, self.blocks, block, vertices)?,
+        };
         let candidates: Vec<Triangle> = candidates.iter().map(|r| [r[0], r[1], r[2]]).collect();
         Ok(Evidence {
             division: *division,
@@ -214,15 +220,15 @@ impl Look<'_> {
         })
     }
 
-    /// Leaves out what would be on a line in the file.
-    fn drop_flat(
+    /// Leaves out what would be on a line in the file, or too long; the positions that told.
+    fn drop_unfit(
         &self,
         block: usize,
         triangles: &mut Vec<Triangle>,
         candidates: &mut Vec<[u32; 4]>,
         found: &mut Found,
-    ) -> Result<()> {
-        if self.places.differ() || self.places.density.is_some() {
+    ) -> Result<Option<Located>> {
+        if self.places.limit_triangles() {
             let vertices = triangles.iter().flatten().copied();
             let file = Located::load(self.places.file, self.blocks, block, vertices)?;
             let (mut t3, open) = (0, candidates.len());
@@ -237,8 +243,9 @@ impl Look<'_> {
             });
             found.flat = t3;
             found.flat_candidates = (open - candidates.len()) as u64;
+            return Ok(Some(file));
         }
-        Ok(())
+        Ok(None)
     }
 
     /// The T3 triangles that touch a block, ascending, and its interior candidates so far. The

@@ -243,7 +243,7 @@ impl BlockWork {
             let base = self.triangles[self.interior_base..].iter().flatten();
             open.chain(base.copied()).collect()
         };
-        if places.differ() || places.density.is_some() {
+        if places.limit_triangles() {
             let all = vertices(&candidates).into_iter();
             let file = Located::load(places.file, blocks, block, all)?;
             let before = candidates.len();

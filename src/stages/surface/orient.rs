@@ -188,23 +188,23 @@ impl Oriented {
             debug_assert!(label < globals, "a seam at a label of the block alone");
             self.sets.look(first + label).1 ^ (r[3] & 1 == 1)
         };
-        let mut gone = Vec::new();
+        let mut gone = 0;
         let mut cut = vec![false; interior.len()];
         for [a, b] in seams.get(block)? {
             let (a, b, flip) = (a as usize, (b >> 1) as usize, b & 1 == 1);
             if !cut[a] && !cut[b] && turned(&interior[a]) ^ turned(&interior[b]) != flip {
                 cut[b] = true;
-                gone.push(b);
+                gone += 1;
             }
         }
-        if !gone.is_empty() {
+        if gone > 0 {
             let mut number = 0;
             interior.retain(|_| {
                 number += 1;
                 !cut[number - 1]
             });
         }
-        Ok((interior, gone.len() as u64))
+        Ok((interior, gone))
     }
 }
 
