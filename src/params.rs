@@ -149,14 +149,16 @@ pub struct Params {
     /// Fill holes of up to this many edges (paper: 500).
     pub max_hole_edges: usize,
     /// Remove components with fewer triangles (paper: 10); `None`: 10, but in noise, where many
-    /// points were relaxed, one for each 2500 points, from 10 to 300, or to 1000 with smoothing.
+    /// points were relaxed, one for each 5000 points, from 10 to 150; with smoothing one for each 2500,
+    /// from 10 to 1000.
     pub min_component: Option<u64>,
     /// Keep points that are off the surface: far from their neighbours for how dense these are. The paper's
     /// method keeps them, and has no limits of length, whatever is said here.
     pub keep_all: bool,
     /// Longest side of a triangle; longer ones stay if the surface is as sparse at one of their ends.
     pub max_edge: MaxWidth,
-    /// Longest side of a triangle that fills a hole, likewise.
+    /// Width of triangles that fill holes: larger ones than an equilateral triangle with such sides stay
+    /// out, likewise.
     pub max_fill: MaxWidth,
     /// Bridges, holes and small components (paper, section 3.6).
     pub repair: bool,
@@ -193,8 +195,8 @@ impl Default for Params {
             max_hole_edges: 500,
             min_component: None,
             keep_all: false,
-            max_edge: MaxWidth::Spacings(11.0),
-            max_fill: MaxWidth::Spacings(25.0),
+            max_edge: MaxWidth::Spacings(8.0),
+            max_fill: MaxWidth::Spacings(9.0),
             repair: true,
             block: BLOCK,
             division: Division::default(),
@@ -244,13 +246,13 @@ impl Params {
     /// relaxed.
     #[must_use]
     pub fn least_component(&self, points: u64, noisy: bool) -> u64 {
-        let most = match (self.smooth > 0, noisy) {
-            (true, _) => 1000,
-            (false, true) => 300,
-            (false, false) => 10,
+        let (each, most) = match (self.smooth > 0, noisy) {
+            (true, _) => (2500, 1000),
+            (false, true) => (5000, 150),
+            (false, false) => return self.min_component.unwrap_or(10),
         };
         self.min_component
-            .unwrap_or_else(|| (points / 2500).clamp(10, most))
+            .unwrap_or_else(|| (points / each).clamp(10, most))
     }
 
     /// # Errors

@@ -161,8 +161,8 @@ pub struct Surface {
     /// usual around them, such as birds, dust and wires
     #[arg(long)]
     pub keep_all: bool,
-    /// Longest side of a triangle: a length in the cloud's unit, a number of local spacings like 11x, or
-    /// none [default: 11x; with --method paper none]
+    /// Longest side of a triangle: a length in the cloud's unit, a number of local spacings like 8x, or
+    /// none [default: 8x; with --method paper none]
     #[arg(long, value_name = "LENGTH|Nx|none")]
     pub max_edge: Option<MaxWidth>,
 }
@@ -175,12 +175,13 @@ pub struct Repair {
     /// holes: but for --method paper they are put in all the same)
     #[arg(long, value_name = "N", default_value_t = 500)]
     pub max_hole_edges: usize,
-    /// Leave holes open that would take triangles with longer sides: a length in the cloud's unit, a
-    /// number of local spacings like 25x, or none [default: 25x; with --method paper none]
+    /// Width of what is filled: triangles larger than an equilateral one with such sides stay out. A length
+    /// in the cloud's unit, a number of local spacings like 9x, or none [default: 9x; with --method paper
+    /// none]
     #[arg(long, value_name = "LENGTH|Nx|none")]
     pub max_fill: Option<MaxWidth>,
-    /// Remove components with fewer triangles [default: 10; in noise one for each 2500 points, from
-    /// 10 to 300, or to 1000 with --smooth; with --method paper 10]
+    /// Remove components with fewer triangles [default: 10; in noise one for each 5000 points, from
+    /// 10 to 150, or for each 2500, to 1000, with --smooth; with --method paper 10]
     #[arg(long, value_name = "N")]
     pub min_component: Option<u64>,
     /// Leave out bridges, holes and components: the surface as extracted

@@ -7,6 +7,7 @@ pub mod lattice;
 pub mod plane;
 pub mod predicate;
 pub(crate) mod round;
+pub mod triangle;
 
 /// A position on the lattice, each coordinate in `0..2^30`.
 pub type Point = [i32; 3];

@@ -4,7 +4,8 @@ use super::blocks::Blocks;
 use super::order::PointStore;
 use super::spacing::Density;
 use crate::error::Result;
-use crate::geom::{Point, sub};
+use crate::geom::triangle::on_a_line;
+use crate::geom::Point;
 use crate::workspace::memory::{Holding, bytes_of, hold, table_bytes};
 use rustc_hash::FxHashMap;
 use std::ops::Range;
@@ -110,29 +111,4 @@ impl Located {
             self.foreign[&v]
         }
     }
-}
-
-/// The exact normal of the triangle `a → b → c`, twice its area long.
-#[must_use]
-pub fn normal(a: Point, b: Point, c: Point) -> [i128; 3] {
-    small_normal(a, b, c).map(i128::from)
-}
-
-/// As [`normal`]: with coordinates of 30 bits it fits machine words.
-#[must_use]
-#[inline]
-pub fn small_normal(a: Point, b: Point, c: Point) -> [i64; 3] {
-    let (u, v) = (sub(b, a), sub(c, a));
-    [
-        u[1] * v[2] - u[2] * v[1],
-        u[2] * v[0] - u[0] * v[2],
-        u[0] * v[1] - u[1] * v[0],
-    ]
-}
-
-/// True if three points are exactly on a line.
-#[must_use]
-#[inline]
-pub fn on_a_line([a, b, c]: [Point; 3]) -> bool {
-    small_normal(a, b, c) == [0; 3]
 }

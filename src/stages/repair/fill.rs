@@ -1,7 +1,7 @@
 //! Filling one hole by splitting its loop (paper, section 3.6).
 
+use crate::geom::triangle::{length, normal, on_a_line};
 use crate::geom::{Point, distance2};
-use crate::stages::located::{normal, on_a_line};
 
 /// A vertex of a boundary loop.
 #[derive(Debug, Clone, Copy)]
@@ -37,21 +37,39 @@ pub enum Filling {
 ///
 /// Loops of more than `sure` edges are first looked at whether they are an outline.
 pub fn fill(mut corners: Vec<Corner>, sure: usize, edge: impl Fn(u32, u32) -> bool) -> Filling {
-    let n = corners.len();
     begin_at_smallest(&mut corners);
-    if goes_around_a_triangle(&corners) || n > sure && is_outline(&corners) {
-        return Filling::Outline;
+    match triangulate(&corners, sure, edge) {
+        Ok(triangles) => Filling::Filled(ids(&corners, &triangles)),
+        Err(why) => why,
+    }
+}
+
+/// The ids of triangles of corners.
+pub fn ids(corners: &[Corner], triangles: &[[usize; 3]]) -> Vec<[u32; 3]> {
+    let of = |t: &[usize; 3]| t.map(|x| corners[x].id);
+    triangles.iter().map(of).collect()
+}
+
+/// The same, as numbers of `corners`, which begin at the smallest.
+pub fn triangulate(
+    corners: &[Corner],
+    sure: usize,
+    edge: impl Fn(u32, u32) -> bool,
+) -> Result<Vec<[usize; 3]>, Filling> {
+    let n = corners.len();
+    if goes_around_a_triangle(corners) || n > sure && is_outline(corners) {
+        return Err(Filling::Outline);
     }
     let mut splitter = Splitter {
-        corners: &corners,
+        corners,
         edge,
         chords: Vec::new(),
         out: Vec::new(),
     };
     if splitter.split(&(0..n).collect::<Vec<_>>()) {
-        Filling::Filled(splitter.out)
+        Ok(splitter.out)
     } else {
-        Filling::Impossible
+        Err(Filling::Impossible)
     }
 }
 
@@ -94,15 +112,11 @@ pub fn is_outline(corners: &[Corner]) -> bool {
     product < -0.5 * length(area) * lengths
 }
 
-pub fn length(v: [i128; 3]) -> f64 {
-    v.iter().map(|x| *x as f64 * *x as f64).sum::<f64>().sqrt()
-}
-
 struct Splitter<'a, E> {
     corners: &'a [Corner],
     edge: E,
     chords: Vec<(u32, u32)>,
-    out: Vec<[u32; 3]>,
+    out: Vec<[usize; 3]>,
 }
 
 impl<E: Fn(u32, u32) -> bool> Splitter<'_, E> {
@@ -115,7 +129,7 @@ impl<E: Fn(u32, u32) -> bool> Splitter<'_, E> {
                 if self.is_flat(a, b, c) {
                     return false;
                 }
-                self.out.push([a, b, c].map(|x| self.corners[x].id));
+                self.out.push([a, b, c]);
                 continue;
             }
             let Some((i, j)) = self.best_chord(&ring) else {

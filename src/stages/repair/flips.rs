@@ -9,8 +9,8 @@
 //! follows from the block alone. Boundary edges, components and fans stay what they are.
 
 use super::around::merge;
+use crate::geom::triangle::small_normal;
 use crate::geom::{Point, sub};
-use crate::stages::located::small_normal;
 use crate::stages::surface::sides::{NONE, across, parts, side};
 use crate::stages::surface::star::Triangle;
 use crate::workspace::memory::{bytes_of, hold};

@@ -1,8 +1,8 @@
 //! Boundary loops: which boundary edge follows which, around the vertices of a block.
 
 use super::OrientedTriangle;
+use crate::geom::triangle::normal;
 use crate::geom::{Point, sub};
-use crate::stages::located::normal;
 use crate::stages::surface::star::{Link, Star, others};
 
 /// One step of a hole's border: it comes from `from` to `at` and goes on to `to`.

@@ -1,12 +1,13 @@
 //! What is done about a boundary loop: filled if it is a hole, closed as far as it is torn if it is
 //! more than that.
 
-use super::fill::{Corner, Filling, begin_at_smallest, fill, is_outline, length};
+use super::fill::{Corner, Filling, begin_at_smallest, fill, ids, is_outline, triangulate};
+use super::parts::Part;
 use super::zip::zip;
-use crate::geom::{Point, distance2};
-use crate::stages::located::normal;
+use crate::geom::distance2;
+use crate::geom::triangle::{area, length, normal};
 use crate::stages::spacing::Density;
-use rustc_hash::{FxHashMap, FxHashSet};
+use rustc_hash::FxHashSet;
 
 /// How boundary loops are treated.
 #[derive(Debug, Clone, Copy)]
@@ -45,13 +46,23 @@ impl Mending<'_> {
         }
     }
 
-    /// True if a filling has a side that is too long for the surface at both of its ends.
-    fn too_wide(&self, corners: &[Corner], filling: &[[u32; 3]]) -> bool {
-        self.density.is_some_and(|density| {
-            let at: FxHashMap<u32, Point> = corners.iter().map(|c| (c.id, c.file)).collect();
-            let wide = |t: &[u32; 3]| density.is_wide(*t, t.map(|v| at[&v]));
-            filling.iter().any(wide)
-        })
+    /// What fills a loop that is wide as `found` is, and stays; `None` if nothing does.
+    fn filled(
+        &self,
+        corners: &[Corner],
+        sure: usize,
+        found: &Width,
+        edge: impl Fn(u32, u32) -> bool,
+    ) -> Option<Part> {
+        let triangles = triangulate(corners, sure, edge).ok()?;
+        if found.is_spanned(corners, &triangles) {
+            return None;
+        }
+        let part = match self.density {
+            Some(density) => Part::not_wide(corners, triangles, density),
+            None => Part::whole(triangles),
+        };
+        Some(part).filter(|part| !part.triangles.is_empty())
     }
 
     fn only_gaps(&self) -> bool {
@@ -71,11 +82,11 @@ impl Mending<'_> {
             !around && corners.len() <= self.longest.max(GAP) && !found.is_opening(corners)
         };
         if fillable(&corners)
-            && let Filling::Filled(new) = fill(corners.clone(), usize::MAX, &edge)
-            && !found.is_spanned(&corners, &new)
-            && !self.too_wide(&corners, &new)
+            && let Some(part) = self.filled(&corners, usize::MAX, &found, &edge)
         {
+            let new = ids(&corners, &part.triangles);
             return match new[..] {
+                _ if part.left > 0 => Filling::Zipped(new, part.left),
                 [gap] => Filling::Gap(gap),
                 _ => Filling::Filled(new),
             };
@@ -84,23 +95,22 @@ impl Mending<'_> {
             return Filling::Impossible;
         }
         let zipped = zip(corners, &edge);
-        let (mut triangles, left) = (zipped.triangles, zipped.left);
-        if left.is_empty() {
-            return Filling::Filled(triangles);
-        }
-        let edges = left.len();
-        if !triangles.is_empty() && fillable(&left) {
+        let (mut triangles, mut left) = (zipped.triangles, zipped.left);
+        let mut open = left.len();
+        if !triangles.is_empty() && !left.is_empty() && fillable(&left) {
             let new = edges_of(&triangles);
             let taken = |a: u32, b: u32| edge(a, b) || new.contains(&(a.min(b), a.max(b)));
-            if let Filling::Filled(more) = fill(left.clone(), SMALL, taken)
-                && !found.is_spanned(&left, &more)
-                && !self.too_wide(&left, &more)
-            {
-                triangles.extend(more);
-                return Filling::Filled(triangles);
+            begin_at_smallest(&mut left);
+            if let Some(part) = self.filled(&left, SMALL, &found, taken) {
+                triangles.extend(ids(&left, &part.triangles));
+                open = part.left;
             }
         }
-        Filling::Zipped(triangles, edges)
+        if open == 0 {
+            Filling::Filled(triangles)
+        } else {
+            Filling::Zipped(triangles, open)
+        }
     }
 }
 
@@ -141,12 +151,8 @@ impl Width {
 
     /// True if the triangles that fill a loop are too large for its edges, as where it goes around a body
     /// and its vector area is small for that.
-    fn is_spanned(&self, corners: &[Corner], filling: &[[u32; 3]]) -> bool {
-        let at: FxHashMap<u32, Point> = corners.iter().map(|c| (c.id, c.at)).collect();
-        let area = |t: &[u32; 3]| {
-            let [a, b, c] = t.map(|v| at[&v]);
-            0.5 * length(normal(a, b, c))
-        };
+    fn is_spanned(&self, corners: &[Corner], filling: &[[usize; 3]]) -> bool {
+        let area = |t: &[usize; 3]| area(t.map(|x| corners[x].at));
         self.is_wide(filling.iter().map(area).sum(), corners.len())
     }
 

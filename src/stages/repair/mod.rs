@@ -12,6 +12,7 @@ mod flips;
 mod holes;
 mod loops;
 mod mend;
+mod parts;
 mod patch;
 mod rim;
 mod surface;
@@ -95,7 +96,7 @@ pub struct RepairStats {
     pub holes_found: u64,
     /// Holes filled.
     pub holes_filled: u64,
-    /// Boundary loops that are torn or open, closed as far as they are torn, which may be nowhere.
+    /// Boundary loops that are torn, open or wide, closed in part, which may be nowhere.
     pub holes_zipped: u64,
     /// Boundary loops left alone because they are an outline of the surface.
     pub holes_outline: u64,

@@ -101,7 +101,7 @@ impl Sheet {
 
     fn area(&self, t: [u32; 3]) -> f64 {
         let [a, b, c] = t.map(|v| self.points[v as usize]);
-        0.5 * super::fill::length(crate::stages::located::normal(a, b, c))
+        crate::geom::triangle::area([a, b, c])
     }
 
     /// The loop with the most edges, mended.

@@ -2,9 +2,9 @@
 //! no further: where it is open, as at doors and at the outline of a survey, ears would be longer
 //! than the surface is dense.
 
-use super::fill::{Corner, length};
+use super::fill::Corner;
+use crate::geom::triangle::{length, normal, on_a_line};
 use crate::geom::{Point, distance2};
-use crate::stages::located::{normal, on_a_line};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 

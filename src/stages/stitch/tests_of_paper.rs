@@ -2,7 +2,7 @@
 //! geometric one. Test IV is with the callers, who know the components.
 
 use crate::geom::Point;
-use crate::stages::located::normal;
+use crate::geom::triangle::normal;
 use crate::stages::surface::star::{EDGES, Triangle, opposed, others};
 use rustc_hash::FxHashMap;
 

@@ -116,6 +116,17 @@ impl Graph {
         }
     }
 
+    /// True if one of the two is the sky, and the other one is small: nothing but the evidence that it
+    /// faces up may hold it.
+    fn is_free(&self, a: u32, b: u32) -> bool {
+        let other = match self.sky {
+            Some(sky) if a == sky => b,
+            Some(sky) if b == sky => a,
+            _ => return false,
+        };
+        self.up[other as usize].abs() < HELD
+    }
+
     /// Adds to the sum of two nodes; nothing if they are the same.
     pub fn add(&mut self, a: u32, b: u32, weight: i64) {
         if a != b {
@@ -189,6 +200,9 @@ impl Graph {
             let Some(&sum) = self.sums.get(&(a, b)) else {
                 continue;
             };
+            if sum == 0 && self.is_free(a, b) {
+                continue;
+            }
             let sum = self.weight(a, b, sum);
             if sum.unsigned_abs() != size {
                 continue;
@@ -249,6 +263,11 @@ impl Graph {
 /// face up at 0.7 % more boundary; with 48 there is 6 % more, with 0 three quarters more area is seen from
 /// behind.
 const UPWARD: i64 = 16;
+
+/// Least evidence that holds a piece of surface which nothing connects: that of 64 highest points. Smaller
+/// pieces are turned as the triangles that connect them later ask. With 0, an aerial scan loses 0.1 % more of its points,
+/// and 5 % more triangles are cut.
+const HELD: i64 = 1024;
 
 /// Bytes that a pair is reckoned to take beside its sum: two names in lists of neighbours, with what these
 /// leave free, and its places in the queue.

@@ -4,7 +4,8 @@
 //! connections at the foot of a wall, and not a kilometre of meadow.
 
 use super::star::Triangle;
-use crate::stages::located::{Located, small_normal};
+use crate::geom::triangle::small_normal;
+use crate::stages::located::Located;
 use crate::workspace::memory::Holding;
 
 /// How a base is divided while it is oriented.

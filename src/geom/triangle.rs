@@ -1,0 +1,40 @@
+//! Exact normals of triangles.
+
+use super::{Point, sub};
+
+/// The exact normal of the triangle `a → b → c`, twice its area long.
+#[must_use]
+pub fn normal(a: Point, b: Point, c: Point) -> [i128; 3] {
+    small_normal(a, b, c).map(i128::from)
+}
+
+/// As [`normal`]: with coordinates of 30 bits it fits machine words.
+#[must_use]
+#[inline]
+pub fn small_normal(a: Point, b: Point, c: Point) -> [i64; 3] {
+    let (u, v) = (sub(b, a), sub(c, a));
+    [
+        u[1] * v[2] - u[2] * v[1],
+        u[2] * v[0] - u[0] * v[2],
+        u[0] * v[1] - u[1] * v[0],
+    ]
+}
+
+/// True if three points are exactly on a line.
+#[must_use]
+#[inline]
+pub fn on_a_line([a, b, c]: [Point; 3]) -> bool {
+    small_normal(a, b, c) == [0; 3]
+}
+
+/// The length of a normal.
+#[must_use]
+pub fn length(v: [i128; 3]) -> f64 {
+    v.iter().map(|x| *x as f64 * *x as f64).sum::<f64>().sqrt()
+}
+
+/// The area of a triangle.
+#[must_use]
+pub fn area([a, b, c]: [Point; 3]) -> f64 {
+    0.5 * length(normal(a, b, c))
+}
