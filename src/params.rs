@@ -196,7 +196,7 @@ impl Default for Params {
             min_component: None,
             keep_all: false,
             max_edge: MaxWidth::Spacings(8.0),
-            max_fill: MaxWidth::Spacings(9.0),
+            max_fill: MaxWidth::Spacings(8.0),
             repair: true,
             block: BLOCK,
             division: Division::default(),

@@ -176,7 +176,7 @@ pub struct Repair {
     #[arg(long, value_name = "N", default_value_t = 500)]
     pub max_hole_edges: usize,
     /// Width of what is filled: triangles larger than an equilateral one with such sides stay out. A length
-    /// in the cloud's unit, a number of local spacings like 9x, or none [default: 9x; with --method paper
+    /// in the cloud's unit, a number of local spacings like 8x, or none [default: 8x; with --method paper
     /// none]
     #[arg(long, value_name = "LENGTH|Nx|none")]
     pub max_fill: Option<MaxWidth>,

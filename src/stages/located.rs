@@ -4,8 +4,8 @@ use super::blocks::Blocks;
 use super::order::PointStore;
 use super::spacing::Density;
 use crate::error::Result;
-use crate::geom::triangle::on_a_line;
 use crate::geom::Point;
+use crate::geom::triangle::on_a_line;
 use crate::workspace::memory::{Holding, bytes_of, hold, table_bytes};
 use rustc_hash::FxHashMap;
 use std::ops::Range;
@@ -35,10 +35,14 @@ impl Places<'_> {
         self.differ() || self.density.is_some()
     }
 
-    /// True if a triangle, with its corners where they are in the file, is on a line or too long.
-    #[must_use]
-    pub fn unfit(&self, t: [u32; 3], at: [Point; 3]) -> bool {
-        on_a_line(at) || self.density.is_some_and(|density| density.is_long(t, at))
+    /// Tells of triangles, with their corners where they are in the file, whether they are on a line or too
+    /// long.
+    pub fn unfit(&self) -> impl Fn([u32; 3], [Point; 3]) -> bool + Copy {
+        let differ = self.differ();
+        let is_long = self.density.map(Density::is_long);
+        // Cells see no three points on a line, as they lie themselves.
+        #[inline(always)]
+        move |t, at| differ && on_a_line(at) || is_long.is_some_and(|is_long| is_long(t, at))
     }
 }
 
@@ -89,7 +93,9 @@ impl Located {
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
     pub fn add(&mut self, store: &PointStore, vertices: impl Iterator<Item = u32>) -> Result<()> {
-        let mut far: Vec<u32> = vertices.filter(|v| !self.ids.contains(v)).collect();
+        let count = self.ids.len() as u32;
+        let is_far = |v: &u32| v.wrapping_sub(self.ids.start) >= count;
+        let mut far: Vec<u32> = vertices.filter(is_far).collect();
         let _far = hold(bytes_of(&far));
         far.sort_unstable();
         far.dedup();
@@ -103,12 +109,24 @@ impl Located {
 
     /// The position of a vertex that was loaded.
     #[must_use]
-    #[inline]
+    #[inline(always)]
     pub fn at(&self, v: u32) -> Point {
-        if self.ids.contains(&v) {
-            self.own[(v - self.ids.start) as usize]
-        } else {
-            self.foreign[&v]
+        match self.own.get(v.wrapping_sub(self.ids.start) as usize) {
+            Some(point) => *point,
+            None => self.foreign(v),
         }
+    }
+
+    /// The positions of the corners of a triangle.
+    #[must_use]
+    #[inline(always)]
+    pub fn corners(&self, [a, b, c]: [u32; 3]) -> [Point; 3] {
+        [self.at(a), self.at(b), self.at(c)]
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn foreign(&self, v: u32) -> Point {
+        self.foreign[&v]
     }
 }

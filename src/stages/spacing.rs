@@ -104,6 +104,7 @@ impl Spacings {
 
     /// The squared distance that the nearest neighbours of a point usually reach.
     #[must_use]
+    #[inline(always)]
     pub fn usual2(&self, id: u32) -> u64 {
         self.usual2[id as usize / PATCH]
     }
@@ -116,10 +117,27 @@ impl Density<'_> {
         self.limits.off_surface && is_far(last2, self.spacings.usual2(id))
     }
 
-    /// True if a triangle has a side that is too long for the surface at both of its ends.
-    #[must_use]
-    pub fn is_long(&self, t: [u32; 3], at: [Point; 3]) -> bool {
-        self.exceeds(self.limits.edge, t, at)
+    /// Tells of triangles whether they have a side that is too long for the surface at both of its ends.
+    pub fn is_long(self) -> impl Fn([u32; 3], [Point; 3]) -> bool + Copy {
+        let (density, width) = (self, self.limits.edge);
+        let sure = self.surely_within(width);
+        #[inline(always)]
+        move |t: [u32; 3], at: [Point; 3]| {
+            // The third side squared is at most twice the sum of the squares of the others.
+            let two = distance2(at[0], at[1]) as f64 + distance2(at[0], at[2]) as f64;
+            let usual2 = |v: u32| density.spacings.usual2(v);
+            let least = usual2(t[0]).min(usual2(t[1])).min(usual2(t[2]));
+            2.0 * two > sure * least as f64 && density.exceeds(width, t, at)
+        }
+    }
+
+    /// Sides whose squares are at most so many times the least `usual2` at their ends are within the limit,
+    /// however that is rounded.
+    fn surely_within(&self, width: Width) -> f64 {
+        match width {
+            Width::Spacings(x) => x * x * std::f64::consts::PI / self.neighbors as f64 * 0.999,
+            Width::Steps(_) | Width::Any => 0.0,
+        }
     }
 
     /// True if a triangle is too wide to fill a hole: it has a side that is far too long for the surface
@@ -144,6 +162,7 @@ impl Density<'_> {
         }
     }
 
+    #[cold]
     fn exceeds(&self, width: Width, t: [u32; 3], at: [Point; 3]) -> bool {
         let long = |(a, b): (usize, usize)| {
             let usual2 = self.spacings.usual2(t[a]).max(self.spacings.usual2(t[b]));
@@ -163,5 +182,40 @@ impl Persist for Spacings {
         let bytes = 8 * usual2.len() as u64;
         let held = from.workspace.reserve("patch spacings", bytes)?;
         Ok(Self::new(usual2, held))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
+    use crate::workspace::progress::{Cancel, Silent};
+    use proptest::prelude::*;
+    use std::sync::Arc;
+
+    fn spacings(usual2: Vec<u64>) -> Spacings {
+        let memory = MemoryPool::new(MINIMUM_BUDGET).unwrap();
+        let folder = std::env::temp_dir();
+        let workspace =
+            crate::workspace::Workspace::new(&folder, memory, 1, Arc::new(Silent), Cancel::new());
+        let held = workspace.unwrap().reserve("patch spacings", 0).unwrap();
+        Spacings::new(usual2, held)
+    }
+
+    proptest! {
+        #[test]
+        fn the_quick_look_at_sides_misses_none(
+            usual2 in prop::array::uniform3(0u64..5000),
+            at in prop::array::uniform3(prop::array::uniform3(0i32..100)),
+            limit in 0.5f64..12.0,
+            steps in any::<bool>(),
+        ) {
+            let spacings = spacings(usual2.to_vec());
+            let edge = if steps { Width::Steps(limit) } else { Width::Spacings(limit) };
+            let limits = Limits { off_surface: true, edge, fill: Width::Any };
+            let density = Density { spacings: &spacings, neighbors: 30, limits };
+            let t = [0, 1, 2].map(|patch| patch * PATCH as u32 + 7);
+            prop_assert_eq!(density.is_long()(t, at), density.exceeds(edge, t, at));
+        }
     }
 }

@@ -40,12 +40,13 @@ impl Sums {
         ];
         let length2 = n.iter().map(|x| (*x as f64) * (*x as f64)).sum::<f64>();
         self.triangles += 1;
-        self.area += u128::from(length2.sqrt() as u64);
+        self.area += u128::from((length2.sqrt() as i64).cast_unsigned());
         if flip {
             n = n.map(|x| -x);
         }
+        let [x, y, z] = [0, 1, 2].map(|axis| i128::from(n[axis]) * i128::from(a[axis]));
+        self.volume6 += x + y + z;
         for axis in 0..3 {
-            self.volume6 += i128::from(n[axis]) * i128::from(a[axis]);
             self.area_vector[axis] += i128::from(n[axis]);
             let corners = i64::from(a[axis]) + i64::from(b[axis]) + i64::from(c[axis]);
             self.corners[axis] += i128::from(corners);

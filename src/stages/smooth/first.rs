@@ -159,19 +159,21 @@ struct Sample {
 /// usual is what is so in the region.
 fn usual_reach(samples: &[Sample], ids: &Range<usize>) -> Vec<u64> {
     let patches = ids.len().div_ceil(PATCH * RUN);
-    let mut reach: Vec<Vec<u64>> = vec![Vec::new(); patches];
+    let mut reach: Vec<Vec<u64>> = Vec::new();
+    reach.resize_with(patches, || Vec::with_capacity(PATCH * RUN / SAMPLE));
     let mut filling = vec![0; patches];
     for sample in samples {
         let patch = patch(sample.target.0, ids);
         reach[patch].push(sample.last2);
         filling[patch] += usize::from(sample.fills);
     }
-    let mut usual2: Vec<u64> = reach.iter().cloned().map(lower_quartile).collect();
-    let counts = filling.chunks(REGION).zip(reach.chunks(REGION));
-    for (usual2, (filling, reach)) in usual2.chunks_mut(REGION).zip(counts) {
+    let counts: Vec<usize> = reach.iter().map(Vec::len).collect();
+    let mut usual2: Vec<u64> = reach.into_iter().map(lower_quartile).collect();
+    let counts = filling.chunks(REGION).zip(counts.chunks(REGION));
+    for (usual2, (filling, counts)) in usual2.chunks_mut(REGION).zip(counts) {
         let region2 = lower_quartile(usual2.to_vec());
-        for (usual2, (filling, reach)) in usual2.iter_mut().zip(filling.iter().zip(reach)) {
-            if 2 * filling >= reach.len() && is_far(*usual2, region2) {
+        for (usual2, (filling, count)) in usual2.iter_mut().zip(filling.iter().zip(counts)) {
+            if 2 * filling >= *count && is_far(*usual2, region2) {
                 *usual2 = region2;
             }
         }
@@ -180,8 +182,11 @@ fn usual_reach(samples: &[Sample], ids: &Range<usize>) -> Vec<u64> {
 }
 
 fn lower_quartile(mut all: Vec<u64>) -> u64 {
-    all.sort_unstable();
-    all.get(all.len() / 4).copied().unwrap_or(0)
+    if all.is_empty() {
+        return 0;
+    }
+    let place = all.len() / 4;
+    *all.select_nth_unstable(place).1
 }
 
 /// The runs of rough patches move if it is noise that makes their region rough.

@@ -205,10 +205,12 @@ impl Look<'_> {
         candidates: &[[u32; 4]],
         (division, highest): &(Division, Sections<1>),
     ) -> Result<Evidence> {
-        let vertices = triangles.iter().flatten().copied();
         let places = match located {
             Some(located) => located,
-            None => Located::load(self.places.shape, self.blocks, block, vertices)?,
+            None => {
+                let vertices = self.foreign(block, triangles);
+                Located::load(self.places.shape, self.blocks, block, vertices)?
+            }
         };
         let candidates: Vec<Triangle> = candidates.iter().map(|r| [r[0], r[1], r[2]]).collect();
         Ok(Evidence {
@@ -220,6 +222,13 @@ impl Look<'_> {
         })
     }
 
+    /// The vertices of the triangles that are not all in a block.
+    fn foreign(&self, block: usize, triangles: &[Triangle]) -> impl Iterator<Item = u32> {
+        let ids = self.blocks.ids(block);
+        let crosses = move |t: &&Triangle| t[0] < ids.start || t[2] >= ids.end;
+        triangles.iter().filter(crosses).flatten().copied()
+    }
+
     /// Leaves out what would be on a line in the file, or too long; the positions that told.
     fn drop_unfit(
         &self,
@@ -229,17 +238,18 @@ impl Look<'_> {
         found: &mut Found,
     ) -> Result<Option<Located>> {
         if self.places.limit_triangles() {
-            let vertices = triangles.iter().flatten().copied();
+            let vertices = self.foreign(block, triangles);
             let file = Located::load(self.places.file, self.blocks, block, vertices)?;
+            let unfit = self.places.unfit();
             let (mut t3, open) = (0, candidates.len());
             triangles.retain(|t| {
-                let flat = self.places.unfit(*t, t.map(|v| file.at(v)));
+                let flat = unfit(*t, file.corners(*t));
                 t3 += u64::from(flat && self.blocks.of(t[0]) == block as u32);
                 !flat
             });
             candidates.retain(|r| {
                 let t = [r[0], r[1], r[2]];
-                !self.places.unfit(t, t.map(|v| file.at(v)))
+                !unfit(t, file.corners(t))
             });
             found.flat = t3;
             found.flat_candidates = (open - candidates.len()) as u64;

@@ -243,18 +243,22 @@ impl BlockWork {
             let base = self.triangles[self.interior_base..].iter().flatten();
             open.chain(base.copied()).collect()
         };
+        let all = vertices(&candidates);
+        self.located.add(places.shape, all.iter().copied())?;
         if places.limit_triangles() {
-            let all = vertices(&candidates).into_iter();
-            let file = Located::load(places.file, blocks, block, all)?;
+            let moved = places
+                .differ()
+                .then(|| Located::load(places.file, blocks, block, all.into_iter()))
+                .transpose()?;
+            let file = moved.as_ref().unwrap_or(&self.located);
+            let unfit = places.unfit();
             let before = candidates.len();
             candidates.retain(|r| {
                 let t = [r[0], r[1], r[2]];
-                !places.unfit(t, t.map(|v| file.at(v)))
+                !unfit(t, file.corners(t))
             });
             self.flat = (before - candidates.len()) as u64;
         }
-        let all = vertices(&candidates).into_iter();
-        self.located.add(places.shape, all)?;
         let new = |&[i, j, k, count]: &[u32; 4]| {
             let t = [i, j, k];
             Candidate::new(t, count, t.map(|v| self.position(v)))

@@ -73,7 +73,11 @@ pub fn highest(store: &PointStore, blocks: Blocks, workspace: &Workspace) -> Res
         let _held = hold(bytes_of(&points));
         for (id, p) in ids.zip(&points) {
             let place = (p[2] as u64) << 32 | u64::from(!id);
-            highest[columns.at(*p)].fetch_max(place, Ordering::Relaxed);
+            let highest = &highest[columns.at(*p)];
+            // Most are not.
+            if place > highest.load(Ordering::Relaxed) {
+                highest.fetch_max(place, Ordering::Relaxed);
+            }
         }
         Ok(())
     })?;

@@ -45,25 +45,85 @@ pub struct Evidence {
 }
 
 impl Evidence {
+    /// The normal of a triangle by its ascending ids, rounded to `f64`, and its squared length.
+    #[must_use]
+    #[inline(always)]
+    pub fn long_normal(&self, t: Triangle) -> LongNormal {
+        let [a, b, c] = self.places.corners(t);
+        let [x, y, z] = small_normal(a, b, c);
+        let n = [x as f64, y as f64, z as f64];
+        LongNormal {
+            n,
+            length2: dot(n, n),
+        }
+    }
+
     /// The unit normal of a triangle by its ascending ids; zero if it has none.
     #[must_use]
     pub fn normal(&self, t: Triangle) -> [f64; 3] {
-        let [a, b, c] = t.map(|v| self.places.at(v));
-        let n = small_normal(a, b, c).map(|x| x as f64);
-        let length = (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]).sqrt();
+        self.long_normal(t).unit()
+    }
+}
+
+/// A normal and its squared length.
+#[derive(Debug, Clone, Copy)]
+pub struct LongNormal {
+    n: [f64; 3],
+    length2: f64,
+}
+
+impl LongNormal {
+    /// The unit normal; zero if there is none.
+    #[must_use]
+    pub fn unit(self) -> [f64; 3] {
+        let length = self.length2.sqrt();
         if length > 0.0 {
-            n.map(|x| x / length)
+            self.n.map(|x| x / length)
         } else {
-            n
+            self.n
         }
     }
+
+    /// True if the [`cosine`] of the unit normals is more than [`FLAT`].
+    #[must_use]
+    #[inline]
+    pub fn is_flat(self, other: Self, flip: bool) -> bool {
+        self.surely_between(other, flip, FLAT, f64::INFINITY)
+            || cosine(self.unit(), other.unit(), flip) > FLAT
+    }
+
+    /// The [`weight`] of the [`cosine`] of the unit normals.
+    #[must_use]
+    #[inline]
+    pub fn weight(self, other: Self, flip: bool) -> i64 {
+        const NEXT: f64 = (FLATTEST - 2) as f64 / (FLATTEST - 1) as f64;
+        if self.surely_between(other, flip, NEXT, 1.0) {
+            FLATTEST - 1
+        } else {
+            weight(cosine(self.unit(), other.unit(), flip))
+        }
+    }
+
+    /// True if the cosine is plainly between two positive ones: without unit normals, and by far more than
+    /// all that is rounded.
+    #[inline]
+    fn surely_between(self, other: Self, flip: bool, least: f64, most: f64) -> bool {
+        let dot = cosine(self.n, other.n, flip);
+        let (square, lengths) = (dot * dot, self.length2 * other.length2);
+        let (least, most) = (least * least * (1.0 + 1e-9), most * most * (1.0 - 1e-9));
+        dot > 0.0 && square > least * lengths && square < most * lengths
+    }
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// The cosine of the angle between two triangles when they run alike, `flip` if one must be turned
 /// for that.
 #[must_use]
 pub fn cosine(a: [f64; 3], b: [f64; 3], flip: bool) -> f64 {
-    let dot = a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    let dot = dot(a, b);
     if flip { -dot } else { dot }
 }
 
@@ -82,6 +142,27 @@ pub const FLAT: f64 = 0.9;
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::stages::located::Located;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// On fine and coarse lattices: with the latter, cosines lie at limits exactly.
+        #[test]
+        fn long_normals_tell_what_unit_normals_do(
+            points in prop::array::uniform4(prop::array::uniform3(0i32..1 << 30)),
+            shift in 0u32..31,
+            flip in any::<bool>(),
+        ) {
+            let points = points.map(|p| p.map(|x| x >> shift));
+            let evidence = Evidence { places: Located::of(&points), ..Evidence::default() };
+            for [t, other] in [[[0, 1, 2], [1, 2, 3]], [[0, 1, 2], [0, 1, 3]], [[0, 1, 3], [0, 1, 3]]] {
+                let cosine = cosine(evidence.normal(t), evidence.normal(other), flip);
+                let [t, other] = [t, other].map(|t| evidence.long_normal(t));
+                prop_assert_eq!(t.is_flat(other, flip), cosine > FLAT);
+                prop_assert_eq!(t.weight(other, flip), weight(cosine));
+            }
+        }
+    }
 
     #[test]
     fn weights_grow_with_flatness() {

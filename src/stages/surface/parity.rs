@@ -73,6 +73,19 @@ impl ParitySets {
         true
     }
 
+    /// As [`ParitySets::join`], but the smaller root stays one.
+    pub fn join_to_smaller(&mut self, a: u32, b: u32, flip: bool) -> bool {
+        let (root_a, flip_a) = self.find(a);
+        let (root_b, flip_b) = self.find(b);
+        let turned = flip ^ flip_a ^ flip_b;
+        if root_a == root_b {
+            return !turned;
+        }
+        let (root, part) = (root_a.min(root_b), root_a.max(root_b));
+        self.parent[part as usize] = root << 1 | u32::from(turned);
+        true
+    }
+
     /// Makes every label point straight at its root.
     pub fn flatten(&mut self) {
         for label in 0..self.parent.len() as u32 {

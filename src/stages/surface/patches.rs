@@ -1,9 +1,9 @@
 //! Patches: small flat parts of a block, the nodes that its orientation is decided between.
 
-use super::evidence::{Evidence, FLAT, cosine, weight};
+use super::evidence::{Evidence, LongNormal};
 use super::parity::ParitySets;
 use super::sides::{NONE, across, parts};
-use super::star::{EDGES, Triangle, opposed};
+use super::star::{EDGES, Triangle};
 use crate::workspace::memory::{Holding, bytes_of, hold};
 use std::ops::Range;
 
@@ -42,33 +42,34 @@ impl Patches {
     #[must_use]
     pub fn of(ids: Range<u32>, triangles: &[Triangle], evidence: &Evidence, patch: u32) -> Self {
         let across = across(ids, triangles);
-        let normals: Vec<_> = triangles.iter().map(|t| evidence.normal(*t)).collect();
-        let mut held = hold(bytes_of(&across) + bytes_of(&normals) + 8 * triangles.len() as u64);
+        let mut held = hold(bytes_of(&across) + 8 * triangles.len() as u64);
         let mut sets = ParitySets::new(triangles.len());
-        let mut joints = Vec::new();
-        for (n, t) in triangles.iter().enumerate() {
-            for (a, b, opposite, _) in EDGES {
-                let (m, _) = parts(across[n][opposite]);
-                if across[n][opposite] == NONE || m < n {
-                    continue;
-                }
-                let other = triangles[m];
-                let flip = opposed(*t, other, t[a], t[b]);
-                let cosine = cosine(normals[n], normals[m], flip);
-                let near = t[0] / patch == other[0] / patch;
-                if !(near && cosine > FLAT && join(&mut sets, n as u32, m as u32, flip)) {
-                    joints.push(Joint {
-                        a: n as u32,
-                        b: m as u32,
-                        flip,
-                        weight: weight(cosine) as u8,
-                    });
-                }
-            }
+        let mut runs = Runs {
+            triangles,
+            across: &across,
+            evidence,
+            normals: Vec::new(),
+            edges: Vec::new(),
+            joints: Vec::new(),
+        };
+        let mut first = 0;
+        while let Some(t) = triangles.get(first) {
+            let end = (u64::from(t[0] / patch) + 1) * u64::from(patch);
+            let count = triangles[first..].partition_point(|t| u64::from(t[0]) < end);
+            runs.join(first..first + count, &mut sets);
+            first += count;
         }
-        drop((across, normals));
+        let mut joints = runs.joints;
+        let held_before = bytes_of(&across) + bytes_of(&joints);
+        held.set(held_before + 8 * triangles.len() as u64);
+        drop(across);
         let (of, roots) = number(&mut sets);
-        joints.retain(|j| sets.relation(j.a, j.b) != Some(j.flip));
+        let apart = |j: &Joint| of[j.a as usize] != of[j.b as usize];
+        joints.retain(|j| apart(j) || sets.relation(j.a, j.b) != Some(j.flip));
+        for j in &mut joints {
+            let [a, b] = [j.a, j.b].map(|n| evidence.long_normal(triangles[n as usize]));
+            j.weight = a.weight(b, j.flip) as u8;
+        }
         held.set(bytes_of(&joints) + bytes_of(&of) + bytes_of(&roots) + 4 * of.len() as u64);
         Self {
             sets,
@@ -80,13 +81,48 @@ impl Patches {
     }
 }
 
-/// Joins two triangles if that contradicts no join before. The smallest triangle of a set is its root:
-/// the set runs as that one does.
-fn join(sets: &mut ParitySets, a: u32, b: u32, flip: bool) -> bool {
-    if sets.find(b).0 < sets.find(a).0 {
-        sets.join(b, a, flip)
-    } else {
-        sets.join(a, b, flip)
+/// Joins triangles run by run.
+struct Runs<'a> {
+    triangles: &'a [Triangle],
+    across: &'a [[u32; 3]],
+    evidence: &'a Evidence,
+    /// Of the triangles of the run.
+    normals: Vec<LongNormal>,
+    /// Room for the edges of the triangles of the run with a later one, as in a [`Joint`].
+    edges: Vec<(u32, u32, bool)>,
+    /// The edges that were not joined; their weights are left out.
+    joints: Vec<Joint>,
+}
+
+impl Runs<'_> {
+    /// Joins the triangles of a run across their flat edges.
+    fn join(&mut self, run: Range<usize>, sets: &mut ParitySets) {
+        let Runs { normals, edges, .. } = self;
+        normals.clear();
+        let triangles = &self.triangles[run.clone()];
+        normals.extend(triangles.iter().map(|t| self.evidence.long_normal(*t)));
+        if edges.len() < 3 * run.len() {
+            edges.resize(3 * run.len(), (0, 0, false));
+        }
+        let mut count = 0;
+        for (n, sides) in (run.start..).zip(&self.across[run.clone()]) {
+            // Which edges are looked at from here cannot be foretold: they are put down without a branch.
+            for (_, _, opposite, _) in EDGES {
+                let side = sides[opposite];
+                let (m, corner) = parts(side);
+                // Edges between the first and the last vertex run down, others up.
+                edges[count] = (n as u32, m as u32, (opposite == 1) == (corner == 1));
+                count += usize::from(side != NONE && m > n);
+            }
+        }
+        for &(a, b, flip) in &edges[..count] {
+            let (n, m) = (a as usize, b as usize);
+            let flat = || normals[n - run.start].is_flat(normals[m - run.start], flip);
+            if !(m < run.end && flat() && sets.join_to_smaller(a, b, flip)) {
+                let weight = 0;
+                self.joints.push(Joint { a, b, flip, weight });
+            }
+        }
     }
 }
 

@@ -30,14 +30,9 @@ pub fn sorted([i, a, b]: [u32; 3]) -> Triangle {
 
 /// The other two vertices of a triangle at `v`, in ascending order.
 #[must_use]
-pub fn others(t: Triangle, v: u32) -> [u32; 2] {
-    if t[0] == v {
-        [t[1], t[2]]
-    } else if t[1] == v {
-        [t[0], t[2]]
-    } else {
-        [t[0], t[1]]
-    }
+#[inline]
+pub fn others([a, b, c]: Triangle, v: u32) -> [u32; 2] {
+    [if a == v { b } else { a }, if c == v { b } else { c }]
 }
 
 /// True if `v` is a vertex of `t`.

@@ -84,9 +84,13 @@ impl Weigher<'_> {
         for (node, (_, triangles)) in (0..).zip(&self.patches.roots) {
             self.graph.add_triangles(node, u64::from(*triangles));
         }
+        let mut highest = vec![false; self.ids.len()];
+        for v in &self.evidence.highest {
+            highest[(v - self.ids.start) as usize] = true;
+        }
         for (number, t) in (0..).zip(self.inner) {
-            let highest = |v: &&u32| self.evidence.highest.binary_search(v).is_ok();
-            let count = t.iter().filter(highest).count() as i64;
+            let [a, b, c] = t.map(|v| i64::from(highest[(v - self.ids.start) as usize]));
+            let count = a + b + c;
             if count > 0 {
                 let z = self.evidence.normal(*t)[2];
                 let up = count * (z * FLATTEST as f64) as i64;
@@ -104,10 +108,7 @@ impl Weigher<'_> {
             let weight = BASE * i64::from(joint.weight);
             self.connect(joint.a, joint.b, joint.flip, weight);
         }
-        let mut edges = Edges::with_room(self.ids.clone(), self.inner);
-        for (number, &t) in self.inner.iter().enumerate() {
-            edges.add(t, number as u32);
-        }
+        let edges = self.edges_of(crossing.iter().chain(&self.evidence.candidates));
         for &c in crossing {
             let mut asks = Vec::new();
             let mut note = |other, flip| asks.push((other, flip));
@@ -123,6 +124,29 @@ impl Weigher<'_> {
         for &c in &self.evidence.candidates {
             self.vote(c, &edges);
         }
+    }
+
+    /// The triangles at the edges inside the block that `others` may have.
+    fn edges_of<'t>(&self, others: impl Iterator<Item = &'t Triangle>) -> Edges {
+        let mut seen = vec![false; self.ids.len()];
+        for v in others.flatten().filter(|v| self.ids.contains(v)) {
+            seen[(v - self.ids.start) as usize] = true;
+        }
+        let place = |v: u32| (v - self.ids.start) as usize;
+        // An edge between two of their vertices.
+        let beside = |t: &Triangle| t.iter().filter(|v| seen[place(**v)]).count() > 1;
+        let numbers: Vec<u32> = (0..)
+            .zip(self.inner)
+            .filter(|(_, t)| beside(t))
+            .map(|(number, _)| number)
+            .collect();
+        let some: Vec<Triangle> = numbers.iter().map(|n| self.inner[*n as usize]).collect();
+        let _held = hold(bytes_of(&numbers) + bytes_of(&some) + bytes_of(&seen));
+        let mut edges = Edges::with_room(self.ids.clone(), &some);
+        for (number, t) in numbers.into_iter().zip(some) {
+            edges.add(t, number);
+        }
+        edges
     }
 
     /// The weight of the edge between two triangles.

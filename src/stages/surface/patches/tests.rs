@@ -1,6 +1,7 @@
 //! Patches of bands with folds.
 
-use super::super::evidence::Division;
+use super::super::evidence::{Division, FLAT, cosine, weight};
+use super::super::star::opposed;
 use super::*;
 use crate::geom::Point;
 use crate::stages::located::Located;
