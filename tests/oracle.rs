@@ -289,6 +289,10 @@ struct Reached {
     spanned: usize,
     partly_zipped: usize,
     zipped_whole: usize,
+    left_open: usize,
+    left_open_zipped: usize,
+    between: usize,
+    wide: usize,
 }
 
 impl Reached {
@@ -305,6 +309,10 @@ impl Reached {
         self.spanned += counts.holes.spanned;
         self.partly_zipped += counts.holes.partly;
         self.zipped_whole += counts.holes.zipped_whole;
+        self.left_open += counts.holes.left_open;
+        self.left_open_zipped += counts.holes.left_open_zipped;
+        self.between += counts.holes.between;
+        self.wide += counts.holes.wide;
     }
 }
 
@@ -394,7 +402,9 @@ fn robust() {
         patch: [4, 256, 16, 7, 10][seed as usize % 5],
         cluster: [2, 1024, 40, 12][seed as usize % 4],
         min_component: [1, 3, 10][seed as usize % 3],
-        max_hole_edges: [500, 500, 0, 500, 4][seed as usize % 5],
+        max_hole_edges: [500, 500, 0, 12, 4][seed as usize % 5],
+        max_edge: [8.0, 11.0, f64::INFINITY][seed as usize / 2 % 3],
+        max_fill: [8.0, 2.0, f64::INFINITY, 3.0, 1.2][seed as usize / 3 % 5],
         ..Settings::robust()
     });
     let parts = [
@@ -408,11 +418,23 @@ fn robust() {
         reached.partly_zipped,
         reached.zipped_whole,
         reached.spanned,
+        reached.left_open,
+        reached.left_open_zipped,
+        reached.between,
+        reached.wide,
     ];
     let all = parts.iter().chain(&mended).all(|n| *n > 0);
     assert!(reached.rounds == 3 && all, "parts not reached: {reached:?}");
     // The rest is met with other triples, see `oracle_stitch.rs`, and by bands.
-    let but = ["folded", "crowded", "flagged elsewhere", "cut inside"];
+    let but = [
+        "folded",
+        "crowded",
+        "flagged elsewhere",
+        "cut inside",
+        "cut between",
+        "under sky",
+        "turned by sky",
+    ];
     assert_eq!(reached.met.missing(&but), [""; 0], "{reached:?}");
 }
 
@@ -483,6 +505,13 @@ fn robust_on_torn_sheets_and_doors() {
         };
         let pillars = clouds::pillars(seed);
         reached.add(&compare("pillars", &pillars, &settings, &CUTS));
+        let settings = Settings {
+            max_hole_edges: [500, 20][seed as usize % 2],
+            max_fill: [8.0, 2.0][seed as usize % 2],
+            ..settings
+        };
+        let hole = clouds::wide_hole(seed);
+        reached.add(&compare("wide hole", &hole, &settings, &CUTS));
         walls_and_bands(seed, settings, &mut reached);
     }
     let parts = [
@@ -491,7 +520,11 @@ fn robust_on_torn_sheets_and_doors() {
         reached.met.folded,
         reached.met.cut_inside,
         reached.met.votes,
+        reached.met.under_sky,
+        reached.met.turned_by_sky,
+        reached.met.left_free,
         reached.partly_zipped,
+        reached.left_open,
     ];
     let parts = parts.iter().all(|n| *n > 0);
     assert!(parts && some_stayed > 1, "{some_stayed} {reached:?}");

@@ -22,6 +22,9 @@ use std::sync::Arc;
 
 type Point = [i32; 3];
 
+/// One in so many sheets is large.
+const LARGE: u64 = 40;
+
 #[derive(Default)]
 struct Faces(Vec<[u32; 3]>);
 
@@ -252,7 +255,11 @@ fn twisted_triples(
 /// and where their points lie. At an edge at the foot of a wall some two or all of the three triangles
 /// are T3.
 fn walled_triples(random: &mut Random, count: usize) -> (BTreeMap<[u32; 3], u32>, Vec<Point>) {
-    let wide = random.integer(3, 9);
+    let wide = if count < 1000 {
+        random.integer(3, 9)
+    } else {
+        54
+    };
     let rows = count as i64 / wide;
     let walls = random.integer(0, 3).min(rows / 4);
     let high = if walls > 0 {
@@ -323,12 +330,13 @@ fn compare(
     let mut reached = Counts::default();
     for seed in seeds {
         let mut random = Random::new(seed);
-        let most = if sheets && (seed % 7 == 3 || seed % 16 == 0) {
-            300
-        } else {
-            60
+        // With walls; only so many points say by themselves what is up.
+        let (least, most) = match seed {
+            _ if sheets && seed % LARGE == 2 => (2800, 3500),
+            _ if sheets && (seed % 7 == 3 || seed % 16 == 0) => (5, 300),
+            _ => (5, 60),
         };
-        let count = random.integer(5, most) as usize;
+        let count = random.integer(least, most) as usize;
         let cloud: Vec<Point> = (0..count)
             .map(|_| [0; 3].map(|_: i32| random.integer(0, side(seed)) as i32))
             .collect();
@@ -348,7 +356,7 @@ fn compare(
         // Cells never see three points on a line.
         all.retain(|t, _| {
             let [a, b, c] = t.map(|v| shape[v as usize]);
-            outcrop::stages::located::normal(a, b, c) != [0; 3]
+            outcrop::geom::triangle::normal(a, b, c) != [0; 3]
         });
         let settings = settings(seed);
         let expected = connect(&shape, points.clone(), &all, None, &settings);
@@ -402,14 +410,19 @@ fn arbitrary_triples_the_robust_way() {
         robust: true,
         ..varied(seed)
     };
-    // Some long bands as one patch.
-    let settings = |seed: u64| match seed.is_multiple_of(16) {
-        true => Settings {
+    // Some long bands as one patch, and the largest sheets in large pieces.
+    let settings = |seed: u64| match (seed % 16, seed % LARGE) {
+        (0, _) => Settings {
             block: 1000,
             patch: 256,
             ..settings(seed)
         },
-        false => settings(seed),
+        (_, 2) => Settings {
+            block: [1000, 100, 65_536, 300][(seed / LARGE) as usize % 4],
+            patch: [256, 16][(seed / LARGE) as usize % 2],
+            ..settings(seed)
+        },
+        _ => settings(seed),
     };
     // Few positions, so that many triples are on a line in the file and not in the shape.
     let side = |seed: u64| [200, 20, 6][seed as usize % 3];

@@ -153,6 +153,21 @@ pub fn door(seed: u64) -> Vec<Point> {
     points
 }
 
+/// A sheet with a round hole whose filling has narrow triangles at its rim and large ones in its middle,
+/// and with enough of columns to say by itself what is up.
+pub fn wide_hole(seed: u64) -> Vec<Point> {
+    let mut random = Random::new(seed);
+    let mut points = Vec::new();
+    for (a, b) in (0..40).flat_map(|a| (0..40).map(move |b| (a, b))) {
+        let p = [12 * a, 12 * b, 0].map(|x| x + 10 + random.integer(-2, 3) as i32);
+        let [x, y] = [p[0] - 245, p[1] - 245];
+        if x * x + y * y > 92 * 92 {
+            points.push(p);
+        }
+    }
+    points
+}
+
 /// A sheet that is smooth on one side and rough, with some narrow cuts, on the other.
 pub fn half_rough(seed: u64, count: usize) -> Vec<Point> {
     let mut random = Random::new(seed);

@@ -5,6 +5,9 @@ use super::homes::{Homes, Side};
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 
+/// Evidence that turns a piece by itself.
+const SURE: i64 = 1024;
+
 /// What is known of a node.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Node {
@@ -111,6 +114,12 @@ impl Graph {
         true
     }
 
+    /// Whether a pair is one with the sky that is not contracted: nothing is for it but a little evidence.
+    fn is_free(&self, pair: Pair) -> bool {
+        let evidence = self.nodes[pair[0]].up.abs();
+        self.sky == Some(pair[1]) && self.sums[&pair] == 0 && evidence < SURE
+    }
+
     /// The node that gives a cluster its number and its run, and the other one.
     fn named([a, b]: Pair, graph: &Self) -> (usize, usize) {
         let [of_a, of_b] = [a, b].map(|node| graph.pairs_of(node).len());
@@ -140,7 +149,8 @@ impl Graph {
         changed
     }
 
-    /// Contracts pairs, without `most` all of them, else those that may be. Gives the cluster of each
+    /// Contracts pairs, without `most` all of them but those with the sky that are left free, else those
+    /// that may be. Gives the cluster of each
     /// node, by the number of the node that it is called after, and whether the node is turned in it.
     pub fn contract(&mut self, most: Option<usize>, met: &mut Weighing) -> Homes {
         let mut clusters = Homes::apart(self.nodes.len());
@@ -154,6 +164,10 @@ impl Graph {
             if let Some(most) = most
                 && !self.may(pair, most, met)
             {
+                continue;
+            }
+            if self.is_free(pair) {
+                met.left_free += 1;
                 continue;
             }
             let sum = self.sum(pair);

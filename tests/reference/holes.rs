@@ -18,7 +18,7 @@ pub struct Filling {
     pub not_split: usize,
     pub filled: usize,
     pub triangles: usize,
-    /// Robust: not filled, but looked at for zipping; and how many of them were closed in part.
+    /// Robust: not filled as a whole, nor closed by zipping; and how many of them were closed in part.
     pub zipped: usize,
     pub partly: usize,
     /// Robust: filled only after zipping, or closed by zipping alone.
@@ -27,8 +27,13 @@ pub struct Filling {
     pub openings: usize,
     /// Robust: likewise, but seen only when it is filled.
     pub spanned: usize,
-    /// Robust: likewise, but a triangle would be too long.
+    /// Robust: likewise, but all triangles would be too wide.
     pub wide: usize,
+    /// Robust: of those closed in part, loops of which a part was filled as they were found, and after
+    /// zipping; and triangles left out that were not wide themselves.
+    pub left_open: usize,
+    pub left_open_zipped: usize,
+    pub between: usize,
     /// Robust: loops of three edges, closed before holes are counted.
     pub gaps: usize,
 }
@@ -97,7 +102,7 @@ pub fn fill(
         } else if let Some(patch) = holes.patch(&hole, &BTreeSet::new()) {
             filling.filled += 1;
             filling.triangles += patch.len();
-            triangles.extend(patch);
+            triangles.extend(patch.into_iter().map(|t| t.map(|k| hole[k])));
         } else {
             filling.not_split += 1;
         }
@@ -236,26 +241,35 @@ impl Holes<'_> {
         dot(area2, normals).approximate() < -0.5 * size * lengths
     }
 
-    /// The triangles that fill a loop, or nothing; `taken` are edges that are there beside the mesh.
-    pub fn patch(&self, hole: &[u32], taken: &BTreeSet<Edge>) -> Option<Vec<[u32; 3]>> {
+    /// The triangles that fill a loop, by the positions of their corners in it, or nothing; `taken` are
+    /// edges that are there beside the mesh.
+    pub fn patch(&self, hole: &[u32], taken: &BTreeSet<Edge>) -> Option<Vec<[usize; 3]>> {
         let mut chords = taken.clone();
         let mut triangles = Vec::new();
-        self.split(hole, &mut chords, &mut triangles)
+        let corners: Vec<(usize, u32)> = hole.iter().copied().enumerate().collect();
+        self.split(&corners, &mut chords, &mut triangles)
             .then_some(triangles)
     }
 
-    /// Fills a part of a loop; false if that cannot be done. Of the two parts that a chord between
-    /// positions `a < b` makes, the one at positions `a..=b` comes first, then `0..=a, b..`.
-    fn split(&self, part: &[u32], chords: &mut BTreeSet<Edge>, out: &mut Vec<[u32; 3]>) -> bool {
+    /// Fills a part of a loop, corners with their positions in it; false if that cannot be done. Of the
+    /// two parts that a chord between places `a < b` of the part makes, the one at `a..=b` comes first,
+    /// then `0..=a, b..`.
+    fn split(
+        &self,
+        part: &[(usize, u32)],
+        chords: &mut BTreeSet<Edge>,
+        out: &mut Vec<[usize; 3]>,
+    ) -> bool {
         if let &[a, b, c] = part {
-            out.push([a, b, c]);
-            return !self.collinear(a, b, c);
+            out.push([a.0, b.0, c.0]);
+            return !self.collinear(a.1, b.1, c.1);
         }
-        let Some((a, b)) = self.best_chord(part, chords) else {
+        let ids: Vec<u32> = part.iter().map(|corner| corner.1).collect();
+        let Some((a, b)) = self.best_chord(&ids, chords) else {
             return false;
         };
-        chords.insert([part[a].min(part[b]), part[a].max(part[b])]);
-        let rest: Vec<u32> = part[..=a].iter().chain(&part[b..]).copied().collect();
+        chords.insert([ids[a].min(ids[b]), ids[a].max(ids[b])]);
+        let rest: Vec<_> = part[..=a].iter().chain(&part[b..]).copied().collect();
         self.split(&part[a..=b], chords, out) && self.split(&rest, chords, out)
     }
 

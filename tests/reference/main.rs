@@ -7,7 +7,7 @@ use outcrop::geom::Point;
 use reference::base::base;
 use reference::check::check;
 use reference::clouds::Random;
-use reference::{Mesh, Radius, Settings, cells, clouds, from_triples, reconstruct};
+use reference::{Mesh, Radius, Settings, cells, clouds, from_triples, narrow, reconstruct};
 use std::collections::BTreeSet;
 
 fn kind(name: &str) -> usize {
@@ -204,6 +204,52 @@ fn a_gap_in_a_grid_is_a_hole_that_can_be_filled() {
 }
 
 #[test]
+fn a_wide_hole_is_closed_at_its_rim() {
+    let settings = |max_fill| Settings {
+        neighbors: 30,
+        relax: 0,
+        max_fill,
+        ..Settings::robust()
+    };
+    let points = clouds::wide_hole(0);
+    let [closed, narrowed] = [f64::INFINITY, 8.0].map(|w| checked(&points, &settings(w)));
+    let holes = [&closed, &narrowed].map(|mesh| mesh.counts.holes);
+    assert_eq!(
+        holes.map(|h| (h.filled, h.left_open)),
+        [(1, 0), (0, 1)],
+        "{holes:?}"
+    );
+    assert!(narrowed.triangles.len() < closed.triangles.len() && holes[1].triangles > 30);
+    let euler = |mesh: &Mesh| check(mesh, true).unwrap().euler();
+    assert!(euler(&closed) == 1 && euler(&narrowed) <= 0);
+}
+
+#[test]
+fn what_lies_between_two_that_are_left_out_is_left_out() {
+    let fan: Vec<[usize; 3]> = (1..7).map(|k| [0, k, k + 1]).collect();
+    let out = |filling: &[[usize; 3]], wide: &[usize]| {
+        let wide: Vec<[usize; 3]> = wide.iter().map(|&t| filling[t]).collect();
+        narrow::left_out(8, filling, |t| wide.contains(t))
+    };
+    assert_eq!(out(&fan, &[]), [false; 6]);
+    assert_eq!(out(&fan, &[3]), [false, false, false, true, false, false]);
+    assert_eq!(out(&fan, &[1, 3]), [false, true, true, true, false, false]);
+    // The corners cut off, two halves in the middle.
+    let octagon = [
+        [0, 1, 2],
+        [2, 3, 4],
+        [4, 5, 6],
+        [6, 7, 0],
+        [0, 2, 4],
+        [0, 4, 6],
+    ];
+    let only = |left: [usize; 6]| left.map(|out| out == 1);
+    assert_eq!(out(&octagon, &[5]), only([0, 0, 0, 0, 0, 1]));
+    // At corner 0 the other half is between.
+    assert_eq!(out(&octagon, &[0, 5]), only([1, 0, 0, 0, 1, 1]));
+}
+
+#[test]
 fn a_moebius_band_is_cut_open() {
     let points = clouds::cloud(kind("moebius band"), 300, 1);
     let settings = Settings {
@@ -343,6 +389,7 @@ fn varied(seed: u64) -> [Settings; 4] {
             patch: [8, 256][seed as usize % 2],
             cluster: [3, 20, 1024][seed as usize % 3],
             min_component: 1 + seed as usize % 2 * 9,
+            max_fill: [8.0, 2.0, 1.2][seed as usize % 3],
             ..Settings::robust()
         },
     ]

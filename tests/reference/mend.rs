@@ -4,6 +4,7 @@
 use super::big::dot;
 use super::holes::{Filling, Holes};
 use super::insert::normal;
+use super::narrow::left_out;
 use super::surface::Edge;
 use outcrop::geom::distance2;
 use std::collections::BTreeSet;
@@ -12,6 +13,32 @@ use std::collections::BTreeSet;
 const LONGEST: usize = 100_000;
 /// Loops of so few edges are never taken for an outline.
 const SMALL: usize = 6;
+
+/// A loop as it was found.
+struct Found<'a> {
+    holes: &'a Holes<'a>,
+    /// Its edges, and the sum of their squares.
+    edges: usize,
+    squares: u128,
+    /// It is an outline.
+    around: bool,
+    /// Longer ones are not filled.
+    longest: usize,
+}
+
+/// What comes of filling a loop.
+enum Outcome {
+    /// It is too long, around a piece of surface, or cannot be split.
+    Cannot,
+    /// It is an opening, by itself or by the triangles that would fill it.
+    Opening,
+    Spanned,
+    /// All triangles are left out.
+    Wide,
+    /// Some are, and so many of them are not wide.
+    Part(Vec<[u32; 3]>, usize),
+    Whole(Vec<[u32; 3]>),
+}
 
 /// The triangles that close a loop, or a part of it.
 pub fn mend(
@@ -22,38 +49,34 @@ pub fn mend(
 ) -> Vec<[u32; 3]> {
     let only_gaps = longest < 3;
     let longest = longest.max(3);
-    if hole.len()
-        > if only_gaps {
-            longest
-        } else {
-            longest.max(LONGEST)
-        }
-    {
+    let most = if only_gaps {
+        longest
+    } else {
+        longest.max(LONGEST)
+    };
+    if hole.len() > most {
         filling.too_long += 1;
         return Vec::new();
     }
     let behind = holes.behind(hole);
-    let around = hole.len() > SMALL && holes.is_outline(hole, &behind);
-    let found: u128 = squares(holes, hole);
-    let is_wide = |area: f64, rest: usize| {
-        let limit = 4.5 * found as f64 * rest as f64;
-        area * hole.len() as f64 > limit
+    let found = Found {
+        holes,
+        edges: hole.len(),
+        squares: squares(holes, hole),
+        around: hole.len() > SMALL && holes.is_outline(hole, &behind),
+        longest,
     };
-    let is_opening = |rest: &[u32]| is_wide(vector_area(holes, rest), rest.len());
-    let is_spanned = |rest: &[u32], patch: &[[u32; 3]]| is_wide(area(holes, patch), rest.len());
-    let is_too_wide = |patch: &[[u32; 3]]| {
-        let wide = |t: &[u32; 3]| holes.density.is_some_and(|d| d.is_wide(*t, holes.file));
-        patch.iter().any(wide)
-    };
-    if !around && hole.len() <= longest {
-        let patch = filled(holes, hole, &behind, &BTreeSet::new());
-        if is_opening(hole) {
-            filling.openings += 1;
-        } else if patch.as_ref().is_some_and(|patch| is_spanned(hole, patch)) {
-            filling.spanned += 1;
-        } else if patch.as_ref().is_some_and(|patch| is_too_wide(patch)) {
-            filling.wide += 1;
-        } else if let Some(patch) = patch {
+    match found.fill(hole, &behind, &BTreeSet::new()) {
+        Outcome::Cannot => {}
+        Outcome::Opening => filling.openings += 1,
+        Outcome::Spanned => filling.spanned += 1,
+        Outcome::Wide => filling.wide += 1,
+        Outcome::Part(patch, between) => {
+            filling.left_open += 1;
+            filling.between += between;
+            return in_part(patch, filling);
+        }
+        Outcome::Whole(patch) => {
             if let [gap] = patch[..] {
                 filling.gaps += 1;
                 return vec![gap];
@@ -67,43 +90,96 @@ pub fn mend(
         filling.not_split += 1;
         return Vec::new();
     }
-    let mut zipper = Zipper::new(holes, hole, &behind);
-    zipper.zip();
-    let left = zipper.begin_at_smallest();
-    let (left, behind): (Vec<u32>, Vec<u32>) = left.into_iter().unzip();
-    let mut triangles = zipper.closed;
-    let mut whole = left.is_empty();
-    let fillable = |rest: &[u32]| !around && rest.len() <= longest && !is_opening(rest);
-    if !whole && !triangles.is_empty() && fillable(&left) {
-        let edges = |&[a, b, c]: &[u32; 3]| [[a, b], [b, c], [c, a]];
-        let taken = triangles.iter().flat_map(edges);
-        let taken = taken.map(|[a, b]| [a.min(b), a.max(b)]).collect();
-        if let Some(patch) = filled(holes, &left, &behind, &taken)
-            && !is_spanned(&left, &patch)
-            && !is_too_wide(&patch)
-        {
-            triangles.extend(patch);
-            whole = true;
-        }
-    }
-    if whole {
-        filling.filled += 1;
-        filling.zipped_whole += 1;
-    } else {
-        filling.zipped += 1;
-        filling.partly += usize::from(!triangles.is_empty());
-    }
+    found.zip(hole, &behind, filling)
+}
+
+/// Counts a loop that stays open, and the triangles that close a part of it.
+fn in_part(triangles: Vec<[u32; 3]>, filling: &mut Filling) -> Vec<[u32; 3]> {
+    filling.zipped += 1;
+    filling.partly += usize::from(!triangles.is_empty());
     filling.triangles += triangles.len();
     triangles
 }
 
-/// Fills a loop if it is none around a piece of surface.
+impl Found<'_> {
+    /// Whether so much area is more than a hole of `rest` edges has.
+    fn is_open(&self, area: f64, rest: usize) -> bool {
+        area * self.edges as f64 > 4.5 * self.squares as f64 * rest as f64
+    }
+
+    /// Fills the loop or what is left of it.
+    fn fill(&self, rest: &[u32], behind: &[u32], taken: &BTreeSet<Edge>) -> Outcome {
+        let holes = self.holes;
+        if self.around || rest.len() > self.longest {
+            return Outcome::Cannot;
+        }
+        if self.is_open(vector_area(holes, rest), rest.len()) {
+            return Outcome::Opening;
+        }
+        let Some(patch) = filled(holes, rest, behind, taken) else {
+            return Outcome::Cannot;
+        };
+        let ids = |t: &[usize; 3]| t.map(|k| rest[k]);
+        let all: Vec<[u32; 3]> = patch.iter().map(ids).collect();
+        if self.is_open(area(holes, &all), rest.len()) {
+            return Outcome::Spanned;
+        }
+        let is_wide = |t: &[usize; 3]| holes.density.is_some_and(|d| d.is_wide(ids(t), holes.file));
+        let out = left_out(rest.len(), &patch, is_wide);
+        let count = out.iter().filter(|out| **out).count();
+        if count == 0 {
+            return Outcome::Whole(all);
+        }
+        if count == all.len() {
+            return Outcome::Wide;
+        }
+        let wide = patch.iter().filter(|t| is_wide(t)).count();
+        let kept = all.into_iter().zip(out).filter(|(_, out)| !out);
+        Outcome::Part(kept.map(|(t, _)| t).collect(), count - wide)
+    }
+
+    /// Zips the loop and fills what is left.
+    fn zip(&self, hole: &[u32], behind: &[u32], filling: &mut Filling) -> Vec<[u32; 3]> {
+        let mut zipper = Zipper::new(self.holes, hole, behind);
+        zipper.zip();
+        let left = zipper.begin_at_smallest();
+        let (left, behind): (Vec<u32>, Vec<u32>) = left.into_iter().unzip();
+        let mut triangles = zipper.closed;
+        let mut whole = left.is_empty();
+        if !whole && !triangles.is_empty() {
+            let edges = |&[a, b, c]: &[u32; 3]| [[a, b], [b, c], [c, a]];
+            let taken = triangles.iter().flat_map(edges);
+            let taken = taken.map(|[a, b]| [a.min(b), a.max(b)]).collect();
+            match self.fill(&left, &behind, &taken) {
+                Outcome::Whole(patch) => {
+                    triangles.extend(patch);
+                    whole = true;
+                }
+                Outcome::Part(patch, between) => {
+                    filling.left_open_zipped += 1;
+                    filling.between += between;
+                    triangles.extend(patch);
+                }
+                _ => {}
+            }
+        }
+        if !whole {
+            return in_part(triangles, filling);
+        }
+        filling.filled += 1;
+        filling.zipped_whole += 1;
+        filling.triangles += triangles.len();
+        triangles
+    }
+}
+
+/// Fills a loop if it is none around a piece of surface; corners by their positions in it.
 fn filled(
     holes: &Holes<'_>,
     hole: &[u32],
     behind: &[u32],
     taken: &BTreeSet<Edge>,
-) -> Option<Vec<[u32; 3]>> {
+) -> Option<Vec<[usize; 3]>> {
     let around_a_triangle = hole.len() == 3 && hole.contains(&behind[0]);
     if around_a_triangle || hole.len() > SMALL && holes.is_outline(hole, behind) {
         return None;

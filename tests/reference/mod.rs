@@ -20,6 +20,7 @@ pub mod holes;
 pub mod homes;
 pub mod insert;
 pub mod mend;
+pub mod narrow;
 pub mod output;
 pub mod patches;
 pub mod relax;
@@ -76,7 +77,7 @@ pub struct Settings {
     pub robust: bool,
     /// Points off the surface stay.
     pub keep_all: bool,
-    /// Longest side of a triangle, and of one that fills a hole, in local spacings.
+    /// Longest side of a triangle, and how wide one may be that fills a hole, in local spacings.
     pub max_edge: f64,
     pub max_fill: f64,
 }
@@ -113,8 +114,8 @@ impl Settings {
             edges: true,
             robust: true,
             keep_all: false,
-            max_edge: 11.0,
-            max_fill: 25.0,
+            max_edge: 8.0,
+            max_fill: 8.0,
             ..Self::default()
         }
     }

@@ -2,6 +2,7 @@
 
 use super::Settings;
 use super::cells::{by_distance, plane_of};
+use super::insert::normal;
 use super::surface::Triangle;
 use outcrop::geom::{Point, distance2};
 
@@ -72,15 +73,17 @@ impl Density {
         !self.settings.keep_all && is_far(last2, self.usual2[id / PATCH])
     }
 
+    /// The square of the local spacing at a point.
+    fn local2(&self, v: u32) -> f64 {
+        let usual2 = self.usual2[v as usize / PATCH];
+        std::f64::consts::PI * usual2 as f64 / self.settings.neighbors as f64
+    }
+
     /// True if a side of a triangle is longer than `spacings` at both ends.
     fn exceeds(&self, spacings: f64, t: Triangle, points: &[Point]) -> bool {
-        let local2 = |v: u32| {
-            let usual2 = self.usual2[v as usize / PATCH];
-            std::f64::consts::PI * usual2 as f64 / self.settings.neighbors as f64
-        };
         [(0, 1), (0, 2), (1, 2)].into_iter().any(|(a, b)| {
             let side2 = distance2(points[t[a] as usize], points[t[b] as usize]) as f64;
-            let long = |v: u32| side2 > spacings * spacings * local2(v);
+            let long = |v: u32| side2 > spacings * spacings * self.local2(v);
             long(t[a]) && long(t[b])
         })
     }
@@ -90,8 +93,13 @@ impl Density {
         self.exceeds(self.settings.max_edge, t, file)
     }
 
-    /// True if a triangle is too long to fill a hole.
+    /// True if a triangle is too long, or too large, to fill a hole.
     pub fn is_wide(&self, t: Triangle, file: &[Point]) -> bool {
-        self.exceeds(self.settings.max_fill, t, file)
+        let w = self.settings.max_fill;
+        let n = normal(file, t).map(|x| x as f64);
+        let area = 0.5 * (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]).sqrt();
+        let local2 = t.map(|v| self.local2(v)).into_iter().fold(0.0, f64::max);
+        let large = area > 0.25 * 3f64.sqrt() * w * w * local2;
+        large || self.exceeds(2.5 * w, t, file)
     }
 }

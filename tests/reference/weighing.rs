@@ -25,6 +25,8 @@ pub struct Weighing {
     /// Step 6: nodes contracted with the sky, and those of them that were turned.
     pub under_sky: usize,
     pub turned_by_sky: usize,
+    /// Step 6: pairs with the sky looked at and not contracted.
+    pub left_free: usize,
     /// Step 7: crossing triangles removed, and triangles at edges between labels.
     pub cut_crossing: usize,
     pub cut_between: usize,
@@ -40,7 +42,7 @@ impl Weighing {
     }
 
     /// All counts with their names.
-    pub fn all(&self) -> [(&'static str, usize); 15] {
+    pub fn all(&self) -> [(&'static str, usize); 16] {
         [
             ("folded", self.folded),
             ("votes", self.votes),
@@ -55,6 +57,7 @@ impl Weighing {
             ("own nodes", self.own_nodes),
             ("under sky", self.under_sky),
             ("turned by sky", self.turned_by_sky),
+            ("left free", self.left_free),
             ("cut crossing", self.cut_crossing),
             ("cut between", self.cut_between),
         ]
@@ -76,6 +79,7 @@ impl Weighing {
             own_nodes,
             under_sky,
             turned_by_sky,
+            left_free,
             cut_crossing,
             cut_between,
         } = more;
@@ -92,6 +96,7 @@ impl Weighing {
         self.own_nodes += own_nodes;
         self.under_sky += under_sky;
         self.turned_by_sky += turned_by_sky;
+        self.left_free += left_free;
         self.cut_crossing += cut_crossing;
         self.cut_between += cut_between;
     }
