@@ -53,7 +53,7 @@ pub fn measure(points: &[Point], settings: &Settings) -> Density {
         let own: Vec<u64> = region.iter().map(quartile).collect();
         let usual = lower_quartile(own.clone());
         for (look, own) in region.iter().zip(own) {
-            let fills = 2 * look.iter().filter(|l| l.1).count() >= look.len();
+            let fills = 8 * look.iter().filter(|l| l.1).count() >= look.len();
             usual2.push(if fills && is_far(own, usual) {
                 usual
             } else {
