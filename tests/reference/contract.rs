@@ -27,6 +27,8 @@ pub struct Graph {
     pub sums: BTreeMap<Pair, i64>,
     /// The node that faces up.
     pub sky: Option<usize>,
+    /// Nodes with a connection to what is a part of the sky.
+    touching: BTreeSet<usize>,
 }
 
 fn pair(a: usize, b: usize) -> Pair {
@@ -117,7 +119,7 @@ impl Graph {
     /// Whether a pair is one with the sky that is not contracted: nothing is for it but a little evidence.
     fn is_free(&self, pair: Pair) -> bool {
         let evidence = self.nodes[pair[0]].up.abs();
-        self.sky == Some(pair[1]) && self.sums[&pair] == 0 && evidence < SURE
+        self.sky == Some(pair[1]) && !self.touching.contains(&pair[0]) && evidence < SURE
     }
 
     /// The node that gives a cluster its number and its run, and the other one.
@@ -138,11 +140,17 @@ impl Graph {
         node.triangles += part.triangles;
         node.outside += part.outside;
         node.up += if turned { -part.up } else { part.up };
+        if self.touching.contains(&goes) {
+            self.touching.insert(stays);
+        }
         let mut changed = Vec::new();
         for old in self.pairs_of(goes) {
             let sum = self.sums.remove(&old).expect("a pair");
             let other = if old[0] == goes { old[1] } else { old[0] };
             let new = pair(stays, other);
+            if self.sky == Some(stays) {
+                self.touching.insert(other);
+            }
             *self.sums.entry(new).or_default() += if turned { -sum } else { sum };
             changed.push(new);
         }

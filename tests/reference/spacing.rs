@@ -99,7 +99,7 @@ impl Density {
         let n = normal(file, t).map(|x| x as f64);
         let area = 0.5 * (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]).sqrt();
         let local2 = t.map(|v| self.local2(v)).into_iter().fold(0.0, f64::max);
-        let large = area > 0.25 * 3f64.sqrt() * w * w * local2;
+        let large = area > 0.25 * 3f64.sqrt() * (w * w * local2);
         large || self.exceeds(2.5 * w, t, file)
     }
 }

@@ -78,9 +78,11 @@ fn spread(fan: &[usize], goes: &mut [bool]) -> bool {
         (Some(first), Some(last)) => &fan[first..=last],
         _ => &[],
     };
-    between.iter().fold(false, |more, &t| {
-        !std::mem::replace(&mut goes[t], true) || more
-    })
+    let mut more = false;
+    for &t in between {
+        more |= !std::mem::replace(&mut goes[t], true);
+    }
+    more
 }
 
 /// The edges that are open if a loop of so many corners is closed by these triangles.

@@ -41,6 +41,8 @@ pub struct Graph {
     up: Vec<i64>,
     /// The node that faces up.
     sky: Option<u32>,
+    /// For each node whether nothing connects it with what is a part of the sky.
+    bare: Vec<bool>,
 }
 
 /// A pair in the order of contraction: the largest sum first, then the smallest nodes.
@@ -70,6 +72,7 @@ impl Graph {
         self.triangles.push(0);
         self.outside.push(0);
         self.up.push(0);
+        self.bare.push(true);
         self.degrees.len() as u32 - 1
     }
 
@@ -116,15 +119,15 @@ impl Graph {
         }
     }
 
-    /// True if one of the two is the sky, and the other one is small: nothing but the evidence that it
-    /// faces up may hold it.
+    /// True if one of the two is the sky, and the other one is not held: nothing connects them but little
+    /// evidence that it faces up.
     fn is_free(&self, a: u32, b: u32) -> bool {
         let other = match self.sky {
             Some(sky) if a == sky => b,
             Some(sky) if b == sky => a,
             _ => return false,
         };
-        self.up[other as usize].abs() < HELD
+        self.bare[other as usize] && self.up[other as usize].abs() < HELD
     }
 
     /// Adds to the sum of two nodes; nothing if they are the same.
@@ -200,7 +203,7 @@ impl Graph {
             let Some(&sum) = self.sums.get(&(a, b)) else {
                 continue;
             };
-            if sum == 0 && self.is_free(a, b) {
+            if self.is_free(a, b) {
                 continue;
             }
             let sum = self.weight(a, b, sum);
@@ -243,11 +246,13 @@ impl Graph {
         let up = std::mem::take(&mut self.up[b as usize]);
         self.up[a as usize] += if sum < 0 { -up } else { up };
         totals[a as usize] += totals[b as usize] - 2 * sum.abs();
+        self.bare[a as usize] &= self.bare[b as usize];
         for x in std::mem::take(&mut self.neighbors[b as usize]) {
             let Some(moved) = self.sums.remove(&key(b, x)) else {
                 continue;
             };
             self.degrees[x as usize] -= 1;
+            self.bare[x as usize] &= self.sky != Some(a);
             let moved = if sum < 0 { -moved } else { moved };
             let before = self.add_to_pair(a, x, moved).unwrap_or(0);
             let now = before + moved;
