@@ -104,15 +104,15 @@ impl Moments {
     }
 
     /// True if the point and its neighbours fill space and do not lie along a surface: their scatter along
-    /// the normal is more than a sixteenth of that in all directions. On a surface with noise of half a
-    /// spacing it is a twentieth.
+    /// the normal is more than a seventh of that in all directions. On a surface with noise of one spacing
+    /// it is a sixth.
     #[must_use]
     pub fn fill_space(&self, normal: Normal) -> bool {
         let [xx, yy, zz, xy, xz, yz] = self.scatter();
         let [x, y, z] = normal.map(f64::from);
         let along =
             (xx * x * x + yy * y * y + zz * z * z) + 2.0 * (xy * x * y + xz * x * z + yz * y * z);
-        16.0 * along > (xx + yy + zz) * (x * x + y * y + z * z)
+        7.0 * along > (xx + yy + zz) * (x * x + y * y + z * z)
     }
 
     /// The best-fitting plane of the point and its neighbours.

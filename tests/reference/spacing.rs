@@ -52,8 +52,10 @@ pub fn measure(points: &[Point], settings: &Settings) -> Density {
     for region in looks.chunks(REGION) {
         let own: Vec<u64> = region.iter().map(quartile).collect();
         let usual = lower_quartile(own.clone());
+        let far = own.iter().filter(|own| is_far(**own, usual)).count();
+        let one_in = if 16 * far <= region.len() { 16 } else { 2 };
         for (look, own) in region.iter().zip(own) {
-            let fills = 8 * look.iter().filter(|l| l.1).count() >= look.len();
+            let fills = one_in * look.iter().filter(|l| l.1).count() >= look.len();
             usual2.push(if fills && is_far(own, usual) {
                 usual
             } else {

@@ -154,13 +154,18 @@ struct Sample {
     fills: bool,
 }
 
-/// A patch may be in the air if the neighbours of one point in so many fill space. With 4, sheets of birds
-/// hang over 0.7 % of the ground of a generated world with one bird for 500 points; real scans are the same.
-const AIR: usize = 8;
+/// Few patches of a region reach far for it if at most one in so many does. Where density falls with the
+/// distance from a scanner, many do; of the patches of a landscape with one bird for 200 points, one in 60.
+const FEW: usize = 16;
+
+/// One in so many neighbourhoods of a patch that reaches far must fill space for it to be in the air: half
+/// of them, or, where such patches are few, a sixteenth. With half everywhere, sheets of birds hang over 1.4 % of the ground
+/// of that landscape; with a sixteenth everywhere, a seventh of a room scanned from its middle is lost.
+const FILLING: (usize, usize) = (2, 16);
 
 /// For each patch how far the neighbours of its points usually reach, squared: the lower quartile of those
-/// looked at. Where enough of these fill space and they reach far for their region they are strewn in the
-/// air, and what is usual is what is so in the region.
+/// looked at. Where these fill space and reach far for their region they are strewn in the air, and what is
+/// usual is what is so in the region.
 fn usual_reach(samples: &[Sample], ids: &Range<usize>) -> Vec<u64> {
     let patches = ids.len().div_ceil(PATCH * RUN);
     let mut reach: Vec<Vec<u64>> = Vec::new();
@@ -176,8 +181,14 @@ fn usual_reach(samples: &[Sample], ids: &Range<usize>) -> Vec<u64> {
     let counts = filling.chunks(REGION).zip(counts.chunks(REGION));
     for (usual2, (filling, counts)) in usual2.chunks_mut(REGION).zip(counts) {
         let region2 = lower_quartile(usual2.to_vec());
+        let far = usual2.iter().filter(|u| is_far(**u, region2)).count();
+        let one_in = if far * FEW <= usual2.len() {
+            FILLING.1
+        } else {
+            FILLING.0
+        };
         for (usual2, (filling, count)) in usual2.iter_mut().zip(filling.iter().zip(counts)) {
-            if AIR * filling >= *count && is_far(*usual2, region2) {
+            if one_in * filling >= *count && is_far(*usual2, region2) {
                 *usual2 = region2;
             }
         }
