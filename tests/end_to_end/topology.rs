@@ -92,11 +92,12 @@ fn closed_surfaces_with_many_blocks() {
     }
 }
 
-/// The bunny is closed but for its base, and closed if wide holes are filled, too; it has at most so many
+/// The bunny is closed but for its base, and closed if there are no limits of length; it has at most so many
 /// holes before repair. The paper's method uses all points; relaxed, a few of the sharpest ridges fall
 /// behind others.
 fn bunny(name: &str, holes: u64) {
     let lid = Params {
+        max_edge: MaxWidth::None,
         max_fill: MaxWidth::None,
         ..Params::default()
     };

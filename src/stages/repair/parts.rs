@@ -38,9 +38,10 @@ impl Part {
         let fans = fans(corners.len(), &triangles);
         let mut more = true;
         while more {
-            more = fans
-                .iter()
-                .fold(false, |more, fan| spread(fan, &mut goes) || more);
+            more = false;
+            for fan in &fans {
+                more |= spread(fan, &mut goes);
+            }
         }
         let mut number = 0;
         triangles.retain(|_| {
