@@ -227,7 +227,7 @@ impl Params {
         self.method == Method::Robust && !self.keep_all
     }
 
-    /// What is too far apart to be one surface, on a lattice of this step.
+    /// The limits of distance on one surface, on a lattice of this step.
     #[must_use]
     pub fn limits(&self, step: f64) -> Limits {
         let width = |max| match max {

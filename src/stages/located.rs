@@ -44,6 +44,13 @@ impl Places<'_> {
         #[inline(always)]
         move |t, at| differ && on_a_line(at) || is_long.is_some_and(|is_long| is_long(t, at))
     }
+
+    /// Leaves out candidates, `[i, j, k, count]`, that are unfit where they are in the file; how many.
+    pub fn drop_unfit(&self, candidates: &mut Vec<[u32; 4]>, file: &Located) -> u64 {
+        let (unfit, before) = (self.unfit(), candidates.len());
+        candidates.retain(|&[i, j, k, _]| !unfit([i, j, k], file.corners([i, j, k])));
+        (before - candidates.len()) as u64
+    }
 }
 
 /// The positions of the vertices of a block and of some others.

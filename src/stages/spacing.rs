@@ -19,7 +19,8 @@ pub const REGION: usize = 256;
 const FAR: u128 = 5;
 
 /// A slender triangle may fill a hole if its sides are no longer than so many widths. With 2, an aerial
-/// scan has a twelfth more boundary; with no such limit a fifth less, but 1 in 1000 points of the mesh is half as far again from the scan.
+/// scan has a twelfth more boundary; with no such limit a fifth less, but one in 1000 points of the mesh is
+/// half as far again from the scan.
 const SLENDER: f64 = 2.5;
 
 /// A limit of length.
@@ -43,7 +44,7 @@ impl Width {
     }
 }
 
-/// What is too far apart to be one surface.
+/// The distances above which points and triangles are no part of one surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
     /// Points off the surface are left out.
@@ -68,7 +69,7 @@ pub struct Density<'a> {
     pub spacings: &'a Spacings,
     /// `k`.
     pub neighbors: usize,
-    /// What is too far apart.
+    /// The limits, in local spacings or lattice steps.
     pub limits: Limits,
 }
 

@@ -46,7 +46,8 @@ impl Mending<'_> {
         }
     }
 
-    /// What fills a loop that is wide as `found` is, and stays; `None` if nothing does.
+    /// The triangles that fill a loop and stay, where the loop as found had this width; `None` if there are
+    /// none.
     fn filled(
         &self,
         corners: &[Corner],

@@ -19,9 +19,9 @@ impl Part {
         Self { triangles, left: 0 }
     }
 
-    /// What stays of the `triangles` that fill the loop of `corners`: none that is wide. At each corner
-    /// they lie side by side from one edge of the loop to the next; those between two that go, go as well,
-    /// so that what stays hangs together with the surface by edges.
+    /// Those of the `triangles` that fill the loop of `corners` that are not wide. At each corner they lie
+    /// side by side from one edge of the loop to the next; those between two that go, go as well, so that
+    /// the others share edges with the surface around.
     pub fn not_wide(
         corners: &[Corner],
         mut triangles: Vec<[usize; 3]>,

@@ -241,18 +241,14 @@ impl Look<'_> {
             let vertices = self.foreign(block, triangles);
             let file = Located::load(self.places.file, self.blocks, block, vertices)?;
             let unfit = self.places.unfit();
-            let (mut t3, open) = (0, candidates.len());
+            let mut t3 = 0;
             triangles.retain(|t| {
                 let flat = unfit(*t, file.corners(*t));
                 t3 += u64::from(flat && self.blocks.of(t[0]) == block as u32);
                 !flat
             });
-            candidates.retain(|r| {
-                let t = [r[0], r[1], r[2]];
-                !unfit(t, file.corners(t))
-            });
             found.flat = t3;
-            found.flat_candidates = (open - candidates.len()) as u64;
+            found.flat_candidates = self.places.drop_unfit(candidates, &file);
             return Ok(Some(file));
         }
         Ok(None)

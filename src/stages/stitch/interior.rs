@@ -251,13 +251,7 @@ impl BlockWork {
                 .then(|| Located::load(places.file, blocks, block, all.into_iter()))
                 .transpose()?;
             let file = moved.as_ref().unwrap_or(&self.located);
-            let unfit = places.unfit();
-            let before = candidates.len();
-            candidates.retain(|r| {
-                let t = [r[0], r[1], r[2]];
-                !unfit(t, file.corners(t))
-            });
-            self.flat = (before - candidates.len()) as u64;
+            self.flat = places.drop_unfit(&mut candidates, file);
         }
         let new = |&[i, j, k, count]: &[u32; 4]| {
             let t = [i, j, k];

@@ -1,7 +1,7 @@
 //! Points seen from above: the highest one of each column of space.
 //!
-//! What is topmost in its column faces up: ground, roofs, crowns of trees, and the outside of any closed
-//! body. A column has a square base; there is about one for every [`POINTS`] points.
+//! The surface there faces up: ground, roofs, crowns of trees, and the outside of any closed body. A column
+//! has a square base; there is about one for every [`POINTS`] points.
 
 use crate::error::Result;
 use crate::geom::Point;

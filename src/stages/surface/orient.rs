@@ -57,7 +57,7 @@ pub struct OrientedInside {
     triangles: u64,
 }
 
-/// What blocks leave where there is evidence, by block.
+/// Evidence on the orientation of each block's labels, by block.
 #[derive(Debug)]
 pub(super) struct Weighed {
     /// Sums of pairs of global labels, `[a, b, sum]`, the sum in two words.

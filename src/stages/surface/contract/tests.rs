@@ -4,7 +4,7 @@ use super::*;
 use proptest::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// What nodes are: triangles, outside, evidence.
+/// Triangles, outside and evidence of each node.
 type Nodes = Vec<(u64, i64, i64)>;
 
 /// A graph that adds up everything anew whenever it is asked.

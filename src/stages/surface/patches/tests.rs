@@ -35,6 +35,24 @@ pub(in super::super) fn band(
     all
 }
 
+/// The edges between two triangles: the earlier and the later one, and whether one must be turned.
+pub(in super::super) fn inner_edges(
+    ids: Range<u32>,
+    triangles: &[Triangle],
+) -> Vec<(usize, usize, bool)> {
+    let mut edges = Vec::new();
+    for (n, sides) in across(ids, triangles).into_iter().enumerate() {
+        for (a, b, opposite, _) in EDGES {
+            let (m, _) = parts(sides[opposite]);
+            if sides[opposite] != NONE && n <= m {
+                let t = triangles[n];
+                edges.push((n, m, opposed(t, triangles[m], t[a], t[b])));
+            }
+        }
+    }
+    edges
+}
+
 /// Evidence of how triangles lie, and nothing else.
 pub(in super::super) fn evidence(places: &[Point], division: Division) -> Evidence {
     Evidence {
@@ -70,24 +88,17 @@ proptest! {
         let ids = 0..places.len() as u32;
         let mut patches = Patches::of(ids.clone(), &triangles, &evidence, patch);
         let mut joints = patches.joints.clone();
-        for (n, sides) in across(ids, &triangles).into_iter().enumerate() {
-            for (a, b, opposite, _) in EDGES {
-                let (m, _) = parts(sides[opposite]);
-                if sides[opposite] == NONE || m < n {
-                    continue;
-                }
-                let (t, other) = (triangles[n], triangles[m]);
-                let flip = opposed(t, other, t[a], t[b]);
-                let cosine = cosine(evidence.normal(t), evidence.normal(other), flip);
-                let weight = weight(cosine) as u8;
-                let one = patches.of[n] == patches.of[m];
-                let near = t[0] / patch == other[0] / patch;
-                prop_assert!(one || !near || cosine <= FLAT, "{:?} {:?}", t, other);
-                prop_assert!(!one || near);
-                if !one || patches.sets.relation(n as u32, m as u32) != Some(flip) {
-                    let joint = Joint { a: n as u32, b: m as u32, flip, weight };
-                    prop_assert_eq!(joints.remove(0), joint);
-                }
+        for (n, m, flip) in inner_edges(ids, &triangles) {
+            let (t, other) = (triangles[n], triangles[m]);
+            let cosine = cosine(evidence.normal(t), evidence.normal(other), flip);
+            let weight = weight(cosine) as u8;
+            let one = patches.of[n] == patches.of[m];
+            let near = t[0] / patch == other[0] / patch;
+            prop_assert!(one || !near || cosine <= FLAT, "{:?} {:?}", t, other);
+            prop_assert!(!one || near);
+            if !one || patches.sets.relation(n as u32, m as u32) != Some(flip) {
+                let joint = Joint { a: n as u32, b: m as u32, flip, weight };
+                prop_assert_eq!(joints.remove(0), joint);
             }
         }
         prop_assert_eq!(joints, []);

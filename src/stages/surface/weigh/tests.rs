@@ -2,9 +2,7 @@
 
 use super::super::evidence::Division;
 use super::super::parity::ParitySets;
-use super::super::patches::tests::{band, evidence, points};
-use super::super::sides::{NONE, across, parts};
-use super::super::star::{EDGES, opposed};
+use super::super::patches::tests::{band, evidence, inner_edges, points};
 use super::*;
 use crate::geom::Point;
 use proptest::prelude::*;
@@ -45,18 +43,10 @@ proptest! {
         let division = Division { patch, cluster: 1000 };
         let (mut sets, dead) = oriented(&triangles, &places, division);
         let mut contradicted = vec![false; triangles.len()];
-        for (n, sides) in across(0..27, &triangles).into_iter().enumerate() {
-            for (a, b, opposite, _) in EDGES {
-                let (m, _) = parts(sides[opposite]);
-                if sides[opposite] == NONE || m < n {
-                    continue;
-                }
-                let (t, other) = (triangles[n], triangles[m]);
-                let flip = opposed(t, other, t[a], t[b]);
-                let fits = sets.relation(n as u32, m as u32) == Some(flip);
-                prop_assert!(fits || dead[n] || dead[m], "{} and {} are left and contradict", n, m);
-                contradicted[m] |= !fits;
-            }
+        for (n, m, flip) in inner_edges(0..27, &triangles) {
+            let fits = sets.relation(n as u32, m as u32) == Some(flip);
+            prop_assert!(fits || dead[n] || dead[m], "{} and {} are left and contradict", n, m);
+            contradicted[m] |= !fits;
         }
         for (dead, contradicted) in dead.iter().zip(contradicted) {
             prop_assert!(!dead || contradicted);
