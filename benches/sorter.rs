@@ -20,7 +20,7 @@ fn sort(bencher: Bencher<'_, '_>, runs: usize) {
     // One record of room to spare keeps a single run in memory.
     let buffer = (RECORDS.div_ceil(runs) + usize::from(runs == 1)) * size_of::<Key>();
     bencher.counter(ItemsCount::new(RECORDS)).bench_local(|| {
-        let sorter = Sorter::<3>::new(&workspace, "bench", buffer as u64);
+        let sorter = Sorter::<Key>::new(&workspace, "bench", buffer as u64);
         sorter.push(&keys).expect("scratch space");
         let each = |record| {
             black_box(record);

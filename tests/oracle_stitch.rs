@@ -5,6 +5,7 @@ mod reference;
 
 use outcrop::inspect::ply_mesh::{PlyMesh, Sink};
 use outcrop::stages::blocks::Blocks;
+use outcrop::stages::cells::{CountedTriple, SentTriple};
 use outcrop::stages::export::{CoordinateType, export};
 use outcrop::stages::located::Places;
 use outcrop::stages::order::{Orderer, PointStore, StoreWriter};
@@ -61,22 +62,24 @@ fn store_of(points: &[Point], workspace: &Workspace) -> PointStore {
     orderer.finish(workspace, 16).unwrap().0
 }
 
-fn sections(all: &BTreeMap<[u32; 3], u32>, blocks: Blocks, workspace: &Workspace) -> Triples {
-    let own = spill::Sections::create(workspace, "own", blocks.count()).unwrap();
-    let visiting = spill::Sections::create(workspace, "visiting", blocks.count()).unwrap();
+fn tables(all: &BTreeMap<[u32; 3], u32>, blocks: Blocks, workspace: &Workspace) -> Triples {
+    let own = spill::Table::create(workspace, "own", blocks.count()).unwrap();
+    let visiting = spill::Table::create(workspace, "visiting", blocks.count()).unwrap();
     for block in 0..blocks.count() as u32 {
-        let records = all.iter().filter(|(t, _)| blocks.of(t[0]) == block);
-        let records: Vec<_> = records
-            .map(|(t, count)| [t[0], t[1], t[2], *count])
-            .collect();
-        own.put(block as usize, &records).unwrap();
+        let first = all.iter().filter(|(t, _)| blocks.of(t[0]) == block);
+        let first = first.map(|(&triple, &count)| CountedTriple { triple, count });
+        own.put(block as usize, &first.collect::<Vec<_>>()).unwrap();
         let visits = all
             .iter()
             .filter(|(t, _)| blocks.visited(**t).any(|b| b == block));
-        let visits: Vec<_> = visits
-            .map(|(t, count)| [block, t[0], t[1], t[2], *count])
-            .collect();
-        visiting.put(block as usize, &visits).unwrap();
+        let visits = visits.map(|(&triple, &count)| SentTriple {
+            to: block,
+            triple,
+            count,
+        });
+        visiting
+            .put(block as usize, &visits.collect::<Vec<_>>())
+            .unwrap();
     }
     Triples { own, visiting }
 }
@@ -99,7 +102,7 @@ fn pipeline(
     let store = store_of(points, workspace);
     let moved = (shape != points).then(|| shape_of(shape, workspace));
     let blocks = Blocks::new(store.len(), settings.block);
-    let triples = sections(all, blocks, workspace);
+    let triples = tables(all, blocks, workspace);
     let places = Places {
         shape: moved.as_ref().unwrap_or(&store),
         file: &store,

@@ -1,20 +1,20 @@
-//! Records on disk: sections written in any order, and the external sorter.
+//! Rows on disk: tables of numbered sections, shuffles and the external sorter.
 //!
-//! Every record is an array of `N` 32-bit words, compared lexicographically; what the words mean
-//! is known only to the stage that writes them. Every part of a file carries a CRC-32 that is
-//! checked when it is read.
+//! A row is a struct of 32-bit words, compared lexicographically; its fields are known only to the
+//! stage that writes it. Every part of a file carries a CRC-32 that is checked when it is read.
 
-mod exchange;
 mod pack;
+mod row;
 mod runs;
-mod sections;
+mod shuffle;
 mod sort;
 mod sorter;
+mod table;
+mod transitional;
 
-pub use exchange::Exchange;
-pub use pack::{Layout, Word, layouts};
-pub use sections::Sections;
+pub(crate) use row::row;
+pub use row::{Id, Row, Word, row_bytes};
+pub use shuffle::Shuffle;
 pub use sorter::{Sorted, Sorter};
-
-/// A record of `N` words.
-pub type Record<const N: usize> = [u32; N];
+pub use table::Table;
+pub use transitional::*;

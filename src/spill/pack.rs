@@ -1,10 +1,11 @@
-//! Records as few bytes: every word as a difference, every difference without its leading zeros.
+//! Rows as few bytes: every word as a difference, every difference without its leading zeros.
 //!
-//! Packed records are frames of up to [`FRAME`] records. A frame begins with two bits for each word,
+//! Packed rows are frames of up to [`FRAME`] records. A frame begins with two bits for each word,
 //! 32 words to a little-endian `u64`: the word's difference takes 0, 1, 2 or 4 bytes, which follow in
 //! the same order. After the last frame come [`PADDING`] zeros, so that four bytes can always be read.
 
-use super::Record;
+use super::row::{Row, Word};
+use std::marker::PhantomData;
 
 /// Records in a frame.
 const FRAME: usize = 512;
@@ -14,74 +15,62 @@ const PADDING: usize = 4;
 const LENGTH: [usize; 4] = [0, 1, 2, 4];
 const MASK: [u32; 4] = [0, 0xff, 0xffff, u32::MAX];
 
-/// What a word of a record is written as the difference to.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Word {
-    /// The same word of the record before.
-    Above,
-    /// The word to its left, which may be larger; zero for the first word.
-    Left,
-    /// The word to its left, which is rarely larger; zero for the first word.
-    Rising,
-}
-
-/// How each word of a record is packed. It changes how many bytes the records take and nothing else.
-pub type Layout<const N: usize> = [Word; N];
-
-/// Layouts of the records that most files hold.
-pub mod layouts {
-    use super::{Layout, Word};
-
-    /// `[i, j, k]`, `i < j < k`, ascending.
-    pub const TRIANGLE: Layout<3> = [Word::Above, Word::Rising, Word::Rising];
-    /// `[i, j, k, attribute]`, `i < j < k`, ascending.
-    pub const LABELLED: Layout<4> = [Word::Above, Word::Rising, Word::Rising, Word::Above];
-    /// `[receiver, i, j, k]`, `i < j < k`, ascending.
-    pub const SENT: Layout<4> = [Word::Above, Word::Above, Word::Rising, Word::Rising];
-    /// `[receiver, i, j, k, attribute]`, `i < j < k`, ascending.
-    pub const SENT_LABELLED: Layout<5> = [
-        Word::Above,
-        Word::Above,
-        Word::Rising,
-        Word::Rising,
-        Word::Above,
-    ];
-    /// `[i, a, b]` with `i` smaller than `a` and `b`, ascending by `i`.
-    pub const ORIENTED: Layout<3> = [Word::Above, Word::Rising, Word::Left];
-}
-
 /// A layout as masks, so that packing a word takes no branch.
-struct Masks<const N: usize> {
-    above: [u32; N],
-    left: [u32; N],
+#[derive(Clone, Copy)]
+struct Masks {
+    above: u32,
+    left: u32,
     /// 1 if differences go up and down alike, so that the sign is moved to the lowest bit.
-    signed: [u32; N],
+    signed: u32,
 }
 
-impl<const N: usize> Masks<N> {
-    fn of(layout: Layout<N>) -> Self {
-        let mask = |yes: bool| if yes { u32::MAX } else { 0 };
+impl Masks {
+    const fn of(word: Word) -> Self {
+        let above = if matches!(word, Word::Above) {
+            u32::MAX
+        } else {
+            0
+        };
         Self {
-            above: layout.map(|w| mask(w == Word::Above)),
-            left: layout.map(|w| mask(w != Word::Above)),
-            signed: layout.map(|w| u32::from(w != Word::Rising)),
+            above,
+            left: !above,
+            signed: if matches!(word, Word::Rising) { 0 } else { 1 },
         }
     }
 
-    fn predict(&self, word: usize, above: &Record<N>, left: u32) -> u32 {
-        above[word] & self.above[word] | left & self.left[word]
+    fn predict(self, above: u32, left: u32) -> u32 {
+        above & self.above | left & self.left
     }
 
-    fn fold(&self, word: usize, difference: u32) -> u32 {
+    fn fold(self, difference: u32) -> u32 {
         let sign = ((difference as i32) >> 31) as u32;
-        let signed = self.signed[word];
-        (difference << signed) ^ (sign & 0u32.wrapping_sub(signed))
+        (difference << self.signed) ^ (sign & 0u32.wrapping_sub(self.signed))
     }
 
-    fn unfold(&self, word: usize, folded: u32) -> u32 {
-        let signed = self.signed[word];
-        (folded >> signed) ^ 0u32.wrapping_sub(folded & signed)
+    fn unfold(self, folded: u32) -> u32 {
+        (folded >> self.signed) ^ 0u32.wrapping_sub(folded & self.signed)
     }
+}
+
+/// Words of a packed row at most.
+const MOST_WORDS: usize = 16;
+
+/// The masks of a row's words, known when the program is compiled.
+struct Packing<R>(PhantomData<R>);
+
+impl<R: Row> Packing<R> {
+    const MASKS: [Masks; MOST_WORDS] = {
+        let mut masks = [Masks::of(Word::Above); MOST_WORDS];
+        if let Some(words) = R::PACKING {
+            assert!(words.len() == R::WORDS && words.len() <= MOST_WORDS);
+            let mut word = 0;
+            while word < words.len() {
+                masks[word] = Masks::of(words[word]);
+                word += 1;
+            }
+        }
+        masks
+    };
 }
 
 /// Bytes that `records` records of `words` words take at most.
@@ -92,20 +81,21 @@ fn most_bytes(records: usize, words: usize) -> usize {
 }
 
 /// Appends the packed records to `bytes`.
-pub fn pack<const N: usize>(records: &[Record<N>], layout: Layout<N>, bytes: &mut Vec<u8>) {
-    let masks = Masks::of(layout);
-    let mut above = [0; N];
+pub fn pack<R: Row>(records: &[R], bytes: &mut Vec<u8>) {
+    let mut above = R::zeroed();
     let mut tags: Vec<u8> = Vec::new();
-    let mut buffer = vec![0u8; FRAME * N * 4 + PADDING];
+    let mut buffer = vec![0u8; FRAME * size_of::<R>() + PADDING];
     for frame in records.chunks(FRAME) {
         tags.clear();
         let mut used = 0;
         let (mut tag, mut shift) = (0u64, 0);
         for record in frame {
             let mut left = 0;
-            for (word, &value) in record.iter().enumerate() {
-                let difference = value.wrapping_sub(masks.predict(word, &above, left));
-                let folded = masks.fold(word, difference);
+            for word in 0..R::WORDS {
+                let (masks, value) = (Packing::<R>::MASKS[word], record.words()[word]);
+                let above = above.words()[word];
+                let difference = value.wrapping_sub(masks.predict(above, left));
+                let folded = masks.fold(difference);
                 let class = usize::from(folded > 0)
                     + usize::from(folded > 0xff)
                     + usize::from(folded > 0xffff);
@@ -132,22 +122,19 @@ pub fn pack<const N: usize>(records: &[Record<N>], layout: Layout<N>, bytes: &mu
 
 /// Fills `records` from exactly the bytes that [`pack`] made of as many; `None` if they cannot be.
 #[must_use]
-pub fn unpack<const N: usize>(
-    bytes: &[u8],
-    layout: Layout<N>,
-    records: &mut [Record<N>],
-) -> Option<()> {
-    let masks = Masks::of(layout);
-    let mut above = [0; N];
+pub fn unpack<R: Row>(bytes: &[u8], records: &mut [R]) -> Option<()> {
+    let mut above = R::zeroed();
     let mut at = 0;
     for frame in records.chunks_mut(FRAME) {
-        let size = (frame.len() * N).div_ceil(32) * 8;
+        let size = (frame.len() * R::WORDS).div_ceil(32) * 8;
         let mut tags = bytes.get(at..at + size)?.chunks_exact(8);
         at += size;
         let (mut tag, mut left_in_tag) = (0u64, 0);
         for record in frame {
             let mut left = 0;
-            for (word, value) in record.iter_mut().enumerate() {
+            let words: &mut [u32] = bytemuck::cast_slice_mut(std::slice::from_mut(record));
+            for word in 0..R::WORDS {
+                let masks = Packing::<R>::MASKS[word];
                 if left_in_tag == 0 {
                     tag = u64::from_le_bytes(tags.next()?.try_into().ok()?);
                     left_in_tag = 32;
@@ -158,9 +145,9 @@ pub fn unpack<const N: usize>(
                 let four: [u8; 4] = bytes.get(at..at + 4)?.try_into().ok()?;
                 let folded = u32::from_le_bytes(four) & MASK[class];
                 at += LENGTH[class];
-                let predicted = masks.predict(word, &above, left);
-                left = masks.unfold(word, folded).wrapping_add(predicted);
-                *value = left;
+                let predicted = masks.predict(above.words()[word], left);
+                left = masks.unfold(folded).wrapping_add(predicted);
+                words[word] = left;
             }
             above = *record;
         }
@@ -176,73 +163,93 @@ fn padding(records: usize) -> &'static [u8] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::spill::row;
     use proptest::prelude::*;
+
+    row! {
+        /// The packing of most rows: ids that rise within a row.
+        struct Triangle { i: u32, j: u32, k: u32, }
+        packed Above Rising Rising
+    }
+
+    row! {
+        /// Every kind of word at another place.
+        struct Mixed { a: u32, b: u32, c: u32, }
+        packed Rising Above Left
+    }
+
+    row! {
+        /// No word is like the one above.
+        struct Leftwards { words: [u32; 3], }
+        packed Left Rising Left
+    }
 
     /// Words small, large and in between.
     fn word() -> impl Strategy<Value = u32> {
         prop_oneof![0u32..4, 0u32..70_000, any::<u32>(), Just(u32::MAX)]
     }
 
-    fn layout() -> impl Strategy<Value = Layout<3>> {
-        prop::array::uniform3(prop::sample::select(vec![
-            Word::Above,
-            Word::Left,
-            Word::Rising,
-        ]))
+    fn comes_back<R: Row>(words: &[[u32; 3]]) {
+        let rows: &[R] = bytemuck::cast_slice(words);
+        let mut bytes = Vec::new();
+        pack(rows, &mut bytes);
+        assert!(bytes.len() <= most_bytes(rows.len(), 3));
+        let mut back = vec![R::zeroed(); rows.len()];
+        assert!(unpack(&bytes, &mut back).is_some());
+        assert_eq!(back, rows);
     }
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(200))]
         #[test]
-        fn any_records_come_back(
-            records in prop::collection::vec(prop::array::uniform3(word()), 0..1600),
-            layout in layout(),
+        fn any_rows_come_back(
+            words in prop::collection::vec(prop::array::uniform3(word()), 0..1600),
         ) {
-            let mut bytes = Vec::new();
-            pack(&records, layout, &mut bytes);
-            prop_assert!(bytes.len() <= most_bytes(records.len(), 3));
-            let mut back = vec![[0; 3]; records.len()];
-            prop_assert!(unpack(&bytes, layout, &mut back).is_some());
-            prop_assert_eq!(back, records);
+            comes_back::<Triangle>(&words);
+            comes_back::<Mixed>(&words);
+            comes_back::<Leftwards>(&words);
+            comes_back::<[u32; 3]>(&words);
         }
 
-        /// Whatever the bytes are, the answer is records or `None`.
+        /// For any bytes the answer is rows or `None`.
         #[test]
         fn no_bytes_are_too_bad(
             bytes in prop::collection::vec(any::<u8>(), 0..3000),
             count in 0usize..700,
-            layout in layout(),
         ) {
-            let mut records = vec![[0; 3]; count];
-            let _ = unpack(&bytes, layout, &mut records);
+            let _ = unpack(&bytes, &mut vec![Triangle::default(); count]);
+            let _ = unpack(&bytes, &mut vec![Mixed::default(); count]);
+            let _ = unpack(&bytes, &mut vec![Leftwards::default(); count]);
         }
 
         /// Bytes that are missing or added are noticed even without a checksum.
         #[test]
         fn a_wrong_length_is_noticed(
-            records in prop::collection::vec(prop::array::uniform3(word()), 1..700),
+            words in prop::collection::vec(prop::array::uniform3(word()), 1..700),
             cut in 1usize..20,
             more in 1usize..20,
         ) {
-            let layout = [Word::Above; 3];
             let mut bytes = Vec::new();
-            pack(&records, layout, &mut bytes);
-            let mut back = vec![[0; 3]; records.len()];
+            pack(&words, &mut bytes);
+            let mut back = vec![[0; 3]; words.len()];
             let shorter = &bytes[..bytes.len() - cut.min(bytes.len())];
-            prop_assert!(unpack(shorter, layout, &mut back).is_none());
+            prop_assert!(unpack(shorter, &mut back).is_none());
             bytes.resize(bytes.len() + more, 0);
-            prop_assert!(unpack(&bytes, layout, &mut back).is_none());
+            prop_assert!(unpack(&bytes, &mut back).is_none());
         }
     }
 
     #[test]
     fn neighbouring_triangles_take_few_bytes() {
-        let records: Vec<_> = (0..30_000u32)
-            .map(|n| [n / 2, n / 2 + 1 + n % 2, n / 2 + 40, 3])
+        let rows: Vec<_> = (0..30_000u32)
+            .map(|n| Triangle {
+                i: n / 2,
+                j: n / 2 + 1 + n % 2,
+                k: n / 2 + 40,
+            })
             .collect();
-        let layout = [Word::Above, Word::Rising, Word::Rising, Word::Above];
         let mut bytes = Vec::new();
-        pack(&records, layout, &mut bytes);
-        assert!(bytes.len() < 4 * records.len(), "{}", bytes.len());
+        pack(&rows, &mut bytes);
+        assert!(bytes.len() < 3 * rows.len(), "{}", bytes.len());
     }
 }

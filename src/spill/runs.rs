@@ -1,11 +1,11 @@
 //! Sorted runs on disk: written frame by frame, merged in whole or over a range.
 
-use super::Record;
+use super::Row;
 use crate::error::{Error, Result};
 use crate::workspace::Workspace;
 use crate::workspace::file::{Place, ScratchFile, open_existing};
 use crate::workspace::persist::{Persist, Saved};
-use std::cmp::Reverse;
+use std::cmp::{Ordering, Reverse};
 use std::collections::BinaryHeap;
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
@@ -19,21 +19,21 @@ pub(super) const FILE_BUFFER: usize = 1 << 15;
 
 /// One sorted file of frames: `u32` length in records, `u32` CRC-32, records.
 #[derive(Debug)]
-pub(super) struct Run<const N: usize> {
+pub(super) struct Run<R: Row> {
     file: ScratchFile,
     bytes: u64,
     /// The first record of each frame; all frames but the last are full.
-    pub(super) firsts: Vec<Record<N>>,
+    pub(super) firsts: Vec<R>,
     /// The whole file.
     place: Place,
 }
 
 /// Bytes of a full frame.
-const fn frame_bytes<const N: usize>() -> u64 {
-    (8 + FRAME * size_of::<Record<N>>()) as u64
+const fn frame_bytes<R: Row>() -> u64 {
+    (8 + FRAME * size_of::<R>()) as u64
 }
 
-impl<const N: usize> Run<N> {
+impl<R: Row> Run<R> {
     /// The name of its file.
     pub(super) fn name(&self) -> String {
         self.file.name.to_string()
@@ -58,10 +58,10 @@ impl<const N: usize> Run<N> {
         if !file.is_gone() {
             let io = |e| Error::io(&file.path, "read", e);
             let handle = open_existing(&file.path).map_err(io)?;
-            let mut first = [0; N];
-            for frame in 0..bytes.div_ceil(frame_bytes::<N>()) {
-                let at = frame * frame_bytes::<N>() + 8;
-                let first_bytes = bytemuck::cast_slice_mut(&mut first);
+            let mut first = R::zeroed();
+            for frame in 0..bytes.div_ceil(frame_bytes::<R>()) {
+                let at = frame * frame_bytes::<R>() + 8;
+                let first_bytes = bytemuck::bytes_of_mut(&mut first);
                 handle.read_exact_at(first_bytes, at).map_err(io)?;
                 firsts.push(first);
             }
@@ -76,7 +76,7 @@ impl<const N: usize> Run<N> {
     }
 }
 
-impl<const N: usize> Persist for Run<N> {
+impl<R: Row> Persist for Run<R> {
     fn save(&self, out: &mut Vec<u8>) {
         self.file.name.to_string().save(out);
     }
@@ -87,12 +87,35 @@ impl<const N: usize> Persist for Run<N> {
     }
 }
 
+/// The next row of a run, with the number of the run: equal rows come in the order of runs.
+struct Next<R>(R, usize);
+
+impl<R: Row> Ord for Next<R> {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.0.compare(&other.0).then(self.1.cmp(&other.1))
+    }
+}
+
+impl<R: Row> PartialOrd for Next<R> {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl<R: Row> PartialEq for Next<R> {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other) == Ordering::Equal
+    }
+}
+
+impl<R: Row> Eq for Next<R> {}
+
 /// Calls `each` with the records of all runs from `from` on and below `to`, ascending.
-pub(super) fn merge<const N: usize>(
-    runs: &[Run<N>],
-    from: Option<Record<N>>,
-    to: Option<Record<N>>,
-    mut each: impl FnMut(Record<N>) -> Result<()>,
+pub(super) fn merge<R: Row>(
+    runs: &[Run<R>],
+    from: Option<R>,
+    to: Option<R>,
+    mut each: impl FnMut(R) -> Result<()>,
 ) -> Result<()> {
     let mut readers = runs
         .iter()
@@ -101,14 +124,14 @@ pub(super) fn merge<const N: usize>(
     let mut heap = BinaryHeap::with_capacity(readers.len());
     for (index, reader) in readers.iter_mut().enumerate() {
         if let Some(record) = reader.next()? {
-            heap.push(Reverse((record, index)));
+            heap.push(Reverse(Next(record, index)));
         }
     }
     while let Some(mut top) = heap.peek_mut() {
-        let Reverse((record, index)) = *top;
+        let Reverse(Next(record, index)) = *top;
         each(record)?;
         match readers[index].next()? {
-            Some(next) => *top = Reverse((next, index)),
+            Some(next) => *top = Reverse(Next(next, index)),
             None => {
                 std::collections::binary_heap::PeekMut::pop(top);
             }
@@ -118,16 +141,16 @@ pub(super) fn merge<const N: usize>(
 }
 
 /// Writes a run.
-pub(super) struct RunWriter<const N: usize> {
+pub(super) struct RunWriter<R: Row> {
     file: ScratchFile,
     bytes: u64,
-    firsts: Vec<Record<N>>,
+    firsts: Vec<R>,
     /// Of the whole file, if a resumed run may need it.
     crc: Option<crc32fast::Hasher>,
     frame: Vec<u8>,
 }
 
-impl<const N: usize> RunWriter<N> {
+impl<R: Row> RunWriter<R> {
     pub(super) fn new(file: ScratchFile, kept: bool) -> Self {
         Self {
             file,
@@ -138,7 +161,7 @@ impl<const N: usize> RunWriter<N> {
         }
     }
 
-    pub(super) fn frame(&mut self, records: &[Record<N>]) -> Result<()> {
+    pub(super) fn frame(&mut self, records: &[R]) -> Result<()> {
         let Some(first) = records.first() else {
             return Ok(());
         };
@@ -156,7 +179,7 @@ impl<const N: usize> RunWriter<N> {
         Ok(())
     }
 
-    pub(super) fn finish(mut self) -> Run<N> {
+    pub(super) fn finish(mut self) -> Run<R> {
         self.file.close();
         Run {
             place: Place {
@@ -172,23 +195,24 @@ impl<const N: usize> RunWriter<N> {
     }
 }
 
-struct RunReader<'a, const N: usize> {
-    run: &'a Run<N>,
-    to: Option<Record<N>>,
+struct RunReader<'a, R: Row> {
+    run: &'a Run<R>,
+    to: Option<R>,
     source: std::io::BufReader<File>,
     offset: u64,
-    frame: Vec<Record<N>>,
+    frame: Vec<R>,
     at: usize,
 }
 
-impl<'a, const N: usize> RunReader<'a, N> {
+impl<'a, R: Row> RunReader<'a, R> {
     /// Stands before the first record that is not below `from`.
-    fn open(run: &'a Run<N>, from: Option<Record<N>>, to: Option<Record<N>>) -> Result<Self> {
+    fn open(run: &'a Run<R>, from: Option<R>, to: Option<R>) -> Result<Self> {
         let io = |action: &'static str| move |e| Error::io(&run.file.path, action, e);
         let mut file = open_existing(&run.file.path).map_err(io("open"))?;
         // The frame before the first that begins at or above `from` may end above it.
-        let below = from.map_or(0, |from| run.firsts.partition_point(|f| *f < from));
-        let offset = below.saturating_sub(1) as u64 * frame_bytes::<N>();
+        let is_below = |from: R| move |row: &R| row.compare(&from) == Ordering::Less;
+        let below = from.map_or(0, |from| run.firsts.partition_point(is_below(from)));
+        let offset = below.saturating_sub(1) as u64 * frame_bytes::<R>();
         if offset > 0 {
             file.seek(SeekFrom::Start(offset)).map_err(io("seek in"))?;
         }
@@ -202,12 +226,12 @@ impl<'a, const N: usize> RunReader<'a, N> {
         };
         if let Some(from) = from.filter(|_| below > 0) {
             reader.read_frame()?;
-            reader.at = reader.frame.partition_point(|record| *record < from);
+            reader.at = reader.frame.partition_point(is_below(from));
         }
         Ok(reader)
     }
 
-    fn next(&mut self) -> Result<Option<Record<N>>> {
+    fn next(&mut self) -> Result<Option<R>> {
         if self.at == self.frame.len() {
             if self.offset == self.run.bytes {
                 return Ok(None);
@@ -215,7 +239,10 @@ impl<'a, const N: usize> RunReader<'a, N> {
             self.read_frame()?;
         }
         let record = self.frame[self.at];
-        if self.to.is_some_and(|to| record >= to) {
+        if self
+            .to
+            .is_some_and(|to| record.compare(&to) != Ordering::Less)
+        {
             return Ok(None);
         }
         self.at += 1;
@@ -243,7 +270,7 @@ impl<'a, const N: usize> RunReader<'a, N> {
                 format!("1 to {FRAME}"),
             ));
         }
-        self.frame.resize(head[0] as usize, [0; N]);
+        self.frame.resize(head[0] as usize, R::zeroed());
         let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut self.frame);
         let read = self.source.read_exact(bytes);
         let (all, crc) = (bytes.len() as u64 + 8, crc32fast::hash(bytes));

@@ -1,13 +1,14 @@
 //! The external sorter: sorted runs on disk, merged with a bounded fan-in.
 
 use super::runs::{FILE_BUFFER, FRAME, Run, RunWriter, merge};
-use super::{Record, sort};
+use super::{Row, sort};
 use crate::error::Result;
 use crate::workspace::Workspace;
 use crate::workspace::file::Maker;
 use crate::workspace::memory::Reservation;
 use crate::workspace::persist::{Persist, Raw, Saved};
 use crate::workspace::steps::Step;
+use std::cmp::Ordering;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -16,8 +17,8 @@ const MOST_IN_RUN: usize = 1 << 27;
 
 /// Sorts any number of records in a bounded buffer.
 #[derive(Debug)]
-pub struct Sorter<const N: usize> {
-    state: Mutex<State<N>>,
+pub struct Sorter<R: Row> {
+    state: Mutex<State<R>>,
     capacity: usize,
     name: String,
     files: Maker,
@@ -25,9 +26,9 @@ pub struct Sorter<const N: usize> {
 }
 
 #[derive(Debug)]
-struct State<const N: usize> {
-    buffer: Vec<Record<N>>,
-    runs: Vec<Run<N>>,
+struct State<R: Row> {
+    buffer: Vec<R>,
+    runs: Vec<Run<R>>,
     made: usize,
     /// Records that the buffer had at most: what is behind them was never touched.
     touched: usize,
@@ -35,7 +36,7 @@ struct State<const N: usize> {
     held: Option<Reservation>,
 }
 
-impl<const N: usize> State<N> {
+impl<R: Row> State<R> {
     fn new() -> Self {
         Self {
             buffer: Vec::new(),
@@ -53,11 +54,11 @@ impl<const N: usize> State<N> {
     }
 }
 
-impl<const N: usize> Sorter<N> {
+impl<R: Row> Sorter<R> {
     /// A sorter whose buffers take at most `buffer` bytes, already reserved by the caller.
     #[must_use]
     pub fn new(workspace: &Workspace, name: &str, buffer: u64) -> Self {
-        let capacity = (buffer as usize / size_of::<Record<N>>()).max(2);
+        let capacity = (buffer as usize / size_of::<R>()).max(2);
         Self {
             state: Mutex::new(State::new()),
             capacity,
@@ -87,7 +88,7 @@ impl<const N: usize> Sorter<N> {
         self.capacity
     }
 
-    fn state(&self) -> MutexGuard<'_, State<N>> {
+    fn state(&self) -> MutexGuard<'_, State<R>> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -95,7 +96,7 @@ impl<const N: usize> Sorter<N> {
     ///
     /// # Errors
     /// [`crate::Error::Io`].
-    pub fn push(&self, mut records: &[Record<N>]) -> Result<()> {
+    pub fn push(&self, mut records: &[R]) -> Result<()> {
         let mut state = self.state();
         while !records.is_empty() {
             let room = self.capacity - state.buffer.len();
@@ -124,14 +125,14 @@ impl<const N: usize> Sorter<N> {
         Ok(())
     }
 
-    fn spill(&self, state: &mut State<N>) -> Result<()> {
+    fn spill(&self, state: &mut State<R>) -> Result<()> {
         let run = self.write_run(state, false)?;
         state.runs.push(run);
         Ok(())
     }
 
     /// Sorts what is in the buffer and writes it.
-    fn write_run(&self, state: &mut State<N>, kept: bool) -> Result<Run<N>> {
+    fn write_run(&self, state: &mut State<R>, kept: bool) -> Result<Run<R>> {
         self.pool.install(|| sort::sort(&mut state.buffer));
         let mut writer = self.run_writer(&mut state.made, kept)?;
         for frame in state.buffer.chunks(FRAME) {
@@ -141,7 +142,7 @@ impl<const N: usize> Sorter<N> {
         Ok(writer.finish())
     }
 
-    fn run_writer(&self, made: &mut usize, kept: bool) -> Result<RunWriter<N>> {
+    fn run_writer(&self, made: &mut usize, kept: bool) -> Result<RunWriter<R>> {
         let name = format!("{}.run{made}", self.name);
         *made += 1;
         Ok(RunWriter::new(self.files.make(&name, kept)?, kept))
@@ -255,7 +256,7 @@ impl<const N: usize> Sorter<N> {
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Disk`], [`crate::Error::Corrupt`],
     /// [`crate::Error::Cancelled`].
-    pub fn finish(self, workspace: &Workspace) -> Result<Sorted<N>> {
+    pub fn finish(self, workspace: &Workspace) -> Result<Sorted<R>> {
         let mut state = {
             let mut guard = self.state();
             std::mem::replace(&mut *guard, State::new())
@@ -308,13 +309,13 @@ impl<const N: usize> Sorter<N> {
     fn merge_runs(
         &self,
         workspace: &Workspace,
-        batch: &[Run<N>],
+        batch: &[Run<R>],
         made: &mut usize,
-    ) -> Result<Run<N>> {
+    ) -> Result<Run<R>> {
         let kept = batch.iter().all(Run::is_kept);
         let mut writer = self.run_writer(made, kept)?;
         let mut frame = Vec::with_capacity(FRAME);
-        merge(batch, None, None, |record: Record<N>| {
+        merge(batch, None, None, |record: R| {
             frame.push(record);
             if frame.len() == FRAME {
                 workspace.check_cancel()?;
@@ -329,42 +330,51 @@ impl<const N: usize> Sorter<N> {
 }
 
 /// Sorted records, and what is reserved for them.
-pub type InMemory<const N: usize> = (Vec<Record<N>>, Option<Reservation>);
+pub type InMemory<R> = (Vec<R>, Option<Reservation>);
 
 /// The output of a [`Sorter`].
 #[derive(Debug)]
-pub struct Sorted<const N: usize> {
-    buffer: Vec<Record<N>>,
-    runs: Vec<Run<N>>,
+pub struct Sorted<R: Row> {
+    buffer: Vec<R>,
+    runs: Vec<Run<R>>,
     held: Option<Reservation>,
 }
 
 /// Memory that merging runs takes, in bytes.
-fn merge_bytes<const N: usize>(runs: &[Run<N>]) -> u64 {
-    (runs.len() * (FRAME * size_of::<Record<N>>() + FILE_BUFFER)) as u64
+fn merge_bytes<R: Row>(runs: &[Run<R>]) -> u64 {
+    (runs.len() * (FRAME * size_of::<R>() + FILE_BUFFER)) as u64
 }
 
-impl<const N: usize> Persist for Sorted<N> {
+impl<R: Row> Persist for Sorted<R> {
     fn save(&self, out: &mut Vec<u8>) {
         self.runs.save(out);
-        self.buffer.save(out);
+        let bytes: &[u8] = bytemuck::cast_slice(&self.buffer);
+        bytes.len().save(out);
+        out.extend_from_slice(bytes);
     }
 
     fn load(from: &mut Saved<'_>) -> Result<Self> {
+        let runs = Persist::load(from)?;
+        let length = usize::load(from)?;
+        let bytes = from.take(length)?;
+        if !length.is_multiple_of(size_of::<R>()) {
+            return Err(from.wrong("whole rows"));
+        }
+        let rows = bytes.chunks_exact(size_of::<R>());
         Ok(Self {
-            runs: Persist::load(from)?,
-            buffer: Persist::load(from)?,
+            runs,
+            buffer: rows.map(bytemuck::pod_read_unaligned).collect(),
             held: None,
         })
     }
 }
 
-impl<const N: usize> Sorted<N> {
+impl<R: Row> Sorted<R> {
     /// All records in ascending order if they are in memory, with what is reserved for them.
     ///
     /// # Errors
     /// The records as they were, on disk.
-    pub fn in_memory(self) -> std::result::Result<InMemory<N>, Self> {
+    pub fn in_memory(self) -> std::result::Result<InMemory<R>, Self> {
         if self.runs.is_empty() {
             Ok((self.buffer, self.held))
         } else {
@@ -391,7 +401,7 @@ impl<const N: usize> Sorted<N> {
     ///
     /// # Errors
     /// What `each` returned, [`crate::Error::Io`], [`crate::Error::Corrupt`].
-    pub fn for_each(self, mut each: impl FnMut(Record<N>) -> Result<()>) -> Result<()> {
+    pub fn for_each(self, mut each: impl FnMut(R) -> Result<()>) -> Result<()> {
         if self.runs.is_empty() {
             return self.buffer.into_iter().try_for_each(each);
         }
@@ -404,12 +414,13 @@ impl<const N: usize> Sorted<N> {
     /// See [`Sorted::for_each`].
     pub fn for_each_from(
         self,
-        from: Option<Record<N>>,
-        mut each: impl FnMut(Record<N>) -> Result<()>,
+        from: Option<R>,
+        mut each: impl FnMut(R) -> Result<()>,
     ) -> Result<()> {
         if self.runs.is_empty() {
             let records = self.buffer.into_iter();
-            return records.filter(|r| Some(*r) >= from).try_for_each(each);
+            let wanted = |r: &R| from.is_none_or(|from| r.compare(&from) != Ordering::Less);
+            return records.filter(wanted).try_for_each(each);
         }
         merge(&self.runs, from, None, &mut each)
     }
@@ -417,12 +428,11 @@ impl<const N: usize> Sorted<N> {
     /// Records that cut what is on disk into parts of about `records` records, more by no more than
     /// a frame of each run; ascending.
     #[must_use]
-    pub fn cuts(&self, records: usize) -> Vec<Record<N>> {
-        let mut firsts: Vec<Record<N>> =
-            self.runs.iter().flat_map(|r| &r.firsts).copied().collect();
-        firsts.sort_unstable();
+    pub fn cuts(&self, records: usize) -> Vec<R> {
+        let mut firsts: Vec<R> = self.runs.iter().flat_map(|r| &r.firsts).copied().collect();
+        firsts.sort_unstable_by(R::compare);
         let frames = (records / FRAME).max(1);
-        let mut cuts: Vec<Record<N>> = firsts.into_iter().step_by(frames).skip(1).collect();
+        let mut cuts: Vec<R> = firsts.into_iter().step_by(frames).skip(1).collect();
         cuts.dedup();
         cuts
     }
@@ -434,9 +444,9 @@ impl<const N: usize> Sorted<N> {
     /// What `each` returned, [`crate::Error::Io`], [`crate::Error::Corrupt`].
     pub fn for_range(
         &self,
-        from: Option<Record<N>>,
-        to: Option<Record<N>>,
-        each: impl FnMut(Record<N>) -> Result<()>,
+        from: Option<R>,
+        to: Option<R>,
+        each: impl FnMut(R) -> Result<()>,
     ) -> Result<()> {
         merge(&self.runs, from, to, each)
     }

@@ -6,7 +6,7 @@ use super::shape::{Choice, Shape, unusable, usable};
 use super::vector::{Box3, V3};
 use crate::error::Result;
 use crate::inspect::ply_mesh::Sink;
-use crate::spill::{Record, Sections, Sorted, Sorter};
+use crate::spill::{Sorted, Sorter, Table, row};
 use crate::workspace::Workspace;
 use crate::workspace::memory::Reservation;
 use std::path::Path;
@@ -14,21 +14,37 @@ use std::path::Path;
 /// Vertices of a section of positions.
 const SECTION: usize = 1 << 14;
 
-/// Vertex, and number of the corner (three times the triangle's number, and 0 to 2) in two words.
-type Corner = Record<3>;
+row! {
+    /// A corner of a triangle.
+    pub(super) struct Corner {
+        /// The vertex.
+        vertex: u32,
+        /// Three times the triangle's number, and 0 to 2; the upper 32 bits first.
+        number: [u32; 2],
+    }
+    unpacked
+}
 
-/// Number of the corner in two words, position.
-type Placed = Record<8>;
+row! {
+    /// The position of a corner.
+    pub(super) struct PlacedCorner {
+        /// As [`Corner`] has it.
+        number: [u32; 2],
+        /// The bits of three `f64`.
+        position: [u32; 6],
+    }
+    unpacked
+}
 
 /// Reads a mesh of any size, its elements in any order.
 pub(super) struct Joined<'a> {
     path: &'a Path,
     name: &'a str,
     workspace: &'a Workspace,
-    sorter: Sorter<3>,
+    sorter: Sorter<Corner>,
     held: Reservation,
-    positions: Sections<6>,
-    pending: Vec<Record<6>>,
+    positions: Table<V3>,
+    pending: Vec<V3>,
     bounds: Box3,
     vertices: u64,
     corners: u64,
@@ -50,7 +66,7 @@ impl<'a> Joined<'a> {
             workspace,
             sorter,
             held,
-            positions: Sections::unpacked(workspace, &format!("{name}.positions"), 0)?,
+            positions: Table::create(workspace, &format!("{name}.positions"), 0)?,
             pending: Vec::with_capacity(SECTION),
             bounds: Box3::EMPTY,
             vertices,
@@ -74,7 +90,7 @@ impl<'a> Joined<'a> {
         let corners = Corners::new(self.sorter.finish(workspace)?);
 
         let buffer = workspace.memory.available() / 4;
-        let (placed, placed_held) = sorter::<8>(workspace, &format!("{name}.placed"), buffer)?;
+        let (placed, placed_held) = sorter(workspace, &format!("{name}.placed"), buffer)?;
         workspace.observer.begin("corners", "corners", self.corners);
         let used = place(&corners, &self.positions, &placed, path, workspace)?;
         workspace.observer.end();
@@ -82,10 +98,10 @@ impl<'a> Joined<'a> {
         let buffer = workspace.memory.available() / 2;
         let (keys, keys_held) = sorter(workspace, &format!("{name}.order"), buffer)?;
         let mut triangle = [[0.0; 3]; 3];
-        placed.finish(workspace)?.for_each(|record: Placed| {
-            let [high, low, words @ ..] = record;
-            let corner = (u64::from(high) << 32 | u64::from(low)) % 3;
-            triangle[corner as usize] = bytemuck::cast(words);
+        placed.finish(workspace)?.for_each(|placed: PlacedCorner| {
+            let [high, low] = placed.number.map(u64::from);
+            let corner = (high << 32 | low) % 3;
+            triangle[corner as usize] = bytemuck::cast(placed.position);
             if corner == 2 {
                 keys.push(&[keyed(triangle, &self.bounds)])?;
             }
@@ -105,8 +121,8 @@ impl<'a> Joined<'a> {
 /// Sends every corner's position back to its triangle; the number of vertices that have corners.
 fn place(
     corners: &Corners,
-    positions: &Sections<6>,
-    placed: &Sorter<8>,
+    positions: &Table<V3>,
+    placed: &Sorter<PlacedCorner>,
     path: &Path,
     workspace: &Workspace,
 ) -> Result<u64> {
@@ -120,10 +136,10 @@ fn place(
         }
     })?;
     let mut window = Window::new(positions);
-    corners.for_each(|[v, high, low]| {
-        let [a, b, c, d, e, f] = bytemuck::cast::<V3, Record<6>>(window.get(v)?);
+    corners.for_each(|Corner { vertex, number }| {
+        let position = bytemuck::cast(window.get(vertex)?);
         workspace.observer.advance(1);
-        placed.push(&[[high, low, a, b, c, d, e, f]])
+        placed.push(&[PlacedCorner { number, position }])
     })?;
     Ok(used)
 }
@@ -134,7 +150,7 @@ impl Sink for Joined<'_> {
         let good = positions.iter().filter(|p| usable(**p));
         self.bounds = good.fold(self.bounds, |b, p| b.with(*p));
         for p in positions {
-            self.pending.push(bytemuck::cast(*p));
+            self.pending.push(*p);
             if self.pending.len() == SECTION {
                 self.positions.append(&self.pending)?;
                 self.pending.clear();
@@ -147,12 +163,12 @@ impl Sink for Joined<'_> {
     fn triangles(&mut self, triangles: &[[u32; 3]]) -> Result<()> {
         self.workspace.check_cancel()?;
         self.batch.clear();
-        for &v in triangles.iter().flatten() {
-            if u64::from(v) >= self.vertices {
+        for &vertex in triangles.iter().flatten() {
+            if u64::from(vertex) >= self.vertices {
                 return Err(no_vertex(self.path, self.vertices));
             }
-            let number = self.corners;
-            self.batch.push([v, (number >> 32) as u32, number as u32]);
+            let number = [(self.corners >> 32) as u32, self.corners as u32];
+            self.batch.push(Corner { vertex, number });
             self.corners += 1;
         }
         self.sorter.push(&self.batch)?;
@@ -168,11 +184,11 @@ impl Sink for Joined<'_> {
 /// All corners by vertex; can be gone through more than once.
 enum Corners {
     Memory(Vec<Corner>),
-    Disk(Sorted<3>),
+    Disk(Sorted<Corner>),
 }
 
 impl Corners {
-    fn new(sorted: Sorted<3>) -> Self {
+    fn new(sorted: Sorted<Corner>) -> Self {
         match sorted.in_memory() {
             Ok((all, _)) => Self::Memory(all),
             Err(sorted) => Self::Disk(sorted),
@@ -191,12 +207,12 @@ impl Corners {
     /// Calls `each` with every vertex that has corners, ascending, and its position.
     fn for_each_vertex(
         &self,
-        positions: &Sections<6>,
+        positions: &Table<V3>,
         mut each: impl FnMut(u32, V3) -> Result<()>,
     ) -> Result<()> {
         let mut last = None;
         let mut window = Window::new(positions);
-        self.for_each(|[v, ..]| {
+        self.for_each(|Corner { vertex: v, .. }| {
             if last == Some(v) {
                 return Ok(());
             }
@@ -208,26 +224,26 @@ impl Corners {
 
 /// Positions of ascending vertices.
 struct Window<'a> {
-    positions: &'a Sections<6>,
+    positions: &'a Table<V3>,
     section: usize,
-    records: Vec<Record<6>>,
+    rows: Vec<V3>,
 }
 
 impl<'a> Window<'a> {
-    fn new(positions: &'a Sections<6>) -> Self {
+    fn new(positions: &'a Table<V3>) -> Self {
         Self {
             positions,
             section: usize::MAX,
-            records: Vec::new(),
+            rows: Vec::new(),
         }
     }
 
     fn get(&mut self, v: u32) -> Result<V3> {
         let section = v as usize / SECTION;
         if section != self.section {
-            self.positions.get_into(section, &mut self.records)?;
+            self.positions.get_into(section, &mut self.rows)?;
             self.section = section;
         }
-        Ok(bytemuck::cast(self.records[v as usize % SECTION]))
+        Ok(self.rows[v as usize % SECTION])
     }
 }

@@ -3,7 +3,7 @@
 use super::measure::Sums;
 use super::shape::{Kind, Side};
 use crate::error::Result;
-use crate::spill::Sorter;
+use crate::spill::{Sorter, row};
 use crate::workspace::Workspace;
 use serde::Serialize;
 use std::fmt;
@@ -70,6 +70,32 @@ pub struct Comparison {
     pub symmetric: Distances,
 }
 
+row! {
+    /// A distance; sorts by size.
+    pub(super) struct DistanceRow {
+        /// The bits of an `f64`, which is not negative; the upper 32 first.
+        bits: [u32; 2],
+        /// 0 from the first side, 1 from the second.
+        way: u32,
+    }
+    unpacked
+}
+
+impl DistanceRow {
+    pub(super) fn new(distance: f64, way: usize) -> Self {
+        let bits = distance.to_bits();
+        Self {
+            bits: [(bits >> 32) as u32, bits as u32],
+            way: way as u32,
+        }
+    }
+
+    fn distance(&self) -> f64 {
+        let [high, low] = self.bits.map(u64::from);
+        f64::from_bits(high << 32 | low)
+    }
+}
+
 /// Counts off percentiles in distances that come in ascending order.
 #[derive(Debug, Clone, Copy, Default)]
 struct Ranks {
@@ -90,10 +116,9 @@ impl Ranks {
     }
 }
 
-/// Percentiles of each direction and of both, exactly, out of `sorter`: distance as two words, and
-/// direction.
+/// Percentiles of each direction and of both, exactly, out of `sorter`.
 pub(super) fn percentiles(
-    sorter: Sorter<3>,
+    sorter: Sorter<DistanceRow>,
     sums: [Sums; 2],
     workspace: &Workspace,
 ) -> Result<[[f64; SHARES.len()]; WAYS]> {
@@ -101,9 +126,9 @@ pub(super) fn percentiles(
     ranks[0].of = sums[0].counted;
     ranks[1].of = sums[1].counted;
     ranks[2].of = sums[0].counted + sums[1].counted;
-    sorter.finish(workspace)?.for_each(|[high, low, way]| {
-        let distance = f64::from_bits(u64::from(high) << 32 | u64::from(low));
-        ranks[usize::from(way == 1)].see(distance);
+    sorter.finish(workspace)?.for_each(|row| {
+        let distance = row.distance();
+        ranks[usize::from(row.way == 1)].see(distance);
         ranks[2].see(distance);
         Ok(())
     })?;

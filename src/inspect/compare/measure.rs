@@ -38,13 +38,13 @@ pub(super) fn to<'a>(
 }
 
 /// Finds what is nearest, with a cache for each thread.
-struct Search<'a, T, const N: usize> {
-    pages: &'a Pages<T, N>,
+struct Search<'a, T: Item> {
+    pages: &'a Pages<T>,
     caches: Mutex<Vec<Cache<T>>>,
     cached: usize,
 }
 
-impl<T: Item<N>, const N: usize> Search<'_, T, N> {
+impl<T: Item> Search<'_, T> {
     fn caches(&self) -> std::sync::MutexGuard<'_, Vec<Cache<T>>> {
         self.caches.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -69,20 +69,20 @@ impl<T: Item<N>, const N: usize> Search<'_, T, N> {
     }
 }
 
-struct Waves<'a, T, const N: usize, F> {
-    search: Search<'a, T, N>,
+struct Waves<'a, T: Item, F> {
+    search: Search<'a, T>,
     workspace: &'a Workspace,
     each: F,
     wave: Vec<Sample>,
     _held: Reservation,
 }
 
-impl<'a, T, const N: usize, F> Waves<'a, T, N, F>
+impl<'a, T, F> Waves<'a, T, F>
 where
-    T: Item<N>,
+    T: Item,
     F: FnMut(Sample, f64) -> Result<()>,
 {
-    fn new(pages: &'a Pages<T, N>, workspace: &'a Workspace, each: F) -> Result<Self> {
+    fn new(pages: &'a Pages<T>, workspace: &'a Workspace, each: F) -> Result<Self> {
         let threads = workspace.threads as u64;
         let share = workspace.memory.available() / 4 / threads;
         let cached = (share / pages.page_bytes()).clamp(1, pages.count().max(1) as u64);
@@ -122,9 +122,9 @@ where
     }
 }
 
-impl<T, const N: usize, F> Measure for Waves<'_, T, N, F>
+impl<T, F> Measure for Waves<'_, T, F>
 where
-    T: Item<N>,
+    T: Item,
     F: FnMut(Sample, f64) -> Result<()>,
 {
     fn push(&mut self, sample: Sample) -> Result<()> {

@@ -10,14 +10,22 @@ use super::shape::{Choice, Items, Kind, Shape, side, unusable, usable};
 use super::vector::{Box3, V3, add, cross, dot, scale, sub};
 use crate::error::{Error, Result};
 use crate::inspect::ply_mesh::{PlyMesh, Sink};
-use crate::spill::{Record, Sections, Sorter};
+use crate::spill::{Row, Sorter, Table, row};
 use crate::workspace::Workspace;
 use crate::workspace::memory::Reservation;
 use oorandom::Rand64;
 use std::path::Path;
 
-/// A triangle behind the key of its centroid.
-pub(super) type Keyed = Record<21>;
+row! {
+    /// A triangle with the key of its centroid; sorts by key.
+    pub(super) struct KeyedTriangle {
+        /// The key on the curve.
+        key: [u32; 3],
+        /// The bits of nine `f64`: three corners.
+        corners: [u32; 18],
+    }
+    unpacked
+}
 
 /// Bytes of a vertex in memory, with its bit.
 const VERTEX: u64 = 25;
@@ -26,11 +34,11 @@ const VERTEX: u64 = 25;
 pub(super) const BLOCK: usize = 4096;
 
 /// A sorter with its memory: growing a buffer holds the old and the new one for a moment.
-pub(super) fn sorter<const N: usize>(
+pub(super) fn sorter<R: Row>(
     workspace: &Workspace,
     name: &str,
     buffer: u64,
-) -> Result<(Sorter<N>, Reservation)> {
+) -> Result<(Sorter<R>, Reservation)> {
     let held = workspace.reserve("compare: sort buffers", buffer + buffer / 2)?;
     Ok((Sorter::new(workspace, name, buffer), held))
 }
@@ -76,14 +84,12 @@ pub(super) fn no_vertex(path: &Path, vertices: u64) -> Error {
 }
 
 /// A triangle with its key on the curve through `bounds`.
-pub(super) fn keyed(triangle: [V3; 3], bounds: &Box3) -> Keyed {
+pub(super) fn keyed(triangle: [V3; 3], bounds: &Box3) -> KeyedTriangle {
     let [a, b, c] = triangle;
-    let [k0, k1, k2] = bounds.key(scale(add(add(a, b), c), 1.0 / 3.0));
-    let words: Record<18> = bytemuck::cast(triangle);
-    let mut record = [0; 21];
-    record[..3].copy_from_slice(&[k0, k1, k2]);
-    record[3..].copy_from_slice(&words);
-    record
+    KeyedTriangle {
+        key: bounds.key(scale(add(add(a, b), c), 1.0 / 3.0)),
+        corners: bytemuck::cast(triangle),
+    }
 }
 
 /// Area of a triangle.
@@ -94,20 +100,18 @@ pub(super) fn area([a, b, c]: &[V3; 3]) -> f64 {
 
 /// The sorted triangles in pages, and their area.
 pub(super) fn pages(
-    sorter: Sorter<21>,
+    sorter: Sorter<KeyedTriangle>,
     name: &str,
     count: u64,
     workspace: &Workspace,
-) -> Result<(Pages<[V3; 3], 18>, f64)> {
+) -> Result<(Pages<[V3; 3]>, f64)> {
     let observer = &workspace.observer;
     observer.begin("order", "triangles", count);
     let mut writer = PageWriter::new(workspace, name, count)?;
     let mut all = 0.0;
     let mut ticks = 0u64;
-    sorter.finish(workspace)?.for_each(|record| {
-        let mut words: Record<18> = [0; 18];
-        words.copy_from_slice(&record[3..]);
-        let triangle = bytemuck::cast(words);
+    sorter.finish(workspace)?.for_each(|keyed| {
+        let triangle = bytemuck::cast(keyed.corners);
         all += area(&triangle);
         ticks += 1;
         if ticks.is_multiple_of(BLOCK as u64) {
@@ -126,8 +130,8 @@ pub(super) struct Chooser {
     /// Still to be seen, still to be chosen.
     left: u64,
     wanted: u64,
-    chosen: Sections<6>,
-    block: Vec<Record<6>>,
+    chosen: Table<V3>,
+    block: Vec<V3>,
 }
 
 impl Chooser {
@@ -148,7 +152,7 @@ impl Chooser {
             rng: Rand64::new(u128::from(choice.seed)),
             left: of,
             wanted: of.min(most),
-            chosen: Sections::unpacked(workspace, &format!("{name}.vertices"), 0)?,
+            chosen: Table::create(workspace, &format!("{name}.vertices"), 0)?,
             block: Vec::with_capacity(BLOCK),
         })
     }
@@ -157,7 +161,7 @@ impl Chooser {
         // Exactly as many as wanted are chosen (Knuth, algorithm S).
         if self.wanted > 0 && self.rng.rand_range(0..self.left) < self.wanted {
             self.wanted -= 1;
-            self.block.push(bytemuck::cast(p));
+            self.block.push(p);
             if self.block.len() == BLOCK {
                 self.chosen.append(&self.block)?;
                 self.block.clear();
@@ -167,7 +171,7 @@ impl Chooser {
         Ok(())
     }
 
-    pub(super) fn finish(self) -> Result<Sections<6>> {
+    pub(super) fn finish(self) -> Result<Table<V3>> {
         if !self.block.is_empty() {
             self.chosen.append(&self.block)?;
         }
@@ -178,9 +182,9 @@ impl Chooser {
 /// The finished shape.
 pub(super) fn shape(
     path: &Path,
-    triangles: (Pages<[V3; 3], 18>, f64),
+    triangles: (Pages<[V3; 3]>, f64),
     counts: [u64; 2],
-    vertices: Sections<6>,
+    vertices: Table<V3>,
 ) -> Shape {
     let (triangles, area) = triangles;
     let mut side = side(path, Kind::Mesh, triangles.bounds());
@@ -200,14 +204,14 @@ struct Direct<'a> {
     path: &'a Path,
     name: &'a str,
     workspace: &'a Workspace,
-    sorter: Sorter<21>,
+    sorter: Sorter<KeyedTriangle>,
     _held: Reservation,
     bounds: Box3,
     expected: u64,
     vertices: Vec<V3>,
     referenced: Vec<u64>,
     triangles: u64,
-    batch: Vec<Keyed>,
+    batch: Vec<KeyedTriangle>,
 }
 
 impl<'a> Direct<'a> {
@@ -218,7 +222,7 @@ impl<'a> Direct<'a> {
         faces: u64,
         workspace: &'a Workspace,
     ) -> Result<Self> {
-        let wanted = faces * size_of::<Keyed>() as u64;
+        let wanted = faces * size_of::<KeyedTriangle>() as u64;
         let buffer = wanted.min(workspace.memory.available() / 3) + (1 << 20);
         let (sorter, held) = sorter(workspace, &format!("{name}.order"), buffer)?;
         let mut all = Vec::new();

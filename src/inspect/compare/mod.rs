@@ -29,11 +29,11 @@ mod tests;
 mod triangle;
 mod vector;
 
+use figures::DistanceRow;
 pub use figures::{Comparison, Distances, Figures};
 pub use shape::{Kind, Side};
 
 use crate::error::{Error, Result};
-use crate::spill::Record;
 use crate::workspace::Workspace;
 use measure::Sums;
 use samples::Numbers;
@@ -77,9 +77,9 @@ pub fn compare(a: &Path, b: &Path, options: &Options, workspace: &Workspace) -> 
     let a = Shape::read(a, "compare.a", choice, workspace)?;
     let b = Shape::read(b, "compare.b", choice, workspace)?;
     let numbers = [Numbers::of(&a, samples), Numbers::of(&b, samples)];
-    let bytes = numbers.iter().map(|n| n.all()).sum::<u64>() * size_of::<Record<3>>() as u64;
+    let bytes = numbers.iter().map(|n| n.all()).sum::<u64>() * size_of::<DistanceRow>() as u64;
     let buffer = bytes.min(workspace.memory.available() / 8) + (1 << 20);
-    let (sorter, _held) = mesh::sorter::<3>(workspace, "compare.distances", buffer)?;
+    let (sorter, _held) = mesh::sorter(workspace, "compare.distances", buffer)?;
     let mut sums = [Sums::default(); 2];
     for (way, (from, to)) in [(&a, &b), (&b, &a)].into_iter().enumerate() {
         let mut records = Vec::with_capacity(RECORDS);
@@ -94,8 +94,7 @@ pub fn compare(a: &Path, b: &Path, options: &Options, workspace: &Workspace) -> 
             |sample, distance| {
                 sums[way].add(&sample, distance);
                 if sample.counts {
-                    let bits = distance.to_bits();
-                    records.push([(bits >> 32) as u32, bits as u32, way as u32]);
+                    records.push(DistanceRow::new(distance, way));
                 }
                 if records.len() == RECORDS {
                     sorter.push(&records)?;

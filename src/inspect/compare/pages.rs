@@ -7,11 +7,10 @@
 use super::triangle;
 use super::vector::{Box3, V3, dot, sub};
 use crate::error::Result;
-use crate::spill::{Record, Sections};
+use crate::spill::{Row, Table, Word};
 use crate::workspace::Workspace;
 use crate::workspace::memory::Reservation;
 use rustc_hash::FxHashMap;
-use std::marker::PhantomData;
 
 /// Fewest items of a page.
 const LEAST: u64 = 64;
@@ -25,13 +24,23 @@ const FAN: usize = 8;
 /// Items that share a box within a page.
 const LEAF: usize = 8;
 
-/// Something that has a distance from a point; `N` words on disk.
-pub(super) trait Item<const N: usize>: bytemuck::Pod + Send + Sync {
+/// Something that has a distance from a point.
+pub(super) trait Item: Row {
     fn bounds(&self) -> Box3;
     fn distance2(&self, p: V3) -> f64;
 }
 
-impl Item<6> for V3 {
+impl Row for V3 {
+    const FIELDS: &'static str = "position: [f64; 3]; ";
+    const PACKING: Option<&'static [Word]> = None;
+}
+
+impl Row for [V3; 3] {
+    const FIELDS: &'static str = "corners: [[f64; 3]; 3]; ";
+    const PACKING: Option<&'static [Word]> = None;
+}
+
+impl Item for V3 {
     fn bounds(&self) -> Box3 {
         Box3::of(&[*self])
     }
@@ -42,7 +51,7 @@ impl Item<6> for V3 {
     }
 }
 
-impl Item<18> for [V3; 3] {
+impl Item for [V3; 3] {
     fn bounds(&self) -> Box3 {
         Box3::of(self)
     }
@@ -54,16 +63,15 @@ impl Item<18> for [V3; 3] {
 
 /// Items in pages.
 #[derive(Debug)]
-pub(super) struct Pages<T, const N: usize> {
-    stored: Sections<N>,
+pub(super) struct Pages<T: Row> {
+    stored: Table<T>,
     /// `levels[0]` has a box for each page, each further level one for `FAN` of the last.
     levels: Vec<Vec<Box3>>,
     page: usize,
-    items: PhantomData<T>,
     _held: Reservation,
 }
 
-impl<T: Item<N>, const N: usize> Pages<T, N> {
+impl<T: Item> Pages<T> {
     /// The box around everything.
     pub(super) fn bounds(&self) -> Box3 {
         let top = self.levels.last().map_or(&[][..], Vec::as_slice);
@@ -83,18 +91,16 @@ impl<T: Item<N>, const N: usize> Pages<T, N> {
 
     /// Calls `each` with the items of every page, in order.
     pub(super) fn for_each_page(&self, mut each: impl FnMut(&[T]) -> Result<()>) -> Result<()> {
-        let mut records = Vec::new();
+        let mut items = Vec::new();
         for page in 0..self.count() {
-            self.stored.get_into(page, &mut records)?;
-            let items: Vec<T> = records.iter().map(|r| bytemuck::cast(*r)).collect();
+            self.stored.get_into(page, &mut items)?;
             each(&items)?;
         }
         Ok(())
     }
 
     fn load(&self, page: usize) -> Result<Page<T>> {
-        let records = self.stored.get(page)?;
-        let items: Vec<T> = records.iter().map(|r| bytemuck::cast(*r)).collect();
+        let items = self.stored.get(page)?;
         let boxes = items.chunks(LEAF).map(|leaf| {
             let all = leaf.iter().map(T::bounds);
             all.fold(Box3::EMPTY, Box3::union)
@@ -162,9 +168,9 @@ struct Page<T> {
 }
 
 impl<T> Page<T> {
-    fn look<const N: usize>(&self, p: V3, best: &mut Best<T>)
+    fn look(&self, p: V3, best: &mut Best<T>)
     where
-        T: Item<N>,
+        T: Item,
     {
         for (leaf, bounds) in self.items.chunks(LEAF).zip(&self.boxes) {
             if bounds.distance2(p) >= best.distance2 {
@@ -201,9 +207,9 @@ impl<T> Cache<T> {
         }
     }
 
-    fn page<const N: usize>(&mut self, pages: &Pages<T, N>, page: usize) -> Result<&Page<T>>
+    fn page(&mut self, pages: &Pages<T>, page: usize) -> Result<&Page<T>>
     where
-        T: Item<N>,
+        T: Item,
     {
         if self.pages.len() >= self.most && !self.pages.contains_key(&page) {
             // Samples come in curve order: soon everything here is new again.
@@ -218,16 +224,15 @@ impl<T> Cache<T> {
 
 /// Writes [`Pages`] in order.
 #[derive(Debug)]
-pub(super) struct PageWriter<T, const N: usize> {
-    stored: Sections<N>,
+pub(super) struct PageWriter<T: Row> {
+    stored: Table<T>,
     page: usize,
-    pending: Vec<Record<N>>,
+    pending: Vec<T>,
     boxes: Vec<Box3>,
-    items: PhantomData<T>,
     held: Reservation,
 }
 
-impl<T: Item<N>, const N: usize> PageWriter<T, N> {
+impl<T: Item> PageWriter<T> {
     /// Starts the scratch file `name` for `count` items.
     pub(super) fn new(workspace: &Workspace, name: &str, count: u64) -> Result<Self> {
         let page = count.div_ceil(MOST_PAGES).max(LEAST) as usize;
@@ -236,16 +241,15 @@ impl<T: Item<N>, const N: usize> PageWriter<T, N> {
         let index = pages * (2 * size_of::<Box3>() as u64) + (page * 2 * size_of::<T>()) as u64;
         Ok(Self {
             held: workspace.reserve("compare: boxes", index + 4096)?,
-            stored: Sections::unpacked(workspace, name, pages as usize)?,
+            stored: Table::create(workspace, name, pages as usize)?,
             page,
             pending: Vec::with_capacity(page),
             boxes: Vec::with_capacity(pages as usize),
-            items: PhantomData,
         })
     }
 
     pub(super) fn push(&mut self, item: T) -> Result<()> {
-        self.pending.push(bytemuck::cast(item));
+        self.pending.push(item);
         if self.pending.len() == self.page {
             self.flush()?;
         }
@@ -253,10 +257,7 @@ impl<T: Item<N>, const N: usize> PageWriter<T, N> {
     }
 
     fn flush(&mut self) -> Result<()> {
-        let bounds = self
-            .pending
-            .iter()
-            .map(|r| bytemuck::cast::<_, T>(*r).bounds());
+        let bounds = self.pending.iter().map(T::bounds);
         let bounds = bounds.fold(Box3::EMPTY, Box3::union);
         self.stored.put(self.boxes.len(), &self.pending)?;
         self.boxes.push(bounds);
@@ -264,7 +265,7 @@ impl<T: Item<N>, const N: usize> PageWriter<T, N> {
         Ok(())
     }
 
-    pub(super) fn finish(mut self) -> Result<Pages<T, N>> {
+    pub(super) fn finish(mut self) -> Result<Pages<T>> {
         if !self.pending.is_empty() {
             self.flush()?;
         }
@@ -277,7 +278,6 @@ impl<T: Item<N>, const N: usize> PageWriter<T, N> {
             stored: self.stored,
             levels,
             page: self.page,
-            items: PhantomData,
             _held: self.held,
         })
     }

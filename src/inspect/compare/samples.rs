@@ -5,7 +5,7 @@ use super::pages::Pages;
 use super::shape::{Items, Shape};
 use super::vector::{Box3, V3, add, scale, sub};
 use crate::error::Result;
-use crate::spill::{Record, Sections, Sorter};
+use crate::spill::{Sorter, Table, row};
 use crate::workspace::Workspace;
 use oorandom::Rand64;
 
@@ -22,6 +22,19 @@ pub(super) struct Sample {
     pub(super) position: V3,
     /// It counts in the mean and so on; if not, only in the maximum.
     pub(super) counts: bool,
+}
+
+row! {
+    /// A sample with the key of its position; sorts by key.
+    struct KeyedSample {
+        /// The key on the curve.
+        key: [u32; 3],
+        /// The bits of three `f64`.
+        position: [u32; 6],
+        /// 1 if it counts in the mean and so on.
+        counts: u32,
+    }
+    unpacked
 }
 
 /// How many samples a shape gets.
@@ -94,46 +107,45 @@ pub(super) fn for_each(
         } => (triangles, vertices),
     };
     let bounds = triangles.bounds();
-    let bytes = numbers.all() * size_of::<Record<10>>() as u64;
+    let bytes = numbers.all() * size_of::<KeyedSample>() as u64;
     let buffer = bytes.min(workspace.memory.available() / 4) + (1 << 20);
-    let (sorter, _held) = sorter::<10>(workspace, &format!("{name}.samples"), buffer)?;
+    let (sorter, _held) = sorter(workspace, &format!("{name}.samples"), buffer)?;
     observer.begin("sample", "samples", numbers.all());
     let mut batch = Batch {
         sorter: &sorter,
         bounds,
         workspace,
-        records: Vec::with_capacity(BATCH),
+        rows: Vec::with_capacity(BATCH),
     };
     take_vertices(vertices, numbers.points == 0, &mut batch)?;
     take_faces(triangles, shape.side.area, numbers.points, seed, &mut batch)?;
     batch.flush()?;
     observer.end();
     observer.begin("distances", "samples", numbers.all());
-    sorter.finish(workspace)?.for_each(|record| {
-        let [_, _, _, words @ .., counts] = record;
-        let position = bytemuck::cast::<Record<6>, V3>(words);
+    sorter.finish(workspace)?.for_each(|sample: KeyedSample| {
         each(Sample {
-            position,
-            counts: counts == 1,
+            position: bytemuck::cast(sample.position),
+            counts: sample.counts == 1,
         })
     })
 }
 
 /// Samples on their way to the sorter.
 struct Batch<'a> {
-    sorter: &'a Sorter<10>,
+    sorter: &'a Sorter<KeyedSample>,
     bounds: Box3,
     workspace: &'a Workspace,
-    records: Vec<Record<10>>,
+    rows: Vec<KeyedSample>,
 }
 
 impl Batch<'_> {
     fn push(&mut self, position: V3, counts: bool) -> Result<()> {
-        let [i, j, k] = self.bounds.key(position);
-        let [a, b, c, d, e, f] = bytemuck::cast::<V3, Record<6>>(position);
-        let record = [i, j, k, a, b, c, d, e, f, u32::from(counts)];
-        self.records.push(record);
-        if self.records.len() == BATCH {
+        self.rows.push(KeyedSample {
+            key: self.bounds.key(position),
+            position: bytemuck::cast(position),
+            counts: counts.into(),
+        });
+        if self.rows.len() == BATCH {
             self.flush()?;
         }
         Ok(())
@@ -141,19 +153,19 @@ impl Batch<'_> {
 
     fn flush(&mut self) -> Result<()> {
         self.workspace.check_cancel()?;
-        self.sorter.push(&self.records)?;
-        self.workspace.observer.advance(self.records.len() as u64);
-        self.records.clear();
+        self.sorter.push(&self.rows)?;
+        self.workspace.observer.advance(self.rows.len() as u64);
+        self.rows.clear();
         Ok(())
     }
 }
 
-fn take_vertices(vertices: &Sections<6>, counts: bool, batch: &mut Batch<'_>) -> Result<()> {
-    let mut records = Vec::new();
+fn take_vertices(vertices: &Table<V3>, counts: bool, batch: &mut Batch<'_>) -> Result<()> {
+    let mut positions = Vec::new();
     for section in 0..vertices.count() {
-        vertices.get_into(section, &mut records)?;
-        for record in &records {
-            batch.push(bytemuck::cast(*record), counts)?;
+        vertices.get_into(section, &mut positions)?;
+        for position in &positions {
+            batch.push(*position, counts)?;
         }
     }
     Ok(())
@@ -161,7 +173,7 @@ fn take_vertices(vertices: &Sections<6>, counts: bool, batch: &mut Batch<'_>) ->
 
 /// Divides the area into as many equal parts as samples, and puts one at random in each.
 fn take_faces(
-    triangles: &Pages<[V3; 3], 18>,
+    triangles: &Pages<[V3; 3]>,
     all: f64,
     wanted: u64,
     seed: u64,

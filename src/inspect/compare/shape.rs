@@ -5,7 +5,7 @@ use super::vector::{Box3, V3};
 use super::{cloud, mesh};
 use crate::error::{Error, Result};
 use crate::inspect::ply_mesh::{PlyMesh, holds_faces};
-use crate::spill::Sections;
+use crate::spill::Table;
 use crate::workspace::Workspace;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -53,11 +53,11 @@ pub(super) struct Shape {
 
 pub(super) enum Items {
     Mesh {
-        triangles: Pages<[V3; 3], 18>,
+        triangles: Pages<[V3; 3]>,
         /// Vertices chosen as samples.
-        vertices: Sections<6>,
+        vertices: Table<V3>,
     },
-    Cloud(Pages<V3, 6>),
+    Cloud(Pages<V3>),
 }
 
 /// What to choose of a mesh's vertices.

@@ -9,12 +9,23 @@ use super::collinear::collinear;
 use super::plan::Plan;
 use super::positions::Positions;
 use crate::error::Result;
-use crate::spill::Record;
+use crate::spill::row;
 use crate::workspace::Workspace;
 
-/// Words of a triangle on its way: the middle corner ([`KNOWN`] once its position is known), the
-/// lowest corner, the positions of the highest and the middle corner.
-const WORDS: usize = 14;
+row! {
+    /// A triangle on its way to the ranges of its middle and lowest corner.
+    struct Travelling {
+        /// The middle corner, [`KNOWN`] once its position is known.
+        middle: u32,
+        /// The lowest corner.
+        low: u32,
+        /// Position of the highest corner.
+        high_at: [f64; 3],
+        /// Position of the middle corner, if it is known.
+        middle_at: [f64; 3],
+    }
+    unpacked
+}
 
 /// No vertex has this number.
 const KNOWN: u32 = u32::MAX;
@@ -24,8 +35,8 @@ const KNOWN: u32 = u32::MAX;
 pub(super) struct Areas {
     plan: Plan,
     positions: Positions,
-    travelling: Buckets<WORDS>,
-    block: Vec<Record<WORDS>>,
+    travelling: Buckets<Travelling>,
+    block: Vec<Travelling>,
     /// Triangles without area so far.
     pub(super) zero: u64,
 }
@@ -48,16 +59,12 @@ impl Areas {
         let mut block = std::mem::take(&mut self.block);
         let mut cursor = self.travelling.cursor(k);
         while self.travelling.next(&mut cursor, &mut block)? {
-            for record in &block {
-                let position = |at: usize| {
-                    let words: [u32; 6] = std::array::from_fn(|i| record[at + i]);
-                    bytemuck::cast::<_, [f64; 3]>(words)
-                };
-                let middle = match record[0] {
-                    KNOWN => Some(position(8)),
+            for row in &block {
+                let middle = match row.middle {
+                    KNOWN => Some(row.middle_at),
                     vertex => self.positions.get(vertex),
                 };
-                self.go_on(record[0], record[1], position(2), middle)?;
+                self.go_on(row.middle, row.low, row.high_at, middle)?;
             }
         }
         self.travelling.clear(k);
@@ -97,17 +104,13 @@ impl Areas {
             self.zero += u64::from(finite && collinear([high, known, lowest]));
             return Ok(());
         }
-        let mut record = [0; WORDS];
-        record[1] = low;
-        record[2..8].copy_from_slice(&bytemuck::cast::<_, [u32; 6]>(high));
-        let next = if let Some(position) = known {
-            record[0] = KNOWN;
-            record[8..].copy_from_slice(&bytemuck::cast::<_, [u32; 6]>(position));
-            low
-        } else {
-            record[0] = middle;
-            middle
+        let row = Travelling {
+            middle: if known.is_some() { KNOWN } else { middle },
+            low,
+            high_at: high,
+            middle_at: known.unwrap_or_default(),
         };
-        self.travelling.push(self.plan.range_of(next), record)
+        let next = if known.is_some() { low } else { middle };
+        self.travelling.push(self.plan.range_of(next), row)
     }
 }

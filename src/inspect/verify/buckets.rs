@@ -5,7 +5,7 @@
 //! records. Records come back in another order than they went in.
 
 use crate::error::{Error, Result};
-use crate::spill::Record;
+use crate::spill::Row;
 use crate::workspace::{IoCounters, Workspace};
 use std::fs::File;
 use std::os::unix::fs::FileExt;
@@ -19,12 +19,12 @@ const NONE: u64 = u64::MAX;
 /// CRC-32 of both and the records (4).
 const HEAD: u64 = 16;
 
-/// Buckets of `N`-word records.
+/// Buckets of rows.
 #[derive(Debug)]
-pub(super) struct Buckets<const N: usize> {
+pub(super) struct Buckets<R: Row> {
     path: PathBuf,
     file: Option<File>,
-    open: Vec<Vec<Record<N>>>,
+    open: Vec<Vec<R>>,
     last: Vec<u64>,
     block: usize,
     end: u64,
@@ -38,7 +38,7 @@ pub(super) struct Cursor {
     next: Option<u64>,
 }
 
-impl<const N: usize> Buckets<N> {
+impl<R: Row> Buckets<R> {
     /// `count` buckets that spill to the scratch file `name`, with blocks of `bytes` bytes.
     pub(super) fn new(workspace: &Workspace, name: &str, count: usize, bytes: u64) -> Self {
         Self {
@@ -46,21 +46,21 @@ impl<const N: usize> Buckets<N> {
             file: None,
             open: vec![Vec::new(); count],
             last: vec![NONE; count],
-            block: (bytes as usize / size_of::<Record<N>>()).max(1),
+            block: (bytes as usize / size_of::<R>()).max(1),
             end: 0,
             io: workspace.io.clone(),
         }
     }
 
-    /// Puts a record into a bucket.
-    pub(super) fn push(&mut self, bucket: usize, record: Record<N>) -> Result<()> {
+    /// Puts a row into a bucket.
+    pub(super) fn push(&mut self, bucket: usize, row: R) -> Result<()> {
         let open = &mut self.open[bucket];
         if open.len() == open.capacity() {
             // Doubling, but never past one block.
             let target = (2 * open.len()).clamp(1, self.block);
             open.reserve_exact(target - open.len());
         }
-        open.push(record);
+        open.push(row);
         if open.len() == self.block {
             self.flush(bucket)?;
         }
@@ -100,7 +100,7 @@ impl<const N: usize> Buckets<N> {
 
     /// Reads the next block of a bucket into `block`; `false` after the last. What is put into
     /// that bucket meanwhile may be missed.
-    pub(super) fn next(&self, cursor: &mut Cursor, block: &mut Vec<Record<N>>) -> Result<bool> {
+    pub(super) fn next(&self, cursor: &mut Cursor, block: &mut Vec<R>) -> Result<bool> {
         block.clear();
         let offset = match cursor.next {
             None => {
@@ -125,7 +125,7 @@ impl<const N: usize> Buckets<N> {
             let found = format!("a block of {found} records");
             return Err(self.corrupt(offset, found, format!("1 to {}", self.block)));
         }
-        block.resize(found, [0; N]);
+        block.resize(found, R::zeroed());
         let bytes: &mut [u8] = bytemuck::cast_slice_mut(block);
         file.read_exact_at(bytes, offset + HEAD).map_err(io)?;
         let right = Head::new(head.before(), head.0[2], bytes);
@@ -155,7 +155,7 @@ impl<const N: usize> Buckets<N> {
     }
 }
 
-impl<const N: usize> Drop for Buckets<N> {
+impl<R: Row> Drop for Buckets<R> {
     fn drop(&mut self) {
         self.io.shrink_scratch(self.end);
         if self.file.is_some() {

@@ -9,7 +9,7 @@
 use super::buckets::Buckets;
 use super::plan::Plan;
 use crate::error::Result;
-use crate::spill::Record;
+use crate::spill::row;
 use crate::workspace::Workspace;
 
 /// Marks a vertex not met, a component without outside neighbour.
@@ -64,13 +64,24 @@ impl Forest {
     }
 }
 
+row! {
+    /// An edge of the graph.
+    struct Edge {
+        /// The lower end.
+        low: u32,
+        /// The higher end.
+        high: u32,
+    }
+    unpacked
+}
+
 /// A graph whose components are being counted.
 #[derive(Debug)]
 pub(super) struct Contraction {
-    /// Edges (lower end, higher end) in the bucket of the range of their higher end.
-    edges: Buckets<2>,
+    /// Edges in the bucket of the range of their higher end.
+    edges: Buckets<Edge>,
     plan: Plan,
-    block: Vec<Record<2>>,
+    block: Vec<Edge>,
     /// Components complete so far.
     pub(super) complete: u64,
 }
@@ -91,7 +102,8 @@ impl Contraction {
             forest.join(low, high);
             return Ok(());
         }
-        self.edges.push(self.plan.range_of(high), [low, high])
+        self.edges
+            .push(self.plan.range_of(high), Edge { low, high })
     }
 
     /// Contracts range `k`, to which nothing will be added any more.
@@ -100,25 +112,32 @@ impl Contraction {
         let first = forest.first;
         let mut cursor = self.edges.cursor(k);
         while self.edges.next(&mut cursor, &mut block)? {
-            for &[low, high] in block.iter().filter(|[low, _]| *low >= first) {
+            for &Edge { low, high } in block.iter().filter(|edge| edge.low >= first) {
                 forest.join(low, high);
             }
         }
         let mut cursor = self.edges.cursor(k);
         while self.edges.next(&mut cursor, &mut block)? {
-            for &[low, high] in block.iter().filter(|[low, _]| *low < first) {
+            for &Edge { low, high } in block.iter().filter(|edge| edge.low < first) {
                 let root = forest.root(high) as usize;
                 forest.lowest[root] = forest.lowest[root].min(low);
             }
         }
-        let mut recent = vec![[NONE; 2]; RECENT];
+        let none = Edge {
+            low: NONE,
+            high: NONE,
+        };
+        let mut recent = vec![none; RECENT];
         let mut cursor = self.edges.cursor(k);
         while self.edges.next(&mut cursor, &mut block)? {
-            for &[other, high] in block.iter().filter(|[low, _]| *low < first) {
+            for &Edge { low: other, high } in block.iter().filter(|edge| edge.low < first) {
                 let root = forest.root(high) as usize;
-                let edge = [forest.lowest[root], other];
-                let slot = &mut recent[(other ^ edge[0].rotate_left(16)) as usize % RECENT];
-                if edge[0] != other && *slot != edge {
+                let edge = Edge {
+                    low: forest.lowest[root],
+                    high: other,
+                };
+                let slot = &mut recent[(other ^ edge.low.rotate_left(16)) as usize % RECENT];
+                if edge.low != other && *slot != edge {
                     *slot = edge;
                     self.edges.push(self.plan.range_of(other), edge)?;
                 }

@@ -27,7 +27,7 @@ pub(super) struct Intake<'a> {
     pub(super) bounds: Option<Bounds>,
     pub(super) positions: Positions,
     /// Triangles with three distinct, valid corners, in the bucket of each corner's range.
-    pub(super) triangles: Buckets<3>,
+    pub(super) triangles: Buckets<[u32; 3]>,
 }
 
 /// Reads all of `mesh`.

@@ -2,19 +2,16 @@
 
 use super::plan::Plan;
 use crate::error::Result;
-use crate::spill::Sections;
+use crate::spill::Table;
 use crate::workspace::Workspace;
-
-/// Three `f64` as words.
-type Words = [u32; 6];
 
 /// Positions of the vertices.
 #[derive(Debug)]
 pub(super) struct Positions {
     first: u32,
-    window: Vec<Words>,
+    window: Vec<[f64; 3]>,
     /// One section a range, unless all positions stay in memory.
-    stored: Option<Sections<6>>,
+    stored: Option<Table<[f64; 3]>>,
     length: usize,
     next: usize,
 }
@@ -27,11 +24,7 @@ impl Positions {
         };
         let stored = match plan.all_positions {
             true => None,
-            false => Some(Sections::unpacked(
-                workspace,
-                "verify.positions",
-                plan.ranges,
-            )?),
+            false => Some(Table::create(workspace, "verify.positions", plan.ranges)?),
         };
         let mut window = Vec::new();
         window.reserve_exact(length);
@@ -49,8 +42,7 @@ impl Positions {
         while !positions.is_empty() {
             let room = self.length - self.window.len();
             let (now, later) = positions.split_at(room.min(positions.len()));
-            self.window
-                .extend(now.iter().map(|p| bytemuck::cast::<[f64; 3], Words>(*p)));
+            self.window.extend_from_slice(now);
             positions = later;
             if self.window.len() == self.length {
                 match self.stored {
@@ -91,7 +83,7 @@ impl Positions {
 
     /// The position of a vertex, if it is in memory.
     pub(super) fn get(&self, vertex: u32) -> Option<[f64; 3]> {
-        let words = self.window.get(vertex.wrapping_sub(self.first) as usize)?;
-        Some(bytemuck::cast(*words))
+        let at = vertex.wrapping_sub(self.first) as usize;
+        self.window.get(at).copied()
     }
 }

@@ -22,7 +22,7 @@ pub(super) struct Swept {
 struct Sweep<'a> {
     plan: &'a Plan,
     workspace: &'a Workspace,
-    triangles: Buckets<3>,
+    triangles: Buckets<[u32; 3]>,
     block: Vec<[u32; 3]>,
     corners: Corners,
     areas: Areas,

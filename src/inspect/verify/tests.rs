@@ -123,7 +123,7 @@ fn plans_fit_what_is_free() {
 #[test]
 fn damage_to_a_bucket_is_found_and_named() {
     let workspace = workspace();
-    let mut buckets = Buckets::<2>::new(&workspace, "bucket", 3, 80);
+    let mut buckets = Buckets::<[u32; 2]>::new(&workspace, "bucket", 3, 80);
     for i in 0..1000u32 {
         buckets.push(i as usize % 3, [i, 7 * i]).unwrap();
     }

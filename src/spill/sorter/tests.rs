@@ -19,7 +19,7 @@ pub(in crate::spill) fn workspace() -> Workspace {
     .unwrap()
 }
 
-fn collect<const N: usize>(sorted: Sorted<N>) -> Vec<Record<N>> {
+fn collect<R: Row>(sorted: Sorted<R>) -> Vec<R> {
     let mut all = Vec::new();
     sorted
         .for_each(|r| {
@@ -40,7 +40,7 @@ proptest! {
         // A tiny buffer makes a run of every few records, so it gets few records.
         if buffer == 16 { records.truncate(900); }
         let workspace = workspace();
-        let sorter = Sorter::<2>::new(&workspace, "s", buffer);
+        let sorter = Sorter::<[u32; 2]>::new(&workspace, "s", buffer);
         for chunk in records.chunks(1000) { sorter.push(chunk).unwrap(); }
         let got = collect(sorter.finish(&workspace).unwrap());
         records.sort_unstable();
@@ -53,7 +53,7 @@ proptest! {
         part in prop::sample::select(vec![1usize, 9000, 100_000]),
     ) {
         let workspace = workspace();
-        let sorter = Sorter::<2>::new(&workspace, "s", 80_000);
+        let sorter = Sorter::<[u32; 2]>::new(&workspace, "s", 80_000);
         for chunk in records.chunks(1000) { sorter.push(chunk).unwrap(); }
         let sorted = sorter.finish(&workspace).unwrap();
         if let Err(sorted) = sorted.in_memory() {
@@ -78,7 +78,7 @@ fn only_what_was_filled_is_held() {
     let before = pool.peak_held();
     for whole in [true, false] {
         let reserved = workspace.promise("sorted", 1 << 20).unwrap();
-        let sorter = Sorter::<2>::new(&workspace, "h", 1 << 20).telling(reserved);
+        let sorter = Sorter::<[u32; 2]>::new(&workspace, "h", 1 << 20).telling(reserved);
         let sorter = if whole { sorter.whole() } else { sorter };
         let _ = pool.take_held();
         for n in 0..30_000u32 {
@@ -95,7 +95,7 @@ fn only_what_was_filled_is_held() {
     }
     // What is merged takes frames, and not the buffer that it went through.
     let reserved = workspace.promise("sorted", 1 << 20).unwrap();
-    let sorter = Sorter::<2>::new(&workspace, "m", 1 << 20).telling(reserved);
+    let sorter = Sorter::<[u32; 2]>::new(&workspace, "m", 1 << 20).telling(reserved);
     for n in 0..300_000u32 {
         sorter.push(&[[n % 100, n]]).unwrap();
     }
@@ -110,7 +110,7 @@ fn only_what_was_filled_is_held() {
 #[test]
 fn damage_is_found_and_named() {
     let workspace = workspace();
-    let sorter = Sorter::<2>::new(&workspace, "d", 800);
+    let sorter = Sorter::<[u32; 2]>::new(&workspace, "d", 800);
     for i in 0..1000u32 {
         sorter.push(&[[i * 7 % 1000, i]]).unwrap();
     }
@@ -151,7 +151,7 @@ fn parts() -> Vec<(u32, u64)> {
         .collect()
 }
 
-fn part(number: u32) -> Vec<Record<2>> {
+fn part(number: u32) -> Vec<[u32; 2]> {
     let count = parts().iter().find(|p| p.0 == number).map_or(0, |p| p.1);
     let word = |n: u32| (number * 5000 + n).wrapping_mul(2_654_435_761) >> 12;
     (0..count as u32).map(|n| [word(n), number]).collect()
@@ -167,7 +167,7 @@ fn goes_on_where_it_was_stopped() {
         // Buffers of other sizes every time; the one but last has done it all, and died then.
         for (stop, buffer) in [(2, 6000), (1, 20_000), (1, 9000), (99, 9000), (99, 500_000)] {
             let workspace = attempt(&path);
-            let sorter = Sorter::<2>::new(&workspace, "s", buffer);
+            let sorter = Sorter::<[u32; 2]>::new(&workspace, "s", buffer);
             let calls = std::cell::Cell::new(0);
             let taken = sorter.take_parts(&workspace, &parts(), kept, |numbers| {
                 calls.set(calls.get() + 1);
@@ -202,7 +202,7 @@ fn a_run_that_was_damaged_is_made_again() {
             std::fs::write(&path, bytes).unwrap();
         }
         let workspace = attempt(&path);
-        let sorter = Sorter::<2>::new(&workspace, "s", 20_000);
+        let sorter = Sorter::<[u32; 2]>::new(&workspace, "s", 20_000);
         let push = |numbers: &[u32]| numbers.iter().try_for_each(|n| sorter.push(&part(*n)));
         sorter.take_parts(&workspace, &parts(), true, push).unwrap();
         if damage == Some("s.run0") {

@@ -1,6 +1,6 @@
 //! The triples seen by the cells of a tile, each once with its count (paper, section 3.4).
 
-use super::TileRanges;
+use super::{CountedTriple, SentTriple, TileRanges};
 use crate::workspace::memory::{Holding, bytes_of};
 use std::ops::Range;
 
@@ -16,9 +16,8 @@ pub(super) struct Seen {
     held: Holding,
 }
 
-/// Triples with counts: `[i, j, k, count]` of the tile, `[tile, i, j, k, count]` for others, both
-/// ascending.
-pub(super) type Folded = (Vec<[u32; 4]>, Vec<[u32; 5]>);
+/// Counted triples of the tile and of others, both ascending.
+pub(super) type Folded = (Vec<CountedTriple>, Vec<SentTriple>);
 
 impl Seen {
     /// Bytes that the triples of `points` cells take at most: usual cells have five or six corners
@@ -65,7 +64,7 @@ impl Seen {
         }
     }
 
-    /// Equal triples as one record with a count.
+    /// Equal triples as one row with a count.
     pub fn fold(mut self, tiles: &TileRanges) -> Folded {
         self.tell(self.here.len() as u64 * 8);
         // By smallest vertex with one pass of counting, then in order by hand: half a dozen each.
@@ -80,7 +79,7 @@ impl Seen {
             *place += 1;
         }
         self.here = Vec::new();
-        let mut kept: Vec<[u32; 4]> = Vec::with_capacity(sorted.len() / 2);
+        let mut kept: Vec<CountedTriple> = Vec::with_capacity(sorted.len() / 2);
         let mut begin = 0;
         for (i, end) in (self.ids.start as u32..).zip(&start[..self.ids.len()]) {
             // Every place has moved on to where the next vertex begins.
@@ -89,15 +88,22 @@ impl Seen {
             pairs.sort_unstable();
             for group in pairs.chunk_by(|a, b| a == b) {
                 let (j, k) = ((group[0] >> 32) as u32, group[0] as u32);
-                kept.push([i, j, k, group.len() as u32]);
+                kept.push(CountedTriple {
+                    triple: [i, j, k],
+                    count: group.len() as u32,
+                });
             }
         }
         self.tell((size_of_val(&*sorted) + size_of_val(&*kept)) as u64);
         drop(sorted);
         self.elsewhere.sort_unstable();
         let sent = self.elsewhere.chunk_by(|a, b| a == b).map(|group| {
-            let [i, j, k] = group[0];
-            [tiles.of(i), i, j, k, group.len() as u32]
+            let triple = group[0];
+            SentTriple {
+                to: tiles.of(triple[0]),
+                triple,
+                count: group.len() as u32,
+            }
         });
         (kept, sent.collect())
     }
@@ -130,10 +136,10 @@ mod tests {
             let (kept, sent) = here.fold(&tiles);
             let mine = |t: &[u32; 3]| ids.contains(&(t[0] as usize));
             let expected: Vec<_> = counts.iter().filter(|(t, _)| mine(t))
-                .map(|(t, n)| [t[0], t[1], t[2], *n]).collect();
+                .map(|(&triple, &count)| CountedTriple { triple, count }).collect();
             prop_assert_eq!(kept, expected);
             let expected: Vec<_> = counts.iter().filter(|(t, _)| !mine(t))
-                .map(|(t, n)| [tiles.of(t[0]), t[0], t[1], t[2], *n]).collect();
+                .map(|(&triple, &count)| SentTriple { to: tiles.of(triple[0]), triple, count }).collect();
             prop_assert_eq!(sent, expected);
         }
     }

@@ -10,8 +10,7 @@ pub use cell::{
 
 use crate::error::Result;
 use crate::geom::Point;
-use crate::spill::layouts::{LABELLED, SENT_LABELLED};
-use crate::spill::{Exchange, Sections};
+use crate::spill::{Id, Shuffle, Table, row};
 use crate::stages::blocks::Blocks;
 use crate::stages::order::PointStore;
 use crate::stages::spacing::Density;
@@ -26,21 +25,43 @@ use serde::Serialize;
 use std::ops::Range;
 
 /// Bytes reserved for sorting the triples that leave their tile.
-const EXCHANGE_BUFFER: u64 = 16 << 20;
+const SHUFFLE_BUFFER: u64 = 16 << 20;
 
-/// What this stage leaves behind: for each tile the sorted triples `[i, j, k, count]` seen by its
-/// cells whose smallest vertex is in the tile, and those sent to it by later tiles, `[tile, i, j,
-/// k, count]`.
+row! {
+    /// A triple of ids, ascending, and the number of cells that have it as a corner.
+    pub struct CountedTriple {
+        /// Ids, ascending.
+        triple: [u32; 3],
+        /// Cells, 1 to 3.
+        count: u32,
+    }
+    packed Above Rising Rising Above
+}
+
+row! {
+    /// A counted triple on its way to a tile or a block.
+    pub struct SentTriple {
+        /// Number of the tile or block.
+        to: u32,
+        /// Ids, ascending.
+        triple: [u32; 3],
+        /// Cells, 1 to 3.
+        count: u32,
+    }
+    packed Above Above Rising Rising Above
+}
+
+/// The triples that are corners of cells, sorted, by the tile of their smallest vertex.
 #[derive(Debug)]
 pub struct CellTriples {
     /// Division into tiles.
     pub tiles: TileRanges,
     /// Triples of the tile's own cells.
-    pub own: Sections<4>,
+    pub own: Table<CountedTriple>,
     /// Triples seen by the cells of later tiles.
-    pub received: Sections<5>,
+    pub received: Table<SentTriple>,
     /// Points of each tile that lie off the surface of their neighbours, ascending.
-    pub off: Sections<1>,
+    pub off: Table<Id>,
 }
 
 /// Counts of this stage.
@@ -151,15 +172,9 @@ pub fn cells(
     density: Option<Density<'_>>,
     workspace: &Workspace,
 ) -> Result<(CellTriples, CellStats)> {
-    let own = Sections::with_layout(workspace, "cells.own", tiles.count(), LABELLED)?;
-    let off = Sections::create(workspace, "cells.off", tiles.count())?;
-    let exchange = Exchange::between(
-        workspace,
-        "cells.sent",
-        EXCHANGE_BUFFER,
-        tiles.count(),
-        SENT_LABELLED,
-    )?;
+    let own = Table::create(workspace, "cells.own", tiles.count())?;
+    let off = Table::create(workspace, "cells.off", tiles.count())?;
+    let shuffle = Shuffle::between_units(workspace, "cells.sent", SHUFFLE_BUFFER, tiles.count())?;
     let bytes = |tile: usize| {
         let points = tiles.ids(tile).len() as u64;
         Tile::bytes(points as usize) + PageCache::bytes(store) + Seen::bytes(points as usize)
@@ -176,7 +191,7 @@ pub fn cells(
         let (kept, sent) = seen.fold(&tiles);
         let _held = hold((size_of_val(&*kept) + size_of_val(&*sent)) as u64);
         own.put(tile, &kept)?;
-        exchange.send_from(tile, &sent)?;
+        shuffle.send_from(tile, &sent)?;
         workspace.advance(ids.len() as u64);
         Ok(stats)
     };
@@ -188,7 +203,7 @@ pub fn cells(
         stats.raw_triples += more.raw_triples;
         Ok(())
     })?;
-    let received = exchange.deliver(workspace, tiles.count())?;
+    let received = shuffle.deliver(workspace, tiles.count())?;
     Ok((
         CellTriples {
             tiles,
@@ -206,7 +221,7 @@ fn one_tile(
     neighbors: usize,
     maker: &mut CellMaker<'_>,
     seen: &mut Seen,
-) -> Result<(CellStats, Vec<[u32; 1]>)> {
+) -> Result<(CellStats, Vec<Id>)> {
     let tile = Tile::load(store, ids)?;
     let mut search = Search::default();
     let mut uncertain: Vec<(u32, Point)> = Vec::new();
@@ -221,7 +236,7 @@ fn one_tile(
         match outcome {
             Ok(Outcome::Complete) => {}
             Ok(Outcome::NoPlane) => no_plane += 1,
-            Ok(Outcome::OffSurface) => off.push([id]),
+            Ok(Outcome::OffSurface) => off.push(Id { id }),
             Ok(Outcome::Uncertain) => uncertain.push((id, point)),
             Err(error) => failed = Some(error),
         }
@@ -237,7 +252,7 @@ fn one_tile(
         let each = |a, b| seen.see(id, a, b);
         match maker.from_store(store, &mut cache, id, point, each)? {
             Outcome::NoPlane => no_plane += 1,
-            Outcome::OffSurface => off.push([id]),
+            Outcome::OffSurface => off.push(Id { id }),
             Outcome::Complete | Outcome::Uncertain => {}
         }
     }

@@ -1,6 +1,6 @@
 //! The triangles of a block in the file's numbers.
 
-use super::number::Numbering;
+use super::number::{Numbering, Split};
 use super::ply::{FACE, encode_face};
 use crate::error::Result;
 use crate::stages::repair::Repaired;
@@ -19,7 +19,7 @@ pub struct Faces<'a> {
     /// Those that fill holes, likewise.
     filled: Vec<[u32; 3]>,
     /// Corners that take copies, by triangle.
-    splits: Vec<[u32; 7]>,
+    splits: Vec<Split>,
 }
 
 impl<'a> Faces<'a> {
@@ -32,7 +32,7 @@ impl<'a> Faces<'a> {
     ) -> Result<Self> {
         let (triangles, _) = repaired.surface.load(block)?;
         let filled = repaired.filled.get(block)?;
-        let filled = filled.iter().map(|r| [r[1], r[2], r[3]]);
+        let filled = filled.iter().map(|f| f.triangle);
         let mut filled: Vec<_> = filled.filter(|t| t[0] >= ids.start).collect();
         filled.sort_unstable_by_key(|t| sorted(*t));
         Ok(Self {
@@ -67,7 +67,7 @@ impl<'a> Faces<'a> {
                 }
                 self.encode_special(t, &mut splits, bytes);
                 let next_filled = filled.peek().map_or(u32::MAX, |f| f[0]);
-                special = next_filled.min(splits.first().map_or(u32::MAX, |s| s[1]));
+                special = next_filled.min(splits.first().map_or(u32::MAX, |s| s.triangle[0]));
             } else {
                 encode_face(t.map(|v| self.number(v)), bytes);
             }
@@ -82,14 +82,14 @@ impl<'a> Faces<'a> {
     }
 
     /// A triangle with corners that may take copies: those in a fan with a copy of its own.
-    fn encode_special(&self, t: [u32; 3], splits: &mut &[[u32; 7]], bytes: &mut Vec<u8>) {
+    fn encode_special(&self, t: [u32; 3], splits: &mut &[Split], bytes: &mut Vec<u8>) {
         let mut out = t.map(|v| self.number(v));
         while let Some((s, rest)) = splits.split_first()
-            && s[1..4] == sorted(t)
+            && s.triangle == sorted(t)
         {
             for (corner, v) in out.iter_mut().zip(t) {
-                if v == s[4] {
-                    *corner = self.numbering.first_copy(s[5] as usize) as u32 + s[6];
+                if v == s.vertex {
+                    *corner = self.numbering.first_copy(s.block as usize) as u32 + s.copy;
                 }
             }
             *splits = rest;

@@ -10,7 +10,6 @@ pub(crate) use ply::{folder_of, temporary};
 
 use crate::error::{Error, Result};
 use crate::geom::lattice::Lattice;
-use crate::spill::Sections;
 use crate::stages::blocks::Blocks;
 use crate::stages::order::PointStore;
 use crate::stages::repair::Repaired;
@@ -38,7 +37,7 @@ pub struct MeshStats {
 }
 
 fn block_bytes(repaired: &Repaired, blocks: Blocks, block: usize) -> u64 {
-    let records = repaired.surface.records(block) + repaired.filled.records(block);
+    let records = repaired.surface.records(block) + repaired.filled.rows(block);
     60 * records as u64 + blocks.ids(block).len() as u64 * 60 + (1 << 20)
 }
 
@@ -107,7 +106,7 @@ fn write_block(
     file.write_vertices(part, numbering.vertex(ids.start).into(), &bytes)?;
     bytes.clear();
     for copy in numbering.copies.get(block)? {
-        file.encode_vertex(at(copy[0]), &mut bytes);
+        file.encode_vertex(at(copy.id), &mut bytes);
     }
     file.write_vertices(part + 1, numbering.first_copy(block), &bytes)?;
     drop(points);
@@ -117,5 +116,3 @@ fn write_block(
     held.set(faces.taken() + bytes_of(&bytes));
     file.write_faces(part + 2, numbering.first_face(block), &bytes)
 }
-
-type Splits = Sections<7>;

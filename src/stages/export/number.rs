@@ -1,15 +1,15 @@
 //! Numbers for the mesh's vertices and triangles.
 
-use super::{MeshStats, Splits};
+use super::MeshStats;
 use crate::error::{Error, Result};
-use crate::spill::{Exchange, Sections};
+use crate::spill::{Id, Shuffle, Table, row};
 use crate::stages::blocks::Blocks;
-use crate::stages::repair::Repaired;
-use crate::stages::surface::star::{Link, Star, sorted};
+use crate::stages::repair::{FilledTriangle, Repaired};
+use crate::stages::surface::star::{Link, Star, Triangle, sorted};
 use crate::workspace::Workspace;
 use crate::workspace::memory::Reservation;
 
-const EXCHANGE_BUFFER: u64 = 8 << 20;
+const SHUFFLE_BUFFER: u64 = 8 << 20;
 
 /// Which points are vertices, and where everything goes in the file; with the bits of `used`, a
 /// fifth of a byte a point.
@@ -20,13 +20,30 @@ pub struct Numbering<'a> {
     /// Vertices before each word.
     rank: Vec<u32>,
     firsts: Vec<Firsts>,
-    /// `[id]` of each copy, by block.
-    pub copies: Sections<1>,
-    /// `[block of the triangle, i, j, k, vertex, block of the vertex, copy]`.
-    pub splits: Splits,
+    /// The point of each copy, by block.
+    pub copies: Table<Id>,
+    /// The corners that take copies, by block of the triangle.
+    pub splits: Table<Split>,
     /// Totals.
     pub stats: MeshStats,
     _held: Reservation,
+}
+
+row! {
+    /// A corner of a triangle that takes a copy of its pinched vertex.
+    pub struct Split {
+        /// Block of the triangle.
+        to: u32,
+        /// Ids of the triangle, ascending.
+        triangle: [u32; 3],
+        /// The pinched vertex.
+        vertex: u32,
+        /// Its block.
+        block: u32,
+        /// Number of the copy within that block.
+        copy: u32,
+    }
+    packed Above Above Above Above Above Above Above
 }
 
 /// Counts of a block, later the sums over the blocks before it.
@@ -122,26 +139,31 @@ fn split(
     repaired: &Repaired,
     blocks: Blocks,
     workspace: &Workspace,
-) -> Result<(Vec<Firsts>, Sections<1>, Splits)> {
+) -> Result<(Vec<Firsts>, Table<Id>, Table<Split>)> {
     let outline = &repaired.outline;
-    let exchange = Exchange::<7>::new(workspace, "export.splits", EXCHANGE_BUFFER)?;
-    let copies = Sections::create(workspace, "export.copies", blocks.count())?;
+    let shuffle = Shuffle::new(workspace, "export.splits", SHUFFLE_BUFFER)?;
+    let copies = Table::create(workspace, "export.copies", blocks.count())?;
     let mut firsts = Vec::with_capacity(blocks.count());
     for block in 0..blocks.count() {
         workspace.check_cancel()?;
-        let records = outline.pinched.records(block) + repaired.filled.records(block);
+        let records = outline.pinched.rows(block) + repaired.filled.rows(block);
         let pinches = outline.pinches.get(block)?;
         let size = blocks.ids(block).len() * 8 * usize::from(!pinches.is_empty());
         let _held = workspace.reserve("export: block", (120 * records + size) as u64)?;
         let filled = repaired.filled.get(block)?;
-        let own = |r: &&[u32; 4]| blocks.of(r[1]) == r[0];
+        let own = |f: &&FilledTriangle| blocks.of(f.triangle[0]) == f.to;
         let faces = u64::from(outline.faces[block]) + filled.iter().filter(own).count() as u64;
         let mut again = Vec::new();
         if !pinches.is_empty() {
-            let mut triangles = outline.pinched.get(block)?;
-            triangles.extend(filled.iter().map(|r| [r[1], r[2], r[3]]));
+            let mut triangles: Vec<Triangle> = outline
+                .pinched
+                .get(block)?
+                .into_iter()
+                .map(|t| t.corners)
+                .collect();
+            triangles.extend(filled.iter().map(|f| f.triangle));
             triangles.sort_unstable_by_key(|t| sorted(*t));
-            again = split_block(&pinches, &triangles, blocks, block, &exchange)?;
+            again = split_block(&pinches, &triangles, blocks, block, &shuffle)?;
         }
         firsts.push(Firsts {
             copies: again.len() as u64,
@@ -150,22 +172,22 @@ fn split(
         copies.put(block, &again)?;
         workspace.observer.advance(1);
     }
-    Ok((firsts, copies, exchange.deliver(workspace, blocks.count())?))
+    Ok((firsts, copies, shuffle.deliver(workspace, blocks.count())?))
 }
 
 /// The copies of a block's pinched vertices; tells the triangles that take them.
 fn split_block(
-    pinches: &[[u32; 1]],
+    pinches: &[Id],
     triangles: &[[u32; 3]],
     blocks: Blocks,
     block: usize,
-    exchange: &Exchange<7>,
-) -> Result<Vec<[u32; 1]>> {
+    shuffle: &Shuffle<Split>,
+) -> Result<Vec<Id>> {
     let star = Star::of(blocks.ids(block), triangles);
     let mut link = Link::default();
     let mut copies = Vec::new();
     let mut splits = Vec::new();
-    for &[v] in pinches {
+    for &Id { id: v } in pinches {
         let at = star.at(v);
         // Triangles are in ascending order, so fans are numbered by their smallest triangles.
         link.set(v, at.iter().map(|&n| triangles[n as usize]));
@@ -173,11 +195,17 @@ fn split_block(
             if let Some(fan) = link.group(index).checked_sub(1) {
                 let t = sorted(triangles[n as usize]);
                 let copy = (copies.len() + fan) as u32;
-                splits.push([blocks.of(t[0]), t[0], t[1], t[2], v, block as u32, copy]);
+                splits.push(Split {
+                    to: blocks.of(t[0]),
+                    triangle: t,
+                    vertex: v,
+                    block: block as u32,
+                    copy,
+                });
             }
         }
-        copies.extend((1..link.groups()).map(|_| [v]));
+        copies.extend((1..link.groups()).map(|_| Id { id: v }));
     }
-    exchange.send(&splits)?;
+    shuffle.send(&splits)?;
     Ok(copies)
 }

@@ -7,11 +7,11 @@ mod writer;
 
 pub use rewrite::Rewriter;
 pub use store::{PAGE, PointStore};
-pub use writer::StoreWriter;
+pub use writer::{Position, StoreWriter};
 
 use crate::error::{Error, Result};
 use crate::geom::{Point, hilbert};
-use crate::spill::{Sorted, Sorter};
+use crate::spill::{Sorted, Sorter, row};
 use crate::workspace::Workspace;
 use crate::workspace::persist::Persist;
 use rayon::prelude::*;
@@ -36,10 +36,30 @@ type Note<M, S> = ((Option<M>, S), (u64, bool));
 /// Takes points of a stream, the mark after them, and the counts up to there.
 pub type Each<'a, M, S> = &'a mut dyn FnMut(&[Point], Option<M>, S) -> Result<()>;
 
+row! {
+    /// The key of a position on the curve.
+    pub struct CurveKey {
+        /// As [`hilbert::encode`] has it.
+        key: hilbert::Key,
+    }
+    unpacked
+}
+
+impl CurveKey {
+    fn of(point: Point) -> Self {
+        let key = hilbert::encode(point);
+        Self { key }
+    }
+
+    fn point(&self) -> Point {
+        hilbert::decode(self.key)
+    }
+}
+
 /// Takes in positions in any order and gives back the ordered store.
 #[derive(Debug)]
 pub struct Orderer {
-    sorter: Sorter<3>,
+    sorter: Sorter<CurveKey>,
     taken: AtomicU64,
     /// Bytes of the sort buffer.
     buffer: u64,
@@ -64,7 +84,7 @@ impl Orderer {
         // A buffer that is full is written: there is room for more than there are.
         let all = most
             .saturating_add(SPARE)
-            .saturating_mul(size_of::<hilbert::Key>() as u64);
+            .saturating_mul(size_of::<CurveKey>() as u64);
         let buffer = third.min(all);
         let held = workspace.promise("order: sort buffer", buffer)?;
         let sorter = Sorter::new(workspace, "order", buffer);
@@ -84,7 +104,7 @@ impl Orderer {
         let mut keys = Vec::with_capacity(CHUNK.min(points.len()));
         for part in points.chunks(CHUNK) {
             keys.clear();
-            keys.extend(part.iter().map(|&p| hilbert::encode(p)));
+            keys.extend(part.iter().map(|&p| CurveKey::of(p)));
             self.sorter.push(&keys)?;
         }
         self.taken.fetch_add(points.len() as u64, Ordering::Relaxed);
@@ -174,7 +194,7 @@ impl Orderer {
             Ok((mut keys, _held)) => {
                 keys.dedup();
                 let left = &keys[writer.len().min(keys.len())..];
-                writer.append(workspace, left, |key| hilbert::decode(*key))?;
+                writer.append(workspace, left, CurveKey::point)?;
             }
             Err(sorted) => merge(sorted, buffer, &mut writer, workspace)?,
         }
@@ -192,11 +212,11 @@ impl Orderer {
 }
 
 /// Where a part of the keys begins and ends.
-type Part = (Option<hilbert::Key>, Option<hilbert::Key>);
+type Part = (Option<CurveKey>, Option<CurveKey>);
 
 /// The key after this one.
-fn next(mut key: hilbert::Key) -> hilbert::Key {
-    for word in key.iter_mut().rev() {
+fn next(mut key: CurveKey) -> CurveKey {
+    for word in key.key.iter_mut().rev() {
         let (sum, over) = word.overflowing_add(1);
         *word = sum;
         if !over {
@@ -208,22 +228,19 @@ fn next(mut key: hilbert::Key) -> hilbert::Key {
 
 /// Writes what is on disk in order, part by part, each merged by one thread, in `memory` bytes.
 fn merge(
-    mut sorted: Sorted<3>,
+    mut sorted: Sorted<CurveKey>,
     memory: u64,
     writer: &mut StoreWriter,
     workspace: &Workspace,
 ) -> Result<()> {
     // A key is a position, so the last one written says where to go on.
-    let start = writer.last()?.map(|point| next(hilbert::encode(point)));
+    let start = writer.last()?.map(|point| next(CurveKey::of(point)));
     let cuts = sorted.cuts(PART).into_iter().map(Some);
     let cuts = cuts.filter(|cut| *cut > start);
     let ends: Vec<_> = [start].into_iter().chain(cuts).chain([None]).collect();
     let parts: Vec<Part> = ends.windows(2).map(|w| (w[0], w[1])).collect();
     // A part has a frame more of each run at most, and its list grows by doubling.
-    let (list, merging) = (
-        (PART * size_of::<hilbert::Key>()) as u64,
-        sorted.merge_bytes(),
-    );
+    let (list, merging) = ((PART * size_of::<CurveKey>()) as u64, sorted.merge_bytes());
     let threads = (memory / (3 * list + 4 * merging)).clamp(1, workspace.threads as u64) as usize;
     sorted.tell(threads as u64 * (list + merging));
     let one = |&(from, to): &Part| {
@@ -238,10 +255,10 @@ fn merge(
         Ok(keys)
     };
     for wave in parts.chunks(threads) {
-        let merged: Result<Vec<Vec<hilbert::Key>>> =
+        let merged: Result<Vec<Vec<CurveKey>>> =
             workspace.install(|| wave.par_iter().with_max_len(1).map(one).collect());
         for keys in merged? {
-            writer.append(workspace, &keys, |key| hilbert::decode(*key))?;
+            writer.append(workspace, &keys, CurveKey::point)?;
         }
     }
     Ok(())

@@ -4,16 +4,38 @@ use super::store::{FAN, PointStore};
 use crate::error::Result;
 use crate::geom::Point;
 use crate::geom::aabb::Aabb;
-use crate::spill::Sections;
+use crate::spill::{Table, row};
 use crate::workspace::Workspace;
 use crate::workspace::file::{Place, ScratchFile};
 use crate::workspace::persist::{Persist, Saved};
 use crate::workspace::steps::Step;
 use rayon::prelude::*;
 
-/// Of every page its checksum and its box. Pages that were written together are a section, which has the
-/// number of the first of them in terms of [`STEP`].
-pub(super) type Index = Sections<7>;
+row! {
+    /// The position of a point on the lattice.
+    pub struct Position {
+        /// Coordinates.
+        point: Point,
+    }
+    unpacked
+}
+
+row! {
+    /// Checksum and box of a page.
+    pub struct PageRow {
+        /// CRC-32 of the page.
+        crc: u32,
+        /// Lowest coordinates.
+        min: Point,
+        /// Highest coordinates.
+        max: Point,
+    }
+    unpacked
+}
+
+/// The pages of a store. Pages that were written together are a section, which has the number of the
+/// first of them in terms of [`STEP`].
+pub(super) type Index = Table<PageRow>;
 
 /// What is written at a time begins with a page whose number is a multiple of this.
 const STEP: usize = 16;
@@ -62,7 +84,7 @@ impl StoreWriter {
     }
 
     fn open(workspace: &Workspace, name: &str, page: usize) -> Result<Self> {
-        let index = || Index::unpacked(workspace, &format!("{name}.index"), 0);
+        let index = || Index::create(workspace, &format!("{name}.index"), 0);
         let mut writer = Self {
             file: workspace.keep_file(name)?.0,
             len: 0,
@@ -86,16 +108,12 @@ impl StoreWriter {
         self.checks.clear();
         self.boxes.clear();
         let mut at = 0;
-        while at < index.count() && index.records(at) > 0 {
-            for [crc, bounds @ ..] in index.get(at)? {
-                let [a, b, c, d, e, f] = bounds.map(u32::cast_signed);
+        while at < index.count() && index.rows(at) > 0 {
+            for PageRow { crc, min, max } in index.get(at)? {
                 self.checks.push(crc);
-                self.boxes.push(Aabb {
-                    min: [a, b, c],
-                    max: [d, e, f],
-                });
+                self.boxes.push(Aabb { min, max });
             }
-            at += index.records(at).div_ceil(STEP);
+            at += index.rows(at).div_ceil(STEP);
         }
         Ok(true)
     }
@@ -139,14 +157,14 @@ impl StoreWriter {
         workspace: &Workspace,
         name: &str,
         page: usize,
-        sections: &Sections<3>,
+        sections: &Table<Position>,
     ) -> Result<PointStore> {
         workspace.once("gather", || {
             let mut writer = Self::create(workspace, name, page)?;
             let mut first = 0;
             for section in 0..sections.count() {
                 workspace.check_cancel()?;
-                let end = first + sections.records(section);
+                let end = first + sections.rows(section);
                 let done = writer.len.clamp(first, end) - first;
                 if first + done < end {
                     let points = sections.get(section)?;
@@ -230,19 +248,20 @@ impl StoreWriter {
         let Some(index) = &self.index else {
             return Ok(());
         };
-        let mut records = Vec::new();
+        let mut rows = Vec::new();
         for (pages, place) in written {
-            let part = (first + records.len()) / STEP;
+            let part = (first + rows.len()) / STEP;
             self.file.put(part as u32, *place)?;
-            records.extend(pages.iter().map(|(crc, b)| {
-                let [p, q] = [b.min, b.max].map(|corner| corner.map(i32::cast_unsigned));
-                [*crc, p[0], p[1], p[2], q[0], q[1], q[2]]
-            }));
+            rows.extend(
+                pages
+                    .iter()
+                    .map(|&(crc, Aabb { min, max })| PageRow { crc, min, max }),
+            );
         }
         while index.count() <= first / STEP {
             index.grow();
         }
-        index.put(first / STEP, &records)
+        index.put(first / STEP, &rows)
     }
 
     /// Takes in groups that were written, for good.

@@ -12,10 +12,10 @@ mod spacing;
 
 use crate::error::Result;
 use crate::geom::Point;
-use crate::spill::Sections;
+use crate::spill::Table;
 use crate::stages::blocks::Blocks;
 use crate::stages::cells::{TileRanges, near_in_store};
-use crate::stages::order::{PointStore, StoreWriter};
+use crate::stages::order::{PointStore, Position, StoreWriter};
 use crate::stages::tiles::Tile;
 use crate::stages::tiles::near::Search;
 use crate::stages::tiles::walk::PageCache;
@@ -88,7 +88,7 @@ fn round(
     let tiles = TileRanges::new(Blocks::new(store.len(), options.block), options.tile);
     let spacings = Spacings::measure(store, tiles, number, workspace)?;
     let name = format!("outliers{number}");
-    let kept = Sections::<3>::unpacked(workspace, &name, tiles.count())?;
+    let kept = Table::<Position>::create(workspace, &name, tiles.count())?;
     let bytes = |tile: usize| {
         let points = tiles.ids(tile).len();
         Tile::bytes(points) + PageCache::bytes(store) + SpacingCache::BYTES + points as u64 * 12

@@ -2,7 +2,7 @@
 
 use super::NEAREST;
 use crate::error::Result;
-use crate::spill::{Record, Sections};
+use crate::spill::{Table, row};
 use crate::stages::cells::TileRanges;
 use crate::stages::order::PointStore;
 use crate::stages::tiles::Tile;
@@ -13,11 +13,20 @@ use crate::workspace::memory::Holding;
 use rustc_hash::FxHashMap;
 use std::ops::Range;
 
-/// The mean distance of every point to its nearest neighbours, as the bits of an `f32`.
+row! {
+    /// The mean distance of a point to its nearest neighbours.
+    pub struct Spacing {
+        /// The bits of an `f32`.
+        bits: u32,
+    }
+    unpacked
+}
+
+/// The mean distance of every point to its nearest neighbours.
 #[derive(Debug)]
 pub(super) struct Spacings {
     tiles: TileRanges,
-    sections: Sections<1>,
+    sections: Table<Spacing>,
 }
 
 impl Spacings {
@@ -29,7 +38,7 @@ impl Spacings {
         workspace: &Workspace,
     ) -> Result<Self> {
         let name = format!("spacings{round}");
-        let sections = Sections::<1>::unpacked(workspace, &name, tiles.count())?;
+        let sections = Table::create(workspace, &name, tiles.count())?;
         let bytes = |tile: usize| {
             let points = tiles.ids(tile).len();
             Tile::bytes(points) + PageCache::bytes(store) + points as u64 * 4
@@ -41,15 +50,15 @@ impl Spacings {
     }
 }
 
-fn one_tile(store: &PointStore, ids: Range<usize>) -> Result<Vec<Record<1>>> {
+fn one_tile(store: &PointStore, ids: Range<usize>) -> Result<Vec<Spacing>> {
     let tile = Tile::load(store, ids.clone())?;
-    let mut spacings = vec![[0]; ids.len()];
+    let mut spacings = vec![Spacing::default(); ids.len()];
     let mut search = Search::default();
     let mut uncertain = Vec::new();
     tile.for_each_query(NEAREST, &mut search, |id, point, query| match query {
         Some(query) => {
             let near = query.near().columns().distances2[..NEAREST].iter();
-            spacings[id as usize - ids.start] = [mean(near.copied())];
+            spacings[id as usize - ids.start] = mean(near.copied());
         }
         None => uncertain.push((id, point)),
     });
@@ -61,22 +70,23 @@ fn one_tile(store: &PointStore, ids: Range<usize>) -> Result<Vec<Record<1>>> {
         for distance2 in &mut near {
             *distance2 = walk.advance()?.map_or(0, |n| n.distance2);
         }
-        spacings[id as usize - ids.start] = [mean(near.into_iter())];
+        spacings[id as usize - ids.start] = mean(near.into_iter());
     }
     Ok(spacings)
 }
 
 /// Mean of the distances, nearest first: the order of the sum is always the same.
-fn mean(distances2: impl Iterator<Item = u64>) -> u32 {
+fn mean(distances2: impl Iterator<Item = u64>) -> Spacing {
     let sum: f64 = distances2.map(|d2| (d2 as f64).sqrt()).sum();
-    ((sum / NEAREST as f64) as f32).to_bits()
+    let bits = ((sum / NEAREST as f64) as f32).to_bits();
+    Spacing { bits }
 }
 
 /// Sections of spacings that were looked at.
 #[derive(Debug)]
 pub(super) struct SpacingCache<'a> {
     spacings: &'a Spacings,
-    sections: FxHashMap<u32, Vec<Record<1>>>,
+    sections: FxHashMap<u32, Vec<Spacing>>,
     held: usize,
     around: Vec<u32>,
     taken: Holding,
@@ -105,7 +115,7 @@ impl<'a> SpacingCache<'a> {
         let tile = tiles.of(id);
         let place = id as usize - tiles.ids(tile as usize).start;
         if let Some(section) = self.sections.get(&tile) {
-            return Ok(section[place][0]);
+            return Ok(section[place].bits);
         }
         if self.held >= Self::HELD {
             // Queries come in curve order: soon everything here is new again.
@@ -113,7 +123,7 @@ impl<'a> SpacingCache<'a> {
             self.held = 0;
         }
         let section = self.spacings.sections.get(tile as usize)?;
-        let found = section[place][0];
+        let found = section[place].bits;
         self.held += section.len();
         self.taken.set(4 * self.held as u64);
         self.sections.insert(tile, section);

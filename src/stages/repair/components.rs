@@ -1,11 +1,12 @@
 //! Components that reach over blocks: labels of blocks, joined by the triangles that several blocks
 //! see, added up and judged.
 
-use super::facing::{Fate, SUMS, Sums, judge};
+use super::facing::{Fate, Sums, SumsRow, judge};
+use super::surface::{SeenTriangle, TriangleTo};
 use super::{RepairOptions, RepairStats};
 use crate::error::Result;
 use crate::geom::Point;
-use crate::spill::Sections;
+use crate::spill::Table;
 use crate::stages::order::PointStore;
 use crate::stages::surface::parity::ParitySets;
 use crate::workspace::Workspace;
@@ -15,7 +16,7 @@ use std::sync::{Mutex, PoisonError};
 
 /// Joins global labels of which a triangle has both.
 pub(super) fn join(
-    seen: &Sections<6>,
+    seen: &Table<SeenTriangle>,
     globals: &[(u32, u32)],
     labels: u32,
     workspace: &Workspace,
@@ -23,12 +24,12 @@ pub(super) fn join(
     let mut sets = ParitySets::new(labels as usize);
     for block in 0..globals.len() {
         workspace.check_cancel()?;
-        let _held = workspace.reserve("labels seen", seen.records(block) as u64 * 24)?;
+        let _held = workspace.reserve("labels seen", seen.rows(block) as u64 * 24)?;
         let all = seen.get(block)?;
-        for same in all.chunk_by(|a, b| a[1..4] == b[1..4]) {
-            let global = |r: &[u32; 6]| globals[r[4] as usize].0 + (r[5] >> 1);
+        for same in all.chunk_by(|a, b| a.triangle == b.triangle) {
+            let global = |s: &SeenTriangle| globals[s.block as usize].0 + s.label();
             for other in &same[1..] {
-                let turned = (same[0][5] ^ other[5]) & 1 == 1;
+                let turned = same[0].flip() ^ other.flip();
                 sets.join(global(&same[0]), global(other), turned);
             }
         }
@@ -41,12 +42,12 @@ pub(super) fn join(
 pub(super) struct Parts<'a> {
     /// Positions that the triangles were connected by.
     pub store: &'a PointStore,
-    /// `[owner, i, j, k, block, label << 1 | flip]`: how a block sees a crossing triangle.
-    pub seen: &'a Sections<6>,
+    /// How blocks see crossing triangles.
+    pub seen: &'a Table<SeenTriangle>,
     /// Sums over the interior triangles of each block's global labels.
-    pub sums: &'a Sections<SUMS>,
-    /// `[block, i, j, k]`
-    pub bridges: &'a Sections<4>,
+    pub sums: &'a Table<SumsRow>,
+    /// Bridges that several blocks see.
+    pub bridges: &'a Table<TriangleTo>,
     /// For each block, the number of the first of its labels that are global, and how many are.
     pub globals: &'a [(u32, u32)],
     /// The labels that were joined.
@@ -64,7 +65,7 @@ impl Parts<'_> {
         let all: Mutex<FxHashMap<u32, Sums>> = Mutex::default();
         let bytes = |block: usize| {
             let labels = self.globals[block].1;
-            self.seen.records(block) as u64 * 150 + u64::from(labels) * 500 + (1 << 16)
+            self.seen.rows(block) as u64 * 150 + u64::from(labels) * 500 + (1 << 16)
         };
         workspace.for_each_unit("repair: borders", self.globals.len(), bytes, |block| {
             let own = self.sum(block)?;
@@ -94,30 +95,31 @@ impl Parts<'_> {
     /// their labels.
     fn sum(&self, block: usize) -> Result<FxHashMap<u32, Sums>> {
         let mut own: FxHashMap<u32, Sums> = FxHashMap::default();
-        for (label, words) in (self.globals[block].0..).zip(self.sums.get(block)?) {
+        for (label, row) in (self.globals[block].0..).zip(self.sums.get(block)?) {
             let (root, turned) = self.sets.look(label);
-            let sums = Sums::from_words(&words);
+            let sums = Sums::of(&row);
             own.entry(root).or_default().merge(&sums, turned);
         }
         let seen = self.seen.get(block)?;
         let bridges = self.bridges.get(block)?;
-        let mut ids: Vec<u32> = seen.iter().flat_map(|r| [r[1], r[2], r[3]]).collect();
+        let mut ids: Vec<u32> = seen.iter().flat_map(|s| s.triangle).collect();
         ids.sort_unstable();
         ids.dedup();
         let mut points: Vec<Point> = Vec::with_capacity(ids.len());
         self.store.fetch(&ids, &mut points)?;
         let _held = hold(table_bytes(&own) + bytes_of(&seen) + bytes_of(&ids) + bytes_of(&points));
-        for same in seen.chunk_by(|a, b| a[1..4] == b[1..4]) {
-            let r = same[0];
-            if bridges.binary_search(&[r[0], r[1], r[2], r[3]]).is_ok() {
+        for same in seen.chunk_by(|a, b| a.triangle == b.triangle) {
+            let first = same[0];
+            let SeenTriangle { to, triangle, .. } = first;
+            if bridges.binary_search(&TriangleTo { to, triangle }).is_ok() {
                 continue;
             }
-            let t = [r[1], r[2], r[3]];
-            let (root, turned) = self.sets.look(self.globals[r[4] as usize].0 + (r[5] >> 1));
+            let label = self.globals[first.block as usize].0 + first.label();
+            let (root, turned) = self.sets.look(label);
             // Every corner was fetched.
-            let corners = t.map(|v| points[ids.partition_point(|id| *id < v)]);
-            let flip = turned ^ (r[5] & 1 == 1);
-            own.entry(root).or_default().add(t, corners, flip);
+            let corners = triangle.map(|v| points[ids.partition_point(|id| *id < v)]);
+            let flip = turned ^ first.flip();
+            own.entry(root).or_default().add(triangle, corners, flip);
         }
         Ok(own)
     }

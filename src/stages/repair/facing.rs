@@ -4,6 +4,7 @@
 
 use super::RepairStats;
 use crate::geom::{Point, sub};
+use crate::spill::row;
 use crate::stages::surface::star::Triangle;
 
 /// Exact sums over triangles.
@@ -24,8 +25,37 @@ pub struct Sums {
     first: Option<(Triangle, bool)>,
 }
 
-/// Words of [`Sums`] as a record.
-pub const SUMS: usize = 38;
+row! {
+    /// [`Sums`] on disk; numbers of 64 and 128 bits are lists of words, the lowest first.
+    pub struct SumsRow {
+        /// Six times the signed volume.
+        volume6: [u32; 4],
+        /// Twice the area.
+        area: [u32; 4],
+        /// Twice the vector area.
+        area_vector: [[u32; 4]; 3],
+        /// Sum of the corners' positions.
+        corners: [[u32; 4]; 3],
+        /// Number of triangles.
+        triangles: [u32; 2],
+        /// 1: the smallest triangle is turned; 2: there is one; 4: an edge has one triangle.
+        flags: u32,
+        /// The smallest triangle.
+        first: Triangle,
+    }
+    unpacked
+}
+
+/// The words of a number, the lowest first.
+fn words(number: i128) -> [u32; 4] {
+    [0, 32, 64, 96].map(|shift| (number >> shift) as u32)
+}
+
+fn number(words: [u32; 4]) -> i128 {
+    let wide = words.iter().rev();
+    wide.fold(0u128, |sum, w| sum << 32 | u128::from(*w))
+        .cast_signed()
+}
 
 impl Sums {
     /// Adds a triangle with corners at `corners`; `flip` if it runs against its ascending ids.
@@ -80,48 +110,34 @@ impl Sums {
         }
     }
 
-    /// As a record.
+    /// As a row.
     #[must_use]
-    pub fn words(&self) -> [u32; SUMS] {
-        let mut words = [0; SUMS];
-        let wide = [self.volume6.cast_unsigned(), self.area].into_iter();
-        let wide = wide
-            .chain(self.area_vector.map(i128::cast_unsigned))
-            .chain(self.corners.map(i128::cast_unsigned));
-        for (to, from) in words.chunks_exact_mut(4).zip(wide) {
-            to.copy_from_slice(&[0, 32, 64, 96].map(|shift| (from >> shift) as u32));
-        }
-        let (t, turned) = self.first.unwrap_or_default();
+    pub fn row(&self) -> SumsRow {
+        let (first, turned) = self.first.unwrap_or_default();
         let flags = u32::from(self.open) << 2 | u32::from(self.first.is_some()) << 1;
-        words[32..].copy_from_slice(&[
-            self.triangles as u32,
-            (self.triangles >> 32) as u32,
-            flags | u32::from(turned),
-            t[0],
-            t[1],
-            t[2],
-        ]);
-        words
+        SumsRow {
+            volume6: words(self.volume6),
+            area: words(self.area.cast_signed()),
+            area_vector: self.area_vector.map(words),
+            corners: self.corners.map(words),
+            triangles: [self.triangles as u32, (self.triangles >> 32) as u32],
+            flags: flags | u32::from(turned),
+            first,
+        }
     }
 
-    /// From a record.
+    /// From a row.
     #[must_use]
-    pub fn from_words(words: &[u32; SUMS]) -> Self {
-        let wide = |at: usize| {
-            let parts = words[4 * at..4 * at + 4].iter().rev();
-            parts.fold(0u128, |sum, w| sum << 32 | u128::from(*w))
-        };
-        let vector = |at: usize| [at, at + 1, at + 2].map(|at| wide(at).cast_signed());
-        let flags = words[34];
-        let first = ([words[35], words[36], words[37]], flags & 1 == 1);
+    pub fn of(row: &SumsRow) -> Self {
+        let [low, high] = row.triangles.map(u64::from);
         Self {
-            triangles: u64::from(words[33]) << 32 | u64::from(words[32]),
-            open: flags & 4 != 0,
-            volume6: wide(0).cast_signed(),
-            area: wide(1),
-            area_vector: vector(2),
-            corners: vector(5),
-            first: (flags & 2 != 0).then_some(first),
+            triangles: high << 32 | low,
+            open: row.flags & 4 != 0,
+            volume6: number(row.volume6),
+            area: number(row.area).cast_unsigned(),
+            area_vector: row.area_vector.map(number),
+            corners: row.corners.map(number),
+            first: (row.flags & 2 != 0).then_some((row.first, row.flags & 1 == 1)),
         }
     }
 
@@ -210,15 +226,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn sums_as_records() {
+    fn sums_as_rows() {
         let far = (1 << 30) - 1;
         let mut sums = Sums::default();
         sums.add([3, 5, 9], [[0, far, 7], [far, 0, 0], [4, 2, far]], true);
         sums.add([4, 5, 9], [[far, far, 0], [0, far, 9], [far, 5, 0]], false);
         sums.open();
-        assert_eq!(Sums::from_words(&sums.words()), sums);
+        assert_eq!(Sums::of(&sums.row()), sums);
         let empty = Sums::default();
-        assert_eq!(Sums::from_words(&empty.words()), empty);
+        assert_eq!(Sums::of(&empty.row()), empty);
         let mut both = sums;
         both.merge(&sums, true);
         assert_eq!((both.volume6, both.area_vector), (0, [0; 3]));

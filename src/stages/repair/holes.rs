@@ -3,11 +3,11 @@
 
 use super::fill::{Corner, Filling};
 use super::mend::Mending;
-use super::rim::{BlockRim, Outline, RimCounts, RimFiles};
+use super::rim::{BlockRim, FragmentRow, Outline, RimCounts, RimFiles};
 use super::surface::Surface;
-use super::{EXCHANGE_BUFFER, RepairStats, from_smallest};
+use super::{FilledTriangle, RepairStats, SHUFFLE_BUFFER, from_smallest};
 use crate::error::Result;
-use crate::spill::{Exchange, Sections, Word};
+use crate::spill::{Shuffle, Table};
 use crate::stages::blocks::Blocks;
 use crate::stages::located::Places;
 use crate::stages::surface::star::sorted;
@@ -47,8 +47,7 @@ persist!(Found {
     rim
 });
 
-/// Fills holes as `mending` says, or none; `[block, i, a, b]` for each block that a triangle
-/// touches, and what the boundary looks like.
+/// Fills holes as `mending` says, or none: the triangles that do so, and the boundary that is left.
 ///
 /// # Errors
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
@@ -60,10 +59,10 @@ pub fn fill(
     blocks: Blocks,
     stats: &mut RepairStats,
     workspace: &Workspace,
-) -> Result<(Sections<4>, Outline)> {
-    let (count, buffer, above) = (blocks.count(), EXCHANGE_BUFFER, [Word::Above; 4]);
-    let exchange = Exchange::between(workspace, "repair.filled", buffer, count, above)?;
-    let kept = Sections::<1>::create(workspace, "repair.fragments", 0)?;
+) -> Result<(Table<FilledTriangle>, Outline)> {
+    let count = blocks.count();
+    let shuffle = Shuffle::between_units(workspace, "repair.filled", SHUFFLE_BUFFER, count)?;
+    let kept = Table::create(workspace, "repair.fragments", 0)?;
     let files = RimFiles::create(workspace, count)?;
     let bytes =
         |b: usize| 150 * surface.records(b) as u64 + blocks.ids(b).len() as u64 * 40 + (1 << 20);
@@ -74,7 +73,7 @@ pub fn fill(
             Some(mending) => fill_inside(&rim, mending, &kept, &mut settled)?,
             None => Vec::new(),
         };
-        exchange.send_from(block, &addressed(&settled.triangles, blocks))?;
+        shuffle.send_from(block, &addressed(&settled.triangles, blocks))?;
         let found = Found {
             fragments,
             stats: settled.stats,
@@ -116,7 +115,7 @@ pub fn fill(
                 let value = (done.stats, done.edges);
                 let sent = addressed(&done.triangles, blocks);
                 let sender = count + number as usize;
-                step.finish(number, &value, || exchange.send_from(sender, &sent))?;
+                step.finish(number, &value, || shuffle.send_from(sender, &sent))?;
                 value
             }
         };
@@ -125,14 +124,14 @@ pub fn fill(
     }
     stats.add(&settled.stats);
     outline.boundary_edges -= settled.edges;
-    Ok((exchange.deliver(workspace, blocks.count())?, outline))
+    Ok((shuffle.deliver(workspace, blocks.count())?, outline))
 }
 
 /// Fills the holes that lie in a block by themselves, and keeps the parts of the others.
 fn fill_inside(
     rim: &BlockRim,
     mending: Mending<'_>,
-    kept: &Sections<1>,
+    kept: &Table<FragmentRow>,
     settled: &mut Settled,
 ) -> Result<Vec<Fragment>> {
     let (loops, open) = rim.trace();
@@ -148,12 +147,12 @@ fn fill_inside(
     let mut fragments = Vec::with_capacity(open.len());
     for part in open {
         let (first, last) = (part[0], part[part.len() - 1]);
-        let words = (part.len() <= mending.longest_loop()).then(|| rim.words(&part));
+        let rows = (part.len() <= mending.longest_loop()).then(|| rim.rows(&part));
         fragments.push(Fragment {
             start: (first.from, first.at),
             end: (last.at, last.to),
             steps: part.len(),
-            kept: words.map(|w| kept.append(&w)).transpose()?,
+            kept: rows.map(|rows| kept.append(&rows)).transpose()?,
         });
     }
     Ok(fragments)
@@ -203,12 +202,12 @@ impl Settled {
     }
 }
 
-fn addressed(triangles: &[[u32; 3]], blocks: Blocks) -> Vec<[u32; 4]> {
+fn addressed(triangles: &[[u32; 3]], blocks: Blocks) -> Vec<FilledTriangle> {
     let mut sent = Vec::with_capacity(triangles.len());
-    for &t in triangles {
-        sent.push([blocks.of(t[0]), t[0], t[1], t[2]]);
-        let sorted = sorted(t);
-        sent.extend(blocks.visited(sorted).map(|b| [b, t[0], t[1], t[2]]));
+    for &triangle in triangles {
+        let to = |to| FilledTriangle { to, triangle };
+        sent.push(to(blocks.of(triangle[0])));
+        sent.extend(blocks.visited(sorted(triangle)).map(to));
     }
     sent
 }
@@ -245,7 +244,7 @@ struct Fragments<'a> {
     places: Places<'a>,
     mending: Option<Mending<'a>>,
     fragments: &'a [Fragment],
-    kept: &'a Sections<1>,
+    kept: &'a Table<FragmentRow>,
 }
 
 impl Fragments<'_> {
@@ -270,7 +269,7 @@ fn fill_across(
     places: Places<'_>,
     ring: &[usize],
     fragments: &[Fragment],
-    kept: &Sections<1>,
+    kept: &Table<FragmentRow>,
     mending: Mending<'_>,
 ) -> Result<Filling> {
     let mut parts: Vec<(u32, u32, bool)> = Vec::new();
@@ -279,17 +278,12 @@ fn fill_across(
         let Some(section) = fragments[f].kept else {
             return Ok(Filling::Impossible);
         };
-        let words = kept.get(section)?;
-        let mut at = 0;
-        while at < words.len() {
-            let [id, apex, pinched, count] = std::array::from_fn(|k| words[at + k][0]);
-            let around = words[at + 4..at + 4 + count as usize]
-                .iter()
-                .map(|w| w[0])
-                .collect();
-            edges.insert(id, around);
+        for step in kept.get(section)?.chunk_by(|a, b| a.id == b.id) {
+            let FragmentRow {
+                id, apex, pinched, ..
+            } = step[0];
+            edges.insert(id, step.iter().map(|row| row.neighbor).collect());
             parts.push((id, apex, pinched == 1));
-            at += 4 + count as usize;
         }
     }
     let mut ids: Vec<u32> = parts.iter().flat_map(|&(id, apex, _)| [id, apex]).collect();

@@ -24,7 +24,7 @@ pub use rim::Outline;
 pub use surface::{Run, Surface};
 
 use crate::error::Result;
-use crate::spill::Sections;
+use crate::spill::{Table, row};
 use crate::stages::blocks::Blocks;
 use crate::stages::located::Places;
 use crate::stages::stitch::Stitched;
@@ -33,7 +33,7 @@ use crate::workspace::persist::persist;
 use mend::Mending;
 use serde::Serialize;
 
-const EXCHANGE_BUFFER: u64 = 8 << 20;
+const SHUFFLE_BUFFER: u64 = 8 << 20;
 
 /// A triangle as it runs, beginning with its smallest vertex.
 pub type OrientedTriangle = [u32; 3];
@@ -50,13 +50,33 @@ pub fn from_smallest([a, b, c]: [u32; 3]) -> OrientedTriangle {
     }
 }
 
+row! {
+    /// A triangle as it runs, beginning with its smallest vertex.
+    pub struct SurfaceTriangle {
+        /// Ids.
+        corners: OrientedTriangle,
+    }
+    packed Above Rising Left
+}
+
+row! {
+    /// A triangle that fills a hole, for each block that it touches.
+    pub struct FilledTriangle {
+        /// Number of the block.
+        to: u32,
+        /// Ids as it runs, beginning with the smallest.
+        triangle: OrientedTriangle,
+    }
+    packed Above Above Above Above
+}
+
 /// The finished surface.
 #[derive(Debug)]
 pub struct Repaired {
     /// The triangles of each block, but for those that fill holes.
     pub surface: Surface,
-    /// Triangles that fill holes, `[block, i, a, b]`.
-    pub filled: Sections<4>,
+    /// Triangles that fill holes.
+    pub filled: Table<FilledTriangle>,
     /// What the numbers of the mesh follow from.
     pub outline: Outline,
 }

@@ -1,10 +1,11 @@
 //! What is at the boundary: the triangles, steps of boundary loops and pinched vertices of a block.
 
+use super::SurfaceTriangle;
 use super::fill::Corner;
 use super::loops::{Step, neighbors, steps};
-use super::surface::Surface;
+use super::surface::{RimBits, Surface};
 use crate::error::Result;
-use crate::spill::Sections;
+use crate::spill::{Id, Table, row};
 use crate::stages::blocks::Blocks;
 use crate::stages::located::{Located, Places};
 use crate::stages::surface::star::Star;
@@ -12,6 +13,32 @@ use crate::workspace::Workspace;
 use crate::workspace::memory::{Holding, Reservation, bytes_of, hold};
 use crate::workspace::persist::{Persist, Saved, persist};
 use std::ops::Range;
+
+row! {
+    /// 64 bits, one for each point: is it a vertex of the mesh?
+    pub struct UsedBits {
+        /// The lower 32.
+        low: u32,
+        /// The upper 32.
+        high: u32,
+    }
+    unpacked
+}
+
+row! {
+    /// A step of a boundary loop that leaves its block, once for each neighbour of its vertex.
+    pub struct FragmentRow {
+        /// The vertex.
+        id: u32,
+        /// The vertex opposite to the boundary edge.
+        apex: u32,
+        /// 1 if the vertex has several fans.
+        pinched: u32,
+        /// A vertex with which it has an edge.
+        neighbor: u32,
+    }
+    packed Above Above Above Above
+}
 
 /// What the numbers of vertices and triangles follow from.
 #[derive(Debug)]
@@ -23,11 +50,11 @@ pub struct Outline {
     /// Edges with one triangle, after holes were filled.
     pub boundary_edges: u64,
     /// The vertices of each block that had several fans before holes were filled.
-    pub pinches: Sections<1>,
+    pub pinches: Table<Id>,
     /// All triangles at these vertices before holes were filled, as they run.
-    pub pinched: Sections<3>,
+    pub pinched: Table<SurfaceTriangle>,
     /// The bits of `used`, by block.
-    bits: Sections<2>,
+    bits: Table<UsedBits>,
     blocks: Blocks,
     _held: Reservation,
 }
@@ -35,9 +62,9 @@ pub struct Outline {
 /// Where blocks leave what they find at their boundary.
 #[derive(Debug)]
 pub(super) struct RimFiles {
-    bits: Sections<2>,
-    pinches: Sections<1>,
-    pinched: Sections<3>,
+    bits: Table<UsedBits>,
+    pinches: Table<Id>,
+    pinched: Table<SurfaceTriangle>,
 }
 
 /// Counts of a block's boundary.
@@ -53,17 +80,20 @@ impl RimFiles {
     /// Makes the files.
     pub(super) fn create(workspace: &Workspace, count: usize) -> Result<Self> {
         Ok(Self {
-            bits: Sections::unpacked(workspace, "repair.used", count)?,
-            pinches: Sections::create(workspace, "repair.pinches", count)?,
-            pinched: Sections::create(workspace, "repair.pinched", count)?,
+            bits: Table::create(workspace, "repair.used", count)?,
+            pinches: Table::create(workspace, "repair.pinches", count)?,
+            pinched: Table::create(workspace, "repair.pinched", count)?,
         })
     }
 
     /// Writes what a block found.
     pub(super) fn put(&self, block: usize, found: &BlockRim) -> Result<RimCounts> {
         let words = found.used.iter();
-        let words: Vec<_> = words.map(|w| [*w as u32, (*w >> 32) as u32]).collect();
-        self.bits.put(block, &words)?;
+        let bits = |word: &u64| UsedBits {
+            low: *word as u32,
+            high: (*word >> 32) as u32,
+        };
+        self.bits.put(block, &words.map(bits).collect::<Vec<_>>())?;
         self.pinches.put(block, &found.pinches)?;
         self.pinched.put(block, &found.pinched())?;
         Ok(RimCounts {
@@ -97,7 +127,7 @@ impl RimFiles {
 
 /// The bits of all blocks in a row.
 fn bits(
-    bits: &Sections<2>,
+    bits: &Table<UsedBits>,
     blocks: Blocks,
     workspace: &Workspace,
 ) -> Result<(Vec<u64>, Reservation)> {
@@ -109,7 +139,7 @@ fn bits(
     for block in 0..count {
         let ids = blocks.ids(block);
         let (first, shift) = (ids.start as usize / 64, ids.start % 64);
-        for (n, [low, high]) in bits.get(block)?.into_iter().enumerate() {
+        for (n, UsedBits { low, high }) in bits.get(block)?.into_iter().enumerate() {
             let word = u64::from(high) << 32 | u64::from(low);
             used[first + n] |= word << shift;
             if shift > 0 {
@@ -133,7 +163,7 @@ impl Persist for Outline {
     fn load(from: &mut Saved<'_>) -> Result<Self> {
         let (faces, boundary_edges) = Persist::load(from)?;
         let (pinches, pinched) = Persist::load(from)?;
-        let (files, blocks) = <(Sections<2>, Blocks)>::load(from)?;
+        let (files, blocks) = <(Table<UsedBits>, Blocks)>::load(from)?;
         let (used, held) = bits(&files, blocks, from.workspace)?;
         Ok(Self {
             used,
@@ -164,7 +194,7 @@ pub struct BlockRim {
     /// Steps of boundary loops, ascending.
     pub steps: Vec<Step>,
     /// Vertices with several fans, ascending.
-    pub pinches: Vec<[u32; 1]>,
+    pub pinches: Vec<Id>,
     held: Holding,
 }
 
@@ -209,7 +239,7 @@ impl BlockRim {
         let on_rim = |v: &u32| bit(&rims, v - ids.start);
         let mut pinches = Vec::new();
         let position = |v| rim.shape.at(v);
-        let pinch = |v| pinches.push([v]);
+        let pinch = |id| pinches.push(Id { id });
         let vertices = ids.clone().filter(on_rim);
         rim.steps = steps(vertices, &rim.star, &rim.triangles, position, pinch);
         rim.pinches = pinches;
@@ -219,7 +249,7 @@ impl BlockRim {
     }
 
     /// Goes through all triangles and picks those at vertices with a boundary edge.
-    fn pick(&mut self, surface: &Surface, block: usize, rims: &[[u32; 1]]) -> Result<()> {
+    fn pick(&mut self, surface: &Surface, block: usize, rims: &[RimBits]) -> Result<()> {
         let (triangles, runs) = surface.load(block)?;
         let mut held = hold(bytes_of(&triangles) + bytes_of(&runs));
         let size = self.ids.len() as u32;
@@ -266,17 +296,17 @@ impl BlockRim {
     }
 
     /// All triangles at pinched vertices, ascending by sorted ids.
-    pub fn pinched(&self) -> Vec<[u32; 3]> {
-        let at = |v: &[u32; 1]| self.star.at(v[0]).iter().copied();
+    pub fn pinched(&self) -> Vec<SurfaceTriangle> {
+        let at = |v: &Id| self.star.at(v.id).iter().copied();
         let mut numbers: Vec<u32> = self.pinches.iter().flat_map(at).collect();
         numbers.sort_unstable();
         numbers.dedup();
-        let plain = |n: u32| &self.triangles[n as usize];
-        numbers
-            .into_iter()
-            .map(plain)
-            .map(|t| [t[0], t[1], t[2]])
-            .collect()
+        let row = |n: u32| {
+            let [a, b, c, _] = self.triangles[n as usize];
+            let corners = [a, b, c];
+            SurfaceTriangle { corners }
+        };
+        numbers.into_iter().map(row).collect()
     }
 
     /// Loops that stay in the block, and parts of loops that leave it.
@@ -308,20 +338,22 @@ impl BlockRim {
         (loops.collect(), open)
     }
 
-    /// Steps as words: for each vertex its id, apex, whether it is pinched, number of neighbours,
-    /// neighbours.
-    pub fn words(&self, part: &[Step]) -> Vec<[u32; 1]> {
-        let mut words = Vec::new();
+    /// Steps as rows.
+    pub fn rows(&self, part: &[Step]) -> Vec<FragmentRow> {
+        let mut rows = Vec::new();
         for step in part {
             let around = neighbors(&self.star, &self.triangles, step.at);
-            let pinched = u32::from(step.pinched);
-            let head = [step.at, step.apex, pinched, around.len() as u32];
-            words.extend(head.into_iter().chain(around).map(|w| [w]));
+            rows.extend(around.into_iter().map(|neighbor| FragmentRow {
+                id: step.at,
+                apex: step.apex,
+                pinched: step.pinched.into(),
+                neighbor,
+            }));
         }
-        words
+        rows
     }
 }
 
-fn bit(words: &[[u32; 1]], local: u32) -> bool {
-    words[local as usize / 32][0] >> (local % 32) & 1 == 1
+fn bit(words: &[RimBits], local: u32) -> bool {
+    words[local as usize / 32].bits >> (local % 32) & 1 == 1
 }

@@ -5,15 +5,15 @@
 //! labels of components that reach further are joined by the triangles that several blocks see.
 
 use super::components::{Parts, join};
-use super::facing::{Fate, SUMS, Sums, judge};
+use super::facing::{Fate, Sums, SumsRow, judge};
 use super::patch::Patch;
 use super::{
-    EXCHANGE_BUFFER, OrientedTriangle, RepairOptions, RepairStats, around, bridges, flips,
+    OrientedTriangle, RepairOptions, RepairStats, SHUFFLE_BUFFER, SurfaceTriangle, around, bridges,
+    flips,
 };
 use crate::error::Result;
 use crate::geom::Point;
-use crate::spill::layouts::{ORIENTED, SENT};
-use crate::spill::{Exchange, Layout, Sections, Word};
+use crate::spill::{Shuffle, Table, row};
 use crate::stages::blocks::Blocks;
 use crate::stages::located::Places;
 use crate::stages::stitch::Stitched;
@@ -22,28 +22,75 @@ use crate::workspace::Workspace;
 use crate::workspace::memory::{Reservation, bytes_of, hold};
 use crate::workspace::persist::{Persist, Saved};
 
-/// `[owner, i, j, k, block, label << 1 | flip]`, ascending.
-const SEEN: Layout<6> = [
-    Word::Above,
-    Word::Above,
-    Word::Rising,
-    Word::Rising,
-    Word::Above,
-    Word::Above,
-];
+row! {
+    /// How a block sees a crossing triangle, for the block of its smallest vertex.
+    pub struct SeenTriangle {
+        /// Block of the smallest vertex.
+        to: u32,
+        /// Ids, ascending.
+        triangle: Triangle,
+        /// The block that sees it.
+        block: u32,
+        /// `label << 1 | flip`: the label that it has there, and whether it runs against its ids.
+        label_flip: u32,
+    }
+    packed Above Above Rising Rising Above Above
+}
+
+impl SeenTriangle {
+    /// The label that the triangle has in the block.
+    pub fn label(&self) -> u32 {
+        self.label_flip >> 1
+    }
+
+    /// True if it runs against its ascending ids.
+    pub fn flip(&self) -> bool {
+        self.label_flip & 1 == 1
+    }
+}
+
+row! {
+    /// A triangle for a block.
+    pub struct TriangleTo {
+        /// Number of the block.
+        to: u32,
+        /// Ids, ascending.
+        triangle: Triangle,
+    }
+    packed Above Above Rising Rising
+}
+
+row! {
+    /// Triangles in a row that have one label.
+    pub struct LabelRun {
+        /// Number of triangles.
+        count: u32,
+        /// The label.
+        label: u32,
+    }
+    unpacked
+}
+
+row! {
+    /// A bit for each of 32 vertices of a block: does it have a boundary edge?
+    pub struct RimBits {
+        /// The first vertex has the lowest bit.
+        bits: u32,
+    }
+    unpacked
+}
 
 /// The oriented surface, small components and bridges left out.
 #[derive(Debug)]
 pub struct Surface {
     /// Triangles that touch each block, ascending, as they run relative to their label.
-    triangles: Sections<3>,
-    /// `[count, label]`: how many of these in a row have which label; those of global labels come
-    /// first.
-    runs: Sections<2>,
-    /// Bits, 32 a word: the vertices of each block that have a boundary edge.
-    rims: Sections<1>,
-    /// `[block, i, j, k]`: bridges that several blocks see, for each of them.
-    bridges: Sections<4>,
+    triangles: Table<SurfaceTriangle>,
+    /// The labels of these; those of global labels come first.
+    runs: Table<LabelRun>,
+    /// The vertices of each block that have a boundary edge.
+    rims: Table<RimBits>,
+    /// Bridges that several blocks see, for each of them.
+    bridges: Table<TriangleTo>,
     /// For each block, the number of the first of its labels that are global, and how many are.
     globals: Vec<(u32, u32)>,
     /// For each global label its component, and what becomes of the label.
@@ -65,7 +112,7 @@ impl Surface {
     /// Number of triangles that touch a block, or some more.
     #[must_use]
     pub fn records(&self, block: usize) -> usize {
-        self.triangles.records(block)
+        self.triangles.rows(block)
     }
 
     /// All triangles that touch a block, as they run, ascending by sorted ids; and the components
@@ -74,17 +121,20 @@ impl Surface {
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
     pub fn load(&self, block: usize) -> Result<(Vec<OrientedTriangle>, Vec<Run>)> {
-        let mut triangles = self.triangles.get(block)?;
+        let mut triangles: Vec<OrientedTriangle> = bytemuck::cast_vec(self.triangles.get(block)?);
         let bridges = self.bridges.get(block)?;
         let is_bridge = |[i, a, b]: OrientedTriangle| {
-            let key = [block as u32, i, a.min(b), a.max(b)];
+            let key = TriangleTo {
+                to: block as u32,
+                triangle: [i, a.min(b), a.max(b)],
+            };
             !bridges.is_empty() && bridges.binary_search(&key).is_ok()
         };
         let (first, globals) = self.globals[block];
         let runs = self.runs.get(block)?;
         let mut kept = Vec::with_capacity(runs.len());
         let (mut from, mut to) = (0, 0);
-        for [count, label] in runs {
+        for LabelRun { count, label } in runs {
             let all = from..from + count as usize;
             from = all.end;
             let run = |component, before, after| Run {
@@ -118,11 +168,11 @@ impl Surface {
         Ok((triangles, kept))
     }
 
-    /// The vertices of a block that have a boundary edge, as bits, 32 a word.
+    /// The vertices of a block that have a boundary edge.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
-    pub fn rims(&self, block: usize) -> Result<Vec<[u32; 1]>> {
+    pub fn rims(&self, block: usize) -> Result<Vec<RimBits>> {
         self.rims.get(block)
     }
 }
@@ -133,15 +183,13 @@ struct Build<'a> {
     stitched: &'a Stitched,
     blocks: Blocks,
     options: RepairOptions,
-    triangles: Sections<3>,
-    runs: Sections<2>,
-    rims: Sections<1>,
+    triangles: Table<SurfaceTriangle>,
+    runs: Table<LabelRun>,
+    rims: Table<RimBits>,
     /// Sums over the interior triangles of each block's global labels.
-    sums: Sections<SUMS>,
-    bridges: Exchange<4>,
-    /// `[owner, i, j, k, block, label << 1 | flip]`: how a block sees a crossing triangle, for the
-    /// block of its smallest vertex.
-    seen: Exchange<6>,
+    sums: Table<SumsRow>,
+    bridges: Shuffle<TriangleTo>,
+    seen: Shuffle<SeenTriangle>,
 }
 
 /// Builds the surface.
@@ -158,7 +206,7 @@ pub fn build(
 ) -> Result<(Surface, RepairStats)> {
     let build = Build::create(places, &stitched, blocks, options, workspace)?;
     let bytes = |b: usize| {
-        let records = stitched.interior.records(b) + stitched.added.records(b);
+        let records = stitched.interior.rows(b) + stitched.added.rows(b);
         230 * records as u64 + blocks.ids(b).len() as u64 * 30 + (1 << 20)
     };
     let work = |block| {
@@ -175,7 +223,7 @@ pub fn build(
     })?;
     let bridges = build.bridges.deliver_unique(workspace, blocks.count())?;
     for block in 0..blocks.count() {
-        let own = |r: &&[u32; 4]| blocks.of(r[1]) == r[0];
+        let own = |b: &&TriangleTo| blocks.of(b.triangle[0]) == b.to;
         stats.bridges_removed += bridges.get(block)?.iter().filter(own).count() as u64;
     }
     let seen = build.seen.deliver(workspace, blocks.count())?;
@@ -253,18 +301,18 @@ impl<'a> Build<'a> {
         options: RepairOptions,
         workspace: &Workspace,
     ) -> Result<Self> {
-        let (count, buffer) = (blocks.count(), EXCHANGE_BUFFER);
+        let (count, buffer) = (blocks.count(), SHUFFLE_BUFFER);
         Ok(Self {
             places,
             stitched,
             blocks,
             options,
-            triangles: Sections::with_layout(workspace, "repair.surface", count, ORIENTED)?,
-            runs: Sections::unpacked(workspace, "repair.runs", count)?,
-            rims: Sections::unpacked(workspace, "repair.rims", count)?,
-            sums: Sections::unpacked(workspace, "repair.sums", count)?,
-            bridges: Exchange::between(workspace, "repair.bridges", buffer, count, SENT)?,
-            seen: Exchange::between(workspace, "repair.seen", buffer, count, SEEN)?,
+            triangles: Table::create(workspace, "repair.surface", count)?,
+            runs: Table::create(workspace, "repair.runs", count)?,
+            rims: Table::create(workspace, "repair.rims", count)?,
+            sums: Table::create(workspace, "repair.sums", count)?,
+            bridges: Shuffle::between_units(workspace, "repair.bridges", buffer, count)?,
+            seen: Shuffle::between_units(workspace, "repair.seen", buffer, count)?,
         })
     }
 
@@ -288,14 +336,14 @@ impl<'a> Build<'a> {
         } else {
             Vec::new()
         };
-        let mut rims = vec![[0u32]; ids.len().div_ceil(32)];
+        let mut rims = vec![RimBits::default(); ids.len().div_ceil(32)];
         for (v, _) in patch.rims.iter().enumerate().filter(|(_, n)| **n > 0) {
-            rims[v / 32][0] |= 1 << (v % 32);
+            rims[v / 32].bits |= 1 << (v % 32);
         }
         self.rims.put(block, &rims)?;
         let sums = self.sum(block, &shape, &triangles, &patch, &bridges);
         let (global, local) = sums.split_at(patch.global as usize);
-        let global: Vec<[u32; SUMS]> = global.iter().map(Sums::words).collect();
+        let global: Vec<SumsRow> = global.iter().map(Sums::row).collect();
         let held = hold(bytes_of(&sums) + bytes_of(&global));
         self.sums.put(block, &global)?;
         let least = self.options.least();
@@ -353,12 +401,16 @@ impl<'a> Build<'a> {
                 continue;
             }
             let owner = self.blocks.of(t[0]);
-            let word = patch.words[number];
-            seen.push([owner, t[0], t[1], t[2], block as u32, word]);
+            seen.push(SeenTriangle {
+                to: owner,
+                triangle: t,
+                block: block as u32,
+                label_flip: patch.words[number],
+            });
             if bridges.binary_search(&(number as u32)).is_ok() {
-                found.push([owner, t[0], t[1], t[2]]);
-                let others = self.blocks.visited(t);
-                found.extend(others.map(|b| [b, t[0], t[1], t[2]]));
+                let to = |to| TriangleTo { to, triangle: t };
+                found.push(to(owner));
+                found.extend(self.blocks.visited(t).map(to));
             }
         }
         self.seen.send_from(block, &seen)?;
@@ -374,7 +426,7 @@ impl<'a> Build<'a> {
         bridges: &[u32],
         fates: &[Fate],
     ) -> Result<()> {
-        let mut runs: Vec<[u32; 2]> = Vec::new();
+        let mut runs: Vec<LabelRun> = Vec::new();
         let mut bridges = bridges.iter().peekable();
         let mut kept = 0;
         for number in 0..triangles.len() {
@@ -394,11 +446,12 @@ impl<'a> Build<'a> {
             triangles[kept] = if turn { [t[0], t[2], t[1]] } else { t };
             kept += 1;
             match runs.last_mut() {
-                Some(run) if run[1] == label => run[0] += 1,
-                _ => runs.push([1, label]),
+                Some(run) if run.label == label => run.count += 1,
+                _ => runs.push(LabelRun { count: 1, label }),
             }
         }
-        self.triangles.put(block, &triangles[..kept])?;
+        let rows = bytemuck::cast_slice(&triangles[..kept]);
+        self.triangles.put(block, rows)?;
         self.runs.put(block, &runs)
     }
 }

@@ -28,7 +28,7 @@ pub(super) struct Base {
     /// All crossing triples by the block of their smallest vertex, `[i, j, k, count]`.
     pub crossing: Sections<4>,
     /// The same for the blocks of their other vertices, `[block, i, j, k, count]`.
-    pub visiting: Sections<5>,
+    pub visiting: crate::spill::Table<crate::stages::cells::SentTriple>,
     /// Crossing T3 triangles that are flagged, by the block of their smallest vertex, `[block, i,
     /// j, k]`.
     pub flags: Sections<4>,
@@ -68,7 +68,7 @@ pub(super) fn base(
         blocks,
     };
     let bytes = |block: usize| {
-        let records = triples.own.records(block) + triples.visiting.records(block);
+        let records = triples.own.rows(block) + triples.visiting.rows(block);
         100 * records as u64 + (3 << 20)
     };
     let around = |block| look.block(block);
@@ -257,8 +257,8 @@ impl Look<'_> {
     /// The T3 triangles that touch a block, ascending, and its interior candidates so far. The
     /// crossing triples are put apart.
     fn part(&self, block: usize, found: &mut Found) -> Result<(Vec<Triangle>, Vec<[u32; 4]>)> {
-        let visiting = self.triples.visiting.get(block)?;
-        let own = self.triples.own.get(block)?;
+        let visiting: Vec<[u32; 5]> = bytemuck::cast_vec(self.triples.visiting.get(block)?);
+        let own: Vec<[u32; 4]> = bytemuck::cast_vec(self.triples.own.get(block)?);
         let t3 = visiting.iter().filter(|r| r[4] == 3).count()
             + own.iter().filter(|r| r[3] == 3).count();
         let mut triangles = Vec::with_capacity(t3);

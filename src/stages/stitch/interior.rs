@@ -69,7 +69,7 @@ pub const NOTHING: u32 = u32::MAX;
 pub fn block_bytes(base: &Base, block: usize) -> u64 {
     let triangles = base.surface.interior.records(block) + base.surface.crossing.records(block);
     let candidates = base.candidates.records(block) + base.crossing.records(block);
-    let records = triangles + candidates + base.visiting.records(block);
+    let records = triangles + candidates + base.visiting.rows(block);
     180 * records as u64 + (4 << 20)
 }
 
@@ -112,7 +112,7 @@ fn border(base: &Base, crossing: &[[u32; 5]], ids: &Range<u32>, block: usize) ->
             border[(v - ids.start) as usize] |= if open { BORDER | OPEN } else { BORDER };
         }
     };
-    for r in &base.visiting.get(block)? {
+    for r in &bytemuck::cast_vec::<_, [u32; 5]>(base.visiting.get(block)?) {
         mark([r[1], r[2], r[3]], r[4]);
     }
     for r in &base.crossing.get(block)? {

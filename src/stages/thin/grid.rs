@@ -2,7 +2,7 @@
 
 use crate::geom::Point;
 use crate::geom::lattice::Lattice;
-use crate::spill::Record;
+use crate::spill::row;
 use crate::workspace::persist::persist;
 
 /// Cubic cells of one side, with a corner at the zero point of the input's coordinates.
@@ -60,17 +60,20 @@ impl Grid {
         std::array::from_fn(|axis| ((along[axis] / self.side).floor() - self.lowest[axis]) as u32)
     }
 
-    /// Cell and position; sorts by cell.
-    pub(super) fn record(&self, position: Point) -> Record<6> {
-        let ([a, b, c], [x, y, z]) = (self.cell(position), position.map(|c| c as u32));
-        [a, b, c, x, y, z]
+    /// A position with its cell.
+    pub(super) fn in_cell(&self, position: Point) -> InCell {
+        InCell {
+            cell: self.cell(position),
+            // Coordinates on the lattice are not negative.
+            position: position.map(i32::cast_unsigned),
+        }
     }
 
-    /// Squared distance of a record's position to the centre of its cell, in the input's unit.
-    pub(super) fn distance2(&self, record: Record<6>) -> f64 {
-        let along = self.along(position(record));
+    /// Squared distance of a position to the centre of its cell, in the input's unit.
+    pub(super) fn distance2(&self, row: InCell) -> f64 {
+        let along = self.along(row.position());
         let off = |axis: usize| {
-            let centre = (f64::from(record[axis]) + self.lowest[axis] + 0.5) * self.side;
+            let centre = (f64::from(row.cell[axis]) + self.lowest[axis] + 0.5) * self.side;
             along[axis] - centre
         };
         let [x, y, z] = [0, 1, 2].map(off);
@@ -78,12 +81,20 @@ impl Grid {
     }
 }
 
-/// The position in a record.
-pub(super) fn position([_, _, _, x, y, z]: Record<6>) -> Point {
-    [x, y, z].map(|c| c as i32)
+row! {
+    /// A position and the cell that it is in; sorts by cell.
+    pub struct InCell {
+        /// Number of the cell along each axis.
+        cell: [u32; 3],
+        /// Coordinates on the lattice.
+        position: [u32; 3],
+    }
+    unpacked
 }
 
-/// Whether two records are in one cell.
-pub(super) fn same_cell(a: Record<6>, b: Record<6>) -> bool {
-    a[..3] == b[..3]
+impl InCell {
+    /// The position.
+    pub(super) fn position(self) -> Point {
+        self.position.map(u32::cast_signed)
+    }
 }

@@ -9,12 +9,12 @@
 mod grid;
 
 pub use grid::Grid;
-use grid::{position, same_cell};
+use grid::InCell;
 
 use crate::error::Result;
 use crate::geom::Point;
 use crate::geom::lattice::Lattice;
-use crate::spill::{Record, Sorted, Sorter};
+use crate::spill::{Sorted, Sorter};
 use crate::stages::ingest::{READ_BUFFERS, Spool};
 use crate::workspace::Workspace;
 use crate::workspace::persist::{Persist, Saved, persist};
@@ -23,7 +23,7 @@ use serde::Serialize;
 /// Points handed on at a time.
 const BATCH: usize = 1 << 14;
 
-/// Records encoded at a time.
+/// Rows encoded at a time.
 const CHUNK: usize = 1 << 12;
 
 /// Counts of this stage.
@@ -39,7 +39,7 @@ pub struct ThinStats {
 /// All points, sorted by cell.
 #[derive(Debug)]
 pub struct Thinned {
-    sorted: Sorted<6>,
+    sorted: Sorted<InCell>,
     grid: Grid,
 }
 
@@ -59,11 +59,11 @@ pub fn thin(spool: Spool, lattice: &Lattice, grid: Grid, workspace: &Workspace) 
     let sorter = Sorter::new(workspace, "thin", buffer).telling(held);
     let take = |points: &[Point]| {
         workspace.check_cancel()?;
-        let mut records = Vec::with_capacity(CHUNK.min(points.len()));
+        let mut rows = Vec::with_capacity(CHUNK.min(points.len()));
         for part in points.chunks(CHUNK) {
-            records.clear();
-            records.extend(part.iter().map(|&p| grid.record(p)));
-            sorter.push(&records)?;
+            rows.clear();
+            rows.extend(part.iter().map(|&p| grid.in_cell(p)));
+            sorter.push(&rows)?;
         }
         workspace.observer.advance(points.len() as u64);
         Ok(())
@@ -102,8 +102,8 @@ persist!(ThinStats {
     duplicates
 });
 
-/// Where the points that stay are handed on from: the first record of a cell.
-pub type Mark = Option<Record<6>>;
+/// Where the points that stay are handed on from: the first row of a cell.
+pub type Mark = Option<[u32; 6]>;
 
 /// Takes points that stay, where the next ones begin, and the counts up to there.
 pub type Each<'a> = &'a mut dyn FnMut(&[Point], Mark, ThinStats) -> Result<()>;
@@ -117,35 +117,35 @@ impl Thinned {
     pub fn for_each(self, from: Mark, mut stats: ThinStats, each: Each<'_>) -> Result<ThinStats> {
         let Self { sorted, grid } = self;
         let mut kept = Vec::with_capacity(BATCH);
-        let mut best: Option<(Record<6>, f64)> = None;
+        let mut best: Option<(InCell, f64)> = None;
         let mut last = None;
-        sorted.for_each_from(from, |record| {
-            if last == Some(record) {
+        sorted.for_each_from(from.map(bytemuck::cast), |row| {
+            if last == Some(row) {
                 stats.duplicates += 1;
                 return Ok(());
             }
-            last = Some(record);
-            let distance2 = grid.distance2(record);
+            last = Some(row);
+            let distance2 = grid.distance2(row);
             match &mut best {
-                Some((nearest, least)) if same_cell(*nearest, record) => {
+                Some((nearest, least)) if nearest.cell == row.cell => {
                     stats.dropped += 1;
-                    // Records of a cell ascend with the position: of equals the first stays.
+                    // Rows of a cell ascend with the position: of equals the first stays.
                     if distance2 < *least {
-                        (*nearest, *least) = (record, distance2);
+                        (*nearest, *least) = (row, distance2);
                     }
                 }
                 _ => {
-                    let done = best.replace((record, distance2));
-                    kept.extend(done.map(|(record, _)| position(record)));
+                    let done = best.replace((row, distance2));
+                    kept.extend(done.map(|(row, _)| row.position()));
                     if kept.len() == BATCH {
-                        each(&kept, Some(record), stats)?;
+                        each(&kept, Some(bytemuck::cast(row)), stats)?;
                         kept.clear();
                     }
                 }
             }
             Ok(())
         })?;
-        kept.extend(best.map(|(record, _)| position(record)));
+        kept.extend(best.map(|(row, _)| row.position()));
         each(&kept, None, stats)?;
         Ok(stats)
     }

@@ -32,7 +32,7 @@ fn thinned(grid: &Grid, points: &[Point], buffer: u64) -> (Vec<Point>, ThinStats
     let workspace = workspace();
     let sorter = Sorter::new(&workspace, "thin", buffer);
     for &point in points {
-        sorter.push(&[grid.record(point)]).unwrap();
+        sorter.push(&[grid.in_cell(point)]).unwrap();
     }
     let thinned = Thinned {
         sorted: sorter.finish(&workspace).unwrap(),

@@ -1,24 +1,23 @@
 //! Triples with their counts, by block: what the cells of all tiles saw, added up (paper, 3.4).
 
 use crate::error::Result;
-use crate::spill::layouts::{LABELLED, SENT_LABELLED};
-use crate::spill::{Exchange, Sections};
+use crate::spill::{Shuffle, Table};
 use crate::stages::blocks::Blocks;
-use crate::stages::cells::CellTriples;
+use crate::stages::cells::{CellTriples, CountedTriple, SentTriple};
 use crate::workspace::Workspace;
 use crate::workspace::memory::{Holding, bytes_of};
 use crate::workspace::persist::persist;
 use serde::Serialize;
 
-const EXCHANGE_BUFFER: u64 = 16 << 20;
+const SHUFFLE_BUFFER: u64 = 16 << 20;
 
-/// All triples `[i, j, k, count]` with `i < j < k`, ascending.
+/// All triples with their counts, ascending.
 #[derive(Debug)]
 pub struct Triples {
     /// By the block of the smallest vertex.
-    pub own: Sections<4>,
-    /// Crossing triples, `[block, i, j, k, count]`, for the blocks of their other vertices.
-    pub visiting: Sections<5>,
+    pub own: Table<CountedTriple>,
+    /// Crossing triples, for the blocks of their other vertices.
+    pub visiting: Table<SentTriple>,
 }
 
 /// Distinct triples by count.
@@ -55,25 +54,20 @@ pub fn triples(
     blocks: Blocks,
     workspace: &Workspace,
 ) -> Result<(Triples, TripleStats)> {
-    let own = Sections::with_layout(workspace, "triples.own", blocks.count(), LABELLED)?;
-    let exchange = Exchange::between(
-        workspace,
-        "triples.sent",
-        EXCHANGE_BUFFER,
-        blocks.count(),
-        SENT_LABELLED,
-    )?;
+    let own = Table::create(workspace, "triples.own", blocks.count())?;
+    let shuffle =
+        Shuffle::between_units(workspace, "triples.sent", SHUFFLE_BUFFER, blocks.count())?;
     let count: u64 = cells.off.total();
     let _off = workspace.reserve("off the surface", 4 * count)?;
     let mut off: Vec<u32> = Vec::with_capacity(count as usize);
     for tile in 0..cells.off.count() {
-        off.extend(cells.off.get(tile)?.into_iter().flatten());
+        off.extend(cells.off.get(tile)?.into_iter().map(|off| off.id));
     }
     let is_off = |v: &u32| off.binary_search(v).is_ok();
     let bytes = |block: usize| {
         let tiles = cells.tiles.of_block(block);
         tiles
-            .map(|t| 50 * (cells.own.records(t) + cells.received.records(t)) as u64)
+            .map(|t| 50 * (cells.own.rows(t) + cells.received.rows(t)) as u64)
             .sum()
     };
     let work = |block| {
@@ -86,20 +80,19 @@ pub fn triples(
             held.set(bytes_of(&all) + bytes_of(&seen) + bytes_of(&received));
         }
         if !off.is_empty() {
-            all.retain(|r| !r[..3].iter().any(is_off));
+            all.retain(|t: &CountedTriple| !t.triple.iter().any(is_off));
         }
         let mut sent = Vec::new();
         let mut local = [0u64; 4];
-        for &[i, j, k, count] in &all {
+        for &CountedTriple { triple, count } in &all {
             local[(count - 1) as usize] += 1;
-            for visited in blocks.visited([i, j, k]) {
-                sent.push([visited, i, j, k, count]);
-            }
-            local[3] += u64::from(blocks.crossing([i, j, k]));
+            let visited = blocks.visited(triple);
+            sent.extend(visited.map(|to| SentTriple { to, triple, count }));
+            local[3] += u64::from(blocks.crossing(triple));
         }
         held.set(bytes_of(&all) + bytes_of(&sent));
         own.put(block, &all)?;
-        exchange.send_from(block, &sent)?;
+        shuffle.send_from(block, &sent)?;
         workspace.advance(all.len() as u64);
         Ok(local)
     };
@@ -108,7 +101,7 @@ pub fn triples(
         counts.iter_mut().zip(more).for_each(|(n, more)| *n += more);
         Ok(())
     })?;
-    let visiting = exchange.deliver(workspace, blocks.count())?;
+    let visiting = shuffle.deliver(workspace, blocks.count())?;
     let [t1, t2, t3, crossing] = counts;
     Ok((
         Triples { own, visiting },
@@ -123,13 +116,16 @@ pub fn triples(
 }
 
 /// Merges two ascending lists, adding up counts; `received` may hold a triple more than once.
-fn merge(own: &[[u32; 4]], received: &[[u32; 5]], all: &mut Vec<[u32; 4]>) {
-    let received = received.iter().map(|&[_, i, j, k, count]| [i, j, k, count]);
+fn merge(own: &[CountedTriple], received: &[SentTriple], all: &mut Vec<CountedTriple>) {
+    let received = received.iter().map(|sent| CountedTriple {
+        triple: sent.triple,
+        count: sent.count,
+    });
     let mut a = own.iter().copied().peekable();
     let mut b = received.peekable();
     loop {
         let take_a = match (a.peek(), b.peek()) {
-            (Some(x), Some(y)) => x[..3] <= y[..3],
+            (Some(x), Some(y)) => x.triple <= y.triple,
             (Some(_), None) => true,
             (None, Some(_)) => false,
             (None, None) => break,
@@ -138,7 +134,7 @@ fn merge(own: &[[u32; 4]], received: &[[u32; 5]], all: &mut Vec<[u32; 4]>) {
             break;
         };
         match all.last_mut() {
-            Some(last) if last[..3] == next[..3] => last[3] += next[3],
+            Some(last) if last.triple == next.triple => last.count += next.count,
             _ => all.push(next),
         }
     }

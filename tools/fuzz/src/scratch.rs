@@ -6,9 +6,9 @@
 
 use crate::Bench;
 use outcrop::geom::lattice::Lattice;
-use outcrop::spill::{Sections, Sorted};
+use outcrop::spill::{Row, Sorted, Table};
 use outcrop::stages::ingest::{IngestStats, Spool};
-use outcrop::stages::order::PointStore;
+use outcrop::stages::order::{PointStore, Position};
 use outcrop::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
 use outcrop::workspace::persist::{Persist, Saved};
 use outcrop::workspace::progress::{Cancel, Silent};
@@ -63,15 +63,15 @@ pub fn read(bytes: &[u8]) {
     load::<PointStore>(saved, &workspace, |store| {
         let _ = store.slice(0..store.len().min(1000));
     });
-    load::<Sections<3>>(saved, &workspace, |sections| all(&sections));
-    load::<Sorted<3>>(saved, &workspace, |sorted| {
+    load::<Table<[u32; 3]>>(saved, &workspace, |table| all(&table));
+    load::<Sorted<[u32; 3]>>(saved, &workspace, |sorted| {
         let _ = sorted.for_each(|_| Ok(()));
     });
     for name in FILES {
-        let packed = Sections::<4>::create(&workspace, name, 3);
-        let _ = packed.map(|sections| all(&sections));
-        let plain = Sections::<2>::unpacked(&workspace, name, 3);
-        let _ = plain.map(|sections| all(&sections));
+        let packed = Table::<[u32; 4]>::create(&workspace, name, 3);
+        let _ = packed.map(|table| all(&table));
+        let plain = Table::<Position>::create(&workspace, name, 3);
+        let _ = plain.map(|table| all(&table));
     }
     workspace.remove(false);
 }
@@ -82,9 +82,9 @@ fn load<T: Persist>(bytes: &[u8], workspace: &Workspace, then: impl FnOnce(T)) {
     }
 }
 
-fn all<const N: usize>(sections: &Sections<N>) {
-    for section in 0..sections.count().min(64) {
-        let _ = sections.get(section);
+fn all<R: Row>(table: &Table<R>) {
+    for section in 0..table.count().min(64) {
+        let _ = table.get(section);
     }
 }
 

@@ -1,19 +1,17 @@
-//! Sections of records like the triples of a surface: packing and writing, reading and unpacking.
+//! Tables of rows like the triples of a surface: packing and writing, reading and unpacking.
 
 mod util;
 
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
-use outcrop::spill::{Record, Sections, Word};
-
-const LAYOUT: [Word; 4] = [Word::Above, Word::Rising, Word::Rising, Word::Above];
+use outcrop::spill::Table;
 
 fn main() {
     divan::main();
 }
 
 /// Three triangles for each point, with vertices near in order and now and then far.
-fn triples() -> Vec<Record<4>> {
+fn triples() -> Vec<[u32; 4]> {
     let mut state = 1u32;
     let mut random = || {
         state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -37,25 +35,24 @@ fn triples() -> Vec<Record<4>> {
 #[divan::bench]
 fn put(bencher: Bencher<'_, '_>) {
     let workspace = util::workspace();
-    let records = triples();
-    let items = ItemsCount::new(records.len());
+    let rows = triples();
+    let items = ItemsCount::new(rows.len());
     bencher.counter(items).bench_local(|| {
-        let sections =
-            Sections::with_layout(&workspace, "bench", 1, LAYOUT).expect("scratch space");
-        sections.put(0, &records).expect("scratch space");
+        let table = Table::create(&workspace, "bench", 1).expect("scratch space");
+        table.put(0, &rows).expect("scratch space");
     });
 }
 
 #[divan::bench]
 fn get(bencher: Bencher<'_, '_>) {
     let workspace = util::workspace();
-    let records = triples();
-    let sections = Sections::with_layout(&workspace, "bench", 1, LAYOUT).expect("scratch space");
-    sections.put(0, &records).expect("scratch space");
-    let items = ItemsCount::new(records.len());
+    let rows = triples();
+    let table = Table::create(&workspace, "bench", 1).expect("scratch space");
+    table.put(0, &rows).expect("scratch space");
+    let items = ItemsCount::new(rows.len());
     let mut back = Vec::new();
     bencher.counter(items).bench_local(|| {
-        sections.get_into(0, &mut back).expect("scratch file");
+        table.get_into(0, &mut back).expect("scratch file");
         black_box(&back);
     });
 }

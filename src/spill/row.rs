@@ -1,0 +1,117 @@
+//! Rows: the records of scratch files, as structs with named fields.
+
+use std::cmp::Ordering;
+use std::fmt::Debug;
+
+/// The value that a word of a row is written as the difference to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Word {
+    /// The same word of the row before.
+    Above,
+    /// The word to its left, which may be larger; zero for the first word.
+    Left,
+    /// The word to its left, which is rarely larger; zero for the first word.
+    Rising,
+}
+
+/// A record of a scratch file: a plain struct of 32-bit words, defined by [`row!`].
+pub trait Row: bytemuck::Pod + PartialEq + Debug + Send + Sync {
+    /// Names and types of the fields, for the list of files.
+    const FIELDS: &'static str;
+
+    /// How each word is packed; `None` for rows that are written as they are. It changes how many bytes
+    /// rows take and nothing else.
+    const PACKING: Option<&'static [Word]>;
+
+    /// Words of a row.
+    const WORDS: usize = size_of::<Self>() / 4;
+
+    /// The row as words.
+    fn words(&self) -> &[u32] {
+        bytemuck::cast_slice(std::slice::from_ref(self))
+    }
+
+    /// Compares two rows word by word, as unsigned numbers; four words at a time.
+    #[inline]
+    fn compare(&self, other: &Self) -> Ordering {
+        let head = |row: &Self| {
+            let words = row.words().iter().take(4);
+            words.fold(0u128, |sum, word| sum << 32 | u128::from(*word))
+        };
+        let order = head(self).cmp(&head(other));
+        if Self::WORDS <= 4 {
+            return order;
+        }
+        order.then_with(|| self.words()[4..].cmp(&other.words()[4..]))
+    }
+}
+
+/// Plain words, without names: for tests of this module.
+impl<const N: usize> Row for [u32; N] {
+    const FIELDS: &'static str = "words";
+    const PACKING: Option<&'static [Word]> = Some(&[Word::Above; N]);
+}
+
+/// Bytes of so many rows.
+#[must_use]
+pub fn row_bytes<R>(count: usize) -> u64 {
+    (count * size_of::<R>()) as u64
+}
+
+/// Defines a row: a struct whose fields are words or arrays of words, and how each word is packed.
+///
+/// `packed` takes one [`Word`] for each word, arrays counted word by word. A row with `unpacked` is
+/// written as it is, which is right for numbers that are not alike from row to row; it may have fields
+/// of other types of 32 and 64 bits.
+macro_rules! row {
+    (
+        $(#[$meta:meta])*
+        $vis:vis struct $name:ident { $($(#[$doc:meta])* $field:ident: $type:ty,)* }
+        packed $($word:ident)*
+    ) => {
+        $crate::spill::row! {
+            @define [$(#[$meta])* #[derive(Eq, Ord)]] [$vis] $name {$($(#[$doc])* $field: $type,)*}
+            Some({
+                const WORDS: &[$crate::spill::Word] = &[$($crate::spill::Word::$word),*];
+                assert!(WORDS.len() * 4 == size_of::<$name>(), "one word of packing for each word");
+                WORDS
+            })
+        }
+    };
+    (
+        $(#[$meta:meta])*
+        $vis:vis struct $name:ident { $($(#[$doc:meta])* $field:ident: $type:ty,)* }
+        unpacked
+    ) => {
+        $crate::spill::row! {
+            @define [$(#[$meta])*] [$vis] $name {$($(#[$doc])* $field: $type,)*} None
+        }
+    };
+    (
+        @define [$(#[$meta:meta])*] [$vis:vis] $name:ident
+        {$($(#[$doc:meta])* $field:ident: $type:ty,)*} $packing:expr
+    ) => {
+        $(#[$meta])*
+        #[derive(
+            Debug, Clone, Copy, Default, PartialEq, PartialOrd, bytemuck::Pod, bytemuck::Zeroable,
+        )]
+        #[repr(C)]
+        $vis struct $name { $($(#[$doc])* pub $field: $type,)* }
+
+        impl $crate::spill::Row for $name {
+            const FIELDS: &'static str =
+                concat!($(stringify!($field), ": ", stringify!($type), "; ",)*);
+            const PACKING: Option<&'static [$crate::spill::Word]> = $packing;
+        }
+    };
+}
+pub(crate) use row;
+
+row! {
+    /// An id, in a list of ids.
+    pub struct Id {
+        /// The id of a point.
+        id: u32,
+    }
+    packed Above
+}
