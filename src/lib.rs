@@ -83,8 +83,8 @@ pub mod workspace;
 
 pub use error::{Error, Result};
 pub use params::{MaxWidth, Method, Params, Radius, Smoothing};
-pub use pipeline::{Builder, DiskEstimate, Reconstruction, Start};
-pub use report::Report;
+pub use pipeline::{Builder, Reconstruction, Start};
+pub use report::{DiskEstimate, Report};
 pub use stages::ingest::Classes;
 pub use stages::surface::evidence::Division;
 pub use workspace::progress::{Cancel, Observer};

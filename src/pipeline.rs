@@ -6,39 +6,24 @@ mod checks;
 mod clock;
 mod disk;
 mod manifest;
-mod points;
+mod stages;
 
 use crate::error::Result;
-use crate::params::{Method, Params};
-use crate::report::{LatticeReport, Report};
-use crate::stages::blocks::Blocks;
-use crate::stages::cells::{DiskRadius, TileRanges, Widen, cells};
-use crate::stages::export::{CoordinateType, export};
-use crate::stages::ingest::{self, ingest_classes};
-use crate::stages::located::Places;
-use crate::stages::repair::{RepairOptions, repair};
-use crate::stages::smooth::{Relaxing, relax, smooth};
-use crate::stages::spacing::Density;
-use crate::stages::stitch::{StitchOptions, stitch};
-use crate::stages::triples::triples;
+use crate::params::Params;
+use crate::report::Report;
 use crate::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
 use crate::workspace::progress::{Cancel, Observer};
 use crate::workspace::{Workspace, limits};
 use attempt::Alarm;
 pub use attempt::Start;
 pub use builder::Builder;
-pub(crate) use checks::disk_radius;
-use checks::{enough, not_a_line, not_an_input, room, writable};
+use checks::{not_an_input, writable};
 pub(crate) use clock::Clock;
-pub use disk::DiskEstimate;
 pub(crate) use disk::Known;
-pub(crate) use points::order;
+use stages::Stages;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::{Duration, Instant};
-
-/// Halvings of the lattice step before smoothing, so that rounding does not undo it.
-const SMOOTH_REFINE: u32 = 10;
+use std::time::Duration;
 
 /// A reconstruction that is ready to run. Made by [`Reconstruction::builder`].
 pub struct Reconstruction {
@@ -107,206 +92,27 @@ impl Reconstruction {
             .time_limit
             .map(|limit| Alarm::set(limit, self.cancel.clone()));
         let workspace = self.open()?;
-        let outcome = self.stages(&workspace);
+        let outcome = self.reconstruct(&workspace);
         self.close(workspace, &outcome);
         outcome
     }
 
     /// All stages, in the order the data flows.
-    fn stages(&self, workspace: &Workspace) -> Result<Report> {
-        let begin = Instant::now();
-        let params = &self.params;
-        let mut clock = Clock::new(workspace);
-        let fits = |estimate| room(&self.folder, &self.output, estimate, workspace);
-        let first = Known::from_headers(&self.inputs).map(|known| known.estimate(params));
-        first.map_or(Ok(()), fits)?;
-
-        let spool = clock.stage("ingest", "points", 0, || {
-            ingest_classes(&self.inputs, &params.classes, workspace)
-        })?;
-        let input = spool.stats().clone();
-        let mut warnings = input.warnings.clone();
-        if input.dropped_non_finite > 0 {
-            let count = input.dropped_non_finite;
-            warnings.push(format!(
-                "{count} points left out: a coordinate is NaN or infinite"
-            ));
-        }
-        let coordinates = match spool.source_precision() {
-            ingest::CoordinateType::F32 => CoordinateType::Float,
-            ingest::CoordinateType::F64 => CoordinateType::Double,
-        };
-        let mut known = Known {
-            read: input.kept,
-            spool: spool.bytes(),
-            points: input.kept,
-            double: Some(coordinates == CoordinateType::Double),
-            moved: None,
-        };
-        if params.thin.is_some() {
-            // Nobody knows how many stay.
-            known.points = 0;
-        }
-        fits(known.estimate(params))?;
-        let refine = if params.smooth + params.relax > 0 {
-            SMOOTH_REFINE
-        } else {
-            0
-        };
-        let lattice = spool.choose_lattice(refine)?;
-        let (store, duplicates_folded, thin) =
-            self.in_order(spool, &lattice, &mut clock, workspace)?;
-        if !lattice.exact && duplicates_folded > input.kept / 100 {
-            warnings.push(format!(
-                "{duplicates_folded} points fell together: the cloud is so wide that positions had to \
-                 be rounded to steps of {}; are there outliers far away?",
-                lattice.step
-            ));
-        }
-        warnings.iter().for_each(|w| self.observer.warn(w));
-        enough(&store)?;
-        known.points = store.len() as u64;
-        fits(known.estimate(params))?;
-        let (mut store, outliers) = self.without_outliers(store, &mut clock, workspace)?;
-        enough(&store)?;
-        let points = store.len() as u64;
-        let radius = disk_radius(params.radius, &store, &lattice);
-        let blocks = Blocks::new(store.len(), params.block);
-        let tiles = TileRanges::new(blocks, self.tile_points);
-        workspace.trim();
-        for round in 1..=params.smooth {
-            store = clock.stage("smooth", "points", points, || {
-                let (k, smoothing) = (params.neighbors, params.smoothing);
-                smooth(&store, tiles, k, smoothing, round, workspace)
-            })?;
-        }
-        let relaxing = Relaxing {
-            neighbors: params.neighbors,
-            rounds: params.relax,
-            smoothed: params.smooth > 0,
-            off_surface: params.off_surface(),
-        };
-        let relaxed = if params.relax > 0 || params.method == Method::Robust {
-            Some(clock.stage(
-                "relax",
-                "points",
-                points * u64::from(params.relax.max(1)),
-                || relax(&store, tiles, relaxing, workspace),
-            )?)
-        } else {
-            None
-        };
-        known.points = points;
-        known.moved = relaxed.as_ref().map(|r| r.store.is_some());
-        let noisy = relaxed.as_ref().is_some_and(|r| r.is_noisy(points));
-        let estimate = known.estimate(params);
-        fits(estimate)?;
-        let robust = relaxed.as_ref().filter(|_| params.method == Method::Robust);
-        let density = robust.map(|relaxed| Density {
-            spacings: &relaxed.spacings,
-            neighbors: params.neighbors,
-            limits: params.limits(lattice.step),
-        });
-        let places = Places {
-            shape: relaxed
-                .as_ref()
-                .and_then(|r| r.store.as_ref())
-                .unwrap_or(&store),
-            file: &store,
-            density,
-        };
-        workspace.trim();
-        let (seen, cell_stats) = clock.stage("cells", "points", points, || {
-            let widen = match params.method {
-                Method::Robust => Widen::OnBands,
-                Method::Paper => Widen::OnLines,
-            };
-            cells(
-                places.shape,
-                tiles,
-                params.neighbors,
-                radius,
-                widen,
-                density,
-                workspace,
-            )
-        })?;
-        not_a_line(&cell_stats, points)?;
-        workspace.trim();
-        let (triples, triple_stats) =
-            clock.stage("triples", "triples", 0, || triples(seen, blocks, workspace))?;
-        let count = blocks.count() as u64;
-        let extraction = StitchOptions {
-            cos_max_angle: params.cos_max_angle(),
-            weigh: (params.method == Method::Robust).then_some(params.division),
-        };
-        let (stitched, base, insertion) = clock.stage("stitch", "blocks", 3 * count, || {
-            stitch(places, triples, blocks, extraction, workspace)
-        })?;
-        let options = RepairOptions {
-            repair: params.repair,
-            min_component: params.least_component(points, noisy),
-            max_hole_edges: params.max_hole_edges,
-            flip: params.method == Method::Robust,
-            zip: params.method == Method::Robust,
-        };
-        workspace.trim();
-        let (repaired, repair) = clock.stage("repair", "blocks", 2 * count, || {
-            repair(places, stitched, blocks, options, workspace)
-        })?;
-        let mesh = clock.stage("export", "blocks", 2 * count, || {
-            export(
-                &store,
-                &repaired,
-                blocks,
-                &lattice,
-                coordinates,
-                &self.output,
-                workspace,
-            )
-        })?;
-
-        Ok(Report {
-            version: env!("CARGO_PKG_VERSION"),
-            parameters: params.clone(),
-            memory_budget: self.memory.budget(),
-            threads: self.threads,
-            warnings,
-            input,
-            duplicates_folded,
-            thin,
-            outliers,
-            points,
-            lattice: LatticeReport {
-                step: lattice.step,
-                exact: lattice.exact,
-            },
-            radius: match radius {
-                DiskRadius::Auto => None,
-                DiskRadius::Steps(steps) => Some(steps * lattice.step),
-            },
-            relax: relaxed.as_ref().map(|r| r.stats),
-            cells: cell_stats,
-            triples: triple_stats,
-            base,
-            insertion,
-            holes_left: repair.holes_found - repair.holes_filled,
-            repair,
-            mesh,
-            coordinates,
-            peak_resident_bytes: limits::peak_resident(),
-            resident_file_bytes: limits::resident_file(),
-            peak_held_bytes: self.memory.peak_held(),
-            held_at_peak: self.memory.held_at_peak(),
-            peak_reserved_bytes: self.memory.peak(),
-            reserved_at_peak: self.memory.at_peak(),
-            estimated_first: first,
-            estimated_scratch_bytes: estimate.scratch,
-            estimated_output_bytes: estimate.output,
-            peak_scratch_bytes: workspace.io.scratch_peak(),
-            seconds: begin.elapsed().as_secs_f64() + clock.earlier,
-            stages: clock.stages,
-        })
+    fn reconstruct(&self, workspace: &Workspace) -> Result<Report> {
+        let mut stages = Stages::begin(self, workspace)?;
+        let (spool, lattice) = stages.ingest()?;
+        let store = stages.order(spool, &lattice)?;
+        let store = stages.without_outliers(store)?;
+        let radius = stages.radius(&store, &lattice);
+        let store = stages.smooth(store)?;
+        let relaxed = stages.relax(&store)?;
+        let places = stages.places(&store, relaxed.as_ref(), &lattice);
+        let seen = stages.cells(places, radius)?;
+        let triples = stages.triples(seen)?;
+        let stitched = stages.stitch(places, triples)?;
+        let repaired = stages.repair(places, stitched)?;
+        stages.export(&store, &repaired, &lattice)?;
+        Ok(stages.report())
     }
 }
 

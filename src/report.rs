@@ -1,7 +1,6 @@
 //! What happened in a run, for machines: the content of `--report`.
 
 use crate::params::Params;
-use crate::pipeline::DiskEstimate;
 use crate::stages::cells::CellStats;
 use crate::stages::export::{CoordinateType, MeshStats};
 use crate::stages::ingest::IngestStats;
@@ -15,7 +14,7 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 
 /// Everything a run counts and measures. Keys are stable; new ones may be added.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Default, Serialize)]
 pub struct Report {
     /// Version of the program.
     pub version: &'static str,
@@ -85,8 +84,19 @@ pub struct Report {
     pub warnings: Vec<String>,
 }
 
+/// Disk space that a run will take, about.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+pub struct DiskEstimate {
+    /// Peak of the scratch files.
+    pub scratch: u64,
+    /// The mesh.
+    pub output: u64,
+    /// Peak of both together.
+    pub together: u64,
+}
+
 /// The lattice, for the report.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Default, Serialize)]
 pub struct LatticeReport {
     /// Length of a step in the input's unit.
     pub step: f64,

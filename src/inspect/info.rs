@@ -3,9 +3,10 @@
 use crate::error::Result;
 use crate::geom::aabb::Aabb;
 use crate::params::Params;
-use crate::pipeline::{Known, order};
+use crate::pipeline::Known;
 use crate::stages::cells::{AUTO_REACH, CellMaker, DiskRadius, Widen};
 use crate::stages::ingest::{Classes, CoordinateType, IngestStats, ingest_classes};
+use crate::stages::order::order;
 use crate::stages::order::{PAGE, PointStore};
 use crate::stages::tiles::Tile;
 use crate::stages::tiles::near::Search;

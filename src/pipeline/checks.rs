@@ -1,9 +1,9 @@
 //! What is checked between the stages.
 
-use super::disk::DiskEstimate;
 use crate::error::{Error, Result};
 use crate::geom::lattice::Lattice;
 use crate::params::Radius;
+use crate::report::DiskEstimate;
 use crate::stages::cells::{CellStats, DiskRadius};
 use crate::stages::export::folder_of;
 use crate::stages::ingest;
@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 const LARGEST_RADIUS: f64 = (1u64 << 34) as f64;
 
 /// The radius in lattice steps.
-pub(crate) fn disk_radius(radius: Radius, store: &PointStore, lattice: &Lattice) -> DiskRadius {
+pub(super) fn disk_radius(radius: Radius, store: &PointStore, lattice: &Lattice) -> DiskRadius {
     match radius {
         Radius::Auto => DiskRadius::Auto,
         Radius::Length(length) => DiskRadius::Steps((length / lattice.step).min(LARGEST_RADIUS)),

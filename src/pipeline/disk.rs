@@ -10,8 +10,8 @@
 //! (`workspace/keeper.rs`), which takes a moment only.
 
 use crate::params::{Method, Params};
+use crate::report::DiskEstimate;
 use crate::stages::ingest::{self, CoordinateType, Format, Probe};
-use serde::Serialize;
 use std::path::PathBuf;
 
 /// Bytes of a position, in the ordered store and in the spool if it was integers or `f32`.
@@ -33,19 +33,8 @@ const SMALL: (f64, f64) = (0.8, 4096.0);
 /// Bytes of a line of text, about.
 const LINE: u64 = 30;
 
-/// Disk space that a run will take, about.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
-pub struct DiskEstimate {
-    /// Peak of the scratch files.
-    pub scratch: u64,
-    /// The mesh.
-    pub output: u64,
-    /// Peak of both together.
-    pub together: u64,
-}
-
 /// What is known of a cloud so far.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Known {
     /// Points in the spool.
     pub read: u64,

@@ -3,8 +3,8 @@
 use super::pages::PageWriter;
 use super::shape::{Items, Kind, Shape, side, unusable, usable};
 use crate::error::{Error, Result};
-use crate::pipeline::order;
 use crate::stages::ingest::ingest;
+use crate::stages::order::order;
 use crate::workspace::Workspace;
 use std::path::Path;
 

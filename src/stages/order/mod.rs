@@ -10,8 +10,10 @@ pub use store::{PAGE, PointStore};
 pub use writer::{Position, StoreWriter};
 
 use crate::error::{Error, Result};
+use crate::geom::lattice::Lattice;
 use crate::geom::{Point, hilbert};
 use crate::spill::{Sorted, Sorter, row};
+use crate::stages::ingest::{READ_BUFFERS, Spool};
 use crate::workspace::Workspace;
 use crate::workspace::persist::Persist;
 use rayon::prelude::*;
@@ -209,6 +211,33 @@ impl Orderer {
         let folded = taken.into_inner() - store.len() as u64;
         Ok((store, folded))
     }
+}
+
+/// Puts all points of a spool in order, in pages of `page` points; the spool is deleted. The store, and
+/// the number of duplicates folded.
+///
+/// # Errors
+/// [`Error::Io`], [`Error::Corrupt`], [`Error::TooManyPoints`], [`Error::Memory`], [`Error::Cancelled`].
+pub fn order(
+    spool: Spool,
+    lattice: &Lattice,
+    page: usize,
+    workspace: &Workspace,
+) -> Result<(PointStore, u64)> {
+    // Their buffers must not take much of what is there to sort in.
+    let most = workspace.memory.available() / (8 * READ_BUFFERS);
+    let threads = workspace.threads.min(most as usize).max(1);
+    let held = workspace.reserve("order: frames", threads as u64 * READ_BUFFERS)?;
+    let orderer = Orderer::for_points(workspace, spool.points())?;
+    orderer.take_parts(workspace, &spool.frames(), |frames| {
+        let push = |points: &[_]| orderer.push(workspace, points);
+        spool.par_for_frames(threads, lattice, frames, push)
+    })?;
+    drop(held);
+    // An attempt that dies has to read again what was only in memory.
+    let read_again = workspace.is_resumable() && !orderer.is_sorted();
+    let _spool = read_again.then_some(spool);
+    orderer.finish(workspace, page)
 }
 
 /// Where a part of the keys begins and ends.

@@ -44,13 +44,6 @@ impl Relaxed {
             self.stats.moved += moved;
         }
     }
-
-    /// True if of so many points at least half moved, each counted as often as it did: not a clean cloud
-    /// that is noisy in places.
-    #[must_use]
-    pub fn is_noisy(&self, points: u64) -> bool {
-        2 * self.stats.moved >= points
-    }
 }
 
 /// Counts of this stage.
@@ -93,6 +86,15 @@ persist!(Relaxed {
     spacings,
     stats
 });
+impl RelaxStats {
+    /// True if half of the points moved, each counted as often as it did: the whole cloud is noisy, and
+    /// not only places in it.
+    #[must_use]
+    pub fn is_noisy(&self, points: u64) -> bool {
+        2 * self.moved >= points
+    }
+}
+
 persist!(RelaxStats { rounds, moved });
 
 /// Rounds of relaxing: points move to the planes of their nearest neighbours, in each round those of the

@@ -1,0 +1,374 @@
+//! Each stage with the parameters of a run: what it is told, what it leaves in the report, and whether
+//! there is room on the disk for what comes after it.
+
+use super::checks::{disk_radius, enough, not_a_line, room};
+use super::{Clock, Known, Reconstruction};
+use crate::error::Result;
+use crate::geom::lattice::Lattice;
+use crate::params::Method;
+use crate::report::{LatticeReport, Report};
+use crate::stages::blocks::Blocks;
+use crate::stages::cells::{CellTriples, DiskRadius, TileRanges, Widen, cells};
+use crate::stages::export::{CoordinateType, export};
+use crate::stages::ingest::{self, Spool, ingest_classes};
+use crate::stages::located::Places;
+use crate::stages::order::{Orderer, PointStore, order};
+use crate::stages::outliers::{OutlierOptions, drop_outliers};
+use crate::stages::repair::{RepairOptions, Repaired, repair};
+use crate::stages::smooth::{Relaxed, Relaxing, relax, smooth};
+use crate::stages::spacing::Density;
+use crate::stages::stitch::{StitchOptions, Stitched, stitch};
+use crate::stages::thin::{Grid, thin};
+use crate::stages::triples::{Triples, triples};
+use crate::workspace::{Workspace, limits};
+use std::time::Instant;
+
+/// Halvings of the lattice step before smoothing, so that rounding does not undo it.
+const SMOOTH_REFINE: u32 = 10;
+
+/// The stages of one run.
+pub(super) struct Stages<'a> {
+    job: &'a Reconstruction,
+    workspace: &'a Workspace,
+    clock: Clock<'a>,
+    begin: Instant,
+    known: Known,
+    report: Report,
+}
+
+impl<'a> Stages<'a> {
+    /// Nothing is done yet, but there is room for what the headers of the inputs let expect.
+    pub fn begin(job: &'a Reconstruction, workspace: &'a Workspace) -> Result<Self> {
+        let headers = Known::from_headers(&job.inputs);
+        let first = headers.map(|known| known.estimate(&job.params));
+        let stages = Self {
+            job,
+            workspace,
+            clock: Clock::new(workspace),
+            begin: Instant::now(),
+            known: headers.unwrap_or_default(),
+            report: Report {
+                version: env!("CARGO_PKG_VERSION"),
+                parameters: job.params.clone(),
+                memory_budget: job.memory.budget(),
+                threads: job.threads,
+                estimated_first: first,
+                ..Report::default()
+            },
+        };
+        if let Some(estimate) = first {
+            room(&job.folder, &job.output, estimate, workspace)?;
+        }
+        Ok(stages)
+    }
+
+    /// Refuses to go on if the disk has no room for all that is to come.
+    fn check_room(&mut self) -> Result<()> {
+        let estimate = self.known.estimate(&self.job.params);
+        self.report.estimated_scratch_bytes = estimate.scratch;
+        self.report.estimated_output_bytes = estimate.output;
+        room(&self.job.folder, &self.job.output, estimate, self.workspace)
+    }
+
+    fn warn(&mut self, warning: String) {
+        self.job.observer.warn(&warning);
+        self.report.warnings.push(warning);
+    }
+
+    /// Reads the files: all points, and the lattice that they are on.
+    pub fn ingest(&mut self) -> Result<(Spool, Lattice)> {
+        let (job, workspace) = (self.job, self.workspace);
+        let params = &job.params;
+        let spool = self.clock.stage("ingest", "points", 0, || {
+            ingest_classes(&job.inputs, &params.classes, workspace)
+        })?;
+        let input = spool.stats().clone();
+        self.report.coordinates = match spool.source_precision() {
+            ingest::CoordinateType::F32 => CoordinateType::Float,
+            ingest::CoordinateType::F64 => CoordinateType::Double,
+        };
+        self.known = Known {
+            read: input.kept,
+            spool: spool.bytes(),
+            // Nobody knows how many stay when points are thinned.
+            points: if params.thin.is_some() { 0 } else { input.kept },
+            double: Some(self.report.coordinates == CoordinateType::Double),
+            moved: None,
+        };
+        self.report.input = input;
+        self.check_room()?;
+        let moves = params.smooth + params.relax > 0;
+        let lattice = spool.choose_lattice(if moves { SMOOTH_REFINE } else { 0 })?;
+        self.report.lattice = LatticeReport {
+            step: lattice.step,
+            exact: lattice.exact,
+        };
+        Ok((spool, lattice))
+    }
+
+    /// Sorts the points along the curve, thinned if that is wanted; duplicates are folded.
+    pub fn order(&mut self, spool: Spool, lattice: &Lattice) -> Result<PointStore> {
+        let (job, workspace) = (self.job, self.workspace);
+        let (points, page) = (spool.points(), job.page_points);
+        let grid = job.params.thin.and_then(|side| Grid::new(lattice, side));
+        let store = if let Some(grid) = grid {
+            let thinned = self.clock.stage("thin", "points", points, || {
+                thin(spool, lattice, grid, workspace)
+            })?;
+            let (store, stats) = self.clock.stage("order", "points", 0, || {
+                let orderer = Orderer::for_points(workspace, points)?;
+                let stats = orderer.take_stream(workspace, |from, stats, each| {
+                    thinned.for_each(from, stats, each)
+                })?;
+                let (store, _) = orderer.finish(workspace, page)?;
+                Ok((store, stats))
+            })?;
+            self.report.duplicates_folded = stats.duplicates;
+            self.report.thin = stats;
+            store
+        } else {
+            let (store, folded) = self.clock.stage("order", "points", points, || {
+                order(spool, lattice, page, workspace)
+            })?;
+            self.report.duplicates_folded = folded;
+            store
+        };
+        self.warn_of_input(lattice);
+        enough(&store)?;
+        self.known.points = store.len() as u64;
+        self.check_room()?;
+        Ok(store)
+    }
+
+    /// What the user should know of the points that were read.
+    fn warn_of_input(&mut self, lattice: &Lattice) {
+        let input = &self.report.input;
+        let (kept, left_out) = (input.kept, input.dropped_non_finite);
+        for warning in input.warnings.clone() {
+            self.warn(warning);
+        }
+        if left_out > 0 {
+            self.warn(format!(
+                "{left_out} points left out: a coordinate is NaN or infinite"
+            ));
+        }
+        let folded = self.report.duplicates_folded;
+        if !lattice.exact && folded > kept / 100 {
+            self.warn(format!(
+                "{folded} points fell together: the cloud is so wide that positions had to \
+                 be rounded to steps of {}; are there outliers far away?",
+                lattice.step
+            ));
+        }
+    }
+
+    /// Drops outliers, if that is wanted.
+    pub fn without_outliers(&mut self, store: PointStore) -> Result<PointStore> {
+        let (job, workspace) = (self.job, self.workspace);
+        let Some(factor) = job.params.drop_outliers else {
+            self.report.points = store.len() as u64;
+            return Ok(store);
+        };
+        let options = OutlierOptions {
+            factor,
+            block: job.params.block,
+            tile: job.tile_points,
+        };
+        let (store, stats) = self.clock.stage("outliers", "points", 0, || {
+            drop_outliers(store, options, workspace)
+        })?;
+        enough(&store)?;
+        self.report.outliers = stats;
+        self.report.points = store.len() as u64;
+        Ok(store)
+    }
+
+    /// The radius of the disks; a percentage refers to the points before they are smoothed.
+    pub fn radius(&mut self, store: &PointStore, lattice: &Lattice) -> DiskRadius {
+        let radius = disk_radius(self.job.params.radius, store, lattice);
+        self.report.radius = match radius {
+            DiskRadius::Auto => None,
+            DiskRadius::Steps(steps) => Some(steps * lattice.step),
+        };
+        radius
+    }
+
+    fn blocks(&self) -> Blocks {
+        Blocks::new(self.report.points as usize, self.job.params.block)
+    }
+
+    fn tiles(&self) -> TileRanges {
+        TileRanges::new(self.blocks(), self.job.tile_points)
+    }
+
+    /// Moves the points towards their surface, if that is wanted.
+    pub fn smooth(&mut self, mut store: PointStore) -> Result<PointStore> {
+        let (params, workspace, tiles) = (&self.job.params, self.workspace, self.tiles());
+        workspace.trim();
+        let points = self.report.points;
+        for round in 1..=params.smooth {
+            store = self.clock.stage("smooth", "points", points, || {
+                let (k, smoothing) = (params.neighbors, params.smoothing);
+                smooth(&store, tiles, k, smoothing, round, workspace)
+            })?;
+        }
+        Ok(store)
+    }
+
+    /// Finds the shape by which points are connected: the points moved towards their surface.
+    pub fn relax(&mut self, store: &PointStore) -> Result<Option<Relaxed>> {
+        let (params, workspace, tiles) = (&self.job.params, self.workspace, self.tiles());
+        let options = Relaxing {
+            neighbors: params.neighbors,
+            rounds: params.relax,
+            smoothed: params.smooth > 0,
+            off_surface: params.off_surface(),
+        };
+        let wanted = params.relax > 0 || params.method == Method::Robust;
+        let items = self.report.points * u64::from(params.relax.max(1));
+        let relaxed = wanted.then(|| {
+            self.clock.stage("relax", "points", items, || {
+                relax(store, tiles, options, workspace)
+            })
+        });
+        let relaxed = relaxed.transpose()?;
+        self.report.relax = relaxed.as_ref().map(|r| r.stats);
+        self.known.points = self.report.points;
+        self.known.moved = relaxed.as_ref().map(|r| r.store.is_some());
+        self.check_room()?;
+        Ok(relaxed)
+    }
+
+    /// The positions that the surface is made from.
+    pub fn places<'p>(
+        &self,
+        store: &'p PointStore,
+        relaxed: Option<&'p Relaxed>,
+        lattice: &Lattice,
+    ) -> Places<'p> {
+        let params = &self.job.params;
+        let robust = relaxed.filter(|_| params.method == Method::Robust);
+        let shape = relaxed.and_then(|relaxed| relaxed.store.as_ref());
+        Places {
+            shape: shape.unwrap_or(store),
+            file: store,
+            density: robust.map(|relaxed| Density {
+                spacings: &relaxed.spacings,
+                neighbors: params.neighbors,
+                limits: params.limits(lattice.step),
+            }),
+        }
+    }
+
+    /// Computes the restricted Voronoi cells.
+    pub fn cells(&mut self, places: Places<'_>, radius: DiskRadius) -> Result<CellTriples> {
+        let (params, workspace, tiles) = (&self.job.params, self.workspace, self.tiles());
+        let (k, points) = (params.neighbors, self.report.points);
+        let widen = match params.method {
+            Method::Robust => Widen::OnBands,
+            Method::Paper => Widen::OnLines,
+        };
+        workspace.trim();
+        let (shape, density) = (places.shape, places.density);
+        let (seen, stats) = self.clock.stage("cells", "points", points, || {
+            cells(shape, tiles, k, radius, widen, density, workspace)
+        })?;
+        not_a_line(&stats, points)?;
+        self.report.cells = stats;
+        Ok(seen)
+    }
+
+    /// Adds up in how many cells each triple is a corner.
+    pub fn triples(&mut self, seen: CellTriples) -> Result<Triples> {
+        let (workspace, blocks) = (self.workspace, self.blocks());
+        workspace.trim();
+        let (all, stats) = self
+            .clock
+            .stage("triples", "triples", 0, || triples(seen, blocks, workspace))?;
+        self.report.triples = stats;
+        Ok(all)
+    }
+
+    /// Makes an oriented manifold of the triples.
+    pub fn stitch(&mut self, places: Places<'_>, triples: Triples) -> Result<Stitched> {
+        let (params, workspace, blocks) = (&self.job.params, self.workspace, self.blocks());
+        let options = StitchOptions {
+            cos_max_angle: params.cos_max_angle(),
+            weigh: (params.method == Method::Robust).then_some(params.division),
+        };
+        let items = 3 * blocks.count() as u64;
+        let (stitched, base, insertion) = self.clock.stage("stitch", "blocks", items, || {
+            stitch(places, triples, blocks, options, workspace)
+        })?;
+        self.report.base = base;
+        self.report.insertion = insertion;
+        Ok(stitched)
+    }
+
+    /// Removes bridges and small components, and fills holes.
+    pub fn repair(&mut self, places: Places<'_>, stitched: Stitched) -> Result<Repaired> {
+        let (params, workspace, blocks) = (&self.job.params, self.workspace, self.blocks());
+        let points = self.report.points;
+        let noisy = self
+            .report
+            .relax
+            .is_some_and(|relax| relax.is_noisy(points));
+        let robust = params.method == Method::Robust;
+        let options = RepairOptions {
+            repair: params.repair,
+            min_component: params.least_component(points, noisy),
+            max_hole_edges: params.max_hole_edges,
+            flip: robust,
+            zip: robust,
+        };
+        workspace.trim();
+        let items = 2 * blocks.count() as u64;
+        let (repaired, stats) = self.clock.stage("repair", "blocks", items, || {
+            repair(places, stitched, blocks, options, workspace)
+        })?;
+        self.report.holes_left = stats.holes_found - stats.holes_filled;
+        self.report.repair = stats;
+        Ok(repaired)
+    }
+
+    /// Writes the mesh.
+    pub fn export(
+        &mut self,
+        store: &PointStore,
+        repaired: &Repaired,
+        lattice: &Lattice,
+    ) -> Result<()> {
+        let (job, workspace, blocks) = (self.job, self.workspace, self.blocks());
+        let coordinates = self.report.coordinates;
+        let items = 2 * blocks.count() as u64;
+        self.report.mesh = self.clock.stage("export", "blocks", items, || {
+            export(
+                store,
+                repaired,
+                blocks,
+                lattice,
+                coordinates,
+                &job.output,
+                workspace,
+            )
+        })?;
+        Ok(())
+    }
+
+    /// What happened.
+    pub fn report(self) -> Report {
+        let memory = &self.job.memory;
+        Report {
+            peak_resident_bytes: limits::peak_resident(),
+            resident_file_bytes: limits::resident_file(),
+            peak_held_bytes: memory.peak_held(),
+            held_at_peak: memory.held_at_peak(),
+            peak_reserved_bytes: memory.peak(),
+            reserved_at_peak: memory.at_peak(),
+            peak_scratch_bytes: self.workspace.io.scratch_peak(),
+            seconds: self.begin.elapsed().as_secs_f64() + self.clock.earlier,
+            stages: self.clock.stages,
+            ..self.report
+        }
+    }
+}
