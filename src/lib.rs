@@ -66,8 +66,8 @@
 //! | [`stages::export`] | triangles by block | the mesh file | |
 //!
 //! [`inspect`] answers questions about files without a reconstruction: what is in a cloud, is a
-//! mesh a manifold, and how far are two shapes from each other. [`report::Report`] is what a run counts and measures. The semantics of the mesh
-//! and the formats of scratch files are in `ARCHITECTURE.md`.
+//! mesh a manifold, and how far are two shapes from each other. [`report::Report`] is what a run counts
+//! and measures. `docs/method.md` defines the mesh, `ARCHITECTURE.md` describes the program.
 
 pub mod cli;
 pub mod error;

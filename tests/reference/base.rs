@@ -1,4 +1,4 @@
-//! Section 1.4: the base, from the triples that all three cells see.
+//! Section 6: the base, from the triples that all three cells see.
 
 use super::evidence::{self, Known};
 use super::homes::Side;
@@ -10,7 +10,7 @@ use std::collections::{BTreeMap, BTreeSet};
 /// What became of the T3.
 pub struct Base {
     pub surface: Surface,
-    /// Flagged by one of their vertices: candidates of 1.5.
+    /// Flagged by one of their vertices: candidates of section 7.
     pub flagged: BTreeSet<Triangle>,
     /// They would close a Möbius band: gone for good.
     pub one_sided: BTreeSet<Triangle>,

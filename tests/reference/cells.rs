@@ -1,4 +1,4 @@
-//! Sections 1.1 to 1.3: ids, neighbours, planes, cells and the triples they see.
+//! Sections 1, 2, 3.1 and 5: ids, neighbours, planes, cells and the triples they see.
 
 use super::spacing::Density;
 use super::surface::Triangle;

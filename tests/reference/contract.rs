@@ -1,4 +1,4 @@
-//! A graph of patches or labels that is contracted pair by pair (section 1.4, robust, step 4).
+//! A graph of patches or labels that is contracted pair by pair (section 6.3, step 4).
 
 use super::Weighing;
 use super::homes::{Homes, Side};

@@ -1,4 +1,4 @@
-//! Smoothing that keeps edges (section 1.2).
+//! Smoothing that keeps edges (section 3.2).
 
 use super::cells::by_distance;
 use outcrop::geom::lattice::COORDINATE_LIMIT;

@@ -1,4 +1,4 @@
-//! Orientation by evidence (section 1.4, robust): the surface is cut where it is least sure.
+//! Orientation by evidence (section 6.3): the surface is cut where it is least sure.
 
 use super::base::is_interior;
 use super::contract::Graph;

@@ -1,4 +1,4 @@
-//! Flips of edges (section 1.6, robust), each neighbour found by looking through all triangles.
+//! Flips of edges (section 8.1), each neighbour found by looking through all triangles.
 
 use super::surface::{Surface, Triangle, edges};
 use outcrop::geom::Point;

@@ -1,4 +1,4 @@
-//! Section 1.6: the loops around holes, and how they are filled.
+//! Sections 8.5 and 8.6: the loops around holes, and how they are filled.
 
 use super::big::{Big, Big3, cross, dot, plus, vector};
 use super::insert::normal;

@@ -1,4 +1,4 @@
-//! Relative orientations of homes, for test IV of section 1.5.
+//! Relative orientations of homes, for test IV of section 7.
 
 /// A triangle's orientation as seen from a home: turned (i → k → j) or not (i → j → k).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,4 +1,4 @@
-//! Section 1.5: candidates inserted one by one, interior ones block by block, then crossing ones.
+//! Section 7: candidates inserted one by one, interior ones block by block, then crossing ones.
 
 use super::base::{Base, is_interior};
 use super::homes::{Homes, Side};

@@ -1,4 +1,4 @@
-//! Mending (section 1.6, robust): loops are filled if they are holes, and else zipped from their
+//! Mending (section 8.7): loops are filled if they are holes, and else zipped from their
 //! sharpest corners.
 
 use super::big::dot;

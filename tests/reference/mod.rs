@@ -1,6 +1,6 @@
-//! A slow implementation of section 1 of `ARCHITECTURE.md`, in memory and by brute force.
+//! A slow implementation of `docs/method.md`, in memory and by brute force; sections are those of it.
 //!
-//! It exists to be compared with the program, so it shares with it only what section 1 leaves to
+//! It exists to be compared with the program, so it shares with it only what the method leaves to
 //! floating point: planes and cells (`outcrop::geom`). Everything else is written here as plainly
 //! as it can be said. Nothing is tuned; a few hundred points are a large cloud.
 
@@ -63,7 +63,7 @@ pub struct Settings {
     pub max_hole_edges: usize,
     /// Components of fewer triangles go.
     pub min_component: usize,
-    /// Without, nothing of section 1.6 happens but orientation and the splitting of vertices.
+    /// Without, nothing of section 8 happens but orientation and the splitting of vertices.
     pub repair: bool,
     /// `B`.
     pub block: u32,
@@ -157,7 +157,7 @@ pub struct Counts {
     /// T3 and candidates on a line in the file, or too long.
     pub flat: usize,
     pub flat_candidates: usize,
-    /// T3 flagged in 1.4.
+    /// T3 flagged in section 6.1.
     pub flagged: usize,
     /// T3 that would close a Möbius band.
     pub one_sided: usize,
@@ -223,7 +223,7 @@ pub fn reconstruct(points: &[Point], settings: &Settings) -> Mesh {
     mesh
 }
 
-/// Sections 1.4 to 1.7, from points in the order of their ids and the number of cells that see
+/// Sections 6 to 9, from points in the order of their ids and the number of cells that see
 /// each triple. Triples need not come from cells: what cells see has, for one, never an edge with
 /// more than two T3, as each cell has at most two corners on a bisector.
 pub fn from_triples(
@@ -291,7 +291,7 @@ pub fn connect(
     }
 }
 
-/// Section 1.6 but for pinched vertices: flips, bridges, small components, which way components face,
+/// Section 8: flips, bridges, small components, which way components face,
 /// holes, in this order. Gives the way the triangles run.
 fn repair_and_orient(
     shape: &[Point],

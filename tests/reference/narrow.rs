@@ -1,4 +1,4 @@
-//! What stays of a filling of which some triangles are too wide (section 1.6, mending).
+//! What stays of a filling of which some triangles are too wide (section 8.7).
 
 /// A triangle of a filling by the positions of its corners in the loop.
 type Corners = [usize; 3];

@@ -1,4 +1,4 @@
-//! Pinched vertices (section 1.6) and the order of the file (section 1.7).
+//! Pinched vertices and the order of the file (section 9).
 
 use super::repair::run;
 use super::surface::{Component, Fan, Surface, Triangle};

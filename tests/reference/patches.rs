@@ -1,4 +1,4 @@
-//! Patches of a block and what connects them (section 1.4, robust, steps 1 to 3).
+//! Patches of a block and what connects them (section 6.3, steps 1 to 3).
 
 use super::Weighing;
 use super::contract::Graph;

@@ -1,4 +1,4 @@
-//! Relaxing (section 1.2): the shape, positions that decide which points are connected.
+//! Relaxing (section 4.3): the shape, positions that decide which points are connected.
 
 use super::cells::{by_distance, plane_of};
 use super::edges::{is_clean, is_curved};

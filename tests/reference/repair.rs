@@ -1,4 +1,4 @@
-//! Section 1.6 without holes: bridges, small components, and which way components face.
+//! Sections 8.2 to 8.4: bridges, small components, and which way components face.
 
 use super::big::{Big, Big3, cross, determinant, dot, plus, vector};
 use super::insert::normal;

@@ -1,4 +1,4 @@
-//! How dense the surface is (section 1.2, robust), and what is too far apart for that.
+//! How dense the surface is (sections 4.1 and 4.2), and what is too far apart for that.
 
 use super::Settings;
 use super::cells::{by_distance, plane_of};

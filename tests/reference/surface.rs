@@ -7,7 +7,7 @@ pub type Triangle = [u32; 3];
 /// Two ids, ascending.
 pub type Edge = [u32; 2];
 
-/// The edges of a triangle in the order that section 1.5 gives them: (i,j), (i,k), (j,k).
+/// The edges of a triangle in the order that the conventions of the method give them: (i,j), (i,k), (j,k).
 pub fn edges([i, j, k]: Triangle) -> [Edge; 3] {
     [[i, j], [i, k], [j, k]]
 }

@@ -1,5 +1,5 @@
 //! Smoothing that keeps edges and does not shrink: a point goes to a curved surface through those of its
-//! neighbours that lie on one with it (ARCHITECTURE, section 1.2).
+//! neighbours that lie on one with it (docs/method.md, section 3.2).
 //!
 //! Sums run over the point and then its neighbours, nearest first, with `+ - * / sqrt` only: the same
 //! bits on every machine, whatever found the neighbours.

@@ -2,7 +2,7 @@
 //!
 //! The mesh is decided block by block: first every vertex flags what it refuses of T3, then the
 //! rest is oriented, then T12 triangles are inserted, inside blocks first and across them after.
-//! See the semantics in `ARCHITECTURE.md`.
+//! Sections 6 and 7 of `docs/method.md` define it.
 
 mod base;
 mod context;

@@ -1,0 +1,228 @@
+//! The documents: not too long, no link that leads nowhere, no option that the program does not have.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// Documents that are to be read at one sitting, and their most lines.
+const SHORT: [(&str, usize); 2] = [("README.md", 200), ("ARCHITECTURE.md", 200)];
+
+/// Most characters of a line, but for tables.
+const WIDTH: usize = 110;
+
+/// Options that documents give to other programs: cargo, scripts and tools.
+const OTHERS: [&str; 7] = [
+    "--address",
+    "--format",
+    "--fraction",
+    "--kind",
+    "--large",
+    "--seconds",
+    "--tried",
+];
+
+/// Options of `outcrop reconstruct` for tests, which its help does not name.
+const HIDDEN: [&str; 2] = ["--block-points", "--tile-points"];
+
+struct Document {
+    /// From the root of the repository.
+    path: PathBuf,
+    text: String,
+}
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// All documents at the root and in `docs`.
+fn documents() -> Vec<Document> {
+    let mut all = Vec::new();
+    for folder in ["", "docs"] {
+        for entry in std::fs::read_dir(root().join(folder)).expect("a folder") {
+            let path = Path::new(folder).join(entry.expect("an entry").file_name());
+            if path.extension().is_some_and(|e| e == "md") {
+                let text = std::fs::read_to_string(root().join(&path)).expect("text");
+                all.push(Document { path, text });
+            }
+        }
+    }
+    assert!(all.len() > 10, "{} documents", all.len());
+    all
+}
+
+impl Document {
+    fn name(&self) -> std::path::Display<'_> {
+        self.path.display()
+    }
+
+    /// True for the changelog: it has long entries, and options that may be gone.
+    fn is_history(&self) -> bool {
+        self.path == Path::new("CHANGELOG.md")
+    }
+
+    /// Its lines with their numbers, and whether they are in a block of code.
+    fn lines(&self) -> impl Iterator<Item = (usize, &str, bool)> {
+        let mut code = false;
+        self.text.lines().zip(1..).map(move |(line, number)| {
+            let fence = line.trim_start().starts_with("```");
+            code ^= fence;
+            (number, line, code || fence)
+        })
+    }
+
+    /// All but blocks of code.
+    fn prose(&self) -> String {
+        let lines = self.lines().filter(|(_, _, code)| !code);
+        lines.map(|(_, line, _)| format!("{line}\n")).collect()
+    }
+
+    /// Targets of its links and pictures, but for those in the web.
+    fn targets(&self) -> Vec<String> {
+        let prose = self.prose();
+        let after = prose.split("](").skip(1);
+        let targets = after.filter_map(|rest| rest.split_once(')'));
+        let own = targets.filter(|(target, _)| !target.starts_with("http"));
+        own.map(|(target, _)| target.to_owned()).collect()
+    }
+
+    /// The anchors of its headings, as GitHub makes them.
+    fn anchors(&self) -> BTreeSet<String> {
+        let mut seen: BTreeMap<String, usize> = BTreeMap::new();
+        let headings = self
+            .lines()
+            .filter(|(_, line, code)| !code && line.starts_with('#'));
+        let mut anchors = BTreeSet::new();
+        for (_, line, _) in headings {
+            let kept = |c: &char| c.is_alphanumeric() || [' ', '-', '_'].contains(c);
+            let title = line.trim_start_matches('#').trim().to_lowercase();
+            let anchor: String = title.chars().filter(kept).collect();
+            let anchor = anchor.replace(' ', "-");
+            let before = seen.entry(anchor.clone()).or_default();
+            let number = *before;
+            *before += 1;
+            anchors.insert(match number {
+                0 => anchor,
+                n => format!("{anchor}-{n}"),
+            });
+        }
+        anchors
+    }
+}
+
+/// The long options in a text.
+fn options(text: &str) -> BTreeSet<String> {
+    let word = |c: char| !(c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-');
+    let words = text
+        .split(word)
+        .filter(|w| w.starts_with("--") && w.len() > 2);
+    words
+        .filter(|w| !w.starts_with("---"))
+        .map(str::to_owned)
+        .collect()
+}
+
+/// The options of each command, by its help.
+fn of_commands() -> BTreeMap<&'static str, BTreeSet<String>> {
+    let commands = ["reconstruct", "resume", "info", "verify", "compare", "demo"];
+    let help = |command: &'static str| {
+        let mut outcrop = Command::new(env!("CARGO_BIN_EXE_outcrop"));
+        let output = outcrop.args([command, "--help"]).output().expect("it runs");
+        assert!(output.status.success(), "{command} --help");
+        let mut all = options(&String::from_utf8_lossy(&output.stdout));
+        if command == "reconstruct" {
+            all.extend(HIDDEN.map(str::to_owned));
+        }
+        (command, all)
+    };
+    commands.into_iter().map(help).collect()
+}
+
+#[test]
+fn short_ones_are_short() {
+    for (path, most) in SHORT {
+        let text = std::fs::read_to_string(root().join(path)).expect("text");
+        let lines = text.lines().count();
+        assert!(
+            lines <= most,
+            "{path} has {lines} lines, expected at most {most}"
+        );
+    }
+}
+
+#[test]
+fn lines_are_not_too_wide() {
+    let mut wide = Vec::new();
+    for document in documents().iter().filter(|d| !d.is_history()) {
+        for (number, line, code) in document.lines() {
+            let table = !code && line.starts_with('|');
+            if !table && line.chars().count() > WIDTH {
+                wide.push(format!("{}:{number}", document.name()));
+            }
+        }
+    }
+    assert!(wide.is_empty(), "more than {WIDTH} characters: {wide:?}");
+}
+
+#[test]
+fn links_lead_somewhere() {
+    let documents = documents();
+    let mut broken = Vec::new();
+    for document in &documents {
+        let folder = document.path.parent().expect("a folder");
+        for target in document.targets() {
+            let (path, anchor) = target.split_once('#').unwrap_or((&target, ""));
+            let path = match path {
+                "" => document.path.clone(),
+                path => folder.join(path),
+            };
+            let Ok(found) = root().join(&path).canonicalize() else {
+                broken.push(format!("{}: {target}", document.name()));
+                continue;
+            };
+            let same =
+                |d: &&Document| root().join(&d.path).canonicalize().ok() == Some(found.clone());
+            let there = documents.iter().find(same);
+            if !anchor.is_empty() && !there.is_some_and(|d| d.anchors().contains(anchor)) {
+                broken.push(format!("{}: {target}", document.name()));
+            }
+        }
+    }
+    assert!(broken.is_empty(), "{broken:#?}");
+}
+
+#[test]
+fn options_exist() {
+    let commands = of_commands();
+    let known = |option: &String| commands.values().any(|all| all.contains(option));
+    let mut unknown = Vec::new();
+    for document in documents().iter().filter(|d| !d.is_history()) {
+        let prose = document.prose();
+        let pieces: Vec<&str> = prose.split('`').collect();
+        assert!(
+            pieces.len() % 2 == 1,
+            "{}: an open code span",
+            document.name()
+        );
+        let spans = pieces.into_iter().skip(1).step_by(2);
+        // Of other programs only what is a span by itself.
+        for span in spans.filter(|span| span.starts_with("--")) {
+            let missing = options(span).into_iter().filter(|o| !known(o));
+            let missing = missing.filter(|o| !OTHERS.contains(&o.as_str()));
+            unknown.extend(missing.map(|o| format!("{}: {o}", document.name())));
+        }
+        let code = document.lines().filter(|(_, _, code)| *code);
+        for (number, line, _) in code {
+            let line = line.split('#').next().unwrap_or_default();
+            let mut words = line.split_whitespace();
+            if words.next() != Some("outcrop") {
+                continue;
+            }
+            let Some(all) = words.next().and_then(|command| commands.get(command)) else {
+                continue;
+            };
+            let missing = options(line).into_iter().filter(|o| !all.contains(o));
+            unknown.extend(missing.map(|o| format!("{}:{number}: {o}", document.name())));
+        }
+    }
+    assert!(unknown.is_empty(), "{unknown:#?}");
+}
