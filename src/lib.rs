@@ -47,44 +47,36 @@
 //!
 //! `examples/reconstruct.rs` shows progress ([`Observer`]) and a stop ([`Cancel`]).
 //!
-//! # Stages
+//! [`inspect`] answers questions about files without a reconstruction: what is in a cloud, is a mesh a
+//! manifold, and how far are two shapes from each other. [`Report`] is what a run counts and measures.
 //!
-//! [`pipeline`] runs them in the order of the data. What one leaves for the next lies on disk.
-//!
-//! | stage | takes | gives | paper |
-//! |---|---|---|---|
-//! | [`stages::ingest`] | files | a spool of points in native precision, a lattice | |
-//! | [`stages::thin`] | the spool | the points that stay of each cell of a grid (if asked for) | |
-//! | [`stages::order`] | lattice positions | the ordered store: the rank on the curve is the id | |
-//! | [`stages::outliers`] | the store | the store without outliers (if asked for) | |
-//! | [`stages::smooth`] | the store | the store with points moved (if asked for); the shape, by which points are connected | 3.2 |
-//! | [`stages::tiles`] | an id range | its points and those around it, neighbours (used by outliers, smooth and cells) | 3.1 |
-//! | [`stages::cells`] | tiles | triples seen by each tile's cells | 3.3, 3.4 |
-//! | [`stages::triples`] | triples by tile | triples with counts, by block | 3.4 |
-//! | [`stages::stitch`] | triples by block | an orientable manifold | 3.5 |
-//! | [`stages::repair`] | triangles by block | bridges and small components gone, holes filled, oriented | 3.6 |
-//! | [`stages::export`] | triangles by block | the mesh file | |
-//!
-//! [`inspect`] answers questions about files without a reconstruction: what is in a cloud, is a
-//! mesh a manifold, and how far are two shapes from each other. [`report::Report`] is what a run counts
-//! and measures. `docs/method.md` defines the mesh, `ARCHITECTURE.md` describes the program.
+//! These items are the interface. The modules that do the work are open to the project's own tests, benches and
+//! tools, and change without notice; `ARCHITECTURE.md` has their map.
 
+#[doc(hidden)]
 pub mod cli;
 pub mod error;
+#[doc(hidden)]
 pub mod geom;
 pub mod inspect;
+#[doc(hidden)]
 pub mod kernels;
 pub mod params;
+#[doc(hidden)]
 pub mod pipeline;
 pub mod report;
+#[doc(hidden)]
 pub mod spill;
+#[doc(hidden)]
 pub mod stages;
+#[doc(hidden)]
 pub mod workspace;
 
 pub use error::{Error, Result};
-pub use params::{MaxWidth, Method, Params, Radius, Smoothing};
-pub use pipeline::{Builder, Reconstruction, Start};
+pub use params::{Division, MaxWidth, Method, Params, Radius, Smoothing};
+pub use pipeline::{Builder, Reconstruction, Start, default_memory, default_threads};
 pub use report::{DiskEstimate, Report};
 pub use stages::ingest::Classes;
-pub use stages::surface::evidence::Division;
-pub use workspace::progress::{Cancel, Observer};
+pub use workspace::Workspace;
+pub use workspace::memory::MemoryPool;
+pub use workspace::progress::{Cancel, Observer, Silent};

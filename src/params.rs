@@ -2,8 +2,9 @@
 
 use crate::error::{Error, Result};
 use crate::stages::ingest::Classes;
+pub use crate::stages::smooth::Smoothing;
 use crate::stages::spacing::{Limits, Width};
-use crate::stages::surface::evidence::Division;
+pub use crate::stages::surface::evidence::Division;
 
 /// Radius of the disks (paper, section 3.4).
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -55,28 +56,6 @@ impl std::str::FromStr for Method {
             "robust" => Ok(Method::Robust),
             "paper" => Ok(Method::Paper),
             _ => Err(format!("{text:?} is not robust or paper")),
-        }
-    }
-}
-
-/// How points move when they are smoothed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Smoothing {
-    /// To the plane of their neighbours (paper, section 3.2).
-    Plain,
-    /// To a curved surface of those that lie on one with them: keeps edges, does not shrink.
-    Edges,
-}
-
-impl std::str::FromStr for Smoothing {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        match text {
-            "plain" => Ok(Smoothing::Plain),
-            "edges" => Ok(Smoothing::Edges),
-            _ => Err(format!("{text:?} is not plain or edges")),
         }
     }
 }

@@ -7,6 +7,7 @@ mod clock;
 mod disk;
 mod manifest;
 mod stages;
+mod start;
 
 use crate::error::Result;
 use crate::params::Params;
@@ -15,12 +16,12 @@ use crate::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
 use crate::workspace::progress::{Cancel, Observer};
 use crate::workspace::{Workspace, limits};
 use attempt::Alarm;
-pub use attempt::Start;
 pub use builder::Builder;
 use checks::{not_an_input, writable};
 pub(crate) use clock::Clock;
 pub(crate) use disk::Known;
 use stages::Stages;
+pub use start::Start;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
@@ -71,7 +72,7 @@ impl Reconstruction {
     /// # Errors
     /// [`crate::Error::NotResumable`], [`crate::Error::Locked`], [`crate::Error::Io`].
     pub fn resume(folder: impl AsRef<Path>) -> Result<Builder> {
-        attempt::unfinished(folder.as_ref())
+        builder::unfinished(folder.as_ref())
     }
 
     /// Where the mesh goes.

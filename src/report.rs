@@ -1,15 +1,15 @@
 //! What happened in a run, for machines: the content of `--report`.
 
 use crate::params::Params;
-use crate::stages::cells::CellStats;
-use crate::stages::export::{CoordinateType, MeshStats};
-use crate::stages::ingest::IngestStats;
-use crate::stages::outliers::OutlierStats;
-use crate::stages::repair::RepairStats;
-use crate::stages::smooth::RelaxStats;
-use crate::stages::stitch::{BaseStats, InsertStats};
-use crate::stages::thin::ThinStats;
-use crate::stages::triples::TripleStats;
+pub use crate::stages::cells::CellStats;
+pub use crate::stages::export::{CoordinateType, MeshStats};
+pub use crate::stages::ingest::IngestStats;
+pub use crate::stages::outliers::OutlierStats;
+pub use crate::stages::repair::RepairStats;
+pub use crate::stages::smooth::RelaxStats;
+pub use crate::stages::stitch::{BaseStats, InsertStats};
+pub use crate::stages::thin::ThinStats;
+pub use crate::stages::triples::TripleStats;
 use serde::Serialize;
 use std::collections::BTreeMap;
 

@@ -1,41 +1,14 @@
 //! One attempt at a run: where it begins, when its time is up, what it leaves behind.
 
 use super::manifest::{Asked, Manifest};
-use super::{Reconstruction, builder};
+use super::{Reconstruction, Start};
 use crate::error::{Error, Result};
 use crate::stages::export;
 use crate::workspace::progress::Cancel;
 use crate::workspace::{Folder, Found, Workspace, fault};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::time::Duration;
-
-/// What to do about an unfinished run in the scratch folder.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum Start {
-    /// Refuse to begin another one.
-    #[default]
-    New,
-    /// Go on with it; begin if there is none.
-    Resume,
-    /// Throw it away and begin.
-    Restart,
-}
-
-/// The scratch folder of a run with this output: beside it, or in another folder.
-pub(super) fn scratch_folder(output: &Path, parent: Option<&Path>) -> PathBuf {
-    let mut name = output.file_name().unwrap_or_default().to_os_string();
-    let beside = export::folder_of(output);
-    let Some(parent) = parent.filter(|parent| *parent != beside) else {
-        name.push(".outcrop-scratch");
-        return beside.join(name);
-    };
-    // Runs with outputs of one name in several folders may share a folder for scratch.
-    let whole = std::path::absolute(output).unwrap_or_else(|_| output.to_path_buf());
-    let bytes = std::os::unix::ffi::OsStrExt::as_bytes(whole.as_os_str());
-    name.push(format!("-{:08x}.outcrop-scratch", crc32fast::hash(bytes)));
-    parent.join(name)
-}
 
 /// Raises a flag when the time is up, unless it is dropped before.
 #[derive(Debug)]
@@ -57,28 +30,6 @@ impl Alarm {
         });
         Self(sender)
     }
-}
-
-/// The run that was left unfinished in a scratch folder.
-///
-/// # Errors
-/// [`Error::NotResumable`], [`Error::Locked`], [`Error::Io`].
-pub(super) fn unfinished(folder: &Path) -> Result<builder::Builder> {
-    let not = |why: &str| Error::NotResumable {
-        path: folder.to_path_buf(),
-        why: why.to_owned(),
-    };
-    let found = match Folder::find(folder)? {
-        Found::Run(found) => found,
-        Found::Nothing => return Err(not("no unfinished run is here")),
-        Found::Damaged(_) => {
-            return Err(not(
-                "its manifest is damaged; run `outcrop reconstruct` again, with --restart",
-            ));
-        }
-    };
-    let manifest = Manifest::from_bytes(folder, &found.manifest)?;
-    Ok(builder::Builder::of(&manifest, folder))
 }
 
 impl Reconstruction {
@@ -118,7 +69,7 @@ impl Reconstruction {
             }
             (Found::Run(folder) | Found::Damaged(folder), _) => folder.restart(bytes)?,
         };
-        folder.mesh = [export::temporary(&self.output), self.output.clone()];
+        folder.output = [export::temporary(&self.output), self.output.clone()];
         let workspace = Workspace::resumable(
             folder,
             self.memory.clone(),

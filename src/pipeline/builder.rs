@@ -1,13 +1,14 @@
 //! What a reconstruction is to do, and the checks before it begins.
 
-use super::attempt::{self, Start};
 use super::manifest::Manifest;
+use super::start::{Start, scratch_folder};
 use super::{Reconstruction, default_memory, default_threads};
 use crate::error::{Error, Result};
 use crate::params::Params;
 use crate::stages::order::PAGE;
 use crate::workspace::memory::MemoryPool;
 use crate::workspace::progress::{Cancel, Observer, Silent};
+use crate::workspace::{Folder, Found};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
@@ -151,7 +152,7 @@ impl Builder {
             return missing("--output", "the path of the mesh");
         }
         let budget = self.memory.unwrap_or_else(default_memory);
-        let folder = || attempt::scratch_folder(&self.output, self.scratch.as_deref());
+        let folder = || scratch_folder(&self.output, self.scratch.as_deref());
         Ok(Reconstruction {
             folder: self.folder.clone().unwrap_or_else(folder),
             inputs: self.inputs,
@@ -167,4 +168,26 @@ impl Builder {
             time_limit: self.time_limit,
         })
     }
+}
+
+/// The run that was left unfinished in a scratch folder.
+///
+/// # Errors
+/// [`Error::NotResumable`], [`Error::Locked`], [`Error::Io`].
+pub(super) fn unfinished(folder: &Path) -> Result<Builder> {
+    let not = |why: &str| Error::NotResumable {
+        path: folder.to_path_buf(),
+        why: why.to_owned(),
+    };
+    let found = match Folder::find(folder)? {
+        Found::Run(found) => found,
+        Found::Nothing => return Err(not("no unfinished run is here")),
+        Found::Damaged(_) => {
+            return Err(not(
+                "its manifest is damaged; run `outcrop reconstruct` again, with --restart",
+            ));
+        }
+    };
+    let manifest = Manifest::from_bytes(folder, &found.manifest)?;
+    Ok(Builder::of(&manifest, folder))
 }

@@ -14,7 +14,7 @@ pub enum Word {
     Rising,
 }
 
-/// A record of a scratch file: a plain struct of 32-bit words, defined by [`row!`].
+/// A record of a scratch file: a plain struct of 32-bit words, defined by `row!`.
 pub trait Row: bytemuck::Pod + PartialEq + Debug + Send + Sync {
     /// Names and types of the fields, for the list of files.
     const FIELDS: &'static str;

@@ -3,8 +3,10 @@
 use super::Row;
 use crate::error::{Error, Result};
 use crate::workspace::Workspace;
-use crate::workspace::file::{Place, ScratchFile, open_existing};
+use crate::workspace::file::ScratchFile;
+use crate::workspace::open::open_existing;
 use crate::workspace::persist::{Persist, Saved};
+use crate::workspace::place::Place;
 use std::cmp::{Ordering, Reverse};
 use std::collections::BinaryHeap;
 use std::fs::File;

@@ -7,9 +7,10 @@ use super::Row;
 use super::pack::{pack, unpack};
 use crate::error::Result;
 use crate::workspace::Workspace;
-use crate::workspace::file::{Place, ScratchFile};
+use crate::workspace::file::ScratchFile;
 use crate::workspace::memory::{bytes_of, hold};
 use crate::workspace::persist::{Persist, Saved};
+use crate::workspace::place::Place;
 use std::marker::PhantomData;
 use std::sync::Mutex;
 

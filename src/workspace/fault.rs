@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(usize)]
 pub enum Event {
-    /// A write to a scratch file or the mesh.
+    /// A write to a scratch file or the output.
     Write,
     /// Before a record goes into the journal.
     Record,
@@ -21,9 +21,9 @@ pub enum Event {
     Recorded,
     /// After files were synced.
     Synced,
-    /// Before the mesh gets its name.
+    /// Before the output gets its name.
     Rename,
-    /// After the mesh got its name.
+    /// After the output got its name.
     Renamed,
     /// Before a file is deleted.
     Delete,

@@ -2,92 +2,15 @@
 
 use super::IoCounters;
 use super::fault;
+use super::open::{failed_write, options};
+use super::place::{Place, Put};
 use super::run::Run;
 use crate::error::{Error, Result};
-use std::fs::{File, OpenOptions};
-use std::os::unix::fs::{FileExt, OpenOptionsExt};
-use std::path::{Path, PathBuf};
+use std::fs::File;
+use std::os::unix::fs::FileExt;
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-
-/// Where a part of a file is, and what it must hold.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Place {
-    /// First byte.
-    pub offset: u64,
-    /// Number of bytes.
-    pub bytes: usize,
-    /// Number of records in them.
-    pub records: usize,
-    /// CRC-32 of the bytes.
-    pub crc: u32,
-}
-
-impl Place {
-    /// Where it ends; none if no file can reach so far.
-    #[must_use]
-    pub fn end(&self) -> Option<u64> {
-        let end = self.offset.checked_add(self.bytes as u64)?;
-        i64::try_from(end).ok().map(i64::cast_unsigned)
-    }
-}
-
-/// A part of a file that was written.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Put {
-    /// Name of the file.
-    pub file: Arc<str>,
-    /// Number of the part.
-    pub section: u32,
-    /// Where it is.
-    pub place: Place,
-}
-
-/// How scratch files are opened: private, and never through a symbolic link.
-#[must_use]
-pub fn options() -> OpenOptions {
-    let mut options = File::options();
-    options
-        .read(true)
-        .write(true)
-        .mode(0o600)
-        .custom_flags(rustix::fs::OFlags::NOFOLLOW.bits().cast_signed());
-    options
-}
-
-/// Opens an existing scratch file, which must be a regular file.
-///
-/// # Errors
-/// What the system says; an error of kind `InvalidInput` for what is no regular file.
-pub fn open_existing(path: &Path) -> std::io::Result<File> {
-    // Opening a pipe must not wait for someone at its other end.
-    let flags = rustix::fs::OFlags::NOFOLLOW | rustix::fs::OFlags::NONBLOCK;
-    let file = options()
-        .custom_flags(flags.bits().cast_signed())
-        .open(path)?;
-    if file.metadata()?.is_file() {
-        Ok(file)
-    } else {
-        Err(std::io::Error::new(
-            std::io::ErrorKind::InvalidInput,
-            "not a regular file",
-        ))
-    }
-}
-
-/// The error of a write of `bytes`, beside which the run will need `more`.
-#[must_use]
-pub fn failed_write(path: &Path, bytes: usize, more: u64, error: std::io::Error) -> Error {
-    use std::io::ErrorKind::{QuotaExceeded, StorageFull};
-    if matches!(error.kind(), StorageFull | QuotaExceeded) {
-        return Error::Disk {
-            path: path.to_path_buf(),
-            needed: more.max(bytes as u64),
-            free: super::limits::disk_free(path).unwrap_or(0),
-        };
-    }
-    Error::io(path, format!("write {bytes} bytes"), error)
-}
 
 /// What the files of a workspace share.
 #[derive(Debug, Default)]

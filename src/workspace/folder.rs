@@ -2,9 +2,9 @@
 
 use super::IoCounters;
 use super::fault::{self, Event};
-use super::file::{failed_write, open_existing, options};
 use super::journal::{self, Entry, Journal, Record};
 use super::keeper::Keeper;
+use super::open::{failed_write, open_existing, options};
 use super::progress::{Cancel, Observer};
 use super::recover::{Whereabouts, recover};
 use super::run::Run;
@@ -31,8 +31,8 @@ pub struct Folder {
     pub path: PathBuf,
     /// The run as it was asked for.
     pub manifest: Vec<u8>,
-    /// The mesh on its way, and where it goes.
-    pub mesh: [PathBuf; 2],
+    /// The output on its way, and where it goes.
+    pub output: [PathBuf; 2],
     lock: File,
     entries: Vec<Entry>,
     /// Where the whole records of the journal end; none without a journal.
@@ -93,7 +93,7 @@ impl Folder {
         let folder = Self {
             path: path.to_path_buf(),
             manifest: Vec::new(),
-            mesh: Default::default(),
+            output: Default::default(),
             lock,
             entries: Vec::new(),
             end: None,
@@ -173,7 +173,7 @@ impl Folder {
         let folder = Self {
             path: path.to_path_buf(),
             manifest,
-            mesh: Default::default(),
+            output: Default::default(),
             lock: lock(path)?,
             entries: Vec::new(),
             end: None,
@@ -258,7 +258,7 @@ impl Folder {
         let path = self.path.join(journal::NAME);
         let places = Whereabouts {
             folder: &self.path,
-            mesh: &self.mesh,
+            output: &self.output,
         };
         let (history, journal) = match self.end {
             Some(end) => {

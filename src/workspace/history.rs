@@ -1,7 +1,7 @@
 //! What the journal says that earlier attempts at a run have done, and what is left of it after damage.
 
-use super::file::Place;
 use super::journal::{Entry, Record};
+use super::place::Place;
 use std::collections::{BTreeMap, HashMap, HashSet};
 
 /// Units finished, files and their parts.
@@ -53,8 +53,8 @@ pub enum Mending {
     Rewind {
         /// End of what counts.
         end: u64,
-        /// The stage that comes then.
-        stage: String,
+        /// The stage that comes then; none if the journal knows of no stage.
+        stage: Option<String>,
     },
 }
 
@@ -182,7 +182,7 @@ impl History {
         let stage = self.begun.iter().rev().find(|(_, start)| holds(*start));
         stage.map(|(stage, start)| Mending::Rewind {
             end: *start,
-            stage: stage.clone(),
+            stage: Some(stage.clone()),
         })
     }
 

@@ -4,7 +4,8 @@
 //! of the journal: a run that died left it there.
 
 use super::fault;
-use super::file::{Place, Put, failed_write};
+use super::open::failed_write;
+use super::place::{Place, Put};
 use crate::error::{Error, Result};
 use std::fs::File;
 use std::os::unix::fs::FileExt;

@@ -10,7 +10,9 @@ mod journal;
 mod keeper;
 pub mod limits;
 pub mod memory;
+pub mod open;
 pub mod persist;
+pub mod place;
 pub mod progress;
 mod recover;
 mod run;
@@ -18,11 +20,13 @@ pub(crate) mod steps;
 mod units;
 
 pub use folder::{Folder, Found};
-pub use recover::{MESH, RENAMED};
+pub use recover::{OUTPUT, RENAMED};
 
 use crate::error::{Error, Result};
-use file::{Maker, Place, ScratchFile, Shared, open_existing};
+use file::{Maker, ScratchFile, Shared};
 use memory::{MemoryPool, Reservation};
+use open::open_existing;
+use place::Place;
 use progress::{Cancel, Observer};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};

@@ -1,9 +1,9 @@
 //! Going on after a crash: everything that is still needed is read and checked; what is damaged is
 //! done again, as little of it as possible.
 
-use super::file::open_existing;
 use super::history::{History, Mending, Needed};
 use super::journal::Entry;
+use super::open::open_existing;
 use super::progress::{Cancel, Observer};
 use crate::error::Result;
 use rayon::prelude::*;
@@ -15,17 +15,17 @@ use std::path::{Path, PathBuf};
 /// Bytes checked at a time.
 const CHUNK: usize = 1 << 20;
 
-/// The name that the journal has for the mesh, which is not in the scratch folder.
-pub const MESH: &str = "mesh";
+/// The name that the journal has for the output of the run, which is not in the scratch folder.
+pub const OUTPUT: &str = "output";
 
-/// The part of the mesh, without a byte, that says that it is whole and gets its name.
+/// The part of the output, without a byte, that says that it is whole and gets its name.
 pub const RENAMED: u32 = u32::MAX - 1;
 
-/// Where files may be: the mesh under its temporary name, or its own.
+/// Where files may be: the output under its temporary name, or its own.
 #[derive(Debug)]
 pub struct Whereabouts<'a> {
     pub folder: &'a Path,
-    pub mesh: &'a [PathBuf; 2],
+    pub output: &'a [PathBuf; 2],
 }
 
 /// True if the part holds what the journal says.
@@ -67,8 +67,8 @@ fn damaged(
     observer.begin("check", "bytes", sizes.fold(0, u64::saturating_add));
     let mut all = Vec::new();
     for (name, parts) in by_file {
-        let paths = if name == MESH {
-            places.mesh.to_vec()
+        let paths = if name == OUTPUT {
+            places.output.to_vec()
         } else {
             vec![places.folder.join(&name)]
         };
@@ -85,9 +85,9 @@ fn damaged(
             let bad = bad.collect::<Result<Vec<_>>>()?;
             Ok(bad.into_iter().flatten().collect())
         };
-        let renamed = name == MESH && parts.iter().any(|part| part.section == RENAMED);
+        let renamed = name == OUTPUT && parts.iter().any(|part| part.section == RENAMED);
         let mut bad = check(&paths[0])?;
-        // A file of the mesh's own name may be one of another run.
+        // A file of the output's own name may be one of another run.
         if !bad.is_empty() && renamed && check(&paths[1])?.is_empty() {
             bad.clear();
         }
@@ -112,7 +112,7 @@ pub fn recover(
     // A journal that speaks of parts before any stage is not of this program: nothing of it counts.
     let first = || Mending::Rewind {
         end: entries.get(1).map_or(end, |entry| entry.offset),
-        stage: "ingest".into(),
+        stage: None,
     };
     let mending = history.mend(&bad).or_else(|| (!bad.is_empty()).then(first));
     match mending {
@@ -127,7 +127,10 @@ pub fn recover(
             Ok((history, end))
         }
         Some(Mending::Rewind { end, stage }) => {
-            let stage = stage.trim_start_matches('/');
+            let stage = stage
+                .as_deref()
+                .unwrap_or("the run")
+                .trim_start_matches('/');
             let stage = stage.split('#').next().unwrap_or(stage);
             observer.warn(&format!(
                 "{}: damaged: {names}; what it was made from is gone, so the run goes back to the \
@@ -146,8 +149,8 @@ pub fn recover(
 
 #[cfg(test)]
 mod tests {
-    use super::super::file::{Place, Put};
     use super::super::journal::Record;
+    use super::super::place::{Place, Put};
     use super::super::progress::Silent;
     use super::*;
 
@@ -185,7 +188,7 @@ mod tests {
             .collect();
         let places = Whereabouts {
             folder: folder.path(),
-            mesh: &Default::default(),
+            output: &Default::default(),
         };
         let (history, end) = recover(&entries, 3, &places, &Silent, &Cancel::new()).unwrap();
         assert!(history.places("a").is_empty() && history.units("/step#1").is_empty());

@@ -4,10 +4,10 @@
 //! knows is not done a second time. A step is known by where it is in the program: the steps around it,
 //! its name, and how many of that name came before it.
 
-use super::file::{Place, Put};
 use super::history::History;
 use super::journal::{Journal, Record};
 use super::keeper::{Keeper, Leaving};
+use super::place::{Place, Put};
 use crate::error::Result;
 use std::cell::RefCell;
 use std::collections::HashMap;

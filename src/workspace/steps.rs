@@ -1,8 +1,8 @@
 //! Steps that a resumed run does not do again.
 
 use super::Workspace;
-use super::file::{Place, Put};
 use super::persist::{Persist, Saved};
+use super::place::{Place, Put};
 use super::run::{Notes, Run};
 use crate::error::Result;
 use std::sync::{Arc, Mutex, PoisonError};

@@ -1,8 +1,8 @@
 //! A mesh whose vertices do not fit into memory: corners are sorted to their vertices, take the
 //! position with them, and are sorted back to their triangles.
 
-use super::mesh::{Chooser, keyed, no_vertex, not_triangles, pages, shape, sorter};
 use super::shape::{Choice, Shape, unusable, usable};
+use super::triangles::{Chooser, keyed, no_vertex, not_triangles, pages, shape, sorter};
 use super::vector::{Box3, V3};
 use crate::error::Result;
 use crate::inspect::ply_mesh::Sink;

@@ -27,6 +27,7 @@ mod shape;
 #[cfg(test)]
 mod tests;
 mod triangle;
+mod triangles;
 mod vector;
 
 use figures::DistanceRow;
@@ -34,6 +35,7 @@ pub use figures::{Comparison, Distances, Figures};
 pub use shape::{Kind, Side};
 
 use crate::error::{Error, Result};
+use crate::inspect::ply_mesh::{PlyMesh, holds_faces};
 use crate::workspace::Workspace;
 use measure::Sums;
 use samples::Numbers;
@@ -58,6 +60,15 @@ impl Default for Options {
     }
 }
 
+/// Reads a mesh or a cloud; `name` keeps the scratch files of the two sides apart.
+fn read_side(path: &Path, name: &str, choice: Choice, workspace: &Workspace) -> Result<Shape> {
+    if path.is_file() && holds_faces(path)? {
+        mesh::read(PlyMesh::open(path)?, path, name, choice, workspace)
+    } else {
+        cloud::read(path, name, workspace)
+    }
+}
+
 /// Distances between two shapes, each a mesh (PLY with faces) or a cloud (whatever ingest reads).
 ///
 /// # Errors
@@ -74,12 +85,12 @@ pub fn compare(a: &Path, b: &Path, options: &Options, workspace: &Workspace) -> 
         });
     }
     let choice = Choice { samples, seed };
-    let a = Shape::read(a, "compare.a", choice, workspace)?;
-    let b = Shape::read(b, "compare.b", choice, workspace)?;
+    let a = read_side(a, "compare.a", choice, workspace)?;
+    let b = read_side(b, "compare.b", choice, workspace)?;
     let numbers = [Numbers::of(&a, samples), Numbers::of(&b, samples)];
     let bytes = numbers.iter().map(|n| n.all()).sum::<u64>() * size_of::<DistanceRow>() as u64;
     let buffer = bytes.min(workspace.memory.available() / 8) + (1 << 20);
-    let (sorter, _held) = mesh::sorter(workspace, "compare.distances", buffer)?;
+    let (sorter, _held) = triangles::sorter(workspace, "compare.distances", buffer)?;
     let mut sums = [Sums::default(); 2];
     for (way, (from, to)) in [(&a, &b), (&b, &a)].into_iter().enumerate() {
         let mut records = Vec::with_capacity(RECORDS);
@@ -173,7 +184,7 @@ pub fn distances(
         samples: 0,
         seed: 0,
     };
-    let to = Shape::read(to, "compare.b", choice, workspace)?;
+    let to = read_side(to, "compare.b", choice, workspace)?;
     let numbers = Numbers::of(&cloud, u64::MAX);
     let mut index = 0;
     measure_way(

@@ -1,8 +1,8 @@
 //! Where distances are taken: positions on one side, in curve order.
 
-use super::mesh::{area, sorter};
 use super::pages::Pages;
 use super::shape::{Items, Shape};
+use super::triangles::{area, sorter};
 use super::vector::{Box3, V3, add, scale, sub};
 use crate::error::Result;
 use crate::spill::{Sorter, Table, row};

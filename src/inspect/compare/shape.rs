@@ -2,11 +2,8 @@
 
 use super::pages::Pages;
 use super::vector::{Box3, V3};
-use super::{cloud, mesh};
-use crate::error::{Error, Result};
-use crate::inspect::ply_mesh::{PlyMesh, holds_faces};
+use crate::error::Error;
 use crate::spill::Table;
-use crate::workspace::Workspace;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -65,22 +62,6 @@ pub(super) enum Items {
 pub(super) struct Choice {
     pub(super) samples: u64,
     pub(super) seed: u64,
-}
-
-impl Shape {
-    /// Reads a mesh or a cloud; `name` keeps the scratch files of the two sides apart.
-    pub(super) fn read(
-        path: &Path,
-        name: &str,
-        choice: Choice,
-        workspace: &Workspace,
-    ) -> Result<Self> {
-        if path.is_file() && holds_faces(path)? {
-            mesh::read(PlyMesh::open(path)?, path, name, choice, workspace)
-        } else {
-            cloud::read(path, name, workspace)
-        }
-    }
 }
 
 /// The side of a comparison that these numbers describe.

@@ -1,9 +1,9 @@
 //! Reads the mesh into buckets of triangles, one for each range of vertices.
 
+use super::bounds::Bounds;
 use super::buckets::Buckets;
 use super::plan::Plan;
 use super::positions::Positions;
-use super::verdict::Bounds;
 use crate::error::Result;
 use crate::inspect::ply_mesh::{PlyMesh, Sink};
 use crate::workspace::Workspace;

@@ -9,6 +9,7 @@
 //! ranges.
 
 mod area;
+mod bounds;
 mod buckets;
 mod collinear;
 mod contract;
@@ -22,7 +23,8 @@ mod sweep;
 mod tests;
 mod verdict;
 
-pub use verdict::{Bounds, Verdict};
+pub use bounds::Bounds;
+pub use verdict::Verdict;
 
 use super::ply_mesh::PlyMesh;
 use crate::error::Result;

@@ -3,8 +3,9 @@
 use super::MeshStats;
 use crate::error::{Error, Result};
 use crate::workspace::fault::{self, Event};
-use crate::workspace::file::{Place, Put, failed_write, open_existing, options};
-use crate::workspace::{MESH, RENAMED, Workspace, limits};
+use crate::workspace::open::{failed_write, open_existing, options};
+use crate::workspace::place::{Place, Put};
+use crate::workspace::{OUTPUT, RENAMED, Workspace, limits};
 use std::fs::File;
 use std::os::unix::fs::{FileExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
@@ -98,7 +99,7 @@ impl<'a> MeshFile<'a> {
             coordinates,
             workspace,
         };
-        let known = workspace.places(MESH);
+        let known = workspace.places(OUTPUT);
         if known.is_empty() {
             mesh.begin(&header, bytes)?;
         } else {
@@ -163,7 +164,7 @@ impl<'a> MeshFile<'a> {
     }
 
     fn put(&self, section: u32, place: Place) -> Result<()> {
-        let file = MESH.into();
+        let file = OUTPUT.into();
         self.workspace.put(Put {
             file,
             section,

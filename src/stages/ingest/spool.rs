@@ -9,7 +9,8 @@ use super::source::{Native, Source};
 use super::stats::SourceStats;
 use crate::error::Result;
 use crate::workspace::Workspace;
-use crate::workspace::file::{Place, ScratchFile};
+use crate::workspace::file::ScratchFile;
+use crate::workspace::place::Place;
 use std::collections::BTreeMap;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 

@@ -1,12 +1,29 @@
 //! The ordered store: positions by id in one file, in pages, with a tree of page boxes in memory.
 
-use super::writer::Index;
 use crate::error::Result;
 use crate::geom::Point;
 use crate::geom::aabb::Aabb;
+use crate::spill::{Table, row};
 use crate::workspace::file::ScratchFile;
 use crate::workspace::memory::Reservation;
 use std::ops::Range;
+
+row! {
+    /// Checksum and box of a page.
+    pub struct PageRow {
+        /// CRC-32 of the page.
+        crc: u32,
+        /// Lowest coordinates.
+        min: Point,
+        /// Highest coordinates.
+        max: Point,
+    }
+    unpacked
+}
+
+/// The pages of a store. Pages that were written together are a section, which has the number of the
+/// first of them divided by 16.
+pub(super) type Index = Table<PageRow>;
 
 /// Points per page unless a test asks for another number.
 pub const PAGE: usize = 256;

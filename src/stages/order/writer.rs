@@ -1,13 +1,14 @@
 //! Writes the ordered store: in id order, or, by way of `rewrite`, in any.
 
-use super::store::{FAN, PointStore};
+use super::store::{FAN, Index, PageRow, PointStore};
 use crate::error::Result;
 use crate::geom::Point;
 use crate::geom::aabb::Aabb;
 use crate::spill::{Table, row};
 use crate::workspace::Workspace;
-use crate::workspace::file::{Place, ScratchFile};
+use crate::workspace::file::ScratchFile;
 use crate::workspace::persist::{Persist, Saved};
+use crate::workspace::place::Place;
 use crate::workspace::steps::Step;
 use rayon::prelude::*;
 
@@ -19,23 +20,6 @@ row! {
     }
     unpacked
 }
-
-row! {
-    /// Checksum and box of a page.
-    pub struct PageRow {
-        /// CRC-32 of the page.
-        crc: u32,
-        /// Lowest coordinates.
-        min: Point,
-        /// Highest coordinates.
-        max: Point,
-    }
-    unpacked
-}
-
-/// The pages of a store. Pages that were written together are a section, which has the number of the
-/// first of them in terms of [`STEP`].
-pub(super) type Index = Table<PageRow>;
 
 /// What is written at a time begins with a page whose number is a multiple of this.
 const STEP: usize = 16;

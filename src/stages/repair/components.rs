@@ -2,7 +2,7 @@
 //! see, added up and judged.
 
 use super::facing::{Fate, Sums, SumsRow, judge};
-use super::surface::{SeenTriangle, TriangleTo};
+use super::rows::{SeenTriangle, TriangleTo};
 use super::{RepairOptions, RepairStats};
 use crate::error::Result;
 use crate::geom::Point;

@@ -15,6 +15,7 @@ mod mend;
 mod parts;
 mod patch;
 mod rim;
+mod rows;
 mod surface;
 #[cfg(test)]
 mod tests;

@@ -3,7 +3,8 @@
 use super::SurfaceTriangle;
 use super::fill::Corner;
 use super::loops::{Step, neighbors, steps};
-use super::surface::{RimBits, Surface};
+use super::rows::RimBits;
+use super::surface::Surface;
 use crate::error::Result;
 use crate::spill::{Id, Table, row};
 use crate::stages::blocks::Blocks;

@@ -7,13 +7,14 @@
 use super::components::{Parts, join};
 use super::facing::{Fate, Sums, SumsRow, judge};
 use super::patch::Patch;
+use super::rows::{LabelRun, RimBits, SeenTriangle, TriangleTo};
 use super::{
     OrientedTriangle, RepairOptions, RepairStats, SHUFFLE_BUFFER, SurfaceTriangle, around, bridges,
     flips,
 };
 use crate::error::Result;
 use crate::geom::Point;
-use crate::spill::{Shuffle, Table, row};
+use crate::spill::{Shuffle, Table};
 use crate::stages::blocks::Blocks;
 use crate::stages::located::Places;
 use crate::stages::stitch::Stitched;
@@ -21,64 +22,6 @@ use crate::stages::surface::star::Triangle;
 use crate::workspace::Workspace;
 use crate::workspace::memory::{Reservation, bytes_of, hold};
 use crate::workspace::persist::{Persist, Saved};
-
-row! {
-    /// How a block sees a crossing triangle, for the block of its smallest vertex.
-    pub struct SeenTriangle {
-        /// Block of the smallest vertex.
-        to: u32,
-        /// Ids, ascending.
-        triangle: Triangle,
-        /// The block that sees it.
-        block: u32,
-        /// `label << 1 | flip`: the label that it has there, and whether it runs against its ids.
-        label_flip: u32,
-    }
-    packed Above Above Rising Rising Above Above
-}
-
-impl SeenTriangle {
-    /// The label that the triangle has in the block.
-    pub fn label(&self) -> u32 {
-        self.label_flip >> 1
-    }
-
-    /// True if it runs against its ascending ids.
-    pub fn flip(&self) -> bool {
-        self.label_flip & 1 == 1
-    }
-}
-
-row! {
-    /// A triangle for a block.
-    pub struct TriangleTo {
-        /// Number of the block.
-        to: u32,
-        /// Ids, ascending.
-        triangle: Triangle,
-    }
-    packed Above Above Rising Rising
-}
-
-row! {
-    /// Triangles in a row that have one label.
-    pub struct LabelRun {
-        /// Number of triangles.
-        count: u32,
-        /// The label.
-        label: u32,
-    }
-    unpacked
-}
-
-row! {
-    /// A bit for each of 32 vertices of a block: does it have a boundary edge?
-    pub struct RimBits {
-        /// The first vertex has the lowest bit.
-        bits: u32,
-    }
-    unpacked
-}
 
 /// The oriented surface, small components and bridges left out.
 #[derive(Debug)]

@@ -19,7 +19,6 @@ use crate::error::Result;
 use crate::geom::Point;
 use crate::geom::lattice::COORDINATE_LIMIT;
 use crate::geom::round::rounded;
-use crate::params::Smoothing;
 use crate::stages::cells::{Fit, TileRanges};
 use crate::stages::order::PointStore;
 use crate::stages::tiles::neighbors::Neighbors;
@@ -28,6 +27,28 @@ use edges::Around;
 use fits::each_fit;
 use pass::Pass;
 use std::ops::Range;
+
+/// How points move when they are smoothed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Smoothing {
+    /// To the plane of their neighbours (paper, section 3.2).
+    Plain,
+    /// To a curved surface of those that lie on one with them: keeps edges, does not shrink.
+    Edges,
+}
+
+impl std::str::FromStr for Smoothing {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "plain" => Ok(Smoothing::Plain),
+            "edges" => Ok(Smoothing::Edges),
+            _ => Err(format!("{text:?} is not plain or edges")),
+        }
+    }
+}
 
 /// How points are relaxed.
 #[derive(Debug, Clone, Copy)]

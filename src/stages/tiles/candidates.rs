@@ -1,6 +1,5 @@
 //! The points that may be among the neighbours of a query, in columns.
 
-use super::near::above;
 use super::{LEAVES, OwnPage, Tile};
 use crate::geom::Point;
 use crate::geom::aabb::Aabb;
@@ -8,6 +7,14 @@ use crate::kernels::{
     Around, BLOCK, Boxes, Level, Pick, first_bits, kernel, near_boxes, point_box_body, take_boxes,
 };
 use crate::workspace::memory::bytes_of;
+
+/// Bound on the relative error of approximate squared distances, and then some.
+pub(super) const APPROXIMATE: f64 = 1.0 / (1 << 20) as f64;
+
+/// An approximate squared distance that is not below any of points within `d2`.
+pub(super) fn above(d2: u64) -> f32 {
+    (d2 as f64 * (1.0 + 2.0 * APPROXIMATE)) as f32
+}
 
 /// x, y, z, and a number that goes with the point. The columns are whole blocks long, with
 /// anything behind the last point.

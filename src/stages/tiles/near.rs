@@ -4,7 +4,7 @@
 //! before. Guesses decide only how much is looked at: a query is answered when what was gathered
 //! proves the answer, and else gathers for itself.
 
-use super::candidates::{Candidates, Columns, PageLeaves};
+use super::candidates::{APPROXIMATE, Candidates, Columns, PageLeaves, above};
 use super::neighbors::Neighbors;
 use super::wanted::Wanted;
 use super::{OwnPage, Tile};
@@ -17,11 +17,8 @@ use std::ops::Range;
 mod list;
 mod sums;
 
+pub use super::neighbors::Sums;
 use list::list_nearest;
-pub use sums::Sums;
-
-/// Bound on the relative error of approximate squared distances, and then some.
-pub(super) const APPROXIMATE: f64 = 1.0 / (1 << 20) as f64;
 
 /// Bytes that a search takes for each candidate: three times its columns, what is picked, distances and
 /// keys.
@@ -284,11 +281,6 @@ impl Search {
             self.spare = std::mem::replace(&mut self.candidates, group);
         }
     }
-}
-
-/// An approximate squared distance that is not below any of points within `d2`.
-pub(super) fn above(d2: u64) -> f32 {
-    (d2 as f64 * (1.0 + 2.0 * APPROXIMATE)) as f32
 }
 
 impl Query<'_> {

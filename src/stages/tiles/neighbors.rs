@@ -1,11 +1,19 @@
 //! The neighbours of one point in columns, nearest first.
 
 use super::Near;
-use super::near::Sums;
 use crate::geom::clip::Nearest;
 use crate::geom::plane::Moments;
 use crate::kernels::{Level, MOST_SUMMED, SUMMED_LIMIT2, second_moments};
 use crate::workspace::memory::bytes_of;
+
+/// The nearest neighbours of a point, summed up.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Sums {
+    /// Exact sums over their differences to the point.
+    pub moments: Moments,
+    /// Squared distance of the last one.
+    pub last2: u64,
+}
 
 /// Neighbours by (squared distance, id).
 #[derive(Debug, Clone, Default)]

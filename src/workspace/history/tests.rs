@@ -1,6 +1,6 @@
 //! What is done again, by what was damaged and what is gone.
 
-use super::super::file::Put;
+use super::super::place::Put;
 use super::*;
 
 /// A journal in short: the offset of a record is its number.
@@ -64,7 +64,7 @@ fn damage(file: &str, section: u32) -> Needed {
 }
 
 fn rewind(end: u64, stage: &str) -> Option<Mending> {
-    let stage = stage.into();
+    let stage = Some(stage.into());
     Some(Mending::Rewind { end, stage })
 }
 

@@ -7,6 +7,7 @@ use crate::geom::Point;
 use crate::geom::plane::Moments;
 use crate::kernels::{BLOCK, MOST_SUMMED, Pick, SUMMED_LIMIT2, kernel};
 use crate::stages::tiles::Tile;
+use crate::stages::tiles::neighbors::Sums;
 
 /// How often a limit that divides the nearest from the others is corrected.
 const DIVISIONS: usize = 16;
@@ -16,15 +17,6 @@ const MARGIN: f32 = 1.3;
 
 /// No number up to this many times the limit: then approximate distances tell inside from outside.
 const GAP: f32 = 1.0 + 8.0 * APPROXIMATE as f32;
-
-/// The nearest neighbours of a point, summed up.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Sums {
-    /// Exact sums over their differences to the point.
-    pub moments: Moments,
-    /// Squared distance of the last one.
-    pub last2: u64,
-}
 
 impl Tile {
     /// Calls `each` with the sums over the `k` nearest neighbours of every point whose id is

@@ -1,0 +1,22 @@
+//! The box around a mesh.
+
+/// Smallest box around all vertices with finite coordinates, in the units of the file.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Bounds {
+    /// Lowest coordinates.
+    pub min: [f64; 3],
+    /// Highest coordinates.
+    pub max: [f64; 3],
+}
+
+impl Bounds {
+    pub(super) fn with(bounds: Option<Self>, p: [f64; 3]) -> Self {
+        let Some(b) = bounds else {
+            return Self { min: p, max: p };
+        };
+        Self {
+            min: std::array::from_fn(|i| b.min[i].min(p[i])),
+            max: std::array::from_fn(|i| b.max[i].max(p[i])),
+        }
+    }
+}

@@ -1,0 +1,52 @@
+//! How files are opened and what a failed write means.
+
+use crate::error::Error;
+use std::fs::{File, OpenOptions};
+use std::os::unix::fs::OpenOptionsExt;
+use std::path::Path;
+
+/// How scratch files are opened: private, and never through a symbolic link.
+#[must_use]
+pub fn options() -> OpenOptions {
+    let mut options = File::options();
+    options
+        .read(true)
+        .write(true)
+        .mode(0o600)
+        .custom_flags(rustix::fs::OFlags::NOFOLLOW.bits().cast_signed());
+    options
+}
+
+/// Opens an existing scratch file, which must be a regular file.
+///
+/// # Errors
+/// What the system says; an error of kind `InvalidInput` for what is no regular file.
+pub fn open_existing(path: &Path) -> std::io::Result<File> {
+    // Opening a pipe must not wait for someone at its other end.
+    let flags = rustix::fs::OFlags::NOFOLLOW | rustix::fs::OFlags::NONBLOCK;
+    let file = options()
+        .custom_flags(flags.bits().cast_signed())
+        .open(path)?;
+    if file.metadata()?.is_file() {
+        Ok(file)
+    } else {
+        Err(std::io::Error::new(
+            std::io::ErrorKind::InvalidInput,
+            "not a regular file",
+        ))
+    }
+}
+
+/// The error of a write of `bytes`, beside which the run will need `more`.
+#[must_use]
+pub fn failed_write(path: &Path, bytes: usize, more: u64, error: std::io::Error) -> Error {
+    use std::io::ErrorKind::{QuotaExceeded, StorageFull};
+    if matches!(error.kind(), StorageFull | QuotaExceeded) {
+        return Error::Disk {
+            path: path.to_path_buf(),
+            needed: more.max(bytes as u64),
+            free: super::limits::disk_free(path).unwrap_or(0),
+        };
+    }
+    Error::io(path, format!("write {bytes} bytes"), error)
+}

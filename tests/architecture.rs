@@ -1,0 +1,356 @@
+//! The map of ARCHITECTURE.md, held against the `use` lines of `src`: which folder may know which, no
+//! circle of imports, and no file or record grown out of hand.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+/// Each room, and the rooms whose items it may use, `error` besides. A room is a folder of `src`, a folder or
+/// file of `src/stages`, or a file of `src`.
+const MAY_USE: &[(&str, &[&str])] = &[
+    (
+        "cli",
+        &[
+            "inspect",
+            "params",
+            "pipeline",
+            "report",
+            "stages/ingest",
+            "workspace",
+        ],
+    ),
+    ("error", &[]),
+    ("geom", &["kernels"]),
+    (
+        "inspect",
+        &[
+            "geom",
+            "params",
+            "ply",
+            "pipeline",
+            "spill",
+            "stages/cells",
+            "stages/ingest",
+            "stages/order",
+            "stages/tiles",
+            "workspace",
+        ],
+    ),
+    ("kernels", &[]),
+    ("method", &[]),
+    (
+        "params",
+        &[
+            "method",
+            "stages/ingest",
+            "stages/smooth",
+            "stages/spacing",
+            "stages/surface",
+        ],
+    ),
+    (
+        "pipeline",
+        &[
+            "geom",
+            "method",
+            "params",
+            "report",
+            "stages/*",
+            "workspace",
+        ],
+    ),
+    ("ply", &[]),
+    ("report", &["params", "stages/*"]),
+    ("spill", &["workspace"]),
+    ("stages/blocks", &[]),
+    (
+        "stages/cells",
+        &[
+            "kernels",
+            "stages/blocks",
+            "stages/order",
+            "stages/spacing",
+            "stages/tiles",
+        ],
+    ),
+    (
+        "stages/export",
+        &[
+            "ply",
+            "stages/blocks",
+            "stages/order",
+            "stages/repair",
+            "stages/surface",
+        ],
+    ),
+    ("stages/ingest", &["ply"]),
+    (
+        "stages/located",
+        &["stages/blocks", "stages/order", "stages/spacing"],
+    ),
+    ("stages/order", &["stages/ingest"]),
+    (
+        "stages/outliers",
+        &[
+            "stages/blocks",
+            "stages/cells",
+            "stages/order",
+            "stages/tiles",
+        ],
+    ),
+    (
+        "stages/repair",
+        &[
+            "stages/blocks",
+            "stages/located",
+            "stages/order",
+            "stages/spacing",
+            "stages/stitch",
+            "stages/surface",
+        ],
+    ),
+    (
+        "stages/smooth",
+        &[
+            "kernels",
+            "stages/cells",
+            "stages/order",
+            "stages/spacing",
+            "stages/tiles",
+        ],
+    ),
+    ("stages/spacing", &[]),
+    (
+        "stages/stitch",
+        &[
+            "stages/blocks",
+            "stages/cells",
+            "stages/located",
+            "stages/surface",
+            "stages/triples",
+        ],
+    ),
+    (
+        "stages/surface",
+        &["stages/blocks", "stages/located", "stages/order"],
+    ),
+    ("stages/thin", &["stages/ingest"]),
+    ("stages/tiles", &["kernels", "stages/order"]),
+    ("stages/triples", &["stages/blocks", "stages/cells"]),
+    ("workspace", &[]),
+];
+
+/// Every stage may use these.
+const COMMON: &[&str] = &["error", "geom", "method", "spill", "workspace"];
+
+/// Lines of a file, its tests not counted.
+const MOST_LINES: usize = 500;
+
+fn source() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("src")
+}
+
+/// Every module that is not a test, with its text without comments and tests.
+fn modules() -> BTreeMap<String, String> {
+    fn walk(folder: &Path, all: &mut BTreeMap<String, String>) {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            let name = path.file_stem().unwrap().to_str().unwrap();
+            if path.is_dir() {
+                walk(&path, all);
+            } else if !name.contains("tests") && !["main", "lib"].contains(&name) {
+                let relative = path.strip_prefix(source()).unwrap().with_extension("");
+                let relative = relative.to_str().unwrap();
+                let module = relative.strip_suffix("/mod").unwrap_or(relative);
+                let text = std::fs::read_to_string(&path).unwrap();
+                let text = text.split("#[cfg(test)]\nmod tests {").next().unwrap();
+                let lines = text.lines().map(|line| line.split("//").next().unwrap());
+                all.insert(module.to_owned(), lines.collect::<Vec<_>>().join("\n"));
+            }
+        }
+    }
+    let mut all = BTreeMap::new();
+    walk(&source(), &mut all);
+    assert!(all.len() > 100, "only {} modules found", all.len());
+    all
+}
+
+/// `a::{b, c::{d, e}}` as `a::b`, `a::c::d`, `a::c::e`.
+fn expand(path: &str) -> Vec<String> {
+    let Some((before, inside)) = path.split_once('{') else {
+        return vec![path.split(" as ").next().unwrap().trim().to_owned()];
+    };
+    let inside = inside.trim_end().strip_suffix('}').unwrap();
+    let (mut parts, mut depth) = (vec![String::new()], 0);
+    for c in inside.chars() {
+        depth += i32::from(c == '{') - i32::from(c == '}');
+        if c == ',' && depth == 0 {
+            parts.push(String::new());
+        } else {
+            parts.last_mut().unwrap().push(c);
+        }
+    }
+    let parts = parts.iter().map(|part| part.trim());
+    let parts = parts.filter(|part| !part.is_empty());
+    parts
+        .flat_map(|part| expand(&format!("{}{part}", before.trim_start())))
+        .collect()
+}
+
+/// The modules that a module imports from, by its `use` lines.
+fn imports(module: &str, text: &str, all: &BTreeMap<String, String>) -> BTreeSet<String> {
+    let mut found = BTreeSet::new();
+    for line in text.split("use ").skip(1) {
+        let Some((path, _)) = line.split_once(';') else {
+            continue;
+        };
+        if !["crate::", "super::", "self::"]
+            .iter()
+            .any(|start| path.starts_with(start))
+        {
+            continue;
+        }
+        let path = path.split_whitespace().collect::<Vec<_>>().join(" ");
+        for path in expand(&path) {
+            let mut at: Vec<&str> = module.split('/').collect();
+            for (number, part) in path.split("::").enumerate() {
+                match part.trim() {
+                    "crate" if number == 0 => at.clear(),
+                    "self" => {}
+                    "super" => drop(at.pop()),
+                    part => {
+                        at.push(part);
+                        if !all.contains_key(&at.join("/")) {
+                            at.pop();
+                            break;
+                        }
+                    }
+                }
+            }
+            let target = at.join("/");
+            if target != module && all.contains_key(&target) {
+                found.insert(target);
+            }
+        }
+    }
+    found
+}
+
+fn room(module: &str) -> String {
+    let depth = 1 + usize::from(module.starts_with("stages/"));
+    module.split('/').take(depth).collect::<Vec<_>>().join("/")
+}
+
+fn graph() -> BTreeMap<String, BTreeSet<String>> {
+    let all = modules();
+    let edges = all
+        .iter()
+        .map(|(module, text)| (module.clone(), imports(module, text, &all)));
+    edges.collect()
+}
+
+#[test]
+fn use_lines_are_read() {
+    let paths = expand("crate::a::{b, c::{D, self}, e::F as G}");
+    assert_eq!(
+        paths,
+        [
+            "crate::a::b",
+            "crate::a::c::D",
+            "crate::a::c::self",
+            "crate::a::e::F"
+        ]
+    );
+    let graph = graph();
+    assert!(graph["pipeline/stages"].contains("stages/repair"));
+    assert!(graph["spill/table"].contains("workspace/place"));
+}
+
+#[test]
+fn no_room_knows_more_than_the_map_says() {
+    let rules: BTreeMap<&str, &[&str]> = MAY_USE.iter().copied().collect();
+    let mut wrong = Vec::new();
+    for (module, targets) in graph() {
+        let from = room(&module);
+        if from == "stages" {
+            continue;
+        }
+        let allowed = rules
+            .get(from.as_str())
+            .unwrap_or_else(|| panic!("{from} is not on the map"));
+        for target in targets {
+            let to = room(&target);
+            let stage = from.starts_with("stages/") && COMMON.contains(&to.as_str());
+            let any = to.starts_with("stages/") && allowed.contains(&"stages/*");
+            if to != from && to != "error" && !stage && !any && !allowed.contains(&to.as_str()) {
+                wrong.push(format!("{module} uses {target}"));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "not on the map:\n{}", wrong.join("\n"));
+}
+
+#[test]
+fn no_circle_of_imports() {
+    let mut graph = graph();
+    // Modules that import nothing that is left are in no circle.
+    loop {
+        let free: Vec<String> = graph
+            .iter()
+            .filter(|(_, targets)| targets.iter().all(|t| !graph.contains_key(t)))
+            .map(|(module, _)| module.clone())
+            .collect();
+        if free.is_empty() {
+            break;
+        }
+        free.iter().for_each(|module| drop(graph.remove(module)));
+    }
+    // A folder's first file and the others in it are one: what is left of them is none.
+    let mut circles = BTreeMap::new();
+    for (module, targets) in &graph {
+        let inside = |t: &&String| graph.contains_key(*t) && !module.starts_with(&format!("{t}/"));
+        let inside: Vec<&String> = targets.iter().filter(inside).collect();
+        if !inside.is_empty() {
+            circles.insert(module, inside);
+        }
+    }
+    let reaches = |from: &String, to: &String| {
+        let (mut seen, mut stack) = (BTreeSet::new(), vec![from]);
+        while let Some(at) = stack.pop() {
+            for &next in circles.get(at).into_iter().flatten() {
+                if next == to {
+                    return true;
+                }
+                if seen.insert(next) {
+                    stack.push(next);
+                }
+            }
+        }
+        false
+    };
+    let wrong: Vec<_> = circles
+        .keys()
+        .filter(|module| reaches(module, module))
+        .collect();
+    assert!(wrong.is_empty(), "in circles of imports: {wrong:?}");
+}
+
+#[test]
+fn no_stage_reads_records_by_position() {
+    for (module, text) in modules() {
+        if module.starts_with("stages/") {
+            let plain = ["Table<[u32", "Shuffle<[u32", "Sorter<[u32"];
+            let found = plain.iter().find(|plain| text.contains(**plain));
+            assert!(found.is_none(), "{module}: {found:?} has no named fields");
+        }
+    }
+}
+
+#[test]
+fn files_are_about_one_thing() {
+    let long: Vec<_> = modules()
+        .into_iter()
+        .map(|(module, text)| (text.lines().count(), module))
+        .filter(|(lines, _)| *lines > MOST_LINES)
+        .collect();
+    assert!(long.is_empty(), "more than {MOST_LINES} lines: {long:?}");
+}
