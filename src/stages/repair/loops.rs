@@ -128,12 +128,11 @@ fn fan<'a>(
     position: &impl Fn(u32) -> Point,
 ) -> Option<Fan> {
     let edges = members.clone().map(|t| after(ids(t), v));
-    let starts = |x: u32| edges.clone().any(|[a, _]| a == x);
-    let ends = |x: u32| edges.clone().any(|[_, b]| b == x);
-    let [start, apex] = edges.clone().find(|&[a, _]| !ends(a))?;
-    let [_, end] = edges.clone().find(|&[_, b]| !starts(b))?;
+    let Ends::One { start, apex, end } = ends(edges.clone()) else {
+        return None;
+    };
     let mut sum = [0i128; 3];
-    for [a, b] in edges.clone() {
+    for [a, b] in edges {
         let n = normal(position(v), position(a), position(b));
         for axis in 0..3 {
             sum[axis] += n[axis];

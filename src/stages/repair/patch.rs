@@ -4,8 +4,8 @@
 //! No edge has more than two triangles and the surface is orientable; so it does not matter in
 //! which order edges are looked at.
 
-use crate::stages::surface::by_end::ByLowerEnd;
 use crate::stages::surface::parity::ParitySets;
+use crate::stages::surface::sides::{pair_edges, parts};
 use crate::stages::surface::star::{EDGES, Triangle};
 use crate::workspace::memory::{Holding, bytes_of, hold};
 use std::ops::Range;
@@ -28,19 +28,49 @@ pub struct Patch {
 
 /// A triangle without a label.
 const NONE: u32 = u32::MAX;
-/// An edge that has its two triangles.
-const PAIRED: u32 = u32::MAX;
+
+/// The labels of triangles while their edges are looked at.
+struct Labels {
+    /// As in [`Patch`], or [`NONE`].
+    words: Vec<u32>,
+    sets: ParitySets,
+}
+
+impl Labels {
+    /// Gives two triangles one label; `flip` if one of the two must be turned.
+    #[inline]
+    fn relate(&mut self, a: u32, b: u32, flip: bool) {
+        let (a, b, flip) = (a as usize, b as usize, u32::from(flip));
+        match (self.words[a], self.words[b]) {
+            (NONE, NONE) => {
+                self.words[a] = self.sets.push() << 1;
+                self.words[b] = self.words[a] ^ flip;
+            }
+            (known, NONE) => self.words[b] = known ^ flip,
+            (NONE, known) => self.words[a] = known ^ flip,
+            (known, other) if known ^ flip != other => {
+                let turned = (known ^ flip ^ other) & 1 == 1;
+                let fits = self.sets.join(known >> 1, other >> 1, turned);
+                debug_assert!(fits, "a surface that is not orientable");
+            }
+            _ => {}
+        }
+    }
+
+    /// Gives a label of its own to every triangle that has none.
+    fn complete(&mut self) {
+        for word in self.words.iter_mut().filter(|word| **word == NONE) {
+            *word = self.sets.push() << 1;
+        }
+    }
+}
 
 struct Builder<'a> {
     ids: Range<u32>,
     triangles: &'a [Triangle],
-    words: Vec<u32>,
-    sets: ParitySets,
+    labels: Labels,
     open: Vec<bool>,
     rims: Vec<u8>,
-    /// For each vertex `y`, the last vertex `v < y` whose edge to it was seen (plus one, in the
-    /// upper half), and the triangle there: number and whether it runs from `v` to `y`.
-    seen: Vec<u64>,
 }
 
 impl Patch {
@@ -48,117 +78,44 @@ impl Patch {
     #[must_use]
     pub fn of(ids: Range<u32>, triangles: &[Triangle]) -> Self {
         let mut builder = Builder {
-            words: vec![NONE; triangles.len()],
-            sets: ParitySets::new(0),
+            labels: Labels {
+                words: vec![NONE; triangles.len()],
+                sets: ParitySets::new(0),
+            },
             open: vec![false; triangles.len()],
             rims: vec![0; ids.len()],
-            seen: vec![0; ids.len()],
             ids,
             triangles,
         };
-        let lists = bytes_of(&builder.words) + bytes_of(&builder.open) + bytes_of(&builder.rims);
-        let held = hold(lists);
+        let words = bytes_of(&builder.labels.words);
+        let held = hold(words + bytes_of(&builder.open) + bytes_of(&builder.rims));
         builder.inside();
-        builder.seen = Vec::new();
         builder.across();
+        builder.labels.complete();
         builder.number(held)
     }
 }
 
 impl Builder<'_> {
-    /// The edges with both ends in the block, by their lower ends.
+    /// The edges with both ends in the block.
     fn inside(&mut self) {
-        let size = self.ids.len() as u32;
-        let edges = ByLowerEnd::of(self.ids.clone(), self.triangles);
-        let mut next = edges.first();
-        let lists = edges.bytes();
-        let mut held = hold(lists + bytes_of(&self.seen));
-        for v in 0..size {
-            let upper = edges.upper(v);
-            let first = next;
-            let mut single = 0;
-            for &number in upper {
-                let y = self.triangles[number as usize][2] - self.ids.start;
-                single += self.visit(v, y, number, true);
-                self.named(number);
+        let Self {
+            labels, open, rims, ..
+        } = self;
+        // An edge between the first and the last vertex runs down, others up.
+        let pair = |a: u32, b: u32| {
+            let ((a, corner), (b, opposite)) = (parts(a), parts(b));
+            let flip = (corner == 1) == (opposite == 1);
+            labels.relate(a as u32, b as u32, flip);
+        };
+        let lone = |side: u32, ends: [u32; 2]| {
+            open[parts(side).0] = true;
+            for end in ends {
+                let rim = &mut rims[end as usize];
+                *rim = rim.saturating_add(1);
             }
-            while let Some(&t) = self
-                .triangles
-                .get(next)
-                .filter(|t| t[0] == self.ids.start + v)
-            {
-                for (y, up) in [(t[1], true), (t[2], false)] {
-                    let y = y - self.ids.start;
-                    if y < size {
-                        single += self.visit(v, y, next as u32, up);
-                    }
-                }
-                self.named(next as u32);
-                next += 1;
-            }
-            if single > 0 {
-                self.note_single(v, upper, first..next);
-            }
-        }
-        let labels = 4 * self.sets.len() as u64;
-        held.set(lists + bytes_of(&self.seen) + labels);
-    }
-
-    /// Sees triangle `number` at the edge from `v` to `y`; 1 for the edge's first, -1 for its second.
-    #[inline]
-    fn visit(&mut self, v: u32, y: u32, number: u32, up: bool) -> i32 {
-        let tag = u64::from(v + 1) << 32;
-        let seen = self.seen[y as usize];
-        if seen >> 32 != tag >> 32 {
-            self.seen[y as usize] = tag | u64::from(number << 1 | u32::from(up));
-            return 1;
-        }
-        let other = seen as u32;
-        debug_assert_ne!(other, PAIRED, "an edge with three triangles");
-        self.seen[y as usize] = tag | u64::from(PAIRED);
-        self.relate(other >> 1, number, (other & 1 == 1) == up);
-        -1
-    }
-
-    /// Puts `b` into the set of `a`, which has a label; `flip` if one must be turned.
-    #[inline]
-    fn relate(&mut self, a: u32, b: u32, flip: bool) {
-        let (known, new) = (
-            self.words[a as usize] ^ u32::from(flip),
-            self.words[b as usize],
-        );
-        if new == NONE {
-            self.words[b as usize] = known;
-        } else if known != new {
-            let turned = (known ^ new) & 1 == 1;
-            let fits = self.sets.join(known >> 1, new >> 1, turned);
-            debug_assert!(fits, "a surface that is not orientable");
-        }
-    }
-
-    /// Gives triangle `number` a label of its own if it has none.
-    #[inline]
-    fn named(&mut self, number: u32) {
-        if self.words[number as usize] == NONE {
-            self.words[number as usize] = self.sets.push() << 1;
-        }
-    }
-
-    /// Notes the edges up from `v` that were seen once.
-    fn note_single(&mut self, v: u32, upper: &[u32], own: Range<usize>) {
-        let own = own.flat_map(|n| [(n, 1), (n, 2)]);
-        for (number, corner) in upper.iter().map(|&n| (n as usize, 2)).chain(own) {
-            let y = (self.triangles[number][corner] - self.ids.start) as usize;
-            if let Some(&seen) = self.seen.get(y)
-                && seen >> 32 == u64::from(v + 1)
-                && seen as u32 != PAIRED
-            {
-                self.open[number] = true;
-                for end in [v as usize, y] {
-                    self.rims[end] = self.rims[end].saturating_add(1);
-                }
-            }
-        }
+        };
+        pair_edges(self.ids.clone(), self.triangles, pair, lone);
     }
 
     /// The edges with one end in the block.
@@ -173,10 +130,9 @@ impl Builder<'_> {
         edges.sort_unstable();
         let mut rest = &edges[..];
         while let Some(&(low, high, number, up)) = rest.first() {
-            self.named(number);
             match rest.get(1) {
                 Some(&(l, h, other, other_up)) if (l, h) == (low, high) => {
-                    self.relate(number, other, up == other_up);
+                    self.labels.relate(number, other, up == other_up);
                     rest = &rest[2..];
                 }
                 _ => {
@@ -199,13 +155,17 @@ impl Builder<'_> {
     }
 
     /// Numbers the labels, those of triangles that are not interior first.
-    fn number(mut self, held: Holding) -> Patch {
-        self.sets.flatten();
-        let mut numbers = vec![NONE; self.sets.len()];
+    fn number(self, held: Holding) -> Patch {
+        let Labels {
+            mut words,
+            mut sets,
+        } = self.labels;
+        sets.flatten();
+        let mut numbers = vec![NONE; sets.len()];
         let _numbers = hold(2 * bytes_of(&numbers));
         let mut labels = 0;
         let mut number = |label: u32| {
-            let (root, flip) = self.sets.look(label);
+            let (root, flip) = sets.look(label);
             let number = &mut numbers[root as usize];
             if *number == NONE {
                 *number = labels;
@@ -214,16 +174,16 @@ impl Builder<'_> {
             *number << 1 | u32::from(flip)
         };
         let mut global = 0;
-        for (word, t) in self.words.iter().zip(self.triangles) {
+        for (word, t) in words.iter().zip(self.triangles) {
             if !(self.ids.contains(&t[0]) && self.ids.contains(&t[2])) {
                 global = global.max((number(word >> 1) >> 1) + 1);
             }
         }
-        for word in &mut self.words {
+        for word in &mut words {
             *word = number(*word >> 1) ^ (*word & 1);
         }
         Patch {
-            words: self.words,
+            words,
             labels,
             global,
             open: self.open,

@@ -9,7 +9,7 @@ use crate::stages::blocks::Blocks;
 use crate::stages::located::{Located, Places};
 use crate::stages::surface::columns;
 use crate::stages::surface::evidence::{Division, Evidence};
-use crate::stages::surface::orient::{Around, Oriented, orient_inside};
+use crate::stages::surface::orient::{BlockTriangles, Oriented, orient_inside};
 use crate::stages::surface::star::{Link, Star, Triangle, has, others};
 use crate::stages::triples::Triples;
 use crate::workspace::Workspace;
@@ -143,7 +143,7 @@ persist!(Found {
 
 impl Look<'_> {
     /// The T3 triangles that touch a block and that no vertex of it flags, ascending.
-    fn block(&self, block: usize) -> Result<Around<Found>> {
+    fn block(&self, block: usize) -> Result<BlockTriangles<Found>> {
         let mut found = Found::default();
         let (mut triangles, mut candidates) = self.part(block, &mut found)?;
         let mut held = hold(bytes_of(&triangles) + bytes_of(&candidates));
@@ -153,7 +153,7 @@ impl Look<'_> {
         let star = Star::of(self.blocks.ids(block), &triangles);
         let mut flagged = Vec::new();
         let mut refusing = Refusing::default();
-        for v in star.ids() {
+        for v in self.blocks.ids(block) {
             refusing.at(v, &star, &triangles, &mut flagged);
         }
         drop(star);
@@ -188,7 +188,7 @@ impl Look<'_> {
             None => None,
         };
         held.set(bytes_of(&triangles));
-        Ok(Around {
+        Ok(BlockTriangles {
             triangles,
             evidence,
             found,

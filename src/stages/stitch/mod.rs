@@ -1,17 +1,24 @@
 //! From triples to an oriented manifold (paper, section 3.5).
 //!
-//! The mesh is decided block by block: first every vertex flags what it refuses of T3, then the
-//! rest is oriented, then T12 triangles are inserted, inside blocks first and across them after.
-//! Sections 6 and 7 of `docs/method.md` define it.
+//! The mesh is decided block by block:
+//! 1. `base`: every vertex flags what it refuses of T3, and the rest is oriented.
+//! 2. `interior`: T12 candidates are inserted inside each block.
+//! 3. `across`: then those between blocks, and tentative merges are confirmed or taken back.
+//!
+//! Both insertions are `insertion`, with the tests of `admissibility`. The semantics are in
+//! sections 6 and 7 of `docs/method.md`.
 
+mod across;
+mod admissibility;
 mod base;
-mod context;
-mod crossing;
-mod fans;
-mod home;
+mod components;
+mod insertion;
 mod interior;
 mod mail;
-mod tests_of_paper;
+mod stats;
+mod surroundings;
+
+pub use stats::{BaseStats, InsertStats};
 
 use crate::error::Result;
 use crate::spill::Sections;
@@ -21,13 +28,8 @@ use crate::stages::surface::evidence::Division;
 use crate::stages::triples::Triples;
 use crate::workspace::Workspace;
 use crate::workspace::persist::persist;
-use base::Base;
-use crossing::Pass;
+use across::Across;
 use interior::Interior;
-use serde::Serialize;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, Ordering};
-use tests_of_paper::Refusal;
 
 /// The mesh after manifold extraction; triangles by ascending ids, orientable, not yet oriented.
 #[derive(Debug)]
@@ -50,90 +52,10 @@ pub struct StitchOptions {
     pub weigh: Option<Division>,
 }
 
-/// Counts of the base.
-#[derive(Debug, Clone, Copy, Default, Serialize, PartialEq, Eq)]
-pub struct BaseStats {
-    /// T3 triangles flagged at non-manifold edges and vertices by excess.
-    pub flagged: u64,
-    /// T3 triangles left out because their points are on a line in the file, or a side is too long for the
-    /// surface.
-    pub unfit: u64,
-    /// T3 triangles removed so that the rest can be oriented: they close a Möbius band.
-    pub mobius: u64,
-    /// Triangles of the base.
-    pub triangles: u64,
-}
-
-/// What became of the candidates.
-#[derive(Debug, Clone, Copy, Default, Serialize, PartialEq, Eq)]
-pub struct InsertStats {
-    /// Inserted.
-    pub accepted: u64,
-    /// Test I: not properly connected to the mesh.
-    pub unconnected: u64,
-    /// Test II: an edge with two triangles.
-    pub full_edge: u64,
-    /// Test III: a vertex by excess.
-    pub excess: u64,
-    /// Geometric test: normals too different.
-    pub angle: u64,
-    /// Test IV: would close a Möbius band.
-    pub orientation: u64,
-    /// Not tried: its points are on a line in the file, or a side is too long for the surface.
-    pub unfit: u64,
-    /// Of the accepted, those taken out again because blocks joined components differently.
-    pub joints_removed: u64,
-    /// Triangles of the base that were cut; counted with those of the base.
-    #[serde(skip)]
-    cut: u64,
-}
-
-impl InsertStats {
-    fn refuse(&mut self, refusal: Refusal) {
-        match refusal {
-            Refusal::Unconnected => self.unconnected += 1,
-            Refusal::FullEdge => self.full_edge += 1,
-            Refusal::Excess => self.excess += 1,
-            Refusal::Angle => self.angle += 1,
-        }
-    }
-}
-
-impl InsertStats {
-    fn add(&mut self, more: &InsertStats) {
-        self.accepted += more.accepted;
-        self.unconnected += more.unconnected;
-        self.full_edge += more.full_edge;
-        self.excess += more.excess;
-        self.angle += more.angle;
-        self.orientation += more.orientation;
-        self.unfit += more.unfit;
-        self.joints_removed += more.joints_removed;
-        self.cut += more.cut;
-    }
-}
-
 persist!(Stitched {
     interior,
     added,
     removed
-});
-persist!(BaseStats {
-    flagged,
-    unfit,
-    mobius,
-    triangles
-});
-persist!(InsertStats {
-    accepted,
-    unconnected,
-    full_edge,
-    excess,
-    angle,
-    orientation,
-    unfit,
-    joints_removed,
-    cut
 });
 
 /// Extracts the manifold.
@@ -150,24 +72,16 @@ pub fn stitch(
 ) -> Result<(Stitched, BaseStats, InsertStats)> {
     let (base, mut counts) = base::base(places, triples, blocks, options.weigh, workspace)?;
     let interior = Interior::create(workspace, blocks.count())?;
+    let cos = options.cos_max_angle;
     // The pass across blocks is short, and begins again when the run is resumed.
     let (crossing, inserted) = workspace.once("insert", || {
-        let mut stats = InsertStats {
-            unfit: base.flat_candidates,
-            ..InsertStats::default()
-        };
-        let angle = options.cos_max_angle;
-        let mut pass = Pass::new(&base, &interior, blocks, angle, workspace)?;
-        let (pass_now, all) = (&mut pass, &mut stats);
-        workspace.part("insert", || {
-            insert(places, pass_now, &base, &interior, blocks, all, workspace)
-        })?;
-        workspace.part("cross", || {
-            pass.advance(|_| true, None)?;
-            let (crossing, more) = pass.finish()?;
-            stats.add(&more);
-            Ok((crossing, stats))
-        })
+        let across = Across::new(&base, &interior, blocks, cos, workspace)?;
+        let inside =
+            || interior::insert_all(places, &base, &interior, blocks, cos, &across, workspace);
+        let mut inserted = workspace.part("insert", inside)?;
+        let (crossing, more) = workspace.part("cross", || across.finish())?;
+        inserted.add(&more);
+        Ok((crossing, inserted))
     })?;
     counts.mobius += inserted.cut;
     counts.triangles -= inserted.cut;
@@ -177,43 +91,4 @@ pub fn stitch(
         removed: crossing.removed,
     };
     Ok((stitched, counts, inserted))
-}
-
-/// Inserts inside all blocks, in the order in which the pass across them needs them; whoever has
-/// finished a block takes the pass as far as it goes by then.
-fn insert(
-    places: Places<'_>,
-    pass: &mut Pass<'_>,
-    base: &Base,
-    interior: &Interior,
-    blocks: Blocks,
-    stats: &mut InsertStats,
-    workspace: &Workspace,
-) -> Result<()> {
-    let order = pass.order();
-    let bytes = |unit: usize| interior::block_bytes(base, order[unit] as usize);
-    // A turn of the pass takes only what the blocks at work cannot need.
-    let most = (0..order.len()).map(bytes).max().unwrap_or(0);
-    let spare = workspace.memory.available();
-    let spare = spare.saturating_sub(most * workspace.threads as u64);
-    let done: Vec<AtomicBool> = order.iter().map(|_| AtomicBool::new(false)).collect();
-    let ready = |block: u32| done[block as usize].load(Ordering::Acquire);
-    let angle = pass.cos_max_angle();
-    let pass = Mutex::new(pass);
-    let work = |unit: usize| {
-        let block = order[unit] as usize;
-        let counts = interior::insert(places, base, interior, blocks, block, angle)?;
-        done[block].store(true, Ordering::Release);
-        workspace.advance(1);
-        // Or someone else is at it.
-        if let Ok(mut pass) = pass.try_lock() {
-            pass.advance(ready, Some(spare))?;
-        }
-        Ok(counts)
-    };
-    workspace.units("stitch: block", order.len(), bytes, work, |unit, counts| {
-        done[order[unit] as usize].store(true, Ordering::Release);
-        stats.add(&counts);
-        Ok(())
-    })
 }

@@ -19,8 +19,8 @@ pub enum Limit {
     /// Always.
     None,
     /// If the pair dominates one of the two (it weighs at least half of all that the node is connected
-    /// by, so that turning the node against it would gain nothing), or both together have at most so
-    /// many triangles.
+    /// by, so that turning the node against it would gain nothing), or both together have at most this
+    /// number of triangles.
     Triangles(u64),
 }
 

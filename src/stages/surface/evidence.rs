@@ -11,7 +11,7 @@ use crate::workspace::memory::Holding;
 /// How a base is divided while it is oriented.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Division {
-    /// The smallest ids of the triangles of a patch share a run of so many ids.
+    /// The smallest ids of the triangles of a patch share a run of this number of ids.
     pub patch: u32,
     /// Most triangles that are joined inside a block where another part of the cloud could still gain by
     /// turning them against each other.

@@ -1,23 +1,22 @@
-//! Components and orientation of a surface given block by block.
+//! Components and orientation of a surface given block by block: each block by itself, and what comes of
+//! it with the crossing triangles.
 
-use super::across::settle;
-use super::border::Border;
 use super::evidence::Evidence;
+use super::labels::orient_block;
 use super::parity::ParitySets;
-use super::patches::Joint;
-use super::star::{EDGES, Edges, Triangle, opposed};
-use super::weigh::weigh_block;
+use super::star::Triangle;
 use crate::error::Result;
-use crate::spill::layouts::{LABELLED, SENT_LABELLED, TRIANGLE};
+use crate::spill::layouts::{LABELLED, TRIANGLE};
 use crate::spill::{Exchange, Sections, Word};
 use crate::stages::blocks::Blocks;
 use crate::workspace::Workspace;
-use crate::workspace::memory::{Holding, bytes_of, hold};
+use crate::workspace::memory::{Holding, Reservation, bytes_of, hold};
 use crate::workspace::persist::{Persist, Saved};
 
 const EXCHANGE_BUFFER: u64 = 8 << 20;
 
-/// An oriented surface: every triangle has a label and an orientation relative to it.
+/// An oriented surface: every triangle has a label and an orientation relative to it. Triangles of one
+/// label are of one component; the labels of a component are joined in `sets`.
 #[derive(Debug)]
 pub struct Oriented {
     /// `[i, j, k, label << 1 | flip]` of interior triangles by block; labels are the block's own.
@@ -40,21 +39,21 @@ pub struct Oriented {
     pub mobius: u64,
     /// Triangles that are left.
     pub triangles: u64,
-    _held: crate::workspace::memory::Reservation,
+    pub(super) _held: Reservation,
 }
 
 /// A surface whose blocks are oriented, but not yet what lies between them.
 #[derive(Debug)]
 pub struct OrientedInside {
-    interior: Sections<4>,
-    relations: Sections<7>,
-    weighed: Option<Weighed>,
+    pub(super) interior: Sections<4>,
+    pub(super) relations: Sections<7>,
+    pub(super) weighed: Option<Weighed>,
     /// Crossing triangles by the block of their smallest vertex.
-    crossing: Sections<3>,
+    pub(super) crossing: Sections<3>,
     /// For each block, the number of labels that are global, and of all.
-    labels: Vec<(u32, u32)>,
-    mobius: u64,
-    triangles: u64,
+    pub(super) labels: Vec<(u32, u32)>,
+    pub(super) mobius: u64,
+    pub(super) triangles: u64,
 }
 
 /// Evidence on the orientation of each block's labels, by block.
@@ -65,7 +64,7 @@ pub(super) struct Weighed {
     /// Evidence that global labels face up, `[label, up]`, the evidence in two words.
     pub ups: Sections<3>,
     /// See [`Oriented::seams`].
-    seams: Sections<2>,
+    pub seams: Sections<2>,
     /// Unit normals of the crossing triangles, in their order, as `f32`.
     pub normals: Sections<3>,
 }
@@ -83,7 +82,7 @@ impl Weighed {
 }
 
 /// The triangles around a block, and what else was found there.
-pub struct Around<T> {
+pub struct BlockTriangles<T> {
     /// All that touch the block, ascending.
     pub triangles: Vec<Triangle>,
     /// What speaks for their orientation; without, the order of triangles decides.
@@ -106,7 +105,7 @@ pub struct Around<T> {
 /// [`crate::Error::Cancelled`].
 pub fn orient_inside<T: Persist + Send>(
     name: &str,
-    around: impl Fn(usize) -> Result<Around<T>> + Sync,
+    around: impl Fn(usize) -> Result<BlockTriangles<T>> + Sync,
     mut each: impl FnMut(usize, T) + Send,
     bytes: impl Fn(usize) -> u64 + Sync,
     blocks: Blocks,
@@ -116,7 +115,7 @@ pub fn orient_inside<T: Persist + Send>(
     let count = blocks.count();
     let sections = |part: &str| format!("{name}.{part}");
     let interior = Sections::with_layout(workspace, &sections("interior"), count, LABELLED)?;
-    let border = Sections::with_layout(workspace, &sections("border"), count, TRIANGLE)?;
+    let first = Sections::with_layout(workspace, &sections("border"), count, TRIANGLE)?;
     let letters = sections("relations");
     let above = [Word::Above; 7];
     let exchange = Exchange::between(workspace, &letters, EXCHANGE_BUFFER, count, above)?;
@@ -124,7 +123,7 @@ pub fn orient_inside<T: Persist + Send>(
         .then(|| Weighed::create(workspace, name, count))
         .transpose()?;
     let work = |block| {
-        let Around {
+        let BlockTriangles {
             triangles: mut inner,
             evidence,
             found,
@@ -137,7 +136,7 @@ pub fn orient_inside<T: Persist + Send>(
         exchange.send_from(block, &done.relations)?;
         let mine = |t: &Triangle| blocks.of(t[0]) == block as u32;
         let mine: Vec<Triangle> = crossing.iter().copied().filter(mine).collect();
-        border.put(block, &mine)?;
+        first.put(block, &mine)?;
         if let (Some(weighed), Some(evidence)) = (&weighed, &evidence) {
             weighed.pairs.put(block, &done.pairs)?;
             weighed.ups.put(block, &done.ups)?;
@@ -163,7 +162,7 @@ pub fn orient_inside<T: Persist + Send>(
         interior,
         relations: exchange.deliver(workspace, count)?,
         weighed,
-        crossing: border,
+        crossing: first,
         labels,
         mobius,
         triangles,
@@ -242,359 +241,7 @@ impl Persist for Oriented {
     }
 }
 
-/// Bytes that so many global labels take.
-fn label_bytes(labels: usize) -> u64 {
+/// Bytes that this number of global labels takes.
+pub(super) fn label_bytes(labels: usize) -> u64 {
     labels as u64 * 16 + 1024
-}
-
-impl OrientedInside {
-    /// The second half of [`orient_inside`]: the crossing triangles, ascending, without those in
-    /// `removed`, `[block, i, j, k]` by the block of their smallest vertex.
-    ///
-    /// # Errors
-    /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
-    /// [`crate::Error::Cancelled`].
-    pub fn join(
-        self,
-        name: &str,
-        removed: &Sections<4>,
-        blocks: Blocks,
-        workspace: &Workspace,
-    ) -> Result<Oriented> {
-        let mut globals = Vec::with_capacity(self.labels.len());
-        let mut next = 0u32;
-        for (global, _) in &self.labels {
-            globals.push((next, *global));
-            next += global;
-        }
-        let held = workspace.reserve("labels", label_bytes(next as usize))?;
-        let mut surface = Oriented {
-            interior: self.interior,
-            crossing: Sections::create(workspace, &format!("{name}.none"), 0)?,
-            globals,
-            labels: self.labels.into_iter().map(|(_, all)| all).collect(),
-            sets: ParitySets::new(next as usize),
-            crosses: vec![false; next as usize],
-            seams: None,
-            mobius: self.mobius,
-            triangles: self.triangles,
-            _held: held,
-        };
-        let present = |block: usize, t: &Triangle, removed: &[[u32; 4]]| {
-            removed
-                .binary_search(&[block as u32, t[0], t[1], t[2]])
-                .is_err()
-        };
-        if let Some(weighed) = &self.weighed {
-            let border = |block: usize| {
-                let (triangles, removed) = (self.crossing.get(block)?, removed.get(block)?);
-                let normals = weighed.normals.get(block)?;
-                let with_normals = triangles.into_iter().zip(normals);
-                let with_normals = with_normals
-                    .map(|(t, normal)| (t, normal.map(|x| f64::from(f32::from_bits(x)))));
-                Ok(with_normals
-                    .filter(|(t, _)| present(block, t, &removed))
-                    .collect())
-            };
-            settle(
-                &mut surface,
-                border,
-                &self.relations,
-                weighed,
-                blocks,
-                workspace,
-            )?;
-        }
-        let border = |block: usize| {
-            let mut triangles = self.crossing.get(block)?;
-            let removed = removed.get(block)?;
-            triangles.retain(|t| present(block, t, &removed));
-            Ok(triangles)
-        };
-        orient_crossing(
-            &mut surface,
-            name,
-            border,
-            &self.relations,
-            blocks,
-            workspace,
-        )?;
-        // Not before: what is dropped while a step is at work may be gone when it is done again.
-        surface.seams = self.weighed.map(|weighed| weighed.seams);
-        Ok(surface)
-    }
-}
-
-pub(super) struct OrientedBlock {
-    interior: Vec<[u32; 4]>,
-    /// `[owner block, i, j, k, this block, label << 1 | flip, weight]`: what an interior triangle of
-    /// this block asks of the crossing triangle `i, j, k`.
-    relations: Vec<[u32; 7]>,
-    pairs: Vec<[u32; 4]>,
-    ups: Vec<[u32; 3]>,
-    seams: Vec<[u32; 2]>,
-    /// Number of labels that occur in relations or pairs; they come first.
-    global: u32,
-    labels: u32,
-    mobius: u64,
-    _held: Holding,
-}
-
-/// What the triangles adjacent to one ask for: their label, and if the triangle must be turned
-/// against it. At most two at each edge.
-#[derive(Debug, Default)]
-pub struct Asks {
-    list: [(u32, bool); 6],
-    len: usize,
-}
-
-impl Asks {
-    /// Adds one.
-    pub fn push(&mut self, ask: (u32, bool)) {
-        // A third triangle at an edge would be no surface; it is not looked at.
-        if self.len < 6 {
-            self.list[self.len] = ask;
-            self.len += 1;
-        }
-    }
-
-    /// All of them in order.
-    #[must_use]
-    pub fn all(&self) -> &[(u32, bool)] {
-        &self.list[..self.len]
-    }
-}
-
-fn orient_block(
-    inner: &[Triangle],
-    crossing: &[Triangle],
-    evidence: Option<&Evidence>,
-    blocks: Blocks,
-    block: usize,
-) -> OrientedBlock {
-    if let Some(evidence) = evidence {
-        return weigh_block(inner, crossing, evidence, blocks, block);
-    }
-    let ids = blocks.ids(block);
-    let mut edges = Edges::with_room(ids.clone(), inner);
-    let mut sets = ParitySets::new(inner.len());
-    let mut kept = Vec::with_capacity(inner.len());
-    let (_held, mut mobius) = (hold(8 * inner.len() as u64), 0);
-    for (number, &t) in inner.iter().enumerate() {
-        let number = number as u32;
-        // Either all adjacent triangles agree and are joined, or the triangle goes.
-        let mut asks = Asks::default();
-        adjacent(t, &edges, inner, &ids, |other, flip| {
-            asks.push((other, flip))
-        });
-        if !consistent(&mut sets, asks.all()) {
-            mobius += 1;
-            continue;
-        }
-        for &(other, flip) in asks.all() {
-            sets.join(other, number, flip);
-        }
-        edges.add(t, number);
-        kept.push(number);
-    }
-    let mut bonds = Bonds::default();
-    for &c in crossing {
-        adjacent(c, &edges, inner, &ids, |other, flip| {
-            bonds.first.push(other);
-            bonds.relations.push((c, other, flip, 1));
-        });
-    }
-    number_labels(inner, &kept, bonds, &mut sets, blocks, block, mobius)
-}
-
-/// What speaks for how the sets of a block run.
-#[derive(Default)]
-pub(super) struct Bonds {
-    /// A triangle of each set that the rest of the cloud may be connected with, in the order of labels.
-    pub first: Vec<u32>,
-    /// A crossing triangle, an interior one at an edge of it, whether one must be turned against the
-    /// other, and the weight of that.
-    pub relations: Vec<(Triangle, u32, bool, i64)>,
-    /// A triangle of each of two sets, and the sum of weights for running alike.
-    pub pairs: Vec<(u32, u32, i64)>,
-    /// A triangle of a set, and the evidence that the set faces up as this triangle runs.
-    pub ups: Vec<(u32, i64)>,
-    /// Edges between sets.
-    pub seams: Vec<Joint>,
-}
-
-/// Gives labels to the sets: first those that the rest of the cloud may be connected with.
-pub(super) fn number_labels(
-    inner: &[Triangle],
-    kept: &[u32],
-    bonds: Bonds,
-    sets: &mut ParitySets,
-    blocks: Blocks,
-    block: usize,
-    mobius: u64,
-) -> OrientedBlock {
-    const NONE: u32 = u32::MAX;
-    let mut label_of = vec![NONE; inner.len()];
-    let mut labels = 0;
-    let mut find = |triangle: u32| {
-        let (root, turned) = sets.find(triangle);
-        let label = &mut label_of[root as usize];
-        if *label == NONE {
-            *label = labels;
-            labels += 1;
-        }
-        (*label, turned, labels)
-    };
-    let mut global = 0;
-    for triangle in bonds.first {
-        global = find(triangle).2;
-    }
-    let mut sent = Vec::with_capacity(bonds.relations.len());
-    for (c, other, flip, weight) in bonds.relations {
-        let (label, turned, _) = find(other);
-        let word = label << 1 | u32::from(flip ^ turned);
-        let owner = blocks.of(c[0]);
-        sent.push([owner, c[0], c[1], c[2], block as u32, word, weight as u32]);
-    }
-    let mut pairs = Vec::with_capacity(bonds.pairs.len());
-    for (a, b, sum) in bonds.pairs {
-        let ((a, turned_a, _), (b, turned_b, _)) = (find(a), find(b));
-        let sum = if turned_a ^ turned_b { -sum } else { sum };
-        pairs.push([a, b, sum as u32, (sum >> 32) as u32]);
-    }
-    let mut ups = Vec::with_capacity(bonds.ups.len());
-    for (a, up) in bonds.ups {
-        let (label, turned, _) = find(a);
-        if label < global {
-            let up = if turned { -up } else { up };
-            ups.push([label, up as u32, (up >> 32) as u32]);
-        }
-    }
-    let mut interior = Vec::with_capacity(kept.len());
-    for &number in kept {
-        let (label, turned, _) = find(number);
-        let t = inner[number as usize];
-        interior.push([t[0], t[1], t[2], label << 1 | u32::from(turned)]);
-    }
-    let place = |n: u32| kept.partition_point(|k| *k < n) as u32;
-    let seam = |j: &Joint| [place(j.a), place(j.b) << 1 | u32::from(j.flip)];
-    let seams: Vec<_> = bonds.seams.iter().map(seam).collect();
-    let held = bytes_of(&interior) + bytes_of(&sent) + bytes_of(&pairs) + bytes_of(&seams);
-    OrientedBlock {
-        _held: hold(held),
-        interior,
-        relations: sent,
-        pairs,
-        ups,
-        seams,
-        global,
-        labels,
-        mobius,
-    }
-}
-
-/// Calls `each` with the triangles that share an edge inside the block with `t`, and whether `t`
-/// must be turned against them.
-pub(super) fn adjacent(
-    t: Triangle,
-    edges: &Edges,
-    triangles: &[Triangle],
-    ids: &std::ops::Range<u32>,
-    mut each: impl FnMut(u32, bool),
-) {
-    for (a, b, ..) in EDGES {
-        let (low, high) = (t[a], t[b]);
-        if ids.contains(&high) {
-            for n in edges.at(low, high) {
-                each(n, opposed(t, triangles[n as usize], low, high));
-            }
-        }
-    }
-}
-
-/// True if no two of `asks`, taken together with what is joined already, contradict each other.
-#[must_use]
-pub fn consistent(sets: &mut ParitySets, asks: &[(u32, bool)]) -> bool {
-    asks.iter().enumerate().all(|(x, &(a, flip_a))| {
-        asks[..x].iter().all(|&(b, flip_b)| {
-            sets.relation(a, b)
-                .is_none_or(|turned| turned == (flip_a ^ flip_b))
-        })
-    })
-}
-
-/// The crossing triangles in ascending order, each against those before it.
-fn orient_crossing(
-    base: &mut Oriented,
-    name: &str,
-    border: impl Fn(usize) -> Result<Vec<Triangle>>,
-    relations: &Sections<7>,
-    blocks: Blocks,
-    workspace: &Workspace,
-) -> Result<()> {
-    let exchange = Exchange::<5>::new(workspace, &format!("{name}.crossing"), EXCHANGE_BUFFER)?
-        .packed(SENT_LABELLED);
-    let mut edges = Border::new(workspace)?;
-    for group in 0..blocks.count() {
-        workspace.check_cancel()?;
-        let relations = relations.get(group)?;
-        let mut sent = Vec::new();
-        let triangles = border(group)?;
-        edges.make_room(triangles.len())?;
-        for t in triangles {
-            let Some(word) = orient_one(base, t, &relations, group as u32, &edges) else {
-                base.mobius += 1;
-                continue;
-            };
-            base.triangles += 1;
-            edges.put(t, word, [0.0; 3]);
-            sent.push([blocks.of(t[0]), t[0], t[1], t[2], word]);
-            sent.extend(blocks.visited(t).map(|b| [b, t[0], t[1], t[2], word]));
-        }
-        exchange.send(&sent)?;
-        edges.end(group, blocks);
-    }
-    base.crossing = exchange.deliver(workspace, blocks.count())?;
-    base.sets.flatten();
-    // Crossing marks were set on labels; what counts is the set.
-    for label in 0..base.sets.len() as u32 {
-        if base.crosses[label as usize] {
-            let (root, _) = base.sets.find(label);
-            base.crosses[root as usize] = true;
-        }
-    }
-    Ok(())
-}
-
-/// Joins one crossing triangle; its label and flip, or `None` if it closes a Möbius band.
-fn orient_one(
-    base: &mut Oriented,
-    t: Triangle,
-    relations: &[[u32; 7]],
-    group: u32,
-    edges: &Border,
-) -> Option<u32> {
-    let key = [group, t[0], t[1], t[2]];
-    let start = relations.partition_point(|r| r[..4] < key[..]);
-    let mut asks: Vec<(u32, bool)> = relations[start..]
-        .iter()
-        .take_while(|r| r[..4] == key[..])
-        .map(|r| (base.globals[r[4] as usize].0 + (r[5] >> 1), r[5] & 1 == 1))
-        .collect();
-    asks.extend(edges.asks(t));
-    if !consistent(&mut base.sets, &asks) {
-        return None;
-    }
-    let (label, flip) = match asks.first() {
-        Some(&first) => first,
-        None => {
-            base.crosses.push(false);
-            (base.sets.push(), false)
-        }
-    };
-    for &(other, turned) in &asks {
-        base.sets.join(label, other, flip ^ turned);
-    }
-    base.crosses[label as usize] = true;
-    Some(label << 1 | u32::from(flip))
 }

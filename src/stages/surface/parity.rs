@@ -1,5 +1,9 @@
 //! Union–find in which every member has an orientation relative to its set.
 
+/// What an adjacent triangle asks of the orientation of another one: a label, and whether the other one
+/// must be turned against it.
+pub type OrientationConstraint = (u32, bool);
+
 /// Sets of labels with relative orientations.
 #[derive(Debug, Clone, Default)]
 pub struct ParitySets {
@@ -113,6 +117,29 @@ impl ParitySets {
         let (root_a, flip_a) = self.find(a);
         let (root_b, flip_b) = self.find(b);
         (root_a == root_b).then_some(flip_a ^ flip_b)
+    }
+
+    /// True if no two of `constraints`, taken together with what is joined already, contradict each
+    /// other.
+    #[must_use]
+    pub fn allow(&mut self, constraints: &[OrientationConstraint]) -> bool {
+        constraints.iter().enumerate().all(|(x, &(a, flip_a))| {
+            constraints[..x].iter().all(|&(b, flip_b)| {
+                self.relation(a, b)
+                    .is_none_or(|turned| turned == (flip_a ^ flip_b))
+            })
+        })
+    }
+
+    /// Joins the labels of `constraints`; false, and nothing changes, if they contradict each other.
+    pub fn merge(&mut self, constraints: &[OrientationConstraint]) -> bool {
+        let fits = self.allow(constraints);
+        if let (true, Some((&(first, flip), others))) = (fits, constraints.split_first()) {
+            for &(other, turned) in others {
+                self.join(first, other, flip ^ turned);
+            }
+        }
+        fits
     }
 }
 

@@ -9,7 +9,7 @@ use std::ops::Range;
 
 /// An edge between two triangles inside a block.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Joint {
+pub struct SharedEdge {
     /// The earlier triangle.
     pub a: u32,
     /// The later one.
@@ -32,7 +32,7 @@ pub struct Patches {
     pub roots: Vec<(u32, u32)>,
     /// Edges between patches, and those in a patch whose triangles run against each other, by
     /// ascending triangles.
-    pub joints: Vec<Joint>,
+    pub shared: Vec<SharedEdge>,
     _held: Holding,
 }
 
@@ -50,7 +50,7 @@ impl Patches {
             evidence,
             normals: Vec::new(),
             edges: Vec::new(),
-            joints: Vec::new(),
+            shared: Vec::new(),
         };
         let mut first = 0;
         while let Some(t) = triangles.get(first) {
@@ -59,23 +59,23 @@ impl Patches {
             runs.join(first..first + count, &mut sets);
             first += count;
         }
-        let mut joints = runs.joints;
-        let held_before = bytes_of(&across) + bytes_of(&joints);
+        let mut shared = runs.shared;
+        let held_before = bytes_of(&across) + bytes_of(&shared);
         held.set(held_before + 8 * triangles.len() as u64);
         drop(across);
         let (of, roots) = number(&mut sets);
-        let apart = |j: &Joint| of[j.a as usize] != of[j.b as usize];
-        joints.retain(|j| apart(j) || sets.relation(j.a, j.b) != Some(j.flip));
-        for j in &mut joints {
+        let apart = |j: &SharedEdge| of[j.a as usize] != of[j.b as usize];
+        shared.retain(|j| apart(j) || sets.relation(j.a, j.b) != Some(j.flip));
+        for j in &mut shared {
             let [a, b] = [j.a, j.b].map(|n| evidence.long_normal(triangles[n as usize]));
             j.weight = a.weight(b, j.flip) as u8;
         }
-        held.set(bytes_of(&joints) + bytes_of(&of) + bytes_of(&roots) + 4 * of.len() as u64);
+        held.set(bytes_of(&shared) + bytes_of(&of) + bytes_of(&roots) + 4 * of.len() as u64);
         Self {
             sets,
             of,
             roots,
-            joints,
+            shared,
             _held: held,
         }
     }
@@ -88,10 +88,10 @@ struct Runs<'a> {
     evidence: &'a Evidence,
     /// Of the triangles of the run.
     normals: Vec<LongNormal>,
-    /// Room for the edges of the triangles of the run with a later one, as in a [`Joint`].
+    /// Room for the edges of the triangles of the run with a later one, as in a [`SharedEdge`].
     edges: Vec<(u32, u32, bool)>,
     /// The edges that were not joined; their weights are left out.
-    joints: Vec<Joint>,
+    shared: Vec<SharedEdge>,
 }
 
 impl Runs<'_> {
@@ -120,7 +120,7 @@ impl Runs<'_> {
             let flat = || normals[n - run.start].is_flat(normals[m - run.start], flip);
             if !(m < run.end && flat() && sets.join_to_smaller(a, b, flip)) {
                 let weight = 0;
-                self.joints.push(Joint { a, b, flip, weight });
+                self.shared.push(SharedEdge { a, b, flip, weight });
             }
         }
     }

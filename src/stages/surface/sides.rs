@@ -1,7 +1,6 @@
-//! What lies behind the edges of the triangles inside a block.
+//! Which triangles share an edge inside a block.
 
-use super::by_end::ByLowerEnd;
-use super::star::Triangle;
+use super::star::{ByVertex, Triangle};
 use crate::workspace::memory::{bytes_of, hold};
 use std::ops::Range;
 
@@ -22,38 +21,82 @@ pub fn parts(side: u32) -> (usize, usize) {
     ((side >> 2) as usize, (side & 3) as usize)
 }
 
+/// Goes through the edges with both ends in `ids`, ascending by their lower ends. `pair` gets the two
+/// [`side`]s of an edge with two triangles; `lone` the side of an edge that has one triangle, and its ends
+/// as places in the block. `triangles` are all that touch the block, ascending; no edge has more than two.
+///
+/// Nothing is sorted or hashed: the triangles around a lower end mark the upper ends.
+#[inline]
+pub fn pair_edges(
+    ids: Range<u32>,
+    triangles: &[Triangle],
+    mut pair: impl FnMut(u32, u32),
+    mut lone: impl FnMut(u32, [u32; 2]),
+) {
+    let (start, size) = (ids.start, ids.len() as u32);
+    let local = |v: u32| v.wrapping_sub(start);
+    let inside = |t: &Triangle| local(t[1]) < size && local(t[2]) < size;
+    // By their middle vertices, the triangles whose upper edge lies inside.
+    let middles = triangles.iter().filter(|t| inside(t)).map(|t| t[1]);
+    let mut upper = ByVertex::with_room(ids.clone(), middles);
+    for (number, t) in (0..).zip(triangles).filter(|(_, t)| inside(t)) {
+        upper.push(t[1], number);
+    }
+    // For each vertex, the last lower end that its edge to was seen from, plus one, and the side there.
+    let mut seen = vec![(0u32, NONE); size as usize];
+    let _held = hold(bytes_of(&seen));
+    let mut next = triangles.partition_point(|t| t[0] < start) as u32;
+    for v in 0..size {
+        let first = next;
+        while triangles
+            .get(next as usize)
+            .is_some_and(|t| local(t[0]) == v)
+        {
+            next += 1;
+        }
+        let own = (first..next).flat_map(|n| [(n, 2, 1), (n, 1, 2)]);
+        let upper = upper.at(v + start).iter().map(|&n| (n, 0, 2));
+        // The sides at edges up from `v`, and the upper ends.
+        let sides = upper.chain(own).map(|(number, corner, end)| {
+            let y = local(triangles[number as usize][end]);
+            (side(number, corner), y)
+        });
+        let sides = sides.filter(|(_, y)| *y < size);
+        let mut single = 0;
+        sides.clone().for_each(|(this, y)| {
+            let seen = &mut seen[y as usize];
+            if seen.0 == v + 1 {
+                pair(seen.1, this);
+                *seen = (v + 1, NONE);
+                single -= 1;
+            } else {
+                *seen = (v + 1, this);
+                single += 1;
+            }
+        });
+        if single > 0 {
+            sides.for_each(|(this, y)| {
+                if seen[y as usize].1 == this {
+                    lone(this, [v, y]);
+                }
+            });
+        }
+    }
+}
+
 /// For each of the `triangles`, ascending, with all their vertices in `ids`, opposite each corner the
-/// [`side`] behind the edge, or [`NONE`]. No edge has more than two triangles.
+/// [`side`] behind the edge, or [`NONE`]. For whoever walks from triangle to triangle. No edge has more
+/// than two triangles.
 #[must_use]
 pub fn across(ids: Range<u32>, triangles: &[Triangle]) -> Vec<[u32; 3]> {
     let mut across = vec![[NONE; 3]; triangles.len()];
-    let size = ids.len() as u32;
-    let edges = ByLowerEnd::of(ids.clone(), triangles);
-    // For each vertex, the last lower end that its edge to was seen from, plus one, and whose.
-    let mut seen = vec![(0u32, 0u32); size as usize];
-    let _held = hold(edges.bytes() + bytes_of(&seen));
-    let mut next = 0;
-    for v in 0..size {
-        let mut visit = |y: u32, number: u32, corner: u32| {
-            let place = &mut seen[(y - ids.start) as usize];
-            let this = side(number, corner);
-            if place.0 == v + 1 {
-                across[number as usize][corner as usize] = place.1;
-                let (other, opposite) = parts(place.1);
-                across[other][opposite] = this;
-            } else {
-                *place = (v + 1, this);
-            }
-        };
-        for &number in edges.upper(v) {
-            visit(triangles[number as usize][2], number, 0);
+    let pair = |a, b| {
+        for (this, other) in [(a, b), (b, a)] {
+            let (number, corner) = parts(this);
+            across[number][corner] = other;
         }
-        while let Some(t) = triangles.get(next).filter(|t| t[0] == v + ids.start) {
-            visit(t[1], next as u32, 2);
-            visit(t[2], next as u32, 1);
-            next += 1;
-        }
-    }
+    };
+    pair_edges(ids, triangles, pair, |_, _| ());
     across
 }
 

@@ -41,131 +41,108 @@ pub fn has(t: Triangle, v: u32) -> bool {
     t[0] == v || t[1] == v || t[2] == v
 }
 
-/// For each vertex of a block, the triangles that contain it; room for more can be left.
+/// Lists for the vertices of a block, one behind the other in memory. The room is counted first, so
+/// filling them allocates nothing. For whoever starts from a vertex: see [`Star`] and [`EdgesUp`]; the
+/// insertion of candidates keeps there what it reads of the triangles around a vertex.
 #[derive(Debug)]
-pub struct Star {
+pub struct ByVertex<T> {
     ids: Range<u32>,
+    /// Where the room of each vertex begins.
     start: Vec<u32>,
-    len: Vec<u32>,
-    list: Vec<u32>,
+    /// Where the entries of each vertex end.
+    end: Vec<u32>,
+    list: Vec<T>,
     _held: Holding,
 }
 
-impl Star {
-    /// An empty star with room for all of `triangles` at the vertices `ids`.
-    pub fn with_room(ids: Range<u32>, triangles: impl Iterator<Item = Triangle>) -> Self {
+impl<T: Copy + Default> ByVertex<T> {
+    /// Empty lists for the vertices `ids`, with room for one entry each time that one of them is
+    /// among `vertices`.
+    pub fn with_room(ids: Range<u32>, vertices: impl Iterator<Item = u32>) -> Self {
         let mut start = vec![0u32; ids.len() + 1];
-        for t in triangles {
-            for v in t {
-                if ids.contains(&v) {
-                    start[(v - ids.start) as usize + 1] += 1;
-                }
+        let behind = &mut start[1..];
+        vertices.for_each(|v| {
+            if let Some(room) = behind.get_mut(v.wrapping_sub(ids.start) as usize) {
+                *room += 1;
             }
-        }
+        });
         for v in 0..ids.len() {
             start[v + 1] += start[v];
         }
-        let list = vec![0; start[ids.len()] as usize];
+        let end = start[..ids.len()].to_vec();
+        let list = vec![T::default(); start[ids.len()] as usize];
         Self {
-            _held: hold(2 * bytes_of(&start) + bytes_of(&list)),
-            len: vec![0; ids.len()],
+            _held: hold(bytes_of(&start) + bytes_of(&end) + bytes_of(&list)),
             ids,
             start,
+            end,
             list,
         }
     }
 
-    /// The star of all `triangles`, numbered in their order.
+    /// Puts an entry into the list of `v`; nothing if `v` is not in the block or has no room left.
+    #[inline]
+    pub fn push(&mut self, v: u32, entry: T) {
+        let v = v.wrapping_sub(self.ids.start) as usize;
+        if let Some(end) = self.end.get_mut(v)
+            && *end < self.start[v + 1]
+        {
+            self.list[*end as usize] = entry;
+            *end += 1;
+        }
+    }
+
+    /// The entries of a vertex of the block, in the order in which they came.
+    #[must_use]
+    #[inline]
+    pub fn at(&self, v: u32) -> &[T] {
+        let v = (v - self.ids.start) as usize;
+        &self.list[self.start[v] as usize..self.end[v] as usize]
+    }
+}
+
+/// For each vertex of a block its star: the numbers of the triangles that contain it.
+pub type Star = ByVertex<u32>;
+
+impl Star {
+    /// The stars in all `triangles`, numbered in their order.
     #[must_use]
     pub fn of(ids: Range<u32>, triangles: &[Triangle]) -> Self {
-        let mut star = Self::with_room(ids, triangles.iter().copied());
-        for (number, &t) in triangles.iter().enumerate() {
-            star.add(t, number as u32);
+        let mut star = Self::with_room(ids, triangles.iter().flatten().copied());
+        for (number, t) in (0..).zip(triangles) {
+            t.iter().for_each(|v| star.push(*v, number));
         }
         star
     }
-
-    /// Puts in triangle `t` as `number`; room must have been left.
-    pub fn add(&mut self, t: Triangle, number: u32) {
-        for v in t {
-            if self.ids.contains(&v) {
-                let v = (v - self.ids.start) as usize;
-                self.list[(self.start[v] + self.len[v]) as usize] = number;
-                self.len[v] += 1;
-            }
-        }
-    }
-
-    /// Numbers of the triangles at a vertex of the block, in order of insertion.
-    #[must_use]
-    pub fn at(&self, v: u32) -> &[u32] {
-        let v = (v - self.ids.start) as usize;
-        let start = self.start[v] as usize;
-        &self.list[start..start + self.len[v] as usize]
-    }
-
-    /// The vertices of the block.
-    #[must_use]
-    pub fn ids(&self) -> Range<u32> {
-        self.ids.clone()
-    }
 }
 
-/// For each vertex of a block, the edges to higher vertices with the triangles at them.
-#[derive(Debug)]
-pub struct Edges {
-    ids: Range<u32>,
-    start: Vec<u32>,
-    len: Vec<u32>,
-    /// Higher vertex and triangle.
-    list: Vec<(u32, u32)>,
-    _held: Holding,
-}
+/// For each vertex of a block the edges to higher vertices: the higher vertex and the number of a
+/// triangle there. For triangles that look for others at their edges.
+pub type EdgesUp = ByVertex<(u32, u32)>;
 
-impl Edges {
-    /// No edges, with room for those of `triangles` whose lower vertex is in `ids`.
+impl EdgesUp {
+    /// No edges, with room for those of `triangles`.
     #[must_use]
-    pub fn with_room(ids: Range<u32>, triangles: &[Triangle]) -> Self {
-        let mut start = vec![0u32; ids.len() + 1];
-        for t in triangles {
-            // Two edges begin at the lowest vertex, one at the middle one.
-            for (v, edges) in [(t[0], 2), (t[1], 1)] {
-                if ids.contains(&v) {
-                    start[(v - ids.start) as usize + 1] += edges;
-                }
-            }
-        }
-        for v in 0..ids.len() {
-            start[v + 1] += start[v];
-        }
-        let list = vec![(0, 0); start[ids.len()] as usize];
-        Self {
-            _held: hold(2 * bytes_of(&start) + bytes_of(&list)),
-            list,
-            len: vec![0; ids.len()],
-            ids,
-            start,
-        }
+    pub fn with_room_for<'a>(
+        ids: Range<u32>,
+        triangles: impl Iterator<Item = &'a Triangle>,
+    ) -> Self {
+        // Two edges begin at the lowest vertex, one at the middle one.
+        Self::with_room(ids, triangles.flat_map(|t| [t[0], t[0], t[1]]))
     }
 
-    /// Puts in triangle `t` as `number`; room must have been left.
+    /// Puts in triangle `t` as `number`.
     pub fn add(&mut self, t: Triangle, number: u32) {
         for (a, b, ..) in EDGES {
-            if self.ids.contains(&t[a]) {
-                let v = (t[a] - self.ids.start) as usize;
-                self.list[(self.start[v] + self.len[v]) as usize] = (t[b], number);
-                self.len[v] += 1;
-            }
+            self.push(t[a], (t[b], number));
         }
     }
 
     /// Numbers of the triangles at the edge `low < high`, in order of insertion; none if `low` is
     /// not in the block.
-    pub fn at(&self, low: u32, high: u32) -> impl Iterator<Item = u32> + '_ {
+    pub fn at_edge(&self, low: u32, high: u32) -> impl Iterator<Item = u32> + '_ {
         let edges = if self.ids.contains(&low) {
-            let v = (low - self.ids.start) as usize;
-            let start = self.start[v] as usize;
-            &self.list[start..start + self.len[v] as usize]
+            self.at(low)
         } else {
             &[]
         };
@@ -176,8 +153,9 @@ impl Edges {
     }
 }
 
-/// The components of the link of a vertex: groups of triangles that hang together through edges at
-/// the vertex. Works for links whose nodes have at most two edges.
+/// The components of the link of one vertex, which are its fans: triangles that hang together through
+/// edges at the vertex. For links whose nodes have at most two edges. It is made anew for each vertex
+/// in the same memory.
 #[derive(Debug, Default)]
 pub struct Link {
     edges: Vec<(u32, u32)>,

@@ -3,14 +3,14 @@
 
 use super::contract::{Graph, Limit};
 use super::evidence::{Evidence, FLATTEST, cosine, weight};
-use super::orient::{Bonds, OrientedBlock, adjacent, number_labels};
+use super::labels::{Connections, OrientedBlock, adjacent, number_labels};
 use super::patches::Patches;
-use super::star::{Edges, Triangle};
+use super::star::{EdgesUp, Triangle};
 use crate::stages::blocks::Blocks;
 use crate::workspace::memory::{bytes_of, hold};
 use std::ops::Range;
 
-/// An edge between two triangles of the base counts for so many candidates.
+/// How many candidates an edge between two triangles of the base counts for.
 pub(super) const BASE: i64 = 8;
 
 /// Orients a block by what the evidence says.
@@ -31,24 +31,26 @@ pub(super) fn weigh_block(
         ids,
     };
     weigher.add_patches();
-    let mut bonds = Bonds::default();
-    weigher.add_connections(crossing, &mut bonds);
+    let mut connections = Connections::default();
+    weigher.add_connections(crossing, &mut connections);
     let _graph = hold(weigher.graph.bytes());
-    weigher.contract(division.cluster, &mut bonds);
+    weigher.contract(division.cluster, &mut connections);
     let dead = weigher.cut();
     let kept: Vec<u32> = (0..inner.len() as u32)
         .filter(|n| !dead[*n as usize])
         .collect();
-    bonds.relations.retain(|r| !dead[r.1 as usize]);
-    bonds.seams = std::mem::take(&mut weigher.patches.joints);
-    bonds
+    connections.relations.retain(|r| !dead[r.1 as usize]);
+    connections.seams = std::mem::take(&mut weigher.patches.shared);
+    connections
         .seams
         .retain(|j| !dead[j.a as usize] && !dead[j.b as usize]);
-    let bonded = bytes_of(&bonds.relations) + bytes_of(&bonds.pairs) + bytes_of(&bonds.seams);
-    let _held = hold(9 * inner.len() as u64 + bytes_of(&kept) + bonded);
+    let connected = bytes_of(&connections.relations)
+        + bytes_of(&connections.pairs)
+        + bytes_of(&connections.seams);
+    let _held = hold(9 * inner.len() as u64 + bytes_of(&kept) + connected);
     let removed = (inner.len() - kept.len()) as u64;
     let sets = &mut weigher.patches.sets;
-    number_labels(inner, &kept, bonds, sets, blocks, block, removed)
+    number_labels(inner, &kept, connections, sets, blocks, block, removed)
 }
 
 /// The patches of a block while it is decided how they run.
@@ -102,20 +104,20 @@ impl Weigher<'_> {
 
     /// Adds up what connects patches: edges, candidates, and crossing triangles as far as they are known
     /// here.
-    fn add_connections(&mut self, crossing: &[Triangle], bonds: &mut Bonds) {
-        for n in 0..self.patches.joints.len() {
-            let joint = self.patches.joints[n];
-            let weight = BASE * i64::from(joint.weight);
-            self.connect(joint.a, joint.b, joint.flip, weight);
+    fn add_connections(&mut self, crossing: &[Triangle], connections: &mut Connections) {
+        for n in 0..self.patches.shared.len() {
+            let edge = self.patches.shared[n];
+            let weight = BASE * i64::from(edge.weight);
+            self.connect(edge.a, edge.b, edge.flip, weight);
         }
         let edges = self.edges_of(crossing.iter().chain(&self.evidence.candidates));
         for &c in crossing {
-            let mut asks = Vec::new();
-            let mut note = |other, flip| asks.push((other, flip));
+            let mut constraints = Vec::new();
+            let mut note = |other, flip| constraints.push((other, flip));
             adjacent(c, &edges, self.inner, &self.ids, &mut note);
-            for (other, flip) in asks {
+            for (other, flip) in constraints {
                 let weight = self.weight(c, other, flip);
-                bonds.relations.push((c, other, flip, weight));
+                connections.relations.push((c, other, flip, weight));
                 // As much as the other two edges of the crossing triangle can weigh.
                 let of = self.patches.of[other as usize];
                 self.graph.add_outside(of, 2 * BASE * FLATTEST);
@@ -127,7 +129,7 @@ impl Weigher<'_> {
     }
 
     /// The triangles at the edges inside the block that `others` may have.
-    fn edges_of<'t>(&self, others: impl Iterator<Item = &'t Triangle>) -> Edges {
+    fn edges_of<'t>(&self, others: impl Iterator<Item = &'t Triangle>) -> EdgesUp {
         let mut seen = vec![false; self.ids.len()];
         for v in others.flatten().filter(|v| self.ids.contains(v)) {
             seen[(v - self.ids.start) as usize] = true;
@@ -135,16 +137,13 @@ impl Weigher<'_> {
         let place = |v: u32| (v - self.ids.start) as usize;
         // An edge between two of their vertices.
         let beside = |t: &Triangle| t.iter().filter(|v| seen[place(**v)]).count() > 1;
-        let numbers: Vec<u32> = (0..)
-            .zip(self.inner)
-            .filter(|(_, t)| beside(t))
-            .map(|(number, _)| number)
-            .collect();
-        let some: Vec<Triangle> = numbers.iter().map(|n| self.inner[*n as usize]).collect();
-        let _held = hold(bytes_of(&numbers) + bytes_of(&some) + bytes_of(&seen));
-        let mut edges = Edges::with_room(self.ids.clone(), &some);
-        for (number, t) in numbers.into_iter().zip(some) {
-            edges.add(t, number);
+        let some = (0..).zip(self.inner).filter(|(_, t)| beside(t));
+        let numbers: Vec<u32> = some.map(|(number, _)| number).collect();
+        let _held = hold(bytes_of(&numbers) + bytes_of(&seen));
+        let triangle = |n: &u32| &self.inner[*n as usize];
+        let mut edges = EdgesUp::with_room_for(self.ids.clone(), numbers.iter().map(triangle));
+        for number in &numbers {
+            edges.add(*triangle(number), *number);
         }
         edges
     }
@@ -156,18 +155,18 @@ impl Weigher<'_> {
     }
 
     /// A candidate connects each two of the first three triangles at its edges.
-    fn vote(&mut self, c: Triangle, edges: &Edges) {
-        let mut asks = [(0, false); 3];
+    fn vote(&mut self, c: Triangle, edges: &EdgesUp) {
+        let mut constraints = [(0, false); 3];
         let mut count = 0;
         adjacent(c, edges, self.inner, &self.ids, |other, flip| {
             if count < 3 {
-                asks[count] = (other, flip);
+                constraints[count] = (other, flip);
                 count += 1;
             }
         });
         for x in 1..count {
             for y in 0..x {
-                let ((a, flip_a), (b, flip_b)) = (asks[x], asks[y]);
+                let ((a, flip_a), (b, flip_b)) = (constraints[x], constraints[y]);
                 if self.patches.of[a as usize] != self.patches.of[b as usize] {
                     let weight = self.weight(c, a, flip_a).min(self.weight(c, b, flip_b));
                     self.connect(a, b, flip_a ^ flip_b, weight);
@@ -177,7 +176,7 @@ impl Weigher<'_> {
     }
 
     /// Contracts patches to clusters, as far as that is safe inside the block.
-    fn contract(&mut self, cluster: u64, bonds: &mut Bonds) {
+    fn contract(&mut self, cluster: u64, connections: &mut Connections) {
         let clusters = self.graph.contract(Limit::Triangles(cluster));
         let root = |patch: u32| self.patches.roots[patch as usize].0;
         for patch in 0..self.patches.roots.len() as u32 {
@@ -185,12 +184,12 @@ impl Weigher<'_> {
             let (of, patch) = (root(of), root(patch));
             self.patches.sets.join(of, patch, flip);
         }
-        bonds.first = self.graph.connected().map(root).collect();
+        connections.first = self.graph.connected().map(root).collect();
         let pairs = self.graph.pairs();
-        bonds.pairs = pairs.map(|(a, b, sum)| (root(a), root(b), sum)).collect();
-        bonds.pairs.sort_unstable();
+        connections.pairs = pairs.map(|(a, b, sum)| (root(a), root(b), sum)).collect();
+        connections.pairs.sort_unstable();
         let ups = self.graph.ups();
-        bonds.ups = ups.map(|(node, up)| (root(node), up)).collect();
+        connections.ups = ups.map(|(node, up)| (root(node), up)).collect();
         self.graph = Graph::default();
     }
 
@@ -198,12 +197,12 @@ impl Weigher<'_> {
     /// unless the earlier one is gone. Edges between clusters are left.
     fn cut(&mut self) -> Vec<bool> {
         let mut dead = vec![false; self.inner.len()];
-        let Patches { sets, joints, .. } = &mut self.patches;
-        joints.retain(|joint| match sets.relation(joint.a, joint.b) {
+        let Patches { sets, shared, .. } = &mut self.patches;
+        shared.retain(|edge| match sets.relation(edge.a, edge.b) {
             None => true,
-            Some(flip) if flip == joint.flip => false,
+            Some(flip) if flip == edge.flip => false,
             Some(_) => {
-                dead[joint.b as usize] |= !dead[joint.a as usize];
+                dead[edge.b as usize] |= !dead[edge.a as usize];
                 false
             }
         });

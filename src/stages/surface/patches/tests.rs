@@ -87,7 +87,7 @@ proptest! {
         let evidence = evidence(&places, Division { patch, cluster: 0 });
         let ids = 0..places.len() as u32;
         let mut patches = Patches::of(ids.clone(), &triangles, &evidence, patch);
-        let mut joints = patches.joints.clone();
+        let mut shared = patches.shared.clone();
         for (n, m, flip) in inner_edges(ids, &triangles) {
             let (t, other) = (triangles[n], triangles[m]);
             let cosine = cosine(evidence.normal(t), evidence.normal(other), flip);
@@ -97,11 +97,11 @@ proptest! {
             prop_assert!(one || !near || cosine <= FLAT, "{:?} {:?}", t, other);
             prop_assert!(!one || near);
             if !one || patches.sets.relation(n as u32, m as u32) != Some(flip) {
-                let joint = Joint { a: n as u32, b: m as u32, flip, weight };
-                prop_assert_eq!(joints.remove(0), joint);
+                let edge = SharedEdge { a: n as u32, b: m as u32, flip, weight };
+                prop_assert_eq!(shared.remove(0), edge);
             }
         }
-        prop_assert_eq!(joints, []);
+        prop_assert_eq!(shared, []);
         let mut first: Vec<u32> = Vec::new();
         for (n, of) in (0..).zip(&patches.of) {
             prop_assert!(*of as usize <= first.len());

@@ -22,12 +22,12 @@ fn oriented(
         evidence,
         ids,
     };
-    let mut bonds = Bonds::default();
+    let mut connections = Connections::default();
     weigher.add_patches();
-    weigher.add_connections(&[], &mut bonds);
-    weigher.contract(division.cluster, &mut bonds);
+    weigher.add_connections(&[], &mut connections);
+    weigher.contract(division.cluster, &mut connections);
     let dead = weigher.cut();
-    assert!(weigher.patches.joints.is_empty(), "all is one cluster");
+    assert!(weigher.patches.shared.is_empty(), "all is one cluster");
     (weigher.patches.sets, dead)
 }
 

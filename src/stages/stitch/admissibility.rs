@@ -1,5 +1,5 @@
 //! The tests that a T12 triangle must pass (paper, section 3.5): combinatorial I to III and the
-//! geometric one. Test IV is with the callers, who know the components.
+//! geometric one. Test IV, which needs the components, is in [`super::insertion`].
 
 use crate::geom::Point;
 use crate::geom::triangle::normal;
@@ -7,15 +7,15 @@ use crate::stages::surface::star::{EDGES, Triangle, opposed, others};
 use rustc_hash::FxHashMap;
 
 /// The mesh around the vertices of a triangle.
-pub trait View {
-    /// All triangles at `v`: their number and their other two vertices, ascending.
-    fn around(&self, v: u32) -> impl Iterator<Item = (u32, [u32; 2])>;
+pub trait Neighborhood {
+    /// The star of `v`: of all triangles there, the number and the other two vertices, ascending.
+    fn star(&self, v: u32) -> impl Iterator<Item = (u32, [u32; 2])>;
     /// How many these are.
     fn count(&self, v: u32) -> usize;
     /// The position of a vertex of a triangle of the mesh or of a candidate.
     fn position(&self, v: u32) -> Point;
     /// The position of `v`, a vertex of the triangle `number` of the mesh.
-    fn third(&self, _number: u32, v: u32) -> Point {
+    fn position_in(&self, _number: u32, v: u32) -> Point {
         self.position(v)
     }
 }
@@ -47,12 +47,12 @@ pub type Adjacent = (u32, bool);
 /// The first test that fails.
 pub fn examine(
     t: Triangle,
-    view: &impl View,
+    mesh: &impl Neighborhood,
     cos_max_angle: f64,
     link: &mut Vec<[u32; 2]>,
 ) -> Result<[Option<Adjacent>; 3], Refusal> {
-    let (counts, found) = at_edges(t, view, HUB);
-    let used = t.map(|v| view.count(v) > 0);
+    let (counts, found) = at_edges(t, mesh, HUB);
+    let used = t.map(|v| mesh.count(v) > 0);
     let connected = counts.iter().filter(|c| **c > 0).count();
     let lone = (0..3).find(|&e| counts[e] > 0);
     match (connected, lone) {
@@ -65,7 +65,7 @@ pub fn examine(
     }
     // Where an edge is new, a component of the link ends there and goes on, and none is closed.
     for (v, [e, f]) in t.into_iter().zip([[0, 1], [0, 2], [1, 2]]) {
-        if counts[e] + counts[f] == 2 && makes_excess(t, v, view, link) {
+        if counts[e] + counts[f] == 2 && makes_excess(t, v, mesh, link) {
             return Err(Refusal::Excess);
         }
     }
@@ -75,8 +75,8 @@ pub fn examine(
             continue;
         };
         if !angle_fits(
-            [t[a], t[b], t[c]].map(|v| view.position(v)),
-            view.third(number, far),
+            [t[a], t[b], t[c]].map(|v| mesh.position(v)),
+            mesh.position_in(number, far),
             cos_max_angle,
         ) {
             return Err(Refusal::Angle);
@@ -89,7 +89,11 @@ pub fn examine(
 
 /// For each edge of `t`, how many triangles of the mesh it has, and the number and third vertex of one;
 /// with an eye on vertices of more than `hub` triangles.
-fn at_edges(t: Triangle, view: &impl View, hub: usize) -> ([usize; 3], [Option<(u32, u32)>; 3]) {
+fn at_edges(
+    t: Triangle,
+    mesh: &impl Neighborhood,
+    hub: usize,
+) -> ([usize; 3], [Option<(u32, u32)>; 3]) {
     let mut found: [Option<(u32, u32)>; 3] = [None; 3];
     let mut counts = [0usize; 3];
     // Does the triangle with `other` beside its first vertex have the edge to `end`?
@@ -100,21 +104,21 @@ fn at_edges(t: Triangle, view: &impl View, hub: usize) -> ([usize; 3], [Option<(
         }
     };
     // The edges are (0,1), (0,2) and (1,2).
-    if t[..2].iter().all(|v| view.count(*v) <= hub) {
-        for (number, other) in view.around(t[0]) {
+    if t[..2].iter().all(|v| mesh.count(*v) <= hub) {
+        for (number, other) in mesh.star(t[0]) {
             see(0, number, other, t[1]);
             see(1, number, other, t[2]);
         }
-        for (number, other) in view.around(t[1]) {
+        for (number, other) in mesh.star(t[1]) {
             see(2, number, other, t[2]);
         }
     } else {
         for (edge, (a, b, ..)) in EDGES.into_iter().enumerate() {
             let (mut from, mut end) = (t[a], t[b]);
-            if view.count(from) > view.count(end) {
+            if mesh.count(from) > mesh.count(end) {
                 std::mem::swap(&mut from, &mut end);
             }
-            for (number, other) in view.around(from) {
+            for (number, other) in mesh.star(from) {
                 see(edge, number, other, end);
             }
         }
@@ -135,9 +139,9 @@ fn with_edge(low: u32, high: u32, third: u32) -> Triangle {
 
 /// True if with `t`, both of whose edges at `v` have one triangle, the link of `v` would have a closed
 /// cycle and another component.
-fn makes_excess(t: Triangle, v: u32, view: &impl View, link: &mut Vec<[u32; 2]>) -> bool {
+fn makes_excess(t: Triangle, v: u32, mesh: &impl Neighborhood, link: &mut Vec<[u32; 2]>) -> bool {
     link.clear();
-    link.extend(view.around(v).map(|(_, other)| other));
+    link.extend(mesh.star(v).map(|(_, other)| other));
     let [from, goal] = others(t, v);
     if link.len() > HUB {
         return closes_part(link, from, goal);
@@ -186,48 +190,6 @@ fn angle_fits([a, b, c]: [Point; 3], far: Point, cos_max_angle: f64) -> bool {
     dot(n, m) >= cos_max_angle * dot(n, n).sqrt() * dot(m, m).sqrt()
 }
 
-/// A triangle that may be inserted; in the order in which they are tried.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Candidate {
-    /// Class and, below 2^62, the square of the longest edge.
-    rank: u64,
-    /// Vertices.
-    pub ids: Triangle,
-    /// When it was last tried; used by the one who tries.
-    pub tried: u32,
-}
-
-impl Candidate {
-    /// The candidate seen by `count` cells (3: it was flagged).
-    #[must_use]
-    pub fn new(ids: Triangle, count: u32, [a, b, c]: [Point; 3]) -> Self {
-        let d = crate::geom::distance2;
-        let length = d(a, b).max(d(b, c)).max(d(a, c));
-        Self {
-            rank: u64::from(3 - count.min(3)) << 62 | length,
-            ids,
-            tried: 0,
-        }
-    }
-
-    /// As a record, in the same order.
-    #[must_use]
-    pub fn record(&self) -> [u32; 5] {
-        let [i, j, k] = self.ids;
-        [(self.rank >> 32) as u32, self.rank as u32, i, j, k]
-    }
-
-    /// From a record.
-    #[must_use]
-    pub fn from_record([high, low, i, j, k]: [u32; 5]) -> Self {
-        Self {
-            rank: u64::from(high) << 32 | u64::from(low),
-            ids: [i, j, k],
-            tried: 0,
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -239,8 +201,8 @@ mod tests {
         looks: std::cell::Cell<usize>,
     }
 
-    impl View for Mesh {
-        fn around(&self, v: u32) -> impl Iterator<Item = (u32, [u32; 2])> {
+    impl Neighborhood for Mesh {
+        fn star(&self, v: u32) -> impl Iterator<Item = (u32, [u32; 2])> {
             let at = (0..)
                 .zip(&self.triangles)
                 .filter(move |(_, t)| t.contains(&v));

@@ -1,17 +1,19 @@
 //! T12 insertion across blocks (paper, section 3.5, second part): block by block in ascending
 //! order. What a turn leaves for later ones is on disk.
 
-use super::InsertStats;
 use super::base::Base;
-use super::context::Context;
-use super::interior::{Interior, RANKED};
+use super::insertion::{Candidate, RANKED, insert_candidates};
+use super::interior::{Follower, Interior, block_bytes};
 use super::mail::Mail;
-use super::tests_of_paper::Candidate;
+use super::stats::InsertStats;
+use super::surroundings::Surroundings;
 use crate::error::Result;
 use crate::spill::layouts::SENT;
 use crate::spill::{Exchange, Sections};
 use crate::stages::blocks::Blocks;
 use crate::workspace::Workspace;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 const EXCHANGE_BUFFER: u64 = 8 << 20;
 
@@ -27,15 +29,83 @@ pub struct Crossing {
 
 crate::workspace::persist::persist!(Crossing { added, removed });
 
+/// The pass across blocks while blocks are at work inside: whoever has finished a block takes it as far
+/// as it goes by then.
+pub struct Across<'a> {
+    /// The blocks in the order in which the pass needs them.
+    order: Vec<u32>,
+    done: Vec<AtomicBool>,
+    /// A turn takes no more bytes than these: what the blocks at work cannot need.
+    spare: u64,
+    pass: Mutex<Pass<'a>>,
+}
+
+impl<'a> Across<'a> {
+    /// The pass before its first block.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], [`crate::Error::Memory`].
+    pub fn new(
+        base: &'a Base,
+        interior: &'a Interior,
+        blocks: Blocks,
+        cos_max_angle: f64,
+        workspace: &'a Workspace,
+    ) -> Result<Self> {
+        let pass = Pass::new(base, interior, blocks, cos_max_angle, workspace)?;
+        let all = 0..blocks.count();
+        let most = all.clone().map(|block| block_bytes(base, block)).max();
+        let at_work = most.unwrap_or(0) * workspace.threads as u64;
+        Ok(Self {
+            order: pass.order.clone(),
+            done: all.map(|_| AtomicBool::new(false)).collect(),
+            spare: workspace.memory.available().saturating_sub(at_work),
+            pass: Mutex::new(pass),
+        })
+    }
+
+    /// Takes the pass to its end; all blocks are finished.
+    ///
+    /// # Errors
+    /// See [`Pass::advance`].
+    pub fn finish(self) -> Result<(Crossing, InsertStats)> {
+        let pass = self.pass.into_inner();
+        let mut pass = pass.unwrap_or_else(PoisonError::into_inner);
+        pass.advance(|_| true, None)?;
+        pass.finish()
+    }
+}
+
+impl Follower for Across<'_> {
+    fn order(&self) -> &[u32] {
+        &self.order
+    }
+
+    fn finished(&self, block: u32) {
+        self.done[block as usize].store(true, Ordering::Release);
+    }
+
+    fn go_on(&self) -> Result<()> {
+        let ready = |block: u32| self.done[block as usize].load(Ordering::Acquire);
+        match self.pass.try_lock() {
+            Ok(mut pass) => pass.advance(ready, Some(self.spare)),
+            // Another thread is at it.
+            Err(_) => Ok(()),
+        }
+    }
+}
+
 /// The insertion of what crosses blocks, and of what inside them waits for it. It goes on as far as
 /// the blocks that it needs are done.
-pub struct Pass<'a> {
-    context: Context<'a>,
-    lives: Lives,
+struct Pass<'a> {
+    mesh: Surroundings<'a>,
+    /// The blocks in the order in which turns need them: that of the first turn that has a candidate at
+    /// one of their vertices.
+    order: Vec<u32>,
     /// Candidates that wait for the turn of a later block.
     waiting: Mail<5>,
     counts: InsertStats,
-    /// The block whose turn is next, and how many of those it needs first are ready.
+    /// The block whose turn is next, and how many of `order` are known to be ready.
     group: usize,
     ready: usize,
     added: Exchange<4>,
@@ -58,9 +128,11 @@ impl<'a> Pass<'a> {
         let exchange = |name| -> Result<Exchange<4>> {
             Ok(Exchange::new(workspace, name, EXCHANGE_BUFFER)?.packed(SENT))
         };
+        let mut order: Vec<u32> = (0..blocks.count() as u32).collect();
+        order.sort_by_key(|block| base.spans[*block as usize].0);
         Ok(Self {
-            context: Context::new(base, interior, blocks, workspace)?,
-            lives: Lives::of(&base.spans),
+            mesh: Surroundings::new(base, interior, blocks, workspace)?,
+            order,
             waiting: Mail::new(workspace, "stitch.waiting", blocks.count(), RANKED)?,
             counts: InsertStats::default(),
             group: 0,
@@ -71,27 +143,19 @@ impl<'a> Pass<'a> {
         })
     }
 
-    /// The cosine of the largest angle between neighbours.
-    pub fn cos_max_angle(&self) -> f64 {
-        self.cos_max_angle
-    }
-
-    /// Blocks in the order in which they are needed.
-    pub fn order(&self) -> Vec<u32> {
-        self.lives.begin.concat()
-    }
-
     /// Takes all turns for which the blocks that are `ready` suffice. Within `most` bytes for a turn,
     /// or as many as there are if it is `None`; otherwise it waits to be called again.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
     /// [`crate::Error::Cancelled`].
-    pub fn advance(&mut self, ready: impl Fn(u32) -> bool, most: Option<u64>) -> Result<()> {
-        while self.group < self.lives.begin.len() {
-            self.context.workspace.check_cancel()?;
-            let needed = &self.lives.begin[self.group];
-            while let Some(&block) = needed.get(self.ready) {
+    fn advance(&mut self, ready: impl Fn(u32) -> bool, most: Option<u64>) -> Result<()> {
+        while self.group < self.mesh.blocks.count() {
+            self.mesh.workspace.check_cancel()?;
+            let spans = &self.mesh.base.spans;
+            while let Some(&block) = self.order.get(self.ready)
+                && spans[block as usize].0 as usize <= self.group
+            {
                 if !ready(block) {
                     return Ok(());
                 }
@@ -101,29 +165,27 @@ impl<'a> Pass<'a> {
                 return Ok(());
             }
             self.group += 1;
-            self.ready = 0;
-            self.context.workspace.observer.advance(1);
+            self.mesh.workspace.observer.advance(1);
         }
         Ok(())
     }
 
     /// The turn of a block; false if it would take more than `most` bytes.
     fn turn(&mut self, group: usize, most: Option<u64>) -> Result<bool> {
-        let blocks = self.context.blocks;
+        let blocks = self.mesh.blocks;
         let mut tried = self.waiting.get(group)?;
-        tried.append(&mut self.context.interior.ranked.get(group)?);
+        tried.append(&mut self.mesh.interior.ranked.get(group)?);
         let mut tried: Vec<_> = tried.into_iter().map(Candidate::from_record).collect();
-        if !self.context.gather(&tried, most)? {
+        if !self.mesh.gather(&tried, most)? {
             return Ok(false);
         }
-        let gone = self.context.joints(group)?;
+        let gone = self.mesh.confirm_merges(group)?;
         self.counts.joints_removed += gone.len() as u64;
         self.removed.send(&gone)?;
         // Ascending runs: this sort merges them.
         tried.sort();
         let (angle, counts) = (self.cos_max_angle, &mut self.counts);
-        let new = self.context.rounds(&mut tried, angle, counts);
-        self.added.send(&new)?;
+        insert_candidates(&mut self.mesh, &mut tried, angle, counts);
         // What has no vertex in a later block will not be tried again.
         let mut waiting = Vec::new();
         for candidate in tried {
@@ -138,9 +200,9 @@ impl<'a> Pass<'a> {
             let records: Vec<_> = part.iter().map(|(_, record)| *record).collect();
             self.waiting.send(part[0].0, &records)?;
         }
-        let last = &self.lives.last;
-        self.context
-            .end(|block| last[block as usize] > group as u32)?;
+        let spans = &self.mesh.base.spans;
+        let later = |block: u32| spans[block as usize].1 > group as u32;
+        self.added.send(&self.mesh.end(later)?)?;
         Ok(true)
     }
 
@@ -149,9 +211,9 @@ impl<'a> Pass<'a> {
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
     pub fn finish(self) -> Result<(Crossing, InsertStats)> {
-        let (blocks, workspace) = (self.context.blocks, self.context.workspace);
+        let (blocks, workspace) = (self.mesh.blocks, self.mesh.workspace);
         // The crossing triangles of the base belong to the mesh as well.
-        let base = &self.context.base.surface;
+        let base = &self.mesh.base.surface;
         for block in 0..blocks.count() {
             let records = base.crossing.get(block)?;
             let records: Vec<_> = records.iter().map(|r| [r[0], r[1], r[2], r[3]]).collect();
@@ -162,28 +224,6 @@ impl<'a> Pass<'a> {
             removed: self.removed.deliver(workspace, blocks.count())?,
         };
         Ok((crossing, self.counts))
-    }
-}
-
-/// When the surroundings of each block are needed: from the first to the last group that has a
-/// candidate at one of its vertices.
-struct Lives {
-    /// The blocks that a group is the first to need.
-    begin: Vec<Vec<u32>>,
-    /// The last group that needs a block.
-    last: Vec<u32>,
-}
-
-impl Lives {
-    fn of(spans: &[(u32, u32)]) -> Self {
-        let mut lives = Self {
-            begin: vec![Vec::new(); spans.len()],
-            last: spans.iter().map(|span| span.1).collect(),
-        };
-        for (block, &(first, _)) in spans.iter().enumerate() {
-            lives.begin[first as usize].push(block as u32);
-        }
-        lives
     }
 }
 

@@ -1,5 +1,6 @@
 //! The edges of crossing triangles, while these are gone through in ascending order.
 
+use super::parity::OrientationConstraint;
 use super::star::{EDGES, Triangle, opposed};
 use crate::error::Result;
 use crate::stages::blocks::Blocks;
@@ -14,16 +15,17 @@ const EDGE: u64 = 128 + LIST;
 /// The triangles at an edge: room for four, and what the allocator takes.
 const LIST: u64 = 128;
 
-/// A triangle, `label << 1 | flip`, and its unit normal if anyone asks for it.
+/// A triangle, `label << 1 | flip`, and its unit normal if that is needed.
 type Entry = (Triangle, u32, [f32; 3]);
 
-/// The triangles so far at the edges that later ones may have.
-pub(super) struct Border {
+/// The triangles so far at the edges that later ones may have. Crossing triangles are few and their edges
+/// are anywhere, so these are hashed; those that no later triangle can have are forgotten block by block.
+pub(super) struct CrossingEdges {
     edges: FxHashMap<(u32, u32), Vec<Entry>>,
     reserved: Reservation,
 }
 
-impl Border {
+impl CrossingEdges {
     /// No edges.
     pub(super) fn new(workspace: &Workspace) -> Result<Self> {
         Ok(Self {
@@ -32,7 +34,7 @@ impl Border {
         })
     }
 
-    /// Makes room for the edges of so many triangles more.
+    /// Makes room for the edges of this number of triangles more.
     pub(super) fn make_room(&mut self, triangles: usize) -> Result<()> {
         let edges = (self.edges.len() + 3 * triangles) as u64;
         self.reserved.at_least(edges * EDGE)
@@ -47,23 +49,18 @@ impl Border {
         }
     }
 
-    /// What the triangles at its edges ask of `t`: their label, and if `t` must be turned against it.
-    pub(super) fn asks(&self, t: Triangle) -> impl Iterator<Item = (u32, bool)> + '_ {
-        self.asks_with_normals(t)
-            .map(|(label, flip, ..)| (label, flip))
-    }
-
-    /// As [`Border::asks`], and if `t` must be turned against the triangle itself, and its normal.
-    pub(super) fn asks_with_normals(
+    /// The triangles at the edges of `t`: each as a constraint, if `t` must be turned against the triangle
+    /// itself, and that one's normal.
+    pub(super) fn adjacent(
         &self,
         t: Triangle,
-    ) -> impl Iterator<Item = (u32, bool, bool, [f64; 3])> + '_ {
+    ) -> impl Iterator<Item = (OrientationConstraint, bool, [f64; 3])> + '_ {
         EDGES.into_iter().flat_map(move |(a, b, ..)| {
             let at = self.edges.get(&(t[a], t[b])).into_iter().flatten();
             at.map(move |&(other, word, normal)| {
                 let opposed = opposed(t, other, t[a], t[b]);
                 let flip = opposed ^ (word & 1 == 1);
-                (word >> 1, flip, opposed, normal.map(f64::from))
+                ((word >> 1, flip), opposed, normal.map(f64::from))
             })
         })
     }
@@ -93,28 +90,27 @@ mod tests {
         let workspace =
             Workspace::new(&folder, memory, 1, Arc::new(Silent), Cancel::new()).unwrap();
         let pool = &workspace.memory;
-        let mut border = Border::new(&workspace).unwrap();
+        let mut edges = CrossingEdges::new(&workspace).unwrap();
         let blocks = Blocks::new(1000, 10);
         for group in 0..90u32 {
             let first = group * 10;
             let new: Vec<Triangle> = (10..19)
                 .map(|n| [first, first + n, first + n + 10])
                 .collect();
-            border.make_room(new.len()).unwrap();
+            edges.make_room(new.len()).unwrap();
             for t in new {
-                border.put(t, 2 * group, [0.0; 3]);
-                let asks: Vec<_> = border.asks(t).collect();
-                assert!(asks.contains(&(group, true)), "{asks:?}");
+                edges.put(t, 2 * group, [0.0; 3]);
+                assert!(edges.adjacent(t).any(|(found, ..)| found == (group, true)));
             }
-            border.end(group as usize, blocks);
-            let kept = border.edges.keys().all(|(low, _)| *low >= first + 10);
-            assert!(kept && border.edges.len() == 9);
+            edges.end(group as usize, blocks);
+            let kept = edges.edges.keys().all(|(low, _)| *low >= first + 10);
+            assert!(kept && edges.edges.len() == 9);
         }
-        assert!(pool.held_at_peak()["stitch: edges"] <= border.reserved.bytes());
+        assert!(pool.held_at_peak()["stitch: edges"] <= edges.reserved.bytes());
         let least = pool.capacity() / (3 * EDGE) + 1;
-        let refused = border.make_room(least as usize);
+        let refused = edges.make_room(least as usize);
         assert!(matches!(refused, Err(Error::Memory { .. })), "{refused:?}");
-        drop(border);
+        drop(edges);
         assert_eq!(pool.available(), pool.capacity());
     }
 }

@@ -1,10 +1,12 @@
 //! Orientation by evidence between blocks: the labels that the blocks could not settle by themselves, and
 //! the crossing triangles between them.
 
-use super::border::Border;
 use super::contract::{Graph, Limit};
+use super::crossing::interior_constraints;
+use super::crossing_edges::CrossingEdges;
 use super::evidence::{cosine, weight};
 use super::orient::{Oriented, Weighed};
+use super::parity::OrientationConstraint;
 use super::star::Triangle;
 use super::weigh::BASE;
 use crate::error::Result;
@@ -12,11 +14,11 @@ use crate::spill::Sections;
 use crate::stages::blocks::Blocks;
 use crate::workspace::Workspace;
 
-/// Settles how global labels run against each other. `border` gives the crossing triangles of a block
+/// Settles how global labels run against each other. `crossing` gives the crossing triangles of a block
 /// with their normals.
 pub(super) fn settle(
     surface: &mut Oriented,
-    border: impl Fn(usize) -> Result<Vec<(Triangle, [f64; 3])>>,
+    crossing: impl Fn(usize) -> Result<Vec<(Triangle, [f64; 3])>>,
     relations: &Sections<7>,
     weighed: &Weighed,
     blocks: Blocks,
@@ -36,33 +38,25 @@ pub(super) fn settle(
         }
         reserved.at_least(graph.bytes())?;
     }
-    let mut edges = Border::new(workspace)?;
+    let mut edges = CrossingEdges::new(workspace)?;
     for group in 0..blocks.count() {
         workspace.check_cancel()?;
         let relations = relations.get(group)?;
-        let triangles = border(group)?;
+        let triangles = crossing(group)?;
         edges.make_room(triangles.len())?;
         for (t, normal) in triangles {
-            let key = [group as u32, t[0], t[1], t[2]];
-            let start = relations.partition_point(|r| r[..4] < key[..]);
             // Label, turned or not, and weight of each neighbour; an interior one comes first.
-            let mut asks: Vec<(u32, bool, i64)> = relations[start..]
-                .iter()
-                .take_while(|r| r[..4] == key[..])
-                .map(|r| {
-                    let label = surface.globals[r[4] as usize].0 + (r[5] >> 1);
-                    (label, r[5] & 1 == 1, i64::from(r[6]))
-                })
-                .collect();
-            let before = edges.asks_with_normals(t);
-            asks.extend(before.map(|(label, flip, opposed, other)| {
-                (label, flip, weight(cosine(normal, other, opposed)))
+            let mut neighbors: Vec<(OrientationConstraint, i64)> =
+                interior_constraints(&surface.globals, &relations, group, t).collect();
+            let before = edges.adjacent(t);
+            neighbors.extend(before.map(|(constraint, opposed, other)| {
+                (constraint, weight(cosine(normal, other, opposed)))
             }));
-            let (label, flip) = match asks.first() {
-                Some(&(label, flip, _)) => (label, flip),
+            let (label, flip) = match neighbors.first() {
+                Some(&(first, _)) => first,
                 None => (graph.push(), false),
             };
-            for &(other, turned, weight) in &asks {
+            for &((other, turned), weight) in &neighbors {
                 let sum = if flip ^ turned { -weight } else { weight };
                 graph.add(label, other, BASE * sum);
             }

@@ -1,0 +1,200 @@
+//! The components that the triangles of a block belong to while candidates are inserted there.
+//!
+//! A component of the base with a crossing triangle is *global*: other blocks see it too. Where an
+//! inserted triangle joins two global components, that is a *tentative merge*: it counts for this block,
+//! and for the whole mesh only if the pass across blocks confirms it. A *local* component is known to this
+//! block alone, so merging it with another one is final.
+
+use crate::stages::surface::orient::Oriented;
+use crate::stages::surface::parity::{OrientationConstraint, ParitySets};
+use crate::stages::surface::star::Triangle;
+use crate::workspace::memory::bytes_of;
+use rustc_hash::FxHashMap;
+
+/// Instead of a global label: there is none.
+pub const NOTHING: u32 = u32::MAX;
+
+/// The component of a triangle as a word: `number << 2 | local << 1 | flip`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ComponentRef {
+    /// Global label, or number within the block.
+    pub number: u32,
+    /// True if it is a number within the block.
+    pub local: bool,
+    /// Orientation of the triangle relative to its component.
+    pub flip: bool,
+}
+
+impl ComponentRef {
+    /// As one word.
+    #[must_use]
+    pub fn word(self) -> u32 {
+        self.number << 2 | u32::from(self.local) << 1 | u32::from(self.flip)
+    }
+
+    /// From a word.
+    #[must_use]
+    pub fn from_word(word: u32) -> Self {
+        Self {
+            number: word >> 2,
+            local: word & 2 != 0,
+            flip: word & 1 != 0,
+        }
+    }
+}
+
+/// The components of the base in a block, numbered as they are met. Labels whose set has a crossing
+/// triangle are one component for each set; every other label is one by itself.
+pub struct BaseComponents<'a> {
+    surface: &'a Oriented,
+    of_root: FxHashMap<u32, u32>,
+    of_label: Vec<OrientationConstraint>,
+    /// Global label of each component, or [`NOTHING`].
+    global: Vec<u32>,
+}
+
+impl<'a> BaseComponents<'a> {
+    /// Those of the interior triangles of a block.
+    pub fn of(surface: &'a Oriented, block: usize) -> Self {
+        let (first, globals) = surface.globals[block];
+        let mut components = Self {
+            surface,
+            of_root: FxHashMap::default(),
+            of_label: Vec::new(),
+            global: Vec::new(),
+        };
+        let labels = surface.labels[block];
+        components.of_label.reserve(labels as usize);
+        for label in 0..labels {
+            let component = if label < globals {
+                components.of_global(first + label)
+            } else {
+                components.global.push(NOTHING);
+                (components.global.len() as u32 - 1, false)
+            };
+            components.of_label.push(component);
+        }
+        components
+    }
+
+    fn of_global(&mut self, label: u32) -> OrientationConstraint {
+        let (root, flip) = self.surface.sets.look(label);
+        let crosses = self.surface.crosses[root as usize];
+        let component = *self.of_root.entry(root).or_insert_with(|| {
+            self.global.push(if crosses { root } else { NOTHING });
+            self.global.len() as u32 - 1
+        });
+        (component, flip)
+    }
+
+    /// The component of an interior triangle with `label << 1 | flip`, and whether it is turned
+    /// against that.
+    pub fn interior(&self, word: u32) -> OrientationConstraint {
+        let (component, flip) = self.of_label[(word >> 1) as usize];
+        (component, flip ^ (word & 1 == 1))
+    }
+
+    /// The same for a crossing triangle.
+    pub fn crossing(&mut self, word: u32) -> OrientationConstraint {
+        let (component, flip) = self.of_global(word >> 1);
+        (component, flip ^ (word & 1 == 1))
+    }
+}
+
+/// The components of a block's triangles.
+#[derive(Default)]
+pub struct BlockComponents {
+    /// For each triangle its component as it was put in, and whether it is turned against that.
+    of: Vec<OrientationConstraint>,
+    /// Components that are one for good.
+    merged: ParitySets,
+    /// Those that are one in this block: also by tentative merges.
+    pub joined: ParitySets,
+    /// Global label of each component, or [`NOTHING`].
+    global: Vec<u32>,
+    /// Tentative merges in order of insertion, see [`super::interior::Interior::merges`].
+    pub tentative: Vec<[u32; 6]>,
+}
+
+impl BlockComponents {
+    /// Those of the base, with the component `of` each triangle.
+    pub fn new(base: BaseComponents<'_>, of: Vec<OrientationConstraint>) -> Self {
+        Self {
+            of,
+            merged: ParitySets::new(base.global.len()),
+            joined: ParitySets::new(base.global.len()),
+            global: base.global,
+            ..Self::default()
+        }
+    }
+
+    /// Bytes of its lists.
+    pub fn bytes(&self) -> u64 {
+        bytes_of(&self.of) + 3 * bytes_of(&self.global) + bytes_of(&self.tentative)
+    }
+
+    /// The component of a triangle by now, and whether it is turned against that.
+    pub fn find(&mut self, number: u32) -> OrientationConstraint {
+        let (component, flip) = self.of[number as usize];
+        let (root, up) = self.merged.find(component);
+        (root, flip ^ up)
+    }
+
+    /// The same for who is not in the block.
+    pub fn reference(&mut self, number: u32) -> ComponentRef {
+        let (root, flip) = self.find(number);
+        let label = self.global[root as usize];
+        let local = label == NOTHING;
+        ComponentRef {
+            number: if local { root } else { label },
+            local,
+            flip,
+        }
+    }
+
+    /// Puts in a triangle at which the components of `constraints` meet: a local one is merged with its
+    /// neighbour, global ones tentatively.
+    pub fn insert(&mut self, t: Triangle, constraints: &[OrientationConstraint]) {
+        let mut current = constraints[0];
+        for &(next, flip) in constraints {
+            let (a, up_a) = self.merged.find(current.0);
+            let (b, up_b) = self.merged.find(next);
+            current = (a, current.1 ^ up_a);
+            if a == b {
+                continue;
+            }
+            let next = (b, flip ^ up_b);
+            let turned = current.1 ^ next.1;
+            // The one that stays a root is the global one, or the first.
+            if self.global[b as usize] == NOTHING {
+                self.merged.join(a, b, turned);
+            } else if self.global[a as usize] == NOTHING {
+                self.merged.join(b, a, turned);
+                current = next;
+            }
+        }
+        self.note_tentative(t, constraints);
+        let (first, flip) = constraints[0];
+        let (root, up) = self.merged.find(first);
+        self.of.push((root, flip ^ up));
+    }
+
+    /// Notes a tentative merge if global components meet at `t`.
+    fn note_tentative(&mut self, t: Triangle, constraints: &[OrientationConstraint]) {
+        let mut words = [NOTHING; 3];
+        let mut count = 0;
+        for &(component, flip) in constraints {
+            let (root, up) = self.merged.find(component);
+            let label = self.global[root as usize];
+            let word = label << 1 | u32::from(flip ^ up);
+            if label != NOTHING && !words[..count].contains(&word) {
+                words[count] = word;
+                count += 1;
+            }
+        }
+        if count > 1 {
+            let ([i, j, k], [a, b, c]) = (t, words);
+            self.tentative.push([i, j, k, a, b, c]);
+        }
+    }
+}

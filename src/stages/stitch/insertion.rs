@@ -1,0 +1,121 @@
+//! The insertion of T12 candidates (paper, section 3.5, second part): rounds in rank order, with the
+//! tests of [`super::admissibility`] and test IV. It is the same inside blocks and across them; a
+//! [`Mesh`] tells what is around a candidate, and takes what is inserted.
+
+use super::admissibility::{Neighborhood, Refusal, examine};
+use super::stats::InsertStats;
+use crate::geom::{Point, distance2};
+use crate::spill::Word;
+use crate::stages::surface::parity::{OrientationConstraint, ParitySets};
+use crate::stages::surface::star::Triangle;
+
+/// The mesh around candidates, which grows as they are inserted.
+pub trait Mesh: Neighborhood {
+    /// When a triangle was last inserted at a vertex of a candidate; 0 if none was.
+    fn changed(&self, v: u32) -> u32;
+    /// The component of a triangle of the mesh, and whether the triangle is turned against it.
+    fn component(&mut self, number: u32) -> OrientationConstraint;
+    /// The components, as far as they are joined; test IV asks these.
+    fn components(&mut self) -> &mut ParitySets;
+    /// Takes in a triangle at the time `now`. It has at least one of `constraints`; their components
+    /// are joined by then.
+    fn insert(&mut self, t: Triangle, constraints: &[OrientationConstraint], now: u32);
+}
+
+/// Tries the candidates, ascending, in rounds until one inserts nothing. What is left in the list failed
+/// only test I.
+pub fn insert_candidates(
+    mesh: &mut impl Mesh,
+    candidates: &mut Vec<Candidate>,
+    cos_max_angle: f64,
+    counts: &mut InsertStats,
+) {
+    let (mut link, mut constraints) = (Vec::new(), Vec::new());
+    // Counts insertions, from 1.
+    let mut now = 1;
+    loop {
+        let before = now;
+        candidates.retain_mut(|candidate| {
+            let t = candidate.ids;
+            // What fails test I needs a triangle at another of its edges.
+            let changed = t.map(|v| u8::from(mesh.changed(v) > candidate.tried));
+            if candidate.tried > 0 && changed.iter().sum::<u8>() < 2 {
+                return true;
+            }
+            candidate.tried = now;
+            match examine(t, mesh, cos_max_angle, &mut link) {
+                Err(Refusal::Unconnected) => return true,
+                Err(refusal) => counts.refuse(refusal),
+                // Test IV.
+                Ok(adjacent) => {
+                    constraints.clear();
+                    for (number, turned) in adjacent.into_iter().flatten() {
+                        let (component, flip) = mesh.component(number);
+                        constraints.push((component, flip ^ turned));
+                    }
+                    if mesh.components().merge(&constraints) {
+                        now += 1;
+                        mesh.insert(t, &constraints, now);
+                        counts.accepted += 1;
+                    } else {
+                        counts.orientation += 1;
+                    }
+                }
+            }
+            false
+        });
+        if now == before {
+            return;
+        }
+    }
+}
+
+/// A triangle that may be inserted; in the order in which they are tried.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Candidate {
+    /// Class and, below 2^62, the square of the longest edge.
+    rank: u64,
+    /// Vertices.
+    pub ids: Triangle,
+    /// When it was last tried; 0 if it was not.
+    tried: u32,
+}
+
+/// How records of candidates are packed.
+pub const RANKED: [Word; 5] = [
+    Word::Above,
+    Word::Above,
+    Word::Above,
+    Word::Rising,
+    Word::Rising,
+];
+
+impl Candidate {
+    /// The candidate seen by `count` cells (3: it was flagged).
+    #[must_use]
+    pub fn new(ids: Triangle, count: u32, [a, b, c]: [Point; 3]) -> Self {
+        let length = distance2(a, b).max(distance2(b, c)).max(distance2(a, c));
+        Self {
+            rank: u64::from(3 - count.min(3)) << 62 | length,
+            ids,
+            tried: 0,
+        }
+    }
+
+    /// As a record, in the same order.
+    #[must_use]
+    pub fn record(&self) -> [u32; 5] {
+        let [i, j, k] = self.ids;
+        [(self.rank >> 32) as u32, self.rank as u32, i, j, k]
+    }
+
+    /// From a record.
+    #[must_use]
+    pub fn from_record([high, low, i, j, k]: [u32; 5]) -> Self {
+        Self {
+            rank: u64::from(high) << 32 | u64::from(low),
+            ids: [i, j, k],
+            tried: 0,
+        }
+    }
+}

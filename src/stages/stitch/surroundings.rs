@@ -1,0 +1,431 @@
+//! The mesh of the pass across blocks: in the turn of a block, what is around the candidates that are
+//! tried, and nothing of it between turns.
+
+use super::admissibility::Neighborhood;
+use super::base::Base;
+use super::components::{ComponentRef, NOTHING};
+use super::insertion::{Candidate, Mesh};
+use super::interior::Interior;
+use super::mail::Mail;
+use crate::error::Result;
+use crate::geom::Point;
+use crate::spill::Word;
+use crate::stages::blocks::Blocks;
+use crate::stages::surface::parity::{OrientationConstraint, ParitySets};
+use crate::stages::surface::star::{Triangle, others};
+use crate::workspace::Workspace;
+use crate::workspace::memory::{Holding, Reservation, bytes_of, table_bytes};
+use rustc_hash::FxHashMap;
+use std::ops::Range;
+
+/// A triangle at a vertex of a candidate.
+#[derive(Debug, Clone, Copy)]
+struct Entry {
+    ids: Triangle,
+    /// `label << 1 | flip`.
+    word: u32,
+    /// Where its vertices are.
+    at: [Point; 3],
+}
+
+impl Entry {
+    /// As one of [`CHANGES`].
+    fn record(&self) -> [u32; 13] {
+        let mut record = [0; 13];
+        record[..3].copy_from_slice(&self.ids);
+        record[3] = self.word;
+        let words = self.at.iter().flatten().map(|c| *c as u32);
+        record[4..].iter_mut().zip(words).for_each(|(r, w)| *r = w);
+        record
+    }
+}
+
+/// The star of a vertex of a candidate.
+#[derive(Default)]
+struct VertexStar {
+    position: Point,
+    triangles: Vec<u32>,
+    /// When one was last inserted.
+    changed: u32,
+}
+
+/// What turns changed at a block: `[i, j, k, label << 1 | flip, positions]` of a triangle that was
+/// inserted, [`NOTHING`] instead of the label for one that was taken out.
+const CHANGES: [Word; 13] = [Word::Above; 13];
+
+/// Bytes that are reserved for a vertex and for a triangle.
+const VERTEX: u64 = 128;
+const TRIANGLE: u64 = 80;
+
+/// The surroundings of the candidates of a turn. Their vertices are few and anywhere in several blocks,
+/// so their stars are hashed.
+pub struct Surroundings<'a> {
+    pub base: &'a Base,
+    pub interior: &'a Interior,
+    pub blocks: Blocks,
+    /// How labels are joined in the whole mesh.
+    sets: ParitySets,
+    /// Labels of the local components that were met, by block and number.
+    locals: FxHashMap<(u32, u32), u32>,
+    triangles: Vec<Entry>,
+    stars: FxHashMap<u32, VertexStar>,
+    /// Triangles inserted in this turn.
+    inserted: Vec<u32>,
+    changes: Mail<13>,
+    pub workspace: &'a Workspace,
+    reserved: Vec<Reservation>,
+    /// What is told of a turn that is taken within a unit of work: it has what the unit had.
+    held: Option<Holding>,
+    told: Reservation,
+}
+
+impl Neighborhood for Surroundings<'_> {
+    fn star(&self, v: u32) -> impl Iterator<Item = (u32, [u32; 2])> {
+        let numbers = self.stars.get(&v).map(|star| star.triangles.iter());
+        numbers
+            .into_iter()
+            .flatten()
+            .map(move |&n| (n, others(self.triangles[n as usize].ids, v)))
+    }
+
+    fn count(&self, v: u32) -> usize {
+        self.stars.get(&v).map_or(0, |star| star.triangles.len())
+    }
+
+    fn position(&self, v: u32) -> Point {
+        self.stars[&v].position
+    }
+
+    fn position_in(&self, number: u32, v: u32) -> Point {
+        let t = &self.triangles[number as usize];
+        t.at[t.ids.iter().position(|w| *w == v).unwrap_or(0)]
+    }
+}
+
+impl Mesh for Surroundings<'_> {
+    fn changed(&self, v: u32) -> u32 {
+        self.stars.get(&v).map_or(0, |star| star.changed)
+    }
+
+    fn component(&mut self, number: u32) -> OrientationConstraint {
+        let word = self.triangles[number as usize].word;
+        (word >> 1, word & 1 == 1)
+    }
+
+    fn components(&mut self) -> &mut ParitySets {
+        &mut self.sets
+    }
+
+    fn insert(&mut self, t: Triangle, constraints: &[OrientationConstraint], now: u32) {
+        let (label, flip) = constraints[0];
+        let number = self.triangles.len() as u32;
+        self.triangles.push(Entry {
+            ids: t,
+            word: label << 1 | u32::from(flip),
+            at: t.map(|v| self.position(v)),
+        });
+        self.inserted.push(number);
+        for v in t {
+            let star = self.stars.entry(v).or_default();
+            star.triangles.push(number);
+            star.changed = now;
+        }
+    }
+}
+
+/// The triangles of a block at the vertices that are wanted.
+struct Found {
+    interior: Vec<[u32; 4]>,
+    crossing: Vec<[u32; 5]>,
+    changes: Vec<[u32; 13]>,
+}
+
+impl Found {
+    fn count(&self) -> usize {
+        self.interior.len() + self.crossing.len() + self.changes.len()
+    }
+}
+
+/// The positions that a block left.
+struct Positions {
+    ids: Range<u32>,
+    /// `[v, x, y, z]`, ascending.
+    vertices: Vec<[u32; 4]>,
+    /// Places in `vertices` of the block's own vertices, which are nearly all of them.
+    places: Vec<u32>,
+}
+
+impl Positions {
+    fn new(ids: Range<u32>, vertices: Vec<[u32; 4]>) -> Self {
+        let mut places = vec![0u32; ids.len()];
+        for (place, r) in (0..).zip(&vertices) {
+            if ids.contains(&r[0]) {
+                places[(r[0] - ids.start) as usize] = place;
+            }
+        }
+        Self {
+            ids,
+            vertices,
+            places,
+        }
+    }
+
+    fn at(&self, v: u32) -> Point {
+        let place = if self.ids.contains(&v) {
+            self.places[(v - self.ids.start) as usize] as usize
+        } else {
+            self.vertices.partition_point(|r| r[0] < v)
+        };
+        let [_, x, y, z] = self.vertices[place];
+        [x, y, z].map(|c| c as i32)
+    }
+}
+
+impl<'a> Surroundings<'a> {
+    pub fn new(
+        base: &'a Base,
+        interior: &'a Interior,
+        blocks: Blocks,
+        workspace: &'a Workspace,
+    ) -> Result<Self> {
+        Ok(Self {
+            base,
+            interior,
+            blocks,
+            sets: base.surface.sets.clone(),
+            locals: FxHashMap::default(),
+            triangles: Vec::new(),
+            stars: FxHashMap::default(),
+            inserted: Vec::new(),
+            changes: Mail::new(workspace, "stitch.changes", blocks.count(), CHANGES)?,
+            workspace,
+            reserved: Vec::new(),
+            held: None,
+            told: workspace.promise("stitch: borders", 0)?,
+        })
+    }
+
+    /// Gathers what is around the candidates `tried`; false, and nothing, if that would take more than
+    /// `most` bytes.
+    pub fn gather(&mut self, tried: &[Candidate], most: Option<u64>) -> Result<bool> {
+        let mut wanted: Vec<u32> = tried.iter().flat_map(|c| c.ids).collect();
+        wanted.sort_unstable();
+        wanted.dedup();
+        let lists = bytes_of(&wanted) + size_of_val(tried) as u64;
+        let blocks = self.blocks;
+        self.held = most.map(|_| Holding::default());
+        let mut fits = self.reserve(2 * lists, most)?;
+        for part in wanted.chunk_by(|v, w| blocks.of(*v) == blocks.of(*w)) {
+            self.workspace.check_cancel()?;
+            fits = fits && self.load(part, lists, most)?;
+        }
+        if !fits {
+            self.clear();
+        }
+        Ok(fits)
+    }
+
+    /// Reserves for this turn; false if it has more than `most` bytes then.
+    fn reserve(&mut self, bytes: u64, most: Option<u64>) -> Result<bool> {
+        let before: u64 = self.reserved.iter().map(Reservation::bytes).sum();
+        if most.is_some_and(|most| before + bytes > most) {
+            return Ok(false);
+        }
+        let more = self.workspace.promise("stitch: borders", bytes)?;
+        self.reserved.push(more);
+        Ok(true)
+    }
+
+    /// Takes in what is around `wanted`, ascending vertices of one block. `lists` is what the turn has
+    /// beside.
+    fn load(&mut self, wanted: &[u32], lists: u64, most: Option<u64>) -> Result<bool> {
+        let block = self.blocks.of(wanted[0]);
+        let section = block as usize;
+        let files = [
+            (self.interior.vertices.records(section), 16),
+            (self.interior.context.records(section), 16),
+            (self.base.surface.crossing.records(section), 20),
+            (self.changes.records(section), 52),
+        ];
+        let read: usize = files.iter().map(|(records, bytes)| records * bytes).sum();
+        // What is read goes when its part was taken.
+        if !self.reserve(2 * read as u64, most)? {
+            return Ok(false);
+        }
+        let found = self.find(wanted, section)?;
+        let kept = wanted.len() as u64 * VERTEX + found.count() as u64 * TRIANGLE;
+        let reading = self.reserved.pop();
+        if !self.reserve(kept, most)? {
+            return Ok(false);
+        }
+        let ids = self.blocks.ids(section);
+        let positions = Positions::new(ids, self.interior.vertices.get(section)?);
+        let tables = 5 * positions.places.len() as u64 + read as u64;
+        self.stars.reserve(wanted.len());
+        for &v in wanted {
+            let star = VertexStar {
+                position: positions.at(v),
+                ..VertexStar::default()
+            };
+            self.stars.insert(v, star);
+        }
+        self.enter_all(&found, &positions, block);
+        self.tell(lists + tables);
+        drop(reading);
+        Ok(true)
+    }
+
+    /// Reads the triangles of a block as they are by now, at the vertices `wanted`.
+    fn find(&self, wanted: &[u32], block: usize) -> Result<Found> {
+        let ids = self.blocks.ids(block);
+        let mut is_wanted = vec![false; ids.len()];
+        let here = |v: u32| v.wrapping_sub(ids.start) as usize;
+        wanted.iter().for_each(|v| is_wanted[here(*v)] = true);
+        let touches = |t: Triangle| {
+            let mut at = t.iter().map(|v| is_wanted.get(here(*v)));
+            at.any(|wanted| wanted == Some(&true))
+        };
+        let mut interior = self.interior.context.get(block)?;
+        interior.retain(|r| touches([r[0], r[1], r[2]]));
+        let mut crossing = self.base.surface.crossing.get(block)?;
+        crossing.retain(|r| touches([r[1], r[2], r[3]]));
+        let (mut changes, mut gone) = (self.changes.get(block)?, Vec::new());
+        changes.retain(|r| {
+            let t = [r[0], r[1], r[2]];
+            if r[3] == NOTHING {
+                gone.push(t);
+            }
+            r[3] != NOTHING && touches(t)
+        });
+        if !gone.is_empty() {
+            gone.sort_unstable();
+            interior.retain(|r| gone.binary_search(&[r[0], r[1], r[2]]).is_err());
+        }
+        Ok(Found {
+            interior,
+            crossing,
+            changes,
+        })
+    }
+
+    /// Enters what was found in a block.
+    fn enter_all(&mut self, found: &Found, positions: &Positions, block: u32) {
+        self.triangles.reserve(found.count());
+        for r in &found.interior {
+            let ComponentRef {
+                number,
+                local,
+                flip,
+            } = ComponentRef::from_word(r[3]);
+            let label = if local {
+                let local = self.locals.entry((block, number));
+                *local.or_insert_with(|| self.sets.push())
+            } else {
+                number
+            };
+            let ids = [r[0], r[1], r[2]];
+            let word = label << 1 | u32::from(flip);
+            let at = ids.map(|v| positions.at(v));
+            self.enter(Entry { ids, word, at }, block);
+        }
+        for &[_, i, j, k, word] in &found.crossing {
+            let ids = [i, j, k];
+            let at = ids.map(|v| positions.at(v));
+            self.enter(Entry { ids, word, at }, block);
+        }
+        for r in &found.changes {
+            let (ids, word) = ([r[0], r[1], r[2]], r[3]);
+            let at = [4, 7, 10].map(|n| [r[n], r[n + 1], r[n + 2]].map(|c| c as i32));
+            self.enter(Entry { ids, word, at }, block);
+        }
+    }
+
+    /// Enters a triangle at the vertices of candidates in `block`.
+    fn enter(&mut self, entry: Entry, block: u32) {
+        let number = self.triangles.len() as u32;
+        self.triangles.push(entry);
+        for v in entry.ids {
+            if self.blocks.of(v) == block
+                && let Some(star) = self.stars.get_mut(&v)
+            {
+                star.triangles.push(number);
+            }
+        }
+    }
+
+    /// Tells what the surroundings take, and `more` bytes.
+    fn tell(&mut self, more: u64) {
+        let stars = self.stars.values();
+        let lists: u64 = stars.map(|star| bytes_of(&star.triangles) + 16).sum();
+        let turn = lists + table_bytes(&self.stars) + bytes_of(&self.triangles) + more;
+        let tables = table_bytes(&self.locals) + self.changes.bytes();
+        match &mut self.held {
+            Some(held) => held.set(turn),
+            None => self.told.set_held(turn + tables),
+        }
+    }
+
+    /// Forgets the surroundings.
+    fn clear(&mut self) {
+        self.triangles = Vec::new();
+        self.stars = FxHashMap::default();
+        self.inserted.clear();
+        self.held = None;
+        self.tell(0);
+        self.reserved.clear();
+    }
+
+    /// Ends the turn of a block; `[block, i, j, k]` of what it inserted, for each block that this touches.
+    /// It is noted for blocks that have a later turn, which `later` tells.
+    pub fn end(&mut self, later: impl Fn(u32) -> bool) -> Result<Vec<[u32; 4]>> {
+        let mut sent = Vec::with_capacity(2 * self.inserted.len());
+        for &number in &self.inserted {
+            let t = self.triangles[number as usize].ids;
+            let first = self.blocks.of(t[0]);
+            let all = std::iter::once(first).chain(self.blocks.visited(t));
+            sent.extend(all.map(|block| (block, number)));
+        }
+        sent.sort_unstable();
+        let entry = |number: u32| self.triangles[number as usize];
+        for part in sent.chunk_by(|a, b| a.0 == b.0).filter(|p| later(p[0].0)) {
+            let records: Vec<_> = part.iter().map(|(_, n)| entry(*n).record()).collect();
+            self.changes.send(part[0].0, &records)?;
+        }
+        let with_block = |&(block, number): &(u32, u32)| {
+            let [i, j, k] = entry(number).ids;
+            [block, i, j, k]
+        };
+        let inserted = sent.iter().map(with_block).collect();
+        self.clear();
+        Ok(inserted)
+    }
+
+    /// Confirms the tentative merges of a block in the whole mesh; those that contradict what is joined
+    /// already are taken out, and returned as `[block, i, j, k]`.
+    pub fn confirm_merges(&mut self, block: usize) -> Result<Vec<[u32; 4]>> {
+        let (mut gone, mut noted) = (Vec::new(), Vec::new());
+        for [i, j, k, words @ ..] in self.interior.merges.get(block)? {
+            let words = words.into_iter().filter(|w| *w != NOTHING);
+            let constraints: Vec<OrientationConstraint> =
+                words.map(|w| (w >> 1, w & 1 == 1)).collect();
+            if !self.sets.merge(&constraints) {
+                gone.push([block as u32, i, j, k]);
+                let (ids, word, at) = ([i, j, k], NOTHING, [[0; 3]; 3]);
+                noted.push(Entry { ids, word, at }.record());
+                self.take_out(ids);
+            }
+        }
+        self.changes.send(block as u32, &noted)?;
+        Ok(gone)
+    }
+
+    fn take_out(&mut self, t: Triangle) {
+        for v in t {
+            if let Some(star) = self.stars.get_mut(&v) {
+                let triangles = &self.triangles;
+                // The order of the list does not matter to any test.
+                star.triangles.retain(|n| triangles[*n as usize].ids != t);
+            }
+        }
+    }
+}

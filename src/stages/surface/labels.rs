@@ -1,0 +1,176 @@
+//! The labels of a block: how its interior triangles run against each other, as far as edges inside the
+//! block tell.
+
+use super::evidence::Evidence;
+use super::parity::ParitySets;
+use super::patches::SharedEdge;
+use super::star::{EDGES, EdgesUp, Triangle, opposed};
+use super::weigh::weigh_block;
+use crate::stages::blocks::Blocks;
+use crate::workspace::memory::{Holding, bytes_of, hold};
+
+/// The labels of a block; the records are those of [`super::orient::Oriented`] and
+/// [`super::orient::Weighed`].
+pub(super) struct OrientedBlock {
+    pub interior: Vec<[u32; 4]>,
+    /// `[owner block, i, j, k, this block, label << 1 | flip, weight]`: the constraint that an
+    /// interior triangle of this block is for the crossing triangle `i, j, k`.
+    pub relations: Vec<[u32; 7]>,
+    pub pairs: Vec<[u32; 4]>,
+    pub ups: Vec<[u32; 3]>,
+    pub seams: Vec<[u32; 2]>,
+    /// Number of labels that occur in relations or pairs; they come first.
+    pub global: u32,
+    pub labels: u32,
+    pub mobius: u64,
+    _held: Holding,
+}
+
+/// Orients the interior triangles of a block and numbers their labels.
+pub(super) fn orient_block(
+    inner: &[Triangle],
+    crossing: &[Triangle],
+    evidence: Option<&Evidence>,
+    blocks: Blocks,
+    block: usize,
+) -> OrientedBlock {
+    if let Some(evidence) = evidence {
+        return weigh_block(inner, crossing, evidence, blocks, block);
+    }
+    let ids = blocks.ids(block);
+    let mut edges = EdgesUp::with_room_for(ids.clone(), inner.iter());
+    let mut sets = ParitySets::new(inner.len());
+    let mut kept = Vec::with_capacity(inner.len());
+    let mut constraints = Vec::new();
+    let (_held, mut mobius) = (hold(8 * inner.len() as u64), 0);
+    for (number, &t) in inner.iter().enumerate() {
+        let number = number as u32;
+        // Either all adjacent triangles agree and are joined, or the triangle goes.
+        constraints.clear();
+        adjacent(t, &edges, inner, &ids, |other, flip| {
+            constraints.push((other, flip))
+        });
+        if !sets.allow(&constraints) {
+            mobius += 1;
+            continue;
+        }
+        for &(other, flip) in &constraints {
+            sets.join(other, number, flip);
+        }
+        edges.add(t, number);
+        kept.push(number);
+    }
+    let mut connections = Connections::default();
+    for &c in crossing {
+        adjacent(c, &edges, inner, &ids, |other, flip| {
+            connections.first.push(other);
+            connections.relations.push((c, other, flip, 1));
+        });
+    }
+    number_labels(inner, &kept, connections, &mut sets, blocks, block, mobius)
+}
+
+/// What speaks for how the sets of a block run.
+#[derive(Default)]
+pub(super) struct Connections {
+    /// A triangle of each set that the rest of the cloud may be connected with, in the order of labels.
+    pub first: Vec<u32>,
+    /// A crossing triangle, an interior one at an edge of it, whether one must be turned against the
+    /// other, and the weight of that.
+    pub relations: Vec<(Triangle, u32, bool, i64)>,
+    /// A triangle of each of two sets, and the sum of weights for running alike.
+    pub pairs: Vec<(u32, u32, i64)>,
+    /// A triangle of a set, and the evidence that the set faces up as this triangle runs.
+    pub ups: Vec<(u32, i64)>,
+    /// Edges between sets.
+    pub seams: Vec<SharedEdge>,
+}
+
+/// Gives labels to the sets: first those that the rest of the cloud may be connected with.
+pub(super) fn number_labels(
+    inner: &[Triangle],
+    kept: &[u32],
+    connections: Connections,
+    sets: &mut ParitySets,
+    blocks: Blocks,
+    block: usize,
+    mobius: u64,
+) -> OrientedBlock {
+    const NONE: u32 = u32::MAX;
+    let mut label_of = vec![NONE; inner.len()];
+    let mut labels = 0;
+    let mut find = |triangle: u32| {
+        let (root, turned) = sets.find(triangle);
+        let label = &mut label_of[root as usize];
+        if *label == NONE {
+            *label = labels;
+            labels += 1;
+        }
+        (*label, turned, labels)
+    };
+    let mut global = 0;
+    for triangle in connections.first {
+        global = find(triangle).2;
+    }
+    let mut sent = Vec::with_capacity(connections.relations.len());
+    for (c, other, flip, weight) in connections.relations {
+        let (label, turned, _) = find(other);
+        let word = label << 1 | u32::from(flip ^ turned);
+        let owner = blocks.of(c[0]);
+        sent.push([owner, c[0], c[1], c[2], block as u32, word, weight as u32]);
+    }
+    let mut pairs = Vec::with_capacity(connections.pairs.len());
+    for (a, b, sum) in connections.pairs {
+        let ((a, turned_a, _), (b, turned_b, _)) = (find(a), find(b));
+        let sum = if turned_a ^ turned_b { -sum } else { sum };
+        pairs.push([a, b, sum as u32, (sum >> 32) as u32]);
+    }
+    let mut ups = Vec::with_capacity(connections.ups.len());
+    for (a, up) in connections.ups {
+        let (label, turned, _) = find(a);
+        if label < global {
+            let up = if turned { -up } else { up };
+            ups.push([label, up as u32, (up >> 32) as u32]);
+        }
+    }
+    let mut interior = Vec::with_capacity(kept.len());
+    for &number in kept {
+        let (label, turned, _) = find(number);
+        let t = inner[number as usize];
+        interior.push([t[0], t[1], t[2], label << 1 | u32::from(turned)]);
+    }
+    let place = |n: u32| kept.partition_point(|k| *k < n) as u32;
+    let seam = |j: &SharedEdge| [place(j.a), place(j.b) << 1 | u32::from(j.flip)];
+    let seams: Vec<_> = connections.seams.iter().map(seam).collect();
+    let held = bytes_of(&interior) + bytes_of(&sent) + bytes_of(&pairs) + bytes_of(&seams);
+    OrientedBlock {
+        _held: hold(held),
+        interior,
+        relations: sent,
+        pairs,
+        ups,
+        seams,
+        global,
+        labels,
+        mobius,
+    }
+}
+
+/// Calls `each` with the triangles that share an edge inside the block with `t`, and whether `t`
+/// must be turned against them.
+pub(super) fn adjacent(
+    t: Triangle,
+    edges: &EdgesUp,
+    triangles: &[Triangle],
+    ids: &std::ops::Range<u32>,
+    mut each: impl FnMut(u32, bool),
+) {
+    for (a, b, ..) in EDGES {
+        let (low, high) = (t[a], t[b]);
+        if ids.contains(&high) {
+            for n in edges.at_edge(low, high) {
+                each(n, opposed(t, triangles[n as usize], low, high));
+            }
+        }
+    }
+}
