@@ -10,11 +10,9 @@ mod shuffle;
 mod sort;
 mod sorter;
 mod table;
-mod transitional;
 
 pub(crate) use row::row;
 pub use row::{Id, Row, Word, row_bytes};
 pub use shuffle::Shuffle;
 pub use sorter::{Sorted, Sorter};
 pub use table::Table;
-pub use transitional::*;

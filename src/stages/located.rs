@@ -1,6 +1,7 @@
 //! Where the vertices of triangles are: those of one block, and some of others.
 
 use super::blocks::Blocks;
+use super::cells::CountedTriple;
 use super::order::PointStore;
 use super::spacing::Density;
 use crate::error::Result;
@@ -45,10 +46,10 @@ impl Places<'_> {
         move |t, at| differ && on_a_line(at) || is_long.is_some_and(|is_long| is_long(t, at))
     }
 
-    /// Leaves out candidates, `[i, j, k, count]`, that are unfit where they are in the file; how many.
-    pub fn drop_unfit(&self, candidates: &mut Vec<[u32; 4]>, file: &Located) -> u64 {
+    /// Leaves out candidates that are unfit where they are in the file; how many.
+    pub fn drop_unfit(&self, candidates: &mut Vec<CountedTriple>, file: &Located) -> u64 {
         let (unfit, before) = (self.unfit(), candidates.len());
-        candidates.retain(|&[i, j, k, _]| !unfit([i, j, k], file.corners([i, j, k])));
+        candidates.retain(|c| !unfit(c.triple, file.corners(c.triple)));
         (before - candidates.len()) as u64
     }
 }

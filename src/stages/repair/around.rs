@@ -2,6 +2,7 @@
 
 use crate::error::Result;
 use crate::stages::stitch::Stitched;
+use crate::stages::surface::rows::TriangleTo;
 use crate::stages::surface::star::Triangle;
 
 /// All triangles that touch a block, ascending.
@@ -9,14 +10,17 @@ use crate::stages::surface::star::Triangle;
 /// # Errors
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
 pub fn load(stitched: &Stitched, block: usize) -> Result<Vec<Triangle>> {
-    let mut triangles = stitched.interior.get(block)?;
+    let mut triangles: Vec<Triangle> = bytemuck::cast_vec(stitched.interior.get(block)?);
     let removed = stitched.removed.get(block)?;
     if !removed.is_empty() {
-        let gone = |t: &Triangle| removed.binary_search(&[block as u32, t[0], t[1], t[2]]);
+        let gone = |&triangle: &Triangle| {
+            let to = block as u32;
+            removed.binary_search(&TriangleTo { to, triangle })
+        };
         triangles.retain(|t| gone(t).is_err());
     }
     let added = stitched.added.get(block)?;
-    merge(&mut triangles, added.iter().map(|r| [r[1], r[2], r[3]]));
+    merge(&mut triangles, added.iter().map(|t| t.triangle));
     Ok(triangles)
 }
 

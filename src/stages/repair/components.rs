@@ -2,13 +2,14 @@
 //! see, added up and judged.
 
 use super::facing::{Fate, Sums, SumsRow, judge};
-use super::rows::{SeenTriangle, TriangleTo};
+use super::rows::SeenTriangle;
 use super::{RepairOptions, RepairStats};
 use crate::error::Result;
 use crate::geom::Point;
 use crate::spill::Table;
 use crate::stages::order::PointStore;
 use crate::stages::surface::parity::ParitySets;
+use crate::stages::surface::rows::TriangleTo;
 use crate::workspace::Workspace;
 use crate::workspace::memory::{bytes_of, hold, table_bytes};
 use rustc_hash::FxHashMap;

@@ -31,17 +31,6 @@ impl SeenTriangle {
 }
 
 row! {
-    /// A triangle for a block.
-    pub struct TriangleTo {
-        /// Number of the block.
-        to: u32,
-        /// Ids, ascending.
-        triangle: Triangle,
-    }
-    packed Above Above Rising Rising
-}
-
-row! {
     /// Triangles in a row that have one label.
     pub struct LabelRun {
         /// Number of triangles.

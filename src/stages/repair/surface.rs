@@ -7,7 +7,7 @@
 use super::components::{Parts, join};
 use super::facing::{Fate, Sums, SumsRow, judge};
 use super::patch::Patch;
-use super::rows::{LabelRun, RimBits, SeenTriangle, TriangleTo};
+use super::rows::{LabelRun, RimBits, SeenTriangle};
 use super::{
     OrientedTriangle, RepairOptions, RepairStats, SHUFFLE_BUFFER, SurfaceTriangle, around, bridges,
     flips,
@@ -18,6 +18,7 @@ use crate::spill::{Shuffle, Table};
 use crate::stages::blocks::Blocks;
 use crate::stages::located::Places;
 use crate::stages::stitch::Stitched;
+use crate::stages::surface::rows::TriangleTo;
 use crate::stages::surface::star::Triangle;
 use crate::workspace::Workspace;
 use crate::workspace::memory::{Reservation, bytes_of, hold};

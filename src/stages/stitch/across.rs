@@ -2,29 +2,29 @@
 //! order. What a turn leaves for later ones is on disk.
 
 use super::base::Base;
-use super::insertion::{Candidate, RANKED, insert_candidates};
+use super::insertion::{Candidate, CandidateRow, insert_candidates};
 use super::interior::{Follower, Interior, block_bytes};
 use super::mail::Mail;
 use super::stats::InsertStats;
 use super::surroundings::Surroundings;
 use crate::error::Result;
-use crate::spill::layouts::SENT;
-use crate::spill::{Exchange, Sections};
+use crate::spill::{Shuffle, Table};
 use crate::stages::blocks::Blocks;
+use crate::stages::surface::rows::{LabelledTo, TriangleTo};
 use crate::workspace::Workspace;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-const EXCHANGE_BUFFER: u64 = 8 << 20;
+const SHUFFLE_BUFFER: u64 = 8 << 20;
 
 /// The crossing part of the mesh.
 #[derive(Debug)]
 pub struct Crossing {
-    /// `[block, i, j, k]` for each block that the triangle touches: crossing triangles of the mesh,
-    /// and interior candidates that were inserted late.
-    pub added: Sections<4>,
-    /// `[block, i, j, k]`: interior triangles to be taken out again.
-    pub removed: Sections<4>,
+    /// Crossing triangles of the mesh and interior candidates that were inserted late, for each block that
+    /// they touch.
+    pub added: Table<TriangleTo>,
+    /// Interior triangles to be taken out again.
+    pub removed: Table<TriangleTo>,
 }
 
 crate::workspace::persist::persist!(Crossing { added, removed });
@@ -103,13 +103,13 @@ struct Pass<'a> {
     /// one of their vertices.
     order: Vec<u32>,
     /// Candidates that wait for the turn of a later block.
-    waiting: Mail<5>,
+    waiting: Mail<CandidateRow>,
     counts: InsertStats,
     /// The block whose turn is next, and how many of `order` are known to be ready.
     group: usize,
     ready: usize,
-    added: Exchange<4>,
-    removed: Exchange<4>,
+    added: Shuffle<TriangleTo>,
+    removed: Shuffle<TriangleTo>,
     cos_max_angle: f64,
 }
 
@@ -125,20 +125,18 @@ impl<'a> Pass<'a> {
         cos_max_angle: f64,
         workspace: &'a Workspace,
     ) -> Result<Self> {
-        let exchange = |name| -> Result<Exchange<4>> {
-            Ok(Exchange::new(workspace, name, EXCHANGE_BUFFER)?.packed(SENT))
-        };
+        let shuffle = |name| Shuffle::new(workspace, name, SHUFFLE_BUFFER);
         let mut order: Vec<u32> = (0..blocks.count() as u32).collect();
         order.sort_by_key(|block| base.spans[*block as usize].0);
         Ok(Self {
             mesh: Surroundings::new(base, interior, blocks, workspace)?,
             order,
-            waiting: Mail::new(workspace, "stitch.waiting", blocks.count(), RANKED)?,
+            waiting: Mail::new(workspace, "stitch.waiting", blocks.count())?,
             counts: InsertStats::default(),
             group: 0,
             ready: 0,
-            added: exchange("stitch.added")?,
-            removed: exchange("stitch.removed")?,
+            added: shuffle("stitch.added")?,
+            removed: shuffle("stitch.removed")?,
             cos_max_angle,
         })
     }
@@ -175,7 +173,7 @@ impl<'a> Pass<'a> {
         let blocks = self.mesh.blocks;
         let mut tried = self.waiting.get(group)?;
         tried.append(&mut self.mesh.interior.ranked.get(group)?);
-        let mut tried: Vec<_> = tried.into_iter().map(Candidate::from_record).collect();
+        let mut tried: Vec<_> = tried.into_iter().map(Candidate::of).collect();
         if !self.mesh.gather(&tried, most)? {
             return Ok(false);
         }
@@ -191,14 +189,14 @@ impl<'a> Pass<'a> {
         for candidate in tried {
             let of = candidate.ids.map(|v| blocks.of(v));
             match of.into_iter().find(|b| *b > group as u32) {
-                Some(next) => waiting.push((next, candidate.record())),
+                Some(next) => waiting.push((next, candidate.row())),
                 None => self.counts.unconnected += 1,
             }
         }
         waiting.sort_unstable();
         for part in waiting.chunk_by(|a, b| a.0 == b.0) {
-            let records: Vec<_> = part.iter().map(|(_, record)| *record).collect();
-            self.waiting.send(part[0].0, &records)?;
+            let rows: Vec<_> = part.iter().map(|(_, row)| *row).collect();
+            self.waiting.send(part[0].0, &rows)?;
         }
         let spans = &self.mesh.base.spans;
         let later = |block: u32| spans[block as usize].1 > group as u32;
@@ -215,9 +213,9 @@ impl<'a> Pass<'a> {
         // The crossing triangles of the base belong to the mesh as well.
         let base = &self.mesh.base.surface;
         for block in 0..blocks.count() {
-            let records = base.crossing.get(block)?;
-            let records: Vec<_> = records.iter().map(|r| [r[0], r[1], r[2], r[3]]).collect();
-            self.added.send(&records)?;
+            let rows = base.crossing.get(block)?.into_iter();
+            let rows = rows.map(|LabelledTo { to, triangle, .. }| TriangleTo { to, triangle });
+            self.added.send(&rows.collect::<Vec<_>>())?;
         }
         let crossing = Crossing {
             added: self.added.deliver(workspace, blocks.count())?,

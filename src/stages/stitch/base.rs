@@ -3,35 +3,35 @@
 
 use super::BaseStats;
 use crate::error::Result;
-use crate::spill::layouts::{LABELLED, SENT};
-use crate::spill::{Exchange, Sections};
+use crate::spill::{Id, Shuffle, Table};
 use crate::stages::blocks::Blocks;
+use crate::stages::cells::{CountedTriple, SentTriple};
 use crate::stages::located::{Located, Places};
 use crate::stages::surface::columns;
 use crate::stages::surface::evidence::{Division, Evidence};
 use crate::stages::surface::orient::{BlockTriangles, Oriented, orient_inside};
+use crate::stages::surface::rows::TriangleTo;
 use crate::stages::surface::star::{Link, Star, Triangle, has, others};
 use crate::stages::triples::Triples;
 use crate::workspace::Workspace;
 use crate::workspace::memory::{bytes_of, hold};
 use crate::workspace::persist::persist;
 
-const EXCHANGE_BUFFER: u64 = 8 << 20;
+const SHUFFLE_BUFFER: u64 = 8 << 20;
 
 /// The base, and what the triples leave for insertion.
 #[derive(Debug)]
 pub(super) struct Base {
     /// Its triangles, oriented.
     pub surface: Oriented,
-    /// Interior candidates by block, `[i, j, k, count]`.
-    pub candidates: Sections<4>,
-    /// All crossing triples by the block of their smallest vertex, `[i, j, k, count]`.
-    pub crossing: Sections<4>,
-    /// The same for the blocks of their other vertices, `[block, i, j, k, count]`.
-    pub visiting: crate::spill::Table<crate::stages::cells::SentTriple>,
-    /// Crossing T3 triangles that are flagged, by the block of their smallest vertex, `[block, i,
-    /// j, k]`.
-    pub flags: Sections<4>,
+    /// Interior candidates by block; 3 cells: it is T3 but was flagged.
+    pub candidates: Table<CountedTriple>,
+    /// All crossing triples by the block of their smallest vertex.
+    pub crossing: Table<CountedTriple>,
+    /// The same for the blocks of their other vertices.
+    pub visiting: Table<SentTriple>,
+    /// Crossing T3 triangles that are flagged, by the block of their smallest vertex.
+    pub flags: Table<TriangleTo>,
     /// For each block the first and the last block that a triple of it touches.
     pub spans: Vec<(u32, u32)>,
     /// Interior candidates left out because they would be on a line in the file.
@@ -51,7 +51,7 @@ pub(super) fn base(
     workspace: &Workspace,
 ) -> Result<(Base, BaseStats)> {
     let count = blocks.count();
-    let buffer = EXCHANGE_BUFFER;
+    let buffer = SHUFFLE_BUFFER;
     let highest = || columns::highest(places.shape, blocks, workspace);
     let by_evidence = match division {
         Some(division) => Some((division, workspace.once("columns", highest)?)),
@@ -59,9 +59,9 @@ pub(super) fn base(
     };
     let weigh = by_evidence.is_some();
     let look = Look {
-        candidates: Sections::with_layout(workspace, "stitch.candidates", count, LABELLED)?,
-        crossing: Sections::with_layout(workspace, "stitch.crossing", count, LABELLED)?,
-        flags: Exchange::between(workspace, "stitch.flags", buffer, count, SENT)?,
+        candidates: Table::create(workspace, "stitch.candidates", count)?,
+        crossing: Table::create(workspace, "stitch.crossing", count)?,
+        flags: Shuffle::between_units(workspace, "stitch.flags", buffer, count)?,
         triples: &triples,
         places,
         by_evidence,
@@ -115,11 +115,11 @@ struct Look<'a> {
     triples: &'a Triples,
     places: Places<'a>,
     /// How blocks are divided and the highest points of columns, if they are oriented by evidence.
-    by_evidence: Option<(Division, Sections<1>)>,
+    by_evidence: Option<(Division, Table<Id>)>,
     blocks: Blocks,
-    candidates: Sections<4>,
-    crossing: Sections<4>,
-    flags: Exchange<4>,
+    candidates: Table<CountedTriple>,
+    crossing: Table<CountedTriple>,
+    flags: Shuffle<TriangleTo>,
 }
 
 /// What the look at a block found.
@@ -165,9 +165,15 @@ impl Look<'_> {
             for &number in &flagged {
                 let t = triangles[number as usize];
                 if self.blocks.crossing(t) {
-                    sent.push([self.blocks.of(t[0]), t[0], t[1], t[2]]);
+                    sent.push(TriangleTo {
+                        to: self.blocks.of(t[0]),
+                        triangle: t,
+                    });
                 } else {
-                    candidates.push([t[0], t[1], t[2], 3]);
+                    candidates.push(CountedTriple {
+                        triple: t,
+                        count: 3,
+                    });
                 }
             }
             found.flagged = (candidates.len() - interior) as u64;
@@ -202,8 +208,8 @@ impl Look<'_> {
         block: usize,
         located: Option<Located>,
         triangles: &[Triangle],
-        candidates: &[[u32; 4]],
-        (division, highest): &(Division, Sections<1>),
+        candidates: &[CountedTriple],
+        (division, highest): &(Division, Table<Id>),
     ) -> Result<Evidence> {
         let places = match located {
             Some(located) => located,
@@ -212,10 +218,10 @@ impl Look<'_> {
                 Located::load(self.places.shape, self.blocks, block, vertices)?
             }
         };
-        let candidates: Vec<Triangle> = candidates.iter().map(|r| [r[0], r[1], r[2]]).collect();
+        let candidates: Vec<Triangle> = candidates.iter().map(|c| c.triple).collect();
         Ok(Evidence {
             division: *division,
-            highest: highest.get(block)?.into_iter().flatten().collect(),
+            highest: bytemuck::cast_vec(highest.get(block)?),
             held: hold(bytes_of(&candidates)),
             places,
             candidates,
@@ -234,7 +240,7 @@ impl Look<'_> {
         &self,
         block: usize,
         triangles: &mut Vec<Triangle>,
-        candidates: &mut Vec<[u32; 4]>,
+        candidates: &mut Vec<CountedTriple>,
         found: &mut Found,
     ) -> Result<Option<Located>> {
         if self.places.limit_triangles() {
@@ -256,34 +262,35 @@ impl Look<'_> {
 
     /// The T3 triangles that touch a block, ascending, and its interior candidates so far. The
     /// crossing triples are put apart.
-    fn part(&self, block: usize, found: &mut Found) -> Result<(Vec<Triangle>, Vec<[u32; 4]>)> {
-        let visiting: Vec<[u32; 5]> = bytemuck::cast_vec(self.triples.visiting.get(block)?);
-        let own: Vec<[u32; 4]> = bytemuck::cast_vec(self.triples.own.get(block)?);
-        let t3 = visiting.iter().filter(|r| r[4] == 3).count()
-            + own.iter().filter(|r| r[3] == 3).count();
+    fn part(&self, block: usize, found: &mut Found) -> Result<(Vec<Triangle>, Vec<CountedTriple>)> {
+        let visiting = self.triples.visiting.get(block)?;
+        let own = self.triples.own.get(block)?;
+        let t3 = visiting.iter().filter(|t| t.count == 3).count()
+            + own.iter().filter(|t| t.count == 3).count();
         let mut triangles = Vec::with_capacity(t3);
         let mut candidates = Vec::new();
         let mut crossing = Vec::new();
         let mut span = (block as u32, block as u32);
         // Visitors have their smallest vertex in a lower block, so they come first.
-        for r in &visiting {
-            let (first, last) = (self.blocks.of(r[1]), self.blocks.of(r[3]));
+        for visitor in &visiting {
+            let [first, _, last] = visitor.triple.map(|v| self.blocks.of(v));
             span = (span.0.min(first), span.1.max(last));
-            if r[4] == 3 {
-                triangles.push([r[1], r[2], r[3]]);
+            if visitor.count == 3 {
+                triangles.push(visitor.triple);
             }
         }
         // Ids ascend, so a triple is interior if its last one is in the block.
         let end = self.blocks.ids(block).end;
-        for &[i, j, k, count] in &own {
-            if count == 3 {
-                triangles.push([i, j, k]);
+        for &counted in &own {
+            if counted.count == 3 {
+                triangles.push(counted.triple);
             }
-            if k >= end {
-                span.1 = span.1.max(self.blocks.of(k));
-                crossing.push([i, j, k, count]);
-            } else if count < 3 {
-                candidates.push([i, j, k, count]);
+            let last = counted.triple[2];
+            if last >= end {
+                span.1 = span.1.max(self.blocks.of(last));
+                crossing.push(counted);
+            } else if counted.count < 3 {
+                candidates.push(counted);
             }
         }
         let read = bytes_of(&visiting) + bytes_of(&own) + bytes_of(&crossing);

@@ -5,14 +5,26 @@
 //! and for the whole mesh only if the pass across blocks confirms it. A *local* component is known to this
 //! block alone, so merging it with another one is final.
 
+use crate::spill::row;
 use crate::stages::surface::orient::Oriented;
-use crate::stages::surface::parity::{OrientationConstraint, ParitySets};
+use crate::stages::surface::parity::{OrientationConstraint, ParitySets, constraint, word};
 use crate::stages::surface::star::Triangle;
 use crate::workspace::memory::bytes_of;
 use rustc_hash::FxHashMap;
 
 /// Instead of a global label: there is none.
 pub const NOTHING: u32 = u32::MAX;
+
+row! {
+    /// An inserted triangle at which global components meet.
+    pub struct Merge {
+        /// Ids, ascending.
+        triangle: Triangle,
+        /// `label << 1 | flip` of the components, or [`NOTHING`].
+        constraints: [u32; 3],
+    }
+    packed Above Above Above Above Above Above
+}
 
 /// The component of a triangle as a word: `number << 2 | local << 1 | flip`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -89,15 +101,17 @@ impl<'a> BaseComponents<'a> {
 
     /// The component of an interior triangle with `label << 1 | flip`, and whether it is turned
     /// against that.
-    pub fn interior(&self, word: u32) -> OrientationConstraint {
-        let (component, flip) = self.of_label[(word >> 1) as usize];
-        (component, flip ^ (word & 1 == 1))
+    pub fn interior(&self, label_flip: u32) -> OrientationConstraint {
+        let (label, turned) = constraint(label_flip);
+        let (component, flip) = self.of_label[label as usize];
+        (component, flip ^ turned)
     }
 
     /// The same for a crossing triangle.
-    pub fn crossing(&mut self, word: u32) -> OrientationConstraint {
-        let (component, flip) = self.of_global(word >> 1);
-        (component, flip ^ (word & 1 == 1))
+    pub fn crossing(&mut self, label_flip: u32) -> OrientationConstraint {
+        let (label, turned) = constraint(label_flip);
+        let (component, flip) = self.of_global(label);
+        (component, flip ^ turned)
     }
 }
 
@@ -112,8 +126,8 @@ pub struct BlockComponents {
     pub joined: ParitySets,
     /// Global label of each component, or [`NOTHING`].
     global: Vec<u32>,
-    /// Tentative merges in order of insertion, see [`super::interior::Interior::merges`].
-    pub tentative: Vec<[u32; 6]>,
+    /// Tentative merges in order of insertion.
+    pub tentative: Vec<Merge>,
 }
 
 impl BlockComponents {
@@ -186,15 +200,17 @@ impl BlockComponents {
         for &(component, flip) in constraints {
             let (root, up) = self.merged.find(component);
             let label = self.global[root as usize];
-            let word = label << 1 | u32::from(flip ^ up);
+            let word = word((label, flip ^ up));
             if label != NOTHING && !words[..count].contains(&word) {
                 words[count] = word;
                 count += 1;
             }
         }
         if count > 1 {
-            let ([i, j, k], [a, b, c]) = (t, words);
-            self.tentative.push([i, j, k, a, b, c]);
+            self.tentative.push(Merge {
+                triangle: t,
+                constraints: words,
+            });
         }
     }
 }

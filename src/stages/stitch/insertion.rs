@@ -5,7 +5,7 @@
 use super::admissibility::{Neighborhood, Refusal, examine};
 use super::stats::InsertStats;
 use crate::geom::{Point, distance2};
-use crate::spill::Word;
+use crate::spill::row;
 use crate::stages::surface::parity::{OrientationConstraint, ParitySets};
 use crate::stages::surface::star::Triangle;
 
@@ -81,14 +81,16 @@ pub struct Candidate {
     tried: u32,
 }
 
-/// How records of candidates are packed.
-pub const RANKED: [Word; 5] = [
-    Word::Above,
-    Word::Above,
-    Word::Above,
-    Word::Rising,
-    Word::Rising,
-];
+row! {
+    /// A [`Candidate`], in the same order.
+    pub struct CandidateRow {
+        /// Its rank, the upper word first.
+        rank: [u32; 2],
+        /// Ids, ascending.
+        triangle: Triangle,
+    }
+    packed Above Above Above Rising Rising
+}
 
 impl Candidate {
     /// The candidate seen by `count` cells (3: it was flagged).
@@ -102,19 +104,22 @@ impl Candidate {
         }
     }
 
-    /// As a record, in the same order.
+    /// As a row, in the same order.
     #[must_use]
-    pub fn record(&self) -> [u32; 5] {
-        let [i, j, k] = self.ids;
-        [(self.rank >> 32) as u32, self.rank as u32, i, j, k]
+    pub fn row(&self) -> CandidateRow {
+        CandidateRow {
+            rank: [(self.rank >> 32) as u32, self.rank as u32],
+            triangle: self.ids,
+        }
     }
 
-    /// From a record.
+    /// From a row.
     #[must_use]
-    pub fn from_record([high, low, i, j, k]: [u32; 5]) -> Self {
+    pub fn of(row: CandidateRow) -> Self {
+        let [high, low] = row.rank.map(u64::from);
         Self {
-            rank: u64::from(high) << 32 | u64::from(low),
-            ids: [i, j, k],
+            rank: high << 32 | low,
+            ids: row.triangle,
             tried: 0,
         }
     }

@@ -3,37 +3,58 @@
 
 use super::admissibility::Neighborhood;
 use super::base::Base;
-use super::components::{BaseComponents, BlockComponents};
-use super::insertion::{Candidate, Mesh, RANKED, insert_candidates};
+use super::components::{BaseComponents, BlockComponents, Merge};
+use super::insertion::{Candidate, CandidateRow, Mesh, insert_candidates};
 use super::stats::InsertStats;
 use crate::error::Result;
 use crate::geom::Point;
-use crate::spill::Sections;
-use crate::spill::layouts::{LABELLED, TRIANGLE};
+use crate::spill::{Table, row};
 use crate::stages::blocks::Blocks;
+use crate::stages::cells::CountedTriple;
 use crate::stages::located::{Located, Places};
 use crate::stages::surface::parity::{OrientationConstraint, ParitySets};
+use crate::stages::surface::rows::{LabelledTo, LabelledTriangle, TriangleRow, TriangleTo};
 use crate::stages::surface::star::{ByVertex, Triangle, others};
 use crate::workspace::Workspace;
 use crate::workspace::memory::{Holding, bytes_of, hold};
 use std::ops::Range;
 
+row! {
+    /// A triangle and its component.
+    pub struct TriangleIn {
+        /// Ids, ascending.
+        triangle: Triangle,
+        /// See [`ComponentRef`](super::components::ComponentRef).
+        component: u32,
+    }
+    packed Above Rising Rising Above
+}
+
+row! {
+    /// A vertex and where it is.
+    pub struct VertexAt {
+        /// The vertex.
+        id: u32,
+        /// Its position.
+        position: Point,
+    }
+    packed Above Above Above Above
+}
+
 /// What the blocks leave for the crossing candidates.
 #[derive(Debug)]
 pub struct Interior {
-    /// Interior triangles of the mesh, `[i, j, k]`, ascending, by block.
-    pub mesh: Sections<3>,
-    /// Tentative merges in order of insertion: `[i, j, k, a, b, c]`; `a`, `b`, `c` are the constraints
-    /// of the adjacent triangles, `label << 1 | flip`, or [`NOTHING`](super::components::NOTHING).
-    pub merges: Sections<6>,
-    /// Interior triangles that touch a context vertex: `[i, j, k, component]`, see
-    /// [`ComponentRef`](super::components::ComponentRef).
-    pub context: Sections<4>,
-    /// Vertices of these, of the crossing base and the context vertices, ascending: `[v, x, y, z]`.
-    pub vertices: Sections<4>,
+    /// Interior triangles of the mesh, ascending, by block.
+    pub mesh: Table<TriangleRow>,
+    /// Tentative merges in order of insertion.
+    pub merges: Table<Merge>,
+    /// Interior triangles that touch a context vertex.
+    pub context: Table<TriangleIn>,
+    /// Vertices of these, of the crossing base and the context vertices, ascending.
+    pub vertices: Table<VertexAt>,
     /// Crossing candidates with their smallest vertex in the block, and interior ones that failed
-    /// only test I and touch a crossing triple; ascending, see [`Candidate::record`].
-    pub ranked: Sections<5>,
+    /// only test I and touch a crossing triple; ascending.
+    pub ranked: Table<CandidateRow>,
 }
 
 impl Interior {
@@ -43,19 +64,19 @@ impl Interior {
     /// [`crate::Error::Io`].
     pub fn create(workspace: &Workspace, count: usize) -> Result<Self> {
         Ok(Self {
-            mesh: Sections::with_layout(workspace, "stitch.mesh", count, TRIANGLE)?,
-            merges: Sections::create(workspace, "stitch.merges", count)?,
-            context: Sections::with_layout(workspace, "stitch.context", count, LABELLED)?,
-            vertices: Sections::create(workspace, "stitch.vertices", count)?,
-            ranked: Sections::with_layout(workspace, "stitch.ranked", count, RANKED)?,
+            mesh: Table::create(workspace, "stitch.mesh", count)?,
+            merges: Table::create(workspace, "stitch.merges", count)?,
+            context: Table::create(workspace, "stitch.context", count)?,
+            vertices: Table::create(workspace, "stitch.vertices", count)?,
+            ranked: Table::create(workspace, "stitch.ranked", count)?,
         })
     }
 }
 
 /// Bytes that the work on a block takes.
 pub fn block_bytes(base: &Base, block: usize) -> u64 {
-    let triangles = base.surface.interior.records(block) + base.surface.crossing.records(block);
-    let candidates = base.candidates.records(block) + base.crossing.records(block);
+    let triangles = base.surface.interior.rows(block) + base.surface.crossing.rows(block);
+    let candidates = base.candidates.rows(block) + base.crossing.rows(block);
     let records = triangles + candidates + base.visiting.rows(block);
     180 * records as u64 + (4 << 20)
 }
@@ -138,20 +159,20 @@ const CROSSING: u8 = 1;
 const OPEN: u8 = 2;
 
 /// [`CROSSING`] and [`OPEN`] of the vertices of a block; `crossing` is the crossing base around it.
-fn marks(base: &Base, crossing: &[[u32; 5]], ids: &Range<u32>, block: usize) -> Result<Vec<u8>> {
+fn marks(base: &Base, crossing: &[LabelledTo], ids: &Range<u32>, block: usize) -> Result<Vec<u8>> {
     let mut marks = vec![0; ids.len()];
     let mut mark = |t: Triangle, count: u32| {
-        let in_base = || crossing.binary_search_by_key(&t, |r| [r[1], r[2], r[3]]);
+        let in_base = || crossing.binary_search_by_key(&t, |c| c.triangle);
         let open = count < 3 || in_base().is_err();
         for v in t.into_iter().filter(|v| ids.contains(v)) {
             marks[(v - ids.start) as usize] |= if open { CROSSING | OPEN } else { CROSSING };
         }
     };
-    for r in &bytemuck::cast_vec::<_, [u32; 5]>(base.visiting.get(block)?) {
-        mark([r[1], r[2], r[3]], r[4]);
+    for t in &base.visiting.get(block)? {
+        mark(t.triple, t.count);
     }
-    for r in &base.crossing.get(block)? {
-        mark([r[0], r[1], r[2]], r[3]);
+    for t in &base.crossing.get(block)? {
+        mark(t.triple, t.count);
     }
     Ok(marks)
 }
@@ -224,10 +245,10 @@ impl BlockWork {
     fn load(places: Places<'_>, base: &Base, blocks: Blocks, block: usize) -> Result<Self> {
         let ids = blocks.ids(block);
         let located = Located::load(places.shape, blocks, block, std::iter::empty())?;
-        let mut candidates: Vec<Candidate> = Vec::with_capacity(base.candidates.records(block));
-        for &[i, j, k, count] in &base.candidates.get(block)? {
-            let t = [i, j, k];
-            candidates.push(Candidate::new(t, count, t.map(|v| located.at(v))));
+        let mut candidates: Vec<Candidate> = Vec::with_capacity(base.candidates.rows(block));
+        for &CountedTriple { triple, count } in &base.candidates.get(block)? {
+            let at = triple.map(|v| located.at(v));
+            candidates.push(Candidate::new(triple, count, at));
         }
         candidates.sort_unstable();
         let mut active = vec![false; ids.len()];
@@ -237,8 +258,8 @@ impl BlockWork {
         let (interior, cut) = base.surface.inside(block)?;
         let crossing = base.surface.crossing.get(block)?;
         let marks = marks(base, &crossing, &ids, block)?;
-        let inside = interior.iter().map(|r| [r[0], r[1], r[2]]);
-        let across = crossing.iter().map(|r| [r[1], r[2], r[3]]);
+        let inside = interior.iter().map(|t| t.triangle);
+        let across = crossing.iter().map(|t| t.triangle);
         let all = inside.chain(across).chain(candidates.iter().map(|c| c.ids));
         let is_active = |v: &u32| active.get(v.wrapping_sub(ids.start) as usize) == Some(&true);
         let stars = ByVertex::with_room(ids.clone(), all.flatten().filter(is_active));
@@ -285,10 +306,11 @@ impl BlockWork {
     ) -> Result<()> {
         let flags = base.flags.get(block)?;
         let mut candidates = base.crossing.get(block)?;
-        candidates.retain(|&[i, j, k, count]| {
-            count < 3 || flags.binary_search(&[block as u32, i, j, k]).is_ok()
+        candidates.retain(|candidate| {
+            let (to, triangle) = (block as u32, candidate.triple);
+            candidate.count < 3 || flags.binary_search(&TriangleTo { to, triangle }).is_ok()
         });
-        let open = candidates.iter().flat_map(|r| [r[0], r[1], r[2]]);
+        let open = candidates.iter().flat_map(|c| c.triple);
         let in_base = self.triangles[self.interior_base..].iter().flatten();
         let all: Vec<u32> = open.chain(in_base.copied()).collect();
         self.located.add(places.shape, all.iter().copied())?;
@@ -300,9 +322,8 @@ impl BlockWork {
             let file = moved.as_ref().unwrap_or(&self.located);
             self.flat = places.drop_unfit(&mut candidates, file);
         }
-        let new = |&[i, j, k, count]: &[u32; 4]| {
-            let t = [i, j, k];
-            Candidate::new(t, count, t.map(|v| self.position(v)))
+        let new = |&CountedTriple { triple, count }: &CountedTriple| {
+            Candidate::new(triple, count, triple.map(|v| self.position(v)))
         };
         self.crossing_candidates = candidates.iter().map(new).collect();
         self.tell(bytes_of(&candidates));
@@ -311,27 +332,30 @@ impl BlockWork {
 
     fn add_base(
         &mut self,
-        interior: &[[u32; 4]],
-        crossing: &[[u32; 5]],
+        interior: &[LabelledTriangle],
+        crossing: &[LabelledTo],
         active: &[bool],
         base: &Base,
         block: usize,
     ) {
         let mut components = BaseComponents::of(&base.surface, block);
         let mut of = Vec::new();
-        for r in interior {
-            let t = [r[0], r[1], r[2]];
+        for &LabelledTriangle {
+            triangle: t,
+            label_flip,
+        } in interior
+        {
             self.mesh.push(t);
             let slots = t.map(|v| (v - self.ids.start) as usize);
             if slots.iter().any(|&v| active[v] || self.marks[v] != 0) {
-                of.push(components.interior(r[3]));
+                of.push(components.interior(label_flip));
                 self.enter(t);
             }
         }
         self.interior_base = self.triangles.len();
-        for r in crossing {
-            of.push(components.crossing(r[4]));
-            self.enter([r[1], r[2], r[3]]);
+        for t in crossing {
+            of.push(components.crossing(t.label_flip));
+            self.enter(t.triangle);
         }
         self.base = self.triangles.len();
         self.components = BlockComponents::new(components, of);
@@ -366,7 +390,7 @@ impl BlockWork {
         }
         ranked.sort_unstable();
         self.tell(bytes_of(&ranked) + 20 * ranked.len() as u64);
-        let ranked: Vec<_> = ranked.iter().map(Candidate::record).collect();
+        let ranked: Vec<_> = ranked.iter().map(Candidate::row).collect();
         out.ranked.put(block, &ranked)?;
         drop(ranked);
         let around = self.around_context(&context);
@@ -382,36 +406,39 @@ impl BlockWork {
         self.tell(2 * bytes_of(&mesh));
         // Two ascending runs: this sort merges them.
         mesh.sort();
-        out.mesh.put(block, &mesh)
+        out.mesh.put(block, bytemuck::cast_slice(&mesh))
     }
 
     /// The interior triangles at context vertices with their components.
-    fn around_context(&mut self, context: &[bool]) -> Vec<[u32; 4]> {
+    fn around_context(&mut self, context: &[bool]) -> Vec<TriangleIn> {
         let mut around = Vec::new();
         for number in (0..self.interior_base).chain(self.base..self.triangles.len()) {
             let t = self.triangles[number];
             if t.iter().any(|v| context[(v - self.ids.start) as usize]) {
                 let component = self.components.reference(number as u32);
-                around.push([t[0], t[1], t[2], component.word()]);
+                around.push(TriangleIn {
+                    triangle: t,
+                    component: component.word(),
+                });
             }
         }
         around
     }
 
     /// The vertices whose positions the crossing candidates may need.
-    fn located(&self, context: &[bool], around: &[[u32; 4]]) -> Vec<[u32; 4]> {
+    fn located(&self, context: &[bool], around: &[TriangleIn]) -> Vec<VertexAt> {
         let in_context = |v: &u32| self.ids.contains(v) && context[(v - self.ids.start) as usize];
         let crossing = self.triangles[self.interior_base..self.base].iter();
         let touching = crossing.filter(|t| t.iter().any(in_context));
         let mut ids: Vec<u32> = touching.flatten().copied().collect();
-        ids.extend(around.iter().flat_map(|r| [r[0], r[1], r[2]]));
+        ids.extend(around.iter().flat_map(|t| t.triangle));
         ids.extend(self.ids.clone().filter(in_context));
         ids.sort_unstable();
         ids.dedup();
         ids.into_iter()
-            .map(|v| {
-                let [x, y, z] = self.position(v).map(|c| c as u32);
-                [v, x, y, z]
+            .map(|id| VertexAt {
+                id,
+                position: self.position(id),
             })
             .collect()
     }

@@ -1,63 +1,58 @@
-//! What one turn of the pass across blocks leaves for later ones.
+//! Rows that one turn of the pass across blocks leaves for later ones.
 
 use crate::error::Result;
-use crate::spill::{Layout, Record, Sections};
+use crate::spill::{Row, Table};
 use crate::workspace::Workspace;
 
 /// Records for numbered receivers, on disk, in parts as they were sent. They do not outlive an attempt.
 #[derive(Debug)]
-pub struct Mail<const N: usize> {
-    parts: Sections<N>,
+pub struct Mail<R: Row> {
+    parts: Table<R>,
     /// The parts for each receiver.
     of: Vec<Vec<u32>>,
 }
 
-impl<const N: usize> Mail<N> {
+impl<R: Row> Mail<R> {
     /// Makes the file `name`.
     ///
     /// # Errors
     /// [`crate::Error::Io`].
-    pub fn new(
-        workspace: &Workspace,
-        name: &str,
-        receivers: usize,
-        layout: Layout<N>,
-    ) -> Result<Self> {
+    pub fn new(workspace: &Workspace, name: &str, receivers: usize) -> Result<Self> {
         Ok(Self {
-            parts: Sections::passing(workspace, name, layout)?,
+            parts: Table::temporary(workspace, name)?,
             of: vec![Vec::new(); receivers],
         })
     }
 
-    /// Sends records.
+    /// Sends rows.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Disk`].
-    pub fn send(&mut self, to: u32, records: &[Record<N>]) -> Result<()> {
-        if !records.is_empty() {
-            let part = self.parts.append(records)?;
+    pub fn send(&mut self, to: u32, rows: &[R]) -> Result<()> {
+        if !rows.is_empty() {
+            let part = self.parts.append(rows)?;
             self.of[to as usize].push(part as u32);
         }
         Ok(())
     }
 
-    /// How many records a receiver has.
+    /// Number of rows that a receiver has.
     #[must_use]
-    pub fn records(&self, to: usize) -> usize {
+    pub fn rows(&self, to: usize) -> usize {
         let parts = self.of[to].iter();
-        parts.map(|part| self.parts.records(*part as usize)).sum()
+        parts.map(|part| self.parts.rows(*part as usize)).sum()
     }
 
-    /// All records of a receiver, in the order in which they were sent.
+    /// All rows of a receiver, in the order in which they were sent.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
-    pub fn get(&self, to: usize) -> Result<Vec<Record<N>>> {
-        let mut all = Vec::with_capacity(self.records(to));
-        let mut records = Vec::new();
+    pub fn get(&self, to: usize) -> Result<Vec<R>> {
+        let mut all = Vec::with_capacity(self.rows(to));
+        let mut rows = Vec::new();
         for &part in &self.of[to] {
-            self.parts.get_into(part as usize, &mut records)?;
-            all.extend_from_slice(&records);
+            self.parts.get_into(part as usize, &mut rows)?;
+            all.extend_from_slice(&rows);
         }
         Ok(all)
     }
@@ -72,7 +67,6 @@ impl<const N: usize> Mail<N> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::spill::Word;
     use crate::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
     use crate::workspace::progress::{Cancel, Silent};
     use std::sync::Arc;
@@ -83,7 +77,7 @@ mod tests {
         let folder = std::env::temp_dir();
         let workspace =
             Workspace::new(&folder, memory, 1, Arc::new(Silent), Cancel::new()).unwrap();
-        let mut mail = Mail::new(&workspace, "mail", 3, [Word::Above; 2]).unwrap();
+        let mut mail = Mail::new(&workspace, "mail", 3).unwrap();
         for i in 0..90u32 {
             let records: Vec<_> = (0..i % 4).map(|k| [i, k]).collect();
             mail.send(i % 3, &records).unwrap();
@@ -91,7 +85,7 @@ mod tests {
         for to in 0..3u32 {
             let sent = (0..90).filter(|i| i % 3 == to);
             let want: Vec<_> = sent.flat_map(|i| (0..i % 4).map(move |k| [i, k])).collect();
-            assert_eq!(mail.records(to as usize), want.len());
+            assert_eq!(mail.rows(to as usize), want.len());
             assert_eq!(mail.get(to as usize).unwrap(), want);
         }
     }

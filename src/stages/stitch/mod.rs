@@ -21,10 +21,11 @@ mod surroundings;
 pub use stats::{BaseStats, InsertStats};
 
 use crate::error::Result;
-use crate::spill::Sections;
+use crate::spill::Table;
 use crate::stages::blocks::Blocks;
 use crate::stages::located::Places;
 use crate::stages::surface::evidence::Division;
+use crate::stages::surface::rows::{TriangleRow, TriangleTo};
 use crate::stages::triples::Triples;
 use crate::workspace::Workspace;
 use crate::workspace::persist::persist;
@@ -34,13 +35,12 @@ use interior::Interior;
 /// The mesh after manifold extraction; triangles by ascending ids, orientable, not yet oriented.
 #[derive(Debug)]
 pub struct Stitched {
-    /// Interior triangles by block, `[i, j, k]`.
-    pub interior: Sections<3>,
-    /// Triangles to add, `[block, i, j, k]`, for each block they touch: all crossing ones, and
-    /// interior ones inserted late.
-    pub added: Sections<4>,
-    /// Triangles to take out of `interior`, `[block, i, j, k]`.
-    pub removed: Sections<4>,
+    /// Interior triangles by block.
+    pub interior: Table<TriangleRow>,
+    /// Triangles to add, for each block they touch: all crossing ones, and interior ones inserted late.
+    pub added: Table<TriangleTo>,
+    /// Triangles to take out of `interior`.
+    pub removed: Table<TriangleTo>,
 }
 
 /// How the manifold is extracted.

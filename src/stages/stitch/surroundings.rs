@@ -5,13 +5,14 @@ use super::admissibility::Neighborhood;
 use super::base::Base;
 use super::components::{ComponentRef, NOTHING};
 use super::insertion::{Candidate, Mesh};
-use super::interior::Interior;
+use super::interior::{Interior, TriangleIn, VertexAt};
 use super::mail::Mail;
 use crate::error::Result;
 use crate::geom::Point;
-use crate::spill::Word;
+use crate::spill::row;
 use crate::stages::blocks::Blocks;
-use crate::stages::surface::parity::{OrientationConstraint, ParitySets};
+use crate::stages::surface::parity::{OrientationConstraint, ParitySets, constraint, word};
+use crate::stages::surface::rows::{LabelledTo, TriangleTo};
 use crate::stages::surface::star::{Triangle, others};
 use crate::workspace::Workspace;
 use crate::workspace::memory::{Holding, Reservation, bytes_of, table_bytes};
@@ -29,14 +30,12 @@ struct Entry {
 }
 
 impl Entry {
-    /// As one of [`CHANGES`].
-    fn record(&self) -> [u32; 13] {
-        let mut record = [0; 13];
-        record[..3].copy_from_slice(&self.ids);
-        record[3] = self.word;
-        let words = self.at.iter().flatten().map(|c| *c as u32);
-        record[4..].iter_mut().zip(words).for_each(|(r, w)| *r = w);
-        record
+    fn row(&self) -> Change {
+        Change {
+            triangle: self.ids,
+            label_flip: self.word,
+            at: self.at,
+        }
     }
 }
 
@@ -49,9 +48,18 @@ struct VertexStar {
     changed: u32,
 }
 
-/// What turns changed at a block: `[i, j, k, label << 1 | flip, positions]` of a triangle that was
-/// inserted, [`NOTHING`] instead of the label for one that was taken out.
-const CHANGES: [Word; 13] = [Word::Above; 13];
+row! {
+    /// A triangle that a turn inserted at a block or took out.
+    struct Change {
+        /// Ids, ascending.
+        triangle: Triangle,
+        /// `label << 1 | flip`; [`NOTHING`] if it was taken out.
+        label_flip: u32,
+        /// Positions of the corners.
+        at: [Point; 3],
+    }
+    packed Above Above Above Above Above Above Above Above Above Above Above Above Above
+}
 
 /// Bytes that are reserved for a vertex and for a triangle.
 const VERTEX: u64 = 128;
@@ -71,7 +79,7 @@ pub struct Surroundings<'a> {
     stars: FxHashMap<u32, VertexStar>,
     /// Triangles inserted in this turn.
     inserted: Vec<u32>,
-    changes: Mail<13>,
+    changes: Mail<Change>,
     pub workspace: &'a Workspace,
     reserved: Vec<Reservation>,
     /// What is told of a turn that is taken within a unit of work: it has what the unit had.
@@ -108,8 +116,7 @@ impl Mesh for Surroundings<'_> {
     }
 
     fn component(&mut self, number: u32) -> OrientationConstraint {
-        let word = self.triangles[number as usize].word;
-        (word >> 1, word & 1 == 1)
+        constraint(self.triangles[number as usize].word)
     }
 
     fn components(&mut self) -> &mut ParitySets {
@@ -117,11 +124,10 @@ impl Mesh for Surroundings<'_> {
     }
 
     fn insert(&mut self, t: Triangle, constraints: &[OrientationConstraint], now: u32) {
-        let (label, flip) = constraints[0];
         let number = self.triangles.len() as u32;
         self.triangles.push(Entry {
             ids: t,
-            word: label << 1 | u32::from(flip),
+            word: word(constraints[0]),
             at: t.map(|v| self.position(v)),
         });
         self.inserted.push(number);
@@ -135,9 +141,9 @@ impl Mesh for Surroundings<'_> {
 
 /// The triangles of a block at the vertices that are wanted.
 struct Found {
-    interior: Vec<[u32; 4]>,
-    crossing: Vec<[u32; 5]>,
-    changes: Vec<[u32; 13]>,
+    interior: Vec<TriangleIn>,
+    crossing: Vec<LabelledTo>,
+    changes: Vec<Change>,
 }
 
 impl Found {
@@ -149,18 +155,18 @@ impl Found {
 /// The positions that a block left.
 struct Positions {
     ids: Range<u32>,
-    /// `[v, x, y, z]`, ascending.
-    vertices: Vec<[u32; 4]>,
+    /// Ascending.
+    vertices: Vec<VertexAt>,
     /// Places in `vertices` of the block's own vertices, which are nearly all of them.
     places: Vec<u32>,
 }
 
 impl Positions {
-    fn new(ids: Range<u32>, vertices: Vec<[u32; 4]>) -> Self {
+    fn new(ids: Range<u32>, vertices: Vec<VertexAt>) -> Self {
         let mut places = vec![0u32; ids.len()];
-        for (place, r) in (0..).zip(&vertices) {
-            if ids.contains(&r[0]) {
-                places[(r[0] - ids.start) as usize] = place;
+        for (place, vertex) in (0..).zip(&vertices) {
+            if ids.contains(&vertex.id) {
+                places[(vertex.id - ids.start) as usize] = place;
             }
         }
         Self {
@@ -174,10 +180,9 @@ impl Positions {
         let place = if self.ids.contains(&v) {
             self.places[(v - self.ids.start) as usize] as usize
         } else {
-            self.vertices.partition_point(|r| r[0] < v)
+            self.vertices.partition_point(|vertex| vertex.id < v)
         };
-        let [_, x, y, z] = self.vertices[place];
-        [x, y, z].map(|c| c as i32)
+        self.vertices[place].position
     }
 }
 
@@ -197,7 +202,7 @@ impl<'a> Surroundings<'a> {
             triangles: Vec::new(),
             stars: FxHashMap::default(),
             inserted: Vec::new(),
-            changes: Mail::new(workspace, "stitch.changes", blocks.count(), CHANGES)?,
+            changes: Mail::new(workspace, "stitch.changes", blocks.count())?,
             workspace,
             reserved: Vec::new(),
             held: None,
@@ -242,10 +247,10 @@ impl<'a> Surroundings<'a> {
         let block = self.blocks.of(wanted[0]);
         let section = block as usize;
         let files = [
-            (self.interior.vertices.records(section), 16),
-            (self.interior.context.records(section), 16),
-            (self.base.surface.crossing.records(section), 20),
-            (self.changes.records(section), 52),
+            (self.interior.vertices.rows(section), 16),
+            (self.interior.context.rows(section), 16),
+            (self.base.surface.crossing.rows(section), 20),
+            (self.changes.rows(section), 52),
         ];
         let read: usize = files.iter().map(|(records, bytes)| records * bytes).sum();
         // What is read goes when its part was taken.
@@ -286,20 +291,20 @@ impl<'a> Surroundings<'a> {
             at.any(|wanted| wanted == Some(&true))
         };
         let mut interior = self.interior.context.get(block)?;
-        interior.retain(|r| touches([r[0], r[1], r[2]]));
+        interior.retain(|t| touches(t.triangle));
         let mut crossing = self.base.surface.crossing.get(block)?;
-        crossing.retain(|r| touches([r[1], r[2], r[3]]));
+        crossing.retain(|t| touches(t.triangle));
         let (mut changes, mut gone) = (self.changes.get(block)?, Vec::new());
-        changes.retain(|r| {
-            let t = [r[0], r[1], r[2]];
-            if r[3] == NOTHING {
-                gone.push(t);
+        changes.retain(|change| {
+            let is_gone = change.label_flip == NOTHING;
+            if is_gone {
+                gone.push(change.triangle);
             }
-            r[3] != NOTHING && touches(t)
+            !is_gone && touches(change.triangle)
         });
         if !gone.is_empty() {
             gone.sort_unstable();
-            interior.retain(|r| gone.binary_search(&[r[0], r[1], r[2]]).is_err());
+            interior.retain(|t| gone.binary_search(&t.triangle).is_err());
         }
         Ok(Found {
             interior,
@@ -311,31 +316,30 @@ impl<'a> Surroundings<'a> {
     /// Enters what was found in a block.
     fn enter_all(&mut self, found: &Found, positions: &Positions, block: u32) {
         self.triangles.reserve(found.count());
-        for r in &found.interior {
+        for row in &found.interior {
             let ComponentRef {
                 number,
                 local,
                 flip,
-            } = ComponentRef::from_word(r[3]);
+            } = ComponentRef::from_word(row.component);
             let label = if local {
                 let local = self.locals.entry((block, number));
                 *local.or_insert_with(|| self.sets.push())
             } else {
                 number
             };
-            let ids = [r[0], r[1], r[2]];
-            let word = label << 1 | u32::from(flip);
+            let ids = row.triangle;
+            let word = word((label, flip));
             let at = ids.map(|v| positions.at(v));
             self.enter(Entry { ids, word, at }, block);
         }
-        for &[_, i, j, k, word] in &found.crossing {
-            let ids = [i, j, k];
+        for row in &found.crossing {
+            let (ids, word) = (row.triangle, row.label_flip);
             let at = ids.map(|v| positions.at(v));
             self.enter(Entry { ids, word, at }, block);
         }
-        for r in &found.changes {
-            let (ids, word) = ([r[0], r[1], r[2]], r[3]);
-            let at = [4, 7, 10].map(|n| [r[n], r[n + 1], r[n + 2]].map(|c| c as i32));
+        for change in &found.changes {
+            let (ids, word, at) = (change.triangle, change.label_flip, change.at);
             self.enter(Entry { ids, word, at }, block);
         }
     }
@@ -375,9 +379,9 @@ impl<'a> Surroundings<'a> {
         self.reserved.clear();
     }
 
-    /// Ends the turn of a block; `[block, i, j, k]` of what it inserted, for each block that this touches.
+    /// Ends the turn of a block: the triangles that it inserted, for each block that they touch.
     /// It is noted for blocks that have a later turn, which `later` tells.
-    pub fn end(&mut self, later: impl Fn(u32) -> bool) -> Result<Vec<[u32; 4]>> {
+    pub fn end(&mut self, later: impl Fn(u32) -> bool) -> Result<Vec<TriangleTo>> {
         let mut sent = Vec::with_capacity(2 * self.inserted.len());
         for &number in &self.inserted {
             let t = self.triangles[number as usize].ids;
@@ -388,12 +392,12 @@ impl<'a> Surroundings<'a> {
         sent.sort_unstable();
         let entry = |number: u32| self.triangles[number as usize];
         for part in sent.chunk_by(|a, b| a.0 == b.0).filter(|p| later(p[0].0)) {
-            let records: Vec<_> = part.iter().map(|(_, n)| entry(*n).record()).collect();
-            self.changes.send(part[0].0, &records)?;
+            let rows: Vec<_> = part.iter().map(|(_, n)| entry(*n).row()).collect();
+            self.changes.send(part[0].0, &rows)?;
         }
-        let with_block = |&(block, number): &(u32, u32)| {
-            let [i, j, k] = entry(number).ids;
-            [block, i, j, k]
+        let with_block = |&(to, number): &(u32, u32)| TriangleTo {
+            to,
+            triangle: entry(number).ids,
         };
         let inserted = sent.iter().map(with_block).collect();
         self.clear();
@@ -401,18 +405,22 @@ impl<'a> Surroundings<'a> {
     }
 
     /// Confirms the tentative merges of a block in the whole mesh; those that contradict what is joined
-    /// already are taken out, and returned as `[block, i, j, k]`.
-    pub fn confirm_merges(&mut self, block: usize) -> Result<Vec<[u32; 4]>> {
+    /// already are taken out, and returned.
+    pub fn confirm_merges(&mut self, block: usize) -> Result<Vec<TriangleTo>> {
         let (mut gone, mut noted) = (Vec::new(), Vec::new());
-        for [i, j, k, words @ ..] in self.interior.merges.get(block)? {
-            let words = words.into_iter().filter(|w| *w != NOTHING);
-            let constraints: Vec<OrientationConstraint> =
-                words.map(|w| (w >> 1, w & 1 == 1)).collect();
+        for merge in self.interior.merges.get(block)? {
+            let triangle = merge.triangle;
+            let words = merge.constraints.into_iter().filter(|w| *w != NOTHING);
+            let constraints: Vec<OrientationConstraint> = words.map(constraint).collect();
             if !self.sets.merge(&constraints) {
-                gone.push([block as u32, i, j, k]);
-                let (ids, word, at) = ([i, j, k], NOTHING, [[0; 3]; 3]);
-                noted.push(Entry { ids, word, at }.record());
-                self.take_out(ids);
+                let to = block as u32;
+                gone.push(TriangleTo { to, triangle });
+                noted.push(Change {
+                    triangle,
+                    label_flip: NOTHING,
+                    at: [[0; 3]; 3],
+                });
+                self.take_out(triangle);
             }
         }
         self.changes.send(block as u32, &noted)?;

@@ -5,7 +5,7 @@
 
 use crate::error::Result;
 use crate::geom::Point;
-use crate::spill::Sections;
+use crate::spill::{Id, Table};
 use crate::stages::blocks::Blocks;
 use crate::stages::order::PointStore;
 use crate::workspace::Workspace;
@@ -60,7 +60,7 @@ impl Columns {
 /// # Errors
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
 /// [`crate::Error::Cancelled`].
-pub fn highest(store: &PointStore, blocks: Blocks, workspace: &Workspace) -> Result<Sections<1>> {
+pub fn highest(store: &PointStore, blocks: Blocks, workspace: &Workspace) -> Result<Table<Id>> {
     let columns = Columns::of(store);
     let count = columns.wide * columns.deep;
     let reserved = workspace.reserve("columns", 8 * count as u64)?;
@@ -90,9 +90,9 @@ pub fn highest(store: &PointStore, blocks: Blocks, workspace: &Workspace) -> Res
     drop((highest, reserved));
     let _held = workspace.reserve("columns", bytes_of(&ids))?;
     ids.sort_unstable();
-    let sections = Sections::create(workspace, "stitch.highest", blocks.count())?;
+    let sections = Table::create(workspace, "stitch.highest", blocks.count())?;
     for part in ids.chunk_by(|a, b| blocks.of(*a) == blocks.of(*b)) {
-        let records: Vec<[u32; 1]> = part.iter().map(|id| [*id]).collect();
+        let records: Vec<Id> = part.iter().map(|&id| Id { id }).collect();
         sections.put(blocks.of(part[0]) as usize, &records)?;
     }
     Ok(sections)

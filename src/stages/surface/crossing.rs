@@ -2,20 +2,20 @@
 
 use super::crossing_edges::CrossingEdges;
 use super::orient::{Oriented, OrientedInside, label_bytes};
-use super::parity::{OrientationConstraint, ParitySets};
+use super::parity::{OrientationConstraint, ParitySets, constraint, word};
+use super::rows::{LabelledTo, Relation, TriangleTo};
 use super::settle::settle;
 use super::star::Triangle;
 use crate::error::Result;
-use crate::spill::layouts::SENT_LABELLED;
-use crate::spill::{Exchange, Sections};
+use crate::spill::{Shuffle, Table};
 use crate::stages::blocks::Blocks;
 use crate::workspace::Workspace;
 
-const EXCHANGE_BUFFER: u64 = 8 << 20;
+const SHUFFLE_BUFFER: u64 = 8 << 20;
 
 impl OrientedInside {
     /// The second half of [`orient_inside`]: the crossing triangles, ascending, without those in
-    /// `removed`, `[block, i, j, k]` by the block of their smallest vertex.
+    /// `removed`, by the block of their smallest vertex.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
@@ -23,7 +23,7 @@ impl OrientedInside {
     pub fn join(
         self,
         name: &str,
-        removed: &Sections<4>,
+        removed: &Table<TriangleTo>,
         blocks: Blocks,
         workspace: &Workspace,
     ) -> Result<Oriented> {
@@ -36,7 +36,7 @@ impl OrientedInside {
         let held = workspace.reserve("labels", label_bytes(next as usize))?;
         let mut surface = Oriented {
             interior: self.interior,
-            crossing: Sections::create(workspace, &format!("{name}.none"), 0)?,
+            crossing: Table::create(workspace, &format!("{name}.none"), 0)?,
             globals,
             labels: self.labels.into_iter().map(|(_, all)| all).collect(),
             sets: ParitySets::new(next as usize),
@@ -47,7 +47,7 @@ impl OrientedInside {
             _held: held,
         };
         let crossing = |block: usize| {
-            let mut triangles = self.crossing.get(block)?;
+            let mut triangles: Vec<Triangle> = bytemuck::cast_vec(self.crossing.get(block)?);
             let removed = removed.get(block)?;
             triangles.retain(|t| is_present(block, t, &removed));
             Ok(triangles)
@@ -56,8 +56,8 @@ impl OrientedInside {
             let with_normals = |block: usize| {
                 let (triangles, removed) = (self.crossing.get(block)?, removed.get(block)?);
                 let normals = weighed.normals.get(block)?.into_iter();
-                let normals = normals.map(|n| n.map(|x| f64::from(f32::from_bits(x))));
-                let all = triangles.into_iter().zip(normals);
+                let normals = normals.map(|n| n.normal.map(f64::from));
+                let all = triangles.into_iter().map(|t| t.triangle).zip(normals);
                 Ok(all
                     .filter(|(t, _)| is_present(block, t, &removed))
                     .collect())
@@ -81,8 +81,9 @@ impl OrientedInside {
 }
 
 /// True if a triangle is not among those removed from a block, ascending.
-fn is_present(block: usize, t: &Triangle, removed: &[[u32; 4]]) -> bool {
-    let key = [block as u32, t[0], t[1], t[2]];
+fn is_present(block: usize, t: &Triangle, removed: &[TriangleTo]) -> bool {
+    let (to, triangle) = (block as u32, *t);
+    let key = TriangleTo { to, triangle };
     removed.binary_search(&key).is_err()
 }
 
@@ -90,18 +91,19 @@ fn is_present(block: usize, t: &Triangle, removed: &[[u32; 4]]) -> bool {
 /// `block`: from its `relations`, with global labels.
 pub(super) fn interior_constraints(
     globals: &[(u32, u32)],
-    relations: &[[u32; 7]],
+    relations: &[Relation],
     block: usize,
     t: Triangle,
 ) -> impl Iterator<Item = (OrientationConstraint, i64)> {
-    let key = [block as u32, t[0], t[1], t[2]];
-    let start = relations.partition_point(|r| r[..4] < key[..]);
+    let key = (block as u32, t);
+    let start = relations.partition_point(|r| (r.to, r.triangle) < key);
     relations[start..]
         .iter()
-        .take_while(move |r| r[..4] == key[..])
+        .take_while(move |r| (r.to, r.triangle) == key)
         .map(|r| {
-            let label = globals[r[4] as usize].0 + (r[5] >> 1);
-            ((label, r[5] & 1 == 1), i64::from(r[6]))
+            let (label, flip) = constraint(r.label_flip);
+            let first = globals[r.block as usize].0;
+            ((first + label, flip), i64::from(r.weight))
         })
 }
 
@@ -110,12 +112,11 @@ fn orient_crossing(
     base: &mut Oriented,
     name: &str,
     crossing: impl Fn(usize) -> Result<Vec<Triangle>>,
-    relations: &Sections<7>,
+    relations: &Table<Relation>,
     blocks: Blocks,
     workspace: &Workspace,
 ) -> Result<()> {
-    let exchange = Exchange::<5>::new(workspace, &format!("{name}.crossing"), EXCHANGE_BUFFER)?
-        .packed(SENT_LABELLED);
+    let shuffle = Shuffle::new(workspace, &format!("{name}.crossing"), SHUFFLE_BUFFER)?;
     let mut edges = CrossingEdges::new(workspace)?;
     for group in 0..blocks.count() {
         workspace.check_cancel()?;
@@ -130,13 +131,18 @@ fn orient_crossing(
             };
             base.triangles += 1;
             edges.put(t, word, [0.0; 3]);
-            sent.push([blocks.of(t[0]), t[0], t[1], t[2], word]);
-            sent.extend(blocks.visited(t).map(|b| [b, t[0], t[1], t[2], word]));
+            let to = |to| LabelledTo {
+                to,
+                triangle: t,
+                label_flip: word,
+            };
+            sent.push(to(blocks.of(t[0])));
+            sent.extend(blocks.visited(t).map(to));
         }
-        exchange.send(&sent)?;
+        shuffle.send(&sent)?;
         edges.end(group, blocks);
     }
-    base.crossing = exchange.deliver(workspace, blocks.count())?;
+    base.crossing = shuffle.deliver(workspace, blocks.count())?;
     base.sets.flatten();
     // Crossing marks were set on labels; what counts is the set.
     for label in 0..base.sets.len() as u32 {
@@ -152,7 +158,7 @@ fn orient_crossing(
 fn orient_one(
     base: &mut Oriented,
     t: Triangle,
-    relations: &[[u32; 7]],
+    relations: &[Relation],
     group: usize,
     edges: &CrossingEdges,
 ) -> Option<u32> {
@@ -171,5 +177,5 @@ fn orient_one(
         }
     };
     base.crosses[label as usize] = true;
-    Some(label << 1 | u32::from(flip))
+    Some(word((label, flip)))
 }

@@ -2,8 +2,9 @@
 //! block tell.
 
 use super::evidence::Evidence;
-use super::parity::ParitySets;
+use super::parity::{ParitySets, word};
 use super::patches::SharedEdge;
+use super::rows::{LabelledTriangle, PairSum, Relation, Seam, Upward, words};
 use super::star::{EDGES, EdgesUp, Triangle, opposed};
 use super::weigh::weigh_block;
 use crate::stages::blocks::Blocks;
@@ -12,13 +13,11 @@ use crate::workspace::memory::{Holding, bytes_of, hold};
 /// The labels of a block; the records are those of [`super::orient::Oriented`] and
 /// [`super::orient::Weighed`].
 pub(super) struct OrientedBlock {
-    pub interior: Vec<[u32; 4]>,
-    /// `[owner block, i, j, k, this block, label << 1 | flip, weight]`: the constraint that an
-    /// interior triangle of this block is for the crossing triangle `i, j, k`.
-    pub relations: Vec<[u32; 7]>,
-    pub pairs: Vec<[u32; 4]>,
-    pub ups: Vec<[u32; 3]>,
-    pub seams: Vec<[u32; 2]>,
+    pub interior: Vec<LabelledTriangle>,
+    pub relations: Vec<Relation>,
+    pub pairs: Vec<PairSum>,
+    pub ups: Vec<Upward>,
+    pub seams: Vec<Seam>,
     /// Number of labels that occur in relations or pairs; they come first.
     pub global: u32,
     pub labels: u32,
@@ -115,32 +114,48 @@ pub(super) fn number_labels(
     let mut sent = Vec::with_capacity(connections.relations.len());
     for (c, other, flip, weight) in connections.relations {
         let (label, turned, _) = find(other);
-        let word = label << 1 | u32::from(flip ^ turned);
-        let owner = blocks.of(c[0]);
-        sent.push([owner, c[0], c[1], c[2], block as u32, word, weight as u32]);
+        sent.push(Relation {
+            to: blocks.of(c[0]),
+            triangle: c,
+            block: block as u32,
+            label_flip: word((label, flip ^ turned)),
+            weight: weight as u32,
+        });
     }
     let mut pairs = Vec::with_capacity(connections.pairs.len());
     for (a, b, sum) in connections.pairs {
         let ((a, turned_a, _), (b, turned_b, _)) = (find(a), find(b));
         let sum = if turned_a ^ turned_b { -sum } else { sum };
-        pairs.push([a, b, sum as u32, (sum >> 32) as u32]);
+        pairs.push(PairSum {
+            a,
+            b,
+            sum: words(sum),
+        });
     }
     let mut ups = Vec::with_capacity(connections.ups.len());
     for (a, up) in connections.ups {
         let (label, turned, _) = find(a);
         if label < global {
             let up = if turned { -up } else { up };
-            ups.push([label, up as u32, (up >> 32) as u32]);
+            ups.push(Upward {
+                label,
+                evidence: words(up),
+            });
         }
     }
     let mut interior = Vec::with_capacity(kept.len());
     for &number in kept {
         let (label, turned, _) = find(number);
-        let t = inner[number as usize];
-        interior.push([t[0], t[1], t[2], label << 1 | u32::from(turned)]);
+        interior.push(LabelledTriangle {
+            triangle: inner[number as usize],
+            label_flip: word((label, turned)),
+        });
     }
     let place = |n: u32| kept.partition_point(|k| *k < n) as u32;
-    let seam = |j: &SharedEdge| [place(j.a), place(j.b) << 1 | u32::from(j.flip)];
+    let seam = |edge: &SharedEdge| Seam {
+        a: place(edge.a),
+        b_flip: word((place(edge.b), edge.flip)),
+    };
     let seams: Vec<_> = connections.seams.iter().map(seam).collect();
     let held = bytes_of(&interior) + bytes_of(&sent) + bytes_of(&pairs) + bytes_of(&seams);
     OrientedBlock {

@@ -13,6 +13,7 @@ mod labels;
 pub mod orient;
 pub mod parity;
 mod patches;
+pub mod rows;
 mod settle;
 pub mod sides;
 pub mod star;

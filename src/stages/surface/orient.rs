@@ -3,27 +3,28 @@
 
 use super::evidence::Evidence;
 use super::labels::orient_block;
-use super::parity::ParitySets;
+use super::parity::{ParitySets, constraint};
+use super::rows::{
+    LabelledTo, LabelledTriangle, Normal, PairSum, Relation, Seam, TriangleRow, Upward,
+};
 use super::star::Triangle;
 use crate::error::Result;
-use crate::spill::layouts::{LABELLED, TRIANGLE};
-use crate::spill::{Exchange, Sections, Word};
+use crate::spill::{Shuffle, Table};
 use crate::stages::blocks::Blocks;
 use crate::workspace::Workspace;
 use crate::workspace::memory::{Holding, Reservation, bytes_of, hold};
 use crate::workspace::persist::{Persist, Saved};
 
-const EXCHANGE_BUFFER: u64 = 8 << 20;
+const SHUFFLE_BUFFER: u64 = 8 << 20;
 
 /// An oriented surface: every triangle has a label and an orientation relative to it. Triangles of one
 /// label are of one component; the labels of a component are joined in `sets`.
 #[derive(Debug)]
 pub struct Oriented {
-    /// `[i, j, k, label << 1 | flip]` of interior triangles by block; labels are the block's own.
-    pub interior: Sections<4>,
-    /// `[block, i, j, k, label << 1 | flip]` of crossing triangles for each block they touch;
-    /// labels are global.
-    pub crossing: Sections<5>,
+    /// Interior triangles by block; labels are the block's own.
+    pub interior: Table<LabelledTriangle>,
+    /// Crossing triangles for each block they touch; labels are global.
+    pub crossing: Table<LabelledTo>,
     /// For each block, the global label of its label 0 and the number of labels that are global.
     pub globals: Vec<(u32, u32)>,
     /// For each block, the number of its labels.
@@ -32,9 +33,9 @@ pub struct Oriented {
     pub sets: ParitySets,
     /// Which roots have a crossing triangle.
     pub crosses: Vec<bool>,
-    /// For each block the edges between triangles of different labels, `[a, b << 1 | flip]` by places in
-    /// `interior`, if there is evidence: where the two run against each other in the end, `b` goes.
-    pub seams: Option<Sections<2>>,
+    /// For each block the edges between triangles of different labels, if there is evidence: where the two run
+    /// against each other in the end, the second goes.
+    pub seams: Option<Table<Seam>>,
     /// Triangles removed because they close a Möbius band.
     pub mobius: u64,
     /// Triangles that are left.
@@ -45,11 +46,11 @@ pub struct Oriented {
 /// A surface whose blocks are oriented, but not yet what lies between them.
 #[derive(Debug)]
 pub struct OrientedInside {
-    pub(super) interior: Sections<4>,
-    pub(super) relations: Sections<7>,
+    pub(super) interior: Table<LabelledTriangle>,
+    pub(super) relations: Table<Relation>,
     pub(super) weighed: Option<Weighed>,
     /// Crossing triangles by the block of their smallest vertex.
-    pub(super) crossing: Sections<3>,
+    pub(super) crossing: Table<TriangleRow>,
     /// For each block, the number of labels that are global, and of all.
     pub(super) labels: Vec<(u32, u32)>,
     pub(super) mobius: u64,
@@ -59,24 +60,24 @@ pub struct OrientedInside {
 /// Evidence on the orientation of each block's labels, by block.
 #[derive(Debug)]
 pub(super) struct Weighed {
-    /// Sums of pairs of global labels, `[a, b, sum]`, the sum in two words.
-    pub pairs: Sections<4>,
-    /// Evidence that global labels face up, `[label, up]`, the evidence in two words.
-    pub ups: Sections<3>,
+    /// Sums of pairs of global labels.
+    pub pairs: Table<PairSum>,
+    /// Evidence that global labels face up.
+    pub ups: Table<Upward>,
     /// See [`Oriented::seams`].
-    pub seams: Sections<2>,
-    /// Unit normals of the crossing triangles, in their order, as `f32`.
-    pub normals: Sections<3>,
+    pub seams: Table<Seam>,
+    /// Unit normals of the crossing triangles, in their order.
+    pub normals: Table<Normal>,
 }
 
 impl Weighed {
     fn create(workspace: &Workspace, name: &str, count: usize) -> Result<Self> {
-        let sections = |part: &str| format!("{name}.{part}");
+        let table = |part: &str| format!("{name}.{part}");
         Ok(Self {
-            pairs: Sections::create(workspace, &sections("pairs"), count)?,
-            ups: Sections::create(workspace, &sections("ups"), count)?,
-            seams: Sections::create(workspace, &sections("seams"), count)?,
-            normals: Sections::unpacked(workspace, &sections("normals"), count)?,
+            pairs: Table::create(workspace, &table("pairs"), count)?,
+            ups: Table::create(workspace, &table("ups"), count)?,
+            seams: Table::create(workspace, &table("seams"), count)?,
+            normals: Table::create(workspace, &table("normals"), count)?,
         })
     }
 }
@@ -113,12 +114,11 @@ pub fn orient_inside<T: Persist + Send>(
     workspace: &Workspace,
 ) -> Result<OrientedInside> {
     let count = blocks.count();
-    let sections = |part: &str| format!("{name}.{part}");
-    let interior = Sections::with_layout(workspace, &sections("interior"), count, LABELLED)?;
-    let first = Sections::with_layout(workspace, &sections("border"), count, TRIANGLE)?;
-    let letters = sections("relations");
-    let above = [Word::Above; 7];
-    let exchange = Exchange::between(workspace, &letters, EXCHANGE_BUFFER, count, above)?;
+    let table = |part: &str| format!("{name}.{part}");
+    let interior = Table::create(workspace, &table("interior"), count)?;
+    let first = Table::create(workspace, &table("border"), count)?;
+    let relations = table("relations");
+    let shuffle = Shuffle::between_units(workspace, &relations, SHUFFLE_BUFFER, count)?;
     let weighed = evidence
         .then(|| Weighed::create(workspace, name, count))
         .transpose()?;
@@ -133,15 +133,17 @@ pub fn orient_inside<T: Persist + Send>(
         let _crossing = hold(bytes_of(&crossing));
         let done = orient_block(&inner, &crossing, evidence.as_ref(), blocks, block);
         interior.put(block, &done.interior)?;
-        exchange.send_from(block, &done.relations)?;
+        shuffle.send_from(block, &done.relations)?;
         let mine = |t: &Triangle| blocks.of(t[0]) == block as u32;
         let mine: Vec<Triangle> = crossing.iter().copied().filter(mine).collect();
-        first.put(block, &mine)?;
+        first.put(block, bytemuck::cast_slice(&mine))?;
         if let (Some(weighed), Some(evidence)) = (&weighed, &evidence) {
             weighed.pairs.put(block, &done.pairs)?;
             weighed.ups.put(block, &done.ups)?;
             weighed.seams.put(block, &done.seams)?;
-            let normal = |t: &Triangle| evidence.normal(*t).map(|x| (x as f32).to_bits());
+            let normal = |t: &Triangle| Normal {
+                normal: evidence.normal(*t).map(|x| x as f32),
+            };
             let normals: Vec<_> = mine.iter().map(normal).collect();
             weighed.normals.put(block, &normals)?;
         }
@@ -160,7 +162,7 @@ pub fn orient_inside<T: Persist + Send>(
     })?;
     Ok(OrientedInside {
         interior,
-        relations: exchange.deliver(workspace, count)?,
+        relations: shuffle.deliver(workspace, count)?,
         weighed,
         crossing: first,
         labels,
@@ -170,27 +172,28 @@ pub fn orient_inside<T: Persist + Send>(
 }
 
 impl Oriented {
-    /// The interior triangles of a block, `[i, j, k, label << 1 | flip]`, without those that are cut where
-    /// labels run against each other; and how many these are.
+    /// The interior triangles of a block without those that are cut where labels run against each other, and
+    /// how many these are.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
-    pub fn inside(&self, block: usize) -> Result<(Vec<[u32; 4]>, u64)> {
+    pub fn inside(&self, block: usize) -> Result<(Vec<LabelledTriangle>, u64)> {
         let mut interior = self.interior.get(block)?;
         let Some(seams) = &self.seams else {
             return Ok((interior, 0));
         };
         let (first, globals) = self.globals[block];
         // Labels at seams are global.
-        let turned = |r: &[u32; 4]| {
-            let label = r[3] >> 1;
+        let turned = |t: &LabelledTriangle| {
+            let (label, flip) = constraint(t.label_flip);
             debug_assert!(label < globals, "a seam at a label of the block alone");
-            self.sets.look(first + label).1 ^ (r[3] & 1 == 1)
+            self.sets.look(first + label).1 ^ flip
         };
         let mut gone = 0;
         let mut cut = vec![false; interior.len()];
-        for [a, b] in seams.get(block)? {
-            let (a, b, flip) = (a as usize, (b >> 1) as usize, b & 1 == 1);
+        for Seam { a, b_flip } in seams.get(block)? {
+            let (b, flip) = constraint(b_flip);
+            let (a, b) = (a as usize, b as usize);
             if !cut[a] && !cut[b] && turned(&interior[a]) ^ turned(&interior[b]) != flip {
                 cut[b] = true;
                 gone += 1;

@@ -4,6 +4,20 @@
 /// must be turned against it.
 pub type OrientationConstraint = (u32, bool);
 
+/// A constraint as one word.
+#[must_use]
+#[inline]
+pub fn word((label, flip): OrientationConstraint) -> u32 {
+    label << 1 | u32::from(flip)
+}
+
+/// The constraint of a word.
+#[must_use]
+#[inline]
+pub fn constraint(word: u32) -> OrientationConstraint {
+    (word >> 1, word & 1 == 1)
+}
+
 /// Sets of labels with relative orientations.
 #[derive(Debug, Clone, Default)]
 pub struct ParitySets {

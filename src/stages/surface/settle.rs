@@ -6,11 +6,12 @@ use super::crossing::interior_constraints;
 use super::crossing_edges::CrossingEdges;
 use super::evidence::{cosine, weight};
 use super::orient::{Oriented, Weighed};
-use super::parity::OrientationConstraint;
+use super::parity::{OrientationConstraint, word};
+use super::rows::{Relation, sum};
 use super::star::Triangle;
 use super::weigh::BASE;
 use crate::error::Result;
-use crate::spill::Sections;
+use crate::spill::Table;
 use crate::stages::blocks::Blocks;
 use crate::workspace::Workspace;
 
@@ -19,7 +20,7 @@ use crate::workspace::Workspace;
 pub(super) fn settle(
     surface: &mut Oriented,
     crossing: impl Fn(usize) -> Result<Vec<(Triangle, [f64; 3])>>,
-    relations: &Sections<7>,
+    relations: &Table<Relation>,
     weighed: &Weighed,
     blocks: Blocks,
     workspace: &Workspace,
@@ -28,13 +29,11 @@ pub(super) fn settle(
     let mut reserved = workspace.promise("labels: graph", 0)?;
     for block in 0..blocks.count() {
         let first = surface.globals[block].0;
-        for [a, b, low, high] in weighed.pairs.get(block)? {
-            let sum = i64::from(high as i32) << 32 | i64::from(low);
-            graph.add(first + a, first + b, sum);
+        for pair in weighed.pairs.get(block)? {
+            graph.add(first + pair.a, first + pair.b, sum(pair.sum));
         }
-        for [label, low, high] in weighed.ups.get(block)? {
-            let up = i64::from(high as i32) << 32 | i64::from(low);
-            graph.add_up(first + label, up);
+        for up in weighed.ups.get(block)? {
+            graph.add_up(first + up.label, sum(up.evidence));
         }
         reserved.at_least(graph.bytes())?;
     }
@@ -60,7 +59,7 @@ pub(super) fn settle(
                 let sum = if flip ^ turned { -weight } else { weight };
                 graph.add(label, other, BASE * sum);
             }
-            edges.put(t, label << 1 | u32::from(flip), normal);
+            edges.put(t, word((label, flip)), normal);
         }
         edges.end(group, blocks);
         reserved.at_least(graph.bytes())?;

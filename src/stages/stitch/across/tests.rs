@@ -29,8 +29,8 @@ fn sheet() -> Vec<Point> {
 /// What a pass leaves for each block, and its counts.
 #[derive(Debug, PartialEq)]
 struct Left {
-    added: Vec<Vec<[u32; 4]>>,
-    removed: Vec<Vec<[u32; 4]>>,
+    added: Vec<Vec<TriangleTo>>,
+    removed: Vec<Vec<TriangleTo>>,
     counts: InsertStats,
 }
 
@@ -81,9 +81,9 @@ fn across(starved: bool) -> (Left, [usize; 2]) {
         turns += 1;
     }
     let (crossing, counts) = pass.finish().unwrap();
-    let all = |sections: &Sections<4>| {
+    let all = |table: &Table<TriangleTo>| {
         let all = 0..blocks.count();
-        all.map(|block| sections.get(block).unwrap()).collect()
+        all.map(|block| table.get(block).unwrap()).collect()
     };
     let left = Left {
         added: all(&crossing.added),
