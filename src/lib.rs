@@ -74,6 +74,7 @@ pub mod error;
 pub mod geom;
 pub mod inspect;
 pub mod kernels;
+mod method;
 pub mod params;
 pub mod pipeline;
 pub mod report;

@@ -9,6 +9,7 @@ mod manifest;
 mod points;
 
 use crate::error::Result;
+use crate::method::METHOD;
 use crate::params::{Method, Params};
 use crate::report::{LatticeReport, Report};
 use crate::stages::blocks::Blocks;
@@ -36,9 +37,6 @@ pub(crate) use points::order;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-
-/// Halvings of the lattice step before smoothing, so that rounding does not undo it.
-const SMOOTH_REFINE: u32 = 10;
 
 /// A reconstruction that is ready to run. Made by [`Reconstruction::builder`].
 pub struct Reconstruction {
@@ -149,7 +147,7 @@ impl Reconstruction {
         }
         fits(known.estimate(params))?;
         let refine = if params.smooth + params.relax > 0 {
-            SMOOTH_REFINE
+            METHOD.smoothing.halvings
         } else {
             0
         };

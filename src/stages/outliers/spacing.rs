@@ -1,7 +1,7 @@
 //! The spacings of all points: a file of them by tile.
 
-use super::NEAREST;
 use crate::error::Result;
+use crate::method::METHOD;
 use crate::spill::{Record, Sections};
 use crate::stages::cells::TileRanges;
 use crate::stages::order::PointStore;
@@ -21,7 +21,7 @@ pub(super) struct Spacings {
 }
 
 impl Spacings {
-    /// Measures them all. There are more than [`NEAREST`] points.
+    /// Measures them all. There are more points than neighbours that make a spacing.
     pub(super) fn measure(
         store: &PointStore,
         tiles: TileRanges,
@@ -46,9 +46,10 @@ fn one_tile(store: &PointStore, ids: Range<usize>) -> Result<Vec<Record<1>>> {
     let mut spacings = vec![[0]; ids.len()];
     let mut search = Search::default();
     let mut uncertain = Vec::new();
-    tile.for_each_query(NEAREST, &mut search, |id, point, query| match query {
+    let nearest = METHOD.outliers.nearest;
+    tile.for_each_query(nearest, &mut search, |id, point, query| match query {
         Some(query) => {
-            let near = query.near().columns().distances2[..NEAREST].iter();
+            let near = query.near().columns().distances2[..nearest].iter();
             spacings[id as usize - ids.start] = [mean(near.copied())];
         }
         None => uncertain.push((id, point)),
@@ -56,10 +57,10 @@ fn one_tile(store: &PointStore, ids: Range<usize>) -> Result<Vec<Record<1>>> {
     drop(tile);
     let mut cache = PageCache::default();
     for (id, point) in uncertain {
-        let mut near = [0; NEAREST];
+        let mut near = Vec::with_capacity(nearest);
         let mut walk = Walk::new(store, &mut cache, id, point);
-        for distance2 in &mut near {
-            *distance2 = walk.advance()?.map_or(0, |n| n.distance2);
+        for _ in 0..nearest {
+            near.push(walk.advance()?.map_or(0, |n| n.distance2));
         }
         spacings[id as usize - ids.start] = [mean(near.into_iter())];
     }
@@ -69,7 +70,7 @@ fn one_tile(store: &PointStore, ids: Range<usize>) -> Result<Vec<Record<1>>> {
 /// Mean of the distances, nearest first: the order of the sum is always the same.
 fn mean(distances2: impl Iterator<Item = u64>) -> u32 {
     let sum: f64 = distances2.map(|d2| (d2 as f64).sqrt()).sum();
-    ((sum / NEAREST as f64) as f32).to_bits()
+    ((sum / METHOD.outliers.nearest as f64) as f32).to_bits()
 }
 
 /// Sections of spacings that were looked at.

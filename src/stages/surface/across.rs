@@ -6,8 +6,8 @@ use super::contract::{Graph, Limit};
 use super::evidence::{cosine, weight};
 use super::orient::{Oriented, Weighed};
 use super::star::Triangle;
-use super::weigh::BASE;
 use crate::error::Result;
+use crate::method::METHOD;
 use crate::spill::Sections;
 use crate::stages::blocks::Blocks;
 use crate::workspace::Workspace;
@@ -64,7 +64,7 @@ pub(super) fn settle(
             };
             for &(other, turned, weight) in &asks {
                 let sum = if flip ^ turned { -weight } else { weight };
-                graph.add(label, other, BASE * sum);
+                graph.add(label, other, METHOD.orientation.edge * sum);
             }
             edges.put(t, label << 1 | u32::from(flip), normal);
         }
