@@ -61,6 +61,7 @@ pub mod geom;
 pub mod inspect;
 #[doc(hidden)]
 pub mod kernels;
+mod method;
 pub mod params;
 #[doc(hidden)]
 pub mod pipeline;

@@ -1,6 +1,7 @@
 //! The geometric parameters of a reconstruction, checked once.
 
 use crate::error::{Error, Result};
+use crate::method::METHOD;
 use crate::stages::ingest::Classes;
 pub use crate::stages::smooth::Smoothing;
 use crate::stages::spacing::{Limits, Width};
@@ -149,9 +150,6 @@ pub struct Params {
     pub division: Division,
 }
 
-/// The block size that a reconstruction uses unless a test asks for another.
-pub const BLOCK: u32 = 1 << 16;
-
 /// The factor of [`Params::drop_outliers`] that suits most clouds.
 pub const OUTLIER_FACTOR: f64 = 5.0;
 
@@ -165,19 +163,19 @@ impl Default for Params {
             thin: None,
             drop_outliers: None,
             method: Method::Robust,
-            neighbors: 30,
+            neighbors: METHOD.plane.neighbors,
             smooth: 0,
             smoothing: Smoothing::Edges,
-            relax: 3,
+            relax: METHOD.relax.rounds,
             radius: Radius::Auto,
-            max_angle: 143.0,
-            max_hole_edges: 500,
+            max_angle: METHOD.admissibility.angle,
+            max_hole_edges: METHOD.filling.longest,
             min_component: None,
             keep_all: false,
-            max_edge: MaxWidth::Spacings(8.0),
-            max_fill: MaxWidth::Spacings(8.0),
+            max_edge: MaxWidth::Spacings(METHOD.admissibility.edge),
+            max_fill: MaxWidth::Spacings(METHOD.filling.width),
             repair: true,
-            block: BLOCK,
+            block: METHOD.curve.block,
             division: Division::default(),
         }
     }
@@ -225,13 +223,14 @@ impl Params {
     /// relaxed.
     #[must_use]
     pub fn least_component(&self, points: u64, noisy: bool) -> u64 {
+        let limits = METHOD.components;
         let (each, most) = match (self.smooth > 0, noisy) {
-            (true, _) => (2500, 1000),
-            (false, true) => (5000, 150),
-            (false, false) => return self.min_component.unwrap_or(10),
+            (true, _) => (limits.each_if_smoothed, limits.most_if_smoothed),
+            (false, true) => (limits.each_if_noisy, limits.most_if_noisy),
+            (false, false) => return self.min_component.unwrap_or(limits.least),
         };
         self.min_component
-            .unwrap_or_else(|| (points / each).clamp(10, most))
+            .unwrap_or_else(|| (points / each).min(most).max(limits.least))
     }
 
     /// # Errors

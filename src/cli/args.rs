@@ -1,5 +1,6 @@
 //! Flags, as the user gives them.
 
+use crate::method::METHOD;
 use crate::params::{MaxWidth, Method, Params, Radius, Smoothing};
 use crate::pipeline::Start;
 use crate::stages::ingest::Classes;
@@ -136,7 +137,7 @@ pub struct Surface {
     #[arg(long, value_name = "robust|paper", default_value = "robust")]
     pub method: Method,
     /// Neighbours for the plane at each point
-    #[arg(long, value_name = "N", default_value_t = 30)]
+    #[arg(long, value_name = "N", default_value_t = METHOD.plane.neighbors)]
     pub neighbors: usize,
     /// Rounds of smoothing before the surface is made; 1 or 2 help noisy scans
     #[arg(long, value_name = "ROUNDS", default_value_t = 0)]
@@ -173,7 +174,7 @@ pub struct Surface {
 pub struct Repair {
     /// Fill holes of up to this many edges; 0 fills none (single triangles that are missing are no
     /// holes: but for --method paper they are put in all the same)
-    #[arg(long, value_name = "N", default_value_t = 500)]
+    #[arg(long, value_name = "N", default_value_t = METHOD.filling.longest)]
     pub max_hole_edges: usize,
     /// Width of what is filled: triangles larger than an equilateral one with such sides stay out. A length
     /// in the cloud's unit, a number of local spacings like 8x, or none [default: 8x; with --method paper
@@ -216,7 +217,7 @@ pub struct Reconstruct {
     #[arg(long, value_name = "N", hide = true)]
     pub tile_points: Option<u32>,
     /// Points per block, for tests: the result depends on it
-    #[arg(long, value_name = "N", hide = true, default_value_t = crate::params::BLOCK)]
+    #[arg(long, value_name = "N", hide = true, default_value_t = METHOD.curve.block)]
     pub block_points: u32,
 }
 

@@ -24,6 +24,18 @@ enum Answer {
 /// Runs the command line; 0 fine, 1 the answer is no, 2 error, 75 time is up, 128 + signal.
 #[must_use]
 pub fn main() -> ExitCode {
+    #[cfg(feature = "ablation")]
+    match crate::method::report() {
+        Ok(list) if list.is_empty() => {}
+        Ok(list) => {
+            print!("{list}");
+            return ExitCode::SUCCESS;
+        }
+        Err(why) => {
+            eprintln!("outcrop: {why}");
+            return ExitCode::from(FAILED);
+        }
+    }
     let args = args::Args::parse();
     match commands::run(args.command) {
         Ok(Answer::Yes) => ExitCode::SUCCESS,

@@ -7,6 +7,7 @@ mod spread;
 
 use crate::kernels::eight::Eight;
 use crate::kernels::{LANES, kernel};
+use crate::method::METHOD;
 use spread::{Spread, extent, normal};
 
 /// A direction as an integer vector; its longest component is about [`NORMAL_SCALE`].
@@ -112,7 +113,7 @@ impl Moments {
         let [x, y, z] = normal.map(f64::from);
         let along =
             (xx * x * x + yy * y * y + zz * z * z) + 2.0 * (xy * x * y + xz * x * z + yz * y * z);
-        7.0 * along > (xx + yy + zz) * (x * x + y * y + z * z)
+        METHOD.off_surface.space * along > (xx + yy + zz) * (x * x + y * y + z * z)
     }
 
     /// The best-fitting plane of the point and its neighbours.

@@ -2,9 +2,10 @@
 
 use crate::error::Result;
 use crate::geom::aabb::Aabb;
+use crate::method::METHOD;
 use crate::params::Params;
 use crate::pipeline::Known;
-use crate::stages::cells::{AUTO_REACH, CellMaker, DiskRadius, Widen};
+use crate::stages::cells::{CellMaker, DiskRadius, Widen};
 use crate::stages::ingest::{Classes, CoordinateType, IngestStats, ingest_classes};
 use crate::stages::order::order;
 use crate::stages::order::{PAGE, PointStore};
@@ -16,9 +17,6 @@ use serde::Serialize;
 use std::fmt;
 use std::path::PathBuf;
 use std::time::Instant;
-
-/// Neighbours that the suggested radius reaches to.
-const NEIGHBORS: usize = 30;
 
 /// Sampled runs of points, and points in each.
 const SAMPLES: usize = 24;
@@ -127,7 +125,8 @@ struct Sample {
 fn sample(store: &PointStore, workspace: &Workspace) -> Result<Sample> {
     let _held = workspace.reserve("info: sample", 16 << 20)?;
     let mut sample = Sample::default();
-    let mut maker = CellMaker::new(NEIGHBORS, DiskRadius::Auto, Widen::OnBands, None);
+    let neighbors = METHOD.plane.neighbors;
+    let mut maker = CellMaker::new(neighbors, DiskRadius::Auto, Widen::OnBands, None);
     let mut search = Search::default();
     let count = SAMPLES.min(store.len().div_ceil(SAMPLE_POINTS));
     for index in 0..count {
@@ -137,15 +136,15 @@ fn sample(store: &PointStore, workspace: &Workspace) -> Result<Sample> {
         let tile = Tile::load(store, ids.clone())?;
         let begin = Instant::now();
         let mut failed = None;
-        tile.for_each_query(NEIGHBORS, &mut search, |_, _, query| {
+        tile.for_each_query(neighbors, &mut search, |_, _, query| {
             let Some(mut query) = query else { return };
             let near = query.near();
-            if let Some(last) = near.get(NEIGHBORS - 1) {
+            if let Some(last) = near.get(neighbors - 1) {
                 let first2 = near.get(0).map_or(0, |n| n.distance2);
                 sample.nearest.push((first2 as f64).sqrt());
                 sample
                     .radius
-                    .push(AUTO_REACH * (last.distance2 as f64).sqrt());
+                    .push(METHOD.disk.reach * (last.distance2 as f64).sqrt());
             }
             failed = maker
                 .from_tile(&mut query, |_, _| {})

@@ -5,6 +5,7 @@ use super::checks::{disk_radius, enough, not_a_line, room};
 use super::{Clock, Known, Reconstruction};
 use crate::error::Result;
 use crate::geom::lattice::Lattice;
+use crate::method::METHOD;
 use crate::params::Method;
 use crate::report::{LatticeReport, Report};
 use crate::stages::blocks::Blocks;
@@ -22,9 +23,6 @@ use crate::stages::thin::{Grid, thin};
 use crate::stages::triples::{Triples, triples};
 use crate::workspace::{Workspace, limits};
 use std::time::Instant;
-
-/// Halvings of the lattice step before smoothing, so that rounding does not undo it.
-const SMOOTH_REFINE: u32 = 10;
 
 /// The stages of one run.
 pub(super) struct Stages<'a> {
@@ -98,7 +96,7 @@ impl<'a> Stages<'a> {
         self.report.input = input;
         self.check_room()?;
         let moves = params.smooth + params.relax > 0;
-        let lattice = spool.choose_lattice(if moves { SMOOTH_REFINE } else { 0 })?;
+        let lattice = spool.choose_lattice(if moves { METHOD.smoothing.halvings } else { 0 })?;
         self.report.lattice = LatticeReport {
             step: lattice.step,
             exact: lattice.exact,

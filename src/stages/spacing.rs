@@ -4,24 +4,9 @@ use crate::error::Result;
 use crate::geom::Point;
 use crate::geom::distance2;
 use crate::geom::triangle::area;
+use crate::method::METHOD;
 use crate::workspace::memory::Reservation;
 use crate::workspace::persist::{Persist, Saved};
-
-/// Ids in a patch: with ids along a curve, a small piece of surface.
-pub const PATCH: usize = 256;
-
-/// Patches in a region.
-pub const REGION: usize = 256;
-
-/// A point is off the surface if its neighbours reach more than so many times as far as is usual in its
-/// patch. With 4, three times as many points of terrestrial scans are left out; with 6, points strewn in
-/// the air are joined over a twentieth of the ground of a generated world.
-const FAR: u128 = 5;
-
-/// A slender triangle may fill a hole if its sides are no longer than so many widths. With 2, an aerial
-/// scan has a twelfth more boundary; with no such limit a fifth less, but one in 1000 points of the mesh is
-/// half as far again from the scan.
-const SLENDER: f64 = 2.5;
 
 /// A limit of length.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -77,7 +62,7 @@ pub struct Density<'a> {
 /// usual.
 #[must_use]
 pub fn is_far(last2: u64, usual2: u64) -> bool {
-    u128::from(last2) > FAR * FAR * u128::from(usual2)
+    u128::from(last2) > METHOD.off_surface.far * METHOD.off_surface.far * u128::from(usual2)
 }
 
 /// The square of the local spacing: on a plane, so many neighbours lie in the disk up to the last one,
@@ -100,14 +85,14 @@ impl Spacings {
     /// Bytes for so many points.
     #[must_use]
     pub fn bytes(points: usize) -> u64 {
-        8 * points.div_ceil(PATCH) as u64
+        8 * points.div_ceil(METHOD.curve.patch) as u64
     }
 
     /// The squared distance that the nearest neighbours of a point usually reach.
     #[must_use]
     #[inline(always)]
     pub fn usual2(&self, id: u32) -> u64 {
-        self.usual2[id as usize / PATCH]
+        self.usual2[id as usize / METHOD.curve.patch]
     }
 }
 
@@ -150,7 +135,7 @@ impl Density<'_> {
         let most = |usual2: u64| 0.25 * 3f64.sqrt() * self.square(width, usual2);
         let usual2 = t.map(|v| self.spacings.usual2(v));
         width != Width::Any
-            && (self.exceeds(width.times(SLENDER), t, at)
+            && (self.exceeds(width.times(METHOD.filling.slender), t, at)
                 || area(at) > most(usual2[0].max(usual2[1]).max(usual2[2])))
     }
 
@@ -215,7 +200,7 @@ mod tests {
             let edge = if steps { Width::Steps(limit) } else { Width::Spacings(limit) };
             let limits = Limits { off_surface: true, edge, fill: Width::Any };
             let density = Density { spacings: &spacings, neighbors: 30, limits };
-            let t = [0, 1, 2].map(|patch| patch * PATCH as u32 + 7);
+            let t = [0, 1, 2].map(|patch| patch * METHOD.curve.patch as u32 + 7);
             prop_assert_eq!(density.is_long()(t, at), density.exceeds(edge, t, at));
         }
     }

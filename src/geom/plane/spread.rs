@@ -4,15 +4,7 @@
 use super::{NORMAL_SCALE, Normal};
 use crate::geom::round::rounded;
 use crate::kernels::eight::Numbers;
-
-/// If the middle eigenvalue is below this share of the largest, the points lie on a line.
-const LINE_RATIO: f64 = 1.0 / 400.0;
-
-/// Below this share they lie on a band so narrow that its normal is a matter of chance.
-const BAND_RATIO: f64 = 1.0 / 25.0;
-
-/// Most steps of Newton's method.
-const STEPS: usize = 40;
+use crate::method::METHOD;
 
 /// A scatter with some extent, divided by the largest of its diagonal, and its eigenvalues.
 #[derive(Debug, Clone, Copy)]
@@ -63,13 +55,13 @@ impl<F: Numbers> Spread<F> {
     /// Bits of those whose points lie on a line.
     #[inline(always)]
     pub fn on_lines(&self) -> u64 {
-        (F::splat(LINE_RATIO) * self.top).greater(self.middle)
+        (F::splat(METHOD.plane.line) * self.top).greater(self.middle)
     }
 
     /// Bits of those whose points lie on a narrow band.
     #[inline(always)]
     pub fn on_bands(&self) -> u64 {
-        (F::splat(BAND_RATIO) * self.top).greater(self.middle)
+        (F::splat(METHOD.plane.band) * self.top).greater(self.middle)
     }
 
     /// The direction that `m - least` maps to nothing: the longest cross product of its rows, as long
@@ -161,7 +153,7 @@ fn least_eigenvalue<F: Numbers>(m: &[F; 6]) -> F {
         + m[4] * (m[3] * m[5] - m[1] * m[4]);
     let mut x = zero;
     let mut going = F::ALL;
-    for _ in 0..STEPS {
+    for _ in 0..METHOD.plane.newton_steps {
         let value = ((trace - x) * x - minors) * x + determinant;
         let slope = (two * trace - three * x) * x - minors;
         going &= value.greater(zero) & zero.greater(slope);

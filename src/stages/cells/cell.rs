@@ -6,6 +6,7 @@ use crate::geom::aabb::Aabb;
 use crate::geom::clip::Cell;
 use crate::geom::plane::{Moments, Plane};
 use crate::kernels::Level;
+use crate::method::METHOD;
 use crate::stages::order::PointStore;
 use crate::stages::spacing::Density;
 use crate::stages::tiles::near::{Query, Sums};
@@ -13,17 +14,10 @@ use crate::stages::tiles::neighbors::Neighbors;
 use crate::stages::tiles::walk::{PageCache, Walk};
 use crate::stages::tiles::wanted::Wanted;
 
-/// How often the neighbourhood is doubled when it lies on a line.
-const WIDENINGS: u32 = 3;
-
-/// Automatic radius in units of the distance of the last neighbour: on uniform samples, borders
-/// included, such disks see 99.9 % of the triangles that very large ones see.
-pub const AUTO_REACH: f64 = 2.0;
-
 /// Disk radius in lattice steps, or from the neighbours.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum DiskRadius {
-    /// [`AUTO_REACH`] times the distance of the last neighbour used for the plane.
+    /// Twice the distance of the last neighbour used for the plane.
     Auto,
     /// Fixed, in steps.
     Steps(f64),
@@ -128,7 +122,7 @@ fn fit_from(source: &mut impl Source, neighbors: usize, widen: Widen) -> Result<
     let mut used = neighbors.min(source.near().len());
     let mut fit = Fit::of(source.near().sums(used, Level::best()));
     let mut wanted = neighbors;
-    for _ in 0..WIDENINGS {
+    for _ in 0..METHOD.plane.doublings {
         let enough = match widen {
             Widen::Never => true,
             Widen::OnLines => fit.plane.spans,
@@ -202,7 +196,7 @@ impl<'a> CellMaker<'a> {
             return Some(Outcome::OffSurface);
         }
         let radius = match self.radius {
-            DiskRadius::Auto => AUTO_REACH * (fit.last2 as f64).sqrt(),
+            DiskRadius::Auto => METHOD.disk.reach * (fit.last2 as f64).sqrt(),
             DiskRadius::Steps(steps) => steps,
         };
         self.cell.start(id, normal, radius);

@@ -4,8 +4,7 @@ mod cell;
 mod fold;
 
 pub use cell::{
-    AUTO_REACH, CellMaker, DiskRadius, Fit, Outcome, Widen, fit_in_store, fit_in_tile,
-    near_in_store,
+    CellMaker, DiskRadius, Fit, Outcome, Widen, fit_in_store, fit_in_tile, near_in_store,
 };
 
 use crate::error::Result;

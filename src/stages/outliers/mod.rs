@@ -12,6 +12,7 @@ mod spacing;
 
 use crate::error::Result;
 use crate::geom::Point;
+use crate::method::METHOD;
 use crate::spill::Table;
 use crate::stages::blocks::Blocks;
 use crate::stages::cells::{TileRanges, near_in_store};
@@ -23,15 +24,6 @@ use crate::workspace::Workspace;
 use serde::Serialize;
 use spacing::{SpacingCache, Spacings};
 use std::ops::Range;
-
-/// Neighbours that make the spacing of a point.
-const NEAREST: usize = 8;
-
-/// Neighbours whose spacings it is compared with.
-const AROUND: usize = 64;
-
-/// Rounds at most; the next one is left out if the last one dropped nothing.
-const ROUNDS: u32 = 4;
 
 /// Counts of this stage.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
@@ -66,7 +58,7 @@ pub fn drop_outliers(
     workspace: &Workspace,
 ) -> Result<(PointStore, OutlierStats)> {
     let mut stats = OutlierStats::default();
-    while stats.rounds < ROUNDS && store.len() > NEAREST {
+    while stats.rounds < METHOD.outliers.rounds && store.len() > METHOD.outliers.nearest {
         stats.rounds += 1;
         let kept = round(&store, options, stats.rounds, workspace)?;
         let dropped = (store.len() - kept.len()) as u64;
@@ -111,7 +103,7 @@ fn one_tile(
     factor: f64,
     mut spacings: SpacingCache<'_>,
 ) -> Result<Vec<Point>> {
-    let around = AROUND.min(store.len() - 1);
+    let around = METHOD.outliers.around.min(store.len() - 1);
     let tile = Tile::load(store, ids.clone())?;
     let mut points = Vec::with_capacity(ids.len());
     let mut stays = vec![true; ids.len()];

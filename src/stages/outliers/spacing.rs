@@ -1,7 +1,7 @@
 //! The spacings of all points: a file of them by tile.
 
-use super::NEAREST;
 use crate::error::Result;
+use crate::method::METHOD;
 use crate::spill::{Table, row};
 use crate::stages::cells::TileRanges;
 use crate::stages::order::PointStore;
@@ -30,7 +30,7 @@ pub(super) struct Spacings {
 }
 
 impl Spacings {
-    /// Measures them all. There are more than [`NEAREST`] points.
+    /// Measures them all. There are more points than neighbours that make a spacing.
     pub(super) fn measure(
         store: &PointStore,
         tiles: TileRanges,
@@ -55,9 +55,10 @@ fn one_tile(store: &PointStore, ids: Range<usize>) -> Result<Vec<Spacing>> {
     let mut spacings = vec![Spacing::default(); ids.len()];
     let mut search = Search::default();
     let mut uncertain = Vec::new();
-    tile.for_each_query(NEAREST, &mut search, |id, point, query| match query {
+    let nearest = METHOD.outliers.nearest;
+    tile.for_each_query(nearest, &mut search, |id, point, query| match query {
         Some(query) => {
-            let near = query.near().columns().distances2[..NEAREST].iter();
+            let near = query.near().columns().distances2[..nearest].iter();
             spacings[id as usize - ids.start] = mean(near.copied());
         }
         None => uncertain.push((id, point)),
@@ -65,10 +66,10 @@ fn one_tile(store: &PointStore, ids: Range<usize>) -> Result<Vec<Spacing>> {
     drop(tile);
     let mut cache = PageCache::default();
     for (id, point) in uncertain {
-        let mut near = [0; NEAREST];
+        let mut near = Vec::with_capacity(nearest);
         let mut walk = Walk::new(store, &mut cache, id, point);
-        for distance2 in &mut near {
-            *distance2 = walk.advance()?.map_or(0, |n| n.distance2);
+        for _ in 0..nearest {
+            near.push(walk.advance()?.map_or(0, |n| n.distance2));
         }
         spacings[id as usize - ids.start] = mean(near.into_iter());
     }
@@ -78,7 +79,7 @@ fn one_tile(store: &PointStore, ids: Range<usize>) -> Result<Vec<Spacing>> {
 /// Mean of the distances, nearest first: the order of the sum is always the same.
 fn mean(distances2: impl Iterator<Item = u64>) -> Spacing {
     let sum: f64 = distances2.map(|d2| (d2 as f64).sqrt()).sum();
-    let bits = ((sum / NEAREST as f64) as f32).to_bits();
+    let bits = ((sum / METHOD.outliers.nearest as f64) as f32).to_bits();
     Spacing { bits }
 }
 

@@ -148,7 +148,10 @@ fn it_is_what_the_definition_says() {
         tile: 400,
     };
     let (store, stats) = drop_outliers(store, options, &workspace).unwrap();
-    assert!(stats.dropped > 50 && stats.rounds < ROUNDS, "{stats:?}");
+    assert!(
+        stats.dropped > 50 && stats.rounds < METHOD.outliers.rounds,
+        "{stats:?}"
+    );
     assert_eq!(store.slice(0..store.len()).unwrap(), all);
 }
 

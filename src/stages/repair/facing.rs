@@ -4,6 +4,7 @@
 
 use super::RepairStats;
 use crate::geom::{Point, sub};
+use crate::method::METHOD;
 use crate::spill::row;
 use crate::stages::surface::star::Triangle;
 
@@ -149,7 +150,7 @@ impl Sums {
         } else {
             let v = self.area_vector.map(|x| x as f64);
             let length = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
-            if 4.0 * length >= self.area as f64 {
+            if METHOD.components.open * length >= self.area as f64 {
                 let [x, y, z] = self.area_vector;
                 [z, y, x].into_iter().find_map(sign)
             } else {

@@ -2,6 +2,7 @@
 
 use crate::geom::triangle::{length, normal, on_a_line};
 use crate::geom::{Point, distance2};
+use crate::method::METHOD;
 
 /// A vertex of a boundary loop.
 #[derive(Debug, Clone, Copy)]
@@ -109,7 +110,7 @@ pub fn is_outline(corners: &[Corner]) -> bool {
         }
     }
     let product: f64 = (0..3).map(|k| area[k] as f64 * normals[k] as f64).sum();
-    product < -0.5 * length(area) * lengths
+    product < -METHOD.filling.outline * length(area) * lengths
 }
 
 struct Splitter<'a, E> {

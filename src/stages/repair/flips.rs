@@ -11,21 +11,11 @@
 use super::around::merge;
 use crate::geom::triangle::small_normal;
 use crate::geom::{Point, sub};
+use crate::method::METHOD;
 use crate::stages::surface::sides::{NONE, across, parts, side};
 use crate::stages::surface::star::Triangle;
 use crate::workspace::memory::{bytes_of, hold};
 use std::ops::Range;
-
-/// Bends at the five edges of a quadrilateral, added up, below which it is flat enough.
-const FLAT: f32 = 1.2;
-/// What a flip must save of this sum.
-const GAIN: f32 = 0.1;
-/// Twice the area over the two longest sides: triangles below it, and below what was there, are not
-/// made. About the sine of the smallest angle.
-const SLENDER: f64 = 0.2;
-
-/// Most sweeps over a block.
-const SWEEPS: usize = 3;
 
 /// Flips edges of the `triangles`, ascending, that touch the vertices `ids`; how many. `points` are
 /// the positions in the file, `shape` those that points were connected by: triangles none of whose
@@ -56,7 +46,7 @@ pub fn flip(
     drop(these);
     let _held = hold(sheet.bytes() + bytes_of(&numbers));
     let mut flips = 0;
-    for _ in 0..SWEEPS {
+    for _ in 0..METHOD.flips.sweeps {
         let more = sheet.sweep();
         flips += more;
         if more == 0 {
@@ -157,7 +147,7 @@ impl<'a> Sheet<'a> {
             let mut bits = 0;
             for (k, &behind) in slot.across.iter().enumerate() {
                 let own = behind != NONE && number < parts(behind).0;
-                bits |= u64::from(own && self.around(number, k, behind) >= FLAT) << k;
+                bits |= u64::from(own && self.around(number, k, behind) >= METHOD.flips.bent) << k;
             }
             self.due[number / 16] |= bits << (number % 16 * 4);
         }
@@ -225,7 +215,7 @@ impl<'a> Sheet<'a> {
     #[inline]
     fn gain(&self, number: usize, k: usize, behind: u32) -> Option<Flip> {
         let was = self.around(number, k, behind);
-        if was < FLAT {
+        if was < METHOD.flips.bent {
             return None;
         }
         let (other, corner) = parts(behind);
@@ -246,7 +236,7 @@ impl<'a> Sheet<'a> {
         let (one, two) = (unit(one), unit(two));
         let inner = distance(one, two);
         // The new edge alone tells of most.
-        if was - inner <= GAIN {
+        if was - inner <= METHOD.flips.gain {
             return None;
         }
         let sides = self.sides(number, k, behind);
@@ -259,7 +249,9 @@ impl<'a> Sheet<'a> {
             bend(two, sides[3]),
         ];
         let is = bends[0] + (bends[1] + bends[2]) + (bends[3] + bends[4]);
-        let pays = was - is > GAIN && !self.too_slender([c, u, d, v]) && !self.meets(number, k, d);
+        let pays = was - is > METHOD.flips.gain
+            && !self.too_slender([c, u, d, v])
+            && !self.meets(number, k, d);
         pays.then_some(Flip {
             normals: [one, two],
             bends,
@@ -304,7 +296,8 @@ impl<'a> Sheet<'a> {
     fn too_slender(&self, [c, u, d, v]: [u32; 4]) -> bool {
         let shape = |t: [u32; 3]| slenderness(t.map(|v| self.points[v as usize]));
         let made = shape([u, d, c]).min(shape([d, v, c]));
-        made == 0.0 || made < SLENDER * SLENDER && made < shape([c, u, v]).min(shape([d, v, u]))
+        let least = METHOD.flips.slender * METHOD.flips.slender;
+        made == 0.0 || made < least && made < shape([c, u, v]).min(shape([d, v, u]))
     }
 
     /// True if corner `k` of a triangle has an edge to `d` already.

@@ -6,6 +6,7 @@ use super::parts::Part;
 use super::zip::zip;
 use crate::geom::distance2;
 use crate::geom::triangle::{area, length, normal};
+use crate::method::METHOD;
 use crate::stages::spacing::Density;
 use rustc_hash::FxHashSet;
 
@@ -20,19 +21,9 @@ pub struct Mending<'a> {
     pub zip: bool,
 }
 
-/// Longer loops are left alone, so that memory does not follow the boundary.
-const LONGEST_ZIPPED: usize = 100_000;
-
-/// A loop is an opening if its area, or that of the triangles that would fill it, is larger than so many
-/// mean squares of its edges, for each edge: a round hole of some 55 edges.
-const OPENING: f64 = 4.5;
-
 /// Edges of a loop that one triangle closes: what no cell saw, and not a hole. It is closed even where no
 /// hole is to be filled.
 const GAP: usize = 3;
-
-/// A loop of so few edges is a hole: pieces with so short an outline were removed.
-const SMALL: usize = 6;
 
 impl Mending<'_> {
     /// The longest loop that is looked at.
@@ -40,7 +31,7 @@ impl Mending<'_> {
         if self.only_gaps() {
             GAP
         } else if self.zip {
-            self.longest.max(LONGEST_ZIPPED)
+            self.longest.max(METHOD.ear_clipping.longest)
         } else {
             self.longest
         }
@@ -77,7 +68,7 @@ impl Mending<'_> {
             return fill(corners, 0, edge);
         }
         begin_at_smallest(&mut corners);
-        let around = corners.len() > SMALL && is_outline(&corners);
+        let around = corners.len() > METHOD.filling.sure && is_outline(&corners);
         let found = Width::of(&corners);
         let fillable = |corners: &[Corner]| {
             !around && corners.len() <= self.longest.max(GAP) && !found.is_opening(corners)
@@ -102,7 +93,7 @@ impl Mending<'_> {
             let new = edges_of(&triangles);
             let taken = |a: u32, b: u32| edge(a, b) || new.contains(&(a.min(b), a.max(b)));
             begin_at_smallest(&mut left);
-            if let Some(part) = self.filled(&left, SMALL, &found, taken) {
+            if let Some(part) = self.filled(&left, METHOD.filling.sure, &found, taken) {
                 triangles.extend(ids(&left, &part.triangles));
                 open = part.left;
             }
@@ -158,6 +149,6 @@ impl Width {
     }
 
     fn is_wide(&self, area: f64, edges: usize) -> bool {
-        area * self.edges as f64 > OPENING * self.squares as f64 * edges as f64
+        area * self.edges as f64 > METHOD.filling.opening * self.squares as f64 * edges as f64
     }
 }

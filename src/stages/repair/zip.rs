@@ -5,17 +5,9 @@
 use super::fill::Corner;
 use crate::geom::triangle::{length, normal, on_a_line};
 use crate::geom::{Point, distance2};
+use crate::method::METHOD;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
-
-/// An ear's third side is at most so many times as long as the triangles around are wide.
-const REACH: f64 = 6.0;
-
-/// The cosine of the largest angle between an ear and its neighbours: 100 degrees.
-const COS_FOLD: f64 = -0.17364817766693036;
-
-/// Corners along the loop, either way, that must not lie under an ear.
-const LOOK: usize = 6;
 
 /// What is left of a loop after zipping.
 pub struct Zipped {
@@ -143,7 +135,7 @@ impl<E: Fn(u32, u32) -> bool> Zipper<E> {
         if !closes {
             let spacing = 0.5 * (self.spacing[s] + self.spacing[e]);
             let key = (cs.id.min(ce.id), cs.id.max(ce.id));
-            if chord > REACH * spacing
+            if chord > METHOD.ear_clipping.reach * spacing
                 || cs.pinched && ce.pinched
                 || self.chords.contains(&key)
                 || (self.edge)(cs.id, ce.id)
@@ -155,7 +147,7 @@ impl<E: Fn(u32, u32) -> bool> Zipper<E> {
         let size = length(n);
         let fits = |m: [i128; 3]| {
             let dot: f64 = (0..3).map(|k| (n[k] * m[k]) as f64).sum();
-            dot >= COS_FOLD * size * length(m)
+            dot >= METHOD.ear_clipping.fold * size * length(m)
         };
         if n == [0; 3]
             || on_a_line([cs.file, cx.file, ce.file])
@@ -181,7 +173,7 @@ impl<E: Fn(u32, u32) -> bool> Zipper<E> {
         };
         let ends = [s, x, e].map(|y| self.corners[y].id);
         let (mut left, mut right) = (s, e);
-        for _ in 0..LOOK {
+        for _ in 0..METHOD.ear_clipping.look {
             left = self.before[left];
             right = self.after[right];
             for y in [left, right] {

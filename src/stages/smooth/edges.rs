@@ -5,40 +5,9 @@
 //! bits on every machine, whatever found the neighbours.
 
 use crate::geom::plane::least_direction;
+use crate::method::METHOD;
 use crate::stages::spacing::spacing2;
 use crate::stages::tiles::neighbors::Neighbors;
-
-/// Neighbours in terms of those of a plane: a curved surface is surer of itself through more.
-pub(super) const SPREAD: usize = 3;
-
-/// The squared distance at which weights end, in terms of that of the last neighbour.
-const REACH2: f64 = 1.1;
-
-/// The squared height over the first surface at which weights end, in terms of the mean square.
-const HEIGHT2: f64 = 4.0;
-
-/// What holds back a surface that the points do not decide, in terms of their weights.
-const RIDGE: f64 = 1e-3;
-
-/// A mean square height, in terms of the reach, that is rounding and nothing else.
-const EXACT2: f64 = 1e-24;
-
-/// A curved surface must leave so much less of the square heights over it than a plane.
-const GAIN: f64 = 1.25;
-
-/// A surface is curved if a curved one leaves less than this part of the square heights over a plane.
-const CURVED: f64 = 0.5;
-
-/// Nearest neighbours of a point that show what noise there is, whatever the surface.
-const NEAREST: usize = 12;
-
-/// So many of their positions and the point's must differ in each coordinate: what is rounded coarsely
-/// lies in layers, which are smooth, and does not tell.
-const DIFFERENT: usize = 9;
-
-/// Noise that does not show: the root of the mean square height over a curved surface through the
-/// nearest neighbours, for each degree of freedom, in terms of the local spacing.
-const CLEAN: f64 = 0.03;
 
 /// Unknowns of a surface of second order.
 const TERMS: usize = 6;
@@ -72,19 +41,20 @@ impl Around {
         self.gather(near, count).is_some()
             && self
                 .heights_alike()
-                .is_some_and(|heights| heights.left < CURVED * heights.square)
+                .is_some_and(|heights| heights.left < METHOD.relax.curved * heights.square)
     }
 
     /// True if no noise shows in the nearest neighbours of a point: they lie on a curved surface. `count`
     /// neighbours tell the local spacing. `None` if there are too few, or in few layers.
     pub(super) fn is_clean(&mut self, near: &Neighbors, count: usize) -> Option<bool> {
         let last = near.iter().take(count).last()?;
-        if near.len() < NEAREST || in_layers(near) {
+        let (nearest, height) = (METHOD.relax.nearest, METHOD.relax.height);
+        if near.len() < nearest || in_layers(near) {
             return None;
         }
-        let freedom = (NEAREST + 1 - TERMS) as f64;
-        let limit = freedom * CLEAN * CLEAN * spacing2(last.distance2, count);
-        let reach = self.gather(near, NEAREST)?;
+        let freedom = (nearest + 1 - TERMS) as f64;
+        let limit = freedom * height * height * spacing2(last.distance2, count);
+        let reach = self.gather(near, nearest)?;
         let heights = self.heights_alike()?;
         Some(heights.left * (reach * reach) < limit)
     }
@@ -104,7 +74,7 @@ impl Around {
         if last2 == 0 {
             return None;
         }
-        let reach = (REACH2 * last2 as f64).sqrt();
+        let reach = (METHOD.smoothing.reach2 * last2 as f64).sqrt();
         self.at.clear();
         self.at.push([0.0; 3]);
         let differences = near.iter().take(count).map(|n| n.difference);
@@ -155,8 +125,8 @@ impl Around {
             sum += w * off2(a);
         }
         let mean2 = sum / total;
-        if mean2 > EXACT2 {
-            let limit = HEIGHT2 * mean2;
+        if mean2 > METHOD.smoothing.exact2 {
+            let limit = METHOD.smoothing.height2 * mean2;
             for (a, w) in self.at.iter().zip(&mut self.weights) {
                 let t = (1.0 - off2(a) / limit).max(0.0);
                 *w *= t * t;
@@ -168,7 +138,7 @@ impl Around {
     fn height(&self, normal: [f64; 3]) -> f64 {
         let curved = self.surface(normal);
         let heights = self.heights(normal, &curved);
-        if heights.square <= GAIN * heights.left {
+        if heights.square <= METHOD.smoothing.gain * heights.left {
             heights.mean
         } else {
             curved.terms[0]
@@ -207,7 +177,7 @@ impl Around {
                 (0..=TERMS).for_each(|j| equation[j] += weighted * row[j]);
             }
         }
-        let ridge = RIDGE * m[0][0];
+        let ridge = METHOD.smoothing.ridge * m[0][0];
         (1..TERMS).for_each(|i| m[i][i] += ridge);
         // The constant term comes out first. No pivot is smaller than the ridge.
         for pivot in (1..TERMS).rev() {
@@ -229,13 +199,12 @@ impl Around {
 /// True if the nearest neighbours and the point are in few layers across an axis.
 fn in_layers(near: &Neighbors) -> bool {
     (0..3).any(|axis| {
-        let mut along = [0; NEAREST + 1];
-        for (c, n) in along[1..].iter_mut().zip(near.iter()) {
-            *c = n.difference[axis];
-        }
+        let nearest = near.iter().take(METHOD.relax.nearest);
+        let mut along = vec![0];
+        along.extend(nearest.map(|n| n.difference[axis]));
         along.sort_unstable();
         let different = 1 + along.windows(2).filter(|pair| pair[0] != pair[1]).count();
-        different < DIFFERENT
+        different < METHOD.relax.different
     })
 }
 

@@ -4,43 +4,25 @@
 use super::Relaxing;
 use super::edges::Around;
 use super::fits::Planes;
-use super::pass::RUN;
 use super::seen::Seen;
 use crate::error::Result;
 use crate::geom::Point;
+use crate::method::METHOD;
 use crate::stages::order::PointStore;
-use crate::stages::spacing::{self, is_far};
+use crate::stages::spacing::is_far;
 use crate::workspace::memory::{bytes_of, hold};
 use crate::workspace::persist::persist;
 use std::ops::Range;
 
-/// Runs in a patch.
-const PATCH: usize = spacing::PATCH / RUN;
-
-/// Every so many runs one is looked at first.
-const SAMPLE: usize = 8;
-
-/// A patch is rough if more than one in so many points that were looked at is.
-const SHARE: usize = 16;
-/// So many rough points of a patch tell whether it is curved.
-const TELLING: usize = 3;
-/// Patches in a region.
-const REGION: usize = spacing::REGION;
-/// Nothing moves in a region of which fewer than one patch in so many is noisy,
-const NOISE: usize = 8;
-/// or where fewer than so many in so many of its rough patches are,
-const EDGES: (usize, usize) = (3, 10);
-/// or where so many in so many of the points that tell are clean, of those whose positions are fine:
-const CLEAN: (usize, usize) = (1, 10);
-/// but where more than so many are, they lie in layers, which are to be one surface;
-const LAYERS: (usize, usize) = (7, 10);
-/// and fewer fine ones than one in so many say nothing.
-const FINE: usize = 4;
-/// Points in a region.
-pub(super) const SPAN: usize = REGION * PATCH * RUN;
-
 /// Bytes for each point of a region: what was seen of the samples, which of them tell, and some.
-pub(super) const BYTES: u64 = ((size_of::<Target>() + size_of::<Sample>()) / SAMPLE + 4) as u64;
+pub(super) fn bytes() -> u64 {
+    ((size_of::<Target>() + size_of::<Sample>()) / METHOD.curve.sample + 4) as u64
+}
+
+/// Patches in a region.
+fn region() -> usize {
+    METHOD.curve.block as usize / METHOD.curve.patch
+}
 
 /// Where a sampled point would go, and whether that is far.
 type Target = (u32, Point, bool);
@@ -83,10 +65,10 @@ pub(super) fn look_and_move(
     let active = if relaxing.rounds > 0 {
         choose(&planes, relaxing, &targets, &ids)?
     } else {
-        vec![false; ids.len().div_ceil(RUN)]
+        vec![false; ids.len().div_ceil(METHOD.curve.run)]
     };
     let mut seen = Seen::of(&ids);
-    let moves = |id: usize| active[(id - ids.start) / RUN];
+    let moves = |id: usize| active[(id - ids.start) / METHOD.curve.run];
     let mut put = |id: usize, to, rough| {
         seen.note(id, rough);
         points[id - ids.start] = to;
@@ -111,12 +93,13 @@ pub(super) fn look_and_move(
 }
 
 fn is_sampled(id: usize) -> bool {
-    (id / RUN).is_multiple_of(SAMPLE)
+    (id / METHOD.curve.run).is_multiple_of(METHOD.curve.sample)
 }
 
 /// Looks at the samples.
 fn look(planes: &Planes<'_>, relaxing: Relaxing, ids: &Range<usize>) -> Result<Looked> {
-    let mut samples: Vec<Sample> = Vec::with_capacity(ids.len() / SAMPLE + RUN);
+    let curve = METHOD.curve;
+    let mut samples: Vec<Sample> = Vec::with_capacity(ids.len() / curve.sample + curve.run);
     planes.each(is_sampled, |id, point, fit| {
         // As if it were on the surface: how far that reaches is not known yet.
         let (to, rough) = relaxing.target(point, &fit, fit.last2);
@@ -154,22 +137,14 @@ struct Sample {
     fills: bool,
 }
 
-/// Few patches of a region reach far for it if at most one in so many does. Where density falls with the
-/// distance from a scanner, many do; of the patches of a landscape with one bird for 200 points, one in 60.
-const FEW: usize = 16;
-
-/// One in so many neighbourhoods of a patch that reaches far must fill space for it to be in the air: half
-/// of them, or, where such patches are few, a sixteenth. With half everywhere, sheets of birds hang over 1.4 % of the ground
-/// of that landscape; with a sixteenth everywhere, a seventh of a room scanned from its middle is lost.
-const FILLING: (usize, usize) = (2, 16);
-
 /// For each patch how far the neighbours of its points usually reach, squared: the lower quartile of those
 /// looked at. Where these fill space and reach far for their region they are strewn in the air, and what is
 /// usual is what is so in the region.
 fn usual_reach(samples: &[Sample], ids: &Range<usize>) -> Vec<u64> {
-    let patches = ids.len().div_ceil(PATCH * RUN);
+    let curve = METHOD.curve;
+    let patches = ids.len().div_ceil(curve.patch);
     let mut reach: Vec<Vec<u64>> = Vec::new();
-    reach.resize_with(patches, || Vec::with_capacity(PATCH * RUN / SAMPLE));
+    reach.resize_with(patches, || Vec::with_capacity(curve.patch / curve.sample));
     let mut filling = vec![0; patches];
     for sample in samples {
         let patch = patch(sample.target.0, ids);
@@ -178,14 +153,14 @@ fn usual_reach(samples: &[Sample], ids: &Range<usize>) -> Vec<u64> {
     }
     let counts: Vec<usize> = reach.iter().map(Vec::len).collect();
     let mut usual2: Vec<u64> = reach.into_iter().map(lower_quartile).collect();
-    let counts = filling.chunks(REGION).zip(counts.chunks(REGION));
-    for (usual2, (filling, counts)) in usual2.chunks_mut(REGION).zip(counts) {
+    let counts = filling.chunks(region()).zip(counts.chunks(region()));
+    for (usual2, (filling, counts)) in usual2.chunks_mut(region()).zip(counts) {
         let region2 = lower_quartile(usual2.to_vec());
         let far = usual2.iter().filter(|u| is_far(**u, region2)).count();
-        let one_in = if far * FEW <= usual2.len() {
-            FILLING.1
+        let one_in = if far * METHOD.off_surface.few <= usual2.len() {
+            METHOD.off_surface.airy_if_few
         } else {
-            FILLING.0
+            METHOD.off_surface.airy
         };
         for (usual2, (filling, count)) in usual2.iter_mut().zip(filling.iter().zip(counts)) {
             if one_in * filling >= *count && is_far(*usual2, region2) {
@@ -200,7 +175,7 @@ fn lower_quartile(mut all: Vec<u64>) -> u64 {
     if all.is_empty() {
         return 0;
     }
-    let place = all.len() / 4;
+    let place = all.len() / METHOD.off_surface.quantile;
     *all.select_nth_unstable(place).1
 }
 
@@ -214,11 +189,13 @@ fn choose(
     let rough = rough_patches(looked, ids);
     let told = ask(planes, relaxing, looked, ids, &rough)?;
     let _held = hold(bytes_of(&told));
-    let mut active = vec![false; ids.len().div_ceil(RUN)];
-    let of_patches = rough.chunks(REGION).zip(told.chunks(REGION));
-    for (runs, (rough, told)) in active.chunks_mut(PATCH * REGION).zip(of_patches) {
+    let run = METHOD.curve.run;
+    let (of_patch, of_region) = (METHOD.curve.patch / run, METHOD.curve.block as usize / run);
+    let mut active = vec![false; ids.len().div_ceil(run)];
+    let of_patches = rough.chunks(region()).zip(told.chunks(region()));
+    for (runs, (rough, told)) in active.chunks_mut(of_region).zip(of_patches) {
         if is_noise(rough, told, relaxing.smoothed) {
-            for (runs, rough) in runs.chunks_mut(PATCH).zip(rough) {
+            for (runs, rough) in runs.chunks_mut(of_patch).zip(rough) {
                 runs.fill(*rough);
             }
         }
@@ -227,21 +204,21 @@ fn choose(
 }
 
 fn patch(id: u32, ids: &Range<usize>) -> usize {
-    (id as usize - ids.start) / (PATCH * RUN)
+    (id as usize - ids.start) / METHOD.curve.patch
 }
 
 /// Patches of which enough was rough of what was looked at; none of a region where these are too few.
 fn rough_patches(looked: &[Target], ids: &Range<usize>) -> Vec<bool> {
-    let mut counts = vec![(0, 0); ids.len().div_ceil(PATCH * RUN)];
+    let mut counts = vec![(0, 0); ids.len().div_ceil(METHOD.curve.patch)];
     for (id, _, far) in looked {
         let (seen, rough) = &mut counts[patch(*id, ids)];
         *seen += 1;
         *rough += usize::from(*far);
     }
-    let rough = counts.iter().map(|(seen, rough)| rough * SHARE > *seen);
-    let mut rough: Vec<bool> = rough.collect();
-    for region in rough.chunks_mut(REGION) {
-        if count(region) * NOISE < region.len() {
+    let is_rough = |(seen, rough): &(usize, usize)| rough * METHOD.relax.patch > *seen;
+    let mut rough: Vec<bool> = counts.iter().map(is_rough).collect();
+    for region in rough.chunks_mut(region()) {
+        if count(region) * METHOD.relax.region < region.len() {
             region.fill(false);
         }
     }
@@ -266,7 +243,7 @@ struct Told {
 
 impl Told {
     fn is_noisy(self) -> bool {
-        2 * self.curved < self.points
+        METHOD.relax.noisy as u8 * self.curved < self.points
     }
 }
 
@@ -276,11 +253,12 @@ fn is_noise(rough: &[bool], told: &[Told], smoothed: bool) -> bool {
     let sum = |of: fn(&Told) -> u8| told.iter().map(|t| usize::from(of(t))).sum::<usize>();
     let noisy = told.iter().filter(|told| told.is_noisy()).count();
     let (fine, clean) = (sum(|t| t.fine), sum(|t| t.clean));
-    let is_clean = fine * FINE >= sum(|t| t.points)
-        && clean * CLEAN.1 >= fine * CLEAN.0
-        && clean * LAYERS.1 <= fine * LAYERS.0;
-    let is_edges = noisy * EDGES.1 < count(rough) * EDGES.0;
-    noisy * NOISE >= rough.len() && !is_edges && (smoothed || !is_clean)
+    let limits = METHOD.relax;
+    let is_clean = fine * limits.fine >= sum(|t| t.points)
+        && 100 * clean >= fine * limits.clean
+        && 100 * clean <= fine * limits.layers;
+    let is_edges = 100 * noisy < count(rough) * limits.edges;
+    noisy * limits.region >= rough.len() && !is_edges && (smoothed || !is_clean)
 }
 
 /// Asks the first rough points of every rough patch.
@@ -316,7 +294,7 @@ fn ask(
 
 /// The first rough ones, by id, of the points of every rough patch that were looked at.
 fn telling_points(looked: &[Target], ids: &Range<usize>, rough: &[bool]) -> Vec<bool> {
-    let wanted = |rough: &bool| if *rough { TELLING } else { 0 };
+    let wanted = |rough: &bool| if *rough { METHOD.relax.telling } else { 0 };
     let mut left: Vec<usize> = rough.iter().map(wanted).collect();
     let mut found: Vec<u32> = looked.iter().filter(|l| l.2).map(|l| l.0).collect();
     found.sort_unstable();

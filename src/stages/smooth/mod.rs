@@ -19,6 +19,7 @@ use crate::error::Result;
 use crate::geom::Point;
 use crate::geom::lattice::COORDINATE_LIMIT;
 use crate::geom::round::rounded;
+use crate::method::METHOD;
 use crate::stages::cells::{Fit, TileRanges};
 use crate::stages::order::PointStore;
 use crate::stages::tiles::neighbors::Neighbors;
@@ -87,7 +88,7 @@ pub fn smooth(
             })
         }
         Smoothing::Edges => {
-            let count = neighbors * edges::SPREAD;
+            let count = neighbors * METHOD.smoothing.neighbors;
             let mut around = Around::default();
             let of = |point: Point, near: &Neighbors| moved(point, around.offset(near, count));
             each_neighborhood(store, ids.clone(), count, of, |id, _, to| {

@@ -2,6 +2,7 @@
 
 use crate::error::Result;
 use crate::geom::Point;
+use crate::method::METHOD;
 use crate::stages::cells::TileRanges;
 use crate::stages::order::{PointStore, Rewriter};
 use crate::stages::tiles::Tile;
@@ -10,9 +11,6 @@ use crate::workspace::Workspace;
 use crate::workspace::memory::{bytes_of, hold};
 use crate::workspace::persist::Persist;
 use std::ops::Range;
-
-/// Ids that follow each other and move by the same rule: pieces of a pass hold whole runs of them.
-pub(super) const RUN: usize = 16;
 
 /// What a pass is called, and how many points it takes at a time.
 #[derive(Debug, Clone, Copy)]
@@ -23,7 +21,7 @@ pub(super) struct Pass<'a> {
     pub memory: &'static str,
     /// Points at a time, about.
     pub tile: u32,
-    /// Points that are not divided: a multiple of [`RUN`].
+    /// Points that are not divided: a multiple of a run.
     pub whole: usize,
     /// Bytes for each point beside its tile and its place.
     pub bytes: u64,
@@ -36,7 +34,7 @@ impl<'a> Pass<'a> {
             file,
             memory,
             tile: tiles.size(),
-            whole: RUN,
+            whole: METHOD.curve.run,
             bytes: 0,
         }
     }
@@ -50,7 +48,7 @@ impl<'a> Pass<'a> {
         work: impl Fn(Range<usize>, &mut [Point]) -> Result<T> + Sync,
         mut each: impl FnMut(T) + Send,
     ) -> Result<PointStore> {
-        let whole = common_multiple(store.page_size() * RUN, self.whole);
+        let whole = common_multiple(store.page_size() * METHOD.curve.run, self.whole);
         let size = (self.tile as usize).next_multiple_of(whole);
         let piece = |number: usize| number * size..((number + 1) * size).min(store.len());
         let bytes = |number: usize| {

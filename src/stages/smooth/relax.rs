@@ -8,21 +8,19 @@
 use super::Relaxing;
 use super::first::{self, Done};
 use super::fits::each_fit;
-use super::pass::{Pass, RUN};
+use super::pass::Pass;
 use super::seen::Seen;
 use crate::error::Result;
 use crate::geom::Point;
+use crate::method::METHOD;
 use crate::stages::cells::TileRanges;
 use crate::stages::order::PointStore;
-use crate::stages::spacing::{PATCH, Spacings};
+use crate::stages::spacing::Spacings;
 use crate::workspace::Workspace;
 use crate::workspace::memory::Reservation;
 use crate::workspace::persist::persist;
 use serde::Serialize;
 use std::ops::Range;
-
-/// A run that moved moves again if at least so many of its points were rough.
-const RAGGED: u8 = 1;
 
 /// Positions to connect the points by.
 #[derive(Debug)]
@@ -65,7 +63,7 @@ struct Runs {
 
 impl Runs {
     fn new(points: usize, workspace: &Workspace) -> Result<Self> {
-        let count = points.div_ceil(RUN);
+        let count = points.div_ceil(METHOD.curve.run);
         Ok(Self {
             _held: workspace.reserve("relax: runs", count as u64 * 2)?,
             active: vec![false; count],
@@ -73,10 +71,10 @@ impl Runs {
         })
     }
 
-    /// Runs move again in which enough was rough.
+    /// Runs move again in which anything was rough.
     fn settle(&mut self) {
         for (active, rough) in self.active.iter_mut().zip(&mut self.rough) {
-            *active &= std::mem::take(rough) >= RAGGED;
+            *active &= std::mem::take(rough) > 0;
         }
     }
 }
@@ -91,7 +89,7 @@ impl RelaxStats {
     /// not only places in it.
     #[must_use]
     pub fn is_noisy(&self, points: u64) -> bool {
-        2 * self.moved >= points
+        METHOD.components.noisy * self.moved >= points
     }
 }
 
@@ -111,7 +109,7 @@ pub fn relax(
 ) -> Result<Relaxed> {
     let held = workspace.reserve("patch spacings", Spacings::bytes(store.len()))?;
     let mut runs = Runs::new(store.len(), workspace)?;
-    let mut usual2 = vec![0; store.len().div_ceil(PATCH)];
+    let mut usual2 = vec![0; store.len().div_ceil(METHOD.curve.patch)];
     let first = first_round(store, tiles, relaxing, &mut runs, &mut usual2, workspace)?;
     let mut relaxed = Relaxed {
         store: None,
@@ -147,8 +145,8 @@ fn first_round(
     workspace: &Workspace,
 ) -> Result<(PointStore, u64)> {
     let pass = Pass {
-        whole: first::SPAN,
-        bytes: first::BYTES,
+        whole: METHOD.curve.block as usize,
+        bytes: first::bytes(),
         ..Pass::new("relaxed1", "relax: tile", tiles)
     };
     let work = |ids: Range<usize>, points: &mut [Point]| {
@@ -156,7 +154,7 @@ fn first_round(
     };
     let mut moved = 0;
     let next = pass.over(store, workspace, work, |done: Done| {
-        let patch = done.seen.first * RUN / PATCH;
+        let patch = done.seen.first * METHOD.curve.run / METHOD.curve.patch;
         usual2[patch..][..done.usual2.len()].copy_from_slice(&done.usual2);
         runs.active[done.seen.first..][..done.active.len()].copy_from_slice(&done.active);
         moved += done.seen.moved;
@@ -179,10 +177,10 @@ fn one_round(
     let pass = Pass::new(&file, "relax: tile", tiles);
     let Runs { active, rough, .. } = runs;
     let work = |ids: Range<usize>, points: &mut [Point]| {
-        let wanted = |id: usize| active[id / RUN];
+        let wanted = |id: usize| active[id / METHOD.curve.run];
         let mut seen = Seen::of(&ids);
         let neighbors = relaxing.neighbors;
-        if ids.clone().step_by(RUN).any(wanted) {
+        if ids.clone().step_by(METHOD.curve.run).any(wanted) {
             each_fit(store, ids.clone(), neighbors, wanted, |id, point, fit| {
                 let (to, rough) = relaxing.target(point, &fit, spacings.usual2(id as u32));
                 seen.note(id, rough);

@@ -1,15 +1,12 @@
 //! What is seen of a point when its plane is known, and of many.
 
-use super::pass::RUN;
 use super::{Relaxing, moved};
 use crate::geom::Point;
+use crate::method::METHOD;
 use crate::stages::cells::Fit;
 use crate::stages::spacing::{is_far, spacing2};
 use crate::workspace::persist::persist;
 use std::ops::Range;
-
-/// A point is rough if it lies farther from its plane than this part of the local spacing.
-const ROUGH: f64 = 0.2;
 
 /// What was seen of a range of ids.
 pub(super) struct Seen {
@@ -28,16 +25,16 @@ persist!(Seen {
 
 impl Seen {
     pub fn of(ids: &Range<usize>) -> Self {
-        let first = ids.start / RUN;
+        let first = ids.start / METHOD.curve.run;
         Self {
             first,
-            rough: vec![0; ids.end.div_ceil(RUN) - first],
+            rough: vec![0; ids.end.div_ceil(METHOD.curve.run) - first],
             moved: 0,
         }
     }
 
     pub fn note(&mut self, id: usize, rough: bool) {
-        self.rough[id / RUN - self.first] += u8::from(rough);
+        self.rough[id / METHOD.curve.run - self.first] += u8::from(rough);
     }
 
     /// Takes over what was seen of each run.
@@ -56,7 +53,7 @@ impl Relaxing {
         };
         let offset = fit.moments.project(normal);
         let length2 = offset[0] * offset[0] + offset[1] * offset[1] + offset[2] * offset[2];
-        let limit = ROUGH * ROUGH * spacing2(fit.last2, self.neighbors);
+        let limit = METHOD.relax.rough * METHOD.relax.rough * spacing2(fit.last2, self.neighbors);
         (moved(point, offset), length2 > limit)
     }
 }

@@ -197,7 +197,7 @@ fn regions_move_by_themselves_however_they_are_divided() {
         store.slice(0..store.len()).unwrap()
     };
     // Two regions and a rest; of the second too little is noisy.
-    let span = first::SPAN;
+    let span = METHOD.curve.block as usize;
     let mut points = in_order(&sheet(390, |_, _| 0));
     for (id, point) in points.iter_mut().enumerate() {
         if id / span != 1 || id % span > span * 9 / 10 {

@@ -1,19 +1,17 @@
 //! Points seen from above: the highest one of each column of space.
 //!
 //! The surface there faces up: ground, roofs, crowns of trees, and the outside of any closed body. A column
-//! has a square base; there is about one for every [`POINTS`] points.
+//! has a square base; there is about one for every 64 points.
 
 use crate::error::Result;
 use crate::geom::Point;
+use crate::method::METHOD;
 use crate::spill::{Id, Table};
 use crate::stages::blocks::Blocks;
 use crate::stages::order::PointStore;
 use crate::workspace::Workspace;
 use crate::workspace::memory::{bytes_of, hold};
 use std::sync::atomic::{AtomicU64, Ordering};
-
-/// Points for each column, if they covered the whole box around the cloud.
-pub const POINTS: u64 = 64;
 
 /// Division of the box around a cloud into columns.
 #[derive(Debug, Clone, Copy)]
@@ -26,13 +24,13 @@ struct Columns {
 }
 
 impl Columns {
-    /// The narrowest columns of which there are no more than one for each [`POINTS`] points.
+    /// The narrowest columns of which there are no more than one for each so many points.
     fn of(store: &PointStore) -> Self {
         let bounds = store.bounds();
         let origin = [bounds.min[0], bounds.min[1]];
         let extent =
             [0, 1].map(|axis| (i64::from(bounds.max[axis]) - i64::from(bounds.min[axis])) as u64);
-        let most = (store.len() as u64 / POINTS).max(1);
+        let most = (store.len() as u64 / METHOD.orientation.column).max(1);
         let count = |shift: u32| extent.map(|e| (e >> shift) + 1);
         let fits = |shift: &u32| {
             let [wide, deep] = count(*shift);

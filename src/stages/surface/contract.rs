@@ -8,6 +8,7 @@
 //! edges).
 
 use super::parity::ParitySets;
+use crate::method::METHOD;
 use crate::workspace::memory::{bytes_of, table_bytes};
 use rustc_hash::FxHashMap;
 use std::cmp::Reverse;
@@ -107,7 +108,7 @@ impl Graph {
     /// circumference.
     fn upward(&self, node: u32) -> i64 {
         let up = self.up[node as usize];
-        up.signum() * UPWARD * up.unsigned_abs().isqrt() as i64
+        up.signum() * METHOD.orientation.upward * up.unsigned_abs().isqrt() as i64
     }
 
     /// The weight of a pair with this sum.
@@ -127,7 +128,7 @@ impl Graph {
             Some(sky) if b == sky => a,
             _ => return false,
         };
-        self.bare[other as usize] && self.up[other as usize].abs() < HELD
+        self.bare[other as usize] && self.up[other as usize].abs() < METHOD.orientation.held
     }
 
     /// Adds to the sum of two nodes; nothing if they are the same.
@@ -263,16 +264,6 @@ impl Graph {
         }
     }
 }
-
-/// Weight of the square root of the evidence that a node faces up. With 16, the trees of an aerial scan
-/// face up at 0.7 % more boundary; with 48 there is 6 % more, with 0 three quarters more area is seen from
-/// behind.
-const UPWARD: i64 = 16;
-
-/// Least evidence that holds a piece of surface which nothing connects: that of 64 highest points. Smaller
-/// pieces are turned as the triangles that connect them later ask. With 0, an aerial scan loses 0.1 % more of its points,
-/// and 5 % more triangles are cut.
-const HELD: i64 = 1024;
 
 /// Bytes that a pair is reckoned to take beside its sum: two names in lists of neighbours, with what these
 /// leave free, and its places in the queue.

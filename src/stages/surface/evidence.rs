@@ -5,6 +5,7 @@
 
 use super::star::Triangle;
 use crate::geom::triangle::small_normal;
+use crate::method::METHOD;
 use crate::stages::located::Located;
 use crate::workspace::memory::Holding;
 
@@ -19,12 +20,10 @@ pub struct Division {
 }
 
 impl Default for Division {
-    /// Patches of a page of points. With clusters of up to 4096 triangles open ground is cut nowhere, with
-    /// 16 384 it is; smaller ones need more memory where blocks are put together.
     fn default() -> Self {
         Self {
-            patch: 256,
-            cluster: 1024,
+            patch: METHOD.curve.patch as u32,
+            cluster: METHOD.orientation.cluster,
         }
     }
 }
@@ -84,21 +83,23 @@ impl LongNormal {
         }
     }
 
-    /// True if the [`cosine`] of the unit normals is more than [`FLAT`].
+    /// True if the [`cosine`] of the unit normals is so large that this is no place to cut.
     #[must_use]
     #[inline]
     pub fn is_flat(self, other: Self, flip: bool) -> bool {
-        self.surely_between(other, flip, FLAT, f64::INFINITY)
-            || cosine(self.unit(), other.unit(), flip) > FLAT
+        let flat = METHOD.orientation.flat;
+        self.surely_between(other, flip, flat, f64::INFINITY)
+            || cosine(self.unit(), other.unit(), flip) > flat
     }
 
     /// The [`weight`] of the [`cosine`] of the unit normals.
     #[must_use]
     #[inline]
     pub fn weight(self, other: Self, flip: bool) -> i64 {
-        const NEXT: f64 = (FLATTEST - 2) as f64 / (FLATTEST - 1) as f64;
-        if self.surely_between(other, flip, NEXT, 1.0) {
-            FLATTEST - 1
+        let most = METHOD.orientation.flattest - 1;
+        let next = (most - 1) as f64 / most as f64;
+        if self.surely_between(other, flip, next, 1.0) {
+            most
         } else {
             weight(cosine(self.unit(), other.unit(), flip))
         }
@@ -130,14 +131,8 @@ pub fn cosine(a: [f64; 3], b: [f64; 3], flip: bool) -> f64 {
 /// Weight of a connection through an edge: 1 for a fold, 16 where it is flat.
 #[must_use]
 pub fn weight(cosine: f64) -> i64 {
-    1 + (cosine.max(0.0) * 15.0) as i64
+    1 + (cosine.max(0.0) * (METHOD.orientation.flattest - 1) as f64) as i64
 }
-
-/// The weight of the flattest connection.
-pub const FLATTEST: i64 = 16;
-
-/// Flatter than this, a connection is no place to cut.
-pub const FLAT: f64 = 0.9;
 
 #[cfg(test)]
 mod tests {
@@ -158,7 +153,7 @@ mod tests {
             for [t, other] in [[[0, 1, 2], [1, 2, 3]], [[0, 1, 2], [0, 1, 3]], [[0, 1, 3], [0, 1, 3]]] {
                 let cosine = cosine(evidence.normal(t), evidence.normal(other), flip);
                 let [t, other] = [t, other].map(|t| evidence.long_normal(t));
-                prop_assert_eq!(t.is_flat(other, flip), cosine > FLAT);
+                prop_assert_eq!(t.is_flat(other, flip), cosine > METHOD.orientation.flat);
                 prop_assert_eq!(t.weight(other, flip), weight(cosine));
             }
         }
@@ -166,6 +161,9 @@ mod tests {
 
     #[test]
     fn weights_grow_with_flatness() {
-        assert_eq!([-1.0, 0.0, 0.5, 1.0].map(weight), [1, 1, 8, FLATTEST]);
+        assert_eq!(
+            [-1.0, 0.0, 0.5, 1.0].map(weight),
+            [1, 1, 8, METHOD.orientation.flattest]
+        );
     }
 }

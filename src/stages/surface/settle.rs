@@ -9,8 +9,8 @@ use super::orient::{Oriented, Weighed};
 use super::parity::{OrientationConstraint, word};
 use super::rows::{Relation, sum};
 use super::star::Triangle;
-use super::weigh::BASE;
 use crate::error::Result;
+use crate::method::METHOD;
 use crate::spill::Table;
 use crate::stages::blocks::Blocks;
 use crate::workspace::Workspace;
@@ -57,7 +57,7 @@ pub(super) fn settle(
             };
             for &((other, turned), weight) in &neighbors {
                 let sum = if flip ^ turned { -weight } else { weight };
-                graph.add(label, other, BASE * sum);
+                graph.add(label, other, METHOD.orientation.edge * sum);
             }
             edges.put(t, word((label, flip)), normal);
         }

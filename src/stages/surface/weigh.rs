@@ -2,16 +2,14 @@
 //! without the rest of the cloud.
 
 use super::contract::{Graph, Limit};
-use super::evidence::{Evidence, FLATTEST, cosine, weight};
+use super::evidence::{Evidence, cosine, weight};
 use super::labels::{Connections, OrientedBlock, adjacent, number_labels};
 use super::patches::Patches;
 use super::star::{EdgesUp, Triangle};
+use crate::method::METHOD;
 use crate::stages::blocks::Blocks;
 use crate::workspace::memory::{bytes_of, hold};
 use std::ops::Range;
-
-/// How many candidates an edge between two triangles of the base counts for.
-pub(super) const BASE: i64 = 8;
 
 /// Orients a block by what the evidence says.
 pub(super) fn weigh_block(
@@ -95,7 +93,7 @@ impl Weigher<'_> {
             let count = a + b + c;
             if count > 0 {
                 let z = self.evidence.normal(*t)[2];
-                let up = count * (z * FLATTEST as f64) as i64;
+                let up = count * (z * METHOD.orientation.flattest as f64) as i64;
                 let (of, turned) = self.patch(number);
                 self.graph.add_up(of, signed(turned, up));
             }
@@ -107,7 +105,7 @@ impl Weigher<'_> {
     fn add_connections(&mut self, crossing: &[Triangle], connections: &mut Connections) {
         for n in 0..self.patches.shared.len() {
             let edge = self.patches.shared[n];
-            let weight = BASE * i64::from(edge.weight);
+            let weight = METHOD.orientation.edge * i64::from(edge.weight);
             self.connect(edge.a, edge.b, edge.flip, weight);
         }
         let edges = self.edges_of(crossing.iter().chain(&self.evidence.candidates));
@@ -120,7 +118,8 @@ impl Weigher<'_> {
                 connections.relations.push((c, other, flip, weight));
                 // As much as the other two edges of the crossing triangle can weigh.
                 let of = self.patches.of[other as usize];
-                self.graph.add_outside(of, 2 * BASE * FLATTEST);
+                let most = 2 * METHOD.orientation.edge * METHOD.orientation.flattest;
+                self.graph.add_outside(of, most);
             }
         }
         for &c in &self.evidence.candidates {

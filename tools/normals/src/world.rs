@@ -4,7 +4,7 @@ use crate::Arguments;
 use crate::candidates::Candidate;
 use crate::error::Result;
 use outcrop::geom::Point;
-use outcrop::params::{BLOCK, Params};
+use outcrop::params::Params;
 use outcrop::stages::blocks::Blocks;
 use outcrop::stages::cells::{TileRanges, Widen};
 use outcrop::stages::order::{Orderer, PAGE, PointStore};
@@ -76,7 +76,8 @@ impl World {
         let orderer = Orderer::new(&workspace)?;
         orderer.push(&workspace, &points)?;
         let store = orderer.finish(&workspace, PAGE)?.0;
-        let tiles = TileRanges::new(Blocks::new(store.len(), BLOCK), BLOCK);
+        let block = Params::default().block;
+        let tiles = TileRanges::new(Blocks::new(store.len(), block), block);
         let relaxing = Relaxing {
             neighbors: args.neighbors,
             rounds: Params::default().relax,
@@ -98,7 +99,8 @@ impl World {
     }
 
     pub(crate) fn tiles(&self) -> TileRanges {
-        TileRanges::new(Blocks::new(self.store.len(), BLOCK), BLOCK)
+        let block = Params::default().block;
+        TileRanges::new(Blocks::new(self.store.len(), block), block)
     }
 
     /// Positions of a store in the generator's unit.

@@ -19,7 +19,7 @@ struct Plain {
 impl Plain {
     fn up(&self, node: u32) -> i64 {
         let up = self.nodes[node as usize].2;
-        up.signum() * UPWARD * (up.abs() as f64).sqrt().floor() as i64
+        up.signum() * METHOD.orientation.upward * (up.abs() as f64).sqrt().floor() as i64
     }
 
     fn weight(&self, pair: (u32, u32)) -> i64 {
@@ -62,7 +62,7 @@ impl Plain {
             if matches!(limit, Limit::Triangles(most) if !self.may(pair, most)) {
                 continue;
             }
-            let free = self.nodes[pair.0 as usize].2.abs() < HELD;
+            let free = self.nodes[pair.0 as usize].2.abs() < METHOD.orientation.held;
             if self.sky == Some(pair.1) && self.bare.contains(&pair.0) && free {
                 continue;
             }
@@ -124,7 +124,7 @@ proptest! {
 
     #[test]
     fn contracts_as_a_plain_one(
-        nodes in prop::collection::vec((0u64..6, prop_oneof![Just(0), 0i64..40], prop_oneof![Just(0), -9i64..10, -HELD - 3..HELD + 3]), 1..12),
+        nodes in prop::collection::vec((0u64..6, prop_oneof![Just(0), 0i64..40], prop_oneof![Just(0), -9i64..10, -METHOD.orientation.held - 3..METHOD.orientation.held + 3]), 1..12),
         pairs in prop::collection::vec((0u32..12, 0u32..12, -20i64..21), 0..40),
         most in prop::option::of(0u64..20),
         sky in any::<bool>(),
@@ -247,7 +247,11 @@ fn the_sky_turns_what_faces_down_unless_more_speaks_against_it() {
 
 #[test]
 fn the_sky_holds_no_small_piece_that_nothing_connects() {
-    for (up, held) in [(HELD - 1, None), (HELD, Some(false)), (-HELD, Some(true))] {
+    for (up, held) in [
+        (METHOD.orientation.held - 1, None),
+        (METHOD.orientation.held, Some(false)),
+        (-METHOD.orientation.held, Some(true)),
+    ] {
         let mut graph = graph(&vec![(1, 0, up)], &[], true);
         assert_eq!(graph.contract(Limit::None).relation(0, 1), held, "{up}");
     }

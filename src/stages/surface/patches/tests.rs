@@ -1,9 +1,10 @@
 //! Patches of bands with folds.
 
-use super::super::evidence::{Division, FLAT, cosine, weight};
+use super::super::evidence::{Division, cosine, weight};
 use super::super::star::opposed;
 use super::*;
 use crate::geom::Point;
+use crate::method::METHOD;
 use crate::stages::located::Located;
 use proptest::prelude::*;
 
@@ -94,7 +95,7 @@ proptest! {
             let weight = weight(cosine) as u8;
             let one = patches.of[n] == patches.of[m];
             let near = t[0] / patch == other[0] / patch;
-            prop_assert!(one || !near || cosine <= FLAT, "{:?} {:?}", t, other);
+            prop_assert!(one || !near || cosine <= METHOD.orientation.flat, "{:?} {:?}", t, other);
             prop_assert!(!one || near);
             if !one || patches.sets.relation(n as u32, m as u32) != Some(flip) {
                 let edge = SharedEdge { a: n as u32, b: m as u32, flip, weight };
