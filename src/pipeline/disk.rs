@@ -10,7 +10,8 @@
 //! (`workspace/keeper.rs`), which takes a moment only.
 
 use crate::params::{Method, Params};
-use crate::stages::ingest::{self, CoordinateType, Format, Probe};
+use crate::stages::export::{self, CoordinateType};
+use crate::stages::ingest::{self, Format, Probe};
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -20,9 +21,6 @@ const POSITION: f64 = 12.0;
 /// Scratch bytes a triple at the peak: two copies, packed. Measured 7.4 where nearly all are triangles,
 /// 8.5 where most are candidates.
 const TRIPLE: f64 = 8.2;
-
-/// Bytes of a triangle in the mesh.
-const TRIANGLE: f64 = 13.0;
 
 /// Bytes a point while triangles are in scratch and the mesh is written, beside the stores.
 const EXPORT: f64 = 7.3;
@@ -107,12 +105,15 @@ impl Known {
         }
         let late = (stores + TRIPLE * triples) * points;
         let small = |bytes: f64| bytes + SMALL.0 * points + SMALL.1;
-        let vertex = match self.double {
-            Some(false) => POSITION,
-            Some(true) => 2.0 * POSITION,
-            None => 1.5 * POSITION,
+        let mesh = |coordinates| {
+            let triangles = (triangles * points) as u64;
+            export::mesh_bytes(self.points, triangles, coordinates) as f64
         };
-        let output = (vertex + TRIANGLE * triangles) * points + 200.0;
+        let output = match self.double {
+            Some(false) => mesh(CoordinateType::Float),
+            Some(true) => mesh(CoordinateType::Double),
+            None => (mesh(CoordinateType::Float) + mesh(CoordinateType::Double)) / 2.0,
+        };
         let scratch = small(early.max(late));
         let export = small((stores + EXPORT) * points) + output;
         DiskEstimate {
@@ -155,7 +156,7 @@ fn double(probes: &[Probe]) -> Option<bool> {
             largest = largest.max(c.abs());
         }
     }
-    Some(ingest::enough_for(step, largest) == CoordinateType::F64)
+    Some(ingest::enough_for(step, largest) == ingest::CoordinateType::F64)
 }
 
 #[cfg(test)]
