@@ -11,7 +11,7 @@
 
 use crate::params::{Method, Params};
 use crate::stages::export::{self, CoordinateType};
-use crate::stages::ingest::{self, Format, Probe};
+use crate::stages::ingest::{self, Probe};
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -27,9 +27,6 @@ const EXPORT: f64 = 7.3;
 
 /// Checksums, boxes and whatever else is small: bytes a point, and in all.
 const SMALL: (f64, f64) = (0.8, 4096.0);
-
-/// Bytes of a line of text, about.
-const LINE: u64 = 30;
 
 /// Disk space that a run will take, about.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
@@ -70,14 +67,7 @@ impl Known {
         let mut probes = Vec::new();
         for path in ingest::expand(inputs).ok()? {
             let probe = ingest::probe(&path).ok()?;
-            let (least, usual) = match probe.format {
-                Format::Laz => (1, 8),
-                Format::Las => (20, 20),
-                Format::Text | Format::PlyAscii => (6, LINE),
-                _ => (POSITION as u64, POSITION as u64),
-            };
-            let claimed = probe.points_claimed.unwrap_or(probe.bytes / usual);
-            let points = claimed.min(probe.bytes / least);
+            let points = probe.points_likely;
             known.read += points;
             known.spool += points * probe.spool_bytes_per_point;
             probes.push(probe);
