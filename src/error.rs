@@ -167,6 +167,18 @@ impl Error {
         }
     }
 
+    /// What is wrong with a PLY file.
+    pub(crate) fn ply(path: &Path, error: outcrop_ply::Error) -> Self {
+        match error {
+            outcrop_ply::Error::Io(source) => Self::io(path, "read", source),
+            outcrop_ply::Error::Input {
+                place,
+                found,
+                expected,
+            } => Self::input(path, place, found, expected),
+        }
+    }
+
     /// An [`Error::Input`] for a file that cannot be read as what it is.
     pub fn input(
         path: impl AsRef<Path>,

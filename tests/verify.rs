@@ -429,7 +429,7 @@ fn errors_name_file_and_place() {
     std::fs::write(&path, "solid cube\nfacet normal 0 0 1\n").unwrap();
     let text = verify(&path, &workspace).unwrap_err().to_string();
     assert!(
-        text.ends_with("mesh.ply: header line 1: found 'solid cube', expected 'ply'"),
+        text.ends_with("mesh.ply: PLY header, line 1: found \"solid cube\", expected \"ply\""),
         "{text}"
     );
     written(&cube(), &workspace);

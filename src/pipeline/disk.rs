@@ -11,7 +11,8 @@
 
 use crate::params::{Method, Params};
 use crate::report::DiskEstimate;
-use crate::stages::ingest::{self, CoordinateType, Format, Probe};
+use crate::stages::export::{self, CoordinateType};
+use crate::stages::ingest::{self, Probe};
 use std::path::PathBuf;
 
 /// Bytes of a position, in the ordered store and in the spool if it was integers or `f32`.
@@ -21,17 +22,11 @@ const POSITION: f64 = 12.0;
 /// 8.5 where most are candidates.
 const TRIPLE: f64 = 8.2;
 
-/// Bytes of a triangle in the mesh.
-const TRIANGLE: f64 = 13.0;
-
 /// Bytes a point while triangles are in scratch and the mesh is written, beside the stores.
 const EXPORT: f64 = 7.3;
 
 /// Checksums, boxes and whatever else is small: bytes a point, and in all.
 const SMALL: (f64, f64) = (0.8, 4096.0);
-
-/// Bytes of a line of text, about.
-const LINE: u64 = 30;
 
 /// What is known of a cloud so far.
 #[derive(Debug, Clone, Copy, Default)]
@@ -61,14 +56,7 @@ impl Known {
         let mut probes = Vec::new();
         for path in ingest::expand(inputs).ok()? {
             let probe = ingest::probe(&path).ok()?;
-            let (least, usual) = match probe.format {
-                Format::Laz => (1, 8),
-                Format::Las => (20, 20),
-                Format::Text | Format::PlyAscii => (6, LINE),
-                _ => (POSITION as u64, POSITION as u64),
-            };
-            let claimed = probe.points_claimed.unwrap_or(probe.bytes / usual);
-            let points = claimed.min(probe.bytes / least);
+            let points = probe.points_likely;
             known.read += points;
             known.spool += points * probe.spool_bytes_per_point;
             probes.push(probe);
@@ -96,12 +84,15 @@ impl Known {
         }
         let late = (stores + TRIPLE * triples) * points;
         let small = |bytes: f64| bytes + SMALL.0 * points + SMALL.1;
-        let vertex = match self.double {
-            Some(false) => POSITION,
-            Some(true) => 2.0 * POSITION,
-            None => 1.5 * POSITION,
+        let mesh = |coordinates| {
+            let triangles = (triangles * points) as u64;
+            export::mesh_bytes(self.points, triangles, coordinates) as f64
         };
-        let output = (vertex + TRIANGLE * triangles) * points + 200.0;
+        let output = match self.double {
+            Some(false) => mesh(CoordinateType::Float),
+            Some(true) => mesh(CoordinateType::Double),
+            None => (mesh(CoordinateType::Float) + mesh(CoordinateType::Double)) / 2.0,
+        };
         let scratch = small(early.max(late));
         let export = small((stores + EXPORT) * points) + output;
         DiskEstimate {
@@ -144,7 +135,7 @@ fn double(probes: &[Probe]) -> Option<bool> {
             largest = largest.max(c.abs());
         }
     }
-    Some(ingest::enough_for(step, largest) == CoordinateType::F64)
+    Some(ingest::enough_for(step, largest) == ingest::CoordinateType::F64)
 }
 
 #[cfg(test)]

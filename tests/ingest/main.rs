@@ -33,7 +33,7 @@ fn reads_every_version_and_point_format() {
                 assert_eq!(positions(&spool, &lattice), based(&points), "{path:?}");
                 let seen = probe(&path).unwrap();
                 assert_eq!(seen.points_claimed, Some(1234));
-                assert_eq!(seen.format == Format::Laz, kind == "laz");
+                assert_eq!(seen.format == Format::LAZ, kind == "laz");
                 assert_eq!(seen.point_format, Some(format));
             }
         }
@@ -134,7 +134,7 @@ fn folders_are_searched_by_content() {
     assert_eq!(expand(&[bench.path("in")]).unwrap(), [a, b]);
     let spool = bench.read(&[bench.path("in")]).unwrap();
     assert_eq!((spool.points(), spool.stats().files.len()), (3, 2));
-    assert_eq!(spool.stats().files[0].format, Format::Text);
+    assert_eq!(spool.stats().files[0].format, Format::TEXT);
     std::fs::create_dir(bench.path("empty")).unwrap();
     assert!(bench.error(bench.path("empty")).contains("no point file"));
     assert!(matches!(

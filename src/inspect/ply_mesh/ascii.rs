@@ -1,29 +1,30 @@
 //! Bodies of ascii PLY files: numbers between blanks; where lines end does not matter.
 
 use super::binary::index;
-use super::header::{Element, Property, Scalar};
 use super::source::Source;
 use super::{Role, SLICE, Sink};
 use crate::error::Result;
+use outcrop_ply::{Element, Property, Scalar};
 use std::str::FromStr;
 
-pub(super) fn element(element: &Element, source: &mut Source, sink: &mut impl Sink) -> Result<()> {
+pub(super) fn element(
+    element: &Element,
+    role: Role,
+    source: &mut Source,
+    sink: &mut impl Sink,
+) -> Result<()> {
     if element.properties.is_empty() {
         return Ok(());
     }
-    match element.role() {
+    match role {
         Role::Vertices(axes) => {
             let mut slice = Vec::with_capacity(SLICE);
             for _ in 0..element.count {
                 let mut position = [0.0; 3];
                 for (i, (name, property)) in element.properties.iter().enumerate() {
-                    if axes.contains(&i) {
-                        let value: f64 = number(source, name, "a number")?;
-                        for (slot, _) in position.iter_mut().zip(axes).filter(|&(_, a)| a == i) {
-                            *slot = value;
-                        }
-                    } else {
-                        skip_property(name, *property, source)?;
+                    match axes.iter().position(|axis| axis.0 == i) {
+                        Some(axis) => position[axis] = number(source, name, "a number")?,
+                        None => skip_property(name, *property, source)?,
                     }
                 }
                 slice.push(position);
@@ -34,7 +35,7 @@ pub(super) fn element(element: &Element, source: &mut Source, sink: &mut impl Si
             }
             sink.vertices(&slice)
         }
-        Role::Faces(corners) => faces(element, corners, source, sink),
+        Role::Faces(corners, ..) => faces(element, corners, source, sink),
         Role::Other => {
             for _ in 0..element.count {
                 for (name, property) in &element.properties {
@@ -66,7 +67,7 @@ fn list_length(source: &mut Source, name: &str) -> Result<u64> {
 
 fn skip_property(name: &str, property: Property, source: &mut Source) -> Result<()> {
     match property {
-        Property::Scalar(scalar) => skip_number(name, scalar, source),
+        Property::One(scalar) => skip_number(name, scalar, source),
         Property::List { item, .. } => {
             for _ in 0..list_length(source, name)? {
                 skip_number(name, item, source)?;

@@ -1,18 +1,19 @@
 //! Bodies of binary PLY files; `BIG` is the byte order.
 
-use super::header::{Element, Property, Scalar};
 use super::source::Source;
 use super::{Axes, NO_VERTEX, Role, SLICE, Sink};
 use crate::error::Result;
+use outcrop_ply::{Element, Property, Scalar, bytes_of, integer, real};
 
 pub(super) fn element<const BIG: bool>(
     element: &Element,
+    role: Role,
     source: &mut Source,
     sink: &mut impl Sink,
 ) -> Result<()> {
-    match (element.role(), stride(&element.properties)) {
+    match (role, element.record_bytes()) {
         (Role::Vertices(axes), _) => vertices::<BIG>(element, axes, source, sink),
-        (Role::Faces(corners), _) => faces::<BIG>(element, corners, source, sink),
+        (Role::Faces(at, count, item), _) => faces::<BIG>(element, (at, count, item), source, sink),
         (Role::Other, Some(each)) => {
             let bytes = element.count.saturating_mul(each as u64);
             source.skip(bytes, &format!("element {}", element.name))
@@ -26,52 +27,14 @@ pub(super) fn element<const BIG: bool>(
     }
 }
 
-/// Bytes taken by properties none of which is a list.
-fn stride(properties: &[(String, Property)]) -> Option<usize> {
-    let size = |(_, property): &(String, Property)| match property {
-        Property::Scalar(scalar) => Some(scalar.size()),
-        Property::List { .. } => None,
-    };
-    properties.iter().map(size).sum()
-}
-
-fn array<const BIG: bool, const N: usize>(bytes: &[u8]) -> [u8; N] {
-    let mut value = [0; N];
-    value.copy_from_slice(&bytes[..N]);
-    if BIG {
-        value.reverse();
-    }
-    value
-}
-
-fn integer<const BIG: bool>(scalar: Scalar, bytes: &[u8]) -> i64 {
-    match scalar {
-        Scalar::I8 => i8::from_le_bytes(array::<BIG, 1>(bytes)).into(),
-        Scalar::U8 => bytes[0].into(),
-        Scalar::I16 => i16::from_le_bytes(array::<BIG, 2>(bytes)).into(),
-        Scalar::U16 => u16::from_le_bytes(array::<BIG, 2>(bytes)).into(),
-        Scalar::I32 => i32::from_le_bytes(array::<BIG, 4>(bytes)).into(),
-        Scalar::U32 => u32::from_le_bytes(array::<BIG, 4>(bytes)).into(),
-        Scalar::F32 | Scalar::F64 => real::<BIG>(scalar, bytes) as i64,
-    }
-}
-
-fn real<const BIG: bool>(scalar: Scalar, bytes: &[u8]) -> f64 {
-    match scalar {
-        Scalar::F32 => f32::from_le_bytes(array::<BIG, 4>(bytes)).into(),
-        Scalar::F64 => f64::from_le_bytes(array::<BIG, 8>(bytes)),
-        _ => integer::<BIG>(scalar, bytes) as f64,
-    }
-}
-
 pub(super) fn index(value: i64) -> u32 {
     u32::try_from(value).unwrap_or(NO_VERTEX)
 }
 
 fn list_length<const BIG: bool>(scalar: Scalar, source: &mut Source) -> Result<u64> {
-    let value = integer::<BIG>(scalar, source.take(scalar.size(), "a list's length")?);
+    let value = integer(scalar, source.take(scalar.bytes(), "a list's length")?, BIG);
     u64::try_from(value).map_err(|_| {
-        let offset = source.position() - scalar.size() as u64;
+        let offset = source.position() - scalar.bytes() as u64;
         source.refuse(offset, &format!("a list of {value} items"), "0 or more")
     })
 }
@@ -82,9 +45,9 @@ fn skip_properties<const BIG: bool>(
 ) -> Result<()> {
     for (name, property) in properties {
         let bytes = match *property {
-            Property::Scalar(scalar) => scalar.size() as u64,
+            Property::One(scalar) => scalar.bytes() as u64,
             Property::List { count, item } => {
-                list_length::<BIG>(count, source)?.saturating_mul(item.size() as u64)
+                list_length::<BIG>(count, source)?.saturating_mul(item.bytes() as u64)
             }
         };
         source.skip(bytes, &format!("property {name}"))?;
@@ -100,16 +63,10 @@ fn vertices<const BIG: bool>(
 ) -> Result<()> {
     let mut slice = Vec::with_capacity(SLICE);
     let mut left = element.count;
-    let Some(each) = stride(&element.properties) else {
+    let Some(each) = element.record_bytes() else {
         return vertices_with_lists::<BIG>(element, axes, source, sink);
     };
-    let fields = axes.map(|axis| {
-        let before = stride(&element.properties[..axis]).unwrap_or(0);
-        match element.properties[axis].1 {
-            Property::Scalar(scalar) => (before, scalar),
-            Property::List { count, .. } => (before, count),
-        }
-    });
+    let fields = axes.map(|(at, scalar)| (element.bytes_before(at).unwrap_or(0), scalar));
     while left > 0 {
         let at_hand = source.peek(each)?.len() / each;
         let now = at_hand
@@ -120,7 +77,7 @@ fn vertices<const BIG: bool>(
         slice.extend(
             bytes
                 .chunks_exact(each)
-                .map(|entry| fields.map(|(at, scalar)| real::<BIG>(scalar, &entry[at..]))),
+                .map(|entry| fields.map(|(at, scalar)| real(scalar, &entry[at..], BIG))),
         );
         sink.vertices(&slice)?;
         left -= now as u64;
@@ -138,10 +95,10 @@ fn vertices_with_lists<const BIG: bool>(
         let mut position = [0.0; 3];
         for (i, (name, property)) in element.properties.iter().enumerate() {
             match *property {
-                Property::Scalar(scalar) => {
-                    let value = real::<BIG>(scalar, source.take(scalar.size(), name)?);
-                    for (slot, _) in position.iter_mut().zip(axes).filter(|&(_, a)| a == i) {
-                        *slot = value;
+                Property::One(scalar) => {
+                    let bytes = source.take(scalar.bytes(), name)?;
+                    if let Some(axis) = axes.iter().position(|axis| axis.0 == i) {
+                        position[axis] = real(scalar, bytes, BIG);
                     }
                 }
                 Property::List { .. } => {
@@ -156,18 +113,15 @@ fn vertices_with_lists<const BIG: bool>(
 
 fn faces<const BIG: bool>(
     element: &Element,
-    corners: usize,
+    (corners, count, item): (usize, Scalar, Scalar),
     source: &mut Source,
     sink: &mut impl Sink,
 ) -> Result<()> {
-    let Property::List { count, item } = element.properties[corners].1 else {
-        return Ok(());
-    };
     let (before, after) = (
         &element.properties[..corners],
         &element.properties[corners + 1..],
     );
-    let fixed = stride(before).zip(stride(after));
+    let fixed = bytes_of(before).zip(bytes_of(after));
     let mut slice = Vec::with_capacity(SLICE);
     let mut left = element.count;
     while left > 0 {
@@ -188,11 +142,11 @@ fn faces<const BIG: bool>(
             skip_properties::<BIG>(before, source)?;
             let length = list_length::<BIG>(count, source)?;
             if length == 3 {
-                let bytes = source.take(3 * item.size(), "a face")?;
-                let corner = |i: usize| index(integer::<BIG>(item, &bytes[i * item.size()..]));
+                let bytes = source.take(3 * item.bytes(), "a face")?;
+                let corner = |i: usize| index(integer(item, &bytes[i * item.bytes()..], BIG));
                 slice.push([corner(0), corner(1), corner(2)]);
             } else {
-                source.skip(length.saturating_mul(item.size() as u64), "a face")?;
+                source.skip(length.saturating_mul(item.bytes() as u64), "a face")?;
                 sink.non_triangles(1)?;
             }
             skip_properties::<BIG>(after, source)?;
@@ -222,18 +176,23 @@ impl Layout {
         most: usize,
         slice: &mut Vec<[u32; 3]>,
     ) -> Result<usize> {
-        let (list, size) = (self.before + self.count.size(), self.item.size());
+        let (list, size) = (self.before + self.count.bytes(), self.item.bytes());
         let each = list + 3 * size + self.after;
         let bytes = source.peek(each)?;
         let before = slice.len();
         for entry in bytes.chunks_exact(each).take(most) {
-            if integer::<BIG>(self.count, &entry[self.before..]) != 3 {
+            if integer(self.count, &entry[self.before..], BIG) != 3 {
                 break;
             }
             let corners = &entry[list..list + 3 * size];
-            slice.push(if self.item.size() == 4 {
+            slice.push(if self.item.bytes() == 4 {
                 let corner = |i: usize| {
-                    let value = u32::from_le_bytes(array::<BIG, 4>(&corners[4 * i..]));
+                    let mut word = [0; 4];
+                    word.copy_from_slice(&corners[4 * i..4 * i + 4]);
+                    let value = match BIG {
+                        true => u32::from_be_bytes(word),
+                        false => u32::from_le_bytes(word),
+                    };
                     // A negative `int` has the top bit set; as `uint` that is a valid number.
                     match self.item == Scalar::I32 && value > i32::MAX as u32 {
                         true => NO_VERTEX,
@@ -242,7 +201,7 @@ impl Layout {
                 };
                 [corner(0), corner(1), corner(2)]
             } else {
-                let corner = |i: usize| index(integer::<BIG>(self.item, &corners[i * size..]));
+                let corner = |i: usize| index(integer(self.item, &corners[i * size..], BIG));
                 [corner(0), corner(1), corner(2)]
             });
         }

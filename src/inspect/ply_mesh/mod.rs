@@ -7,13 +7,12 @@
 
 mod ascii;
 mod binary;
-mod header;
 mod source;
 #[cfg(test)]
 mod tests;
 
 use crate::error::{Error, Result};
-use header::{Element, Encoding, Header, Property};
+use outcrop_ply::{Element, Encoding, Header, Scalar};
 use source::Source;
 use std::path::Path;
 
@@ -62,7 +61,7 @@ pub fn holds_faces(path: &Path) -> Result<bool> {
     if source.peek(3)?.get(..3) != Some(b"ply") {
         return Ok(false);
     }
-    match Header::read(&mut source) {
+    match read_header(&mut source) {
         Ok(header) => Ok(header
             .elements
             .iter()
@@ -72,8 +71,12 @@ pub fn holds_faces(path: &Path) -> Result<bool> {
     }
 }
 
-/// Where `x`, `y` and `z` are among the properties of element `vertex`.
-type Axes = [usize; 3];
+fn read_header(source: &mut Source) -> Result<Header> {
+    let header = Header::read(&mut source.peek(Header::LONGEST)?);
+    let header = header.map_err(|e| Error::ply(source.path(), e))?;
+    source.consume(header.bytes as usize);
+    Ok(header)
+}
 
 impl PlyMesh {
     /// Opens a file and reads its header.
@@ -82,7 +85,7 @@ impl PlyMesh {
     /// [`Error::Io`]; [`Error::Input`] if it is not a PLY mesh, or claims more than it can hold.
     pub fn open(path: &Path) -> Result<Self> {
         let mut source = Source::open(path)?;
-        let header = Header::read(&mut source)?;
+        let header = read_header(&mut source)?;
         let mesh = Self { header, source };
         mesh.check()?;
         Ok(mesh)
@@ -120,41 +123,30 @@ impl PlyMesh {
 
     /// Checks that the elements a mesh needs are there and that their counts fit the file.
     fn check(&self) -> Result<()> {
+        let wrong = |e| Error::ply(self.source.path(), e);
+        let elements = &self.header.elements;
         for name in ["vertex", "face"] {
-            let known = || {
-                let names: Vec<_> = self.header.elements.iter().map(|e| &*e.name).collect();
-                format!("elements [{}]", names.join(", "))
-            };
-            match self
-                .header
-                .elements
-                .iter()
-                .filter(|e| e.name == name)
-                .count()
-            {
-                0 => return Err(self.refuse("header", known(), &format!("an element {name}"))),
-                1 => {}
-                n => {
-                    let found = format!("{n} elements named {name}");
-                    return Err(self.refuse("header", found, "one"));
-                }
+            if self.header.element(name).map_err(wrong)?.is_none() {
+                let names: Vec<_> = elements.iter().map(|e| &*e.name).collect();
+                let found = format!("elements [{}]", names.join(", "));
+                return Err(self.refuse("PLY header", found, &format!("an element {name}")));
             }
         }
         if self.vertices() > u64::from(NO_VERTEX) {
             let found = format!("{} vertices", self.vertices());
-            return Err(self.refuse("header", found, "at most 4294967295"));
+            return Err(self.refuse("PLY header", found, "at most 4294967295"));
         }
         let body = self.source.length().saturating_sub(self.source.position());
         // The last number of an ascii file needs no character after it.
         let room = u128::from(body) + u128::from(self.header.encoding == Encoding::Ascii);
         let mut needed = 0u128;
-        for element in &self.header.elements {
-            self.header.check_properties(element, &self.source)?;
+        for element in elements {
+            Role::of(element).map_err(wrong)?;
             let each = element.least_bytes(self.header.encoding);
             needed += u128::from(element.count) * u128::from(each);
             if needed > room {
                 return Err(self.refuse(
-                    &format!("header, element {}", element.name),
+                    &format!("PLY header, element {}", element.name),
                     format!("{} entries of {each} bytes or more", element.count),
                     &format!("what fits into the {body} bytes after the header"),
                 ));
@@ -169,47 +161,39 @@ impl PlyMesh {
     /// What the sink returned; [`Error::Io`]; [`Error::Input`] with the byte offset at which the
     /// file ends early or does not hold what its header announced.
     pub fn read(mut self, sink: &mut impl Sink) -> Result<()> {
+        let source = &mut self.source;
         for element in &self.header.elements {
+            let role = Role::of(element).map_err(|e| Error::ply(source.path(), e))?;
             match self.header.encoding {
-                Encoding::Ascii => ascii::element(element, &mut self.source, sink)?,
-                Encoding::Little => binary::element::<false>(element, &mut self.source, sink)?,
-                Encoding::Big => binary::element::<true>(element, &mut self.source, sink)?,
+                Encoding::Ascii => ascii::element(element, role, source, sink)?,
+                Encoding::Little => binary::element::<false>(element, role, source, sink)?,
+                Encoding::Big => binary::element::<true>(element, role, source, sink)?,
             }
         }
         Ok(())
     }
 }
 
+/// Places and types of `x`, `y` and `z` among the properties of element `vertex`.
+type Axes = [(usize, Scalar); 3];
+
 /// What an element means to the reader.
 enum Role {
     Vertices(Axes),
-    /// Faces whose corners are the property of this index.
-    Faces(usize),
+    /// Faces: place of the property with the corners, the types of their count and of each.
+    Faces(usize, Scalar, Scalar),
     Other,
 }
 
-impl Element {
-    fn role(&self) -> Role {
-        match self.name.as_str() {
-            "vertex" => self.axes().map_or(Role::Other, Role::Vertices),
-            "face" => self.corners().map_or(Role::Other, Role::Faces),
-            _ => Role::Other,
-        }
-    }
-
-    fn axes(&self) -> Option<Axes> {
-        let find = |name| self.find(|p, n| n == name && matches!(p, Property::Scalar(_)));
-        Some([find("x")?, find("y")?, find("z")?])
-    }
-
-    fn corners(&self) -> Option<usize> {
-        self.find(|p, n| {
-            (n == "vertex_indices" || n == "vertex_index") && matches!(p, Property::List { .. })
+impl Role {
+    fn of(element: &Element) -> outcrop_ply::Result<Self> {
+        Ok(match element.name.as_str() {
+            "vertex" => Self::Vertices(element.coordinates()?),
+            "face" => {
+                let (at, count, item) = element.corners()?;
+                Self::Faces(at, count, item)
+            }
+            _ => Self::Other,
         })
-    }
-
-    fn find(&self, wanted: impl Fn(&Property, &str) -> bool) -> Option<usize> {
-        let mut properties = self.properties.iter();
-        properties.position(|(name, property)| wanted(property, name))
     }
 }

@@ -1,13 +1,13 @@
 //! A file read front to back in a buffer of fixed size.
 
-use super::header::LONGEST;
 use crate::error::{Error, Result};
+use outcrop_ply::Header;
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 /// Bytes of buffer; not less than the longest header, so that one entry always fits.
-const BUFFER: usize = LONGEST;
+const BUFFER: usize = Header::LONGEST;
 
 #[derive(Debug)]
 pub(super) struct Source {
@@ -85,7 +85,7 @@ impl Source {
         self.at = (self.at + bytes).min(self.filled);
     }
 
-    /// The next `wanted` bytes (at most [`LONGEST`]), stepped over.
+    /// The next `wanted` bytes (at most those of the buffer), stepped over.
     pub(super) fn take(&mut self, wanted: usize, what: &str) -> Result<&[u8]> {
         let at_hand = self.peek(wanted)?.len();
         if at_hand < wanted {
@@ -121,26 +121,6 @@ impl Source {
     /// The error for something wrong at a byte offset.
     pub(super) fn refuse(&self, offset: u64, found: &str, expected: &str) -> Error {
         Error::input(&self.path, format!("byte {offset}"), found, expected)
-    }
-
-    /// The next line without its end, stepped over; the file's first `longest` bytes hold it.
-    pub(super) fn line(&mut self, longest: usize) -> Result<String> {
-        let before = self.position() as usize;
-        let bytes = self.peek(longest.saturating_sub(before))?;
-        let limit = bytes.len().min(longest.saturating_sub(before));
-        let Some(length) = bytes[..limit].iter().position(|&b| b == b'\n') else {
-            let found = match limit < bytes.len() || limit == longest.saturating_sub(before) {
-                true => format!("no line end in the first {longest} bytes"),
-                false => "the end of the file".to_owned(),
-            };
-            return Err(self.refuse(before as u64, &found, "a PLY header up to 'end_header'"));
-        };
-        let line = bytes[..length]
-            .strip_suffix(b"\r")
-            .unwrap_or(&bytes[..length]);
-        let line = String::from_utf8_lossy(line).trim_end().to_owned();
-        self.consume(length + 1);
-        Ok(line)
     }
 
     /// The next word of an ascii body.

@@ -1,7 +1,6 @@
 //! The triangles of a block in the file's numbers.
 
 use super::number::{Numbering, Split};
-use super::ply::{FACE, encode_face};
 use crate::error::Result;
 use crate::stages::repair::Repaired;
 use crate::stages::surface::star::sorted;
@@ -51,28 +50,36 @@ impl<'a> Faces<'a> {
         triangles + bytes_of(&self.numbers) + bytes_of(&self.splits)
     }
 
-    /// Appends all triangles, ascending by sorted ids, to `bytes`.
-    pub fn encode(&self, bytes: &mut Vec<u8>) {
+    /// Number of triangles.
+    pub fn len(&self) -> usize {
+        self.own().len() + self.filled.len()
+    }
+
+    /// Triangles of the surface whose smallest vertex is in the block.
+    fn own(&self) -> &[[u32; 3]] {
         let first = self.triangles.partition_point(|t| t[0] < self.ids.start);
-        let own = &self.triangles[first..];
-        bytes.reserve_exact((own.len() + self.filled.len()) * FACE as usize);
+        &self.triangles[first..]
+    }
+
+    /// Gives all triangles to `put`, ascending by sorted ids.
+    pub fn for_each(&self, mut put: impl FnMut([u32; 3])) {
         let mut filled = self.filled.iter().copied().peekable();
         let mut splits = &self.splits[..];
         // The smallest vertex of the next triangle that needs more than numbers.
         let mut special = 0;
-        for &t in own {
+        for &t in self.own() {
             if t[0] >= special {
                 while let Some(f) = filled.next_if(|f| sorted(*f) < sorted(t)) {
-                    self.encode_special(f, &mut splits, bytes);
+                    put(self.special(f, &mut splits));
                 }
-                self.encode_special(t, &mut splits, bytes);
+                put(self.special(t, &mut splits));
                 let next_filled = filled.peek().map_or(u32::MAX, |f| f[0]);
                 special = next_filled.min(splits.first().map_or(u32::MAX, |s| s.triangle[0]));
             } else {
-                encode_face(t.map(|v| self.number(v)), bytes);
+                put(t.map(|v| self.number(v)));
             }
         }
-        filled.for_each(|f| self.encode_special(f, &mut splits, bytes));
+        filled.for_each(|f| put(self.special(f, &mut splits)));
     }
 
     #[inline]
@@ -82,7 +89,7 @@ impl<'a> Faces<'a> {
     }
 
     /// A triangle with corners that may take copies: those in a fan with a copy of its own.
-    fn encode_special(&self, t: [u32; 3], splits: &mut &[Split], bytes: &mut Vec<u8>) {
+    fn special(&self, t: [u32; 3], splits: &mut &[Split]) -> [u32; 3] {
         let mut out = t.map(|v| self.number(v));
         while let Some((s, rest)) = splits.split_first()
             && s.triangle == sorted(t)
@@ -94,6 +101,6 @@ impl<'a> Faces<'a> {
             }
             *splits = rest;
         }
-        encode_face(out, bytes);
+        out
     }
 }

@@ -1,12 +1,16 @@
 //! The mesh file: used points renumbered, pinched vertices split, slices written in parallel at
 //! known offsets under a temporary name, then renamed.
+//!
+//! A format is a module that implements `MeshFormat`, and a line of the list here.
 
 mod faces;
+mod file;
+mod format;
 mod number;
 mod ply;
 
-pub use ply::CoordinateType;
-pub(crate) use ply::{folder_of, temporary};
+pub(crate) use file::{folder_of, temporary};
+pub use format::CoordinateType;
 
 use crate::error::{Error, Result};
 use crate::geom::lattice::Lattice;
@@ -17,9 +21,33 @@ use crate::workspace::Workspace;
 use crate::workspace::memory::{bytes_of, hold};
 use crate::workspace::persist::persist;
 use faces::Faces;
+use file::MeshFile;
+use format::{Mesh, MeshFormat};
 use number::Numbering;
 use serde::Serialize;
 use std::path::Path;
+
+/// All formats. The first is that of names which say nothing else.
+const FORMATS: [&dyn MeshFormat; 1] = [&ply::Ply];
+
+/// The format that the name of a mesh asks for.
+fn format_of(output: &Path) -> &'static dyn MeshFormat {
+    let extension = output.extension().unwrap_or_default();
+    let is = |known: &&str| extension.eq_ignore_ascii_case(known);
+    let mut named = FORMATS.into_iter();
+    let named = named.find(|f| f.extensions().iter().any(is));
+    named.unwrap_or(FORMATS[0])
+}
+
+/// Bytes of a mesh, in the first format.
+pub(crate) fn mesh_bytes(vertices: u64, triangles: u64, coordinates: CoordinateType) -> u64 {
+    let mesh = Mesh {
+        vertices,
+        triangles,
+        coordinates,
+    };
+    FORMATS[0].layout(&mesh).bytes
+}
 
 /// Counts of the finished mesh.
 #[derive(Debug, Clone, Copy, Default, Serialize, PartialEq, Eq)]
@@ -62,7 +90,12 @@ pub fn export(
             why: NO_TRIANGLES.into(),
         });
     }
-    let file = ply::MeshFile::open(output, coordinates, &stats, workspace)?;
+    let mesh = Mesh {
+        vertices: stats.vertices,
+        triangles: stats.triangles,
+        coordinates,
+    };
+    let file = MeshFile::open(output, format_of(output), mesh, workspace)?;
     let bytes = |block| block_bytes(repaired, blocks, block);
     let work = |block| {
         write_block(store, repaired, &numbering, blocks, lattice, &file, block)?;
@@ -91,7 +124,7 @@ fn write_block(
     numbering: &Numbering<'_>,
     blocks: Blocks,
     lattice: &Lattice,
-    file: &ply::MeshFile<'_>,
+    file: &MeshFile<'_>,
     block: usize,
 ) -> Result<()> {
     let ids = blocks.ids(block);
@@ -100,19 +133,21 @@ fn write_block(
     let mut bytes = Vec::with_capacity(file.vertex_bytes() * ids.len());
     let mut held = hold(bytes_of(&points) + bytes_of(&bytes));
     let used = ids.clone().filter(|v| numbering.used(*v));
-    used.for_each(|v| file.encode_vertex(at(v), &mut bytes));
+    file.encode_vertices(used.map(at), &mut bytes);
     // Three parts a block; the number is only a name.
     let part = 3 * block as u32;
     file.write_vertices(part, numbering.vertex(ids.start).into(), &bytes)?;
     bytes.clear();
-    for copy in numbering.copies.get(block)? {
-        file.encode_vertex(at(copy.id), &mut bytes);
-    }
+    let copies = numbering.copies.get(block)?;
+    file.encode_vertices(copies.iter().map(|c| at(c.id)), &mut bytes);
     file.write_vertices(part + 1, numbering.first_copy(block), &bytes)?;
     drop(points);
     bytes.clear();
     let faces = Faces::load(repaired, numbering, ids, block)?;
-    faces.encode(&mut bytes);
+    bytes.reserve_exact(faces.len() * file.triangle_bytes());
+    let mut batch = file.triangles(&mut bytes);
+    faces.for_each(|t| batch.push(t));
+    batch.finish();
     held.set(faces.taken() + bytes_of(&bytes));
-    file.write_faces(part + 2, numbering.first_face(block), &bytes)
+    file.write_triangles(part + 2, numbering.first_face(block), &bytes)
 }

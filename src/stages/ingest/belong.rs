@@ -1,6 +1,6 @@
 //! Do the files belong together? Warnings about reference systems, units and places that do not fit.
 
-use super::las::Crs;
+use super::crs::Crs;
 use super::stats::FileStats;
 
 /// How many times as far apart points of one file are, and how many times as large its box is, that
@@ -130,12 +130,12 @@ fn rounded(length: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stages::ingest::Format;
+    use crate::stages::ingest::format::Format;
 
     fn file(name: &str, kept: u64, min: [f64; 3], max: [f64; 3]) -> FileStats {
         FileStats {
             path: name.into(),
-            format: Format::Las,
+            format: Format::LAS,
             bytes: 0,
             claimed: None,
             points: kept,

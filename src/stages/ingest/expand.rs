@@ -1,18 +1,8 @@
 //! Folders to the point files in them.
 
-use super::format::{self, Family, has_extension};
-use super::input::Input;
+use super::formats::{is_points, readable};
 use crate::error::{Error, Result};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-
-/// Names that promise a point cloud; one that does not hold it is an error, not a file to skip.
-const PROMISING: [&str; 3] = ["las", "laz", "ply"];
-
-/// Names under which text in a folder is taken for points.
-const TEXT: [&str; 9] = [
-    "xyz", "txt", "csv", "pts", "asc", "ply", "xyzrgb", "xyzn", "neu",
-];
 
 /// The point files among `inputs`: files as they are, folders recursively, by name.
 ///
@@ -32,7 +22,7 @@ pub fn expand(inputs: &[PathBuf]) -> Result<Vec<PathBuf>> {
         let before = files.len();
         walk(input, &mut files)?;
         if files.len() == before {
-            let expected = format!("at least one file of {}", format::READABLE);
+            let expected = format!("at least one file of {}", readable());
             return Err(Error::input(input, "folder", "no point file", expected));
         }
     }
@@ -57,17 +47,4 @@ fn walk(folder: &Path, files: &mut Vec<PathBuf>) -> Result<()> {
         }
     }
     Ok(())
-}
-
-fn is_points(path: &Path) -> Result<bool> {
-    if has_extension(path, &PROMISING) {
-        return Ok(true);
-    }
-    let input = Input::open(path, Arc::default())?;
-    Ok(match format::family_of(&input)? {
-        // A cloud that cannot be read must not go missing silently.
-        Family::Las | Family::Ply | Family::Foreign(_) => true,
-        Family::Text(_) => has_extension(path, &TEXT),
-        Family::Unknown(_) => false,
-    })
 }

@@ -5,18 +5,23 @@
 //! lattice for all of them, and [`Spool::for_each`] streams the points as positions on it.
 //!
 //! Formats are told apart by content: LAS 1.0 to 1.4 with point formats 0 to 10, LAZ (COPC
-//! included), PLY, and text with a point a line.
+//! included), PLY, and text with a point a line. Each is a module of its own that implements
+//! `PointFormat`, and a line of the list in `formats.rs`.
 
 mod belong;
 mod classes;
 mod contain;
+mod crs;
 mod expand;
 mod format;
+mod formats;
 mod input;
 mod las;
 mod lattice;
 mod map;
+mod number;
 mod ply;
+mod point_format;
 mod probe;
 mod source;
 mod spool;
@@ -33,15 +38,15 @@ pub use stream::READ_BUFFERS;
 
 use crate::error::Result;
 use crate::geom::lattice::Lattice;
-use crate::workspace::Workspace;
 use crate::workspace::persist::{Persist, Saved};
 use crate::workspace::progress::Cancel;
-use format::Family;
+use crate::workspace::{IoCounters, Workspace};
 use input::Input;
+use point_format::{Claims, PointFile};
 use source::{Native, Source};
 use spool::{SourceWriter, SpoolFile};
-use stats::SourceStats;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Precision in which coordinates of the cloud can be written without harm.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize)]
@@ -92,20 +97,19 @@ pub fn ingest_classes(
         workspace.check_cancel()?;
         let opened = Opened::new(&path, workspace.io.clone())?;
         let target = SourceWriter::new(workspace, &file, sources.len() as u32, classes);
-        let mut warnings = opened.read(&target)?;
-        if *classes != Classes::All && opened.las().is_none() {
+        let mut warnings = opened.file.read(&opened.input, &target)?;
+        if *classes != Classes::All && !opened.claims.classes {
             warnings.push("its points have no class, all of them are kept".to_owned());
         }
         let source = Source {
-            native: opened.native(),
-            stats: target.into_stats(),
-            text: matches!(opened.format(), Format::Text | Format::PlyAscii),
+            native: opened.claims.native,
+            stats: target.stats(),
+            text: opened.claims.text,
         };
-        opened.check(&source.stats)?;
         let shown = |w: String| format!("{}: {w}", path.display());
         stats.warnings.extend(warnings.into_iter().map(shown));
         stats.add(&opened, &source);
-        systems.push(opened.crs());
+        systems.push(opened.file.crs(&opened.input));
         sources.push(source);
     }
     stats
@@ -122,83 +126,20 @@ pub fn ingest_classes(
 /// An input file whose header was read.
 struct Opened {
     input: Input,
-    kind: Kind,
-}
-
-enum Kind {
-    Las(las::Header),
-    Ply(ply::Header),
-    Text(text::dialect::Dialect),
+    file: Box<dyn PointFile>,
+    claims: Claims,
 }
 
 impl Opened {
-    fn new(path: &Path, io: std::sync::Arc<crate::workspace::IoCounters>) -> Result<Self> {
+    fn new(path: &Path, io: Arc<IoCounters>) -> Result<Self> {
         let input = Input::open(path, io)?;
-        let kind = match format::family_of(&input)? {
-            Family::Las => Kind::Las(las::Header::read(&input)?),
-            Family::Ply => Kind::Ply(ply::Header::read(&input)?),
-            Family::Text(dialect) => Kind::Text(dialect),
-            other => return Err(format::refuse(&input, &other)),
-        };
-        Ok(Self { input, kind })
-    }
-
-    fn read(&self, target: &SourceWriter<'_>) -> Result<Vec<String>> {
-        match &self.kind {
-            Kind::Las(header) => {
-                let mut warnings = header.warnings.clone();
-                warnings.extend(las::read(&self.input, header, target)?);
-                Ok(warnings)
-            }
-            Kind::Ply(header) => ply::read(&self.input, header, target),
-            Kind::Text(dialect) => text::read(&self.input, dialect, target),
-        }
-    }
-
-    fn check(&self, stats: &SourceStats) -> Result<()> {
-        match &self.kind {
-            Kind::Text(dialect) => {
-                text::check_claim(&self.input, dialect, stats.claimed, stats.read)
-            }
-            Kind::Las(_) | Kind::Ply(_) => Ok(()),
-        }
-    }
-
-    fn format(&self) -> Format {
-        match &self.kind {
-            Kind::Las(header) if header.compressed => Format::Laz,
-            Kind::Las(_) => Format::Las,
-            Kind::Ply(header) => header.format(),
-            Kind::Text(_) => Format::Text,
-        }
-    }
-
-    fn native(&self) -> Native {
-        match &self.kind {
-            Kind::Las(header) => header.native(),
-            Kind::Ply(header) => header.native(),
-            Kind::Text(_) => Native::F64,
-        }
-    }
-
-    fn las(&self) -> Option<&las::Header> {
-        match &self.kind {
-            Kind::Las(header) => Some(header),
-            Kind::Ply(_) | Kind::Text(_) => None,
-        }
-    }
-
-    /// The reference system that the file names.
-    fn crs(&self) -> Option<las::Crs> {
-        las::crs::read(&self.input, self.las()?)
-    }
-
-    fn claimed(&self) -> Option<u64> {
-        match &self.kind {
-            Kind::Las(header) => Some(header.claimed),
-            Kind::Ply(header) => Some(header.claimed()),
-            Kind::Text(_) => None,
-        }
+        let file = formats::open(&input)?;
+        let claims = file.claims(&input);
+        Ok(Self {
+            input,
+            file,
+            claims,
+        })
     }
 }
 
@@ -231,9 +172,9 @@ impl IngestStats {
         let bounds = source.bounds();
         self.files.push(FileStats {
             path: opened.input.path.clone(),
-            format: opened.format(),
+            format: opened.claims.format,
             bytes: opened.input.bytes,
-            claimed: opened.claimed(),
+            claimed: opened.claims.points,
             points: stats.read,
             kept: stats.kept,
             dropped_non_finite: stats.dropped,

@@ -1,7 +1,8 @@
 //! A cheap look at one file.
 
+use super::Opened;
+use super::format::Format;
 use super::source::Native;
-use super::{Format, Opened};
 use crate::error::Result;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -18,6 +19,8 @@ pub struct Probe {
     pub bytes: u64,
     /// Points the header claims; text has no such claim.
     pub points_claimed: Option<u64>,
+    /// The same as far as the file is large enough for them; a guess for text.
+    pub points_likely: u64,
     /// Version of LAS and LAZ, e.g. `1.2`.
     pub las_version: Option<String>,
     /// Point format of LAS and LAZ.
@@ -37,23 +40,22 @@ pub struct Probe {
 /// # Errors
 /// [`crate::Error::Io`]; [`crate::Error::Input`] if it is no point cloud that can be read.
 pub fn probe(path: &Path) -> Result<Probe> {
-    let opened = Opened::new(path, Arc::default())?;
-    let native = opened.native();
-    let (scale, offset) = match native {
+    let Opened { input, claims, .. } = Opened::new(path, Arc::default())?;
+    let (scale, offset) = match claims.native {
         Native::Las { scale, offset } => (Some(scale), Some(offset)),
         Native::F32 | Native::F64 => (None, None),
     };
-    let las = opened.las();
     Ok(Probe {
-        path: opened.input.path.clone(),
-        format: opened.format(),
-        bytes: opened.input.bytes,
-        points_claimed: opened.claimed(),
-        las_version: las.map(|h| format!("{}.{}", h.version[0], h.version[1])),
-        point_format: las.map(|h| h.point_format),
+        format: claims.format,
+        bytes: input.bytes,
+        points_claimed: claims.points,
+        points_likely: claims.likely_points,
+        las_version: claims.version,
+        point_format: claims.point_format,
         scale,
         offset,
-        bounds: las.map(|h| h.bounds),
-        spool_bytes_per_point: native.point_bytes() as u64,
+        bounds: claims.bounds,
+        spool_bytes_per_point: claims.native.point_bytes() as u64,
+        path: input.path,
     })
 }

@@ -1,6 +1,7 @@
 //! A source: the points of one input file in their native form.
 
-use super::stats::{NOT_FIXED, SourceStats};
+use super::number::NOT_FIXED;
+use super::stats::SourceStats;
 use crate::error::Result;
 use crate::workspace::persist::{Persist, Saved, persist};
 
@@ -13,6 +14,17 @@ pub(super) enum Native {
     F32,
     /// Double precision.
     F64,
+}
+
+impl Native {
+    /// Bytes of one point in the spool.
+    pub(super) fn point_bytes(&self) -> usize {
+        match self {
+            Self::Las { .. } => size_of::<[i32; 3]>(),
+            Self::F32 => size_of::<[f32; 3]>(),
+            Self::F64 => size_of::<[f64; 3]>(),
+        }
+    }
 }
 
 impl Persist for Native {

@@ -4,8 +4,8 @@
 //! the other header words too. Frames may be appended by several threads; their order has no
 //! meaning.
 
-use super::Classes;
-use super::source::{Native, Source};
+use super::classes::Classes;
+use super::source::Source;
 use super::stats::SourceStats;
 use crate::error::Result;
 use crate::workspace::Workspace;
@@ -190,11 +190,9 @@ impl<'a> SourceWriter<'a> {
         self.units(name, 1, |_| bytes, |_| work())
     }
 
-    /// Statistics of all units.
-    pub(super) fn into_stats(self) -> SourceStats {
-        self.stats
-            .into_inner()
-            .unwrap_or_else(PoisonError::into_inner)
+    /// Statistics of the units so far.
+    pub(super) fn stats(&self) -> SourceStats {
+        *self.stats.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -355,16 +353,5 @@ impl SpoolFile {
         frame.points = points;
         frame.offset = offset;
         Ok(())
-    }
-}
-
-impl Native {
-    /// Bytes of one point in the spool.
-    pub(super) fn point_bytes(&self) -> usize {
-        match self {
-            Self::Las { .. } => size_of::<[i32; 3]>(),
-            Self::F32 => size_of::<[f32; 3]>(),
-            Self::F64 => size_of::<[f64; 3]>(),
-        }
     }
 }

@@ -51,9 +51,6 @@ pub struct FileStats {
     pub max: Option<[f64; 3]>,
 }
 
-/// Decimals of numbers that are not written with a fixed point.
-pub(super) const NOT_FIXED: u32 = u32::MAX;
-
 /// Exact statistics of one source, in its native form; merging is commutative.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct SourceStats {
@@ -67,7 +64,7 @@ pub(super) struct SourceStats {
     pub(super) max: [f64; 3],
     /// All coordinates are multiples of two to this power; `i32::MAX` if all are zero.
     pub(super) exponent: i32,
-    /// Largest number of decimals in text, or [`NOT_FIXED`].
+    /// Largest number of decimals in text, or [`NOT_FIXED`](super::number::NOT_FIXED).
     pub(super) decimals: u32,
     /// Points that count lines inside the text claim.
     pub(super) claimed: u64,

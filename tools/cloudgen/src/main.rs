@@ -302,32 +302,8 @@ fn write(args: &Args, cloud: &Cloud, output: &Path) -> Result<()> {
     }
 }
 
-/// The message of a usage error on one line, without the usage text.
-fn one_line(error: &clap::Error) -> String {
-    let text = error.to_string();
-    let lines = text
-        .lines()
-        .take_while(|line| !line.trim().is_empty())
-        .map(str::trim);
-    lines.collect::<Vec<_>>().join(" ")
-}
-
 fn main() -> ExitCode {
-    let args = match Args::try_parse() {
-        Ok(args) => args,
-        Err(error) if !error.use_stderr() => error.exit(),
-        Err(error) => {
-            eprintln!("{}", one_line(&error));
-            return ExitCode::from(2);
-        }
-    };
-    match run(&args) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::from(2)
-        }
-    }
+    outcrop_command::main(run)
 }
 
 #[cfg(test)]

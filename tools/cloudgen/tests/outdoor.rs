@@ -346,15 +346,18 @@ fn what_is_no_mesh_is_refused() {
         ),
         (bytes(&nan, &triangles, true), "not finite"),
         (quad, "a face of 4 corners"),
-        (Vec::new(), "no PLY header"),
+        (Vec::new(), "PLY header: found the end of the file"),
         (
             replaced("end_header\n", "end_heades\n"),
-            "no end of the header",
+            "line 11: found \"end_heades\"",
         ),
         (replaced("binary_little_endian", "ascii"), "format ascii"),
-        (replaced("float x", "int x"), "x must be float or double"),
-        (replaced("float y", "float x"), "two properties x"),
-        (replaced("float z", "float w"), "must have x, y and z"),
+        (
+            replaced("float x", "int x"),
+            "x, y and z must be float or double",
+        ),
+        (replaced("float y", "float x"), "2 properties named x"),
+        (replaced("float z", "float w"), "no property z"),
         (
             replaced("list uchar int", "list uchar short"),
             "a list uchar int",
@@ -365,13 +368,13 @@ fn what_is_no_mesh_is_refused() {
         ),
         (
             replaced("vertex 121", "vertex 99999999999999999999"),
-            "is no number",
+            "a number of elements, 0 or more",
         ),
         (
             replaced("vertex 121", "vertex 9999999999999999999"),
             "too many",
         ),
-        (replaced("comment", "commend"), "is not understood"),
+        (replaced("comment", "commend"), "line 3: found \"commend"),
     ] {
         let error = measure(&world(0), &mesh).unwrap_err();
         assert!(matches!(error, Error::Mesh { .. }), "{error}");

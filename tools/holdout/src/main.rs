@@ -77,8 +77,8 @@ impl Limits {
     }
 }
 
-fn run(command: &Command) -> Result<()> {
-    let text = match command {
+fn run(args: &Arguments) -> Result<()> {
+    let text = match &args.command {
         Command::Split(split) => split::run(split)?,
         Command::Measure(measure) => measure::run(measure)?,
         Command::Row(row) => row::run(row)?,
@@ -88,11 +88,5 @@ fn run(command: &Command) -> Result<()> {
 }
 
 fn main() -> ExitCode {
-    match run(&Arguments::parse().command) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("holdout: {error}");
-            ExitCode::from(2)
-        }
-    }
+    outcrop_command::main(run)
 }

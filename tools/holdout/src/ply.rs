@@ -1,6 +1,7 @@
 //! Writes clouds: binary PLY in double precision.
 
 use crate::error::{Error, Result};
+use outcrop_ply::{Encoding, Layout, Scalar};
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::Path;
@@ -9,12 +10,14 @@ use std::path::Path;
 pub(crate) fn write(path: &Path, points: &[[f64; 3]]) -> Result<()> {
     let work = || -> std::io::Result<()> {
         let mut file = BufWriter::with_capacity(1 << 20, File::create(path)?);
-        write!(
-            file,
-            "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty double x\n\
-             property double y\nproperty double z\nend_header\n",
-            points.len()
-        )?;
+        let layout = Layout {
+            encoding: Encoding::Little,
+            comment: None,
+            vertices: points.len() as u64,
+            coordinates: Scalar::F64,
+            triangles: None,
+        };
+        file.write_all(layout.header().as_bytes())?;
         for c in points.iter().flatten() {
             file.write_all(&c.to_le_bytes())?;
         }

@@ -90,11 +90,5 @@ fn run(args: &Arguments) -> Result<()> {
 }
 
 fn main() -> ExitCode {
-    match run(&Arguments::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("normals: {error}");
-            ExitCode::from(2)
-        }
-    }
+    outcrop_command::main(run)
 }

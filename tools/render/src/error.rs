@@ -16,11 +16,10 @@ pub(crate) enum Error {
         source: std::io::Error,
     },
     /// The input is not a PLY file that can be drawn.
-    #[error("{path}: {place}: {what}", path = path.display())]
+    #[error("{path}: {source}", path = path.display())]
     Ply {
         path: PathBuf,
-        place: String,
-        what: String,
+        source: outcrop_ply::Error,
     },
     /// A setting is out of range.
     #[error("{name}: {found} is not valid, expected {expected}")]
@@ -46,11 +45,10 @@ impl Error {
         }
     }
 
-    pub(crate) fn ply(path: &Path, place: impl Into<String>, what: impl Into<String>) -> Self {
+    pub(crate) fn ply(path: &Path, source: outcrop_ply::Error) -> Self {
         Error::Ply {
             path: path.to_path_buf(),
-            place: place.into(),
-            what: what.into(),
+            source,
         }
     }
 

@@ -4,8 +4,8 @@
 mod camera;
 mod edges;
 mod error;
-mod ply;
 mod raster;
+mod scene;
 mod shade;
 mod vec3;
 
@@ -19,8 +19,8 @@ use std::{
 use camera::{Camera, Framing, View};
 use clap::Parser;
 use error::{Error, Result};
-use ply::Mesh;
 use raster::{Mark, Raster};
+use scene::Scene;
 use shade::Shader;
 use vec3::Vec3;
 
@@ -146,7 +146,7 @@ fn check(args: &Args) -> Result<()> {
 
 fn run(args: &Args) -> Result<()> {
     check(args)?;
-    let mesh = ply::read(&args.input)?;
+    let mesh = scene::read(&args.input)?;
     let factor = args.supersample;
     let framing = Framing {
         size: [args.width * factor, args.height * factor],
@@ -177,7 +177,7 @@ fn run(args: &Args) -> Result<()> {
 }
 
 /// Draws wires and special edges.
-fn overlay(args: &Args, mesh: &Mesh, camera: &Camera, raster: &mut Raster) {
+fn overlay(args: &Args, mesh: &Scene, camera: &Camera, raster: &mut Raster) {
     let factor = args.supersample as f64;
     let mut line = |[a, b]: [u32; 2], mark: Mark, thickness: f64| {
         let ends = [a, b].map(|v| mesh.positions[v as usize]);
@@ -226,30 +226,6 @@ fn write_png(path: &Path, width: u32, height: u32, rgb: &[u8]) -> Result<()> {
     writer.finish().map_err(png)
 }
 
-/// The message of a usage error on one line, without the usage text.
-fn one_line(error: &clap::Error) -> String {
-    let text = error.to_string();
-    let lines = text
-        .lines()
-        .take_while(|line| !line.trim().is_empty())
-        .map(str::trim);
-    lines.collect::<Vec<_>>().join(" ")
-}
-
 fn main() -> ExitCode {
-    let args = match Args::try_parse() {
-        Ok(args) => args,
-        Err(error) if !error.use_stderr() => error.exit(),
-        Err(error) => {
-            eprintln!("{}", one_line(&error));
-            return ExitCode::from(2);
-        }
-    };
-    match run(&args) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::from(2)
-        }
-    }
+    outcrop_command::main(run)
 }

@@ -1,8 +1,8 @@
 //! From the depth buffer to colours.
 
 use crate::camera::{Camera, span};
-use crate::ply::Mesh;
 use crate::raster::{Mark, NOTHING, Raster};
+use crate::scene::Scene;
 use crate::vec3::{Vec3, cross, dot, normalize, sub};
 
 type Colour = [f64; 3];
@@ -29,7 +29,7 @@ const RAMP: [Colour; 6] = [
 
 /// Colours pixels.
 pub(crate) struct Shader<'a> {
-    mesh: &'a Mesh,
+    mesh: &'a Scene,
     camera: &'a Camera,
     light: Vec3,
     heights: [f64; 2],
@@ -38,7 +38,7 @@ pub(crate) struct Shader<'a> {
 }
 
 impl<'a> Shader<'a> {
-    pub(crate) fn new(mesh: &'a Mesh, camera: &'a Camera, raster: &Raster) -> Self {
+    pub(crate) fn new(mesh: &'a Scene, camera: &'a Camera, raster: &Raster) -> Self {
         // A headlight over the left shoulder: straight from the viewer it would flatten shapes.
         let light = std::array::from_fn(|k| {
             camera.towards[k] + 0.45 * camera.up[k] - 0.35 * camera.right[k]

@@ -68,17 +68,14 @@ struct Run {
     json: Option<PathBuf>,
 }
 
-fn main() -> ExitCode {
-    let outcome = match Arguments::parse().command {
-        Command::Run(run) => measure::run(&run),
-        Command::Table { files } => show::table(&files),
-        Command::Pipeline(job) => pipeline::work(&job),
-    };
-    match outcome {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::from(2)
-        }
+fn run(args: &Arguments) -> Result<()> {
+    match &args.command {
+        Command::Run(run) => measure::run(run),
+        Command::Table { files } => show::table(files),
+        Command::Pipeline(job) => pipeline::work(job),
     }
+}
+
+fn main() -> ExitCode {
+    outcrop_command::main(run)
 }

@@ -3,6 +3,7 @@
 //! Coordinates are read as they are; the records are looked at for a warning only, so what is wrong
 //! with them is no error.
 
+use super::super::crs::Crs;
 use super::super::input::{Input, u16_at, u64_at};
 use super::Header;
 
@@ -28,48 +29,6 @@ const CITATIONS: [u16; 4] = [1026, 2049, 3073, 4097];
 /// Deepest nesting of well-known text.
 const DEEPEST: usize = 32;
 
-/// A reference system.
-#[derive(Debug, Clone, PartialEq)]
-pub(in super::super) struct Crs {
-    /// Its numbers in the EPSG registry: in the plane, and of heights.
-    horizontal: Option<u32>,
-    vertical: Option<u32>,
-    /// The record, without what may differ between two of the same meaning.
-    normal: String,
-    name: String,
-}
-
-impl Crs {
-    /// True if two systems are certainly not the same.
-    pub(in super::super) fn differs(&self, other: &Self) -> bool {
-        let unlike =
-            |a: Option<u32>, b: Option<u32>| matches!((a, b), (Some(a), Some(b)) if a != b);
-        match (self.horizontal, other.horizontal) {
-            (Some(_), Some(_)) => {
-                unlike(self.horizontal, other.horizontal) || unlike(self.vertical, other.vertical)
-            }
-            // Without numbers, two texts of one kind can be compared.
-            (None, None) => {
-                self.normal.is_empty() == other.normal.is_empty() && self.normal != other.normal
-            }
-            _ => false,
-        }
-    }
-}
-
-impl std::fmt::Display for Crs {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match (self.horizontal, self.vertical) {
-            (Some(plane), Some(heights)) => write!(f, "EPSG:{plane}+{heights}"),
-            (Some(plane), None) => write!(f, "EPSG:{plane}"),
-            _ => {
-                let short: String = self.name.chars().take(40).collect();
-                write!(f, "\"{}\"", short.escape_debug())
-            }
-        }
-    }
-}
-
 /// What the records of a file say.
 #[derive(Default)]
 struct Records {
@@ -80,7 +39,7 @@ struct Records {
 }
 
 /// The reference system of a file, if it names one.
-pub(in super::super) fn read(input: &Input, header: &Header) -> Option<Crs> {
+pub(super) fn read(input: &Input, header: &Header) -> Option<Crs> {
     let mut records = Records::default();
     let mut at = header.vlrs;
     for _ in 0..MOST_RECORDS {

@@ -18,26 +18,26 @@ const LARGEST_OFFSET: f64 = 1e15;
 
 /// The parts of the header that matter here.
 #[derive(Debug, Clone)]
-pub(in super::super) struct Header {
-    pub(in super::super) version: [u8; 2],
-    pub(in super::super) compressed: bool,
-    pub(in super::super) point_format: u8,
-    pub(in super::super) record_bytes: u16,
+pub(super) struct Header {
+    pub(super) version: [u8; 2],
+    pub(super) compressed: bool,
+    pub(super) point_format: u8,
+    pub(super) record_bytes: u16,
     /// Number of points the header claims.
-    pub(in super::super) claimed: u64,
+    pub(super) claimed: u64,
     /// Where the points start.
-    pub(in super::super) data: u64,
+    pub(super) data: u64,
     /// Where the points must have ended: the first extended record or waveform, or the file's end.
-    pub(in super::super) data_end: u64,
+    pub(super) data_end: u64,
     /// Where the variable-length records start.
-    pub(in super::super) vlrs: u64,
+    pub(super) vlrs: u64,
     /// Where the extended records start, and how many there are.
-    pub(in super::super) extended: Option<(u64, u32)>,
-    pub(in super::super) scale: [f64; 3],
-    pub(in super::super) offset: [f64; 3],
+    pub(super) extended: Option<(u64, u32)>,
+    pub(super) scale: [f64; 3],
+    pub(super) offset: [f64; 3],
     /// Smallest and largest coordinates that the header claims. Nothing but estimates relies on them.
-    pub(in super::super) bounds: [[f64; 3]; 2],
-    pub(in super::super) warnings: Vec<String>,
+    pub(super) bounds: [[f64; 3]; 2],
+    pub(super) warnings: Vec<String>,
 }
 
 impl Header {
@@ -45,7 +45,7 @@ impl Header {
     ///
     /// # Errors
     /// [`crate::Error::Input`] naming the field and its byte offset.
-    pub(in super::super) fn read(input: &Input) -> Result<Self> {
+    pub(super) fn read(input: &Input) -> Result<Self> {
         let head = input.head(LARGEST)?;
         if head.len() < SMALLEST {
             return Err(input.error(

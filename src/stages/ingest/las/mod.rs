@@ -1,7 +1,7 @@
 //! LAS 1.0 to 1.4 and LAZ.
 
 mod chunks;
-pub(super) mod crs;
+mod crs;
 mod gps;
 mod header;
 mod laz;
@@ -9,8 +9,7 @@ mod plain;
 mod table;
 mod vlr;
 
-pub(super) use crs::Crs;
-pub(super) use header::Header;
+use header::Header;
 
 /// Byte of a record that holds the withheld flag, in all point formats.
 const FLAGS: usize = 15;
@@ -18,32 +17,88 @@ const FLAGS: usize = 15;
 /// Byte that holds the class in point formats 6 to 10; before, it shares that of the flags.
 const CLASS: usize = 16;
 
-use super::Classes;
+use super::classes::Classes;
+use super::crs::Crs;
+use super::format::Format;
 use super::input::Input;
+use super::point_format::{Claims, Head, PointFile, PointFormat, Refusal};
 use super::source::Native;
 use super::spool::{Sink, SourceWriter};
 use crate::error::Result;
 
-/// Reads a LAS or LAZ file into the spool; returns what the user should know.
-pub(super) fn read(
-    input: &Input,
-    header: &Header,
-    writer: &SourceWriter<'_>,
-) -> Result<Vec<String>> {
-    if header.compressed {
-        laz::read(input, header, writer)
-    } else {
-        plain::read(input, header, writer)
+impl Format {
+    /// ASPRS LAS.
+    pub const LAS: Self = Self {
+        id: "las",
+        name: "LAS",
+    };
+    /// LAS compressed by laszip, COPC included.
+    pub const LAZ: Self = Self {
+        id: "laz",
+        name: "LAZ",
+    };
+}
+
+/// Both formats: the header says which of them a file is of.
+pub(super) struct Las;
+
+impl PointFormat for Las {
+    fn names(&self) -> &'static str {
+        "LAS, LAZ"
+    }
+
+    fn formats(&self) -> &'static [Format] {
+        &[Format::LAS, Format::LAZ]
+    }
+
+    fn extensions(&self) -> &'static [&'static str] {
+        &["las", "laz"]
+    }
+
+    fn recognize(&self, head: &Head) -> Result<bool, Refusal> {
+        let signed = head.bytes.starts_with(b"LASF");
+        if !signed && head.is_named(self.extensions()) {
+            let why = format!("{}, no signature \"LASF\"", head.shown());
+            return Err(Refusal::Unknown(why));
+        }
+        Ok(signed)
+    }
+
+    fn open(&self, input: &Input, _: &Head) -> Result<Box<dyn PointFile>> {
+        Ok(Box::new(Header::read(input)?))
     }
 }
 
-impl Header {
-    /// How the spool holds the points.
-    pub(super) fn native(&self) -> Native {
-        Native::Las {
+impl PointFile for Header {
+    fn claims(&self, input: &Input) -> Claims {
+        let (format, least) = match self.compressed {
+            true => (Format::LAZ, 1),
+            false => (Format::LAS, self.record_bytes.into()),
+        };
+        let native = Native::Las {
             scale: self.scale,
             offset: self.offset,
+        };
+        Claims {
+            classes: true,
+            version: Some(format!("{}.{}", self.version[0], self.version[1])),
+            point_format: Some(self.point_format),
+            bounds: Some(self.bounds),
+            ..Claims::new(input, format, native, self.claimed, least)
         }
+    }
+
+    fn crs(&self, input: &Input) -> Option<Crs> {
+        crs::read(input, self)
+    }
+
+    fn read(&self, input: &Input, target: &SourceWriter<'_>) -> Result<Vec<String>> {
+        let mut warnings = self.warnings.clone();
+        warnings.extend(match self.compressed {
+            true => laz::read(input, self, target)?,
+            false => plain::read(input, self, target)?,
+        });
+        Ok(warnings)
     }
 }
 

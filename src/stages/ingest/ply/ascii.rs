@@ -1,12 +1,12 @@
 //! PLY with numbers as text, one record a line.
 
 use super::super::input::{Input, Range, STREAM_BUFFER};
+use super::super::number;
 use super::super::spool::{SourceWriter, sink_bytes};
 use super::super::stats::SourceStats;
-use super::super::text::number;
-use super::FromScalar;
-use super::header::{Header, Property, Vertex};
+use super::{Cloud, FromScalar, Vertex};
 use crate::error::{Error, Result};
+use outcrop_ply::Property;
 use std::io::{BufRead, BufReader};
 
 /// Longest line that is read.
@@ -14,31 +14,29 @@ const LONGEST_LINE: usize = 1 << 20;
 
 pub(super) fn read<T: FromScalar>(
     input: &Input,
-    header: &Header,
+    cloud: &Cloud,
+    vertex: &Vertex,
     writer: &SourceWriter<'_>,
 ) -> Result<()> {
-    let Some(vertex) = &header.vertex else {
-        return Ok(());
-    };
     let memory = sink_bytes::<T>() + (STREAM_BUFFER + LONGEST_LINE) as u64;
     writer.whole("PLY lines", memory, || {
-        vertices::<T>(input, header, vertex, writer)
+        vertices::<T>(input, cloud, vertex, writer)
     })
 }
 
 fn vertices<T: FromScalar>(
     input: &Input,
-    header: &Header,
+    cloud: &Cloud,
     vertex: &Vertex,
     writer: &SourceWriter<'_>,
 ) -> Result<SourceStats> {
     let mut lines = Lines {
         input,
-        source: input.stream(header.data, input.bytes),
+        source: input.stream(cloud.data, input.bytes),
         line: Vec::new(),
-        at: header.data,
+        at: cloud.data,
     };
-    for element in &header.before {
+    for element in &cloud.before {
         for number in 0..element.count {
             if number % 65536 == 0 {
                 writer.workspace.check_cancel()?;
@@ -47,8 +45,8 @@ fn vertices<T: FromScalar>(
         }
     }
     let mut sink = writer.sink::<T>();
-    for number in 0..vertex.count {
-        lines.next("vertex", number, vertex.count)?;
+    for number in 0..vertex.element.count {
+        lines.next("vertex", number, vertex.element.count)?;
         let point = lines.point(vertex, number, &mut sink.stats.decimals)?;
         sink.push(point)?;
     }
@@ -108,13 +106,13 @@ impl Lines<'_> {
         number: u64,
         decimals: &mut u32,
     ) -> Result<[T; 3]> {
-        let mut point = [T::from_single(0.0); 3];
+        let mut point = [T::from_double(0.0); 3];
         let mut words = self
             .line
             .split(u8::is_ascii_whitespace)
             .filter(|w| !w.is_empty());
         let mut found = 0;
-        for (column, property) in vertex.properties.iter().enumerate() {
+        for (column, (_, property)) in vertex.element.properties.iter().enumerate() {
             let Some(word) = words.next() else {
                 break;
             };
@@ -145,7 +143,7 @@ impl Lines<'_> {
         Err(self.input.error(
             format!("vertex {number}, line before byte {}", self.position()),
             format!("\"{}\"", shown.escape_ascii()),
-            format!("{} numbers", vertex.properties.len()),
+            format!("{} numbers", vertex.element.properties.len()),
         ))
     }
 

@@ -2,66 +2,37 @@
 
 use super::super::input::{Input, Range, STREAM_BUFFER};
 use super::super::spool::{SourceWriter, sink_bytes};
-use super::FromScalar;
-use super::header::{Body, Header, Property, Scalar, Vertex};
+use super::{Cloud, FromScalar, Vertex};
 use crate::error::{Error, Result};
+use outcrop_ply::{Element, Encoding, Property, Scalar};
 use std::io::{BufReader, Read};
 
 /// Bytes of records read at one time.
 const SLAB: u64 = 2 << 20;
 
-/// Bytes of a record of these properties, if it is fixed.
-fn record_bytes(properties: &[Property]) -> Option<u64> {
-    properties
-        .iter()
-        .map(|p| match p {
-            Property::One(scalar) => Some(scalar.bytes() as u64),
-            Property::List { .. } => None,
-        })
-        .sum()
-}
-
-fn scalar<T: FromScalar>(bytes: &[u8], kind: Scalar, body: Body) -> T {
-    let mut word = [0u8; 8];
-    let bytes = &bytes[..kind.bytes()];
-    word[..bytes.len()].copy_from_slice(bytes);
-    if body == Body::Big {
-        word[..bytes.len()].reverse();
-    }
-    let value = u64::from_le_bytes(word);
-    match kind {
-        Scalar::F32 => T::from_single(f32::from_bits(value as u32)),
-        Scalar::F64 => T::from_double(f64::from_bits(value)),
-        Scalar::I8 => T::from_double(f64::from(value as i8)),
-        Scalar::U8 => T::from_double(f64::from(value as u8)),
-        Scalar::I16 => T::from_double(f64::from(value as i16)),
-        Scalar::U16 => T::from_double(f64::from(value as u16)),
-        Scalar::I32 => T::from_double(f64::from(value as i32)),
-        Scalar::U32 => T::from_double(f64::from(value as u32)),
-    }
+fn scalar<T: FromScalar>(bytes: &[u8], kind: Scalar, encoding: Encoding) -> T {
+    T::from_double(outcrop_ply::real(kind, bytes, encoding == Encoding::Big))
 }
 
 pub(super) fn read<T: FromScalar>(
     input: &Input,
-    header: &Header,
+    cloud: &Cloud,
+    vertex: &Vertex,
     writer: &SourceWriter<'_>,
 ) -> Result<()> {
-    let Some(vertex) = &header.vertex else {
-        return Ok(());
-    };
-    let start = skip_elements(input, header, writer)?;
-    match record_bytes(&vertex.properties) {
-        Some(bytes) => fixed::<T>(input, header.body, vertex, start, bytes, writer),
-        None => one_by_one::<T>(input, header.body, vertex, start, writer),
+    let start = skip_elements(input, cloud, writer)?;
+    match vertex.element.record_bytes() {
+        Some(bytes) => fixed::<T>(input, cloud.encoding, vertex, start, bytes as u64, writer),
+        None => one_by_one::<T>(input, cloud.encoding, vertex, start, writer),
     }
 }
 
 /// Where the vertices start.
-fn skip_elements(input: &Input, header: &Header, writer: &SourceWriter<'_>) -> Result<u64> {
-    let mut at = header.data;
-    for element in &header.before {
-        if let Some(bytes) = record_bytes(&element.properties) {
-            let end = bytes
+fn skip_elements(input: &Input, cloud: &Cloud, writer: &SourceWriter<'_>) -> Result<u64> {
+    let mut at = cloud.data;
+    for element in &cloud.before {
+        if let Some(bytes) = element.record_bytes() {
+            let end = (bytes as u64)
                 .checked_mul(element.count)
                 .and_then(|b| b.checked_add(at))
                 .filter(|end| *end <= input.bytes);
@@ -74,13 +45,13 @@ fn skip_elements(input: &Input, header: &Header, writer: &SourceWriter<'_>) -> R
             })?;
             continue;
         }
-        let mut records = Records::new(input, header.body, at);
+        let mut records = Records::new(input, cloud.encoding, at);
         for number in 0..element.count {
             if number % 65536 == 0 {
                 writer.workspace.check_cancel()?;
             }
             records
-                .skip(&element.properties)
+                .skip(element)
                 .map_err(|e| records.error(&element.name, number, element.count, e))?;
         }
         at = records.position();
@@ -90,17 +61,18 @@ fn skip_elements(input: &Input, header: &Header, writer: &SourceWriter<'_>) -> R
 
 fn fixed<T: FromScalar>(
     input: &Input,
-    body: Body,
+    encoding: Encoding,
     vertex: &Vertex,
     start: u64,
     bytes: u64,
     writer: &SourceWriter<'_>,
 ) -> Result<()> {
+    let count = vertex.element.count;
     let present = (input.bytes - start) / bytes;
-    if vertex.count > present {
+    if count > present {
         return Err(input.error(
             "PLY header, element vertex",
-            format!("{} vertices", vertex.count),
+            format!("{count} vertices"),
             format!(
                 "at most the {present} records of {bytes} bytes between byte {start} and the end \
                  of the file at byte {}",
@@ -108,22 +80,21 @@ fn fixed<T: FromScalar>(
             ),
         ));
     }
-    let places = vertex.coordinates.map(|(number, kind)| {
-        let before = record_bytes(&vertex.properties[..number]).unwrap_or(0);
-        (before as usize, kind)
-    });
+    let places = vertex
+        .coordinates
+        .map(|(number, kind)| (vertex.element.bytes_before(number).unwrap_or(0), kind));
     let rows = (SLAB / bytes).max(1);
-    let units = usize::try_from(vertex.count.div_ceil(rows)).unwrap_or(usize::MAX);
+    let units = usize::try_from(count.div_ceil(rows)).unwrap_or(usize::MAX);
     let memory = rows * bytes + sink_bytes::<T>();
     let work = |unit: usize| {
         let first = unit as u64 * rows;
-        let rows = rows.min(vertex.count - first);
+        let rows = rows.min(count - first);
         let mut slab = vec![0u8; (rows * bytes) as usize];
         let what = format!("vertices {first} to {}", first + rows - 1);
         input.read_exact_at(start + first * bytes, &mut slab, &what)?;
         let mut sink = writer.sink::<T>();
         for record in slab.chunks_exact(bytes as usize) {
-            sink.push(places.map(|(at, kind)| scalar(&record[at..], kind, body)))?;
+            sink.push(places.map(|(at, kind)| scalar(&record[at..], kind, encoding)))?;
         }
         sink.finish()
     };
@@ -132,19 +103,20 @@ fn fixed<T: FromScalar>(
 
 fn one_by_one<T: FromScalar>(
     input: &Input,
-    body: Body,
+    encoding: Encoding,
     vertex: &Vertex,
     start: u64,
     writer: &SourceWriter<'_>,
 ) -> Result<()> {
+    let count = vertex.element.count;
     let memory = sink_bytes::<T>() + STREAM_BUFFER as u64;
     writer.whole("PLY vertices", memory, || {
-        let mut records = Records::new(input, body, start);
+        let mut records = Records::new(input, encoding, start);
         let mut sink = writer.sink::<T>();
-        for number in 0..vertex.count {
+        for number in 0..count {
             let point = records
                 .point(vertex)
-                .map_err(|e| records.error("vertex", number, vertex.count, e))?;
+                .map_err(|e| records.error("vertex", number, count, e))?;
             sink.push(point)?;
         }
         sink.finish()
@@ -154,15 +126,15 @@ fn one_by_one<T: FromScalar>(
 /// Reads records with lists, one after the other.
 struct Records<'a> {
     input: &'a Input,
-    body: Body,
+    encoding: Encoding,
     source: BufReader<Range<'a>>,
 }
 
 impl<'a> Records<'a> {
-    fn new(input: &'a Input, body: Body, at: u64) -> Self {
+    fn new(input: &'a Input, encoding: Encoding, at: u64) -> Self {
         Self {
             input,
-            body,
+            encoding,
             source: input.stream(at, input.bytes),
         }
     }
@@ -174,7 +146,7 @@ impl<'a> Records<'a> {
     fn scalar<T: FromScalar>(&mut self, kind: Scalar) -> std::io::Result<T> {
         let mut bytes = [0u8; 8];
         self.source.read_exact(&mut bytes[..kind.bytes()])?;
-        Ok(scalar(&bytes, kind, self.body))
+        Ok(scalar(&bytes, kind, self.encoding))
     }
 
     fn skip_property(&mut self, property: Property) -> std::io::Result<()> {
@@ -196,13 +168,14 @@ impl<'a> Records<'a> {
         }
     }
 
-    fn skip(&mut self, properties: &[Property]) -> std::io::Result<()> {
-        properties.iter().try_for_each(|p| self.skip_property(*p))
+    fn skip(&mut self, element: &Element) -> std::io::Result<()> {
+        let mut properties = element.properties.iter();
+        properties.try_for_each(|p| self.skip_property(p.1))
     }
 
     fn point<T: FromScalar>(&mut self, vertex: &Vertex) -> std::io::Result<[T; 3]> {
-        let mut point = [T::from_single(0.0); 3];
-        for (number, property) in vertex.properties.iter().enumerate() {
+        let mut point = [T::from_double(0.0); 3];
+        for (number, (_, property)) in vertex.element.properties.iter().enumerate() {
             let axis = vertex.coordinates.iter().position(|c| c.0 == number);
             match (axis, *property) {
                 (Some(axis), Property::One(kind)) => point[axis] = self.scalar(kind)?,

@@ -2,75 +2,167 @@
 
 mod ascii;
 mod binary;
-mod header;
-
-pub(super) use header::Header;
 
 use super::format::Format;
 use super::input::Input;
+use super::number;
+use super::point_format::{Claims, Head, PointFile, PointFormat, Refusal};
 use super::source::Native;
 use super::spool::SourceWriter;
-use super::text::number;
-use crate::error::Result;
-use header::{Body, Scalar};
+use crate::error::{Error, Result};
+use outcrop_ply::{Element, Encoding, Header, Scalar};
 
-impl Header {
-    /// Format by the kind of body.
-    pub(super) fn format(&self) -> Format {
-        match self.body {
-            Body::Ascii => Format::PlyAscii,
-            Body::Little => Format::PlyBinaryLittleEndian,
-            Body::Big => Format::PlyBinaryBigEndian,
+impl Format {
+    /// PLY with numbers as text.
+    pub const PLY_ASCII: Self = Self {
+        id: "ply_ascii",
+        name: "PLY (ascii)",
+    };
+    /// PLY, little-endian binary.
+    pub const PLY_BINARY_LITTLE_ENDIAN: Self = Self {
+        id: "ply_binary_little_endian",
+        name: "PLY (binary, little-endian)",
+    };
+    /// PLY, big-endian binary.
+    pub const PLY_BINARY_BIG_ENDIAN: Self = Self {
+        id: "ply_binary_big_endian",
+        name: "PLY (binary, big-endian)",
+    };
+}
+
+/// The vertices of a PLY file.
+pub(super) struct Ply;
+
+impl PointFormat for Ply {
+    fn names(&self) -> &'static str {
+        "PLY"
+    }
+
+    fn formats(&self) -> &'static [Format] {
+        &[
+            Format::PLY_ASCII,
+            Format::PLY_BINARY_LITTLE_ENDIAN,
+            Format::PLY_BINARY_BIG_ENDIAN,
+        ]
+    }
+
+    fn extensions(&self) -> &'static [&'static str] {
+        &["ply"]
+    }
+
+    fn recognize(&self, head: &Head) -> Result<bool, Refusal> {
+        let marked = head.bytes.strip_prefix(b"\xef\xbb\xbf");
+        if marked.is_some_and(is_ply) {
+            return Err(Refusal::Unknown("PLY behind a byte order mark".into()));
         }
+        Ok(is_ply(&head.bytes))
     }
 
-    /// How the spool holds the points: single precision if all coordinates have it.
-    pub(super) fn native(&self) -> Native {
-        let single = self
-            .vertex
-            .as_ref()
-            .is_some_and(|v| v.coordinates.iter().all(|c| c.1 == Scalar::F32));
-        if single { Native::F32 } else { Native::F64 }
-    }
-
-    /// Points the header claims.
-    pub(super) fn claimed(&self) -> u64 {
-        self.vertex.as_ref().map_or(0, |v| v.count)
+    fn open(&self, input: &Input, _: &Head) -> Result<Box<dyn PointFile>> {
+        let header = Header::read(&mut input.stream(0, input.bytes));
+        let header = header.map_err(|e| Error::ply(&input.path, e))?;
+        let cloud = Cloud::of(header).map_err(|e| Error::ply(&input.path, e))?;
+        Ok(Box::new(cloud))
     }
 }
 
-/// Reads a PLY file into the spool; returns what the user should know.
-pub(super) fn read(
-    input: &Input,
-    header: &Header,
-    writer: &SourceWriter<'_>,
-) -> Result<Vec<String>> {
-    if header.vertex.is_none() {
-        return Ok(vec![
-            "the header has no element \"vertex\", so there are no points".into(),
-        ]);
+fn is_ply(head: &[u8]) -> bool {
+    head.strip_prefix(b"ply").is_some_and(|rest| {
+        let line = rest.split(|b| matches!(b, b'\n' | b'\r')).next();
+        rest.len() > line.map_or(0, <[u8]>::len)
+            && line.is_some_and(|l| l.iter().all(u8::is_ascii_whitespace))
+    })
+}
+
+/// What a header says of the vertices.
+struct Cloud {
+    encoding: Encoding,
+    /// Where the elements start.
+    data: u64,
+    /// The elements before the vertices.
+    before: Vec<Element>,
+    vertex: Option<Vertex>,
+}
+
+/// The element of the points.
+struct Vertex {
+    element: Element,
+    /// Number and type of the properties x, y and z.
+    coordinates: [(usize, Scalar); 3],
+}
+
+impl Cloud {
+    fn of(header: Header) -> outcrop_ply::Result<Self> {
+        let vertex = match header.element("vertex")? {
+            Some((at, element)) => Some((at, element.coordinates()?)),
+            None => None,
+        };
+        let mut before = header.elements;
+        let vertex = vertex.map(|(at, coordinates)| {
+            before.truncate(at + 1);
+            let element = before.remove(at);
+            Vertex {
+                element,
+                coordinates,
+            }
+        });
+        Ok(Self {
+            encoding: header.encoding,
+            data: header.bytes,
+            before,
+            vertex,
+        })
     }
-    match (header.body, header.native()) {
-        (Body::Ascii, Native::F32) => ascii::read::<f32>(input, header, writer),
-        (Body::Ascii, _) => ascii::read::<f64>(input, header, writer),
-        (_, Native::F32) => binary::read::<f32>(input, header, writer),
-        (..) => binary::read::<f64>(input, header, writer),
-    }?;
-    Ok(Vec::new())
+
+    /// How the spool holds the points: single precision if all coordinates have it.
+    fn native(&self) -> Native {
+        let single = |v: &Vertex| v.coordinates.iter().all(|c| c.1 == Scalar::F32);
+        match self.vertex.as_ref().is_some_and(single) {
+            true => Native::F32,
+            false => Native::F64,
+        }
+    }
+}
+
+impl PointFile for Cloud {
+    fn claims(&self, input: &Input) -> Claims {
+        let format = match self.encoding {
+            Encoding::Ascii => Format::PLY_ASCII,
+            Encoding::Little => Format::PLY_BINARY_LITTLE_ENDIAN,
+            Encoding::Big => Format::PLY_BINARY_BIG_ENDIAN,
+        };
+        let (points, least) = self.vertex.as_ref().map_or((0, 1), |v| {
+            (v.element.count, v.element.least_bytes(self.encoding))
+        });
+        Claims {
+            text: self.encoding == Encoding::Ascii,
+            ..Claims::new(input, format, self.native(), points, least)
+        }
+    }
+
+    fn read(&self, input: &Input, target: &SourceWriter<'_>) -> Result<Vec<String>> {
+        let Some(vertex) = &self.vertex else {
+            let why = "the header has no element \"vertex\", so there are no points";
+            return Ok(vec![why.into()]);
+        };
+        match (self.encoding, self.native()) {
+            (Encoding::Ascii, Native::F32) => ascii::read::<f32>(input, self, vertex, target),
+            (Encoding::Ascii, _) => ascii::read::<f64>(input, self, vertex, target),
+            (_, Native::F32) => binary::read::<f32>(input, self, vertex, target),
+            (..) => binary::read::<f64>(input, self, vertex, target),
+        }?;
+        Ok(Vec::new())
+    }
 }
 
 /// A coordinate made from any scalar.
 trait FromScalar: super::spool::Coordinate {
-    fn from_single(value: f32) -> Self;
     fn from_double(value: f64) -> Self;
     /// A number in text; see [`number::parse`].
     fn parse(word: &[u8], decimals: &mut u32) -> Option<Self>;
 }
 
 impl FromScalar for f32 {
-    fn from_single(value: f32) -> Self {
-        value
-    }
     fn from_double(value: f64) -> Self {
         value as f32
     }
@@ -84,9 +176,6 @@ impl FromScalar for f32 {
 }
 
 impl FromScalar for f64 {
-    fn from_single(value: f32) -> Self {
-        f64::from(value)
-    }
     fn from_double(value: f64) -> Self {
         value
     }

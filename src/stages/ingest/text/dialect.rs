@@ -1,13 +1,13 @@
 //! How a text file writes its points, guessed from its first lines.
 
-use super::number;
+use super::super::number;
 
 /// Data lines that a guess must explain.
 const SAMPLE: usize = 50;
 
 /// What is between two numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in super::super) enum Separator {
+pub(super) enum Separator {
     /// Spaces and tabs.
     Space,
     /// Commas, with or without spaces.
@@ -28,12 +28,12 @@ impl Separator {
 
 /// How a text file writes its points.
 #[derive(Debug, Clone, PartialEq)]
-pub(in super::super) struct Dialect {
+pub(super) struct Dialect {
     pub(super) separator: Separator,
     decimal_comma: bool,
     columns: [usize; 3],
     /// Where the data start, behind byte order mark and header line.
-    pub(in super::super) start: u64,
+    pub(super) start: u64,
     /// Lines with one integer count the points that follow, as in PTS.
     pub(super) counted: bool,
 }
@@ -115,7 +115,7 @@ fn count(line: &[u8]) -> Option<u64> {
 }
 
 /// The lines of the head that are neither blank nor comments, with where each starts and ends.
-fn lines(head: &[u8], whole: bool) -> Vec<(usize, usize, &[u8])> {
+pub(super) fn lines(head: &[u8], whole: bool) -> Vec<(usize, usize, &[u8])> {
     let mut found = Vec::new();
     let mut at = 0;
     for line in head.split(|b| matches!(b, b'\n' | b'\r')) {
@@ -133,7 +133,7 @@ fn lines(head: &[u8], whole: bool) -> Vec<(usize, usize, &[u8])> {
 }
 
 /// Guesses how the points are written, or says why this is no text with points.
-pub(in super::super) fn guess(head: &[u8], whole: bool) -> Result<Dialect, String> {
+pub(super) fn guess(head: &[u8], whole: bool) -> Result<Dialect, String> {
     let mark = if head.starts_with(b"\xef\xbb\xbf") {
         3
     } else {
@@ -199,7 +199,7 @@ fn explains(dialect: &Dialect, lines: &[(usize, usize, &[u8])]) -> bool {
     points > wrong
 }
 
-fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
+pub(super) fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
     line.split(|b| matches!(b, b' ' | b'\t' | b',' | b';'))
         .map(|w| w.trim_ascii().trim_quotes())
         .filter(|w| !w.is_empty())
@@ -215,50 +215,6 @@ fn is_header(line: &[u8]) -> bool {
 fn named_columns(header: &[u8]) -> Option<[usize; 3]> {
     let find = |name: &str| words(header).position(|w| w.eq_ignore_ascii_case(name.as_bytes()));
     Some([find("x")?, find("y")?, find("z")?])
-}
-
-/// True for the header of a PCD file.
-pub(in super::super) fn is_pcd(head: &[u8]) -> bool {
-    let line = head
-        .split(|b| matches!(b, b'\n' | b'\r'))
-        .map(<[u8]>::trim_ascii);
-    let first = line.clone().find(|l| !l.is_empty() && !l.starts_with(b"#"));
-    head.starts_with(b"# .PCD")
-        || first.is_some_and(|l| l.starts_with(b"VERSION ") || l.starts_with(b"FIELDS "))
-}
-
-/// The name of a text format that holds geometry but is not read.
-pub(in super::super) fn foreign(head: &[u8]) -> Option<&'static str> {
-    let lines = lines(head, true);
-    let keyword = |line: &[u8]| {
-        let word = line.split(|b| *b == b' ').next().unwrap_or(line);
-        let known: [&[u8]; 7] = [b"v", b"vn", b"vt", b"o", b"g", b"mtllib", b"usemtl"];
-        known.contains(&word)
-    };
-    if is_ptx(head) {
-        Some("PTX")
-    } else if lines.len() > 1 && lines[..2].iter().all(|(_, _, line)| keyword(line)) {
-        Some("OBJ")
-    } else if lines
-        .first()
-        .is_some_and(|(_, _, line)| line.starts_with(b"solid "))
-    {
-        Some("STL")
-    } else {
-        None
-    }
-}
-
-/// True for the header of a PTX file: columns, rows, four lines of three and four of four numbers.
-fn is_ptx(head: &[u8]) -> bool {
-    let numbers = |line: &[u8]| {
-        let mut decimals = 0;
-        let all = words(line).all(|w| number::parse(w, false, &mut decimals).is_some());
-        all.then(|| words(line).count())
-    };
-    let lines = lines(head, true);
-    let shape: Vec<_> = lines.iter().take(10).map(|(_, _, l)| numbers(l)).collect();
-    shape == [1, 1, 3, 3, 3, 3, 4, 4, 4, 4].map(Some)
 }
 
 #[cfg(test)]
@@ -310,9 +266,5 @@ mod tests {
         ] {
             assert!(guess(text.as_bytes(), true).is_err(), "{text:?}");
         }
-        assert!(is_pcd(b"# .PCD v0.7\nVERSION 0.7\n"));
-        assert!(is_ptx(
-            b"1\n1\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n0 0 0 0.5\n"
-        ));
     }
 }

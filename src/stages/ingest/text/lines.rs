@@ -93,7 +93,7 @@ impl Lines {
 }
 
 /// Number, from 1, of the line that starts at `at`.
-pub(in super::super) fn number_of(input: &Input, at: u64) -> Result<u64> {
+pub(super) fn number_of(input: &Input, at: u64) -> Result<u64> {
     let mut number = 1;
     let mut buffer = vec![0u8; 64 << 10];
     let mut done = 0;

@@ -1,50 +1,107 @@
 //! Lines of numbers: XYZ, TXT, CSV, PTS.
 
-pub(super) mod dialect;
+mod dialect;
+mod foreign;
 mod lines;
-pub(super) mod number;
 
+use super::format::Format;
 use super::input::Input;
+use super::point_format::{Claims, Head, PointFile, PointFormat, Refusal};
+use super::source::Native;
 use super::spool::{Sink, SourceWriter, sink_bytes};
 use crate::error::{Error, Result};
 use dialect::{Dialect, Row};
 use lines::{LONGEST_LINE, Lines, SLAB};
 
-/// Reads a text file into the spool; returns what the user should know.
-pub(super) fn read(
-    input: &Input,
-    dialect: &Dialect,
-    writer: &SourceWriter<'_>,
-) -> Result<Vec<String>> {
-    let slabs = input.bytes.saturating_sub(dialect.start).div_ceil(SLAB);
-    let memory = SLAB + LONGEST_LINE + sink_bytes::<f64>();
-    writer.units(
-        "text lines",
-        usize::try_from(slabs).unwrap_or(usize::MAX),
-        |_| memory,
-        |unit| {
-            let start = dialect.start + unit as u64 * SLAB;
-            let lines = Lines::read(input, dialect.start, start)?;
-            let mut sink = writer.sink::<f64>();
-            for (at, line) in lines.iter() {
-                take(input, dialect, at, line, &mut sink)?;
-            }
-            sink.finish()
-        },
-    )?;
-    Ok(Vec::new())
+impl Format {
+    /// Lines of numbers: XYZ, TXT, CSV, PTS.
+    pub const TEXT: Self = Self {
+        id: "text",
+        name: "text",
+    };
 }
 
-/// Compares the points read with those that PTS count lines claim.
-pub(super) fn check_claim(input: &Input, dialect: &Dialect, claimed: u64, read: u64) -> Result<()> {
-    if dialect.counted && claimed > read {
-        return Err(input.error(
-            "count line",
-            format!("{claimed} points"),
-            format!("at most {read}, the number of lines with a point"),
-        ));
+/// Bytes of a line of text: the fewest with a point, and what is usual.
+const LINE: [u64; 2] = [6, 30];
+
+/// A point a line.
+pub(super) struct Text;
+
+impl PointFormat for Text {
+    fn names(&self) -> &'static str {
+        "text (XYZ, CSV, PTS)"
     }
-    Ok(())
+
+    fn formats(&self) -> &'static [Format] {
+        &[Format::TEXT]
+    }
+
+    fn extensions(&self) -> &'static [&'static str] {
+        &["xyz", "txt", "csv", "pts", "asc", "xyzrgb", "xyzn", "neu"]
+    }
+
+    /// Numbers can mean anything.
+    fn has_signature(&self) -> bool {
+        false
+    }
+
+    fn recognize(&self, head: &Head) -> Result<bool, Refusal> {
+        let bytes = &head.bytes;
+        if bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
+            return Err(Refusal::Unknown("UTF-16 text".into()));
+        }
+        if let Some(name) = foreign::name(bytes) {
+            return Err(Refusal::Foreign(name));
+        }
+        if bytes.contains(&0) {
+            let why = format!("{}, binary data", head.shown());
+            return Err(Refusal::Unknown(why));
+        }
+        let dialect = dialect::guess(bytes, head.whole);
+        dialect.map(|_| true).map_err(Refusal::Unknown)
+    }
+
+    fn open(&self, input: &Input, head: &Head) -> Result<Box<dyn PointFile>> {
+        let dialect = dialect::guess(&head.bytes, head.whole);
+        let wrong = |why| input.error("format", why, self.names());
+        Ok(Box::new(dialect.map_err(wrong)?))
+    }
+}
+
+impl PointFile for Dialect {
+    fn claims(&self, input: &Input) -> Claims {
+        let [least, usual] = LINE;
+        Claims {
+            text: true,
+            points: None,
+            ..Claims::new(input, Format::TEXT, Native::F64, input.bytes / usual, least)
+        }
+    }
+
+    fn read(&self, input: &Input, target: &SourceWriter<'_>) -> Result<Vec<String>> {
+        let slabs = input.bytes.saturating_sub(self.start).div_ceil(SLAB);
+        let memory = SLAB + LONGEST_LINE + sink_bytes::<f64>();
+        let work = |unit: usize| {
+            let start = self.start + unit as u64 * SLAB;
+            let lines = Lines::read(input, self.start, start)?;
+            let mut sink = target.sink::<f64>();
+            for (at, line) in lines.iter() {
+                take(input, self, at, line, &mut sink)?;
+            }
+            sink.finish()
+        };
+        let slabs = usize::try_from(slabs).unwrap_or(usize::MAX);
+        target.units("text lines", slabs, |_| memory, work)?;
+        let stats = target.stats();
+        if self.counted && stats.claimed > stats.read {
+            return Err(input.error(
+                "count line",
+                format!("{} points", stats.claimed),
+                format!("at most {}, the number of lines with a point", stats.read),
+            ));
+        }
+        Ok(Vec::new())
+    }
 }
 
 fn take(

@@ -8,6 +8,7 @@ use std::{
 
 use super::{Encoding, Precision, Sink};
 use crate::error::{Error, Result};
+use outcrop_ply::{Layout, Scalar};
 
 /// Writes vertices as they come.
 pub(super) struct PlySink {
@@ -31,21 +32,22 @@ impl PlySink {
             encoding,
             precision,
         };
-        let format = match encoding {
-            Encoding::LittleEndian => "binary_little_endian",
-            Encoding::BigEndian => "binary_big_endian",
-            Encoding::Ascii => "ascii",
+        let layout = Layout {
+            encoding: match encoding {
+                Encoding::LittleEndian => outcrop_ply::Encoding::Little,
+                Encoding::BigEndian => outcrop_ply::Encoding::Big,
+                Encoding::Ascii => outcrop_ply::Encoding::Ascii,
+            },
+            comment: Some("outcrop-cloudgen"),
+            vertices: count,
+            coordinates: match precision {
+                Precision::Single => Scalar::F32,
+                Precision::Double => Scalar::F64,
+            },
+            triangles: None,
         };
-        let float = match precision {
-            Precision::Single => "float",
-            Precision::Double => "double",
-        };
-        write!(
-            sink.file,
-            "ply\nformat {format} 1.0\ncomment outcrop-cloudgen\nelement vertex {count}\n\
-             property {float} x\nproperty {float} y\nproperty {float} z\nend_header\n"
-        )
-        .map_err(|e| Error::io(path, "write", e))?;
+        let written = sink.file.write_all(layout.header().as_bytes());
+        written.map_err(|e| Error::io(path, "write", e))?;
         Ok(sink)
     }
 

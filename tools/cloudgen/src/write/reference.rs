@@ -8,6 +8,7 @@ use std::{
 
 use crate::error::{Error, Result};
 use crate::surface::Tessellation;
+use outcrop_ply::{Encoding, Layout, Scalar};
 
 /// Writes a triangle mesh, binary with 64-bit coordinates.
 pub(crate) fn write_reference(mesh: &Tessellation, path: &Path) -> Result<()> {
@@ -16,14 +17,14 @@ pub(crate) fn write_reference(mesh: &Tessellation, path: &Path) -> Result<()> {
 }
 
 fn body(mesh: &Tessellation, mut file: impl Write) -> io::Result<()> {
-    write!(
-        file,
-        "ply\nformat binary_little_endian 1.0\ncomment outcrop-cloudgen reference\n\
-         element vertex {}\nproperty double x\nproperty double y\nproperty double z\n\
-         element face {}\nproperty list uchar uint vertex_indices\nend_header\n",
-        mesh.vertices.len(),
-        mesh.triangles.len()
-    )?;
+    let layout = Layout {
+        encoding: Encoding::Little,
+        comment: Some("outcrop-cloudgen reference"),
+        vertices: mesh.vertices.len() as u64,
+        coordinates: Scalar::F64,
+        triangles: Some((mesh.triangles.len() as u64, Scalar::U32)),
+    };
+    file.write_all(layout.header().as_bytes())?;
     for vertex in &mesh.vertices {
         file.write_all(vertex.map(f64::to_le_bytes).as_flattened())?;
     }

@@ -1,14 +1,11 @@
 //! Numbers in text.
 
-use super::super::stats::NOT_FIXED;
+/// Decimals of a number that is not written with a fixed point.
+pub(super) const NOT_FIXED: u32 = u32::MAX;
 
 /// Parses a number; raises `decimals` to its number of decimals, or to [`NOT_FIXED`] if it has an
 /// exponent. Words for infinities and what is not a number are numbers too.
-pub(in super::super) fn parse(
-    token: &[u8],
-    decimal_comma: bool,
-    decimals: &mut u32,
-) -> Option<f64> {
+pub(super) fn parse(token: &[u8], decimal_comma: bool, decimals: &mut u32) -> Option<f64> {
     let mut copy = [0u8; 64];
     let token = if decimal_comma {
         // Longer than any sensible number.

@@ -1,0 +1,249 @@
+//! The mesh file while it is written: slices at known offsets, under a temporary name.
+
+use super::format::{Layout, Mesh, MeshFormat, Records};
+use crate::error::{Error, Result};
+use crate::workspace::fault::{self, Event};
+use crate::workspace::open::{failed_write, open_existing, options};
+use crate::workspace::place::{Place, Put};
+use crate::workspace::{OUTPUT, RENAMED, Workspace, limits};
+use std::fs::File;
+use std::os::unix::fs::{FileExt, OpenOptionsExt};
+use std::path::{Path, PathBuf};
+
+/// Records that are encoded at a time.
+const BATCH: usize = 1024;
+
+/// A mesh file under its temporary name. It is deleted unless finished, but for a run that can be
+/// resumed.
+pub struct MeshFile<'a> {
+    output: PathBuf,
+    temporary: PathBuf,
+    /// None if the mesh has its name already.
+    file: Option<File>,
+    format: &'static dyn MeshFormat,
+    mesh: Mesh,
+    layout: Layout,
+    workspace: &'a Workspace,
+}
+
+/// The mesh's name until it is finished, beside its last one.
+#[must_use]
+pub fn temporary(output: &Path) -> PathBuf {
+    let mut name = std::ffi::OsString::from(".");
+    name.push(output.file_name().unwrap_or_default());
+    name.push(".outcrop-part");
+    folder_of(output).join(name)
+}
+
+/// The number of the header among the parts of the mesh.
+const HEADER: u32 = u32::MAX;
+
+impl<'a> MeshFile<'a> {
+    /// Writes the header of a mesh beside `output`, or opens the file in which an earlier attempt at the
+    /// run did.
+    ///
+    /// # Errors
+    /// [`Error::Io`]; [`Error::Disk`] if there is no room for the whole file.
+    pub fn open(
+        output: &Path,
+        format: &'static dyn MeshFormat,
+        mesh: Mesh,
+        workspace: &'a Workspace,
+    ) -> Result<Self> {
+        let mut file = Self {
+            temporary: temporary(output),
+            output: output.to_path_buf(),
+            file: None,
+            layout: format.layout(&mesh),
+            format,
+            mesh,
+            workspace,
+        };
+        let known = workspace.places(OUTPUT);
+        if known.is_empty() {
+            file.begin()?;
+        } else {
+            // Every part was checked, in one file or the other.
+            match open_existing(&file.temporary) {
+                Ok(found) => {
+                    file.file = Some(found);
+                    file.write(HEADER, &file.layout.header, 0)?;
+                }
+                Err(e) if e.kind() == std::io::ErrorKind::NotFound => {}
+                Err(e) => return Err(Error::io(&file.temporary, "open", e)),
+            }
+        }
+        Ok(file)
+    }
+
+    fn begin(&mut self) -> Result<()> {
+        let bytes = self.layout.bytes;
+        let folder = folder_of(&self.output);
+        if let Some(free) = limits::disk_free(folder).filter(|free| *free < bytes) {
+            return Err(Error::Disk {
+                path: self.output.clone(),
+                needed: bytes,
+                free,
+            });
+        }
+        // Left by a run that died, and whose scratch folder is gone.
+        let _ = std::fs::remove_file(&self.temporary);
+        let file = options()
+            .mode(0o666)
+            .create_new(true)
+            .open(&self.temporary)
+            .map_err(|e| Error::io(&self.output, "create a file beside it", e))?;
+        let room = fault::write().and_then(|()| file.set_len(bytes));
+        room.map_err(|e| match failed_write(&self.output, 0, bytes, e) {
+            Error::Io { source, .. } => Error::io(&self.output, "make room for the mesh", source),
+            full => full,
+        })?;
+        self.file = Some(file);
+        self.write(HEADER, &self.layout.header, 0)
+    }
+
+    fn write(&self, part: u32, bytes: &[u8], offset: u64) -> Result<()> {
+        let Some(file) = &self.file else {
+            let gone = std::io::ErrorKind::NotFound.into();
+            return Err(Error::io(&self.temporary, "open", gone));
+        };
+        self.workspace.io.add_written(bytes.len() as u64);
+        fault::write()
+            .and_then(|()| file.write_all_at(bytes, offset))
+            .map_err(|e| failed_write(&self.output, bytes.len(), 0, e))?;
+        let place = Place {
+            offset,
+            bytes: bytes.len(),
+            records: 0,
+            crc: if self.workspace.is_resumable() {
+                crc32fast::hash(bytes)
+            } else {
+                0
+            },
+        };
+        self.put(part, place)
+    }
+
+    fn put(&self, section: u32, place: Place) -> Result<()> {
+        let file = OUTPUT.into();
+        self.workspace.put(Put {
+            file,
+            section,
+            place,
+        })
+    }
+
+    /// Bytes of a vertex.
+    pub fn vertex_bytes(&self) -> usize {
+        self.layout.vertices.bytes as usize
+    }
+
+    /// Bytes of a triangle.
+    pub fn triangle_bytes(&self) -> usize {
+        self.layout.triangles.bytes as usize
+    }
+
+    /// Appends the bytes of vertices to `bytes`.
+    pub fn encode_vertices(&self, positions: impl Iterator<Item = [f64; 3]>, bytes: &mut Vec<u8>) {
+        let put = |batch: &[[f64; 3]]| self.format.put_vertices(&self.mesh, batch, bytes);
+        let mut batch = Batch::new(put);
+        positions.for_each(|p| batch.push(p));
+        batch.finish();
+    }
+
+    /// A batch of triangles, whose bytes go to `bytes`.
+    pub fn triangles(&self, bytes: &mut Vec<u8>) -> Batch<[u32; 3], impl FnMut(&[[u32; 3]])> {
+        Batch::new(|batch: &[[u32; 3]]| self.format.put_triangles(&self.mesh, batch, bytes))
+    }
+
+    /// Writes encoded vertices from number `first` on, as part `part` of the mesh.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn write_vertices(&self, part: u32, first: u64, bytes: &[u8]) -> Result<()> {
+        self.write_records(part, self.layout.vertices, first, bytes)
+    }
+
+    /// Writes encoded triangles from number `first` on, as part `part` of the mesh.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn write_triangles(&self, part: u32, first: u64, bytes: &[u8]) -> Result<()> {
+        self.write_records(part, self.layout.triangles, first, bytes)
+    }
+
+    fn write_records(&self, part: u32, of: Records, first: u64, bytes: &[u8]) -> Result<()> {
+        self.write(part, bytes, of.at + first * of.bytes)
+    }
+
+    /// Makes the file durable and gives it its name.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn finish(mut self) -> Result<()> {
+        if let Some(file) = self.file.take() {
+            file.sync_all()
+                .map_err(|e| Error::io(&self.output, "sync", e))?;
+            let step = self.workspace.step("rename")?;
+            step.finish(0, &(), || self.put(RENAMED, Place::default()))?;
+            fault::point(Event::Rename);
+            std::fs::rename(&self.temporary, &self.output)
+                .map_err(|e| Error::io(&self.output, "rename the finished file to it", e))?;
+            fault::point(Event::Renamed);
+        }
+        let folder = folder_of(&self.output);
+        File::open(folder)
+            .and_then(|f| f.sync_all())
+            .map_err(|e| Error::io(folder, "sync the folder", e))
+    }
+}
+
+impl Drop for MeshFile<'_> {
+    fn drop(&mut self) {
+        if self.file.is_some() && !self.workspace.is_resumable() {
+            let _ = std::fs::remove_file(&self.temporary);
+        }
+    }
+}
+
+/// Records that are handed on many at a time.
+pub struct Batch<T, F: FnMut(&[T])> {
+    records: Vec<T>,
+    put: F,
+}
+
+impl<T, F: FnMut(&[T])> Batch<T, F> {
+    fn new(put: F) -> Self {
+        Self {
+            records: Vec::with_capacity(BATCH),
+            put,
+        }
+    }
+
+    /// Takes a record.
+    #[inline]
+    pub fn push(&mut self, record: T) {
+        self.records.push(record);
+        if self.records.len() == BATCH {
+            self.flush();
+        }
+    }
+
+    fn flush(&mut self) {
+        (self.put)(&self.records);
+        self.records.clear();
+    }
+
+    /// Hands on what is left.
+    pub fn finish(mut self) {
+        self.flush();
+    }
+}
+
+/// The folder that holds `path`.
+pub(crate) fn folder_of(path: &Path) -> &Path {
+    match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    }
+}

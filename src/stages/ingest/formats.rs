@@ -1,0 +1,98 @@
+//! The formats that are read, and which of them a file is of.
+
+use super::format::Format;
+use super::input::Input;
+use super::las::Las;
+use super::ply::Ply;
+use super::point_format::{Head, PointFile, PointFormat, Refusal, has_extension};
+use super::text::Text;
+use crate::error::Result;
+use crate::workspace::persist::{Persist, Saved};
+use std::path::Path;
+use std::sync::Arc;
+
+/// All formats, in the order in which they are asked about a file. Text is last: it says why a file is of
+/// none of them.
+pub(super) const FORMATS: [&dyn PointFormat; 3] = [&Las, &Ply, &Text];
+
+/// Bytes at the start of a file that decide its format.
+const HEAD: usize = 64 << 10;
+
+/// The same for a file with a very long first line, or many lines without a point.
+const LONG_HEAD: usize = 1 << 20;
+
+/// Names of the formats that are read, for messages.
+pub(super) fn readable() -> String {
+    let names = FORMATS.map(PointFormat::names);
+    let (last, first) = names.split_last().unwrap_or((&"", &[]));
+    format!("{} or {last}", first.join(", "))
+}
+
+fn ask(head: &Head) -> Result<&'static dyn PointFormat, Refusal> {
+    if head.bytes.is_empty() {
+        return Err(Refusal::Unknown("an empty file".into()));
+    }
+    for format in FORMATS {
+        if format.recognize(head)? {
+            return Ok(format);
+        }
+    }
+    Err(Refusal::Unknown(head.shown()))
+}
+
+/// The format of a file, and the bytes that tell it.
+fn find(input: &Input) -> Result<(Head, Result<&'static dyn PointFormat, Refusal>)> {
+    let head = Head::read(input, HEAD)?;
+    match ask(&head) {
+        // A long first line, or many lines of comments.
+        Err(Refusal::Unknown(_)) if !head.whole && !head.bytes.contains(&0) => {
+            let head = Head::read(input, LONG_HEAD)?;
+            let found = ask(&head);
+            Ok((head, found))
+        }
+        found => Ok((head, found)),
+    }
+}
+
+/// Reads the header of a file, whatever its format.
+///
+/// # Errors
+/// [`crate::Error::Input`] if it is no point cloud that can be read; [`crate::Error::Io`].
+pub(super) fn open(input: &Input) -> Result<Box<dyn PointFile>> {
+    let (head, found) = find(input)?;
+    let (found, advice) = match found {
+        Ok(format) => return format.open(input, &head),
+        Err(Refusal::Foreign(name)) => (format!("{name}, which is not read"), "; convert it first"),
+        Err(Refusal::Unknown(why)) => (why, ""),
+    };
+    Err(input.error("format", found, readable() + advice))
+}
+
+/// Whether a file in a folder is one of the point files.
+pub(super) fn is_points(path: &Path) -> Result<bool> {
+    let named = |format: &dyn PointFormat| has_extension(path, format.extensions());
+    // A name that promises a point cloud which is not there is an error, and no file to skip.
+    if FORMATS.into_iter().any(|f| f.has_signature() && named(f)) {
+        return Ok(true);
+    }
+    let (_, found) = find(&Input::open(path, Arc::default())?)?;
+    Ok(match found {
+        Ok(format) => format.has_signature() || named(format),
+        // A cloud that cannot be read must not go missing silently.
+        Err(Refusal::Foreign(_)) => true,
+        Err(Refusal::Unknown(_)) => false,
+    })
+}
+
+impl Persist for Format {
+    fn save(&self, out: &mut Vec<u8>) {
+        self.id.to_owned().save(out);
+    }
+
+    fn load(from: &mut Saved<'_>) -> Result<Self> {
+        let id = String::load(from)?;
+        let mut known = FORMATS.iter().flat_map(|f| f.formats());
+        let found = known.find(|f| f.id == id);
+        found.copied().ok_or_else(|| from.wrong("a format"))
+    }
+}

@@ -1,0 +1,195 @@
+//! Whole meshes and clouds in memory.
+
+use crate::error::{Error, Result};
+use crate::header::{Element, Header};
+use crate::numbers::Numbers;
+use std::io::BufRead;
+
+/// A mesh, or a cloud if there are no triangles.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Mesh {
+    /// Positions of the vertices.
+    pub vertices: Vec<[f64; 3]>,
+    /// Corners of the triangles, each the number of a vertex; polygons become fans.
+    pub triangles: Vec<[u32; 3]>,
+}
+
+impl Mesh {
+    /// Reads a file of `bytes` bytes, which bounds what is reserved on account of the header. Elements
+    /// other than vertices and faces are skipped, and what is behind both is not read.
+    ///
+    /// # Errors
+    /// [`Error`], naming the entry.
+    pub fn read(mut input: impl BufRead, bytes: u64) -> Result<Self> {
+        let header = Header::read(&mut input)?;
+        let mut numbers = Numbers {
+            input,
+            encoding: header.encoding,
+            token: Vec::new(),
+        };
+        let mut mesh = Self::default();
+        let place = |name| header.element(name).map(|e| e.map(|(at, _)| at));
+        let (vertex, face) = (place("vertex")?, place("face")?);
+        let last = vertex.max(face).map_or(0, |last| last + 1);
+        let vertices = match vertex {
+            Some(at) => header.elements[at].count,
+            None => 0,
+        };
+        if vertices > u64::from(u32::MAX) {
+            let found = format!("{vertices} vertices");
+            return Err(Error::input("PLY header", found, "at most 4294967295"));
+        }
+        for (at, element) in header.elements[..last].iter().enumerate() {
+            let least = element.least_bytes(header.encoding).max(1);
+            let room = element.count.min(bytes / least + 1) as usize;
+            if Some(at) == vertex {
+                mesh.vertices.reserve_exact(room);
+                read_vertices(&mut numbers, element, &mut mesh.vertices)?;
+            } else if Some(at) == face {
+                mesh.triangles.reserve_exact(room);
+                read_faces(&mut numbers, element, vertices, &mut mesh.triangles)?;
+            } else if !element.properties.is_empty() {
+                for row in 0..element.count {
+                    let mut properties = element.properties.iter();
+                    let skipped = properties.try_for_each(|p| numbers.skip(p.1));
+                    skipped.map_err(|found| wrong(element, row, found))?;
+                }
+            }
+        }
+        Ok(mesh)
+    }
+}
+
+fn wrong(element: &Element, row: u64, found: String) -> Error {
+    let expected = format!("{} entries of element {}", element.count, element.name);
+    Error::input(format!("{} {row}", element.name), found, expected)
+}
+
+fn read_vertices(
+    numbers: &mut Numbers<impl BufRead>,
+    element: &Element,
+    out: &mut Vec<[f64; 3]>,
+) -> Result<()> {
+    let coordinates = element.coordinates()?;
+    for row in 0..element.count {
+        let mut place = [0.0; 3];
+        for (at, (_, property)) in element.properties.iter().enumerate() {
+            match coordinates.iter().position(|c| c.0 == at) {
+                Some(k) => numbers.next(coordinates[k].1).map(|c| place[k] = c),
+                None => numbers.skip(*property),
+            }
+            .map_err(|found| wrong(element, row, found))?;
+        }
+        out.push(place);
+    }
+    Ok(())
+}
+
+fn read_faces(
+    numbers: &mut Numbers<impl BufRead>,
+    element: &Element,
+    vertices: u64,
+    out: &mut Vec<[u32; 3]>,
+) -> Result<()> {
+    let (list, count, item) = element.corners()?;
+    let mut corners: Vec<u32> = Vec::new();
+    for row in 0..element.count {
+        let mut face = || -> Result<(), String> {
+            for (at, (_, property)) in element.properties.iter().enumerate() {
+                if at != list {
+                    numbers.skip(*property)?;
+                    continue;
+                }
+                corners.clear();
+                for _ in 0..numbers.length(count)? {
+                    let corner = numbers.next(item)?;
+                    if !(0.0..vertices as f64).contains(&corner) || corner.fract() != 0.0 {
+                        return Err(format!("corner {corner} with {vertices} vertices"));
+                    }
+                    corners.push(corner as u32);
+                }
+            }
+            Ok(())
+        };
+        face().map_err(|found| wrong(element, row, found))?;
+        for pair in corners.get(1..).unwrap_or_default().windows(2) {
+            out.push([corners[0], pair[0], pair[1]]);
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(bytes: &[u8]) -> Result<Mesh> {
+        Mesh::read(bytes, bytes.len() as u64)
+    }
+
+    const HEADER: &str = "element vertex 4\nproperty float x\nproperty double y\nproperty float z\n\
+                          property uchar red\nelement face 2\n\
+                          property list uchar int vertex_indices\nend_header\n";
+
+    #[test]
+    fn ascii_and_both_binary_forms_agree() {
+        let corners = [
+            [0.0, 0.0, 0.5],
+            [2.0, 0.0, 0.5],
+            [2.0, 4.0, 0.5],
+            [0.0, 4.0, 0.5],
+        ];
+        let mut ascii = format!("ply\nformat ascii 1.0\ncomment x\n{HEADER}").into_bytes();
+        let mut little = format!("ply\nformat binary_little_endian 1.0\n{HEADER}").into_bytes();
+        let mut big = format!("ply\nformat binary_big_endian 1.0\n{HEADER}").into_bytes();
+        for [x, y, z] in corners {
+            ascii.extend(format!("{x} {y}  {z} 9\r\n").bytes());
+            little.extend((x as f32).to_le_bytes());
+            little.extend(f64::to_le_bytes(y));
+            little.extend((z as f32).to_le_bytes());
+            little.push(9);
+            big.extend((x as f32).to_be_bytes());
+            big.extend(f64::to_be_bytes(y));
+            big.extend((z as f32).to_be_bytes());
+            big.push(9);
+        }
+        for polygon in [&[0i32, 1, 2, 3][..], &[0, 1, 2]] {
+            ascii.extend(format!("{}", polygon.len()).bytes());
+            little.push(polygon.len() as u8);
+            big.push(polygon.len() as u8);
+            for index in polygon {
+                ascii.extend(format!(" {index}").bytes());
+                little.extend(index.to_le_bytes());
+                big.extend(index.to_be_bytes());
+            }
+            ascii.push(b'\n');
+        }
+        for bytes in [ascii, little, big] {
+            let mesh = parse(&bytes).unwrap();
+            assert_eq!(mesh.vertices, corners);
+            assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3], [0, 1, 2]]);
+            // Cut anywhere it is an error, never a panic.
+            for end in 0..bytes.len() - 1 {
+                assert!(parse(&bytes[..end]).is_err(), "cut at {end}");
+            }
+        }
+    }
+
+    #[test]
+    fn bad_indices_are_refused() {
+        for index in ["4", "-1", "0.5", "nan", "1e20"] {
+            let text = format!(
+                "ply\nformat ascii 1.0\n{HEADER}0 0 0 0\n1 0 0 0\n1 1 0 0\n0 1 0 0\n\
+                 3 0 1 {index}\n3 0 1 2\n"
+            );
+            assert!(parse(text.as_bytes()).is_err(), "{index}");
+        }
+    }
+
+    #[test]
+    fn huge_claims_are_not_believed() {
+        let text = "ply\nformat binary_little_endian 1.0\nelement vertex 18446744073709551615\n\
+                    property float x\nproperty float y\nproperty float z\nend_header\n";
+        assert!(parse(text.as_bytes()).is_err());
+    }
+}

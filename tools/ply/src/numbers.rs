@@ -1,0 +1,116 @@
+//! What is behind a header, as a sequence of numbers.
+
+use crate::error::Result;
+use crate::types::{Encoding, Property, Scalar};
+use std::io::{BufRead, ErrorKind};
+
+/// The number in the first bytes, in little-endian order unless `big`; all types fit into `f64`. The
+/// caller has checked the length.
+#[must_use]
+#[inline]
+pub fn real(scalar: Scalar, bytes: &[u8], big: bool) -> f64 {
+    match scalar {
+        Scalar::F32 => f32::from_le_bytes(array(bytes, big)).into(),
+        Scalar::F64 => f64::from_le_bytes(array(bytes, big)),
+        _ => integer(scalar, bytes, big) as f64,
+    }
+}
+
+/// As [`real`], cut to a whole number.
+#[must_use]
+#[inline]
+pub fn integer(scalar: Scalar, bytes: &[u8], big: bool) -> i64 {
+    match scalar {
+        Scalar::I8 => i8::from_le_bytes(array(bytes, big)).into(),
+        Scalar::U8 => u8::from_le_bytes(array(bytes, big)).into(),
+        Scalar::I16 => i16::from_le_bytes(array(bytes, big)).into(),
+        Scalar::U16 => u16::from_le_bytes(array(bytes, big)).into(),
+        Scalar::I32 => i32::from_le_bytes(array(bytes, big)).into(),
+        Scalar::U32 => u32::from_le_bytes(array(bytes, big)).into(),
+        Scalar::F32 => f32::from_le_bytes(array(bytes, big)) as i64,
+        Scalar::F64 => f64::from_le_bytes(array(bytes, big)) as i64,
+    }
+}
+
+#[inline]
+fn array<const N: usize>(bytes: &[u8], big: bool) -> [u8; N] {
+    let mut value = [0; N];
+    value.copy_from_slice(&bytes[..N]);
+    if big {
+        value.reverse();
+    }
+    value
+}
+
+/// Reads numbers one after the other, whatever the encoding. Errors are what was found.
+pub(crate) struct Numbers<R> {
+    pub(crate) input: R,
+    pub(crate) encoding: Encoding,
+    pub(crate) token: Vec<u8>,
+}
+
+/// A number in text is not longer.
+const LONGEST: usize = 400;
+
+impl<R: BufRead> Numbers<R> {
+    pub(crate) fn next(&mut self, scalar: Scalar) -> Result<f64, String> {
+        if self.encoding == Encoding::Ascii {
+            return self.next_token();
+        }
+        let mut bytes = [0; 8];
+        let read = self.input.read_exact(&mut bytes[..scalar.bytes()]);
+        read.map_err(|e| match e.kind() {
+            ErrorKind::UnexpectedEof => "the end of the file".to_owned(),
+            _ => e.to_string(),
+        })?;
+        Ok(real(scalar, &bytes, self.encoding == Encoding::Big))
+    }
+
+    fn next_token(&mut self) -> Result<f64, String> {
+        self.token.clear();
+        loop {
+            let buffer = self.input.fill_buf().map_err(|e| e.to_string())?;
+            if buffer.is_empty() {
+                break;
+            }
+            // Leading blanks first, then up to the next blank, over as many buffers as it takes.
+            let blank = |b: &&u8| b.is_ascii_whitespace();
+            let begin = match self.token.is_empty() {
+                true => buffer.iter().take_while(blank).count(),
+                false => 0,
+            };
+            let word = buffer[begin..].iter().take_while(|b| !blank(b)).count();
+            self.token.extend_from_slice(&buffer[begin..begin + word]);
+            let more = begin + word == buffer.len() && self.token.len() <= LONGEST;
+            self.input.consume(begin + word);
+            if !more {
+                break;
+            }
+        }
+        if self.token.is_empty() {
+            return Err("the end of the file".to_owned());
+        }
+        let text = String::from_utf8_lossy(&self.token);
+        let short: String = text.chars().take(40).collect();
+        let wrong = |_| format!("\"{}\", not a number", short.escape_debug());
+        text.parse().map_err(wrong)
+    }
+
+    pub(crate) fn length(&mut self, scalar: Scalar) -> Result<u64, String> {
+        let length = self.next(scalar)?;
+        if (0.0..=f64::from(u32::MAX)).contains(&length) && length.fract() == 0.0 {
+            Ok(length as u64)
+        } else {
+            Err(format!("a list of {length} items"))
+        }
+    }
+
+    pub(crate) fn skip(&mut self, property: Property) -> Result<(), String> {
+        match property {
+            Property::One(scalar) => self.next(scalar).map(drop),
+            Property::List { count, item } => {
+                (0..self.length(count)?).try_for_each(|_| self.next(item).map(drop))
+            }
+        }
+    }
+}

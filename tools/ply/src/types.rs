@@ -1,0 +1,117 @@
+//! Types that a header names.
+
+/// How the elements are written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Encoding {
+    /// Numbers as text.
+    Ascii,
+    /// Binary, least significant byte first.
+    Little,
+    /// Binary, most significant byte first.
+    Big,
+}
+
+impl Encoding {
+    pub(crate) fn parse(name: &str) -> Option<Self> {
+        [Self::Ascii, Self::Little, Self::Big]
+            .into_iter()
+            .find(|e| e.name() == name)
+    }
+
+    /// The name in a header.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Ascii => "ascii",
+            Self::Little => "binary_little_endian",
+            Self::Big => "binary_big_endian",
+        }
+    }
+}
+
+/// Type of a number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub enum Scalar {
+    I8,
+    U8,
+    I16,
+    U16,
+    I32,
+    U32,
+    F32,
+    F64,
+}
+
+impl Scalar {
+    pub(crate) fn parse(name: &str) -> Option<Self> {
+        Some(match name {
+            "char" | "int8" => Self::I8,
+            "uchar" | "uint8" => Self::U8,
+            "short" | "int16" => Self::I16,
+            "ushort" | "uint16" => Self::U16,
+            "int" | "int32" => Self::I32,
+            "uint" | "uint32" => Self::U32,
+            "float" | "float32" => Self::F32,
+            "double" | "float64" => Self::F64,
+            _ => return None,
+        })
+    }
+
+    /// The name in a header, of the two that which every reader knows.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::I8 => "char",
+            Self::U8 => "uchar",
+            Self::I16 => "short",
+            Self::U16 => "ushort",
+            Self::I32 => "int",
+            Self::U32 => "uint",
+            Self::F32 => "float",
+            Self::F64 => "double",
+        }
+    }
+
+    /// Bytes of a number in a binary file.
+    #[must_use]
+    pub fn bytes(self) -> usize {
+        match self {
+            Self::I8 | Self::U8 => 1,
+            Self::I16 | Self::U16 => 2,
+            Self::I32 | Self::U32 | Self::F32 => 4,
+            Self::F64 => 8,
+        }
+    }
+
+    /// True for whole numbers.
+    #[must_use]
+    pub fn is_integer(self) -> bool {
+        !matches!(self, Self::F32 | Self::F64)
+    }
+}
+
+/// A property of an element.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Property {
+    /// One number.
+    One(Scalar),
+    /// As many as a number before them says.
+    List {
+        /// Type of that number, an integer.
+        count: Scalar,
+        /// Type of the others.
+        item: Scalar,
+    },
+}
+
+impl Property {
+    /// Bytes in a binary file; none for a list.
+    #[must_use]
+    pub fn bytes(self) -> Option<usize> {
+        match self {
+            Self::One(scalar) => Some(scalar.bytes()),
+            Self::List { .. } => None,
+        }
+    }
+}

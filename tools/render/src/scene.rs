@@ -1,0 +1,67 @@
+//! The mesh or cloud of a PLY file, about its middle.
+
+use crate::error::{Error, Result};
+use crate::vec3::{Vec3, sub};
+use outcrop_ply::Mesh;
+use std::fs::File;
+use std::io::BufReader;
+use std::path::Path;
+
+/// What is drawn: a cloud if there are no triangles.
+#[derive(Debug)]
+pub(crate) struct Scene {
+    /// Vertices relative to `origin`.
+    pub positions: Vec<Vec3>,
+    pub triangles: Vec<[u32; 3]>,
+    /// Middle of the bounding box, so that the numbers stay small far from the zero point.
+    pub origin: Vec3,
+}
+
+/// Reads a file whole.
+pub(crate) fn read(path: &Path) -> Result<Scene> {
+    let file = File::open(path).map_err(|e| Error::io(path, "open", e))?;
+    let bytes = file.metadata().map_err(|e| Error::io(path, "examine", e))?;
+    let file = BufReader::with_capacity(1 << 20, file);
+    let mesh = Mesh::read(file, bytes.len()).map_err(|e| Error::ply(path, e))?;
+    Ok(centred(mesh))
+}
+
+fn centred(mesh: Mesh) -> Scene {
+    let mut scene = Scene {
+        positions: mesh.vertices,
+        triangles: mesh.triangles,
+        origin: [0.0; 3],
+    };
+    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+    for p in &scene.positions {
+        if p.iter().all(|c| c.is_finite()) {
+            for k in 0..3 {
+                low[k] = low[k].min(p[k]);
+                high[k] = high[k].max(p[k]);
+            }
+        }
+    }
+    if low[0] <= high[0] {
+        scene.origin = std::array::from_fn(|k| low[k] / 2.0 + high[k] / 2.0);
+        for p in &mut scene.positions {
+            *p = sub(*p, scene.origin);
+        }
+    }
+    scene
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn points_that_are_not_finite_do_not_move_the_middle() {
+        let vertices = vec![[0.0, 0.0, 0.5], [2.0, 4.0, 0.5], [f64::NAN, 9.0, 9.0]];
+        let scene = centred(Mesh {
+            vertices,
+            triangles: Vec::new(),
+        });
+        assert_eq!(scene.origin, [1.0, 2.0, 0.5]);
+        assert_eq!(scene.positions[1], [1.0, 2.0, 0.0]);
+    }
+}
