@@ -231,6 +231,23 @@ mod tests {
     use super::*;
 
     #[test]
+    fn the_document_has_all_as_they_are() {
+        let document = include_str!("../docs/ablation.md");
+        for entry in Constants::list() {
+            let row = format!("| {} | {} | {} |", entry.name, entry.value, entry.unit);
+            let described = format!("{row} {} |", entry.why);
+            assert!(
+                document.contains(&described),
+                "scripts/ablation --constants: {described}"
+            );
+            assert!(
+                document.matches(&row).count() == 3,
+                "scripts/ablation: {row}"
+            );
+        }
+    }
+
+    #[test]
     fn all_are_described_and_have_two_other_values() {
         for entry in Constants::list() {
             let (name, [less, more]) = (entry.name, &entry.tried);
