@@ -312,19 +312,15 @@ impl<'a> Surroundings<'a> {
     fn enter_all(&mut self, found: &Found, positions: &Positions, block: u32) {
         self.triangles.reserve(found.count());
         for r in &found.interior {
-            let ComponentRef {
-                number,
-                local,
-                flip,
-            } = ComponentRef::from_word(r[3]);
-            let label = if local {
-                let local = self.locals.entry((block, number));
+            let component = ComponentRef::from_word(r[3]);
+            let label = if component.local {
+                let local = self.locals.entry((block, component.number));
                 *local.or_insert_with(|| self.sets.push())
             } else {
-                number
+                component.number
             };
             let ids = [r[0], r[1], r[2]];
-            let word = label << 1 | u32::from(flip);
+            let word = label << 1 | u32::from(component.flip);
             let at = ids.map(|v| positions.at(v));
             self.enter(Entry { ids, word, at }, block);
         }
