@@ -317,19 +317,15 @@ impl<'a> Surroundings<'a> {
     fn enter_all(&mut self, found: &Found, positions: &Positions, block: u32) {
         self.triangles.reserve(found.count());
         for row in &found.interior {
-            let ComponentRef {
-                number,
-                local,
-                flip,
-            } = ComponentRef::from_word(row.component);
-            let label = if local {
-                let local = self.locals.entry((block, number));
+            let component = ComponentRef::from_word(row.component);
+            let label = if component.local {
+                let local = self.locals.entry((block, component.number));
                 *local.or_insert_with(|| self.sets.push())
             } else {
-                number
+                component.number
             };
             let ids = row.triangle;
-            let word = word((label, flip));
+            let word = word((label, component.flip));
             let at = ids.map(|v| positions.at(v));
             self.enter(Entry { ids, word, at }, block);
         }

@@ -48,12 +48,8 @@ pub fn pair_edges(
     let mut next = triangles.partition_point(|t| t[0] < start) as u32;
     for v in 0..size {
         let first = next;
-        while triangles
-            .get(next as usize)
-            .is_some_and(|t| local(t[0]) == v)
-        {
-            next += 1;
-        }
+        let own = triangles[next as usize..].iter();
+        next += own.take_while(|t| local(t[0]) == v).count() as u32;
         let own = (first..next).flat_map(|n| [(n, 2, 1), (n, 1, 2)]);
         let upper = upper.at(v + start).iter().map(|&n| (n, 0, 2));
         // The sides at edges up from `v`, and the upper ends.
