@@ -250,6 +250,6 @@ mod tests {
             .collect();
         let mut bytes = Vec::new();
         pack(&rows, &mut bytes);
-        assert!(bytes.len() < 3 * rows.len(), "{}", bytes.len());
+        assert!(bytes.len() < 4 * rows.len(), "{}", bytes.len());
     }
 }
