@@ -50,32 +50,46 @@ pub fn pair_edges(
         let first = next;
         let own = triangles[next as usize..].iter();
         next += own.take_while(|t| local(t[0]) == v).count() as u32;
-        let own = (first..next).flat_map(|n| [(n, 2, 1), (n, 1, 2)]);
-        let upper = upper.at(v + start).iter().map(|&n| (n, 0, 2));
-        // The sides at edges up from `v`, and the upper ends.
-        let sides = upper.chain(own).map(|(number, corner, end)| {
-            let y = local(triangles[number as usize][end]);
-            (side(number, corner), y)
-        });
-        let sides = sides.filter(|(_, y)| *y < size);
+        let own = first..next;
+        let upper = upper.at(v + start);
+        // At the edges up from `v`: a triangle, the corner opposite, and the upper end's corner.
+        let end = |number: u32, corner: usize| local(triangles[number as usize][corner]);
         let mut single = 0;
-        sides.clone().for_each(|(this, y)| {
-            let seen = &mut seen[y as usize];
-            if seen.0 == v + 1 {
-                pair(seen.1, this);
-                *seen = (v + 1, NONE);
-                single -= 1;
-            } else {
-                *seen = (v + 1, this);
-                single += 1;
+        let mut mark = |number: u32, corner: u32, y: u32| {
+            if y < size {
+                let seen = &mut seen[y as usize];
+                let this = side(number, corner);
+                if seen.0 == v + 1 {
+                    pair(seen.1, this);
+                    *seen = (v + 1, NONE);
+                    single -= 1;
+                } else {
+                    *seen = (v + 1, this);
+                    single += 1;
+                }
             }
-        });
+        };
+        for &n in upper {
+            mark(n, 0, end(n, 2));
+        }
+        for n in own.clone() {
+            mark(n, 2, end(n, 1));
+            mark(n, 1, end(n, 2));
+        }
         if single > 0 {
-            sides.for_each(|(this, y)| {
-                if seen[y as usize].1 == this {
+            let mut report = |number: u32, corner: u32, y: u32| {
+                let this = side(number, corner);
+                if y < size && seen[y as usize].1 == this {
                     lone(this, [v, y]);
                 }
-            });
+            };
+            for &n in upper {
+                report(n, 0, end(n, 2));
+            }
+            for n in own {
+                report(n, 2, end(n, 1));
+                report(n, 1, end(n, 2));
+            }
         }
     }
 }
