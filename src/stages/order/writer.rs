@@ -136,7 +136,8 @@ impl StoreWriter {
     /// A whole store from the points of the sections, in their order.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`], [`crate::Error::Cancelled`].
+    /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
+    /// [`crate::Error::Cancelled`].
     pub fn gather(
         workspace: &Workspace,
         name: &str,
