@@ -1,4 +1,4 @@
-//! The space-filling curve that orders points: a three-dimensional Hilbert curve of 30 bits an axis.
+//! The space-filling curve that orders points: a three-dimensional Hilbert curve with 30 bits for each axis.
 //!
 //! A key has 90 bits in three words, highest first, so comparing records compares keys. The map is a
 //! bijection: the position can be computed from the key, so keys are sorted without a payload.

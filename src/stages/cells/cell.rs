@@ -317,7 +317,7 @@ pub fn fit_in_store(
     fit_from(&mut source, neighbors, widen)
 }
 
-/// The `count` nearest of a point, or all there are, from the whole store.
+/// The `count` nearest neighbours of a point, or all other points if there are fewer, from the whole store.
 ///
 /// # Errors
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`].

@@ -241,7 +241,7 @@ pub fn order(
     orderer.finish(workspace, page)
 }
 
-/// First and last key of a part; `None` at the ends.
+/// The limits of a part of the keys; `None` at the two ends.
 type Part = (Option<CurveKey>, Option<CurveKey>);
 
 /// The successor of a key.

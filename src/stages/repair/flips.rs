@@ -76,7 +76,7 @@ struct Slot {
 struct Sheet<'a> {
     points: &'a [Point],
     slots: Vec<Slot>,
-    /// Fixed vertices, whose triangles are kept: some of their triangles are outside the sheet, or they are
+    /// Fixed vertices, which take part in no flip: some of their triangles are outside the sheet, or they are
     /// on the boundary.
     shut: Vec<bool>,
     /// Edges to examine, with four bits for each triangle and 16 triangles in a word: bit `k` is the edge

@@ -37,8 +37,8 @@ impl Mending<'_> {
         }
     }
 
-    /// The part of a loop's filling that is not too wide; `width` is that of the loop as it was found. `None`
-    /// if nothing remains.
+    /// The part of a loop's filling that is not too wide; `found` is the width of the loop as it was found.
+    /// `None` if there is no filling, if it is an opening, or if nothing remains.
     fn filled(
         &self,
         corners: &[Corner],

@@ -16,8 +16,8 @@ pub struct Zipped {
     pub left: Vec<Corner>,
 }
 
-/// A candidate ear: its sharpness as the bits of a positive number, its corner, and the version of the
-/// corner.
+/// A candidate ear: its sharpness as the bits of a positive number, its corner, and the corner's age. The
+/// entry is outdated if the corner has another age by then.
 type Ear = Reverse<(u64, usize, u32)>;
 
 struct Zipper<E> {

@@ -96,7 +96,7 @@ fn at_edges(
 ) -> ([usize; 3], [Option<(u32, u32)>; 3]) {
     let mut found: [Option<(u32, u32)>; 3] = [None; 3];
     let mut counts = [0usize; 3];
-    // Counts the triangle at the edge's first vertex, with the other vertex `other`, if it contains `end`.
+    // Counts triangle `number` at one end of an edge, with the other vertices `a` and `b`, if one is `end`.
     let mut see = |edge: usize, number: u32, [a, b]: [u32; 2], end: u32| {
         if a == end || b == end {
             counts[edge] += 1;

@@ -229,7 +229,7 @@ impl Look<'_> {
         })
     }
 
-    /// The vertices outside the block of triangles that are not interior.
+    /// The vertices of the triangles that are not interior to the block.
     fn foreign(&self, block: usize, triangles: &[Triangle]) -> impl Iterator<Item = u32> {
         let ids = self.blocks.ids(block);
         let crosses = move |t: &&Triangle| t[0] < ids.start || t[2] >= ids.end;

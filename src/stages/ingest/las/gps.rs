@@ -15,7 +15,7 @@ const MULTIPLES: i32 = 500;
 const NEGATIVE_MULTIPLES: i32 = 10;
 /// Symbol of a time that did not change.
 const UNCHANGED: i32 = MULTIPLES + NEGATIVE_MULTIPLES + 1;
-/// Symbol of a time that is stored whole; symbols above it switch to another sequence.
+/// Symbol of a time that is stored in full; larger symbols switch to another sequence.
 const WHOLE: i32 = UNCHANGED + 1;
 
 /// Most consecutive switches from one sequence of times to another; a writer makes at most one.
