@@ -1,5 +1,6 @@
 //! Rows of triangles and their orientations.
 
+use super::parity::{OrientationConstraint, constraint};
 use super::star::Triangle;
 use crate::spill::row;
 
@@ -117,4 +118,24 @@ pub fn words(sum: i64) -> [u32; 2] {
 /// The sum from two words.
 pub fn sum([low, high]: [u32; 2]) -> i64 {
     i64::from(high.cast_signed()) << 32 | i64::from(low)
+}
+
+/// The constraints of interior triangles on the crossing triangle `t` of `block`, with their weights, from
+/// its `relations`; with global labels.
+pub(super) fn interior_constraints(
+    globals: &[(u32, u32)],
+    relations: &[Relation],
+    block: usize,
+    t: Triangle,
+) -> impl Iterator<Item = (OrientationConstraint, i64)> {
+    let key = (block as u32, t);
+    let start = relations.partition_point(|r| (r.to, r.triangle) < key);
+    relations[start..]
+        .iter()
+        .take_while(move |r| (r.to, r.triangle) == key)
+        .map(|r| {
+            let (label, flip) = constraint(r.label_flip);
+            let first = globals[r.block as usize].0;
+            ((first + label, flip), i64::from(r.weight))
+        })
 }
