@@ -2,7 +2,7 @@
 
 use super::Point;
 
-/// A closed box; [`Aabb::EMPTY`] holds nothing.
+/// A closed box; [`Aabb::EMPTY`] contains no point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Aabb {
     /// Lowest corner.
@@ -12,7 +12,7 @@ pub struct Aabb {
 }
 
 impl Aabb {
-    /// The box of no points.
+    /// The box that contains no point.
     pub const EMPTY: Self = Self {
         min: [i32::MAX; 3],
         max: [i32::MIN; 3],
@@ -24,13 +24,13 @@ impl Aabb {
         points.iter().fold(Self::EMPTY, |b, &p| b.with(p))
     }
 
-    /// The smallest box around this box and `p`.
+    /// The smallest box that contains this box and `p`.
     #[must_use]
     pub fn with(self, p: Point) -> Self {
         self.union(Self { min: p, max: p })
     }
 
-    /// The smallest box around both boxes.
+    /// The smallest box that contains both boxes.
     #[must_use]
     pub fn union(self, other: Self) -> Self {
         Self {
@@ -55,7 +55,7 @@ impl Aabb {
         self.distance2_box(&Self { min: p, max: p })
     }
 
-    /// Exact squared distance of the nearest two points of two boxes; 0 if they meet.
+    /// Exact squared distance between two boxes; 0 if they intersect.
     #[must_use]
     pub fn distance2_box(&self, other: &Self) -> u64 {
         let mut sum = 0u64;

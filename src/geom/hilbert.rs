@@ -1,30 +1,30 @@
-//! The space-filling curve that orders points: a three-dimensional Hilbert curve of 30 bits an axis.
+//! The space-filling curve that orders points: a three-dimensional Hilbert curve with 30 bits for each axis.
 //!
-//! Keys are 90 bits in three words, highest first, so that records compare as keys do. The map is
-//! one to one: a key is a position, and sorting keys needs no payload.
+//! A key has 90 bits in three words, highest first, so comparing records compares keys. The map is a
+//! bijection: the position can be computed from the key, so keys are sorted without a payload.
 //!
-//! The curve is walked by a table over 24 states (entry corner, direction); the state update is
-//! that of Hamilton & Rau-Chaplin, *Compact Hilbert indices* (2008), section 2.
+//! The curve is evaluated with a table over 24 states (entry corner, direction). The state update is that of
+//! Hamilton & Rau-Chaplin, *Compact Hilbert indices* (2008), section 2.
 
 use super::Point;
 
 /// Bits of each coordinate.
 pub const BITS: u32 = 30;
 
-/// A curve key; words compare in order. Each word holds 30 bits, ten levels of three.
+/// A key of the curve, compared lexicographically. Each word holds 30 bits: ten levels of three bits.
 pub type Key = [u32; 3];
 
 const STATES: usize = 24;
 
-/// For each state and octant the digit and next state, and the inverse for each state and digit;
+/// Maps state and octant to digit and next state, and state and digit to octant and next state. Entries are
 /// packed as `next state << 3 | result`.
 struct Tables {
     digit: [[u8; 8]; STATES],
     octant: [[u8; 8]; STATES],
 }
 
-/// The same for two levels at a time, packed as `next state << 6 | result`. Digits are six bits of a
-/// key, octants two bits each of x, y and z.
+/// The same tables for two levels at a time, packed as `next state << 6 | result`. Digits are six bits of a
+/// key; octants are two bits each of x, y and z.
 struct Pairs {
     digits: [[u16; 64]; STATES],
     octants: [[u16; 64]; STATES],
@@ -61,7 +61,7 @@ const fn direction(digit: u32) -> u32 {
     } else {
         digit
     };
-    // Number of trailing one bits: the axis along which the Gray code moves next.
+    // Number of trailing one bits: the axis along which the Gray code changes next.
     (!of).trailing_zeros() % 3
 }
 
@@ -85,7 +85,7 @@ const fn tables() -> Tables {
         }
         state += 1;
     }
-    // The transform must undo itself, or the tables are no bijection.
+    // Checks that the two rotations are inverse, as the tables must be bijections.
     assert!(rotate_right(rotate_left(5, 2), 2) == 5);
     t
 }
@@ -102,7 +102,7 @@ const fn pairs() -> Pairs {
         while digits < 64 {
             let upper = single.octant[state][digits >> 3] as usize;
             let lower = single.octant[upper >> 3][digits & 7] as usize;
-            // Of each octant one bit of x, y and z; of the pair two bits each.
+            // An octant has one bit each of x, y and z; a pair of levels has two.
             let (a, b) = (upper & 7, lower & 7);
             let x = (a >> 2) << 1 | b >> 2;
             let y = (a >> 1 & 1) << 1 | b >> 1 & 1;

@@ -2,19 +2,19 @@
 
 use super::Point;
 
-/// Coordinates on the lattice are in `0..COORDINATE_LIMIT`, so that every product of the exact
-/// predicates fits 128 bits.
+/// Lattice coordinates are in `0..COORDINATE_LIMIT`, so that all products in the exact predicates fit 128
+/// bits.
 pub const COORDINATE_LIMIT: i64 = 1 << 30;
 
 /// Maps lattice positions to the input's coordinates: `(p + base) * step + offset` per axis.
 ///
-/// For LAS input with one scale and offset the map is the file's own, so coordinates come out
-/// as the file states them.
+/// For LAS input with one scale and offset this is the map of the file, so the coordinates written are
+/// exactly those of the file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Lattice {
     /// Length of one step, the same along each axis, in the input's unit.
     pub step: f64,
-    /// Offset in the input's unit.
+    /// Offset, in the input's unit.
     pub offset: [f64; 3],
     /// Integer shift that moves the cloud's lowest corner to the lattice's origin.
     pub base: [i64; 3],

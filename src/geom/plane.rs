@@ -1,7 +1,7 @@
 //! The plane through a point's neighbours (paper, sections 3.2 and 3.3).
 //!
-//! Sums are exact integers, so they do not depend on the order of the neighbours; from there on
-//! one fixed sequence of `+ - * / sqrt` (all correctly rounded) leads to the normal.
+//! Sums are exact integers, so the order of the neighbours does not matter. The normal follows from them by a
+//! fixed sequence of correctly rounded `+ - * / sqrt`.
 
 mod spread;
 
@@ -10,35 +10,35 @@ use crate::kernels::{LANES, kernel};
 use crate::method::METHOD;
 use spread::{Spread, extent, normal};
 
-/// A direction as an integer vector; its longest component is about [`NORMAL_SCALE`].
+/// A direction as an integer vector, about [`NORMAL_SCALE`] long.
 ///
-/// Rounding the normal costs less than a ten-millionth of a radian and makes the disk's plane
-/// exact, so that predicates on it can be decided exactly.
+/// Rounding turns the normal by less than 10⁻⁷ rad. In return the plane of the disk is exact, so that
+/// predicates on it can be decided exactly.
 pub type Normal = [i32; 3];
 
 /// Length, in integer units, of a [`Normal`].
 pub const NORMAL_SCALE: f64 = (1 << 24) as f64;
 
-/// The axes of second moments, in their order.
+/// The pairs of axes of the six second moments, in their order.
 const PAIRS: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
 
-/// Exact first and second moments of differences to a point.
+/// Exact first and second moments of the neighbours' differences to a point.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Moments {
     count: i64,
     sum: [i64; 3],
-    /// xx, yy, zz, xy, xz, yz.
+    /// Sums of the products xx, yy, zz, xy, xz, yz.
     products: [i128; 6],
 }
 
-/// What the moments say.
+/// The plane fitted to the moments.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Plane {
     /// The normal; `None` if all points are exactly on a line.
     pub normal: Option<Normal>,
-    /// False if the points are so close to a line that the normal means little.
+    /// False if the points are so close to a line that the normal is unreliable.
     pub spans: bool,
-    /// False if they are so close to a narrow band that the normal is unsure.
+    /// False if the points are so close to a narrow band that the normal is uncertain.
     pub wide: bool,
 }
 
@@ -51,7 +51,7 @@ impl Plane {
 }
 
 impl Moments {
-    /// Takes in the difference of a neighbour to the point itself.
+    /// Adds the difference of a neighbour to the point.
     pub fn add(&mut self, d: [i64; 3]) {
         self.count += 1;
         self.shift(d);
@@ -66,7 +66,7 @@ impl Moments {
         }
     }
 
-    /// From sums over `count` differences: x, y, z, and xx, yy, zz, xy, xz, yz.
+    /// Moments from sums over `count` differences: x, y, z, and xx, yy, zz, xy, xz, yz.
     #[must_use]
     pub fn from_sums(count: usize, sum: [i64; 3], products: [i64; 6]) -> Self {
         Self {
@@ -76,10 +76,10 @@ impl Moments {
         }
     }
 
-    /// Covariance times the number of points (the point itself among them), in squared steps.
+    /// Covariance times the number of points, the point itself included, in squared steps.
     #[inline(always)]
     fn scatter(&self) -> [f64; 6] {
-        // Machine words where everything fits: almost always.
+        // The common case: everything fits machine words.
         let m = self.count + 1;
         let most = 1i64 << (62 - m.ilog2() - 1);
         let mut fits = self.sum.iter().all(|s| s.unsigned_abs() < 1 << 31);
@@ -104,9 +104,9 @@ impl Moments {
         std::array::from_fn(|i| m * self.products[i] - s[PAIRS[i].0] * s[PAIRS[i].1])
     }
 
-    /// True if the point and its neighbours fill space and do not lie along a surface: their scatter along
-    /// the normal is more than a seventh of that in all directions. On a surface with noise of one spacing
-    /// it is a sixth.
+    /// True if the point and its neighbours fill space instead of lying along a surface: their scatter along
+    /// the normal is more than a seventh of that in all directions. On a surface with noise of one spacing it
+    /// is a sixth.
     #[must_use]
     pub fn fill_space(&self, normal: Normal) -> bool {
         let [xx, yy, zz, xy, xz, yz] = self.scatter();
@@ -125,7 +125,7 @@ impl Moments {
         }
         let spread = Spread::of(scatter);
         let spans = spread.on_lines() & 1 == 0;
-        // Points that span a plane are not on a line.
+        // Points that span a plane cannot be collinear.
         let normal = if !spans && self.collinear() {
             None
         } else {
@@ -138,18 +138,18 @@ impl Moments {
         }
     }
 
-    /// True if the point and all its neighbours are exactly on a line: the scatter has rank one.
+    /// True if the point and all its neighbours are exactly collinear: the scatter matrix has rank one.
     fn collinear(&self) -> bool {
         let c = self.wide_scatter();
         let zero = |a: i128, b: i128, ab: i128| match (a.checked_mul(b), ab.checked_mul(ab)) {
             (Some(x), Some(y)) => x == y,
-            // Too large for exact arithmetic: equal in floating point is equal enough.
+            // Too large for exact arithmetic: compared in floating point.
             _ => a as f64 * b as f64 == ab as f64 * ab as f64,
         };
         zero(c[0], c[1], c[3]) && zero(c[0], c[2], c[4]) && zero(c[1], c[2], c[5])
     }
 
-    /// Offset from the point to its foot on the plane with `normal` through the centroid, in steps.
+    /// Offset, in steps, from the point to its foot on the plane with `normal` through the centroid.
     #[must_use]
     #[inline]
     pub fn project(&self, [x, y, z]: Normal) -> [f64; 3] {
@@ -163,8 +163,8 @@ impl Moments {
     }
 }
 
-/// The direction in which a scatter (xx, yy, zz, xy, xz, yz) is least, by the steps of
-/// [`Moments::plane`]; `None` without any extent.
+/// The direction of least scatter (xx, yy, zz, xy, xz, yz), computed as in [`Moments::plane`]; `None` if all
+/// points coincide.
 #[must_use]
 pub fn least_direction(scatter: &[f64; 6]) -> Option<Normal> {
     let largest = extent(scatter);
@@ -176,7 +176,7 @@ pub fn least_direction(scatter: &[f64; 6]) -> Option<Normal> {
 }
 
 kernel! {
-    /// The planes of several moments at a time: the same as [`Moments::plane`] of each.
+    /// The planes of several moments at a time, equal to [`Moments::plane`] of each.
     pub fn planes(moments: &[Moments; LANES]) -> [Plane; LANES] = planes_body<Eight>
 }
 
@@ -201,7 +201,7 @@ fn planes_body<F: Eight>(moments: &[Moments; LANES]) -> [Plane; LANES] {
     }
     let mut planes = [Plane::NONE; LANES];
     for (lane, plane) in planes.iter_mut().enumerate() {
-        // Lines, and points without extent: seldom, and more than one formula.
+        // Points on a line or all in one place: rare, and handled by other formulas.
         if known >> lane & 1 == 0 {
             *plane = moments[lane].plane();
             continue;
@@ -264,7 +264,7 @@ mod tests {
             shift in prop::array::uniform3(0u32..32),
             step in 1i64..4,
         ) {
-            // Flat, on lines, at one place, or all over.
+            // Points on a plane, on a line, in one place, or anywhere.
             let points: Vec<_> = points.iter().map(|p| {
                 std::array::from_fn(|axis| (p[axis] >> shift[axis]) / step * step)
             }).collect();

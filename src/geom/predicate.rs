@@ -1,11 +1,10 @@
 //! Exact decisions about the corners of restricted Voronoi cells.
 //!
-//! In coordinates relative to the cell's point `i`, the corner of the bisectors of `j` and `k` on
-//! the disk's plane (normal `n`) is the point `q` with `n·q = 0`, `2 a·q = |a|²`, `2 b·q = |b|²`,
-//! where `a = p_j − p_i`, `b = p_k − p_i`. The bisector of `l`, `c = p_l − p_i`, cuts it off if
-//! `2 c·q > |c|²`. With `D = n·(a×b)` and `W = |a|² (b×c) + |b|² (c×a) + |c|² (a×b)` this is
-//! `sign(n·W) · sign(D) < 0`, and both are integers. For co-circular points in one plane `W = 0`
-//! whatever the normal.
+//! In coordinates relative to the cell's point `i`, the corner of the bisectors of `j` and `k` on the disk's
+//! plane (normal `n`) is the point `q` with `n·q = 0`, `2 a·q = |a|²`, `2 b·q = |b|²`, where `a = p_j − p_i`,
+//! `b = p_k − p_i`. The bisector of `l`, `c = p_l − p_i`, cuts it off if `2 c·q > |c|²`. With `D = n·(a×b)`
+//! and `W = |a|² (b×c) + |b|² (c×a) + |c|² (a×b)` this is `sign(n·W) · sign(D) < 0`; both are integers. For
+//! co-circular points in a plane `W = 0` for every normal.
 //!
 //! Ties are broken as in a power diagram with infinitesimal weights `ε_0 ≫ ε_1 ≫ …`
 //! (simulation of simplicity): `|a|²` becomes `|a|² + ε_i − ε_j`, and so on. A larger weight
@@ -15,10 +14,10 @@ use super::plane::Normal;
 
 type Vector = [i64; 3];
 
-/// A neighbour as a cell sees it: its difference to the cell's point, and its id.
+/// A neighbour of the cell's point: its difference to the point, and its id.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Neighbor {
-    /// Position minus the cell's position, each component below 2^30 in size.
+    /// Position minus the position of the cell's point, each component below 2^30 in absolute value.
     pub difference: Vector,
     /// The neighbour's id.
     pub id: u32,
@@ -37,7 +36,7 @@ fn length2(a: Vector) -> i128 {
     a.iter().map(|&x| i128::from(x) * i128::from(x)).sum()
 }
 
-/// Sign of `n·v`, exact: `v` is split in words so that no product overflows.
+/// Exact sign of `n·v`; `v` is split into words so that no product overflows.
 fn sign_dot(n: Normal, v: [i128; 3]) -> i32 {
     let mut high = 0i128;
     let mut low = 0i128;
@@ -54,14 +53,14 @@ fn sign_dot(n: Normal, v: [i128; 3]) -> i32 {
     }
 }
 
-/// Sign of the determinant of `n`, `a`, `b`: which way the corner of `a` and `b` turns.
+/// Sign of the determinant of `n`, `a`, `b`: the orientation of the corner of `a` and `b`.
 #[must_use]
 pub fn turn(n: Normal, a: Vector, b: Vector) -> i32 {
     sign_dot(n, cross(a, b))
 }
 
-/// True if the bisector of `c` cuts off the corner of the bisectors of `a` and `b` in the cell of
-/// point `own`, whose disk has normal `n`. Exact, ties broken by id.
+/// True if the bisector of `c` cuts off the corner of the bisectors of `a` and `b` in the cell of point
+/// `own`, whose disk has normal `n`. Exact; ties are broken by id.
 ///
 /// The corner must exist: the bisectors of `a` and `b` are not parallel on the disk's plane.
 #[must_use]
@@ -75,7 +74,7 @@ pub fn cuts_corner(n: Normal, own: u32, a: Neighbor, b: Neighbor, c: Neighbor) -
     if sign != 0 {
         return sign * orientation < 0;
     }
-    // Coefficients of the weights in n·W, the heaviest (lowest id) first.
+    // Coefficients of the weights in n·W, in ascending order of ids (the largest weight first).
     let sum: [i128; 3] = std::array::from_fn(|i| bc[i] + ca[i] + ab[i]);
     let minus = |v: [i128; 3]| v.map(|x| -x);
     let mut terms = [
@@ -91,12 +90,12 @@ pub fn cuts_corner(n: Normal, own: u32, a: Neighbor, b: Neighbor, c: Neighbor) -
             return sign * orientation < 0;
         }
     }
-    // Only reached for a corner that does not exist.
+    // Reached only for a corner that does not exist.
     false
 }
 
-/// For bisectors of `a` and `c` that are parallel on the disk's plane: does that of `c` cut off
-/// the points on that of `a`? `None` if they are not parallel.
+/// For bisectors of `a` and `c` that are parallel on the disk's plane: true if the bisector of `c` cuts off
+/// the points on the bisector of `a`; `None` if the two are not parallel.
 #[must_use]
 pub fn cuts_parallel(n: Normal, own: u32, a: Neighbor, c: Neighbor) -> Option<bool> {
     let (va, vc) = (a.difference, c.difference);
@@ -118,7 +117,7 @@ pub fn cuts_parallel(n: Normal, own: u32, a: Neighbor, c: Neighbor) -> Option<bo
     if order.is_ne() {
         return Some(order.is_gt());
     }
-    // The same with weights: p (ε_i − ε_j) > q (ε_i − ε_l), the lowest id decides.
+    // With weights: p (ε_i − ε_j) > q (ε_i − ε_l); the lowest id decides.
     let mut terms = [(own, p - q), (a.id, -p), (c.id, q)];
     terms.sort_unstable_by_key(|(id, _)| *id);
     Some(
@@ -129,7 +128,7 @@ pub fn cuts_parallel(n: Normal, own: u32, a: Neighbor, c: Neighbor) -> Option<bo
     )
 }
 
-/// The part of `v` in the plane across `n`, times `|n|²`.
+/// The projection of `v` on the plane across `n`, times `|n|²`.
 fn flatten(n: Normal, v: Vector) -> [i128; 3] {
     let n = n.map(i128::from);
     let v = v.map(i128::from);
@@ -168,7 +167,7 @@ mod tests {
 
     #[test]
     fn four_on_a_circle_make_two_triangles_whatever_the_normal() {
-        // A unit square; every cell must agree on the diagonal.
+        // A unit square: all its cells must choose the same diagonal.
         let square = [[0i64, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]];
         for n in [[0, 0, 1 << 24], [3, -5, 1 << 24], [100, 7, -(1 << 20)]] {
             let mut seen = std::collections::BTreeMap::new();

@@ -1,7 +1,6 @@
-//! Rounding without a call: a base machine has no instruction for it.
+//! Rounding without a function call: base x86-64 has no instruction for it.
 
-/// The nearest integer, away from zero in the middle, as [`f64::round`] has it; the nearest there is if
-/// the number is too large.
+/// The nearest integer, halves away from zero, as [`f64::round`]; clamped to the range of the integer.
 #[inline]
 #[must_use]
 pub(crate) fn rounded(x: f64) -> i64 {

@@ -2,13 +2,13 @@
 
 use super::{Point, sub};
 
-/// The exact normal of the triangle `a → b → c`, twice its area long.
+/// The exact normal of the triangle `a → b → c`; its length is twice the area.
 #[must_use]
 pub fn normal(a: Point, b: Point, c: Point) -> [i128; 3] {
     small_normal(a, b, c).map(i128::from)
 }
 
-/// As [`normal`]: with coordinates of 30 bits it fits machine words.
+/// As [`normal`], in machine words: coordinates have 30 bits, so nothing overflows.
 #[must_use]
 #[inline]
 pub fn small_normal(a: Point, b: Point, c: Point) -> [i64; 3] {
@@ -20,7 +20,7 @@ pub fn small_normal(a: Point, b: Point, c: Point) -> [i64; 3] {
     ]
 }
 
-/// True if three points are exactly on a line.
+/// True if three points are exactly collinear.
 #[must_use]
 #[inline]
 pub fn on_a_line([a, b, c]: [Point; 3]) -> bool {

@@ -1,24 +1,24 @@
-//! Which of many boxes come near another box.
+//! Selection of the boxes near another box.
 
 use super::kernel;
 use super::pick::{BLOCK, Pick, first_bits};
 
-/// Boxes in columns, each with a number. The columns are a block longer than there are boxes, with
-/// anything behind the last.
+/// Boxes in columns, each with a number. The columns are one block longer than there are boxes; the rest is
+/// undefined.
 #[derive(Debug, Clone, Default)]
 pub struct Boxes {
-    /// The lowest corners, the highest, the numbers.
+    /// Lowest corners, highest corners, numbers.
     columns: [Vec<u32>; 7],
     len: usize,
 }
 
 impl Boxes {
-    /// Forgets all boxes.
+    /// Removes all boxes.
     pub fn clear(&mut self) {
         self.len = 0;
     }
 
-    /// Makes room for `count` in all.
+    /// Reserves room for `count` boxes in all.
     pub fn reserve(&mut self, count: usize) {
         let room = count.next_multiple_of(BLOCK) + BLOCK;
         if self.columns[0].len() < room {
@@ -27,7 +27,7 @@ impl Boxes {
         }
     }
 
-    /// Puts in the box from `min` to `max`, of coordinates in `0..2^30`.
+    /// Appends the box from `min` to `max`, with coordinates in `0..2^30`.
     pub fn push(&mut self, min: [i32; 3], max: [i32; 3], number: u32) {
         if self.columns[0].len() <= self.len + BLOCK {
             self.reserve((self.len + 1).next_power_of_two());
@@ -39,7 +39,7 @@ impl Boxes {
         self.len += 1;
     }
 
-    /// Box number `index`, from its lowest corner to its highest.
+    /// Lowest and highest corner of the box at `index`.
     #[must_use]
     #[inline]
     pub fn get(&self, index: usize) -> ([i32; 3], [i32; 3]) {
@@ -61,7 +61,7 @@ impl Boxes {
         self.len == 0
     }
 
-    /// Bytes that they have room for.
+    /// Allocated bytes.
     #[must_use]
     pub fn bytes(&self) -> u64 {
         self.columns.iter().map(|c| 4 * c.capacity() as u64).sum()
@@ -82,8 +82,8 @@ impl Boxes {
     }
 }
 
-/// The box from its lowest corner to its highest, and the largest squared distance to it, of which
-/// those of boxes are known to a relative error below 2^-21.
+/// A box, and the largest squared distance to it. Squared distances between boxes are computed with a
+/// relative error below 2^-21.
 #[derive(Debug, Clone, Copy)]
 pub struct Around {
     /// Lowest corner.
@@ -95,8 +95,8 @@ pub struct Around {
 }
 
 kernel! {
-    /// The numbers of the `boxes` that come near, in their order, at the front of `to`, which is longer by
-    /// a block than there are boxes; how many.
+    /// Writes the numbers of the `boxes` within the limit, in their order, to the front of `to`, and returns
+    /// how many there are. `to` must be one block longer than there are boxes.
     pub fn near_boxes(boxes: &Boxes, around: Around, to: &mut [u32]) -> usize = near_body<Eight>
 }
 
@@ -115,7 +115,8 @@ fn near_body<P: Pick>(boxes: &Boxes, around: Around, to: &mut [u32]) -> usize {
 }
 
 kernel! {
-    /// Takes over the boxes that come near, out of `blocks` of 16, of which the first so many are meant.
+    /// Copies the boxes within the limit out of `blocks`: each a block of 16 boxes and the number of them to
+    /// test.
     pub fn take_boxes(from: &Boxes, blocks: &[(u32, u32)], around: Around, to: &mut Boxes) = take_body<Eight>
 }
 
@@ -155,8 +156,8 @@ fn within_body<P: Pick>(block: [&[u32; BLOCK]; 7], around: Around) -> u32 {
     P::within(&distances, around.limit)
 }
 
-/// Squared distances of points in columns to the box from `min` to `max`, to a relative error
-/// below 2^-21. Coordinates are in `0..2^30`; all slices are of one length.
+/// Squared distances of points in columns to the box from `min` to `max`, with a relative error below 2^-21.
+/// Coordinates are in `0..2^30`; all slices have the same length.
 #[inline(always)]
 pub(crate) fn point_box_body(
     [x, y, z]: [&[i32]; 3],

@@ -1,50 +1,48 @@
-//! Bisectors as lines in a plane, and which corners of a polygon lie beyond one.
+//! Bisectors as lines in a plane, and the corners of a polygon beyond a line.
 
 use super::eight::Eight;
 use super::kernel;
 
-/// Corners are looked at in groups of this size, and lines made.
+/// Size of the groups in which corners and lines are processed.
 pub const LANES: usize = 8;
 
-/// Factor of the forward error bounds, in units of the last place; several times what a count of
-/// the roundings gives.
+/// Factor of the forward error bounds, in units of the last place: several times the number of roundings.
 pub(crate) const SLACK: f64 = 32.0 * f64::EPSILON;
 
-/// Corners of a convex polygon around the origin, in columns. All zeros is a place without a
-/// corner: it is at the origin, which no line cuts off.
+/// Corners of a convex polygon around the origin, in columns. All zeros means no corner: the origin is not
+/// cut off by any line.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct CornerGroup {
-    /// Position.
+    /// x coordinate.
     pub x: [f64; LANES],
-    /// Position.
+    /// y coordinate.
     pub y: [f64; LANES],
-    /// Bound on the distance from the true corner.
+    /// Upper bound on the distance from the true corner.
     pub error: [f64; LANES],
-    /// Squared distance of the true corner from the origin, at most.
+    /// Upper bound on the squared distance of the true corner from the origin.
     pub reach2: [f64; LANES],
 }
 
-/// The line `line · q = offset`, `offset > 0`; what is beyond it is cut off.
+/// The line `line · q = offset`, `offset > 0`; the side with `line · q > offset` is cut off.
 #[derive(Debug, Clone, Copy)]
 pub struct Line {
     /// Normal of the line, of any length.
     pub line: [f64; 2],
-    /// Where the line is.
+    /// Right-hand side of the equation.
     pub offset: f64,
-    /// At least the length of the difference in space whose bisector it is; scales the error of
-    /// `line`.
+    /// Upper bound on the length of the difference in space whose bisector it is; scales the error of `line`.
     pub length: f64,
 }
 
 impl Line {
-    /// How far beyond the line a corner is, times the length of the line's normal.
+    /// Distance of a corner beyond the line, times the length of the line's normal.
     #[inline(always)]
     #[must_use]
     pub fn depth(&self, x: f64, y: f64) -> f64 {
         self.line[0] * x + self.line[1] * y - self.offset
     }
 
-    /// A bound on the error of [`Line::depth`].
+    /// Upper bound on the error of [`Line::depth`].
     #[inline(always)]
     #[must_use]
     pub fn bound(&self, x: f64, y: f64, error: f64) -> f64 {
@@ -62,7 +60,7 @@ pub struct LineGroup {
 }
 
 impl LineGroup {
-    /// One of the lines.
+    /// The line at one index.
     #[inline(always)]
     #[must_use]
     pub fn get(&self, k: usize) -> Line {
@@ -78,8 +76,8 @@ impl LineGroup {
 pub type Frame = [[f64; 3]; 2];
 
 kernel! {
-    /// The bisectors between the origin and up to [`LANES`] differences, in a plane through the
-    /// origin. The line of a difference of zero means nothing.
+    /// The bisectors between the origin and up to [`LANES`] differences, in a plane through the origin. The
+    /// line of a zero difference is meaningless.
     pub fn bisectors(x: &[i32], y: &[i32], z: &[i32], frame: &Frame) -> LineGroup = bisectors_body<Eight>
 }
 
@@ -120,7 +118,7 @@ fn eight_bisectors<E: Eight>(
     dot(x, y, z, u).store(&mut lines.x);
     dot(x, y, z, v).store(&mut lines.y);
     E::splat(0.5).mul(length2).store(&mut lines.offset);
-    // No shorter than the true length, and without a root.
+    // The sum of absolute values: at least the true length, without a square root.
     x.abs().add(y.abs()).add(z.abs()).store(&mut lines.length);
     lines
 }
@@ -136,8 +134,8 @@ fn dot<E: Eight>(x: E, y: E, z: E, w: &[f64; 3]) -> E {
 }
 
 kernel! {
-    /// Two words for up to 64 corners: in the first, bit `k` is set if corner `k` is surely cut off
-    /// by the line; in the second, if the error bound does not allow to say.
+    /// Two words for up to 64 corners. In the first, bit `k` is set if the line certainly cuts off corner
+    /// `k`; in the second, if the error bound leaves it in doubt.
     pub fn cut_corners(corners: &[CornerGroup], line: &Line) -> (u64, u64) = cut_body<Eight>
 }
 
@@ -155,14 +153,14 @@ pub(crate) fn cut_body<E: Eight>(corners: &[CornerGroup], line: &Line) -> (u64, 
         let error = E::load(&corners.error).add(around);
         let bound = length.mul(error).add(slack.mul(offset));
         cut |= depth.greater(bound) << (group * LANES);
-        // Not a number is in doubt, too.
+        // NaN is in doubt, too.
         doubt |= (!depth.abs().greater(bound) & 0xff) << (group * LANES);
     }
     (cut, doubt)
 }
 
 kernel! {
-    /// Bit `k` is set unless [`cut_corners`] finds nothing, cut off or in doubt, with line `k`.
+    /// Bit `k` is set unless line `k` certainly cuts off no corner: [`cut_corners`] would return two zeros.
     pub fn touching_lines(corners: &[CornerGroup], lines: &LineGroup) -> u64 = touching_body<Eight>
 }
 
@@ -186,7 +184,7 @@ pub(crate) fn touching_body<E: Eight>(corners: &[CornerGroup], lines: &LineGroup
 }
 
 kernel! {
-    /// The largest of the corners' squared reaches.
+    /// The largest squared reach of the corners.
     pub fn farthest(corners: &[CornerGroup]) -> f64 = farthest_body<Eight>
 }
 

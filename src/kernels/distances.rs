@@ -1,10 +1,10 @@
-//! Approximate squared distances, and how many of them are within a limit.
+//! Approximate squared distances, and the number of them within a limit.
 
 use super::kernel;
 
 kernel! {
-    /// Squared distances of the points in columns to `p`, to a relative error below 2^-21.
-    /// Coordinates are in `0..2^30`; all slices are of one length.
+    /// Squared distances of the points in columns to `p`, with a relative error below 2^-21. Coordinates are
+    /// in `0..2^30`; all slices have the same length.
     pub fn distances(x: &[i32], y: &[i32], z: &[i32], p: [i32; 3], out: &mut [f32]) = distances_body
 }
 
@@ -19,13 +19,13 @@ pub(crate) fn distances_body(x: &[i32], y: &[i32], z: &[i32], p: [i32; 3], out: 
 }
 
 kernel! {
-    /// How many numbers are at most `limit`.
+    /// The number of values that are at most `limit`.
     pub fn count_within(numbers: &[f32], limit: f32) -> usize = count_body
 }
 
 #[inline(always)]
 pub(crate) fn count_body(numbers: &[f32], limit: f32) -> usize {
-    // 32-bit sums keep as many lanes as there are numbers in a register.
+    // With 32-bit sums a register has as many lanes as it holds values.
     numbers.iter().map(|d| u32::from(*d <= limit)).sum::<u32>() as usize
 }
 

@@ -1,34 +1,35 @@
-//! Eight `f64` at a time: what the compiler does not widen by itself.
+//! Vectors of eight `f64`, for loops that the compiler does not vectorise by itself.
 //!
-//! [`Base`] is the definition. The others do the same operations in wider registers.
+//! [`Base`] is the definition. The other types perform the same operations in wider registers.
 
 use std::ops::{Add, Div, Mul, Sub};
 
-/// A number, or several; every operation is that of each number by itself.
+/// One or several numbers; every operation applies to each of them.
 pub(crate) trait Numbers:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
 {
-    /// A bit for each number.
+    /// One set bit for each number.
     const ALL: u64;
-    /// The same number everywhere.
+    /// All numbers equal to `x`.
     fn splat(x: f64) -> Self;
     /// Square roots.
     fn sqrt(self) -> Self;
-    /// Bit `k` is set if number `k` is greater than the other one (false for NaN).
+    /// Bit `k` is set if number `k` is greater than that of `other` (false for NaN).
     fn greater(self, other: Self) -> u64;
-    /// Of each pair the first if it is greater, else the second.
+    /// For each pair the first number if it is greater, else the second.
     fn larger(self, other: Self) -> Self;
-    /// Of each pair the first if its bit is set, else the second; several with the same bits.
+    /// For each pair the first number if its bit is set, else the second; applied to `N` vectors with the
+    /// same bits.
     fn choose<const N: usize>(bits: u64, first: [Self; N], second: [Self; N]) -> [Self; N];
 }
 
 /// Eight numbers.
 pub(crate) trait Eight: Numbers {
-    /// From memory.
+    /// Loads from memory.
     fn load(from: &[f64; 8]) -> Self;
-    /// From integers, exactly.
+    /// Converts integers, exactly.
     fn convert(from: &[i32; 8]) -> Self;
-    /// To memory.
+    /// Stores to memory.
     fn store(self, to: &mut [f64; 8]);
     /// Absolute values.
     fn abs(self) -> Self;
@@ -64,7 +65,7 @@ impl Numbers for f64 {
     }
 }
 
-/// Makes operators of a type out of what they do.
+/// Implements the arithmetic operators of a type.
 macro_rules! operators {
     ($type:ident: $($trait:ident $name:ident($a:ident, $b:ident) = $does:expr;)*) => {
         $(impl $trait for $type {
@@ -79,7 +80,7 @@ macro_rules! operators {
     };
 }
 
-/// The definition.
+/// The definition, in plain code.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Base([f64; 8]);
 
@@ -175,9 +176,9 @@ mod wide {
     #[derive(Debug, Clone, Copy)]
     pub(crate) struct Avx512(__m512d);
 
-    // SAFETY (all of both): the types are named only by the versions of a kernel that are compiled for
-    // these instructions, and those are called only after `Level` found them on the machine. Loads
-    // and stores are within an array of eight and need no alignment.
+    // SAFETY (all of both types): they are named only by the versions of a kernel that are compiled for these
+    // instructions, and those are called only after `Level` found the instructions on the machine. Loads and
+    // stores stay within an array of eight and need no alignment.
     operators! { Avx2:
         Add add(a, b) = {
             // SAFETY: see above.
@@ -224,7 +225,7 @@ mod wide {
 
         #[inline(always)]
         fn larger(self, other: Self) -> Self {
-            // SAFETY: see above. The instruction gives its second operand unless the first is greater.
+            // SAFETY: see above. The instruction returns its second operand unless the first is greater.
             unsafe {
                 Self(
                     _mm256_max_pd(self.0, other.0),
@@ -332,7 +333,7 @@ mod wide {
 
         #[inline(always)]
         fn larger(self, other: Self) -> Self {
-            // SAFETY: see above. The instruction gives its second operand unless the first is greater.
+            // SAFETY: see above. The instruction returns its second operand unless the first is greater.
             unsafe { Self(_mm512_max_pd(self.0, other.0)) }
         }
 

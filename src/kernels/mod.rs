@@ -1,10 +1,10 @@
-//! The inner loops that run once for every point and candidate, compiled for the registers that
-//! the machine has.
+//! The inner loops, executed once for every point and candidate, compiled for the vector instructions of the
+//! machine.
 //!
-//! A kernel is written once, as plain code over columns: that is its definition. The same text is
-//! compiled for each [`Level`] and the compiler widens it. Integer arithmetic is exact, and
-//! floating-point operations keep their order (none is contracted or reassociated), so every level
-//! gives the same bits; the tests of each kernel compare them.
+//! A kernel is written once, as scalar code over columns; this is its definition. The same source is compiled
+//! for each [`Level`], and the compiler vectorises it. Integer arithmetic is exact, and floating-point
+//! operations keep their order (none is fused or reassociated), so every level gives the same bits. The tests
+//! of each kernel compare them.
 
 mod boxes;
 mod corners;
@@ -30,13 +30,13 @@ pub(crate) use ranks::{RANKED, ranks_body};
 pub(crate) use sums::{MOST_SUMMED, SUMMED_LIMIT2};
 pub use sums::{SecondMoments, second_moments};
 
-/// A set of vector instructions that this machine has.
+/// A set of vector instructions that this machine supports.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Level(Width);
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Width {
-    /// What every machine of the architecture has.
+    /// The baseline of the architecture.
     Base,
     /// AVX2, 256 bits.
     #[cfg(target_arch = "x86_64")]
@@ -47,10 +47,10 @@ pub(crate) enum Width {
 }
 
 impl Level {
-    /// What every machine has: the scalar definition.
+    /// The baseline: the scalar definition.
     pub const BASE: Self = Self(Width::Base);
 
-    /// The widest that this machine has.
+    /// The widest level of this machine.
     #[must_use]
     pub fn best() -> Self {
         #[cfg(target_arch = "x86_64")]
@@ -65,7 +65,7 @@ impl Level {
         Self::BASE
     }
 
-    /// All that this machine has, narrowest first.
+    /// All levels of this machine, narrowest first.
     #[must_use]
     pub fn all() -> Vec<Self> {
         let mut all = vec![Self::BASE];
@@ -109,9 +109,9 @@ fn avx512() -> bool {
         && is_x86_feature_detected!("avx512vl")
 }
 
-/// Makes `name(level, …)` out of the scalar definition `body(…)`, which must be `inline(always)`, as
-/// must be what it calls and should be widened with it. With `<Eight>` behind its name the body takes
-/// the type of eight numbers for the level.
+/// Defines `name(level, …)` from the scalar definition `body(…)`. The body must be `inline(always)`, as must
+/// the functions it calls that are to be vectorised. With `<Eight>` after its name, the body is generic over
+/// the vector type, which is chosen by the level.
 macro_rules! kernel {
     ($(#[$doc:meta])* $vis:vis fn $name:ident($($arg:ident: $type:ty),* $(,)?) $(-> $out:ty)? = $body:ident<Eight>) => {
         $crate::kernels::kernel! {
@@ -143,7 +143,7 @@ macro_rules! kernel {
                 }
                 match level.width() {
                     $crate::kernels::Width::Base => {}
-                    // SAFETY: only `Level::best` and `Level::all` make this level, after they found
+                    // SAFETY: only `Level::best` and `Level::all` construct this level, after they found
                     // these instructions on the machine.
                     $crate::kernels::Width::Avx2 => return unsafe { avx2($($arg),*) },
                     // SAFETY: as above.

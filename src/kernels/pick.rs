@@ -1,26 +1,26 @@
-//! Picking out of columns what is within a limit: what the compiler does not widen by itself.
+//! Selection of values within a limit from columns, for loops that the compiler does not vectorise by itself.
 //!
-//! [`Base`] is the definition. The others do the same with an instruction or a table.
+//! [`Base`] is the definition. The other types do the same with an instruction or a table.
 
 use super::eight::Base;
 use super::kernel;
 
-/// Numbers that are looked at together; columns to pick from are this many or a multiple long.
+/// Values processed together; the length of a column to select from is a multiple of this.
 pub(crate) const BLOCK: usize = 16;
 
-/// The lowest `count` bits of a block, or all.
+/// The lowest `count` bits of a block; all bits if `count` is larger.
 #[inline(always)]
 pub(crate) fn first_bits(count: usize) -> u32 {
     (1u32 << count.min(BLOCK)) - 1
 }
 
-/// What is done with each block.
+/// The operations on one block.
 pub(crate) trait Pick {
-    /// Bit `k` is set if number `k` is at most `limit`.
+    /// Bit `k` is set if value `k` is at most `limit`.
     fn within(numbers: &[f32; BLOCK], limit: f32) -> u32;
 
-    /// The values whose bits are set, in their order, at the front of `to`; what is behind them there
-    /// has no meaning.
+    /// Writes the values whose bits are set, in their order, to the front of `to`; the rest of `to` is
+    /// undefined.
     fn pack(values: &[u32; BLOCK], bits: u32, to: &mut [u32; BLOCK]);
 
     /// As [`Pick::pack`], at place `at` of a column that has room for a block there.
@@ -51,8 +51,9 @@ impl Pick for Base {
     }
 }
 
-/// Packs columns: the values that stand where the numbers are at most `limit`, in their order; how many.
-/// Numbers beyond the last whole block are not looked at; each `to` has room for all and a block.
+/// Selects from columns the values at the places where `numbers` are at most `limit`, in their order, and
+/// returns how many there are. Numbers after the last whole block are ignored. Each `to` has room for all
+/// values and one block.
 #[inline(always)]
 pub(crate) fn pick_body<P: Pick, const N: usize>(
     numbers: &[f32],
@@ -73,8 +74,9 @@ pub(crate) fn pick_body<P: Pick, const N: usize>(
 }
 
 kernel! {
-    /// Packs a column: the values that stand where the numbers are at most `limit`, in their order; how
-    /// many. Numbers beyond the last whole sixteen are not looked at; `to` has room for all and sixteen.
+    /// Selects from a column the values at the places where `numbers` are at most `limit`, in their order,
+    /// and returns how many there are. Numbers after the last whole block of 16 are ignored. `to` has room
+    /// for all values and 16 more.
     pub fn pick_column(numbers: &[f32], limit: f32, from: &[u32], to: &mut [u32]) -> usize = pick_one_body<Eight>
 }
 
@@ -93,7 +95,7 @@ mod wide {
     use crate::kernels::eight::{Avx2, Avx512};
     use std::arch::x86_64::*;
 
-    /// For each pattern of eight bits where the set ones stand.
+    /// For each pattern of eight bits, the indices of the set bits.
     static PLACES: [[u32; 8]; 256] = places();
 
     const fn places() -> [[u32; 8]; 256] {
@@ -113,9 +115,9 @@ mod wide {
         all
     }
 
-    // SAFETY (all of both): the types are named only by the versions of a kernel that are compiled for
-    // these instructions, and those are called only after `Level` found them on the machine. Loads
-    // and stores are within an array of sixteen and need no alignment.
+    // SAFETY (all of both types): they are named only by the versions of a kernel that are compiled for these
+    // instructions, and those are called only after `Level` found the instructions on the machine. Loads and
+    // stores stay within an array of sixteen and need no alignment.
     impl Pick for Avx2 {
         #[inline(always)]
         fn within(numbers: &[f32; BLOCK], limit: f32) -> u32 {
@@ -131,7 +133,7 @@ mod wide {
         #[inline(always)]
         fn pack(values: &[u32; BLOCK], bits: u32, to: &mut [u32; BLOCK]) {
             let (low, high) = (bits as usize & 0xff, bits as usize >> 8 & 0xff);
-            // SAFETY: see above; the second store begins at most eight behind the first.
+            // SAFETY: see above; the second store begins at most eight places after the first.
             unsafe {
                 let (p, to) = (values.as_ptr().cast::<__m256i>(), to.as_mut_ptr());
                 let packed = |half: usize, bits: usize| {
@@ -158,8 +160,8 @@ mod wide {
 
         #[inline(always)]
         fn pack(values: &[u32; BLOCK], bits: u32, to: &mut [u32; BLOCK]) {
-            // SAFETY: see above. Packing in a register and storing all of it is faster than packing
-            // into memory.
+            // SAFETY: see above. Packing in a register and storing all of it is faster than packing into
+            // memory.
             unsafe {
                 let values = _mm512_loadu_si512(values.as_ptr().cast());
                 let packed = _mm512_maskz_compress_epi32(bits as u16, values);

@@ -3,9 +3,8 @@
 use super::kernel;
 
 kernel! {
-    /// For each key how many are smaller: its place once sorted, if all keys are different. Keys are
-    /// not negative.
-    /// Quadratic, without a branch: faster than sorting up to about a hundred keys.
+    /// For each key, the number of smaller keys: its rank if all keys are different. Keys must not be
+    /// negative. Quadratic, but without branches: faster than sorting up to about a hundred keys.
     pub fn ranks(keys: &[i64], out: &mut [u32]) = ranks_of
 }
 
@@ -19,10 +18,10 @@ fn ranks_of(keys: &[i64], out: &mut [u32]) {
     out.copy_from_slice(&places[..count]);
 }
 
-/// Keys whose counts are kept in registers: columns of keys are this many or a multiple long.
+/// Keys whose ranks are counted in registers; the length of a column of keys is a multiple of this.
 pub(crate) const RANKED: usize = 8;
 
-/// As [`ranks`], of the first `count` keys.
+/// As [`ranks`], for the first `count` keys.
 #[inline(always)]
 pub(crate) fn ranks_body(keys: &[i64], count: usize, out: &mut [u32]) {
     let blocks = keys.as_chunks::<RANKED>().0;
@@ -31,7 +30,7 @@ pub(crate) fn ranks_body(keys: &[i64], count: usize, out: &mut [u32]) {
         let mut smaller = [0i64; RANKED];
         for other in &keys[..count] {
             for (smaller, key) in smaller.iter_mut().zip(block) {
-                // The sign of the difference, without a comparison.
+                // Adds the sign bit of the difference, which avoids a comparison.
                 *smaller += ((other - key) as u64 >> 63) as i64;
             }
         }

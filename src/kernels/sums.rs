@@ -2,17 +2,18 @@
 
 use super::kernel;
 
-/// First and second moments: x, y, z, then xx, yy, zz, xy, xz, yz.
+/// First moments x, y, z, then second moments xx, yy, zz, xy, xz, yz.
 pub type SecondMoments = ([i64; 3], [i64; 6]);
 
-/// So many differences at most are summed exactly.
+/// Most differences whose sums are exact.
 pub(crate) const MOST_SUMMED: usize = 256;
 
-/// They are shorter than the root of this.
+/// Their squared lengths must be less than this.
 pub(crate) const SUMMED_LIMIT2: u64 = 1 << 54;
 
 kernel! {
-    /// Sums over columns of differences. Exact for up to 256 differences below 2^27 in size.
+    /// Sums over columns of differences. Exact for up to 256 differences with components below 2^27 in
+    /// absolute value.
     pub fn second_moments(x: &[i32], y: &[i32], z: &[i32]) -> SecondMoments = second_moments_body
 }
 

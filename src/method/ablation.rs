@@ -1,13 +1,13 @@
-//! Other values for the constants, from the environment: `OUTCROP_ABLATION=flips.gain=0.2,relax.rough=0.3`.
+//! Other values of the constants, from the environment: `OUTCROP_ABLATION=flips.gain=0.2,relax.rough=0.3`.
 
 use super::{Constants, VALUES};
 use std::fmt::Write;
 use std::sync::LazyLock;
 
-/// The variable.
+/// Name of the environment variable.
 const VARIABLE: &str = "OUTCROP_ABLATION";
 
-/// The constants. The command line has looked at the variable before ([`report`]).
+/// The constants. The command line has checked the variable before ([`report`]).
 pub(crate) static METHOD: LazyLock<Constants> =
     LazyLock::new(|| read().unwrap_or_else(|why| panic!("{VARIABLE}: {why}")));
 
@@ -23,8 +23,8 @@ fn read() -> Result<Constants, String> {
     Ok(constants)
 }
 
-/// With `OUTCROP_ABLATION=list` all constants, a line each: name, value, unit, reason, and two values to
-/// try, with tabs between them. Else nothing, or why the variable does not make sense.
+/// With `OUTCROP_ABLATION=list`, all constants, one in a line: name, value, unit, reason, and two values to
+/// try, separated by tabs. Else an empty text, or an error that describes an invalid variable.
 pub(crate) fn report() -> Result<String, String> {
     let mut lines = String::new();
     if std::env::var(VARIABLE).is_ok_and(|asked| asked == "list") {

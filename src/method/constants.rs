@@ -1,9 +1,9 @@
-//! One list of constants makes the struct, its values, and what an ablation study needs: names, units,
-//! reasons, and other values to try.
+//! Defines the constants by one list, from which a macro makes the struct, its values, and the data of an
+//! ablation study: names, units, reasons, and other values to try.
 
-/// Makes `Constants` with a struct for each group, `VALUES`, and for tests and ablation studies the list
-/// of all of them. A constant is given as `name: type = value, "unit";`, or with two other values that are
-/// worth trying, if these are not half and double, as `name: type = value, "unit", [less, more];`.
+/// Defines `Constants` with a struct for each group, `VALUES`, and, for tests and ablation studies, a list of
+/// all entries. A constant is written as `name: type = value, "unit";`. The two other values to try are half
+/// and double; others can be given as `name: type = value, "unit", [less, more];`.
 macro_rules! constants {
     ($(
         $(#[doc = $about:literal])+
@@ -12,7 +12,7 @@ macro_rules! constants {
             $name:ident: $type:ty = $value:expr, $unit:literal $(, [$less:expr, $more:expr])?;
         )+}
     )+) => {
-        /// All constants of the method, by its steps.
+        /// All constants of the method, in groups by step.
         #[derive(Debug, Clone, Copy)]
         pub(crate) struct Constants {$(
             $(#[doc = $about])+
@@ -32,7 +32,7 @@ macro_rules! constants {
 
         #[cfg(any(test, feature = "ablation"))]
         impl Constants {
-            /// What there is to say of each constant.
+            /// A description of each constant.
             pub fn list() -> Vec<constants::Entry> {
                 vec![$($(constants::Entry {
                     name: concat!(stringify!($group), ".", stringify!($name)),
@@ -50,7 +50,7 @@ macro_rules! constants {
 
         #[cfg(feature = "ablation")]
         impl Constants {
-            /// Sets the constant of that name.
+            /// Sets the constant with that name.
             pub fn set(&mut self, name: &str, value: &str) -> Result<(), String> {
                 match name {
                     $($(concat!(stringify!($group), ".", stringify!($name)) => {
@@ -72,19 +72,19 @@ pub(crate) use list::{Entry, Halved, text};
 
 #[cfg(any(test, feature = "ablation"))]
 mod list {
-    /// A constant as tables have it.
+    /// A constant as a row of a table.
     #[derive(Debug, Clone)]
     pub(crate) struct Entry {
-        /// Group and name, with a dot between them.
+        /// Group and name, separated by a dot.
         pub name: &'static str,
         pub value: String,
         pub unit: &'static str,
         pub why: &'static str,
-        /// Two values worth trying instead.
+        /// Two other values to try.
         pub tried: [String; 2],
     }
 
-    /// A number that parses to the same one.
+    /// A short text that parses to the same number.
     pub(crate) fn text(value: impl std::fmt::Debug) -> String {
         let text = format!("{value:?}");
         text.strip_suffix(".0").map_or(text.clone(), str::to_owned)
@@ -92,7 +92,7 @@ mod list {
 
     /// A number that can be halved and doubled.
     pub(crate) trait Halved: Sized {
-        /// Half of it, of whole numbers rounded up, and twice as much.
+        /// Half of it, rounded up for integers, and double.
         fn half_and_double(self) -> [Self; 2];
     }
 

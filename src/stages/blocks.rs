@@ -1,4 +1,4 @@
-//! Blocks: the fixed id ranges in which the mesh is decided.
+//! Blocks: the fixed id ranges by which the mesh is computed.
 
 use std::ops::Range;
 
@@ -12,7 +12,7 @@ pub struct Blocks {
 crate::workspace::persist::persist!(Blocks { points, size });
 
 impl Blocks {
-    /// Blocks of `size` ids for `points` points.
+    /// Divides `points` points into blocks of `size` ids.
     #[must_use]
     pub fn new(points: usize, size: u32) -> Self {
         Self {
@@ -52,7 +52,7 @@ impl Blocks {
         self.of(i) != self.of(j) || self.of(i) != self.of(k)
     }
 
-    /// The other blocks that the vertices of ascending `ids` lie in, besides that of the first.
+    /// The blocks that contain vertices of ascending `ids`, without the block of the first vertex.
     pub fn visited(&self, [i, j, k]: [u32; 3]) -> impl Iterator<Item = u32> + use<> {
         let (a, b, c) = (self.of(i), self.of(j), self.of(k));
         [(b != a).then_some(b), (c != b).then_some(c)]

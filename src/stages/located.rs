@@ -1,4 +1,4 @@
-//! Where the vertices of triangles are: those of one block, and some of others.
+//! Positions of the vertices of a block and of some other vertices.
 
 use super::blocks::Blocks;
 use super::cells::CountedTriple;
@@ -11,42 +11,42 @@ use crate::workspace::memory::{Holding, bytes_of, hold, table_bytes};
 use rustc_hash::FxHashMap;
 use std::ops::Range;
 
-/// Positions by id, twice: those by which points are connected, and those that go into the file.
-/// They are the same store unless points were moved for the connection only.
+/// The two positions of every id: those that decide the connectivity, and those that are written to the file.
+/// They are the same store unless points were relaxed.
 #[derive(Debug, Clone, Copy)]
 pub struct Places<'a> {
-    /// To connect by.
+    /// The positions that decide the connectivity.
     pub shape: &'a PointStore,
-    /// In the file.
+    /// The positions in the file.
     pub file: &'a PointStore,
-    /// How dense the surface is, if edges that are too long for it are left out.
+    /// The density of the surface, if triangles too long for it are left out.
     pub density: Option<Density<'a>>,
 }
 
 impl Places<'_> {
-    /// True if positions in the file are not those that points are connected by.
+    /// True if the positions in the file differ from those that decide the connectivity.
     #[must_use]
     pub fn differ(&self) -> bool {
         !std::ptr::eq(self.shape, self.file)
     }
 
-    /// True if positions in the file may make triangles unfit that were fit to be seen by cells.
+    /// True if triangles can be unfit by their positions in the file although cells saw them.
     #[must_use]
     pub fn limit_triangles(&self) -> bool {
         self.differ() || self.density.is_some()
     }
 
-    /// Tells of triangles, with their corners where they are in the file, whether they are on a line or too
-    /// long.
+    /// Returns a test of triangles with the positions of their corners in the file: true if the corners are
+    /// collinear or a side is too long.
     pub fn unfit(&self) -> impl Fn([u32; 3], [Point; 3]) -> bool + Copy {
         let differ = self.differ();
         let is_long = self.density.map(Density::is_long);
-        // Cells see no three points on a line, as they lie themselves.
+        // Without relaxing, cells see no three collinear points.
         #[inline(always)]
         move |t, at| differ && on_a_line(at) || is_long.is_some_and(|is_long| is_long(t, at))
     }
 
-    /// Leaves out candidates that are unfit where they are in the file; how many.
+    /// Removes the candidates that are unfit by their positions in the file, and returns their number.
     pub fn drop_unfit(&self, candidates: &mut Vec<CountedTriple>, file: &Located) -> u64 {
         let (unfit, before) = (self.unfit(), candidates.len());
         candidates.retain(|c| !unfit(c.triple, file.corners(c.triple)));
@@ -54,7 +54,7 @@ impl Places<'_> {
     }
 }
 
-/// The positions of the vertices of a block and of some others.
+/// Positions of the vertices of a block and of some others.
 #[derive(Debug, Default)]
 pub struct Located {
     ids: Range<u32>,
@@ -64,7 +64,7 @@ pub struct Located {
 }
 
 impl Located {
-    /// Those of `block`, and of `vertices` in any order.
+    /// Loads the positions of `block`, and of `vertices` in any order.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
@@ -96,7 +96,7 @@ impl Located {
         }
     }
 
-    /// Takes in those of `vertices` that are not in the block.
+    /// Adds the positions of those `vertices` that are not in the block.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Corrupt`].

@@ -1,4 +1,4 @@
-//! The stages of a reconstruction, one folder each, in the order the data flows.
+//! The stages of a reconstruction, one folder each, in the order of the data flow.
 
 pub mod ingest;
 pub mod order;

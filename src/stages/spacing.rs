@@ -1,4 +1,4 @@
-//! How dense the surface is, patch by patch, and what is too far apart for that.
+//! Local spacing by patch, and the limits of length that follow from it.
 
 use crate::error::Result;
 use crate::geom::Point;
@@ -11,11 +11,11 @@ use crate::workspace::persist::{Persist, Saved};
 /// A limit of length.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Width {
-    /// In local spacings.
+    /// A multiple of the local spacing.
     Spacings(f64),
-    /// In lattice steps.
+    /// A length in lattice steps.
     Steps(f64),
-    /// None.
+    /// No limit.
     Any,
 }
 
@@ -29,51 +29,52 @@ impl Width {
     }
 }
 
-/// The distances above which points and triangles are no part of one surface.
+/// The lengths above which points and triangles are not part of a surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
-    /// Points off the surface are left out.
+    /// True if points off the surface are left out.
     pub off_surface: bool,
-    /// Sides of triangles.
+    /// Longest side of a triangle.
     pub edge: Width,
-    /// Triangles that fill holes: the sides of an equilateral one as large as the largest.
+    /// Side of an equilateral triangle with the area of the largest triangle that fills a hole.
     pub fill: Width,
 }
 
-/// For each patch the squared distance that the `k` nearest neighbours of a point usually reach.
+/// For each patch, the squared distance that the `k` nearest neighbours of a point usually reach (the usual
+/// reach).
 #[derive(Debug)]
 pub struct Spacings {
     usual2: Vec<u64>,
     _held: Reservation,
 }
 
-/// How dense the surface is, and what that limits.
+/// The density of the surface, and the limits that depend on it.
 #[derive(Debug, Clone, Copy)]
 pub struct Density<'a> {
-    /// By patch.
+    /// The usual reaches by patch.
     pub spacings: &'a Spacings,
-    /// `k`.
+    /// The number of neighbours `k`.
     pub neighbors: usize,
-    /// The limits, in local spacings or lattice steps.
+    /// The limits, in local spacings or in lattice steps.
     pub limits: Limits,
 }
 
-/// True if neighbours that reach as far as `last2` reach farther than a surface does where `usual2` is
-/// usual.
+/// True if neighbours at squared distances up to `last2` reach farther than those of a surface with the usual
+/// reach `usual2`.
 #[must_use]
 pub fn is_far(last2: u64, usual2: u64) -> bool {
     u128::from(last2) > METHOD.off_surface.far * METHOD.off_surface.far * u128::from(usual2)
 }
 
-/// The square of the local spacing: on a plane, so many neighbours lie in the disk up to the last one,
-/// which is so far away.
+/// The square of the local spacing: the mean spacing of `neighbors` points that fill a plane disk of squared
+/// radius `last2`.
 #[must_use]
 pub fn spacing2(last2: u64, neighbors: usize) -> f64 {
     std::f64::consts::PI * last2 as f64 / neighbors as f64
 }
 
 impl Spacings {
-    /// Takes over what was measured.
+    /// From the measured values.
     #[must_use]
     pub fn new(usual2: Vec<u64>, held: Reservation) -> Self {
         Self {
@@ -82,7 +83,7 @@ impl Spacings {
         }
     }
 
-    /// Bytes for so many points.
+    /// Bytes for a number of points.
     #[must_use]
     pub fn bytes(points: usize) -> u64 {
         8 * points.div_ceil(METHOD.curve.patch) as u64
@@ -97,19 +98,20 @@ impl Spacings {
 }
 
 impl Density<'_> {
-    /// True if a point is off the surface: its `k` nearest neighbours reach as far as `last2`.
+    /// True if a point is off the surface; `last2` is the squared distance of the last of its `k` nearest
+    /// neighbours.
     #[must_use]
     pub fn is_off_surface(&self, id: u32, last2: u64) -> bool {
         self.limits.off_surface && is_far(last2, self.spacings.usual2(id))
     }
 
-    /// Tells of triangles whether they have a side that is too long for the surface at both of its ends.
+    /// Returns a test of triangles: true if a side is longer than the limit at both of its ends.
     pub fn is_long(self) -> impl Fn([u32; 3], [Point; 3]) -> bool + Copy {
         let (density, width) = (self, self.limits.edge);
         let sure = self.surely_within(width);
         #[inline(always)]
         move |t: [u32; 3], at: [Point; 3]| {
-            // The third side squared is at most twice the sum of the squares of the others.
+            // The square of the third side is at most twice the sum of the squares of the other two.
             let two = distance2(at[0], at[1]) as f64 + distance2(at[0], at[2]) as f64;
             let usual2 = |v: u32| density.spacings.usual2(v);
             let least = usual2(t[0]).min(usual2(t[1])).min(usual2(t[2]));
@@ -117,8 +119,8 @@ impl Density<'_> {
         }
     }
 
-    /// Sides whose squares are at most so many times the least `usual2` at their ends are within the limit,
-    /// however that is rounded.
+    /// A factor such that sides with squares up to this factor times the smallest `usual2` of their ends are
+    /// within the limit, whatever the rounding.
     fn surely_within(&self, width: Width) -> f64 {
         match width {
             Width::Spacings(x) => x * x * std::f64::consts::PI / self.neighbors as f64 * 0.999,
@@ -126,9 +128,8 @@ impl Density<'_> {
         }
     }
 
-    /// True if a triangle is too wide to fill a hole: it has a side that is far too long for the surface
-    /// at both of its ends, or a larger area than an equilateral triangle whose sides are just not too
-    /// long.
+    /// True if a triangle is too wide to fill a hole: it has a side much longer than the limit at both of its
+    /// ends, or a larger area than an equilateral triangle with sides of the limit.
     #[must_use]
     pub fn is_wide(&self, t: [u32; 3], at: [Point; 3]) -> bool {
         let width = self.limits.fill;
@@ -139,7 +140,7 @@ impl Density<'_> {
                 || area(at) > most(usual2[0].max(usual2[1]).max(usual2[2])))
     }
 
-    /// The square of a width where neighbours usually reach so far.
+    /// The square of a width in a patch with the usual reach `usual2`.
     fn square(&self, width: Width, usual2: u64) -> f64 {
         match width {
             Width::Any => f64::INFINITY,

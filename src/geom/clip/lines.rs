@@ -1,4 +1,4 @@
-//! Lines in a disk's plane and where they meet.
+//! Lines in a disk's plane and their intersections.
 
 use super::Normal;
 use crate::kernels::{Frame, Line, SLACK};
@@ -7,9 +7,9 @@ use crate::kernels::{Frame, Line, SLACK};
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Corner {
     pub at: [f64; 2],
-    /// Bound on the distance of `at` from the true corner.
+    /// Upper bound on the distance of `at` from the true corner.
     pub error: f64,
-    /// Squared distance of the true corner from the centre, at most.
+    /// Upper bound on the squared distance of the true corner from the centre.
     pub reach2: f64,
 }
 
@@ -39,7 +39,7 @@ pub(super) fn frame(normal: Normal) -> Frame {
     [u, cross(unit(n), u)]
 }
 
-/// Where two lines meet.
+/// The intersection of two lines.
 #[inline(always)]
 pub(super) fn meet(a: &Line, b: &Line) -> Corner {
     let determinant = a.line[0] * b.line[1] - a.line[1] * b.line[0];
@@ -56,7 +56,7 @@ pub(super) fn meet(a: &Line, b: &Line) -> Corner {
     }
 }
 
-/// A closer bound on the distance of `at`, where [`meet`] has two lines meet, from the true corner.
+/// A tighter bound on the distance of `at`, the intersection computed by [`meet`], from the true corner.
 pub(super) fn error_of_meeting(a: &Line, b: &Line, at: [f64; 2]) -> f64 {
     let determinant = a.line[0] * b.line[1] - a.line[1] * b.line[0];
     let distance = at[0].abs() + at[1].abs();

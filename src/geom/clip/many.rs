@@ -1,10 +1,10 @@
-//! Cells of hundreds of corners and more, as that of a point that many others lie around.
+//! Cells of hundreds of corners or more, for instance of a point in the middle of a sphere of points.
 //!
-//! A bisector is compared with the one corner that lies farthest in its direction, which an index of
-//! the sides by their directions finds, and then with those beside it until one stays. As long as
-//! every decision was exact or certain the corners are those of a convex polygon, and the outcome is
-//! that of a look at all corners. Once floating point had the last word on a corner of the rim, or
-//! would have it now, all are looked at, as in a small cell.
+//! An index of the sides by direction finds the corner that is extreme in the direction of a new bisector.
+//! The bisector is compared with this corner, and then with the corners beside it until one is kept. As long
+//! as every decision was exact or certain, the corners form a convex polygon and the outcome equals that of
+//! testing all corners. If a corner on the rim has been, or would now be, decided by uncertain floating
+//! point, all corners are tested, as in a small cell.
 
 use super::{Cell, Nearest, RIM_CORNERS, RIM_ID, Side};
 use crate::geom::predicate::{Neighbor, turn};
@@ -12,29 +12,29 @@ use crate::kernels::{Line, SLACK, bisectors, cut_corners};
 use std::cell::OnceCell;
 use std::collections::{BTreeMap, BinaryHeap};
 
-/// Cells of more corners are handled as such with many.
+/// Cells with more corners use the index.
 pub(super) const MANY: usize = 256;
 
-/// Sides that the index leads past at most, where directions are too close for it to tell.
+/// Most sides stepped over where directions are too close for the index to distinguish them.
 const STEPS: usize = 64;
 
-/// Balls in a ball.
+/// Balls grouped into a larger ball.
 const FAN: usize = 8;
 
-/// What a cell of many corners has besides them.
+/// The data that only a cell of many corners has.
 #[derive(Debug, Clone)]
 pub(super) struct Many {
-    /// The sides by their directions, as far as floating point tells: where they end.
+    /// The sides sorted by direction in floating point, with the corner at which each ends.
     ends: BTreeMap<(u64, u32), u32>,
-    /// How far corners reach, as bits, also such as are gone.
+    /// Squared reaches of corners, as bits; corners that have been cut off may still be included.
     reaches: BinaryHeap<(u64, u32)>,
     /// The corners on the rim.
     rim: Vec<u32>,
-    /// What the spheres around the corners fill, if anyone asked since the last cut.
+    /// Bounding balls of the spheres around the corners, if computed since the last cut.
     balls: OnceCell<Balls>,
 }
 
-/// A cell's corners in boxes, in boxes of boxes, and so on.
+/// A hierarchy of bounding balls over the cell's corners.
 #[derive(Debug, Clone)]
 struct Balls {
     levels: Vec<Vec<Ball>>,
@@ -45,12 +45,12 @@ struct Balls {
 struct Ball {
     low: [f64; 3],
     high: [f64; 3],
-    /// Squared radius of the largest.
+    /// Squared radius of the largest sphere.
     reach2: f64,
 }
 
 impl Cell {
-    /// As [`Cell::clip_nearest`], as long as the cell has many corners.
+    /// As [`Cell::clip_nearest`], while the cell has many corners.
     #[cold]
     pub(super) fn clip_many(&mut self, near: Nearest<'_>, mut next: usize) -> usize {
         if self.many.is_none() {
@@ -91,7 +91,7 @@ impl Cell {
         }
     }
 
-    /// The run of corners that `side` cuts off; `None` if only a look at all of them can tell.
+    /// The connected run of corners that `side` cuts off; `None` if all corners must be tested.
     fn run_around(&mut self, side: &Side) -> Option<Option<(u32, u32)>> {
         if self.unsure {
             return None;
@@ -120,7 +120,7 @@ impl Cell {
         Some((count < self.count).then_some((first, last)))
     }
 
-    /// Whether `side` cuts off corner `k`; `None` if that is a matter of rounding.
+    /// True if `side` cuts off corner `k`; `None` if rounding could decide it.
     fn surely_cuts(&self, k: u32, side: &Side) -> Option<bool> {
         let corner = self.corner(k as usize);
         let [x, y] = corner.at;
@@ -132,8 +132,7 @@ impl Cell {
         self.cuts(k as usize, side).or_else(certain)
     }
 
-    /// The corner that is farthest in the direction of `side`: the one between the directions of its
-    /// own sides.
+    /// The extreme corner in the direction of `side`: the one whose own two sides enclose this direction.
     fn support(&self, many: &Many, side: &Side) -> Option<u32> {
         let from = (key(&side.line), 0);
         let after = many
@@ -155,8 +154,8 @@ impl Cell {
         None
     }
 
-    /// Which way the direction of `to` turns from that of `from`, a side of the cell; `None` if that is
-    /// a matter of rounding.
+    /// Sign of the turn from the direction of `from`, a side of the cell, to that of `to`; `None` if rounding
+    /// could decide it.
     fn turn(&self, from: &Side, to: &Side) -> Option<i32> {
         let (a, b) = (&from.line, &to.line);
         let cross = a.line[0] * b.line[1] - a.line[1] * b.line[0];
@@ -167,7 +166,7 @@ impl Cell {
         (from.neighbor.id != RIM_ID).then(|| turn(self.normal, a, b))
     }
 
-    /// The sides between the corners from `first` to `last` go.
+    /// Removes the sides between the corners `first` and `last` from the index.
     fn unlist(&mut self, first: u32, last: u32) {
         let Some(many) = &mut self.many else { return };
         many.rim.retain(|k| *k != first);
@@ -181,7 +180,7 @@ impl Cell {
         }
     }
 
-    /// Takes in a new side and the corners where it begins and ends.
+    /// Adds to the index a new side with its first and last corner.
     fn list(&mut self, begin: u32, end: u32) {
         let number = self.links[end as usize].side;
         let line = self.sides[number as usize].line;
@@ -210,7 +209,7 @@ impl Cell {
         sides.iter().any(|side| side.neighbor.id == RIM_ID)
     }
 
-    /// The largest reach of a corner, after those on top that are of none any more are gone.
+    /// The largest reach of a corner; entries of removed corners are popped from the heap first.
     fn farthest(&self, reaches: &mut BinaryHeap<(u64, u32)>) -> f64 {
         while let Some(&(bits, k)) = reaches.peek() {
             if self.corner(k as usize).reach2.to_bits() == bits {
@@ -221,7 +220,7 @@ impl Cell {
         0.0
     }
 
-    /// Makes the index anew, and forgets sides that are no longer part of the polygon.
+    /// Rebuilds the index, and drops sides that are no longer part of the polygon.
     fn index(&mut self) {
         let mut sides = self.sides[..RIM_CORNERS].to_vec();
         let ring: Vec<u32> = self.ring().map(|k| k as u32).collect();
@@ -253,7 +252,7 @@ impl Cell {
         }
     }
 
-    /// Gives the memory of many corners back.
+    /// Releases the memory of many corners.
     #[cold]
     pub(super) fn forget_many(&mut self) {
         self.many = None;
@@ -268,8 +267,7 @@ impl Cell {
 
 impl Many {
     fn note(&mut self, reach2: f64, k: u32) {
-        // What is not a number does not count as the largest; bits of the others, none of which is
-        // negative, are in the order of the numbers.
+        // NaN is excluded. The other values are not negative, so their bits are ordered like their values.
         if !reach2.is_nan() {
             self.reaches.push((reach2.to_bits(), k));
         }
@@ -285,7 +283,7 @@ impl Many {
 impl Balls {
     fn of(cell: &Cell) -> Self {
         let corners: Vec<Ball> = cell.ring().map(|k| Ball::around(cell, k)).collect();
-        // Eight corners in a box say enough.
+        // Up to eight corners, one box suffices.
         let mut levels = vec![Ball::joined(&corners)];
         while let Some(below) = levels.last().filter(|below| below.len() > 1) {
             let above = Ball::joined(below);
@@ -294,7 +292,7 @@ impl Balls {
         Self { levels }
     }
 
-    /// Whether a box may meet a sphere of those in ball `number` of a level.
+    /// True if a box may intersect a sphere in ball `number` of a level.
     fn touch(&self, level: usize, number: usize, low: [f64; 3], high: [f64; 3]) -> bool {
         let Some(ball) = self.levels[level].get(number) else {
             return false;
@@ -320,7 +318,7 @@ impl Ball {
         }
     }
 
-    /// Each few together.
+    /// The next level: each few consecutive balls in one.
     fn joined(balls: &[Self]) -> Vec<Self> {
         let both = |a: &Self, b: &Self| Self {
             low: std::array::from_fn(|axis| a.low[axis].min(b.low[axis])),
@@ -332,8 +330,8 @@ impl Ball {
             .collect()
     }
 
-    /// False if no sphere around a point of the ball meets the box; rounding is monotone, so no
-    /// sphere that does is lost.
+    /// False if no sphere around a point of the ball intersects the box. Rounding is monotone, so no sphere
+    /// that does is missed.
     fn meets(&self, low: [f64; 3], high: [f64; 3]) -> bool {
         let mut distance2 = 0.0;
         for axis in 0..3 {
@@ -346,12 +344,12 @@ impl Ball {
     }
 }
 
-/// Directions in turn, for floating point: bits that grow with the angle.
+/// Bits that increase with the angle of a direction, computed in floating point.
 fn key(line: &Line) -> u64 {
     let [x, y] = line.line;
     let part = y / (x.abs() + y.abs());
     let turned = if x >= 0.0 { part } else { 2.0 - part };
-    // From one to five; of no direction at all any number will do.
+    // A value from one to five; arbitrary for a line without direction.
     (turned + 2.0).to_bits()
 }
 

@@ -1,10 +1,9 @@
 //! The restricted Voronoi cell of a point: its disk clipped by bisectors (paper, Algorithm 1).
 //!
-//! The polygon lives in two dimensions, in a frame of the disk's plane. Its corners are kept in
-//! columns, in no order, linked into a ring; each knows the side that it ends. Whether a new
-//! bisector cuts a corner off is read off floating point where a forward error bound allows, for
-//! all corners at once ([`crate::kernels::cut_corners`]), and else decided exactly
-//! ([`super::predicate`]).
+//! The polygon is two-dimensional, in a frame of the disk's plane. Its corners are kept in columns,
+//! unordered, and linked into a ring; each stores the side that ends at it. Whether a new bisector cuts off a
+//! corner is decided in floating point for all corners at once where a forward error bound allows
+//! ([`crate::kernels::cut_corners`]), else exactly ([`super::predicate`]).
 
 mod lines;
 mod many;
@@ -22,7 +21,7 @@ use lines::{Corner, error_of_meeting, frame, meet};
 use many::{MANY, Many};
 use rim::{RIM, RIM_CORNERS, RIM_DISTANCE, RIM_PLACES, RIM_SIDES};
 
-/// Id of a line that is part of the disk's rim and not a bisector.
+/// Id of a side that belongs to the disk's rim instead of a bisector.
 const RIM_ID: u32 = u32::MAX;
 
 /// A side of the polygon.
@@ -32,7 +31,7 @@ struct Side {
     neighbor: Neighbor,
 }
 
-/// Neighbours of a cell's point in columns, nearest first.
+/// Neighbours of a cell's point in columns, in ascending order of distance.
 #[derive(Debug, Clone, Copy)]
 pub struct Nearest<'a> {
     /// Squared distances.
@@ -47,35 +46,35 @@ pub struct Nearest<'a> {
     pub z: &'a [i32],
 }
 
-/// A restricted Voronoi cell in the making. One value can serve many cells in turn.
+/// A restricted Voronoi cell under construction. One value can be reused for many cells.
 #[derive(Debug, Clone)]
 pub struct Cell {
     level: Level,
     own: u32,
     normal: Normal,
     frame: Frame,
-    /// All sides so far, also those that are no longer part of the polygon; the rim's come first.
+    /// All sides so far, including those no longer part of the polygon; those of the rim come first.
     sides: Vec<Side>,
     corners: Vec<CornerGroup>,
-    /// Of each corner the next one around the polygon, and the side between it and the one before.
+    /// For each corner, the next corner around the polygon and the side between it and the previous one.
     links: Vec<Link>,
-    /// Places in the columns without a corner.
+    /// Unused places in the columns.
     free: Vec<u32>,
     count: usize,
-    /// Some corner.
+    /// One corner of the ring.
     head: u32,
     cut: Vec<u64>,
     doubt: Vec<u64>,
-    /// The largest of the corners'.
+    /// The largest `reach2` of the corners.
     reach2: f64,
-    /// Four times that, rounded up.
+    /// Four times `reach2`, rounded up.
     secure2: u64,
     hidden: bool,
-    /// True if floating point had the last word on a corner of the rim.
+    /// True if a corner on the rim was decided by uncertain floating point.
     unsure: bool,
-    /// Of a cell of many corners.
+    /// The index of a cell of many corners.
     many: Option<Box<Many>>,
-    /// Cells with more corners are handled as such with many.
+    /// Cells with more corners use the index.
     most: usize,
     #[cfg(test)]
     looks: usize,
@@ -89,7 +88,7 @@ struct Link {
 }
 
 impl Cell {
-    /// The whole disk of point `own`: radius in steps, in the plane with `normal`.
+    /// The whole disk of point `own`: `radius` in steps, in the plane with `normal`.
     #[must_use]
     pub fn new(own: u32, normal: Normal, radius: f64) -> Self {
         let rim = |line| Side {
@@ -129,7 +128,7 @@ impl Cell {
         cell
     }
 
-    /// Begins another cell in the same memory.
+    /// Starts a new cell in the same memory.
     pub fn start(&mut self, own: u32, normal: Normal, radius: f64) {
         self.own = own;
         self.normal = normal;
@@ -170,12 +169,12 @@ impl Cell {
         self.secure2 = ((4.0 * reach2 * (1.0 + 1e-9)) as u64).saturating_add(1);
     }
 
-    /// Number of places for corners.
+    /// Number of places for corners, used or not.
     fn places(&self) -> usize {
         self.corners.len() * LANES
     }
 
-    /// Makes free places up to a number of them, a multiple of [`LANES`]; lower ones are used first.
+    /// Increases the number of places, a multiple of [`LANES`], to `places`; lower ones are used first.
     fn grow(&mut self, places: usize) {
         let before = self.places() as u32;
         self.corners.resize(places / LANES, CornerGroup::default());
@@ -203,15 +202,15 @@ impl Cell {
         group.reach2[k] = corner.reach2;
     }
 
-    /// Points at a larger squared distance than this cannot touch the cell: four times the squared
-    /// radius of security, rounded up.
+    /// Points at a larger squared distance cannot touch the cell: four times the squared radius of security,
+    /// rounded up.
     #[must_use]
     #[inline]
     pub fn reach2(&self) -> u64 {
         self.secure2
     }
 
-    /// Clips by the bisector of the point `id` at `difference` from this cell's point.
+    /// Clips by the bisector of the point `id`, at `difference` from this cell's point.
     pub fn clip(&mut self, difference: [i64; 3], id: u32) {
         // Differences of coordinates in 0..2^30 fit 32 bits.
         let [x, y, z] = difference.map(|c| [c as i32]);
@@ -225,8 +224,8 @@ impl Cell {
         clip_nearest(self.level, self, near, 0);
     }
 
-    /// Clips by the bisectors of neighbours from number `next` on, nearest first, until one cannot
-    /// touch the cell; the number of that, or of all.
+    /// Clips by the bisectors of neighbours, nearest first, from index `next` until one cannot touch the
+    /// cell. Returns the index of that one, or the number of neighbours.
     pub fn clip_nearest(&mut self, near: Nearest<'_>, next: usize) -> usize {
         clip_nearest(self.level, self, near, next)
     }
@@ -243,16 +242,16 @@ impl Cell {
         }
     }
 
-    /// True for a point in the same place, which has no bisector.
+    /// True for a point at the same position, which has no bisector.
     #[inline(always)]
     fn shares_place(&mut self, neighbor: &Neighbor) -> bool {
         let same = neighbor.difference == [0; 3];
-        // Of two points in one place the heavier, with the lower id, has the cell.
+        // Of points at one position, the one with the lowest id (the largest weight) has the cell.
         self.hidden |= same && neighbor.id < self.own;
         same
     }
 
-    /// The run of corners that `side` cuts off, after a look at all of them.
+    /// The connected run of corners that `side` cuts off, found by testing all corners.
     #[inline(always)]
     fn scan(
         &mut self,
@@ -275,7 +274,7 @@ impl Cell {
         self.arc(side)
     }
 
-    /// Decides the corners that floating point does not.
+    /// Decides the corners that floating point leaves in doubt.
     #[cold]
     fn settle_doubts(&mut self, side: &Side) {
         for word in 0..self.doubt.len() {
@@ -293,7 +292,7 @@ impl Cell {
         }
     }
 
-    /// Whether `side` cuts off corner `k`: exact, or `None` for a corner on the rim.
+    /// True if `side` cuts off corner `k`, decided exactly; `None` for a corner on the rim.
     fn cuts(&self, k: usize, side: &Side) -> Option<bool> {
         let [a, b] = self.sides_at(k).map(|side| side.neighbor);
         let c = side.neighbor;
@@ -307,8 +306,9 @@ impl Cell {
         }
     }
 
-    /// True if rounding has no part in the depth of corner `k` being above or below zero: its own bound
-    /// is far too large where the lengths of its lines differ, as those of the rim and others do.
+    /// True if the sign of the depth of corner `k` is certain although it is within the general bound. That
+    /// bound is far too large where the lengths of the corner's two lines differ, as those of the rim and of
+    /// bisectors do.
     fn is_certain(&self, k: usize, side: &Side) -> bool {
         let [a, b] = self.sides_at(k).map(|side| &side.line);
         let [x, y] = self.corner(k).at;
@@ -333,7 +333,7 @@ impl Cell {
         self.cut[k as usize / 64] >> (k % 64) & 1 == 1
     }
 
-    /// The run of corners that is cut off, by its first and last; `None` if there is none.
+    /// The connected run of corners that is cut off, as its first and last; `None` if there is none.
     #[inline(always)]
     fn arc(&self, side: &Side) -> Option<(u32, u32)> {
         let total: usize = self.cut.iter().map(|w| w.count_ones() as usize).sum();
@@ -346,11 +346,11 @@ impl Cell {
         self.deepest_run(side)
     }
 
-    /// The run around the corner that is deepest beyond `side`, where there are several.
+    /// Of several runs, the one that contains the corner deepest beyond `side`.
     #[cold]
     fn deepest_run(&self, side: &Side) -> Option<(u32, u32)> {
-        // A line cuts one run off a convex polygon; rim corners decided in floating point might
-        // say otherwise by a hair, so the run around the deepest one counts.
+        // A line cuts one run off a convex polygon. Rounding at rim corners can split it; the run of the
+        // deepest corner is then taken.
         let mut deepest: Option<(f64, u32)> = None;
         for k in (0..self.places() as u32).filter(|k| self.is_cut(*k)) {
             let depth = self.depth(k as usize, side).max(f64::MIN_POSITIVE);
@@ -362,8 +362,8 @@ impl Cell {
         Some((first, last))
     }
 
-    /// The run of cut corners around `seed`: first, last, how many. The cell's own point is never
-    /// cut off, so some corner stays: `None` if none does.
+    /// The run of cut corners around `seed`: first, last, length. `None` if no corner would remain, which is
+    /// impossible in exact arithmetic: the cell contains its own point.
     #[inline(always)]
     fn run(&self, seed: u32) -> Option<(u32, u32, usize)> {
         let (mut first, mut last, mut count) = (seed, seed, 1);
@@ -378,8 +378,8 @@ impl Cell {
         (count < self.count).then_some((first, last, count))
     }
 
-    /// Puts `side` in place of the corners from `first` to `last`, and the sides between them; it ends at
-    /// the corner that is returned.
+    /// Replaces the corners from `first` to `last`, and the sides between them, by `side`. Returns the corner
+    /// at which it ends.
     #[inline(always)]
     fn replace(&mut self, first: u32, last: u32, side: Side) -> u32 {
         let start = self.links[first as usize];
@@ -394,7 +394,8 @@ impl Cell {
         let into = self.links[end.next as usize].side;
         let entry = meet(&self.sides[start.side as usize].line, &side.line);
         let exit = meet(&side.line, &self.sides[into as usize].line);
-        // The side before the run now ends where it meets the new side, and that at the side after.
+        // The side before the run now ends at its intersection with the new side, and the new side at its
+        // intersection with the side after the run.
         self.set_corner(first as usize, entry);
         let second = self.free_place();
         self.set_corner(second as usize, exit);
@@ -418,7 +419,7 @@ impl Cell {
         self.free.pop().unwrap_or_default()
     }
 
-    /// The places of the corners, in turn around the cell.
+    /// The places of the corners, in order around the cell.
     fn ring(&self) -> impl Iterator<Item = usize> + '_ {
         let first = self.head;
         std::iter::successors(Some(first), move |k| {
@@ -428,8 +429,8 @@ impl Cell {
         .map(|k| k as usize)
     }
 
-    /// Calls `each` with the ids of the two bisectors at every corner between bisectors, in turn
-    /// around the cell: with the cell's own id, the triples it sees.
+    /// Calls `each` with the ids of the two bisectors at every corner between bisectors, in order around the
+    /// cell. With the cell's own id these are its triples.
     pub fn triples(&self, mut each: impl FnMut(u32, u32)) {
         if self.hidden {
             return;
@@ -451,7 +452,7 @@ kernel! {
 #[inline(always)]
 fn clip_nearest_body<E: Eight>(cell: &mut Cell, near: Nearest<'_>, mut next: usize) -> usize {
     let count = near.distances2.len();
-    // After eight lines that changed nothing, most will change nothing.
+    // After eight bisectors without effect, most of the following have none.
     let mut quiet = false;
     while next < count {
         if cell.count > cell.most || cell.many.is_some() {

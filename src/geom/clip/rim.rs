@@ -1,4 +1,4 @@
-//! The disk: a regular polygon, as it is before any bisector clips it.
+//! The disk: a regular decagon, before any bisector clips it.
 
 use super::Link;
 use crate::kernels::{CornerGroup, LANES, SLACK};
@@ -6,8 +6,8 @@ use crate::kernels::{CornerGroup, LANES, SLACK};
 /// Number of corners of the disk.
 pub(super) const RIM_CORNERS: usize = 10;
 
-/// Unit normals of the disk's sides, at odd multiples of 18 degrees, and their distance from the
-/// centre, cos 18°, for a disk of radius 1. Written out so that no library function decides bits.
+/// Unit normals of the disk's sides, at odd multiples of 18 degrees, and their distance from the centre, cos
+/// 18°, for a disk of radius 1. They are literals, so that no library function affects the result.
 pub(super) const RIM_SIDES: [[f64; 2]; RIM_CORNERS] = [
     [0.951_056_516_295_153_5, 0.309_016_994_374_947_45],
     [0.587_785_252_292_473_1, 0.809_016_994_374_947_5],
@@ -22,7 +22,7 @@ pub(super) const RIM_SIDES: [[f64; 2]; RIM_CORNERS] = [
 ];
 pub(super) const RIM_DISTANCE: f64 = 0.951_056_516_295_153_5;
 
-/// Places for corners in the beginning.
+/// Initial number of places for corners.
 pub(super) const RIM_PLACES: usize = RIM_CORNERS.next_multiple_of(LANES);
 
 /// The disk of radius 1.

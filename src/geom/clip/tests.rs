@@ -42,7 +42,7 @@ fn of_two_points_in_one_place_the_lower_id_has_the_cell() {
     assert!(cell.hidden);
 }
 
-/// Points around a circle of `radius`, a little inside a regular polygon of `count` corners.
+/// Points around a circle of `radius`, slightly inside a regular polygon of `count` corners.
 fn around(count: u32, radius: f64, first: u32) -> Vec<([i64; 3], u32)> {
     let at = |k: u32| {
         let angle = f64::from(k) / f64::from(count) * std::f64::consts::TAU;
@@ -66,7 +66,7 @@ fn a_polygon_of_hundreds_of_corners_and_a_cut_through_most_of_them() {
         let all = seen(&cell);
         assert_eq!(all.len(), 300);
         assert!(ring.iter().all(|pair| all.contains(pair)) && all.contains(&(1, 300)));
-        // A pentagon inside leaves the five corners between its own sides.
+        // Clipping by a pentagon inside leaves only the five corners between its own sides.
         for &(difference, id) in &inner {
             cell.clip(difference, id);
         }
@@ -84,7 +84,7 @@ fn a_polygon_of_hundreds_of_corners_and_a_cut_through_most_of_them() {
 }
 
 proptest! {
-    /// Corners found by clipping are those that no other bisector cuts off, decided exactly.
+    /// The corners found by clipping are exactly those that no other bisector cuts off.
     #[test]
     fn corners_are_those_nobody_cuts_off(
         points in prop::collection::hash_set(prop::array::uniform3(-6i64..=6), 3..14),
@@ -109,7 +109,7 @@ proptest! {
         }
         expected.sort_unstable();
         for level in Level::all() {
-            // A disk so large that every bounded corner is inside.
+            // A disk so large that it contains every bounded corner.
             let mut cell = Cell::new(0, normal, 1e7);
             cell.level = level;
             all.iter().for_each(|p| cell.clip(p.difference, p.id));

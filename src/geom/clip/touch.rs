@@ -1,4 +1,4 @@
-//! What can touch a cell: boxes and points that need no closer look if they cannot.
+//! Conservative tests whether boxes and points can touch a cell.
 
 use super::Cell;
 use crate::geom::Point;
@@ -6,8 +6,8 @@ use crate::kernels::eight::Eight;
 use crate::kernels::{LANES, bisectors_body, kernel, touching_body};
 
 impl Cell {
-    /// False if no point in a box, given relative to the cell's point, can change the cell: a point
-    /// cuts off a corner only if it is nearer to the corner than the cell's own point.
+    /// False if no point in a box, given relative to the cell's point, can change the cell. A point cuts off
+    /// a corner only if it is nearer to the corner than the cell's own point.
     #[must_use]
     pub fn may_touch(&self, low: [f64; 3], high: [f64; 3]) -> bool {
         if let Some(many) = &self.many {
@@ -26,8 +26,8 @@ impl Cell {
         })
     }
 
-    /// Puts down the places of all points, in columns, whose bisectors may cut off a corner; `own` is
-    /// the cell's point. Many others may be among them if the cell has many corners.
+    /// Appends to `places` the places, in `columns`, of all points whose bisectors may cut off a corner;
+    /// `own` is the cell's point. If the cell has many corners, many other points may be included.
     pub fn touching(&self, columns: [&[i32]; 3], own: Point, places: &mut Vec<u32>) {
         if self.many.is_some() {
             places.extend(0..columns[0].len() as u32);

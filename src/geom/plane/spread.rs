@@ -1,12 +1,11 @@
-//! How points spread: the eigenvalues of a scatter and its least direction, for one point or for
-//! eight at a time.
+//! Eigenvalues of a scatter matrix and the direction of least scatter, for one point or eight at a time.
 
 use super::{NORMAL_SCALE, Normal};
 use crate::geom::round::rounded;
 use crate::kernels::eight::Numbers;
 use crate::method::METHOD;
 
-/// A scatter with some extent, divided by the largest of its diagonal, and its eigenvalues.
+/// A scatter matrix that is not zero, divided by the largest of its diagonal, and its eigenvalues.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Spread<F> {
     /// xx, yy, zz, xy, xz, yz.
@@ -16,7 +15,7 @@ pub(super) struct Spread<F> {
     top: F,
 }
 
-/// The largest of a scatter's diagonal; without extent it is 0, and there is no [`Spread`].
+/// The largest of a scatter's diagonal. If it is 0, all points coincide and there is no [`Spread`].
 #[inline(always)]
 pub(super) fn extent<F: Numbers>(scatter: &[F; 6]) -> F {
     scatter[0].larger(scatter[1]).larger(scatter[2])
@@ -37,7 +36,7 @@ impl<F: Numbers> Spread<F> {
         ];
         let least = least_eigenvalue(&m);
         let trace = m[0] + m[1] + m[2];
-        // The two others, from the trace and the sum of the principal minors.
+        // The other two eigenvalues, from the trace and the sum of the principal minors.
         let zero = F::splat(0.0);
         let rest = trace - least;
         let product = (minors(&m) - least * rest).larger(zero);
@@ -52,20 +51,20 @@ impl<F: Numbers> Spread<F> {
         }
     }
 
-    /// Bits of those whose points lie on a line.
+    /// Bits of the lanes whose points lie on a line.
     #[inline(always)]
     pub fn on_lines(&self) -> u64 {
         (F::splat(METHOD.plane.line) * self.top).greater(self.middle)
     }
 
-    /// Bits of those whose points lie on a narrow band.
+    /// Bits of the lanes whose points lie on a narrow band.
     #[inline(always)]
     pub fn on_bands(&self) -> u64 {
         (F::splat(METHOD.plane.band) * self.top).greater(self.middle)
     }
 
-    /// The direction that `m - least` maps to nothing: the longest cross product of its rows, as long
-    /// as a [`Normal`]; and how long that product was. With no length there is no direction.
+    /// The null direction of `m - least`: the longest cross product of its rows, scaled to the length of a
+    /// [`Normal`], and the length of the product. If that is 0 there is no such direction.
     #[inline(always)]
     pub fn direction(&self) -> ([F; 3], F) {
         let [a, b, c] = self.rows();
@@ -94,7 +93,7 @@ impl<F: Numbers> Spread<F> {
 }
 
 impl Spread<f64> {
-    /// The direction in which points spread least.
+    /// The direction of least scatter.
     #[inline(always)]
     pub fn normal(&self) -> Option<Normal> {
         let (direction, length) = self.direction();
@@ -104,7 +103,7 @@ impl Spread<f64> {
         self.across()
     }
 
-    /// Any direction across the longest row: points almost on a line, whose rows are all parallel.
+    /// A direction across the longest row, for points almost on a line: all rows are parallel.
     #[cold]
     fn across(&self) -> Option<Normal> {
         let rows = self.rows();
@@ -142,8 +141,8 @@ fn minors<F: Numbers>(m: &[F; 6]) -> F {
     (m[0] * m[1] - m[3] * m[3]) + (m[0] * m[2] - m[4] * m[4]) + (m[1] * m[2] - m[5] * m[5])
 }
 
-/// Newton's method from below on the characteristic polynomial, which is monotone up to its
-/// least root.
+/// Newton's method for the least root of the characteristic polynomial, from below, where the polynomial is
+/// monotone.
 #[inline(always)]
 fn least_eigenvalue<F: Numbers>(m: &[F; 6]) -> F {
     let (zero, two, three) = (F::splat(0.0), F::splat(2.0), F::splat(3.0));
@@ -170,7 +169,7 @@ fn least_eigenvalue<F: Numbers>(m: &[F; 6]) -> F {
     x
 }
 
-/// A direction of the length of a [`Normal`] as one.
+/// A direction of the length of a [`Normal`], rounded to one.
 #[inline]
 pub(super) fn normal([x, y, z]: [f64; 3]) -> Normal {
     [rounded(x) as i32, rounded(y) as i32, rounded(z) as i32]

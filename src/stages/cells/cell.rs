@@ -1,4 +1,5 @@
-//! One cell: neighbours, plane, disk, clipping up to the radius of security (paper, 3.3 and 3.4).
+//! Computation of one cell: neighbours, plane, disk, clipping up to the radius of security (paper, 3.3 and
+//! 3.4).
 
 use crate::error::Result;
 use crate::geom::Point;
@@ -14,7 +15,7 @@ use crate::stages::tiles::neighbors::Neighbors;
 use crate::stages::tiles::walk::{PageCache, Walk};
 use crate::stages::tiles::wanted::Wanted;
 
-/// Disk radius in lattice steps, or from the neighbours.
+/// The radius of the disk.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum DiskRadius {
     /// Twice the distance of the last neighbour used for the plane.
@@ -23,27 +24,27 @@ pub enum DiskRadius {
     Steps(f64),
 }
 
-/// What became of a point.
+/// Outcome for one point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outcome {
-    /// Its cell is complete and certified; its triples were handed out.
+    /// The cell is complete and certified; its triples were reported.
     Complete,
-    /// The tile does not prove the cell; nothing was handed out.
+    /// The points of the tile do not certify the cell; nothing was reported.
     Uncertain,
-    /// All its neighbours are on one line: no plane, no cell.
+    /// All neighbours are on one line: no plane, no cell.
     NoPlane,
-    /// It lies far off the surface that its neighbours are on: no cell.
+    /// The point lies far off the surface of its neighbours: no cell.
     OffSurface,
 }
 
-/// Where the neighbours of a point come from.
+/// A source of the neighbours of a point.
 trait Source {
-    /// The neighbours known so far, nearest first.
+    /// The neighbours found so far, nearest first.
     fn near(&self) -> &Neighbors;
-    /// Makes `count` neighbours known, or all there are; false if that cannot be certified.
+    /// Finds `count` neighbours, or all other points if there are fewer; false if they cannot be certified.
     fn reach(&mut self, count: usize) -> Result<bool>;
-    /// The sums over the `count` nearest neighbours, or over all if there are fewer, and how many
-    /// those are; `None` if that cannot be certified.
+    /// The sums over the `count` nearest neighbours, or over all other points if there are fewer, and the
+    /// number of points summed; `None` if they cannot be certified.
     fn sums(&mut self, count: usize) -> Result<Option<(Sums, usize)>>;
 }
 
@@ -61,7 +62,7 @@ impl Source for Query<'_> {
     }
 }
 
-/// Neighbours from the whole store.
+/// Neighbours searched in the whole store.
 struct Walked<'a> {
     walk: Walk<'a>,
     near: Neighbors,
@@ -89,21 +90,21 @@ impl Source for Walked<'_> {
     }
 }
 
-/// The plane of a point and the moments it came from.
+/// The plane fitted to a point's neighbours, and the moments it follows from.
 #[derive(Debug, Clone, Copy)]
 pub struct Fit {
-    /// Normal, and whether the neighbours span a plane.
+    /// The normal, and whether the neighbours span a plane.
     pub plane: Plane,
     /// The sums over the neighbours.
     pub moments: Moments,
     /// Squared distance of the last neighbour used.
     pub last2: u64,
-    /// Squared distance of the last of the neighbours asked for, before there were more.
+    /// Squared distance of the last of the requested neighbours, before widening.
     pub near2: u64,
 }
 
 impl Fit {
-    /// The plane of neighbours that are summed up.
+    /// The plane of neighbours given by their sums.
     #[must_use]
     pub fn of(sums: Sums) -> Self {
         Self {
@@ -131,7 +132,7 @@ fn fit_from(source: &mut impl Source, neighbors: usize, widen: Widen) -> Result<
         if enough || used < wanted {
             break;
         }
-        // Which they are matters here, and not yet in what order.
+        // Only the set of neighbours matters here, not yet their order.
         wanted *= 2;
         let Some((sums, count)) = source.sums(wanted)? else {
             return Ok(None);
@@ -145,30 +146,30 @@ fn fit_from(source: &mut impl Source, neighbors: usize, widen: Widen) -> Result<
     Ok(Some(fit))
 }
 
-/// When a plane takes in twice the neighbours that it was asked for, up to eight times as many.
+/// When the fit of a plane doubles the number of neighbours, up to eight times the requested one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Widen {
-    /// Never: exactly these.
+    /// Never: exactly the requested neighbours.
     Never,
-    /// As long as they lie on a line.
+    /// While the neighbours lie on a line.
     OnLines,
-    /// As long as they lie on a narrow band, such as two scan lines.
+    /// While the neighbours lie on a narrow band, such as two scan lines.
     OnBands,
 }
 
-/// Makes cells one after the other in the same memory.
+/// Computes cells one after another in the same memory.
 #[derive(Debug)]
 pub struct CellMaker<'a> {
     neighbors: usize,
     radius: DiskRadius,
     widen: Widen,
-    /// Points off the surface get no cell.
+    /// If given, points off the surface get no cell.
     density: Option<Density<'a>>,
     cell: Cell,
 }
 
 impl<'a> CellMaker<'a> {
-    /// For planes of `neighbors` neighbours and disks of `radius`.
+    /// For planes through `neighbors` neighbours and disks of `radius`.
     #[must_use]
     pub fn new(
         neighbors: usize,
@@ -185,7 +186,7 @@ impl<'a> CellMaker<'a> {
         }
     }
 
-    /// Begins the cell of a point; why it gets none.
+    /// Starts the cell of a point, or returns the reason why it has none.
     fn start(&mut self, id: u32, fit: &Fit) -> Option<Outcome> {
         let Some(normal) = fit.plane.normal else {
             return Some(Outcome::NoPlane);
@@ -203,7 +204,8 @@ impl<'a> CellMaker<'a> {
         None
     }
 
-    /// The cell of a point from what its tile knows; `each` gets the ids at its corners.
+    /// Computes the cell of a point from the points in its tile and halo. `each` receives the ids at its
+    /// corners.
     ///
     /// # Errors
     /// None today; the signature is that of [`CellMaker::from_store`].
@@ -224,7 +226,7 @@ impl<'a> CellMaker<'a> {
                 self.cell.triples(each);
                 return Ok(Outcome::Complete);
             }
-            // On scan lines thousands of points are nearer than what can touch the cell.
+            // On scan lines, thousands of points are nearer than the farthest one that can touch the cell.
             let touching = Touching {
                 cell: &self.cell,
                 own: query.point(),
@@ -235,7 +237,7 @@ impl<'a> CellMaker<'a> {
         }
     }
 
-    /// The cell of a point from the whole store.
+    /// Computes the cell of a point from the whole store.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
@@ -270,7 +272,7 @@ impl<'a> CellMaker<'a> {
     }
 }
 
-/// What can change the cell of the point `own`.
+/// Selects the points that can change the cell of the point `own`.
 struct Touching<'a> {
     cell: &'a Cell,
     own: Point,
@@ -287,7 +289,8 @@ impl Wanted for Touching<'_> {
     }
 }
 
-/// The plane of the `neighbors` nearest from what the tile knows; `None` if uncertain.
+/// The plane of the `neighbors` nearest, from the points in a tile and its halo; `None` if they cannot be
+/// certified.
 ///
 /// # Errors
 /// None today; see [`fit_in_store`].
@@ -314,7 +317,7 @@ pub fn fit_in_store(
     fit_from(&mut source, neighbors, widen)
 }
 
-/// The `count` nearest of a point, or all there are, from the whole store.
+/// The `count` nearest neighbours of a point, or all other points if there are fewer, from the whole store.
 ///
 /// # Errors
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`].

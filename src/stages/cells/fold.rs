@@ -1,26 +1,26 @@
-//! The triples seen by the cells of a tile, each once with its count (paper, section 3.4).
+//! The distinct triples of the cells of a tile with their counts (paper, section 3.4).
 
 use super::{CountedTriple, SentTriple, TileRanges};
 use crate::workspace::memory::{Holding, bytes_of};
 use std::ops::Range;
 
-/// Triples as the cells of one tile see them, and the memory to put them in order.
+/// Triples of the cells of one tile, and memory for sorting them.
 #[derive(Debug)]
 pub(super) struct Seen {
     ids: Range<usize>,
-    /// Those whose smallest vertex is in the tile: its rank there, and the other two in one word.
+    /// Triples whose smallest vertex is in the tile: its rank there, and the other two vertices in one word.
     here: Vec<(u32, u32, u32)>,
-    /// How many of `here` begin with each vertex.
+    /// The number of triples in `here` for each smallest vertex.
     begins: Vec<u32>,
     elsewhere: Vec<[u32; 3]>,
     held: Holding,
 }
 
-/// Counted triples of the tile and of others, both ascending.
+/// Counted triples of this tile and those sent to other tiles, both ascending.
 pub(super) type Folded = (Vec<CountedTriple>, Vec<SentTriple>);
 
 impl Seen {
-    /// Bytes that the triples of `points` cells take at most: usual cells have five or six corners
+    /// Upper estimate of the bytes for the triples of `points` cells: usual cells have five or six corners
     /// between bisectors.
     pub fn bytes(points: usize) -> u64 {
         points as u64 * 200
@@ -39,18 +39,18 @@ impl Seen {
         seen
     }
 
-    /// Tells what the lists take, and `more` bytes. Room that was never written to takes none.
+    /// Reports the memory in use: the lists and `more` bytes. Room that was never written to is not counted.
     pub fn tell(&mut self, more: u64) {
         let lists = size_of_val(&*self.here) + size_of_val(&*self.elsewhere);
         self.held.set(lists as u64 + bytes_of(&self.begins) + more);
     }
 
-    /// Number of triples so far, each as often as it was seen.
+    /// Number of triples so far, with repetitions.
     pub fn len(&self) -> usize {
         self.here.len() + self.elsewhere.len()
     }
 
-    /// The cell of `v` sees the triple that it makes with `a` and `b`.
+    /// Adds the triple of `a` and `b` in the cell of `v`.
     #[inline]
     pub fn see(&mut self, v: u32, a: u32, b: u32) {
         let (low, high) = (a.min(b), a.max(b));
@@ -64,10 +64,10 @@ impl Seen {
         }
     }
 
-    /// Equal triples as one row with a count.
+    /// Merges equal triples into one row with a count.
     pub fn fold(mut self, tiles: &TileRanges) -> Folded {
         self.tell(self.here.len() as u64 * 8);
-        // By smallest vertex with one pass of counting, then in order by hand: half a dozen each.
+        // A counting sort by smallest vertex; then one small sort for each vertex, of about six triples.
         let mut start = std::mem::take(&mut self.begins);
         for rank in 1..start.len() {
             start[rank] += start[rank - 1];
@@ -82,7 +82,7 @@ impl Seen {
         let mut kept: Vec<CountedTriple> = Vec::with_capacity(sorted.len() / 2);
         let mut begin = 0;
         for (i, end) in (self.ids.start as u32..).zip(&start[..self.ids.len()]) {
-            // Every place has moved on to where the next vertex begins.
+            // After the counting sort, the start of a vertex has become the start of the next one.
             let pairs = &mut sorted[begin..*end as usize];
             begin = *end as usize;
             pairs.sort_unstable();

@@ -23,11 +23,11 @@ use fold::Seen;
 use serde::Serialize;
 use std::ops::Range;
 
-/// Bytes reserved for sorting the triples that leave their tile.
+/// Bytes reserved for sorting the triples that are sent to other tiles.
 const SHUFFLE_BUFFER: u64 = 16 << 20;
 
 row! {
-    /// A triple of ids, ascending, and the number of cells that have it as a corner.
+    /// A triple of ids, ascending, and the number of cells that see it.
     pub struct CountedTriple {
         /// Ids, ascending.
         triple: [u32; 3],
@@ -38,7 +38,7 @@ row! {
 }
 
 row! {
-    /// A counted triple on its way to a tile or a block.
+    /// A counted triple that is sent to a tile or a block.
     pub struct SentTriple {
         /// Number of the tile or block.
         to: u32,
@@ -50,7 +50,7 @@ row! {
     packed Above Above Rising Rising Above
 }
 
-/// The triples that are corners of cells, sorted, by the tile of their smallest vertex.
+/// The triples seen by cells, sorted, by the tile of their smallest vertex.
 #[derive(Debug)]
 pub struct CellTriples {
     /// Division into tiles.
@@ -59,24 +59,24 @@ pub struct CellTriples {
     pub own: Table<CountedTriple>,
     /// Triples seen by the cells of later tiles.
     pub received: Table<SentTriple>,
-    /// Points of each tile that lie off the surface of their neighbours, ascending.
+    /// Points off the surface of their neighbours, ascending, by tile.
     pub off: Table<Id>,
 }
 
 /// Counts of this stage.
 #[derive(Debug, Clone, Copy, Default, Serialize, PartialEq, Eq)]
 pub struct CellStats {
-    /// Cells whose halo did not prove them and that were made from the whole cloud.
+    /// Cells not certified by the halo of their tile, which were computed from the whole store.
     pub second_looks: u64,
     /// Points without a plane: all their neighbours are on one line.
     pub no_plane: u64,
-    /// Points off the surface that their neighbours are on; they are not in the mesh.
+    /// Points off the surface of their neighbours; they are not in the mesh.
     pub off_surface: u64,
-    /// Corners of cells: triples, each as often as it was seen.
+    /// Corners of cells, i.e. triples with repetitions.
     pub raw_triples: u64,
 }
 
-/// Tiles: ranges of at most `size` ids that do not cross a block's border.
+/// Tiles: ranges of at most `size` ids, none of which crosses the boundary of a block.
 #[derive(Debug, Clone, Copy)]
 pub struct TileRanges {
     blocks: Blocks,
@@ -86,7 +86,7 @@ pub struct TileRanges {
 }
 
 impl TileRanges {
-    /// Tiles of at most `size` points.
+    /// Divides each block into tiles of at most `size` points.
     #[must_use]
     pub fn new(blocks: Blocks, size: u32) -> Self {
         let block = blocks.ids(0).end.max(1);
@@ -99,7 +99,7 @@ impl TileRanges {
         }
     }
 
-    /// Points of a tile at most.
+    /// Largest number of points in a tile.
     #[must_use]
     pub fn size(&self) -> u32 {
         self.size
@@ -243,7 +243,7 @@ fn one_tile(
     if let Some(error) = failed {
         return Err(error);
     }
-    // It has grown beside the tile and the search.
+    // The list has grown beside the tile and the search.
     seen.tell(0);
     drop(tile);
     let mut cache = PageCache::default();

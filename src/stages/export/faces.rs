@@ -1,4 +1,4 @@
-//! The triangles of a block in the file's numbers.
+//! The triangles of a block, with the vertex numbers of the mesh file.
 
 use super::number::{Numbering, Split};
 use crate::error::Result;
@@ -11,18 +11,18 @@ use std::ops::Range;
 pub struct Faces<'a> {
     numbering: &'a Numbering<'a>,
     ids: Range<u32>,
-    /// Numbers of the block's vertices.
+    /// Numbers in the file of the block's vertices.
     numbers: Vec<u32>,
-    /// Those of the surface, ascending by sorted ids.
+    /// Triangles of the surface, ascending by sorted ids.
     triangles: Vec<[u32; 3]>,
-    /// Those that fill holes, likewise.
+    /// Triangles that fill holes, in the same order.
     filled: Vec<[u32; 3]>,
-    /// Corners that take copies, by triangle.
+    /// Corners that use copies of pinched vertices, by triangle.
     splits: Vec<Split>,
 }
 
 impl<'a> Faces<'a> {
-    /// Reads the triangles of a block with vertices `ids`.
+    /// Reads the triangles of the block whose ids are `ids`.
     pub fn load(
         repaired: &Repaired,
         numbering: &'a Numbering<'a>,
@@ -44,7 +44,7 @@ impl<'a> Faces<'a> {
         })
     }
 
-    /// Bytes that its lists take.
+    /// Bytes allocated by the lists.
     pub fn taken(&self) -> u64 {
         let triangles = bytes_of(&self.triangles) + bytes_of(&self.filled);
         triangles + bytes_of(&self.numbers) + bytes_of(&self.splits)
@@ -61,11 +61,11 @@ impl<'a> Faces<'a> {
         &self.triangles[first..]
     }
 
-    /// Gives all triangles to `put`, ascending by sorted ids.
+    /// Passes all triangles to `put`, ascending by sorted ids.
     pub fn for_each(&self, mut put: impl FnMut([u32; 3])) {
         let mut filled = self.filled.iter().copied().peekable();
         let mut splits = &self.splits[..];
-        // The smallest vertex of the next triangle that needs more than numbers.
+        // The smallest vertex of the next triangle that needs a lookup of copies or of another block.
         let mut special = 0;
         for &t in self.own() {
             if t[0] >= special {
@@ -88,7 +88,7 @@ impl<'a> Faces<'a> {
         own.copied().unwrap_or_else(|| self.numbering.vertex(v))
     }
 
-    /// A triangle with corners that may take copies: those in a fan with a copy of its own.
+    /// Numbers of a triangle whose corners may use copies.
     fn special(&self, t: [u32; 3], splits: &mut &[Split]) -> [u32; 3] {
         let mut out = t.map(|v| self.number(v));
         while let Some((s, rest)) = splits.split_first()

@@ -1,4 +1,4 @@
-//! The mesh file while it is written: slices at known offsets, under a temporary name.
+//! The mesh file while it is being written: slices at known offsets, under a temporary name.
 
 use super::format::{Layout, Mesh, MeshFormat, Records};
 use crate::error::{Error, Result};
@@ -10,15 +10,15 @@ use std::fs::File;
 use std::os::unix::fs::{FileExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 
-/// Records that are encoded at a time.
+/// Records encoded at a time.
 const BATCH: usize = 1024;
 
-/// A mesh file under its temporary name. It is deleted unless finished, but for a run that can be
-/// resumed.
+/// A mesh file under its temporary name. It is deleted if it is dropped unfinished, except in a run that can
+/// be resumed.
 pub struct MeshFile<'a> {
     output: PathBuf,
     temporary: PathBuf,
-    /// None if the mesh has its name already.
+    /// `None` if the mesh already has its final name.
     file: Option<File>,
     format: &'static dyn MeshFormat,
     mesh: Mesh,
@@ -26,7 +26,7 @@ pub struct MeshFile<'a> {
     workspace: &'a Workspace,
 }
 
-/// The mesh's name until it is finished, beside its last one.
+/// The temporary name of a mesh, in the same folder as the final one.
 #[must_use]
 pub fn temporary(output: &Path) -> PathBuf {
     let mut name = std::ffi::OsString::from(".");
@@ -35,12 +35,12 @@ pub fn temporary(output: &Path) -> PathBuf {
     folder_of(output).join(name)
 }
 
-/// The number of the header among the parts of the mesh.
+/// Number of the header among the parts of the mesh.
 const HEADER: u32 = u32::MAX;
 
 impl<'a> MeshFile<'a> {
-    /// Writes the header of a mesh beside `output`, or opens the file in which an earlier attempt at the
-    /// run did.
+    /// Writes the header of a mesh beside `output`, or reopens the file if an earlier attempt of the run
+    /// wrote it.
     ///
     /// # Errors
     /// [`Error::Io`]; [`Error::Disk`] if there is no room for the whole file.
@@ -63,7 +63,7 @@ impl<'a> MeshFile<'a> {
         if known.is_empty() {
             file.begin()?;
         } else {
-            // Every part was checked, in one file or the other.
+            // All parts were verified, in the temporary or in the final file.
             match open_existing(&file.temporary) {
                 Ok(found) => {
                     file.file = Some(found);
@@ -86,7 +86,7 @@ impl<'a> MeshFile<'a> {
                 free,
             });
         }
-        // Left by a run that died, and whose scratch folder is gone.
+        // May remain from an interrupted run whose scratch folder was deleted.
         let _ = std::fs::remove_file(&self.temporary);
         let file = options()
             .mode(0o666)
@@ -133,17 +133,17 @@ impl<'a> MeshFile<'a> {
         })
     }
 
-    /// Bytes of a vertex.
+    /// Bytes of one vertex record.
     pub fn vertex_bytes(&self) -> usize {
         self.layout.vertices.bytes as usize
     }
 
-    /// Bytes of a triangle.
+    /// Bytes of one triangle record.
     pub fn triangle_bytes(&self) -> usize {
         self.layout.triangles.bytes as usize
     }
 
-    /// Appends the bytes of vertices to `bytes`.
+    /// Appends the encoded vertices to `bytes`.
     pub fn encode_vertices(&self, positions: impl Iterator<Item = [f64; 3]>, bytes: &mut Vec<u8>) {
         let put = |batch: &[[f64; 3]]| self.format.put_vertices(&self.mesh, batch, bytes);
         let mut batch = Batch::new(put);
@@ -151,12 +151,12 @@ impl<'a> MeshFile<'a> {
         batch.finish();
     }
 
-    /// A batch of triangles, whose bytes go to `bytes`.
+    /// A batch of triangles that are encoded to the end of `bytes`.
     pub fn triangles(&self, bytes: &mut Vec<u8>) -> Batch<[u32; 3], impl FnMut(&[[u32; 3]])> {
         Batch::new(|batch: &[[u32; 3]]| self.format.put_triangles(&self.mesh, batch, bytes))
     }
 
-    /// Writes encoded vertices from number `first` on, as part `part` of the mesh.
+    /// Writes encoded vertices, starting with number `first`, as part `part` of the mesh.
     ///
     /// # Errors
     /// [`Error::Io`].
@@ -164,7 +164,7 @@ impl<'a> MeshFile<'a> {
         self.write_records(part, self.layout.vertices, first, bytes)
     }
 
-    /// Writes encoded triangles from number `first` on, as part `part` of the mesh.
+    /// Writes encoded triangles, starting with number `first`, as part `part` of the mesh.
     ///
     /// # Errors
     /// [`Error::Io`].
@@ -176,7 +176,7 @@ impl<'a> MeshFile<'a> {
         self.write(part, bytes, of.at + first * of.bytes)
     }
 
-    /// Makes the file durable and gives it its name.
+    /// Flushes the file to disk and renames it to its final name.
     ///
     /// # Errors
     /// [`Error::Io`].
@@ -206,7 +206,7 @@ impl Drop for MeshFile<'_> {
     }
 }
 
-/// Records that are handed on many at a time.
+/// Collects records and passes them on in batches.
 pub struct Batch<T, F: FnMut(&[T])> {
     records: Vec<T>,
     put: F,
@@ -220,7 +220,7 @@ impl<T, F: FnMut(&[T])> Batch<T, F> {
         }
     }
 
-    /// Takes a record.
+    /// Adds a record.
     #[inline]
     pub fn push(&mut self, record: T) {
         self.records.push(record);
@@ -234,13 +234,13 @@ impl<T, F: FnMut(&[T])> Batch<T, F> {
         self.records.clear();
     }
 
-    /// Hands on what is left.
+    /// Passes on the remaining records.
     pub fn finish(mut self) {
         self.flush();
     }
 }
 
-/// The folder that holds `path`.
+/// The folder of `path`.
 pub(crate) fn folder_of(path: &Path) -> &Path {
     match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,

@@ -1,4 +1,4 @@
-//! How a format of meshes is written.
+//! The interface of mesh formats.
 
 /// Type of the coordinates in the file.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize)]
@@ -11,23 +11,23 @@ pub enum CoordinateType {
     Double,
 }
 
-/// A format of meshes; [`FORMATS`](super::FORMATS) lists all of them. Records have fixed sizes, so slices
-/// of the file are written in any order at known places.
+/// A mesh format; [`FORMATS`](super::FORMATS) lists all of them. Records have fixed sizes, so slices of the
+/// file can be written in any order at known offsets.
 pub trait MeshFormat: Sync {
-    /// Extensions of its files.
+    /// File name extensions.
     fn extensions(&self) -> &'static [&'static str];
 
-    /// Where everything goes.
+    /// The layout of the file.
     fn layout(&self, mesh: &Mesh) -> Layout;
 
-    /// Appends the records of some vertices.
+    /// Appends the records of vertices to `bytes`.
     fn put_vertices(&self, mesh: &Mesh, positions: &[[f64; 3]], bytes: &mut Vec<u8>);
 
-    /// Appends the records of some triangles.
+    /// Appends the records of triangles to `bytes`.
     fn put_triangles(&self, mesh: &Mesh, triangles: &[[u32; 3]], bytes: &mut Vec<u8>);
 }
 
-/// What is known of a mesh before it is written.
+/// Properties of a mesh that are known before it is written.
 #[derive(Debug, Clone, Copy)]
 pub struct Mesh {
     /// Number of vertices.
@@ -38,7 +38,7 @@ pub struct Mesh {
     pub coordinates: CoordinateType,
 }
 
-/// Where everything is in a file.
+/// The offsets of all parts of a file.
 #[derive(Debug)]
 pub struct Layout {
     /// The bytes at its start.
@@ -51,11 +51,11 @@ pub struct Layout {
     pub bytes: u64,
 }
 
-/// Records of one size, one behind the other.
+/// Consecutive records of one size.
 #[derive(Debug, Clone, Copy)]
 pub struct Records {
-    /// Where the first one is.
+    /// Offset of the first record.
     pub at: u64,
-    /// Bytes of each.
+    /// Bytes of one record.
     pub bytes: u64,
 }

@@ -1,7 +1,7 @@
-//! The mesh file: used points renumbered, pinched vertices split, slices written in parallel at
-//! known offsets under a temporary name, then renamed.
+//! Writes the mesh file. Used points are renumbered and pinched vertices split. Slices are written in
+//! parallel at known offsets under a temporary name; then the file is renamed.
 //!
-//! A format is a module that implements `MeshFormat`, and a line of the list here.
+//! A format is a module that implements `MeshFormat`, and an entry of the list here.
 
 mod faces;
 mod file;
@@ -27,10 +27,10 @@ use number::Numbering;
 use serde::Serialize;
 use std::path::Path;
 
-/// All formats. The first is that of names which say nothing else.
+/// All formats. The first is used if the extension is not known.
 const FORMATS: [&dyn MeshFormat; 1] = [&ply::Ply];
 
-/// The format that the name of a mesh asks for.
+/// The format for the extension of `output`.
 fn format_of(output: &Path) -> &'static dyn MeshFormat {
     let extension = output.extension().unwrap_or_default();
     let is = |known: &&str| extension.eq_ignore_ascii_case(known);
@@ -39,7 +39,7 @@ fn format_of(output: &Path) -> &'static dyn MeshFormat {
     named.unwrap_or(FORMATS[0])
 }
 
-/// Bytes of a mesh, in the first format.
+/// Bytes of a mesh file in the first format.
 pub(crate) fn mesh_bytes(vertices: u64, triangles: u64, coordinates: CoordinateType) -> u64 {
     let mesh = Mesh {
         vertices,
@@ -54,13 +54,13 @@ pub(crate) fn mesh_bytes(vertices: u64, triangles: u64, coordinates: CoordinateT
 pub struct MeshStats {
     /// Vertices, copies included.
     pub vertices: u64,
-    /// Points of the cloud that are a vertex.
+    /// Points of the cloud that are vertices.
     pub points_used: u64,
     /// Copies made to split pinched vertices.
     pub pinched_copies: u64,
     /// Triangles.
     pub triangles: u64,
-    /// Edges with one triangle.
+    /// Edges with exactly one triangle.
     pub boundary_edges: u64,
 }
 
@@ -134,7 +134,7 @@ fn write_block(
     let mut held = hold(bytes_of(&points) + bytes_of(&bytes));
     let used = ids.clone().filter(|v| numbering.used(*v));
     file.encode_vertices(used.map(at), &mut bytes);
-    // Three parts a block; the number is only a name.
+    // Three parts for each block; the number only identifies a part.
     let part = 3 * block as u32;
     file.write_vertices(part, numbering.vertex(ids.start).into(), &bytes)?;
     bytes.clear();

@@ -1,4 +1,4 @@
-//! Numbers for the mesh's vertices and triangles.
+//! Numbering of the mesh's vertices and triangles in the file.
 
 use super::MeshStats;
 use crate::error::{Error, Result};
@@ -11,26 +11,26 @@ use crate::workspace::memory::Reservation;
 
 const SHUFFLE_BUFFER: u64 = 8 << 20;
 
-/// Which points are vertices, and where everything goes in the file; with the bits of `used`, a
-/// fifth of a byte a point.
+/// The points that are vertices, and the numbers of all vertices and triangles in the file. With the bits of
+/// `used` it takes a fifth of a byte for each point.
 #[derive(Debug)]
 pub struct Numbering<'a> {
-    /// A bit for each point, 64 a word.
+    /// One bit for each point, 64 in a word.
     used: &'a [u64],
-    /// Vertices before each word.
+    /// The number of vertices before each word.
     rank: Vec<u32>,
     firsts: Vec<Firsts>,
-    /// The point of each copy, by block.
+    /// The points of the copies, by block.
     pub copies: Table<Id>,
-    /// The corners that take copies, by block of the triangle.
+    /// The corners that use copies, by block of the triangle.
     pub splits: Table<Split>,
-    /// Totals.
+    /// Counts of the mesh.
     pub stats: MeshStats,
     _held: Reservation,
 }
 
 row! {
-    /// A corner of a triangle that takes a copy of its pinched vertex.
+    /// A corner of a triangle that uses a copy of its pinched vertex.
     pub struct Split {
         /// Block of the triangle.
         to: u32,
@@ -38,7 +38,7 @@ row! {
         triangle: [u32; 3],
         /// The pinched vertex.
         vertex: u32,
-        /// Its block.
+        /// The block of this vertex.
         block: u32,
         /// Number of the copy within that block.
         copy: u32,
@@ -46,7 +46,7 @@ row! {
     packed Above Above Above Above Above Above Above
 }
 
-/// Counts of a block, later the sums over the blocks before it.
+/// Counts of a block; later the sums over all blocks before it.
 #[derive(Debug, Clone, Copy, Default)]
 struct Firsts {
     copies: u64,
@@ -61,13 +61,13 @@ impl Numbering<'_> {
         self.used[v as usize / 64] >> (v % 64) & 1 == 1
     }
 
-    /// The number of a point if it is a vertex, else of the next one that is.
+    /// The number of a point if it is a vertex, else that of the next point that is one.
     pub fn vertex(&self, v: u32) -> u32 {
         let below = self.used[v as usize / 64] & ((1 << (v % 64)) - 1);
         self.rank[v as usize / 64] + below.count_ones()
     }
 
-    /// Number of the first copy of a vertex of a block.
+    /// Number of the first copy in a block.
     pub fn first_copy(&self, block: usize) -> u64 {
         self.stats.points_used + self.firsts[block].copies
     }
@@ -78,7 +78,7 @@ impl Numbering<'_> {
     }
 }
 
-/// Numbers everything.
+/// Numbers all vertices and triangles.
 ///
 /// # Errors
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
@@ -134,7 +134,8 @@ pub fn number<'a>(
     })
 }
 
-/// Counts of each block, the copies of its pinched vertices, and the corners that take them.
+/// Counts the vertices and triangles of each block, copies its pinched vertices, and lists the corners that
+/// use copies.
 fn split(
     repaired: &Repaired,
     blocks: Blocks,
@@ -175,7 +176,8 @@ fn split(
     Ok((firsts, copies, shuffle.deliver(workspace, blocks.count())?))
 }
 
-/// The copies of a block's pinched vertices; tells the triangles that take them.
+/// Copies the pinched vertices of a block, and sends the corners that use the copies to the blocks of their
+/// triangles.
 fn split_block(
     pinches: &[Id],
     triangles: &[[u32; 3]],
@@ -189,7 +191,7 @@ fn split_block(
     let mut splits = Vec::new();
     for &Id { id: v } in pinches {
         let at = star.at(v);
-        // Triangles are in ascending order, so fans are numbered by their smallest triangles.
+        // Triangles ascend, so fans are numbered by their smallest triangles.
         link.set(v, at.iter().map(|&n| triangles[n as usize]));
         for (index, &n) in at.iter().enumerate() {
             if let Some(fan) = link.group(index).checked_sub(1) {

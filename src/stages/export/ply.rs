@@ -16,7 +16,7 @@ impl MeshFormat for Ply {
             CoordinateType::Float => Scalar::F32,
             CoordinateType::Double => Scalar::F64,
         };
-        // A file with up to 2^31 vertices can use the index type that every reader knows.
+        // With up to 2^31 vertices, use the signed index type that every reader supports.
         let index = match mesh.vertices <= 1 << 31 {
             true => Scalar::I32,
             false => Scalar::U32,

@@ -1,20 +1,19 @@
-//! Do the files belong together? Warnings about reference systems, units and places that do not fit.
+//! Warnings about files that may not belong together: different reference systems, units or places.
 
 use super::crs::Crs;
 use super::stats::FileStats;
 
-/// How many times as far apart points of one file are, and how many times as large its box is, that
-/// the unit is asked for. A small piece of a survey has few points: its box is small, and they are no
-/// closer to each other.
+/// A warning is given if one file's point spacing and box are both this many times those of another: it may
+/// be in another unit. A small piece of a survey has a small box but no smaller spacing.
 const LARGER: f64 = 100.0;
 
-/// Fewest points of a file that is compared in size.
+/// Fewest points of a file whose size is compared.
 const FEWEST: u64 = 100;
 
-/// How many times the largest file a stretch without files is, that it is asked about.
+/// A warning is given if a gap between files exceeds this many times the extent of the largest file.
 const FARTHER: f64 = 100.0;
 
-/// At most one line about reference systems, and one about sizes or places.
+/// At most one warning about reference systems, and one about sizes or places.
 pub(super) fn warnings(files: &[FileStats], systems: &[Option<Crs>]) -> Vec<String> {
     let boxes: Vec<Extent<'_>> = files.iter().filter_map(Extent::of).collect();
     let places = far_apart(&boxes).or_else(|| unlike_sizes(&boxes));
@@ -22,7 +21,7 @@ pub(super) fn warnings(files: &[FileStats], systems: &[Option<Crs>]) -> Vec<Stri
     systems.into_iter().chain(places).collect()
 }
 
-/// The first file with a reference system, and the first whose system is another.
+/// A warning with the first file that has a reference system, and the first file with a different one.
 fn unlike_systems(files: &[FileStats], systems: &[Option<Crs>]) -> Option<String> {
     let mut known = files
         .iter()
@@ -58,13 +57,13 @@ impl<'a> Extent<'a> {
         })
     }
 
-    /// About how far apart points are, if they lie on a surface.
+    /// Approximate spacing of the points, if they lie on a surface.
     fn spacing(&self) -> f64 {
         self.diagonal / (self.file.kept as f64).sqrt()
     }
 }
 
-/// Two files with a long stretch between them, along an axis, in which there is no other.
+/// A warning with two files that have a long gap between them along an axis.
 fn far_apart(boxes: &[Extent<'_>]) -> Option<String> {
     let largest = boxes.iter().map(|b| b.diagonal).fold(0.0, f64::max);
     if largest == 0.0 {
@@ -94,7 +93,7 @@ fn far_apart(boxes: &[Extent<'_>]) -> Option<String> {
     None
 }
 
-/// The largest and the smallest file, if one seems to be in another unit.
+/// A warning with the largest and the smallest file, if one of them seems to be in another unit.
 fn unlike_sizes(boxes: &[Extent<'_>]) -> Option<String> {
     let filled = || {
         boxes
@@ -117,7 +116,7 @@ fn unlike_sizes(boxes: &[Extent<'_>]) -> Option<String> {
     })
 }
 
-/// A length with three digits.
+/// A length rounded to three digits.
 fn rounded(length: f64) -> f64 {
     let unit = 10f64.powf(length.log10().floor() - 2.0);
     if unit >= 1.0 && unit.is_finite() {
@@ -152,7 +151,7 @@ mod tests {
         warnings(files, &vec![None; files.len()])
     }
 
-    /// A square of `side` with its corner at `x`, `y`, with points at a distance of `spacing`.
+    /// A square of side `side` with a corner at `x`, `y` and points `spacing` apart.
     fn square(name: &str, [x, y]: [f64; 2], side: f64, spacing: f64) -> FileStats {
         let points = (side / spacing).powi(2) as u64;
         file(name, points, [x, y, 0.0], [x + side, y + side, side / 10.0])
@@ -170,7 +169,7 @@ mod tests {
                 tiles.push(square("tile", corner, 1000.0, 0.5));
             }
         }
-        // At its border a tile may hold next to nothing, or nothing.
+        // At the boundary of a survey a tile may have few points, or none.
         tiles.push(file(
             "sliver",
             150,
@@ -179,7 +178,7 @@ mod tests {
         ));
         tiles.push(file("single", 1, [4.3e5, 5e6, 0.0], [4.3e5, 5e6, 0.0]));
         tiles.push(file("empty", 0, [0.0; 3], [0.0; 3]));
-        // Some tiles of many, far from each other.
+        // A few tiles of many, far from each other.
         tiles.push(square("island", [4.9e5, 5.05e6], 1000.0, 0.5));
         assert_eq!(said(&tiles), [""; 0]);
         tiles.reverse();

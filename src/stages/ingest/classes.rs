@@ -1,22 +1,22 @@
-//! Which points are wanted by their class (LAS and LAZ).
+//! Selection of points by their class (LAS and LAZ).
 
 use serde::{Deserialize, Serialize};
 
-/// Points to read by their classification; points of files without one are always read.
+/// The classes of points to read; points of files without classes are always read.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Classes {
     /// All points.
     #[default]
     All,
-    /// Only points of these classes.
+    /// Only points of the listed classes.
     Keep(Vec<u8>),
-    /// All but points of these classes.
+    /// All points but those of the listed classes.
     Drop(Vec<u8>),
 }
 
 impl Classes {
-    /// Whether points of `class` are wanted.
+    /// True if points of `class` are to be read.
     #[must_use]
     pub fn wants(&self, class: u8) -> bool {
         match self {

@@ -1,4 +1,4 @@
-//! Keeps panics of third-party decoders, and their messages, from getting out.
+//! Catches panics of third-party decoders, and suppresses their messages.
 
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook};
@@ -10,10 +10,10 @@ thread_local! {
 
 static HOOK: Once = Once::new();
 
-/// Runs `work`, which must leave nothing behind that is used after a panic; a panic becomes its
-/// message.
+/// Runs `work` and converts a panic to its message. `work` must not leave state behind that is used after a
+/// panic.
 ///
-/// The process's panic hook is wrapped once, so that contained panics print nothing.
+/// The panic hook of the process is wrapped once, so that caught panics print nothing.
 pub(super) fn contain<T>(work: impl FnOnce() -> T) -> Result<T, String> {
     HOOK.call_once(|| {
         let before = take_hook();

@@ -1,18 +1,18 @@
-//! Reference systems, as far as it takes to tell two of them apart.
+//! Reference systems, as far as needed to compare two of them.
 
 /// A reference system.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Crs {
-    /// Its numbers in the EPSG registry: in the plane, and of heights.
+    /// EPSG codes of the horizontal and of the vertical system.
     pub(super) horizontal: Option<u32>,
     pub(super) vertical: Option<u32>,
-    /// The record, without what may differ between two of the same meaning.
+    /// The record without the parts that may differ between records of the same meaning.
     pub(super) normal: String,
     pub(super) name: String,
 }
 
 impl Crs {
-    /// True if two systems are certainly not the same.
+    /// True if the two systems are certainly different.
     pub(super) fn differs(&self, other: &Self) -> bool {
         let unlike =
             |a: Option<u32>, b: Option<u32>| matches!((a, b), (Some(a), Some(b)) if a != b);
@@ -20,7 +20,7 @@ impl Crs {
             (Some(_), Some(_)) => {
                 unlike(self.horizontal, other.horizontal) || unlike(self.vertical, other.vertical)
             }
-            // Without numbers, two texts of one kind can be compared.
+            // Without codes, two texts of the same kind are compared.
             (None, None) => {
                 self.normal.is_empty() == other.normal.is_empty() && self.normal != other.normal
             }

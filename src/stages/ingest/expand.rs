@@ -1,13 +1,13 @@
-//! Folders to the point files in them.
+//! Replaces folders by the point files in them.
 
 use super::formats::{is_points, readable};
 use crate::error::{Error, Result};
 use std::path::{Path, PathBuf};
 
-/// The point files among `inputs`: files as they are, folders recursively, by name.
+/// The point files of `inputs`: files are taken as they are, folders recursively, sorted by name.
 ///
-/// Inside a folder, hidden files and files that are no point cloud are skipped; links to folders
-/// are not followed.
+/// In folders, hidden files and files that are not point clouds are skipped; links to folders are not
+/// followed.
 ///
 /// # Errors
 /// [`Error::Io`] if something cannot be read, [`Error::Input`] for a folder without point files.

@@ -1,13 +1,13 @@
-//! The name of a format.
+//! Identification of an input format.
 
 use serde::{Serialize, Serializer};
 
-/// Format of an input file. Each has its constant beside its reader.
+/// Format of an input file. Each format is a constant next to its reader.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Format {
-    /// The name in reports.
+    /// Name in reports.
     pub(super) id: &'static str,
-    /// The name on the screen.
+    /// Name in messages.
     pub(super) name: &'static str,
 }
 

@@ -1,4 +1,4 @@
-//! The formats that are read, and which of them a file is of.
+//! The list of input formats, and the detection of a file's format.
 
 use super::format::Format;
 use super::input::Input;
@@ -11,17 +11,16 @@ use crate::workspace::persist::{Persist, Saved};
 use std::path::Path;
 use std::sync::Arc;
 
-/// All formats, in the order in which they are asked about a file. Text is last: it says why a file is of
-/// none of them.
+/// All formats, in the order in which they are tested. Text is last: its error explains why no format fits.
 pub(super) const FORMATS: [&dyn PointFormat; 3] = [&Las, &Ply, &Text];
 
-/// Bytes at the start of a file that decide its format.
+/// Bytes at the start of a file that are used for detection.
 const HEAD: usize = 64 << 10;
 
-/// The same for a file with a very long first line, or many lines without a point.
+/// The same, for a file with a very long first line, or with many lines before the first point.
 const LONG_HEAD: usize = 1 << 20;
 
-/// Names of the formats that are read, for messages.
+/// Names of all formats, for messages.
 pub(super) fn readable() -> String {
     let names = FORMATS.map(PointFormat::names);
     let (last, first) = names.split_last().unwrap_or((&"", &[]));
@@ -40,7 +39,7 @@ fn ask(head: &Head) -> Result<&'static dyn PointFormat, Refusal> {
     Err(Refusal::Unknown(head.shown()))
 }
 
-/// The format of a file, and the bytes that tell it.
+/// The format of a file, and the bytes used for detection.
 fn find(input: &Input) -> Result<(Head, Result<&'static dyn PointFormat, Refusal>)> {
     let head = Head::read(input, HEAD)?;
     match ask(&head) {
@@ -54,7 +53,7 @@ fn find(input: &Input) -> Result<(Head, Result<&'static dyn PointFormat, Refusal
     }
 }
 
-/// Reads the header of a file, whatever its format.
+/// Detects the format of a file and reads its header.
 ///
 /// # Errors
 /// [`crate::Error::Input`] if it is no point cloud that can be read; [`crate::Error::Io`].
@@ -68,17 +67,17 @@ pub(super) fn open(input: &Input) -> Result<Box<dyn PointFile>> {
     Err(input.error("format", found, readable() + advice))
 }
 
-/// Whether a file in a folder is one of the point files.
+/// True if a file in a folder is to be read as a point file.
 pub(super) fn is_points(path: &Path) -> Result<bool> {
     let named = |format: &dyn PointFormat| has_extension(path, format.extensions());
-    // A name that promises a point cloud which is not there is an error, and no file to skip.
+    // A file named like a point cloud but with other content is an error; it is not skipped.
     if FORMATS.into_iter().any(|f| f.has_signature() && named(f)) {
         return Ok(true);
     }
     let (_, found) = find(&Input::open(path, Arc::default())?)?;
     Ok(match found {
         Ok(format) => format.has_signature() || named(format),
-        // A cloud that cannot be read must not go missing silently.
+        // A point cloud of an unsupported format must not be skipped silently.
         Err(Refusal::Foreign(_)) => true,
         Err(Refusal::Unknown(_)) => false,
     })

@@ -1,4 +1,4 @@
-//! An input file: positioned reads, counted, with errors that name the place.
+//! An input file: positioned reads that are counted, with errors that give the position.
 
 use crate::error::{Error, Result};
 use crate::workspace::IoCounters;
@@ -68,7 +68,7 @@ impl Input {
         Ok(done)
     }
 
-    /// Fills `buffer` from `offset`, or says that the file ends before `what` does.
+    /// Fills `buffer` from `offset`; if the file ends before that, an error names `what`.
     pub(super) fn read_exact_at(&self, offset: u64, buffer: &mut [u8], what: &str) -> Result<()> {
         let got = self.read_at(offset, buffer)?;
         if got == buffer.len() {
@@ -103,7 +103,7 @@ impl Input {
 /// Bytes buffered by [`Input::stream`].
 pub(super) const STREAM_BUFFER: usize = 256 << 10;
 
-/// Reads a range of an input from its start to its end.
+/// Sequential reader of a range of an input file.
 #[derive(Debug)]
 pub(super) struct Range<'a> {
     input: &'a Input,
@@ -112,7 +112,7 @@ pub(super) struct Range<'a> {
 }
 
 impl Range<'_> {
-    /// Where the next byte is read.
+    /// Offset of the next byte.
     pub(super) fn position(&self) -> u64 {
         self.at
     }

@@ -1,4 +1,4 @@
-//! The choice of one lattice for all sources.
+//! Choice of a common lattice for all sources.
 
 use super::map::{SourceMap, rational};
 use super::source::Source;
@@ -6,10 +6,10 @@ use super::stats::IngestStats;
 use crate::error::{Error, Result};
 use crate::geom::lattice::{COORDINATE_LIMIT, Lattice};
 
-/// A lattice offset may be refined by at most this factor to meet the offsets of all files.
+/// Largest factor by which the step is refined so that the offsets of all files are on the lattice.
 const MOST_REFINEMENT: i64 = 1000;
 
-/// Maps of all sources for one candidate lattice.
+/// The maps of all sources to a candidate lattice.
 struct Placed {
     base: [i64; 3],
     exact: bool,
@@ -26,7 +26,7 @@ pub(super) fn choose(sources: &[Source], stats: &IngestStats, refine: u32) -> Re
         Some(step) => refine_for_floats(&sources, offset, step),
         None => float_step(&sources),
     };
-    // A scale in a forged spool may be nothing, and twice nothing is no more.
+    // In a forged spool the scale may be zero, and doubling zero would not end.
     step = step.max(f64::MIN_POSITIVE);
     let placed = loop {
         match place(&sources, step, offset) {
@@ -82,7 +82,7 @@ fn no_points(stats: &IngestStats) -> Error {
     }
 }
 
-/// Base and exactness of a lattice, or `None` if the sources do not fit it.
+/// Base and exactness of a lattice; `None` if the sources do not fit it.
 fn place(sources: &[&Source], step: f64, offset: [f64; 3]) -> Option<Placed> {
     let mut low = [i64::MAX; 3];
     let mut high = [i64::MIN; 3];
@@ -104,18 +104,18 @@ fn place(sources: &[&Source], step: f64, offset: [f64; 3]) -> Option<Placed> {
     fits.then_some(Placed { base: low, exact })
 }
 
-/// The lowest offset of all sources on a grid, so that it does not depend on their order.
+/// The lowest offset of all sources on a grid, which does not depend on their order.
 fn common_offset(sources: &[&Source]) -> [f64; 3] {
     std::array::from_fn(|axis| {
         let offsets = sources.iter().filter_map(|s| s.grid(axis));
         let lowest = offsets.map(|(_, offset)| offset).reduce(f64::min);
-        // No negative zero, whichever file comes first.
+        // Avoids negative zero, which would depend on the order of files.
         lowest.unwrap_or(0.0) + 0.0
     })
 }
 
-/// The step for the sources on grids (LAS, decimals): of all scales the greatest common divisor,
-/// refined to meet all offsets, if it fits; else the finest that fits. `None` without such sources.
+/// The step for sources on grids (LAS, decimals): the greatest common divisor of all scales, refined to
+/// include all offsets, if it fits; else the finest that fits. `None` without such sources.
 fn grid_step(sources: &[&Source], offset: [f64; 3]) -> Option<f64> {
     let grids: Vec<Vec<(f64, f64)>> = (0..3)
         .map(|axis| sources.iter().filter_map(|s| s.grid(axis)).collect())
@@ -139,7 +139,7 @@ fn grid_step(sources: &[&Source], offset: [f64; 3]) -> Option<f64> {
         }
     }
     if parts.is_none() {
-        // Nothing is exact, but a tenth of a step keeps the rounding out of sight.
+        // Not exact, but a tenth of a step keeps rounding errors invisible.
         let fine = divided(step, 10);
         if place(sources, fine, offset).is_some() {
             return Some(fine);
@@ -153,7 +153,7 @@ fn grid_step(sources: &[&Source], offset: [f64; 3]) -> Option<f64> {
         .or(Some(step))
 }
 
-/// `step / parts`, as the decimal it was meant to be.
+/// `step / parts`, corrected to the decimal number it stands for.
 fn divided(step: f64, parts: i64) -> f64 {
     if parts == 1 {
         step
@@ -162,7 +162,7 @@ fn divided(step: f64, parts: i64) -> f64 {
     }
 }
 
-/// The multiple of 1e-12 that `step` is up to rounding noise, else `step`.
+/// The multiple of 1e-12 that equals `step` up to rounding errors, else `step`.
 fn nice(step: f64) -> f64 {
     let picos = (step * 1e12).round();
     let decimal = picos / 1e12;
@@ -184,7 +184,7 @@ fn common_divisor(scales: &[f64]) -> Option<f64> {
             return None;
         }
     }
-    // Noise such as 1.0000000000000002e-7 is cleaned up only if there is a choice to be made.
+    // Rounding errors as in 1.0000000000000002e-7 are only removed if there are several scales.
     Some(if rest.is_empty() {
         finest
     } else {
@@ -192,18 +192,18 @@ fn common_divisor(scales: &[f64]) -> Option<f64> {
     })
 }
 
-/// Into how many parts a step must be divided for all offsets to be whole numbers of parts.
+/// The number of parts into which a step must be divided so that all offsets are integer numbers of parts.
 fn offset_parts(step: f64, shifts: impl Iterator<Item = (f64, f64)>) -> Option<i64> {
     let mut parts = 1i64;
     for (shift, origin) in shifts {
-        // What rounding offsets to doubles may have moved them, in steps.
+        // Upper bound, in steps, on the rounding errors of offsets stored as doubles.
         let noise = 1e-9 + (shift.abs() + 2.0 * origin.abs()) * f64::EPSILON / step;
         let steps = shift / step;
         let on = |q: i64| {
             let x = steps * q as f64;
             (x - x.round()).abs() <= noise * q as f64
         };
-        // With more parts, any offset would meet some of them by chance.
+        // With more parts, any offset would be close to an integer number of them by chance.
         let most = MOST_REFINEMENT.min((0.1 / noise.sqrt()) as i64).max(1);
         let q = (1..=most).find(|q| on(parts * q))?;
         parts *= q;
@@ -214,7 +214,7 @@ fn offset_parts(step: f64, shifts: impl Iterator<Item = (f64, f64)>) -> Option<i
     Some(parts)
 }
 
-/// Halves a step until the floating-point sources beside the grids are on it, as far as it fits.
+/// Halves the step until floating-point sources beside grids lie on the lattice, as long as the cloud fits.
 fn refine_for_floats(sources: &[&Source], offset: [f64; 3], mut step: f64) -> f64 {
     let floats = sources.iter().filter(|s| s.grid(0).is_none());
     let Some(wanted) = floats.map(|s| s.stats.exponent).min() else {
@@ -226,13 +226,13 @@ fn refine_for_floats(sources: &[&Source], offset: [f64; 3], mut step: f64) -> f6
     step
 }
 
-/// The step for floating-point sources alone: the coarsest of which all values are multiples, or
+/// The step for floating-point sources alone: the largest power of two of which all values are multiples, or
 /// the finest that fits.
 fn float_step(sources: &[&Source]) -> f64 {
     let exponent = sources.iter().map(|s| s.stats.exponent).min();
     match exponent {
         None | Some(i32::MAX) => 1.0,
-        // A step must stay a normal number for its inverse to be finite.
+        // The step must stay a normal number so that its inverse is finite.
         Some(e) => pow2(e.max(-1000)),
     }
 }

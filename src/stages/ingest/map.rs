@@ -1,15 +1,16 @@
-//! From native coordinates to lattice positions, axis by axis.
+//! Conversion of native coordinates to lattice positions, for each axis.
 
 use super::source::{Native, Source};
 use super::spool::FrameBuffer;
 
-/// Positions beyond this, before the base is taken off, are refused so that sums cannot overflow.
+/// Largest position before the base is subtracted; beyond it sums could overflow, so larger ones are
+/// rejected.
 const POSITION_LIMIT: f64 = (1u64 << 62) as f64;
 
-/// Parts of a step by which a file's offset may miss the lattice and still count as on it.
+/// Largest distance from the lattice, in steps, at which a file's offset counts as on it.
 const RESIDUE: f64 = 1e-6;
 
-/// Relative tolerance when two scales are compared: over all of `i32` it stays far below a step.
+/// Relative tolerance for comparing two scales: far below a step over the whole range of `i32`.
 const RATIO: f64 = 1e-12;
 
 /// The rational `n / d` closest to `x > 0` within a relative 1e-12, with `d` at most `limit`.
@@ -39,7 +40,7 @@ pub(super) fn rational(x: f64, limit: i64) -> Option<(i64, i64)> {
     None
 }
 
-/// How one axis of one source maps to positions, before the base is taken off.
+/// The map of one axis of one source to positions, before the base is subtracted.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum AxisMap {
     /// `(i * mul + shift) / div`, rounded half to even.
@@ -67,8 +68,8 @@ impl AxisMap {
     }
 }
 
-/// Rounds half to even; small numbers by adding one whose last binary digit is a whole, which is
-/// faster where the processor cannot be counted on to know rounding.
+/// Rounds half to even. Small numbers are rounded by adding and subtracting a large constant, which is faster
+/// if the processor has no rounding instruction.
 fn nearest(x: f64) -> f64 {
     const WHOLES: f64 = 1.5 * (1u64 << 52) as f64;
     if x.abs() < (1u64 << 51) as f64 {
@@ -94,12 +95,12 @@ pub(super) struct SourceMap {
     axes: [AxisMap; 3],
     /// Power of ten that makes the numbers of a text source integers.
     decimal: Option<f64>,
-    /// Every point of the source is on the lattice without rounding.
+    /// True if every point of the source is on the lattice without rounding.
     pub(super) exact: bool,
 }
 
 impl SourceMap {
-    /// The map to steps of `step` from `offset`; `None` if positions would be out of all bounds.
+    /// The map to a lattice of `step` and `offset`; `None` if positions would exceed the limits.
     pub(super) fn new(source: &Source, step: f64, offset: [f64; 3]) -> Option<Self> {
         let mut axes = [AxisMap::Real {
             scale: 1.0,
@@ -122,7 +123,7 @@ impl SourceMap {
         })
     }
 
-    /// Lowest and highest positions of an axis; `None` if they are out of all bounds.
+    /// Lowest and highest position along an axis; `None` if they exceed the limits.
     pub(super) fn extent(&self, source: &Source, axis: usize) -> Option<[i64; 2]> {
         let ends = [source.stats.min[axis], source.stats.max[axis]];
         let ends = ends.map(|end| self.position(source.native, axis, end));
@@ -151,7 +152,7 @@ impl SourceMap {
         })
     }
 
-    /// Positions of a frame of the source, less `base`.
+    /// Converts a frame of the source to positions, minus `base`.
     pub(super) fn apply(
         &self,
         native: Native,
@@ -196,8 +197,8 @@ fn integers(
     out: &mut [[i64; 3]],
 ) {
     match map {
-        // The extent was checked against the limit, so no value of the source overflows; a value
-        // that does comes from a damaged spool and is refused by its position.
+        // The extent was checked against the limit, so no value of the source overflows. A value that does
+        // comes from a damaged spool and is rejected by its position.
         AxisMap::Ratio { mul, shift, div: 1 } => {
             let shift = shift.wrapping_sub(base);
             for (to, i) in out.iter_mut().zip(values) {
@@ -212,7 +213,8 @@ fn integers(
     }
 }
 
-/// The map of values on a grid of `scale`, shifted by `shift` from the lattice's `origin`.
+/// The map of values on a grid of step `scale`, shifted by `shift` from the lattice's `origin`; true if it is
+/// exact.
 fn grid_map(scale: f64, shift: f64, origin: f64, step: f64) -> Option<(AxisMap, bool)> {
     let real = AxisMap::Real { scale, shift, step };
     let Some((mul, div)) = rational(scale.abs() / step, 10_000_000) else {
@@ -224,7 +226,7 @@ fn grid_map(scale: f64, shift: f64, origin: f64, step: f64) -> Option<(AxisMap, 
         return None;
     }
     let whole = steps.round_ties_even();
-    // Offsets are decimals that a double holds only nearly.
+    // Offsets are decimals, which doubles represent approximately.
     let noise = (shift.abs() + 2.0 * origin.abs()) * f64::EPSILON / step;
     let on = div == 1 && (steps - whole).abs() <= RESIDUE + noise;
     let map = AxisMap::Ratio {
@@ -235,7 +237,7 @@ fn grid_map(scale: f64, shift: f64, origin: f64, step: f64) -> Option<(AxisMap, 
     Some((map, on))
 }
 
-/// The map of floating-point values, and whether all are on the lattice.
+/// The map of floating-point values; true if all are on the lattice.
 fn float_map(source: &Source, origin: f64, step: f64) -> (AxisMap, bool) {
     let map = AxisMap::Real {
         scale: 1.0,

@@ -1,12 +1,12 @@
-//! Formats in, lattice positions out.
+//! Reads the input formats and converts points to lattice positions.
 //!
-//! [`ingest`] decodes every input once into a [`Spool`]: one scratch file with all points in their
-//! native precision, and exact statistics of each file. [`Spool::choose_lattice`] then finds one
-//! lattice for all of them, and [`Spool::for_each`] streams the points as positions on it.
+//! [`ingest`] decodes every input once into a [`Spool`]: one scratch file with all points in their native
+//! precision, and exact statistics of each file. [`Spool::choose_lattice`] then finds a common lattice, and
+//! [`Spool::for_each`] streams the points as positions on it.
 //!
-//! Formats are told apart by content: LAS 1.0 to 1.4 with point formats 0 to 10, LAZ (COPC
-//! included), PLY, and text with a point a line. Each is a module of its own that implements
-//! `PointFormat`, and a line of the list in `formats.rs`.
+//! Formats are detected by content: LAS 1.0 to 1.4 with point formats 0 to 10, LAZ (COPC included), PLY, and
+//! text with one point in a line. Each format is a module that implements `PointFormat`, and an entry of the
+//! list in `formats.rs`.
 
 mod belong;
 mod classes;
@@ -48,11 +48,11 @@ use spool::{SourceWriter, SpoolFile};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Precision in which coordinates of the cloud can be written without harm.
+/// Precision that suffices for writing the coordinates of the cloud.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CoordinateType {
-    /// Single precision: all inputs have it, or it moves no point by a tenth of a step.
+    /// Single precision: all inputs have it, or it moves no point by a tenth of a step or more.
     F32,
     /// Double precision.
     F64,
@@ -67,10 +67,10 @@ pub struct Spool {
     cancel: Cancel,
 }
 
-/// Decodes all inputs, files and folders, into a spool.
+/// Decodes all inputs, which may be files and folders, into a spool.
 ///
-/// The observer is told of points as they are read; the caller begins and ends the stage. Memory
-/// is reserved per unit of work, a few MiB a thread.
+/// Progress is reported to the observer; the caller begins and ends the stage. Memory is reserved for each
+/// unit of work, a few MiB for each thread.
 ///
 /// # Errors
 /// [`crate::Error::Input`] for a file that is not what it claims to be; [`crate::Error::Io`],
@@ -79,7 +79,7 @@ pub fn ingest(inputs: &[PathBuf], workspace: &Workspace) -> Result<Spool> {
     ingest_classes(inputs, &Classes::All, workspace)
 }
 
-/// As [`ingest`], but takes only the points whose class is wanted.
+/// As [`ingest`], but reads only points of the wanted classes.
 ///
 /// # Errors
 /// See [`ingest`].
@@ -123,7 +123,7 @@ pub fn ingest_classes(
     })
 }
 
-/// An input file whose header was read.
+/// An input file with its header.
 struct Opened {
     input: Input,
     file: Box<dyn PointFile>,
@@ -187,13 +187,13 @@ impl IngestStats {
 }
 
 impl Spool {
-    /// What was read.
+    /// Counts and extents of the input.
     #[must_use]
     pub fn stats(&self) -> &IngestStats {
         &self.stats
     }
 
-    /// Bytes of the points in the spool, about.
+    /// Approximate bytes of the points in the spool.
     #[must_use]
     pub fn bytes(&self) -> u64 {
         let bytes = |source: &Source| source.stats.kept * source.native.point_bytes() as u64;
@@ -206,12 +206,13 @@ impl Spool {
         self.stats.kept
     }
 
-    /// One isotropic lattice for the whole cloud, whatever the order of the files.
+    /// Chooses one lattice for the whole cloud, with the same step along all axes, independent of the order
+    /// of the files.
     ///
-    /// LAS scales and fixed decimals give the greatest common step, floating-point values the
-    /// coarsest power of two of which all are multiples. What would span 2^30 steps or more gets a
-    /// coarser step, and `exact` is false. The step is then halved up to `refine` times, as often
-    /// as the cloud still fits.
+    /// For LAS scales and fixed decimals it has the largest common step, for floating-point values the
+    /// largest power of two of which all are multiples. If the cloud would span 2^30 steps or more, the step
+    /// is enlarged and `exact` is false. The step is then halved up to `refine` times, as long as the cloud
+    /// fits.
     ///
     /// # Errors
     /// [`crate::Error::Degenerate`] if there are no points.
@@ -219,7 +220,7 @@ impl Spool {
         lattice::choose(&self.sources, &self.stats, refine)
     }
 
-    /// The precision in which coordinates should be written.
+    /// The precision in which coordinates are to be written.
     #[must_use]
     pub fn source_precision(&self) -> CoordinateType {
         let kept = || self.sources.iter().filter(|s| s.stats.kept > 0);
@@ -237,10 +238,10 @@ impl Spool {
     }
 }
 
-/// The precision in which multiples of `step` up to `largest` should be written.
+/// The precision needed for writing multiples of `step` up to `largest`.
 pub(crate) fn enough_for(step: f64, largest: f64) -> CoordinateType {
-    // Rounding to single precision moves a coordinate by at most 2^-24 of the power of two at or
-    // below it.
+    // Rounding to single precision moves a coordinate by at most 2^-24 of the largest power of two not above
+    // it.
     let half_unit = if largest == 0.0 {
         0.0
     } else {

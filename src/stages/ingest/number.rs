@@ -1,14 +1,14 @@
 //! Numbers in text.
 
-/// Decimals of a number that is not written with a fixed point.
+/// Stands for the number of decimals of a number with an exponent.
 pub(super) const NOT_FIXED: u32 = u32::MAX;
 
-/// Parses a number; raises `decimals` to its number of decimals, or to [`NOT_FIXED`] if it has an
-/// exponent. Words for infinities and what is not a number are numbers too.
+/// Parses a number; raises `decimals` to its number of decimals, or to [`NOT_FIXED`] if it has an exponent.
+/// Words for infinity and NaN are accepted.
 pub(super) fn parse(token: &[u8], decimal_comma: bool, decimals: &mut u32) -> Option<f64> {
     let mut copy = [0u8; 64];
     let token = if decimal_comma {
-        // Longer than any sensible number.
+        // Longer tokens are not numbers.
         let copy = copy.get_mut(..token.len())?;
         copy.copy_from_slice(token);
         copy.iter_mut()

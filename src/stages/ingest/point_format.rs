@@ -1,4 +1,4 @@
-//! How a format of point clouds is recognised and read.
+//! The interface of input formats: detection and reading.
 
 use super::crs::Crs;
 use super::format::Format;
@@ -8,38 +8,38 @@ use super::spool::SourceWriter;
 use crate::error::Result;
 use std::path::{Path, PathBuf};
 
-/// A format of point clouds; [`FORMATS`](super::formats::FORMATS) lists all of them.
+/// An input format; [`FORMATS`](super::formats::FORMATS) lists all of them.
 pub(super) trait PointFormat: Sync {
-    /// The names in messages that say which formats are read.
+    /// Names for messages that list the supported formats.
     fn names(&self) -> &'static str;
 
-    /// The formats that its files are said to have.
+    /// The formats reported for its files.
     fn formats(&self) -> &'static [Format];
 
-    /// Extensions of its files.
+    /// File name extensions.
     fn extensions(&self) -> &'static [&'static str];
 
-    /// True if content alone tells the format. In a folder, files are then taken that have the content
-    /// or the extension; otherwise those that have both.
+    /// True if content alone identifies the format. In folders, files with the content or the extension are
+    /// then read; else only files with both.
     fn has_signature(&self) -> bool {
         true
     }
 
-    /// Whether a file is of this format; an error if it is of none.
+    /// True if a file is of this format; an error if it is certainly not of any supported format.
     fn recognize(&self, head: &Head) -> Result<bool, Refusal>;
 
-    /// Reads the header of a file that was recognised.
+    /// Reads the header of a file of this format.
     ///
     /// # Errors
-    /// [`crate::Error::Input`] for a header that is wrong; [`crate::Error::Io`].
+    /// [`crate::Error::Input`] for an invalid header; [`crate::Error::Io`].
     fn open(&self, input: &Input, head: &Head) -> Result<Box<dyn PointFile>>;
 }
 
-/// The start of a file, by which its format is told.
+/// The start of a file, used for detection.
 pub(super) struct Head {
     pub(super) path: PathBuf,
     pub(super) bytes: Vec<u8>,
-    /// The file has no more bytes.
+    /// True if this is the whole file.
     pub(super) whole: bool,
 }
 
@@ -53,7 +53,7 @@ impl Head {
         })
     }
 
-    /// True if the file's name ends, in any case, with one of the extensions.
+    /// True if the file name has one of the extensions, in upper or lower case.
     pub(super) fn is_named(&self, extensions: &[&str]) -> bool {
         has_extension(&self.path, extensions)
     }
@@ -65,62 +65,62 @@ impl Head {
     }
 }
 
-/// True if a name ends, in any case, with one of the extensions.
+/// True if a path has one of the extensions, in upper or lower case.
 pub(super) fn has_extension(path: &Path, extensions: &[&str]) -> bool {
     let extension = path.extension().and_then(|e| e.to_str());
     extension.is_some_and(|e| extensions.iter().any(|x| e.eq_ignore_ascii_case(x)))
 }
 
-/// Why a file is not read.
+/// The reason why a file is not read.
 #[derive(Debug, PartialEq)]
 pub(super) enum Refusal {
-    /// It is of a format that is not read, of this name.
+    /// It is of an unsupported format with this name.
     Foreign(&'static str),
-    /// It is no point cloud; why.
+    /// It is not a point cloud, for this reason.
     Unknown(String),
 }
 
-/// A file whose header was read.
+/// An input file with its header.
 pub(super) trait PointFile {
-    /// What the header says.
+    /// The values given in the header.
     fn claims(&self, input: &Input) -> Claims;
 
-    /// The reference system that the file names.
+    /// The reference system given in the file.
     fn crs(&self, _input: &Input) -> Option<Crs> {
         None
     }
 
-    /// Reads all points, in units of at most some MiB; returns what the user should know.
+    /// Reads all points, in units of at most a few MiB; returns warnings.
     ///
     /// # Errors
-    /// [`crate::Error::Input`] where the file is damaged; those of a [`SourceWriter`].
+    /// [`crate::Error::Input`] where the file is damaged; errors of a [`SourceWriter`].
     fn read(&self, input: &Input, target: &SourceWriter<'_>) -> Result<Vec<String>>;
 }
 
-/// What the header of a file says; nothing of it is checked against the points.
+/// Values given in a file's header; none is verified.
 #[derive(Debug, Clone)]
 pub(super) struct Claims {
     pub(super) format: Format,
-    /// How the spool holds the points.
+    /// The type of the points in the spool.
     pub(super) native: Native,
-    /// The numbers come from text, so a fixed number of decimals is a lattice.
+    /// True if the numbers come from text, so that a fixed number of decimals gives a lattice.
     pub(super) text: bool,
-    /// Points have a class.
+    /// True if points have a class.
     pub(super) classes: bool,
     /// Number of points.
     pub(super) points: Option<u64>,
-    /// The same as far as the file is large enough for them; a guess if nothing is claimed.
+    /// The number of points, limited by the file size; an estimate if the header gives none.
     pub(super) likely_points: u64,
     /// Version of the format.
     pub(super) version: Option<String>,
-    /// Number of the layout of a point, where there are several.
+    /// Number of the point format, if the format has several.
     pub(super) point_format: Option<u8>,
     /// Smallest and largest coordinates.
     pub(super) bounds: Option<[[f64; 3]; 2]>,
 }
 
 impl Claims {
-    /// Those of a header that says no more than the number of points; each takes `least` bytes or more.
+    /// Claims with only the number of points, each of which takes at least `least` bytes.
     pub(super) fn new(
         input: &Input,
         format: Format,

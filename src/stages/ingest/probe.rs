@@ -1,4 +1,4 @@
-//! A cheap look at one file.
+//! Reads the header of a file only.
 
 use super::Opened;
 use super::format::Format;
@@ -8,37 +8,37 @@ use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// What the header of a file says; nothing of it is checked against the points.
+/// Values given in a file's header; none is verified.
 #[derive(Debug, Clone, Serialize)]
 pub struct Probe {
     /// The file.
     pub path: PathBuf,
-    /// Its format, found by content.
+    /// Its format, detected by content.
     pub format: Format,
     /// Its size in bytes.
     pub bytes: u64,
-    /// Points the header claims; text has no such claim.
+    /// Number of points given in the header; `None` for text.
     pub points_claimed: Option<u64>,
-    /// The same as far as the file is large enough for them; a guess for text.
+    /// The number of points, limited by the file size; an estimate for text.
     pub points_likely: u64,
     /// Version of LAS and LAZ, e.g. `1.2`.
     pub las_version: Option<String>,
     /// Point format of LAS and LAZ.
     pub point_format: Option<u8>,
-    /// Length of a step of each axis of LAS and LAZ, in the file's unit.
+    /// Step of each axis of LAS and LAZ, in the file's unit.
     pub scale: Option<[f64; 3]>,
     /// Offset of each axis of LAS and LAZ, in the file's unit.
     pub offset: Option<[f64; 3]>,
-    /// Smallest and largest coordinates that the header of LAS and LAZ claims.
+    /// Smallest and largest coordinates given in the header of LAS and LAZ.
     pub bounds: Option<[[f64; 3]; 2]>,
-    /// Bytes a point takes in the scratch folder.
+    /// Bytes of a point in the scratch folder.
     pub spool_bytes_per_point: u64,
 }
 
 /// Reads the header of a file.
 ///
 /// # Errors
-/// [`crate::Error::Io`]; [`crate::Error::Input`] if it is no point cloud that can be read.
+/// [`crate::Error::Io`]; [`crate::Error::Input`] if it is not a readable point cloud.
 pub fn probe(path: &Path) -> Result<Probe> {
     let Opened { input, claims, .. } = Opened::new(path, Arc::default())?;
     let (scale, offset) = match claims.native {

@@ -5,7 +5,7 @@ use super::stats::SourceStats;
 use crate::error::Result;
 use crate::workspace::persist::{Persist, Saved, persist};
 
-/// How the spool holds the coordinates of a source.
+/// The type of a source's coordinates in the spool.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Native {
     /// Integers; the coordinate is `i * scale + offset`.
@@ -55,18 +55,18 @@ persist!(Source {
     text
 });
 
-/// One input file in the spool.
+/// The points of one input file in the spool.
 #[derive(Debug, Clone)]
 pub(super) struct Source {
     pub(super) native: Native,
     pub(super) stats: SourceStats,
-    /// The numbers come from text, so a fixed number of decimals is a lattice.
+    /// True if the numbers come from text, so that a fixed number of decimals gives a lattice.
     pub(super) text: bool,
 }
 
 impl Source {
-    /// Number of decimals of all coordinates, if they come from text with a fixed point and are
-    /// few enough for the integer of the last decimal to be exact.
+    /// Number of decimals of all coordinates, if they come from text without exponents and are few enough for
+    /// an exact integer in units of the last decimal.
     pub(super) fn decimals(&self) -> Option<u32> {
         let stats = &self.stats;
         let fixed = self.text

@@ -1,8 +1,7 @@
 //! The spool: all points in their native form, in checksummed frames of one scratch file.
 //!
-//! A frame is `magic, source, points, CRC-32` (four `u32`) and then the coordinates. The CRC covers
-//! the other header words too. Frames may be appended by several threads; their order has no
-//! meaning.
+//! A frame is `magic, source, points, CRC-32` (four `u32`), followed by the coordinates. The CRC also covers
+//! the other header words. Several threads may append frames; their order has no meaning.
 
 use super::classes::Classes;
 use super::source::Source;
@@ -22,9 +21,9 @@ const HEADER: usize = 16;
 
 /// A coordinate as a file stores it.
 pub(super) trait Coordinate: bytemuck::Pod + PartialEq {
-    /// False for infinities and what is not a number.
+    /// False for infinity and NaN.
     fn is_finite(self) -> bool;
-    /// The same value; exact.
+    /// The value, converted exactly.
     fn value(self) -> f64;
     /// The highest power of two of which the value is a multiple; `i32::MAX` for zero.
     fn exponent(self) -> i32;
@@ -77,12 +76,12 @@ impl Coordinate for f64 {
 #[derive(Debug)]
 pub(super) struct SpoolFile {
     pub(super) file: ScratchFile,
-    /// Frames by number, which has no meaning.
+    /// Frames by number; the numbers have no meaning.
     frames: Mutex<BTreeMap<u32, Place>>,
 }
 
 impl SpoolFile {
-    /// The spool `name` with the frames that earlier attempts at the run have finished.
+    /// Opens the spool `name`, with the frames that earlier attempts of the run completed.
     pub(super) fn open(workspace: &Workspace, name: &str) -> Result<Self> {
         let (file, frames) = workspace.keep_file(name)?;
         Ok(Self {
@@ -95,7 +94,7 @@ impl SpoolFile {
         self.frames.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Numbers of all frames and their points.
+    /// The number of each frame, and its number of points.
     pub(super) fn frames(&self) -> Vec<(u32, u64)> {
         let places = self.places();
         let frames = places.iter();
@@ -125,12 +124,12 @@ impl SpoolFile {
     }
 }
 
-/// Takes the points of one source in, from any number of threads.
+/// Receives the points of one source, from several threads.
 pub(super) struct SourceWriter<'a> {
     pub(super) workspace: &'a Workspace,
     file: &'a SpoolFile,
     source: u32,
-    /// Points to take, where they have a class.
+    /// The classes to keep, if points have a class.
     pub(super) classes: &'a Classes,
     stats: Mutex<SourceStats>,
 }
@@ -151,7 +150,7 @@ impl<'a> SourceWriter<'a> {
         }
     }
 
-    /// A buffer for one unit; its points count once it is finished.
+    /// A buffer for one unit; its points are counted when it is finished.
     pub(super) fn sink<T: Coordinate>(&self) -> Sink<'_, T> {
         let mut bytes = Vec::with_capacity(HEADER + FRAME * size_of::<[T; 3]>());
         bytes.resize(HEADER, 0);
@@ -164,8 +163,8 @@ impl<'a> SourceWriter<'a> {
         }
     }
 
-    /// Reads units of the source on all threads, as [`Workspace::units`]; `work` fills and finishes a
-    /// sink for each.
+    /// Reads units of the source on all threads, as [`Workspace::units`]; `work` fills and finishes a sink
+    /// for each.
     pub(super) fn units(
         &self,
         name: &'static str,
@@ -180,7 +179,7 @@ impl<'a> SourceWriter<'a> {
         })
     }
 
-    /// Reads the source as one unit, which takes `bytes` of memory.
+    /// Reads the source as one unit that takes `bytes` of memory.
     pub(super) fn whole(
         &self,
         name: &'static str,
@@ -190,13 +189,13 @@ impl<'a> SourceWriter<'a> {
         self.units(name, 1, |_| bytes, |_| work())
     }
 
-    /// Statistics of the units so far.
+    /// Statistics of the finished units.
     pub(super) fn stats(&self) -> SourceStats {
         *self.stats.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-/// Bytes of memory of one [`Sink`].
+/// Bytes of one [`Sink`].
 pub(super) const fn sink_bytes<T>() -> u64 {
     (HEADER + 2 * FRAME * size_of::<[T; 3]>()) as u64
 }
@@ -206,13 +205,13 @@ pub(super) struct Sink<'a, T: Coordinate> {
     target: &'a SourceWriter<'a>,
     bytes: Vec<u8>,
     points: Vec<[T; 3]>,
-    /// What was seen so far; extents and kept points are added when a frame is full.
+    /// Statistics so far; extents and kept points are added when a frame is full.
     pub(super) stats: SourceStats,
     reported: u64,
 }
 
 impl<T: Coordinate> Sink<'_, T> {
-    /// Takes a point, unless a coordinate is not finite.
+    /// Adds a point, unless a coordinate is not finite.
     #[inline]
     pub(super) fn push(&mut self, point: [T; 3]) -> Result<()> {
         self.stats.read += 1;
@@ -270,7 +269,7 @@ impl<T: Coordinate> Sink<'_, T> {
         self.target.file.append(&self.bytes, points)
     }
 
-    /// Writes the rest; what was seen.
+    /// Writes the remaining points; returns the statistics.
     pub(super) fn finish(mut self) -> Result<SourceStats> {
         self.flush()?;
         Ok(self.stats)
@@ -284,21 +283,21 @@ fn frame_crc(head: &[u8], body: &[u8]) -> u32 {
     hasher.finalize()
 }
 
-/// Memory of one frame while it is read.
+/// Buffer for reading one frame.
 #[derive(Debug, Default)]
 pub(super) struct FrameBuffer {
     /// Number of the source.
     pub(super) source: usize,
     /// Number of points.
     pub(super) points: usize,
-    /// Where the frame starts in the file.
+    /// Offset of the frame in the file.
     pub(super) offset: u64,
-    /// Coordinates; `u64` so that every coordinate type is aligned.
+    /// Coordinates, in `u64` words so that every coordinate type is aligned.
     words: Vec<u64>,
 }
 
 impl FrameBuffer {
-    /// The points, if they are of type `T`.
+    /// The points, which must have coordinates of type `T`.
     pub(super) fn points<T: Coordinate>(&self) -> &[[T; 3]] {
         let all: &[T] = bytemuck::cast_slice(&self.words);
         &bytemuck::cast_slice(&all[..self.points * 3])[..self.points]

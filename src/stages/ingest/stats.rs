@@ -1,4 +1,4 @@
-//! What was read: counts and extents per file and in all.
+//! Statistics of the input: counts and extents of each file and in total.
 
 use super::format::Format;
 use crate::workspace::persist::persist;
@@ -8,19 +8,19 @@ use std::path::PathBuf;
 /// Counts of one run over all input files.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct IngestStats {
-    /// Points found in the files.
+    /// Points in the files.
     pub read: u64,
-    /// Points that went into the spool.
+    /// Points written to the spool.
     pub kept: u64,
-    /// Points left out because a coordinate was not a number or infinite.
+    /// Points left out because a coordinate is infinite or NaN.
     pub dropped_non_finite: u64,
-    /// Points left out because the file flags them as withheld.
+    /// Points left out because they are flagged as withheld.
     pub withheld: u64,
     /// Points left out because their class is not wanted.
     pub dropped_by_class: u64,
-    /// The same, file by file, in the order given.
+    /// The counts of each file, in the order given.
     pub files: Vec<FileStats>,
-    /// What the user should know, one line each.
+    /// Warnings for the user, one line each.
     pub warnings: Vec<String>,
 }
 
@@ -29,25 +29,25 @@ pub struct IngestStats {
 pub struct FileStats {
     /// The file.
     pub path: PathBuf,
-    /// Its format, found by content.
+    /// Its format, detected by content.
     pub format: Format,
     /// Its size in bytes.
     pub bytes: u64,
-    /// Points its header claims; text has no such claim.
+    /// Number of points given in the header; `None` for text.
     pub claimed: Option<u64>,
-    /// Points found.
+    /// Points in the file.
     pub points: u64,
     /// Points kept.
     pub kept: u64,
-    /// Points left out because a coordinate was not a number or infinite.
+    /// Points left out because a coordinate is infinite or NaN.
     pub dropped_non_finite: u64,
     /// Points left out because they are flagged as withheld.
     pub withheld: u64,
     /// Points left out because their class is not wanted.
     pub dropped_by_class: u64,
-    /// Lowest coordinates of the kept points, in the file's unit; none without points.
+    /// Lowest coordinates of the kept points, in the file's unit; `None` without points.
     pub min: Option<[f64; 3]>,
-    /// Highest coordinates of the kept points, in the file's unit; none without points.
+    /// Highest coordinates of the kept points, in the file's unit; `None` without points.
     pub max: Option<[f64; 3]>,
 }
 
@@ -58,15 +58,15 @@ pub(super) struct SourceStats {
     pub(super) kept: u64,
     pub(super) dropped: u64,
     pub(super) withheld: u64,
-    /// Points of classes that are not wanted.
+    /// Points left out because of their class.
     pub(super) unwanted: u64,
     pub(super) min: [f64; 3],
     pub(super) max: [f64; 3],
-    /// All coordinates are multiples of two to this power; `i32::MAX` if all are zero.
+    /// All coordinates are multiples of 2 to the power of this; `i32::MAX` if all are zero.
     pub(super) exponent: i32,
     /// Largest number of decimals in text, or [`NOT_FIXED`](super::number::NOT_FIXED).
     pub(super) decimals: u32,
-    /// Points that count lines inside the text claim.
+    /// Sum of the point counts given in count lines of a text file.
     pub(super) claimed: u64,
 }
 

@@ -9,10 +9,10 @@ use crate::geom::Point;
 use crate::geom::lattice::{COORDINATE_LIMIT, Lattice};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// Memory of the buffers of one thread that streams a [`Spool`], in bytes.
+/// Bytes of the buffers of one thread that streams a [`Spool`].
 pub const READ_BUFFERS: u64 = (FRAME * (24 + 24 + 12)) as u64;
 
-/// Buffers of one thread.
+/// The buffers of one thread.
 #[derive(Default)]
 struct Buffers {
     frame: FrameBuffer,
@@ -20,7 +20,7 @@ struct Buffers {
     points: Vec<Point>,
 }
 
-/// The frames that are left; none once a thread has failed.
+/// The remaining frames; empty after a thread has failed.
 type Next<'a> = Mutex<std::slice::Iter<'a, u32>>;
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -28,20 +28,19 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 impl Spool {
-    /// Numbers of the frames that the points are in, and the points in each.
+    /// The number of each frame, and its number of points.
     #[must_use]
     pub fn frames(&self) -> Vec<(u32, u64)> {
         self.file.frames()
     }
 
-    /// Streams all points as positions on `lattice`, one chunk at a time, in memory of
-    /// [`READ_BUFFERS`].
+    /// Streams all points as positions on `lattice`, in chunks, with buffers of [`READ_BUFFERS`] bytes.
     ///
     /// The order of the points has no meaning.
     ///
     /// # Errors
-    /// What `each` returned; [`Error::Io`], [`Error::Cancelled`], [`Error::Corrupt`] if the spool
-    /// is not what was written; [`Error::Parameter`] for a lattice that was not chosen for it.
+    /// What `each` returned; [`Error::Io`], [`Error::Cancelled`]; [`Error::Corrupt`] if a frame does not
+    /// match its checksum; [`Error::Parameter`] if the lattice was not chosen for this spool.
     pub fn for_each(
         &self,
         lattice: &Lattice,
@@ -56,8 +55,7 @@ impl Spool {
         Ok(())
     }
 
-    /// Like [`Spool::for_each`], on `threads` threads at the same time, each with its own
-    /// [`READ_BUFFERS`].
+    /// As [`Spool::for_each`], on `threads` threads, each with its own [`READ_BUFFERS`].
     ///
     /// # Errors
     /// See [`Spool::for_each`]; the first error of any thread.
@@ -71,8 +69,7 @@ impl Spool {
         self.par_for_frames(threads, lattice, &frames, each)
     }
 
-    /// Streams the points of some `frames`, on `threads` threads at the same time, each with its own
-    /// [`READ_BUFFERS`].
+    /// Streams the points of some `frames`, on `threads` threads, each with its own [`READ_BUFFERS`].
     ///
     /// # Errors
     /// See [`Spool::for_each`]; the first error of any thread.
@@ -114,8 +111,8 @@ impl Spool {
         }
     }
 
-    /// How positions of each source become positions on `lattice`. The lattice was chosen without a
-    /// look at sources of which no point was kept, and may not have a place for them.
+    /// The maps of all sources to `lattice`; `None` for sources without kept points, which had no influence
+    /// on the lattice and may not fit it.
     fn maps(&self, lattice: &Lattice) -> Result<Vec<Option<SourceMap>>> {
         let map = |source: &Source| {
             if source.stats.kept == 0 {

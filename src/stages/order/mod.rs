@@ -1,5 +1,5 @@
-//! Points in curve order: an external sort, duplicates folded; the rank is the id (paper: none;
-//! this is what makes everything after it independent of memory and threads).
+//! Sorts points along the Hilbert curve, on disk, and removes duplicates; the rank of a point is its id (not
+//! in the paper). This makes all later stages independent of memory and threads.
 
 mod rewrite;
 mod store;
@@ -22,26 +22,26 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// Keys encoded at a time.
 const CHUNK: usize = 1 << 12;
 
-/// Keys of a merge that one thread takes at a time, or more if there are many runs.
+/// Keys that a thread merges at a time; more if there are many runs.
 const PART: usize = 1 << 18;
 
-/// Room in the sort buffer beside all points.
+/// Room in the sort buffer in addition to all points.
 const SPARE: u64 = 1 << 17;
 
-/// Points of a stream that a run holds at most.
+/// Most points of a stream in one run.
 const MOST_IN_RUN: usize = 1 << 26;
 
-/// What is noted with a run of a stream: the mark after it and the counts up to there; the points so
-/// far, and whether they are all.
+/// The note kept with a run of a stream: the mark after it and the counts up to there; the number of points
+/// so far, and true if these are all.
 type Note<M, S> = ((Option<M>, S), (u64, bool));
 
-/// Takes points of a stream, the mark after them, and the counts up to there.
+/// Receives points of a stream, the mark after them, and the counts up to there.
 pub type Each<'a, M, S> = &'a mut dyn FnMut(&[Point], Option<M>, S) -> Result<()>;
 
 row! {
     /// The key of a position on the curve.
     pub struct CurveKey {
-        /// As [`hilbert::encode`] has it.
+        /// The key computed by [`hilbert::encode`].
         key: hilbert::Key,
     }
     unpacked
@@ -58,17 +58,17 @@ impl CurveKey {
     }
 }
 
-/// Takes in positions in any order and gives back the ordered store.
+/// Accepts positions in any order and returns the ordered store.
 #[derive(Debug)]
 pub struct Orderer {
     sorter: Sorter<CurveKey>,
     taken: AtomicU64,
-    /// Bytes of the sort buffer.
+    /// Size of the sort buffer in bytes.
     buffer: u64,
 }
 
 impl Orderer {
-    /// Sorts in about a third of the memory that is free now.
+    /// Reserves about a third of the available memory for sorting.
     ///
     /// # Errors
     /// [`Error::Memory`].
@@ -76,14 +76,14 @@ impl Orderer {
         Self::for_points(workspace, u64::MAX)
     }
 
-    /// Sorts up to so many points in about a third of the memory that is free now, or in less if they
-    /// fit.
+    /// Reserves memory for sorting up to `most` points: about a third of the available memory, or less if
+    /// they fit in less.
     ///
     /// # Errors
     /// [`Error::Memory`].
     pub fn for_points(workspace: &Workspace, most: u64) -> Result<Self> {
         let third = (workspace.memory.available() / 3).max(16 << 20);
-        // A buffer that is full is written: there is room for more than there are.
+        // A full buffer is written to disk, so there is room for more points than there are.
         let all = most
             .saturating_add(SPARE)
             .saturating_mul(size_of::<CurveKey>() as u64);
@@ -97,7 +97,7 @@ impl Orderer {
         })
     }
 
-    /// Takes in positions, each coordinate in `0..2^30`; safe to call from several threads.
+    /// Adds positions, each coordinate in `0..2^30`; may be called from several threads.
     ///
     /// # Errors
     /// [`Error::Io`], [`Error::Cancelled`].
@@ -113,8 +113,8 @@ impl Orderer {
         Ok(())
     }
 
-    /// Takes in parts of the input, given by their numbers and points, all of which `push` pushes to it.
-    /// In a run that can be resumed, those that are sorted are not taken in again.
+    /// Adds parts of the input, given by their numbers and numbers of points; `push` passes all points of a
+    /// part to `self`. In a run that can be resumed, parts that are already sorted are not read again.
     ///
     /// # Errors
     /// What `push` returned, [`Error::Io`], [`Error::Disk`].
@@ -129,9 +129,9 @@ impl Orderer {
         Ok(())
     }
 
-    /// Takes in a stream of points that can be begun anywhere between two of its parts. `stream` is
-    /// called with a mark where to begin (none: at the start) and with what was counted before that;
-    /// it hands on points, the mark after them and the counts up to there, and returns the counts of all.
+    /// Adds a stream of points that can be restarted between any two of its parts. `stream` is called with
+    /// the mark at which to start (`None`: at the beginning) and the counts before it. It passes on points,
+    /// the mark after them and the counts up to there, and returns the counts of all.
     ///
     /// # Errors
     /// What `stream` returned, [`Error::Io`], [`Error::Disk`], [`Error::Cancelled`].
@@ -157,7 +157,8 @@ impl Orderer {
         let counts = stream(mark, counts, &mut |points, mark, counts| {
             self.push(workspace, points)?;
             since += points.len();
-            // The next points must not fill the buffer: it would be written, and not for good.
+            // The next points must not fill the buffer: it would be written without a note, and lost on
+            // resume.
             let full = self.sorter.buffered() + points.len() >= self.sorter.capacity();
             if workspace.is_resumable() && mark.is_some() && (full || since > MOST_IN_RUN) {
                 since = 0;
@@ -174,14 +175,14 @@ impl Orderer {
         Ok(counts)
     }
 
-    /// True if all that was taken in is on disk.
+    /// True if all points added are on disk.
     #[must_use]
     pub fn is_sorted(&self) -> bool {
         self.sorter.is_spilled()
     }
 
-    /// The store of all distinct points in curve order, in pages of `page` points, and the number
-    /// of duplicates folded.
+    /// The store of all distinct points in curve order, with `page` points in a page, and the number of
+    /// duplicates removed.
     ///
     /// # Errors
     /// [`Error::Io`], [`Error::Corrupt`], [`Error::TooManyPoints`], [`Error::Cancelled`].
@@ -213,8 +214,8 @@ impl Orderer {
     }
 }
 
-/// Puts all points of a spool in order, in pages of `page` points; the spool is deleted. The store, and
-/// the number of duplicates folded.
+/// Sorts all points of a spool, with `page` points in a page, and deletes the spool. Returns the store and
+/// the number of duplicates removed.
 ///
 /// # Errors
 /// [`Error::Io`], [`Error::Corrupt`], [`Error::TooManyPoints`], [`Error::Memory`], [`Error::Cancelled`].
@@ -224,7 +225,7 @@ pub fn order(
     page: usize,
     workspace: &Workspace,
 ) -> Result<(PointStore, u64)> {
-    // Their buffers must not take much of what is there to sort in.
+    // The read buffers may only take a small part of the memory for sorting.
     let most = workspace.memory.available() / (8 * READ_BUFFERS);
     let threads = workspace.threads.min(most as usize).max(1);
     let held = workspace.reserve("order: frames", threads as u64 * READ_BUFFERS)?;
@@ -234,16 +235,16 @@ pub fn order(
         spool.par_for_frames(threads, lattice, frames, push)
     })?;
     drop(held);
-    // An attempt that dies has to read again what was only in memory.
+    // After an interruption, the points that were only in memory have to be read again.
     let read_again = workspace.is_resumable() && !orderer.is_sorted();
     let _spool = read_again.then_some(spool);
     orderer.finish(workspace, page)
 }
 
-/// Where a part of the keys begins and ends.
+/// The limits of a part of the keys; `None` at the two ends.
 type Part = (Option<CurveKey>, Option<CurveKey>);
 
-/// The key after this one.
+/// The successor of a key.
 fn next(mut key: CurveKey) -> CurveKey {
     for word in key.key.iter_mut().rev() {
         let (sum, over) = word.overflowing_add(1);
@@ -255,20 +256,20 @@ fn next(mut key: CurveKey) -> CurveKey {
     key
 }
 
-/// Writes what is on disk in order, part by part, each merged by one thread, in `memory` bytes.
+/// Merges the sorted runs on disk part by part, one thread for each part, in `memory` bytes.
 fn merge(
     mut sorted: Sorted<CurveKey>,
     memory: u64,
     writer: &mut StoreWriter,
     workspace: &Workspace,
 ) -> Result<()> {
-    // A key is a position, so the last one written says where to go on.
+    // A key can be computed from a position, so the last point written determines where to continue.
     let start = writer.last()?.map(|point| next(CurveKey::of(point)));
     let cuts = sorted.cuts(PART).into_iter().map(Some);
     let cuts = cuts.filter(|cut| *cut > start);
     let ends: Vec<_> = [start].into_iter().chain(cuts).chain([None]).collect();
     let parts: Vec<Part> = ends.windows(2).map(|w| (w[0], w[1])).collect();
-    // A part has a frame more of each run at most, and its list grows by doubling.
+    // A part reads up to one extra frame of each run, and its list grows by doubling.
     let (list, merging) = ((PART * size_of::<CurveKey>()) as u64, sorted.merge_bytes());
     let threads = (memory / (3 * list + 4 * merging)).clamp(1, workspace.threads as u64) as usize;
     sorted.tell(threads as u64 * (list + merging));

@@ -1,4 +1,4 @@
-//! A store of the same points at other positions, written in any order.
+//! Writes a store of the same points at other positions, in any order.
 
 use super::store::PointStore;
 use super::writer::{PageEnd, StoreWriter};
@@ -8,7 +8,7 @@ use crate::geom::aabb::Aabb;
 use crate::workspace::Workspace;
 use std::sync::{Mutex, PoisonError};
 
-/// Writes a [`PointStore`] as long as another one; ranges of pages may come from several threads.
+/// Writes a [`PointStore`] of the same length as another one; several threads may write ranges of pages.
 #[derive(Debug)]
 pub struct Rewriter {
     writer: StoreWriter,
@@ -17,7 +17,7 @@ pub struct Rewriter {
 }
 
 impl Rewriter {
-    /// Starts the scratch file `name`, with the length and pages of `store`.
+    /// Creates the scratch file `name`, with the length and page size of `store`.
     ///
     /// # Errors
     /// [`crate::Error::Io`].
@@ -32,7 +32,7 @@ impl Rewriter {
         })
     }
 
-    /// Writes whole pages, the first of which begins with point `first`; its number is a multiple of 16.
+    /// Writes whole pages, starting with point `first`; the number of the first page is a multiple of 16.
     ///
     /// # Errors
     /// [`crate::Error::Io`].
@@ -45,7 +45,7 @@ impl Rewriter {
         Ok(())
     }
 
-    /// The store; every page must have been written.
+    /// Returns the store; every page must have been written.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Memory`].

@@ -9,7 +9,7 @@ use crate::workspace::memory::Reservation;
 use std::ops::Range;
 
 row! {
-    /// Checksum and box of a page.
+    /// Checksum and bounding box of a page.
     pub struct PageRow {
         /// CRC-32 of the page.
         crc: u32,
@@ -21,26 +21,27 @@ row! {
     unpacked
 }
 
-/// The pages of a store. Pages that were written together are a section, which has the number of the
-/// first of them divided by 16.
+/// The pages of a store. Pages written together form a section; its number is that of its first page divided
+/// by 16.
 pub(super) type Index = Table<PageRow>;
 
-/// Points per page unless a test asks for another number.
+/// Points in a page, except in tests.
 pub const PAGE: usize = 256;
 
 /// Children of a node of the box tree.
 pub(super) const FAN: usize = 8;
 
-/// Positions of all points by id; 12 bytes a point on disk, 28/256 in memory.
+/// Positions of all points by id; 12 bytes for each point on disk, 28/256 in memory.
 #[derive(Debug)]
 pub struct PointStore {
     pub(super) file: ScratchFile,
     pub(super) len: usize,
     pub(super) page: usize,
     pub(super) checks: Vec<u32>,
-    /// `levels[0]` has a box for each page, each further level one for `FAN` of the last.
+    /// `levels[0]` has a box for each page; each further level has one box for `FAN` boxes of the previous
+    /// level.
     pub(super) levels: Vec<Vec<Aabb>>,
-    /// Checksums and boxes on disk, if a resumed run may need them.
+    /// Checksums and boxes on disk, needed if the run is resumed.
     pub(super) _index: Option<Index>,
     pub(super) _held: Reservation,
 }
@@ -58,7 +59,7 @@ impl PointStore {
         self.len == 0
     }
 
-    /// Points per page.
+    /// Points in a page.
     #[must_use]
     pub fn page_size(&self) -> usize {
         self.page
@@ -70,19 +71,19 @@ impl PointStore {
         self.levels[0].len()
     }
 
-    /// The box around a page.
+    /// The bounding box of a page.
     #[must_use]
     pub fn page_box(&self, page: usize) -> &Aabb {
         &self.levels[0][page]
     }
 
-    /// Ids of the points in a page.
+    /// Ids of the points of a page.
     #[must_use]
     pub fn page_ids(&self, page: usize) -> Range<usize> {
         page * self.page..((page + 1) * self.page).min(self.len)
     }
 
-    /// The box around all points.
+    /// The bounding box of all points.
     #[must_use]
     pub fn bounds(&self) -> Aabb {
         self.levels.last().map_or(Aabb::EMPTY, |top| {
@@ -90,7 +91,7 @@ impl PointStore {
         })
     }
 
-    /// Number of levels of the box tree; level 0 are the pages.
+    /// Number of levels of the box tree; level 0 is the pages.
     #[must_use]
     pub fn tree_levels(&self) -> usize {
         self.levels.len()
@@ -102,14 +103,14 @@ impl PointStore {
         &self.levels[level]
     }
 
-    /// The nodes of `level - 1` under node `index` of `level`.
+    /// The children in `level - 1` of node `index` of `level`.
     #[must_use]
     pub fn tree_children(&self, level: usize, index: usize) -> Range<usize> {
         index * FAN..((index + 1) * FAN).min(self.levels[level - 1].len())
     }
 
-    /// Calls `each` with all pages whose box is within squared distance `d2` of `target`, ascending,
-    /// until it returns false.
+    /// Calls `each` with all pages whose box is within squared distance `d2` of `target`, ascending, until it
+    /// returns false.
     pub fn pages_near(&self, target: &Aabb, d2: u64, each: &mut dyn FnMut(usize) -> bool) {
         let top = self.levels.len() - 1;
         for node in 0..self.levels[top].len() {
@@ -137,10 +138,10 @@ impl PointStore {
             .all(|child| self.descend(level - 1, child, target, d2, each))
     }
 
-    /// Reads a run of pages and appends their points to `points`.
+    /// Reads consecutive pages and appends their points to `points`.
     ///
     /// # Errors
-    /// [`crate::Error::Io`]; [`crate::Error::Corrupt`] if a page is not what was written.
+    /// [`crate::Error::Io`]; [`crate::Error::Corrupt`] if a page does not match its checksum.
     pub fn read_pages(&self, pages: Range<usize>, points: &mut Vec<Point>) -> Result<()> {
         if pages.end > self.checks.len() {
             let offset = (self.checks.len() * self.page * 12) as u64;
@@ -167,7 +168,7 @@ impl PointStore {
         Ok(())
     }
 
-    /// Positions of ascending `ids`, appended to `points` in the same order.
+    /// Appends the positions of ascending `ids` to `points`, in the same order.
     ///
     /// # Errors
     /// See [`PointStore::read_pages`].
@@ -214,8 +215,8 @@ mod tests {
     use crate::workspace::progress::{Cancel, Silent};
     use std::sync::Arc;
 
-    /// Found by fuzzing: a journal that says of a file that is gone how many points it had, and a stage
-    /// that reads it all the same.
+    /// Found by fuzzing: the journal gives a number of points for a file that no longer exists, and a stage
+    /// reads it nevertheless.
     #[test]
     fn a_store_whose_file_is_gone_is_not_read() {
         let memory = MemoryPool::new(MINIMUM_BUDGET).unwrap();

@@ -1,4 +1,4 @@
-//! Writes the ordered store: in id order, or, by way of `rewrite`, in any.
+//! Writes the ordered store: in id order, or, with `rewrite`, in any order.
 
 use super::store::{FAN, Index, PageRow, PointStore};
 use crate::error::Result;
@@ -21,45 +21,45 @@ row! {
     unpacked
 }
 
-/// What is written at a time begins with a page whose number is a multiple of this.
+/// The first page of every write has a number that is a multiple of this.
 const STEP: usize = 16;
 
 /// Pages written at a time.
 const GROUP: usize = 64;
 
-/// Checksum and box of a page.
+/// Checksum and bounding box of a page.
 pub(super) type PageEnd = (u32, Aabb);
 
-/// Pages that were written together.
+/// Pages that were written together, and their place in the file.
 pub(super) type Written = (Vec<PageEnd>, Place);
 
 /// Writes a [`PointStore`] in id order.
 #[derive(Debug)]
 pub struct StoreWriter {
     file: ScratchFile,
-    /// Points written.
+    /// Number of points written.
     len: usize,
     page: usize,
-    /// Points not yet written, less than a group of pages.
+    /// Points not written yet, less than a group of pages.
     pending: Vec<Point>,
     checks: Vec<u32>,
     boxes: Vec<Aabb>,
-    /// As [`PointStore`] has it.
+    /// See [`PointStore`].
     index: Option<Index>,
-    /// Groups of pages are its units.
+    /// The step whose units are the groups of pages.
     step: Step,
 }
 
 impl StoreWriter {
-    /// Starts the scratch file `name`. What an earlier attempt at the run has written of it is there,
-    /// see [`StoreWriter::len`].
+    /// Opens the scratch file `name`. It contains the points that an earlier attempt of the run wrote; see
+    /// [`StoreWriter::len`].
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
     pub fn create(workspace: &Workspace, name: &str, page: usize) -> Result<Self> {
         let mut writer = Self::open(workspace, name, page)?;
         writer.step = workspace.step("store")?;
-        // The last group may have been cut short by the end of the points; it is written again.
+        // The end of the points may have cut the last group short; it is written again.
         let whole = writer.boxes.len() / GROUP * GROUP;
         writer.checks.truncate(whole);
         writer.boxes.truncate(whole);
@@ -83,7 +83,7 @@ impl StoreWriter {
         Ok(writer)
     }
 
-    /// Reads the index of what is there; false if there is none.
+    /// Reads the index of the existing pages; false if there is none.
     pub(super) fn take_up(&mut self) -> Result<bool> {
         let index = self.index.as_ref().filter(|_| !self.is_gone());
         let Some(index) = index else {
@@ -102,12 +102,12 @@ impl StoreWriter {
         Ok(true)
     }
 
-    /// True if an earlier attempt has deleted it.
+    /// True if an earlier attempt deleted the file.
     fn is_gone(&self) -> bool {
         self.file.is_gone() || self.index.as_ref().is_some_and(Index::is_gone)
     }
 
-    /// Points written so far.
+    /// Number of points written so far.
     #[must_use]
     pub fn len(&self) -> usize {
         self.len
@@ -133,10 +133,11 @@ impl StoreWriter {
         Ok(Some(point))
     }
 
-    /// A whole store from the points of sections, one after the other.
+    /// A whole store from the points of the sections, in their order.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`], [`crate::Error::Cancelled`].
+    /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
+    /// [`crate::Error::Cancelled`].
     pub fn gather(
         workspace: &Workspace,
         name: &str,
@@ -160,7 +161,7 @@ impl StoreWriter {
         })
     }
 
-    /// Appends points, in order of id.
+    /// Appends points, in id order.
     ///
     /// # Errors
     /// [`crate::Error::Io`].
@@ -177,7 +178,7 @@ impl StoreWriter {
         Ok(())
     }
 
-    /// Appends the points of `items`, in order of id, on all threads.
+    /// Appends the points of `items`, in id order, on all threads.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Cancelled`].
@@ -209,7 +210,7 @@ impl StoreWriter {
         self.push(&last.iter().map(&point).collect::<Vec<_>>())
     }
 
-    /// Writes a group of pages from point `first` on; their checksums and boxes, and the place.
+    /// Writes a group of pages starting with point `first`; returns their checksums and boxes, and the place.
     pub(super) fn write(&self, first: usize, points: &[Point]) -> Result<Written> {
         let bytes: &[u8] = bytemuck::cast_slice(points);
         let offset = first as u64 * 12;
@@ -227,7 +228,7 @@ impl StoreWriter {
         Ok((points.chunks(self.page).map(page).collect(), place))
     }
 
-    /// Notes pages, the first of which is number `first`, for an attempt that comes later.
+    /// Records pages in the index, the first with number `first`, for a later attempt of the run.
     pub(super) fn keep(&self, first: usize, written: &[Written]) -> Result<()> {
         let Some(index) = &self.index else {
             return Ok(());
@@ -248,7 +249,7 @@ impl StoreWriter {
         index.put(first / STEP, &rows)
     }
 
-    /// Takes in groups that were written, for good.
+    /// Records groups that were written.
     fn note(&mut self, groups: Vec<Written>) -> Result<()> {
         if groups.is_empty() {
             return Ok(());
@@ -263,7 +264,7 @@ impl StoreWriter {
         Ok(())
     }
 
-    /// Writes what is pending.
+    /// Writes the pending points.
     fn flush(&mut self) -> Result<()> {
         if !self.pending.is_empty() {
             let group = self.write(self.len, &self.pending)?;
@@ -274,13 +275,13 @@ impl StoreWriter {
         Ok(())
     }
 
-    /// Points per page.
+    /// Points in a page.
     pub(super) fn page(&self) -> usize {
         self.page
     }
 
-    /// As [`StoreWriter::finish`], if `pages` were written to the file without this writer's knowledge;
-    /// an index knows more of them.
+    /// As [`StoreWriter::finish`], for a file with `pages` that were not all written through this writer; an
+    /// index may list more of them.
     pub(super) fn finish_with(
         mut self,
         len: usize,
@@ -294,7 +295,7 @@ impl StoreWriter {
         self.into_store(workspace)
     }
 
-    /// Ends the file and builds the tree of boxes.
+    /// Closes the file and builds the tree of boxes.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Memory`].
@@ -350,7 +351,7 @@ impl Persist for PointStore {
         }
         writer.len = len;
         if gone {
-            // Nobody reads its points any more, but where they were is known.
+            // The points will not be read any more, but their bounding box is still needed.
             writer.boxes = vec![Aabb { min, max }];
         }
         writer.into_store(workspace)

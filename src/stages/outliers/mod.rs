@@ -1,12 +1,12 @@
-//! Outliers: points much farther from their neighbours than the points around them are from theirs
-//! (paper: none).
+//! Outliers: points much farther from their neighbours than the points around them are from theirs (not in
+//! the paper).
 //!
-//! The *spacing* of a point is the mean distance to its 8 nearest neighbours. A point goes if its
-//! spacing is larger than a factor times the median of the spacings of its 64 nearest neighbours.
-//! The second neighbourhood is much larger than the first, since an outlier's nearest neighbours are
-//! often outliers themselves, alone or in small clusters; the median of many is that of the surface.
-//! Where outliers are so far off that even these 64 are outliers, another round finds them, when
-//! those nearer to the surface are gone.
+//! The *spacing* of a point is the mean distance to its 8 nearest neighbours. A point is dropped if its
+//! spacing is larger than a factor times the median of the spacings of its 64 nearest neighbours. The second
+//! neighbourhood is much larger than the first, since the nearest neighbours of an outlier are often outliers
+//! themselves, alone or in small clusters; the median of many is that of the surface. Where outliers are so
+//! far off that even these 64 are outliers, another round finds them, after the ones nearer to the surface
+//! have been dropped.
 
 mod spacing;
 
@@ -30,24 +30,24 @@ use std::ops::Range;
 pub struct OutlierStats {
     /// Points dropped.
     pub dropped: u64,
-    /// Rounds, the one that dropped nothing included.
+    /// Rounds, including the last one, which dropped nothing.
     pub rounds: u32,
 }
 
 crate::workspace::persist::persist!(OutlierStats { dropped, rounds });
 
-/// What decides which points are outliers, and how they are worked on.
+/// The definition of outliers, and the division of the work.
 #[derive(Debug, Clone, Copy)]
 pub struct OutlierOptions {
-    /// How many times as large as around it the spacing of an outlier is.
+    /// A point is an outlier if its spacing is more than this times the median around it.
     pub factor: f64,
-    /// Ids in a block, and at most in a tile; neither decides anything.
+    /// Ids in a block; has no influence on the result.
     pub block: u32,
-    /// See `block`.
+    /// Most ids in a tile; has no influence on the result.
     pub tile: u32,
 }
 
-/// The points that are no outliers, with new ids: their ranks among themselves.
+/// The points that are not outliers, with new ids: their ranks among themselves.
 ///
 /// # Errors
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
@@ -96,7 +96,7 @@ fn round(
     StoreWriter::gather(workspace, &name, store.page_size(), &kept)
 }
 
-/// The points of a tile that stay.
+/// The points of a tile that are kept.
 fn one_tile(
     store: &PointStore,
     ids: Range<usize>,

@@ -1,4 +1,4 @@
-//! The spacings of all points: a file of them by tile.
+//! The spacings of all points, in a file by tile.
 
 use crate::error::Result;
 use crate::method::METHOD;
@@ -22,7 +22,7 @@ row! {
     unpacked
 }
 
-/// The mean distance of every point to its nearest neighbours.
+/// The mean distances of all points to their nearest neighbours.
 #[derive(Debug)]
 pub(super) struct Spacings {
     tiles: TileRanges,
@@ -30,7 +30,7 @@ pub(super) struct Spacings {
 }
 
 impl Spacings {
-    /// Measures them all. There are more points than neighbours that make a spacing.
+    /// Measures all spacings. There must be more points than the neighbours used for a spacing.
     pub(super) fn measure(
         store: &PointStore,
         tiles: TileRanges,
@@ -76,14 +76,14 @@ fn one_tile(store: &PointStore, ids: Range<usize>) -> Result<Vec<Spacing>> {
     Ok(spacings)
 }
 
-/// Mean of the distances, nearest first: the order of the sum is always the same.
+/// Mean of the distances, summed nearest first so that rounding is reproducible.
 fn mean(distances2: impl Iterator<Item = u64>) -> Spacing {
     let sum: f64 = distances2.map(|d2| (d2 as f64).sqrt()).sum();
     let bits = ((sum / METHOD.outliers.nearest as f64) as f32).to_bits();
     Spacing { bits }
 }
 
-/// Sections of spacings that were looked at.
+/// A cache of sections of spacings.
 #[derive(Debug)]
 pub(super) struct SpacingCache<'a> {
     spacings: &'a Spacings,
@@ -94,10 +94,10 @@ pub(super) struct SpacingCache<'a> {
 }
 
 impl<'a> SpacingCache<'a> {
-    /// Most spacings held; a section of any size comes on top.
+    /// Most spacings held; one more section of any size may be added.
     const HELD: usize = 1 << 20;
 
-    /// Bytes of a full cache: a section more than it holds, which is of a block at most.
+    /// Bytes of a full cache: one section, of at most a block, more than it holds.
     pub(super) const BYTES: u64 = 4 * (Self::HELD as u64 + (1 << 16)) + (1 << 16);
 
     pub(super) fn new(spacings: &'a Spacings) -> Self {
@@ -110,7 +110,8 @@ impl<'a> SpacingCache<'a> {
         }
     }
 
-    /// The bits of the spacing of a point. Not negative, so they are in the order of the numbers.
+    /// The bits of the spacing of a point. Spacings are not negative, so their bits are ordered like their
+    /// values.
     fn get(&mut self, id: u32) -> Result<u32> {
         let tiles = &self.spacings.tiles;
         let tile = tiles.of(id);
@@ -119,7 +120,7 @@ impl<'a> SpacingCache<'a> {
             return Ok(section[place].bits);
         }
         if self.held >= Self::HELD {
-            // Queries come in curve order: soon everything here is new again.
+            // Queries come in curve order, so the old sections are soon no longer needed.
             self.sections.clear();
             self.held = 0;
         }
@@ -131,7 +132,7 @@ impl<'a> SpacingCache<'a> {
         Ok(found)
     }
 
-    /// Whether the spacing of a point is larger than `factor` times the median of those `around` it.
+    /// True if the spacing of a point is larger than `factor` times the median of the spacings `around` it.
     pub(super) fn stand_out(
         &mut self,
         id: u32,

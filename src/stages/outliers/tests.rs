@@ -12,7 +12,7 @@ fn workspace() -> Workspace {
     Workspace::new(&folder, memory, 2, Arc::new(Silent), Cancel::new()).unwrap()
 }
 
-/// Steps in a unit, and the shift of a cloud's centre.
+/// Lattice steps in a unit, and the shift of a cloud's centre.
 const STEPS: f64 = 100_000.0;
 const SHIFT: f64 = 2000.0;
 
@@ -91,7 +91,7 @@ fn small_clusters_go_however_they_are_worked_on() {
     let mut all = surface.clone();
     for cluster in 0..6 {
         let at = [0, 1, 2].map(|k| ((cluster * 7 + k * 3) % 11) * 30_000_000 + 5_000_000);
-        // One to five points, closer together than those of the surface.
+        // One to five points, closer together than points of the surface.
         for n in 0..1 + cluster % 5 {
             all.push([at[0] + 9000 * n, at[1] - 7000 * n, at[2] + 100 * n]);
         }
@@ -164,7 +164,7 @@ fn too_few_points_have_no_outliers() {
     }
 }
 
-/// Why a point is not compared with the same eight: outliers have outliers for neighbours.
+/// Shows why a point is not compared with its eight nearest: the neighbours of an outlier can be outliers.
 #[test]
 fn the_eight_nearest_would_not_do() {
     let cloud = Cloud::new(Kind::Torus).points(4000).outliers(0.05);

@@ -1,4 +1,4 @@
-//! The triangles around a block as stitching left them.
+//! The triangles of the stitched surface that touch a block.
 
 use crate::error::Result;
 use crate::stages::stitch::Stitched;
@@ -24,7 +24,7 @@ pub fn load(stitched: &Stitched, block: usize) -> Result<Vec<Triangle>> {
     Ok(triangles)
 }
 
-/// Merges ascending triangles into ascending ones, in place and from behind.
+/// Merges ascending triangles into a list of ascending ones, in place and from the back.
 pub fn merge(
     into: &mut Vec<Triangle>,
     more: impl DoubleEndedIterator<Item = Triangle> + ExactSizeIterator,

@@ -1,4 +1,4 @@
-//! Bridges: triangles that hang by one edge and touch another part with the opposite vertex.
+//! Bridges: triangles connected by one edge only, whose opposite vertex touches another part of the surface.
 
 use super::patch::Patch;
 use crate::stages::surface::star::{Link, Star, Triangle};
@@ -6,11 +6,11 @@ use std::ops::Range;
 
 /// Numbers, ascending, of the triangles that are bridges at a vertex of the block.
 ///
-/// A bridge has two boundary edges, so it is next to at most one triangle: taking it away leaves
-/// the rest connected as it was, and the component of that triangle was open before.
+/// A bridge has two boundary edges, so it is adjacent to at most one triangle. Removing it leaves the rest
+/// connected as before, and the component of that triangle was open before.
 #[must_use]
 pub fn find(ids: Range<u32>, triangles: &[Triangle], patch: &Patch) -> Vec<u32> {
-    // Every fan that is not closed has two boundary edges, and a closed fan is alone.
+    // Every open fan has two boundary edges, and a closed fan is the only fan of its vertex.
     let several = |v: u32| ids.contains(&v) && patch.rims[(v - ids.start) as usize] >= 4;
     let near: Vec<u32> = (0..triangles.len() as u32)
         .filter(|&n| triangles[n as usize].into_iter().any(several))
@@ -25,8 +25,8 @@ pub fn find(ids: Range<u32>, triangles: &[Triangle], patch: &Patch) -> Vec<u32> 
     for v in ids.clone().filter(|v| several(*v)) {
         let at = star.at(v);
         link.set(v, at.iter().map(|&n| these[n as usize]));
-        // A triangle that is a fan by itself has both its edges at v on the boundary. If there
-        // is no larger fan, the first stays, so that v stays.
+        // A fan of one triangle has both its edges at v on the boundary. If there is no larger fan, the first
+        // triangle is kept, so that v stays in the mesh.
         let size = |group| (0..at.len()).filter(|&i| link.group(i) == group).count();
         let larger = (0..link.groups()).any(|group| size(group) > 1);
         for (index, &n) in at.iter().enumerate() {

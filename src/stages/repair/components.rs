@@ -1,5 +1,5 @@
-//! Components that reach over blocks: labels of blocks, joined by the triangles that several blocks
-//! see, added up and judged.
+//! Components across blocks: labels of blocks are merged through the crossing triangles that several blocks
+//! see; then the sums over each component decide its fate.
 
 use super::facing::{Fate, Sums, SumsRow, judge};
 use super::rows::SeenTriangle;
@@ -15,7 +15,7 @@ use crate::workspace::memory::{bytes_of, hold, table_bytes};
 use rustc_hash::FxHashMap;
 use std::sync::{Mutex, PoisonError};
 
-/// Joins global labels of which a triangle has both.
+/// Merges the global labels that different blocks give to the same triangle.
 pub(super) fn join(
     seen: &Table<SeenTriangle>,
     globals: &[(u32, u32)],
@@ -39,19 +39,19 @@ pub(super) fn join(
     Ok(sets)
 }
 
-/// What the components of global labels are put together from.
+/// The input for the components of global labels.
 pub(super) struct Parts<'a> {
-    /// Positions that the triangles were connected by.
+    /// Positions that decide the connectivity.
     pub store: &'a PointStore,
-    /// How blocks see crossing triangles.
+    /// Labels and orientations of crossing triangles in the blocks that they touch.
     pub seen: &'a Table<SeenTriangle>,
     /// Sums over the interior triangles of each block's global labels.
     pub sums: &'a Table<SumsRow>,
     /// Bridges that several blocks see.
     pub bridges: &'a Table<TriangleTo>,
-    /// For each block, the number of the first of its labels that are global, and how many are.
+    /// For each block, the number of its first global label, and how many global labels it has.
     pub globals: &'a [(u32, u32)],
-    /// The labels that were joined.
+    /// The merged labels.
     pub sets: &'a ParitySets,
 }
 
@@ -84,7 +84,7 @@ impl Parts<'_> {
             .collect();
         let labels = (0..self.sets.len() as u32).map(|label| {
             let (root, turned) = self.sets.look(label);
-            // Every label has sums.
+            // Every label has an entry.
             let fate = fates.get(&root).copied().unwrap_or(Fate::UNKNOWN);
             let turn = fate.turn ^ turned;
             (root, Fate { turn, ..fate })
@@ -92,8 +92,8 @@ impl Parts<'_> {
         Ok(labels.unzip())
     }
 
-    /// Sums over a block's interior triangles and the crossing ones that it owns, by the roots of
-    /// their labels.
+    /// Sums over a block's interior triangles and over the crossing ones whose smallest vertex is in it, by
+    /// the roots of their labels.
     fn sum(&self, block: usize) -> Result<FxHashMap<u32, Sums>> {
         let mut own: FxHashMap<u32, Sums> = FxHashMap::default();
         for (label, row) in (self.globals[block].0..).zip(self.sums.get(block)?) {
@@ -117,7 +117,7 @@ impl Parts<'_> {
             }
             let label = self.globals[first.block as usize].0 + first.label();
             let (root, turned) = self.sets.look(label);
-            // Every corner was fetched.
+            // The positions of all corners were fetched.
             let corners = triangle.map(|v| points[ids.partition_point(|id| *id < v)]);
             let flip = turned ^ first.flip();
             own.entry(root).or_default().add(triangle, corners, flip);

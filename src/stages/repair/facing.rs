@@ -1,4 +1,4 @@
-//! Which components stay, and which way they face.
+//! The fate of a component: kept or removed, and its orientation.
 //!
 //! Sums over a component are exact integers, so they do not depend on the order of triangles.
 
@@ -8,26 +8,26 @@ use crate::method::METHOD;
 use crate::spill::row;
 use crate::stages::surface::star::Triangle;
 
-/// Exact sums over triangles.
+/// Exact sums over the triangles of a component.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Sums {
     triangles: u64,
-    /// True if an edge has one triangle.
+    /// True if there is a boundary edge.
     open: bool,
-    /// Six times the signed volume against the lattice's origin.
+    /// Six times the signed volume relative to the lattice's origin.
     volume6: i128,
     /// Twice the vector area.
     area_vector: [i128; 3],
-    /// Twice the area, each triangle's rounded down.
+    /// Twice the area; that of each triangle is rounded down.
     area: u128,
     /// Sum of the positions of all corners.
     corners: [i128; 3],
-    /// The smallest triangle, and whether it is turned.
+    /// The smallest triangle, and true if it is turned (does not run ascending).
     first: Option<(Triangle, bool)>,
 }
 
 row! {
-    /// [`Sums`] on disk; numbers of 64 and 128 bits are lists of words, the lowest first.
+    /// [`Sums`] on disk; numbers of 64 and 128 bits are lists of words, lowest first.
     pub struct SumsRow {
         /// Six times the signed volume.
         volume6: [u32; 4],
@@ -39,7 +39,8 @@ row! {
         corners: [[u32; 4]; 3],
         /// Number of triangles.
         triangles: [u32; 2],
-        /// 1: the smallest triangle is turned; 2: there is one; 4: an edge has one triangle.
+        /// Bit 1: the smallest triangle is turned; bit 2: there is a triangle; bit 4: there is a boundary
+        /// edge.
         flags: u32,
         /// The smallest triangle.
         first: Triangle,
@@ -47,7 +48,7 @@ row! {
     unpacked
 }
 
-/// The words of a number, the lowest first.
+/// The words of a number, lowest first.
 fn words(number: i128) -> [u32; 4] {
     [0, 32, 64, 96].map(|shift| (number >> shift) as u32)
 }
@@ -59,11 +60,11 @@ fn number(words: [u32; 4]) -> i128 {
 }
 
 impl Sums {
-    /// Adds a triangle with corners at `corners`; `flip` if it runs against its ascending ids.
+    /// Adds a triangle with corners at `corners`; `flip` if it is turned against its ascending ids.
     pub fn add(&mut self, t: Triangle, [a, b, c]: [Point; 3], flip: bool) {
         self.see(t, flip);
         let (u, v) = (sub(b, a), sub(c, a));
-        // Coordinates have 30 bits: twice the area has 61.
+        // Coordinates have 30 bits, so twice the area has 61.
         let mut n = [
             u[1] * v[2] - u[2] * v[1],
             u[2] * v[0] - u[0] * v[2],
@@ -84,7 +85,7 @@ impl Sums {
         }
     }
 
-    /// Notes that a triangle has a boundary edge.
+    /// Records that there is a boundary edge.
     pub fn open(&mut self) {
         self.open = true;
     }
@@ -95,7 +96,7 @@ impl Sums {
         }
     }
 
-    /// Adds the sums over other triangles, all to be turned if `flip`.
+    /// Adds the sums over other triangles, with all of them turned if `flip`.
     pub fn merge(&mut self, other: &Sums, flip: bool) {
         let sign = if flip { -1 } else { 1 };
         if let Some((t, turned)) = other.first {
@@ -111,7 +112,7 @@ impl Sums {
         }
     }
 
-    /// As a row.
+    /// Converts to a row.
     #[must_use]
     pub fn row(&self) -> SumsRow {
         let (first, turned) = self.first.unwrap_or_default();
@@ -127,7 +128,7 @@ impl Sums {
         }
     }
 
-    /// From a row.
+    /// Converts from a row.
     #[must_use]
     pub fn of(row: &SumsRow) -> Self {
         let [low, high] = row.triangles.map(u64::from);
@@ -142,8 +143,8 @@ impl Sums {
         }
     }
 
-    /// True if the component must be turned round; where nothing else decides, its smallest triangle
-    /// runs in ascending order.
+    /// True if the component must be turned. If nothing else decides, its smallest triangle is to run
+    /// ascending.
     fn faces_wrong_way(&self) -> bool {
         let wrong = if !self.open {
             sign(self.volume6)
@@ -160,7 +161,7 @@ impl Sums {
         wrong.unwrap_or_else(|| self.first.is_some_and(|(_, turned)| turned))
     }
 
-    /// Six times the volume against the mean corner, times the number of corners.
+    /// Six times the volume relative to the mean corner, times the number of corners.
     fn volume_about_centroid(&self) -> i128 {
         let corners = 3 * i128::from(self.triangles);
         let exact = || {
@@ -181,34 +182,34 @@ impl Sums {
     }
 }
 
-/// Whether a number is negative; `None` for zero.
+/// True if a number is negative; `None` for zero.
 fn sign(x: i128) -> Option<bool> {
     (x != 0).then_some(x < 0)
 }
 
-/// What becomes of a component.
+/// The decision about a component.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Fate {
-    /// It is large enough.
+    /// True if it is large enough to be kept.
     pub keep: bool,
-    /// Its triangles must be turned round.
+    /// True if its triangles must be turned.
     pub turn: bool,
 }
 
 crate::workspace::persist::persist!(Fate { keep, turn });
 
 impl Fate {
-    /// Until it is judged, all of it is kept as it is.
+    /// Before the decision, everything is kept as it is.
     pub const UNKNOWN: Self = Self {
         keep: true,
         turn: false,
     };
 }
 
-/// Judges a component of which nothing else is to come; small ones go.
+/// Decides about a component with complete sums; components of fewer than `least` triangles are removed.
 pub fn judge(sums: &Sums, least: u64, stats: &mut RepairStats) -> Fate {
     let keep = sums.triangles >= least;
-    // A component may have lost all its triangles as bridges.
+    // All triangles of a component may have been removed as bridges.
     if sums.triangles > 0 {
         stats.components_found += 1;
         if !keep {

@@ -1,4 +1,4 @@
-//! Filling one hole by splitting its loop (paper, section 3.6).
+//! Filling a hole by splitting its boundary loop (paper, section 3.6).
 
 use crate::geom::triangle::{length, normal, on_a_line};
 use crate::geom::{Point, distance2};
@@ -11,32 +11,32 @@ pub struct Corner {
     pub id: u32,
     /// Its position.
     pub at: Point,
-    /// Position of the third vertex of the triangle at the edge that comes in.
+    /// Position of the third vertex of the triangle at the edge from the previous corner.
     pub apex: Point,
     /// Its position in the file.
     pub file: Point,
-    /// True if the triangles at this vertex are not one fan.
+    /// True if the vertex has several fans.
     pub pinched: bool,
 }
 
-/// What became of a loop.
+/// Outcome for a boundary loop.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Filling {
-    /// A single triangle, as it runs: no hole, but what no cell saw.
+    /// One oriented triangle fills the loop: a triangle that no cell saw, not a hole.
     Gap([u32; 3]),
-    /// Triangles as they run.
+    /// Filled completely, by these oriented triangles.
     Filled(Vec<[u32; 3]>),
-    /// Triangles that close it in part, and the edges that are left.
+    /// Closed in part, by these oriented triangles; and the number of open edges left.
     Zipped(Vec<[u32; 3]>, usize),
-    /// The loop runs around the surface, not around a hole.
+    /// The loop is an outline: it goes around a piece of surface and not around a hole.
     Outline,
-    /// No way to split it cleanly.
+    /// No valid triangulation was found.
     Impossible,
 }
 
-/// Triangulates the hole inside `corners`; `edge(a, b)` tells if the mesh has an edge.
+/// Triangulates the hole inside `corners`; `edge(a, b)` is true if the mesh has that edge.
 ///
-/// Loops of more than `sure` edges are first looked at whether they are an outline.
+/// Loops of more than `sure` edges are first tested for being an outline.
 pub fn fill(mut corners: Vec<Corner>, sure: usize, edge: impl Fn(u32, u32) -> bool) -> Filling {
     begin_at_smallest(&mut corners);
     match triangulate(&corners, sure, edge) {
@@ -45,13 +45,13 @@ pub fn fill(mut corners: Vec<Corner>, sure: usize, edge: impl Fn(u32, u32) -> bo
     }
 }
 
-/// The ids of triangles of corners.
+/// The ids of the corners of triangles.
 pub fn ids(corners: &[Corner], triangles: &[[usize; 3]]) -> Vec<[u32; 3]> {
     let of = |t: &[usize; 3]| t.map(|x| corners[x].id);
     triangles.iter().map(of).collect()
 }
 
-/// The same, as numbers of `corners`, which begin at the smallest.
+/// Triangulates, with triangles given by indices into `corners`, which must start at the smallest edge.
 pub fn triangulate(
     corners: &[Corner],
     sure: usize,
@@ -74,8 +74,8 @@ pub fn triangulate(
     }
 }
 
-/// Turns a loop so that its smallest edge, by (from, to), comes first: where a loop was found to
-/// begin must not matter.
+/// Rotates a loop so that its smallest edge, by (from, to), comes first. The result then does not depend on
+/// the corner at which the loop was found.
 pub fn begin_at_smallest(corners: &mut [Corner]) {
     let n = corners.len();
     // Edge x runs from corner x - 1 to corner x.
@@ -87,13 +87,13 @@ pub fn begin_at_smallest(corners: &mut [Corner]) {
     }
 }
 
-/// True if the loop is that of a triangle that hangs together with no other.
+/// True if the loop goes around a single triangle without neighbours.
 fn goes_around_a_triangle(corners: &[Corner]) -> bool {
     matches!(corners, [a, b, c] if b.apex == c.at && c.apex == a.at && a.apex == b.at)
 }
 
-/// True if the loop's vector area looks away from the triangles along it: by more than half of what
-/// it would if they were all flat against it.
+/// True if the vector area of the loop points away from the triangles along it: its product with the sum of
+/// their normals is below minus one half of the product of the lengths.
 pub fn is_outline(corners: &[Corner]) -> bool {
     let n = corners.len();
     let mut area = [0i128; 3];
@@ -121,9 +121,9 @@ struct Splitter<'a, E> {
 }
 
 impl<E: Fn(u32, u32) -> bool> Splitter<'_, E> {
-    /// Splits the loop until only triangles are left; false if it gets stuck.
+    /// Splits the loop until only triangles are left; false if no valid chord is left.
     fn split(&mut self, ring: &[usize]) -> bool {
-        // An explicit stack: a long thin hole splits as often as it has edges.
+        // An explicit stack: a long thin hole is split as often as it has edges.
         let mut rings = vec![ring.to_vec()];
         while let Some(ring) = rings.pop() {
             if let [a, b, c] = ring[..] {
@@ -149,7 +149,7 @@ impl<E: Fn(u32, u32) -> bool> Splitter<'_, E> {
         on_a_line(corners.map(|c| c.at)) || on_a_line(corners.map(|c| c.file))
     }
 
-    /// The chord that is shortest against the way round.
+    /// The chord with the smallest ratio of its length to the length of the shorter way around.
     fn best_chord(&self, ring: &[usize]) -> Option<(usize, usize)> {
         let n = ring.len();
         let length = |x: usize, y: usize| {

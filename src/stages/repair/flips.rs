@@ -1,12 +1,12 @@
-//! Flips of edges, until the surface bends no less for another.
+//! Edge flips that reduce the bending of the surface.
 //!
-//! Of the two ways to cut a quadrilateral into triangles, the points alone say which is nearer to the
-//! surface: the one with smaller angles between the normals of triangles side by side (Dyn, Levin and
-//! Rippa, *Data dependent triangulations for piecewise linear interpolation*, 1990). Cells do not
-//! look at that, and relaxed positions know less of it than those in the file.
+//! Of the two triangulations of a quadrilateral, the one with smaller angles between the normals of adjacent
+//! triangles is usually closer to the surface (Dyn, Levin and Rippa, *Data dependent triangulations for
+//! piecewise linear interpolation*, 1990). The cells do not take this into account, and relaxed positions
+//! show less of it than those in the file.
 //!
-//! Only what lies inside the block is changed, triangle by triangle in ascending order, so that it
-//! follows from the block alone. Boundary edges, components and fans stay what they are.
+//! Only triangles inside the block are changed, in ascending order, so that the result depends on the block
+//! alone. Boundary edges, components and fans are preserved.
 
 use super::around::merge;
 use crate::geom::triangle::small_normal;
@@ -17,9 +17,9 @@ use crate::stages::surface::star::Triangle;
 use crate::workspace::memory::{bytes_of, hold};
 use std::ops::Range;
 
-/// Flips edges of the `triangles`, ascending, that touch the vertices `ids`; how many. `points` are
-/// the positions in the file, `shape` those that points were connected by: triangles none of whose
-/// points were moved stay.
+/// Flips edges of the ascending `triangles` that touch the vertices `ids`, and returns the number of flips.
+/// `points` are the positions in the file, `shape` those that decide the connectivity. Triangles none of
+/// whose points were moved are kept.
 pub fn flip(
     ids: Range<u32>,
     triangles: &mut Vec<Triangle>,
@@ -59,39 +59,41 @@ pub fn flip(
     flips
 }
 
-/// A triangle that may change, and what is behind its edges.
+/// A triangle that may be changed, and its neighbours.
 #[derive(Debug, Clone, Copy)]
 struct Slot {
-    /// Corners by place in the block, as they run.
+    /// Corners by index in the block, in the triangle's orientation.
     corners: [u32; 3],
-    /// Opposite each corner: the triangle behind the edge, and which of its corners is opposite.
+    /// For the edge opposite each corner: the adjacent triangle, and its corner opposite this edge.
     across: [u32; 3],
-    /// One long.
+    /// Unit normal.
     normal: [f32; 3],
-    /// Opposite each corner: how far the surface bends there, the distance of two unit normals.
+    /// For the edge opposite each corner: the bend there, i.e. the distance of the two unit normals.
     bends: [f32; 3],
 }
 
-/// The triangles of a block that may change.
+/// The triangles of a block that may be changed.
 struct Sheet<'a> {
     points: &'a [Point],
     slots: Vec<Slot>,
-    /// Vertices whose triangles stay: some of them are others, or there is a boundary.
+    /// Fixed vertices, which take part in no flip: some of their triangles are outside the sheet, or they are
+    /// on the boundary.
     shut: Vec<bool>,
-    /// Edges to look at, 16 triangles a word, four bits each: bit `k` for the edge opposite corner `k`.
+    /// Edges to examine, with four bits for each triangle and 16 triangles in a word: bit `k` is the edge
+    /// opposite corner `k`.
     due: Vec<u64>,
     flipped: Vec<bool>,
 }
 
-/// A flip that pays.
+/// A flip that lowers the sum of bends.
 struct Flip {
     normals: [[f32; 3]; 2],
-    /// Of the new edge, and of the sides `cu`, `ud`, `dv`, `vc`.
+    /// Bends at the new edge, and at the sides `cu`, `ud`, `dv`, `vc`.
     bends: [f32; 5],
 }
 
 impl<'a> Sheet<'a> {
-    /// Triangles by place in the block, ascending.
+    /// From triangles with corners by index in the block, ascending.
     fn of(these: &[Triangle], shut: Vec<bool>, points: &'a [Point]) -> Self {
         let across = across(0..points.len() as u32, these);
         let _held = hold(bytes_of(&across));
@@ -113,12 +115,12 @@ impl<'a> Sheet<'a> {
         sheet
     }
 
-    /// Bytes of its lists.
+    /// Bytes allocated by its lists.
     fn bytes(&self) -> u64 {
         bytes_of(&self.slots) + bytes_of(&self.shut) + bytes_of(&self.due) + bytes_of(&self.flipped)
     }
 
-    /// Shuts vertices with an edge that has nothing behind it.
+    /// Fixes the vertices of boundary edges.
     fn shut(&mut self) {
         for slot in &self.slots {
             for k in (0..3).filter(|&k| slot.across[k] == NONE) {
@@ -129,7 +131,7 @@ impl<'a> Sheet<'a> {
         }
     }
 
-    /// Measures how far the surface bends, and which edges there is anything to gain at.
+    /// Computes all bends, and marks the edges where a flip may lower the sum.
     fn bend(&mut self) {
         for number in 0..self.slots.len() {
             for k in 0..3 {
@@ -153,7 +155,7 @@ impl<'a> Sheet<'a> {
         }
     }
 
-    /// How far the surface bends at an edge and around it.
+    /// The sum of bends at the five edges of the quadrilateral of an edge.
     #[inline]
     fn around(&self, number: usize, k: usize, behind: u32) -> f32 {
         let (other, corner) = parts(behind);
@@ -161,31 +163,33 @@ impl<'a> Sheet<'a> {
         mine[k] + (mine[next(k)] + mine[last(k)]) + (theirs[next(corner)] + theirs[last(corner)])
     }
 
-    /// The normal of the triangle `behind` the edge opposite corner `k` of triangle `number`, turned
-    /// so that both face the same way.
+    /// The normal of triangle `behind` the edge opposite corner `k` of triangle `number`, negated if the two
+    /// are not oriented alike.
     #[inline]
     fn seen_from(&self, number: usize, k: usize, behind: u32) -> [f32; 3] {
         self.facing(behind, self.slots[number].corners[next(k)])
     }
 
-    /// The normal of the triangle `behind` an edge, as one sees it whose edge begins at `from`: a
-    /// neighbour that faces alike runs back.
+    /// The normal of triangle `behind` an edge that starts at `from` in the neighbour; negated unless the
+    /// triangle runs along the edge in the opposite direction.
     #[inline]
     fn facing(&self, behind: u32, from: u32) -> [f32; 3] {
         let (other, corner) = parts(behind);
         let slot = &self.slots[other];
-        // As often one way as the other: a sign, not a branch.
+        // A sign instead of a branch, since both cases are equally frequent.
         let sign = u32::from(slot.corners[next(corner)] == from) << 31;
         slot.normal.map(|x| f32::from_bits(x.to_bits() ^ sign))
     }
 
-    /// Looks at the edges that are due, in order, and flips those where it pays; how many.
+    /// Examines the edges that are due, in order, and flips them if the sum of bends is lowered. Returns the
+    /// number of flips.
     fn sweep(&mut self) -> u64 {
         let mut flips = 0;
         for word in 0..self.due.len() {
             let mut ahead = u64::MAX;
             loop {
-                // What a flip makes due further on is looked at now, what is behind in the next sweep.
+                // Edges that become due further on are examined in this sweep, those already passed in the
+                // next one.
                 let bits = self.due[word] & ahead;
                 if bits == 0 {
                     break;
@@ -194,7 +198,8 @@ impl<'a> Sheet<'a> {
                 self.due[word] &= !(1 << bit);
                 ahead = u64::MAX.checked_shl(bit + 1).unwrap_or(0);
                 let (number, k) = (word * 16 + bit as usize / 4, bit as usize % 4);
-                // Seen from the smaller of the two numbers only; there is none beyond the last.
+                // An edge is examined from the triangle with the smaller number; there is none beyond the
+                // last.
                 let Some(slot) = self.slots.get(number) else {
                     break;
                 };
@@ -211,7 +216,7 @@ impl<'a> Sheet<'a> {
         flips
     }
 
-    /// What flipping the edge opposite corner `k` of `number` makes, if it pays.
+    /// The outcome of flipping the edge opposite corner `k` of `number`, if it lowers the sum of bends.
     #[inline]
     fn gain(&self, number: usize, k: usize, behind: u32) -> Option<Flip> {
         let was = self.around(number, k, behind);
@@ -235,7 +240,7 @@ impl<'a> Sheet<'a> {
         }
         let (one, two) = (unit(one), unit(two));
         let inner = distance(one, two);
-        // The new edge alone tells of most.
+        // In most cases the new edge alone decides.
         if was - inner <= METHOD.flips.gain {
             return None;
         }
@@ -258,20 +263,20 @@ impl<'a> Sheet<'a> {
         })
     }
 
-    /// Corner `k` of a triangle, and the two after it as they run.
+    /// Corner `k` of a triangle, and the two after it in its orientation.
     #[inline]
     fn named(&self, number: usize, k: usize) -> (u32, u32, u32) {
         let t = self.slots[number].corners;
         (t[k], t[next(k)], t[last(k)])
     }
 
-    /// What is behind the sides `cu`, `ud`, `dv`, `vc` of the quadrilateral of an edge.
+    /// The triangles adjacent to the sides `cu`, `ud`, `dv`, `vc` of the quadrilateral of an edge.
     #[inline]
     fn behind(&self, number: usize, k: usize, behind: u32) -> [u32; 4] {
         let (other, corner) = parts(behind);
         let (mine, theirs) = (&self.slots[number].across, &self.slots[other].across);
         let u = self.slots[number].corners[next(k)];
-        // Opposite `u` is the side `dv`.
+        // The side opposite `u` is `dv`.
         let (ud, dv) = if self.slots[other].corners[next(corner)] == u {
             (last(corner), next(corner))
         } else {
@@ -280,7 +285,7 @@ impl<'a> Sheet<'a> {
         [mine[last(k)], theirs[ud], theirs[dv], mine[next(k)]]
     }
 
-    /// The normals of the triangles behind these sides, facing as `number` does.
+    /// The normals of the triangles adjacent to these sides, oriented like `number`.
     #[inline]
     fn sides(&self, number: usize, k: usize, behind: u32) -> [Option<[f32; 3]>; 4] {
         let (c, u, v) = self.named(number, k);
@@ -292,7 +297,7 @@ impl<'a> Sheet<'a> {
         std::array::from_fn(|i| (all[i] != NONE).then(|| self.facing(all[i], from[i])))
     }
 
-    /// True if one of the two new triangles has no area, or is slender and more so than both old ones.
+    /// True if one of the two new triangles is degenerate, or is slender and less regular than both old ones.
     fn too_slender(&self, [c, u, d, v]: [u32; 4]) -> bool {
         let shape = |t: [u32; 3]| slenderness(t.map(|v| self.points[v as usize]));
         let made = shape([u, d, c]).min(shape([d, v, c]));
@@ -300,7 +305,7 @@ impl<'a> Sheet<'a> {
         made == 0.0 || made < least && made < shape([c, u, v]).min(shape([d, v, u]))
     }
 
-    /// True if corner `k` of a triangle has an edge to `d` already.
+    /// True if there is already an edge from corner `k` of a triangle to `d`.
     fn meets(&self, number: usize, k: usize, d: u32) -> bool {
         let c = self.slots[number].corners[k];
         let all_around = |begin: usize| {
@@ -317,7 +322,7 @@ impl<'a> Sheet<'a> {
                 if self.slots[other].corners[corner] == d {
                     return (true, true);
                 }
-                // Out again through the other edge at c: opposite the end of the one we came through.
+                // Leave the triangle through its other edge at c.
                 at = other;
                 through = if self.slots[other].corners[next(corner)] == c {
                     last(corner)
@@ -330,7 +335,7 @@ impl<'a> Sheet<'a> {
         found || (!whole && all_around(last(k)).0)
     }
 
-    /// Flips.
+    /// Carries out a flip.
     fn turn(&mut self, number: usize, k: usize, behind: u32, flip: Flip) {
         let (other, corner) = parts(behind);
         let (c, u, v) = self.named(number, k);
@@ -369,7 +374,7 @@ impl<'a> Sheet<'a> {
         }
     }
 
-    /// Puts the flipped triangles in their places.
+    /// Writes the flipped triangles back to their places.
     fn write(&self, first: u32, numbers: &[u32], triangles: &mut Vec<Triangle>) {
         let mut new: Vec<Triangle> = Vec::new();
         let mut gone = Vec::new();
@@ -389,13 +394,13 @@ impl<'a> Sheet<'a> {
     }
 }
 
-/// The corner after corner `k` as a triangle runs: two bits for each.
+/// The index of the corner after corner `k`; two bits for each.
 #[inline]
 fn next(k: usize) -> usize {
     0b00_10_01 >> (2 * k) & 3
 }
 
-/// The corner before it.
+/// The index of the corner before corner `k`.
 #[inline]
 fn last(k: usize) -> usize {
     0b01_00_10 >> (2 * k) & 3
@@ -407,7 +412,7 @@ fn distance(a: [f32; 3], b: [f32; 3]) -> f32 {
     (x * x + y * y + z * z).sqrt()
 }
 
-/// The normal of a triangle.
+/// The unit normal of a triangle.
 #[inline]
 fn normal(points: &[Point], [a, b, c]: [u32; 3]) -> [f32; 3] {
     let at = |v: u32| points[v as usize];
@@ -419,7 +424,7 @@ fn normal(points: &[Point], [a, b, c]: [u32; 3]) -> [f32; 3] {
     ]
 }
 
-/// One long; not a number if the vector is zero.
+/// Scales a vector to unit length; NaN if it is zero.
 #[inline]
 fn unit([x, y, z]: [f32; 3]) -> [f32; 3] {
     let inverse = 1.0 / (x * x + y * y + z * z).sqrt();
@@ -431,13 +436,13 @@ fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// The way from `a` to `b`.
+/// The vector from `a` to `b`.
 #[inline]
 fn difference(a: Point, b: Point) -> [f32; 3] {
     std::array::from_fn(|k| (i64::from(b[k]) - i64::from(a[k])) as f32)
 }
 
-/// The square of twice a triangle's area over its two longest sides; zero only without an area.
+/// The square of twice a triangle's area divided by its two longest sides; zero only if it is degenerate.
 fn slenderness([a, b, c]: [Point; 3]) -> f64 {
     let square = |v: [i64; 3]| {
         let [x, y, z] = v.map(|x| x as f64);

@@ -1,5 +1,5 @@
-//! Finds boundary loops and has them filled: those inside a block at once, those across blocks
-//! from the fragments that the blocks leave.
+//! Finds boundary loops and has them filled: loops inside a block immediately, loops across blocks later,
+//! from the fragments that the blocks write.
 
 use super::fill::{Corner, Filling};
 use super::mend::Mending;
@@ -15,13 +15,13 @@ use crate::workspace::Workspace;
 use crate::workspace::persist::persist;
 use rustc_hash::FxHashMap;
 
-/// A part of a loop inside one block: it enters at `start` (from, at) and leaves at `end` (at, to).
+/// Part of a loop inside one block: it enters at `start` (from, at) and leaves at `end` (at, to).
 #[derive(Debug, Clone, Copy)]
 struct Fragment {
     start: (u32, u32),
     end: (u32, u32),
     steps: usize,
-    /// Where its steps are kept; `None` if it is too long by itself.
+    /// Index of its stored steps; `None` if the fragment alone exceeds the longest loop.
     kept: Option<usize>,
 }
 
@@ -32,7 +32,7 @@ persist!(Fragment {
     kept
 });
 
-/// What was found and done in a block.
+/// The loops of a block and the outcome for them.
 struct Found {
     fragments: Vec<Fragment>,
     stats: RepairStats,
@@ -47,7 +47,8 @@ persist!(Found {
     rim
 });
 
-/// Fills holes as `mending` says, or none: the triangles that do so, and the boundary that is left.
+/// Fills holes as `mending` prescribes, or none. Returns the triangles that fill them and the boundary that
+/// is left.
 ///
 /// # Errors
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
@@ -94,7 +95,7 @@ pub fn fill(
         Ok(())
     })?;
     let mut outline = files.outline(&rims, blocks, workspace)?;
-    // In an order of their own, not in that in which blocks were done.
+    // Sorted, since blocks finish in any order.
     fragments.sort_unstable_by_key(|fragment: &Fragment| fragment.start);
     let _fragments = workspace.reserve("fragments", fragments.len() as u64 * 120)?;
     let parts = Fragments {
@@ -127,7 +128,7 @@ pub fn fill(
     Ok((shuffle.deliver(workspace, blocks.count())?, outline))
 }
 
-/// Fills the holes that lie in a block by themselves, and keeps the parts of the others.
+/// Fills the loops that lie inside a block, and stores the fragments of the others.
 fn fill_inside(
     rim: &BlockRim,
     mending: Mending<'_>,
@@ -158,11 +159,11 @@ fn fill_inside(
     Ok(fragments)
 }
 
-/// What became of loops.
+/// The outcome for several loops.
 #[derive(Default)]
 struct Settled {
     stats: RepairStats,
-    /// Edges of the holes that were filled.
+    /// Number of edges of the holes that were filled.
     edges: u64,
     triangles: Vec<[u32; 3]>,
 }
@@ -212,7 +213,7 @@ fn addressed(triangles: &[[u32; 3]], blocks: Blocks) -> Vec<FilledTriangle> {
     sent
 }
 
-/// Chains fragments to loops; every fragment is in one.
+/// Chains fragments into loops; every fragment belongs to one.
 fn link_up(fragments: &[Fragment]) -> Vec<Vec<usize>> {
     let by_start: FxHashMap<(u32, u32), usize> = fragments
         .iter()
@@ -236,10 +237,10 @@ fn link_up(fragments: &[Fragment]) -> Vec<Vec<usize>> {
     loops
 }
 
-/// Loops across blocks that are done at a time.
+/// Loops across blocks that are processed at a time.
 const RINGS: usize = 256;
 
-/// Parts of loops, and how these are filled.
+/// Fragments of loops across blocks, and the rules for filling them.
 struct Fragments<'a> {
     places: Places<'a>,
     mending: Option<Mending<'a>>,
@@ -248,7 +249,7 @@ struct Fragments<'a> {
 }
 
 impl Fragments<'_> {
-    /// Fills some loops.
+    /// Fills the loops `rings`, each a list of fragments.
     fn fill(&self, rings: &[Vec<usize>], workspace: &Workspace) -> Result<Settled> {
         let mut settled = Settled::default();
         for ring in rings {

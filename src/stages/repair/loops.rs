@@ -1,26 +1,26 @@
-//! Boundary loops: which boundary edge follows which, around the vertices of a block.
+//! Boundary loops: the succession of boundary edges at the vertices of a block.
 
 use super::OrientedTriangle;
 use crate::geom::triangle::normal;
 use crate::geom::{Point, sub};
 use crate::stages::surface::star::{Link, Star, others};
 
-/// One step of a hole's border: it comes from `from` to `at` and goes on to `to`.
+/// One step of a boundary loop: the edge from `from` to `at` is followed by the edge from `at` to `to`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Step {
-    /// Where the half-edge into `at` begins.
+    /// The previous vertex.
     pub from: u32,
-    /// The vertex, one of the block's.
+    /// The vertex, which is in the block.
     pub at: u32,
     /// The next vertex.
     pub to: u32,
     /// The third vertex of the triangle at the edge `from`, `at`.
     pub apex: u32,
-    /// True if the triangles at `at` are not one fan.
+    /// True if `at` has several fans.
     pub pinched: bool,
 }
 
-/// A fan of triangles that is not closed, seen from its vertex.
+/// An open fan around a vertex.
 #[derive(Debug, Clone, Copy)]
 struct Fan {
     start: u32,
@@ -30,8 +30,8 @@ struct Fan {
     normal: [i128; 3],
 }
 
-/// The steps at those of `vertices` that have a boundary edge, ascending by (`from`, `at`); calls
-/// `pinch` with every vertex whose triangles are not one fan.
+/// The steps at those of `vertices` that have a boundary edge, ascending by (`from`, `at`). Calls `pinch`
+/// with every vertex that has several fans.
 pub fn steps(
     vertices: impl Iterator<Item = u32>,
     star: &Star,
@@ -80,17 +80,17 @@ pub fn steps(
     all
 }
 
-/// Where the fans around a vertex begin and end.
+/// The open fans around a vertex.
 enum Ends {
-    /// Nowhere: there is no triangle, or they go all the way round.
+    /// None: the vertex has no triangle, or a closed fan.
     None,
-    /// There is one fan.
+    /// One fan.
     One { start: u32, apex: u32, end: u32 },
-    /// There are several fans.
+    /// Several fans.
     More,
 }
 
-/// From the edges opposite to the vertex, as they run.
+/// From the oriented edges opposite to the vertex.
 fn ends(edges: impl Iterator<Item = [u32; 2]> + Clone) -> Ends {
     let mut starts = edges
         .clone()
@@ -102,7 +102,7 @@ fn ends(edges: impl Iterator<Item = [u32; 2]> + Clone) -> Ends {
         return Ends::More;
     }
     let last = |&[_, b]: &[u32; 2]| edges.clone().all(|[a, _]| a != b);
-    // A fan that has a start has an end.
+    // A fan with a start has an end.
     let end = edges.clone().find(last).map_or(start, |[_, b]| b);
     Ends::One { start, apex, end }
 }
@@ -111,7 +111,7 @@ fn ids(t: &[u32; 4]) -> OrientedTriangle {
     [t[0], t[1], t[2]]
 }
 
-/// The other two vertices of an oriented triangle, as they run after `v`.
+/// The other two vertices of an oriented triangle, in their order after `v`.
 fn after(t: OrientedTriangle, v: u32) -> [u32; 2] {
     if t[0] == v {
         [t[1], t[2]]
@@ -148,7 +148,7 @@ fn fan<'a>(
     })
 }
 
-/// Matches incoming and outgoing edges of the fans of each component across the gaps between them.
+/// Matches incoming and outgoing boundary edges of the fans of each component across the gaps between them.
 fn pair_up(
     v: u32,
     fans: &[Fan],
@@ -185,15 +185,15 @@ fn pair_up(
     }
 }
 
-/// A full turn in the measure of [`clockwise`].
+/// A full turn in the unit of [`clockwise`].
 const FULL_TURN: u64 = 4 << ANGLE_BITS;
 
-/// Angles closer than this many binary digits of a quarter turn are equal: rounding must not decide
-/// between directions that are exactly opposite or alike.
+/// Binary digits of a quarter turn to which angles are rounded. Directions that are exactly alike or opposite
+/// then have equal angles in spite of rounding errors.
 const ANGLE_BITS: u32 = 36;
 
-/// The angle turned clockwise about `axis` from `s` to `e`, as a number that grows with it from
-/// more than 0 to [`FULL_TURN`].
+/// A monotone measure of the angle turned clockwise about `axis` from `s` to `e`, more than 0 and up to
+/// [`FULL_TURN`].
 fn clockwise(axis: [f64; 3], s: [f64; 3], e: [f64; 3]) -> u64 {
     let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     let length = dot(axis, axis).sqrt();
@@ -201,7 +201,7 @@ fn clockwise(axis: [f64; 3], s: [f64; 3], e: [f64; 3]) -> u64 {
         return FULL_TURN;
     }
     let n = axis.map(|x| x / length);
-    // In the plane across the axis, both of unit length.
+    // The projection on the plane across the axis, scaled to unit length.
     let flat = |v: [f64; 3]| {
         let along = dot(v, n);
         let f: [f64; 3] = std::array::from_fn(|k| v[k] - along * n[k]);
@@ -230,7 +230,7 @@ fn clockwise(axis: [f64; 3], s: [f64; 3], e: [f64; 3]) -> u64 {
     }
 }
 
-/// The neighbours of a vertex: all vertices it shares an edge with.
+/// The one-ring of a vertex: all vertices connected to it by an edge.
 pub fn neighbors(star: &Star, triangles: &[[u32; 4]], v: u32) -> Vec<u32> {
     let mut all: Vec<u32> = star
         .at(v)

@@ -1,5 +1,5 @@
-//! What is done about a boundary loop: filled if it is a hole, closed as far as it is torn if it is
-//! more than that.
+//! Treatment of a boundary loop: a hole is filled, any other loop is closed by ear clipping as far as it is
+//! torn.
 
 use super::fill::{Corner, Filling, begin_at_smallest, fill, ids, is_outline, triangulate};
 use super::parts::Part;
@@ -10,23 +10,23 @@ use crate::method::METHOD;
 use crate::stages::spacing::Density;
 use rustc_hash::FxHashSet;
 
-/// How boundary loops are treated.
+/// The rules for boundary loops.
 #[derive(Debug, Clone, Copy)]
 pub struct Mending<'a> {
-    /// How dense the surface is, if holes that are too wide for it stay open.
+    /// The density of the surface, if holes too wide for it are to stay open.
     pub density: Option<Density<'a>>,
-    /// Most edges of a hole that is filled; with less than three none is.
+    /// Most edges of a hole that is filled; with less than three no hole is filled.
     pub longest: usize,
-    /// Zip what is not filled, and leave openings open.
+    /// Close loops that are not filled by ear clipping, and leave openings open.
     pub zip: bool,
 }
 
-/// Edges of a loop that one triangle closes: what no cell saw, and not a hole. It is closed even where no
-/// hole is to be filled.
+/// Number of edges of a gap: a loop closed by one triangle that no cell saw. It is not a hole, and is closed
+/// even if no holes are to be filled.
 const GAP: usize = 3;
 
 impl Mending<'_> {
-    /// The longest loop that is looked at.
+    /// The most edges of a loop that is examined.
     pub fn longest_loop(&self) -> usize {
         if self.only_gaps() {
             GAP
@@ -37,8 +37,8 @@ impl Mending<'_> {
         }
     }
 
-    /// The triangles that fill a loop and stay, where the loop as found had this width; `None` if there are
-    /// none.
+    /// The part of a loop's filling that is not too wide; `found` is the width of the loop as it was found.
+    /// `None` if there is no filling, if it is an opening, or if nothing remains.
     fn filled(
         &self,
         corners: &[Corner],
@@ -61,8 +61,7 @@ impl Mending<'_> {
         self.zip && self.longest < GAP
     }
 
-    /// Closes the loop of `corners` if that is what it wants; `edge(a, b)` tells if the mesh has an
-    /// edge.
+    /// Fills or closes the loop of `corners` by the rules; `edge(a, b)` is true if the mesh has that edge.
     pub fn mend(&self, mut corners: Vec<Corner>, edge: impl Fn(u32, u32) -> bool) -> Filling {
         if !self.zip {
             return fill(corners, 0, edge);
@@ -112,8 +111,8 @@ fn edges_of(triangles: &[[u32; 3]]) -> FxHashSet<(u32, u32)> {
     triangles.iter().flat_map(edges).map(ordered).collect()
 }
 
-/// How wide a loop may be: it follows from its edges as it was found, since those that zipping leaves
-/// grow with what was zipped.
+/// The limit for the width of a loop. It follows from the edges of the loop as it was found, since ear
+/// clipping leaves longer ones.
 struct Width {
     edges: usize,
     squares: u128,
@@ -129,7 +128,7 @@ impl Width {
         }
     }
 
-    /// True if a loop is wide for its edges: a door and not a tear.
+    /// True if a loop is wide for its edges: an opening such as a door, not a tear.
     fn is_opening(&self, corners: &[Corner]) -> bool {
         let n = corners.len();
         let mut area = [0i128; 3];
@@ -141,8 +140,8 @@ impl Width {
         self.is_wide(0.5 * length(area), n)
     }
 
-    /// True if the triangles that fill a loop are too large for its edges, as where it goes around a body
-    /// and its vector area is small for that.
+    /// True if the triangles that fill a loop are too large for its edges. The vector area does not show this
+    /// where the loop goes around a solid body.
     fn is_spanned(&self, corners: &[Corner], filling: &[[usize; 3]]) -> bool {
         let area = |t: &[usize; 3]| area(t.map(|x| corners[x].at));
         self.is_wide(filling.iter().map(area).sum(), corners.len())

@@ -1,7 +1,8 @@
-//! Post-processing (paper, section 3.6): bridges, small components, facing, holes; and flips of edges.
+//! Post-processing (paper, section 3.6): bridges, small components, orientation of components, holes; and
+//! edge flips.
 //!
-//! Everything here looks only at triangles and positions, block by block; how the triangles were
-//! chosen is not its business.
+//! It works block by block and uses only triangles and positions, not the way in which the triangles were
+//! found.
 
 mod around;
 mod bridges;
@@ -36,10 +37,10 @@ use serde::Serialize;
 
 const SHUFFLE_BUFFER: u64 = 8 << 20;
 
-/// A triangle as it runs, beginning with its smallest vertex.
+/// An oriented triangle, starting with its smallest vertex.
 pub type OrientedTriangle = [u32; 3];
 
-/// A triangle as it runs from any vertex, beginning with its smallest.
+/// Rotates an oriented triangle so that it starts with its smallest vertex.
 #[must_use]
 pub fn from_smallest([a, b, c]: [u32; 3]) -> OrientedTriangle {
     if a < b && a < c {
@@ -52,7 +53,7 @@ pub fn from_smallest([a, b, c]: [u32; 3]) -> OrientedTriangle {
 }
 
 row! {
-    /// A triangle as it runs, beginning with its smallest vertex.
+    /// An oriented triangle, starting with its smallest vertex.
     pub struct SurfaceTriangle {
         /// Ids.
         corners: OrientedTriangle,
@@ -61,11 +62,11 @@ row! {
 }
 
 row! {
-    /// A triangle that fills a hole, for each block that it touches.
+    /// An oriented triangle that fills a hole, once for each block that it touches.
     pub struct FilledTriangle {
         /// Number of the block.
         to: u32,
-        /// Ids as it runs, beginning with the smallest.
+        /// Ids in the triangle's orientation, starting with the smallest.
         triangle: OrientedTriangle,
     }
     packed Above Above Above Above
@@ -74,26 +75,26 @@ row! {
 /// The finished surface.
 #[derive(Debug)]
 pub struct Repaired {
-    /// The triangles of each block, but for those that fill holes.
+    /// The triangles of each block, except those that fill holes.
     pub surface: Surface,
     /// Triangles that fill holes.
     pub filled: Table<FilledTriangle>,
-    /// What the numbers of the mesh follow from.
+    /// The input for numbering vertices and triangles.
     pub outline: Outline,
 }
 
-/// What repair should do.
+/// The parameters of repair.
 #[derive(Debug, Clone, Copy)]
 pub struct RepairOptions {
-    /// Do anything at all; otherwise only orient.
+    /// False: only orient the components.
     pub repair: bool,
-    /// Remove components with fewer triangles.
+    /// Components with fewer triangles are removed.
     pub min_component: u64,
-    /// Fill holes of up to this many edges.
+    /// Holes of up to this many edges are filled.
     pub max_hole_edges: usize,
-    /// Flip edges where the surface bends less for it.
+    /// Flip edges where this makes the surface bend less.
     pub flip: bool,
-    /// Close torn boundaries of any length as far as they are torn; do not fill openings.
+    /// Close torn boundaries of any length by ear clipping, and do not fill openings.
     pub zip: bool,
 }
 
@@ -104,38 +105,39 @@ pub struct RepairStats {
     pub edges_flipped: u64,
     /// Bridge triangles removed.
     pub bridges_removed: u64,
-    /// Edge-connected components before small ones are removed.
+    /// Edge-connected components before the removal of small ones.
     pub components_found: u64,
-    /// Components with too few triangles, removed.
+    /// Components removed because they have too few triangles.
     pub components_removed: u64,
-    /// Triangles in them.
+    /// Triangles of these components.
     pub component_triangles_removed: u64,
-    /// Boundary loops of three edges that were closed before holes are counted: T0 triangles, which
-    /// belong to the surface whether holes are filled or not.
+    /// Gaps closed: boundary loops of three edges. They are T0 triangles, which belong to the surface and are
+    /// closed even if holes are not filled, and are not counted as holes.
     pub gaps_closed: u64,
     /// Boundary loops before filling.
     pub holes_found: u64,
     /// Holes filled.
     pub holes_filled: u64,
-    /// Boundary loops that are torn, open or wide, closed in part, which may be nowhere.
+    /// Boundary loops of torn, open or wide parts that were processed by ear clipping, with or without
+    /// effect.
     pub holes_zipped: u64,
-    /// Boundary loops left alone because they are an outline of the surface.
+    /// Boundary loops left open because they are outlines of the surface.
     pub holes_outline: u64,
-    /// Boundary loops left alone because they are too long.
+    /// Boundary loops left open because they are too long.
     pub holes_too_long: u64,
-    /// Holes that could not be triangulated cleanly.
+    /// Holes left open because no valid triangulation was found.
     pub holes_not_filled: u64,
     /// Triangles added to fill holes.
     pub hole_triangles: u64,
 }
 
 impl RepairOptions {
-    /// The least triangles of a component that stays.
+    /// The smallest number of triangles of a component that is kept.
     fn least(&self) -> u64 {
         if self.repair { self.min_component } else { 0 }
     }
 
-    /// How boundary loops are treated; `None` if they all stay as they are.
+    /// The rules for boundary loops; `None` if all stay open.
     fn filling<'a>(&self, places: Places<'a>) -> Option<Mending<'a>> {
         let filling = Mending {
             density: places.density,

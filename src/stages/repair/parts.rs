@@ -1,27 +1,27 @@
-//! Fillings in part: triangles that are too wide for the surface around are left out.
+//! Partial fillings: triangles too wide for the surrounding surface are left out.
 
 use super::fill::Corner;
 use crate::stages::spacing::Density;
 use rustc_hash::FxHashSet;
 
-/// The part of a filling that stays.
+/// The part of a filling that is kept.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Part {
-    /// Its triangles, as numbers of corners.
+    /// Its triangles, as indices of corners.
     pub triangles: Vec<[usize; 3]>,
-    /// Edges that are open afterwards.
+    /// Number of edges that stay open.
     pub left: usize,
 }
 
 impl Part {
-    /// All of a filling.
+    /// A complete filling.
     pub fn whole(triangles: Vec<[usize; 3]>) -> Self {
         Self { triangles, left: 0 }
     }
 
-    /// Those of the `triangles` that fill the loop of `corners` that are not wide. At each corner they lie
-    /// side by side from one edge of the loop to the next; those between two that go, go as well, so that
-    /// the others share edges with the surface around.
+    /// The triangles of a filling of the loop of `corners` without the wide ones. At each corner they form a
+    /// fan from one edge of the loop to the next. Triangles of a fan between two that are left out are left
+    /// out as well, so that the others share edges with the surface around the loop.
     pub fn not_wide(
         corners: &[Corner],
         mut triangles: Vec<[usize; 3]>,
@@ -53,8 +53,8 @@ impl Part {
     }
 }
 
-/// For each corner the triangles at it, from the loop's edge to the next corner round to the edge to the
-/// corner before.
+/// The fan of triangles at each corner, from the loop's edge to the next corner to its edge to the previous
+/// corner.
 fn fans(corners: usize, triangles: &[[usize; 3]]) -> Vec<Vec<usize>> {
     let mut fans: Vec<Vec<(usize, usize)>> = vec![Vec::new(); corners];
     for (number, t) in triangles.iter().enumerate() {
@@ -71,7 +71,7 @@ fn fans(corners: usize, triangles: &[[usize; 3]]) -> Vec<Vec<usize>> {
     fans.into_iter().map(sorted).collect()
 }
 
-/// Lets those go that lie between two that go; true if there were any.
+/// Marks the triangles of a fan that lie between two marked ones; true if there were any.
 fn spread(fan: &[usize], goes: &mut [bool]) -> bool {
     let first = fan.iter().position(|&t| goes[t]);
     let last = fan.iter().rposition(|&t| goes[t]);
@@ -86,7 +86,7 @@ fn spread(fan: &[usize], goes: &mut [bool]) -> bool {
     more
 }
 
-/// The edges that are open if a loop of so many corners is closed by these triangles.
+/// The number of edges that stay open if a loop of `corners` corners is closed by these triangles.
 fn open_edges(corners: usize, triangles: &[[usize; 3]]) -> usize {
     let sides = |t: &[usize; 3]| [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])];
     let all: FxHashSet<(usize, usize)> = triangles.iter().flat_map(sides).collect();
@@ -132,7 +132,7 @@ mod tests {
         let all = fan_of_eight();
         assert_eq!(open_edges(8, &all), 0);
         assert_eq!(open_edges(8, &[]), 8);
-        // Without the third and fourth: two edges of the loop, and the chords to corners 3 and 5.
+        // Without the third and fourth triangle: two edges of the loop, and the chords to corners 3 and 5.
         let rest = [&all[..2], &all[4..]].concat();
         assert_eq!(open_edges(8, &rest), 4);
     }

@@ -1,8 +1,8 @@
-//! The patch of a block: how the triangles that touch it hang together across the edges at its
-//! vertices, and which of these edges are boundary.
+//! The patch of a block: the connections, across edges at vertices of the block, between the triangles that
+//! touch it, and the boundary edges among these edges.
 //!
-//! No edge has more than two triangles and the surface is orientable; so it does not matter in
-//! which order edges are looked at.
+//! No edge has more than two triangles and the surface is orientable, so the order of the edges does not
+//! matter.
 
 use crate::stages::surface::parity::ParitySets;
 use crate::stages::surface::sides::{pair_edges, parts};
@@ -10,26 +10,26 @@ use crate::stages::surface::star::{EDGES, Triangle};
 use crate::workspace::memory::{Holding, bytes_of, hold};
 use std::ops::Range;
 
-/// What is known of a block's triangles.
+/// Labels and boundary of the triangles that touch a block. Triangles with the same label are connected.
 #[derive(Debug)]
 pub struct Patch {
-    /// For each triangle `label << 1 | flip`, its orientation relative to its label.
+    /// For each triangle `label << 1 | flip`; `flip` is its orientation relative to its label.
     pub words: Vec<u32>,
     /// Number of labels.
     pub labels: u32,
-    /// Number of labels with a triangle that is not interior; they come first.
+    /// Number of labels with a triangle that is not interior; their numbers come first.
     pub global: u32,
-    /// For each triangle, whether it has a boundary edge at a vertex of the block.
+    /// For each triangle, true if it has a boundary edge at a vertex of the block.
     pub open: Vec<bool>,
     /// For each vertex of the block, the number of boundary edges at it, up to 255.
     pub rims: Vec<u8>,
     _held: Holding,
 }
 
-/// A triangle without a label.
+/// The word of a triangle without a label.
 const NONE: u32 = u32::MAX;
 
-/// The labels of triangles while their edges are looked at.
+/// The labels of triangles during the traversal of edges.
 struct Labels {
     /// As in [`Patch`], or [`NONE`].
     words: Vec<u32>,
@@ -37,7 +37,7 @@ struct Labels {
 }
 
 impl Labels {
-    /// Gives two triangles one label; `flip` if one of the two must be turned.
+    /// Merges the labels of two triangles; `flip` if one of the two must be turned.
     #[inline]
     fn relate(&mut self, a: u32, b: u32, flip: bool) {
         let (a, b, flip) = (a as usize, b as usize, u32::from(flip));
@@ -57,7 +57,7 @@ impl Labels {
         }
     }
 
-    /// Gives a label of its own to every triangle that has none.
+    /// Gives every triangle without a label a label of its own.
     fn complete(&mut self) {
         for word in self.words.iter_mut().filter(|word| **word == NONE) {
             *word = self.sets.push() << 1;
@@ -74,7 +74,7 @@ struct Builder<'a> {
 }
 
 impl Patch {
-    /// Looks at all `triangles` that touch the vertices `ids`, in ascending order.
+    /// Builds the patch of all `triangles` that touch the vertices `ids`, given in ascending order.
     #[must_use]
     pub fn of(ids: Range<u32>, triangles: &[Triangle]) -> Self {
         let mut builder = Builder {
@@ -97,12 +97,12 @@ impl Patch {
 }
 
 impl Builder<'_> {
-    /// The edges with both ends in the block.
+    /// Processes the edges with both ends in the block.
     fn inside(&mut self) {
         let Self {
             labels, open, rims, ..
         } = self;
-        // An edge between the first and the last vertex runs down, others up.
+        // An edge between the first and the last vertex of a triangle runs down, others run up.
         let pair = |a: u32, b: u32| {
             let ((a, corner), (b, opposite)) = (parts(a), parts(b));
             let flip = (corner == 1) == (opposite == 1);
@@ -118,7 +118,7 @@ impl Builder<'_> {
         pair_edges(self.ids.clone(), self.triangles, pair, lone);
     }
 
-    /// The edges with one end in the block.
+    /// Processes the edges with one end in the block.
     fn across(&mut self) {
         let mut edges: Vec<(u32, u32, u32, bool)> = Vec::new();
         for (number, t) in self.triangles.iter().enumerate() {
@@ -154,7 +154,7 @@ impl Builder<'_> {
         }
     }
 
-    /// Numbers the labels, those of triangles that are not interior first.
+    /// Numbers the labels; those with triangles that are not interior come first.
     fn number(self, held: Holding) -> Patch {
         let Labels {
             mut words,
@@ -199,13 +199,14 @@ mod tests {
 
     #[test]
     fn a_strip_across_a_border() {
-        // 0-1-2, 1-2-3, 2-3-4 and, apart, 5-6-7; the block ends at 6.
+        // 0-1-2, 1-2-3, 2-3-4 and, separate, 5-6-7; the block ends at 6.
         let triangles = [[0, 1, 2], [1, 2, 3], [2, 3, 4], [5, 6, 7]];
         let patch = Patch::of(0..6, &triangles);
         assert_eq!((patch.labels, patch.global), (2, 1));
         let labels: Vec<u32> = patch.words.iter().map(|w| w >> 1).collect();
         assert_eq!(labels, [1, 1, 1, 0]);
-        // Neighbours in a strip run through their edge the same way by ids.
+        // Adjacent triangles of a strip, with ascending ids, run along their common edge in the same
+        // direction.
         let flips: Vec<u32> = patch.words[..3].iter().map(|w| w & 1).collect();
         assert_eq!(flips, [0, 1, 0]);
         assert_eq!(patch.open, [true, true, true, true]);

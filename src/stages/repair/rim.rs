@@ -1,4 +1,4 @@
-//! What is at the boundary: the triangles, steps of boundary loops and pinched vertices of a block.
+//! The boundary of the surface in a block: triangles, steps of boundary loops and pinched vertices.
 
 use super::SurfaceTriangle;
 use super::fill::Corner;
@@ -16,43 +16,43 @@ use crate::workspace::persist::{Persist, Saved, persist};
 use std::ops::Range;
 
 row! {
-    /// 64 bits, one for each point: is it a vertex of the mesh?
+    /// 64 bits, one for each point: set if it is a vertex of the mesh.
     pub struct UsedBits {
-        /// The lower 32.
+        /// The lower 32 bits.
         low: u32,
-        /// The upper 32.
+        /// The upper 32 bits.
         high: u32,
     }
     unpacked
 }
 
 row! {
-    /// A step of a boundary loop that leaves its block, once for each neighbour of its vertex.
+    /// A step of a boundary loop that leaves its block, repeated for each vertex of its one-ring.
     pub struct FragmentRow {
         /// The vertex.
         id: u32,
-        /// The vertex opposite to the boundary edge.
+        /// The vertex opposite the boundary edge.
         apex: u32,
         /// 1 if the vertex has several fans.
         pinched: u32,
-        /// A vertex with which it has an edge.
+        /// A vertex of its one-ring.
         neighbor: u32,
     }
     packed Above Above Above Above
 }
 
-/// What the numbers of vertices and triangles follow from.
+/// The input for numbering the vertices and triangles of the mesh.
 #[derive(Debug)]
 pub struct Outline {
-    /// A bit for each point, 64 a word: is it a vertex?
+    /// One bit for each point, 64 in a word: set if it is a vertex.
     pub used: Vec<u64>,
-    /// For each block, the triangles whose smallest vertex is in it, without those that fill holes.
+    /// For each block, the number of triangles whose smallest vertex is in it, without those that fill holes.
     pub faces: Vec<u32>,
-    /// Edges with one triangle, after holes were filled.
+    /// Edges with exactly one triangle, after holes were filled.
     pub boundary_edges: u64,
-    /// The vertices of each block that had several fans before holes were filled.
+    /// For each block, the vertices that had several fans before holes were filled.
     pub pinches: Table<Id>,
-    /// All triangles at these vertices before holes were filled, as they run.
+    /// All triangles at these vertices before holes were filled, oriented.
     pub pinched: Table<SurfaceTriangle>,
     /// The bits of `used`, by block.
     bits: Table<UsedBits>,
@@ -60,7 +60,7 @@ pub struct Outline {
     _held: Reservation,
 }
 
-/// Where blocks leave what they find at their boundary.
+/// The tables to which blocks write their boundary.
 #[derive(Debug)]
 pub(super) struct RimFiles {
     bits: Table<UsedBits>,
@@ -78,7 +78,7 @@ pub(super) struct RimCounts {
 persist!(RimCounts { faces, steps });
 
 impl RimFiles {
-    /// Makes the files.
+    /// Creates the tables.
     pub(super) fn create(workspace: &Workspace, count: usize) -> Result<Self> {
         Ok(Self {
             bits: Table::create(workspace, "repair.used", count)?,
@@ -87,7 +87,7 @@ impl RimFiles {
         })
     }
 
-    /// Writes what a block found.
+    /// Writes the boundary of a block.
     pub(super) fn put(&self, block: usize, found: &BlockRim) -> Result<RimCounts> {
         let words = found.used.iter();
         let bits = |word: &u64| UsedBits {
@@ -103,7 +103,7 @@ impl RimFiles {
         })
     }
 
-    /// All of it together.
+    /// Collects the boundaries of all blocks.
     pub(super) fn outline(
         self,
         found: &[RimCounts],
@@ -126,7 +126,7 @@ impl RimFiles {
     }
 }
 
-/// The bits of all blocks in a row.
+/// The bits of all blocks, concatenated.
 fn bits(
     bits: &Table<UsedBits>,
     blocks: Blocks,
@@ -135,7 +135,7 @@ fn bits(
     let (words, count) = (blocks.points().div_ceil(64) + 1, blocks.count());
     let held = workspace.reserve("vertices", (words * 8 + count * 4) as u64)?;
     let mut used = vec![0u64; words];
-    // A run that is finished reads nothing any more.
+    // In a finished run the bits are not read any more.
     let count = if bits.is_gone() { 0 } else { count };
     for block in 0..count {
         let ids = blocks.ids(block);
@@ -182,15 +182,15 @@ impl Persist for Outline {
 /// The boundary of the surface in a block.
 pub struct BlockRim {
     ids: Range<u32>,
-    /// Bits: the block's vertices that have a triangle.
+    /// One bit for each vertex of the block, set if it has a triangle.
     used: Vec<u64>,
-    /// Triangles whose smallest vertex is in the block.
+    /// Number of triangles whose smallest vertex is in the block.
     faces: u32,
-    /// All triangles at vertices with a boundary edge, and the component of each.
+    /// All triangles at vertices with a boundary edge, each with its component.
     triangles: Vec<[u32; 4]>,
     star: Star,
     shape: Located,
-    /// Positions in the file, if they differ.
+    /// Positions in the file, if they differ from the shape.
     file: Option<Located>,
     /// Steps of boundary loops, ascending.
     pub steps: Vec<Step>,
@@ -249,7 +249,7 @@ impl BlockRim {
         Ok(rim)
     }
 
-    /// Goes through all triangles and picks those at vertices with a boundary edge.
+    /// Selects the triangles at vertices with a boundary edge from all triangles of the block.
     fn pick(&mut self, surface: &Surface, block: usize, rims: &[RimBits]) -> Result<()> {
         let (triangles, runs) = surface.load(block)?;
         let mut held = hold(bytes_of(&triangles) + bytes_of(&runs));
@@ -277,7 +277,7 @@ impl BlockRim {
         Ok(())
     }
 
-    /// The corner of a boundary loop at a step.
+    /// The corner of a boundary loop that belongs to a step.
     pub fn corner(&self, step: &Step) -> Corner {
         Corner {
             id: step.at,
@@ -288,7 +288,7 @@ impl BlockRim {
         }
     }
 
-    /// True if the mesh has the edge from `a`, a vertex of a step, to `b`.
+    /// True if the mesh has the edge from `a`, which must be a vertex of a step, to `b`.
     pub fn has_edge(&self, a: u32, b: u32) -> bool {
         self.star
             .at(a)
@@ -310,7 +310,7 @@ impl BlockRim {
         numbers.into_iter().map(row).collect()
     }
 
-    /// Loops that stay in the block, and parts of loops that leave it.
+    /// Loops inside the block, and the fragments of loops that leave it.
     pub fn trace(&self) -> (Vec<Vec<Step>>, Vec<Vec<Step>>) {
         let mut seen = vec![false; self.steps.len()];
         let next = |step: &Step| {
@@ -339,7 +339,7 @@ impl BlockRim {
         (loops.collect(), open)
     }
 
-    /// Steps as rows.
+    /// Converts steps to rows.
     pub fn rows(&self, part: &[Step]) -> Vec<FragmentRow> {
         let mut rows = Vec::new();
         for step in part {

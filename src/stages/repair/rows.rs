@@ -1,37 +1,38 @@
-//! Rows that blocks leave for each other when components are judged.
+//! Rows exchanged between blocks to merge components.
 
 use crate::spill::row;
 use crate::stages::surface::star::Triangle;
 
 row! {
-    /// How a block sees a crossing triangle, for the block of its smallest vertex.
+    /// The label of a crossing triangle in one block, sent to the block of its smallest vertex.
     pub struct SeenTriangle {
         /// Block of the smallest vertex.
         to: u32,
         /// Ids, ascending.
         triangle: Triangle,
-        /// The block that sees it.
+        /// The block of the label.
         block: u32,
-        /// `label << 1 | flip`: the label that it has there, and whether it runs against its ids.
+        /// `label << 1 | flip`: its label in that block, and 1 if it is turned against its ascending ids
+        /// there.
         label_flip: u32,
     }
     packed Above Above Rising Rising Above Above
 }
 
 impl SeenTriangle {
-    /// The label that the triangle has in the block.
+    /// The label of the triangle in the block.
     pub fn label(&self) -> u32 {
         self.label_flip >> 1
     }
 
-    /// True if it runs against its ascending ids.
+    /// True if it is turned against its ascending ids.
     pub fn flip(&self) -> bool {
         self.label_flip & 1 == 1
     }
 }
 
 row! {
-    /// Triangles in a row that have one label.
+    /// A run of consecutive triangles with the same label.
     pub struct LabelRun {
         /// Number of triangles.
         count: u32,
@@ -42,9 +43,9 @@ row! {
 }
 
 row! {
-    /// A bit for each of 32 vertices of a block: does it have a boundary edge?
+    /// One bit for each of 32 vertices of a block, set if the vertex has a boundary edge.
     pub struct RimBits {
-        /// The first vertex has the lowest bit.
+        /// The lowest bit is that of the first vertex.
         bits: u32,
     }
     unpacked

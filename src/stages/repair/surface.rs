@@ -1,8 +1,8 @@
-//! The surface by block: bridges found, triangles oriented, components judged.
+//! The surface by block: bridges are found, triangles oriented, components kept or removed.
 //!
-//! One pass looks at everything: each block by itself sets the triangles that touch it apart into
-//! labels, turns those of components that it has to itself, and leaves out the small ones. The
-//! labels of components that reach further are joined by the triangles that several blocks see.
+//! One pass reads all triangles. Each block on its own divides the triangles that touch it into labels,
+//! orients the components that lie entirely in the block, and removes small ones. The labels of components
+//! that extend further are merged through the triangles that several blocks see.
 
 use super::components::{Parts, join};
 use super::facing::{Fate, Sums, SumsRow, judge};
@@ -24,43 +24,42 @@ use crate::workspace::Workspace;
 use crate::workspace::memory::{Reservation, bytes_of, hold};
 use crate::workspace::persist::{Persist, Saved};
 
-/// The oriented surface, small components and bridges left out.
+/// The oriented surface, without small components and bridges.
 #[derive(Debug)]
 pub struct Surface {
-    /// Triangles that touch each block, ascending, as they run relative to their label.
+    /// Triangles that touch each block, ascending, oriented relative to their label.
     triangles: Table<SurfaceTriangle>,
-    /// The labels of these; those of global labels come first.
+    /// The labels of these triangles; global labels come first.
     runs: Table<LabelRun>,
     /// The vertices of each block that have a boundary edge.
     rims: Table<RimBits>,
-    /// Bridges that several blocks see, for each of them.
+    /// Bridges at crossing triangles, once for each block that they touch.
     bridges: Table<TriangleTo>,
-    /// For each block, the number of the first of its labels that are global, and how many are.
+    /// For each block, the number of its first global label, and how many global labels it has.
     globals: Vec<(u32, u32)>,
-    /// For each global label its component, and what becomes of the label.
+    /// For each global label its component, and the decision about it.
     components: Vec<u32>,
     fates: Vec<Fate>,
     _held: Reservation,
 }
 
-/// The triangles of a component in a row.
+/// A run of consecutive triangles of one component.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Run {
     /// Number of triangles.
     pub count: usize,
-    /// The component; numbers can be compared within a block.
+    /// The component; the number is only meaningful within a block.
     pub component: u32,
 }
 
 impl Surface {
-    /// Number of triangles that touch a block, or some more.
+    /// An upper bound on the number of triangles that touch a block.
     #[must_use]
     pub fn records(&self, block: usize) -> usize {
         self.triangles.rows(block)
     }
 
-    /// All triangles that touch a block, as they run, ascending by sorted ids; and the components
-    /// they belong to.
+    /// All triangles that touch a block, oriented, ascending by sorted ids; and their components.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
@@ -121,7 +120,7 @@ impl Surface {
     }
 }
 
-/// Files that the blocks leave, and what they add up to.
+/// The tables to which the blocks write, and the totals.
 struct Build<'a> {
     places: Places<'a>,
     stitched: &'a Stitched,
@@ -203,7 +202,7 @@ pub fn build(
     Ok((surface, stats))
 }
 
-/// Bytes that so many global labels of so many blocks take.
+/// Bytes for a number of global labels and blocks.
 fn label_bytes(labels: usize, blocks: usize) -> u64 {
     (labels * 10 + blocks * 8 + 1024) as u64
 }
@@ -260,7 +259,7 @@ impl<'a> Build<'a> {
         })
     }
 
-    /// Works on a block: the number of its global labels, and counts.
+    /// Processes a block; returns the number of its global labels, and counts.
     fn block(&self, block: usize) -> Result<(u32, RepairStats)> {
         let ids = self.blocks.ids(block);
         let mut triangles = around::load(self.stitched, block)?;
@@ -329,7 +328,8 @@ impl<'a> Build<'a> {
         sums
     }
 
-    /// Tells other blocks of crossing triangles: their labels here, and which are bridges.
+    /// Sends crossing triangles to the other blocks that see them: their labels here, and the bridges among
+    /// them.
     fn send(
         &self,
         block: usize,
@@ -361,7 +361,7 @@ impl<'a> Build<'a> {
         self.bridges.send_from(block, &found)
     }
 
-    /// Writes what stays of the triangles, as they run.
+    /// Writes the remaining triangles, oriented.
     fn write(
         &self,
         block: usize,

@@ -1,4 +1,4 @@
-//! Mending of single loops and flips of edges, on surfaces made for them.
+//! Tests of filling and ear clipping of single loops, and of edge flips, on synthetic surfaces.
 
 use super::fill::{Corner, Filling};
 use super::flips::flip;
@@ -9,7 +9,7 @@ use crate::stages::surface::star::Triangle;
 use proptest::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// A surface in the plane, about, with triangles as they run.
+/// A surface near a plane, with oriented triangles.
 #[derive(Debug, Clone)]
 struct Sheet {
     points: Vec<Point>,
@@ -28,8 +28,7 @@ fn sorted(mut t: [u32; 3]) -> [u32; 3] {
 }
 
 impl Sheet {
-    /// A grid of `wide` by `high` points ten steps apart, moved by what `off` says, without the
-    /// squares that are in a `gap`.
+    /// A grid of `wide` by `high` points ten steps apart, displaced by `off`, without the squares in `gap`.
     fn grid(
         [wide, high]: [i32; 2],
         off: impl Fn(usize) -> Point,
@@ -60,7 +59,7 @@ impl Sheet {
         all.map(|(a, b, c)| ((a, b), c)).collect()
     }
 
-    /// Boundary loops that meet no vertex twice, as they run along the hole.
+    /// Boundary loops that visit no vertex twice, in the orientation of the hole.
     fn loops(&self) -> Vec<Vec<Corner>> {
         let edges = self.half_edges();
         let open = edges
@@ -104,7 +103,7 @@ impl Sheet {
         crate::geom::triangle::area([a, b, c])
     }
 
-    /// The loop with the most edges, mended.
+    /// Mends the loop for which `which` is largest.
     fn mend(&self, which: impl Fn(&Vec<Corner>) -> usize) -> (Filling, usize) {
         let ring = self.loops().into_iter().max_by_key(which).unwrap();
         let edges = ring.len();
@@ -118,7 +117,7 @@ const MENDING: Mending<'static> = Mending {
     zip: true,
 };
 
-/// Sheets with random gaps, more or less off the plane.
+/// Sheets with random gaps, with points on or near the plane.
 fn torn() -> impl Strategy<Value = Sheet> {
     let side = 12;
     let off = prop::collection::vec(prop::array::uniform3(-3..=3), (side * side) as usize);
@@ -129,7 +128,7 @@ fn torn() -> impl Strategy<Value = Sheet> {
     })
 }
 
-/// Adds the edges of a closed way to those counted, or takes them away.
+/// Adds `sign` for each edge of a closed path.
 fn count(edges: &mut BTreeMap<(u32, u32), i32>, way: &[u32], sign: i32) {
     for (k, &a) in way.iter().enumerate() {
         let b = way[(k + 1) % way.len()];
@@ -173,7 +172,7 @@ proptest! {
     }
 }
 
-/// With all points exactly on a grid every ear is as sharp as many others.
+/// With all points exactly on a grid, many ears are equally sharp.
 #[test]
 fn a_loop_on_a_grid_is_mended_alike_wherever_it_begins() {
     let gap = |x, y| (4..7).contains(&x) && (3..9).contains(&y);
@@ -192,7 +191,7 @@ fn a_loop_on_a_grid_is_mended_alike_wherever_it_begins() {
     }
 }
 
-/// A sheet rolled to a tube with a slit: its one boundary goes around both ends, one against the other.
+/// A sheet rolled to a tube with a slit: its only boundary loop goes around both ends in opposite directions.
 #[test]
 fn the_ends_of_a_slit_tube_stay_open() {
     let (long, high) = (80, 8);
@@ -270,13 +269,13 @@ fn a_long_narrow_tear_is_closed() {
     assert_eq!(triangles.len(), edges - 2);
 }
 
-/// True if a corner is not at the outer border of a grid.
+/// True if a corner is not on the outer boundary of a grid.
 fn inside(corner: &Corner, wide: i32, high: i32) -> bool {
     let within = |x: i32, count: i32| (55..10 * (count - 1) + 45).contains(&x);
     within(corner.at[0], wide) && within(corner.at[1], high)
 }
 
-/// Its border is a little rounded and has longer edges after zipping; that makes it no hole.
+/// Ear clipping rounds the boundary slightly and leaves longer edges; it must still not count as a hole.
 #[test]
 fn a_wide_door_stays_open() {
     let door = |x, y| (5..65).contains(&x) && (5..65).contains(&y);
@@ -293,7 +292,7 @@ fn a_wide_door_stays_open() {
     }
 }
 
-/// A valley along the diagonal of a grid of six by six points, every square cut across it or along.
+/// A valley along the diagonal of a grid of six by six points, with all squares split across it or along it.
 fn valley(across: bool) -> (Vec<Point>, Vec<Triangle>) {
     let point = |n: i32| [10 * (n % 6), 10 * (n / 6), 10 * (n % 6 - n / 6).abs()];
     let squares = (0..5).flat_map(|y| (0..5).map(move |x| y * 6 + x));
@@ -306,7 +305,7 @@ fn valley(across: bool) -> (Vec<Point>, Vec<Triangle>) {
     ((0..36).map(point).collect(), triangles)
 }
 
-/// As if they had been relaxed.
+/// Displaced points, as after relaxing.
 fn lifted(points: &[Point]) -> Vec<Point> {
     points.iter().map(|p| [p[0], p[1], p[2] + 1]).collect()
 }
@@ -335,7 +334,7 @@ fn what_bends_no_more_than_it_must_stays() {
     assert_eq!(triangles, still);
 }
 
-/// The middle of the valley is at the border of the block.
+/// The middle of the valley is at the boundary of the block.
 #[test]
 fn what_reaches_out_of_the_block_is_not_flipped() {
     let (points, all) = valley(true);

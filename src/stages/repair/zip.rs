@@ -1,6 +1,5 @@
-//! Closing a boundary loop from its sharpest corners, ear by ear, as far as the surface is torn and
-//! no further: where it is open, as at doors and at the outline of a survey, ears would be longer
-//! than the surface is dense.
+//! Ear clipping of a boundary loop, sharpest corners first, as far as the surface is torn. Where it is open,
+//! as at doors and at the outline of a survey, ears would be longer than the spacing of the surface allows.
 
 use super::fill::Corner;
 use crate::geom::triangle::{length, normal, on_a_line};
@@ -9,20 +8,21 @@ use crate::method::METHOD;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-/// What is left of a loop after zipping.
+/// A loop after ear clipping.
 pub struct Zipped {
-    /// Triangles as they run.
+    /// The ears, as oriented triangles.
     pub triangles: Vec<[u32; 3]>,
-    /// The corners that are left, in turn; none if it is closed.
+    /// The remaining corners in order; none if the loop is closed.
     pub left: Vec<Corner>,
 }
 
-/// An ear to be: its sharpness as the bits of a positive number, its corner, and the corner's age.
+/// A candidate ear: its sharpness as the bits of a positive number, its corner, and the corner's age. The
+/// entry is outdated if the corner has another age by then.
 type Ear = Reverse<(u64, usize, u32)>;
 
 struct Zipper<E> {
     corners: Vec<Corner>,
-    /// The local width of the triangles along the loop.
+    /// Local width of the triangles at each corner of the loop.
     spacing: Vec<f64>,
     before: Vec<usize>,
     after: Vec<usize>,
@@ -34,7 +34,7 @@ struct Zipper<E> {
     out: Vec<[u32; 3]>,
 }
 
-/// Zips the loop of `corners`; `edge(a, b)` tells if the mesh has an edge.
+/// Clips ears of the loop of `corners`; `edge(a, b)` is true if the mesh has that edge.
 pub fn zip(corners: Vec<Corner>, edge: impl Fn(u32, u32) -> bool) -> Zipped {
     let n = corners.len();
     let mut zipper = Zipper {
@@ -65,8 +65,7 @@ pub fn zip(corners: Vec<Corner>, edge: impl Fn(u32, u32) -> bool) -> Zipped {
     }
 }
 
-/// For each corner the mean length of the sides of the triangles at its two edges, and those next
-/// to them.
+/// For each corner, the mean side length of the triangles at its two edges and at the edges next to them.
 fn spacing(corners: &[Corner]) -> Vec<f64> {
     let n = corners.len();
     let far = |a: Point, b: Point| (distance2(a, b) as f64).sqrt();
@@ -93,7 +92,7 @@ impl<E: Fn(u32, u32) -> bool> Zipper<E> {
         }
     }
 
-    /// Closes ears until none is left; some corner that is left.
+    /// Closes ears until no more may be closed; returns one of the remaining corners.
     fn run(&mut self) -> usize {
         let mut some = 0;
         while let Some(Reverse((_, x, age))) = self.heap.pop() {
@@ -122,7 +121,8 @@ impl<E: Fn(u32, u32) -> bool> Zipper<E> {
         some
     }
 
-    /// How sharp the corner is, less for sharper ones; `None` if its ear must stay open.
+    /// Ratio of the chord to the two edges of a corner, less for sharper ones; `None` if its ear must stay
+    /// open.
     fn ear(&self, x: usize) -> Option<f64> {
         let (s, e) = (self.before[x], self.after[x]);
         let [cs, cx, ce] = [s, x, e].map(|c| &self.corners[c]);
@@ -161,7 +161,7 @@ impl<E: Fn(u32, u32) -> bool> Zipper<E> {
         Some(chord / way)
     }
 
-    /// True if a corner near by along the loop lies under the ear or above it.
+    /// True if a corner nearby along the loop lies under or over the ear.
     fn covers(&self, s: usize, x: usize, e: usize, n: [i128; 3]) -> bool {
         let [a, b, c] = [s, x, e].map(|y| self.corners[y].at);
         let under = |p: Point| {

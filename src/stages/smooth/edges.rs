@@ -1,8 +1,8 @@
-//! Smoothing that keeps edges and does not shrink: a point goes to a curved surface through those of its
-//! neighbours that lie on one with it (docs/method.md, section 3.2).
+//! Smoothing that keeps edges and does not shrink: a point moves to a curved surface through those of its
+//! neighbours that lie on one surface with it (docs/method.md, section 3.2).
 //!
-//! Sums run over the point and then its neighbours, nearest first, with `+ - * / sqrt` only: the same
-//! bits on every machine, whatever found the neighbours.
+//! Sums run over the point and then its neighbours, nearest first, with `+ - * / sqrt` only. So the bits are
+//! the same on every machine and do not depend on how the neighbours were found.
 
 use crate::geom::plane::least_direction;
 use crate::method::METHOD;
@@ -12,16 +12,16 @@ use crate::stages::tiles::neighbors::Neighbors;
 /// Unknowns of a surface of second order.
 const TERMS: usize = 6;
 
-/// Neighbours of a point in memory that is used again and again.
+/// Neighbours of a point, in memory that is reused.
 #[derive(Debug, Default)]
 pub(super) struct Around {
-    /// Differences to the point, which is the first itself, in terms of the reach.
+    /// Differences to the point, divided by the reach; the first is the point itself.
     at: Vec<[f64; 3]>,
     weights: Vec<f64>,
 }
 
 impl Around {
-    /// Where a point goes from where it is, in steps, by the first `count` of its neighbours.
+    /// Offset of the point's new position, in steps, from the first `count` neighbours.
     pub(super) fn offset(&mut self, near: &Neighbors, count: usize) -> [f64; 3] {
         let Some(reach) = self.gather(near, count) else {
             return [0.0; 3];
@@ -35,8 +35,8 @@ impl Around {
         normal.map(|n| n * height)
     }
 
-    /// True if a curved surface is what lies off the plane of a point and `count` of its neighbours,
-    /// which count alike: of the square heights over the plane it leaves less than half.
+    /// True if the heights of a point and `count` neighbours over their plane come from a curved surface:
+    /// with equal weights, it leaves less than half of the sum of their squares.
     pub(super) fn is_curved(&mut self, near: &Neighbors, count: usize) -> bool {
         self.gather(near, count).is_some()
             && self
@@ -44,8 +44,8 @@ impl Around {
                 .is_some_and(|heights| heights.left < METHOD.relax.curved * heights.square)
     }
 
-    /// True if no noise shows in the nearest neighbours of a point: they lie on a curved surface. `count`
-    /// neighbours tell the local spacing. `None` if there are too few, or in few layers.
+    /// True if the nearest neighbours of a point show no noise: they lie on a curved surface. The local
+    /// spacing follows from `count` neighbours. `None` if there are too few, or if they lie in few layers.
     pub(super) fn is_clean(&mut self, near: &Neighbors, count: usize) -> Option<bool> {
         let last = near.iter().take(count).last()?;
         let (nearest, height) = (METHOD.relax.nearest, METHOD.relax.height);
@@ -59,15 +59,15 @@ impl Around {
         Some(heights.left * (reach * reach) < limit)
     }
 
-    /// Heights over a plane and a curved surface for which all points count alike.
+    /// Heights over a plane and over a curved surface, with equal weights.
     fn heights_alike(&mut self) -> Option<Heights> {
         self.weights.fill(1.0);
         let normal = self.normal()?;
         Some(self.heights(normal, &self.surface(normal)))
     }
 
-    /// Takes in the first `count` neighbours, with weights by distance; the reach, `None` if all of them
-    /// are at the point itself.
+    /// Reads the first `count` neighbours, with weights by distance. Returns the reach; `None` if all are at
+    /// the position of the point itself.
     fn gather(&mut self, near: &Neighbors, count: usize) -> Option<f64> {
         let count = count.min(near.len());
         let last2 = near.get(count.wrapping_sub(1)).map_or(0, |n| n.distance2);
@@ -88,7 +88,7 @@ impl Around {
         Some(reach)
     }
 
-    /// The direction in which the points scatter least.
+    /// The direction of least scatter.
     fn normal(&self) -> Option<[f64; 3]> {
         let (mut total, mut sum, mut products) = (0.0, [0.0; 3], [0.0; 6]);
         for (a, w) in self.at.iter().zip(&self.weights) {
@@ -113,7 +113,7 @@ impl Around {
         Some(normal.map(|n| n / length))
     }
 
-    /// Takes weight from what lies off a surface, as across an edge or on another layer.
+    /// Lowers the weights of points off a surface, as across an edge or on another layer.
     fn reweigh(&mut self, surface: &Surface) {
         let off2 = |a: &[f64; 3]| {
             let off = surface.off(*a);
@@ -134,7 +134,7 @@ impl Around {
         }
     }
 
-    /// How far the surface is above the point: a plane, unless a curved one fits far better.
+    /// Height of the surface above the point: that of the plane, unless a curved surface fits far better.
     fn height(&self, normal: [f64; 3]) -> f64 {
         let curved = self.surface(normal);
         let heights = self.heights(normal, &curved);
@@ -164,11 +164,11 @@ impl Around {
         }
     }
 
-    /// The best surface of second order over the plane with `normal`.
+    /// The least-squares surface of second order over the plane with `normal`.
     fn surface(&self, normal: [f64; 3]) -> Surface {
         let [u, v] = frame(normal);
         let frame = [u, v, normal];
-        // Normal equations, their right sides in the last column.
+        // Normal equations; the last column is the right-hand side.
         let mut m = [[0.0; TERMS + 1]; TERMS];
         for (a, w) in self.at.iter().zip(&self.weights) {
             let row = row(&frame, *a);
@@ -179,7 +179,7 @@ impl Around {
         }
         let ridge = METHOD.smoothing.ridge * m[0][0];
         (1..TERMS).for_each(|i| m[i][i] += ridge);
-        // The constant term comes out first. No pivot is smaller than the ridge.
+        // The constant term is solved first. No pivot is smaller than the ridge.
         for pivot in (1..TERMS).rev() {
             let from = m[pivot];
             for equation in &mut m[..pivot] {
@@ -196,7 +196,7 @@ impl Around {
     }
 }
 
-/// True if the nearest neighbours and the point are in few layers across an axis.
+/// True if the nearest neighbours and the point lie in few layers across an axis.
 fn in_layers(near: &Neighbors) -> bool {
     (0..3).any(|axis| {
         let nearest = near.iter().take(METHOD.relax.nearest);
@@ -208,16 +208,16 @@ fn in_layers(near: &Neighbors) -> bool {
     })
 }
 
-/// Weighted heights over the best plane.
+/// Weighted heights over the least-squares plane.
 struct Heights {
     mean: f64,
-    /// The sum of the squares of what they differ from the mean.
+    /// Sum of the squared deviations from the mean.
     square: f64,
-    /// The sum of the squares of heights over a curved surface.
+    /// Sum of the squared heights over a curved surface.
     left: f64,
 }
 
-/// Terms of second order at a place, and its height.
+/// The terms of second order at a position, and its height.
 fn row(frame: &[[f64; 3]; 3], a: [f64; 3]) -> [f64; TERMS + 1] {
     let [x, y, height] = frame.map(|axis| dot(a, axis));
     let (xx, yy) = (x * x, y * y);
@@ -227,13 +227,13 @@ fn row(frame: &[[f64; 3]; 3], a: [f64; 3]) -> [f64; TERMS + 1] {
 /// A surface of second order.
 #[derive(Debug, Clone, Copy)]
 struct Surface {
-    /// Two directions along and the normal.
+    /// Two directions in the plane, and the normal.
     frame: [[f64; 3]; 3],
     terms: [f64; TERMS],
 }
 
 impl Surface {
-    /// How far a place is above it.
+    /// Height of a position above the surface.
     fn off(&self, a: [f64; 3]) -> f64 {
         let row = row(&self.frame, a);
         let on: f64 = (0..TERMS).map(|i| self.terms[i] * row[i]).sum();
@@ -241,9 +241,9 @@ impl Surface {
     }
 }
 
-/// Two directions of length 1, at right angles to each other and to `n`.
+/// Two unit vectors at right angles to each other and to `n`.
 fn frame(n: [f64; 3]) -> [[f64; 3]; 2] {
-    // Across x, unless that is nearly the normal.
+    // Across x, unless x is close to the normal.
     let u = if n[0] * n[0] < 0.5 {
         [0.0, n[2], -n[1]]
     } else {

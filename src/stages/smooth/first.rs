@@ -1,5 +1,5 @@
-//! The first round of relaxing, a region at a time: a look at some points of every patch, and those that
-//! are rough move if it is noise that makes them so.
+//! The first round of relaxing, region by region: samples of every patch are examined, and the points of
+//! rough patches move if the roughness of their region is noise.
 
 use super::Relaxing;
 use super::edges::Around;
@@ -14,32 +14,32 @@ use crate::workspace::memory::{bytes_of, hold};
 use crate::workspace::persist::persist;
 use std::ops::Range;
 
-/// Bytes for each point of a region: what was seen of the samples, which of them tell, and some.
+/// Bytes for each point of a region: the results for samples, the set of witnesses, and lists.
 pub(super) fn bytes() -> u64 {
     ((size_of::<Target>() + size_of::<Sample>()) / METHOD.curve.sample + 4) as u64
 }
 
-/// Patches in a region.
+/// Number of patches in a region.
 fn region() -> usize {
     METHOD.curve.block as usize / METHOD.curve.patch
 }
 
-/// Where a sampled point would go, and whether that is far.
+/// A sample: its id, the position to which it would move, and true if it is rough.
 type Target = (u32, Point, bool);
 
-/// A look at the samples of some regions.
+/// The results for the samples of some regions.
 struct Looked {
-    /// Where each would go.
+    /// The target of each sample.
     targets: Vec<Target>,
-    /// How far the neighbours of points usually reach, squared, by patch.
+    /// The usual reach, squared, by patch.
     usual2: Vec<u64>,
 }
 
-/// What became of the points of some regions.
+/// The result of the first round for some regions.
 pub(super) struct Done {
-    /// Which runs move.
+    /// For each run, true if it moves.
     pub active: Vec<bool>,
-    /// What was seen of them.
+    /// The number of rough points in each run.
     pub seen: Seen,
     /// See [`Spacings`](crate::stages::spacing::Spacings).
     pub usual2: Vec<u64>,
@@ -51,7 +51,7 @@ persist!(Done {
     usual2
 });
 
-/// Moves `points`, which are those of the regions `ids`.
+/// Moves the `points` of the regions with the ids `ids`.
 pub(super) fn look_and_move(
     store: &PointStore,
     ids: Range<usize>,
@@ -96,12 +96,12 @@ fn is_sampled(id: usize) -> bool {
     (id / METHOD.curve.run).is_multiple_of(METHOD.curve.sample)
 }
 
-/// Looks at the samples.
+/// Examines the samples.
 fn look(planes: &Planes<'_>, relaxing: Relaxing, ids: &Range<usize>) -> Result<Looked> {
     let curve = METHOD.curve;
     let mut samples: Vec<Sample> = Vec::with_capacity(ids.len() / curve.sample + curve.run);
     planes.each(is_sampled, |id, point, fit| {
-        // As if it were on the surface: how far that reaches is not known yet.
+        // As if the point were on the surface: the usual reach is not known yet.
         let (to, rough) = relaxing.target(point, &fit, fit.last2);
         let fills = |normal| fit.moments.fill_space(normal);
         samples.push(Sample {
@@ -127,19 +127,18 @@ fn look(planes: &Planes<'_>, relaxing: Relaxing, ids: &Range<usize>) -> Result<L
     })
 }
 
-/// A point that is looked at first.
+/// A sample for the usual reach.
 struct Sample {
     point: Point,
     target: Target,
-    /// Squared distance of the last of its neighbours.
+    /// Squared distance of the last neighbour.
     last2: u64,
-    /// It and its neighbours fill space.
+    /// True if it and its neighbours fill space.
     fills: bool,
 }
 
-/// For each patch how far the neighbours of its points usually reach, squared: the lower quartile of those
-/// looked at. Where these fill space and reach far for their region they are strewn in the air, and what is
-/// usual is what is so in the region.
+/// The usual reach of each patch, squared: the lower quartile over its samples. Where samples fill space and
+/// reach far for their region, they are points strewn in the air, and the usual reach of the region is taken.
 fn usual_reach(samples: &[Sample], ids: &Range<usize>) -> Vec<u64> {
     let curve = METHOD.curve;
     let patches = ids.len().div_ceil(curve.patch);
@@ -179,7 +178,7 @@ fn lower_quartile(mut all: Vec<u64>) -> u64 {
     *all.select_nth_unstable(place).1
 }
 
-/// The runs of rough patches move if it is noise that makes their region rough.
+/// Selects the runs of rough patches in the regions whose roughness is noise.
 fn choose(
     planes: &Planes<'_>,
     relaxing: Relaxing,
@@ -207,7 +206,8 @@ fn patch(id: u32, ids: &Range<usize>) -> usize {
     (id as usize - ids.start) / METHOD.curve.patch
 }
 
-/// Patches of which enough was rough of what was looked at; none of a region where these are too few.
+/// The rough patches: those with a large enough share of rough samples; none in a region with too few of
+/// them.
 fn rough_patches(looked: &[Target], ids: &Range<usize>) -> Vec<bool> {
     let mut counts = vec![(0, 0); ids.len().div_ceil(METHOD.curve.patch)];
     for (id, _, far) in looked {
@@ -229,15 +229,16 @@ fn count(patches: &[bool]) -> usize {
     patches.iter().filter(|patch| **patch).count()
 }
 
-/// What some rough points of a patch tell.
+/// Counts of the witnesses of a patch.
 #[derive(Debug, Clone, Copy, Default)]
 struct Told {
     points: u8,
-    /// With a curved surface through their neighbours.
+    /// Witnesses that are curved: their neighbours lie on a curved surface.
     curved: u8,
-    /// With the nearest of these in more than few layers, as rounding makes them.
+    /// Witnesses that are fine: their nearest neighbours lie in more than a few layers (rounding makes
+    /// layers).
     fine: u8,
-    /// Of these, without noise in the nearest.
+    /// Fine witnesses whose nearest neighbours show no noise.
     clean: u8,
 }
 
@@ -247,7 +248,7 @@ impl Told {
     }
 }
 
-/// True if it is noise that makes patches of a region rough, not its edges or details that are too fine
+/// True if the patches of a region are rough because of noise, not because of edges or of details too fine
 /// for the points.
 fn is_noise(rough: &[bool], told: &[Told], smoothed: bool) -> bool {
     let sum = |of: fn(&Told) -> u8| told.iter().map(|t| usize::from(of(t))).sum::<usize>();
@@ -261,7 +262,7 @@ fn is_noise(rough: &[bool], told: &[Told], smoothed: bool) -> bool {
     noisy * limits.region >= rough.len() && !is_edges && (smoothed || !is_clean)
 }
 
-/// Asks the first rough points of every rough patch.
+/// Counts the properties of the witnesses of every rough patch.
 fn ask(
     planes: &Planes<'_>,
     relaxing: Relaxing,
@@ -292,7 +293,7 @@ fn ask(
     Ok(told)
 }
 
-/// The first rough ones, by id, of the points of every rough patch that were looked at.
+/// The witnesses: of each rough patch, the first rough samples by id.
 fn telling_points(looked: &[Target], ids: &Range<usize>, rough: &[bool]) -> Vec<bool> {
     let wanted = |rough: &bool| if *rough { METHOD.relax.telling } else { 0 };
     let mut left: Vec<usize> = rough.iter().map(wanted).collect();

@@ -1,4 +1,4 @@
-//! The planes and the neighbours of the points of a tile, as smoothing and relaxing need them.
+//! The planes and neighbours of the points of a tile, for smoothing and relaxing.
 
 use crate::error::Result;
 use crate::geom::Point;
@@ -24,8 +24,8 @@ pub(super) fn each_fit(
     each_plane(store, ids, neighbors, Widen::Never, wanted, each)
 }
 
-/// Calls `each` with the plane of every point of a tile whose id is `wanted`, of exactly the
-/// `neighbors` nearest or as a cell has it.
+/// Calls `each` with the plane of every point of a tile whose id is `wanted`: through exactly `neighbors`
+/// neighbours, or widened as for a cell.
 ///
 /// # Errors
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
@@ -54,7 +54,8 @@ pub fn each_plane(
     each_found(store, ids, &wanted, look, in_store, each)
 }
 
-/// A tile that is asked for planes of exactly the nearest neighbours, or for these, any number of times.
+/// A tile in which planes through exactly the nearest neighbours, or these neighbours, can be requested
+/// repeatedly.
 pub(super) struct Planes<'a> {
     store: &'a PointStore,
     tile: Tile,
@@ -62,7 +63,7 @@ pub(super) struct Planes<'a> {
 }
 
 impl<'a> Planes<'a> {
-    /// The tile of the points `ids`, and so many neighbours.
+    /// Loads the tile of the points `ids`, for planes through `neighbors` neighbours.
     pub fn load(store: &'a PointStore, ids: Range<usize>, neighbors: usize) -> Result<Self> {
         Ok(Self {
             store,
@@ -87,7 +88,7 @@ impl<'a> Planes<'a> {
         look_in_store(&uncertain, in_store, each)
     }
 
-    /// Calls `each` with what `of` makes of the neighbours of every point whose id is `wanted`.
+    /// Calls `each` with the value of `of` for the neighbours of every point whose id is `wanted`.
     pub fn each_neighborhood<T>(
         &self,
         wanted: impl Fn(usize) -> bool,
@@ -135,8 +136,8 @@ fn each_sum(
     several.fit(found);
 }
 
-/// Calls `each` with what `of` makes of the neighbours of every point of a tile: at least the `count`
-/// nearest, or all there are.
+/// Calls `each` with the value of `of` for the neighbours of every point of a tile: at least the `count`
+/// nearest, or all points if there are fewer.
 ///
 /// # Errors
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
@@ -150,7 +151,7 @@ pub fn each_neighborhood<T>(
     Planes::load(store, ids, count)?.each_neighborhood(|_| true, of, each)
 }
 
-/// Points whose neighbours are summed up, until their planes are found together.
+/// Points with summed neighbours, collected until their planes are computed together.
 #[derive(Default)]
 struct Several {
     level: Level,
@@ -172,7 +173,7 @@ impl Several {
         }
     }
 
-    /// Hands them out.
+    /// Computes the planes and passes them on.
     fn fit(&mut self, found: &mut Found<'_, Fit>) {
         let planes = planes(self.level, &self.moments);
         for (lane, plane) in planes.into_iter().enumerate().take(self.count) {
@@ -193,11 +194,11 @@ impl Several {
     }
 }
 
-/// Takes in what was found around a point; `None` if the tile does not know enough.
+/// Receives the result for a point; `None` if the tile cannot certify it.
 type Found<'a, T> = dyn FnMut(u32, Point, Result<Option<T>>) + 'a;
 
-/// Calls `each` with what is found around every `wanted` point: by `look` in the tile if that knows
-/// enough, else in the whole store.
+/// Calls `each` with the result for every `wanted` point: that of `look` in the tile if it is certified, else
+/// that from the whole store.
 fn each_found<T>(
     store: &PointStore,
     ids: Range<usize>,
@@ -212,7 +213,7 @@ fn each_found<T>(
     look_in_store(&uncertain, in_store, each)
 }
 
-/// Calls `each` with what `look` finds; the points of which the tile does not know enough.
+/// Calls `each` with the results of `look`; returns the points that the tile cannot certify.
 fn look_in_tile<T>(
     tile: &Tile,
     look: impl FnOnce(&Tile, &mut Found<'_, T>),
@@ -228,7 +229,7 @@ fn look_in_tile<T>(
     failed.map_or(Ok(uncertain), Err)
 }
 
-/// Calls `each` with what is found around these points in the whole store.
+/// Calls `each` with the results for these points from the whole store.
 fn look_in_store<T>(
     points: &[(u32, Point)],
     mut in_store: impl FnMut(&mut PageCache, u32, Point) -> Result<Option<T>>,

@@ -1,7 +1,7 @@
 //! Smoothing: every point is projected on the plane of its neighbours (paper, section 3.2), or on a
 //! curved surface ([`Smoothing::Edges`]).
 //!
-//! Ids stay as they are; only positions and the boxes around them change.
+//! Ids are kept; only positions and bounding boxes change.
 
 mod edges;
 mod first;
@@ -29,13 +29,14 @@ use fits::each_fit;
 use pass::Pass;
 use std::ops::Range;
 
-/// How points move when they are smoothed.
+/// The kind of smoothing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Smoothing {
-    /// To the plane of their neighbours (paper, section 3.2).
+    /// A point moves to the plane of its neighbours (paper, section 3.2).
     Plain,
-    /// To a curved surface of those that lie on one with them: keeps edges, does not shrink.
+    /// A point moves to a curved surface through those neighbours that lie on one surface with it: keeps
+    /// edges, does not shrink.
     Edges,
 }
 
@@ -51,21 +52,21 @@ impl std::str::FromStr for Smoothing {
     }
 }
 
-/// How points are relaxed.
+/// The parameters of relaxing.
 #[derive(Debug, Clone, Copy)]
 pub struct Relaxing {
-    /// Whose plane a point moves to.
+    /// Number of neighbours for the plane to which a point moves.
     pub neighbors: usize,
-    /// At most so many rounds.
+    /// Largest number of rounds.
     pub rounds: u32,
-    /// The points were smoothed: noisy ones, even where it does not show any more.
+    /// True if the points were smoothed: they are noisy, even if this does not show any more.
     pub smoothed: bool,
-    /// Points off the surface stay where they are.
+    /// True if points off the surface stay where they are.
     pub off_surface: bool,
 }
 
-/// One round of smoothing: the same points, each on the plane of its `neighbors` nearest, or on
-/// what [`Smoothing::Edges`] puts through three times as many.
+/// One round of smoothing: every point moves to the plane of its `neighbors` nearest, or, with
+/// [`Smoothing::Edges`], to a surface through three times as many neighbours.
 ///
 /// # Errors
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
@@ -99,7 +100,7 @@ pub fn smooth(
     pass.over(store, workspace, work, |()| ())
 }
 
-/// The foot of a point on its plane, on the lattice; the point itself if there is no plane.
+/// The foot of a point on its plane, on the lattice; the point itself if it has no plane.
 fn project(point: Point, fit: &Fit) -> Point {
     let Some(normal) = fit.plane.normal else {
         return point;

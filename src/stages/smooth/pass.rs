@@ -1,4 +1,4 @@
-//! A pass over all points, each moved or not: the same ids, the same pages, other positions.
+//! A pass over all points that moves some of them: same ids, same pages, other positions.
 
 use crate::error::Result;
 use crate::geom::Point;
@@ -12,23 +12,23 @@ use crate::workspace::memory::{bytes_of, hold};
 use crate::workspace::persist::Persist;
 use std::ops::Range;
 
-/// What a pass is called, and how many points it takes at a time.
+/// The names of a pass and the division of its work.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Pass<'a> {
     /// Name of the scratch file.
     pub file: &'a str,
-    /// Name of the memory that it takes.
+    /// Name of its memory reservation.
     pub memory: &'static str,
-    /// Points at a time, about.
+    /// Approximate number of points processed at a time.
     pub tile: u32,
-    /// Points that are not divided: a multiple of a run.
+    /// Number of consecutive points that are never divided: a multiple of a run.
     pub whole: usize,
-    /// Bytes for each point beside its tile and its place.
+    /// Bytes for each point in addition to its tile and its position.
     pub bytes: u64,
 }
 
 impl<'a> Pass<'a> {
-    /// A pass that may divide points between any two runs and keeps nothing beside them.
+    /// A pass that may divide points between any two runs and needs no additional memory.
     pub fn new(file: &'a str, memory: &'static str, tiles: TileRanges) -> Self {
         Self {
             file,
@@ -39,8 +39,8 @@ impl<'a> Pass<'a> {
         }
     }
 
-    /// Moves the points of `store`: `work` gets a range of ids and their positions to change; `each`
-    /// what it returned.
+    /// Moves the points of `store`. `work` is called with a range of ids and their positions, which it
+    /// changes; `each` receives its result.
     pub fn over<T: Persist + Send>(
         self,
         store: &PointStore,

@@ -1,9 +1,9 @@
-//! Relaxing: smoothing that decides only which points are connected (scale space; Digne et al., *Scale
-//! space meshing of raw data point sets*, Computer Graphics Forum 30, 2011). The mesh keeps the positions
-//! that were measured.
+//! Relaxing: smoothing that only serves to decide which points are connected (scale space; Digne et al.,
+//! *Scale space meshing of raw data point sets*, Computer Graphics Forum 30, 2011). The mesh keeps the
+//! measured positions.
 //!
-//! Restricted Voronoi cells disagree where points lie off the surface by a part of their spacing. So
-//! points move only there: patches of points that are smooth already cost a look at some of them.
+//! Restricted Voronoi cells disagree where points lie off the surface by a part of their spacing. Points move
+//! only there; of smooth patches only samples are examined.
 
 use super::Relaxing;
 use super::first::{self, Done};
@@ -22,19 +22,19 @@ use crate::workspace::persist::persist;
 use serde::Serialize;
 use std::ops::Range;
 
-/// Positions to connect the points by.
+/// The shape: positions that decide the connectivity.
 #[derive(Debug)]
 pub struct Relaxed {
-    /// As the store's, each moved or not; `None` if none moved.
+    /// The store with moved positions; `None` if no point moved.
     pub store: Option<PointStore>,
-    /// How dense the surface is.
+    /// The local spacings.
     pub spacings: Spacings,
-    /// What was done.
+    /// Counts of the rounds.
     pub stats: RelaxStats,
 }
 
 impl Relaxed {
-    /// Takes over where points are after a round, and how many moved.
+    /// Records the positions after a round, and the number of points that moved.
     fn take(&mut self, round: u32, (store, moved): (PointStore, u64)) {
         if moved > 0 {
             self.store = Some(store);
@@ -49,14 +49,14 @@ impl Relaxed {
 pub struct RelaxStats {
     /// Rounds in which points moved.
     pub rounds: u32,
-    /// Points that moved, each as often as it did.
+    /// Points that moved, summed over the rounds.
     pub moved: u64,
 }
 
-/// Which runs of ids move, and what was seen of them.
+/// The runs that move, and the rough points in them.
 struct Runs {
     active: Vec<bool>,
-    /// Rough points of each.
+    /// Number of rough points in each run.
     rough: Vec<u8>,
     _held: Reservation,
 }
@@ -71,7 +71,7 @@ impl Runs {
         })
     }
 
-    /// Runs move again in which anything was rough.
+    /// Selects the runs for the next round: those with a rough point.
     fn settle(&mut self) {
         for (active, rough) in self.active.iter_mut().zip(&mut self.rough) {
             *active &= std::mem::take(rough) > 0;
@@ -85,8 +85,8 @@ persist!(Relaxed {
     stats
 });
 impl RelaxStats {
-    /// True if half of the points moved, each counted as often as it did: the whole cloud is noisy, and
-    /// not only places in it.
+    /// True if the sum of moved points over all rounds is at least half the number of points: the whole cloud
+    /// is noisy, not only parts of it.
     #[must_use]
     pub fn is_noisy(&self, points: u64) -> bool {
         METHOD.components.noisy * self.moved >= points
@@ -95,8 +95,8 @@ impl RelaxStats {
 
 persist!(RelaxStats { rounds, moved });
 
-/// Rounds of relaxing: points move to the planes of their nearest neighbours, in each round those of the
-/// runs that were rough in the round before.
+/// Rounds of relaxing: points move to the planes of their nearest neighbours. After the first round, only the
+/// points of runs that were rough in the previous round move.
 ///
 /// # Errors
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
@@ -135,7 +135,7 @@ pub fn relax(
     Ok(relaxed)
 }
 
-/// Looks at some points of every patch and moves the points of those that are rough; how many.
+/// Examines samples of every patch and moves the points of rough patches; returns the number of moved points.
 fn first_round(
     store: &PointStore,
     tiles: TileRanges,
@@ -163,7 +163,7 @@ fn first_round(
     Ok((next, moved))
 }
 
-/// Moves the points of all active runs; how many.
+/// Moves the points of all active runs; returns their number.
 fn one_round(
     store: &PointStore,
     tiles: TileRanges,

@@ -1,4 +1,4 @@
-//! What is seen of a point when its plane is known, and of many.
+//! Rough points: the test for one point, and their number in runs of points.
 
 use super::{Relaxing, moved};
 use crate::geom::Point;
@@ -8,7 +8,7 @@ use crate::stages::spacing::{is_far, spacing2};
 use crate::workspace::persist::persist;
 use std::ops::Range;
 
-/// What was seen of a range of ids.
+/// Rough points in a range of ids.
 pub(super) struct Seen {
     /// Its first run.
     pub first: usize,
@@ -37,15 +37,15 @@ impl Seen {
         self.rough[id / METHOD.curve.run - self.first] += u8::from(rough);
     }
 
-    /// Takes over what was seen of each run.
+    /// Writes the counts of the runs to `rough`.
     pub fn put(self, rough: &mut [u8]) {
         rough[self.first..][..self.rough.len()].copy_from_slice(&self.rough);
     }
 }
 
 impl Relaxing {
-    /// Where a point goes, and whether that is far. Where neighbours usually reach as far as `usual2`, a point
-    /// off the surface stays.
+    /// The position to which a point moves, and true if the point is rough. `usual2` is the squared usual
+    /// reach of its patch; a point off the surface stays.
     pub(super) fn target(&self, point: Point, fit: &Fit, usual2: u64) -> (Point, bool) {
         let off_surface = self.off_surface && is_far(fit.last2, usual2);
         let Some(normal) = fit.plane.normal.filter(|_| !off_surface) else {

@@ -1,4 +1,4 @@
-//! Relaxing and smoothing on sheets, edges and spheres.
+//! Tests of relaxing and smoothing on planes, edges and spheres.
 
 use super::*;
 use crate::stages::blocks::Blocks;
@@ -13,13 +13,13 @@ fn workspace() -> Workspace {
     Workspace::new(&folder, memory, 2, Arc::new(Silent), Cancel::new()).unwrap()
 }
 
-/// A square sheet of `side * side` points, a hundred steps apart, `high` off its plane at `x`.
+/// A square sheet of `side * side` points, a hundred steps apart, with height `high`.
 fn sheet(side: i32, high: impl Fn(i32, i32) -> i32) -> Vec<Point> {
     let at = |n: i32| [100 * (n % side), 100 * (n / side), 500 + high(n % side, n)];
     (0..side * side).map(at).collect()
 }
 
-/// As noise: from -100 to 100 in no order.
+/// Deterministic noise from -100 to 100.
 fn noise(n: i32) -> i32 {
     let n = (n as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     ((n ^ n >> 29).wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 40) as i32 % 201 - 100
@@ -38,7 +38,7 @@ fn ordered(
     (store, tiles)
 }
 
-/// Positions after relaxing with tiles and pages of these sizes, and what was done.
+/// Positions after relaxing with tiles and pages of these sizes, and the counts.
 fn relaxed(points: &[Point], rounds: u32, tile: u32, page: usize) -> (Vec<Point>, RelaxStats) {
     let relaxing = Relaxing {
         neighbors: 12,
@@ -94,14 +94,14 @@ fn a_noisy_plane_gets_flatter_with_every_round() {
 
 #[test]
 fn edges_are_rough_and_stay() {
-    // Roofs, 45 degrees steep, of eight points from the gutter to the ridge.
+    // Roofs of slope 45 degrees, eight points from the gutter to the ridge.
     let roof = |x: i32| 100 * (x % 16 - 8).abs();
     let points = sheet(64, |x, _| roof(x));
     let (same, stats) = relaxed(&points, 3, 1000, 256);
     assert_eq!(stats, RelaxStats::default());
     let rough = rough_points(&points);
     assert!(rough > points.len() / 10, "{rough}");
-    // With noise on them they move, however they are divided.
+    // With noise on them they move, however the points are divided.
     let noisy = sheet(64, |x, n| roof(x) + noise(n));
     let (expected, stats) = relaxed(&noisy, 3, 1000, 256);
     assert!(stats.moved > points.len() as u64 && expected != same);
@@ -112,7 +112,7 @@ fn edges_are_rough_and_stay() {
 
 #[test]
 fn details_too_fine_for_the_points_stay_unless_there_is_noise() {
-    // Pillars of six by six points, each of another height; their tops slope.
+    // Pillars of six by six points of different heights, with sloping tops.
     let pillars = |off: &dyn Fn(i32) -> i32| -> Vec<Point> {
         let pillar = |x: i32, n: i32| 6 * noise(x / 6 + 100 * (n / 96 / 6)) + off(n);
         let slope = |(n, [x, y, z]): (usize, Point)| {
@@ -138,21 +138,21 @@ fn details_too_fine_for_the_points_stay_unless_there_is_noise() {
         moved > points.len() / 2 || moved > 0 && panic!("{moved}")
     };
     assert!(!moved(&clean, relaxing));
-    // What was smoothed has no noise to show.
+    // Smoothed points show no noise.
     let smoothed = Relaxing {
         smoothed: true,
         ..relaxing
     };
     assert!(moved(&clean, smoothed));
     assert!(moved(&pillars(&|n| noise(n) / 4), relaxing));
-    // Nor has what is rounded to few heights, but that is noise.
+    // Nor do points rounded to few heights; but this is taken as noise.
     let step = 150;
     let coarse = |p: &Point| [p[0], p[1], p[2] / step * step];
     let coarse: Vec<Point> = clean.iter().map(coarse).collect();
     assert!(moved(&coarse, relaxing));
 }
 
-/// How many points a look at all of them finds rough.
+/// The number of rough points among all points.
 fn rough_points(points: &[Point]) -> usize {
     let workspace = &workspace();
     let (store, _) = ordered(points, 1000, 256, workspace);
@@ -196,7 +196,7 @@ fn regions_move_by_themselves_however_they_are_divided() {
         let (store, _) = ordered(points, 1, 256, workspace);
         store.slice(0..store.len()).unwrap()
     };
-    // Two regions and a rest; of the second too little is noisy.
+    // Two regions and a part of a third; too few patches of the second are noisy.
     let span = METHOD.curve.block as usize;
     let mut points = in_order(&sheet(390, |_, _| 0));
     for (id, point) in points.iter_mut().enumerate() {
@@ -214,7 +214,7 @@ fn regions_move_by_themselves_however_they_are_divided() {
         moved[0] > 1000 && moved[1] < 300 && moved[2] > 1000,
         "{moved:?}"
     );
-    // Pages of 100 put all of it into one piece.
+    // With pages of 100 all points are in one piece.
     let (same, same_stats) = relaxed(&points, 2, 1000, 100);
     assert_eq!(stats, same_stats);
     assert!(shape == same);
@@ -238,7 +238,7 @@ const BOTH: [Smoothing; 2] = [Smoothing::Plain, Smoothing::Edges];
 
 #[test]
 fn planes_stay_where_they_are() {
-    // Level, and along (2, 1, 2) and (-2, 2, 1).
+    // A plane, in the xy plane and spanned by (2, 1, 2) and (-2, 2, 1).
     let level = sheet(40, |_, _| 0);
     let tilted = |n: i32| {
         let (a, b) = (1000 * (n % 40), 1000 * (n / 40) + 17 * (n % 7));
@@ -253,7 +253,7 @@ fn planes_stay_where_they_are() {
     }
 }
 
-/// Root of the mean of the squares of `off` at the points that are `near`.
+/// Root mean square of `off` over the points that are `near`.
 fn off(
     points: &[(Point, Point)],
     near: impl Fn(&Point) -> bool,
@@ -266,7 +266,8 @@ fn off(
 
 #[test]
 fn a_noisy_edge_of_a_cube_stays_sharper() {
-    // Two faces of 40 by 20 steps of 1000, at right angles along z; noise of a tenth of a step.
+    // Two faces of 40 by 20 spacings of 1000 steps, meeting at right angles along z; noise of a tenth of a
+    // spacing.
     let face = |n: i32| {
         let (z, far, up) = (1000 * (n % 40), 1000 * (n / 40) + 250, 5000 + noise(n));
         [[5000 + far, up, z], [up, 5000 + far, z]][n as usize % 2]
@@ -283,13 +284,13 @@ fn a_noisy_edge_of_a_cube_stays_sharper() {
         )
     });
     assert!(edges.0 < 0.6 * plain.0, "at the edge {edges:?} {plain:?}");
-    // The noise has 58.
+    // Before smoothing it is 58.
     assert!(edges.1 < 40.0, "on the faces {edges:?} {plain:?}");
 }
 
 #[test]
 fn a_noisy_sphere_shrinks_less() {
-    // Along a spiral of even steps.
+    // Along a spiral with even spacing.
     let (count, radius) = (2000, 100_000.0);
     let at = |n: i32| {
         let z = 1.0 - (2.0 * f64::from(n) + 1.0) / f64::from(count);

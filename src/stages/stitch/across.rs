@@ -1,5 +1,5 @@
-//! T12 insertion across blocks (paper, section 3.5, second part): block by block in ascending
-//! order. What a turn leaves for later ones is on disk.
+//! T12 insertion across blocks (paper, section 3.5, second part): one turn for each block, in ascending
+//! order. Results that later turns need are on disk.
 
 use super::base::Base;
 use super::insertion::{Candidate, CandidateRow, insert_candidates};
@@ -20,28 +20,28 @@ const SHUFFLE_BUFFER: u64 = 8 << 20;
 /// The crossing part of the mesh.
 #[derive(Debug)]
 pub struct Crossing {
-    /// Crossing triangles of the mesh and interior candidates that were inserted late, for each block that
-    /// they touch.
+    /// Crossing triangles of the mesh and interior candidates that were inserted late, once for each block
+    /// that they touch.
     pub added: Table<TriangleTo>,
-    /// Interior triangles to be taken out again.
+    /// Interior triangles that are removed again.
     pub removed: Table<TriangleTo>,
 }
 
 crate::workspace::persist::persist!(Crossing { added, removed });
 
-/// The pass across blocks while blocks are at work inside: whoever has finished a block takes it as far
-/// as it goes by then.
+/// The pass across blocks, which advances while other threads still work inside blocks: a thread that has
+/// finished a block advances it as far as the finished blocks allow.
 pub struct Across<'a> {
     /// The blocks in the order in which the pass needs them.
     order: Vec<u32>,
     done: Vec<AtomicBool>,
-    /// A turn takes no more bytes than these: what the blocks at work cannot need.
+    /// Most bytes for one turn: the part of the budget that the blocks in progress cannot need.
     spare: u64,
     pass: Mutex<Pass<'a>>,
 }
 
 impl<'a> Across<'a> {
-    /// The pass before its first block.
+    /// Starts the pass before its first block.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Memory`].
@@ -64,7 +64,7 @@ impl<'a> Across<'a> {
         })
     }
 
-    /// Takes the pass to its end; all blocks are finished.
+    /// Takes the remaining turns, after all blocks are finished.
     ///
     /// # Errors
     /// See [`Pass::advance`].
@@ -89,23 +89,23 @@ impl Follower for Across<'_> {
         let ready = |block: u32| self.done[block as usize].load(Ordering::Acquire);
         match self.pass.try_lock() {
             Ok(mut pass) => pass.advance(ready, Some(self.spare)),
-            // Another thread is at it.
+            // Another thread is advancing the pass.
             Err(_) => Ok(()),
         }
     }
 }
 
-/// The insertion of what crosses blocks, and of what inside them waits for it. It goes on as far as
-/// the blocks that it needs are done.
+/// The insertion of crossing candidates, and of interior candidates that depend on them. It advances as far
+/// as the blocks that it needs are finished.
 struct Pass<'a> {
     mesh: Surroundings<'a>,
-    /// The blocks in the order in which turns need them: that of the first turn that has a candidate at
-    /// one of their vertices.
+    /// The blocks in the order in which turns need them: by the first turn with a candidate at one of their
+    /// vertices.
     order: Vec<u32>,
     /// Candidates that wait for the turn of a later block.
     waiting: Mail<CandidateRow>,
     counts: InsertStats,
-    /// The block whose turn is next, and how many of `order` are known to be ready.
+    /// The block whose turn is next, and the number of blocks of `order` known to be ready.
     group: usize,
     ready: usize,
     added: Shuffle<TriangleTo>,
@@ -114,7 +114,7 @@ struct Pass<'a> {
 }
 
 impl<'a> Pass<'a> {
-    /// The pass before its first block.
+    /// Starts the pass before its first block.
     ///
     /// # Errors
     /// [`crate::Error::Memory`].
@@ -141,8 +141,8 @@ impl<'a> Pass<'a> {
         })
     }
 
-    /// Takes all turns for which the blocks that are `ready` suffice. Within `most` bytes for a turn,
-    /// or as many as there are if it is `None`; otherwise it waits to be called again.
+    /// Takes all turns for which the blocks that are `ready` suffice, each in at most `most` bytes (`None`:
+    /// in the available memory). A turn that needs more waits for the next call.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
@@ -168,7 +168,7 @@ impl<'a> Pass<'a> {
         Ok(())
     }
 
-    /// The turn of a block; false if it would take more than `most` bytes.
+    /// Takes the turn of a block; false if it would need more than `most` bytes.
     fn turn(&mut self, group: usize, most: Option<u64>) -> Result<bool> {
         let blocks = self.mesh.blocks;
         let mut tried = self.waiting.get(group)?;
@@ -180,11 +180,11 @@ impl<'a> Pass<'a> {
         let gone = self.mesh.confirm_merges(group)?;
         self.counts.joints_removed += gone.len() as u64;
         self.removed.send(&gone)?;
-        // Ascending runs: this sort merges them.
+        // Consists of ascending runs, which this sort merges.
         tried.sort();
         let (angle, counts) = (self.cos_max_angle, &mut self.counts);
         insert_candidates(&mut self.mesh, &mut tried, angle, counts);
-        // What has no vertex in a later block will not be tried again.
+        // A candidate without a vertex in a later block is not tried again.
         let mut waiting = Vec::new();
         for candidate in tried {
             let of = candidate.ids.map(|v| blocks.of(v));
@@ -204,7 +204,7 @@ impl<'a> Pass<'a> {
         Ok(true)
     }
 
-    /// Ends the pass once all turns were taken.
+    /// Ends the pass after all turns.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Corrupt`].

@@ -1,5 +1,5 @@
-//! The tests that a T12 triangle must pass (paper, section 3.5): combinatorial I to III and the
-//! geometric one. Test IV, which needs the components, is in [`super::insertion`].
+//! The tests of a T12 triangle (paper, section 3.5): the combinatorial tests I to III and the geometric test.
+//! Test IV needs the components and is in [`super::insertion`].
 
 use crate::geom::Point;
 use crate::geom::triangle::normal;
@@ -8,9 +8,9 @@ use rustc_hash::FxHashMap;
 
 /// The mesh around the vertices of a triangle.
 pub trait Neighborhood {
-    /// The star of `v`: of all triangles there, the number and the other two vertices, ascending.
+    /// The star of `v`: for each of its triangles the number and the other two vertices, ascending.
     fn star(&self, v: u32) -> impl Iterator<Item = (u32, [u32; 2])>;
-    /// How many these are.
+    /// The number of triangles at `v`.
     fn count(&self, v: u32) -> usize;
     /// The position of a vertex of a triangle of the mesh or of a candidate.
     fn position(&self, v: u32) -> Point;
@@ -20,28 +20,28 @@ pub trait Neighborhood {
     }
 }
 
-/// Why a candidate is not inserted.
+/// The test that a candidate fails.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Refusal {
-    /// Not properly connected to the mesh, for now.
+    /// Test I: not properly connected to the mesh, so far.
     Unconnected,
-    /// An edge has two triangles already.
+    /// Test II: an edge has two triangles already.
     FullEdge,
-    /// A vertex would have a closed fan and more.
+    /// Test III: a vertex would have a closed fan and another fan.
     Excess,
-    /// The normals differ too much.
+    /// Geometric test: the angle between normals is too large.
     Angle,
 }
 
-/// A vertex with more triangles is a hub: it is not gone through where another one will do.
+/// A vertex with more triangles is a hub: its star is not searched if that of another vertex suffices.
 const HUB: usize = 64;
 
-/// A triangle adjacent to a candidate: its number, and whether the candidate must be turned
-/// against it.
+/// A triangle adjacent to a candidate: its number, and true if the candidate must be turned to be oriented
+/// like it.
 pub type Adjacent = (u32, bool);
 
-/// Applies the tests I, II, III and G in this order; the adjacent triangles by edge on success.
-/// `link` is room to work in.
+/// Applies the tests I, II, III and G in this order. Returns the adjacent triangles by edge. `link` is a
+/// buffer.
 ///
 /// # Errors
 /// The first test that fails.
@@ -63,7 +63,7 @@ pub fn examine(
     if counts.iter().any(|c| *c > 1) {
         return Err(Refusal::FullEdge);
     }
-    // Where an edge is new, a component of the link ends there and goes on, and none is closed.
+    // At a new edge, a component of the link is only extended at its end; no cycle is closed.
     for (v, [e, f]) in t.into_iter().zip([[0, 1], [0, 2], [1, 2]]) {
         if counts[e] + counts[f] == 2 && makes_excess(t, v, mesh, link) {
             return Err(Refusal::Excess);
@@ -87,8 +87,8 @@ pub fn examine(
     Ok(adjacent)
 }
 
-/// For each edge of `t`, how many triangles of the mesh it has, and the number and third vertex of one;
-/// with an eye on vertices of more than `hub` triangles.
+/// For each edge of `t`, the number of triangles of the mesh at it, and the number and third vertex of one of
+/// them. The stars of vertices with more than `hub` triangles are avoided.
 fn at_edges(
     t: Triangle,
     mesh: &impl Neighborhood,
@@ -96,7 +96,7 @@ fn at_edges(
 ) -> ([usize; 3], [Option<(u32, u32)>; 3]) {
     let mut found: [Option<(u32, u32)>; 3] = [None; 3];
     let mut counts = [0usize; 3];
-    // Does the triangle with `other` beside its first vertex have the edge to `end`?
+    // Counts triangle `number` at one end of an edge, with the other vertices `a` and `b`, if one is `end`.
     let mut see = |edge: usize, number: u32, [a, b]: [u32; 2], end: u32| {
         if a == end || b == end {
             counts[edge] += 1;
@@ -126,7 +126,7 @@ fn at_edges(
     (counts, found)
 }
 
-/// The triangle of an edge `low < high` and a third vertex.
+/// The triangle with the edge `low < high` and a third vertex.
 fn with_edge(low: u32, high: u32, third: u32) -> Triangle {
     if third < low {
         [third, low, high]
@@ -137,8 +137,8 @@ fn with_edge(low: u32, high: u32, third: u32) -> Triangle {
     }
 }
 
-/// True if with `t`, both of whose edges at `v` have one triangle, the link of `v` would have a closed
-/// cycle and another component.
+/// True if `t`, both of whose edges at `v` have one triangle, would give the link of `v` a cycle and another
+/// component.
 fn makes_excess(t: Triangle, v: u32, mesh: &impl Neighborhood, link: &mut Vec<[u32; 2]>) -> bool {
     link.clear();
     link.extend(mesh.star(v).map(|(_, other)| other));
@@ -156,9 +156,9 @@ fn makes_excess(t: Triangle, v: u32, mesh: &impl Neighborhood, link: &mut Vec<[u
     !link.is_empty()
 }
 
-/// True if the path from `from`, an end of it, leads to `goal` and not through the whole link.
+/// True if the path that starts at the end node `from` leads to `goal` and does not contain the whole link.
 fn closes_part(link: &[[u32; 2]], from: u32, goal: u32) -> bool {
-    // No node has more than two edges: their other ends, combined, lead on from either.
+    // Nodes have at most two edges; the XOR of their other ends gives the next node from either side.
     let mut beside: FxHashMap<u32, (u32, u32)> = FxHashMap::default();
     for [a, b] in link {
         for (node, other) in [(a, b), (b, a)] {
@@ -174,15 +174,16 @@ fn closes_part(link: &[[u32; 2]], from: u32, goal: u32) -> bool {
             Some((both, count)) if length == 0 || *count > 1 => {
                 (before, node) = (node, both ^ before);
             }
-            // Another end.
+            // Another end node.
             _ => return false,
         }
     }
-    // All of the link.
+    // The path contains the whole link.
     false
 }
 
-/// Do `a b c` and its neighbour `b a far` across the edge `a b` agree?
+/// True if the normals of `a b c` and of its neighbour `b a far` across the edge `a b` differ by a small
+/// enough angle.
 fn angle_fits([a, b, c]: [Point; 3], far: Point, cos_max_angle: f64) -> bool {
     let n = normal(a, b, c);
     let m = normal(b, a, far);
@@ -195,7 +196,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Triangles around their vertices; `looks` counts those that were looked at.
+    /// Triangles by vertex; `looks` counts the triangles visited.
     struct Mesh {
         triangles: Vec<Triangle>,
         looks: std::cell::Cell<usize>,
@@ -240,7 +241,7 @@ mod tests {
             }
         }
 
-        /// Links of paths and cycles: a path is closed by an edge between its ends.
+        /// Links of paths and cycles; a path is closed by an edge between its ends.
         #[test]
         fn a_path_that_is_closed_leaves_others_or_not(
             lengths in prop::collection::vec((1u32..6, any::<bool>()), 1..5),
@@ -270,7 +271,7 @@ mod tests {
         }
     }
 
-    /// Many triangles around one vertex are not gone through for each that is tried there.
+    /// The many triangles around a hub are not visited for every candidate there.
     #[test]
     fn a_hub_is_not_gone_through() {
         let triangles = (1..1000).map(|k| [0, k, k + 1]).collect();

@@ -19,26 +19,26 @@ use crate::workspace::persist::persist;
 
 const SHUFFLE_BUFFER: u64 = 8 << 20;
 
-/// The base, and what the triples leave for insertion.
+/// The base, and the candidates for insertion.
 #[derive(Debug)]
 pub(super) struct Base {
-    /// Its triangles, oriented.
+    /// Triangles of the base, oriented.
     pub surface: Oriented,
-    /// Interior candidates by block; 3 cells: it is T3 but was flagged.
+    /// Interior candidates by block; a count of 3 means a T3 triangle that was flagged.
     pub candidates: Table<CountedTriple>,
     /// All crossing triples by the block of their smallest vertex.
     pub crossing: Table<CountedTriple>,
-    /// The same for the blocks of their other vertices.
+    /// Crossing triples by the blocks of their other vertices.
     pub visiting: Table<SentTriple>,
     /// Crossing T3 triangles that are flagged, by the block of their smallest vertex.
     pub flags: Table<TriangleTo>,
-    /// For each block the first and the last block that a triple of it touches.
+    /// For each block, the first and the last block touched by a triple of it.
     pub spans: Vec<(u32, u32)>,
-    /// Interior candidates left out because they would be on a line in the file.
+    /// Interior candidates left out because their points are collinear in the file.
     pub flat_candidates: u64,
 }
 
-/// Makes the base. The triples are read once: what is needed of them later is written apart.
+/// Computes the base. The triples are read once; the part needed later is written to separate tables.
 ///
 /// # Errors
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
@@ -110,11 +110,11 @@ pub(super) fn base(
     Ok((base, stats))
 }
 
-/// The one look at the triples.
+/// The single pass over the triples.
 struct Look<'a> {
     triples: &'a Triples,
     places: Places<'a>,
-    /// How blocks are divided and the highest points of columns, if they are oriented by evidence.
+    /// The division of blocks and the highest points of columns, if the base is oriented by evidence.
     by_evidence: Option<(Division, Table<Id>)>,
     blocks: Blocks,
     candidates: Table<CountedTriple>,
@@ -122,15 +122,15 @@ struct Look<'a> {
     flags: Shuffle<TriangleTo>,
 }
 
-/// What the look at a block found.
+/// Counts of a block.
 #[derive(Default)]
 struct Found {
-    /// Interior triangles that are flagged.
+    /// Interior triangles that were flagged.
     flagged: u64,
-    /// T3 triangles and interior candidates on a line.
+    /// Unfit T3 triangles and interior candidates.
     flat: u64,
     flat_candidates: u64,
-    /// The first and the last block that a triple of it touches.
+    /// The first and the last block touched by a triple of the block.
     span: (u32, u32),
 }
 
@@ -142,13 +142,13 @@ persist!(Found {
 });
 
 impl Look<'_> {
-    /// The T3 triangles that touch a block and that no vertex of it flags, ascending.
+    /// The T3 triangles that touch a block and are not flagged by a vertex of it, ascending.
     fn block(&self, block: usize) -> Result<BlockTriangles<Found>> {
         let mut found = Found::default();
         let (mut triangles, mut candidates) = self.part(block, &mut found)?;
         let mut held = hold(bytes_of(&triangles) + bytes_of(&candidates));
         let file = self.drop_unfit(block, &mut triangles, &mut candidates, &mut found)?;
-        // Where no point was moved the same positions tell how triangles lie.
+        // If no point was relaxed, the positions in the file are also those of the shape.
         let located = file.filter(|_| self.by_evidence.is_some() && !self.places.differ());
         let star = Star::of(self.blocks.ids(block), &triangles);
         let mut flagged = Vec::new();
@@ -202,7 +202,8 @@ impl Look<'_> {
         })
     }
 
-    /// How the triangles around a block and its candidates lie; `located` if their positions are known.
+    /// The evidence for the triangles around a block and its candidates; `located` has their positions if
+    /// they are known.
     fn evidence(
         &self,
         block: usize,
@@ -228,14 +229,14 @@ impl Look<'_> {
         })
     }
 
-    /// The vertices of the triangles that are not all in a block.
+    /// The vertices of the triangles that are not interior to the block.
     fn foreign(&self, block: usize, triangles: &[Triangle]) -> impl Iterator<Item = u32> {
         let ids = self.blocks.ids(block);
         let crosses = move |t: &&Triangle| t[0] < ids.start || t[2] >= ids.end;
         triangles.iter().filter(crosses).flatten().copied()
     }
 
-    /// Leaves out what would be on a line in the file, or too long; the positions that told.
+    /// Removes triangles and candidates that are unfit in the file; returns the positions used.
     fn drop_unfit(
         &self,
         block: usize,
@@ -260,8 +261,8 @@ impl Look<'_> {
         Ok(None)
     }
 
-    /// The T3 triangles that touch a block, ascending, and its interior candidates so far. The
-    /// crossing triples are put apart.
+    /// The T3 triangles that touch a block, ascending, and its interior candidates so far. The crossing
+    /// triples are written to separate tables.
     fn part(&self, block: usize, found: &mut Found) -> Result<(Vec<Triangle>, Vec<CountedTriple>)> {
         let visiting = self.triples.visiting.get(block)?;
         let own = self.triples.own.get(block)?;
@@ -271,7 +272,7 @@ impl Look<'_> {
         let mut candidates = Vec::new();
         let mut crossing = Vec::new();
         let mut span = (block as u32, block as u32);
-        // Visitors have their smallest vertex in a lower block, so they come first.
+        // Visiting triples have their smallest vertex in a lower block, so they come first.
         for visitor in &visiting {
             let [first, _, last] = visitor.triple.map(|v| self.blocks.of(v));
             span = (span.0.min(first), span.1.max(last));
@@ -279,7 +280,7 @@ impl Look<'_> {
                 triangles.push(visitor.triple);
             }
         }
-        // Ids ascend, so a triple is interior if its last one is in the block.
+        // Ids ascend, so a triple is interior if its last vertex is in the block.
         let end = self.blocks.ids(block).end;
         for &counted in &own {
             if counted.count == 3 {
@@ -301,10 +302,10 @@ impl Look<'_> {
     }
 }
 
-/// Most triangles around a vertex that are looked at the quick way.
+/// Most triangles at a vertex for which the fast test is used.
 const FEW: usize = 16;
 
-/// What a vertex refuses.
+/// Buffers for finding the triangles that a vertex flags.
 #[derive(Default)]
 struct Refusing {
     link: Link,
@@ -312,7 +313,8 @@ struct Refusing {
 }
 
 impl Refusing {
-    /// The triangles around `v` that it flags: at edges with more than two, and beside a closed fan.
+    /// Appends the triangles around `v` that it flags: at edges with more than two triangles, and beside a
+    /// closed fan.
     fn at(&mut self, v: u32, star: &Star, triangles: &[Triangle], flagged: &mut Vec<u32>) {
         let around = star.at(v);
         if one_fan(v, around, triangles) {
@@ -342,7 +344,7 @@ impl Refusing {
         if link.groups() < 2 {
             return;
         }
-        // Triangles are numbered ascending, so the first in a cycle is the smallest in any cycle.
+        // Triangles are numbered in ascending order, so the first in a cycle is the smallest in any cycle.
         let Some(first) = (0..kept.len()).find(|&i| link.is_closed(link.group(i))) else {
             return;
         };
@@ -355,8 +357,8 @@ impl Refusing {
     }
 }
 
-/// True if the link of `v` is one path or one cycle, or nothing: then nothing is flagged. False says
-/// only that this was not found out.
+/// True if the link of `v` is one path, one cycle, or empty: then nothing is flagged. False if this could not
+/// be established by the fast test.
 fn one_fan(v: u32, around: &[u32], triangles: &[Triangle]) -> bool {
     let count = around.len();
     if count < 2 {
@@ -370,7 +372,7 @@ fn one_fan(v: u32, around: &[u32], triangles: &[Triangle]) -> bool {
         *edge = others(triangles[n as usize], v);
     }
     let edges = &edges[..count];
-    // Bits of the edges that were not walked yet, from the first one on, both ways.
+    // Bits of the edges not visited yet. The walk starts at the first edge and goes both ways.
     let mut left = ((1u32 << count) - 1) & !1;
     for mut node in [edges[0][1], edges[0][0]] {
         loop {
@@ -389,7 +391,7 @@ fn one_fan(v: u32, around: &[u32], triangles: &[Triangle]) -> bool {
             node ^= a ^ b;
             left &= !next;
             if node == edges[0][0] {
-                // A cycle; whatever is left is beside it.
+                // A cycle; any edge left belongs to another component.
                 return left == 0;
             }
         }

@@ -1,8 +1,8 @@
-//! The components that the triangles of a block belong to while candidates are inserted there.
+//! The components of a block's triangles during insertion in the block.
 //!
-//! A component of the base with a crossing triangle is *global*: other blocks see it too. Where an
-//! inserted triangle joins two global components, that is a *tentative merge*: it counts for this block,
-//! and for the whole mesh only if the pass across blocks confirms it. A *local* component is known to this
+//! A component of the base with a crossing triangle is *global*: other blocks contain triangles of it too. If
+//! an inserted triangle connects two global components, this is a *tentative merge*: it is valid in this
+//! block, and in the whole mesh only if the pass across blocks confirms it. A *local* component lies in this
 //! block alone, so merging it with another one is final.
 
 use crate::spill::row;
@@ -12,11 +12,11 @@ use crate::stages::surface::star::Triangle;
 use crate::workspace::memory::bytes_of;
 use rustc_hash::FxHashMap;
 
-/// Instead of a global label: there is none.
+/// Stands for a missing global label.
 pub const NOTHING: u32 = u32::MAX;
 
 row! {
-    /// An inserted triangle at which global components meet.
+    /// An inserted triangle that connects global components.
     pub struct Merge {
         /// Ids, ascending.
         triangle: Triangle,
@@ -26,25 +26,25 @@ row! {
     packed Above Above Above Above Above Above
 }
 
-/// The component of a triangle as a word: `number << 2 | local << 1 | flip`.
+/// The component of a triangle, packed in a word as `number << 2 | local << 1 | flip`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ComponentRef {
-    /// Global label, or number within the block.
+    /// The global label, or the number within the block.
     pub number: u32,
-    /// True if it is a number within the block.
+    /// True if `number` is a number within the block.
     pub local: bool,
     /// Orientation of the triangle relative to its component.
     pub flip: bool,
 }
 
 impl ComponentRef {
-    /// As one word.
+    /// Packs it in a word.
     #[must_use]
     pub fn word(self) -> u32 {
         self.number << 2 | u32::from(self.local) << 1 | u32::from(self.flip)
     }
 
-    /// From a word.
+    /// Unpacks a word.
     #[must_use]
     pub fn from_word(word: u32) -> Self {
         Self {
@@ -55,8 +55,8 @@ impl ComponentRef {
     }
 }
 
-/// The components of the base in a block, numbered as they are met. Labels whose set has a crossing
-/// triangle are one component for each set; every other label is one by itself.
+/// The components of the base in a block, numbered in the order of first use. All labels of a set with a
+/// crossing triangle are one component; every other label is a component of its own.
 pub struct BaseComponents<'a> {
     surface: &'a Oriented,
     of_root: FxHashMap<u32, u32>,
@@ -66,7 +66,7 @@ pub struct BaseComponents<'a> {
 }
 
 impl<'a> BaseComponents<'a> {
-    /// Those of the interior triangles of a block.
+    /// The components of the interior triangles of a block.
     pub fn of(surface: &'a Oriented, block: usize) -> Self {
         let (first, globals) = surface.globals[block];
         let mut components = Self {
@@ -99,15 +99,15 @@ impl<'a> BaseComponents<'a> {
         (component, flip)
     }
 
-    /// The component of an interior triangle with `label << 1 | flip`, and whether it is turned
-    /// against that.
+    /// The component of an interior triangle with `label << 1 | flip`, and true if the triangle is turned
+    /// against it.
     pub fn interior(&self, label_flip: u32) -> OrientationConstraint {
         let (label, turned) = constraint(label_flip);
         let (component, flip) = self.of_label[label as usize];
         (component, flip ^ turned)
     }
 
-    /// The same for a crossing triangle.
+    /// The same for a crossing triangle, whose label is global.
     pub fn crossing(&mut self, label_flip: u32) -> OrientationConstraint {
         let (label, turned) = constraint(label_flip);
         let (component, flip) = self.of_global(label);
@@ -115,23 +115,23 @@ impl<'a> BaseComponents<'a> {
     }
 }
 
-/// The components of a block's triangles.
+/// The components of a block's triangles during insertion.
 #[derive(Default)]
 pub struct BlockComponents {
-    /// For each triangle its component as it was put in, and whether it is turned against that.
+    /// For each triangle, its component when it was added, and true if it is turned against it.
     of: Vec<OrientationConstraint>,
-    /// Components that are one for good.
+    /// Final merges of components.
     merged: ParitySets,
-    /// Those that are one in this block: also by tentative merges.
+    /// All merges valid in this block, including tentative ones.
     pub joined: ParitySets,
     /// Global label of each component, or [`NOTHING`].
     global: Vec<u32>,
-    /// Tentative merges in order of insertion.
+    /// Tentative merges, in the order of insertion.
     pub tentative: Vec<Merge>,
 }
 
 impl BlockComponents {
-    /// Those of the base, with the component `of` each triangle.
+    /// The components of the base; `of` gives that of each triangle.
     pub fn new(base: BaseComponents<'_>, of: Vec<OrientationConstraint>) -> Self {
         Self {
             of,
@@ -142,19 +142,19 @@ impl BlockComponents {
         }
     }
 
-    /// Bytes of its lists.
+    /// Bytes allocated by its lists.
     pub fn bytes(&self) -> u64 {
         bytes_of(&self.of) + 3 * bytes_of(&self.global) + bytes_of(&self.tentative)
     }
 
-    /// The component of a triangle by now, and whether it is turned against that.
+    /// The current component of a triangle, and true if the triangle is turned against it.
     pub fn find(&mut self, number: u32) -> OrientationConstraint {
         let (component, flip) = self.of[number as usize];
         let (root, up) = self.merged.find(component);
         (root, flip ^ up)
     }
 
-    /// The same for who is not in the block.
+    /// The same in a form that other blocks understand.
     pub fn reference(&mut self, number: u32) -> ComponentRef {
         let (root, flip) = self.find(number);
         let label = self.global[root as usize];
@@ -166,8 +166,8 @@ impl BlockComponents {
         }
     }
 
-    /// Puts in a triangle at which the components of `constraints` meet: a local one is merged with its
-    /// neighbour, global ones tentatively.
+    /// Adds a triangle at which the components of `constraints` meet. A local component is merged with its
+    /// neighbour; global ones are merged tentatively.
     pub fn insert(&mut self, t: Triangle, constraints: &[OrientationConstraint]) {
         let mut current = constraints[0];
         for &(next, flip) in constraints {
@@ -179,7 +179,7 @@ impl BlockComponents {
             }
             let next = (b, flip ^ up_b);
             let turned = current.1 ^ next.1;
-            // The one that stays a root is the global one, or the first.
+            // The global root is kept, or the first one if none is global.
             if self.global[b as usize] == NOTHING {
                 self.merged.join(a, b, turned);
             } else if self.global[a as usize] == NOTHING {
@@ -193,7 +193,7 @@ impl BlockComponents {
         self.of.push((root, flip ^ up));
     }
 
-    /// Notes a tentative merge if global components meet at `t`.
+    /// Records a tentative merge if global components meet at `t`.
     fn note_tentative(&mut self, t: Triangle, constraints: &[OrientationConstraint]) {
         let mut words = [NOTHING; 3];
         let mut count = 0;

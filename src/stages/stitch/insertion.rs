@@ -1,6 +1,6 @@
-//! The insertion of T12 candidates (paper, section 3.5, second part): rounds in rank order, with the
-//! tests of [`super::admissibility`] and test IV. It is the same inside blocks and across them; a
-//! [`Mesh`] tells what is around a candidate, and takes what is inserted.
+//! The insertion of T12 candidates (paper, section 3.5, second part): rounds in rank order, with the tests of
+//! [`super::admissibility`] and test IV. The same code serves insertion inside blocks and across them,
+//! through the trait [`Mesh`].
 
 use super::admissibility::{Neighborhood, Refusal, examine};
 use super::stats::InsertStats;
@@ -11,19 +11,19 @@ use crate::stages::surface::star::Triangle;
 
 /// The mesh around candidates, which grows as they are inserted.
 pub trait Mesh: Neighborhood {
-    /// When a triangle was last inserted at a vertex of a candidate; 0 if none was.
+    /// Time of the last insertion of a triangle at a vertex of a candidate; 0 if there was none.
     fn changed(&self, v: u32) -> u32;
-    /// The component of a triangle of the mesh, and whether the triangle is turned against it.
+    /// The component of a triangle of the mesh, and true if the triangle is turned against it.
     fn component(&mut self, number: u32) -> OrientationConstraint;
-    /// The components, as far as they are joined; test IV asks these.
+    /// The merged components, for test IV.
     fn components(&mut self) -> &mut ParitySets;
-    /// Takes in a triangle at the time `now`. It has at least one of `constraints`; their components
-    /// are joined by then.
+    /// Adds a triangle at the time `now`. There is at least one constraint, and the components of
+    /// `constraints` have been merged.
     fn insert(&mut self, t: Triangle, constraints: &[OrientationConstraint], now: u32);
 }
 
-/// Tries the candidates, ascending, in rounds until one inserts nothing. What is left in the list failed
-/// only test I.
+/// Tries the candidates, ascending, in rounds until a round inserts none. The candidates left in the list
+/// failed test I only.
 pub fn insert_candidates(
     mesh: &mut impl Mesh,
     candidates: &mut Vec<Candidate>,
@@ -31,13 +31,14 @@ pub fn insert_candidates(
     counts: &mut InsertStats,
 ) {
     let (mut link, mut constraints) = (Vec::new(), Vec::new());
-    // Counts insertions, from 1.
+    // The number of insertions so far, plus one.
     let mut now = 1;
     loop {
         let before = now;
         candidates.retain_mut(|candidate| {
             let t = candidate.ids;
-            // What fails test I needs a triangle at another of its edges.
+            // A candidate that failed test I can only pass after a triangle was added at another of its
+            // edges.
             let changed = t.map(|v| u8::from(mesh.changed(v) > candidate.tried));
             if candidate.tried > 0 && changed.iter().sum::<u8>() < 2 {
                 return true;
@@ -70,21 +71,21 @@ pub fn insert_candidates(
     }
 }
 
-/// A triangle that may be inserted; in the order in which they are tried.
+/// A candidate; the order is that in which candidates are tried.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Candidate {
-    /// Class and, below 2^62, the square of the longest edge.
+    /// The class and, below 2^62, the square of the longest edge.
     rank: u64,
     /// Vertices.
     pub ids: Triangle,
-    /// When it was last tried; 0 if it was not.
+    /// Time of the last test; 0 if there was none.
     tried: u32,
 }
 
 row! {
     /// A [`Candidate`], in the same order.
     pub struct CandidateRow {
-        /// Its rank, the upper word first.
+        /// The rank, upper word first.
         rank: [u32; 2],
         /// Ids, ascending.
         triangle: Triangle,
@@ -104,7 +105,7 @@ impl Candidate {
         }
     }
 
-    /// As a row, in the same order.
+    /// Converts to a row, with the same order.
     #[must_use]
     pub fn row(&self) -> CandidateRow {
         CandidateRow {
@@ -113,7 +114,7 @@ impl Candidate {
         }
     }
 
-    /// From a row.
+    /// Converts from a row.
     #[must_use]
     pub fn of(row: CandidateRow) -> Self {
         let [high, low] = row.rank.map(u64::from);

@@ -1,5 +1,5 @@
-//! T12 insertion inside a block (paper, section 3.5, second part): the candidates whose vertices
-//! are all in one block, each block by itself.
+//! T12 insertion inside blocks (paper, section 3.5, second part): candidates whose vertices are all in one
+//! block. Blocks are independent.
 
 use super::admissibility::Neighborhood;
 use super::base::Base;
@@ -31,7 +31,7 @@ row! {
 }
 
 row! {
-    /// A vertex and where it is.
+    /// A vertex and its position.
     pub struct VertexAt {
         /// The vertex.
         id: u32,
@@ -41,24 +41,24 @@ row! {
     packed Above Above Above Above
 }
 
-/// What the blocks leave for the crossing candidates.
+/// Output of the blocks, for the insertion across blocks.
 #[derive(Debug)]
 pub struct Interior {
     /// Interior triangles of the mesh, ascending, by block.
     pub mesh: Table<TriangleRow>,
-    /// Tentative merges in order of insertion.
+    /// Tentative merges, in the order of insertion.
     pub merges: Table<Merge>,
-    /// Interior triangles that touch a context vertex.
+    /// Interior triangles at context vertices.
     pub context: Table<TriangleIn>,
-    /// Vertices of these, of the crossing base and the context vertices, ascending.
+    /// Vertices of these triangles and of the crossing base, and the context vertices, ascending.
     pub vertices: Table<VertexAt>,
-    /// Crossing candidates with their smallest vertex in the block, and interior ones that failed
-    /// only test I and touch a crossing triple; ascending.
+    /// Crossing candidates with their smallest vertex in the block, and interior ones that failed test I only
+    /// and touch a crossing triple; ascending.
     pub ranked: Table<CandidateRow>,
 }
 
 impl Interior {
-    /// Makes the files.
+    /// Creates the tables.
     ///
     /// # Errors
     /// [`crate::Error::Io`].
@@ -73,7 +73,7 @@ impl Interior {
     }
 }
 
-/// Bytes that the work on a block takes.
+/// Upper estimate of the bytes for a block.
 pub fn block_bytes(base: &Base, block: usize) -> u64 {
     let triangles = base.surface.interior.rows(block) + base.surface.crossing.rows(block);
     let candidates = base.candidates.rows(block) + base.crossing.rows(block);
@@ -81,17 +81,17 @@ pub fn block_bytes(base: &Base, block: usize) -> u64 {
     180 * records as u64 + (4 << 20)
 }
 
-/// Goes on with what finished blocks leave, beside the work on others.
+/// Work that follows the finished blocks, interleaved with the work inside other blocks.
 pub trait Follower: Sync {
     /// The blocks in the order in which they are needed.
     fn order(&self) -> &[u32];
-    /// Notes that a block is finished.
+    /// Records that a block is finished.
     fn finished(&self, block: u32);
-    /// Goes on as far as the finished blocks allow. A thread calls it between two blocks.
+    /// Advances as far as the finished blocks allow. A thread calls this between two blocks.
     fn go_on(&self) -> Result<()>;
 }
 
-/// Inserts the interior candidates of all blocks; what became of them.
+/// Inserts the interior candidates of all blocks; returns the counts.
 ///
 /// # Errors
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
@@ -120,7 +120,7 @@ pub fn insert_all(
     };
     let bytes = |unit: usize| block_bytes(base, order[unit] as usize);
     workspace.units("stitch: block", order.len(), bytes, work, |unit, counts| {
-        // Perhaps in an earlier attempt.
+        // The block may have been finished in an earlier attempt.
         follower.finished(order[unit]);
         all.add(&counts);
         Ok(())
@@ -128,7 +128,7 @@ pub fn insert_all(
     Ok(all)
 }
 
-/// Inserts the interior candidates of a block; what became of them.
+/// Inserts the interior candidates of a block; returns the counts.
 ///
 /// # Errors
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
@@ -153,12 +153,12 @@ pub fn insert(
     Ok(counts)
 }
 
-/// For each vertex of a block: is it in a crossing triple?
+/// Mark of a vertex: it is in a crossing triple.
 const CROSSING: u8 = 1;
-/// Is it in one that is not in the base, so that it may be a candidate?
+/// Mark of a vertex: it is in a crossing triple that is not in the base and may be a candidate.
 const OPEN: u8 = 2;
 
-/// [`CROSSING`] and [`OPEN`] of the vertices of a block; `crossing` is the crossing base around it.
+/// The marks [`CROSSING`] and [`OPEN`] of the vertices of a block; `crossing` is the crossing base around it.
 fn marks(base: &Base, crossing: &[LabelledTo], ids: &Range<u32>, block: usize) -> Result<Vec<u8>> {
     let mut marks = vec![0; ids.len()];
     let mut mark = |t: Triangle, count: u32| {
@@ -177,18 +177,18 @@ fn marks(base: &Base, crossing: &[LabelledTo], ids: &Range<u32>, block: usize) -
     Ok(marks)
 }
 
-/// The mesh around a block while candidates are inserted.
+/// The mesh around a block during insertion.
 struct BlockWork {
     ids: Range<u32>,
     /// The interior triangles of the base.
     mesh: Vec<Triangle>,
-    /// For the vertices of candidates, which are *active*: numbers and other two vertices, ascending,
-    /// of the triangles there.
+    /// For each vertex of a candidate (*active* vertices), the number and the other two vertices, ascending,
+    /// of each triangle there.
     stars: ByVertex<(u32, [u32; 2])>,
-    /// For each vertex of the block when a triangle was last inserted there.
+    /// For each vertex of the block, the time of the last insertion there.
     changed: Vec<u32>,
-    /// Those of base interior that touch a candidate or a crossing triple, base crossing, then
-    /// inserted triangles.
+    /// The interior triangles of the base that touch a candidate or a crossing triple, then those of the
+    /// crossing base, then inserted ones.
     triangles: Vec<Triangle>,
     components: BlockComponents,
     interior_base: usize,
@@ -196,11 +196,11 @@ struct BlockWork {
     candidates: Vec<Candidate>,
     crossing_candidates: Vec<Candidate>,
     located: Located,
-    /// For each vertex of the block [`CROSSING`] and [`OPEN`].
+    /// For each vertex of the block, the marks [`CROSSING`] and [`OPEN`].
     marks: Vec<u8>,
-    /// Triangles of the base that went because the labels at an edge run against each other.
+    /// Triangles of the base that were removed at edges where two labels are not oriented alike.
     cut: u64,
-    /// Crossing candidates that would be on a line in the file.
+    /// Crossing candidates whose points are collinear in the file.
     flat: u64,
     held: Holding,
 }
@@ -287,7 +287,7 @@ impl BlockWork {
         Ok(work)
     }
 
-    /// Tells what its lists take, and `more` bytes.
+    /// Reports the bytes of its lists and `more` bytes.
     fn tell(&mut self, more: u64) {
         let triangles = bytes_of(&self.mesh) + bytes_of(&self.triangles);
         let candidates = bytes_of(&self.candidates) + bytes_of(&self.crossing_candidates);
@@ -296,7 +296,7 @@ impl BlockWork {
             .set(triangles + candidates + self.components.bytes() + vertices + more);
     }
 
-    /// Takes in which crossing triples are candidates, and where their vertices are.
+    /// Determines which crossing triples are candidates, and the positions of their vertices.
     fn see_crossing(
         &mut self,
         places: Places<'_>,
@@ -361,7 +361,7 @@ impl BlockWork {
         self.components = BlockComponents::new(components, of);
     }
 
-    /// Gives a triangle the next number.
+    /// Adds a triangle with the next number.
     fn enter(&mut self, t: Triangle) {
         let number = self.triangles.len() as u32;
         self.triangles.push(t);
@@ -402,14 +402,14 @@ impl BlockWork {
         inserted.sort_unstable();
         let mut mesh = std::mem::take(&mut self.mesh);
         mesh.extend_from_slice(inserted);
-        // The sort takes as much again.
+        // The sort needs the same memory again.
         self.tell(2 * bytes_of(&mesh));
-        // Two ascending runs: this sort merges them.
+        // Consists of two ascending runs, which this sort merges.
         mesh.sort();
         out.mesh.put(block, bytemuck::cast_slice(&mesh))
     }
 
-    /// The interior triangles at context vertices with their components.
+    /// The interior triangles at context vertices, with their components.
     fn around_context(&mut self, context: &[bool]) -> Vec<TriangleIn> {
         let mut around = Vec::new();
         for number in (0..self.interior_base).chain(self.base..self.triangles.len()) {
@@ -425,7 +425,7 @@ impl BlockWork {
         around
     }
 
-    /// The vertices whose positions the crossing candidates may need.
+    /// The vertices whose positions crossing candidates may need.
     fn located(&self, context: &[bool], around: &[TriangleIn]) -> Vec<VertexAt> {
         let in_context = |v: &u32| self.ids.contains(v) && context[(v - self.ids.start) as usize];
         let crossing = self.triangles[self.interior_base..self.base].iter();

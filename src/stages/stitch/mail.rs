@@ -1,10 +1,11 @@
-//! Rows that one turn of the pass across blocks leaves for later ones.
+//! Rows that one turn of the pass across blocks sends to later ones.
 
 use crate::error::Result;
 use crate::spill::{Row, Table};
 use crate::workspace::Workspace;
 
-/// Records for numbered receivers, on disk, in parts as they were sent. They do not outlive an attempt.
+/// Rows for numbered receivers, on disk, in the parts in which they were sent. They are not kept if the run
+/// is interrupted.
 #[derive(Debug)]
 pub struct Mail<R: Row> {
     parts: Table<R>,
@@ -13,7 +14,7 @@ pub struct Mail<R: Row> {
 }
 
 impl<R: Row> Mail<R> {
-    /// Makes the file `name`.
+    /// Creates the file `name`.
     ///
     /// # Errors
     /// [`crate::Error::Io`].
@@ -36,14 +37,14 @@ impl<R: Row> Mail<R> {
         Ok(())
     }
 
-    /// Number of rows that a receiver has.
+    /// Number of rows for a receiver.
     #[must_use]
     pub fn rows(&self, to: usize) -> usize {
         let parts = self.of[to].iter();
         parts.map(|part| self.parts.rows(*part as usize)).sum()
     }
 
-    /// All rows of a receiver, in the order in which they were sent.
+    /// All rows for a receiver, in the order of sending.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
@@ -57,7 +58,7 @@ impl<R: Row> Mail<R> {
         Ok(all)
     }
 
-    /// Bytes that the tables take.
+    /// Bytes of the lists of parts.
     #[must_use]
     pub fn bytes(&self) -> u64 {
         (self.parts.count() * 40 + self.of.len() * 24) as u64

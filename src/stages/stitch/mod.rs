@@ -1,12 +1,12 @@
 //! From triples to an oriented manifold (paper, section 3.5).
 //!
-//! The mesh is decided block by block:
-//! 1. `base`: every vertex flags what it refuses of T3, and the rest is oriented.
+//! The mesh is computed block by block:
+//! 1. `base`: every vertex flags the T3 triangles that are not manifold at it; the others are oriented.
 //! 2. `interior`: T12 candidates are inserted inside each block.
-//! 3. `across`: then those between blocks, and tentative merges are confirmed or taken back.
+//! 3. `across`: T12 candidates between blocks are inserted, and tentative merges are confirmed or reverted.
 //!
-//! Both insertions are `insertion`, with the tests of `admissibility`. The semantics are in
-//! sections 6 and 7 of `docs/method.md`.
+//! Both insertions use `insertion`, with the tests of `admissibility`. They are defined in sections 6 and 7
+//! of `docs/method.md`.
 
 mod across;
 mod admissibility;
@@ -32,23 +32,23 @@ use crate::workspace::persist::persist;
 use across::Across;
 use interior::Interior;
 
-/// The mesh after manifold extraction; triangles by ascending ids, orientable, not yet oriented.
+/// The manifold mesh; triangles by ascending ids, orientable but not yet oriented.
 #[derive(Debug)]
 pub struct Stitched {
     /// Interior triangles by block.
     pub interior: Table<TriangleRow>,
-    /// Triangles to add, for each block they touch: all crossing ones, and interior ones inserted late.
+    /// Additional triangles, for each block they touch: all crossing ones, and interior ones inserted late.
     pub added: Table<TriangleTo>,
-    /// Triangles to take out of `interior`.
+    /// Triangles to be removed from `interior`.
     pub removed: Table<TriangleTo>,
 }
 
-/// How the manifold is extracted.
+/// The parameters of the extraction.
 #[derive(Debug, Clone, Copy)]
 pub struct StitchOptions {
     /// Cosine of the largest angle between the normals of a T12 triangle and its neighbours.
     pub cos_max_angle: f64,
-    /// Orient by evidence, divided like this, instead of in the order of triangles.
+    /// The division for orientation by evidence; `None` orients in the order of triangles.
     pub weigh: Option<Division>,
 }
 
@@ -73,7 +73,7 @@ pub fn stitch(
     let (base, mut counts) = base::base(places, triples, blocks, options.weigh, workspace)?;
     let interior = Interior::create(workspace, blocks.count())?;
     let cos = options.cos_max_angle;
-    // The pass across blocks is short, and begins again when the run is resumed.
+    // The pass across blocks is short, and starts from the beginning when the run is resumed.
     let (crossing, inserted) = workspace.once("insert", || {
         let across = Across::new(&base, &interior, blocks, cos, workspace)?;
         let inside =

@@ -7,10 +7,9 @@ use serde::Serialize;
 /// Counts of the base.
 #[derive(Debug, Clone, Copy, Default, Serialize, PartialEq, Eq)]
 pub struct BaseStats {
-    /// T3 triangles flagged at non-manifold edges and vertices by excess.
+    /// T3 triangles flagged at non-manifold edges and at vertices by excess.
     pub flagged: u64,
-    /// T3 triangles left out because their points are on a line in the file, or a side is too long for the
-    /// surface.
+    /// Unfit T3 triangles: their points are collinear in the file, or a side is too long for the surface.
     pub unfit: u64,
     /// T3 triangles removed so that the rest can be oriented: they close a Möbius band.
     pub mobius: u64,
@@ -18,26 +17,27 @@ pub struct BaseStats {
     pub triangles: u64,
 }
 
-/// What became of the candidates.
+/// Counts of the candidates by outcome.
 #[derive(Debug, Clone, Copy, Default, Serialize, PartialEq, Eq)]
 pub struct InsertStats {
-    /// Inserted.
+    /// Inserted candidates.
     pub accepted: u64,
-    /// Test I: not properly connected to the mesh.
+    /// Failed test I: not properly connected to the mesh.
     pub unconnected: u64,
-    /// Test II: an edge with two triangles.
+    /// Failed test II: an edge has two triangles.
     pub full_edge: u64,
-    /// Test III: a vertex by excess.
+    /// Failed test III: a vertex by excess.
     pub excess: u64,
-    /// Geometric test: normals too different.
+    /// Failed the geometric test: the angle between normals is too large.
     pub angle: u64,
-    /// Test IV: would close a Möbius band.
+    /// Failed test IV: it would close a Möbius band.
     pub orientation: u64,
-    /// Not tried: its points are on a line in the file, or a side is too long for the surface.
+    /// Unfit, hence not tried: its points are collinear in the file, or a side is too long for the surface.
     pub unfit: u64,
-    /// Of the accepted, those taken out again because blocks joined components differently.
+    /// Inserted candidates that were removed again because the merges of different blocks contradict each
+    /// other.
     pub joints_removed: u64,
-    /// Triangles of the base that were cut; counted with those of the base.
+    /// Triangles of the base that were cut; they are counted with the base.
     #[serde(skip)]
     pub(super) cut: u64,
 }

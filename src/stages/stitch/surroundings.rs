@@ -1,5 +1,4 @@
-//! The mesh of the pass across blocks: in the turn of a block, what is around the candidates that are
-//! tried, and nothing of it between turns.
+//! The mesh around the candidates of one turn of the pass across blocks. It is discarded between turns.
 
 use super::admissibility::Neighborhood;
 use super::base::Base;
@@ -25,7 +24,7 @@ struct Entry {
     ids: Triangle,
     /// `label << 1 | flip`.
     word: u32,
-    /// Where its vertices are.
+    /// Positions of its vertices.
     at: [Point; 3],
 }
 
@@ -39,21 +38,21 @@ impl Entry {
     }
 }
 
-/// The star of a vertex of a candidate.
+/// The star of a candidate's vertex.
 #[derive(Default)]
 struct VertexStar {
     position: Point,
     triangles: Vec<u32>,
-    /// When one was last inserted.
+    /// Time of the last insertion.
     changed: u32,
 }
 
 row! {
-    /// A triangle that a turn inserted at a block or took out.
+    /// A triangle that a turn inserted into or removed from a block.
     struct Change {
         /// Ids, ascending.
         triangle: Triangle,
-        /// `label << 1 | flip`; [`NOTHING`] if it was taken out.
+        /// `label << 1 | flip`; [`NOTHING`] if the triangle was removed.
         label_flip: u32,
         /// Positions of the corners.
         at: [Point; 3],
@@ -61,19 +60,19 @@ row! {
     packed Above Above Above Above Above Above Above Above Above Above Above Above Above
 }
 
-/// Bytes that are reserved for a vertex and for a triangle.
+/// Bytes reserved for a vertex and for a triangle.
 const VERTEX: u64 = 128;
 const TRIANGLE: u64 = 80;
 
-/// The surroundings of the candidates of a turn. Their vertices are few and anywhere in several blocks,
-/// so their stars are hashed.
+/// The mesh around the candidates of a turn. Their vertices are few and scattered over several blocks, so
+/// their stars are in a hash table.
 pub struct Surroundings<'a> {
     pub base: &'a Base,
     pub interior: &'a Interior,
     pub blocks: Blocks,
-    /// How labels are joined in the whole mesh.
+    /// The merged labels of the whole mesh.
     sets: ParitySets,
-    /// Labels of the local components that were met, by block and number.
+    /// Labels of the local components used so far, by block and number.
     locals: FxHashMap<(u32, u32), u32>,
     triangles: Vec<Entry>,
     stars: FxHashMap<u32, VertexStar>,
@@ -82,7 +81,7 @@ pub struct Surroundings<'a> {
     changes: Mail<Change>,
     pub workspace: &'a Workspace,
     reserved: Vec<Reservation>,
-    /// What is told of a turn that is taken within a unit of work: it has what the unit had.
+    /// The memory reported by a turn that is taken inside a unit of work, whose reservation it uses.
     held: Option<Holding>,
     told: Reservation,
 }
@@ -139,7 +138,7 @@ impl Mesh for Surroundings<'_> {
     }
 }
 
-/// The triangles of a block at the vertices that are wanted.
+/// The triangles of a block at the requested vertices.
 struct Found {
     interior: Vec<TriangleIn>,
     crossing: Vec<LabelledTo>,
@@ -152,12 +151,12 @@ impl Found {
     }
 }
 
-/// The positions that a block left.
+/// The positions that a block wrote.
 struct Positions {
     ids: Range<u32>,
-    /// Ascending.
+    /// Vertices, ascending.
     vertices: Vec<VertexAt>,
-    /// Places in `vertices` of the block's own vertices, which are nearly all of them.
+    /// Indices in `vertices` of the block's own vertices, which are the great majority.
     places: Vec<u32>,
 }
 
@@ -210,8 +209,8 @@ impl<'a> Surroundings<'a> {
         })
     }
 
-    /// Gathers what is around the candidates `tried`; false, and nothing, if that would take more than
-    /// `most` bytes.
+    /// Loads the mesh around the candidates `tried`. If that would take more than `most` bytes, returns false
+    /// and loads nothing.
     pub fn gather(&mut self, tried: &[Candidate], most: Option<u64>) -> Result<bool> {
         let mut wanted: Vec<u32> = tried.iter().flat_map(|c| c.ids).collect();
         wanted.sort_unstable();
@@ -230,7 +229,7 @@ impl<'a> Surroundings<'a> {
         Ok(fits)
     }
 
-    /// Reserves for this turn; false if it has more than `most` bytes then.
+    /// Reserves memory for this turn; false if the turn would then have more than `most` bytes.
     fn reserve(&mut self, bytes: u64, most: Option<u64>) -> Result<bool> {
         let before: u64 = self.reserved.iter().map(Reservation::bytes).sum();
         if most.is_some_and(|most| before + bytes > most) {
@@ -241,8 +240,8 @@ impl<'a> Surroundings<'a> {
         Ok(true)
     }
 
-    /// Takes in what is around `wanted`, ascending vertices of one block. `lists` is what the turn has
-    /// beside.
+    /// Loads the mesh around `wanted`, ascending vertices of one block. `lists` is the bytes of the turn's
+    /// other lists.
     fn load(&mut self, wanted: &[u32], lists: u64, most: Option<u64>) -> Result<bool> {
         let block = self.blocks.of(wanted[0]);
         let section = block as usize;
@@ -253,7 +252,7 @@ impl<'a> Surroundings<'a> {
             (self.changes.rows(section), 52),
         ];
         let read: usize = files.iter().map(|(records, bytes)| records * bytes).sum();
-        // What is read goes when its part was taken.
+        // The data read are freed once the needed part has been copied.
         if !self.reserve(2 * read as u64, most)? {
             return Ok(false);
         }
@@ -280,7 +279,7 @@ impl<'a> Surroundings<'a> {
         Ok(true)
     }
 
-    /// Reads the triangles of a block as they are by now, at the vertices `wanted`.
+    /// Reads the current triangles of a block at the vertices `wanted`.
     fn find(&self, wanted: &[u32], block: usize) -> Result<Found> {
         let ids = self.blocks.ids(block);
         let mut is_wanted = vec![false; ids.len()];
@@ -313,7 +312,7 @@ impl<'a> Surroundings<'a> {
         })
     }
 
-    /// Enters what was found in a block.
+    /// Adds the triangles found in a block.
     fn enter_all(&mut self, found: &Found, positions: &Positions, block: u32) {
         self.triangles.reserve(found.count());
         for row in &found.interior {
@@ -340,7 +339,7 @@ impl<'a> Surroundings<'a> {
         }
     }
 
-    /// Enters a triangle at the vertices of candidates in `block`.
+    /// Adds a triangle to the stars of candidates' vertices in `block`.
     fn enter(&mut self, entry: Entry, block: u32) {
         let number = self.triangles.len() as u32;
         self.triangles.push(entry);
@@ -353,7 +352,7 @@ impl<'a> Surroundings<'a> {
         }
     }
 
-    /// Tells what the surroundings take, and `more` bytes.
+    /// Reports the bytes of the lists and `more` bytes.
     fn tell(&mut self, more: u64) {
         let stars = self.stars.values();
         let lists: u64 = stars.map(|star| bytes_of(&star.triangles) + 16).sum();
@@ -365,7 +364,7 @@ impl<'a> Surroundings<'a> {
         }
     }
 
-    /// Forgets the surroundings.
+    /// Discards the loaded mesh.
     fn clear(&mut self) {
         self.triangles = Vec::new();
         self.stars = FxHashMap::default();
@@ -375,8 +374,8 @@ impl<'a> Surroundings<'a> {
         self.reserved.clear();
     }
 
-    /// Ends the turn of a block: the triangles that it inserted, for each block that they touch.
-    /// It is noted for blocks that have a later turn, which `later` tells.
+    /// Ends the turn of a block. Returns the triangles that it inserted, once for each block that they touch.
+    /// They are recorded for blocks that have a later turn, as given by `later`.
     pub fn end(&mut self, later: impl Fn(u32) -> bool) -> Result<Vec<TriangleTo>> {
         let mut sent = Vec::with_capacity(2 * self.inserted.len());
         for &number in &self.inserted {
@@ -400,8 +399,8 @@ impl<'a> Surroundings<'a> {
         Ok(inserted)
     }
 
-    /// Confirms the tentative merges of a block in the whole mesh; those that contradict what is joined
-    /// already are taken out, and returned.
+    /// Confirms the tentative merges of a block in the whole mesh. Triangles whose merges contradict earlier
+    /// ones are removed and returned.
     pub fn confirm_merges(&mut self, block: usize) -> Result<Vec<TriangleTo>> {
         let (mut gone, mut noted) = (Vec::new(), Vec::new());
         for merge in self.interior.merges.get(block)? {
@@ -427,7 +426,7 @@ impl<'a> Surroundings<'a> {
         for v in t {
             if let Some(star) = self.stars.get_mut(&v) {
                 let triangles = &self.triangles;
-                // The order of the list does not matter to any test.
+                // No test depends on the order of the list.
                 star.triangles.retain(|n| triangles[*n as usize].ids != t);
             }
         }

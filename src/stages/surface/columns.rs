@@ -1,7 +1,7 @@
-//! Points seen from above: the highest one of each column of space.
+//! The highest point of each vertical column of space.
 //!
-//! The surface there faces up: ground, roofs, crowns of trees, and the outside of any closed body. A column
-//! has a square base; there is about one for every 64 points.
+//! At the highest point the surface faces up: ground, roofs, tree crowns, and the outside of any closed body.
+//! A column has a square base; there is about one for every 64 points.
 
 use crate::error::Result;
 use crate::geom::Point;
@@ -13,18 +13,18 @@ use crate::workspace::Workspace;
 use crate::workspace::memory::{bytes_of, hold};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Division of the box around a cloud into columns.
+/// Division of a cloud's bounding box into columns.
 #[derive(Debug, Clone, Copy)]
 struct Columns {
     origin: [i32; 2],
-    /// The side of a column is a power of two.
+    /// Binary logarithm of the side of a column.
     shift: u32,
     wide: usize,
     deep: usize,
 }
 
 impl Columns {
-    /// The narrowest columns of which there are no more than one for each so many points.
+    /// The narrowest columns of which there are not more than one for a fixed number of points.
     fn of(store: &PointStore) -> Self {
         let bounds = store.bounds();
         let origin = [bounds.min[0], bounds.min[1]];
@@ -52,8 +52,8 @@ impl Columns {
     }
 }
 
-/// For each block the ids of its points that are the highest in their columns, ascending. Of equally
-/// high ones the smallest id.
+/// For each block, the ids of its points that are the highest of their columns, ascending; of equally high
+/// points the one with the smallest id.
 ///
 /// # Errors
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
@@ -62,7 +62,8 @@ pub fn highest(store: &PointStore, blocks: Blocks, workspace: &Workspace) -> Res
     let columns = Columns::of(store);
     let count = columns.wide * columns.deep;
     let reserved = workspace.reserve("columns", 8 * count as u64)?;
-    // Height in the upper half, so that the larger is the higher; in the lower one a smaller id is larger.
+    // The height is in the upper half of the word, so that a larger word is higher; in the lower half a
+    // smaller id gives a larger value.
     let highest: Vec<AtomicU64> = (0..count).map(|_| AtomicU64::new(0)).collect();
     let bytes = |block: usize| 12 * blocks.ids(block).len() as u64;
     workspace.for_each_unit("columns: block", blocks.count(), bytes, |block| {
@@ -72,7 +73,7 @@ pub fn highest(store: &PointStore, blocks: Blocks, workspace: &Workspace) -> Res
         for (id, p) in ids.zip(&points) {
             let place = (p[2] as u64) << 32 | u64::from(!id);
             let highest = &highest[columns.at(*p)];
-            // Most are not.
+            // Most points are not.
             if place > highest.load(Ordering::Relaxed) {
                 highest.fetch_max(place, Ordering::Relaxed);
             }

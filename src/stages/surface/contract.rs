@@ -1,11 +1,10 @@
-//! Greedy additive contraction of a signed graph: which nodes run alike and which against each other.
+//! Greedy additive contraction of a signed graph: it decides the relative orientations of the nodes.
 //!
-//! A pair of nodes has a sum of weights: positive if they should run alike, negative if one should be
-//! turned. The pair with the largest sum is contracted to one node, which turns one of the two if the sum
-//! is negative; sums of pairs that become parallel are added up. So what is decided last, and against
-//! what was decided before, are the pairs whose whole connection weighs least (Keuper et al., *Efficient
-//! decomposition of image and mesh graphs by lifted multicuts*, ICCV 2015, for signed instead of cut
-//! edges).
+//! A pair of nodes has a sum of weights: positive if the two should be oriented alike as they are, negative
+//! if one should be turned. The pair with the largest absolute sum is contracted to one node, which turns one
+//! of the two if the sum is negative; the sums of pairs that become parallel are added. So the pairs decided
+//! last, possibly against earlier decisions, are those with the weakest connection (Keuper et al., *Efficient
+//! decomposition of image and mesh graphs by lifted multicuts*, ICCV 2015, for signed instead of cut edges).
 
 use super::parity::ParitySets;
 use crate::method::METHOD;
@@ -14,39 +13,39 @@ use rustc_hash::FxHashMap;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-/// When two nodes of a part of a graph may be contracted.
+/// Condition for contracting two nodes of a part of a graph.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Limit {
     /// Always.
     None,
-    /// If the pair dominates one of the two (it weighs at least half of all that the node is connected
-    /// by, so that turning the node against it would gain nothing), or both together have at most this
-    /// number of triangles.
+    /// If the pair dominates one of the two nodes (its weight is at least half of the total of that node, so
+    /// that turning the node against it would gain nothing), or if both together have at most this number of
+    /// triangles.
     Triangles(u64),
 }
 
-/// Signed sums between nodes.
+/// A graph with signed sums between nodes, under contraction.
 #[derive(Debug, Default)]
 pub struct Graph {
-    /// By the two nodes, the smaller one first.
+    /// The sum of each pair, given as two nodes, the smaller one first.
     sums: FxHashMap<(u32, u32), i64>,
-    /// For each node those that it has a pair with, or had.
+    /// For each node, the nodes with which it has, or had, a pair.
     neighbors: Vec<Vec<u32>>,
     /// For each node the number of its pairs.
     degrees: Vec<u32>,
-    /// For each node the triangles that it stands for.
+    /// For each node, the number of its triangles.
     triangles: Vec<u64>,
-    /// For each node what it is connected by outside the graph.
+    /// For each node, the weight of its connections outside the graph.
     outside: Vec<i64>,
-    /// For each node the evidence that it faces up as it runs; negative if it faces down.
+    /// For each node, the evidence that it faces up as it is oriented; negative if it faces down.
     up: Vec<i64>,
-    /// The node that faces up.
+    /// The sky: an additional node that faces up, paired with every node that has evidence.
     sky: Option<u32>,
-    /// For each node whether nothing connects it with what is a part of the sky.
+    /// For each node, true if nothing but evidence connects it with the nodes contracted into the sky.
     bare: Vec<bool>,
 }
 
-/// A pair in the order of contraction: the largest sum first, then the smallest nodes.
+/// A pair in the order of contraction: the largest weight first, then the smallest nodes.
 type Due = (u64, Reverse<(u32, u32)>);
 
 fn key(a: u32, b: u32) -> (u32, u32) {
@@ -58,7 +57,7 @@ fn due(a: u32, b: u32, sum: i64) -> Due {
 }
 
 impl Graph {
-    /// `count` nodes without triangles and pairs.
+    /// `count` nodes without triangles or pairs.
     #[must_use]
     pub fn new(count: usize) -> Self {
         let mut graph = Self::default();
@@ -66,7 +65,7 @@ impl Graph {
         graph
     }
 
-    /// Adds a node; its number.
+    /// Adds a node and returns its number.
     pub fn push(&mut self) -> u32 {
         self.neighbors.push(Vec::new());
         self.degrees.push(0);
@@ -82,7 +81,7 @@ impl Graph {
         self.triangles[node as usize] += triangles;
     }
 
-    /// Adds to what a node is connected by outside the graph.
+    /// Adds to the weight of a node's connections outside the graph.
     pub fn add_outside(&mut self, node: u32, weight: i64) {
         self.outside[node as usize] += weight;
     }
@@ -92,7 +91,7 @@ impl Graph {
         self.up[node as usize] += evidence;
     }
 
-    /// Adds a node that faces up, and a pair with it for each node that there is evidence of.
+    /// Adds the node `sky`, with a pair for each node that has evidence.
     pub fn push_sky(&mut self) {
         let sky = self.push();
         self.sky = Some(sky);
@@ -104,8 +103,8 @@ impl Graph {
         }
     }
 
-    /// How the evidence of facing up weighs against connections: it grows with the area, they with the
-    /// circumference.
+    /// The upward weight of a node: evidence grows with the area, connections with the circumference, hence a
+    /// square root.
     fn upward(&self, node: u32) -> i64 {
         let up = self.up[node as usize];
         up.signum() * METHOD.orientation.upward * up.unsigned_abs().isqrt() as i64
@@ -120,8 +119,8 @@ impl Graph {
         }
     }
 
-    /// True if one of the two is the sky, and the other one is not held: nothing connects them but little
-    /// evidence that it faces up.
+    /// True if one of the two is the sky, and the other is connected with it only by evidence that is too
+    /// little.
     fn is_free(&self, a: u32, b: u32) -> bool {
         let other = match self.sky {
             Some(sky) if a == sky => b,
@@ -131,14 +130,14 @@ impl Graph {
         self.bare[other as usize] && self.up[other as usize].abs() < METHOD.orientation.held
     }
 
-    /// Adds to the sum of two nodes; nothing if they are the same.
+    /// Adds to the sum of a pair; does nothing if the nodes are the same.
     pub fn add(&mut self, a: u32, b: u32, weight: i64) {
         if a != b {
             self.add_to_pair(a, b, weight);
         }
     }
 
-    /// Adds to the sum of a pair; what it was before, if there was one.
+    /// Adds to the sum of a pair; returns its previous sum, if the pair existed.
     fn add_to_pair(&mut self, a: u32, b: u32, weight: i64) -> Option<i64> {
         let sum = self.sums.entry(key(a, b));
         if let std::collections::hash_map::Entry::Occupied(mut sum) = sum {
@@ -154,40 +153,40 @@ impl Graph {
         None
     }
 
-    /// Number of nodes, contracted ones too.
+    /// Number of nodes, including contracted ones.
     #[must_use]
     pub fn len(&self) -> usize {
         self.degrees.len()
     }
 
-    /// All pairs with their sums, in no order.
+    /// All pairs with their sums, unordered.
     pub fn pairs(&self) -> impl Iterator<Item = (u32, u32, i64)> + '_ {
         self.sums.iter().map(|(&(a, b), &sum)| (a, b, sum))
     }
 
-    /// The nodes that are connected with anything, ascending; no contracted ones.
+    /// The nodes with at least one connection, ascending; contracted ones are left out.
     pub fn connected(&self) -> impl Iterator<Item = u32> + '_ {
         let all = (0..).zip(self.degrees.iter().zip(&self.outside));
         all.filter(|(_, (degree, outside))| **degree > 0 || **outside > 0)
             .map(|(node, _)| node)
     }
 
-    /// The evidence that nodes face up, where there is any.
+    /// The nodes with evidence that is not zero, and this evidence.
     pub fn ups(&self) -> impl Iterator<Item = (u32, i64)> + '_ {
         let all = (0..).zip(&self.up).filter(|(_, up)| **up != 0);
         all.map(|(node, up)| (node, *up))
     }
 
-    /// Bytes that it takes, with the queue of a contraction.
+    /// Bytes that the graph takes, with the queue of a contraction.
     #[must_use]
     pub fn bytes(&self) -> u64 {
         let pairs = self.sums.len() as u64;
         table_bytes(&self.sums) + bytes_of(&self.neighbors) + pairs * PAIR
     }
 
-    /// Contracts pairs until no more are due. A pair is due at first, and again when a contraction
-    /// renamed it or added to it. The contracted node has the name of the one with more pairs, or the
-    /// smaller name if they have as many.
+    /// Contracts pairs until none is due. A pair is due at first, and again when a contraction renames it or
+    /// adds to it. A contracted node keeps the number of the node with more pairs, or the smaller number if
+    /// they have equally many.
     pub fn contract(&mut self, limit: Limit) -> ParitySets {
         let mut sets = ParitySets::new(self.len());
         let mut totals = self.outside.clone();
@@ -237,7 +236,7 @@ impl Graph {
         sets
     }
 
-    /// Makes `b` a part of `a`.
+    /// Contracts `b` into `a`.
     fn merge(&mut self, a: u32, b: u32, sum: i64, totals: &mut [i64], queue: &mut BinaryHeap<Due>) {
         self.sums.remove(&key(a, b));
         self.degrees[a as usize] -= 1;
@@ -265,8 +264,8 @@ impl Graph {
     }
 }
 
-/// Bytes that a pair is reckoned to take beside its sum: two names in lists of neighbours, with what these
-/// leave free, and its places in the queue.
+/// Estimated bytes of a pair besides its sum: two entries in lists of neighbours, with their free room, and
+/// its entries in the queue.
 const PAIR: u64 = 16 + 48;
 
 #[cfg(test)]

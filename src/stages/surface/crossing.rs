@@ -1,4 +1,4 @@
-//! The orientation of the crossing triangles, which joins the labels of blocks.
+//! The orientation of the crossing triangles, which merges the labels of blocks.
 
 use super::crossing_edges::CrossingEdges;
 use super::orient::{Oriented, OrientedInside, label_bytes};
@@ -14,8 +14,8 @@ use crate::workspace::Workspace;
 const SHUFFLE_BUFFER: u64 = 8 << 20;
 
 impl OrientedInside {
-    /// The second half of [`orient_inside`]: the crossing triangles, ascending, without those in
-    /// `removed`, by the block of their smallest vertex.
+    /// The second part of [`orient_inside`]: orients the crossing triangles, ascending, given by the block of
+    /// their smallest vertex, without those in `removed`.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
@@ -74,20 +74,20 @@ impl OrientedInside {
         }
         let relations = &self.relations;
         orient_crossing(&mut surface, name, crossing, relations, blocks, workspace)?;
-        // Not before: what is dropped while a step is at work may be gone when it is done again.
+        // Only now: a table dropped during a step might be missing if the step is repeated.
         surface.seams = self.weighed.map(|weighed| weighed.seams);
         Ok(surface)
     }
 }
 
-/// True if a triangle is not among those removed from a block, ascending.
+/// True if a triangle is not in `removed`, the triangles removed from the block, ascending.
 fn is_present(block: usize, t: &Triangle, removed: &[TriangleTo]) -> bool {
     let (to, triangle) = (block as u32, *t);
     let key = TriangleTo { to, triangle };
     removed.binary_search(&key).is_err()
 }
 
-/// The crossing triangles in ascending order, each against those before it.
+/// Orients the crossing triangles in ascending order, each relative to those before it.
 fn orient_crossing(
     base: &mut Oriented,
     name: &str,
@@ -124,7 +124,7 @@ fn orient_crossing(
     }
     base.crossing = shuffle.deliver(workspace, blocks.count())?;
     base.sets.flatten();
-    // Crossing marks were set on labels; what counts is the set.
+    // The marks were set on labels; they apply to whole sets.
     for label in 0..base.sets.len() as u32 {
         if base.crosses[label as usize] {
             let (root, _) = base.sets.find(label);
@@ -134,7 +134,7 @@ fn orient_crossing(
     Ok(())
 }
 
-/// Joins one crossing triangle; its label and flip, or `None` if it closes a Möbius band.
+/// Orients one crossing triangle; returns its label and flip, or `None` if it closes a Möbius band.
 fn orient_one(
     base: &mut Oriented,
     t: Triangle,

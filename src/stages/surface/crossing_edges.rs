@@ -1,4 +1,4 @@
-//! The edges of crossing triangles, while these are gone through in ascending order.
+//! The edges of crossing triangles, during the pass over these triangles in ascending order.
 
 use super::parity::OrientationConstraint;
 use super::star::{EDGES, Triangle, opposed};
@@ -8,18 +8,17 @@ use crate::workspace::Workspace;
 use crate::workspace::memory::{Reservation, table_bytes};
 use rustc_hash::FxHashMap;
 
-/// What an edge is reckoned to take: its place in a table, which is there twice while it grows, and its
-/// list.
+/// Estimated bytes of an edge: its place in a hash table, which exists twice while it grows, and its list.
 const EDGE: u64 = 128 + LIST;
 
-/// The triangles at an edge: room for four, and what the allocator takes.
+/// Bytes of the list of triangles at an edge: room for four, and the allocator's overhead.
 const LIST: u64 = 128;
 
-/// A triangle, `label << 1 | flip`, and its unit normal if that is needed.
+/// A triangle, `label << 1 | flip`, and its unit normal if it is needed.
 type Entry = (Triangle, u32, [f32; 3]);
 
-/// The triangles so far at the edges that later ones may have. Crossing triangles are few and their edges
-/// are anywhere, so these are hashed; those that no later triangle can have are forgotten block by block.
+/// The triangles so far at edges that later triangles may share. Crossing triangles are few and scattered, so
+/// their edges are in a hash table. Edges that no later triangle can share are removed block by block.
 pub(super) struct CrossingEdges {
     edges: FxHashMap<(u32, u32), Vec<Entry>>,
     reserved: Reservation,
@@ -34,13 +33,13 @@ impl CrossingEdges {
         })
     }
 
-    /// Makes room for the edges of this number of triangles more.
+    /// Reserves room for the edges of this number of additional triangles.
     pub(super) fn make_room(&mut self, triangles: usize) -> Result<()> {
         let edges = (self.edges.len() + 3 * triangles) as u64;
         self.reserved.at_least(edges * EDGE)
     }
 
-    /// Puts in a triangle with `label << 1 | flip`; room must have been made.
+    /// Adds a triangle with `label << 1 | flip`; room must have been reserved.
     pub(super) fn put(&mut self, t: Triangle, word: u32, normal: [f64; 3]) {
         let normal = normal.map(|x| x as f32);
         for (a, b, ..) in EDGES {
@@ -49,8 +48,8 @@ impl CrossingEdges {
         }
     }
 
-    /// The triangles at the edges of `t`: each as a constraint, if `t` must be turned against the triangle
-    /// itself, and that one's normal.
+    /// The triangles at the edges of `t`: each with its constraint on `t`, true if `t` must be turned against
+    /// the triangle itself, and its normal.
     pub(super) fn adjacent(
         &self,
         t: Triangle,
@@ -65,11 +64,11 @@ impl CrossingEdges {
         })
     }
 
-    /// Forgets what triangles of blocks after `group` cannot touch.
+    /// Removes the edges that triangles of the blocks after `group` cannot share.
     pub(super) fn end(&mut self, group: usize, blocks: Blocks) {
         let lists = self.edges.len() as u64 * LIST;
         self.reserved.set_held(table_bytes(&self.edges) + lists);
-        // A triangle at an edge has its smallest vertex at or below the edge's.
+        // The smallest vertex of a triangle is at most the lower vertex of its edge.
         self.edges
             .retain(|(low, _), _| blocks.of(*low) > group as u32);
     }

@@ -1,7 +1,7 @@
-//! What speaks for an orientation: how flat a surface runs from one triangle to the next.
+//! Evidence for the orientation: the flatness of the surface at edges between triangles.
 //!
-//! Where not everything can be oriented alike, the surface should be cut where that costs least: a few
-//! connections at the foot of a wall, and not a kilometre of meadow.
+//! Where not everything can be oriented consistently, the surface should be cut where the connections have
+//! the least weight: a few edges at the foot of a wall rather than a kilometre of meadow.
 
 use super::star::Triangle;
 use crate::geom::triangle::small_normal;
@@ -9,13 +9,13 @@ use crate::method::METHOD;
 use crate::stages::located::Located;
 use crate::workspace::memory::Holding;
 
-/// How a base is divided while it is oriented.
+/// The division of a base into patches and clusters for its orientation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Division {
-    /// The smallest ids of the triangles of a patch share a run of this number of ids.
+    /// The smallest ids of the triangles of a patch are in the same run of this number of ids.
     pub patch: u32,
-    /// Most triangles that are joined inside a block where another part of the cloud could still gain by
-    /// turning them against each other.
+    /// Most triangles that are joined inside a block where turning one part could still reduce the cut weight
+    /// in the rest of the cloud.
     pub cluster: u64,
 }
 
@@ -28,23 +28,23 @@ impl Default for Division {
     }
 }
 
-/// Where triangles lie, and what may be inserted between them later.
+/// The positions of triangles, and the candidates that may connect them.
 #[derive(Debug, Default)]
 pub struct Evidence {
-    /// The vertices of the triangles around a block.
+    /// Positions of the vertices of the triangles around a block.
     pub places: Located,
-    /// Candidates inside the block.
+    /// Interior candidates of the block.
     pub candidates: Vec<Triangle>,
-    /// How it is divided.
+    /// Its division into patches and clusters.
     pub division: Division,
     /// Vertices of the block that are the highest in their columns, ascending.
     pub highest: Vec<u32>,
-    /// What they hold.
+    /// The memory that the evidence holds.
     pub held: Holding,
 }
 
 impl Evidence {
-    /// The normal of a triangle by its ascending ids, rounded to `f64`, and its squared length.
+    /// The normal of a triangle with ascending ids, rounded to `f64`, and its squared length.
     #[must_use]
     #[inline(always)]
     pub fn long_normal(&self, t: Triangle) -> LongNormal {
@@ -57,7 +57,7 @@ impl Evidence {
         }
     }
 
-    /// The unit normal of a triangle by its ascending ids; zero if it has none.
+    /// The unit normal of a triangle with ascending ids; zero if it is degenerate.
     #[must_use]
     pub fn normal(&self, t: Triangle) -> [f64; 3] {
         self.long_normal(t).unit()
@@ -72,7 +72,7 @@ pub struct LongNormal {
 }
 
 impl LongNormal {
-    /// The unit normal; zero if there is none.
+    /// The unit normal; zero if the triangle is degenerate.
     #[must_use]
     pub fn unit(self) -> [f64; 3] {
         let length = self.length2.sqrt();
@@ -83,7 +83,8 @@ impl LongNormal {
         }
     }
 
-    /// True if the [`cosine`] of the unit normals is so large that this is no place to cut.
+    /// True if the [`cosine`] of the unit normals is above the limit, so that the surface is not to be cut
+    /// here.
     #[must_use]
     #[inline]
     pub fn is_flat(self, other: Self, flip: bool) -> bool {
@@ -105,8 +106,8 @@ impl LongNormal {
         }
     }
 
-    /// True if the cosine is plainly between two positive ones: without unit normals, and by far more than
-    /// all that is rounded.
+    /// True if the cosine is certainly between two positive values: without unit normals, and with a margin
+    /// far larger than all rounding errors.
     #[inline]
     fn surely_between(self, other: Self, flip: bool, least: f64, most: f64) -> bool {
         let dot = cosine(self.n, other.n, flip);
@@ -120,7 +121,7 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// The cosine of the angle between two triangles when they run alike, `flip` if one must be turned
+/// The cosine of the angle between two triangles when they are oriented alike; `flip` if one must be turned
 /// for that.
 #[must_use]
 pub fn cosine(a: [f64; 3], b: [f64; 3], flip: bool) -> f64 {
@@ -128,7 +129,7 @@ pub fn cosine(a: [f64; 3], b: [f64; 3], flip: bool) -> f64 {
     if flip { -dot } else { dot }
 }
 
-/// Weight of a connection through an edge: 1 for a fold, 16 where it is flat.
+/// Weight of an edge: 1 for a fold, 16 where the surface is flat.
 #[must_use]
 pub fn weight(cosine: f64) -> i64 {
     1 + (cosine.max(0.0) * (METHOD.orientation.flattest - 1) as f64) as i64
@@ -141,7 +142,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// On fine and coarse lattices: with the latter, cosines lie at limits exactly.
+        /// On fine and coarse lattices; on coarse ones, cosines can be exactly at the limits.
         #[test]
         fn long_normals_tell_what_unit_normals_do(
             points in prop::array::uniform4(prop::array::uniform3(0i32..1 << 30)),

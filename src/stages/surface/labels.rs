@@ -1,5 +1,5 @@
-//! The labels of a block: how its interior triangles run against each other, as far as edges inside the
-//! block tell.
+//! The labels of a block: the relative orientations of its interior triangles, as far as edges inside the
+//! block determine them.
 
 use super::parity::{ParitySets, word};
 use super::patches::SharedEdge;
@@ -8,7 +8,7 @@ use super::star::{EDGES, EdgesUp, Triangle, opposed};
 use crate::stages::blocks::Blocks;
 use crate::workspace::memory::{Holding, bytes_of, hold};
 
-/// The labels of a block; the records are those of [`super::orient::Oriented`] and
+/// The labels of a block; the rows are described at [`super::orient::Oriented`] and
 /// [`super::orient::Weighed`].
 pub(super) struct OrientedBlock {
     pub interior: Vec<LabelledTriangle>,
@@ -16,7 +16,7 @@ pub(super) struct OrientedBlock {
     pub pairs: Vec<PairSum>,
     pub ups: Vec<Upward>,
     pub seams: Vec<Seam>,
-    /// Number of labels that occur in relations or pairs; they come first.
+    /// Number of labels that occur in relations or pairs; their numbers come first.
     pub global: u32,
     pub labels: u32,
     pub mobius: u64,
@@ -38,7 +38,7 @@ pub(super) fn orient_block(
     let (_held, mut mobius) = (hold(8 * inner.len() as u64), 0);
     for (number, &t) in inner.iter().enumerate() {
         let number = number as u32;
-        // Either all adjacent triangles agree and are joined, or the triangle goes.
+        // The adjacent triangles agree and are joined, or this triangle is removed.
         constraints.clear();
         adjacent(t, &edges, inner, &ids, |other, flip| {
             constraints.push((other, flip))
@@ -63,23 +63,25 @@ pub(super) fn orient_block(
     number_labels(inner, &kept, connections, &mut sets, blocks, block, mobius)
 }
 
-/// What speaks for how the sets of a block run.
+/// The connections of a block's sets that influence their orientation.
 #[derive(Default)]
 pub(super) struct Connections {
-    /// A triangle of each set that the rest of the cloud may be connected with, in the order of labels.
+    /// One triangle of each set that may be connected with the rest of the cloud, in the order of labels.
     pub first: Vec<u32>,
-    /// A crossing triangle, an interior one at an edge of it, whether one must be turned against the
-    /// other, and the weight of that.
+    /// A crossing triangle, an interior one at one of its edges, true if one must be turned against the
+    /// other, and the weight of the edge.
     pub relations: Vec<(Triangle, u32, bool, i64)>,
-    /// A triangle of each of two sets, and the sum of weights for running alike.
+    /// One triangle of each of two sets, and the signed sum of weights between the sets, relative to these
+    /// triangles.
     pub pairs: Vec<(u32, u32, i64)>,
-    /// A triangle of a set, and the evidence that the set faces up as this triangle runs.
+    /// A triangle of a set, and the evidence that the set faces up, relative to the orientation of this
+    /// triangle.
     pub ups: Vec<(u32, i64)>,
     /// Edges between sets.
     pub seams: Vec<SharedEdge>,
 }
 
-/// Gives labels to the sets: first those that the rest of the cloud may be connected with.
+/// Numbers the labels of the sets; those that may be connected with the rest of the cloud come first.
 pub(super) fn number_labels(
     inner: &[Triangle],
     kept: &[u32],
@@ -165,8 +167,8 @@ pub(super) fn number_labels(
     }
 }
 
-/// Calls `each` with the triangles that share an edge inside the block with `t`, and whether `t`
-/// must be turned against them.
+/// Calls `each` with the triangles that share an edge inside the block with `t`, and with true if `t` must be
+/// turned against them.
 pub(super) fn adjacent(
     t: Triangle,
     edges: &EdgesUp,

@@ -1,8 +1,8 @@
-//! Surfaces as triangles around the vertices of a block: what stitching and repair share.
+//! Surfaces as triangles around the vertices of a block; used by stitching and repair.
 //!
-//! Adjacency has four shapes, by where one starts from: [`star::ByVertex`] from a vertex,
-//! [`star::Link`] for the fans at one vertex, [`sides`] from one triangle to the next, and
-//! `crossing_edges` from an edge anywhere in the cloud.
+//! There are four structures for adjacency: [`star::ByVertex`] from a vertex to its triangles, [`star::Link`]
+//! for the fans at one vertex, [`sides`] from a triangle to its neighbours, and `crossing_edges` from any
+//! edge of the cloud.
 
 pub mod columns;
 mod contract;

@@ -1,5 +1,5 @@
-//! Components and orientation of a surface given block by block: each block by itself, and what comes of
-//! it with the crossing triangles.
+//! Components and orientation of a surface given block by block: first each block on its own, then the blocks
+//! together with the crossing triangles.
 
 use super::evidence::Evidence;
 use super::labels::orient_block;
@@ -18,24 +18,24 @@ use crate::workspace::persist::{Persist, Saved};
 
 const SHUFFLE_BUFFER: u64 = 8 << 20;
 
-/// An oriented surface: every triangle has a label and an orientation relative to it. Triangles of one
-/// label are of one component; the labels of a component are joined in `sets`.
+/// An oriented surface: every triangle has a label and an orientation relative to it. Triangles with the same
+/// label are in the same component; the labels of a component are merged in `sets`.
 #[derive(Debug)]
 pub struct Oriented {
-    /// Interior triangles by block; labels are the block's own.
+    /// Interior triangles by block; labels are numbered within the block.
     pub interior: Table<LabelledTriangle>,
-    /// Crossing triangles for each block they touch; labels are global.
+    /// Crossing triangles, once for each block they touch; labels are global.
     pub crossing: Table<LabelledTo>,
     /// For each block, the global label of its label 0 and the number of labels that are global.
     pub globals: Vec<(u32, u32)>,
     /// For each block, the number of its labels.
     pub labels: Vec<u32>,
-    /// Relations of the global labels.
+    /// The merged global labels, with relative orientations.
     pub sets: ParitySets,
-    /// Which roots have a crossing triangle.
+    /// For each root, true if its component has a crossing triangle.
     pub crosses: Vec<bool>,
-    /// For each block the edges between triangles of different labels, if there is evidence: where the two run
-    /// against each other in the end, the second goes.
+    /// For each block, the edges between triangles of different labels, if there is evidence. If the two
+    /// triangles are not oriented alike in the end, the second one is removed.
     pub seams: Option<Table<Seam>>,
     /// Triangles removed because they close a Möbius band.
     pub mobius: u64,
@@ -44,7 +44,7 @@ pub struct Oriented {
     pub(super) _held: Reservation,
 }
 
-/// A surface whose blocks are oriented, but not yet what lies between them.
+/// A surface with oriented blocks, before the blocks are oriented relative to each other.
 #[derive(Debug)]
 pub struct OrientedInside {
     pub(super) interior: Table<LabelledTriangle>,
@@ -52,13 +52,13 @@ pub struct OrientedInside {
     pub(super) weighed: Option<Weighed>,
     /// Crossing triangles by the block of their smallest vertex.
     pub(super) crossing: Table<TriangleRow>,
-    /// For each block, the number of labels that are global, and of all.
+    /// For each block, the number of its global labels, and of all its labels.
     pub(super) labels: Vec<(u32, u32)>,
     pub(super) mobius: u64,
     pub(super) triangles: u64,
 }
 
-/// Evidence on the orientation of each block's labels, by block.
+/// Evidence for the orientation of each block's labels, by block.
 #[derive(Debug)]
 pub(super) struct Weighed {
     /// Sums of pairs of global labels.
@@ -83,24 +83,23 @@ impl Weighed {
     }
 }
 
-/// The triangles around a block, and what else was found there.
+/// The triangles around a block, and additional results.
 pub struct BlockTriangles<T> {
-    /// All that touch the block, ascending.
+    /// All triangles that touch the block, ascending.
     pub triangles: Vec<Triangle>,
-    /// What speaks for their orientation; without, the order of triangles decides.
+    /// Evidence for their orientation; without it, they are oriented in their order.
     pub evidence: Option<Evidence>,
-    /// What the caller wants to know of the block.
+    /// Additional results for the caller.
     pub found: T,
-    /// What it holds.
+    /// The memory that it holds.
     pub held: Holding,
 }
 
-/// Orients a surface: the interior triangles of every block by themselves, ascending; the crossing
-/// ones follow in [`OrientedInside::join`]. A triangle that would make the surface non-orientable is
-/// removed.
+/// Orients a surface: first the interior triangles of every block on its own, ascending; the crossing ones
+/// follow in [`OrientedInside::join`]. A triangle that would make the surface non-orientable is removed.
 ///
-/// `around(block)` gives all triangles that touch a block, ascending; `bytes(block)` what that
-/// takes in memory; `each` gets what else was found in each block.
+/// `around(block)` returns all triangles that touch a block, ascending; `bytes(block)` estimates the memory
+/// for that; `each` receives the additional results of each block.
 ///
 /// # Errors
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
@@ -176,8 +175,8 @@ pub fn orient_inside<T: Persist + Send>(
 }
 
 impl Oriented {
-    /// The interior triangles of a block without those that are cut where labels run against each other, and
-    /// how many these are.
+    /// The interior triangles of a block without those that are cut where labels are not oriented alike, and
+    /// the number of the latter.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
@@ -248,7 +247,7 @@ impl Persist for Oriented {
     }
 }
 
-/// Bytes that this number of global labels takes.
+/// Bytes for this number of global labels.
 pub(super) fn label_bytes(labels: usize) -> u64 {
     labels as u64 * 16 + 1024
 }

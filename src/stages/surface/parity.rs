@@ -1,17 +1,17 @@
 //! Union–find in which every member has an orientation relative to its set.
 
-/// What an adjacent triangle asks of the orientation of another one: a label, and whether the other one
-/// must be turned against it.
+/// The constraint of an adjacent triangle on the orientation of another one: a label, and true if the other
+/// triangle must be turned against this label.
 pub type OrientationConstraint = (u32, bool);
 
-/// A constraint as one word.
+/// Packs a constraint in a word.
 #[must_use]
 #[inline]
 pub fn word((label, flip): OrientationConstraint) -> u32 {
     label << 1 | u32::from(flip)
 }
 
-/// The constraint of a word.
+/// Unpacks a word.
 #[must_use]
 #[inline]
 pub fn constraint(word: u32) -> OrientationConstraint {
@@ -21,7 +21,7 @@ pub fn constraint(word: u32) -> OrientationConstraint {
 /// Sets of labels with relative orientations.
 #[derive(Debug, Clone, Default)]
 pub struct ParitySets {
-    /// Parent and, in the lowest bit, orientation relative to it.
+    /// Parent and, in the lowest bit, orientation relative to the parent.
     parent: Vec<u32>,
 }
 
@@ -36,7 +36,7 @@ impl ParitySets {
         }
     }
 
-    /// Adds a set of one new label.
+    /// Adds a set of one new label, and returns the label.
     pub fn push(&mut self) -> u32 {
         let label = self.parent.len() as u32;
         self.parent.push(label << 1);
@@ -55,7 +55,7 @@ impl ParitySets {
         self.parent.is_empty()
     }
 
-    /// The set of a label, by its root, and the label's orientation relative to the root.
+    /// The root of a label's set, and the label's orientation relative to the root.
     pub fn find(&mut self, label: u32) -> (u32, bool) {
         let mut node = label;
         let mut flip = 0;
@@ -78,8 +78,9 @@ impl ParitySets {
         }
     }
 
-    /// Joins two labels, `b` turned by `flip` against `a`; the root of `a` stays a root. False,
-    /// and nothing changes, if they are in one set already the other way round.
+    /// Joins the sets of two labels, with `b` turned by `flip` against `a`; the root of `a` stays a root. If
+    /// they are already in one set with the other relative orientation, nothing changes and the result is
+    /// false.
     pub fn join(&mut self, a: u32, b: u32, flip: bool) -> bool {
         let (root_a, flip_a) = self.find(a);
         let (root_b, flip_b) = self.find(b);
@@ -91,7 +92,7 @@ impl ParitySets {
         true
     }
 
-    /// As [`ParitySets::join`], but the smaller root stays one.
+    /// As [`ParitySets::join`], but the smaller of the two roots stays a root.
     pub fn join_to_smaller(&mut self, a: u32, b: u32, flip: bool) -> bool {
         let (root_a, flip_a) = self.find(a);
         let (root_b, flip_b) = self.find(b);
@@ -104,7 +105,7 @@ impl ParitySets {
         true
     }
 
-    /// Makes every label point straight at its root.
+    /// Makes the parent of every label its root.
     pub fn flatten(&mut self) {
         for label in 0..self.parent.len() as u32 {
             let (root, flip) = self.find(label);
@@ -112,7 +113,7 @@ impl ParitySets {
         }
     }
 
-    /// As [`ParitySets::find`] without shortening paths.
+    /// As [`ParitySets::find`], without shortening paths.
     #[must_use]
     pub fn look(&self, label: u32) -> (u32, bool) {
         let (mut node, mut flip) = (label, 0);
@@ -126,15 +127,14 @@ impl ParitySets {
         }
     }
 
-    /// How two labels are turned against each other; `None` if they are in different sets.
+    /// The relative orientation of two labels; `None` if they are in different sets.
     pub fn relation(&mut self, a: u32, b: u32) -> Option<bool> {
         let (root_a, flip_a) = self.find(a);
         let (root_b, flip_b) = self.find(b);
         (root_a == root_b).then_some(flip_a ^ flip_b)
     }
 
-    /// True if no two of `constraints`, taken together with what is joined already, contradict each
-    /// other.
+    /// True if `constraints` do not contradict each other, given the joined sets.
     #[must_use]
     pub fn allow(&mut self, constraints: &[OrientationConstraint]) -> bool {
         constraints.iter().enumerate().all(|(x, &(a, flip_a))| {
@@ -145,7 +145,8 @@ impl ParitySets {
         })
     }
 
-    /// Joins the labels of `constraints`; false, and nothing changes, if they contradict each other.
+    /// Joins the labels of `constraints`. If they contradict each other, nothing changes and the result is
+    /// false.
     pub fn merge(&mut self, constraints: &[OrientationConstraint]) -> bool {
         let fits = self.allow(constraints);
         if let (true, Some((&(first, flip), others))) = (fits, constraints.split_first()) {
@@ -163,7 +164,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// Against plain colouring by search.
+        /// Compares with a two-colouring by search.
         #[test]
         fn agrees_with_colouring(joins in prop::collection::vec((0u32..12, 0u32..12, any::<bool>()), 0..40)) {
             let mut sets = ParitySets::new(12);

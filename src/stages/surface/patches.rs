@@ -1,4 +1,4 @@
-//! Patches: small flat parts of a block, the nodes that its orientation is decided between.
+//! Patches: small flat parts of a block, the units whose relative orientation is decided.
 
 use super::evidence::{Evidence, LongNormal};
 use super::parity::ParitySets;
@@ -14,31 +14,30 @@ pub struct SharedEdge {
     pub a: u32,
     /// The later one.
     pub b: u32,
-    /// One of the two must be turned for both to run alike.
+    /// True if one of the two must be turned to orient them alike.
     pub flip: bool,
-    /// Of the edge, see [`weight`].
+    /// Weight of the edge, see [`weight`].
     pub weight: u8,
 }
 
-/// The triangles of a block by patches.
+/// The patches of a block.
 #[derive(Debug)]
 pub struct Patches {
-    /// The triangles that are joined, with their orientation relative to each other.
+    /// The joined triangles, with their relative orientations.
     pub sets: ParitySets,
     /// The patch of each triangle.
     pub of: Vec<u32>,
-    /// For each patch its smallest triangle, which its orientation is relative to, and the number of
-    /// triangles.
+    /// For each patch, its smallest triangle, which defines its orientation, and its number of triangles.
     pub roots: Vec<(u32, u32)>,
-    /// Edges between patches, and those in a patch whose triangles run against each other, by
-    /// ascending triangles.
+    /// Edges between patches, and edges inside a patch whose triangles are not oriented alike, by ascending
+    /// triangles.
     pub shared: Vec<SharedEdge>,
     _held: Holding,
 }
 
 impl Patches {
-    /// Joins the `triangles` of the block of `ids`, all inside it, ascending, across their flat edges if
-    /// their smallest ids share a run of `patch` ids.
+    /// Joins the interior `triangles` of the block of `ids`, ascending, across their flat edges, if their
+    /// smallest ids are in the same run of `patch` ids.
     #[must_use]
     pub fn of(ids: Range<u32>, triangles: &[Triangle], evidence: &Evidence, patch: u32) -> Self {
         let across = across(ids, triangles);
@@ -86,11 +85,11 @@ struct Runs<'a> {
     triangles: &'a [Triangle],
     across: &'a [[u32; 3]],
     evidence: &'a Evidence,
-    /// Of the triangles of the run.
+    /// Normals of the triangles of the run.
     normals: Vec<LongNormal>,
-    /// Room for the edges of the triangles of the run with a later one, as in a [`SharedEdge`].
+    /// Buffer for the edges between triangles of the run, as in a [`SharedEdge`].
     edges: Vec<(u32, u32, bool)>,
-    /// The edges that were not joined; their weights are left out.
+    /// The edges that were not joined, without their weights.
     shared: Vec<SharedEdge>,
 }
 
@@ -106,11 +105,11 @@ impl Runs<'_> {
         }
         let mut count = 0;
         for (n, sides) in (run.start..).zip(&self.across[run.clone()]) {
-            // Which edges are looked at from here cannot be foretold: they are put down without a branch.
+            // Branches here would be unpredictable, so every edge is written and only some are counted.
             for (_, _, opposite, _) in EDGES {
                 let side = sides[opposite];
                 let (m, corner) = parts(side);
-                // Edges between the first and the last vertex run down, others up.
+                // Edges between the first and the last vertex of a triangle run down, others run up.
                 edges[count] = (n as u32, m as u32, (opposite == 1) == (corner == 1));
                 count += usize::from(side != NONE && m > n);
             }
@@ -126,7 +125,7 @@ impl Runs<'_> {
     }
 }
 
-/// Numbers sets in the order of their first triangles.
+/// Numbers the sets in the order of their first triangles.
 fn number(sets: &mut ParitySets) -> (Vec<u32>, Vec<(u32, u32)>) {
     let mut number = vec![NONE; sets.len()];
     let mut of = Vec::with_capacity(sets.len());

@@ -1,4 +1,4 @@
-//! Rows of triangles and of how they run.
+//! Rows of triangles and their orientations.
 
 use super::parity::{OrientationConstraint, constraint};
 use super::star::Triangle;
@@ -14,7 +14,7 @@ row! {
 }
 
 row! {
-    /// A triangle for a block.
+    /// A triangle sent to a block.
     pub struct TriangleTo {
         /// Number of the block.
         to: u32,
@@ -25,31 +25,32 @@ row! {
 }
 
 row! {
-    /// A triangle and how it runs.
+    /// A triangle and its orientation.
     pub struct LabelledTriangle {
         /// Ids, ascending.
         triangle: Triangle,
-        /// `label << 1 | flip`: whether it runs against its ids relative to the label.
+        /// `label << 1 | flip`: its label, and 1 if it is turned against its ascending ids relative to the
+        /// label.
         label_flip: u32,
     }
     packed Above Rising Rising Above
 }
 
 row! {
-    /// A labelled triangle for a block.
+    /// A labelled triangle sent to a block.
     pub struct LabelledTo {
         /// Number of the block.
         to: u32,
         /// Ids, ascending.
         triangle: Triangle,
-        /// As [`LabelledTriangle`] has it.
+        /// See [`LabelledTriangle`].
         label_flip: u32,
     }
     packed Above Above Rising Rising Above
 }
 
 row! {
-    /// The constraint that an interior triangle of a block is for a crossing triangle.
+    /// The constraint of an interior triangle of a block on a crossing triangle.
     pub struct Relation {
         /// Block of the smallest vertex of the crossing triangle.
         to: u32,
@@ -57,7 +58,7 @@ row! {
         triangle: Triangle,
         /// Block of the interior triangle.
         block: u32,
-        /// `label << 1 | flip`: its label, and whether the crossing triangle is turned against that.
+        /// `label << 1 | flip`: its label, and 1 if the crossing triangle is turned against the label.
         label_flip: u32,
         /// Weight of the common edge.
         weight: u32,
@@ -72,7 +73,7 @@ row! {
         a: u32,
         /// The second label.
         b: u32,
-        /// For running alike, less those against; see [`words`].
+        /// Weights for the two being oriented alike, less those against; see [`words`].
         sum: [u32; 2],
     }
     packed Above Above Above Above
@@ -83,18 +84,18 @@ row! {
     pub struct Upward {
         /// The label.
         label: u32,
-        /// For facing up, less that for facing down; see [`words`].
+        /// Evidence for facing up, less that for facing down; see [`words`].
         evidence: [u32; 2],
     }
     packed Above Above Above
 }
 
 row! {
-    /// An edge between triangles of different labels, by their places among the interior ones.
+    /// An edge between triangles of different labels, given by their indices among the interior triangles.
     pub struct Seam {
-        /// The first triangle.
+        /// Index of the first triangle.
         a: u32,
-        /// `place << 1 | flip` of the second, and whether it must be turned against the first.
+        /// `index << 1 | flip` of the second triangle; 1 if it must be turned against the first.
         b_flip: u32,
     }
     packed Above Above
@@ -109,18 +110,18 @@ row! {
     unpacked
 }
 
-/// A sum as two words, the lower first.
+/// A sum as two words, lower word first.
 pub fn words(sum: i64) -> [u32; 2] {
     [sum as u32, (sum >> 32) as u32]
 }
 
-/// The sum of two words.
+/// The sum from two words.
 pub fn sum([low, high]: [u32; 2]) -> i64 {
     i64::from(high.cast_signed()) << 32 | i64::from(low)
 }
 
-/// The constraints, with their weights, that interior triangles are for the crossing triangle `t` of
-/// `block`: from its `relations`, with global labels.
+/// The constraints of interior triangles on the crossing triangle `t` of `block`, with their weights, from
+/// its `relations`; with global labels.
 pub(super) fn interior_constraints(
     globals: &[(u32, u32)],
     relations: &[Relation],

@@ -1,5 +1,5 @@
-//! Orientation by evidence between blocks: the labels that the blocks could not settle by themselves, and
-//! the crossing triangles between them.
+//! Orientation by evidence between blocks: of the labels that the blocks on their own could not orient, and
+//! of the crossing triangles between them.
 
 use super::contract::{Graph, Limit};
 use super::crossing_edges::CrossingEdges;
@@ -14,7 +14,7 @@ use crate::spill::Table;
 use crate::stages::blocks::Blocks;
 use crate::workspace::Workspace;
 
-/// Settles how global labels run against each other. `crossing` gives the crossing triangles of a block
+/// Decides the relative orientations of global labels. `crossing` returns the crossing triangles of a block
 /// with their normals.
 pub(super) fn settle(
     surface: &mut Oriented,
@@ -43,7 +43,7 @@ pub(super) fn settle(
         let triangles = crossing(group)?;
         edges.make_room(triangles.len())?;
         for (t, normal) in triangles {
-            // Label, turned or not, and weight of each neighbour; an interior one comes first.
+            // Label, flip and weight of each neighbour; interior neighbours come first.
             let mut neighbors: Vec<(OrientationConstraint, i64)> =
                 interior_constraints(&surface.globals, &relations, group, t).collect();
             let before = edges.adjacent(t);
@@ -67,7 +67,7 @@ pub(super) fn settle(
     graph.push_sky();
     reserved.set_held(graph.bytes());
     let clusters = graph.contract(Limit::None);
-    // A label of the surface that stands for each cluster.
+    // One label of the surface that represents each cluster.
     let mut standing = vec![None; graph.len()];
     for label in 0..surface.sets.len() as u32 {
         let (root, flip) = clusters.look(label);

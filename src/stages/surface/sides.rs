@@ -1,29 +1,29 @@
-//! Which triangles share an edge inside a block.
+//! Pairs of triangles that share an edge inside a block.
 
 use super::star::{ByVertex, Triangle};
 use crate::workspace::memory::{bytes_of, hold};
 use std::ops::Range;
 
-/// An edge without a triangle inside the block behind it.
+/// Stands for an edge without a second triangle inside the block.
 pub const NONE: u32 = u32::MAX;
 
-/// An edge of a triangle as one word: the one opposite a corner.
+/// An edge of a triangle packed in a word: the triangle, and the corner opposite the edge.
 #[must_use]
 #[inline]
 pub fn side(triangle: u32, corner: u32) -> u32 {
     triangle << 2 | corner
 }
 
-/// The triangle and the corner of [`side`].
+/// The triangle and the corner of a [`side`].
 #[must_use]
 #[inline]
 pub fn parts(side: u32) -> (usize, usize) {
     ((side >> 2) as usize, (side & 3) as usize)
 }
 
-/// Goes through the edges with both ends in `ids`, ascending by their lower ends. `pair` gets the two
-/// [`side`]s of an edge with two triangles; `lone` the side of an edge that has one triangle, and its ends
-/// as places in the block. `triangles` are all that touch the block, ascending; no edge has more than two.
+/// Visits the edges with both ends in `ids`, ascending by their lower ends. `pair` receives the two [`side`]s
+/// of an edge with two triangles; `lone` receives the side of an edge with one triangle, and its ends as
+/// indices in the block. `triangles` are all that touch the block, ascending; no edge may have more than two.
 ///
 /// Nothing is sorted or hashed: the triangles around a lower end mark the upper ends.
 #[inline]
@@ -36,13 +36,14 @@ pub fn pair_edges(
     let (start, size) = (ids.start, ids.len() as u32);
     let local = |v: u32| v.wrapping_sub(start);
     let inside = |t: &Triangle| local(t[1]) < size && local(t[2]) < size;
-    // By their middle vertices, the triangles whose upper edge lies inside.
+    // By their middle vertices, the triangles whose upper edge is inside the block.
     let middles = triangles.iter().filter(|t| inside(t)).map(|t| t[1]);
     let mut upper = ByVertex::with_room(ids.clone(), middles);
     for (number, t) in (0..).zip(triangles).filter(|(_, t)| inside(t)) {
         upper.push(t[1], number);
     }
-    // For each vertex, the last lower end that its edge to was seen from, plus one, and the side there.
+    // For each vertex, the last lower end from which an edge to it was found, plus one, and the side of this
+    // edge.
     let mut seen = vec![(0u32, NONE); size as usize];
     let _held = hold(bytes_of(&seen));
     let mut next = triangles.partition_point(|t| t[0] < start) as u32;
@@ -52,7 +53,7 @@ pub fn pair_edges(
         next += own.take_while(|t| local(t[0]) == v).count() as u32;
         let own = first..next;
         let upper = upper.at(v + start);
-        // At the edges up from `v`: a triangle, the corner opposite, and the upper end's corner.
+        // The place of a corner in the block: the upper end of an edge from `v`.
         let end = |number: u32, corner: usize| local(triangles[number as usize][corner]);
         let mut single = 0;
         let mut mark = |number: u32, corner: u32, y: u32| {
@@ -94,9 +95,9 @@ pub fn pair_edges(
     }
 }
 
-/// For each of the `triangles`, ascending, with all their vertices in `ids`, opposite each corner the
-/// [`side`] behind the edge, or [`NONE`]. For whoever walks from triangle to triangle. No edge has more
-/// than two triangles.
+/// For each of the ascending `triangles`, all with their vertices in `ids`: for the edge opposite each
+/// corner, the [`side`] of the adjacent triangle, or [`NONE`]. For traversals from triangle to triangle. No
+/// edge may have more than two triangles.
 #[must_use]
 pub fn across(ids: Range<u32>, triangles: &[Triangle]) -> Vec<[u32; 3]> {
     let mut across = vec![[NONE; 3]; triangles.len()];

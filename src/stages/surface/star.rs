@@ -1,18 +1,18 @@
-//! Triangles around the vertices of a block, and what a vertex or an edge sees of them.
+//! The triangles around the vertices and edges of a block.
 
 use crate::workspace::memory::{Holding, bytes_of, hold};
 use std::ops::Range;
 
-/// A triangle by ascending ids.
+/// A triangle as ascending ids.
 pub type Triangle = [u32; 3];
 
-/// The three edges of a triangle as positions of its vertices: first, second, opposite vertex, and
-/// whether the edge runs from low to high in the orientation `0 → 1 → 2`.
+/// The three edges of a triangle as positions of its vertices: first, second, opposite vertex, and true if
+/// the edge runs from low to high in the orientation `0 → 1 → 2`.
 pub const EDGES: [(usize, usize, usize, bool); 3] =
     [(0, 1, 2, true), (0, 2, 1, false), (1, 2, 0, true)];
 
-/// Whether two triangles with ascending ids that share the edge `low < high` need opposite flags to
-/// run through it in opposite directions.
+/// True if two triangles with ascending ids that share the edge `low < high` need opposite flips to be
+/// oriented alike.
 #[must_use]
 pub fn opposed(t: Triangle, u: Triangle, low: u32, high: u32) -> bool {
     runs_up(t, low, high) == runs_up(u, low, high)
@@ -22,7 +22,7 @@ fn runs_up(t: Triangle, low: u32, high: u32) -> bool {
     !(t[0] == low && t[2] == high)
 }
 
-/// The ids, ascending, of a triangle that begins with its smallest and runs either way.
+/// The ascending ids of an oriented triangle that starts with its smallest vertex.
 #[must_use]
 pub fn sorted([i, a, b]: [u32; 3]) -> Triangle {
     if a < b { [i, a, b] } else { [i, b, a] }
@@ -41,23 +41,22 @@ pub fn has(t: Triangle, v: u32) -> bool {
     t[0] == v || t[1] == v || t[2] == v
 }
 
-/// Lists for the vertices of a block, one behind the other in memory. The room is counted first, so
-/// filling them allocates nothing. For whoever starts from a vertex: see [`Star`] and [`EdgesUp`]; the
-/// insertion of candidates keeps there what it reads of the triangles around a vertex.
+/// Lists for the vertices of a block, contiguous in memory. The room is counted first, so filling them
+/// allocates nothing. Used for [`Star`] and [`EdgesUp`], and by the insertion of candidates for the triangles
+/// around a vertex.
 #[derive(Debug)]
 pub struct ByVertex<T> {
     ids: Range<u32>,
-    /// Where the room of each vertex begins.
+    /// Index of the first entry of each vertex.
     start: Vec<u32>,
-    /// Where the entries of each vertex end.
+    /// Index after the last entry of each vertex.
     end: Vec<u32>,
     list: Vec<T>,
     _held: Holding,
 }
 
 impl<T: Copy + Default> ByVertex<T> {
-    /// Empty lists for the vertices `ids`, with room for one entry each time that one of them is
-    /// among `vertices`.
+    /// Empty lists for the vertices `ids`, each with room for as many entries as it occurs in `vertices`.
     pub fn with_room(ids: Range<u32>, vertices: impl Iterator<Item = u32>) -> Self {
         let mut start = vec![0u32; ids.len() + 1];
         let behind = &mut start[1..];
@@ -80,7 +79,7 @@ impl<T: Copy + Default> ByVertex<T> {
         }
     }
 
-    /// Puts an entry into the list of `v`; nothing if `v` is not in the block or has no room left.
+    /// Appends an entry to the list of `v`; ignored if `v` is not in the block or its list is full.
     #[inline]
     pub fn push(&mut self, v: u32, entry: T) {
         let v = v.wrapping_sub(self.ids.start) as usize;
@@ -92,7 +91,7 @@ impl<T: Copy + Default> ByVertex<T> {
         }
     }
 
-    /// The entries of a vertex of the block, in the order in which they came.
+    /// The entries of a vertex of the block, in the order of insertion.
     #[must_use]
     #[inline]
     pub fn at(&self, v: u32) -> &[T] {
@@ -101,11 +100,11 @@ impl<T: Copy + Default> ByVertex<T> {
     }
 }
 
-/// For each vertex of a block its star: the numbers of the triangles that contain it.
+/// For each vertex of a block, its star: the numbers of the triangles that contain it.
 pub type Star = ByVertex<u32>;
 
 impl Star {
-    /// The stars in all `triangles`, numbered in their order.
+    /// The stars of the vertices `ids`, with all `triangles` numbered in their order.
     #[must_use]
     pub fn of(ids: Range<u32>, triangles: &[Triangle]) -> Self {
         let mut star = Self::with_room(ids, triangles.iter().flatten().copied());
@@ -116,8 +115,8 @@ impl Star {
     }
 }
 
-/// For each vertex of a block the edges to higher vertices: the higher vertex and the number of a
-/// triangle there. For triangles that look for others at their edges.
+/// For each vertex of a block, the edges to higher vertices: the higher vertex and the number of a triangle
+/// there. Used to find the neighbours of a triangle.
 pub type EdgesUp = ByVertex<(u32, u32)>;
 
 impl EdgesUp {
@@ -127,11 +126,11 @@ impl EdgesUp {
         ids: Range<u32>,
         triangles: impl Iterator<Item = &'a Triangle>,
     ) -> Self {
-        // Two edges begin at the lowest vertex, one at the middle one.
+        // Two edges start at the lowest vertex, one at the middle one.
         Self::with_room(ids, triangles.flat_map(|t| [t[0], t[0], t[1]]))
     }
 
-    /// Puts in triangle `t` as `number`.
+    /// Adds triangle `t` as `number`.
     pub fn add(&mut self, t: Triangle, number: u32) {
         for (a, b, ..) in EDGES {
             self.push(t[a], (t[b], number));
@@ -153,19 +152,18 @@ impl EdgesUp {
     }
 }
 
-/// The components of the link of one vertex, which are its fans: triangles that hang together through
-/// edges at the vertex. For links whose nodes have at most two edges. It is made anew for each vertex
-/// in the same memory.
+/// The components of the link of one vertex, which are its fans: triangles connected through edges at the
+/// vertex. Only for links whose nodes have at most two edges. The memory is reused for each vertex.
 #[derive(Debug, Default)]
 pub struct Link {
     edges: Vec<(u32, u32)>,
     group: Vec<usize>,
-    /// Per group: is it a closed cycle?
+    /// For each component, true if it is a closed cycle.
     closed: Vec<bool>,
 }
 
 impl Link {
-    /// Takes in the triangles around `v`.
+    /// Reads the triangles around `v`.
     pub fn set(&mut self, v: u32, triangles: impl Iterator<Item = Triangle>) {
         self.edges.clear();
         self.edges
@@ -187,7 +185,7 @@ impl Link {
         }
     }
 
-    /// Walks from node `from` through edges without a group; true if it ends at `goal`.
+    /// Walks from node `from` along edges without a component; true if it ends at `goal`.
     fn follow(&mut self, from: u32, goal: u32, number: usize) -> bool {
         let mut node = from;
         loop {
@@ -210,7 +208,7 @@ impl Link {
         self.closed.len()
     }
 
-    /// The component of the triangle given as number `index`.
+    /// The component of the triangle with index `index` in the order given.
     #[must_use]
     pub fn group(&self, index: usize) -> usize {
         self.group[index]

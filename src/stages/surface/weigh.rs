@@ -1,5 +1,5 @@
-//! Orientation by evidence inside a block: which of its patches run alike, as far as that can be said
-//! without the rest of the cloud.
+//! Orientation by evidence inside a block: the relative orientations of its patches, as far as they can be
+//! decided without the rest of the cloud.
 
 use super::contract::{Graph, Limit};
 use super::evidence::{Evidence, cosine, weight};
@@ -11,7 +11,7 @@ use crate::stages::blocks::Blocks;
 use crate::workspace::memory::{bytes_of, hold};
 use std::ops::Range;
 
-/// Orients a block by what the evidence says.
+/// Orients a block by evidence.
 pub(super) fn weigh_block(
     inner: &[Triangle],
     crossing: &[Triangle],
@@ -51,7 +51,7 @@ pub(super) fn weigh_block(
     number_labels(inner, &kept, connections, sets, blocks, block, removed)
 }
 
-/// The patches of a block while it is decided how they run.
+/// The patches of a block, and the graph that decides their relative orientations.
 struct Weigher<'a> {
     patches: Patches,
     graph: Graph,
@@ -65,20 +65,20 @@ fn signed(flip: bool, weight: i64) -> i64 {
 }
 
 impl Weigher<'_> {
-    /// The patch of a triangle, and whether the triangle is turned against it.
+    /// The patch of a triangle, and true if the triangle is turned against it.
     fn patch(&self, triangle: u32) -> (u32, bool) {
         let (_, turned) = self.patches.sets.look(triangle);
         (self.patches.of[triangle as usize], turned)
     }
 
-    /// Adds to the sum of the patches of two triangles, of which one must be turned if `flip`.
+    /// Adds to the sum of the patches of two triangles; one of the two must be turned if `flip`.
     fn connect(&mut self, a: u32, b: u32, flip: bool, weight: i64) {
         let ((of_a, up_a), (of_b, up_b)) = (self.patch(a), self.patch(b));
         self.graph
             .add(of_a, of_b, signed(flip ^ up_a ^ up_b, weight));
     }
 
-    /// Makes patches nodes, with the evidence that they face up.
+    /// Makes the patches nodes, with the evidence that they face up.
     fn add_patches(&mut self) {
         self.graph = Graph::new(self.patches.roots.len());
         for (node, (_, triangles)) in (0..).zip(&self.patches.roots) {
@@ -100,8 +100,8 @@ impl Weigher<'_> {
         }
     }
 
-    /// Adds up what connects patches: edges, candidates, and crossing triangles as far as they are known
-    /// here.
+    /// Adds the connections between patches: edges, candidates, and crossing triangles as far as they are
+    /// known in the block.
     fn add_connections(&mut self, crossing: &[Triangle], connections: &mut Connections) {
         for n in 0..self.patches.shared.len() {
             let edge = self.patches.shared[n];
@@ -116,7 +116,7 @@ impl Weigher<'_> {
             for (other, flip) in constraints {
                 let weight = self.weight(c, other, flip);
                 connections.relations.push((c, other, flip, weight));
-                // As much as the other two edges of the crossing triangle can weigh.
+                // The most that the other two edges of the crossing triangle can weigh.
                 let of = self.patches.of[other as usize];
                 let most = 2 * METHOD.orientation.edge * METHOD.orientation.flattest;
                 self.graph.add_outside(of, most);
@@ -127,14 +127,14 @@ impl Weigher<'_> {
         }
     }
 
-    /// The triangles at the edges inside the block that `others` may have.
+    /// The triangles at the edges inside the block that `others` may share.
     fn edges_of<'t>(&self, others: impl Iterator<Item = &'t Triangle>) -> EdgesUp {
         let mut seen = vec![false; self.ids.len()];
         for v in others.flatten().filter(|v| self.ids.contains(v)) {
             seen[(v - self.ids.start) as usize] = true;
         }
         let place = |v: u32| (v - self.ids.start) as usize;
-        // An edge between two of their vertices.
+        // True if an edge of the triangle joins two of their vertices.
         let beside = |t: &Triangle| t.iter().filter(|v| seen[place(**v)]).count() > 1;
         let some = (0..).zip(self.inner).filter(|(_, t)| beside(t));
         let numbers: Vec<u32> = some.map(|(number, _)| number).collect();
@@ -174,7 +174,7 @@ impl Weigher<'_> {
         }
     }
 
-    /// Contracts patches to clusters, as far as that is safe inside the block.
+    /// Contracts patches to clusters, as far as this cannot be wrong for the rest of the cloud.
     fn contract(&mut self, cluster: u64, connections: &mut Connections) {
         let clusters = self.graph.contract(Limit::Triangles(cluster));
         let root = |patch: u32| self.patches.roots[patch as usize].0;
@@ -192,8 +192,8 @@ impl Weigher<'_> {
         self.graph = Graph::default();
     }
 
-    /// Cuts the edges inside clusters whose triangles run against each other: the later triangle goes,
-    /// unless the earlier one is gone. Edges between clusters are left.
+    /// Cuts the edges inside clusters whose triangles are not oriented alike: the later triangle is removed,
+    /// unless the earlier one has been removed. Edges between clusters stay in `shared`.
     fn cut(&mut self) -> Vec<bool> {
         let mut dead = vec![false; self.inner.len()];
         let Patches { sets, shared, .. } = &mut self.patches;

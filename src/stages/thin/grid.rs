@@ -1,20 +1,20 @@
-//! The cells that points are thinned by.
+//! The grid of cells for thinning.
 
 use crate::geom::Point;
 use crate::geom::lattice::Lattice;
 use crate::spill::row;
 use crate::workspace::persist::persist;
 
-/// Cubic cells of one side, with a corner at the zero point of the input's coordinates.
+/// Cubic cells of one size, with a corner at the origin of the input's coordinates.
 ///
-/// A cell's number along an axis grows with the coordinate, however it was rounded: so every
-/// position is in one cell, and cells are boxes.
+/// The index of a cell along an axis is a monotone function of the coordinate, however it is rounded. So
+/// every position is in exactly one cell, and cells are boxes.
 #[derive(Debug, Clone)]
 pub struct Grid {
     lattice: Lattice,
-    /// In the input's unit.
+    /// Side of a cell, in the input's unit.
     side: f64,
-    /// Along each axis the cell of the lattice's lowest coordinate.
+    /// For each axis, the cell of the lowest lattice coordinate.
     lowest: [f64; 3],
 }
 
@@ -25,8 +25,7 @@ persist!(Grid {
 });
 
 impl Grid {
-    /// Cells of side `length` over the lattice; `None` if they are so small that no two points can
-    /// be in one.
+    /// Cells of side `length` over the lattice; `None` if they are so small that no two points can share one.
     #[must_use]
     pub fn new(lattice: &Lattice, length: f64) -> Option<Self> {
         let mut grid = Self {
@@ -48,13 +47,13 @@ impl Grid {
         self.side
     }
 
-    /// The coordinates in the input's unit.
+    /// The coordinates of a lattice position in the input's unit.
     fn along(&self, position: Point) -> [f64; 3] {
         self.lattice.position(position)
     }
 
-    /// The cell of a position, counted from the lattice's lowest. A cell is wider than a step, so
-    /// there are no more of them than steps.
+    /// The cell of a position, counted from the lowest cell of the lattice. A cell is wider than a step, so
+    /// the number of cells along an axis is at most the number of steps.
     fn cell(&self, position: Point) -> [u32; 3] {
         let along = self.along(position);
         std::array::from_fn(|axis| ((along[axis] / self.side).floor() - self.lowest[axis]) as u32)
@@ -64,7 +63,7 @@ impl Grid {
     pub(super) fn in_cell(&self, position: Point) -> InCell {
         InCell {
             cell: self.cell(position),
-            // Coordinates on the lattice are not negative.
+            // Lattice coordinates are not negative.
             position: position.map(i32::cast_unsigned),
         }
     }
@@ -82,7 +81,7 @@ impl Grid {
 }
 
 row! {
-    /// A position and the cell that it is in; sorts by cell.
+    /// A position and its cell; sorted by cell.
     pub struct InCell {
         /// Number of the cell along each axis.
         cell: [u32; 3],

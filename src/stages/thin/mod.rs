@@ -1,10 +1,9 @@
-//! Thinning: of each cell of a cubic grid at most one point stays, the one nearest to the cell's
-//! centre (paper: none).
+//! Thinning: in each cell of a cubic grid only the point nearest to the cell's centre is kept (not in the
+//! paper).
 //!
-//! The side of the cells is any length, so cells are not runs of the curve that orders points. All
-//! points are sorted by cell instead, on disk as far as the memory does not suffice, before they
-//! are put in order. The grid is fixed to the zero point of the input's coordinates, so that clouds
-//! beside each other are thinned alike.
+//! The side of the cells is arbitrary, so cells are not intervals of the curve that orders points. Therefore
+//! all points are first sorted by cell, on disk if memory does not suffice, and then put in curve order. The
+//! grid is fixed to the origin of the input's coordinates, so that adjacent clouds are thinned consistently.
 
 mod grid;
 
@@ -20,7 +19,7 @@ use crate::workspace::Workspace;
 use crate::workspace::persist::{Persist, Saved, persist};
 use serde::Serialize;
 
-/// Points handed on at a time.
+/// Points passed on at a time.
 const BATCH: usize = 1 << 14;
 
 /// Rows encoded at a time.
@@ -29,9 +28,9 @@ const CHUNK: usize = 1 << 12;
 /// Counts of this stage.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct ThinStats {
-    /// Distinct points left out, since another one of their cell stays.
+    /// Distinct points left out because another point of their cell is kept.
     pub dropped: u64,
-    /// Points that share their position with another one.
+    /// Points that have the same position as another point.
     #[serde(skip)]
     pub duplicates: u64,
 }
@@ -52,9 +51,9 @@ pub fn thin(spool: Spool, lattice: &Lattice, grid: Grid, workspace: &Workspace) 
     let most = workspace.memory.available() / (8 * READ_BUFFERS);
     let threads = workspace.threads.min(most as usize).max(1);
     let frames = workspace.reserve("thin: frames", threads as u64 * READ_BUFFERS)?;
-    // A quarter, for the points are put in order while these are still there.
+    // A quarter, because the sorted points stay on disk and in memory while they are put in order.
     let buffer = (workspace.memory.available() / 4).max(16 << 20);
-    // Growing a buffer holds the old and the new one for a moment.
+    // While a buffer grows, both the old and the new one are allocated.
     let held = workspace.promise("thin: sort buffer", buffer + buffer / 2)?;
     let sorter = Sorter::new(workspace, "thin", buffer).telling(held);
     let take = |points: &[Point]| {
@@ -102,15 +101,15 @@ persist!(ThinStats {
     duplicates
 });
 
-/// Where the points that stay are handed on from: the first row of a cell.
+/// The first row of the cell at which to continue; `None` at the beginning.
 pub type Mark = Option<[u32; 6]>;
 
-/// Takes points that stay, where the next ones begin, and the counts up to there.
+/// Receives points that are kept, the mark of the next ones, and the counts up to there.
 pub type Each<'a> = &'a mut dyn FnMut(&[Point], Mark, ThinStats) -> Result<()>;
 
 impl Thinned {
-    /// Calls `each` with the points that stay, some at a time, with where the next ones begin and with
-    /// the counts so far; from where an earlier call said, with the counts it said.
+    /// Calls `each` with batches of the points that are kept, with the mark of the next ones and the counts
+    /// so far. Starts at `from` with the counts `stats`, as passed to `each` in an earlier call.
     ///
     /// # Errors
     /// What `each` returned; [`crate::Error::Io`], [`crate::Error::Corrupt`].
@@ -129,7 +128,7 @@ impl Thinned {
             match &mut best {
                 Some((nearest, least)) if nearest.cell == row.cell => {
                     stats.dropped += 1;
-                    // Rows of a cell ascend with the position: of equals the first stays.
+                    // Rows of a cell ascend by position, so the first of equally near points is kept.
                     if distance2 < *least {
                         (*nearest, *least) = (row, distance2);
                     }

@@ -27,7 +27,7 @@ fn workspace() -> Workspace {
     .unwrap()
 }
 
-/// What stays of points in this order, with a sort buffer of so many bytes.
+/// The points kept, from points in the given order, with a sort buffer of `buffer` bytes.
 fn thinned(grid: &Grid, points: &[Point], buffer: u64) -> (Vec<Point>, ThinStats) {
     let workspace = workspace();
     let sorter = Sorter::new(&workspace, "thin", buffer);
@@ -48,7 +48,7 @@ fn thinned(grid: &Grid, points: &[Point], buffer: u64) -> (Vec<Point>, ThinStats
     (kept, stats)
 }
 
-/// The same by a table of cells.
+/// The same, computed with a hash table of cells.
 fn naive(grid: &Grid, points: &[Point]) -> Vec<Point> {
     let mut cells: BTreeMap<[i64; 3], (f64, Point)> = BTreeMap::new();
     for &point in points {

@@ -1,4 +1,4 @@
-//! The points that may be among the neighbours of a query, in columns.
+//! The points that may be neighbours of a query, in columns.
 
 use super::{LEAVES, OwnPage, Tile};
 use crate::geom::Point;
@@ -8,21 +8,21 @@ use crate::kernels::{
 };
 use crate::workspace::memory::bytes_of;
 
-/// Bound on the relative error of approximate squared distances, and then some.
+/// Upper bound on the relative error of approximate squared distances, with a margin.
 pub(super) const APPROXIMATE: f64 = 1.0 / (1 << 20) as f64;
 
-/// An approximate squared distance that is not below any of points within `d2`.
+/// An upper bound on the approximate squared distances of all points within `d2`.
 pub(super) fn above(d2: u64) -> f32 {
     (d2 as f64 * (1.0 + 2.0 * APPROXIMATE)) as f32
 }
 
-/// x, y, z, and a number that goes with the point. The columns are whole blocks long, with
-/// anything behind the last point.
+/// Columns of x, y, z and a number for each point. The columns consist of whole blocks; entries after the
+/// last point are undefined.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Columns([Vec<u32>; 4]);
 
 impl Columns {
-    /// Makes room for `count` points, for what is behind them in the last block, and for a block.
+    /// Reserves room for `count` points, the rest of their last block, and one more block.
     pub fn reserve(&mut self, count: usize) {
         let room = count.next_multiple_of(BLOCK) + BLOCK;
         if self.0[0].len() < room {
@@ -30,12 +30,12 @@ impl Columns {
         }
     }
 
-    /// Bytes that they have room for.
+    /// Allocated bytes.
     pub fn bytes(&self) -> u64 {
         self.0.iter().map(bytes_of).sum()
     }
 
-    /// Coordinates of the first `count`.
+    /// Coordinates of the first `count` points.
     #[inline(always)]
     pub fn coordinates(&self, count: usize) -> [&[i32]; 3] {
         let [x, y, z, _] = &self.0;
@@ -46,7 +46,7 @@ impl Columns {
         ]
     }
 
-    /// A point and its number.
+    /// Appends a point and its number.
     #[inline(always)]
     pub fn get(&self, place: usize) -> (Point, u32) {
         let [x, y, z, numbers] = &self.0;
@@ -54,13 +54,13 @@ impl Columns {
         (at, numbers[place])
     }
 
-    /// The numbers of the first `count`.
+    /// Numbers of the first `count` points.
     #[inline(always)]
     pub fn numbers(&self, count: usize) -> &[u32] {
         &self.0[3][..count]
     }
 
-    /// Whole blocks of the first `count`, a multiple of a block.
+    /// The first `count` entries, a multiple of a block, as whole blocks.
     #[inline(always)]
     pub fn blocks(&self, count: usize) -> [&[[u32; BLOCK]]; 4] {
         let [x, y, z, numbers] = &self.0;
@@ -78,7 +78,7 @@ impl Columns {
         [x, y, z, numbers]
     }
 
-    /// The columns, of one length: the compiler sees that and checks places once.
+    /// The columns as slices of one length, so that the compiler checks bounds once.
     #[inline(always)]
     pub fn slices_mut(&mut self) -> [&mut [u32]; 4] {
         let [x, y, z, numbers] = &mut self.0;
@@ -92,29 +92,29 @@ impl Columns {
     }
 }
 
-/// All points within a squared distance of some box, and maybe others, in order of id.
+/// All points within a squared distance of a box, and possibly others, in order of id.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Candidates {
-    /// Numbered by id.
+    /// The points, numbered by id.
     pub columns: Columns,
-    /// How many there are.
+    /// Number of points.
     pub len: usize,
-    /// The squared distance.
+    /// The squared distance within which all points are included.
     pub complete2: u64,
 }
 
-/// The leaves within reach of one page, in order of id.
+/// The leaves within the reach of a page, in order of id.
 #[derive(Debug, Default)]
 pub(super) struct PageLeaves {
-    /// With their numbers in the tile.
+    /// The boxes of the leaves, with their numbers in the tile.
     boxes: Boxes,
-    /// Pages, and how many leaves they have.
+    /// The pages, each with its number of leaves.
     pages: Vec<(u32, u32)>,
     near: Vec<u32>,
 }
 
 impl PageLeaves {
-    /// Those within reach of `own`.
+    /// Finds the leaves within the reach of `own`.
     pub fn set(&mut self, level: Level, tile: &Tile, own: &OwnPage) {
         let page = |local: &u32| {
             let leaves = tile.range(*local as usize).len().div_ceil(tile.leaf);
@@ -136,13 +136,13 @@ impl PageLeaves {
             .resize((self.boxes.len() + BLOCK).max(self.near.len()), 0);
     }
 
-    /// Bytes that its lists have room for.
+    /// Allocated bytes of its lists.
     pub fn bytes(&self) -> u64 {
         self.boxes.bytes() + bytes_of(&self.pages) + bytes_of(&self.near)
     }
 
-    /// Collects the points of all leaves within `d2` of `around`, a box inside the page, for `d2` up to
-    /// the page's squared reach; only of those that are `wanted`, if that is asked.
+    /// Collects the points of all leaves within `d2` of `around`, a box inside the page; `d2` is at most the
+    /// page's squared reach. If `wanted` is given, only its points.
     pub fn gather(
         &mut self,
         level: Level,
@@ -167,7 +167,7 @@ impl PageLeaves {
     }
 }
 
-/// Moves those that are `wanted` to the front; how many.
+/// Moves the `wanted` numbers to the front; returns how many there are.
 fn keep(numbers: &mut [u32], wanted: impl Fn(u32) -> bool) -> usize {
     let mut kept = 0;
     for place in 0..numbers.len() {
@@ -179,7 +179,7 @@ fn keep(numbers: &mut [u32], wanted: impl Fn(u32) -> bool) -> usize {
     kept
 }
 
-/// What is within a squared distance of a box, and maybe more.
+/// The box `bounds` with a squared distance that includes all points within `d2`, and possibly others.
 pub(super) fn within(bounds: &Aabb, d2: u64) -> Around {
     Around {
         min: bounds.min,
@@ -189,7 +189,7 @@ pub(super) fn within(bounds: &Aabb, d2: u64) -> Around {
 }
 
 kernel! {
-    /// Takes over the points of `leaves` that are `around`; how many.
+    /// Copies the points of `leaves` that are within `around`; returns how many there are.
     fn pick_leaves(tile: &Tile, leaves: &[u32], around: Around, out: &mut Columns) -> usize = pick_leaves_body<Eight>
 }
 

@@ -1,5 +1,5 @@
-//! Which pages a tile takes in: how far each of its own reaches. None of it decides what is found, only
-//! what is found in the tile.
+//! The pages of a tile and its halo, and the reach of each of its own pages. This decides only which queries
+//! are answered in the tile, not their results.
 
 use super::MOST_HALO;
 use super::candidates::within;
@@ -7,37 +7,37 @@ use crate::geom::aabb::Aabb;
 use crate::kernels::{BLOCK, Boxes, Level, near_boxes};
 use crate::stages::order::PointStore;
 
-/// Most pages that the reach of one page may touch; it is made shorter where it touches more,
+/// Most pages within the reach of a page; a reach that touches more is shortened.
 const MOST_NEAR: usize = 96;
 
-/// or so many, if few of them are the tile's for its sake.
+/// The same limit where most of these pages are already in the tile for other pages.
 const MOST_SHARED: usize = 1024;
 
-/// So many more pages are taken in for each that reaches shorter: no more than answering its points in
-/// the whole store would take.
+/// Most additional pages loaded for each page with a shortened reach. Answering its points from the whole
+/// store would read about as many.
 const MOST_MORE: usize = 32;
 
-/// Where a reach touches no more pages it is made longer,
+/// A reach is lengthened if it then still touches at most this number of pages.
 const FEW_NEAR: usize = 20;
 
-/// up to so many times.
+/// Largest factor by which a reach is lengthened.
 const MOST_TIMES: u64 = 4;
 
-/// So many pages at most, for each of a tile, are put on a list to look for near ones.
+/// Most pages, for each page of a tile, on the list that is searched for near pages.
 const MOST_AROUND: usize = 8;
 
-/// How far a page reaches.
+/// The reach of a page.
 #[derive(Debug)]
 pub(super) struct Reach {
     pub page: usize,
-    /// Squared.
+    /// Squared distance, in squared steps.
     pub reach2: u64,
-    /// The pages within it.
+    /// The pages within this distance.
     pub near: Vec<u32>,
 }
 
-/// All pages of a tile of `size` pages, of which `own` are asked for, and the reaches of these; shorter
-/// than usual where the halo would outgrow the tile, as it would around scattered outliers.
+/// All pages of a tile of `size` pages whose pages `own` are queried, and the reaches of the latter. Reaches
+/// are shorter than usual where the halo would be too large for the tile, as around scattered outliers.
 pub(super) fn halo(store: &PointStore, own: &[usize], size: usize) -> (Vec<usize>, Vec<Reach>) {
     let most = size * (1 + MOST_HALO) + MOST_NEAR;
     let mut around = Around::of(store, own, size);
@@ -63,8 +63,8 @@ pub(super) fn halo(store: &PointStore, own: &[usize], size: usize) -> (Vec<usize
     }
 }
 
-/// Makes reaches long again that touched too many pages, where these are the tile's already or
-/// serve many: around a dense middle all pages farther out reach over the same ones.
+/// Restores reaches that were shortened, if the pages they touch are already in the tile or are few for all
+/// shortened reaches together: around a dense centre, all outer pages reach the same pages.
 fn share(around: &mut Around<'_>, wanted: &mut Vec<usize>, reaches: &mut [Reach], most: usize) {
     let short: Vec<_> = (reaches.iter_mut())
         .filter(|short| short.reach2 < reach(around, short.page, 1).pow(2))
@@ -88,22 +88,22 @@ fn share(around: &mut Around<'_>, wanted: &mut Vec<usize>, reaches: &mut [Reach]
     }
 }
 
-/// How far a page should reach.
+/// The desired reach of a page.
 fn reach(around: &mut Around<'_>, page: usize, shrink: u64) -> u64 {
     let reach = full(around.store.page_box(page).longest_side());
     if shrink == 1 {
-        // Along a line neighbours are far, and pages few.
+        // Along a line, neighbours are far and pages few.
         return reach * lonely(around, page, reach);
     }
     (reach / shrink).max(1)
 }
 
-/// How far a page of this longest side reaches where nothing is special.
+/// The usual reach of a page whose box has this longest side.
 fn full(longest: i64) -> u64 {
     (longest * 7 / 8).max(1) as u64
 }
 
-/// How far a page may reach, at most `reach`, to touch at most `most` pages.
+/// The longest reach, up to `reach`, that touches at most `most` pages; found by halving.
 fn near_pages(around: &mut Around<'_>, page: usize, mut reach: u64, most: usize) -> Reach {
     loop {
         let (near, all) = around.pages(page, reach, most);
@@ -122,7 +122,7 @@ fn near_pages(around: &mut Around<'_>, page: usize, mut reach: u64, most: usize)
     }
 }
 
-/// How many times as far a page can reach and still touch few pages.
+/// The factor by which a reach can be lengthened and still touch few pages.
 fn lonely(around: &mut Around<'_>, page: usize, reach: u64) -> u64 {
     for times in [MOST_TIMES, MOST_TIMES / 2] {
         if around.pages(page, reach * times, FEW_NEAR).1 {
@@ -132,12 +132,12 @@ fn lonely(around: &mut Around<'_>, page: usize, reach: u64) -> u64 {
     1
 }
 
-/// The pages that any page of a tile may reach, if they are not too many, so that the whole tree need
-/// not be asked for each.
+/// The pages that any page of a tile can reach, if they are not too many; then the box tree need not be
+/// searched for each page.
 struct Around<'a> {
     store: &'a PointStore,
     level: Level,
-    /// The pages within `reach` of the box around the tile; with their numbers.
+    /// The boxes of the pages within `reach` of the tile's box, with their numbers.
     boxes: Boxes,
     reach: u64,
     found: Vec<u32>,
@@ -174,8 +174,8 @@ impl<'a> Around<'a> {
         around
     }
 
-    /// The pages within `reach` of one of the tile, ascending, if there are at most `most`; else some,
-    /// and false.
+    /// The pages within `reach` of a page of the tile, ascending, and true, if there are at most `most`; else
+    /// only some of them, and false.
     fn pages(&mut self, page: usize, reach: u64, most: usize) -> (&[u32], bool) {
         let bounds = self.store.page_box(page);
         if reach <= self.reach {

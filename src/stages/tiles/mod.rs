@@ -1,8 +1,8 @@
-//! Tiles: contiguous id ranges of the ordered store with a halo of the pages around them.
+//! Tiles: contiguous id ranges of the ordered store, with a halo of surrounding pages.
 //!
-//! Each page of a tile has a *reach*: all points within this distance of the page's box are in the
-//! tile. It follows the page's own extent, so it follows the local density. What a query needs
-//! beyond its reach, it asks of the whole store ([`walk::Walk`]).
+//! Each page of a tile has a *reach*: all points within this distance of the page's box are in the tile. The
+//! reach is proportional to the size of the page, so it follows the local density. A query that needs points
+//! beyond the reach is answered from the whole store ([`walk::Walk`]).
 
 mod candidates;
 mod halo;
@@ -21,14 +21,14 @@ use halo::{Reach, halo};
 use points::Points;
 use std::ops::Range;
 
-/// Leaves per page: the unit in which candidates are gathered and queries answered. Their boxes are a
-/// block of the kernels.
+/// Leaves in a page. A leaf is the unit for which candidates are gathered and queries answered. The boxes of
+/// the leaves of a page are one block of the kernels.
 const LEAVES: usize = BLOCK;
 
 /// Most halo pages for each page of the tile itself.
 const MOST_HALO: usize = 4;
 
-/// Pages that are read at a time, if they follow each other.
+/// Most consecutive pages read at a time.
 const READ: usize = 16;
 
 /// A neighbour of a point.
@@ -42,28 +42,28 @@ pub struct Near {
     pub difference: [i64; 3],
 }
 
-/// A page of the tile that holds points of its own range.
+/// A page of the tile that contains points of its id range.
 #[derive(Debug, Clone)]
 struct OwnPage {
-    /// Index among the tile's pages.
+    /// Its index in the tile's pages.
     local: usize,
-    /// Which of the tile's pages are within reach: a range of `Tile::near`.
+    /// The pages of the tile within reach, as a range of `Tile::near`.
     near: Range<usize>,
     /// Squared reach in steps.
     reach2: u64,
 }
 
-/// A slice of the store and what surrounds it, in memory.
+/// A range of the store and its surroundings, in memory.
 #[derive(Debug)]
 pub struct Tile {
     ids: Range<usize>,
     page: usize,
     leaf: usize,
-    /// Ascending page numbers.
+    /// Page numbers, ascending.
     pages: Vec<usize>,
     points: Points,
     page_boxes: Vec<Aabb>,
-    /// So many for each page, of which the last may have less.
+    /// `LEAVES` boxes for each page; the last page may have fewer leaves.
     leaf_boxes: Boxes,
     own: Vec<OwnPage>,
     near: Vec<u32>,
@@ -71,7 +71,7 @@ pub struct Tile {
 }
 
 impl Tile {
-    /// Bytes that a tile of `points` points takes with the largest halo, and a search in it.
+    /// Upper estimate of the bytes of a tile of `points` points with the largest halo, and of a search in it.
     #[must_use]
     pub fn bytes(points: usize) -> u64 {
         let most = (points as u64 + 256) * (1 + MOST_HALO as u64);
@@ -86,8 +86,8 @@ impl Tile {
         Self::load_some(store, ids, |_| true)
     }
 
-    /// As [`Tile::load`], but only pages with points that are `wanted`, and what surrounds these: others
-    /// cannot be asked for.
+    /// As [`Tile::load`], but only with the pages that contain `wanted` points, and their halo; other points
+    /// cannot be queried.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
@@ -138,13 +138,13 @@ impl Tile {
         Ok(tile)
     }
 
-    /// Bytes that a search takes at most, if all that is near a page is near one of its points.
+    /// Upper estimate of the bytes of a search: all points near a page are candidates of one of its points.
     fn searched(&self) -> u64 {
         let pages = self.own.iter().map(|own| own.near.len()).max();
         (pages.unwrap_or(0) * self.page) as u64 * near::CANDIDATE
     }
 
-    /// Bytes that its lists take.
+    /// Bytes allocated by its lists.
     fn taken(&self) -> u64 {
         let lists = bytes_of(&self.pages) + self.points.bytes() + bytes_of(&self.page_boxes);
         lists + self.leaf_boxes.bytes() + bytes_of(&self.own) + bytes_of(&self.near)
@@ -153,7 +153,7 @@ impl Tile {
     fn index(&mut self, reaches: Vec<Reach>) {
         self.leaf_boxes.reserve(self.pages.len() * LEAVES);
         for number in 0..self.pages.len() * LEAVES {
-            // Leaves without points stand in as a place that nobody looks at.
+            // Leaves without points get a box that is never searched.
             let bounds = self.leaf(number).map(|leaf| self.points.bounds(leaf));
             let Aabb { min, max } = bounds.unwrap_or(Aabb::of(&[[0; 3]]));
             self.leaf_boxes.push(min, max, number as u32);
@@ -173,13 +173,13 @@ impl Tile {
         }
     }
 
-    /// Where the points of a page lie in `points`; only the store's last page can be short.
+    /// The indices in `points` of a page; only the last page of the store can be shorter.
     fn range(&self, local: usize) -> Range<usize> {
         let start = local * self.page;
         start..(start + self.page).min(self.points.len())
     }
 
-    /// Where the points of a leaf lie, numbered page by page; `None` if it has none.
+    /// The indices in `points` of a leaf, numbered page by page; `None` if it is empty.
     #[inline(always)]
     fn leaf(&self, number: usize) -> Option<Range<usize>> {
         let page = self.range(number / LEAVES);
@@ -192,7 +192,7 @@ impl Tile {
         self.pages[local] * self.page + index
     }
 
-    /// The ids that belong to the tile itself.
+    /// The ids of the tile, without the halo.
     #[must_use]
     pub fn ids(&self) -> Range<usize> {
         self.ids.clone()

@@ -1,8 +1,8 @@
-//! Neighbours inside a tile, for all points of a leaf at once (paper, section 3.1).
+//! Nearest neighbours inside a tile, for all points of a leaf at once (paper, section 3.1).
 //!
-//! What a leaf's points may need is gathered once, within a distance that is a guess from the leaf
-//! before. Guesses decide only how much is looked at: a query is answered when what was gathered
-//! proves the answer, and else gathers for itself.
+//! The candidates for all points of a leaf are gathered once, within a distance estimated from the previous
+//! leaf. Estimates only affect the cost: a query is answered if the gathered candidates prove the answer,
+//! else candidates are gathered for this query alone.
 
 use super::candidates::{APPROXIMATE, Candidates, Columns, PageLeaves, above};
 use super::neighbors::Neighbors;
@@ -20,42 +20,40 @@ mod sums;
 pub use super::neighbors::Sums;
 use list::list_nearest;
 
-/// Bytes that a search takes for each candidate: three times its columns, what is picked, distances and
-/// keys.
+/// Bytes of a search for each candidate: three sets of columns, the picked candidates, distances and keys.
 pub(super) const CANDIDATE: u64 = 3 * 16 + 16 + 4 + 24;
 
-/// How often the limit of a query is corrected before one that is too large is taken.
+/// Most corrections of a query's limit; then one that is too large is accepted.
 const CORRECTIONS: usize = 6;
 
-/// How much farther than usual, squared, a query looks because the one before did.
+/// Largest factor, in squared distance, by which a search is widened because the previous one was.
 const MOST_WIDER: u64 = 32;
 
-/// The candidates and the sorted neighbours of one query, in memory that is used again and again.
+/// The candidates and the sorted neighbours of one query, in memory that is reused.
 #[derive(Debug, Default)]
 pub struct Search {
     level: Level,
     leaves: PageLeaves,
     candidates: Candidates,
-    /// The group's candidates while one query looks farther.
+    /// The candidates of the leaf, while one query uses its own.
     aside: Option<Candidates>,
     spare: Candidates,
     /// Approximate squared distances of the candidates to the query.
     distances: Vec<f32>,
-    /// The nearest candidates and some more, in order of id, numbered by it or with their distances.
+    /// The nearest candidates and some more, in order of id, with their ids or distances as numbers.
     picked: Columns,
     keys: Vec<i64>,
     places: Vec<u32>,
     long_keys: Vec<(u64, u32)>,
     window: Vec<u64>,
     near: Neighbors,
-    /// About how far the last neighbour of the query before was, if it was summed.
+    /// Approximate squared distance of the last neighbour in the previous query, if that query was a sum.
     last: f32,
-    /// The same for those that took in more, by how many these were.
+    /// The same for queries with a widened number of neighbours, by this number.
     lasts: Vec<(usize, f32)>,
-    /// What the last query that took in more neighbours ended with: how many, and within which
-    /// squared distance.
+    /// Number of neighbours, and squared distance of the last, in the previous query that was widened.
     widened: (usize, u64),
-    /// The largest such distance in the leaf that is looked at.
+    /// The largest such distance in the current leaf.
     wider2: u64,
     held: Holding,
 }
@@ -68,13 +66,13 @@ pub struct Query<'a> {
     search: &'a mut Search,
     point: Point,
     id: u32,
-    /// All points up to this squared distance are listed.
+    /// All points within this squared distance are listed.
     complete2: u64,
 }
 
 impl Tile {
-    /// Calls `each` with a [`Query`] for every point of the tile, in order of id, that lists at
-    /// least the `k` nearest neighbours; with `None` for those that the halo cannot certify.
+    /// Calls `each` with a [`Query`] for every point of the tile, in order of id. The query lists at least
+    /// the `k` nearest neighbours; it is `None` if the halo cannot certify them.
     pub fn for_each_query(
         &self,
         k: usize,
@@ -84,7 +82,7 @@ impl Tile {
         self.for_some_queries(k, search, |_| true, each);
     }
 
-    /// As [`Tile::for_each_query`] for the points whose ids are `wanted`.
+    /// As [`Tile::for_each_query`], for the points whose ids are `wanted`.
     pub fn for_some_queries(
         &self,
         k: usize,
@@ -112,8 +110,8 @@ impl Tile {
         });
     }
 
-    /// Gathers the candidates for each leaf with `wanted` ids and calls `one` with the page, the
-    /// index and the id of every one of them; it returns the squared distance that it needed.
+    /// Gathers the candidates of each leaf with `wanted` ids, and calls `one` with the page, index and id of
+    /// each of them; `one` returns the squared distance that it needed.
     fn for_groups(
         &self,
         k: usize,
@@ -148,8 +146,8 @@ impl Tile {
                     }
                 }
                 if farthest > 0 {
-                    // Somewhat farther than the leaf before needed: one point that gathers for itself
-                    // costs as much as a leaf.
+                    // A little farther than the previous leaf needed: gathering for one point alone costs as
+                    // much as for a leaf.
                     let wider = search.wider2.min(farthest.saturating_mul(MOST_WIDER));
                     guess = Some(wider.max(farthest + farthest / 2));
                 }
@@ -158,7 +156,7 @@ impl Tile {
         }
     }
 
-    /// Lists at least the `k` nearest neighbours of point `index`; the squared distance up to which
+    /// Lists at least the `k` nearest neighbours of point `index`. Returns the squared distance up to which
     /// the list is complete.
     fn nearest(
         &self,
@@ -178,8 +176,8 @@ impl Tile {
         list_nearest(search.level, search, point, id, k)
     }
 
-    /// Gathers candidates that are enough for the `k` nearest neighbours of point `index`, or as far
-    /// as the page reaches; false if it reached so far already.
+    /// Gathers enough candidates for the `k` nearest neighbours of point `index`, or all within the reach of
+    /// the page; false if all of them had been gathered before.
     fn gather_for_one(&self, own: &OwnPage, index: usize, k: usize, search: &mut Search) -> bool {
         if search.candidates.complete2 >= own.reach2 {
             return false;
@@ -191,8 +189,8 @@ impl Tile {
         true
     }
 
-    /// An upper bound of the squared distance of the `k`th neighbour of each point of a group,
-    /// from the points around it in curve order; `u64::MAX` if there are too few.
+    /// An upper bound on the squared distance of the `k`th neighbour for each point of a group, from the
+    /// points next to it in curve order; `u64::MAX` if there are too few.
     fn limit(&self, group: Range<usize>, k: usize, search: &mut Search) -> u64 {
         let side = (k + 1).max(32);
         let around = group.start.saturating_sub(side)..(group.end + side).min(self.points.len());
@@ -207,7 +205,7 @@ impl Tile {
             let near = x.iter().zip(y).zip(z);
             window.clear();
             window.extend(near.map(|((x, y), z)| distance2([*x, *y, *z], point)));
-            // The point itself is among them, at distance 0.
+            // The point itself is included, at distance 0.
             *window.select_nth_unstable(k).1
         };
         group.map(limit).max().unwrap_or(u64::MAX)
@@ -215,7 +213,7 @@ impl Tile {
 }
 
 impl Search {
-    /// A search with the kernels of `level`; they differ in speed only.
+    /// A search with the kernels of `level`; levels differ only in speed.
     #[must_use]
     pub fn at(level: Level) -> Self {
         Self {
@@ -224,7 +222,7 @@ impl Search {
         }
     }
 
-    /// Tells what its lists take.
+    /// Reports the bytes of its lists.
     fn tell(&mut self) {
         let candidates = [
             Some(&self.candidates),
@@ -239,7 +237,7 @@ impl Search {
             .set(bytes + self.leaves.bytes() + self.near.bytes());
     }
 
-    /// Whole blocks of distances; those behind the last candidate are infinite.
+    /// Whole blocks of distances; those after the last candidate are infinite.
     #[inline(always)]
     fn measured(&self) -> &[f32] {
         &self.distances[..self.candidates.len.next_multiple_of(BLOCK)]
@@ -261,7 +259,7 @@ impl Search {
             .gather(self.level, tile, around, d2, wanted, out);
     }
 
-    /// Keeps the group's candidates for later, so that others can be gathered.
+    /// Sets the candidates of the leaf aside, so that a query can gather its own.
     fn step_aside(&mut self) {
         if self.aside.is_none() {
             let group = std::mem::take(&mut self.candidates);
@@ -270,7 +268,7 @@ impl Search {
         }
     }
 
-    /// Takes in that a query needed `count` neighbours, the last of them this far.
+    /// Records that a query needed `count` neighbours, the last at squared distance `last2`.
     fn note_wider(&mut self, count: usize, last2: u64) {
         self.widened = (count, last2 + last2 / 4);
         self.wider2 = self.wider2.max(self.widened.1);
@@ -284,32 +282,32 @@ impl Search {
 }
 
 impl Query<'_> {
-    /// The query's own id.
+    /// The id of the point.
     #[must_use]
     pub fn id(&self) -> u32 {
         self.id
     }
 
-    /// The query's own position.
+    /// The position of the point.
     #[must_use]
     pub fn point(&self) -> Point {
         self.point
     }
 
-    /// The neighbours known so far, nearest first, none left out between them.
+    /// All neighbours known so far, nearest first, without gaps.
     #[must_use]
     pub fn near(&self) -> &Neighbors {
         &self.search.near
     }
 
-    /// All neighbours up to this squared distance are listed.
+    /// All neighbours within this squared distance are listed.
     #[must_use]
     pub fn complete2(&self) -> u64 {
         self.complete2
     }
 
-    /// Lists the neighbours beyond [`Query::complete2`] up to a squared distance, instead of those
-    /// known so far, if they are `wanted`. False if the halo does not reach that far.
+    /// Replaces the list by the neighbours farther than [`Query::complete2`], up to a squared distance, that
+    /// are `wanted`. False if the halo does not reach that far.
     #[must_use]
     pub fn extend_where(&mut self, distance2: u64, wanted: &impl Wanted) -> bool {
         if distance2 > self.own.reach2.max(self.complete2) {
@@ -332,7 +330,7 @@ impl Query<'_> {
         true
     }
 
-    /// Lists at least `count` neighbours. False if the halo does not reach that far.
+    /// Extends the list to at least `count` neighbours. False if the halo does not reach that far.
     #[must_use]
     pub fn extend_to(&mut self, count: usize) -> bool {
         while self.near().len() < count {
@@ -353,10 +351,10 @@ impl Query<'_> {
         true
     }
 
-    /// How far to look, squared, when what is within `known` is too little.
+    /// The squared distance to search next, if the points within `known` are too few.
     fn farther(&self, known: u64) -> u64 {
-        // On a surface, twice the distance holds four times the points. On a line it holds twice as
-        // many; there what the query before needed is the better guess.
+        // On a surface, twice the distance contains four times as many points. On a line it contains twice as
+        // many; there the distance of the previous query is the better estimate.
         let next = known.saturating_mul(3).saturating_add(1);
         let (_, before2) = self.search.widened;
         let next = next.max(before2.min(next.saturating_mul(MOST_WIDER)));

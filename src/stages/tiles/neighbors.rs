@@ -6,12 +6,12 @@ use crate::geom::plane::Moments;
 use crate::kernels::{Level, MOST_SUMMED, SUMMED_LIMIT2, second_moments};
 use crate::workspace::memory::bytes_of;
 
-/// The nearest neighbours of a point, summed up.
+/// Sums over the nearest neighbours of a point.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Sums {
     /// Exact sums over their differences to the point.
     pub moments: Moments,
-    /// Squared distance of the last one.
+    /// Squared distance of the last neighbour.
     pub last2: u64,
 }
 
@@ -19,7 +19,7 @@ pub struct Sums {
 #[derive(Debug, Clone, Default)]
 pub struct Neighbors {
     len: usize,
-    /// The columns have room for `len` and maybe more.
+    /// The columns have room for at least `len` neighbours.
     distances2: Vec<u64>,
     ids: Vec<u32>,
     x: Vec<i32>,
@@ -27,7 +27,7 @@ pub struct Neighbors {
     z: Vec<i32>,
 }
 
-/// The columns of [`Neighbors`] to write to, each as long as there are neighbours.
+/// The columns of [`Neighbors`] for writing, each as long as there are neighbours.
 pub(super) struct Columns<'a> {
     pub distances2: &'a mut [u64],
     pub ids: &'a mut [u32],
@@ -37,7 +37,7 @@ pub(super) struct Columns<'a> {
 }
 
 impl Columns<'_> {
-    /// Writes the neighbour that stands at place `to`.
+    /// Writes the neighbour at place `to`.
     #[inline(always)]
     pub fn put(&mut self, to: usize, distance2: u64, id: u32, [x, y, z]: [i32; 3]) {
         self.distances2[to] = distance2;
@@ -47,26 +47,26 @@ impl Columns<'_> {
 }
 
 impl Neighbors {
-    /// Bytes that its columns have room for.
+    /// Allocated bytes of its columns.
     #[must_use]
     pub fn bytes(&self) -> u64 {
         let words = bytes_of(&self.ids) + bytes_of(&self.x) + bytes_of(&self.y) + bytes_of(&self.z);
         words + bytes_of(&self.distances2)
     }
 
-    /// How many there are.
+    /// Number of neighbours.
     #[must_use]
     pub fn len(&self) -> usize {
         self.len
     }
 
-    /// True if there is none.
+    /// True if there is no neighbour.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len == 0
     }
 
-    /// The neighbour with `index` nearer ones, if it is known.
+    /// The neighbour at `index`, counted from the nearest, if it is known.
     #[must_use]
     #[inline]
     pub fn get(&self, index: usize) -> Option<Near> {
@@ -90,17 +90,17 @@ impl Neighbors {
         }
     }
 
-    /// All of them, nearest first.
+    /// All neighbours, nearest first.
     pub fn iter(&self) -> impl Iterator<Item = Near> + '_ {
         (0..self.len()).filter_map(|index| self.get(index))
     }
 
-    /// Forgets all.
+    /// Removes all neighbours.
     pub fn clear(&mut self) {
         self.len = 0;
     }
 
-    /// Puts in one that is no nearer than those there.
+    /// Appends a neighbour that is not nearer than those before.
     pub fn push(&mut self, near: Near) {
         let last = self.len;
         // Differences of coordinates in 0..2^30 fit 32 bits.
@@ -109,7 +109,7 @@ impl Neighbors {
             .put(last, near.distance2, near.id, difference);
     }
 
-    /// Makes it `len` neighbours; what they are, the caller writes.
+    /// Sets the number of neighbours to `len`; the caller writes the columns.
     pub(super) fn resize(&mut self, len: usize) -> Columns<'_> {
         if len > self.ids.len() {
             let room = len.next_multiple_of(64);
@@ -129,7 +129,7 @@ impl Neighbors {
         }
     }
 
-    /// [`Neighbors::moments`] of the first `count`, and how far the last of them is.
+    /// [`Neighbors::moments`] of the first `count`, and the squared distance of the last of them.
     #[must_use]
     pub fn sums(&self, count: usize, level: Level) -> Sums {
         let last = self.get(count.wrapping_sub(1));
@@ -139,7 +139,7 @@ impl Neighbors {
         }
     }
 
-    /// Exact sums over the first `count`.
+    /// Exact sums over the first `count` neighbours.
     #[must_use]
     pub fn moments(&self, count: usize, level: Level) -> Moments {
         let small = count <= MOST_SUMMED && self.distances2[..count].last() < Some(&SUMMED_LIMIT2);

@@ -6,18 +6,19 @@ use crate::kernels::BLOCK;
 use crate::workspace::memory::bytes_of;
 use std::ops::Range;
 
-/// Points in columns, with a block more than there are points: a whole block can be read anywhere.
+/// Points in columns that are a block longer than the number of points, so that a whole block can be read
+/// anywhere.
 #[derive(Debug)]
 pub(super) struct Points {
-    /// The columns one after the other: one list, so that the allocator has one to find room for.
+    /// The columns one after another, in one allocation.
     words: Vec<i32>,
-    /// Words of a column.
+    /// Length of a column.
     column: usize,
     len: usize,
 }
 
 impl Points {
-    /// None yet, with room for `count`.
+    /// No points, with room for `count`.
     pub fn with_capacity(count: usize) -> Self {
         let column = count + BLOCK;
         Self {
@@ -27,7 +28,7 @@ impl Points {
         }
     }
 
-    /// Adds points, for which there is room.
+    /// Appends points, for which there must be room.
     pub fn extend(&mut self, points: &[Point]) {
         let end = self.len + points.len();
         for (axis, column) in self.words.chunks_exact_mut(self.column).enumerate() {
@@ -45,7 +46,7 @@ impl Points {
         [x, y, z]
     }
 
-    /// How many there are.
+    /// Number of points.
     pub fn len(&self) -> usize {
         self.len
     }
@@ -56,7 +57,7 @@ impl Points {
         [x[index], y[index], z[index]]
     }
 
-    /// The smallest box around some of them.
+    /// The bounding box of the points in `range`.
     pub fn bounds(&self, range: Range<usize>) -> Aabb {
         let mut bounds = Aabb::EMPTY;
         for (axis, column) in self.columns().into_iter().enumerate() {
@@ -68,14 +69,14 @@ impl Points {
         bounds
     }
 
-    /// Their coordinates.
+    /// The coordinates of the points in `range`.
     #[inline(always)]
     pub fn coordinates(&self) -> [&[i32]; 3] {
         let [x, y, z] = self.columns();
         [&x[..self.len], &y[..self.len], &z[..self.len]]
     }
 
-    /// The coordinates of a block of points, some of which may be none.
+    /// The coordinates of a block of points; those after the last point are undefined.
     #[inline(always)]
     pub fn block(&self, start: usize) -> Option<[&[i32; BLOCK]; 3]> {
         let [x, y, z] = self.columns();
@@ -86,7 +87,7 @@ impl Points {
         ])
     }
 
-    /// Bytes that they take.
+    /// Allocated bytes.
     pub fn bytes(&self) -> u64 {
         bytes_of(&self.words)
     }

@@ -1,4 +1,4 @@
-//! The search of a tile against all distances, for every level of the kernels.
+//! Compares the search in a tile with all distances, for every level of the kernels.
 
 use super::near::Search;
 use super::neighbors::Neighbors;
@@ -21,7 +21,7 @@ fn workspace() -> Workspace {
     Workspace::new(&folder, memory, 1, Arc::new(Silent), Cancel::new()).unwrap()
 }
 
-/// A store of a cloud in pages of so many points, where it lies, and its points by id.
+/// The store of a cloud in pages of `page` points, its workspace, and its points by id.
 fn ordered(cloud: &[Point], page: usize) -> (Workspace, PointStore, Vec<Point>) {
     let workspace = workspace();
     let orderer = Orderer::new(&workspace).unwrap();
@@ -41,7 +41,7 @@ fn all_near(points: &[Point], id: usize) -> Vec<(u64, u32)> {
     all
 }
 
-/// Clouds that are flat, thin, gridded, clustered, or reach to the ends of the lattice.
+/// Clouds that are flat, thin, gridded, clustered, or extend to the ends of the lattice.
 fn clouds() -> impl Strategy<Value = Vec<Point>> {
     let cube =
         |side: i32, count: usize| prop::collection::vec(prop::array::uniform3(0..side), 1..count);
@@ -65,7 +65,7 @@ fn picked(p: &Point) -> bool {
     (p[0] ^ p[1] ^ p[2]) % 3 == 0
 }
 
-/// Boxes that reach into a half of space, and of their points every third one.
+/// Wants boxes in a half-space, and every third of their points.
 struct Half {
     from: Point,
 }
@@ -84,7 +84,7 @@ impl Wanted for Half {
     }
 }
 
-/// Asks for everything that a query offers; what it does not know must not be claimed.
+/// Tests all functions of a query; it must not claim more than it knows.
 fn check(points: &[Point], tile: &Tile, k: usize, search: &mut Search) {
     let mut next = tile.ids().start;
     tile.for_each_query(k, search, |id, point, query| {
@@ -118,7 +118,7 @@ fn check(points: &[Point], tile: &Tile, k: usize, search: &mut Search) {
             assert!(query.near().len() >= 2 * k);
         }
         agrees(&query);
-        // Of those farther, the ones in a half of space, and of these every third one at least.
+        // Of the farther points, all wanted ones in the half-space must be listed, and no unwanted ones.
         let known = query.complete2();
         let farther = known.saturating_mul(2).saturating_add(1);
         let half = |p: &Point| p[0] >= point[0];
@@ -152,7 +152,7 @@ fn sums_over(points: &[Point], point: Point, nearest: &[(u64, u32)]) -> near::Su
     }
 }
 
-/// Sums over the nearest are those of a list of all; some are asked for.
+/// Compares sums over the nearest with those over a sorted list, for all or only some of the points.
 fn check_sums(points: &[Point], tile: &Tile, k: usize, search: &mut Search) {
     let wanted = |id: usize| !id.is_multiple_of(3);
     let mut next: Vec<usize> = tile.ids().filter(|id| wanted(*id)).rev().collect();
@@ -228,7 +228,7 @@ proptest! {
                 *d2 <= within2 && picked(at) && at[0] >= point[0]
             };
             prop_assert!(rest.iter().filter(wanted).all(|near| got.contains(near)));
-            // What was ready from the walk before is not asked about.
+            // Points that were ready from an earlier step are returned whether wanted or not.
             let asked = got.iter().all(|(_, id)| picked(&points[*id as usize]));
             prop_assert!(asked || known > 0);
         }

@@ -1,5 +1,5 @@
-//! Neighbours in the whole store, nearest first, as many as are asked for: the second look for
-//! points whose halo does not prove enough.
+//! Neighbours in the whole store, nearest first, as many as needed: for points that the halo of their tile
+//! cannot certify.
 
 use super::Near;
 use super::neighbors::Neighbors;
@@ -15,21 +15,21 @@ use std::collections::BinaryHeap;
 /// Pages kept in memory by a [`PageCache`].
 const CACHED_PAGES: usize = 1024;
 
-/// Recently read pages of the store, one behind the other: the allocator has one list to find room for.
+/// Recently read pages of the store, in one allocation.
 #[derive(Debug, Default)]
 pub struct PageCache {
-    /// Coordinates of each page: all along x, then y, then z.
+    /// Coordinates of each page: all x, then all y, then all z.
     words: Vec<i32>,
-    /// Where the words of each page begin, and how many points it has.
+    /// For each page, the index of its first word and its number of points.
     pages: FxHashMap<usize, (usize, usize)>,
     read: Vec<Point>,
-    /// Words that there were at one time.
+    /// The largest number of words so far.
     most: usize,
     held: Holding,
 }
 
 impl PageCache {
-    /// Bytes that a full cache takes.
+    /// Bytes of a full cache.
     #[must_use]
     pub fn bytes(store: &PointStore) -> u64 {
         (CACHED_PAGES * store.page_size() * 12) as u64
@@ -47,12 +47,12 @@ impl PageCache {
 
     fn take_in(&mut self, store: &PointStore, page: usize) -> Result<(usize, usize)> {
         if self.pages.len() >= CACHED_PAGES {
-            // Queries come in curve order: soon everything here is new again.
+            // Queries come in curve order, so the old pages are soon no longer needed.
             self.pages.clear();
             self.words.clear();
         }
         if self.words.capacity() == 0 {
-            // As far as it is not filled it is not there.
+            // Memory that was not written to is not resident.
             let room = CACHED_PAGES * store.page_size() * 3;
             self.words.reserve_exact(room);
         }
@@ -69,10 +69,10 @@ impl PageCache {
     }
 }
 
-/// Points handed out before the search goes on; then twice as many, and so on.
+/// Neighbours in the first batch; each following batch is twice as large.
 const BATCH: usize = 32;
 
-/// A node of the box tree that is not yet opened: its squared distance, level and index.
+/// A node of the box tree that has not been opened: its squared distance, level and index.
 type Node = Reverse<(u64, usize, usize)>;
 
 /// Best-first search from one point, a batch of neighbours at a time.
@@ -83,18 +83,18 @@ pub struct Walk<'a> {
     id: u32,
     point: Point,
     nodes: BinaryHeap<Node>,
-    /// What is handed out next, with squared distance and id, farthest first.
+    /// The neighbours to return next, with squared distance and id, farthest first.
     ready: Vec<(u64, u32, Point)>,
-    /// Other points of opened pages, in no order.
+    /// The other points of opened pages, unordered.
     later: Vec<(u64, u32, Point)>,
-    /// Places of points of a page.
+    /// Places of points in a page.
     places: Vec<u32>,
     batch: usize,
     held: Holding,
 }
 
 impl<'a> Walk<'a> {
-    /// A walk from point `id` at `point`.
+    /// Starts at point `id` at the position `point`.
     #[must_use]
     pub fn new(store: &'a PointStore, cache: &'a mut PageCache, id: u32, point: Point) -> Self {
         let level = store.tree_levels() - 1;
@@ -115,7 +115,7 @@ impl<'a> Walk<'a> {
         walk
     }
 
-    /// The next neighbour, nearest first by (distance, id), of all; `None` when there is no more.
+    /// The next neighbour in the order of (distance, id); `None` if there are no more.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
@@ -126,9 +126,9 @@ impl<'a> Walk<'a> {
         Ok(self.next_ready())
     }
 
-    /// Lists the neighbours that follow, nearest first, instead of those in `near`: of what is left
-    /// within the squared distance `within2` and `wanted`, and maybe others, some at least; none when
-    /// there is no more. What was not wanted once is not asked for again.
+    /// Replaces `near` by the next neighbours, nearest first: `wanted` points within the squared distance
+    /// `within2`, and possibly others; at least one, or none if there are no more. Points that were not
+    /// wanted once are not offered again.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
@@ -156,8 +156,8 @@ impl<'a> Walk<'a> {
         })
     }
 
-    /// Makes the nearest of what is left within `within2` ready, at least a batch if there are so
-    /// many, and all that are as far as the last of them.
+    /// Makes the nearest remaining points within `within2` ready: at least a batch if there are that many,
+    /// and all at the distance of the last one.
     fn fill(&mut self, within2: u64, wanted: &impl Wanted) -> Result<()> {
         let mut limit = within2;
         self.take_later(limit, wanted);
@@ -189,7 +189,7 @@ impl<'a> Walk<'a> {
         Ok(())
     }
 
-    /// If more than a batch is ready, only as far as the batch reaches; the new limit.
+    /// If more than a batch is ready, moves the points beyond the batch back; returns the new limit.
     fn narrow(&mut self, limit: u64) -> u64 {
         if self.ready.len() <= self.batch {
             return limit;
@@ -202,7 +202,7 @@ impl<'a> Walk<'a> {
         limit
     }
 
-    /// Makes those `wanted` of the points of opened pages ready that are up to `limit`.
+    /// Makes the `wanted` points of opened pages ready that are within `limit`.
     fn take_later(&mut self, limit: u64, wanted: &impl Wanted) {
         self.ready
             .extend(self.later.extract_if(.., |p| p.0 <= limit));
@@ -216,7 +216,7 @@ impl<'a> Walk<'a> {
         self.ready.truncate(self.places.len());
     }
 
-    /// Takes in those `wanted` of a page's points; those up to `limit` are ready.
+    /// Adds the `wanted` points of a page; those within `limit` are ready.
     fn open(&mut self, page: usize, limit: u64, wanted: &impl Wanted) -> Result<()> {
         let first = self.store.page_ids(page).start as u32;
         let columns = self.cache.get(self.store, page)?;

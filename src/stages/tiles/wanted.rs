@@ -1,17 +1,17 @@
-//! What a search looks at besides being near enough.
+//! An additional condition on the points that a search returns.
 
 use crate::geom::aabb::Aabb;
 
-/// Says which points matter to one query. Some that do not may pass.
+/// Selects the points that matter to a query. It may let others pass.
 pub trait Wanted {
-    /// False if no point in a box matters.
+    /// False if no point in a box can matter.
     fn may_be_in(&self, bounds: &Aabb) -> bool;
 
-    /// Puts down the places of the points that matter, in order, of those with these coordinates.
+    /// Appends the places, ascending, of the points with these coordinates that matter.
     fn pick(&self, columns: [&[i32]; 3], places: &mut Vec<u32>);
 }
 
-/// All of them.
+/// All points matter.
 #[derive(Debug, Clone, Copy)]
 pub struct All;
 

@@ -1,4 +1,4 @@
-//! Triples with their counts, by block: what the cells of all tiles saw, added up (paper, 3.4).
+//! Distinct triples with their counts, by block: the sums over the cells of all tiles (paper, 3.4).
 
 use crate::error::Result;
 use crate::spill::{Shuffle, Table};
@@ -14,9 +14,9 @@ const SHUFFLE_BUFFER: u64 = 16 << 20;
 /// All triples with their counts, ascending.
 #[derive(Debug)]
 pub struct Triples {
-    /// By the block of the smallest vertex.
+    /// Triples by the block of their smallest vertex.
     pub own: Table<CountedTriple>,
-    /// Crossing triples, for the blocks of their other vertices.
+    /// Crossing triples, by each other block that contains one of their vertices.
     pub visiting: Table<SentTriple>,
 }
 
@@ -25,13 +25,13 @@ pub struct Triples {
 pub struct TripleStats {
     /// All distinct triples.
     pub triples: u64,
-    /// Seen by all three cells.
+    /// Triples seen by all three cells.
     pub t3: u64,
-    /// Seen by two cells.
+    /// Triples seen by two cells.
     pub t2: u64,
-    /// Seen by one cell.
+    /// Triples seen by one cell.
     pub t1: u64,
-    /// Those with vertices in more than one block.
+    /// Triples with vertices in more than one block.
     pub crossing: u64,
 }
 
@@ -115,7 +115,7 @@ pub fn triples(
     ))
 }
 
-/// Merges two ascending lists, adding up counts; `received` may hold a triple more than once.
+/// Merges two ascending lists and adds up the counts; `received` may contain a triple more than once.
 fn merge(own: &[CountedTriple], received: &[SentTriple], all: &mut Vec<CountedTriple>) {
     let received = received.iter().map(|sent| CountedTriple {
         triple: sent.triple,

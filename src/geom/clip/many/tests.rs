@@ -1,4 +1,4 @@
-//! A cell of many corners is the cell that a look at all corners makes.
+//! Tests: a cell of many corners equals the cell found by testing all corners.
 
 use super::*;
 use crate::geom::plane::Normal;
@@ -14,11 +14,11 @@ fn seen(cell: &Cell) -> Vec<(u32, u32)> {
     all
 }
 
-/// Around part of a circle, at about the same distance.
+/// Points on part of a circle, at about the same distance.
 fn ring(count: usize, radius: f64, part: f64, noise: f64) -> Vec<Difference> {
     let at = |k: usize| {
         let (sin, cos) = (TAU * part * k as f64 / count as f64).sin_cos();
-        // Something that looks like chance.
+        // Deterministic noise.
         let radius = radius + noise * ((k * k + 7 * k) as f64).sin();
         [(cos * radius) as i64, (sin * radius) as i64, 0]
     };
@@ -29,7 +29,7 @@ fn small(most: i64) -> impl Strategy<Value = Difference> {
     prop::array::uniform3(-most..=most)
 }
 
-/// Circles and parts of them, full of ties or with noise, grids and anything, on a plane or near it.
+/// Circles and arcs (with ties or with noise), grids and arbitrary points, on a plane or near it.
 fn clouds() -> impl Strategy<Value = Vec<Difference>> {
     let rings = (3usize..150, 1.0f64..1e6, 0.1f64..1.0, 0.0f64..3.0)
         .prop_map(|(count, radius, part, noise)| ring(count, radius, part, noise));
@@ -58,7 +58,7 @@ proptest! {
     fn many_corners_are_those_of_a_look_at_all(
         points in clouds(),
         normal in normals(),
-        // A disk within the points, about them, or far around.
+        // A disk smaller than the point set, of about its size, or far larger.
         radius in prop_oneof![1.0f64..100.0, 1e3f64..1e6, Just(1e10)],
         shuffled in any::<bool>(),
         most in 4usize..40,
@@ -88,7 +88,7 @@ proptest! {
             let high = low.map(|c| c + (side >> shift) as f64);
             prop_assert!(many.may_touch(low, high) || !plain.may_touch(low, high));
         }
-        // The memory serves the next cell.
+        // Memory is reused for the next cell.
         many.start(50, normal, radius);
         plain.start(50, normal, radius);
         for &(point, id) in points.iter().take(20) {
@@ -99,8 +99,7 @@ proptest! {
     }
 }
 
-/// Corners that are looked at, for each bisector, while a cell gets as many corners as there are
-/// points.
+/// Mean number of corners tested for a bisector, while a cell reaches as many corners as there are points.
 fn looks(points: &[Difference], radius: f64, corners: std::ops::RangeInclusive<usize>) -> f64 {
     let mut cell = Cell::new(0, [0, 0, 1 << 24], radius);
     for (point, id) in points.iter().zip(1..) {
@@ -111,7 +110,7 @@ fn looks(points: &[Difference], radius: f64, corners: std::ops::RangeInclusive<u
     cell.looks as f64 / points.len() as f64
 }
 
-/// Quadratic would be thousands of looks for each.
+/// Quadratic time would be thousands of tests for a bisector.
 #[test]
 fn the_centre_of_a_circle_looks_at_few_corners() {
     const COUNT: usize = 30_000;
@@ -123,7 +122,7 @@ fn the_centre_of_a_circle_looks_at_few_corners() {
             assert!(looks < 20.0, "{looks}");
         }
     }
-    // Most of many sides go again.
+    // Most of many sides are cut off again.
     let outer = ring(COUNT, 5e8, 1.0, 0.0);
     let inner = ring(COUNT, 4.9e8, 1.0, 0.0);
     let looks = looks(&[outer, inner].concat(), 1e9, COUNT..=COUNT);

@@ -1,4 +1,4 @@
-//! Decoding one chunk.
+//! Decoding of one chunk.
 
 use super::super::contain::contain;
 use super::super::input::{Input, u32_at};
@@ -14,12 +14,12 @@ use laz::record::{
 use laz::{LazItem, LazItemType};
 use std::io::{Cursor, Read};
 
-/// Bytes decoded between two looks at the sink.
+/// Bytes decoded before they are passed to the sink.
 const BATCH: usize = 64 << 10;
 
 /// Layers of the point item: x and y, z, class, flags, …
 const POINT_LAYERS: usize = 9;
-/// The layer of the class, which is decoded only if classes matter.
+/// Layer of the class, decoded only if points are selected by class.
 const CLASS_LAYER: usize = 2;
 /// Layers that are always decoded: x and y, z, flags.
 const WANTED: [usize; 3] = [0, 1, 3];
@@ -38,12 +38,12 @@ pub(super) struct LayerHead {
     first: [u8; 30],
     /// Sizes of the layers of the point item.
     sizes: [u32; POINT_LAYERS],
-    /// Where the layers start in the file.
+    /// Offset of the first layer in the file.
     layers_at: u64,
 }
 
 impl LayerHead {
-    /// Reads the head of the chunk at `at`; the whole chunk lies inside the file.
+    /// Reads the head of the chunk at `at`, and checks that the whole chunk is inside the file.
     pub(super) fn read(input: &Input, header: &Header, laszip: &Laszip, at: u64) -> Result<Self> {
         let record = usize::from(header.record_bytes);
         let count: usize = laszip.items.iter().map(layers).sum();
@@ -70,9 +70,10 @@ impl LayerHead {
         })
     }
 
-    /// A chunk of the point item alone, with the `class` or without it, and without the layers that are of no use.
+    /// The chunk reduced to the point item and the needed layers, with or without the class according to
+    /// `class`.
     ///
-    /// A layer of no bytes is legal and means that the field keeps its first value.
+    /// An empty layer is legal: the field keeps its first value.
     fn reduced(&self, input: &Input, class: bool) -> Result<Vec<u8>> {
         let wanted = self.sizes.iter().enumerate();
         let wanted = wanted.filter(|(layer, _)| is_wanted(*layer, class));
@@ -122,7 +123,7 @@ impl Decoder<'_> {
         self.points(&mut decoder, chunk.at, chunk.points, sink)
     }
 
-    /// Decodes a chunk, or a stream, of whole points from `source`; returns the source, behind it.
+    /// Decodes a chunk, or a stream, of whole points from `source`. Returns the source, positioned after it.
     pub(super) fn stream<R: Read>(
         &self,
         source: R,

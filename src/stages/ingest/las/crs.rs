@@ -1,35 +1,34 @@
-//! The reference system that a file names, as far as it takes to tell two of them apart.
+//! The reference system given in a file, as far as needed to compare two of them.
 //!
-//! Coordinates are read as they are; the records are looked at for a warning only, so what is wrong
-//! with them is no error.
+//! Coordinates are read unchanged; the records only serve for a warning. So errors in them are ignored.
 
 use super::super::crs::Crs;
 use super::super::input::{Input, u16_at, u64_at};
 use super::Header;
 
-/// Who defines the records of reference systems.
+/// User id of the records of reference systems.
 const USER: &[u8] = b"LASF_Projection";
 
-/// Records: keys of GeoTIFF, their numbers and their texts, and well-known text.
+/// Record ids: GeoTIFF keys, their numbers and their texts, and well-known text.
 const KEYS: u16 = 34735;
 const NUMBERS: u16 = 34736;
 const TEXTS: u16 = 34737;
 const WELL_KNOWN: u16 = 2112;
 
-/// Records that are looked at, and the largest of them.
+/// Limits for the number of records read and for the size of one.
 const MOST_RECORDS: usize = 200;
 const LARGEST: u64 = 64 << 10;
 
-/// Keys of GeoTIFF that name a system by its number, and those that only describe it.
+/// GeoTIFF keys with the code of a system, and keys that only describe one.
 const GEOGRAPHIC: u16 = 2048;
 const PROJECTED: u16 = 3072;
 const VERTICAL: u16 = 4096;
 const CITATIONS: [u16; 4] = [1026, 2049, 3073, 4097];
 
-/// Deepest nesting of well-known text.
+/// Deepest nesting accepted in well-known text.
 const DEEPEST: usize = 32;
 
-/// What the records of a file say.
+/// The records of a file that describe its reference system.
 #[derive(Default)]
 struct Records {
     keys: Vec<u8>,
@@ -38,7 +37,7 @@ struct Records {
     well_known: Vec<u8>,
 }
 
-/// The reference system of a file, if it names one.
+/// The reference system of a file, if it gives one.
 pub(super) fn read(input: &Input, header: &Header) -> Option<Crs> {
     let mut records = Records::default();
     let mut at = header.vlrs;
@@ -62,7 +61,7 @@ pub(super) fn read(input: &Input, header: &Header) -> Option<Crs> {
 }
 
 impl Records {
-    /// Takes the record at `at` if it matters; where the next one is.
+    /// Reads the record at `at` if it is relevant; returns the offset of the next one.
     fn take(&mut self, input: &Input, at: u64, head_bytes: usize, end: u64) -> Option<u64> {
         let data = at.checked_add(head_bytes as u64)?;
         if data > end {
@@ -91,7 +90,7 @@ impl Records {
         Some(next)
     }
 
-    /// Well-known text if it is there: files of newer point formats may have old keys beside it.
+    /// From well-known text if present: files of newer point formats may have outdated keys beside it.
     fn crs(&self) -> Option<Crs> {
         let text = String::from_utf8_lossy(&self.well_known);
         let text = text.trim_matches(|c: char| c == '\0' || c.is_whitespace());
@@ -136,7 +135,7 @@ impl Records {
         found.sort();
         let code = |key: u16| {
             let (_, value) = found.iter().find(|(k, _)| *k == key)?;
-            // 32767 means that it is described by other keys.
+            // 32767 stands for a system described by other keys.
             value.parse().ok().filter(|code| (1..32767).contains(code))
         };
         let projected = found.iter().any(|(key, _)| *key == PROJECTED);
@@ -152,7 +151,7 @@ impl Records {
     }
 }
 
-/// The system that a well-known text describes, of the first or the second kind.
+/// The system described by a well-known text, version 1 or 2.
 fn well_known(text: &str) -> Crs {
     let mut crs = Crs {
         horizontal: None,
@@ -197,7 +196,7 @@ fn well_known(text: &str) -> Crs {
 }
 
 impl Crs {
-    /// Takes the number of a system from a node of well-known text that ends.
+    /// Takes the code of a system from a completed node of well-known text.
     fn close(&mut self, path: &[String], arguments: &[String]) {
         let path: Vec<&str> = path.iter().map(String::as_str).collect();
         let of = match path[..] {
@@ -243,7 +242,7 @@ mod tests {
     #[test]
     fn numbers_decide_where_both_have_one() {
         let a = keys(&[[1024, 0, 1, 1], [3072, 0, 1, 26917]], "");
-        // Written by another program: more keys, and a name.
+        // As written by another program: with more keys and a name.
         let name = [3073, 34737, 5, 0];
         let b = keys(
             &[
@@ -279,7 +278,7 @@ mod tests {
         let c = well_known("LOCAL_CS[\"other site\",UNIT[\"metre\",1]]");
         assert!(!a.differs(&b) && a.differs(&c));
         assert_eq!(c.to_string(), "\"other site\"");
-        // One has a number, the other none: nobody knows.
+        // With a code for only one of the two, nothing can be decided.
         assert!(!a.differs(&well_known(UTM_17)));
         let user_defined = keys(&[[3072, 0, 1, 32767], [3073, 34737, 4, 0]], "own|");
         assert!(!user_defined.differs(&well_known(UTM_17)));

@@ -1,8 +1,8 @@
-//! Steps over compressed GPS times (laszip item 7, version 2).
+//! Skips compressed GPS times (laszip item 7, version 2).
 //!
-//! In chunks of whole points the times share one stream with the positions, so they must be
-//! decoded to get past them; the times themselves are not wanted. The decoder of the `laz` crate
-//! does the same by recursion, whose depth damaged data can drive past any stack.
+//! In chunks of whole points, times and positions share one stream, so times must be decoded to be skipped;
+//! their values are not used. The decoder of the `laz` crate is recursive, and damaged data can make it
+//! overflow the stack.
 
 use laz::decoders::ArithmeticDecoder;
 use laz::decompressors::{IntegerDecompressor, IntegerDecompressorBuilder};
@@ -15,10 +15,10 @@ const MULTIPLES: i32 = 500;
 const NEGATIVE_MULTIPLES: i32 = 10;
 /// Symbol of a time that did not change.
 const UNCHANGED: i32 = MULTIPLES + NEGATIVE_MULTIPLES + 1;
-/// Symbol of a time that is stored whole; symbols above it switch to another sequence.
+/// Symbol of a time that is stored in full; larger symbols switch to another sequence.
 const WHOLE: i32 = UNCHANGED + 1;
 
-/// Switches from one sequence of times to another in a row; a writer makes one at most.
+/// Most consecutive switches from one sequence of times to another; a writer makes at most one.
 const MOST_SWITCHES: usize = 16;
 
 /// State of the four interleaved sequences of times.
@@ -61,7 +61,7 @@ impl GpsTimes {
         self.integers.decompress(decoder, prediction, context)
     }
 
-    /// After four extreme differences in a row, the last of them is the one to predict from.
+    /// After four extreme differences in a row, the last one becomes the prediction.
     fn extreme(&mut self, difference: i32) {
         self.extremes[self.last] += 1;
         if self.extremes[self.last] > 3 {
@@ -70,9 +70,9 @@ impl GpsTimes {
         }
     }
 
-    /// A time stored whole starts a new sequence.
+    /// A time stored in full starts a new sequence.
     fn whole<R: Read>(&mut self, decoder: &mut ArithmeticDecoder<R>) -> std::io::Result<()> {
-        // What is predicted does not change what is consumed.
+        // The predicted value does not affect how many bytes are consumed.
         self.integers.decompress(decoder, 0, 8)?;
         decoder.read_int()?;
         self.next = (self.next + 1) & 3;
@@ -82,7 +82,7 @@ impl GpsTimes {
         Ok(())
     }
 
-    /// Decodes one symbol and what follows it; true if it was a switch to another sequence.
+    /// Decodes one symbol and its data; true if it was a switch to another sequence.
     fn step<R: Read>(&mut self, decoder: &mut ArithmeticDecoder<R>) -> std::io::Result<bool> {
         if self.differences[self.last] == 0 {
             match decoder.decode_symbol(&mut self.first_difference)? {

@@ -1,4 +1,4 @@
-//! The public header block, read leniently: what does not matter for positions is not checked.
+//! The public header block, read leniently: fields without influence on positions are not checked.
 
 use super::super::input::{Input, f64_at, u16_at, u32_at, u64_at};
 use crate::error::Result;
@@ -12,30 +12,30 @@ const LARGEST: usize = 375;
 /// Bytes of a record of each point format.
 const RECORD_BYTES: [u16; 11] = [20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67];
 
-/// Scales and offsets beyond these are damage, and would overflow.
+/// Valid scales and offsets. Values outside indicate damage, and would overflow.
 const SCALES: std::ops::RangeInclusive<f64> = 1e-15..=1e9;
 const LARGEST_OFFSET: f64 = 1e15;
 
-/// The parts of the header that matter here.
+/// The fields of the header that are used.
 #[derive(Debug, Clone)]
 pub(super) struct Header {
     pub(super) version: [u8; 2],
     pub(super) compressed: bool,
     pub(super) point_format: u8,
     pub(super) record_bytes: u16,
-    /// Number of points the header claims.
+    /// Number of points given in the header.
     pub(super) claimed: u64,
-    /// Where the points start.
+    /// Offset of the first point.
     pub(super) data: u64,
-    /// Where the points must have ended: the first extended record or waveform, or the file's end.
+    /// Upper limit for the end of the points: the first extended record or waveform, or the end of the file.
     pub(super) data_end: u64,
-    /// Where the variable-length records start.
+    /// Offset of the variable-length records.
     pub(super) vlrs: u64,
-    /// Where the extended records start, and how many there are.
+    /// Offset and number of the extended records.
     pub(super) extended: Option<(u64, u32)>,
     pub(super) scale: [f64; 3],
     pub(super) offset: [f64; 3],
-    /// Smallest and largest coordinates that the header claims. Nothing but estimates relies on them.
+    /// Smallest and largest coordinates given in the header; used for estimates only.
     pub(super) bounds: [[f64; 3]; 2],
     pub(super) warnings: Vec<String>,
 }
@@ -85,8 +85,8 @@ impl Header {
             warnings,
         };
         if full {
-            // Format 6 and above leave the old count at zero; writers of lower formats fill one
-            // of the two, or both.
+            // Formats from 6 on leave the legacy count at zero; writers of lower formats fill in one of the
+            // two, or both.
             match u64_at(&head, 247) {
                 0 => {}
                 count => header.claimed = count,
@@ -125,13 +125,13 @@ impl Header {
         Ok(())
     }
 
-    /// Ends the points where something else is known to start.
+    /// Ends the points where other data are known to start.
     fn find_end(&mut self, input: &Input, head: &[u8], header_bytes: usize) {
         let mut starts = Vec::new();
         if let Some((start, 1..)) = self.extended {
             starts.push(start);
         }
-        // The waveform packets, if they are in this file, are an extended record too.
+        // Waveform packets in this file are an extended record too.
         if self.version[1] >= 3 && header_bytes >= 235 && head.len() >= 235 {
             starts.push(u64_at(head, 227));
         }

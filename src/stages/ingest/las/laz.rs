@@ -1,4 +1,4 @@
-//! LAZ: chunks decoded on all threads where the file says where they are, else one by one.
+//! LAZ: chunks are decoded on all threads if their offsets are known, else one after another.
 
 use super::super::input::{Input, STREAM_BUFFER};
 use super::super::spool::{SourceWriter, sink_bytes};
@@ -12,11 +12,11 @@ use crate::error::Result;
 const MODELS: u64 = 1 << 20;
 /// Memory of the models of one extra byte: 256 symbols with their tables.
 const MODELS_PER_BYTE: u64 = 4 << 10;
-/// Chunks of whole points up to this size are decoded from memory.
+/// Chunks of whole points up to this size are read into memory first.
 const IN_MEMORY: u64 = 8 << 20;
-/// Points that a byte of a file may stand for, and points that are believed whatever the size. Scans
-/// take some bytes a point, and rows of a grid, or points that are all alike, a twenty-fifth of one: a
-/// small file could claim any number of them.
+/// Most points for each byte of a file, and number of points that is always accepted. Scans take several
+/// bytes for a point; rows of a grid, or identical points, take a twenty-fifth of a byte, so a small file
+/// could claim any number.
 const PER_BYTE: u64 = 64;
 const FEW: u64 = 1 << 23;
 
@@ -55,7 +55,7 @@ pub(super) fn read(
     Ok(warnings)
 }
 
-/// Refuses a number of points that no scan can have in a file of this size.
+/// Rejects a number of points that is impossible for the size of the file.
 fn plausible(input: &Input, points: u64) -> Result<()> {
     let most = FEW + PER_BYTE * input.bytes;
     if points <= most {
@@ -68,7 +68,7 @@ fn plausible(input: &Input, points: u64) -> Result<()> {
     ))
 }
 
-/// Memory of the models that decode all items.
+/// Memory of the models for all items.
 fn models(laszip: &Laszip) -> u64 {
     let extra: u64 = match laszip.layout {
         Layout::Layers => 0,
@@ -89,7 +89,7 @@ fn in_parallel(decoder: &Decoder<'_>, chunks: &[Chunk], writer: &SourceWriter<'_
         let bytes = chunks[unit].bytes;
         fixed
             + match layered {
-                // The decoder copies every layer once.
+                // The decoder copies each layer once.
                 true => 2 * bytes,
                 false if bytes <= IN_MEMORY => bytes,
                 false => STREAM_BUFFER as u64,
@@ -115,7 +115,7 @@ fn in_parallel(decoder: &Decoder<'_>, chunks: &[Chunk], writer: &SourceWriter<'_
     writer.units("LAZ chunks", chunks.len(), memory, work)
 }
 
-/// Decodes a file whose chunks can only be found by decoding what is before them.
+/// Decodes a file in which the offset of a chunk is only known after the previous one has been decoded.
 fn one_by_one(decoder: &Decoder<'_>, writer: &SourceWriter<'_>) -> Result<()> {
     let (input, header) = (decoder.input, decoder.header);
     let (start, per_chunk) = match (decoder.laszip.layout, decoder.laszip.chunk_points) {
@@ -145,7 +145,7 @@ fn one_by_one(decoder: &Decoder<'_>, writer: &SourceWriter<'_>) -> Result<()> {
     })
 }
 
-/// Makes the chunks hold as many points as the header claims.
+/// Limits the points of the chunks to the number given in the header.
 fn limit(
     input: &Input,
     header: &Header,
@@ -156,7 +156,7 @@ fn limit(
     let claimed = header.claimed;
     let layered = laszip.layout == Layout::Layers;
     if claimed == 0 && layered {
-        // Each chunk says how many points it holds.
+        // Each chunk has its own number of points.
         for chunk in &mut table.chunks {
             chunk.points = LayerHead::read(input, header, laszip, chunk.at)?.points;
         }
@@ -172,7 +172,7 @@ fn limit(
             ),
         ));
     }
-    // With chunks of one size, only the count in the header says how full the last one is.
+    // With chunks of fixed size, the number of points in the last one only follows from the header.
     let counted = laszip.chunk_points.is_none();
     if claimed == 0 && present > 0 {
         if !layered && !counted {

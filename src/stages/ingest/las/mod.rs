@@ -11,10 +11,10 @@ mod vlr;
 
 use header::Header;
 
-/// Byte of a record that holds the withheld flag, in all point formats.
+/// Byte of a record with the withheld flag, in all point formats.
 const FLAGS: usize = 15;
 
-/// Byte that holds the class in point formats 6 to 10; before, it shares that of the flags.
+/// Byte of the class in point formats 6 to 10; in lower formats the class is in the same byte as the flags.
 const CLASS: usize = 16;
 
 use super::classes::Classes;
@@ -39,7 +39,7 @@ impl Format {
     };
 }
 
-/// Both formats: the header says which of them a file is of.
+/// Both formats; the header distinguishes them.
 pub(super) struct Las;
 
 impl PointFormat for Las {
@@ -102,13 +102,13 @@ impl PointFile for Header {
     }
 }
 
-/// Where a record says that it is withheld and of which class it is, and which classes are wanted.
+/// The position of the withheld flag and of the class in a record, and the wanted classes.
 #[derive(Debug, Clone, Copy)]
 struct Record<'a> {
     withheld: u8,
     /// Byte and bits of the class.
     class: (usize, u8),
-    /// None if all are.
+    /// `None` if all classes are wanted.
     wanted: Option<&'a Classes>,
 }
 
@@ -116,7 +116,7 @@ impl<'a> Record<'a> {
     fn of(header: &Header, classes: &'a Classes) -> Self {
         let (withheld, class) = match (header.point_format, header.version) {
             (6.., _) => (0x04, (CLASS, 0xff)),
-            // In LAS 1.0 the whole byte is the class.
+            // In LAS 1.0 the class is the whole byte.
             (_, [1, 0]) => (0, (FLAGS, 0xff)),
             _ => (0x80, (FLAGS, 0x1f)),
         };
@@ -128,7 +128,7 @@ impl<'a> Record<'a> {
         }
     }
 
-    /// Hands a point on, or counts why not.
+    /// Passes a point on, or counts why it is left out.
     #[inline]
     fn take(self, record: &[u8], sink: &mut Sink<'_, i32>) -> Result<()> {
         if record[FLAGS] & self.withheld != 0 {

@@ -5,7 +5,7 @@ use super::super::spool::{SourceWriter, sink_bytes};
 use super::{Header, Record};
 use crate::error::Result;
 
-/// Bytes of records read at one time.
+/// Bytes of records read at a time.
 const SLAB: u64 = 2 << 20;
 
 pub(super) fn read(
@@ -40,11 +40,11 @@ pub(super) fn read(
     Ok(warnings)
 }
 
-/// Number of points to read: what the header claims, if it is there.
+/// Number of points to read: that of the header, if the file contains them.
 fn count(input: &Input, header: &Header, warnings: &mut Vec<String>) -> Result<u64> {
     let record_bytes = u64::from(header.record_bytes);
     let until = |end: u64| (end - header.data) / record_bytes;
-    // A start of extended records or waveforms inside the points is a lie about that start.
+    // If extended records or waveforms seem to start inside the points, their offset is wrong.
     let present = if header.claimed > until(header.data_end) {
         until(input.bytes)
     } else {
@@ -67,7 +67,7 @@ fn count(input: &Input, header: &Header, warnings: &mut Vec<String>) -> Result<u
         .saturating_sub(header.data + claimed * record_bytes);
     let whole_records = left > 0 && left.is_multiple_of(record_bytes);
     if claimed == 0 && whole_records {
-        // A writer that was interrupted never came back to fill the count in.
+        // A writer that was interrupted did not fill in the count.
         warnings.push(format!(
             "the header claims 0 points, the {present} records in the file are read"
         ));

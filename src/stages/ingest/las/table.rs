@@ -1,4 +1,4 @@
-//! The chunk table: where each chunk is and how many points it holds.
+//! The chunk table: offset and number of points of each chunk.
 
 use super::super::contain::contain;
 use super::super::input::{Input, u32_at, u64_at};
@@ -12,26 +12,26 @@ use laz::laszip::ChunkTable;
 /// One chunk of compressed points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Chunk {
-    /// Where it starts in the file.
+    /// Offset in the file.
     pub(super) at: u64,
-    /// Its size in bytes.
+    /// Size in bytes.
     pub(super) bytes: u64,
-    /// The points to take from it.
+    /// Number of points to read from it.
     pub(super) points: u64,
 }
 
-/// The chunks of a file, with the memory that holds them.
+/// The chunks of a file, and the memory reservation for them.
 pub(super) struct Table {
     pub(super) chunks: Vec<Chunk>,
     _memory: Reservation,
 }
 
-/// Bytes of memory of one chunk while the table is read: the decoder's entry and ours.
+/// Bytes for one chunk while the table is read: the decoder's entry and our own.
 const ENTRY: u64 = (16 + 2 * size_of::<Chunk>()) as u64;
 
 /// Reads the chunk table; `None` if the file has none.
 ///
-/// The points of the last chunk of a fixed size are set to the full size.
+/// With chunks of fixed size, the last one is also set to the full number of points.
 ///
 /// # Errors
 /// [`crate::Error::Input`] if it is damaged, [`crate::Error::Memory`] if it is too large.
@@ -48,7 +48,7 @@ pub(super) fn read(
     let mut head = [0u8; 8];
     input.read_exact_at(at, &mut head, "chunk table")?;
     let count = u64::from(u32_at(&head, 4));
-    // Each chunk starts with one whole record.
+    // Each chunk starts with an uncompressed record.
     let most = (at - first) / u64::from(header.record_bytes);
     if count > most {
         return Err(input.error(
@@ -71,7 +71,7 @@ pub(super) fn read(
     let mut chunks = Vec::with_capacity(entries.len());
     let mut start = first;
     for (number, entry) in entries.as_ref().iter().enumerate() {
-        // The decoder extends the sign of 32-bit sizes.
+        // The decoder sign-extends 32-bit sizes.
         let bytes = entry.byte_count & u64::from(u32::MAX);
         let points = laszip
             .chunk_points
@@ -96,8 +96,8 @@ pub(super) fn read(
     }))
 }
 
-/// Where the chunk table starts, from the start of the data or, for files written to a stream,
-/// from the last bytes of the file.
+/// Offset of the chunk table: given at the start of the data or, in files written to a stream, in the last
+/// bytes of the file.
 fn find(input: &Input, header: &Header) -> Result<Option<u64>> {
     let mut word = [0u8; 8];
     for at in [header.data, input.bytes.saturating_sub(8)] {
@@ -113,10 +113,10 @@ fn find(input: &Input, header: &Header) -> Result<Option<u64>> {
     Ok(None)
 }
 
-/// Finds the chunks of layered points without a table: each says how long it is.
+/// Finds the chunks of layered points without a table; each gives its own length.
 ///
 /// # Errors
-/// [`crate::Error::Input`] if a chunk reaches beyond the file.
+/// [`crate::Error::Input`] if a chunk extends beyond the end of the file.
 pub(super) fn walk(
     input: &Input,
     header: &Header,

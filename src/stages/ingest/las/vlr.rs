@@ -1,4 +1,4 @@
-//! The laszip record that says how points are compressed.
+//! The laszip record, which describes the compression of the points.
 
 use super::super::input::{Input, u16_at, u32_at};
 use super::Header;
@@ -8,14 +8,14 @@ use laz::{LazItem, LazItemType, LazVlr};
 /// Bytes before the data of a variable-length record.
 const HEAD: usize = 54;
 
-/// How the points of a file are organised.
+/// Organisation of the compressed points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Layout {
     /// One stream of all points.
     Stream,
     /// Chunks, each a stream of whole points.
     Chunks,
-    /// Chunks whose fields are apart.
+    /// Chunks with a separate layer for each field.
     Layers,
 }
 
@@ -23,7 +23,7 @@ pub(super) enum Layout {
 #[derive(Debug, Clone)]
 pub(super) struct Laszip {
     pub(super) layout: Layout,
-    /// Points of each chunk but the last; `None` if every chunk has its own number.
+    /// Points in each chunk except the last; `None` if every chunk has its own number.
     pub(super) chunk_points: Option<u64>,
     pub(super) items: Vec<LazItem>,
 }
@@ -31,7 +31,7 @@ pub(super) struct Laszip {
 /// Finds and checks the record.
 ///
 /// # Errors
-/// [`crate::Error::Input`] if there is none, or none that can be decoded.
+/// [`crate::Error::Input`] if there is none, or if it describes an unsupported compression.
 pub(super) fn read(input: &Input, header: &Header) -> Result<Laszip> {
     let mut at = header.vlrs;
     while at + HEAD as u64 <= header.data {

@@ -1,4 +1,4 @@
-//! PLY with numbers as text, one record a line.
+//! PLY with numbers as text, one record in a line.
 
 use super::super::input::{Input, Range, STREAM_BUFFER};
 use super::super::number;
@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 use outcrop_ply::Property;
 use std::io::{BufRead, BufReader};
 
-/// Longest line that is read.
+/// Longest accepted line, in bytes.
 const LONGEST_LINE: usize = 1 << 20;
 
 pub(super) fn read<T: FromScalar>(
@@ -57,7 +57,7 @@ struct Lines<'a> {
     input: &'a Input,
     source: BufReader<Range<'a>>,
     line: Vec<u8>,
-    /// Where the line starts.
+    /// Offset of the line.
     at: u64,
 }
 

@@ -1,4 +1,4 @@
-//! Binary PLY: slabs of records on all threads, or one by one where vertices hold lists.
+//! Binary PLY: slabs of records on all threads, or one record after another if vertices contain lists.
 
 use super::super::input::{Input, Range, STREAM_BUFFER};
 use super::super::spool::{SourceWriter, sink_bytes};
@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 use outcrop_ply::{Element, Encoding, Property, Scalar};
 use std::io::{BufReader, Read};
 
-/// Bytes of records read at one time.
+/// Bytes of records read at a time.
 const SLAB: u64 = 2 << 20;
 
 fn scalar<T: FromScalar>(bytes: &[u8], kind: Scalar, encoding: Encoding) -> T {
@@ -27,7 +27,7 @@ pub(super) fn read<T: FromScalar>(
     }
 }
 
-/// Where the vertices start.
+/// Offset of the first vertex.
 fn skip_elements(input: &Input, cloud: &Cloud, writer: &SourceWriter<'_>) -> Result<u64> {
     let mut at = cloud.data;
     for element in &cloud.before {
@@ -123,7 +123,7 @@ fn one_by_one<T: FromScalar>(
     })
 }
 
-/// Reads records with lists, one after the other.
+/// Reader of records with lists, one after another.
 struct Records<'a> {
     input: &'a Input,
     encoding: Encoding,

@@ -30,7 +30,7 @@ impl Format {
     };
 }
 
-/// The vertices of a PLY file.
+/// The format PLY, of which the vertices are read.
 pub(super) struct Ply;
 
 impl PointFormat for Ply {
@@ -74,10 +74,10 @@ fn is_ply(head: &[u8]) -> bool {
     })
 }
 
-/// What a header says of the vertices.
+/// The description of the vertices in a header.
 struct Cloud {
     encoding: Encoding,
-    /// Where the elements start.
+    /// Offset of the first element.
     data: u64,
     /// The elements before the vertices.
     before: Vec<Element>,
@@ -87,7 +87,7 @@ struct Cloud {
 /// The element of the points.
 struct Vertex {
     element: Element,
-    /// Number and type of the properties x, y and z.
+    /// Index and type of the properties x, y and z.
     coordinates: [(usize, Scalar); 3],
 }
 
@@ -114,7 +114,7 @@ impl Cloud {
         })
     }
 
-    /// How the spool holds the points: single precision if all coordinates have it.
+    /// The type in the spool: single precision if all coordinates have it.
     fn native(&self) -> Native {
         let single = |v: &Vertex| v.coordinates.iter().all(|c| c.1 == Scalar::F32);
         match self.vertex.as_ref().is_some_and(single) {
@@ -155,10 +155,10 @@ impl PointFile for Cloud {
     }
 }
 
-/// A coordinate made from any scalar.
+/// A coordinate that can be converted from any scalar.
 trait FromScalar: super::spool::Coordinate {
     fn from_double(value: f64) -> Self;
-    /// A number in text; see [`number::parse`].
+    /// Parses a number in text; see [`number::parse`].
     fn parse(word: &[u8], decimals: &mut u32) -> Option<Self>;
 }
 
@@ -167,7 +167,7 @@ impl FromScalar for f32 {
         value as f32
     }
     fn parse(word: &[u8], decimals: &mut u32) -> Option<Self> {
-        // Straight to single precision: rounding twice may differ.
+        // Parsed directly as single precision, since rounding twice may differ.
         match std::str::from_utf8(word).ok()?.parse() {
             Ok(value) => Some(value),
             Err(_) => number::parse(word, false, decimals).map(|v| v as f32),

@@ -1,11 +1,11 @@
-//! How a text file writes its points, guessed from its first lines.
+//! The layout of points in a text file, inferred from its first lines.
 
 use super::super::number;
 
-/// Data lines that a guess must explain.
+/// Number of data lines used to infer the layout.
 const SAMPLE: usize = 50;
 
-/// What is between two numbers.
+/// Separator between numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Separator {
     /// Spaces and tabs.
@@ -26,29 +26,29 @@ impl Separator {
     }
 }
 
-/// How a text file writes its points.
+/// The layout of points in a text file.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Dialect {
     pub(super) separator: Separator,
     decimal_comma: bool,
     columns: [usize; 3],
-    /// Where the data start, behind byte order mark and header line.
+    /// Offset of the data, after byte order mark and header line.
     pub(super) start: u64,
-    /// Lines with one integer count the points that follow, as in PTS.
+    /// True if lines with a single integer give the number of following points, as in PTS.
     pub(super) counted: bool,
 }
 
-/// What a line holds.
+/// The content of a line.
 pub(super) enum Row {
     Blank,
     Point([f64; 3]),
     Count(u64),
-    /// Something else; what.
+    /// Anything else, with a description.
     Wrong(String),
 }
 
 impl Dialect {
-    /// Reads a line; `decimals` is raised to the largest number of decimals seen.
+    /// Parses a line; `decimals` is raised to the largest number of decimals found.
     pub(super) fn row(&self, line: &[u8], decimals: &mut u32) -> Row {
         let line = line.trim_ascii();
         if is_blank(line) {
@@ -103,7 +103,7 @@ fn is_blank(line: &[u8]) -> bool {
     line.is_empty() || line.starts_with(b"#") || line.starts_with(b"//")
 }
 
-/// A short text for error messages.
+/// A shortened text for error messages.
 fn shown(text: &[u8]) -> String {
     let cut = &text[..text.len().min(40)];
     let dots = if cut.len() < text.len() { "…" } else { "" };
@@ -114,13 +114,13 @@ fn count(line: &[u8]) -> Option<u64> {
     std::str::from_utf8(line).ok()?.parse().ok()
 }
 
-/// The lines of the head that are neither blank nor comments, with where each starts and ends.
+/// The lines of the head that are neither blank nor comments, each with its start and end offset.
 pub(super) fn lines(head: &[u8], whole: bool) -> Vec<(usize, usize, &[u8])> {
     let mut found = Vec::new();
     let mut at = 0;
     for line in head.split(|b| matches!(b, b'\n' | b'\r')) {
         let end = at + line.len();
-        // The last line of a part of a file is cut somewhere.
+        // The last line is incomplete unless the head is the whole file.
         if (end < head.len() || whole) && !is_blank(line.trim_ascii()) {
             found.push((at, end, line.trim_ascii()));
         }
@@ -132,7 +132,7 @@ pub(super) fn lines(head: &[u8], whole: bool) -> Vec<(usize, usize, &[u8])> {
     found
 }
 
-/// Guesses how the points are written, or says why this is no text with points.
+/// Infers the layout; the error explains why this is not a text with points.
 pub(super) fn guess(head: &[u8], whole: bool) -> Result<Dialect, String> {
     let mark = if head.starts_with(b"\xef\xbb\xbf") {
         3
@@ -167,7 +167,7 @@ pub(super) fn guess(head: &[u8], whole: bool) -> Result<Dialect, String> {
         if explains(&dialect, &lines) {
             return Ok(dialect);
         }
-        // The first line may be names.
+        // The first line may contain column names.
         if lines.len() > 1 && is_header(first) {
             dialect.start = (mark + first_end) as u64;
             dialect.columns = named_columns(first).unwrap_or([0, 1, 2]);
@@ -183,7 +183,7 @@ pub(super) fn guess(head: &[u8], whole: bool) -> Result<Dialect, String> {
     ))
 }
 
-/// True if the first data line is a point; later lines may be wrong, with an error that says where.
+/// True if the first data line is a point. Errors in later lines are reported when they are read.
 fn explains(dialect: &Dialect, lines: &[(usize, usize, &[u8])]) -> bool {
     let mut decimals = 0;
     let mut points = 0;
@@ -205,13 +205,13 @@ pub(super) fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
         .filter(|w| !w.is_empty())
 }
 
-/// True for a line of names: every word starts with a letter or a sign that no number has.
+/// True for a line of column names: every word starts with a letter or a sign that no number starts with.
 fn is_header(line: &[u8]) -> bool {
     let mut decimals = 0;
     words(line).all(|w| number::parse(w, false, &mut decimals).is_none())
 }
 
-/// The columns called x, y and z.
+/// The columns named x, y and z.
 fn named_columns(header: &[u8]) -> Option<[usize; 3]> {
     let find = |name: &str| words(header).position(|w| w.eq_ignore_ascii_case(name.as_bytes()));
     Some([find("x")?, find("y")?, find("z")?])

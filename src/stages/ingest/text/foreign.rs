@@ -1,9 +1,9 @@
-//! Formats known by name that are not read.
+//! Names of formats that are recognised but not supported.
 
 use super::super::number;
 use super::dialect::{lines, words};
 
-/// The name of a format that holds geometry and is not read.
+/// The name of an unsupported format with geometry.
 pub(super) fn name(head: &[u8]) -> Option<&'static str> {
     if head.starts_with(b"ASTM-E57") {
         Some("E57")

@@ -1,13 +1,13 @@
-//! Lines of a slab of a file: those that start in it.
+//! The lines that start in a slab of a file.
 
 use super::super::input::Input;
 use crate::error::Result;
 
 /// Bytes of a slab.
 pub(super) const SLAB: u64 = 2 << 20;
-/// Longest line that is read.
+/// Longest accepted line, in bytes.
 pub(super) const LONGEST_LINE: u64 = 1 << 20;
-/// Bytes read at one time to find the end of a slab's last line.
+/// Bytes read at a time to find the end of a slab's last line.
 const STEP: usize = 4 << 10;
 
 fn is_end(byte: u8) -> bool {
@@ -17,14 +17,14 @@ fn is_end(byte: u8) -> bool {
 /// The bytes of the lines that start in one slab.
 pub(super) struct Lines {
     bytes: Vec<u8>,
-    /// Where `bytes` start in the file.
+    /// Offset of `bytes` in the file.
     at: u64,
 }
 
 impl Lines {
-    /// Reads the lines that start in the slab at `start`; the file's lines start at `first`.
+    /// Reads the lines that start in the slab at `start`; `first` is the offset of the file's first line.
     pub(super) fn read(input: &Input, first: u64, start: u64) -> Result<Self> {
-        // The byte before tells whether a line starts right here.
+        // The preceding byte shows if a line starts exactly here.
         let before = u64::from(start > first);
         let mut bytes = vec![0u8; (SLAB + before) as usize];
         let got = input.read_at(start - before, &mut bytes)?;
@@ -41,7 +41,7 @@ impl Lines {
             }
         };
         let full = got as u64 == SLAB + before;
-        // A line that starts right behind the slab belongs to the next one.
+        // A line that starts exactly at the end of the slab belongs to the next one.
         if full && bytes.len() > skip && !bytes.last().is_some_and(|b| is_end(*b)) {
             Self::complete(input, start - before, &mut bytes)?;
         }
@@ -81,7 +81,7 @@ impl Lines {
         )
     }
 
-    /// The lines, each with its place in the file.
+    /// The lines, each with its offset in the file.
     pub(super) fn iter(&self) -> impl Iterator<Item = (u64, &[u8])> {
         let mut at = self.at;
         self.bytes.split(|b| is_end(*b)).map(move |line| {
@@ -105,7 +105,7 @@ pub(super) fn number_of(input: &Input, at: u64) -> Result<u64> {
             break;
         }
         for &byte in &buffer[..got] {
-            // CR LF is one end.
+            // CR LF is one line end.
             if byte == b'\r' || (byte == b'\n' && last != b'\r') {
                 number += 1;
             }

@@ -21,10 +21,10 @@ impl Format {
     };
 }
 
-/// Bytes of a line of text: the fewest with a point, and what is usual.
+/// Bytes of a line with a point: the minimum, and a typical value.
 const LINE: [u64; 2] = [6, 30];
 
-/// A point a line.
+/// The format with one point in a line.
 pub(super) struct Text;
 
 impl PointFormat for Text {
@@ -40,7 +40,7 @@ impl PointFormat for Text {
         &["xyz", "txt", "csv", "pts", "asc", "xyzrgb", "xyzn", "neu"]
     }
 
-    /// Numbers can mean anything.
+    /// Any text may contain numbers.
     fn has_signature(&self) -> bool {
         false
     }

@@ -1,4 +1,4 @@
-//! Turns that are given up for want of memory, and taken again.
+//! Tests: turns that are abandoned for lack of memory, and repeated.
 
 use super::super::base::base;
 use super::super::interior::insert;
@@ -16,7 +16,7 @@ use std::sync::Arc;
 const SIDE: i32 = 50;
 const BLOCK: u32 = 100;
 
-/// A square sheet, up to a spacing off its plane: there is something to insert everywhere.
+/// A square sheet with noise of up to one spacing, so that there are candidates everywhere.
 fn sheet() -> Vec<Point> {
     let noise = |n: i32| {
         let n = (n as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
@@ -26,7 +26,7 @@ fn sheet() -> Vec<Point> {
     (0..SIDE * SIDE).map(at).collect()
 }
 
-/// What a pass leaves for each block, and its counts.
+/// The result of a pass for each block, and its counts.
 #[derive(Debug, PartialEq)]
 struct Left {
     added: Vec<Vec<TriangleTo>>,
@@ -34,8 +34,8 @@ struct Left {
     counts: InsertStats,
 }
 
-/// Takes the pass across the sheet, each turn first within no memory at all and then within more and more
-/// if it is to be `starved`; how many turns there were, and how often one was given up.
+/// Takes the pass over the sheet. If `starved`, each turn is first tried without memory, and then with more
+/// and more. Returns the result, the number of turns, and how often one was abandoned.
 fn across(starved: bool) -> (Left, [usize; 2]) {
     let memory = MemoryPool::new(MINIMUM_BUDGET).unwrap();
     let folder = std::env::temp_dir();
@@ -65,7 +65,7 @@ fn across(starved: bool) -> (Left, [usize; 2]) {
     let (mut turns, mut given_up) = (0, 0);
     while pass.group < blocks.count() {
         let group = pass.group;
-        // No further than this turn.
+        // Not beyond this turn.
         let ready = |block: u32| base.spans[block as usize].0 as usize <= group;
         let mut most = starved.then_some(0);
         let free = workspace.memory.available();
@@ -99,7 +99,7 @@ fn a_turn_that_is_given_up_is_taken_again() {
     assert_eq!(given_up, 0);
     assert!(want.counts.accepted > 50, "{:?}", want.counts);
     let (got, [turns, given_up]) = across(true);
-    // At once, when a block is to be read, and when its triangles are to be kept.
+    // At the start, before a block is read, and before its triangles are stored.
     assert!(given_up > 10 * turns, "{given_up} of {turns}");
     assert_eq!(got, want);
 }

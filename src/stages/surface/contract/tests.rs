@@ -1,18 +1,18 @@
-//! Contraction against a plain one, and by hand.
+//! Compares contraction with a plain implementation, and with examples.
 
 use super::*;
 use proptest::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Triangles, outside and evidence of each node.
+/// Triangles, outside weight and evidence of each node.
 type Nodes = Vec<(u64, i64, i64)>;
 
-/// A graph that adds up everything anew whenever it is asked.
+/// A graph that recomputes all sums whenever they are needed.
 struct Plain {
     nodes: Nodes,
     sums: BTreeMap<(u32, u32), i64>,
     sky: Option<u32>,
-    /// Nodes that nothing connects with the sky.
+    /// Nodes that only evidence connects with the sky.
     bare: BTreeSet<u32>,
 }
 
@@ -49,7 +49,7 @@ impl Plain {
         (dominates || few) && !against
     }
 
-    /// The node of each node, and whether it is turned there.
+    /// For each node, the node that contains it, and true if it is turned there.
     fn contract(&mut self, limit: Limit) -> Vec<(u32, bool)> {
         let mut of: Vec<_> = (0..self.nodes.len() as u32).map(|v| (v, false)).collect();
         let mut due: BTreeSet<(u32, u32)> = self.sums.keys().copied().collect();
@@ -162,7 +162,7 @@ proptest! {
     }
 }
 
-/// Nodes of a triangle each.
+/// Nodes of one triangle each.
 fn single(count: usize) -> Nodes {
     vec![(1, 0, 0); count]
 }
@@ -185,7 +185,7 @@ fn a_ring_that_cannot_agree_is_cut_at_its_least_connection() {
     }
 }
 
-/// Two connections of 4 to what is one node by then weigh more than one of 7.
+/// Two connections of weight 4 to nodes that have been contracted weigh more than one of 7.
 #[test]
 fn parallel_sums_add_up_before_they_are_compared() {
     let pairs = [(0, 1, 10), (0, 2, 4), (1, 2, 4), (2, 3, 5), (3, 0, -7)];
@@ -198,7 +198,7 @@ fn parallel_sums_add_up_before_they_are_compared() {
 fn ties_are_broken_by_numbers_and_sums_of_nothing_run_alike() {
     let equal = [(1, 2, -1), (0, 2, 1), (0, 1, 1)];
     let mut sets = graph(&single(3), &equal, false).contract(Limit::None);
-    // The first two agree with 0; the last one has nothing left to say.
+    // The first two follow node 0; the last connection has no influence any more.
     assert_eq!(sets.relation(0, 1), Some(false));
     assert_eq!(sets.relation(1, 2), Some(false));
 }
@@ -206,7 +206,7 @@ fn ties_are_broken_by_numbers_and_sums_of_nothing_run_alike() {
 #[test]
 fn a_part_contracts_what_is_small_or_sure() {
     let most = |triangles| Limit::Triangles(triangles);
-    // Node 1 could be gained by the outside; node 0 has nothing but the pair.
+    // Turning node 1 could pay because of its connections outside; node 0 has no other connection.
     let nodes = vec![(3, 0, 0), (4, 1000, 0)];
     let mut sure = graph(&nodes, &[(0, 1, 1)], false);
     assert_eq!(sure.contract(most(0)).relation(0, 1), Some(false));
@@ -219,7 +219,7 @@ fn a_part_contracts_what_is_small_or_sure() {
 
 #[test]
 fn what_faces_up_is_not_turned_by_less() {
-    // Both face up, and should not run alike; an upward weight is 16 here, or 32.
+    // Both face up, but should not be oriented alike; their upward weights are 16 and 32.
     for (sum, joined) in [(-15, None), (-16, Some(true)), (15, Some(false))] {
         let mut graph = graph(&vec![(1, 0, 1), (1, 0, 4)], &[(0, 1, sum)], false);
         let mut sets = graph.contract(Limit::Triangles(100));
@@ -240,7 +240,7 @@ fn the_sky_turns_what_faces_down_unless_more_speaks_against_it() {
         let mut sets = graph.contract(Limit::None);
         let found = [0, 1].map(|node| sets.relation(node, sky));
         assert_eq!(found, turned.map(Some), "{sum}");
-        // Without evidence and without a connection it stays by itself.
+        // Without evidence and connections it remains a component of its own.
         assert_eq!(sets.relation(2, sky), None);
     }
 }
@@ -255,7 +255,7 @@ fn the_sky_holds_no_small_piece_that_nothing_connects() {
         let mut graph = graph(&vec![(1, 0, up)], &[], true);
         assert_eq!(graph.contract(Limit::None).relation(0, 1), held, "{up}");
     }
-    // Connections that cancel out are connections.
+    // Connections whose sum is 0 are still connections.
     let nodes = vec![(1, 0, 90_000), (1, 0, 80_000), (1, 0, 4)];
     let mut graph = graph(&nodes, &[(0, 2, 5), (1, 2, -5)], true);
     assert_eq!(graph.contract(Limit::None).relation(2, 3), Some(false));

@@ -1,4 +1,4 @@
-//! Patches of bands with folds.
+//! Tests of patches on bands with folds.
 
 use super::super::evidence::{Division, cosine, weight};
 use super::super::star::opposed;
@@ -8,8 +8,8 @@ use crate::method::METHOD;
 use crate::stages::located::Located;
 use proptest::prelude::*;
 
-/// The triangles of a sheet `wide` long and three points high that closes on itself, with a twist or
-/// without, in the order of their ids; `names` are the ids of its points, and `gone` are missing.
+/// The triangles of a closed band, `wide` points long and three points high, with a twist or without, in the
+/// order of their ids; `names` are the ids of its points, and the triangles `gone` are left out.
 pub(in super::super) fn band(
     wide: usize,
     twist: bool,
@@ -36,7 +36,7 @@ pub(in super::super) fn band(
     all
 }
 
-/// The edges between two triangles: the earlier and the later one, and whether one must be turned.
+/// The edges between two triangles: the earlier and the later one, and true if one must be turned.
 pub(in super::super) fn inner_edges(
     ids: Range<u32>,
     triangles: &[Triangle],
@@ -54,7 +54,7 @@ pub(in super::super) fn inner_edges(
     edges
 }
 
-/// Evidence of how triangles lie, and nothing else.
+/// Evidence with positions only.
 pub(in super::super) fn evidence(places: &[Point], division: Division) -> Evidence {
     Evidence {
         places: Located::of(places),
@@ -63,11 +63,11 @@ pub(in super::super) fn evidence(places: &[Point], division: Division) -> Eviden
     }
 }
 
-/// Ids in some order, and places.
+/// Ids in a random order, and positions.
 pub(in super::super) fn points(count: usize) -> impl Strategy<Value = (Vec<u32>, Vec<Point>)> {
     let names: Vec<u32> = (0..count as u32).collect();
     let places = prop::collection::vec(prop::array::uniform3(0..50), count);
-    // Flat, or not at all.
+    // Flat, or with random heights.
     let places = (places, any::<bool>()).prop_map(|(mut places, flat)| {
         let flatten = |p: &mut Point| p[2] = if flat { p[2] / 25 } else { p[2] };
         places.iter_mut().for_each(flatten);
@@ -118,7 +118,7 @@ proptest! {
     }
 }
 
-/// A flat sheet that is folded once.
+/// A flat band that is folded once.
 #[test]
 fn a_patch_ends_at_a_fold_and_where_its_run_ends() {
     let names: Vec<u32> = (0..30).collect();

@@ -1,4 +1,4 @@
-//! Where a block is cut.
+//! Tests of the cuts inside a block.
 
 use super::super::evidence::Division;
 use super::super::parity::ParitySets;
@@ -7,7 +7,7 @@ use super::*;
 use crate::geom::Point;
 use proptest::prelude::*;
 
-/// Orients them, in one block, with their points where `places` says.
+/// Orients triangles in one block, with points at `places`.
 fn oriented(
     triangles: &[Triangle],
     places: &[Point],
@@ -56,8 +56,8 @@ proptest! {
     }
 }
 
-/// A band with a twist lies flat but for one place, and that is not where its ids end. The later triangle
-/// goes of each edge that is cut, so it may be one beside the fold.
+/// A twisted band that is flat except for one fold, which is not where its ids wrap around. At each cut edge
+/// the later triangle is removed, so that may be a triangle beside the fold.
 #[test]
 fn the_surface_is_cut_where_it_is_folded() {
     let names: Vec<u32> = (0..36).collect();
@@ -85,8 +85,8 @@ fn the_surface_is_cut_where_it_is_folded() {
     }
 }
 
-/// A torn band with a twist. Two edges contradict, both of one triangle: once that is gone, the other
-/// edge is, too.
+/// A torn twisted band. Two edges contradict the rest, both of one triangle: if it is removed, neither edge
+/// is left.
 #[test]
 fn a_removed_triangle_removes_no_others() {
     let triangles = [

@@ -1,4 +1,4 @@
-//! The nearest candidates of a query as a list, nearest first.
+//! The sorted list of a query's nearest neighbours.
 
 use super::{APPROXIMATE, CORRECTIONS, Search, above};
 use crate::geom::{Point, distance2, sub};
@@ -13,12 +13,12 @@ use std::ops::RangeInclusive;
 /// Up to this number, keys are sorted by counting.
 const MOST_RANKED: usize = 96;
 
-/// The limit of a query against the last distance of the query before: what is picked is sorted.
+/// Factor from the last distance of the previous query to the limit of a query that sorts what it picks.
 const MARGIN: f32 = 1.08;
 
 impl Search {
-    /// Picks the measured candidates whose approximate squared distance is at most `limit`, in order of
-    /// id; how many.
+    /// Picks the measured candidates whose approximate squared distance is at most `limit`, in order of id;
+    /// returns how many there are.
     #[inline(always)]
     fn pick_measured<P: Pick>(&mut self, limit: f32) -> usize {
         let distances = &self.distances[..self.measured().len()];
@@ -26,8 +26,8 @@ impl Search {
         pick_body::<P, 4>(distances, limit, from, self.picked.slices_mut())
     }
 
-    /// Lists those picked within `limit` in order of (distance, id); the squared distance up to which
-    /// all are listed.
+    /// Lists the picked candidates within `limit` in order of (distance, id). Returns the squared distance up
+    /// to which all are listed.
     #[inline(always)]
     fn list_picked(&mut self, picked: usize, point: Point, own: u32, limit: f32) -> u64 {
         let below = (f64::from(limit) * (1.0 - APPROXIMATE)) as u64;
@@ -41,7 +41,7 @@ impl Search {
         complete2
     }
 
-    /// What is picked is in order of id, so distance and place in one word sort as they must.
+    /// Candidates are picked in order of id, so a word of distance and place sorts by (distance, id).
     #[inline(always)]
     fn list_short(&mut self, picked: usize, point: Point, own: u32, complete2: u64, bits: u32) {
         let [x, y, z] = self.picked.coordinates(picked);
@@ -55,7 +55,7 @@ impl Search {
         for (place, (key, (((x, y), z), id))) in (0i64..).zip(keys.iter_mut().zip(picks)) {
             let d2 = distance2([*x, *y, *z], point);
             let listed = (d2 <= complete2) & (*id != own);
-            // The others are behind all that are listed.
+            // The others are sorted behind all listed ones.
             *key = if listed {
                 (d2 << bits) as i64 | place
             } else {
@@ -94,7 +94,7 @@ impl Search {
         list_keys(&mut self.near, &mut self.long_keys, columns, point);
     }
 
-    /// Lists of the candidates at `places`, ascending, those `within` these squared distances.
+    /// Lists the candidates at `places`, ascending, whose squared distances are in `within`.
     pub(super) fn list_places(&mut self, point: Point, own: u32, within: RangeInclusive<u64>) {
         self.long_keys.clear();
         let columns = &self.candidates.columns;
@@ -105,8 +105,8 @@ impl Search {
     }
 }
 
-/// What points, in order of id, are sorted by: squared distance and place in the columns; `None` unless
-/// the distance is `within` these. A point is no neighbour of its own.
+/// Sort keys of points in order of id: squared distance and place in the columns; `None` unless the distance
+/// is in `within`. A point is not its own neighbour.
 #[inline(always)]
 fn key<'a>(
     columns: &'a Columns,
@@ -135,18 +135,18 @@ fn list_keys(near: &mut Neighbors, keys: &mut [(u64, u32)], columns: &Columns, p
 }
 
 kernel! {
-    /// Measures the candidates from `point` and lists the `k` nearest neighbours, and some more;
-    /// the squared distance up to which all are listed. `None` if there are fewer than `k` as far as
-    /// the candidates are complete.
+    /// Measures the candidates from `point` and lists the `k` nearest neighbours, and possibly more. Returns
+    /// the squared distance up to which all are listed; `None` if there are fewer than `k` within the
+    /// distance up to which the candidates are complete.
     pub(super) fn list_nearest(search: &mut Search, point: Point, own: u32, k: usize) -> Option<u64> = nearest_body<Eight>
 }
 
 #[inline(always)]
 fn nearest_body<P: Pick>(search: &mut Search, point: Point, own: u32, k: usize) -> Option<u64> {
     let most = above(search.candidates.complete2);
-    // The point itself is a candidate; one more, for those that are not sure to be within.
+    // The point itself is a candidate; one more for those not certain to be within the limit.
     let wanted = k + 2;
-    // The neighbours of the query before are about as far.
+    // The neighbours of the previous query are at about the same distances.
     let last = search.near.get(k.wrapping_sub(1));
     let likely = likely_body(last.map_or(0.0, |n| n.distance2 as f32) * MARGIN, most);
     let (mut picked, mut limit) =
@@ -173,8 +173,8 @@ fn nearest_body<P: Pick>(search: &mut Search, point: Point, own: u32, k: usize) 
     }
 }
 
-/// A limit to begin with, up to `most`: somewhat more than the last of so many was far in the query
-/// before, `0.0` if nothing is known.
+/// An initial limit, up to `most`, from the distance `last` in the previous query; `most` if that is unknown
+/// (0.0).
 #[inline(always)]
 pub(super) fn likely_body(last: f32, most: f32) -> f32 {
     if last > 0.0 {
@@ -184,21 +184,22 @@ pub(super) fn likely_body(last: f32, most: f32) -> f32 {
     }
 }
 
-/// What is picked is sorted or divided, which is more than counting where it is much.
+/// Number of picked candidates above which the limit is lowered: sorting or dividing them costs more than
+/// counting.
 #[inline(always)]
 fn too_many_body(wanted: usize) -> usize {
     wanted + wanted.min(MOST_RANKED / 2)
 }
 
-/// A limit up to `most` to try after one within which only `count` are.
+/// The next limit to try, up to `most`, after a limit that contains only `count`.
 #[inline(always)]
 fn wider_body(limit: f32, count: usize, wanted: usize, most: f32) -> f32 {
     let grow = (wanted + 4) as f32 / (count.max(1) as f32);
     (limit * grow.clamp(1.1, 8.0) + 4.0).min(most)
 }
 
-/// A limit up to `most` within which `wanted` of the distances are and not many more, or `most` if
-/// there are not so many; from one that is likely.
+/// A limit up to `most` that contains `wanted` of the distances and not many more, starting from `likely`;
+/// `most` if there are fewer.
 #[inline(always)]
 fn reach_body(
     distances: &[f32],
@@ -221,8 +222,8 @@ fn reach_body(
     }
 }
 
-/// Picks as [`pick_near_body`] within a limit that is likely to hold `wanted`, or a wider one, up to the
-/// end of the `limits`; how many, and within which.
+/// As [`pick_near_body`], with a limit that is likely to contain `wanted` candidates, widened up to the end
+/// of `limits` if it does not. Returns how many were picked, and the limit.
 #[inline(always)]
 pub(super) fn pick_enough_body<P: Pick, const DISTANCES: bool>(
     search: &mut Search,
@@ -240,7 +241,7 @@ pub(super) fn pick_enough_body<P: Pick, const DISTANCES: bool>(
 }
 
 /// Picks the candidates whose approximate squared distance to `point` is at most `limit`, in order of id,
-/// with their ids or with these distances; how many. Nothing is measured for later.
+/// with their ids or these distances as numbers. Returns how many there are. The distances are not stored.
 #[inline(always)]
 fn pick_near_body<P: Pick, const DISTANCES: bool>(
     search: &mut Search,
@@ -274,7 +275,7 @@ fn pick_near_body<P: Pick, const DISTANCES: bool>(
     count
 }
 
-/// Measures the candidates from `point`.
+/// Computes the approximate squared distances of the candidates from `point`.
 #[inline(always)]
 fn measure_body(search: &mut Search, point: Point) {
     let candidates = &search.candidates;

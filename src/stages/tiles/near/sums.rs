@@ -1,5 +1,5 @@
-//! Sums over the nearest neighbours of many points: which they are matters, in what order they
-//! stand does not, so nothing is sorted.
+//! Sums over the nearest neighbours of many points. Only the set of neighbours matters, not their order, so
+//! nothing is sorted.
 
 use super::list::{likely_body, pick_enough_body};
 use super::{APPROXIMATE, OwnPage, Query, Search, above};
@@ -9,18 +9,19 @@ use crate::kernels::{BLOCK, MOST_SUMMED, Pick, SUMMED_LIMIT2, kernel};
 use crate::stages::tiles::Tile;
 use crate::stages::tiles::neighbors::Sums;
 
-/// How often a limit that divides the nearest from the others is corrected.
+/// Most corrections of the limit that separates the nearest from the others.
 const DIVISIONS: usize = 16;
 
-/// The limit of a query against that of the query before: what is picked is only divided.
+/// Factor from the limit of the previous query to that of a query that only divides what it picks.
 const MARGIN: f32 = 1.3;
 
-/// No number up to this many times the limit: then approximate distances tell inside from outside.
+/// No number may lie between the limit and this multiple of it. Approximate distances then separate
+/// correctly.
 const GAP: f32 = 1.0 + 8.0 * APPROXIMATE as f32;
 
 impl Tile {
-    /// Calls `each` with the sums over the `k` nearest neighbours of every point whose id is
-    /// `wanted`, in order of id; with `None` where the halo cannot certify which they are.
+    /// Calls `each` with the sums over the `k` nearest neighbours of every point whose id is `wanted`, in
+    /// order of id; with `None` if the halo cannot certify these neighbours.
     pub fn for_some_sums(
         &self,
         k: usize,
@@ -37,8 +38,8 @@ impl Tile {
         });
     }
 
-    /// Sums over the `k` nearest neighbours of point `index`; false if the halo cannot certify which
-    /// they are.
+    /// Sums over the `k` nearest neighbours of point `index`; false if the halo cannot certify these
+    /// neighbours.
     fn sums(
         &self,
         own: &OwnPage,
@@ -68,8 +69,8 @@ impl Tile {
 }
 
 impl Query<'_> {
-    /// Sums over the `count` nearest neighbours, for less than a list of them. `None` if the halo does
-    /// not reach that far.
+    /// Sums over the `count` nearest neighbours, computed faster than a list. `None` if the halo does not
+    /// reach that far.
     #[must_use]
     pub fn sums(&mut self, count: usize) -> Option<Sums> {
         let mut sums = Sums::default();
@@ -104,12 +105,13 @@ impl Query<'_> {
     }
 }
 
-/// Why there are no sums.
+/// The reason why there are no sums.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Unknown {
-    /// There are fewer neighbours as far as the candidates are complete.
+    /// There are too few neighbours within the distance up to which the candidates are complete.
     Few,
-    /// Ties at the last place, which are decided by id, or distances too close or too large to tell.
+    /// Ties at the last place, which would be decided by id; or distances too close or too large to be
+    /// separated.
     Close,
 }
 
@@ -132,7 +134,7 @@ fn sum_body<P: Pick>(
     let [_, _, _, numbers] = search.picked.slices_mut();
     numbers[picked..room].fill(f32::INFINITY.to_bits());
     let distances = bytemuck::cast_slice(search.picked.numbers(room));
-    // The point itself is one of them, and adds nothing to the sums.
+    // The point itself is included, and adds nothing to the sums.
     if picked <= k {
         return Err(Unknown::Few);
     }
@@ -152,15 +154,15 @@ fn sum_body<P: Pick>(
     Ok(())
 }
 
-/// A limit within which exactly `wanted` of `count` numbers are, so that no other is close to it; they
-/// are about evenly spread up to `most`.
+/// A limit within which exactly `wanted` of `count` numbers lie, with no other number close to it; the
+/// numbers are roughly evenly distributed up to `most`.
 #[inline(always)]
 fn divide_body<P: Pick>(numbers: &[f32], count: usize, wanted: usize, most: f32) -> Option<f32> {
     let (mut low, mut high) = (0.0, most);
     let between = most / count as f32;
     let (mut limit, mut count) = (most, count);
     for division in 0..DIVISIONS {
-        // As if they were spread evenly; in the middle where that leads nowhere.
+        // The secant step for an even distribution; bisection where that does not converge.
         limit += (wanted as f32 + 0.5 - count as f32) * between;
         if division % 4 == 3 || limit <= low || limit >= high {
             limit = 0.5 * (low + high);
@@ -178,7 +180,7 @@ fn divide_body<P: Pick>(numbers: &[f32], count: usize, wanted: usize, most: f32)
     None
 }
 
-/// How many of whole blocks of numbers are at most `limit`.
+/// The number of values in whole blocks that are at most `limit`.
 #[inline(always)]
 fn count_within_body<P: Pick>(numbers: &[f32], limit: f32) -> usize {
     let blocks = numbers.as_chunks::<BLOCK>().0.iter();
@@ -186,7 +188,7 @@ fn count_within_body<P: Pick>(numbers: &[f32], limit: f32) -> usize {
     within.sum::<u32>() as usize
 }
 
-/// First and second sums over the points within `limit`, and the largest squared distance.
+/// First and second moments of the points within `limit`, and the largest squared distance.
 #[inline(always)]
 fn sums_within(
     [x, y, z]: [&[i32]; 3],
