@@ -50,9 +50,21 @@ impl<'a> Clock<'a> {
         total: u64,
         work: impl FnOnce() -> Result<T>,
     ) -> Result<T> {
+        self.round(name, name, unit, total, work)
+    }
+
+    /// A stage with the name `step` among the steps of the run: one of several rounds of stage `name`.
+    pub(crate) fn round<T: Persist>(
+        &mut self,
+        name: &'static str,
+        step: &str,
+        unit: &'static str,
+        total: u64,
+        work: impl FnOnce() -> Result<T>,
+    ) -> Result<T> {
         let workspace = self.workspace;
         let mut now = false;
-        let (value, took) = workspace.once(name, || {
+        let (value, took) = workspace.once(step, || {
             now = true;
             let io = &workspace.io;
             let (start, read, written) = (Instant::now(), io.read(), io.written());

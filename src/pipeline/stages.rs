@@ -205,7 +205,8 @@ impl<'a> Stages<'a> {
         workspace.trim();
         let points = self.report.points;
         for round in 1..=params.smooth {
-            store = self.clock.stage("smooth", "points", points, || {
+            let step = format!("smooth {round}");
+            store = self.clock.round("smooth", &step, "points", points, || {
                 let (k, smoothing) = (params.neighbors, params.smoothing);
                 smooth(&store, tiles, k, smoothing, round, workspace)
             })?;

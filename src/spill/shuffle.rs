@@ -92,7 +92,7 @@ impl<R: Row> Shuffle<R> {
         receivers: usize,
         wanted: impl Fn(Option<&R>, &R) -> bool,
     ) -> Result<Table<R>> {
-        workspace.once("deliver", || {
+        workspace.once(&format!("deliver {}", self.name), || {
             let name = format!("{}.sections", self.name);
             let table = Table::create(workspace, &name, receivers)?;
             if let Some(sent) = self.sent {

@@ -167,7 +167,7 @@ impl<R: Row> Sorter<R> {
             push(&numbers)?;
             return Ok(all);
         }
-        let step = workspace.step("runs")?;
+        let step = workspace.step(&format!("runs {}", self.name))?;
         let mut left: BTreeMap<u32, u64> = parts.iter().copied().collect();
         for (number, (name, taken)) in step.finished::<(String, Vec<u32>)>(workspace)? {
             let mut state = self.state();
@@ -274,7 +274,7 @@ impl<R: Row> Sorter<R> {
         }
         state.buffer = Vec::new();
         state.tell(0);
-        let step = workspace.step("merges")?;
+        let step = workspace.step(&format!("merges {}", self.name))?;
         for (number, (name, merged)) in step.finished::<(String, Vec<String>)>(workspace)? {
             state.made = state.made.max(number as usize + 1);
             state.runs.retain(|run| !merged.contains(&run.name()));

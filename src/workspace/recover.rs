@@ -131,7 +131,6 @@ pub fn recover(
                 .as_deref()
                 .unwrap_or("the run")
                 .trim_start_matches('/');
-            let stage = stage.split('#').next().unwrap_or(stage);
             observer.warn(&format!(
                 "{}: damaged: {names}; what it was made from is gone, so the run goes back to the \
                  beginning of {stage}",
@@ -171,7 +170,7 @@ mod tests {
             },
         };
         let unit = Record::Unit {
-            step: "/step#1".into(),
+            step: "/step".into(),
             unit: 0,
             puts: vec![put],
             payload: Vec::new(),
@@ -191,7 +190,7 @@ mod tests {
             output: &Default::default(),
         };
         let (history, end) = recover(&entries, 3, &places, &Silent, &Cancel::new()).unwrap();
-        assert!(history.places("a").is_empty() && history.units("/step#1").is_empty());
+        assert!(history.places("a").is_empty() && history.units("/step").is_empty());
         assert_eq!(end, 1);
     }
 

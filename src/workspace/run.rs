@@ -10,7 +10,7 @@ use super::keeper::{Keeper, Leaving};
 use super::place::{Place, Put};
 use crate::error::Result;
 use std::cell::RefCell;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::fs::File;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -37,8 +37,8 @@ pub struct Run {
 #[derive(Debug, Default)]
 struct Scope {
     path: String,
-    /// Steps begun inside, by name.
-    begun: HashMap<&'static str, u32>,
+    /// Names of the steps begun inside.
+    begun: HashSet<String>,
 }
 
 thread_local! {
@@ -140,15 +140,16 @@ impl Run {
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Disk`].
-    pub fn begin(&self, name: &'static str) -> Result<String> {
+    pub fn begin(&self, name: &str) -> Result<String> {
         self.let_go()?;
         let mut scopes = lock(&self.scopes);
         let (depth, Some(scope)) = (scopes.len(), scopes.last_mut()) else {
             return Ok(String::new());
         };
-        let number = scope.begun.entry(name).or_default();
-        *number += 1;
-        let path = format!("{}/{name}#{number}", scope.path);
+        // A resumed run would take the result of one for that of the other.
+        let new = scope.begun.insert(name.to_owned());
+        assert!(new, "two steps of {:?} have the name {name:?}", scope.path);
+        let path = format!("{}/{name}", scope.path);
         drop(scopes);
         if depth == 1 && !self.history.began(&path) {
             self.journal.append(&Record::Begin(path.clone()))?;
@@ -160,7 +161,7 @@ impl Run {
     pub fn enter(&self, path: &str) {
         lock(&self.scopes).push(Scope {
             path: path.to_owned(),
-            begun: HashMap::new(),
+            begun: HashSet::new(),
         });
     }
 

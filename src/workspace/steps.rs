@@ -7,6 +7,26 @@ use super::run::{Notes, Run};
 use crate::error::Result;
 use std::sync::{Arc, Mutex, PoisonError};
 
+/// The name of a step that consists of units, and the name under which their memory is reserved.
+#[derive(Debug)]
+pub struct UnitsName {
+    step: String,
+    memory: &'static str,
+}
+
+impl From<&'static str> for UnitsName {
+    fn from(name: &'static str) -> Self {
+        Self::from((name, name))
+    }
+}
+
+impl<S: Into<String>> From<(S, &'static str)> for UnitsName {
+    fn from((step, memory): (S, &'static str)) -> Self {
+        let step = step.into();
+        Self { step, memory }
+    }
+}
+
 /// Inside a step as long as it lives.
 struct Inside<'a>(&'a Run);
 
@@ -30,11 +50,7 @@ impl Workspace {
     ///
     /// # Errors
     /// What `work` returned, [`crate::Error::Io`], [`crate::Error::Disk`].
-    pub fn once<T: Persist>(
-        &self,
-        name: &'static str,
-        work: impl FnOnce() -> Result<T>,
-    ) -> Result<T> {
+    pub fn once<T: Persist>(&self, name: &str, work: impl FnOnce() -> Result<T>) -> Result<T> {
         let Some(run) = &self.shared.run else {
             return work();
         };
@@ -60,7 +76,7 @@ impl Workspace {
     /// See [`Workspace::for_each_unit`]; what `each` returned.
     pub fn units<T: Persist + Send>(
         &self,
-        name: &'static str,
+        name: impl Into<UnitsName>,
         count: usize,
         bytes_of: impl Fn(usize) -> u64 + Sync,
         work: impl Fn(usize) -> Result<T> + Sync,
@@ -71,10 +87,11 @@ impl Workspace {
             let mut each = each.lock().unwrap_or_else(PoisonError::into_inner);
             (*each)(unit, value)
         };
+        let UnitsName { step, memory } = name.into();
         let Some(run) = &self.shared.run else {
-            return self.for_each_unit(name, count, bytes_of, |unit| hand_on(unit, work(unit)?));
+            return self.for_each_unit(memory, count, bytes_of, |unit| hand_on(unit, work(unit)?));
         };
-        let step = run.begin(name)?;
+        let step = run.begin(&step)?;
         let mut left: Vec<usize> = Vec::new();
         let mut finished = run.finished(&step).into_iter().peekable();
         for unit in 0..count {
@@ -88,7 +105,7 @@ impl Workspace {
             hand_on(unit, value)?;
         }
         let bytes_of = |n: usize| bytes_of(left[n]);
-        self.for_each_unit(name, left.len(), bytes_of, |n| {
+        self.for_each_unit(memory, left.len(), bytes_of, |n| {
             let unit = left[n];
             let notes = Notes::begin();
             let value = work(unit)?;
@@ -104,7 +121,7 @@ impl Workspace {
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Disk`].
-    pub(crate) fn step(&self, name: &'static str) -> Result<Step> {
+    pub(crate) fn step(&self, name: &str) -> Result<Step> {
         let run = self.shared.run.clone();
         Ok(Step {
             path: run

@@ -172,11 +172,13 @@ impl<'a> SourceWriter<'a> {
         bytes: impl Fn(usize) -> u64 + Sync,
         work: impl Fn(usize) -> Result<SourceStats> + Sync,
     ) -> Result<()> {
-        self.workspace.units(name, count, bytes, work, |_, stats| {
-            let mut all = self.stats.lock().unwrap_or_else(PoisonError::into_inner);
-            all.merge(&stats);
-            Ok(())
-        })
+        let step = format!("{name} of source {}", self.source);
+        self.workspace
+            .units((step, name), count, bytes, work, |_, stats| {
+                let mut all = self.stats.lock().unwrap_or_else(PoisonError::into_inner);
+                all.merge(&stats);
+                Ok(())
+            })
     }
 
     /// Reads the source as one unit that takes `bytes` of memory.

@@ -58,7 +58,7 @@ impl StoreWriter {
     /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
     pub fn create(workspace: &Workspace, name: &str, page: usize) -> Result<Self> {
         let mut writer = Self::open(workspace, name, page)?;
-        writer.step = workspace.step("store")?;
+        writer.step = workspace.step(&format!("store {name}"))?;
         // The end of the points may have cut the last group short; it is written again.
         let whole = writer.boxes.len() / GROUP * GROUP;
         writer.checks.truncate(whole);
@@ -144,7 +144,7 @@ impl StoreWriter {
         page: usize,
         sections: &Table<Position>,
     ) -> Result<PointStore> {
-        workspace.once("gather", || {
+        workspace.once(&format!("gather {name}"), || {
             let mut writer = Self::create(workspace, name, page)?;
             let mut first = 0;
             for section in 0..sections.count() {

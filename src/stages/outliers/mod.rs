@@ -91,7 +91,8 @@ fn round(
         let points = one_tile(store, ids, options.factor, SpacingCache::new(&spacings))?;
         kept.put(tile, bytemuck::cast_slice(&points))
     };
-    workspace.units("outliers: tile", tiles.count(), bytes, work, |_, ()| Ok(()))?;
+    let step = (name, "outliers: tile");
+    workspace.units(step, tiles.count(), bytes, work, |_, ()| Ok(()))?;
     let name = format!("points-kept{number}");
     StoreWriter::gather(workspace, &name, store.page_size(), &kept)
 }

@@ -44,7 +44,7 @@ impl Spacings {
             Tile::bytes(points) + PageCache::bytes(store) + points as u64 * 4
         };
         let work = |tile| sections.put(tile, &one_tile(store, tiles.ids(tile))?);
-        let name = "outliers: spacings";
+        let name = (name, "outliers: spacings");
         workspace.units(name, tiles.count(), bytes, work, |_, ()| Ok(()))?;
         Ok(Self { tiles, sections })
     }

@@ -66,7 +66,7 @@ impl<'a> Pass<'a> {
             Ok(found)
         };
         let count = store.len().div_ceil(size);
-        workspace.units(self.memory, count, bytes, one, |_, found| {
+        workspace.units((self.file, self.memory), count, bytes, one, |_, found| {
             each(found);
             Ok(())
         })?;

@@ -156,13 +156,19 @@ pub fn orient_inside<T: Persist + Send>(
     };
     let mut labels = vec![(0u32, 0u32); count];
     let (mut mobius, mut triangles) = (0, 0);
-    workspace.units("block", count, &bytes, work, |block, (own, more, found)| {
-        labels[block] = own;
-        mobius += more.0;
-        triangles += more.1 as u64;
-        each(block, found);
-        Ok(())
-    })?;
+    workspace.units(
+        "orient: block",
+        count,
+        &bytes,
+        work,
+        |block, (own, more, found)| {
+            labels[block] = own;
+            mobius += more.0;
+            triangles += more.1 as u64;
+            each(block, found);
+            Ok(())
+        },
+    )?;
     Ok(OrientedInside {
         interior,
         relations: shuffle.deliver(workspace, count)?,

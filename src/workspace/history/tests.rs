@@ -42,16 +42,16 @@ impl Script {
 /// Two stages: one makes `a`, the next reads it and makes `b` and `letters`, and of these `c`.
 fn script() -> Script {
     let mut script = Script(Vec::new());
-    script.begin("/one#1");
-    script.unit("/one#1/tiles#1", 0, &[("a", 0)]);
-    script.unit("/one#1/tiles#1", 1, &[("a", 1)]);
-    script.unit("/one#1", 0, &[]);
-    script.begin("/two#1");
-    script.unit("/two#1/tiles#1", 0, &[("b", 0), ("letters", 0)]);
-    script.unit("/two#1/tiles#1", 1, &[("b", 1), ("letters", 1)]);
-    script.unit("/two#1/deliver#1", 0, &[("c", 0)]);
+    script.begin("/one");
+    script.unit("/one/tiles", 0, &[("a", 0)]);
+    script.unit("/one/tiles", 1, &[("a", 1)]);
+    script.unit("/one", 0, &[]);
+    script.begin("/two");
+    script.unit("/two/tiles", 0, &[("b", 0), ("letters", 0)]);
+    script.unit("/two/tiles", 1, &[("b", 1), ("letters", 1)]);
+    script.unit("/two/deliver", 0, &[("c", 0)]);
     script.deleted("letters");
-    script.unit("/two#1", 0, &[]);
+    script.unit("/two", 0, &[]);
     script
 }
 
@@ -79,15 +79,15 @@ fn nothing_is_done_about_no_damage() {
 #[test]
 fn a_unit_is_done_again_if_its_inputs_are_there() {
     let mut history = History::of(&script().0);
-    let units = vec![("/two#1/tiles#1".to_owned(), 1)];
+    let units = vec![("/two/tiles".to_owned(), 1)];
     let found = history.mend(&[damage("b", 1)]);
     assert_eq!(found, Some(Mending::Redo(units.clone())));
     history.forget(&units);
     // The unit, and the stage around it; not what was made of it.
-    assert_eq!(history.units("/two#1/tiles#1"), [0]);
-    assert!(history.units("/two#1").is_empty());
-    assert_eq!(history.units("/two#1/deliver#1"), [0]);
-    assert_eq!(history.units("/one#1"), [0]);
+    assert_eq!(history.units("/two/tiles"), [0]);
+    assert!(history.units("/two").is_empty());
+    assert_eq!(history.units("/two/deliver"), [0]);
+    assert_eq!(history.units("/one"), [0]);
     assert_eq!(history.places("b").len(), 1);
 }
 
@@ -95,19 +95,19 @@ fn a_unit_is_done_again_if_its_inputs_are_there() {
 fn a_stage_begins_again_if_they_are_not() {
     // What was sent is gone, so it cannot be delivered again.
     let history = History::of(&script().0);
-    assert_eq!(history.mend(&[damage("c", 0)]), rewind(4, "/two#1"));
+    assert_eq!(history.mend(&[damage("c", 0)]), rewind(4, "/two"));
     let mut later = script();
     later.deleted("a");
     let history = History::of(&later.0);
-    assert_eq!(history.mend(&[damage("b", 0)]), rewind(0, "/one#1"));
-    assert_eq!(history.mend(&[damage("c", 0)]), rewind(0, "/one#1"));
+    assert_eq!(history.mend(&[damage("b", 0)]), rewind(0, "/one"));
+    assert_eq!(history.mend(&[damage("c", 0)]), rewind(0, "/one"));
 }
 
 #[test]
 fn a_unit_that_was_done_again_counts_as_it_is() {
     let mut again = script();
-    again.unit("/two#1/tiles#1", 1, &[("b", 1), ("letters", 1)]);
+    again.unit("/two/tiles", 1, &[("b", 1), ("letters", 1)]);
     let history = History::of(&again.0);
     assert_eq!(history.needed().len(), 5);
-    assert_eq!(history.units("/two#1/tiles#1"), [0, 1]);
+    assert_eq!(history.units("/two/tiles"), [0, 1]);
 }
