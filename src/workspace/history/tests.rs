@@ -1,9 +1,9 @@
-//! What is done again, by what was damaged and what is gone.
+//! The units that are repeated after damage and deletion.
 
 use super::super::place::Put;
 use super::*;
 
-/// A journal in short: the offset of a record is its number.
+/// A short journal: the offset of a record is its number.
 struct Script(Vec<Entry>);
 
 impl Script {
@@ -39,7 +39,7 @@ impl Script {
     }
 }
 
-/// Two stages: one makes `a`, the next reads it and makes `b` and `letters`, and of these `c`.
+/// Two stages: one writes `a`; the next reads it and writes `b` and `letters`, and from these `c`.
 fn script() -> Script {
     let mut script = Script(Vec::new());
     script.begin("/one#1");
@@ -83,7 +83,7 @@ fn a_unit_is_done_again_if_its_inputs_are_there() {
     let found = history.mend(&[damage("b", 1)]);
     assert_eq!(found, Some(Mending::Redo(units.clone())));
     history.forget(&units);
-    // The unit, and the stage around it; not what was made of it.
+    // The unit and the stage around it, but not the units that used its result.
     assert_eq!(history.units("/two#1/tiles#1"), [0]);
     assert!(history.units("/two#1").is_empty());
     assert_eq!(history.units("/two#1/deliver#1"), [0]);
@@ -93,7 +93,7 @@ fn a_unit_is_done_again_if_its_inputs_are_there() {
 
 #[test]
 fn a_stage_begins_again_if_they_are_not() {
-    // What was sent is gone, so it cannot be delivered again.
+    // The rows that were sent are deleted, so they cannot be delivered again.
     let history = History::of(&script().0);
     assert_eq!(history.mend(&[damage("c", 0)]), rewind(4, "/two#1"));
     let mut later = script();
