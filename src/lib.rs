@@ -50,7 +50,7 @@
 //! [`inspect`] describes a cloud, checks that a mesh is a manifold, and measures the distance between two
 //! shapes. [`Report`] has the counts and measurements of a run.
 //!
-//! These items are the interface. All other modules are public only for the project's own tests, benches and
+//! These items are the interface. The hidden modules are public only for the project's own tests, benches and
 //! tools, and change without notice; `ARCHITECTURE.md` has their map.
 
 #[doc(hidden)]

@@ -7,11 +7,11 @@
 //!
 //! * A cloud is sampled at its points, without repetition; if there are more than [`Options::samples`], that
 //!   number of them is drawn with equal chances.
-//! * A mesh is sampled at the vertices of its triangles, at most half of the samples, drawn likewise if there
-//!   are more. The other samples are points on its faces: the area is divided into equal parts, along the
-//!   curve, with a random point in each. Mean, RMS and percentiles are those of the points on faces, so they do
-//!   not depend on the triangulation of the surface; vertices count for the maximum. A mesh without area is
-//!   sampled at its vertices alone, and then these count.
+//! * A mesh is sampled at the vertices of its triangles, at most half of the samples, drawn likewise if
+//!   there are more. The other samples are points on its faces: the area is divided into equal parts, along
+//!   the curve, with a random point in each. Mean, RMS and percentiles are those of the points on faces, so
+//!   they do not depend on the triangulation of the surface; vertices count for the maximum. A mesh without
+//!   area is sampled at its vertices alone, and then these count.
 //!
 //! The result depends only on the files, the number of samples and the seed.
 
