@@ -33,14 +33,14 @@
 //! let run = Reconstruction::builder()
 //!     .input("scan.laz")
 //!     .output("mesh.ply")
-//!     .start(Start::Resume) // go on if there is something to go on with
+//!     .start(Start::Resume) // continue the unfinished run, if there is one
 //!     .time_limit(Duration::from_secs(3600))
 //!     .build()?;
 //! match run.run() {
 //!     Err(Error::TimeLimit) => println!("to be continued: {}", run.scratch_folder().display()),
 //!     other => println!("{} triangles", other?.mesh.triangles),
 //! }
-//! // Later: all but threads and memory is known.
+//! // Later; inputs, output and parameters are in the scratch folder.
 //! Reconstruction::resume("mesh.ply.outcrop-scratch")?.build()?.run()?;
 //! # Ok::<(), Error>(())
 //! ```
