@@ -1,5 +1,5 @@
 //! All constants of the method: what decides the mesh beside the points and what is asked for
-//! ([`crate::Params`]). The defaults of what can be asked for are here as well. ARCHITECTURE, section 1, says
+//! ([`crate::Params`]). The defaults of what can be asked for are here as well. docs/method.md says
 //! what each is used for; `docs/ablation.md` what happens with other values.
 //!
 //! Constants that only concern speed, memory, rounding or files are where they are used.

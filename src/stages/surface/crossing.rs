@@ -2,8 +2,8 @@
 
 use super::crossing_edges::CrossingEdges;
 use super::orient::{Oriented, OrientedInside, label_bytes};
-use super::parity::{OrientationConstraint, ParitySets, constraint, word};
-use super::rows::{LabelledTo, Relation, TriangleTo};
+use super::parity::{OrientationConstraint, ParitySets, word};
+use super::rows::{LabelledTo, Relation, TriangleTo, interior_constraints};
 use super::settle::settle;
 use super::star::Triangle;
 use crate::error::Result;
@@ -85,26 +85,6 @@ fn is_present(block: usize, t: &Triangle, removed: &[TriangleTo]) -> bool {
     let (to, triangle) = (block as u32, *t);
     let key = TriangleTo { to, triangle };
     removed.binary_search(&key).is_err()
-}
-
-/// The constraints, with their weights, that interior triangles are for the crossing triangle `t` of
-/// `block`: from its `relations`, with global labels.
-pub(super) fn interior_constraints(
-    globals: &[(u32, u32)],
-    relations: &[Relation],
-    block: usize,
-    t: Triangle,
-) -> impl Iterator<Item = (OrientationConstraint, i64)> {
-    let key = (block as u32, t);
-    let start = relations.partition_point(|r| (r.to, r.triangle) < key);
-    relations[start..]
-        .iter()
-        .take_while(move |r| (r.to, r.triangle) == key)
-        .map(|r| {
-            let (label, flip) = constraint(r.label_flip);
-            let first = globals[r.block as usize].0;
-            ((first + label, flip), i64::from(r.weight))
-        })
 }
 
 /// The crossing triangles in ascending order, each against those before it.

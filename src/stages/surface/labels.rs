@@ -1,12 +1,10 @@
 //! The labels of a block: how its interior triangles run against each other, as far as edges inside the
 //! block tell.
 
-use super::evidence::Evidence;
 use super::parity::{ParitySets, word};
 use super::patches::SharedEdge;
 use super::rows::{LabelledTriangle, PairSum, Relation, Seam, Upward, words};
 use super::star::{EDGES, EdgesUp, Triangle, opposed};
-use super::weigh::weigh_block;
 use crate::stages::blocks::Blocks;
 use crate::workspace::memory::{Holding, bytes_of, hold};
 
@@ -29,13 +27,9 @@ pub(super) struct OrientedBlock {
 pub(super) fn orient_block(
     inner: &[Triangle],
     crossing: &[Triangle],
-    evidence: Option<&Evidence>,
     blocks: Blocks,
     block: usize,
 ) -> OrientedBlock {
-    if let Some(evidence) = evidence {
-        return weigh_block(inner, crossing, evidence, blocks, block);
-    }
     let ids = blocks.ids(block);
     let mut edges = EdgesUp::with_room_for(ids.clone(), inner.iter());
     let mut sets = ParitySets::new(inner.len());

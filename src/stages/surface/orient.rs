@@ -8,6 +8,7 @@ use super::rows::{
     LabelledTo, LabelledTriangle, Normal, PairSum, Relation, Seam, TriangleRow, Upward,
 };
 use super::star::Triangle;
+use super::weigh::weigh_block;
 use crate::error::Result;
 use crate::spill::{Shuffle, Table};
 use crate::stages::blocks::Blocks;
@@ -131,7 +132,10 @@ pub fn orient_inside<T: Persist + Send>(
         } = around(block)?;
         let crossing: Vec<Triangle> = inner.extract_if(.., |t| blocks.crossing(*t)).collect();
         let _crossing = hold(bytes_of(&crossing));
-        let done = orient_block(&inner, &crossing, evidence.as_ref(), blocks, block);
+        let done = match &evidence {
+            Some(evidence) => weigh_block(&inner, &crossing, evidence, blocks, block),
+            None => orient_block(&inner, &crossing, blocks, block),
+        };
         interior.put(block, &done.interior)?;
         shuffle.send_from(block, &done.relations)?;
         let mine = |t: &Triangle| blocks.of(t[0]) == block as u32;

@@ -1,5 +1,6 @@
 //! Rows of triangles and of how they run.
 
+use super::parity::{OrientationConstraint, constraint};
 use super::star::Triangle;
 use crate::spill::row;
 
@@ -116,4 +117,24 @@ pub fn words(sum: i64) -> [u32; 2] {
 /// The sum of two words.
 pub fn sum([low, high]: [u32; 2]) -> i64 {
     i64::from(high.cast_signed()) << 32 | i64::from(low)
+}
+
+/// The constraints, with their weights, that interior triangles are for the crossing triangle `t` of
+/// `block`: from its `relations`, with global labels.
+pub(super) fn interior_constraints(
+    globals: &[(u32, u32)],
+    relations: &[Relation],
+    block: usize,
+    t: Triangle,
+) -> impl Iterator<Item = (OrientationConstraint, i64)> {
+    let key = (block as u32, t);
+    let start = relations.partition_point(|r| (r.to, r.triangle) < key);
+    relations[start..]
+        .iter()
+        .take_while(move |r| (r.to, r.triangle) == key)
+        .map(|r| {
+            let (label, flip) = constraint(r.label_flip);
+            let first = globals[r.block as usize].0;
+            ((first + label, flip), i64::from(r.weight))
+        })
 }

@@ -2,12 +2,11 @@
 //! the crossing triangles between them.
 
 use super::contract::{Graph, Limit};
-use super::crossing::interior_constraints;
 use super::crossing_edges::CrossingEdges;
 use super::evidence::{cosine, weight};
 use super::orient::{Oriented, Weighed};
 use super::parity::{OrientationConstraint, word};
-use super::rows::{Relation, sum};
+use super::rows::{Relation, interior_constraints, sum};
 use super::star::Triangle;
 use crate::error::Result;
 use crate::method::METHOD;
