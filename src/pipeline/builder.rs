@@ -110,7 +110,7 @@ impl Builder {
         self
     }
 
-    /// Time after which the run stops by itself; it can be resumed then.
+    /// The run stops by itself before this time is over; it can be resumed then.
     #[must_use]
     pub fn time_limit(mut self, limit: Duration) -> Self {
         self.time_limit = Some(limit);

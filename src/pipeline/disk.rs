@@ -2,9 +2,9 @@
 //!
 //! Scratch space has its peak where triples are put together and stitched: one or two stores of positions,
 //! and all triples twice. The number of triples depends on noise, which is measured when the points are
-//! relaxed: noisy points move, and a second store is written. Headers give no information about that store
-//! alone. Where noise makes more triples it makes fewer triangles, so scratch and mesh together have the same
-//! size otherwise; half a store is assumed, which is wrong by 6 bytes a point either way.
+//! relaxed: noisy points move, and a second store is written. This store is the only size that headers do not
+//! determine: where noise makes more triples it makes fewer triangles, so scratch and mesh together have the
+//! same size otherwise. Half a store is assumed, which is wrong by 6 bytes a point either way.
 //!
 //! Unneeded files are not counted. They are deleted as soon as the deletion is synced
 //! (`workspace/keeper.rs`), within a moment.

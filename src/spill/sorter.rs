@@ -148,10 +148,10 @@ impl<R: Row> Sorter<R> {
         Ok(RunWriter::new(self.files.make(&name, kept)?, kept))
     }
 
-    /// Adds the rows of parts of an input, given by their numbers and row counts; `push` adds one part. In a
-    /// run that can be resumed, the parts that fit the buffer form a run, which a later attempt does not
-    /// repeat. If all rows fit the buffer they stay in memory, unless they are to be `kept`. Returns the
-    /// number of rows.
+    /// Adds the rows of parts of an input, given by their numbers and row counts; `push` adds the parts with
+    /// the given numbers. In a run that can be resumed, the parts that fit the buffer form a sorted run,
+    /// which a later attempt does not repeat. If all rows fit the buffer they stay in memory, unless they are
+    /// to be `kept`. Returns the number of rows.
     ///
     /// # Errors
     /// Errors of `push`, [`crate::Error::Io`], [`crate::Error::Disk`].
@@ -209,8 +209,8 @@ impl<R: Row> Sorter<R> {
         self.state().buffer.is_empty()
     }
 
-    /// The runs of a step that were written in sequence: each with its last row and the value noted with it.
-    /// Runs after a gap are not used.
+    /// Reopens the sorted runs of a step that were written in sequence; returns the value noted with the last
+    /// one. Runs after a gap are not used.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Corrupt`].

@@ -72,7 +72,7 @@ impl Table {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Waits for the next round or for a file to delete; false when the run has ended.
+    /// Waits for the next round or for a file to delete; false if the thread has to stop.
     fn wait(&self, round: Duration) -> bool {
         let idle = |state: &mut State| !state.stop && state.leaving.is_empty();
         let waited = self.wake.wait_timeout_while(self.state(), round, idle);
