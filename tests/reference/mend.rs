@@ -33,7 +33,7 @@ enum Outcome {
     /// It is an opening, by itself or by the area of its filling.
     Opening,
     Spanned,
-    /// All triangles are too wide.
+    /// All triangles of the filling are left out.
     Wide,
     /// Some are; the triangles that remain, and the number of those left out without being too wide.
     Part(Vec<[u32; 3]>, usize),
