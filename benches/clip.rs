@@ -15,7 +15,7 @@ fn main() {
     divan::main();
 }
 
-/// A cell's id, normal, disk radius and neighbours.
+/// Id, normal, disk radius and neighbours of a cell.
 type Task = (u32, Normal, f64, Neighbors);
 
 fn tasks() -> Vec<Task> {

@@ -1,4 +1,4 @@
-//! Bisectors as lines, and the corners that they cut off, at every level that the machine has.
+//! Bisectors as lines, and the corners that they cut off, at every level of instructions of the machine.
 
 mod util;
 

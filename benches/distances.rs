@@ -1,4 +1,4 @@
-//! Approximate squared distances of a query's candidates, at every level that the machine has.
+//! Approximate squared distances of a query's candidates, at every level of instructions of the machine.
 
 mod util;
 

@@ -1,5 +1,5 @@
-//! A whole reconstruction, cloud file to mesh, with K beside it: a k-d tree's 30 nearest neighbours
-//! of all points on as many threads. What counts is the ratio of the two.
+//! A whole reconstruction, from cloud to mesh, and K: a k-d tree's 30 nearest neighbours of all points on the
+//! same number of threads. The ratio of the two is the result.
 
 mod util;
 
@@ -13,14 +13,14 @@ use std::num::NonZero;
 
 const POINTS: usize = 300_000;
 
-/// A plane's neighbours; the query is one of them.
+/// Neighbours of a plane, with the query itself.
 const NEIGHBORS: NonZero<usize> = NonZero::new(util::NEIGHBORS).unwrap();
 
 fn main() {
     divan::main();
 }
 
-/// One thread, and all there are.
+/// One thread, and all available ones.
 fn threads() -> Vec<usize> {
     let mut counts = vec![1, outcrop::pipeline::default_threads()];
     counts.dedup();

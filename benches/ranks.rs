@@ -1,4 +1,4 @@
-//! Sorting a query's neighbours by counting, at every level that the machine has.
+//! Sorting a query's neighbours by counting, at every level of instructions of the machine.
 
 mod util;
 

@@ -1,4 +1,4 @@
-//! Counting and picking the candidates within a limit, at every level that the machine has.
+//! Counting and choosing the candidates within a limit, at every level of instructions of the machine.
 
 mod util;
 

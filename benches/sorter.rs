@@ -1,4 +1,4 @@
-//! The external sorter: in its buffer, and with four runs to merge.
+//! The external sorter, in memory and with four runs to merge.
 
 mod util;
 
@@ -17,7 +17,7 @@ fn main() {
 fn sort(bencher: Bencher<'_, '_>, runs: usize) {
     let workspace = util::workspace();
     let keys: Vec<Key> = util::points(RECORDS).into_iter().map(encode).collect();
-    // One record of room to spare keeps a single run in memory.
+    // Room for one more row keeps a single run in memory.
     let buffer = (RECORDS.div_ceil(runs) + usize::from(runs == 1)) * size_of::<Key>();
     bencher.counter(ItemsCount::new(RECORDS)).bench_local(|| {
         let sorter = Sorter::<Key>::new(&workspace, "bench", buffer as u64);

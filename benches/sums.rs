@@ -1,4 +1,4 @@
-//! The sums that a plane is fitted to, at every level that the machine has.
+//! The sums for the fit of a plane, at every level of instructions of the machine.
 
 mod util;
 

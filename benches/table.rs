@@ -10,7 +10,7 @@ fn main() {
     divan::main();
 }
 
-/// Three triangles for each point, with vertices near in order and now and then far.
+/// Three triangles for each point; most vertices are near each other in order, some are far.
 fn triples() -> Vec<[u32; 4]> {
     let mut state = 1u32;
     let mut random = || {

@@ -1,10 +1,10 @@
-//! Reconstructs a surface from a program: progress, a stop, and the report.
+//! Reconstructs a surface from a program: progress, cancellation, and the report.
 //!
 //! ```text
 //! cargo run --release --example reconstruct -- scan.laz mesh.ply
 //! ```
 //!
-//! Without arguments it makes a small cloud in a temporary folder first.
+//! Without arguments it generates a small cloud in a temporary folder first.
 
 use outcrop::{Cancel, Error, Observer, Params, Radius, Reconstruction};
 use outcrop_cloudgen::{Cloud, Format, Kind};
@@ -13,13 +13,13 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-/// Points of the cloud that is made if none is given.
+/// Points of the generated cloud.
 const POINTS: u64 = 20_000;
 
-/// How long the run may take before it is asked to stop.
+/// Time after which the run is cancelled.
 const PATIENCE: Duration = Duration::from_secs(3600);
 
-/// Prints a line when a stage begins and one when it ends, and stops the run after a while.
+/// Prints a line when a stage begins and ends, and cancels the run when its time is over.
 struct Progress {
     begun: Instant,
     cancel: Cancel,
@@ -67,7 +67,7 @@ impl Observer for Progress {
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    // The folder goes when the variable does, so it lives until the end.
+    // The folder is deleted when this variable is dropped.
     let folder = tempfile::tempdir()?;
     let arguments: Vec<PathBuf> = std::env::args_os().skip(1).map(PathBuf::from).collect();
     let (input, output) = match arguments.as_slice() {
@@ -115,7 +115,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             );
             Ok(())
         }
-        // Nothing was written: the mesh gets its name only when it is complete.
+        // No mesh was written: it is renamed only when it is complete.
         Err(Error::Cancelled) => Err("stopped before the end".into()),
         Err(error) => Err(error.into()),
     }

@@ -1,48 +1,48 @@
-//! The one error type of the library. Every variant says what was found and what would have worked.
+//! The error type of the library. A variant has what was found and what was expected.
 
 use std::path::{Path, PathBuf};
 
 /// Result with this crate's [`Error`].
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
-/// Everything that can end a run early.
+/// The errors that end a run.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The operating system refused to read or write a file.
+    /// A file cannot be read or written.
     #[error("{path}: cannot {action}: {source}", path = path.display())]
     Io {
         /// File or folder concerned.
         path: PathBuf,
-        /// What was being done, e.g. `open` or `write 65536 bytes`.
+        /// The failed action, e.g. `open` or `write 65536 bytes`.
         action: String,
         /// The system's reason.
         source: std::io::Error,
     },
-    /// An input file is not what it claims to be.
+    /// An input file is invalid.
     #[error("{path}: {place}: found {found}, expected {expected}", path = path.display())]
     Input {
         /// The input file.
         path: PathBuf,
-        /// Where in it: a byte offset, line, header field or chunk.
+        /// Place in the file: a byte offset, line, header field or chunk.
         place: String,
-        /// What is there.
+        /// The invalid content.
         found: String,
-        /// What would have been right.
+        /// The expected content.
         expected: String,
     },
-    /// The cloud has too few distinct points, or none, to carry a triangle.
+    /// The cloud has too few distinct points for a triangle.
     #[error(
         "cannot build a surface: {found}; at least three distinct points that are not on one line are needed"
     )]
     Degenerate {
-        /// What the cloud consists of.
+        /// Description of the cloud.
         found: String,
     },
-    /// All cells were computed and no triangle came of it.
+    /// The cells gave no triangle.
     #[error("the cloud yields no triangle: {why}")]
     NoTriangles {
-        /// The reason, with what to change.
+        /// The reason, and the parameter to change.
         why: String,
     },
     /// A parameter is out of range.
@@ -50,44 +50,44 @@ pub enum Error {
     Parameter {
         /// Name as on the command line.
         name: &'static str,
-        /// The value given.
+        /// The given value.
         found: String,
         /// The accepted range.
         expected: String,
     },
-    /// The memory budget cannot work.
+    /// The memory budget is too small.
     #[error("memory budget of {budget} bytes is too small: {what} needs {needed} bytes ({needed_mib} MiB); give at least --memory {needed_mib}MiB", needed_mib = needed.div_ceil(1 << 20))]
     Memory {
-        /// What asked for memory, with the current holders.
+        /// The failed reservation, with the current holders.
         what: String,
-        /// The budget that would do, in bytes.
+        /// A budget that would suffice, in bytes.
         needed: u64,
-        /// The budget given, in bytes.
+        /// The given budget, in bytes.
         budget: u64,
     },
-    /// A file system is too small, or full.
+    /// A disk is full, or too small.
     #[error("{path}: not enough space: {needed} more bytes ({mib} MiB) are needed, {free} are free", path = path.display(), mib = needed.div_ceil(1 << 20))]
     Disk {
-        /// Scratch or output folder, or the file that could not be written.
+        /// Scratch or output folder, or the file of the failed write.
         path: PathBuf,
-        /// Bytes the run needs there, beside those it has.
+        /// Further bytes that the run needs there.
         needed: u64,
-        /// Bytes free.
+        /// Free bytes.
         free: u64,
     },
-    /// A scratch file does not hold what was written to it.
+    /// A scratch file does not match its checksum or has invalid content.
     #[error("{path}: scratch file damaged at byte {offset}: found {found}, expected {expected}", path = path.display())]
     Corrupt {
         /// The scratch file.
         path: PathBuf,
         /// Byte offset of the damaged part.
         offset: u64,
-        /// What was found there.
+        /// The content found there.
         found: String,
-        /// What was written.
+        /// The expected content.
         expected: String,
     },
-    /// More distinct points than ids.
+    /// There are more distinct points than ids.
     #[error("{found} distinct points are more than the {limit} that 32-bit ids can name")]
     TooManyPoints {
         /// Points found.
@@ -95,48 +95,48 @@ pub enum Error {
         /// Largest number supported.
         limit: u64,
     },
-    /// Another run is at work in the scratch folder.
+    /// Another process uses the scratch folder.
     #[error("{path}: another run is at work here; wait for it, or choose another --scratch", path = path.display())]
     Locked {
         /// The scratch folder.
         path: PathBuf,
     },
-    /// There is an unfinished run already.
+    /// There is an unfinished run in the scratch folder.
     #[error("{path}: an unfinished run is here already; --resume goes on with it, --restart begins again", path = path.display())]
     Unfinished {
         /// The scratch folder.
         path: PathBuf,
     },
-    /// The unfinished run is not the one that was asked for.
+    /// The unfinished run has other inputs or parameters.
     #[error("{path}: cannot go on: {what} was {was}, now it is {now}; --restart begins again", path = path.display())]
     Mismatch {
         /// The scratch folder.
         path: PathBuf,
-        /// What changed.
+        /// The property that differs.
         what: String,
-        /// As the run began.
+        /// Its value when the run began.
         was: String,
-        /// As it is now.
+        /// Its value now.
         now: String,
     },
-    /// The folder holds no run that could be resumed.
+    /// The folder has no run that can be resumed.
     #[error("{path}: {why}", path = path.display())]
     NotResumable {
         /// The folder.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The reason.
         why: String,
     },
-    /// The time that the run was given is up.
+    /// The time limit is reached.
     #[error("stopped: the time limit is reached")]
     TimeLimit,
-    /// The run was asked to stop.
+    /// The run is cancelled.
     #[error("stopped on request")]
     Cancelled,
 }
 
 impl Error {
-    /// True if a run that ended so can go on from where it was, once the reason is gone.
+    /// True if a run that ended with this error can be resumed once the cause is removed.
     #[must_use]
     pub fn can_resume(&self) -> bool {
         match self {
@@ -167,7 +167,7 @@ impl Error {
         }
     }
 
-    /// What is wrong with a PLY file.
+    /// The error of a PLY file.
     pub(crate) fn ply(path: &Path, error: outcrop_ply::Error) -> Self {
         match error {
             outcrop_ply::Error::Io(source) => Self::io(path, "read", source),
@@ -179,7 +179,7 @@ impl Error {
         }
     }
 
-    /// An [`Error::Input`] for a file that cannot be read as what it is.
+    /// An [`Error::Input`] for a file that is not valid in its format.
     pub fn input(
         path: impl AsRef<Path>,
         place: impl Into<String>,

@@ -1,9 +1,9 @@
 //! Out-of-core surface reconstruction by restricted Voronoi cells.
 //!
-//! A point cloud of any size goes in, a triangle mesh comes out that interpolates it, and the memory
-//! stays below a budget. The method is that of Boltcheva & Lévy, *Surface reconstruction by
-//! computing restricted Voronoi cells in parallel*, CAD 90 (2017). One cloud and one set of
-//! [`Params`] give one file, byte for byte, whatever the memory, the threads and the order of inputs.
+//! The input is a point cloud of any size, the output a triangle mesh that interpolates it; memory stays
+//! below a budget. The method is that of Boltcheva & Lévy, *Surface reconstruction by computing restricted
+//! Voronoi cells in parallel*, CAD 90 (2017). One cloud and one set of [`Params`] give the same file, byte
+//! for byte, for any memory budget, number of threads and order of inputs.
 //!
 //! ```
 //! use outcrop::{Params, Reconstruction};
@@ -24,7 +24,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! A run that was stopped or killed goes on from where it was, and gives the same file:
+//! A run that was stopped or killed continues with its last unfinished work, and gives the same file:
 //!
 //! ```no_run
 //! use outcrop::{Error, Reconstruction, Start};
@@ -33,24 +33,24 @@
 //! let run = Reconstruction::builder()
 //!     .input("scan.laz")
 //!     .output("mesh.ply")
-//!     .start(Start::Resume) // go on if there is something to go on with
+//!     .start(Start::Resume) // continue the unfinished run, if there is one
 //!     .time_limit(Duration::from_secs(3600))
 //!     .build()?;
 //! match run.run() {
 //!     Err(Error::TimeLimit) => println!("to be continued: {}", run.scratch_folder().display()),
 //!     other => println!("{} triangles", other?.mesh.triangles),
 //! }
-//! // Later: all but threads and memory is known.
+//! // Later; inputs, output and parameters are in the scratch folder.
 //! Reconstruction::resume("mesh.ply.outcrop-scratch")?.build()?.run()?;
 //! # Ok::<(), Error>(())
 //! ```
 //!
-//! `examples/reconstruct.rs` shows progress ([`Observer`]) and a stop ([`Cancel`]).
+//! `examples/reconstruct.rs` shows progress ([`Observer`]) and cancellation ([`Cancel`]).
 //!
-//! [`inspect`] answers questions about files without a reconstruction: what is in a cloud, is a mesh a
-//! manifold, and how far are two shapes from each other. [`Report`] is what a run counts and measures.
+//! [`inspect`] describes a cloud, checks that a mesh is a manifold, and measures the distance between two
+//! shapes. [`Report`] has the counts and measurements of a run.
 //!
-//! These items are the interface. The modules that do the work are open to the project's own tests, benches and
+//! These items are the interface. The hidden modules are public only for the project's own tests, benches and
 //! tools, and change without notice; `ARCHITECTURE.md` has their map.
 
 #[doc(hidden)]

@@ -1,4 +1,4 @@
-//! Command line of `outcrop`: parse, run, exit code.
+//! The program `outcrop`: see `outcrop::cli`.
 
 fn main() -> std::process::ExitCode {
     outcrop::cli::main()

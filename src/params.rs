@@ -1,4 +1,4 @@
-//! The geometric parameters of a reconstruction, checked once.
+//! The parameters of a reconstruction, with their ranges.
 
 use crate::error::{Error, Result};
 use crate::method::METHOD;
@@ -39,7 +39,7 @@ impl std::str::FromStr for Radius {
     }
 }
 
-/// How the surface is made.
+/// The variant of the method.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Method {
@@ -61,7 +61,7 @@ impl std::str::FromStr for Method {
     }
 }
 
-/// A limit of length.
+/// A limit for lengths.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum MaxWidth {
@@ -102,25 +102,24 @@ impl std::fmt::Display for MaxWidth {
     }
 }
 
-/// Everything that decides the mesh. Two runs with equal parameters and equal points give the same
-/// bytes.
+/// All parameters that decide the mesh. Equal parameters and equal points give the same bytes.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Params {
-    /// Points to read, by class.
+    /// Classes of the points that are read.
     pub classes: Classes,
     /// Keep at most one point in each cube of this side, in the input's unit.
     pub thin: Option<f64>,
-    /// Drop points whose spacing is this many times as large as around them.
+    /// Drop points whose spacing is more than this factor times that of the points around them.
     pub drop_outliers: Option<f64>,
-    /// How the surface is made; [`Params::paper`] sets what goes with the paper's.
+    /// Variant of the method; [`Params::paper`] has the defaults of the paper's.
     pub method: Method,
     /// Neighbours for planes and smoothing (paper: 30).
     pub neighbors: usize,
     /// Rounds of smoothing (paper: 0 to 2).
     pub smooth: u32,
-    /// How they move.
+    /// Method of smoothing.
     pub smoothing: Smoothing,
-    /// Most rounds of relaxing: smoothing that decides only which points are connected.
+    /// Largest number of rounds of relaxing: smoothing that decides only which points are connected.
     pub relax: u32,
     /// Disk radius.
     pub radius: Radius,
@@ -128,32 +127,32 @@ pub struct Params {
     pub max_angle: f64,
     /// Fill holes of up to this many edges (paper: 500).
     pub max_hole_edges: usize,
-    /// Remove components with fewer triangles (paper: 10); `None`: 10, but in noise, where many
-    /// points were relaxed, one for each 5000 points, from 10 to 150; with smoothing one for each 2500,
-    /// from 10 to 1000.
+    /// Remove components with fewer triangles (paper: 10). `None`: 10; in noise, where many points were
+    /// relaxed, one for each 5000 points, from 10 to 150, or with smoothing one for each 2500, from 10 to
+    /// 1000.
     pub min_component: Option<u64>,
-    /// Keep points that are off the surface: far from their neighbours for how dense these are. The paper's
-    /// method keeps them, and has no limits of length, whatever is said here.
+    /// Keep points off the surface: those far from their neighbours for the density of the surroundings. The
+    /// paper's method always keeps them, and has no limits of length.
     pub keep_all: bool,
-    /// Longest side of a triangle; longer ones stay if the surface is as sparse at one of their ends.
+    /// Longest side of a triangle; a longer one stays if the surface is as sparse at one of its ends.
     pub max_edge: MaxWidth,
-    /// Width of triangles that fill holes: larger ones than an equilateral triangle with such sides stay
-    /// out, likewise.
+    /// Largest triangle of a filling, as the side of an equilateral triangle of the same area; a larger one
+    /// stays likewise.
     pub max_fill: MaxWidth,
-    /// Bridges, holes and small components (paper, section 3.6).
+    /// Remove bridges and small components, fill holes (paper, section 3.6).
     pub repair: bool,
-    /// Points per block, the unit in which T12 triangles are decided; part of the result.
+    /// Points per block, the unit of insertion; changes the result.
     #[serde(skip)]
     pub block: u32,
-    /// How blocks are divided while they are oriented; part of the result.
+    /// Division of blocks for the orientation; changes the result.
     #[serde(skip)]
     pub division: Division,
 }
 
-/// The factor of [`Params::drop_outliers`] that suits most clouds.
+/// A factor for [`Params::drop_outliers`] that suits most clouds.
 pub const OUTLIER_FACTOR: f64 = 5.0;
 
-/// Largest number of neighbours that can be asked for.
+/// Largest number of neighbours.
 pub const MAX_NEIGHBORS: usize = 255;
 
 impl Default for Params {
@@ -198,13 +197,13 @@ impl Params {
         }
     }
 
-    /// True if points off the surface are left out.
+    /// True if points off the surface are dropped.
     #[must_use]
     pub fn off_surface(&self) -> bool {
         self.method == Method::Robust && !self.keep_all
     }
 
-    /// The limits of distance on one surface, on a lattice of this step.
+    /// The limits of length on a lattice with this step.
     #[must_use]
     pub fn limits(&self, step: f64) -> Limits {
         let width = |max| match max {
@@ -219,8 +218,8 @@ impl Params {
         }
     }
 
-    /// The least triangles of a component that stays, in a cloud of so many points; `noisy` if many were
-    /// relaxed.
+    /// The least number of triangles of a component that stays, in a cloud of `points` points; `noisy` if
+    /// many were relaxed.
     #[must_use]
     pub fn least_component(&self, points: u64, noisy: bool) -> u64 {
         let limits = METHOD.components;
@@ -234,7 +233,7 @@ impl Params {
     }
 
     /// # Errors
-    /// [`Error::Parameter`] for the first value out of range.
+    /// [`Error::Parameter`] for the first value out of its range.
     pub fn check(&self) -> Result<()> {
         let error = |name, found: String, expected: &str| {
             Err(Error::Parameter {
@@ -293,7 +292,7 @@ impl Params {
         }
     }
 
-    /// Cosine of the largest angle, by a library that gives the same bits on every machine.
+    /// Cosine of the largest angle, computed by a library with the same bits on every machine.
     #[must_use]
     pub fn cos_max_angle(&self) -> f64 {
         if self.max_angle == 60.0 {

@@ -1,4 +1,4 @@
-//! The driver: the stages in the order the data flows.
+//! The driver: the stages in the order of the data flow.
 
 mod attempt;
 mod builder;
@@ -26,7 +26,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// A reconstruction that is ready to run. Made by [`Reconstruction::builder`].
+/// A reconstruction that is ready to run, made by [`Reconstruction::builder`].
 pub struct Reconstruction {
     inputs: Vec<PathBuf>,
     output: PathBuf,
@@ -48,26 +48,26 @@ pub fn default_memory() -> u64 {
     share_of(limits::memory_allowed())
 }
 
-/// Half of what is allowed, but no less than the least budget if that is allowed.
+/// Half of the allowed memory, but at least the smallest budget if that is allowed.
 fn share_of(allowed: u64) -> u64 {
     (allowed / 2).max(allowed.min(MINIMUM_BUDGET))
 }
 
-/// All threads the system offers to this process.
+/// Number of threads available to this process.
 #[must_use]
 pub fn default_threads() -> usize {
     std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
 }
 
 impl Reconstruction {
-    /// Starts a description of a reconstruction.
+    /// A builder with the default parameters.
     #[must_use]
     pub fn builder() -> Builder {
         Builder::default()
     }
 
-    /// The description of the run that was left unfinished in a scratch folder; threads, memory,
-    /// observer, flag and time limit can be set anew.
+    /// The builder of the unfinished run in a scratch folder. Threads, memory, observer, flag and time limit
+    /// can be changed.
     ///
     /// # Errors
     /// [`crate::Error::NotResumable`], [`crate::Error::Locked`], [`crate::Error::Io`].
@@ -75,7 +75,7 @@ impl Reconstruction {
         builder::unfinished(folder.as_ref())
     }
 
-    /// Where the mesh goes.
+    /// Path of the mesh.
     #[must_use]
     pub fn output(&self) -> &Path {
         &self.output
@@ -84,8 +84,8 @@ impl Reconstruction {
     /// Reconstructs the surface and writes the mesh.
     ///
     /// # Errors
-    /// Any [`crate::Error`]; the output is then untouched. Scratch files are gone, unless the run can be
-    /// resumed, see [`Reconstruction::is_unfinished`].
+    /// Any [`crate::Error`]; an existing output file is then unchanged. Scratch files are deleted, unless the
+    /// run can be resumed, see [`Reconstruction::is_unfinished`].
     pub fn run(&self) -> Result<Report> {
         writable(&self.output)?;
         not_an_input(&self.output, &self.inputs)?;
@@ -98,7 +98,7 @@ impl Reconstruction {
         outcome
     }
 
-    /// All stages, in the order the data flows.
+    /// All stages, in the order of the data flow.
     fn reconstruct(&self, workspace: &Workspace) -> Result<Report> {
         let mut stages = Stages::begin(self, workspace)?;
         let (spool, lattice) = stages.ingest()?;
@@ -127,7 +127,7 @@ mod tests {
         assert_eq!(share_of(mib(1024)), mib(512));
         assert_eq!(share_of(mib(256)), mib(192));
         assert_eq!(share_of(mib(192)), mib(192));
-        // Too little is refused, with what is the least.
+        // Too little memory is refused, with the least budget in the message.
         assert_eq!(share_of(mib(100)), mib(100));
     }
 }

@@ -1,4 +1,4 @@
-//! What happened in a run, for machines: the content of `--report`.
+//! The report of a run: the content of `--report`.
 
 use crate::params::Params;
 pub use crate::stages::cells::CellStats;
@@ -13,7 +13,7 @@ pub use crate::stages::triples::TripleStats;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// Everything a run counts and measures. Keys are stable; new ones may be added.
+/// All counts and measurements of a run. Keys are stable; new ones may be added.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct Report {
     /// Version of the program.
@@ -26,19 +26,19 @@ pub struct Report {
     pub threads: usize,
     /// Points and files read.
     pub input: IngestStats,
-    /// Points that share their position with another one and were folded into it.
+    /// Points with the position of another one, dropped.
     pub duplicates_folded: u64,
-    /// Thinning, if asked for.
+    /// Thinning, if requested.
     pub thin: ThinStats,
-    /// Outliers, if they were to be dropped.
+    /// Outliers, if they were dropped.
     pub outliers: OutlierStats,
-    /// Points left: what the surface is made from.
+    /// Points from which the surface is made.
     pub points: u64,
-    /// The lattice that positions are kept on.
+    /// The lattice of the positions.
     pub lattice: LatticeReport,
     /// Disk radius in the input's unit; absent if it follows the local density.
     pub radius: Option<f64>,
-    /// What relaxing did; none with `--relax 0`.
+    /// Counts of relaxing; none with `--relax 0`.
     pub relax: Option<RelaxStats>,
     /// Cells.
     pub cells: CellStats,
@@ -50,7 +50,7 @@ pub struct Report {
     pub insertion: InsertStats,
     /// Bridges, components and holes.
     pub repair: RepairStats,
-    /// Holes left: too long, outlines of the surface, and not cleanly triangulable.
+    /// Holes left open: too long, outlines of the surface, or without a clean triangulation.
     pub holes_left: u64,
     /// The mesh.
     pub mesh: MeshStats,
@@ -58,21 +58,21 @@ pub struct Report {
     pub coordinates: CoordinateType,
     /// Peak resident memory of the process in bytes.
     pub peak_resident_bytes: u64,
-    /// Pages of mapped files among the resident memory: the program's code and its libraries.
+    /// Mapped files in resident memory, in bytes: the program's code and its libraries.
     pub resident_file_bytes: u64,
-    /// Peak of the memory held by name in bytes, the program's own among it.
+    /// Peak of the memory in use by name in bytes, with that of the program.
     pub peak_held_bytes: u64,
-    /// What it consisted of.
+    /// The memory in use at that peak.
     pub held_at_peak: BTreeMap<&'static str, u64>,
-    /// Peak of the memory reserved by name in bytes: what might have been taken at most.
+    /// Peak of the memory reserved by name in bytes, an upper bound of the usage.
     pub peak_reserved_bytes: u64,
-    /// What it consisted of.
+    /// The reservations at that peak.
     pub reserved_at_peak: BTreeMap<&'static str, u64>,
-    /// Disk space as the headers of the inputs let expect; none if one cannot be read by itself.
+    /// Disk space estimated from the headers of the inputs; none if there is no such estimate.
     pub estimated_first: Option<DiskEstimate>,
-    /// Peak of the scratch space as estimated when the points were read and relaxed, in bytes.
+    /// Estimated peak of the scratch space after the points were read and relaxed, in bytes.
     pub estimated_scratch_bytes: u64,
-    /// Size of the mesh as estimated then.
+    /// Estimated size of the mesh at that time, in bytes.
     pub estimated_output_bytes: u64,
     /// Peak of the scratch space in bytes.
     pub peak_scratch_bytes: u64,
@@ -80,11 +80,11 @@ pub struct Report {
     pub seconds: f64,
     /// Seconds and bytes of each stage, in order.
     pub stages: Vec<StageReport>,
-    /// What the user should know, one line each.
+    /// Warnings for the user, one line each.
     pub warnings: Vec<String>,
 }
 
-/// Disk space that a run will take, about.
+/// Estimated disk space of a run, in bytes.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct DiskEstimate {
     /// Peak of the scratch files.
@@ -115,11 +115,11 @@ pub struct StageReport {
     pub bytes_read: u64,
     /// Bytes written to files.
     pub bytes_written: u64,
-    /// Peak of the scratch space while it was at work, in bytes.
+    /// Peak of the scratch space during the stage, in bytes.
     pub scratch_bytes: u64,
-    /// Peak of the memory held while it was at work, in bytes.
+    /// Peak of the memory in use during the stage, in bytes.
     pub held_bytes: u64,
-    /// What the stage did one after the other, if it says so.
+    /// The sequential parts of the stage, if it measures them.
     pub parts: Vec<PartReport>,
 }
 

@@ -1,11 +1,11 @@
-//! The map of ARCHITECTURE.md, held against the `use` lines of `src`: which folder may know which, no
-//! circle of imports, and no file or record grown out of hand.
+//! The map of ARCHITECTURE.md, checked by the `use` lines of `src`: the permitted imports of each folder, no
+//! circle of imports, rows with named fields, and files of limited length.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// Each room, and the rooms whose items it may use, `error` besides. A room is a folder of `src`, a folder or
-/// file of `src/stages`, or a file of `src`.
+/// Each part of the program, and the parts whose items it may use, besides `error`. A part is a folder of
+/// `src`, a folder or file of `src/stages`, or a file of `src`.
 const MAY_USE: &[(&str, &str)] = &[
     (
         "cli",
@@ -71,14 +71,14 @@ const MAY_USE: &[(&str, &str)] = &[
 /// Every stage may use these.
 const COMMON: &str = "error geom method spill workspace";
 
-/// Lines of a file, its tests not counted.
+/// Largest number of lines of a file, without its tests.
 const MOST_LINES: usize = 500;
 
 fn source() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("src")
 }
 
-/// Every module that is not a test, with its text without comments and tests.
+/// Every module that is not a test; its text without comments and tests.
 fn modules() -> BTreeMap<String, String> {
     fn walk(folder: &Path, all: &mut BTreeMap<String, String>) {
         for entry in std::fs::read_dir(folder).unwrap() {
@@ -222,7 +222,7 @@ fn no_room_knows_more_than_the_map_says() {
 #[test]
 fn no_circle_of_imports() {
     let mut graph = graph();
-    // Modules that import nothing that is left are in no circle.
+    // Modules whose imports are all removed already are in no circle.
     loop {
         let free: Vec<String> = graph
             .iter()
@@ -234,7 +234,7 @@ fn no_circle_of_imports() {
         }
         free.iter().for_each(|module| drop(graph.remove(module)));
     }
-    // A folder's first file and the others in it are one: what is left of them is none.
+    // A folder's first file and its other files count as one module.
     let mut circles = BTreeMap::new();
     for (module, targets) in &graph {
         let inside = |t: &&String| graph.contains_key(*t) && !module.starts_with(&format!("{t}/"));

@@ -129,7 +129,7 @@ fn squares_side_by_side() {
     let b = bench.mesh("b.ply", &shifted);
     let samples = 200_000;
     let found = between(&a, &b, samples);
-    // The distance of (x, y) is 1 − x: uniform, and samples are spread evenly.
+    // The distance of (x, y) is 1 − x: uniform, and the samples are evenly distributed.
     let figures = found.a_to_b.figures;
     assert!(near(figures.max, 1.0), "{figures:?}");
     assert_eq!(found.a_to_b.max_at[0], 0.0);
@@ -164,8 +164,8 @@ fn a_cube_and_its_corners() {
             .iter()
             .all(|(_, value)| *value == 0.0)
     );
-    // The middle of a side is the farthest from any corner; the mean is that of a square's
-    // quarter: (√2 + ln(1 + √2)) / 3 for a unit square, half as much here.
+    // The middle of a side is the farthest from any corner; the mean is that of a square's quarter: (√2 +
+    // ln(1 + √2)) / 3 for a unit square, half of that here.
     let figures = found.a_to_b.figures;
     let middle = 0.5f64.sqrt();
     assert!(
@@ -174,7 +174,7 @@ fn a_cube_and_its_corners() {
     );
     let mean = (2f64.sqrt() + (1.0 + 2f64.sqrt()).ln()) / 6.0;
     assert!((figures.mean - mean).abs() < 2e-3, "{figures:?} {mean}");
-    // One sample is a vertex, and then vertices count.
+    // The only sample is a vertex, and then vertices count.
     let found = between(&mesh, &corners, 1);
     assert_eq!((found.a_to_b.samples, found.a_to_b.vertex_samples), (1, 0));
     assert_eq!(found.a_to_b.figures.max, 0.0);
@@ -212,7 +212,7 @@ fn a_shape_and_itself() {
 fn unused_vertices_and_empty_triangles() {
     let bench = Bench::new();
     let mut odd = square(0.0);
-    // Nothing uses these two; a point and a segment are triangles without area.
+    // These two vertices are unused; a point and a segment are triangles without area.
     odd.positions
         .extend([[9.0, 9.0, 9.0], [f64::NAN, 0.0, 0.0]]);
     odd.positions.push([3.0, 0.0, 0.0]);
@@ -226,7 +226,7 @@ fn unused_vertices_and_empty_triangles() {
         ([3.0, 1.0, 0.0], 2.0)
     );
     assert!(found.b_to_a.figures.max < 1e-15);
-    // A mesh without any area is sampled at its vertices, and they count.
+    // A mesh without area is sampled at its vertices, and they count.
     odd.triangles.drain(..2);
     let a = bench.mesh("flat.ply", &odd);
     let found = between(&a, &b, 1000);
@@ -270,7 +270,7 @@ proptest! {
         scale in 0.01..1.0f64,
     ) {
         let bench = Bench::new();
-        // Some triangles small, some as large as everything.
+        // Some triangles are small, some as large as the box.
         let mut soup = Mesh::default();
         for (n, pick) in picks.iter().enumerate() {
             let shrink = if n % 3 == 0 { 1.0 } else { scale };
@@ -305,7 +305,7 @@ proptest! {
         let corners = bench.points("corners.ply", &soup.positions);
         distances(&cloud, &corners, &workspace, |m| {
             let want = brute::nearest(&soup.positions, m.position);
-            // Random doubles are no multiples of a step: a cloud keeps 30 bits of its extent.
+            // Random doubles are not multiples of a step: a cloud keeps 30 bits of its extent.
             assert!((m.distance - want).abs() < 1e-8, "{m:?} {want}");
             Ok(())
         }).unwrap();
@@ -337,7 +337,7 @@ fn limits_do_not_change_the_answer() {
     };
     let large = run(4 << 30, 2, 0);
     assert_eq!(large, run(MINIMUM_BUDGET, 1, 0));
-    // 1 M triangles with 504 100 vertices: in 44 MiB everything goes to disk, vertices too.
+    // 1 M triangles with 504 100 vertices: in 44 MiB all data go to disk, vertices too.
     assert_eq!(large, run(MINIMUM_BUDGET, 3, 100 << 20));
 }
 

@@ -1,13 +1,13 @@
-//! The documents: not too long, no link that leads nowhere, no option that the program does not have.
+//! The documents: not too long, without dead links, and without options that the program does not have.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Documents that are to be read at one sitting, and their most lines.
+/// Documents with a limit of lines.
 const SHORT: [(&str, usize); 2] = [("README.md", 200), ("ARCHITECTURE.md", 200)];
 
-/// Most characters of a line, but for tables.
+/// Largest number of characters of a line, except in tables.
 const WIDTH: usize = 110;
 
 /// Options that documents give to other programs: cargo, scripts and tools.
@@ -21,11 +21,11 @@ const OTHERS: [&str; 7] = [
     "--tried",
 ];
 
-/// Options of `outcrop reconstruct` for tests, which its help does not name.
+/// Hidden options of `outcrop reconstruct`, for tests.
 const HIDDEN: [&str; 2] = ["--block-points", "--tile-points"];
 
 struct Document {
-    /// From the root of the repository.
+    /// Path from the root of the repository.
     path: PathBuf,
     text: String,
 }
@@ -55,12 +55,12 @@ impl Document {
         self.path.display()
     }
 
-    /// True for the changelog: it has long entries, and options that may be gone.
+    /// True for the changelog: it has long entries, and options that may have been removed.
     fn is_history(&self) -> bool {
         self.path == Path::new("CHANGELOG.md")
     }
 
-    /// Its lines with their numbers, and whether they are in a block of code.
+    /// Lines with their numbers; true for those in a block of code.
     fn lines(&self) -> impl Iterator<Item = (usize, &str, bool)> {
         let mut code = false;
         self.text.lines().zip(1..).map(move |(line, number)| {
@@ -70,13 +70,13 @@ impl Document {
         })
     }
 
-    /// All but blocks of code.
+    /// The text without blocks of code.
     fn prose(&self) -> String {
         let lines = self.lines().filter(|(_, _, code)| !code);
         lines.map(|(_, line, _)| format!("{line}\n")).collect()
     }
 
-    /// Targets of its links and pictures, but for those in the web.
+    /// Targets of links and pictures, without those in the web.
     fn targets(&self) -> Vec<String> {
         let prose = self.prose();
         let after = prose.split("](").skip(1);
@@ -85,7 +85,7 @@ impl Document {
         own.map(|(target, _)| target.to_owned()).collect()
     }
 
-    /// The anchors of its headings, as GitHub makes them.
+    /// The anchors of its headings by GitHub's rules.
     fn anchors(&self) -> BTreeSet<String> {
         let mut seen: BTreeMap<String, usize> = BTreeMap::new();
         let headings = self
@@ -121,7 +121,7 @@ fn options(text: &str) -> BTreeSet<String> {
         .collect()
 }
 
-/// The options of each command, by its help.
+/// The options of each command, from its help.
 fn of_commands() -> BTreeMap<&'static str, BTreeSet<String>> {
     let commands = ["reconstruct", "resume", "info", "verify", "compare", "demo"];
     let help = |command: &'static str| {
@@ -204,7 +204,7 @@ fn options_exist() {
             document.name()
         );
         let spans = pieces.into_iter().skip(1).step_by(2);
-        // Of other programs only what is a span by itself.
+        // Options of other programs may appear as a code span of their own.
         for span in spans.filter(|span| span.starts_with("--")) {
             let missing = options(span).into_iter().filter(|o| !known(o));
             let missing = missing.filter(|o| !OTHERS.contains(&o.as_str()));

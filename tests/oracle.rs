@@ -1,5 +1,5 @@
-//! The pipeline's mesh equals the reference's, triangle for triangle, on many small and nasty
-//! clouds, for every block size, tile size, page size and number of threads.
+//! The pipeline's mesh equals the reference's, triangle for triangle, on many small difficult clouds, for
+//! every block size, tile size, page size and number of threads.
 
 mod reference;
 
@@ -14,7 +14,7 @@ use std::path::Path;
 
 type Point = [i32; 3];
 
-/// A mesh as it was read back: positions in lattice steps.
+/// A mesh read from a file: positions in lattice steps.
 #[derive(Default)]
 struct ReadBack {
     vertices: Vec<[f64; 3]>,
@@ -38,7 +38,7 @@ impl Sink for ReadBack {
     }
 }
 
-/// How the work is cut up; must not matter.
+/// The division of the work; it must not affect the mesh.
 #[derive(Debug, Clone, Copy)]
 struct Cut {
     tile: u32,
@@ -46,7 +46,7 @@ struct Cut {
     threads: usize,
 }
 
-/// The angle, of those used here, with this cosine.
+/// The angle with this cosine, among those used here.
 fn angle_of(cosine: f64) -> f64 {
     let has = |max_angle: &f64| {
         let params = Params {
@@ -134,7 +134,7 @@ fn pipeline(
     Ok((mesh, report))
 }
 
-/// The cloud moved to the lattice's origin, as the pipeline has it, without duplicates in a row.
+/// The cloud moved to the origin of the lattice, as the pipeline does, without successive duplicates.
 fn at_origin(points: &[Point]) -> Vec<Point> {
     let least: Point =
         std::array::from_fn(|axis| points.iter().map(|p| p[axis]).min().unwrap_or(0));
@@ -146,7 +146,7 @@ fn at_origin(points: &[Point]) -> Vec<Point> {
 
 fn compare(name: &str, points: &[Point], settings: &Settings, cuts: &[Cut]) -> Counts {
     let points = at_origin(points);
-    // Moved points lie on a lattice ten times halved.
+    // Moved points lie on a lattice whose step was halved ten times.
     let scale = if settings.smooth + settings.relax > 0 {
         1024
     } else {
@@ -245,7 +245,7 @@ fn same(what: &str, mesh: &ReadBack, report: &Report, expected: &Mesh, scale: f6
     assert_eq!(first, None, "{what}: the first triangles that differ");
     assert_eq!(mesh.triangles.len(), expected.triangles.len(), "{what}");
     let position = |id: &u32| {
-        // A coordinate in the file is single precision where that is enough for the input.
+        // Coordinates in the file are in single precision where that suffices for the input.
         expected.ids[*id as usize].map(|x| f64::from(x) / scale)
     };
     let close = |a: &[f64; 3], b: &[f64; 3]| (0..3).all(|k| (a[k] - b[k]).abs() <= 0.05);
@@ -274,7 +274,7 @@ const CUTS: [Cut; 3] = [
     },
 ];
 
-/// What happened in all runs.
+/// Counts over all runs.
 #[derive(Debug, Default)]
 struct Reached {
     rounds: u32,
@@ -425,7 +425,7 @@ fn robust() {
     ];
     let all = parts.iter().chain(&mended).all(|n| *n > 0);
     assert!(reached.rounds == 3 && all, "parts not reached: {reached:?}");
-    // The rest is met with other triples, see `oracle_stitch.rs`, and by bands.
+    // The remaining cases are reached with other triples, see `oracle_stitch.rs`, and by bands.
     let but = [
         "folded",
         "crowded",
@@ -451,7 +451,7 @@ fn robust_and_smoothed() {
     });
 }
 
-/// Junctions of three sheets, and bands with a twist that are one flat patch.
+/// Junctions of three sheets, and twisted bands that are one flat patch.
 fn walls_and_bands(seed: u64, settings: Settings, reached: &mut Reached) {
     let cloud = |name: &str, size: usize| {
         let kind = clouds::KINDS.iter().position(|kind| kind.0 == name);
@@ -474,7 +474,7 @@ fn walls_and_bands(seed: u64, settings: Settings, reached: &mut Reached) {
     reached.add(&compare("band", &bands, &settings, &CUTS));
 }
 
-/// Several patches, of which some move.
+/// Several patches, of which some are relaxed.
 #[test]
 fn robust_on_torn_sheets_and_doors() {
     let (mut reached, mut some_stayed) = (Reached::default(), 0);

@@ -1,5 +1,5 @@
-//! Stitching, repair and export of arbitrary triples equal the reference: triples that no cells
-//! would see reach the parts that clean up edges with many triangles and vertices by excess.
+//! Stitching, repair and export of arbitrary triples equal the reference: triples that cells never have reach
+//! the code for edges with many triangles and for vertices by excess.
 
 mod reference;
 
@@ -23,7 +23,7 @@ use std::sync::Arc;
 
 type Point = [i32; 3];
 
-/// One in so many sheets is large.
+/// One sheet in this number is large.
 const LARGE: u64 = 40;
 
 #[derive(Default)]
@@ -84,14 +84,14 @@ fn tables(all: &BTreeMap<[u32; 3], u32>, blocks: Blocks, workspace: &Workspace) 
     Triples { own, visiting }
 }
 
-/// The shape as a store beside that of the file.
+/// The shape as a store beside that of the file positions.
 fn shape_of(shape: &[Point], workspace: &Workspace) -> PointStore {
     let mut writer = StoreWriter::create(workspace, "shape", 16).unwrap();
     writer.push(shape).unwrap();
     writer.finish(workspace).unwrap()
 }
 
-/// The triangles, and counts as [`counted`] has them.
+/// The triangles, and the counts of [`counted`].
 fn pipeline(
     shape: &[Point],
     points: &[Point],
@@ -163,7 +163,7 @@ fn counted(c: &Counts) -> [u64; 7] {
     counts.map(|x| x as u64)
 }
 
-/// Triples among points that are near in order, as often T3 as `share` says.
+/// Triples of points that are near in order, with the share `share` of T3.
 fn random_triples(random: &mut Random, count: usize, share: i64) -> BTreeMap<[u32; 3], u32> {
     let mut all = BTreeMap::new();
     for _ in 0..3 * count {
@@ -181,7 +181,7 @@ fn random_triples(random: &mut Random, count: usize, share: i64) -> BTreeMap<[u3
         }
     }
     if count > 5 && random.integer(0, 4) == 0 {
-        // The smallest Möbius band, trusted as a whole.
+        // The smallest Möbius band, of T3 only.
         let first = random.integer(0, count as i64 - 5) as u32;
         for k in 0..5 {
             let mut t = [k, k + 1, k + 2].map(|v| first + v % 5);
@@ -192,7 +192,7 @@ fn random_triples(random: &mut Random, count: usize, share: i64) -> BTreeMap<[u3
     all
 }
 
-/// Ids in order but for a few, or in no order at all.
+/// Ids in order except for a few, or in random order.
 fn some_order(random: &mut Random, count: usize) -> Vec<u32> {
     let mut id: Vec<u32> = (0..count as u32).collect();
     for _ in 0..[0, 4, count][random.integer(0, 3) as usize] {
@@ -202,8 +202,8 @@ fn some_order(random: &mut Random, count: usize) -> Vec<u32> {
     id
 }
 
-/// Triples of a sheet that closes on itself, with a twist or without, and is torn. Some lie where `places`
-/// then says: on a band that is nowhere steep.
+/// Triples of a sheet that closes on itself, twisted or not, with tears. For some sheets `places` gives
+/// positions: on a band that is nowhere steep.
 fn twisted_triples(
     random: &mut Random,
     count: usize,
@@ -254,9 +254,9 @@ fn twisted_triples(
     all
 }
 
-/// A sheet that is flat but for a few folds and a little noise, in places torn, with walls on it: triples,
-/// and where their points lie. At an edge at the foot of a wall some two or all of the three triangles
-/// are T3.
+/// Triples of a flat sheet with a few folds, a little noise and tears, and with walls on it, and the
+/// positions of their points. At an edge at the foot of a wall two or all of the three triangles are T3 in
+/// some cases.
 fn walled_triples(random: &mut Random, count: usize) -> (BTreeMap<[u32; 3], u32>, Vec<Point>) {
     let wide = if count < 1000 {
         random.integer(3, 9)
@@ -283,7 +283,7 @@ fn walled_triples(random: &mut Random, count: usize) -> (BTreeMap<[u32; 3], u32>
             places[id[(row * wide + x) as usize] as usize] = p;
         }
     };
-    // Up at the first fold, and back at the second.
+    // Up at the first fold, and down again at the second.
     let turn = |y: i64| (y.min(2 * folds[0] - y), 35 * (y - folds[1]).max(0));
     for row in 0..deep {
         let (y, z) = turn(row);
@@ -316,13 +316,13 @@ fn walled_triples(random: &mut Random, count: usize) -> (BTreeMap<[u32; 3], u32>
             let below = if up == 0 { foot(wall) } else { first - 1 };
             strip(below, first, up == 0);
         }
-        // The strip before the foot.
+        // The strip before the foot of a wall.
         strip(foot(wall), foot(wall) - 1, true);
     }
     (all, places)
 }
 
-/// Compares for many seeds; `shape` moves a point. Sums of the counts that must not stay 0.
+/// Compares for many seeds; `shape` moves a point. Returns sums of the counts that must not stay 0.
 fn compare(
     seeds: std::ops::Range<u64>,
     sheets: bool,
@@ -333,7 +333,7 @@ fn compare(
     let mut reached = Counts::default();
     for seed in seeds {
         let mut random = Random::new(seed);
-        // With walls; only so many points say by themselves what is up.
+        // With walls; only sheets of this size have enough evidence of their own for facing up.
         let (least, most) = match seed {
             _ if sheets && seed % LARGE == 2 => (2800, 3500),
             _ if sheets && (seed % 7 == 3 || seed % 16 == 0) => (5, 300),
@@ -356,7 +356,7 @@ fn compare(
             _ => random_triples(&mut random, points.len(), share),
         };
         let shape = lie;
-        // Cells never see three points on a line.
+        // Cells never have three points on a line.
         all.retain(|t, _| {
             let [a, b, c] = t.map(|v| shape[v as usize]);
             outcrop::geom::triangle::normal(a, b, c) != [0; 3]
@@ -413,7 +413,7 @@ fn arbitrary_triples_the_robust_way() {
         robust: true,
         ..varied(seed)
     };
-    // Some long bands as one patch, and the largest sheets in large pieces.
+    // Some long bands are one patch, and the largest sheets consist of large patches.
     let settings = |seed: u64| match (seed % 16, seed % LARGE) {
         (0, _) => Settings {
             block: 1000,

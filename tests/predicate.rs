@@ -1,5 +1,5 @@
-//! The exact corner test of `geom::predicate` against power diagrams with real, tiny weights, and
-//! the clipped cells of `geom::clip` against all corners that nobody cuts off.
+//! The exact corner test of `geom::predicate` against power diagrams with real, tiny weights, and the clipped
+//! cells of `geom::clip` against all corners that no neighbour cuts off.
 
 mod reference;
 
@@ -14,19 +14,19 @@ type Wide = Big<40>;
 
 /// Weights are multiples of `2^-SCALE`.
 const SCALE: usize = 1000;
-/// Each weight is this many bits smaller than that of the next lower id: without weights, what
-/// is compared are integers of less than 180 bits.
+/// The weights of successive ids differ by a factor of 2 to this power. Without weights, integers of less
+/// than 180 bits are compared.
 const GAP: usize = 240;
 
-/// `2^SCALE` times the weight of `id`, where only these four ids matter.
+/// `2^SCALE` times the weight of `id`, if only these four ids occur.
 fn weight(id: u32, ids: [u32; 4]) -> Wide {
     let rank = ids.iter().filter(|other| **other < id).count();
     Wide::power_of_two(SCALE - GAP * (rank + 1))
 }
 
-/// Whether `c` cuts off the corner of `a` and `b`, from the definition: the corner is the point of
-/// the plane with equal power to the cell's point, `a` and `b`, found by Cramer's rule; it is cut
-/// off if its power with respect to `c` is less. `None` if there is no corner.
+/// True if `c` cuts off the corner of `a` and `b`, by the definition: the corner is the point of the plane
+/// with equal power to the cell's point, `a` and `b`, found by Cramer's rule; it is cut off if its power with
+/// respect to `c` is less. `None` if there is no corner.
 fn oracle(n: [i32; 3], own: u32, a: Neighbor, b: Neighbor, c: Neighbor) -> Option<bool> {
     let ids = [own, a.id, b.id, c.id];
     let scale = Wide::power_of_two(SCALE);
@@ -60,7 +60,7 @@ fn oracle(n: [i32; 3], own: u32, a: Neighbor, b: Neighbor, c: Neighbor) -> Optio
     Some(power(c.difference, c.id) < power([0; 3], own))
 }
 
-/// Tries all ways to take four of the points as a cell with two corner lines and a third.
+/// Tries all choices of four of the points as a cell, two lines of a corner, and a third line.
 fn compare(points: &[Point], ids: &[u32], n: [i32; 3]) -> (usize, usize) {
     let (mut compared, mut cut) = (0, 0);
     for own in 0..points.len() {
@@ -92,7 +92,7 @@ fn compare(points: &[Point], ids: &[u32], n: [i32; 3]) -> (usize, usize) {
     (compared, cut)
 }
 
-/// Different ids in no order.
+/// Distinct ids in random order.
 fn ids(random: &mut Random, count: usize) -> Vec<u32> {
     let mut ids: Vec<u32> = (0..count as u32).map(|k| 7 * k).collect();
     for k in (1..count).rev() {
@@ -174,8 +174,8 @@ fn reach2(n: [i32; 3], a: Neighbor, b: Neighbor) -> f64 {
     at.iter().map(|x| x * x).sum()
 }
 
-/// Corners well inside the disk must be in the cell exactly if nobody cuts them off, corners
-/// beyond its rim never.
+/// Corners well inside the disk must be in the cell exactly if no neighbour cuts them off, corners beyond its
+/// rim never.
 #[test]
 fn cells_have_the_corners_that_nobody_cuts_off() {
     let mut corners = 0;

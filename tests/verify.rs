@@ -1,5 +1,5 @@
-//! `verify` against a naive checker, on good meshes, on one mesh for each defect, and on random
-//! triangle soups, with ranges of vertices small enough that everything crosses their borders.
+//! `verify` against a simple checker, on good meshes, on a mesh for each defect, and on random triangles,
+//! with ranges of vertices so small that triangles cross their borders.
 
 #[path = "verify/naive.rs"]
 mod naive;
@@ -64,7 +64,7 @@ fn counts(v: &Verdict) -> Counts {
     }
 }
 
-/// The verdict, the same for every size of range and equal to the naive one.
+/// The verdict, equal for every size of range and to that of the simple checker.
 fn agreed(mesh: &Mesh, workspace: &Workspace) -> Verdict {
     let path = written(mesh, workspace);
     let verdict = verify(&path, workspace).unwrap();
@@ -87,7 +87,7 @@ fn check(mesh: &Mesh) -> Verdict {
     verdict
 }
 
-/// A grid of `n` × `m` squares; `wrap` says which sides are glued, `twist` turns the second glue.
+/// A grid of `n` × `m` squares; `wrap` selects the sides that are glued, `twist` turns the second seam.
 fn grid(n: i64, m: i64, wrap: [bool; 2], twist: bool) -> Mesh {
     let (rows, columns) = (n + i64::from(!wrap[0]), m + i64::from(!wrap[1]));
     let id = |i: i64, j: i64| {
@@ -171,7 +171,7 @@ fn both(mut a: Mesh, b: Mesh) -> Mesh {
     a
 }
 
-/// Spreads the ids over the whole mesh, so that no triangle is local.
+/// Distributes the ids over the whole mesh, so that no triangle is local.
 fn shuffled(mesh: &Mesh) -> Mesh {
     let n = mesh.positions.len() as i64;
     let step = (7..)
@@ -239,10 +239,10 @@ fn moebius_strip_is_inconsistent() {
     assert_eq!(verdict.genus, None);
 }
 
-/// Name of a defect, how often it is found, and what brings it about in a good mesh.
+/// Name of a defect, its count, and the change of a good mesh that causes it.
 type Case<'a> = (&'a str, u64, &'a dyn Fn(&mut Mesh));
 
-/// Each defect, alone where it can be.
+/// Each defect, alone if possible.
 #[test]
 fn every_defect_is_found() {
     let spoiled = |spoil: &dyn Fn(&mut Mesh)| {
@@ -296,7 +296,7 @@ fn every_defect_is_found() {
         let found: Vec<_> = verdict.defects().into_iter().filter(|d| d.1 > 0).collect();
         assert!(found.contains(&(name, count)), "{name}: {found:?}");
         assert!(!verdict.manifold, "{name}");
-        // A repeated triangle makes edges of three or more triangles; the others come alone.
+        // A repeated triangle causes edges with three or more triangles; the others occur alone.
         assert!(
             found.len() == 1 || name == "repeated triangles",
             "{name}: {found:?}"
@@ -390,7 +390,7 @@ fn random_soups() {
     });
 }
 
-/// Nearly manifold: a closed or open grid from which triangles are taken, turned and doubled.
+/// Nearly a manifold: a closed or open grid with triangles removed, turned and doubled.
 #[test]
 fn random_damage() {
     let workspace = workspace(MINIMUM_BUDGET, 2);

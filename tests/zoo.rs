@@ -1,4 +1,4 @@
-//! Odd, old, empty and broken files: each has its expected outcome, and none panics.
+//! Odd, old, empty and broken files: each has its expected outcome, without a panic.
 
 use outcrop::stages::ingest::{Spool, ingest};
 use outcrop::workspace::Workspace;
@@ -29,7 +29,7 @@ fn manifest(path: &Path) -> Vec<Value> {
     serde_json::from_str(&text).unwrap()
 }
 
-/// Streams the spool and checks what must hold of every cloud.
+/// Streams the spool and checks properties of every cloud.
 fn check_stream(spool: &Spool, workspace: &Workspace) {
     let stats = spool.stats();
     assert_eq!(
@@ -69,7 +69,7 @@ fn check_stream(spool: &Spool, workspace: &Workspace) {
     assert_eq!(workspace.memory.available(), workspace.memory.capacity());
 }
 
-/// Points read, or the error.
+/// Number of points, or the error.
 fn read(path: &Path, workspace: &Workspace) -> Result<u64, String> {
     match ingest(&[PathBuf::from(path)], workspace) {
         Ok(spool) => {
@@ -117,9 +117,9 @@ fn generated_files_have_their_expected_outcome() {
             (f, _, Err(text)) if refused_format(f).is_some() => {
                 text.contains(refused_format(f).unwrap())
             }
-            // Content decides, not the name: these are lists of points.
+            // The content decides, not the name: these are lists of points.
             ("xyz_named.ply", _, Ok(n)) => *n == 2000,
-            // The header of an interrupted writer: what is there is read.
+            // The header of an interrupted writer: the existing points are read.
             ("count_zero.las", _, Ok(n)) => *n == 2000,
             (_, "ok" | "ok-empty" | "ok-no-crash" | "ok-or-warn" | "ok-drop-nonfinite", o) => {
                 o.as_ref().ok().copied() == points
@@ -151,7 +151,7 @@ fn real_files_hold_as_many_points_as_another_reader_finds() {
         let points = entry["points_by_another_reader"].as_u64();
         let outcome = read(&zoo.join(file), &workspace);
         let good = match (&outcome, points) {
-            // Nothing there: an error says so as well.
+            // An empty file: an error is a valid outcome, too.
             (Err(_), Some(0) | None) => true,
             (Err(text), _) if refused_format(file).is_some() => {
                 text.contains(refused_format(file).unwrap())
@@ -206,7 +206,7 @@ fn compressed_files_hold_the_same_points() {
         let [a, b] = pair.map(|file| coordinates(zoo.join(file), &workspace));
         assert_eq!(a.len(), b.len(), "{pair:?}");
         for (a, b) in a.iter().flatten().zip(b.iter().flatten()) {
-            // Offsets may differ, and with them the last bit.
+            // Offsets may differ, and so may the last bit.
             assert!((a - b).abs() < 1e-6, "{pair:?}: {a}, {b}");
         }
     }

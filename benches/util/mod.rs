@@ -1,4 +1,4 @@
-//! The surface that the kernels are measured on, as the stages see it.
+//! The surface on which the kernels are measured, as the stages provide it.
 #![allow(dead_code, reason = "every bench uses a part of this")]
 
 use outcrop::geom::Point;
@@ -12,13 +12,13 @@ use outcrop::workspace::progress::{Cancel, Silent};
 use outcrop_cloudgen::{Cloud, Kind};
 use std::sync::Arc;
 
-/// Neighbours of a plane, as the pipeline's default.
+/// Neighbours of a plane, the pipeline's default.
 pub const NEIGHBORS: usize = 30;
 
-/// Candidates of a query, about.
+/// Approximate number of candidates of a query.
 pub const CANDIDATES: usize = 192;
 
-/// Neighbours listed for a query, about.
+/// Approximate number of neighbours listed for a query.
 pub const LISTED: usize = 40;
 
 /// Numbers without a pattern.
@@ -53,7 +53,7 @@ pub fn points(count: usize) -> Vec<Point> {
         .collect()
 }
 
-/// The same as an ordered store.
+/// The same points as an ordered store.
 pub fn store(count: usize, workspace: &Workspace) -> PointStore {
     let orderer = Orderer::new(workspace).expect("memory");
     orderer

@@ -1,4 +1,4 @@
-//! Flags, as the user gives them.
+//! Command-line arguments.
 
 use crate::method::METHOD;
 use crate::params::{MaxWidth, Method, Params, Radius, Smoothing};
@@ -8,7 +8,7 @@ use clap::{Args as ClapArgs, Parser, Subcommand};
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// Turns point clouds of any size into clean triangle meshes, inside the memory you give it.
+/// Turns point clouds of any size into clean triangle meshes within a memory budget.
 #[derive(Debug, Parser)]
 #[command(version, about, long_about = LONG_ABOUT, max_term_width = 100, after_help = EXAMPLES)]
 pub struct Args {
@@ -37,27 +37,27 @@ const EXAMPLES: &str = "Examples:
 Exit codes: 0 fine, 1 the answer is no (verify), 2 error. A run that was stopped can be resumed: 75 its \
 time limit was reached, 130 Ctrl-C, 143 SIGTERM, 129 SIGHUP.";
 
-/// What to do.
+/// The commands.
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Make a mesh from points
     Reconstruct(Box<Reconstruct>),
-    /// Go on with a run that was stopped, killed, or out of disk
+    /// Continue a run that was stopped, killed, or ran out of disk
     Resume(Resume),
-    /// Say what is in a cloud and what a run would need
+    /// Describe a cloud and estimate what a run needs
     Info(Info),
-    /// Check that a mesh is a manifold: exit 0 yes, 1 no
+    /// Check that a mesh is a manifold (exit code 0 if it is, 1 if not)
     Verify(Verify),
-    /// Measure how far two meshes or clouds are from each other
+    /// Measure the distance between two meshes or clouds
     Compare(Compare),
-    /// Make a cloud, reconstruct it, verify the mesh: a first look at the program
+    /// Generate a cloud, reconstruct it and verify the mesh
     Demo(Demo),
 }
 
-/// Limits of a run.
+/// Resources of a run.
 #[derive(Debug, ClapArgs)]
 pub struct Limits {
-    /// Ceiling for memory, e.g. 512MiB or 4GiB [default: half of what machine and cgroup allow, or 192MiB]
+    /// Memory budget, e.g. 512MiB or 4GiB [default: half of what machine and cgroup allow, or 192MiB]
     #[arg(long, value_name = "SIZE", value_parser = size)]
     pub memory: Option<u64>,
     /// Worker threads [default: all available]
@@ -66,12 +66,12 @@ pub struct Limits {
     /// Folder for scratch files, which are removed at the end [default: beside the output]
     #[arg(long, value_name = "DIR")]
     pub scratch: Option<PathBuf>,
-    /// No progress, even on a terminal
+    /// Show no progress, even on a terminal
     #[arg(long, short)]
     pub quiet: bool,
 }
 
-/// Which points are read.
+/// Selection of points by class.
 #[derive(Debug, ClapArgs)]
 #[command(next_help_heading = "Points")]
 pub struct Points {
@@ -88,16 +88,14 @@ pub struct Points {
     pub keep_classes: Vec<u8>,
 }
 
-/// Which points are left of those.
+/// Selection of points by position.
 #[derive(Debug, ClapArgs)]
 #[command(next_help_heading = "Points")]
 pub struct Filters {
-    /// Keep at most one point in each cube of this side, in the cloud's unit: the one nearest to its
-    /// centre
+    /// Keep at most one point in each cube with this side, in the cloud's unit: the one nearest to its centre
     #[arg(long, value_name = "LENGTH")]
     pub thin: Option<f64>,
-    /// Drop points that are FACTOR times as far from their neighbours as the points around them are
-    /// from theirs [without a number: 5]
+    /// Drop points FACTOR times as far from their neighbours as is usual around them [without a number: 5]
     #[arg(
         long,
         value_name = "FACTOR",
@@ -112,7 +110,7 @@ pub struct Filters {
 const OUTLIER_FACTOR_TEXT: &str = "5";
 
 impl Points {
-    /// The classes to read.
+    /// The selected classes.
     pub fn classes(&self) -> Classes {
         let sorted = |classes: &[u8]| {
             let mut classes = classes.to_vec();
@@ -132,38 +130,37 @@ impl Points {
 #[derive(Debug, ClapArgs)]
 #[command(next_help_heading = "Surface")]
 pub struct Surface {
-    /// How the surface is made: robust, for scans as they are, or paper, the published method as it
-    /// is written
+    /// Method: robust, for noisy scans, or paper, the published method unchanged
     #[arg(long, value_name = "robust|paper", default_value = "robust")]
     pub method: Method,
-    /// Neighbours for the plane at each point
+    /// Number of neighbours for the plane at each point
     #[arg(long, value_name = "N", default_value_t = METHOD.plane.neighbors)]
     pub neighbors: usize,
-    /// Rounds of smoothing before the surface is made; 1 or 2 help noisy scans
+    /// Rounds of smoothing before the reconstruction; 1 or 2 help with noisy scans
     #[arg(long, value_name = "ROUNDS", default_value_t = 0)]
     pub smooth: u32,
-    /// How smoothing moves points: plain, to the plane of their neighbours, or edges, which keeps
-    /// edges and does not shrink [default: edges; with --method paper plain]
+    /// Smoothing moves points: plain, to the plane of their neighbours; edges, preserving edges and without
+    /// shrinking [default: edges; with --method paper plain]
     #[arg(long, value_name = "plain|edges")]
     pub smoothing: Option<Smoothing>,
-    /// Most rounds of relaxing: smoothing that only decides which points are connected, and leaves
-    /// the points where they are [default: 3; with --method paper 0]
+    /// Largest number of rounds of relaxing: smoothing that decides which points are connected, but does not
+    /// move the points of the mesh [default: 3; with --method paper 0]
     #[arg(long, value_name = "ROUNDS")]
     pub relax: Option<u32>,
-    /// Disk radius: auto (follows the local density), a percentage of the bounding box's diagonal
-    /// like 5%, or a length in the cloud's unit
+    /// Disk radius: auto (follows the local density), a percentage of the diagonal of the bounding box like
+    /// 5%, or a length in the cloud's unit
     #[arg(long, value_name = "auto|PERCENT%|LENGTH", default_value = "auto")]
     pub radius: Radius,
-    /// Largest angle between neighbouring normals where the surface is uncertain, in degrees
-    /// [default: 143; with --method paper 60]
+    /// Largest angle between neighbouring normals where the surface is uncertain, in degrees [default: 143;
+    /// with --method paper 60]
     #[arg(long, value_name = "DEGREES")]
     pub max_angle: Option<f64>,
-    /// Keep points that are off the surface: whose neighbours are more than five times as far as is
-    /// usual around them, such as birds, dust and wires
+    /// Keep points off the surface, such as birds, dust and wires: those more than five times as far from
+    /// their neighbours as is usual around them
     #[arg(long)]
     pub keep_all: bool,
-    /// Longest side of a triangle: a length in the cloud's unit, a number of local spacings like 8x, or
-    /// none [default: 8x; with --method paper none]
+    /// Longest side of a triangle: a length in the cloud's unit, a number of local spacings like 8x, or none
+    /// [default: 8x; with --method paper none]
     #[arg(long, value_name = "LENGTH|Nx|none")]
     pub max_edge: Option<MaxWidth>,
 }
@@ -172,20 +169,19 @@ pub struct Surface {
 #[derive(Debug, ClapArgs)]
 #[command(next_help_heading = "Repair")]
 pub struct Repair {
-    /// Fill holes of up to this many edges; 0 fills none (single triangles that are missing are no
-    /// holes: but for --method paper they are put in all the same)
+    /// Fill holes of up to this many edges; 0 fills none (missing single triangles are still filled, except
+    /// with --method paper)
     #[arg(long, value_name = "N", default_value_t = METHOD.filling.longest)]
     pub max_hole_edges: usize,
-    /// Width of what is filled: triangles larger than an equilateral one with such sides stay out. A length
-    /// in the cloud's unit, a number of local spacings like 8x, or none [default: 8x; with --method paper
-    /// none]
+    /// Largest triangle of a filling, as the side of an equilateral triangle: a length in the cloud's unit, a
+    /// number of local spacings like 8x, or none [default: 8x; with --method paper none]
     #[arg(long, value_name = "LENGTH|Nx|none")]
     pub max_fill: Option<MaxWidth>,
-    /// Remove components with fewer triangles [default: 10; in noise one for each 5000 points, from
-    /// 10 to 150, or for each 2500, to 1000, with --smooth; with --method paper 10]
+    /// Remove components with fewer triangles [default: 10; in noise one for each 5000 points, from 10 to
+    /// 150, or with --smooth one for each 2500, from 10 to 1000; with --method paper 10]
     #[arg(long, value_name = "N")]
     pub min_component: Option<u64>,
-    /// Leave out bridges, holes and components: the surface as extracted
+    /// No repair: keep bridges, holes and small components
     #[arg(long)]
     pub no_repair: bool,
 }
@@ -193,10 +189,10 @@ pub struct Repair {
 /// `outcrop reconstruct`
 #[derive(Debug, ClapArgs)]
 pub struct Reconstruct {
-    /// Files (LAS, LAZ, PLY, XYZ text) or folders of them; together one cloud
+    /// Files (LAS, LAZ, PLY, XYZ text) or folders of files; together they are one cloud
     #[arg(value_name = "INPUT", required = true)]
     pub inputs: Vec<PathBuf>,
-    /// The mesh to write, binary PLY
+    /// The mesh to write (binary PLY)
     #[arg(long, short, value_name = "MESH.ply")]
     pub output: PathBuf,
     #[command(flatten)]
@@ -213,28 +209,28 @@ pub struct Reconstruct {
     pub again: Again,
     #[command(flatten)]
     pub ends: Ends,
-    /// Points worked on at a time; does not change the result
+    /// Points per tile; does not change the result
     #[arg(long, value_name = "N", hide = true)]
     pub tile_points: Option<u32>,
-    /// Points per block, for tests: the result depends on it
+    /// Points per block, for tests; changes the result
     #[arg(long, value_name = "N", hide = true, default_value_t = METHOD.curve.block)]
     pub block_points: u32,
 }
 
-/// What to do about an unfinished run.
+/// Treatment of an unfinished run.
 #[derive(Debug, ClapArgs)]
 #[command(next_help_heading = "Resume")]
 pub struct Again {
-    /// Go on with the unfinished run of this output, if there is one; begin if there is none
+    /// Resume the unfinished run of this output, if there is one
     #[arg(long, conflicts_with = "restart")]
     pub resume: bool,
-    /// Throw an unfinished run of this output away and begin again
+    /// Discard an unfinished run of this output and begin again
     #[arg(long)]
     pub restart: bool,
 }
 
 impl Again {
-    /// The same for the library.
+    /// The corresponding value of the library.
     pub fn start(&self) -> Start {
         match (self.resume, self.restart) {
             (true, _) => Start::Resume,
@@ -244,14 +240,14 @@ impl Again {
     }
 }
 
-/// How a run ends.
+/// Time limit and report of a run.
 #[derive(Debug, ClapArgs)]
 #[command(next_help_heading = "Limits")]
 pub struct Ends {
-    /// Stop by itself before this time is over, e.g. 7h30m, to be resumed later
+    /// Stop before this time is over, e.g. 7h30m; the run can be resumed later
     #[arg(long, value_name = "TIME", value_parser = time)]
     pub time_limit: Option<Duration>,
-    /// Write what happened as JSON
+    /// Write a report as JSON
     #[arg(long, value_name = "FILE.json")]
     pub report: Option<PathBuf>,
 }
@@ -262,15 +258,15 @@ pub struct Resume {
     /// The scratch folder of the run: MESH.ply.outcrop-scratch beside the mesh, or in --scratch
     #[arg(value_name = "FOLDER")]
     pub folder: PathBuf,
-    /// Ceiling for memory, as for reconstruct; need not be what it was
+    /// Memory budget; may differ from the earlier one
     #[arg(long, value_name = "SIZE", value_parser = size)]
     pub memory: Option<u64>,
-    /// Worker threads, as for reconstruct; need not be what they were
+    /// Worker threads; may differ from the earlier number
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub threads: Option<u16>,
     #[command(flatten)]
     pub ends: Ends,
-    /// No progress, even on a terminal
+    /// Show no progress, even on a terminal
     #[arg(long, short)]
     pub quiet: bool,
 }
@@ -278,10 +274,10 @@ pub struct Resume {
 /// `outcrop info`
 #[derive(Debug, ClapArgs)]
 pub struct Info {
-    /// Files or folders
+    /// Files or folders of files
     #[arg(value_name = "INPUT", required = true)]
     pub inputs: Vec<PathBuf>,
-    /// Answer as JSON
+    /// Print JSON
     #[arg(long)]
     pub json: bool,
     #[command(flatten)]
@@ -293,13 +289,13 @@ pub struct Info {
 /// `outcrop verify`
 #[derive(Debug, ClapArgs)]
 pub struct Verify {
-    /// The mesh, PLY
+    /// The mesh (PLY)
     #[arg(value_name = "MESH")]
     pub mesh: PathBuf,
-    /// Answer as JSON
+    /// Print JSON
     #[arg(long)]
     pub json: bool,
-    /// Vertices without a triangle are no defect
+    /// Accept vertices without a triangle
     #[arg(long)]
     pub allow_unreferenced: bool,
     #[command(flatten)]
@@ -309,19 +305,19 @@ pub struct Verify {
 /// `outcrop compare`
 #[derive(Debug, ClapArgs)]
 pub struct Compare {
-    /// A mesh (PLY with faces), or a cloud (LAS, LAZ, PLY, XYZ text, a folder of them)
+    /// A mesh (PLY with faces) or a cloud (LAS, LAZ, PLY, XYZ text, or a folder of them)
     #[arg(value_name = "A")]
     pub a: PathBuf,
-    /// What to compare it with, likewise
+    /// The mesh or cloud to compare it with
     #[arg(value_name = "B")]
     pub b: PathBuf,
-    /// Most places of each side from which the distance to the other is taken, e.g. 1e6
+    /// Largest number of samples of each side, e.g. 1e6
     #[arg(long, value_name = "N", default_value = "1000000", value_parser = count)]
     pub samples: u64,
-    /// Seed of the random choice of these places
+    /// Seed of the random samples
     #[arg(long, value_name = "SEED", default_value_t = 0)]
     pub seed: u64,
-    /// Answer as JSON
+    /// Print JSON
     #[arg(long)]
     pub json: bool,
     #[command(flatten)]
@@ -342,7 +338,7 @@ pub struct Demo {
 }
 
 impl Reconstruct {
-    /// The geometric parameters.
+    /// The parameters of the reconstruction.
     pub fn params(&self) -> Params {
         let usual = match self.surface.method {
             Method::Robust => Params::default(),

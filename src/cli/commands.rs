@@ -1,4 +1,4 @@
-//! What each command does.
+//! The commands.
 
 use super::args::{Command, Compare, Demo, Ends, Info, Limits, Reconstruct, Resume, Verify};
 use super::progress::{Bars, Warnings};
@@ -110,7 +110,7 @@ fn run_reconstruction(builder: Builder, ends: &Ends, quiet: bool) -> Result<Answ
     }
     let new_report = ends.report.as_ref().is_some_and(|path| !path.exists());
     if let Some(path) = &ends.report {
-        // Better now than after hours of work.
+        // An unwritable report is an error before the work, not after it.
         let mut options = std::fs::File::options();
         let opened = options.append(true).create(true).open(path);
         opened.map_err(|e| Error::io(path, "write the report", e))?;
@@ -120,7 +120,7 @@ fn run_reconstruction(builder: Builder, ends: &Ends, quiet: bool) -> Result<Answ
     match (&outcome, &ends.report) {
         (Ok(report), Some(path)) => std::fs::write(path, json(report)? + "\n")
             .map_err(|e| Error::io(path, "write the report", e))?,
-        // No report of a run that did not end.
+        // No empty report of a failed run.
         (Err(_), Some(path)) if new_report => drop(std::fs::remove_file(path)),
         _ => {}
     }
@@ -151,7 +151,7 @@ fn summary(report: &Report, output: &Path) -> String {
     ) + &left_out(report)
 }
 
-/// A line about the points that options left out, if there are any.
+/// A line about the points left out by options, if there are any.
 fn left_out(report: &Report) -> String {
     let reasons: Vec<String> = [
         (report.input.dropped_by_class, "of other classes"),

@@ -1,4 +1,4 @@
-//! The command line: flags to configuration, messages, exit codes. The only code that prints.
+//! The command line: arguments, messages, exit codes. The only code that prints.
 
 mod args;
 mod commands;
@@ -10,18 +10,18 @@ use crate::error::Error;
 use clap::Parser;
 use std::process::ExitCode;
 
-/// Exit code when the answer is no.
+/// Exit code for a negative answer (`verify`).
 const NO: u8 = 1;
 /// Exit code for errors.
 const FAILED: u8 = 2;
 
-/// What a command comes to.
+/// The result of a command.
 enum Answer {
     Yes,
     No,
 }
 
-/// Runs the command line; 0 fine, 1 the answer is no, 2 error, 75 time is up, 128 + signal.
+/// Runs the command line. Exit codes: 0 success, 1 negative answer, 2 error, 75 time limit, 128 + signal.
 #[must_use]
 pub fn main() -> ExitCode {
     #[cfg(feature = "ablation")]
@@ -41,7 +41,7 @@ pub fn main() -> ExitCode {
         Ok(Answer::Yes) => ExitCode::SUCCESS,
         Ok(Answer::No) => ExitCode::from(NO),
         Err(error) => {
-            // A reader that went away (`| head`) is no error.
+            // A closed pipe (`| head`) is no error.
             if !style::is_broken_pipe(&error) {
                 let hint = if error.can_resume() {
                     stop::hint()

@@ -1,4 +1,4 @@
-//! Progress on a terminal: stage, rate, time left, memory; one line a stage.
+//! Progress on a terminal: stage, rate, time left, memory; one line for each stage.
 
 use crate::workspace::limits;
 use crate::workspace::progress::Observer;
@@ -7,7 +7,7 @@ use std::fmt::Write;
 use std::sync::Mutex;
 use std::time::Duration;
 
-/// Draws a bar for the current stage on standard error.
+/// Draws a progress bar for the current stage on standard error.
 #[derive(Default)]
 pub struct Bars {
     current: Mutex<Option<ProgressBar>>,

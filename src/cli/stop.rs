@@ -1,4 +1,4 @@
-//! Stopping: signals, time limits, and what the user is told then.
+//! Stopping: signals, time limits, and the messages about them.
 
 use crate::pipeline::Reconstruction;
 use crate::workspace::fault;
@@ -9,20 +9,20 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicI32, Ordering};
 use std::time::Duration;
 
-/// Exit code of a run whose time is up.
+/// Exit code of a run that reached its time limit.
 pub const TIME_IS_UP: u8 = 75;
 
-/// What a run that was asked to stop has to do so by itself. What it has finished is on disk, so it can
-/// be ended at any time after that.
+/// Time that a run has to stop by itself. Its finished work is on disk, so the program can be ended at any
+/// time after that.
 const PATIENCE: Duration = Duration::from_millis(1500);
 
-/// How often it is looked whether the run was asked to stop.
+/// Interval at which the flag is checked.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// The signal that stops the program; 0 if none did.
+/// The signal that stops the program; 0 if none.
 static SIGNAL: AtomicI32 = AtomicI32::new(0);
 
-/// The scratch folder of the run, which may be there when it is stopped.
+/// The scratch folder of the run, for the message about resuming.
 static FOLDER: Mutex<Option<std::path::PathBuf>> = Mutex::new(None);
 
 /// Exit code of a run that was stopped.
@@ -34,11 +34,11 @@ pub fn code(expired: bool) -> u8 {
     }
 }
 
-/// A flag that signals raise; a second one ends the program at once.
+/// A flag that signals raise; a second signal ends the program at once.
 pub fn on_signal() -> Cancel {
     let cancel = Cancel::new();
     let raised = cancel.clone();
-    // Without a handler a signal ends the program, from which a run resumes as well.
+    // Without a handler a signal ends the program; the run can be resumed in this case too.
     if let Ok(mut signals) = Signals::new([SIGINT, SIGTERM, SIGHUP]) {
         std::thread::spawn(move || {
             for signal in signals.forever() {
@@ -53,7 +53,7 @@ pub fn on_signal() -> Cancel {
     cancel
 }
 
-/// Ends the program if the run does not stop soon once its flag is raised.
+/// Ends the program if the run does not stop soon after its flag is raised.
 pub fn watch(run: &Reconstruction, cancel: &Cancel) {
     if let Ok(mut folder) = FOLDER.lock() {
         *folder = Some(run.scratch_folder().to_path_buf());
@@ -72,7 +72,7 @@ pub fn watch(run: &Reconstruction, cancel: &Cancel) {
     });
 }
 
-/// How to go on with the run, if that is possible.
+/// A line about resuming the run, if that is possible.
 pub fn hint() -> String {
     let folder = FOLDER.lock().ok().and_then(|folder| folder.clone());
     match folder {
@@ -83,7 +83,7 @@ pub fn hint() -> String {
     }
 }
 
-/// A path as a shell takes it.
+/// A path quoted for a shell.
 fn quoted(path: &std::path::Path) -> String {
     let text = path.display().to_string();
     let plain = |c: char| c.is_alphanumeric() || "/._-+,@%".contains(c);

@@ -1,4 +1,4 @@
-//! Numbers as people read them, and small helpers for messages.
+//! Formatting of numbers, and small helpers for messages.
 
 use crate::error::Error;
 
@@ -26,7 +26,7 @@ pub fn bytes(count: u64) -> String {
     bytesize::ByteSize(count).display().iec().to_string()
 }
 
-/// Seconds as people say them.
+/// Seconds in a readable form.
 pub fn seconds(seconds: f64) -> String {
     if seconds < 10.0 {
         format!("{seconds:.1} s")
@@ -39,7 +39,7 @@ pub fn seconds(seconds: f64) -> String {
     }
 }
 
-/// True for a write into a pipe that nobody reads.
+/// True for a write to a closed pipe.
 pub fn is_broken_pipe(error: &Error) -> bool {
     matches!(error, Error::Io { source, .. } if source.kind() == std::io::ErrorKind::BrokenPipe)
 }

@@ -1,4 +1,4 @@
-//! What is in a cloud, and what a run on it would need.
+//! Description of a cloud, and estimates for a run on it.
 
 use crate::error::Result;
 use crate::geom::aabb::Aabb;
@@ -18,11 +18,11 @@ use std::fmt;
 use std::path::PathBuf;
 use std::time::Instant;
 
-/// Sampled runs of points, and points in each.
+/// Number of sampled sequences of points, and of points in each.
 const SAMPLES: usize = 24;
 const SAMPLE_POINTS: usize = 1024;
 
-/// Seconds of the other stages for each second of cells; measured on real scans.
+/// Time of the other stages per second of the stage of cells; measured on real scans.
 const OTHER_STAGES: f64 = 1.3;
 
 /// Percentiles of a length over a sample of the points, in the cloud's unit.
@@ -36,12 +36,12 @@ pub struct Percentiles {
     pub p95: f64,
 }
 
-/// A cloud and what it needs.
+/// Description of a cloud, with estimates.
 #[derive(Debug, Clone, Serialize)]
 pub struct Info {
     /// Points and files.
     pub input: IngestStats,
-    /// Points that share their position with another one.
+    /// Points with the position of another one.
     pub duplicates: u64,
     /// Distinct points.
     pub points: u64,
@@ -49,28 +49,28 @@ pub struct Info {
     pub min: [f64; 3],
     /// Highest corner in the cloud's unit.
     pub max: [f64; 3],
-    /// Step of the lattice that positions would be kept on.
+    /// Step of the lattice of the positions.
     pub lattice_step: f64,
-    /// True if every position is on it without rounding.
+    /// True if every position is on the lattice without rounding.
     pub lattice_exact: bool,
     /// Distance to the nearest other point.
     pub spacing: Percentiles,
     /// Disk radius that `--radius auto` would use.
     pub auto_radius: Percentiles,
-    /// Smallest memory budget that a run accepts, in bytes.
+    /// Smallest memory budget, in bytes.
     pub memory_minimum: u64,
-    /// Scratch space a run would take at its peak, about, in bytes.
+    /// Estimated peak of the scratch space, in bytes.
     pub scratch_bytes: u64,
-    /// Size of the mesh file, about, in bytes.
+    /// Estimated size of the mesh file, in bytes.
     pub output_bytes: u64,
-    /// Seconds a run would take on these threads, about.
+    /// Estimated seconds of a run on these threads.
     pub seconds: f64,
 }
 
-/// Reads the whole cloud once, or the points of the wanted classes, and samples it.
+/// Reads the whole cloud (or the points of the given classes) once, and samples it.
 ///
 /// # Errors
-/// As for a reconstruction, but a cloud too small for a surface is no error.
+/// As for a reconstruction, but a cloud that is too small for a surface is no error.
 pub fn info(inputs: &[PathBuf], classes: &Classes, workspace: &Workspace) -> Result<Info> {
     let start = Instant::now();
     let observer = &workspace.observer;

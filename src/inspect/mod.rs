@@ -1,4 +1,4 @@
-//! Questions a user asks of a cloud or a mesh.
+//! Inspection of clouds and meshes without a reconstruction.
 
 pub mod compare;
 pub mod info;

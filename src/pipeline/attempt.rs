@@ -1,4 +1,4 @@
-//! One attempt at a run: where it begins, when its time is up, what it leaves behind.
+//! One attempt at a run: its beginning, its time limit, and the removal of its scratch files.
 
 use super::manifest::{Asked, Manifest};
 use super::{Reconstruction, Start};
@@ -14,7 +14,7 @@ use std::time::Duration;
 #[derive(Debug)]
 pub(super) struct Alarm(#[expect(dead_code, reason = "dropping it is the message")] Sender<()>);
 
-/// The time a run needs to stop, and a bit more.
+/// Time before the limit at which the run is stopped.
 fn margin(limit: Duration) -> Duration {
     Duration::from_secs(5).min(limit / 10)
 }
@@ -33,13 +33,13 @@ impl Alarm {
 }
 
 impl Reconstruction {
-    /// The folder that holds all scratch of this run, and from which it can be resumed.
+    /// The scratch folder of this run, from which it can be resumed.
     #[must_use]
     pub fn scratch_folder(&self) -> &Path {
         &self.folder
     }
 
-    /// True if the run is not finished and can go on from where it was.
+    /// True if the run is unfinished and can be resumed.
     #[must_use]
     pub fn is_unfinished(&self) -> bool {
         Folder::has_progress(&self.folder)
@@ -83,15 +83,15 @@ impl Reconstruction {
         workspace
     }
 
-    /// Removes all scratch, unless the run can go on from there.
+    /// Removes the scratch folder, unless the run can be resumed.
     pub(super) fn close<T>(&self, workspace: Workspace, outcome: &Result<T>) {
         let keep = outcome.as_ref().is_err_and(Error::can_resume) && self.is_unfinished();
         if !keep {
             workspace.remove(outcome.is_ok());
-            // A mesh that is not finished; what cannot be deleted is in nobody's way.
+            // An unfinished mesh; if it cannot be deleted it does no harm.
             let _ = std::fs::remove_file(export::temporary(&self.output));
         }
-        // With the lock, which has to outlive the files.
+        // The workspace has the lock, which must outlive the files.
         drop(workspace);
         fault::finish();
     }

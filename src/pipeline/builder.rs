@@ -1,4 +1,4 @@
-//! What a reconstruction is to do, and the checks before it begins.
+//! The builder of a reconstruction, with all checks before it begins.
 
 use super::manifest::Manifest;
 use super::start::{Start, scratch_folder};
@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Collects what a [`Reconstruction`] needs; everything but inputs and output has a default.
+/// Collects the settings of a [`Reconstruction`]; all but inputs and output have defaults.
 #[derive(Default)]
 pub struct Builder {
     inputs: Vec<PathBuf>,
@@ -27,20 +27,20 @@ pub struct Builder {
     observer: Option<Arc<dyn Observer>>,
     cancel: Cancel,
     start: Start,
-    /// The scratch folder itself, if it is known.
+    /// The scratch folder, if an unfinished run is continued.
     folder: Option<PathBuf>,
     time_limit: Option<Duration>,
 }
 
 impl Builder {
-    /// Adds a file or folder of points; together they are one cloud.
+    /// Adds a file or folder of points; all inputs together are one cloud.
     #[must_use]
     pub fn input(mut self, path: impl Into<PathBuf>) -> Self {
         self.inputs.push(path.into());
         self
     }
 
-    /// Where the mesh goes (binary PLY).
+    /// Path of the mesh (binary PLY).
     #[must_use]
     pub fn output(mut self, path: impl Into<PathBuf>) -> Self {
         self.output = path.into();
@@ -54,7 +54,7 @@ impl Builder {
         self
     }
 
-    /// Geometric parameters.
+    /// Parameters of the reconstruction.
     #[must_use]
     pub fn params(mut self, params: Params) -> Self {
         self.params = params;
@@ -89,7 +89,7 @@ impl Builder {
         self
     }
 
-    /// Who is told of progress.
+    /// Receiver of progress.
     #[must_use]
     pub fn observer(mut self, observer: Arc<dyn Observer>) -> Self {
         self.observer = Some(observer);
@@ -103,22 +103,21 @@ impl Builder {
         self
     }
 
-    /// What to do about an unfinished run with the same output and scratch folder; default: refuse to
-    /// begin another one.
+    /// Treatment of an unfinished run with the same output and scratch folder; default: an error.
     #[must_use]
     pub fn start(mut self, start: Start) -> Self {
         self.start = start;
         self
     }
 
-    /// Stop by itself before this time is over; the run can be resumed then.
+    /// The run stops by itself before this time is over; it can be resumed then.
     #[must_use]
     pub fn time_limit(mut self, limit: Duration) -> Self {
         self.time_limit = Some(limit);
         self
     }
 
-    /// The run that is described in a scratch folder, to go on with it.
+    /// The settings in the manifest of a scratch folder.
     pub(super) fn of(manifest: &Manifest, folder: &Path) -> Self {
         Self {
             inputs: manifest.inputs().collect(),
@@ -132,7 +131,7 @@ impl Builder {
         }
     }
 
-    /// Checks everything that can be checked before work starts.
+    /// Checks everything that can be checked in advance.
     ///
     /// # Errors
     /// [`Error::Parameter`], [`Error::Memory`].
@@ -170,7 +169,7 @@ impl Builder {
     }
 }
 
-/// The run that was left unfinished in a scratch folder.
+/// The builder of the unfinished run in a scratch folder.
 ///
 /// # Errors
 /// [`Error::NotResumable`], [`Error::Locked`], [`Error::Io`].

@@ -1,4 +1,4 @@
-//! What is checked between the stages.
+//! Checks between the stages.
 
 use crate::error::{Error, Result};
 use crate::geom::lattice::Lattice;
@@ -12,7 +12,7 @@ use crate::workspace::{Workspace, limits};
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
-/// Disks larger than this, in steps, see all of any cloud.
+/// Larger disks, in steps, contain any cloud.
 const LARGEST_RADIUS: f64 = (1u64 << 34) as f64;
 
 /// The radius in lattice steps.
@@ -28,7 +28,7 @@ pub(super) fn disk_radius(radius: Radius, store: &PointStore, lattice: &Lattice)
     }
 }
 
-/// Finds out before any work whether the output's folder takes files.
+/// Checks that a file can be created in the output's folder.
 pub(super) fn writable(output: &Path) -> Result<()> {
     if output.is_dir() {
         let error = std::io::Error::from(std::io::ErrorKind::IsADirectory);
@@ -39,8 +39,8 @@ pub(super) fn writable(output: &Path) -> Result<()> {
         .map_err(|e| Error::io(output, "write the mesh into this folder", e))
 }
 
-/// Refuses before long stages what the scratch folder, which may share its disk with the mesh, has no
-/// room for; some of it may be taken already.
+/// Checks that the scratch folder and the mesh, possibly on one disk, have enough free space; a part of it
+/// may be in use by this run already.
 pub(super) fn room(
     scratch: &Path,
     output: &Path,
@@ -65,7 +65,7 @@ pub(super) fn room(
     }
 }
 
-/// Refuses to replace a file that the cloud is read from.
+/// Checks that the output is not an input file.
 pub(super) fn not_an_input(output: &Path, inputs: &[PathBuf]) -> Result<()> {
     let Ok(output) = output.canonicalize() else {
         return Ok(());

@@ -1,4 +1,4 @@
-//! Stages as steps of a run, and the time they take.
+//! Stages as steps of a run, with their time.
 
 use crate::error::Result;
 use crate::report::{PartReport, StageReport};
@@ -6,16 +6,16 @@ use crate::workspace::Workspace;
 use crate::workspace::persist::{Persist, persist};
 use std::time::Instant;
 
-/// Runs stages and notes what each takes.
+/// Runs stages and measures them.
 pub(crate) struct Clock<'a> {
     workspace: &'a Workspace,
-    /// What each stage took, those of earlier attempts too.
+    /// Measurements of the stages, with those of earlier attempts.
     pub stages: Vec<StageReport>,
-    /// Seconds that stages took which an earlier attempt had finished.
+    /// Seconds of the stages that an earlier attempt finished.
     pub earlier: f64,
 }
 
-/// What a stage took.
+/// Measurements of a stage.
 struct Took {
     seconds: f64,
     read: u64,
@@ -69,7 +69,7 @@ impl<'a> Clock<'a> {
             let io = &workspace.io;
             let (start, read, written) = (Instant::now(), io.read(), io.written());
             io.begin_stage();
-            // What was held before is not its own.
+            // Usage before the stage does not count for it.
             let _ = workspace.memory.take_held();
             workspace.observer.begin(name, unit, total);
             let outcome = work();

@@ -1,13 +1,13 @@
-//! How much disk a run will take: before it starts, when the points are read, and when they are relaxed.
+//! Estimates of disk space: before a run starts, after reading the points, and after relaxing them.
 //!
-//! At its peak, which is where triples are put together and stitched, scratch holds one or two stores of
-//! positions and all triples twice. How many triples there are depends on noise, which shows when the points are
-//! relaxed: noisy ones move, and then there is a second store. That store is all that headers cannot
-//! tell: where noise makes more triples it makes fewer triangles, so scratch and mesh together are the
-//! same otherwise, and half a store is off by 6 bytes a point either way.
+//! Scratch space has its peak where triples are put together and stitched: one or two stores of positions,
+//! and all triples twice. The number of triples depends on noise, which is measured when the points are
+//! relaxed: noisy points move, and a second store is written. This store is the only size that headers do not
+//! determine: where noise makes more triples it makes fewer triangles, so scratch and mesh together have the
+//! same size otherwise. Half a store is assumed, which is wrong by 6 bytes a point either way.
 //!
-//! Files that are not needed any more are not reckoned. They are deleted as soon as that is synced
-//! (`workspace/keeper.rs`), which takes a moment only.
+//! Unneeded files are not counted. They are deleted as soon as the deletion is synced
+//! (`workspace/keeper.rs`), within a moment.
 
 use crate::params::{Method, Params};
 use crate::report::DiskEstimate;
@@ -15,36 +15,37 @@ use crate::stages::export::{self, CoordinateType};
 use crate::stages::ingest::{self, Probe};
 use std::path::PathBuf;
 
-/// Bytes of a position, in the ordered store and in the spool if it was integers or `f32`.
+/// Bytes of a position in the ordered store, and in the spool if its source has integers or `f32`.
 const POSITION: f64 = 12.0;
 
-/// Scratch bytes a triple at the peak: two copies, packed. Measured 7.4 where nearly all are triangles,
+/// Scratch bytes per triple at the peak: two copies, packed. Measured: 7.4 where nearly all are triangles,
 /// 8.5 where most are candidates.
 const TRIPLE: f64 = 8.2;
 
-/// Bytes a point while triangles are in scratch and the mesh is written, beside the stores.
+/// Scratch bytes per point while the mesh is written, beside the stores.
 const EXPORT: f64 = 7.3;
 
-/// Checksums, boxes and whatever else is small: bytes a point, and in all.
+/// Checksums, boxes and other small data: bytes per point, and in all.
 const SMALL: (f64, f64) = (0.8, 4096.0);
 
-/// What is known of a cloud so far.
+/// Properties of a cloud that are known at some stage.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Known {
     /// Points in the spool.
     pub read: u64,
     /// Bytes of the spool.
     pub spool: u64,
-    /// Points left.
+    /// Points that remain.
     pub points: u64,
-    /// Whether the mesh has coordinates in double precision.
+    /// True if the mesh has coordinates in double precision; none if unknown.
     pub double: Option<bool>,
-    /// Whether points moved when they were relaxed.
+    /// True if points moved in relaxing; none if unknown.
     pub moved: Option<bool>,
 }
 
 impl Known {
-    /// What the headers of the inputs say. They may be wrong, but cannot claim more than the files hold.
+    /// The properties in the headers of the inputs. They may be wrong, but cannot exceed the sizes of the
+    /// files.
     pub fn from_headers(inputs: &[PathBuf]) -> Option<Self> {
         let mut known = Self {
             read: 0,
@@ -66,12 +67,12 @@ impl Known {
         Some(known)
     }
 
-    /// The space that a run with these parameters will take.
+    /// The estimated space of a run with these parameters.
     pub fn estimate(&self, params: &Params) -> DiskEstimate {
         let points = self.points as f64;
         let (moved, triples, triangles) = self.surface(params);
         let stores = POSITION * (1.0 + moved);
-        // What is read, sorted and written anew is there twice for a while.
+        // While points are read and sorted they are on disk twice.
         let mut early = self.spool as f64 + POSITION * points;
         if params.thin.is_some() {
             early = early.max(self.spool as f64 + 2.0 * POSITION * self.read as f64);
@@ -102,8 +103,8 @@ impl Known {
         }
     }
 
-    /// How much of a second store there is, triples and triangles a point. A surface without noise has two
-    /// of each, but for its borders.
+    /// Size of a second store as a share of the first, triples per point and triangles per point. A surface
+    /// without noise has two triples and two triangles per point, except at its boundary.
     fn surface(&self, params: &Params) -> (f64, f64, f64) {
         let robust = params.method == Method::Robust;
         match self.moved {
@@ -117,7 +118,7 @@ impl Known {
     }
 }
 
-/// Whether the mesh of these files will have coordinates in double precision, as far as headers tell.
+/// True if the mesh of these files will have double precision; none if the headers do not decide it.
 fn double(probes: &[Probe]) -> Option<bool> {
     let single = |p: &Probe| p.scale.is_none() && p.spool_bytes_per_point <= POSITION as u64;
     if probes.iter().all(single) {
@@ -125,7 +126,7 @@ fn double(probes: &[Probe]) -> Option<bool> {
     }
     let (mut step, mut largest) = (f64::INFINITY, 0f64);
     for probe in probes {
-        // Of others it depends on the coordinates themselves.
+        // For other formats it depends on the coordinates.
         let (scale, bounds) = (probe.scale?, probe.bounds?);
         step = scale.iter().fold(step, |least, s| least.min(s.abs()));
         for c in bounds.into_iter().flatten() {
@@ -168,7 +169,7 @@ mod tests {
             ..MILLION
         }
         .estimate(&params);
-        // "double" is a letter longer than "float", three times.
+        // "double" is one letter longer than "float", three times.
         assert_eq!(double.output - first.output, 12_000_003);
     }
 

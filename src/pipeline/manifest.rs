@@ -1,5 +1,5 @@
-//! What a run is: its parameters, its output, the identity of every input. Bound to the scratch folder,
-//! so that nobody goes on with something else.
+//! The manifest: parameters, output and the identity of every input of a run. It ensures that a run is
+//! resumed only with the same ones.
 
 use crate::error::{Error, Result};
 use crate::params::Params;
@@ -15,10 +15,10 @@ use std::path::{Path, PathBuf};
 /// The format of scratch folders that this program writes and reads.
 const FORMAT: u32 = 2;
 
-/// Bytes of an input that are looked at in one place.
+/// Bytes of each sample of an input.
 const SAMPLE: u64 = 64 << 10;
 
-/// A path, in text if it is one.
+/// A path, as text if it is valid UTF-8.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 enum Name {
@@ -27,7 +27,7 @@ enum Name {
 }
 
 impl Name {
-    /// The path from the root.
+    /// The absolute path.
     fn of(path: &Path) -> Result<Self> {
         let path = std::path::absolute(path).map_err(|e| Error::io(path, "find", e))?;
         Ok(match path.as_os_str().to_str() {
@@ -51,7 +51,7 @@ struct Identity {
     bytes: u64,
     /// Seconds and nanoseconds of its last change.
     modified: (i64, i64),
-    /// CRC-32 of its beginning, its end and two places between.
+    /// CRC-32 of four samples: the beginning, the end, and two places between.
     sample: u32,
 }
 
@@ -61,7 +61,7 @@ impl Identity {
         let file = File::open(path).map_err(io("open"))?;
         let meta = file.metadata().map_err(io("read the size of"))?;
         let mut crc = crc32fast::Hasher::new();
-        // A pipe or a device has no places; it is refused later, with a better word.
+        // Pipes and devices are refused later, with a clearer message.
         if meta.is_file() {
             let last = meta.len().saturating_sub(SAMPLE);
             let mut buffer = vec![0; SAMPLE.min(meta.len()) as usize];
@@ -79,7 +79,7 @@ impl Identity {
     }
 }
 
-/// A run as it was asked for.
+/// The manifest of a run.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct Manifest {
     format: u32,
@@ -90,12 +90,12 @@ pub(super) struct Manifest {
     division: Division,
     tile_points: u32,
     page_points: usize,
-    /// As they were given.
+    /// Inputs as given.
     inputs: Vec<Name>,
     files: Vec<Identity>,
 }
 
-/// What a run is made of.
+/// The settings from which a manifest is made.
 #[derive(Debug)]
 pub(super) struct Asked<'a> {
     pub inputs: &'a [PathBuf],
@@ -106,7 +106,7 @@ pub(super) struct Asked<'a> {
 }
 
 impl Manifest {
-    /// Looks at every input.
+    /// Makes the manifest; samples every input.
     pub fn of(asked: &Asked<'_>) -> Result<Self> {
         let files = ingest::expand(asked.inputs)?;
         Ok(Self {
@@ -176,7 +176,7 @@ impl Manifest {
     }
 
     /// # Errors
-    /// [`Error::Mismatch`] with the first thing in which `now` is another run.
+    /// [`Error::Mismatch`] with the first difference to `now`.
     pub fn check(&self, now: &Self, folder: &Path) -> Result<()> {
         let differ = |what: String, was: String, now: String| {
             Err(Error::Mismatch {
@@ -245,7 +245,7 @@ impl Manifest {
     }
 
     fn json(&self) -> serde_json::Value {
-        // Everything in it can be shown as JSON: it came from there or goes there.
+        // All fields can be represented in JSON.
         serde_json::to_value(self).unwrap_or_default()
     }
 }

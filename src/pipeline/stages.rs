@@ -1,5 +1,5 @@
-//! Each stage with the parameters of a run: what it is told, what it leaves in the report, and whether
-//! there is room on the disk for what comes after it.
+//! The stages of a run: each with its parameters, its part of the report, and the check of disk space for the
+//! following stages.
 
 use super::checks::{disk_radius, enough, not_a_line, room};
 use super::{Clock, Known, Reconstruction};
@@ -35,7 +35,7 @@ pub(super) struct Stages<'a> {
 }
 
 impl<'a> Stages<'a> {
-    /// Nothing is done yet, but there is room for what the headers of the inputs let expect.
+    /// Begins with the estimate of disk space from the headers of the inputs.
     pub fn begin(job: &'a Reconstruction, workspace: &'a Workspace) -> Result<Self> {
         let headers = Known::from_headers(&job.inputs);
         let first = headers.map(|known| known.estimate(&job.params));
@@ -60,7 +60,7 @@ impl<'a> Stages<'a> {
         Ok(stages)
     }
 
-    /// Refuses to go on if the disk has no room for all that is to come.
+    /// Ends the run if the disk is too small for the following stages.
     fn check_room(&mut self) -> Result<()> {
         let estimate = self.known.estimate(&self.job.params);
         self.report.estimated_scratch_bytes = estimate.scratch;
@@ -73,7 +73,7 @@ impl<'a> Stages<'a> {
         self.report.warnings.push(warning);
     }
 
-    /// Reads the files: all points, and the lattice that they are on.
+    /// Reads the files; returns the points and their lattice.
     pub fn ingest(&mut self) -> Result<(Spool, Lattice)> {
         let (job, workspace) = (self.job, self.workspace);
         let params = &job.params;
@@ -88,7 +88,7 @@ impl<'a> Stages<'a> {
         self.known = Known {
             read: input.kept,
             spool: spool.bytes(),
-            // Nobody knows how many stay when points are thinned.
+            // With thinning, the number of points that stay is unknown.
             points: if params.thin.is_some() { 0 } else { input.kept },
             double: Some(self.report.coordinates == CoordinateType::Double),
             moved: None,
@@ -104,7 +104,7 @@ impl<'a> Stages<'a> {
         Ok((spool, lattice))
     }
 
-    /// Sorts the points along the curve, thinned if that is wanted; duplicates are folded.
+    /// Sorts the points along the curve, thinned if requested; duplicates become one point.
     pub fn order(&mut self, spool: Spool, lattice: &Lattice) -> Result<PointStore> {
         let (job, workspace) = (self.job, self.workspace);
         let (points, page) = (spool.points(), job.page_points);
@@ -138,7 +138,7 @@ impl<'a> Stages<'a> {
         Ok(store)
     }
 
-    /// What the user should know of the points that were read.
+    /// Warnings about the points that were read.
     fn warn_of_input(&mut self, lattice: &Lattice) {
         let input = &self.report.input;
         let (kept, left_out) = (input.kept, input.dropped_non_finite);
@@ -160,7 +160,7 @@ impl<'a> Stages<'a> {
         }
     }
 
-    /// Drops outliers, if that is wanted.
+    /// Drops outliers, if requested.
     pub fn without_outliers(&mut self, store: PointStore) -> Result<PointStore> {
         let (job, workspace) = (self.job, self.workspace);
         let Some(factor) = job.params.drop_outliers else {
@@ -181,7 +181,7 @@ impl<'a> Stages<'a> {
         Ok(store)
     }
 
-    /// The radius of the disks; a percentage refers to the points before they are smoothed.
+    /// The radius of the disks; a percentage refers to the points before smoothing.
     pub fn radius(&mut self, store: &PointStore, lattice: &Lattice) -> DiskRadius {
         let radius = disk_radius(self.job.params.radius, store, lattice);
         self.report.radius = match radius {
@@ -199,7 +199,7 @@ impl<'a> Stages<'a> {
         TileRanges::new(self.blocks(), self.job.tile_points)
     }
 
-    /// Moves the points towards their surface, if that is wanted.
+    /// Smooths the points, if requested.
     pub fn smooth(&mut self, mut store: PointStore) -> Result<PointStore> {
         let (params, workspace, tiles) = (&self.job.params, self.workspace, self.tiles());
         workspace.trim();
@@ -214,7 +214,7 @@ impl<'a> Stages<'a> {
         Ok(store)
     }
 
-    /// Finds the shape by which points are connected: the points moved towards their surface.
+    /// The relaxed positions, which decide how points are connected.
     pub fn relax(&mut self, store: &PointStore) -> Result<Option<Relaxed>> {
         let (params, workspace, tiles) = (&self.job.params, self.workspace, self.tiles());
         let options = Relaxing {
@@ -238,7 +238,7 @@ impl<'a> Stages<'a> {
         Ok(relaxed)
     }
 
-    /// The positions that the surface is made from.
+    /// The positions from which the surface is made.
     pub fn places<'p>(
         &self,
         store: &'p PointStore,
@@ -277,7 +277,7 @@ impl<'a> Stages<'a> {
         Ok(seen)
     }
 
-    /// Adds up in how many cells each triple is a corner.
+    /// Adds up the number of cells of each triple.
     pub fn triples(&mut self, seen: CellTriples) -> Result<Triples> {
         let (workspace, blocks) = (self.workspace, self.blocks());
         workspace.trim();
@@ -288,7 +288,7 @@ impl<'a> Stages<'a> {
         Ok(all)
     }
 
-    /// Makes an oriented manifold of the triples.
+    /// Makes an oriented manifold from the triples.
     pub fn stitch(&mut self, places: Places<'_>, triples: Triples) -> Result<Stitched> {
         let (params, workspace, blocks) = (&self.job.params, self.workspace, self.blocks());
         let options = StitchOptions {
@@ -354,7 +354,7 @@ impl<'a> Stages<'a> {
         Ok(())
     }
 
-    /// What happened.
+    /// The report of the run.
     pub fn report(self) -> Report {
         let memory = &self.job.memory;
         Report {

@@ -1,21 +1,21 @@
-//! Where a run keeps its scratch files, and what to do about a run that is there already.
+//! The place of scratch files, and the treatment of an unfinished run.
 
 use crate::stages::export;
 use std::path::{Path, PathBuf};
 
-/// What to do about an unfinished run in the scratch folder.
+/// Treatment of an unfinished run in the scratch folder.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Start {
-    /// Refuse to begin another one.
+    /// An unfinished run is an error.
     #[default]
     New,
-    /// Go on with it; begin if there is none.
+    /// Resume it; begin a new run if there is none.
     Resume,
-    /// Throw it away and begin.
+    /// Discard it and begin a new run.
     Restart,
 }
 
-/// The scratch folder of a run with this output: beside it, or in another folder.
+/// The scratch folder of a run with this output: beside it, or in the folder `parent`.
 pub(super) fn scratch_folder(output: &Path, parent: Option<&Path>) -> PathBuf {
     let mut name = output.file_name().unwrap_or_default().to_os_string();
     let beside = export::folder_of(output);
@@ -23,7 +23,7 @@ pub(super) fn scratch_folder(output: &Path, parent: Option<&Path>) -> PathBuf {
         name.push(".outcrop-scratch");
         return beside.join(name);
     };
-    // Runs with outputs of one name in several folders may share a folder for scratch.
+    // Outputs of the same name in several folders may share one folder for scratch.
     let whole = std::path::absolute(output).unwrap_or_else(|_| output.to_path_buf());
     let bytes = std::os::unix::ffi::OsStrExt::as_bytes(whole.as_os_str());
     name.push(format!("-{:08x}.outcrop-scratch", crc32fast::hash(bytes)));

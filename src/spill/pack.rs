@@ -1,26 +1,26 @@
-//! Rows as few bytes: every word as a difference, every difference without its leading zeros.
+//! Packing of rows: each word is stored as a difference, without the difference's leading zero bytes.
 //!
-//! Packed rows are frames of up to [`FRAME`] records. A frame begins with two bits for each word,
-//! 32 words to a little-endian `u64`: the word's difference takes 0, 1, 2 or 4 bytes, which follow in
-//! the same order. After the last frame come [`PADDING`] zeros, so that four bytes can always be read.
+//! Packed rows are frames of up to [`FRAME`] rows. A frame begins with two bits for each word, 32 words to a
+//! little-endian `u64`: the word's difference takes 0, 1, 2 or 4 bytes. The differences follow in the same
+//! order. After the last frame come [`PADDING`] zeros, so that four bytes can always be read.
 
 use super::row::{Row, Word};
 use std::marker::PhantomData;
 
-/// Records in a frame.
+/// Rows in a frame.
 const FRAME: usize = 512;
 /// Zeros at the end.
 const PADDING: usize = 4;
-/// Bytes of a difference, and which of four bytes read they are, by its two bits.
+/// For each value of the two bits: the bytes of a difference, and the mask for the four bytes read.
 const LENGTH: [usize; 4] = [0, 1, 2, 4];
 const MASK: [u32; 4] = [0, 0xff, 0xffff, u32::MAX];
 
-/// A layout as masks, so that packing a word takes no branch.
+/// The packing of a word as masks, so that packing takes no branch.
 #[derive(Clone, Copy)]
 struct Masks {
     above: u32,
     left: u32,
-    /// 1 if differences go up and down alike, so that the sign is moved to the lowest bit.
+    /// 1 if differences have both signs: the sign is then moved to the lowest bit.
     signed: u32,
 }
 
@@ -52,10 +52,10 @@ impl Masks {
     }
 }
 
-/// Words of a packed row at most.
+/// Largest number of words of a packed row.
 const MOST_WORDS: usize = 16;
 
-/// The masks of a row's words, known when the program is compiled.
+/// The masks of a row's words, a constant.
 struct Packing<R>(PhantomData<R>);
 
 impl<R: Row> Packing<R> {
@@ -73,14 +73,14 @@ impl<R: Row> Packing<R> {
     };
 }
 
-/// Bytes that `records` records of `words` words take at most.
+/// Upper bound of the bytes of `records` packed rows of `words` words.
 #[cfg(test)]
 fn most_bytes(records: usize, words: usize) -> usize {
     let tags = |records: usize| (records * words).div_ceil(32) * 8;
     records / FRAME * tags(FRAME) + tags(records % FRAME) + records * words * 4 + PADDING
 }
 
-/// Appends the packed records to `bytes`.
+/// Appends the packed rows to `bytes`.
 pub fn pack<R: Row>(records: &[R], bytes: &mut Vec<u8>) {
     let mut above = R::zeroed();
     let mut tags: Vec<u8> = Vec::new();
@@ -120,7 +120,7 @@ pub fn pack<R: Row>(records: &[R], bytes: &mut Vec<u8>) {
     bytes.extend_from_slice(padding(records.len()));
 }
 
-/// Fills `records` from exactly the bytes that [`pack`] made of as many; `None` if they cannot be.
+/// Fills `records` from the bytes that [`pack`] made of the same number of rows; `None` if they are invalid.
 #[must_use]
 pub fn unpack<R: Row>(bytes: &[u8], records: &mut [R]) -> Option<()> {
     let mut above = R::zeroed();
@@ -155,7 +155,7 @@ pub fn unpack<R: Row>(bytes: &[u8], records: &mut [R]) -> Option<()> {
     (bytes.len() == at + padding(records.len()).len()).then_some(())
 }
 
-/// What ends so many packed records; none take no bytes.
+/// The zeros after `records` packed rows; none after no rows.
 fn padding(records: usize) -> &'static [u8] {
     if records == 0 { &[] } else { &[0; PADDING] }
 }
@@ -173,18 +173,18 @@ mod tests {
     }
 
     row! {
-        /// Every kind of word at another place.
+        /// Every kind of difference once.
         struct Mixed { a: u32, b: u32, c: u32, }
         packed Rising Above Left
     }
 
     row! {
-        /// No word is like the one above.
+        /// No difference to the row above.
         struct Leftwards { words: [u32; 3], }
         packed Left Rising Left
     }
 
-    /// Words small, large and in between.
+    /// Small, medium and large words.
     fn word() -> impl Strategy<Value = u32> {
         prop_oneof![0u32..4, 0u32..70_000, any::<u32>(), Just(u32::MAX)]
     }
@@ -211,7 +211,7 @@ mod tests {
             comes_back::<[u32; 3]>(&words);
         }
 
-        /// For any bytes the answer is rows or `None`.
+        /// Any bytes give rows or `None`.
         #[test]
         fn no_bytes_are_too_bad(
             bytes in prop::collection::vec(any::<u8>(), 0..3000),
@@ -222,7 +222,7 @@ mod tests {
             let _ = unpack(&bytes, &mut vec![Leftwards::default(); count]);
         }
 
-        /// Bytes that are missing or added are noticed even without a checksum.
+        /// Missing or added bytes are an error even without a checksum.
         #[test]
         fn a_wrong_length_is_noticed(
             words in prop::collection::vec(prop::array::uniform3(word()), 1..700),

@@ -3,7 +3,7 @@
 use std::cmp::Ordering;
 use std::fmt::Debug;
 
-/// The value that a word of a row is written as the difference to.
+/// The reference of a packed word: the word's difference to it is stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Word {
     /// The same word of the row before.
@@ -14,16 +14,16 @@ pub enum Word {
     Rising,
 }
 
-/// A record of a scratch file: a plain struct of 32-bit words, defined by `row!`.
+/// A row of a scratch file: a plain struct of 32-bit words, defined by `row!`.
 pub trait Row: bytemuck::Pod + PartialEq + Debug + Send + Sync {
-    /// Names and types of the fields, for the list of files.
+    /// Names and types of the fields.
     const FIELDS: &'static str;
 
-    /// How each word is packed; `None` for rows that are written as they are. It changes how many bytes
-    /// rows take and nothing else.
+    /// The packing of each word; `None` for rows that are stored unpacked. It affects only the size of the
+    /// file.
     const PACKING: Option<&'static [Word]>;
 
-    /// Words of a row.
+    /// Number of words of a row.
     const WORDS: usize = size_of::<Self>() / 4;
 
     /// The row as words.
@@ -52,7 +52,7 @@ impl<const N: usize> Row for [u32; N] {
     const PACKING: Option<&'static [Word]> = Some(&[Word::Above; N]);
 }
 
-/// Bytes of so many rows.
+/// Bytes of `count` rows.
 #[must_use]
 pub fn row_bytes<R>(count: usize) -> u64 {
     (count * size_of::<R>()) as u64
@@ -61,8 +61,8 @@ pub fn row_bytes<R>(count: usize) -> u64 {
 /// Defines a row: a struct whose fields are words or arrays of words, and how each word is packed.
 ///
 /// `packed` takes one [`Word`] for each word, arrays counted word by word. A row with `unpacked` is
-/// written as it is, which is right for numbers that are not alike from row to row; it may have fields
-/// of other types of 32 and 64 bits.
+/// stored unpacked, which suits numbers that differ much from row to row; its fields may also be other types
+/// of 32 and 64 bits.
 macro_rules! row {
     (
         $(#[$meta:meta])*
@@ -108,7 +108,7 @@ macro_rules! row {
 pub(crate) use row;
 
 row! {
-    /// An id, in a list of ids.
+    /// An id in a list of ids.
     pub struct Id {
         /// The id of a point.
         id: u32,

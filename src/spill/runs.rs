@@ -1,4 +1,4 @@
-//! Sorted runs on disk: written frame by frame, merged in whole or over a range.
+//! Sorted runs on disk: written frame by frame, merged completely or over a range.
 
 use super::Row;
 use crate::error::{Error, Result};
@@ -13,18 +13,18 @@ use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::os::unix::fs::FileExt;
 
-/// Records per checksummed frame of a run.
+/// Rows in a checksummed frame of a run.
 pub(super) const FRAME: usize = 4096;
 
-/// Bytes of a run that are read from its file at a time.
+/// Bytes read at a time from the file of a run.
 pub(super) const FILE_BUFFER: usize = 1 << 15;
 
-/// One sorted file of frames: `u32` length in records, `u32` CRC-32, records.
+/// A sorted file of frames: `u32` number of rows, `u32` CRC-32, rows.
 #[derive(Debug)]
 pub(super) struct Run<R: Row> {
     file: ScratchFile,
     bytes: u64,
-    /// The first record of each frame; all frames but the last are full.
+    /// The first row of each frame; all frames but the last are full.
     pub(super) firsts: Vec<R>,
     /// The whole file.
     place: Place,
@@ -36,12 +36,12 @@ const fn frame_bytes<R: Row>() -> u64 {
 }
 
 impl<R: Row> Run<R> {
-    /// The name of its file.
+    /// Name of the file.
     pub(super) fn name(&self) -> String {
         self.file.name.to_string()
     }
 
-    /// True if it outlives an attempt.
+    /// True if a resumed run can use the file.
     pub(super) fn is_kept(&self) -> bool {
         self.file.is_kept()
     }
@@ -51,7 +51,7 @@ impl<R: Row> Run<R> {
         self.file.put(0, self.place)
     }
 
-    /// The run `name` that an earlier attempt wrote. It has no frames if it was deleted since.
+    /// The run `name` of an earlier attempt. It has no frames if it was deleted since.
     pub(super) fn reopen(workspace: &Workspace, name: &str) -> Result<Self> {
         let (mut file, places) = workspace.keep_file(name)?;
         let place = places.first().map_or(Place::default(), |(_, place)| *place);
@@ -112,7 +112,7 @@ impl<R: Row> PartialEq for Next<R> {
 
 impl<R: Row> Eq for Next<R> {}
 
-/// Calls `each` with the records of all runs from `from` on and below `to`, ascending.
+/// Calls `each` with the rows of all runs from `from` (inclusive) to `to` (exclusive), ascending.
 pub(super) fn merge<R: Row>(
     runs: &[Run<R>],
     from: Option<R>,
@@ -147,7 +147,7 @@ pub(super) struct RunWriter<R: Row> {
     file: ScratchFile,
     bytes: u64,
     firsts: Vec<R>,
-    /// Of the whole file, if a resumed run may need it.
+    /// CRC-32 of the whole file, if a resumed run may need it.
     crc: Option<crc32fast::Hasher>,
     frame: Vec<u8>,
 }
@@ -207,11 +207,11 @@ struct RunReader<'a, R: Row> {
 }
 
 impl<'a, R: Row> RunReader<'a, R> {
-    /// Stands before the first record that is not below `from`.
+    /// Positioned before the first row that is not below `from`.
     fn open(run: &'a Run<R>, from: Option<R>, to: Option<R>) -> Result<Self> {
         let io = |action: &'static str| move |e| Error::io(&run.file.path, action, e);
         let mut file = open_existing(&run.file.path).map_err(io("open"))?;
-        // The frame before the first that begins at or above `from` may end above it.
+        // The frame before the first that begins at or above `from` may end above `from`.
         let is_below = |from: R| move |row: &R| row.compare(&from) == Ordering::Less;
         let below = from.map_or(0, |from| run.firsts.partition_point(is_below(from)));
         let offset = below.saturating_sub(1) as u64 * frame_bytes::<R>();

@@ -1,4 +1,4 @@
-//! Rows sent to numbered receivers: an external sort by receiver, then one section each.
+//! Rows sent to numbered receivers: an external sort by receiver, then one section for each.
 
 use super::{Row, Sorter, Table};
 use crate::error::Result;
@@ -8,14 +8,14 @@ use crate::workspace::Workspace;
 #[derive(Debug)]
 pub struct Shuffle<R: Row> {
     sorter: Sorter<R>,
-    /// What was sent by senders with a number, in a run that can be resumed.
+    /// Rows by sender, in a run that can be resumed.
     sent: Option<Table<R>>,
     name: String,
 }
 
 impl<R: Row> Shuffle<R> {
-    /// A shuffle that sorts in `buffer` bytes of memory. What is sent does not outlive an attempt: for
-    /// steps that are done again as a whole.
+    /// A shuffle that sorts in `buffer` bytes of memory. Rows sent do not survive the attempt: for steps that
+    /// are repeated as a whole when a run is resumed.
     ///
     /// # Errors
     /// [`crate::Error::Memory`].
@@ -28,7 +28,7 @@ impl<R: Row> Shuffle<R> {
         })
     }
 
-    /// A shuffle between units of work: what a finished one has sent is there when the run is resumed.
+    /// A shuffle between units of work: the rows of finished units survive the attempt.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Memory`].
@@ -78,7 +78,7 @@ impl<R: Row> Shuffle<R> {
         self.deliver_if(workspace, receivers, |_, _| true)
     }
 
-    /// As [`Shuffle::deliver`]; of rows that were sent more than once only one is kept.
+    /// As [`Shuffle::deliver`]; equal rows are delivered once.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Corrupt`].

@@ -1,17 +1,17 @@
-//! Sorting records in memory on several threads.
+//! Sorting rows in memory on several threads.
 
 use super::Row;
 use std::cmp::Ordering;
 
-/// Records that one thread sorts by itself: they fit its cache.
+/// Rows that one thread sorts alone: they fit its cache.
 const LEAF: usize = 1 << 16;
 
-/// Records looked at for a pivot.
+/// Rows from which a pivot is chosen.
 const SAMPLE: usize = 31;
 
-/// Sorts with rayon's current threads; which record of equal ones comes first has no meaning.
+/// Sorts on the current threads of rayon. The order of equal rows is unspecified.
 pub(super) fn sort<R: Row>(records: &mut [R]) {
-    // A bad pivot at every level would be a remarkable accident; then one thread does the rest.
+    // If the pivots are bad at many levels, which is very unlikely, one thread does the rest.
     sort_part(records, 2 * records.len().max(1).ilog2());
 }
 
@@ -21,7 +21,7 @@ fn sort_part<R: Row>(records: &mut [R], depth: u32) {
     } else {
         split(records)
     };
-    // Nothing is below the pivot if many records are equal.
+    // Nothing is below the pivot if many rows are equal.
     if middle == 0 {
         records.sort_unstable_by(R::compare);
         return;
@@ -33,7 +33,7 @@ fn sort_part<R: Row>(records: &mut [R], depth: u32) {
     );
 }
 
-/// Moves the records below a pivot to the front; their number.
+/// Moves the rows below a pivot to the front; returns their number.
 fn split<R: Row>(records: &mut [R]) -> usize {
     let mut sample: [R; SAMPLE] =
         std::array::from_fn(|n| records[(2 * n + 1) * records.len() / (2 * SAMPLE)]);

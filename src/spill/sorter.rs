@@ -12,10 +12,10 @@ use std::cmp::Ordering;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// Records of a run at most, if the run may be resumed: what is lost with an attempt is not more.
+/// Largest number of rows of a run that can be resumed. It bounds the work that is lost with an attempt.
 const MOST_IN_RUN: usize = 1 << 27;
 
-/// Sorts any number of records in a bounded buffer.
+/// Sorts any number of rows in a bounded buffer.
 #[derive(Debug)]
 pub struct Sorter<R: Row> {
     state: Mutex<State<R>>,
@@ -30,9 +30,9 @@ struct State<R: Row> {
     buffer: Vec<R>,
     runs: Vec<Run<R>>,
     made: usize,
-    /// Records that the buffer had at most: what is behind them was never touched.
+    /// Largest number of rows that were in the buffer; memory beyond them was never touched.
     touched: usize,
-    /// What is told how much of the buffer is taken.
+    /// The reservation to which the usage of the buffer is reported.
     held: Option<Reservation>,
 }
 
@@ -55,7 +55,7 @@ impl<R: Row> State<R> {
 }
 
 impl<R: Row> Sorter<R> {
-    /// A sorter whose buffers take at most `buffer` bytes, already reserved by the caller.
+    /// A sorter whose buffers take at most `buffer` bytes, which the caller has reserved.
     #[must_use]
     pub fn new(workspace: &Workspace, name: &str, buffer: u64) -> Self {
         let capacity = (buffer as usize / size_of::<R>()).max(2);
@@ -68,21 +68,21 @@ impl<R: Row> Sorter<R> {
         }
     }
 
-    /// The sorter that tells how much its buffer takes of what is reserved for it.
+    /// Reports the usage of the buffer to the reservation `held`.
     #[must_use]
     pub fn telling(self, held: Reservation) -> Self {
         self.state().held = Some(held);
         self
     }
 
-    /// Takes the whole buffer at once, so that it never has to grow.
+    /// Allocates the whole buffer at once, so that it never has to grow.
     #[must_use]
     pub fn whole(self) -> Self {
         self.state().buffer.reserve_exact(self.capacity);
         self
     }
 
-    /// Records that fit the buffer.
+    /// Number of rows that fit the buffer.
     #[must_use]
     pub fn capacity(&self) -> usize {
         self.capacity
@@ -92,7 +92,7 @@ impl<R: Row> Sorter<R> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Takes records in; safe to call from several threads.
+    /// Adds rows; may be called from several threads.
     ///
     /// # Errors
     /// [`crate::Error::Io`].
@@ -103,10 +103,10 @@ impl<R: Row> Sorter<R> {
             let (now, later) = records.split_at(room.min(records.len()));
             let wanted = state.buffer.len() + now.len();
             if wanted > state.buffer.capacity() {
-                // Doubling, but never past what was reserved.
+                // Doubles the buffer, within the reservation.
                 let target = wanted.max(2 * state.buffer.len()).min(self.capacity);
                 let more = target - state.buffer.len();
-                // The old one and its copy.
+                // The old buffer and its copy.
                 let both = 2 * size_of_val(state.buffer.as_slice()) as u64;
                 state.buffer.reserve_exact(more);
                 state.tell(both);
@@ -131,7 +131,7 @@ impl<R: Row> Sorter<R> {
         Ok(())
     }
 
-    /// Sorts what is in the buffer and writes it.
+    /// Sorts the rows in the buffer and writes them as a run.
     fn write_run(&self, state: &mut State<R>, kept: bool) -> Result<Run<R>> {
         self.pool.install(|| sort::sort(&mut state.buffer));
         let mut writer = self.run_writer(&mut state.made, kept)?;
@@ -148,12 +148,13 @@ impl<R: Row> Sorter<R> {
         Ok(RunWriter::new(self.files.make(&name, kept)?, kept))
     }
 
-    /// Takes in parts of an input, given by their numbers and records, all of which `push` pushes. In a
-    /// run that can be resumed, as many as fit the buffer make a run that is not made again; all that
-    /// fits at once is left in memory, unless it is to be `kept`. How many records there were.
+    /// Adds the rows of parts of an input, given by their numbers and row counts; `push` adds the parts with
+    /// the given numbers. In a run that can be resumed, the parts that fit the buffer form a sorted run,
+    /// which a later attempt does not repeat. If all rows fit the buffer they stay in memory, unless they are
+    /// to be `kept`. Returns the number of rows.
     ///
     /// # Errors
-    /// What `push` returned, [`crate::Error::Io`], [`crate::Error::Disk`].
+    /// Errors of `push`, [`crate::Error::Io`], [`crate::Error::Disk`].
     pub fn take_parts(
         &self,
         workspace: &Workspace,
@@ -177,7 +178,7 @@ impl<R: Row> Sorter<R> {
                 state.runs.push(Run::reopen(workspace, &name)?);
             }
         }
-        // A buffer that is full would be written by whoever fills it, and not for good.
+        // A full buffer would be written by [`Sorter::push`], as a run that does not survive the attempt.
         let most = (self.capacity - 1).min(MOST_IN_RUN) as u64;
         while !left.is_empty() {
             let (mut numbers, mut records) = (Vec::new(), 0);
@@ -202,14 +203,14 @@ impl<R: Row> Sorter<R> {
         Ok(all)
     }
 
-    /// True if all that was taken in is on disk.
+    /// True if all rows are on disk.
     #[must_use]
     pub fn is_spilled(&self) -> bool {
         self.state().buffer.is_empty()
     }
 
-    /// The runs of a step that were made one after the other: each with where it ended, and what else was
-    /// noted with it. Runs after a gap are of no use.
+    /// Reopens the sorted runs of a step that were written in sequence; returns the value noted with the last
+    /// one. Runs after a gap are not used.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
@@ -230,7 +231,7 @@ impl<R: Row> Sorter<R> {
         Ok(last)
     }
 
-    /// Writes what is in the buffer as the next run of such a step.
+    /// Writes the rows in the buffer as the next run of such a step.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Disk`].
@@ -246,12 +247,12 @@ impl<R: Row> Sorter<R> {
         Ok(())
     }
 
-    /// Records in the buffer.
+    /// Number of rows in the buffer.
     pub(crate) fn buffered(&self) -> usize {
         self.state().buffer.len()
     }
 
-    /// Ends input: the records in ascending order, equal ones adjacent.
+    /// Ends input; returns the rows in ascending order, equal rows adjacent.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Disk`], [`crate::Error::Corrupt`],
@@ -280,7 +281,7 @@ impl<R: Row> Sorter<R> {
             state.runs.retain(|run| !merged.contains(&run.name()));
             state.runs.push(Run::reopen(workspace, &name)?);
         }
-        // Each open run holds one frame of records and as many bytes of file buffer.
+        // Each open run has one frame of rows and a file buffer of the same size.
         let fan_in = (self.capacity / (2 * FRAME)).clamp(2, 512);
         while state.runs.len() > fan_in {
             let rest = state.runs.split_off(fan_in.min(state.runs.len()));
@@ -305,7 +306,7 @@ impl<R: Row> Sorter<R> {
         Ok(sorted)
     }
 
-    /// Makes one run of several.
+    /// Merges several runs into one.
     fn merge_runs(
         &self,
         workspace: &Workspace,
@@ -329,10 +330,10 @@ impl<R: Row> Sorter<R> {
     }
 }
 
-/// Sorted records, and what is reserved for them.
+/// Sorted rows and their reservation.
 pub type InMemory<R> = (Vec<R>, Option<Reservation>);
 
-/// The output of a [`Sorter`].
+/// The rows of a [`Sorter`] in ascending order.
 #[derive(Debug)]
 pub struct Sorted<R: Row> {
     buffer: Vec<R>,
@@ -340,7 +341,7 @@ pub struct Sorted<R: Row> {
     held: Option<Reservation>,
 }
 
-/// Memory that merging runs takes, in bytes.
+/// Bytes of memory for merging the runs.
 fn merge_bytes<R: Row>(runs: &[Run<R>]) -> u64 {
     (runs.len() * (FRAME * size_of::<R>() + FILE_BUFFER)) as u64
 }
@@ -370,10 +371,10 @@ impl<R: Row> Persist for Sorted<R> {
 }
 
 impl<R: Row> Sorted<R> {
-    /// All records in ascending order if they are in memory, with what is reserved for them.
+    /// All rows in ascending order with their reservation, if they are in memory.
     ///
     /// # Errors
-    /// The records as they were, on disk.
+    /// `self`, if the rows are on disk.
     pub fn in_memory(self) -> std::result::Result<InMemory<R>, Self> {
         if self.runs.is_empty() {
             Ok((self.buffer, self.held))
@@ -382,25 +383,25 @@ impl<R: Row> Sorted<R> {
         }
     }
 
-    /// These, in memory that is reserved.
+    /// Attaches the reservation of the rows.
     #[must_use]
     pub fn holding(mut self, reserved: Reservation) -> Self {
         self.held = Some(reserved);
         self
     }
 
-    /// Tells how much is taken of what is reserved. Merging by [`Sorted::for_range`] is for the caller to
-    /// tell; all else is told.
+    /// Reports usage to the reservation. The caller of [`Sorted::for_range`] reports the memory of that
+    /// merge; all other usage is reported here.
     pub fn tell(&mut self, bytes: u64) {
         if let Some(held) = &mut self.held {
             held.set_held(bytes);
         }
     }
 
-    /// Calls `each` with every record in ascending order.
+    /// Calls `each` with every row in ascending order.
     ///
     /// # Errors
-    /// What `each` returned, [`crate::Error::Io`], [`crate::Error::Corrupt`].
+    /// Errors of `each`, [`crate::Error::Io`], [`crate::Error::Corrupt`].
     pub fn for_each(self, mut each: impl FnMut(R) -> Result<()>) -> Result<()> {
         if self.runs.is_empty() {
             return self.buffer.into_iter().try_for_each(each);
@@ -408,7 +409,7 @@ impl<R: Row> Sorted<R> {
         merge(&self.runs, None, None, &mut each)
     }
 
-    /// As [`Sorted::for_each`], from the first record on that is not below `from`.
+    /// As [`Sorted::for_each`], beginning with the first row that is not below `from`.
     ///
     /// # Errors
     /// See [`Sorted::for_each`].
@@ -425,8 +426,8 @@ impl<R: Row> Sorted<R> {
         merge(&self.runs, from, None, &mut each)
     }
 
-    /// Records that cut what is on disk into parts of about `records` records, more by no more than
-    /// a frame of each run; ascending.
+    /// Rows that divide the rows on disk into parts of about `records` rows, at most a frame of each run
+    /// more; ascending.
     #[must_use]
     pub fn cuts(&self, records: usize) -> Vec<R> {
         let mut firsts: Vec<R> = self.runs.iter().flat_map(|r| &r.firsts).copied().collect();
@@ -437,11 +438,11 @@ impl<R: Row> Sorted<R> {
         cuts
     }
 
-    /// Calls `each` with every record on disk from `from` on and below `to`, in ascending order.
+    /// Calls `each` with the rows on disk from `from` (inclusive) to `to` (exclusive), in ascending order.
     /// Several threads may do so at the same time, each in memory of [`Sorted::merge_bytes`].
     ///
     /// # Errors
-    /// What `each` returned, [`crate::Error::Io`], [`crate::Error::Corrupt`].
+    /// Errors of `each`, [`crate::Error::Io`], [`crate::Error::Corrupt`].
     pub fn for_range(
         &self,
         from: Option<R>,
@@ -451,7 +452,7 @@ impl<R: Row> Sorted<R> {
         merge(&self.runs, from, to, each)
     }
 
-    /// Memory that merging takes, in bytes.
+    /// Bytes of memory for a merge.
     #[must_use]
     pub fn merge_bytes(&self) -> u64 {
         merge_bytes(&self.runs)

@@ -14,10 +14,10 @@ use crate::workspace::place::Place;
 use std::marker::PhantomData;
 use std::sync::Mutex;
 
-/// Sections up to which the list of places is made without a reservation.
+/// Largest number of sections whose list of places is allocated without a reservation.
 const LARGE: usize = 1 << 20;
 
-/// Numbered sections of rows in one scratch file, which is deleted on drop.
+/// Numbered sections of rows in one scratch file. The file is deleted on drop.
 #[derive(Debug)]
 pub struct Table<R: Row> {
     file: ScratchFile,
@@ -26,8 +26,8 @@ pub struct Table<R: Row> {
 }
 
 impl<R: Row> Table<R> {
-    /// Makes the file `name` in the scratch folder, with `count` empty sections. While a section is
-    /// written or read, its packed bytes are in memory as well, unless its rows are not packed.
+    /// Creates the file `name` in the scratch folder, with `count` empty sections. While a section is written
+    /// or read, its packed bytes are in memory too, unless its rows are unpacked.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Disk`].
@@ -35,7 +35,7 @@ impl<R: Row> Table<R> {
         let (file, known) = workspace.keep_file(name)?;
         let count = known.iter().fold(count, |n, (s, _)| n.max(*s as usize + 1));
         if count > LARGE {
-            // More than the budget holds comes from a journal that speaks of something else.
+            // A number that exceeds the budget can only come from a damaged journal.
             let bytes = (count as u64).saturating_mul(size_of::<Place>() as u64);
             drop(workspace.reserve("table of sections", bytes)?);
         }
@@ -50,7 +50,7 @@ impl<R: Row> Table<R> {
         })
     }
 
-    /// A table without sections that is gone when the run is resumed.
+    /// A table without sections that does not survive the attempt.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Disk`].
@@ -92,14 +92,14 @@ impl<R: Row> Table<R> {
         self.places().iter().map(|p| p.records as u64).sum()
     }
 
-    /// Adds an empty section; its number.
+    /// Adds an empty section; returns its number.
     pub fn grow(&self) -> usize {
         let mut places = self.places();
         places.push(Place::default());
         places.len() - 1
     }
 
-    /// Writes a further section and gives its number.
+    /// Writes a new section; returns its number.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Disk`].
@@ -109,7 +109,7 @@ impl<R: Row> Table<R> {
         Ok(section)
     }
 
-    /// Writes a section; an earlier content of it is forgotten.
+    /// Writes a section; replaces its earlier content.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Disk`].
@@ -135,13 +135,13 @@ impl<R: Row> Table<R> {
     /// Reads a section into `rows`, which is cleared first.
     ///
     /// # Errors
-    /// [`crate::Error::Io`]; [`crate::Error::Corrupt`] if it is not what was written.
+    /// [`crate::Error::Io`]; [`crate::Error::Corrupt`] if the bytes do not match their checksum.
     pub fn get_into(&self, section: usize, rows: &mut Vec<R>) -> Result<()> {
         let place = self.places()[section];
         rows.clear();
         let mut bytes = Vec::new();
         let packed = R::PACKING.map_or(0, |_| place.bytes);
-        // What a journal says about sizes is not believed as far as to end the program.
+        // A size from a damaged journal must not abort the program, so the allocation may fail.
         let room = bytes.try_reserve_exact(packed).is_ok()
             && Self::fits(place)
             && rows.try_reserve(place.records).is_ok();
@@ -165,7 +165,7 @@ impl<R: Row> Table<R> {
         })
     }
 
-    /// True if as many rows can take as many bytes.
+    /// True if the number of rows is possible for the number of bytes.
     fn fits(place: Place) -> bool {
         if R::PACKING.is_some() {
             // Packed, a word takes at least the two bits of its length.
@@ -224,7 +224,7 @@ mod tests {
     }
 
     row! {
-        /// Two words as they are.
+        /// Two unpacked words.
         struct Plain { words: [u32; 2], }
         unpacked
     }
@@ -248,7 +248,7 @@ mod tests {
         }
     }
 
-    /// Found by fuzzing a journal whose checksums are right.
+    /// Found by fuzzing a journal with valid checksums and invalid content.
     #[test]
     fn places_that_cannot_be_ask_for_no_memory() {
         let workspace = crate::spill::sorter::tests::workspace();
@@ -269,7 +269,7 @@ mod tests {
             let error = table.get(0).unwrap_err();
             assert!(matches!(error, Error::Corrupt { .. }), "{error}");
         }
-        // As many bytes as that many rows take, and no memory has.
+        // More rows than the bytes can hold, and than any memory can.
         table.places()[0].records = 1 << 57;
         table.places()[0].bytes = 8 << 57;
         let error = table.get(0).unwrap_err();

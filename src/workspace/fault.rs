@@ -1,29 +1,29 @@
-//! Faults on purpose, for tests: the environment variable `OUTCROP_FAULT` is read once.
+//! Fault injection for tests: the environment variable `OUTCROP_FAULT` is read once.
 //!
-//! `KIND:N` kills the program at, or fails, the `N`th event of a kind; `count:FILE` writes how many
-//! there were of each. See `CONTRIBUTING.md`.
+//! `KIND:N` kills the program at the `N`th event of a kind, or makes that event fail; `count:FILE` writes the
+//! number of events of each kind. See `CONTRIBUTING.md`.
 
 use std::io;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Where something can be made to go wrong.
+/// Events at which a fault can be injected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(usize)]
 pub enum Event {
     /// A write to a scratch file or the output.
     Write,
-    /// Before a record goes into the journal.
+    /// Before a record is appended to the journal.
     Record,
-    /// In the middle of a record.
+    /// In the middle of appending a record.
     Torn,
-    /// After a record.
+    /// After a record was appended.
     Recorded,
     /// After files were synced.
     Synced,
-    /// Before the output gets its name.
+    /// Before the output is renamed.
     Rename,
-    /// After the output got its name.
+    /// After the output was renamed.
     Renamed,
     /// Before a file is deleted.
     Delete,
@@ -64,7 +64,7 @@ fn plan() -> Option<&'static Plan> {
     PLAN.get_or_init(read).as_ref()
 }
 
-/// Notes an event; true if the program is to die of it.
+/// Counts an event; true if the program has to end at it.
 fn dies(event: Event) -> bool {
     let Some(plan) = plan() else {
         return false;
@@ -73,30 +73,30 @@ fn dies(event: Event) -> bool {
     matches!(plan, Plan::Kill(kind, at) if *kind == event as usize && *at == number)
 }
 
-/// Ends the program as `kill -9` does.
+/// Ends the program like `kill -9`.
 fn die() -> ! {
     let _ = rustix::process::kill_process(rustix::process::getpid(), rustix::process::Signal::KILL);
     std::process::abort()
 }
 
-/// An event that may be the program's last.
+/// An event at which the program may be ended.
 pub fn point(event: Event) {
     if dies(event) {
         die();
     }
 }
 
-/// Before a write: it may fail, or be the program's last event.
+/// An event before a write: the write may fail, or the program may end.
 ///
 /// # Errors
-/// The error that was asked for.
+/// The injected error.
 pub fn write() -> io::Result<()> {
     let Some(plan) = plan() else {
         return Ok(());
     };
     point(Event::Write);
     match plan {
-        // From then on every write fails, as on a disk that is full or gone.
+        // From then on every write fails, as on a disk that is full or removed.
         Plan::Fail(error, at) if SEEN[Event::Write as usize].load(Ordering::Relaxed) >= *at => {
             Err((*error).into())
         }
@@ -104,10 +104,10 @@ pub fn write() -> io::Result<()> {
     }
 }
 
-/// Writes a record whole, or as much of it as a dying program does.
+/// Writes a record; if the program has to end at it, only a part of the record.
 ///
 /// # Errors
-/// What `write` returned.
+/// Errors of `write`.
 pub fn record(bytes: &[u8], write: impl FnOnce(&[u8]) -> io::Result<()>) -> io::Result<()> {
     point(Event::Record);
     if dies(Event::Torn) {
@@ -119,7 +119,7 @@ pub fn record(bytes: &[u8], write: impl FnOnce(&[u8]) -> io::Result<()>) -> io::
     Ok(())
 }
 
-/// Writes down how many events there were, if that was asked for.
+/// Writes the number of events of each kind, if requested.
 pub fn finish() {
     if let Some(Plan::Count(path)) = plan() {
         let lines = NAMES.iter().zip(&SEEN);

@@ -1,4 +1,4 @@
-//! Files of the scratch folder: private, never through a symbolic link, every byte counted.
+//! Files of the scratch folder: private, never opened through a symbolic link; all bytes are counted.
 
 use super::IoCounters;
 use super::fault;
@@ -12,19 +12,19 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-/// What the files of a workspace share.
+/// State shared by the files of a workspace.
 #[derive(Debug, Default)]
 pub struct Shared {
     /// Bytes moved.
     pub io: Arc<IoCounters>,
-    /// Set in a run that can be resumed.
+    /// The run, if it can be resumed.
     pub run: Option<Arc<Run>>,
-    /// Scratch bytes that the run is expected to take at its peak.
+    /// Expected peak of scratch bytes.
     pub expected: AtomicU64,
 }
 
 impl Shared {
-    /// Scratch bytes that will be needed beside those that are taken, as far as that is known.
+    /// Scratch bytes still to be written, as far as that is known.
     pub fn more(&self) -> u64 {
         let expected = self.expected.load(Ordering::Relaxed);
         expected.saturating_sub(self.io.scratch())
@@ -34,13 +34,13 @@ impl Shared {
 #[derive(Debug)]
 enum Handle {
     Open(Arc<File>),
-    /// Written and closed, so that many of them need no handles.
+    /// Closed after writing: a large number of files then needs no handles.
     Closed,
-    /// It was deleted already: nobody will read it.
+    /// Deleted already; it will not be read.
     Gone,
 }
 
-/// Makes scratch files.
+/// Creates scratch files.
 #[derive(Debug, Clone)]
 pub struct Maker {
     pub(super) folder: PathBuf,
@@ -48,14 +48,14 @@ pub struct Maker {
 }
 
 impl Maker {
-    /// The scratch file `name`, `kept` if a resumed run needs it.
+    /// Creates the scratch file `name`; `kept` if a resumed run needs it.
     ///
     /// # Errors
     /// [`Error::Io`], [`Error::Disk`].
     pub fn make(&self, name: &str, kept: bool) -> Result<ScratchFile> {
         let path = self.folder.join(name);
         if self.shared.run.is_some() {
-            // What an attempt that died was about to write.
+            // A file of an earlier attempt that was killed before it noted the file.
             let _ = std::fs::remove_file(&path);
         }
         let file = options().create_new(true).open(&path);
@@ -68,20 +68,20 @@ impl Maker {
     }
 }
 
-/// A scratch file. When it is dropped it is deleted: at once, or, in a run that can be resumed, as soon
-/// as the next step has begun.
+/// A scratch file. It is deleted when it is dropped: at once, or, in a run that can be resumed, when the next
+/// step has begun.
 #[derive(Debug)]
 pub struct ScratchFile {
-    /// Its name in the folder.
+    /// Name in the folder.
     pub name: Arc<str>,
-    /// Where it is.
+    /// Path of the file.
     pub path: PathBuf,
     handle: Handle,
-    /// Written to since it was last synced.
+    /// Set by writing, reset by syncing.
     dirty: Arc<AtomicBool>,
-    /// Bytes given away so far.
+    /// End of the bytes allocated so far.
     end: AtomicU64,
-    /// A resumed run needs it.
+    /// True if a resumed run needs the file.
     kept: bool,
     shared: Arc<Shared>,
 }
@@ -110,7 +110,7 @@ impl ScratchFile {
         }
     }
 
-    /// Notes what was written as part `section`, if a resumed run may ask for it.
+    /// Notes the part `section` in the journal, if a resumed run may need it.
     ///
     /// # Errors
     /// [`Error::Io`], [`Error::Disk`].
@@ -125,32 +125,32 @@ impl ScratchFile {
         }
     }
 
-    /// True if a resumed run needs it.
+    /// True if a resumed run needs the file.
     #[must_use]
     pub fn is_kept(&self) -> bool {
         self.kept
     }
 
-    /// True if it was deleted already.
+    /// True if the file is deleted already.
     #[must_use]
     pub fn is_gone(&self) -> bool {
         matches!(self.handle, Handle::Gone)
     }
 
-    /// Gives the handle back; who reads the file opens it by its path.
+    /// Closes the handle; later reads open the file by its path.
     pub fn close(&mut self) {
         if !self.is_gone() {
             self.handle = Handle::Closed;
         }
     }
 
-    /// Bytes given away so far.
+    /// End of the bytes allocated so far.
     #[must_use]
     pub fn end(&self) -> u64 {
         self.end.load(Ordering::Relaxed)
     }
 
-    /// Notes bytes that were written by an earlier attempt.
+    /// Reserves the bytes up to `end`, which an earlier attempt wrote.
     pub(crate) fn reach(&self, end: u64) {
         let before = self.end.fetch_max(end, Ordering::Relaxed);
         if !self.is_gone() {
@@ -158,7 +158,7 @@ impl ScratchFile {
         }
     }
 
-    /// Writes at the end; where that was.
+    /// Writes at the end; returns the offset.
     ///
     /// # Errors
     /// See [`ScratchFile::write_at`].
@@ -172,14 +172,14 @@ impl ScratchFile {
     /// Writes at `offset`.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Disk`] if there is no room.
+    /// [`Error::Io`]; [`Error::Disk`] if the disk is full.
     pub fn write_at(&self, bytes: &[u8], offset: u64) -> Result<()> {
         self.reach(offset + bytes.len() as u64);
         self.write_counted(bytes, offset)
     }
 
     fn write_counted(&self, bytes: &[u8], offset: u64) -> Result<()> {
-        // What is left of a step whose outcome is known needs no file.
+        // A step whose result is in the journal writes no file.
         let Handle::Open(file) = &self.handle else {
             return Ok(());
         };
@@ -202,7 +202,7 @@ impl ScratchFile {
     /// Fills `bytes` from `offset`.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Corrupt`] if the file ends before that.
+    /// [`Error::Io`]; [`Error::Corrupt`] if the file is too short.
     pub fn read_at(&self, bytes: &mut [u8], offset: u64) -> Result<()> {
         let wanted = bytes.len();
         let read = match &self.handle {
@@ -220,12 +220,12 @@ impl ScratchFile {
         Ok(())
     }
 
-    /// Counts bytes that were read by other means.
+    /// Counts bytes that were read without [`ScratchFile::read_at`].
     pub fn count_read(&self, bytes: u64) {
         self.shared.io.add_read(bytes);
     }
 
-    /// The error for something else than what was written.
+    /// The error for content that differs from what was written.
     #[must_use]
     pub fn damaged(&self, offset: u64, found: String, expected: String) -> Error {
         Error::Corrupt {
@@ -247,7 +247,7 @@ impl Drop for ScratchFile {
             }
             _ => {
                 self.shared.io.shrink_scratch(self.end());
-                // A scratch file that cannot be deleted goes with its folder.
+                // A scratch file that cannot be deleted is deleted with its folder.
                 let _ = std::fs::remove_file(&self.path);
             }
         }

@@ -1,4 +1,4 @@
-//! The scratch folder of a run that can be resumed: found again, locked, private.
+//! The scratch folder of a run that can be resumed: private and locked.
 
 use super::IoCounters;
 use super::fault::{self, Event};
@@ -18,39 +18,39 @@ use std::sync::Arc;
 const LOCK: &str = "lock";
 const MANIFEST: &str = "manifest";
 
-/// What a journal and its first record have beside the manifest, at most.
+/// Upper bound of the bytes that a journal and its first record have in addition to the manifest.
 const FIRST_RECORD: u64 = 64;
 
-/// Files that are no data.
+/// Files of the folder that are not data.
 const OURS: [&str; 3] = [LOCK, MANIFEST, journal::NAME];
 
 /// A locked scratch folder.
 #[derive(Debug)]
 pub struct Folder {
-    /// Where it is.
+    /// Path of the folder.
     pub path: PathBuf,
-    /// The run as it was asked for.
+    /// The manifest of the run.
     pub manifest: Vec<u8>,
-    /// The output on its way, and where it goes.
+    /// The temporary path of the output, and its final path.
     pub output: [PathBuf; 2],
     lock: File,
     entries: Vec<Entry>,
-    /// Where the whole records of the journal end; none without a journal.
+    /// End of the last whole record of the journal; none without a journal.
     end: Option<u64>,
-    /// What must be said about its state.
+    /// Warnings about the state of the folder.
     warnings: Vec<String>,
-    /// The manifest must be written again.
+    /// True if the manifest must be written again.
     rewrite: bool,
 }
 
-/// What is at a path where a run may have been.
+/// The result of looking for a run.
 #[derive(Debug)]
 pub enum Found {
-    /// Nothing, or a folder in which no run ever began.
+    /// No folder, or a folder in which no run began.
     Nothing,
-    /// A run that is not finished.
+    /// An unfinished run.
     Run(Folder),
-    /// A run of which not even its manifest can be read.
+    /// A run with an unreadable manifest.
     Damaged(Folder),
 }
 
@@ -73,10 +73,10 @@ fn unsealed(bytes: &[u8]) -> Option<Vec<u8>> {
 }
 
 impl Folder {
-    /// Looks for a run at `path`, and locks it.
+    /// Looks for a run at `path` and locks it.
     ///
     /// # Errors
-    /// [`Error::Locked`], [`Error::NotResumable`] for a folder that is not private or not ours,
+    /// [`Error::Locked`]; [`Error::NotResumable`] for a folder that is not private or has another owner;
     /// [`Error::Io`].
     pub fn find(path: &Path) -> Result<Found> {
         if !is_private(path)? {
@@ -124,7 +124,7 @@ impl Folder {
         match (bytes.ok().and_then(|b| unsealed(&b)), in_journal) {
             (Some(manifest), Some(_)) => self.manifest = manifest,
             (Some(manifest), None) => {
-                // A journal that was never begun, or ends within its first record, is no loss.
+                // A journal without a whole first record holds no work.
                 let first = manifest.len() as u64 + FIRST_RECORD;
                 let bytes = path_bytes(&self.path.join(journal::NAME));
                 if bytes.is_none_or(|bytes| bytes <= first) && data(&self.path)?.is_empty() {
@@ -154,7 +154,7 @@ impl Folder {
             .push(format!("{}: damaged; {what}", path.display()));
     }
 
-    /// Makes the folder, or empties the one that is there, for a new run.
+    /// Creates the folder, or empties an existing one, for a new run.
     ///
     /// # Errors
     /// [`Error::Io`], [`Error::Locked`], [`Error::Disk`].
@@ -167,7 +167,7 @@ impl Folder {
             Err(e) if e.kind() != std::io::ErrorKind::AlreadyExists => {
                 return Err(Error::io(path, "make the scratch folder", e));
             }
-            // Someone else may have been quicker.
+            // Another process may have created it meanwhile.
             _ => is_private(path)?,
         };
         let folder = Self {
@@ -189,7 +189,7 @@ impl Folder {
         begun.map(|()| folder)
     }
 
-    /// The same folder for another run, which begins anew.
+    /// Empties the folder for a new run.
     ///
     /// # Errors
     /// [`Error::Io`], [`Error::Disk`].
@@ -213,7 +213,7 @@ impl Folder {
             .map_err(|e| failed_write(&path, bytes.len(), 0, e))
     }
 
-    /// Removes all files but those of these names.
+    /// Removes all files except those named in `but`.
     fn clean(&self, but: &HashSet<&str>) -> Result<()> {
         for name in listing(&self.path)? {
             if !but.contains(name.as_str()) {
@@ -224,12 +224,12 @@ impl Folder {
         Ok(())
     }
 
-    /// Removes a folder, in an order in which it can be interrupted: what is left is a folder of a run
-    /// that begins, or, if the journal knows that the data is gone, of one that is finished.
+    /// Removes a folder, in an order that may be interrupted: the rest is a folder of a run that begins, or,
+    /// if the journal records that the data are deleted, of a finished one.
     pub fn remove(path: &Path, finished: bool) {
         let delete = |name: &str| {
             fault::point(Event::Delete);
-            // What cannot be deleted is in nobody's way.
+            // A file that cannot be deleted does no harm.
             let _ = std::fs::remove_file(path.join(name));
         };
         if !finished {
@@ -244,7 +244,7 @@ impl Folder {
         let _ = std::fs::remove_dir(path);
     }
 
-    /// Goes on from what is there.
+    /// Opens the run in the folder, with the results of earlier attempts.
     pub(super) fn open(
         self,
         io: &Arc<IoCounters>,
@@ -282,7 +282,7 @@ impl Folder {
         Ok(Run::new(self.path, journal, keeper, history, self.lock))
     }
 
-    /// True if an earlier attempt has finished anything.
+    /// True if an earlier attempt has finished a unit of work.
     #[must_use]
     pub fn has_progress(path: &Path) -> bool {
         let path = path.join(journal::NAME);
@@ -296,7 +296,7 @@ impl Folder {
     }
 }
 
-/// False if there is nothing at `path`; an error unless it is a folder that is ours alone.
+/// False if there is nothing at `path`; an error unless it is a private folder of this user.
 fn is_private(path: &Path) -> Result<bool> {
     let meta = match path.symlink_metadata() {
         Ok(meta) => meta,
@@ -318,7 +318,7 @@ fn path_bytes(path: &Path) -> Option<u64> {
     path.symlink_metadata().ok().map(|meta| meta.len())
 }
 
-/// Files of the folder that are data.
+/// Names of the data files in the folder.
 pub(super) fn data(path: &Path) -> Result<Vec<String>> {
     let mut names = listing(path)?;
     names.retain(|name| !OURS.contains(&name.as_str()));
@@ -330,13 +330,13 @@ fn listing(path: &Path) -> Result<Vec<String>> {
     let mut names = Vec::new();
     for entry in std::fs::read_dir(path).map_err(io)? {
         let entry = entry.map_err(io)?;
-        // A name that is no text is none of ours.
+        // A name that is not UTF-8 is not one of this program's.
         names.extend(entry.file_name().into_string());
     }
     Ok(names)
 }
 
-/// Locks a folder; the lock goes with the process.
+/// Locks a folder until the process ends.
 fn lock(folder: &Path) -> Result<File> {
     let path = folder.join(LOCK);
     let file = options().create(true).truncate(false).open(&path);
@@ -346,7 +346,7 @@ fn lock(folder: &Path) -> Result<File> {
         Err(std::fs::TryLockError::WouldBlock) => Err(Error::Locked {
             path: folder.to_path_buf(),
         }),
-        // Some file systems know no locks; a run without one is better than none.
+        // Some file systems do not support locks; the run then works without one.
         Err(std::fs::TryLockError::Error(e)) if e.kind() == std::io::ErrorKind::Unsupported => {
             Ok(file)
         }

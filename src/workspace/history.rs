@@ -1,30 +1,30 @@
-//! What the journal says that earlier attempts at a run have done, and what is left of it after damage.
+//! The finished work of earlier attempts according to the journal, and the part of it that survives damage.
 
 use super::journal::{Entry, Record};
 use super::place::Place;
 use std::collections::{BTreeMap, HashMap, HashSet};
 
-/// Units finished, files and their parts.
+/// Finished units, files and their parts.
 #[derive(Debug, Default)]
 pub struct History {
-    /// Where the payload of each unit of each step is.
+    /// For each unit of each step the offset and length of its payload in the journal.
     steps: HashMap<String, BTreeMap<u64, (u64, usize)>>,
     files: HashMap<String, FileHistory>,
-    /// Stages begun, and where the journal says so.
+    /// Stages begun, with the offsets of their records.
     begun: Vec<(String, u64)>,
 }
 
 #[derive(Debug, Default)]
 struct FileHistory {
     parts: BTreeMap<u32, Part>,
-    /// Where the journal speaks of it first.
+    /// Offset of the first record about the file.
     first: u64,
     deleted: Option<u64>,
-    /// Steps that put something there.
+    /// Steps that wrote to the file.
     steps: HashSet<String>,
 }
 
-/// A part of a file, and the unit that put it there.
+/// A part of a file, and the unit that wrote it.
 #[derive(Debug, Clone)]
 struct Part {
     place: Place,
@@ -33,33 +33,33 @@ struct Part {
     record: u64,
 }
 
-/// A part of a file that has to be there for the run to go on.
+/// A part of a file that the run needs to continue.
 #[derive(Debug, Clone)]
 pub struct Needed {
-    /// The file.
+    /// Name of the file.
     pub file: String,
     /// Number of the part.
     pub section: u32,
-    /// What it must hold.
+    /// Its place and checksum.
     pub place: Place,
 }
 
-/// What can be done about damage.
+/// The repair after damage.
 #[derive(Debug, PartialEq, Eq)]
 pub enum Mending {
-    /// These units are done again; all others count.
+    /// These units are repeated; all others stay finished.
     Redo(Vec<(String, u64)>),
-    /// The journal counts up to here: a stage is done again from its start.
+    /// The journal is cut at `end`: a stage is repeated from its start.
     Rewind {
-        /// End of what counts.
+        /// Offset of the cut.
         end: u64,
-        /// The stage that comes then; none if the journal knows of no stage.
+        /// The stage that follows; none if the journal has no stage.
         stage: Option<String>,
     },
 }
 
 impl History {
-    /// From the records of a journal.
+    /// The history in the records of a journal.
     #[must_use]
     pub fn of(entries: &[Entry]) -> Self {
         let mut history = Self::default();
@@ -100,20 +100,20 @@ impl History {
         }
     }
 
-    /// True if an earlier attempt came to the stage.
+    /// True if an earlier attempt began the stage.
     #[must_use]
     pub fn began(&self, stage: &str) -> bool {
         self.begun.iter().any(|(name, _)| name == stage)
     }
 
-    /// Units finished, ascending.
+    /// Finished units, ascending.
     #[must_use]
     pub fn units(&self, step: &str) -> Vec<u64> {
         let units = self.steps.get(step);
         units.map_or_else(Vec::new, |units| units.keys().copied().collect())
     }
 
-    /// Where the payload of a unit is, and its bytes.
+    /// Offset and length of the payload of a unit.
     #[must_use]
     pub fn payload(&self, step: &str, unit: u64) -> Option<(u64, usize)> {
         self.steps.get(step)?.get(&unit).copied()
@@ -129,19 +129,19 @@ impl History {
             .collect()
     }
 
-    /// True if the file was deleted.
+    /// True if the file is deleted.
     #[must_use]
     pub fn is_deleted(&self, file: &str) -> bool {
         self.files.get(file).is_some_and(|f| f.deleted.is_some())
     }
 
-    /// Names of the files that are there.
+    /// Names of the files that exist.
     pub fn live(&self) -> impl Iterator<Item = &str> {
         let live = self.files.iter().filter(|(_, file)| file.deleted.is_none());
         live.map(|(name, _)| name.as_str())
     }
 
-    /// All parts of files that are there.
+    /// All parts of files that exist.
     #[must_use]
     pub fn needed(&self) -> Vec<Needed> {
         let live = self.files.iter().filter(|(_, file)| file.deleted.is_none());
@@ -155,7 +155,7 @@ impl History {
             .collect()
     }
 
-    /// What to do about parts that are damaged; `None` if there are none.
+    /// The repair for damaged parts; `None` if there are none.
     #[must_use]
     pub fn mend(&self, damaged: &[Needed]) -> Option<Mending> {
         let parts: Vec<&Part> = damaged
@@ -186,8 +186,8 @@ impl History {
         })
     }
 
-    /// True if all that the unit was made from is still there: since then only files were deleted that
-    /// its own step or later ones made.
+    /// True if all inputs of the unit still exist: since then only files were deleted that the unit's own
+    /// step or later ones made.
     fn can_redo(&self, part: &Part) -> bool {
         !part.step.is_empty()
             && self.files.values().all(|file| {
@@ -196,7 +196,7 @@ impl History {
             })
     }
 
-    /// Forgets that units were finished, and the steps around them.
+    /// Marks units, and the steps around them, as not finished.
     pub fn forget(&mut self, units: &[(String, u64)]) {
         for (step, unit) in units {
             if let Some(known) = self.steps.get_mut(step) {

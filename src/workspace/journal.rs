@@ -1,7 +1,7 @@
-//! The journal: what a run has finished, one checksummed record after the other, appended only.
+//! The journal: the finished work of a run as checksummed records, append-only.
 //!
-//! A record is `length, CRC-32` (two `u32`) and its body. What follows the last whole record is no part
-//! of the journal: a run that died left it there.
+//! A record is `length, CRC-32` (two `u32`) and its body. Bytes after the last whole record are ignored: an
+//! attempt ended while it wrote them.
 
 use super::fault;
 use super::open::failed_write;
@@ -12,43 +12,43 @@ use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Its name in the scratch folder.
+/// Name of the file in the scratch folder.
 pub const NAME: &str = "journal";
 
-/// What the file begins with; the number is that of the format.
+/// The first bytes of the file; the digit is the version of the journal's format.
 const MAGIC: &[u8; 8] = b"OUTCROP1";
 
 /// Bytes before the body of a record.
 const HEAD: u64 = 8;
 
-/// Something that is done for good.
+/// A record of finished work.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Record {
-    /// The run as it was asked for; the first record.
+    /// The manifest of the run; the first record.
     Manifest(Vec<u8>),
     /// A stage began.
     Begin(String),
-    /// A unit of a step is finished: what it put where, and what else came of it.
+    /// A unit of a step is finished.
     Unit {
-        /// The step.
+        /// Name of the step.
         step: String,
         /// Its number within the step.
         unit: u64,
-        /// Parts of files.
+        /// Parts of files that the unit wrote.
         puts: Vec<Put>,
-        /// Saved values.
+        /// The saved result of the unit.
         payload: Vec<u8>,
     },
     /// A file is not needed any more.
     Deleted(String),
 }
 
-/// A record, and where it lies.
+/// A record and its offset.
 #[derive(Debug, Clone)]
 pub struct Entry {
-    /// Where the record begins.
+    /// Offset of the record.
     pub offset: u64,
-    /// Where its payload begins, and its bytes.
+    /// Offset and length of its payload.
     pub payload: (u64, usize),
     /// The record itself.
     pub record: Record,
@@ -110,7 +110,7 @@ fn encode(record: &Record) -> Vec<u8> {
     out
 }
 
-/// Reads fields of a body.
+/// Reads the fields of a body.
 struct Fields<'a>(&'a [u8]);
 
 impl Fields<'_> {
@@ -149,7 +149,7 @@ impl Fields<'_> {
     }
 }
 
-/// A record and where its payload begins in `body`.
+/// A record and the offset of its payload in `body`.
 fn decode(body: &[u8]) -> Option<(Record, usize)> {
     let (kind, rest) = body.split_first()?;
     let mut fields = Fields(rest);
@@ -160,7 +160,7 @@ fn decode(body: &[u8]) -> Option<(Record, usize)> {
         3 => {
             let (step, unit, count) = (fields.text()?, fields.u64()?, fields.u32()?);
             let puts = (0..count).map(|_| fields.put()).collect::<Option<_>>()?;
-            // Payloads stay on disk until they are asked for.
+            // Payloads are read from disk when they are needed.
             let at = body.len() - fields.0.len();
             let payload = Vec::new();
             let record = Record::Unit {
@@ -187,7 +187,7 @@ impl Journal {
         Ok(Self::at(path, file, MAGIC.len() as u64))
     }
 
-    /// A journal that goes on at `end`; what follows is cut off.
+    /// Continues a journal at `end`; the bytes after it are cut off.
     ///
     /// # Errors
     /// [`Error::Io`].
@@ -205,7 +205,7 @@ impl Journal {
         }
     }
 
-    /// The file, to be synced.
+    /// The file, for syncing.
     pub fn file(&self) -> Arc<File> {
         self.file.clone()
     }
@@ -217,14 +217,14 @@ impl Journal {
     pub fn append(&self, record: &Record) -> Result<()> {
         let bytes = encode(record);
         let mut end = self.end.lock().unwrap_or_else(PoisonError::into_inner);
-        // A record that was not written whole is overwritten by the next.
+        // An incomplete record is overwritten by the next one.
         fault::record(&bytes, |bytes| self.file.write_all_at(bytes, *end))
             .map_err(|e| failed_write(&self.path, bytes.len(), 0, e))?;
         *end += bytes.len() as u64;
         Ok(())
     }
 
-    /// Reads a payload back.
+    /// Reads a payload.
     ///
     /// # Errors
     /// [`Error::Io`].
@@ -237,7 +237,7 @@ impl Journal {
     }
 }
 
-/// All whole records of a journal, and where the last of them ends; `None` if it is no journal.
+/// All whole records of a journal and the end of the last; `None` if the file is no journal.
 ///
 /// # Errors
 /// [`Error::Io`].

@@ -1,8 +1,8 @@
-//! What makes a run outlive a loss of power: a thread that syncs what was written every few seconds,
-//! and deletes what is not needed any more once that is safe.
+//! A thread that protects a run from a loss of power: it syncs written files every few seconds, and deletes
+//! unneeded files once that is safe.
 //!
-//! A process that is killed needs none of this: the system has what was written. Nobody waits for the
-//! thread, so a run loses at most the work of a few seconds.
+//! A killed process needs no sync, since written data are in the system's cache. No other thread waits for
+//! this one, so a loss of power costs at most a few seconds of work.
 
 use super::IoCounters;
 use super::fault::{self, Event};
@@ -13,31 +13,31 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-/// Between two rounds of syncing, if no file waits to be deleted. One that does is room that the run
-/// may need, so it does not wait for the time of a round.
+/// Time between two rounds of syncing, if no file waits to be deleted. A file that waits triggers a round at
+/// once, since the run may need its space.
 const ROUND: Duration = Duration::from_secs(5);
 
-/// A file that is not needed any more, and its size.
+/// A file to delete, and its size.
 #[derive(Debug)]
 pub struct Leaving {
-    /// Its name.
+    /// Name of the file.
     pub name: Arc<str>,
-    /// Where it is.
+    /// Path of the file.
     pub path: PathBuf,
-    /// Bytes of scratch that go with it.
+    /// Scratch bytes that its deletion frees.
     pub bytes: u64,
 }
 
 impl Leaving {
     fn delete(&self, io: &IoCounters) {
         fault::point(Event::Delete);
-        // A scratch file that cannot be deleted goes with its folder.
+        // A scratch file that cannot be deleted is deleted with its folder.
         let _ = std::fs::remove_file(&self.path);
         io.shrink_scratch(self.bytes);
     }
 }
 
-/// A file that was written to.
+/// A file with unsynced data.
 #[derive(Debug)]
 struct Dirty {
     name: Arc<str>,
@@ -48,7 +48,7 @@ struct Dirty {
 #[derive(Debug, Default)]
 struct State {
     dirty: Vec<Dirty>,
-    /// Files of this attempt of which nothing was synced yet.
+    /// Files of this attempt without any synced data.
     fresh: HashSet<Arc<str>>,
     leaving: Vec<Leaving>,
     stop: bool,
@@ -60,7 +60,7 @@ struct Table {
     wake: Condvar,
 }
 
-/// The thread, and what it has to do.
+/// The thread and its queue.
 #[derive(Debug)]
 pub struct Keeper {
     table: Arc<Table>,
@@ -72,7 +72,7 @@ impl Table {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Waits for the time of the next round, or for a file to be deleted; false when there is none.
+    /// Waits for the next round or for a file to delete; false if the thread has to stop.
     fn wait(&self, round: Duration) -> bool {
         let idle = |state: &mut State| !state.stop && state.leaving.is_empty();
         let waited = self.wake.wait_timeout_while(self.state(), round, idle);
@@ -93,15 +93,15 @@ impl Table {
                 return;
             }
             flag.store(false, Ordering::Relaxed);
-            // What did not get to the disk is found by its checksum when the run is resumed.
+            // Unsynced data are found by their checksums when the run is resumed.
             let _ = file.sync_data();
         }
-        // The names of new files, too.
+        // Syncs the names of new files.
         let _ = folder.sync_all();
         let _ = journal.sync_data();
         fault::point(Event::Synced);
         for file in leaving {
-            // Once the run is over, the folder may be that of another one.
+            // After the run the folder may belong to another run.
             let state = self.state();
             if state.stop {
                 return;
@@ -115,7 +115,7 @@ impl Keeper {
     /// Starts the thread.
     ///
     /// # Errors
-    /// What the system says.
+    /// Errors of the system.
     pub fn start(journal: Arc<File>, folder: File, io: Arc<IoCounters>) -> std::io::Result<Self> {
         Self::every(ROUND, journal, folder, io)
     }
@@ -138,12 +138,12 @@ impl Keeper {
         Ok(Self { table, io })
     }
 
-    /// Takes in a new file.
+    /// Notes a new file.
     pub fn made(&self, name: &Arc<str>) {
         self.table.state().fresh.insert(name.clone());
     }
 
-    /// Takes in a file that was written to.
+    /// Notes a file that was written to.
     pub fn sync_later(&self, name: &Arc<str>, file: &Arc<File>, flag: &Arc<AtomicBool>) {
         self.table.state().dirty.push(Dirty {
             name: name.clone(),
@@ -152,13 +152,13 @@ impl Keeper {
         });
     }
 
-    /// Takes in files that nobody needs; the journal says so already. One that was never synced would
-    /// not outlive a loss of power anyway, so it is deleted at once.
+    /// Notes files to delete; the journal already records their deletion. A file that was never synced would
+    /// not survive a loss of power anyway, so it is deleted at once.
     pub fn delete(&self, files: Vec<Leaving>) {
         let mut now = Vec::new();
         let mut state = self.table.state();
         for file in files {
-            // Nobody will read it, so it need not be synced any more either.
+            // It will not be read, so it needs no sync.
             state.dirty.retain(|dirty| dirty.name != file.name);
             if state.fresh.remove(&file.name) {
                 now.push(file);
@@ -177,7 +177,7 @@ impl Keeper {
 
 impl Drop for Keeper {
     fn drop(&mut self) {
-        // Nobody waits for a sync that is under way.
+        // The end of the run does not wait for a sync under way.
         self.table.state().stop = true;
         self.table.wake.notify_all();
     }

@@ -1,4 +1,4 @@
-//! What the machine allows: memory limits of the cgroup (v1 and v2), memory in use, free disk.
+//! Limits of the machine: memory limits of the cgroup (v1 and v2), memory in use, free disk.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -68,14 +68,14 @@ fn status(key: &str) -> Option<u64> {
 /// All limits on the way from the groups in the text of `/proc/self/cgroup` to the root of their
 /// hierarchies, which are mounted at or below `root`.
 fn cgroup_limits(groups: &str, root: &Path) -> Vec<u64> {
-    // No limit is a word in v2 and does not parse, and a large number in v1.
+    // In v2 "no limit" is a word and does not parse; in v1 it is a large number.
     limit_files(groups, root)
         .iter()
         .filter_map(|file| fs::read_to_string(file).ok()?.trim().parse().ok())
         .collect()
 }
 
-/// The files that may hold a limit.
+/// Paths of the files that may hold a limit.
 fn limit_files(groups: &str, root: &Path) -> Vec<PathBuf> {
     let mut files = Vec::new();
     for line in groups.lines() {
@@ -83,7 +83,7 @@ fn limit_files(groups: &str, root: &Path) -> Vec<PathBuf> {
         let (Some(controllers), Some(path)) = (parts.next(), parts.next()) else {
             continue;
         };
-        // Beyond `memory.high` a process is slowed down until it is of no use.
+        // Above `memory.high` a process is slowed down so much that it must be treated as a limit.
         let (mounts, names): (&[&str], &[&str]) = if controllers.is_empty() {
             (&["", "unified"], &["memory.max", "memory.high"])
         } else if controllers.split(',').any(|c| c == "memory") {
@@ -106,7 +106,7 @@ fn limit_files(groups: &str, root: &Path) -> Vec<PathBuf> {
 mod tests {
     use super::*;
 
-    /// Files of a fake hierarchy, and what is in them.
+    /// Files of a simulated hierarchy and their contents.
     fn tree(files: &[(&str, &str)]) -> tempfile::TempDir {
         let root = tempfile::tempdir().unwrap();
         for (name, text) in files {
@@ -152,12 +152,12 @@ mod tests {
         let groups = "0::/user.slice/shell/job\n";
         assert_eq!(least(groups, &files), Some(2 << 30));
         assert_eq!(least("0::/user.slice\n", &files), None);
-        // A group of a container sees itself as the root.
+        // Inside a container its own group appears as the root.
         assert_eq!(
             least("0::/\n", &[("memory.max", "536870912\n")]),
             Some(512 << 20)
         );
-        // Groups may be named that cannot be seen.
+        // A group may be named that is not visible.
         assert_eq!(
             least("0::/../other/job\n", &[("memory.max", "536870912\n")]),
             Some(512 << 20)

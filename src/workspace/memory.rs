@@ -1,10 +1,10 @@
 //! The memory budget: one pool, named reservations.
 //!
-//! Two figures are kept. What is *reserved* is the most that may be taken, and decides what may
-//! start. What is *held* is what was taken: a unit of work says it of its large buffers with
-//! [`hold`], an exchange as its buffer grows; other reservations are held whole. What a unit held at
-//! most counts for its thread until the loop over the units ends, since the allocator keeps it for the
-//! next one.
+//! Two figures are kept. A *reservation* is an upper bound of the memory that its holder may take.
+//! Reservations gate admission. The memory *held* is the usage, which is reported. A unit of work reports the
+//! size of its large buffers with [`hold`], a shuffle as its buffer grows; other reservations count as held
+//! in full. The largest usage of a unit counts for its thread until the loop over the units ends, since the
+//! allocator keeps that memory for the next unit.
 
 mod trim;
 mod unit;
@@ -19,20 +19,21 @@ use std::sync::{Arc, Condvar, Mutex};
 /// Smallest budget a run accepts, in bytes.
 pub const MINIMUM_BUDGET: u64 = 192 << 20;
 
-/// Part of the budget that the program takes before it has anything to do: code, tables, stacks.
+/// Part of the budget for the program itself before any work: code, tables, stacks.
 pub const PROGRAM: u64 = 7 << 20;
 
-/// What a thread that has worked holds beside its units: its stack, small lists, and the pieces that the
-/// allocator keeps for it between larger ones. Paid from [`SLACK`].
+/// Bytes that a thread which has worked holds beside its units: its stack, small lists, and the free pieces
+/// that the allocator keeps for it between larger ones. Paid from [`SLACK`].
 const THREAD: u64 = 9 << 18;
 
-/// The same where memory is tight.
+/// The same if memory is tight.
 const TIGHT_THREAD: u64 = 7 << 18;
 
-/// Below this budget memory is tight: what is freed goes back to the system, for some per cent of the time.
+/// Below this budget memory is tight: freed memory is returned to the system, which takes some per cent of
+/// the time.
 const TIGHT: u64 = 512 << 20;
 
-/// Part of the budget kept for what is not reserved by name: small buffers, allocator slack.
+/// Part of the budget for memory that is not reserved by name: small buffers, allocator slack.
 pub const SLACK: u64 = 41 << 20;
 
 /// Part of the budget that no stage can reserve.
@@ -43,21 +44,21 @@ struct State {
     used: u64,
     peak: u64,
     holders: BTreeMap<&'static str, u64>,
-    /// Who had reserved what at the peak.
+    /// Reservations at the peak, by name.
     at_peak: BTreeMap<&'static str, u64>,
     held: Ledger,
-    /// Threads that do units now, and that did so at one time at most.
+    /// Threads that do units now, and their largest number at one time.
     threads: (u64, u64),
 }
 
-/// What is held, by name.
+/// Memory held, by name.
 #[derive(Debug, Default)]
 struct Ledger {
     now: BTreeMap<&'static str, u64>,
     sum: u64,
     peak: u64,
     at_peak: BTreeMap<&'static str, u64>,
-    /// The peak since it was last asked for.
+    /// The peak since the last [`MemoryPool::take_held`].
     lately: u64,
 }
 
@@ -98,12 +99,12 @@ struct Shared {
     freed: Condvar,
 }
 
-/// A pool of bytes out of which every large buffer is reserved by name.
+/// A pool of bytes. Every large buffer is reserved from it by name.
 #[derive(Debug, Clone)]
 pub struct MemoryPool(Arc<Shared>);
 
 impl MemoryPool {
-    /// A pool for a process that may use `budget` bytes in all.
+    /// A pool for a process with a budget of `budget` bytes.
     ///
     /// # Errors
     /// [`Error::Memory`] if the budget is below [`MINIMUM_BUDGET`].
@@ -132,13 +133,13 @@ impl MemoryPool {
         })))
     }
 
-    /// The whole budget in bytes, as the user gave it.
+    /// The whole budget in bytes.
     #[must_use]
     pub fn budget(&self) -> u64 {
         self.0.budget
     }
 
-    /// Bytes that can be reserved when nothing is held.
+    /// Bytes that can be reserved when nothing else is reserved.
     #[must_use]
     pub fn capacity(&self) -> u64 {
         self.0.capacity - PROGRAM
@@ -150,47 +151,47 @@ impl MemoryPool {
         self.0.capacity - self.state().used
     }
 
-    /// Largest number of bytes reserved at one time so far, the program's own among them.
+    /// Peak of the reserved bytes, with those of the program.
     #[must_use]
     pub fn peak(&self) -> u64 {
         self.state().peak
     }
 
-    /// What was reserved at the peak, by name.
+    /// The reservations at that peak, by name.
     #[must_use]
     pub fn at_peak(&self) -> BTreeMap<&'static str, u64> {
         self.state().at_peak.clone()
     }
 
-    /// Largest number of bytes held at one time so far, the program's own among them.
+    /// Peak of the held bytes, with those of the program.
     #[must_use]
     pub fn peak_held(&self) -> u64 {
         self.state().held.peak
     }
 
-    /// What was held at that time, by name.
+    /// The memory held at that peak, by name.
     #[must_use]
     pub fn held_at_peak(&self) -> BTreeMap<&'static str, u64> {
         self.state().held.at_peak.clone()
     }
 
-    /// Largest number of bytes held at one time since this was last asked for.
+    /// Peak of the held bytes since the last call.
     #[must_use]
     pub fn take_held(&self) -> u64 {
         let held = &mut self.state().held;
         std::mem::replace(&mut held.lately, held.sum)
     }
 
-    /// Gives back to the system what the allocator keeps of what was freed, by `threads` above all, if
-    /// memory is tight. For when none of them is at work, and what comes next is large and has other sizes.
+    /// Returns freed memory that the allocator keeps, mainly for `threads`, to the system if memory is tight.
+    /// For the time between stages, when none of the threads is at work.
     pub fn trim(&self, threads: &rayon::ThreadPool) {
         if self.is_tight() {
             trim::trim(threads);
         }
     }
 
-    /// True if the budget is so small that freed memory goes back to the system, so that what is held now
-    /// is what counts; else a thread keeps what its largest unit took.
+    /// True if the budget is so small that freed memory is returned to the system. Then the present usage
+    /// counts; otherwise a thread keeps the largest usage of its units.
     fn is_tight(&self) -> bool {
         trim::CAN && self.0.budget < TIGHT
     }
@@ -210,7 +211,7 @@ impl MemoryPool {
             .unwrap_or_else(std::sync::PoisonError::into_inner)
     }
 
-    /// Reserves `bytes` under `name`, or fails with the budget that would have done.
+    /// Reserves `bytes` under `name`; the error has a budget that would suffice.
     ///
     /// # Errors
     /// [`Error::Memory`], naming the current holders.
@@ -221,7 +222,7 @@ impl MemoryPool {
         Ok(reservation)
     }
 
-    /// Reserves `bytes` of which nothing is held yet.
+    /// Reserves `bytes` that are not in use yet.
     ///
     /// # Errors
     /// As [`MemoryPool::reserve`].
@@ -254,10 +255,10 @@ impl MemoryPool {
         })
     }
 
-    /// Like [`MemoryPool::promise`], but waits while others of the same name hold memory.
+    /// Like [`MemoryPool::promise`], but waits while other reservations of the same name exist.
     ///
     /// # Errors
-    /// [`Error::Memory`] if it does not fit although no other holder of `name` is left to wait for.
+    /// [`Error::Memory`] if it does not fit although there is no other reservation of `name`.
     pub fn promise_waiting(&self, name: &'static str, bytes: u64) -> Result<Reservation> {
         let mut state = self.state();
         while state.used.saturating_add(bytes) > self.0.capacity && state.holders.contains_key(name)
@@ -269,7 +270,7 @@ impl MemoryPool {
                 .unwrap_or_else(std::sync::PoisonError::into_inner);
         }
         drop(state);
-        // A race for the freed bytes can only be lost to a holder of the same name.
+        // Another thread can take the freed bytes first only under the same name.
         match self.promise(name, bytes) {
             Err(_) if self.state().holders.contains_key(name) => self.promise_waiting(name, bytes),
             other => other,
@@ -302,7 +303,7 @@ impl Reservation {
         self.bytes
     }
 
-    /// Tells how many bytes are taken of what was promised.
+    /// Reports the usage of the reservation in bytes.
     pub fn set_held(&mut self, bytes: u64) {
         let mut state = self.pool.state();
         state.held.add(self.name, bytes.saturating_sub(self.held));
@@ -310,10 +311,10 @@ impl Reservation {
         self.held = bytes;
     }
 
-    /// Reserves more, unless there are as many as `bytes` already.
+    /// Raises the reservation to `bytes`, if it is smaller.
     ///
     /// # Errors
-    /// [`Error::Memory`]; what is reserved stays.
+    /// [`Error::Memory`]; the reservation is then unchanged.
     pub fn at_least(&mut self, bytes: u64) -> Result<()> {
         if bytes > self.bytes {
             let mut more = self.pool.promise(self.name, bytes - self.bytes)?;
@@ -322,14 +323,14 @@ impl Reservation {
         Ok(())
     }
 
-    /// Reserves so many bytes less: they will not be taken.
+    /// Reduces the reservation by `bytes`.
     pub fn give_back(&mut self, bytes: u64) {
         let bytes = bytes.min(self.bytes);
         let mut state = self.pool.state();
         state.used -= bytes;
         take(&mut state.holders, self.name, bytes);
         self.bytes -= bytes;
-        // Whoever waits for others of the name must find one as long as there is one.
+        // One byte stays reserved, so that threads waiting for reservations of this name still find a holder.
         if self.bytes == 0 && bytes > 0 {
             state.used += 1;
             *state.holders.entry(self.name).or_insert(0) += 1;
@@ -372,7 +373,7 @@ mod tests {
         assert_eq!(pool.available(), pool.capacity());
     }
 
-    /// Found by fuzzing: the sum was taken modulo 2^64, and so this was granted.
+    /// Found by fuzzing: the sum was taken modulo 2^64, so this reservation was granted.
     #[test]
     fn refuses_what_has_no_sum_with_what_is_held() {
         let pool = MemoryPool::new(MINIMUM_BUDGET).unwrap();
@@ -407,10 +408,10 @@ mod tests {
         assert_eq!(pool.peak(), PROGRAM + (6 << 20));
         promised.give_back(4 << 20);
         assert_eq!(pool.available(), pool.capacity() - (2 << 20));
-        // It is known as a holder for as long as it is one.
+        // It counts as a holder until it is dropped.
         promised.give_back(u64::MAX);
         assert_eq!(promised.bytes(), 1);
-        // It grows as far as there is room.
+        // It grows as far as the budget allows.
         promised.at_least(2 << 20).unwrap();
         promised.at_least(1 << 20).unwrap();
         assert_eq!(promised.bytes(), 2 << 20);
@@ -440,7 +441,7 @@ mod tests {
         slot.ended(at_work);
         let _ = pool.take_held();
         assert_eq!(pool.take_held(), PROGRAM + TIGHT_THREAD);
-        // What says nothing has taken all that it reserved.
+        // A unit that reports no usage counts with its whole reservation.
         let silent = Unit::begin(pool.promise_waiting("unit", 9 << 20).unwrap());
         slot.ended(silent);
         assert_eq!(pool.peak_held(), PROGRAM + TIGHT_THREAD + (9 << 20));

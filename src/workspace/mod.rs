@@ -1,6 +1,6 @@
-//! What a run stands on: the scratch folder, the memory budget, threads, progress and cancellation.
+//! Services for a run: the scratch folder, the memory budget, threads, progress and cancellation.
 //!
-//! The workspace knows nothing of stages or records; stages ask it for memory, files and threads.
+//! The workspace knows neither stages nor rows. Stages obtain memory, files and threads from it.
 
 pub mod fault;
 pub mod file;
@@ -61,12 +61,12 @@ impl IoCounters {
         self.stage_peak.fetch_max(now, Ordering::Relaxed);
     }
 
-    /// Begins to look for another peak, see [`IoCounters::stage_peak`].
+    /// Begins a new peak, see [`IoCounters::stage_peak`].
     pub fn begin_stage(&self) {
         self.stage_peak.store(self.scratch(), Ordering::Relaxed);
     }
 
-    /// Largest scratch space held at one time since the stage began.
+    /// Peak of the scratch space in bytes since the stage began.
     #[must_use]
     pub fn stage_peak(&self) -> u64 {
         self.stage_peak.load(Ordering::Relaxed)
@@ -77,7 +77,7 @@ impl IoCounters {
         self.scratch.fetch_sub(bytes, Ordering::Relaxed);
     }
 
-    /// Scratch space held now.
+    /// Scratch space in use now, in bytes.
     #[must_use]
     pub fn scratch(&self) -> u64 {
         self.scratch.load(Ordering::Relaxed)
@@ -95,7 +95,7 @@ impl IoCounters {
         self.written.load(Ordering::Relaxed)
     }
 
-    /// Largest scratch space held at one time.
+    /// Peak of the scratch space in bytes.
     #[must_use]
     pub fn scratch_peak(&self) -> u64 {
         self.scratch_peak.load(Ordering::Relaxed)
@@ -105,7 +105,7 @@ impl IoCounters {
 /// The scratch folder, memory budget, threads, progress and cancellation of one run.
 pub struct Workspace {
     folder: PathBuf,
-    /// Removes the folder at the end, unless a later run may go on from there.
+    /// Removes the folder at the end, unless a later attempt may resume the run.
     _temporary: Option<tempfile::TempDir>,
     /// The memory budget.
     pub memory: MemoryPool,
@@ -113,7 +113,7 @@ pub struct Workspace {
     pub threads: usize,
     /// Raised to stop the run.
     pub cancel: Cancel,
-    /// Who is told of progress.
+    /// Receives the progress.
     pub observer: Arc<dyn Observer>,
     /// Bytes moved so far.
     pub io: Arc<IoCounters>,
@@ -133,10 +133,10 @@ fn pool(threads: usize, folder: &Path) -> Result<Arc<rayon::ThreadPool>> {
 }
 
 impl Workspace {
-    /// Makes a private scratch folder (mode 0700) inside `parent`; it is removed on drop.
+    /// Creates a private scratch folder (mode 0700) inside `parent`; it is removed on drop.
     ///
     /// # Errors
-    /// [`Error::Io`] if the folder or the threads cannot be made.
+    /// [`Error::Io`] if the folder or the threads cannot be created.
     pub fn new(
         parent: &Path,
         memory: MemoryPool,
@@ -167,8 +167,7 @@ impl Workspace {
         })
     }
 
-    /// Works in a folder from which a later run can go on, and goes on from what an earlier one left
-    /// there.
+    /// Uses a folder from which a run can be resumed, and resumes the run of earlier attempts in it.
     ///
     /// # Errors
     /// [`Error::Io`], [`Error::Corrupt`], [`Error::Cancelled`].
@@ -210,7 +209,7 @@ impl Workspace {
         self.folder.join(name)
     }
 
-    /// Makes the scratch file `name`.
+    /// Creates the scratch file `name`.
     ///
     /// # Errors
     /// [`Error::Io`].
@@ -218,8 +217,8 @@ impl Workspace {
         self.maker().make(name, false)
     }
 
-    /// The scratch file `name` of a run that can be resumed, with what earlier attempts put there: new
-    /// in others. Whoever puts something there tells so by [`ScratchFile::put`].
+    /// The scratch file `name`, with its parts from earlier attempts if the run can be resumed; a new file
+    /// otherwise. The caller notes the parts that it writes by [`ScratchFile::put`].
     ///
     /// # Errors
     /// [`Error::Io`].
@@ -242,18 +241,19 @@ impl Workspace {
         Ok((file, places))
     }
 
-    /// Tells the observer of progress, and of as much if the unit that does so is found finished later.
+    /// Reports progress to the observer. A unit that is found finished when a run is resumed reports the same
+    /// progress again.
     pub fn advance(&self, items: u64) {
         run::Notes::advance(items);
         self.observer.advance(items);
     }
 
-    /// 0, 1, 2 … to tell things apart that are made in one workspace.
+    /// The next of the numbers 0, 1, 2 …, for names that are unique in the workspace.
     pub fn number(&self) -> u64 {
         self.numbers.fetch_add(1, Ordering::Relaxed)
     }
 
-    /// Makes scratch files on any thread.
+    /// Creates scratch files on any thread.
     #[must_use]
     pub fn maker(&self) -> Maker {
         Maker {
@@ -262,13 +262,13 @@ impl Workspace {
         }
     }
 
-    /// Removes the folder of a run that is `finished`, or that nobody can go on with.
+    /// Removes the folder if the run is `finished` or cannot be resumed.
     pub fn remove(&self, finished: bool) {
         let finished = finished && self.shared.run.as_ref().is_some_and(|r| r.retire().is_ok());
         Folder::remove(&self.folder, finished);
     }
 
-    /// Deletes files that were dropped. Only after a step that did not fail.
+    /// Deletes dropped files. To be called only after a step without an error.
     ///
     /// # Errors
     /// [`Error::Io`], [`Error::Disk`].
@@ -276,18 +276,18 @@ impl Workspace {
         self.shared.run.as_ref().map_or(Ok(()), |run| run.let_go())
     }
 
-    /// Says how much scratch the run will take at its peak, for those who run out of it.
+    /// Sets the estimated peak of the scratch space in bytes, for the message when the disk is full.
     pub fn expect_scratch(&self, bytes: u64) {
         self.shared.expected.store(bytes, Ordering::Relaxed);
     }
 
-    /// Scratch bytes that will be needed beside those that are taken.
+    /// Scratch bytes still to be written, according to that estimate.
     #[must_use]
     pub fn more_scratch(&self) -> u64 {
         self.shared.more()
     }
 
-    /// Reserves memory out of the budget.
+    /// Reserves memory from the budget.
     ///
     /// # Errors
     /// See [`MemoryPool::reserve`].
@@ -295,7 +295,7 @@ impl Workspace {
         self.memory.reserve(name, bytes)
     }
 
-    /// Reserves memory of which nothing is taken yet.
+    /// Reserves memory that is not in use yet.
     ///
     /// # Errors
     /// See [`MemoryPool::promise`].
@@ -303,8 +303,8 @@ impl Workspace {
         self.memory.promise(name, bytes)
     }
 
-    /// Gives back to the system what stages have freed. For before those whose lists are large and of other
-    /// sizes; no unit may be at work.
+    /// Returns freed memory to the system. To be called before stages with large lists of other sizes, while
+    /// no unit is at work.
     pub fn trim(&self) {
         self.memory.trim(&self.pool);
     }
@@ -315,12 +315,12 @@ impl Workspace {
         self.pool.clone()
     }
 
-    /// Runs `work` with rayon's parallel iterators bound to this run's threads.
+    /// Runs `work` with rayon's parallel iterators on the threads of this run.
     pub fn install<T: Send>(&self, work: impl FnOnce() -> T + Send) -> T {
         self.pool.install(work)
     }
 
-    /// Does `work` and notes, for the report, how long it took as part `name` of the stage.
+    /// Does `work` and notes its time, for the report, as the part `name` of the stage.
     pub fn part<T>(&self, name: &'static str, work: impl FnOnce() -> T) -> T {
         let start = Instant::now();
         let outcome = work();
@@ -328,19 +328,19 @@ impl Workspace {
         outcome
     }
 
-    /// Notes a part of the stage that took so many seconds.
+    /// Notes a part of the stage that took `seconds`.
     pub fn note_part(&self, name: &'static str, seconds: f64) {
         let mut parts = self.parts.lock().unwrap_or_else(PoisonError::into_inner);
         parts.push((name, seconds));
     }
 
-    /// The parts noted since this was last asked for.
+    /// The parts noted since the last call.
     pub fn take_parts(&self) -> Vec<(&'static str, f64)> {
         std::mem::take(&mut *self.parts.lock().unwrap_or_else(PoisonError::into_inner))
     }
 
     /// # Errors
-    /// [`Error::Cancelled`] once the run was asked to stop, [`Error::TimeLimit`] once its time is up.
+    /// [`Error::Cancelled`] if the run is cancelled, [`Error::TimeLimit`] if its time is up.
     pub fn check_cancel(&self) -> Result<()> {
         self.cancel.check()
     }

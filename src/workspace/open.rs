@@ -1,11 +1,11 @@
-//! How files are opened and what a failed write means.
+//! Options for opening files, and the error of a failed write.
 
 use crate::error::Error;
 use std::fs::{File, OpenOptions};
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::Path;
 
-/// How scratch files are opened: private, and never through a symbolic link.
+/// Options for scratch files: private, never through a symbolic link.
 #[must_use]
 pub fn options() -> OpenOptions {
     let mut options = File::options();
@@ -20,9 +20,9 @@ pub fn options() -> OpenOptions {
 /// Opens an existing scratch file, which must be a regular file.
 ///
 /// # Errors
-/// What the system says; an error of kind `InvalidInput` for what is no regular file.
+/// Errors of the system; an error of kind `InvalidInput` for a file that is not regular.
 pub fn open_existing(path: &Path) -> std::io::Result<File> {
-    // Opening a pipe must not wait for someone at its other end.
+    // Opening a pipe must not block.
     let flags = rustix::fs::OFlags::NOFOLLOW | rustix::fs::OFlags::NONBLOCK;
     let file = options()
         .custom_flags(flags.bits().cast_signed())
@@ -37,7 +37,7 @@ pub fn open_existing(path: &Path) -> std::io::Result<File> {
     }
 }
 
-/// The error of a write of `bytes`, beside which the run will need `more`.
+/// The error of a failed write of `bytes`, if the run needs `more` bytes besides.
 #[must_use]
 pub fn failed_write(path: &Path, bytes: usize, more: u64, error: std::io::Error) -> Error {
     use std::io::ErrorKind::{QuotaExceeded, StorageFull};

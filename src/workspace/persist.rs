@@ -1,25 +1,25 @@
-//! Values as bytes: what a finished step leaves for a run that is resumed.
+//! Values as bytes: the results of finished steps, for a run that is resumed.
 
 use super::Workspace;
 use crate::error::{Error, Result};
 use std::path::PathBuf;
 
-/// A value that a later attempt at the same run can have back.
+/// A value that is saved in the journal and restored by a later attempt.
 pub trait Persist: Sized {
     /// Appends the value to `out`.
     fn save(&self, out: &mut Vec<u8>);
-    /// The value that was saved.
+    /// Restores the value.
     ///
     /// # Errors
-    /// [`Error::Corrupt`] if it was something else; what opening its files gives.
+    /// [`Error::Corrupt`] if the bytes are not such a value; errors of opening its files.
     fn load(from: &mut Saved<'_>) -> Result<Self>;
 }
 
-/// Saved values, read from first to last.
+/// Saved values, read in sequence.
 #[derive(Clone, Copy)]
 pub struct Saved<'a> {
     bytes: &'a [u8],
-    /// Where files of the values are.
+    /// The workspace in which the files of the values are opened.
     pub workspace: &'a Workspace,
 }
 
@@ -33,7 +33,7 @@ impl<'a> Saved<'a> {
     /// The next bytes.
     ///
     /// # Errors
-    /// [`Error::Corrupt`] if there are not so many.
+    /// [`Error::Corrupt`] if there are fewer than `count`.
     pub fn take(&mut self, count: usize) -> Result<&'a [u8]> {
         match self.bytes.split_at_checked(count) {
             Some((taken, rest)) => {
@@ -44,7 +44,7 @@ impl<'a> Saved<'a> {
         }
     }
 
-    /// The error for a value that is not what was expected.
+    /// The error for an unexpected value.
     #[must_use]
     pub fn wrong(&self, expected: impl Into<String>) -> Error {
         Error::Corrupt {
@@ -122,7 +122,7 @@ impl Persist for PathBuf {
     }
 }
 
-/// Bytes as they are, for values that were saved one after the other.
+/// Plain bytes, for values that were saved one after another.
 #[derive(Debug)]
 pub(crate) struct Raw(pub Vec<u8>);
 
@@ -159,7 +159,7 @@ impl<T: Persist> Persist for Vec<T> {
     }
     fn load(from: &mut Saved<'_>) -> Result<Self> {
         let length = usize::load(from)?;
-        // A length is not believed before the values are there.
+        // A length may be invalid, so it does not decide how much memory is allocated.
         let mut all = Vec::with_capacity(length.min(from.bytes.len()));
         for _ in 0..length {
             all.push(T::load(from)?);

@@ -1,22 +1,22 @@
-//! Parts of files: where they are and what they must hold.
+//! Parts of files: their place, length and checksum.
 
 use std::sync::Arc;
 
-/// Where a part of a file is, and what it must hold.
+/// Place, length and checksum of a part of a file.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Place {
-    /// First byte.
+    /// Offset of the first byte.
     pub offset: u64,
     /// Number of bytes.
     pub bytes: usize,
-    /// Number of records in them.
+    /// Number of rows in them.
     pub records: usize,
     /// CRC-32 of the bytes.
     pub crc: u32,
 }
 
 impl Place {
-    /// Where it ends; none if no file can reach so far.
+    /// Offset of its end; none if it exceeds 64 bits.
     #[must_use]
     pub fn end(&self) -> Option<u64> {
         let end = self.offset.checked_add(self.bytes as u64)?;
@@ -24,13 +24,13 @@ impl Place {
     }
 }
 
-/// A part of a file that was written.
+/// A part of a file that is written.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Put {
     /// Name of the file.
     pub file: Arc<str>,
     /// Number of the part.
     pub section: u32,
-    /// Where it is.
+    /// Its place.
     pub place: Place,
 }

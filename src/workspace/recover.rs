@@ -1,5 +1,5 @@
-//! Going on after a crash: everything that is still needed is read and checked; what is damaged is
-//! done again, as little of it as possible.
+//! Recovery: all parts of files that are still needed are read and checked, and damaged ones are made again,
+//! with as little work as possible.
 
 use super::history::{History, Mending, Needed};
 use super::journal::Entry;
@@ -15,20 +15,20 @@ use std::path::{Path, PathBuf};
 /// Bytes checked at a time.
 const CHUNK: usize = 1 << 20;
 
-/// The name that the journal has for the output of the run, which is not in the scratch folder.
+/// The name of the mesh file in the journal; it is not in the scratch folder.
 pub const OUTPUT: &str = "output";
 
-/// The part of the output, without a byte, that says that it is whole and gets its name.
+/// An empty part of the output which records that the mesh is complete and may be renamed.
 pub const RENAMED: u32 = u32::MAX - 1;
 
-/// Where files may be: the output under its temporary name, or its own.
+/// Paths of the files; of the output its temporary name and its final one.
 #[derive(Debug)]
 pub struct Whereabouts<'a> {
     pub folder: &'a Path,
     pub output: &'a [PathBuf; 2],
 }
 
-/// True if the part holds what the journal says.
+/// True if the part matches the journal.
 fn is_whole(file: &File, part: &Needed) -> bool {
     let mut crc = crc32fast::Hasher::new();
     let mut buffer = vec![0; part.place.bytes.min(CHUNK)];
@@ -49,7 +49,7 @@ fn is_whole(file: &File, part: &Needed) -> bool {
     crc.finalize() == part.place.crc
 }
 
-/// The parts that do not hold what the journal says.
+/// The parts that do not match the journal.
 fn damaged(
     parts: Vec<Needed>,
     places: &Whereabouts<'_>,
@@ -58,7 +58,7 @@ fn damaged(
 ) -> Result<Vec<Needed>> {
     let mut by_file: BTreeMap<String, Vec<Needed>> = BTreeMap::new();
     for part in parts {
-        // A name with a path in it is none of ours.
+        // A name with a path in it was not written by this program.
         if !part.file.contains('/') {
             by_file.entry(part.file.clone()).or_default().push(part);
         }
@@ -87,7 +87,7 @@ fn damaged(
         };
         let renamed = name == OUTPUT && parts.iter().any(|part| part.section == RENAMED);
         let mut bad = check(&paths[0])?;
-        // A file of the output's own name may be one of another run.
+        // A file with the final name may be the output of another run.
         if !bad.is_empty() && renamed && check(&paths[1])?.is_empty() {
             bad.clear();
         }
@@ -97,7 +97,7 @@ fn damaged(
     Ok(all)
 }
 
-/// What counts of a journal's entries, and where they end, given what is left of the files.
+/// The entries of a journal that stay valid, and their end, given the surviving files.
 pub fn recover(
     entries: &[Entry],
     end: u64,
@@ -109,7 +109,7 @@ pub fn recover(
     let bad = damaged(history.needed(), places, observer, cancel)?;
     let names: BTreeSet<&str> = bad.iter().map(|part| part.file.as_str()).collect();
     let names = names.into_iter().collect::<Vec<_>>().join(", ");
-    // A journal that speaks of parts before any stage is not of this program: nothing of it counts.
+    // A journal with parts before any stage was not written by this program and is ignored.
     let first = || Mending::Rewind {
         end: entries.get(1).map_or(end, |entry| entry.offset),
         stage: None,
@@ -153,8 +153,7 @@ mod tests {
     use super::super::progress::Silent;
     use super::*;
 
-    /// Found by fuzzing: parts of no stage were believed, damaged or not, and memory was asked for by
-    /// their sizes.
+    /// Found by fuzzing: parts before any stage were accepted, and memory was allocated by their sizes.
     #[test]
     fn damage_before_any_stage_leaves_nothing_that_counts() {
         let folder = tempfile::tempdir().unwrap();

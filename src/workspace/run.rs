@@ -1,8 +1,7 @@
-//! A run that can be resumed: its journal, the steps it has finished, the files it still needs.
+//! A run that can be resumed: its journal, its finished steps, the files it still needs.
 //!
-//! The program is deterministic, so a resumed run is the same program again, in which what the journal
-//! knows is not done a second time. A step is known by where it is in the program: the steps around it,
-//! its name, and how many of that name came before it.
+//! The program is deterministic, so a resumed run is the same program again, in which finished work of the
+//! journal is skipped. A step is identified by its name and the names of the steps around it.
 
 use super::history::History;
 use super::journal::{Journal, Record};
@@ -15,22 +14,22 @@ use std::fs::File;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// What a run that can be resumed keeps beside its files.
+/// The state of a run that can be resumed.
 #[derive(Debug)]
 pub struct Run {
     folder: PathBuf,
     journal: Journal,
-    /// Syncs and deletes.
+    /// Syncs and deletes files.
     pub keeper: Keeper,
-    /// What earlier attempts have done.
+    /// The finished work of earlier attempts.
     history: History,
-    /// The steps that the program is in, outermost first; the program itself is the first.
+    /// The open steps of the program, outermost first; the first is the program itself.
     scopes: Mutex<Vec<Scope>>,
     /// Files dropped since the last step began.
     dropped: Mutex<Vec<(Arc<str>, u64)>>,
-    /// How many have each file.
+    /// Number of owners of each file.
     held: Mutex<HashMap<Arc<str>, usize>>,
-    /// Held as long as the run is at work.
+    /// Locked as long as the run is at work.
     _lock: File,
 }
 
@@ -42,16 +41,16 @@ struct Scope {
 }
 
 thread_local! {
-    /// What the work on this thread has put into files, for each unit that it is in.
+    /// Notes of the units that are at work on this thread, outermost first.
     static NOTES: RefCell<Vec<Noted>> = const { RefCell::new(Vec::new()) };
 }
 
-/// What came of a unit beside its result.
+/// The parts of files and the progress of a unit.
 #[derive(Debug, Default)]
 pub struct Noted {
     /// Parts of files.
     pub puts: Vec<Put>,
-    /// Items of the stage's progress.
+    /// Items of progress.
     pub items: u64,
 }
 
@@ -59,7 +58,7 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Collects what is put into files on this thread until it is finished or dropped.
+/// Collects the notes of a unit on this thread until it is finished or dropped.
 #[derive(Debug)]
 pub struct Notes(());
 
@@ -71,7 +70,7 @@ impl Notes {
         Self(())
     }
 
-    /// What was noted.
+    /// The collected notes.
     #[must_use]
     pub fn finish(self) -> Noted {
         let noted = NOTES.with_borrow_mut(Vec::pop).unwrap_or_default();
@@ -96,7 +95,7 @@ impl Drop for Notes {
 }
 
 impl Run {
-    /// A run in a folder that is locked for it.
+    /// A run in a locked folder.
     #[must_use]
     pub fn new(
         folder: PathBuf,
@@ -117,7 +116,7 @@ impl Run {
         }
     }
 
-    /// Notes what was put into a file.
+    /// Notes a part of a file.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Disk`].
@@ -130,13 +129,14 @@ impl Run {
             None => Some(put),
         });
         match alone {
-            // Not part of any unit: it counts at once.
+            // A part outside of any unit is recorded at once.
             Some(put) => self.finish("", 0, vec![put], Vec::new()),
             None => Ok(()),
         }
     }
 
-    /// The step `name` that the program comes to now. Files that it does not need any more go.
+    /// Begins the next step `name` of the program and returns its path. Files that were dropped before are
+    /// deleted.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Disk`].
@@ -157,7 +157,7 @@ impl Run {
         Ok(path)
     }
 
-    /// Goes into a step.
+    /// Enters a step.
     pub fn enter(&self, path: &str) {
         lock(&self.scopes).push(Scope {
             path: path.to_owned(),
@@ -165,7 +165,7 @@ impl Run {
         });
     }
 
-    /// Leaves it.
+    /// Leaves the innermost step.
     pub fn leave(&self) {
         lock(&self.scopes).pop();
     }
@@ -176,7 +176,7 @@ impl Run {
         self.history.units(step)
     }
 
-    /// What a finished unit left.
+    /// The payload of a finished unit; none if it is not finished.
     ///
     /// # Errors
     /// [`crate::Error::Io`].
@@ -187,7 +187,7 @@ impl Run {
         }
     }
 
-    /// A unit is finished.
+    /// Records that a unit is finished.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Disk`].
@@ -200,7 +200,7 @@ impl Run {
         })
     }
 
-    /// What earlier attempts put into a file.
+    /// The parts of a file that earlier attempts wrote.
     #[must_use]
     pub fn places(&self, file: &str) -> Vec<(u32, Place)> {
         self.history.places(file)
@@ -212,14 +212,14 @@ impl Run {
         self.history.is_deleted(file)
     }
 
-    /// Notes that someone has a file. What a finished step took in and gives back is there twice for a
-    /// moment: as it was before the step, and as it is known to have come out.
+    /// Notes another owner of a file. A file that a finished step takes and returns has two owners for a
+    /// moment: the argument of the step, and its restored result.
     pub fn hold(&self, name: &Arc<str>) {
         *lock(&self.held).entry(name.clone()).or_default() += 1;
     }
 
-    /// Notes that a file was dropped; false if someone else has it. It is needed again if that is because
-    /// the run failed; whether it did is known when the next step begins.
+    /// Notes that an owner dropped a file; false if there are others. After an error the file is still
+    /// needed; it is therefore deleted only when the next step begins.
     pub fn drop_later(&self, name: &Arc<str>, bytes: u64) -> bool {
         let mut held = lock(&self.held);
         let holders = held.entry(name.clone()).or_insert(1);
@@ -232,7 +232,7 @@ impl Run {
         last
     }
 
-    /// Notes that the run is finished: nobody needs its files any more.
+    /// Records that the run is finished and its files are not needed any more.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Disk`].
@@ -243,7 +243,7 @@ impl Run {
             .try_for_each(|record| self.journal.append(&record))
     }
 
-    /// Deletes the files that were dropped.
+    /// Deletes the dropped files.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Disk`].

@@ -1,4 +1,4 @@
-//! Steps that a resumed run does not do again.
+//! Steps that a resumed run does not repeat.
 
 use super::Workspace;
 use super::persist::{Persist, Saved};
@@ -27,7 +27,7 @@ impl<S: Into<String>> From<(S, &'static str)> for UnitsName {
     }
 }
 
-/// Inside a step as long as it lives.
+/// Inside a step until it is dropped.
 struct Inside<'a>(&'a Run);
 
 impl Drop for Inside<'_> {
@@ -43,13 +43,13 @@ fn bytes(value: &impl Persist) -> Vec<u8> {
 }
 
 impl Workspace {
-    /// Does `work`, or, if an earlier attempt at this run has finished it, has its result back.
+    /// Does `work`, or restores its result if an earlier attempt finished it.
     ///
-    /// Steps may be inside steps; only one thread at a time may begin them, in an order that depends
-    /// on nothing but the input and the parameters.
+    /// Steps may be nested. Only one thread at a time may begin steps, in an order that depends only on the
+    /// input and the parameters.
     ///
     /// # Errors
-    /// What `work` returned, [`crate::Error::Io`], [`crate::Error::Disk`].
+    /// Errors of `work`, [`crate::Error::Io`], [`crate::Error::Disk`].
     pub fn once<T: Persist>(&self, name: &str, work: impl FnOnce() -> Result<T>) -> Result<T> {
         let Some(run) = &self.shared.run else {
             return work();
@@ -68,12 +68,12 @@ impl Workspace {
         Ok(value)
     }
 
-    /// As [`Workspace::for_each_unit`], but units that an earlier attempt at this run has finished are
-    /// not done again. What a unit leaves beside files is what `work` returns; `each` gets it, for
-    /// every unit once, in any order.
+    /// As [`Workspace::for_each_unit`], but units that an earlier attempt finished are not repeated. The
+    /// result of a unit, apart from files, is the value that `work` returns. `each` is called with it once
+    /// for every unit, in any order.
     ///
     /// # Errors
-    /// See [`Workspace::for_each_unit`]; what `each` returned.
+    /// Errors of [`Workspace::for_each_unit`] and of `each`.
     pub fn units<T: Persist + Send>(
         &self,
         name: impl Into<UnitsName>,
@@ -117,7 +117,7 @@ impl Workspace {
         })
     }
 
-    /// The step `name` that the program comes to now, for those who keep its units themselves.
+    /// Begins the next step `name` of the program, for callers that manage its units themselves.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Disk`].
@@ -131,7 +131,7 @@ impl Workspace {
         })
     }
 
-    /// Notes what was put into a file that is not in the scratch folder.
+    /// Notes a part of a file that is not in the scratch folder.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Disk`].
@@ -139,7 +139,7 @@ impl Workspace {
         self.run().map_or(Ok(()), |run| run.put(put))
     }
 
-    /// What earlier attempts put into a file.
+    /// The parts of a file that earlier attempts wrote.
     pub(crate) fn places(&self, file: &str) -> Vec<(u32, Place)> {
         self.run().map_or_else(Vec::new, |run| run.places(file))
     }
@@ -155,7 +155,7 @@ impl Workspace {
     }
 }
 
-/// A step whose units are not known beforehand.
+/// A step whose units are not known in advance.
 #[derive(Debug, Default)]
 pub(crate) struct Step {
     run: Option<Arc<Run>>,
@@ -163,7 +163,7 @@ pub(crate) struct Step {
 }
 
 impl Step {
-    /// The units that are finished, and what they left.
+    /// The finished units and their results.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
@@ -180,7 +180,7 @@ impl Step {
             .collect()
     }
 
-    /// Notes as one unit what `put` puts into files, and `value`.
+    /// Records as one unit the parts of files that `put` writes, and `value`.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Disk`].

@@ -1,4 +1,4 @@
-//! Units of work on all threads, as many at a time as the memory budget allows.
+//! Units of work on all threads; the memory budget limits the number of simultaneous units.
 
 use super::Workspace;
 use super::memory::{Slot, Unit};
@@ -7,16 +7,15 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 impl Workspace {
-    /// Runs `work(unit)` for every unit in `0..count`, on all threads, in ascending order of start.
+    /// Runs `work(unit)` for every unit in `0..count`, on all threads, started in ascending order.
     ///
-    /// Before a unit starts, `bytes(unit)` are reserved as `name`, waiting for other units to end;
-    /// so the budget, not the number of threads, bounds what is in memory. A unit may give back what it
-    /// does not need once its sizes are known, and says what it holds ([`super::memory`]). The first error (that
-    /// of the lowest unit) ends the loop and is returned.
+    /// Before a unit starts, `bytes(unit)` are reserved as `name`, waiting for other units to end. So the
+    /// budget, not the number of threads, bounds the memory. A unit may reduce its reservation once its sizes
+    /// are known, and reports its usage ([`super::memory`]). The first error (that of the lowest unit) ends
+    /// the loop and is returned.
     ///
     /// # Errors
-    /// What `work` returned, [`Error::Memory`] if one unit alone does not fit, or
-    /// [`Error::Cancelled`].
+    /// Errors of `work`; [`Error::Memory`] if one unit alone does not fit; [`Error::Cancelled`].
     pub fn for_each_unit(
         &self,
         name: &'static str,
@@ -27,7 +26,7 @@ impl Workspace {
         let next = AtomicUsize::new(0);
         let stop = AtomicBool::new(false);
         let failed: Mutex<Option<(usize, Error)>> = Mutex::new(None);
-        // What a thread has held counts until all have ended, also of those that end first.
+        // The usage of a thread counts until all threads have ended.
         let slots = Mutex::new(Vec::new());
         let worker = || {
             let mut slot = Slot::new(&self.memory, name);
@@ -60,7 +59,7 @@ impl Workspace {
                 .unwrap_or_else(std::sync::PoisonError::into_inner)
                 .push(slot);
         };
-        // Always the same threads: what the allocator keeps for one is of no use to another.
+        // Always the same threads: memory that the allocator keeps for one is of no use to another.
         self.pool.broadcast(|_| worker());
         match failed
             .into_inner()

@@ -1,9 +1,9 @@
-//! Distances without any structure, to triangles by a walk on the simplex instead of by regions.
+//! Distances by brute force, to triangles by a search on the simplex instead of by regions.
 
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write as _;
 
-/// A triangle mesh, or without triangles a cloud.
+/// A triangle mesh; a cloud if there are no triangles.
 #[derive(Debug, Clone, Default)]
 pub struct Mesh {
     pub positions: Vec<[f64; 3]>,
@@ -86,11 +86,11 @@ pub fn nearest(points: &[[f64; 3]], p: [f64; 3]) -> f64 {
         .fold(f64::INFINITY, f64::min)
 }
 
-/// The distance is a convex function along any line of the triangle, and so is the least distance
-/// along lines through one corner: a ternary search in a ternary search.
+/// The distance is a convex function along any line in the triangle, and so is the least distance along lines
+/// through one corner: a nested ternary search.
 fn to_triangle([a, b, c]: [[f64; 3]; 3], p: [f64; 3]) -> f64 {
     let mix = |x: [f64; 3], y: [f64; 3], t: f64| [0, 1, 2].map(|i| x[i] + t * (y[i] - x[i]));
-    // Along a segment the foot of the perpendicular is all there is to find.
+    // Along a segment the foot of the perpendicular is the nearest point.
     let along = |x: [f64; 3], y: [f64; 3]| {
         let (mut above, mut below) = (0.0, 0.0);
         for i in 0..3 {
@@ -104,7 +104,7 @@ fn to_triangle([a, b, c]: [[f64; 3]; 3], p: [f64; 3]) -> f64 {
         };
         to_point(mix(x, y, t), p)
     };
-    // Segments from a point of `a b` to the same share of `c b`: parallel to `a c`.
+    // Segments from a point of `a b` to the point of `c b` at the same fraction: parallel to `a c`.
     let at = |t: f64| along(mix(a, b, t), mix(c, b, t));
     let (mut low, mut high) = (0.0, 1.0);
     for _ in 0..90 {

@@ -1,4 +1,4 @@
-//! What cannot work ends with one clear line and exit code 2, and leaves nothing behind.
+//! Invalid input ends with one clear line and exit code 2, and leaves no files behind.
 
 use crate::util::{self, Bench, Said};
 use outcrop_cloudgen::{Cloud, Kind};
@@ -19,7 +19,7 @@ fn refused(said: &Said, words: &[&str]) {
     }
 }
 
-/// Runs with more arguments than input and output; whatever happens to be there stays as it was.
+/// Runs with `more` arguments beside input and output; an existing output stays unchanged.
 fn refuses_with(inputs: &[&Path], more: &[&str], words: &[&str]) {
     let folder = Bench::new();
     let mesh = folder.path("mesh.ply");
@@ -345,7 +345,7 @@ fn a_scratch_file_that_cannot_grow() {
     let bench = Bench::new();
     let cloud = bench.cloud("cloud.laz", &Cloud::new(Kind::Sphere).points(50_000));
     let mesh = bench.path("mesh.ply");
-    // Blocks of 512 bytes; with the signal ignored a write beyond them fails.
+    // Blocks of 512 bytes; if the signal is ignored a write beyond them fails.
     let limits = [
         (1, "write"),
         (200, "write"),
@@ -358,7 +358,7 @@ fn a_scratch_file_that_cannot_grow() {
         let said = in_shell(&limit, &[&cloud, Path::new("-o"), &mesh]);
         let scratch = bench.path("mesh.ply.outcrop-scratch");
         refused(&said, &[action]);
-        // What was finished stays, and without the limit the run goes on.
+        // Finished work stays, and without the limit the run can be resumed.
         assert_eq!(scratch.exists(), said.err.contains("; go on with: "));
         if scratch.exists() {
             resumed_runs += 1;
@@ -382,7 +382,7 @@ fn a_scratch_folder_that_is_too_small() {
     let small = bench.subfolder("small");
     let mesh = bench.path("mesh.ply");
     let mount = |size: &str| format!("mount -t tmpfs -o size={size} none '{}'", small.display());
-    // A name space of its own, so that the mount is gone with the process.
+    // A mount namespace of its own, so that the mount ends with the process.
     let run = |script: &str, arguments: &[&Path]| -> Said {
         let mut command = Command::new("unshare");
         command.args([
@@ -410,10 +410,10 @@ fn a_scratch_folder_that_is_too_small() {
         return;
     }
     let program = Path::new(env!("CARGO_BIN_EXE_outcrop"));
-    // Too small from the start; or with few files, of which free space says nothing.
+    // Too small from the start, or with a limit on the number of files, which free space does not show.
     let few = ["64m,nr_inodes=6", "64m,nr_inodes=8"];
     for size in ["64k", "512k", "2m"].into_iter().chain(few) {
-        // Once there is room, it goes on.
+        // Once there is room, the run is resumed.
         let script = format!(
             "{} && {{ \"$@\"; code=$?; cd '{}'; mount -o remount,size=64m,nr_inodes=1000 . || exit 3; \
              for left in *.outcrop-scratch; do \

@@ -1,4 +1,4 @@
-//! The program as its user sees it: answers, exit codes, silence.
+//! The program from the user's view: output and exit codes.
 
 use crate::util::{self, Bench, Said};
 use outcrop_cloudgen::{Cloud, Kind};

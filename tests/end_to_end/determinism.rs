@@ -1,5 +1,5 @@
-//! One cloud and one set of parameters give one file, byte for byte, whatever the threads, the
-//! memory, the tiles, the pages, and the order and format of the inputs.
+//! One cloud and one set of parameters give one file, byte for byte, for any threads, memory, tiles, pages,
+//! and order and format of the inputs.
 
 use crate::util::{self, Bench};
 use outcrop::params::Params;
@@ -7,7 +7,7 @@ use outcrop::workspace::memory::MINIMUM_BUDGET;
 use outcrop_cloudgen::{Cloud, Format, Kind, LasOptions};
 use std::path::{Path, PathBuf};
 
-/// Everything that must not matter.
+/// Settings that must not affect the mesh.
 #[derive(Debug, Clone)]
 struct Way {
     inputs: Vec<PathBuf>,
@@ -76,7 +76,7 @@ impl Way {
     }
 }
 
-/// All ways give the same file as the first.
+/// All ways give the same file as the first one.
 fn one_hash(bench: &Bench, params: &Params, ways: &[Way]) {
     let expected = ways[0].hash(bench, params);
     println!("{expected:016x}");
@@ -90,7 +90,7 @@ fn one_hash(bench: &Bench, params: &Params, ways: &[Way]) {
     }
 }
 
-/// Combinations in which each setting takes all its values.
+/// Combinations in which each setting has all of its values.
 fn settings(base: &Way) -> Vec<Way> {
     vec![
         base.clone(),
@@ -106,7 +106,7 @@ fn settings(base: &Way) -> Vec<Way> {
     ]
 }
 
-/// The nastiest cloud the generator makes: noise, outliers, copies, scan lines.
+/// The most difficult cloud of the generator: noise, outliers, copies, scan lines.
 fn nasty(points: u64) -> Cloud {
     Cloud::new(Kind::Bumpy)
         .points(points)
@@ -346,7 +346,7 @@ fn triangles_and_places(scan: &Path) -> (Vec<u8>, Vec<i64>) {
     (bytes[faces..].to_vec(), places)
 }
 
-/// The two files count from different origins, so that decoded coordinates differ in the last bit.
+/// The two files have different origins, so decoded coordinates differ in the last bit.
 #[test]
 fn a_terrestrial_scan_from_two_origins() {
     let Some(laz) = util::scan("lone-star.laz") else {

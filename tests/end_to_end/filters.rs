@@ -1,4 +1,4 @@
-//! Options that leave points out: by class, by thinning, as outliers.
+//! Options that leave points out: by class, by thinning, and outliers.
 
 use crate::util::{self, Bench, Said};
 use outcrop::params::Params;
@@ -7,7 +7,7 @@ use serde_json::Value;
 use std::collections::BTreeSet;
 use std::path::Path;
 
-/// Runs `reconstruct` with `more` arguments; what it reported.
+/// Runs `reconstruct` with `more` arguments; returns the report.
 fn report(bench: &Bench, input: &Path, more: &[&str]) -> Value {
     let path = bench.path("report.json");
     let mut command = util::program(["reconstruct", "--memory", "192MiB"]);
@@ -21,7 +21,7 @@ fn report(bench: &Bench, input: &Path, more: &[&str]) -> Value {
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
 }
 
-/// A wavy height field whose points are of classes 2, 6 and 7 in turn.
+/// A wavy height field with points of the classes 2, 6 and 7 in turn.
 fn classified(path: &Path, format: u8) {
     let mut builder = las::Builder::from((1, 4));
     builder.point_format = las::point::Format::new(format).unwrap();
@@ -104,7 +104,7 @@ fn thinning_leaves_a_point_in_every_cell() {
         assert_eq!(json["thin"]["dropped"], 40_000 - cells.len());
         assert_eq!(json["duplicates_folded"], 0);
     }
-    // Cells no wider than the lattice leave everything as it is.
+    // Cells no wider than a step of the lattice change nothing.
     let json = report(&bench, &input, &["--thin", "0.0009"]);
     assert_eq!(
         (&json["points"], &json["thin"]["dropped"]),
@@ -139,7 +139,7 @@ fn without_outliers_the_surface_is_closed() {
     assert!(util::verdict(&bench.path("mesh.ply")).manifold);
     let json = report(&bench, &input, &["--drop-outliers=50"]);
     assert!(json["outliers"]["dropped"].as_u64().unwrap() < dropped);
-    // Nothing is dropped that is not asked for.
+    // Without the option nothing is dropped.
     assert_eq!(report(&bench, &input, &[])["outliers"]["dropped"], 0);
 }
 

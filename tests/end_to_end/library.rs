@@ -7,7 +7,7 @@ use outcrop_cloudgen::{Cloud, Kind};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 
-/// What an observer is told of a stage.
+/// Calls for one stage that an observer received.
 #[derive(Debug, Clone, PartialEq)]
 struct Stage {
     name: &'static str,
@@ -17,7 +17,7 @@ struct Stage {
     ended: bool,
 }
 
-/// Notes all it is told, and cancels in the middle of a stage or at its start.
+/// Notes all calls, and cancels in the middle of a stage or at its start.
 #[derive(Default)]
 struct Notes {
     stages: Mutex<Vec<Stage>>,
@@ -116,7 +116,7 @@ fn a_run_can_be_cancelled_in_every_stage() {
         .run();
         let heard = notes.stages.lock().unwrap();
         if cancel_within == Some(stages - 1) {
-            // The last advance of the last stage may come too late.
+            // The last call of the last stage may come too late.
             assert!(
                 matches!(outcome, Ok(_) | Err(Error::Cancelled)),
                 "{outcome:?}"

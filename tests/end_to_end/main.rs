@@ -1,4 +1,4 @@
-//! Whole runs, through the library and through the program. One test binary, so that it links once.
+//! Whole runs, through the library and through the program. One test binary, to link only once.
 
 mod bad_input;
 mod cli;

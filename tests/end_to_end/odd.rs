@@ -1,5 +1,5 @@
-//! Clouds that no scanner should make: always a mesh that `verify` accepts, or a clear refusal, and the
-//! same whatever the threads, the memory, the tiles and the order of the points.
+//! Clouds that are no scans of a surface: the result is always a mesh that `verify` accepts or a clear error,
+//! and the same for any threads, memory, tiles and order of the points.
 
 use crate::util::{self, Bench};
 use outcrop::Error;
@@ -9,16 +9,16 @@ use outcrop_cloudgen::{Cloud, Kind, NoiseMode, Odd};
 use proptest::prelude::*;
 use std::path::Path;
 
-/// What became of a cloud.
+/// The outcome of a run.
 #[derive(Debug, PartialEq, Eq)]
 enum Outcome {
-    /// A mesh with this fingerprint and so many triangles.
+    /// A mesh with this hash and number of triangles.
     Mesh(u64, u64),
-    /// No mesh, for this reason.
+    /// No mesh, with the reason.
     Refused(String),
 }
 
-/// How a run is made; none of it may matter.
+/// Settings of a run that must not affect the result.
 struct Way {
     threads: usize,
     memory: u64,
@@ -74,7 +74,7 @@ fn outcome(cloud: &Path, mesh: &Path, params: &Params, way: &Way) -> Outcome {
     }
 }
 
-/// Methods and ways to smooth that differ in what they do to odd clouds.
+/// Methods and kinds of smoothing that treat odd clouds differently.
 fn options() -> Vec<Params> {
     let robust = Params::default();
     vec![
@@ -99,7 +99,7 @@ fn options() -> Vec<Params> {
     ]
 }
 
-/// Runs with all options, each but the first in one way only; the outcomes.
+/// Runs with all options, the first one in all ways and the others in one; returns the outcomes.
 fn every_option(bench: &Bench, cloud: &Path) -> Vec<Outcome> {
     let mesh = bench.path("mesh.ply");
     let each = options().into_iter().enumerate().map(|(number, params)| {
@@ -168,7 +168,7 @@ fn planes_grids_and_steps() {
             "turned.ply",
             Cloud::new(Kind::Grid).points(1500).rotated(true),
         ),
-        // Steps of a thousandth.
+        // Steps of one thousandth.
         ("below.las", plane.clone().rotated(true).noise(0.0003)),
         ("apart.las", plane.layers(2, 0.001)),
     ];
@@ -185,7 +185,7 @@ fn planes_grids_and_steps() {
     }
 }
 
-/// Vertices and cells with hundreds of neighbours: what surrounds a point, at about the same distance.
+/// Vertices and cells with hundreds of neighbours at about the same distance.
 #[test]
 fn hubs_of_circles() {
     let circle = |count: usize, radius: f64, part: f64| {
@@ -212,7 +212,7 @@ fn hubs_of_circles() {
     }
 }
 
-/// Steps of 1e-4 at coordinates of 1e7 need double precision, from the file to the mesh.
+/// Steps of 1e-4 at coordinates of 1e7 need double precision throughout.
 #[test]
 fn far_from_zero_in_fine_steps() {
     let bench = Bench::new();
@@ -263,7 +263,7 @@ fn places(most: i64, count: usize) -> impl Strategy<Value = Vec<[i64; 3]>> {
     prop::collection::vec(prop::array::uniform3(0..most), 1..count)
 }
 
-/// Small clouds of all the kinds at once: on grids, lines and planes, in clusters, with copies.
+/// Small clouds of several kinds combined: on grids, lines and planes, in clusters, with copies.
 fn clouds() -> impl Strategy<Value = Vec<[f64; 3]>> {
     let scaled = |by: [f64; 3]| {
         move |points: Vec<[i64; 3]>| {

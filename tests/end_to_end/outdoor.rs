@@ -1,4 +1,5 @@
-//! Outdoor worlds with known truth: open ground faces up and has no boundary, and nothing hangs over it.
+//! Outdoor worlds with known ground: open ground faces up and has no boundary, and there are no sails over
+//! it.
 
 use crate::util::{self, Bench};
 use outcrop::Params;
@@ -26,7 +27,7 @@ fn measured(seed: u64, objects: Objects, outliers: f64) -> GroundReport {
     report
 }
 
-/// Walls and trees make the surface one-sided around their ends; ground is not cut for that.
+/// Walls and trees make the surface non-orientable at their ends; the ground is not cut for that.
 #[test]
 fn open_ground_is_whole_and_faces_up() {
     let objects = Objects {
@@ -38,7 +39,7 @@ fn open_ground_is_whole_and_faces_up() {
     assert!(report.open_down_share <= 0.003, "{report:?}");
 }
 
-/// Birds and wires are not joined with each other and the ground.
+/// Birds and wires are not connected with each other or the ground.
 #[test]
 fn nothing_hangs_over_the_ground() {
     let objects = Objects {
@@ -48,6 +49,6 @@ fn nothing_hangs_over_the_ground() {
     let report = measured(5, objects, 0.0005);
     assert!(report.open_boundary_edges <= 5, "{report:?}");
     assert!(report.open_down_share <= 0.003, "{report:?}");
-    // Without limits there are 2000.
+    // Without limits of length the area is 2000.
     assert!(report.open_sail_area <= 100.0, "{report:?}");
 }

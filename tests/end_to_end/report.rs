@@ -1,4 +1,4 @@
-//! The keys of `--report`, and that they hold what they say.
+//! The keys of `--report`, and their values.
 
 use crate::util::{self, Bench, Said};
 use outcrop_cloudgen::{Cloud, Kind};
@@ -110,7 +110,7 @@ fn report(cloud: &Cloud, more: &[&str]) -> (Bench, Value) {
     (bench, serde_json::from_str(&text).unwrap())
 }
 
-/// Why a candidate is not inserted.
+/// The reasons for which a candidate is not inserted.
 const INSERTION: [&str; 6] = [
     "unconnected",
     "full_edge",
@@ -152,7 +152,7 @@ fn every_key_is_there() {
     assert!(json["radius"].as_f64().unwrap() > 0.0);
 }
 
-/// A stage that has parts does nothing else for long.
+/// Checks that the parts of a stage take no more time than the stage.
 fn parts_add_up(stage: &Value) {
     let parts = stage["parts"].as_array().unwrap();
     let names: Vec<_> = parts.iter().map(|p| p["name"].as_str().unwrap()).collect();
@@ -184,7 +184,7 @@ fn the_numbers_agree_with_each_other_and_with_the_files() {
     let (t3, t2, t1) = (n("/triples/t3"), n("/triples/t2"), n("/triples/t1"));
     assert!(t3 > 0 && t2 > 0 && t1 > 0);
     assert_eq!(n("/triples/triples"), t3 + t2 + t1);
-    // What cells saw of points off the surface is no triple.
+    // Cells count triples with points off the surface, which are no triples later.
     let (raw, counted) = (n("/cells/raw_triples"), 3 * t3 + 2 * t2 + t1);
     assert!(raw == counted || n("/cells/off_surface") > 0 && raw > counted);
     assert_eq!(

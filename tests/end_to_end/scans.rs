@@ -4,7 +4,7 @@ use crate::util::{self, Bench};
 use outcrop::params::Params;
 use std::path::Path;
 
-/// A mesh that has no defect and agrees with the report.
+/// Checks that the mesh has no defect and agrees with the report.
 fn manifold(scan: &Path, params: &Params) {
     let bench = Bench::new();
     let mesh = bench.path("mesh.ply");
@@ -26,7 +26,7 @@ fn manifold(scan: &Path, params: &Params) {
     assert_eq!(verdict.vertices, report.mesh.vertices);
     assert_eq!(verdict.boundary_edges, report.mesh.boundary_edges);
     assert_eq!(verdict.zero_area_triangles, 0, "{}", scan.display());
-    // A surface and not a few crumbs of it.
+    // A surface, and not only some fragments of it.
     assert!(report.mesh.points_used * 4 > report.points, "{report:?}");
 }
 

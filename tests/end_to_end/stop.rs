@@ -8,7 +8,7 @@ use std::path::Path;
 use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
-/// Far more than a run needs to stop, so that a busy machine fails no test.
+/// Much more than a run needs to stop, so that the test passes on a busy machine.
 const PATIENCE: Duration = Duration::from_secs(30);
 
 fn wait(child: &mut Child, what: &str, mut done: impl FnMut(&mut Child) -> bool) {
@@ -22,8 +22,8 @@ fn wait(child: &mut Child, what: &str, mut done: impl FnMut(&mut Child) -> bool)
     }
 }
 
-/// Sends `signal` once the scratch folder holds `file`; the program would work for long. What it had
-/// finished stays, if there was something.
+/// Sends `signal` once the scratch folder has `file`, in the middle of a long run. Finished work stays, if
+/// there is any.
 fn stops(input: &Path, file: &str, signal: Signal, code: i32) {
     let bench = Bench::new();
     let scratch = bench.subfolder("scratch");
@@ -91,7 +91,7 @@ fn signals_stop_a_run() {
     let bench = Bench::new();
     let input = bench.cloud("cloud.laz", &Cloud::new(Kind::Terrain).points(300_000));
     for (signal, code) in [(Signal::INT, 130), (Signal::TERM, 143)] {
-        // At once, and in the middle of the work.
+        // At once, and in the middle of the run.
         for file in ["", "points"] {
             stops(&input, file, signal, code);
         }

@@ -1,11 +1,11 @@
-//! Surfaces of known shape come out with the right topology.
+//! Surfaces with known topology are reconstructed with it.
 
 use crate::util::{self, Bench};
 use outcrop::params::{MaxWidth, Params, Radius};
 use outcrop_cloudgen::{Cloud, Kind, LasOptions};
 use std::path::Path;
 
-/// One closed component of the right genus that uses every point.
+/// Checks that the mesh is one closed component of the right genus that uses every point.
 fn closed(input: &Path, params: &Params, points: u64, euler: i64) {
     let bench = Bench::new();
     let mesh = bench.path("mesh.ply");
@@ -92,9 +92,9 @@ fn closed_surfaces_with_many_blocks() {
     }
 }
 
-/// The bunny is closed but for its base, and closed if there are no limits of length; it has at most so many
-/// holes before repair. The paper's method uses all points; relaxed, a few of the sharpest ridges fall
-/// behind others.
+/// The bunny is closed except at its base, and closed if there are no limits of length; it has at most
+/// `holes` holes before repair. The paper's method uses all points; when points are relaxed, some on the
+/// sharpest ridges are not used.
 fn bunny(name: &str, holes: u64) {
     let lid = Params {
         max_edge: MaxWidth::None,
@@ -148,7 +148,7 @@ fn large_bunny() {
     bunny("bunny-1m.ply", 177);
 }
 
-/// Every cell of a regular grid agrees with its neighbours: nothing but T3, and no hole.
+/// All cells of a regular grid agree with their neighbours: there are only T3, and no hole.
 fn grid(columns: i64, [u, v]: [[i64; 3]; 2], params: &Params) {
     let bench = Bench::new();
     let mut points = Vec::new();
@@ -246,7 +246,7 @@ fn t3_by_radius(cloud: &Cloud) -> (u64, u64) {
 
 #[test]
 fn the_automatic_radius_finds_what_a_large_one_finds() {
-    // Open ones too: a large disk spans even the flattest triangles of an outline.
+    // Open surfaces too: a large disk contains even the flattest triangles of an outline.
     for kind in [
         Kind::Sphere,
         Kind::Torus,

@@ -1,5 +1,5 @@
-//! What the end-to-end tests share: clouds made on the spot, runs of the library and of the
-//! program, and what they left behind.
+//! Shared by the end-to-end tests: generated clouds, runs of the library and of the program, and their
+//! results.
 
 use outcrop::inspect::verify::{Verdict, verify};
 use outcrop::params::Params;
@@ -15,10 +15,10 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::sync::Arc;
 
-/// Real scans that are used where they are, if they are.
+/// Folder of real scans, if it exists.
 pub const SCANS: &str = "../shared/data/scans";
 
-/// The real scan `name`, or none with a word about it.
+/// The real scan `name`; none, with a message, if it is absent.
 pub fn scan(name: &str) -> Option<PathBuf> {
     let path = Path::new(SCANS).join(name);
     if !path.exists() {
@@ -28,7 +28,7 @@ pub fn scan(name: &str) -> Option<PathBuf> {
     Some(path)
 }
 
-/// A folder for one test.
+/// A folder for the files of one test.
 pub struct Bench(tempfile::TempDir);
 
 impl Bench {
@@ -87,7 +87,7 @@ pub fn listing(folder: &Path) -> Vec<String> {
     names
 }
 
-/// A fingerprint of a file's bytes.
+/// A hash of a file's bytes.
 pub fn hash(path: &Path) -> u64 {
     let bytes = std::fs::read(path).unwrap();
     let mut hasher = std::collections::hash_map::DefaultHasher::new();
@@ -95,7 +95,7 @@ pub fn hash(path: &Path) -> u64 {
     hasher.finish()
 }
 
-/// A description of a run with the smallest budget and two threads.
+/// A builder with the smallest budget and two threads.
 pub fn builder(inputs: &[PathBuf], output: &Path, params: &Params) -> Builder {
     let start = Reconstruction::builder()
         .output(output)
@@ -116,7 +116,7 @@ pub fn reconstruct(input: &Path, output: &Path, params: &Params) -> Report {
         .unwrap()
 }
 
-/// What `verify` says of a mesh.
+/// The verdict of `verify` on a mesh.
 pub fn verdict(mesh: &Path) -> Verdict {
     let memory = MemoryPool::new(MINIMUM_BUDGET).unwrap();
     let folder = tempfile::tempdir().unwrap();
@@ -125,14 +125,14 @@ pub fn verdict(mesh: &Path) -> Verdict {
     verify(mesh, &workspace).unwrap()
 }
 
-/// The program with arguments, not started yet.
+/// The program with arguments, not started.
 pub fn program<S: AsRef<OsStr>>(arguments: impl IntoIterator<Item = S>) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_outcrop"));
     command.args(arguments).stdin(Stdio::null());
     command
 }
 
-/// What a finished program said.
+/// Output and exit code of a finished program.
 #[derive(Debug)]
 pub struct Said {
     pub code: Option<i32>,

@@ -54,7 +54,7 @@ impl Bench {
     }
 }
 
-/// The points on a lattice, sorted.
+/// The points of the spool on a lattice, sorted.
 pub fn positions(spool: &Spool, lattice: &Lattice) -> Vec<[i32; 3]> {
     let mut all = Vec::new();
     spool
@@ -91,7 +91,7 @@ pub fn cloud(count: usize, seed: u64) -> Vec<[i32; 3]> {
         .collect()
 }
 
-/// Integers, less the lowest of each axis and sorted, as a lattice of their own step has them.
+/// Integers minus the lowest of each axis, sorted: positions on a lattice with their step.
 pub fn based(points: &[[i32; 3]]) -> Vec<[i32; 3]> {
     let low: [i32; 3] = std::array::from_fn(|a| points.iter().map(|p| p[a]).min().unwrap());
     let mut based: Vec<_> = points
@@ -102,7 +102,7 @@ pub fn based(points: &[[i32; 3]]) -> Vec<[i32; 3]> {
     based
 }
 
-/// Writes a LAS or LAZ file, by its name; every hundredth point has the flag if `withheld`.
+/// Writes a LAS or LAZ file, by its extension; every hundredth point is flagged if `withheld`.
 pub fn write_las(
     path: &Path,
     version: (u8, u8),
@@ -127,7 +127,7 @@ pub fn write_las(
     let mut writer = las::Writer::from_path(path, header).unwrap();
     for (i, p) in points.iter().enumerate() {
         let [x, y, z] = std::array::from_fn(|a| f64::from(p[a]) * grid.0 + grid.1[a]);
-        // Times of three scanners in turn, with pauses: all branches of their compression.
+        // Times of three scanners in turn, with pauses: all branches of the compression of times.
         let time = 1e5 + (i % 3) as f64 * 1e4 + (i / 7) as f64 * 1e-5 + (i / 5000) as f64 * 1e7;
         let point = las::Point {
             x,
@@ -148,7 +148,7 @@ pub fn write_las(
     writer.close().unwrap();
 }
 
-/// A PLY with a list element first, coordinates among other properties, and a face at the end.
+/// A PLY file with a list element first, coordinates among other properties, and a face at the end.
 pub fn ply(body: &str, kind: &str, list: bool, points: &[[f64; 3]]) -> Vec<u8> {
     let extra = if list {
         "property list uchar short extra\n"

@@ -1,8 +1,8 @@
-//! Small files that claim to hold very much.
+//! Small files with very large counts in their headers.
 
 use crate::bench::{Bench, write_las};
 
-/// The file with another number of points in its header, and as the size of a chunk.
+/// The file with another number of points in its header, and as chunk size.
 fn claiming(bytes: &[u8], points: u32) -> Vec<u8> {
     let mut bytes = bytes.to_vec();
     let name = bytes.windows(14).position(|w| w == b"laszip encoded");
@@ -34,7 +34,7 @@ fn points_that_take_no_room_are_read_up_to_a_bound() {
             assert!(error.contains(&format!("{points} points in")), "{error}");
             assert!(error.contains("give them as LAS"), "{error}");
         }
-        // What is believed is there or is missed soon.
+        // A wrong count is noticed soon.
         let begin = std::time::Instant::now();
         let error = bench.error(bench.write("lie.laz", claiming(&bytes, 8_000_000)));
         assert!(

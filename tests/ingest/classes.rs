@@ -1,17 +1,17 @@
-//! Points chosen by their class.
+//! Selection of points by class.
 
 use crate::bench::{Bench, ply};
 use outcrop::stages::ingest::{Classes, ingest_classes};
 use std::path::{Path, PathBuf};
 
-/// Point `i` is of class `i % 19`, and every hundredth is withheld.
+/// Point `i` has class `i % 19`; every hundredth is withheld.
 fn write(path: &Path, version: (u8, u8), format: u8, count: i32) {
     let mut builder = las::Builder::from(version);
     builder.point_format = las::point::Format::new(format).unwrap();
     let mut writer = las::Writer::from_path(path, builder.into_header().unwrap()).unwrap();
     let format = *writer.header().point_format();
     for i in 0..count {
-        // Class 12 means overlap and is a flag in new formats.
+        // Class 12 means overlap, which is a flag in new formats.
         let class = match i % 19 {
             12 => 11,
             class => class as u8,

@@ -1,4 +1,4 @@
-//! What is wrong is refused, with the place; nothing panics.
+//! Damaged files are refused with the place of the damage, without a panic.
 
 use crate::bench::{Bench, cloud, ply, positions, write_las};
 use outcrop::Error;

@@ -135,8 +135,7 @@ fn floats_lie_on_a_power_of_two() {
     assert_eq!(spool.source_precision(), CoordinateType::F64);
 }
 
-/// Found by fuzzing: the lattice is chosen without files of which no point is kept, and need not have a
-/// place for them.
+/// Found by fuzzing: the lattice is chosen without files of which no point is kept, and need not cover them.
 #[test]
 fn a_file_without_points_may_be_anywhere() {
     let bench = Bench::new();

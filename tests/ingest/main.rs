@@ -1,4 +1,4 @@
-//! Files of every kind made on the spot, read back as lattice positions.
+//! Generated files of every kind, read back as lattice positions.
 
 mod belong;
 mod bench;
@@ -61,7 +61,7 @@ fn reads_many_chunks_with_and_without_a_chunk_table() {
         let data = u32::from_le_bytes(bytes[96..100].try_into().unwrap()) as usize;
         bytes[data..data + 8].copy_from_slice(&(-1i64).to_le_bytes());
         check(bench.write("streamed.laz", &bytes));
-        // Chunks of different sizes: the layered ones say how long they are, the others do not.
+        // Chunks of different sizes: layered ones have their length, the others do not.
         let name = bytes
             .windows(14)
             .position(|w| w == b"laszip encoded")

@@ -1,4 +1,4 @@
-//! Text and numbers that no program should write: what becomes of each.
+//! Unusual text and numbers, and their outcomes.
 
 use crate::bench::{Bench, positions};
 use outcrop::Error;
@@ -18,7 +18,7 @@ fn both(bench: &Bench, lines: &str) -> [PathBuf; 2] {
     ]
 }
 
-/// Points left out and kept.
+/// Numbers of points left out and kept.
 fn counts(spool: &Spool) -> (u64, u64) {
     (spool.stats().dropped_non_finite, spool.points())
 }
@@ -47,7 +47,7 @@ fn numbers_beyond_all_bounds_are_left_out_and_counted() {
             let seen = bench.read(std::slice::from_ref(&path));
             match seen {
                 Ok(spool) => assert_eq!(counts(&spool), (1, 1), "{number} in {path:?}"),
-                // A sign in front of what is no number.
+                // A sign before a word that is no number.
                 Err(error) => assert!(number == "-nan" && error.to_string().contains("-nan")),
             }
         }
@@ -146,7 +146,7 @@ fn a_line_of_a_million_columns_is_refused() {
     );
 }
 
-/// A file of 4 GiB: `start`, then digits, then nothing that was ever written.
+/// A file of 4 GiB: `start`, then digits, then a hole in the file.
 fn endless(bench: &Bench, name: &str, start: &str) -> PathBuf {
     let path = bench.path(name);
     let mut file = File::create(&path).unwrap();

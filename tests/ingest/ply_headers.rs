@@ -1,4 +1,4 @@
-//! PLY headers that lie, repeat themselves or do not end: what becomes of each.
+//! PLY headers with wrong counts, repetitions or without an end, and their outcomes.
 
 use crate::bench::Bench;
 use std::fs::File;
@@ -10,7 +10,7 @@ fn header(body: &str, elements: &str) -> String {
     format!("ply\nformat {body} 1.0\n{elements}end_header\n")
 }
 
-/// A file with a header and a body, refused with these words.
+/// Checks that a file with this header and body is refused with these words.
 fn refused(bench: &Bench, header: &str, body: &[u8], words: &[&str]) {
     let bytes = [header.as_bytes(), body].concat();
     let error = bench.error(bench.write("bad.ply", bytes));
@@ -47,7 +47,7 @@ fn counts_that_no_file_holds() {
             b"1 2 3\n4 5 6\n",
             &words,
         );
-        // Before the vertices, of fixed and of variable size.
+        // Elements before the vertices, of fixed and of variable size.
         let before = format!("element a {count}\nproperty double b\nelement vertex 1\n{XYZ}");
         let words = ["element a at byte", &*format!("{count} records of 8 bytes")];
         refused(
@@ -80,7 +80,7 @@ fn counts_that_no_file_holds() {
         let words = ["line 3", &*format!("element vertex {count}"), "0 or more"];
         refused(&bench, &header("ascii", &elements), b"1 2 3\n", &words);
     }
-    // So many elements of nothing take no time: there is nothing to read.
+    // Elements without properties take no time, whatever their number: there is nothing to read.
     let nothing = format!("element a {}\nelement vertex 1\n{XYZ}", u64::MAX);
     let path = bench.write(
         "nothing.ply",
@@ -162,7 +162,7 @@ fn headers_that_do_not_end() {
     assert_eq!(bench.read(&[path]).unwrap().points(), 1);
     let endless = format!("{start}comment {}", "x".repeat(3 << 20));
     refused(&bench, &endless, b"", &["no end in 1 MiB", "end_header"]);
-    // A large file is not searched for it.
+    // A large file is not searched for the end of the header.
     let path = bench.path("large.ply");
     let mut file = File::create(&path).unwrap();
     file.write_all(start.as_bytes()).unwrap();

@@ -1,4 +1,4 @@
-//! Section 6: the base, from the triples that all three cells see.
+//! Section 6: the base, from the triples with count three.
 
 use super::evidence::{self, Known};
 use super::homes::Side;
@@ -7,22 +7,22 @@ use super::{Settings, Weighing};
 use outcrop::geom::Point;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// What became of the T3.
+/// The T3 after the orientation.
 pub struct Base {
     pub surface: Surface,
-    /// Flagged by one of their vertices: candidates of section 7.
+    /// Flagged by one of their vertices: candidates in section 7.
     pub flagged: BTreeSet<Triangle>,
-    /// They would close a Möbius band: gone for good.
+    /// Removed because they would close a Möbius band.
     pub one_sided: BTreeSet<Triangle>,
-    /// The home of each triangle, and how it runs in it.
+    /// The component of each triangle, and its orientation in it.
     pub sides: BTreeMap<Triangle, Side>,
-    /// Whether a home has a crossing triangle.
+    /// For each component: it has a crossing triangle.
     pub global: Vec<bool>,
-    /// Robust: how it was oriented.
+    /// Robust: counts of the orientation.
     pub met: Weighing,
 }
 
-/// The triangles at `v`, among the given ones, that `v` flags.
+/// The triangles at `v`, of the given ones, that `v` flags.
 fn flagged_at(v: u32, triangles: &BTreeSet<Triangle>) -> BTreeSet<Triangle> {
     let degree = |node: u32| triangles.iter().filter(|t| t.contains(&node)).count();
     let crowded = |t: &&Triangle| t.iter().any(|&node| node != v && degree(node) >= 3);
@@ -30,7 +30,7 @@ fn flagged_at(v: u32, triangles: &BTreeSet<Triangle>) -> BTreeSet<Triangle> {
 
     let rest: BTreeSet<Triangle> = triangles.difference(&flagged).copied().collect();
     let fans = fans(v, &rest);
-    // Fans come in order of their smallest triangles.
+    // Fans are in order of their smallest triangles.
     let kept = fans.iter().position(|fan| fan.closed);
     if let (Some(kept), true) = (kept, fans.len() > 1) {
         for (which, fan) in fans.iter().enumerate() {
@@ -47,7 +47,7 @@ pub fn is_interior(t: Triangle, block: u32) -> bool {
     t[0] / block == t[2] / block
 }
 
-/// By block, the triangles that a vertex of it flags.
+/// By block, the triangles flagged by a vertex of it.
 fn flagged_by(t3: &BTreeSet<Triangle>, block: u32) -> BTreeMap<u32, BTreeSet<Triangle>> {
     let all = Surface::of(t3.iter().copied());
     let mut flagged: BTreeMap<u32, BTreeSet<Triangle>> = BTreeMap::new();
@@ -120,11 +120,11 @@ pub fn weighed(
     }
 }
 
-/// Adds triangles one after the other and leaves out those that make the surface one-sided.
+/// Adds triangles in order and leaves out those that would make the surface non-orientable.
 fn without_moebius_bands(kept: &[Triangle], block: u32) -> (Surface, BTreeSet<Triangle>) {
     let whole = Surface::of(kept.iter().copied());
     if whole.components().is_some() {
-        // If the whole can be oriented, every part of it can.
+        // If the whole can be oriented, so can every part of it.
         return (whole, BTreeSet::new());
     }
     let mut order = kept.to_vec();

@@ -1,9 +1,9 @@
-//! Integers wide enough never to overflow here, so that signs are exact without thought.
+//! Integers wide enough for all values here, for exact signs.
 
 use std::cmp::Ordering;
 use std::ops::{Add, Mul, Neg, Sub};
 
-/// A two's-complement integer of `W` 64-bit words, lowest first; overflow is the user's problem.
+/// A two's-complement integer of `W` 64-bit words, lowest first; overflow is not checked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Big<const W: usize>([u64; W]);
 

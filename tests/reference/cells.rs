@@ -1,4 +1,4 @@
-//! Sections 1, 2, 3.1 and 5: ids, neighbours, planes, cells and the triples they see.
+//! Sections 1, 2, 3.1 and 5: ids, neighbours, planes, cells and their triples.
 
 use super::spacing::Density;
 use super::surface::Triangle;
@@ -42,8 +42,8 @@ pub fn plane_of(points: &[Point], i: usize, neighbors: &[usize]) -> (Moments, Pl
     (moments, moments.plane())
 }
 
-/// One round of smoothing. The plane is that of exactly the `k` nearest; a point without a plane
-/// stays. The rounded offset is added to the position, which is kept on the lattice.
+/// One round of smoothing with the plane of exactly the `k` nearest; a point without a plane stays. The
+/// rounded offset is added to the position, which is kept on the lattice.
 pub fn smooth(points: &[Point], k: usize) -> Vec<Point> {
     let moved = |i: usize| {
         let others = by_distance(points, i);
@@ -67,7 +67,7 @@ fn is_off_surface(points: &[Point], i: usize, settings: &Settings, density: &Den
     last.is_some_and(|&j| density.is_off_surface(i, distance2(points[i], points[j])))
 }
 
-/// The pairs that the cell of `i` makes triples with. `diagonal` is that of the whole cloud.
+/// The pairs with which the cell of `i` makes triples. `diagonal` is that of the whole cloud.
 fn corners(points: &[Point], i: usize, settings: &Settings, diagonal: f64) -> Vec<(u32, u32)> {
     let others = by_distance(points, i);
     let mut k = settings.neighbors;
@@ -97,7 +97,7 @@ fn corners(points: &[Point], i: usize, settings: &Settings, diagonal: f64) -> Ve
         cell.clip(sub(points[j], points[i]), j as u32);
     }
     let mut seen = Vec::new();
-    // A point that shares its place with one of lower id has no cell.
+    // A point at the position of a point with lower id has no cell.
     if others.iter().any(|&j| j < i && points[j] == points[i]) {
         return seen;
     }
@@ -105,8 +105,8 @@ fn corners(points: &[Point], i: usize, settings: &Settings, diagonal: f64) -> Ve
     seen
 }
 
-/// How many of its three cells see each triple; none with a point off the surface. And how many points
-/// are that.
+/// For each triple the number of its cells, without triples with a point off the surface; and the number of
+/// such points.
 pub fn triples(
     points: &[Point],
     settings: &Settings,

@@ -1,4 +1,4 @@
-//! What every mesh must hold, whatever the cloud.
+//! Properties of every mesh, for any cloud.
 
 use super::Mesh;
 use super::surface::{Surface, Triangle};
@@ -21,7 +21,7 @@ impl Shape {
     }
 }
 
-/// Checks a mesh (with `split`, that its pinched vertices were split, too) and measures it.
+/// Checks a mesh (and with `split`, that pinched vertices were split) and measures its shape.
 pub fn check(mesh: &Mesh, split: bool) -> Result<Shape, String> {
     let sorted = |t: &[u32; 3]| {
         let mut t = t.map(|index| mesh.vertices[index as usize]);

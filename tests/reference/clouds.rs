@@ -1,4 +1,4 @@
-//! Small clouds that are hard in one way or another: made from a kind, a size and a seed.
+//! Small clouds that are difficult in various ways, made from a kind, a size and a seed.
 
 use outcrop::geom::Point;
 
@@ -40,7 +40,7 @@ impl Random {
     }
 }
 
-/// Positions before they are moved into the lattice.
+/// Positions before they are moved to the lattice.
 type Raw = Vec<[i64; 3]>;
 type Maker = fn(&mut Random, usize) -> Raw;
 
@@ -90,7 +90,7 @@ pub const KINDS: &[(&str, Maker)] = &[
 pub fn cloud(kind: usize, size: usize, seed: u64) -> Vec<Point> {
     let mut random = Random::new(seed ^ (kind as u64) << 32 ^ (size as u64) << 48);
     let mut raw = KINDS[kind].1(&mut random, size);
-    // Some of the clouds far from the origin, where coordinates are large.
+    // Some clouds are far from the origin, where coordinates are large.
     let base = if random.integer(0, 4) == 0 {
         (1 << 30) - (1 << 20)
     } else {
@@ -102,7 +102,7 @@ pub fn cloud(kind: usize, size: usize, seed: u64) -> Vec<Point> {
         .iter()
         .any(|p| (0..3).any(|axis| p[axis] - least[axis] >= 1 << 20));
     let base = if far { 0 } else { base };
-    // The order of points must not matter.
+    // The order of the points must not affect the mesh.
     for k in (1..raw.len()).rev() {
         raw.swap(k, random.integer(0, k as i64 + 1) as usize);
     }
@@ -111,7 +111,7 @@ pub fn cloud(kind: usize, size: usize, seed: u64) -> Vec<Point> {
         .collect()
 }
 
-/// One cloud of every kind, with its name; sizes from 3 to 400, more of them small.
+/// A cloud of every kind, with its name; sizes from 3 to 400, mostly small.
 pub fn one_of_each(seed: u64) -> Vec<(&'static str, Vec<Point>)> {
     let mut random = Random::new(seed);
     let mut size = || match random.integer(0, 4) {
@@ -125,7 +125,7 @@ pub fn one_of_each(seed: u64) -> Vec<(&'static str, Vec<Point>)> {
         .collect()
 }
 
-/// Pillars of six by six points, each of another height: rough for many neighbours, not for few.
+/// Pillars of six by six points with different heights: rough for many neighbours, smooth for few.
 pub fn pillars(seed: u64) -> Vec<Point> {
     let mut random = Random::new(seed);
     let heights: Vec<i32> = (0..16).map(|_| random.integer(0, 1200) as i32).collect();
@@ -140,7 +140,7 @@ pub fn pillars(seed: u64) -> Vec<Point> {
         .collect()
 }
 
-/// A frame around a door too wide to be a hole, its points a little off a grid.
+/// A frame around a door too wide to be a hole, its points slightly off a grid.
 pub fn door(seed: u64) -> Vec<Point> {
     let mut random = Random::new(seed);
     let mut points = Vec::new();
@@ -153,8 +153,8 @@ pub fn door(seed: u64) -> Vec<Point> {
     points
 }
 
-/// A sheet with a round hole whose filling has narrow triangles at its rim and large ones in its middle,
-/// and with enough of columns to say by itself what is up.
+/// A sheet with a round hole, whose filling has narrow triangles at its boundary and large ones in its
+/// middle, and with enough columns for evidence of facing up.
 pub fn wide_hole(seed: u64) -> Vec<Point> {
     let mut random = Random::new(seed);
     let mut points = Vec::new();
@@ -168,7 +168,7 @@ pub fn wide_hole(seed: u64) -> Vec<Point> {
     points
 }
 
-/// A sheet that is smooth on one side and rough, with some narrow cuts, on the other.
+/// A sheet that is smooth on one side and rough, with some narrow gaps, on the other.
 pub fn half_rough(seed: u64, count: usize) -> Vec<Point> {
     let mut random = Random::new(seed);
     let mut points = Vec::new();
@@ -276,7 +276,7 @@ fn two_clusters(r: &mut Random, n: usize) -> Raw {
     (0..n).map(point).collect()
 }
 
-/// A rough plane, and a few points where no surface is.
+/// A rough plane, and a few points off the surface.
 fn outliers(r: &mut Random, n: usize) -> Raw {
     let point = |k: usize| match k % 23 {
         5 => in_box(r, [1 << 29, 1 << 29, 1 << 29]),
@@ -302,7 +302,7 @@ fn sheets(r: &mut Random, n: usize, apart: i64) -> Raw {
     (0..n).map(point).collect()
 }
 
-/// Points along lines that are twenty times as far apart as the points on them.
+/// Points on lines whose distance is twenty times the spacing on them.
 fn scan_lines(r: &mut Random, n: usize) -> Raw {
     let length = ((n as f64).sqrt() * 4.0) as i64 + 2;
     let point = |k: i64| {
@@ -377,7 +377,7 @@ fn tube(r: &mut Random, n: usize) -> Raw {
     (0..n).map(|_| point()).collect()
 }
 
-/// Thin walls on a ground, one of them across its middle: the surface has T-shaped junctions.
+/// Thin walls on a ground, one of them across the middle: the surface has T-shaped junctions.
 fn walls(r: &mut Random, n: usize) -> Raw {
     let side = (6.0 * (n as f64).sqrt()) as i64 + 10;
     let point = |k: usize| {

@@ -1,33 +1,33 @@
-//! A graph of patches or labels that is contracted pair by pair (section 6.3, step 4).
+//! A graph of patches or labels, contracted pair by pair (section 6.3, step 4).
 
 use super::Weighing;
 use super::homes::{Homes, Side};
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Evidence that turns a piece by itself.
+/// Evidence that suffices to turn a component alone.
 const SURE: i64 = 1024;
 
-/// What is known of a node.
+/// A node.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Node {
     pub triangles: usize,
     pub outside: i64,
-    /// Evidence that it faces up as it runs.
+    /// Evidence that it faces up with its present orientation.
     pub up: i64,
 }
 
 /// Two nodes, the smaller number first.
 pub type Pair = [usize; 2];
 
-/// Nodes are numbered; one that was contracted with another keeps its number, but has no pairs.
+/// The graph. Nodes have numbers; a node that was contracted into another keeps its number, but has no pairs.
 #[derive(Debug, Clone, Default)]
 pub struct Graph {
     pub nodes: Vec<Node>,
     pub sums: BTreeMap<Pair, i64>,
-    /// The node that faces up.
+    /// The node of the sky, which faces up.
     pub sky: Option<usize>,
-    /// Nodes with a connection to what is a part of the sky.
+    /// Nodes connected with a node that is a part of the sky.
     touching: BTreeSet<usize>,
 }
 
@@ -36,13 +36,13 @@ fn pair(a: usize, b: usize) -> Pair {
 }
 
 impl Graph {
-    /// Adds a node; its number.
+    /// Adds a node; returns its number.
     pub fn push(&mut self) -> usize {
         self.nodes.push(Node::default());
         self.nodes.len() - 1
     }
 
-    /// Adds a weight for that both sides are one orientation; nothing if they have the same node.
+    /// Adds the weight of a relation: both sides are one orientation. Nothing if they have the same node.
     pub fn add(&mut self, a: Side, b: Side, weight: i64) {
         if a.home != b.home {
             let sign = if a.turned == b.turned { 1 } else { -1 };
@@ -50,7 +50,7 @@ impl Graph {
         }
     }
 
-    /// Adds the sky, and a pair with each node that has evidence.
+    /// Adds the sky, and its pair with each node that has evidence.
     pub fn push_sky(&mut self) {
         let sky = self.push();
         self.sky = Some(sky);
@@ -68,7 +68,7 @@ impl Graph {
         16 * root
     }
 
-    /// The sum of a pair; one with the sky counts with the upward weight of the other node.
+    /// The sum of a pair; for a pair with the sky it includes the upward weight of the other node.
     fn sum(&self, pair: Pair) -> i64 {
         let sum = self.sums[&pair];
         match self.sky {
@@ -89,15 +89,15 @@ impl Graph {
         self.nodes[node].outside > 0 || !self.pairs_of(node).is_empty()
     }
 
-    /// All that connects a node.
+    /// The sum of a node's connections.
     fn total(&self, node: usize) -> i64 {
         let pairs = self.pairs_of(node).into_iter();
         let sums: i64 = pairs.map(|pair| self.sum(pair).abs()).sum();
         sums + self.nodes[node].outside + self.upward(node)
     }
 
-    /// Whether a pair may be contracted to a cluster with up to `most` triangles, or more if it
-    /// dominates.
+    /// True if a pair may be contracted to a cluster with up to `most` triangles, or to a larger one because
+    /// it dominates.
     fn may(&self, pair: Pair, most: usize, met: &mut Weighing) -> bool {
         let sum = self.sum(pair);
         let dominates = pair.iter().any(|&node| 2 * sum.abs() >= self.total(node));
@@ -116,13 +116,13 @@ impl Graph {
         true
     }
 
-    /// Whether a pair is one with the sky that is not contracted: nothing is for it but a little evidence.
+    /// True for a pair with the sky that is not contracted: its only weight is a little evidence.
     fn is_free(&self, pair: Pair) -> bool {
         let evidence = self.nodes[pair[0]].up.abs();
         self.sky == Some(pair[1]) && !self.touching.contains(&pair[0]) && evidence < SURE
     }
 
-    /// The node that gives a cluster its number and its run, and the other one.
+    /// The node that gives a cluster its number and orientation, and the other one.
     fn named([a, b]: Pair, graph: &Self) -> (usize, usize) {
         let [of_a, of_b] = [a, b].map(|node| graph.pairs_of(node).len());
         if graph.sky == Some(b) || graph.sky != Some(a) && of_b > of_a {
@@ -132,7 +132,7 @@ impl Graph {
         }
     }
 
-    /// Makes one node a part of another; the pairs that it renamed or added to.
+    /// Contracts one node into another; returns the pairs that changed.
     fn merge(&mut self, stays: usize, goes: usize, turned: bool) -> Vec<Pair> {
         self.sums.remove(&pair(stays, goes));
         let part = std::mem::take(&mut self.nodes[goes]);
@@ -157,9 +157,9 @@ impl Graph {
         changed
     }
 
-    /// Contracts pairs, without `most` all of them but those with the sky that are left free, else those
-    /// that may be. Gives the cluster of each
-    /// node, by the number of the node that it is called after, and whether the node is turned in it.
+    /// Contracts pairs: without `most` all but those with the sky that stay free, otherwise those that may be
+    /// contracted. Returns the cluster of each node, as the number of the node that names it, and whether the
+    /// node is turned in it.
     pub fn contract(&mut self, most: Option<usize>, met: &mut Weighing) -> Homes {
         let mut clusters = Homes::apart(self.nodes.len());
         let mut due: BTreeSet<Pair> = self.sums.keys().copied().collect();

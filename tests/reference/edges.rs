@@ -1,4 +1,4 @@
-//! Smoothing that keeps edges (section 3.2).
+//! Smoothing that preserves edges (section 3.2).
 
 use super::cells::by_distance;
 use outcrop::geom::lattice::COORDINATE_LIMIT;
@@ -8,14 +8,14 @@ use std::collections::BTreeSet;
 
 type Vec3 = [f64; 3];
 
-/// A point around the one that moves, in terms of the reach, and its weight.
+/// A point around the moving one, in units of the reach, with its weight.
 #[derive(Clone, Copy)]
 struct Weighted {
     at: Vec3,
     weight: f64,
 }
 
-/// One round: all points at once.
+/// One round for all points at once.
 pub fn smooth(points: &[Point], k: usize) -> Vec<Point> {
     (0..points.len()).map(|i| moved(points, i, k)).collect()
 }
@@ -67,15 +67,15 @@ fn moved(points: &[Point], i: usize, k: usize) -> Point {
     })
 }
 
-/// Whether a surface of second order leaves less than half of the square heights over the plane, all
-/// points alike.
+/// True if a surface of second order leaves less than half of the squared heights over the plane, with equal
+/// weights.
 pub fn is_curved(points: &[Point], i: usize, k: usize) -> bool {
     heights(points, i, k).is_some_and(|(over_plane, left)| left < 0.5 * over_plane)
 }
 
-/// Whether no noise shows: over a surface of second order through a point and the twelve nearest, the
-/// others are high by less than 0.03 of the local spacing, seven degrees of freedom. It cannot be told
-/// without twelve of the `k` neighbours and nine values of each coordinate.
+/// True if there is no noise: the squared heights over a surface of second order through a point and its
+/// twelve nearest sum to less than 7 times the square of 0.03 local spacings (seven degrees of freedom).
+/// `None` without twelve of the `k` neighbours or nine different values of each coordinate.
 pub fn is_clean(points: &[Point], i: usize, k: usize) -> Option<bool> {
     let others = by_distance(points, i);
     let last = *others[..k.min(others.len())].last()?;
@@ -90,8 +90,8 @@ pub fn is_clean(points: &[Point], i: usize, k: usize) -> Option<bool> {
     Some(left < 7.0 * 0.03 * 0.03 * spacing2)
 }
 
-/// The square heights of a point and `k` others over their plane, and over a surface of second order, all
-/// points alike.
+/// The squared heights of a point and `k` others over their plane, and over a surface of second order, with
+/// equal weights.
 fn heights(points: &[Point], i: usize, k: usize) -> Option<(f64, f64)> {
     let mut others = by_distance(points, i);
     others.truncate(k);
@@ -113,7 +113,7 @@ fn heights(points: &[Point], i: usize, k: usize) -> Option<(f64, f64)> {
     Some((squares.sum::<f64>() * unit, left.sum::<f64>() * unit))
 }
 
-/// The direction in which the weighted points scatter least.
+/// The direction of least scatter of the weighted points.
 fn least_scatter(all: &[Weighted]) -> Option<Vec3> {
     let mut total = 0.0;
     let mut sum = [0.0; 3];
@@ -147,9 +147,9 @@ fn terms(x: f64, y: f64) -> [f64; 6] {
 }
 
 impl Surface {
-    /// That for which the weighted squares of what is left, and the ridge, come to least.
+    /// The surface with the least weighted sum of squared residuals and ridge.
     fn best(all: &[Weighted], normal: Vec3) -> Self {
-        // Any frame gives the same but for rounding.
+        // Any frame gives the same result up to rounding.
         let least = (0..3).min_by(|&a, &b| normal[a].abs().total_cmp(&normal[b].abs()));
         let mut axis = [0.0; 3];
         axis[least.unwrap_or(0)] = 1.0;
@@ -185,7 +185,7 @@ impl Surface {
     }
 }
 
-/// Gauss's elimination with the largest pivot of each column.
+/// Gaussian elimination with the largest pivot of each column.
 fn solve(mut m: [[f64; 7]; 6]) -> [f64; 6] {
     for column in 0..6 {
         let largest =

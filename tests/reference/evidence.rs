@@ -1,4 +1,4 @@
-//! Orientation by evidence (section 6.3): the surface is cut where it is least sure.
+//! Orientation by evidence (section 6.3): the surface is cut where its connections weigh least.
 
 use super::base::is_interior;
 use super::contract::Graph;
@@ -9,14 +9,14 @@ use super::{Settings, Weighing};
 use outcrop::geom::Point;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// What is known of the T3 before they are oriented.
+/// Input: the T3 before they are oriented.
 pub struct Known<'a> {
     /// The shape.
     pub points: &'a [Point],
     pub settings: &'a Settings,
     /// The T3 that no vertex flags.
     pub kept: &'a BTreeSet<Triangle>,
-    /// By block, the crossing T3 that touch it and that none of its own vertices flags.
+    /// By block, the crossing T3 that touch it and are not flagged by its own vertices.
     pub seen: BTreeMap<u32, BTreeSet<Triangle>>,
     /// Interior candidates.
     pub candidates: BTreeSet<Triangle>,
@@ -26,28 +26,28 @@ pub struct Known<'a> {
 pub struct Weighed {
     pub surface: Surface,
     pub one_sided: BTreeSet<Triangle>,
-    /// The home of each triangle, and how it runs in it.
+    /// The component of each triangle, and its orientation in it.
     pub sides: BTreeMap<Triangle, Side>,
-    /// Whether a home has a crossing triangle.
+    /// For each component: it has a crossing triangle.
     pub global: Vec<bool>,
     pub met: Weighing,
 }
 
-/// Everything while it is worked on. A triangle's number is its place among those that no vertex
-/// flags; each begins as a set of its own.
+/// The state. A triangle's number is its place among those that no vertex flags; each begins as a component
+/// of its own.
 struct Weigher<'a> {
     known: Known<'a>,
     number: BTreeMap<Triangle, usize>,
-    /// Triangles that run as is decided.
+    /// Orientations decided so far.
     sets: Homes,
-    /// What is there so far: first the interior triangles, then crossing ones, too.
+    /// Triangles so far: first the interior ones, later crossing ones too.
     surface: Surface,
     removed: BTreeSet<Triangle>,
     /// The nodes between blocks.
     graph: Graph,
-    /// The nodes of the triangles of global labels, and whether they are turned there.
+    /// The nodes of the triangles of global labels; true if they are turned there.
     nodes: BTreeMap<Triangle, Side>,
-    /// The edges that step 5 left.
+    /// The edges that remain after step 5.
     seams: Vec<(Triangle, Triangle, Edge)>,
     met: Weighing,
 }
@@ -87,7 +87,7 @@ impl Weigher<'_> {
         }
     }
 
-    /// The orientation that `other` asks of `t`.
+    /// The orientation that `other` implies for `t`.
     fn asks(&self, other: Triangle, t: Triangle, edge: Edge) -> Side {
         Side {
             turned: !alike(t, other, edge),
@@ -139,7 +139,7 @@ impl Weigher<'_> {
         self.add_labels(&patches.graph, &of);
     }
 
-    /// Step 5: the cuts.
+    /// Step 5: cuts.
     fn cut_clusters(&mut self, block: &Block<'_>, of: &BTreeMap<Triangle, Side>) {
         for (t, other, edge) in block.joints() {
             let (a, b) = (of[&t], of[&other]);
@@ -156,8 +156,8 @@ impl Weigher<'_> {
         }
     }
 
-    /// Step 5: the labels of a block; and of step 6 the nodes of the global ones. `graph` has the clusters,
-    /// and `of` tells the cluster of each triangle.
+    /// Step 5: the labels of a block; and for step 6 the nodes of the global ones. `graph` has the clusters,
+    /// `of` the cluster of each triangle.
     fn add_labels(&mut self, graph: &Graph, of: &BTreeMap<Triangle, Side>) {
         let clusters: BTreeSet<usize> = of.values().map(|side| side.home).collect();
         let mut nodes: BTreeMap<usize, usize> = BTreeMap::new();
@@ -186,13 +186,13 @@ impl Weigher<'_> {
         }
     }
 
-    /// Step 6: how labels run against each other.
+    /// Step 6: the relative orientations of labels.
     fn settle(&mut self) {
         let labels = self.nodes.clone();
         self.add_crossing_nodes();
         self.graph.push_sky();
         let settled = self.graph.contract(None, &mut self.met);
-        // All triangles of a label are joined by now.
+        // All triangles of a label are joined at this point.
         let mut first: BTreeMap<usize, (Triangle, bool)> = BTreeMap::new();
         for (t, side) in labels {
             let side = settled.seen_from_label(side);
@@ -209,7 +209,7 @@ impl Weigher<'_> {
         let rounded = |t| exact(t).map(|x| f64::from(x as f32));
         let mut before: BTreeSet<Triangle> = BTreeSet::new();
         for t in self.crossing() {
-            // The sides that others ask of it, with the weights of the edges; interior ones first.
+            // The sides that others imply for it, with the weights of the edges; interior ones first.
             let mut asked: Vec<(Side, i64)> = Vec::new();
             let mut ask = |other: Triangle, edge: Edge, cosine: f64| {
                 let side = self.nodes[&other];
@@ -282,7 +282,8 @@ impl Weigher<'_> {
         }
     }
 
-    /// Homes are the sets; one without a crossing triangle is cut up into its parts in each block.
+    /// Components are the joined sets; one without a crossing triangle is divided into its parts in each
+    /// block.
     fn finish(self) -> Weighed {
         let seen: BTreeMap<Triangle, Side> = self
             .surface

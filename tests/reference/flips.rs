@@ -1,25 +1,25 @@
-//! Flips of edges (section 8.1), each neighbour found by looking through all triangles.
+//! Flips of edges (section 8.1); neighbours are found by a search through all triangles.
 
 use super::surface::{Surface, Triangle, edges};
 use outcrop::geom::Point;
 use std::collections::BTreeSet;
 
-/// Bends around an edge below which it is flat enough.
+/// Sum of bends around an edge below which it is flat enough.
 const FLAT: f32 = 1.2;
-/// What a flip must save of them.
+/// Least reduction of that sum by a flip.
 const GAIN: f32 = 0.1;
 /// Least shape of a new triangle, if it is less than that of both old ones: twice the area over
 /// the two longest sides.
 const SLENDER: f64 = 0.2;
-/// Looks at all that changed.
+/// Passes over all changed edges.
 const SWEEPS: usize = 3;
 
 type Edge = [u32; 2];
 
-/// A triangle as it runs; its place in the list decides who comes first, and does not change.
+/// A triangle as it runs; its place in the list decides the order and does not change.
 type Run = [u32; 3];
 
-/// Flips edges, block by block: only those of triangles inside it of which a point was moved.
+/// Flips edges, block by block: only those between interior triangles with a moved point.
 pub fn flip(file: &[Point], shape: &[Point], surface: &mut Surface, block: u32) -> usize {
     let mut flips = 0;
     for b in 0..(file.len() as u32).div_ceil(block) {
@@ -42,7 +42,7 @@ pub fn flip(file: &[Point], shape: &[Point], surface: &mut Surface, block: u32) 
     flips
 }
 
-/// Vertices whose triangles stay: those with other triangles, and those at a boundary.
+/// Vertices whose triangles stay: those with triangles outside the block, and those at a boundary.
 fn shut(surface: &Surface, runs: &[Run]) -> BTreeSet<u32> {
     let all: BTreeSet<u32> = runs.iter().flatten().copied().collect();
     let closed = |v: &u32| {
@@ -99,7 +99,7 @@ impl Sheet<'_> {
         flips
     }
 
-    /// The first edge that is due after a place: by the earlier of its triangles, and by corner.
+    /// The first edge to be examined after a place: by the earlier of its triangles, then by corner.
     fn first(&self, due: &BTreeSet<Edge>, after: Option<(usize, usize)>) -> Option<(usize, usize)> {
         let places = (0..self.runs.len()).flat_map(|n| (0..3).map(move |k| (n, k)));
         let later = |place: &(usize, usize)| after.is_none_or(|a| *place > a);
@@ -120,14 +120,15 @@ impl Sheet<'_> {
         (0..self.runs.len()).find(|&m| m != n && edge.iter().all(|v| self.runs[m].contains(v)))
     }
 
-    /// The sum of bends at an edge and at the other edges of its two triangles: those of each added first.
+    /// The sum of bends at an edge and at the other edges of its two triangles; the two of each triangle are
+    /// added first.
     fn around(&self, n: usize, k: usize, other: usize) -> f32 {
         let at = self.corner(n, k, other);
         let of = |n: usize, k: usize| self.bend(n, (k + 1) % 3) + self.bend(n, (k + 2) % 3);
         self.bend(n, k) + of(n, k) + of(other, at)
     }
 
-    /// The corner of `other` opposite the edge that it has in common with `n`.
+    /// The corner of `other` opposite to its common edge with `n`.
     fn corner(&self, n: usize, k: usize, other: usize) -> usize {
         let edge = self.edge(n, k);
         let t = self.runs[other];
@@ -141,7 +142,7 @@ impl Sheet<'_> {
         })
     }
 
-    /// The unit normal of a triangle as one sees it that runs from `u` to `v`.
+    /// The unit normal of a triangle, oriented so that it runs from `u` to `v`.
     fn seen(&self, n: usize, u: u32, v: u32) -> [f32; 3] {
         let t = self.runs[n];
         let along = (0..3).any(|k| (t[k], t[(k + 1) % 3]) == (u, v));
@@ -166,7 +167,7 @@ impl Sheet<'_> {
         n.map(|x| x * inverse)
     }
 
-    /// The two triangles instead of `n` and `other`, if that pays.
+    /// The two triangles that replace `n` and `other`, if the flip pays.
     fn pays(&self, n: usize, k: usize, other: usize) -> Option<[Run; 2]> {
         let was = self.around(n, k, other);
         let t = self.runs[n];

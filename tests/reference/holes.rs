@@ -1,4 +1,4 @@
-//! Sections 8.5 and 8.6: the loops around holes, and how they are filled.
+//! Sections 8.5 and 8.6: boundary loops, and the filling of holes.
 
 use super::big::{Big, Big3, cross, dot, plus, vector};
 use super::insert::normal;
@@ -9,7 +9,7 @@ use super::{Settings, mend};
 use outcrop::geom::{Point, distance2, sub};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// What became of the loops.
+/// Counts of the loops.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Filling {
     pub loops: usize,
@@ -18,19 +18,19 @@ pub struct Filling {
     pub not_split: usize,
     pub filled: usize,
     pub triangles: usize,
-    /// Robust: not filled as a whole, nor closed by zipping; and how many of them were closed in part.
+    /// Robust: neither filled as a whole nor closed by ear clipping; and the number of them closed in part.
     pub zipped: usize,
     pub partly: usize,
-    /// Robust: filled only after zipping, or closed by zipping alone.
+    /// Robust: filled only after ear clipping, or closed by ear clipping alone.
     pub zipped_whole: usize,
-    /// Robust: short enough to be filled but for being an opening.
+    /// Robust: short enough to be filled, but an opening.
     pub openings: usize,
-    /// Robust: likewise, but seen only when it is filled.
+    /// Robust: likewise, but only its filling shows that.
     pub spanned: usize,
     /// Robust: likewise, but all triangles would be too wide.
     pub wide: usize,
-    /// Robust: of those closed in part, loops of which a part was filled as they were found, and after
-    /// zipping; and triangles left out that were not wide themselves.
+    /// Robust: of those closed in part, loops of which a part was filled as they were found, and after ear
+    /// clipping; and the triangles left out that were not wide themselves.
     pub left_open: usize,
     pub left_open_zipped: usize,
     pub between: usize,
@@ -38,7 +38,7 @@ pub struct Filling {
     pub gaps: usize,
 }
 
-/// From one vertex to another, in the direction of travel.
+/// From one vertex to another, in the direction of the loop.
 type HalfEdge = (u32, u32);
 
 pub struct Holes<'a> {
@@ -50,12 +50,12 @@ pub struct Holes<'a> {
     /// Triangles as they run, by each of their directed edges.
     half_edges: BTreeMap<HalfEdge, Triangle>,
     turned: Component,
-    /// Vertices with several fans (of whatever component).
+    /// Vertices with several fans (of any components).
     pub pinched: BTreeSet<u32>,
 }
 
-/// The triangles that fill the holes of an oriented surface, as they run. All loops are found and
-/// all chords chosen on the surface as it was before anything was filled.
+/// The triangles that fill the holes of an oriented surface, as they run. All loops are found and all chords
+/// chosen on the surface before filling.
 pub fn fill(
     points: &[Point],
     file: &[Point],
@@ -121,7 +121,7 @@ impl Holes<'_> {
         sub(self.points[to as usize], self.points[from as usize])
     }
 
-    /// Every loop as its vertices in the direction of travel, from its smallest (from, to) on.
+    /// Every loop as its vertices in order, beginning with its smallest (from, to).
     fn loops(&self, components: &[Component]) -> Vec<Vec<u32>> {
         let mut next: BTreeMap<HalfEdge, HalfEdge> = BTreeMap::new();
         for component in components {
@@ -146,7 +146,7 @@ impl Holes<'_> {
         found
     }
 
-    /// Which way in belongs to which way out of a hole, at the fans of one component at `v`.
+    /// For the fans of one component at `v`: the incoming edge of a loop and its outgoing edge.
     fn matching(&self, v: u32, component: &Component) -> Vec<(u32, u32)> {
         let mut openings = Vec::new();
         let mut axis = [0i128; 3];
@@ -210,7 +210,7 @@ impl Holes<'_> {
         (0..hole.len()).map(edge).map(third).collect()
     }
 
-    /// Twice the vector area of a loop: the sum is the same about any point.
+    /// Twice the vector area of a loop; it does not depend on the reference point.
     pub fn area2(&self, hole: &[u32]) -> Big3<8> {
         let mut area2: Big3<8> = [Big::ZERO; 3];
         for (k, &from) in hole.iter().enumerate() {
@@ -221,8 +221,8 @@ impl Holes<'_> {
         area2
     }
 
-    /// Whether a loop runs around the outside of its surface; `behind` are the third corners of the
-    /// triangles along it. A triangle with two edges in the loop counts twice.
+    /// True if a loop is an outline of its surface; `behind` are the third corners of the triangles along it.
+    /// A triangle with two edges in the loop counts twice.
     pub fn is_outline(&self, hole: &[u32], behind: &[u32]) -> bool {
         let area2 = self.area2(hole);
         let mut normals: Big3<8> = [Big::ZERO; 3];
@@ -241,8 +241,8 @@ impl Holes<'_> {
         dot(area2, normals).approximate() < -0.5 * size * lengths
     }
 
-    /// The triangles that fill a loop, by the positions of their corners in it, or nothing; `taken` are
-    /// edges that are there beside the mesh.
+    /// The triangles that fill a loop, by the positions of their corners in it, or none; `taken` are further
+    /// edges besides those of the mesh.
     pub fn patch(&self, hole: &[u32], taken: &BTreeSet<Edge>) -> Option<Vec<[usize; 3]>> {
         let mut chords = taken.clone();
         let mut triangles = Vec::new();
@@ -251,9 +251,8 @@ impl Holes<'_> {
             .then_some(triangles)
     }
 
-    /// Fills a part of a loop, corners with their positions in it; false if that cannot be done. Of the
-    /// two parts that a chord between places `a < b` of the part makes, the one at `a..=b` comes first,
-    /// then `0..=a, b..`.
+    /// Fills a part of a loop, given as positions; false if that is impossible. Of the two parts that a chord
+    /// between places `a < b` of the part makes, the one at `a..=b` comes first, then `0..=a, b..`.
     fn split(
         &self,
         part: &[(usize, u32)],
@@ -273,9 +272,9 @@ impl Holes<'_> {
         self.split(&part[a..=b], chords, out) && self.split(&rest, chords, out)
     }
 
-    /// The positions of the chord with the least length relative to the shorter way round the
-    /// part. The way from `a` to `b` is the difference of two running sums of edge lengths from
-    /// position 0 on; the other way is the whole sum less this. The first of equal chords counts.
+    /// The positions of the chord with the least length relative to the shorter way round the part. The way
+    /// from `a` to `b` is the difference of two running sums of edge lengths from position 0 on; the other
+    /// way is the whole sum less this. The first of equal chords is taken.
     fn best_chord(&self, part: &[u32], chords: &BTreeSet<Edge>) -> Option<(usize, usize)> {
         let count = part.len();
         let length = |a: u32, b: u32| {
@@ -314,7 +313,7 @@ impl Holes<'_> {
             && !(self.pinched.contains(&u) && self.pinched.contains(&v))
     }
 
-    /// Whether three points are on a line, in the shape or in the file.
+    /// True if three points are on a line, in the shape or in the file.
     pub fn collinear(&self, a: u32, b: u32, c: u32) -> bool {
         let flat = |points| normal(points, [a, b, c]) == [0; 3];
         flat(self.points) || flat(self.file)

@@ -1,23 +1,23 @@
-//! Relative orientations of homes, for test IV of section 7.
+//! Relative orientations of components, for test IV of section 7.
 
-/// A triangle's orientation as seen from a home: turned (i → k → j) or not (i → j → k).
+/// A triangle's orientation relative to a component: turned (i → k → j) or not (i → j → k).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Side {
     pub home: usize,
     pub turned: bool,
 }
 
-/// Which homes are joined with which, and how they lie to each other.
+/// Merged components and their relative orientations.
 ///
-/// Every home has a label; homes with the same label are joined. `turned` relates a home to the
-/// frame of its label.
+/// Every component has a label; components with the same label are merged. `turned` is the orientation of a
+/// component relative to its label.
 #[derive(Debug, Clone)]
 pub struct Homes {
     label: Vec<Side>,
 }
 
 impl Homes {
-    /// `count` homes, each by itself.
+    /// `count` components, none merged.
     pub fn apart(count: usize) -> Self {
         Self {
             label: (0..count)
@@ -29,7 +29,7 @@ impl Homes {
         }
     }
 
-    /// The same orientation seen from the label of its home.
+    /// The same orientation relative to the label of its component.
     pub fn seen_from_label(&self, side: Side) -> Side {
         let label = self.label[side.home];
         Side {
@@ -38,13 +38,13 @@ impl Homes {
         }
     }
 
-    /// The label of a home.
+    /// The label of a component.
     pub fn label(&self, home: usize) -> usize {
         self.label[home].home
     }
 
-    /// True if two of the asked-for orientations of one triangle contradict each other: their
-    /// homes are joined (or the same) and they see it turned differently.
+    /// True if two of the implied orientations of one triangle contradict each other: their components are
+    /// merged (or the same) and the orientations differ.
     pub fn conflict(&self, asked: &[Side]) -> bool {
         let seen: Vec<Side> = asked
             .iter()
@@ -56,7 +56,7 @@ impl Homes {
         })
     }
 
-    /// Joins two homes so that both sides are one orientation of one triangle.
+    /// Merges two components so that both sides are one orientation of one triangle.
     pub fn join(&mut self, a: Side, b: Side) {
         let (a, b) = (self.seen_from_label(a), self.seen_from_label(b));
         assert!(
@@ -74,7 +74,7 @@ impl Homes {
         }
     }
 
-    /// Joins all homes that ask for an orientation of one triangle.
+    /// Merges all components that imply an orientation of one triangle.
     pub fn join_all(&mut self, asked: &[Side]) {
         for pair in asked.windows(2) {
             self.join(pair[0], pair[1]);

@@ -1,4 +1,4 @@
-//! Section 7: candidates inserted one by one, interior ones block by block, then crossing ones.
+//! Section 7: insertion of candidates, interior ones by block, then crossing ones.
 
 use super::base::{Base, is_interior};
 use super::homes::{Homes, Side};
@@ -17,7 +17,7 @@ pub struct Candidate {
     triangle: Triangle,
 }
 
-/// The tests, but IV, which needs more than the mesh.
+/// The first failed test; test IV needs more than the mesh and is not here.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Failure {
     Edges,
@@ -26,7 +26,7 @@ enum Failure {
     Angle,
 }
 
-/// Triangles so far, each with its home and orientation in it.
+/// Triangles so far, each with its component and its orientation in it.
 #[derive(Clone)]
 struct Mesh<'a> {
     points: &'a [Point],
@@ -47,7 +47,7 @@ pub fn normal(points: &[Point], t: Triangle) -> [i128; 3] {
 }
 
 impl Mesh<'_> {
-    /// Tests I, II, III and G in this order: the first that fails.
+    /// Tests I, II, III and G in this order; returns the first that fails.
     fn failure(&self, t: Triangle) -> Option<Failure> {
         let shared: Vec<_> = edges(t)
             .into_iter()
@@ -86,7 +86,7 @@ impl Mesh<'_> {
         product as f64 >= self.cos_max_angle * length(n) * length(m)
     }
 
-    /// The orientations that the adjacent triangles ask of `t`, in the order of its edges.
+    /// The orientations that the adjacent triangles imply for `t`, in the order of its edges.
     fn asked(&self, t: Triangle) -> Vec<Side> {
         let mut asked = Vec::new();
         for edge in edges(t) {
@@ -106,9 +106,8 @@ impl Mesh<'_> {
         self.sides.insert(t, side);
     }
 
-    /// Tries candidates in rank order, in rounds, until a round inserts nothing. `agree` is test
-    /// IV and takes note of an insertion. Gives those inserted, in order, and those that fail
-    /// only test I.
+    /// Tries candidates in rank order, in rounds, until a round inserts nothing. `agree` is test IV and notes
+    /// an insertion. Returns the inserted ones, in order, and those that fail only test I.
     fn rounds(
         &mut self,
         mut pending: BTreeSet<Candidate>,
@@ -169,20 +168,21 @@ fn candidates(
     all
 }
 
-/// A triangle at which two global homes meet, and what its neighbours ask of it.
+/// A tentative merge: a triangle at which two global components meet, and the orientations that its
+/// neighbours imply.
 struct Joint {
     triangle: Triangle,
     asked: Vec<Side>,
 }
 
-/// What a block by itself came to.
+/// The result of a block.
 struct Block {
     joints: Vec<Joint>,
     /// Interior candidates that failed only test I.
     left: BTreeSet<Candidate>,
 }
 
-/// What became of all candidates.
+/// Counts of all candidates.
 pub struct Inserted {
     pub surface: Surface,
     pub candidates: usize,
@@ -257,8 +257,8 @@ pub fn insert(
     }
 }
 
-/// The interior candidates of one block, tried against the base and each other. Absorbed homes
-/// are joined in `homes` for good.
+/// Tries the interior candidates of one block against the base and each other. Absorbed components are merged
+/// in `homes` for good.
 fn by_itself(
     base: &Mesh<'_>,
     own: BTreeSet<Candidate>,
@@ -284,7 +284,7 @@ fn by_itself(
                 is_joint = true;
                 continue;
             }
-            // Whichever label remains, the one home that they now are is global if either was.
+            // The merged component is global if either was, whichever label remains.
             homes.join(asked[0], further);
             let either = global[a] || global[b];
             (global[a], global[b]) = (either, either);
@@ -302,8 +302,8 @@ fn by_itself(
     (inserted, Block { joints, left })
 }
 
-/// Joints and crossing candidates, block by block, in the whole mesh. Gives the number of
-/// triangles inserted and of joints removed.
+/// Tentative merges and crossing candidates, block by block, in the whole mesh. Returns the numbers of
+/// triangles inserted and of tentative merges removed.
 fn across(
     mesh: &mut Mesh<'_>,
     blocks: Vec<Block>,
@@ -324,7 +324,7 @@ fn across(
                 homes.join_all(&joint.asked);
             }
         }
-        // That the smallest vertex is in block g or before follows from a vertex in block g.
+        // A vertex in block g implies that the smallest vertex is in block g or before.
         let touches = |c: &Candidate| c.triangle.iter().any(|v| v / block == g as u32);
         let (now, later): (BTreeSet<_>, BTreeSet<_>) = crossing.into_iter().partition(touches);
         let again = |c: &&Candidate| c.triangle.iter().any(|v| near_border.contains(v));
@@ -339,7 +339,7 @@ fn across(
         let tried = now.union(&retried).copied().collect();
         let (done, left) = mesh.rounds(tried, rejected, &mut agree);
         inserted += done.len();
-        // Crossing candidates have another chance while a later block holds one of their vertices.
+        // Crossing candidates are tried again in each later block that has one of their vertices.
         let (wait, over): (BTreeSet<_>, BTreeSet<_>) = left
             .into_iter()
             .partition(|c: &Candidate| c.triangle[2] / block > g as u32);

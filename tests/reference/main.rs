@@ -17,7 +17,7 @@ fn kind(name: &str) -> usize {
         .expect("a kind of this name")
 }
 
-/// The mesh of a cloud, with all that must hold of every mesh checked.
+/// The mesh of a cloud, checked for all properties of every mesh.
 fn checked(points: &[Point], settings: &Settings) -> Mesh {
     let mesh = reconstruct(points, settings);
     let counts = mesh.counts;
@@ -34,12 +34,12 @@ fn a_tetrahedron_closes_if_its_cells_agree() {
         radius: Radius::Length(100.0),
         ..Settings::default()
     };
-    // No plane through four such points is better than another: each triple lacks a cell, and
-    // without a base there is nothing to insert candidates at.
+    // No plane through four such points is better than another: each triple lacks a cell, and without a base
+    // no candidate can be inserted.
     let counts = checked(&points, &settings).counts;
     assert_eq!((counts.t3, counts.t2, counts.t1, counts.base), (0, 4, 0, 0));
     for block in [1, 2, 4] {
-        // Two T3 side by side, and two T12 that close the rest.
+        // Two adjacent T3, and two T12 that close the rest.
         let triples = [
             ([0, 1, 2], 3),
             ([0, 1, 3], 3),
@@ -123,7 +123,7 @@ fn a_small_sphere_is_closed_and_faces_outwards() {
     }
 }
 
-/// Six times the volume of a triangle's tetrahedron with the point of three equal coordinates.
+/// Six times the volume of the tetrahedron of a triangle and the point with three equal coordinates.
 fn volume6(mesh: &Mesh, t: [u32; 3], middle: f64) -> f64 {
     let at = t.map(|v| {
         let id = mesh.vertices[v as usize];
@@ -234,7 +234,7 @@ fn what_lies_between_two_that_are_left_out_is_left_out() {
     assert_eq!(out(&fan, &[]), [false; 6]);
     assert_eq!(out(&fan, &[3]), [false, false, false, true, false, false]);
     assert_eq!(out(&fan, &[1, 3]), [false, true, true, true, false, false]);
-    // The corners cut off, two halves in the middle.
+    // An octagon: the corners cut off, and the two halves of the middle.
     let octagon = [
         [0, 1, 2],
         [2, 3, 4],
@@ -319,7 +319,7 @@ fn of_points_in_one_place_only_the_first_is_seen() {
     }
 }
 
-/// What cells see never has an edge with three T3; other triples have.
+/// Cells never give an edge with three T3; other triples do.
 #[test]
 fn triples_with_any_counts_make_manifolds() {
     let (mut flagged, mut joints_removed) = (0, 0);
@@ -356,7 +356,7 @@ fn the_triangle_that_closes_a_moebius_band_is_removed() {
     }
 }
 
-/// Settings that reach different parts of the method.
+/// Settings that cover different parts of the method.
 fn varied(seed: u64) -> [Settings; 4] {
     let plain = Settings {
         neighbors: 10,

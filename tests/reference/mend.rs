@@ -1,5 +1,5 @@
-//! Mending (section 8.7): loops are filled if they are holes, and else zipped from their
-//! sharpest corners.
+//! Filling and ear clipping (section 8.7): loops are filled if they are holes, otherwise their sharpest ears
+//! are clipped.
 
 use super::big::dot;
 use super::holes::{Filling, Holes};
@@ -9,33 +9,33 @@ use super::surface::Edge;
 use outcrop::geom::distance2;
 use std::collections::BTreeSet;
 
-/// Longer loops are left alone.
+/// Longer loops stay open.
 const LONGEST: usize = 100_000;
-/// Loops of so few edges are never taken for an outline.
+/// Loops with at most this number of edges are never outlines.
 const SMALL: usize = 6;
 
-/// A loop as it was found.
+/// A boundary loop before filling.
 struct Found<'a> {
     holes: &'a Holes<'a>,
-    /// Its edges, and the sum of their squares.
+    /// Number of its edges, and the sum of their squared lengths.
     edges: usize,
     squares: u128,
-    /// It is an outline.
+    /// True if it is an outline.
     around: bool,
-    /// Longer ones are not filled.
+    /// Loops with more edges are not filled.
     longest: usize,
 }
 
-/// What comes of filling a loop.
+/// The result of filling a loop.
 enum Outcome {
-    /// It is too long, around a piece of surface, or cannot be split.
+    /// It is too long, an outline, or cannot be split.
     Cannot,
-    /// It is an opening, by itself or by the triangles that would fill it.
+    /// It is an opening, by itself or by the area of its filling.
     Opening,
     Spanned,
-    /// All triangles are left out.
+    /// All triangles of the filling are left out.
     Wide,
-    /// Some are, and so many of them are not wide.
+    /// Some are; the triangles that remain, and the number of those left out without being too wide.
     Part(Vec<[u32; 3]>, usize),
     Whole(Vec<[u32; 3]>),
 }
@@ -93,7 +93,7 @@ pub fn mend(
     found.zip(hole, &behind, filling)
 }
 
-/// Counts a loop that stays open, and the triangles that close a part of it.
+/// Counts a loop that stays open in part, and the triangles of its closed part.
 fn in_part(triangles: Vec<[u32; 3]>, filling: &mut Filling) -> Vec<[u32; 3]> {
     filling.zipped += 1;
     filling.partly += usize::from(!triangles.is_empty());
@@ -102,12 +102,12 @@ fn in_part(triangles: Vec<[u32; 3]>, filling: &mut Filling) -> Vec<[u32; 3]> {
 }
 
 impl Found<'_> {
-    /// Whether so much area is more than a hole of `rest` edges has.
+    /// True if the area is larger than that of a hole of `rest` edges.
     fn is_open(&self, area: f64, rest: usize) -> bool {
         area * self.edges as f64 > 4.5 * self.squares as f64 * rest as f64
     }
 
-    /// Fills the loop or what is left of it.
+    /// Fills the loop or the rest of it.
     fn fill(&self, rest: &[u32], behind: &[u32], taken: &BTreeSet<Edge>) -> Outcome {
         let holes = self.holes;
         if self.around || rest.len() > self.longest {
@@ -138,7 +138,7 @@ impl Found<'_> {
         Outcome::Part(kept.map(|(t, _)| t).collect(), count - wide)
     }
 
-    /// Zips the loop and fills what is left.
+    /// Clips ears of the loop and fills the rest.
     fn zip(&self, hole: &[u32], behind: &[u32], filling: &mut Filling) -> Vec<[u32; 3]> {
         let mut zipper = Zipper::new(self.holes, hole, behind);
         zipper.zip();
@@ -173,7 +173,7 @@ impl Found<'_> {
     }
 }
 
-/// Fills a loop if it is none around a piece of surface; corners by their positions in it.
+/// Fills a loop unless it is an outline; corners by their positions in it.
 fn filled(
     holes: &Holes<'_>,
     hole: &[u32],
@@ -215,16 +215,16 @@ fn length(holes: &Holes<'_>, a: u32, b: u32) -> f64 {
     (square(holes, a, b) as f64).sqrt()
 }
 
-/// A corner of what is left of a loop.
+/// A corner of the rest of a loop.
 #[derive(Debug, Clone, Copy)]
 struct Corner {
     v: u32,
-    /// Its place in the loop as it was found.
+    /// Its place in the original loop.
     place: usize,
     spacing: f64,
     /// The third corner of the triangle at the edge to the next corner.
     behind: u32,
-    /// The ratio of its ear, as long as that is waiting to be closed.
+    /// The ratio of its ear, while that waits to be clipped.
     ratio: Option<f64>,
 }
 
@@ -268,8 +268,8 @@ impl<'a> Zipper<'a> {
         &self.ring[k.rem_euclid(self.ring.len() as isize) as usize]
     }
 
-    /// Closes ears, the one with the least ratio first. An ear that may not be closed when it is
-    /// looked at is looked at again when one of its two edges is new.
+    /// Clips ears, the one with the least ratio first. An ear that may not be clipped when it is examined is
+    /// examined again when one of its two edges is new.
     fn zip(&mut self) {
         for k in 0..self.ring.len() {
             self.ring[k].ratio = self.ear(k as isize);
@@ -303,7 +303,7 @@ impl<'a> Zipper<'a> {
         }
     }
 
-    /// The ratio of chord to edges of the ear at a corner, if it may be closed.
+    /// The ratio of chord to edges of the ear at a corner, if it may be clipped.
     fn ear(&self, k: isize) -> Option<f64> {
         let (holes, last) = (self.holes, self.ring.len() == 3);
         let [cs, cx, ce] = [-1, 0, 1].map(|d| *self.at(k + d));
@@ -328,7 +328,7 @@ impl<'a> Zipper<'a> {
         fine.then(|| chord / (length(holes, s, x) + length(holes, x, e)))
     }
 
-    /// Whether one of the next six corners along the loop, either way, is over or under the ear.
+    /// True if one of the next six corners along the loop, in either direction, is over or under the ear.
     fn covers(&self, k: isize) -> bool {
         let points = self.holes.points;
         let [s, x, e] = [-1, 0, 1].map(|d| self.at(k + d).v);
@@ -340,7 +340,7 @@ impl<'a> Zipper<'a> {
             .any(|p| ![s, x, e].contains(&p) && over(p))
     }
 
-    /// What is left, with what is behind each edge, from its smallest (from, to) pair on.
+    /// The rest of the loop, with the third corner at each edge, from its smallest (from, to) pair on.
     fn begin_at_smallest(&self) -> Vec<(u32, u32)> {
         let mut left: Vec<(u32, u32)> = self.ring.iter().map(|c| (c.v, c.behind)).collect();
         let pair = |&k: &usize| (left[k].0, left[(k + 1) % left.len()].0);
@@ -354,7 +354,7 @@ fn product(a: [i128; 3], b: [i128; 3]) -> i128 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// Whether two triangles that run alike make an angle of at most 100 degrees.
+/// True if two triangles that run alike make an angle of at most 100 degrees.
 fn smooth(n: [i128; 3], m: [i128; 3]) -> bool {
     let size = |v: [i128; 3]| (product(v, v) as f64).sqrt();
     product(n, m) as f64 >= -0.17364817766693036 * size(n) * size(m)

@@ -1,10 +1,11 @@
-//! A slow implementation of `docs/method.md`, in memory and by brute force; sections are those of it.
+//! A slow implementation of `docs/method.md`, in memory and by brute force. Section numbers are those of that
+//! document.
 //!
-//! It exists to be compared with the program, so it shares with it only what the method leaves to
-//! floating point: planes and cells (`outcrop::geom`). Everything else is written here as plainly
-//! as it can be said. Nothing is tuned; a few hundred points are a large cloud.
+//! It is compared with the program, and shares with it only what the method leaves to floating point: planes
+//! and cells (`outcrop::geom`). Everything else is written as plainly as possible. Nothing is optimised; a
+//! few hundred points are a large cloud.
 
-// Each test that includes this module uses another part of it.
+// Each test that includes this module uses a part of it.
 #![allow(dead_code)]
 
 pub mod base;
@@ -41,7 +42,7 @@ use weighing::Weighing;
 pub enum Radius {
     /// Twice the distance of the last neighbour used for the plane.
     Auto,
-    /// Of the diagonal of the box around the points as given (before smoothing).
+    /// Percent of the diagonal of the box around the input points (before smoothing).
     Percent(f64),
     /// In lattice steps.
     Length(f64),
@@ -52,18 +53,18 @@ pub enum Radius {
 pub struct Settings {
     /// `k`.
     pub neighbors: usize,
-    /// Rounds of smoothing; the lattice is taken as it is.
+    /// Rounds of smoothing; the lattice is not refined.
     pub smooth: u32,
-    /// Smoothing keeps edges.
+    /// Smoothing preserves edges.
     pub edges: bool,
     pub radius: Radius,
     /// Cosine of the largest angle between normals (test G).
     pub cos_max_angle: f64,
-    /// Holes of more edges stay.
+    /// Holes with more edges stay open.
     pub max_hole_edges: usize,
-    /// Components of fewer triangles go.
+    /// Components with fewer triangles are removed.
     pub min_component: usize,
-    /// Without, nothing of section 8 happens but orientation and the splitting of vertices.
+    /// If false, of section 8 only orientation and the splitting of vertices are done.
     pub repair: bool,
     /// `B`.
     pub block: u32,
@@ -71,13 +72,13 @@ pub struct Settings {
     pub patch: u32,
     /// `C`.
     pub cluster: usize,
-    /// Most rounds of relaxing.
+    /// Largest number of rounds of relaxing.
     pub relax: u32,
-    /// Orientation by evidence, and mending.
+    /// Orientation by evidence, and ear clipping.
     pub robust: bool,
-    /// Points off the surface stay.
+    /// Points off the surface are kept.
     pub keep_all: bool,
-    /// Longest side of a triangle, and how wide one may be that fills a hole, in local spacings.
+    /// Longest side of a triangle, and largest triangle of a filling, in local spacings.
     pub max_edge: f64,
     pub max_fill: f64,
 }
@@ -136,21 +137,21 @@ pub struct Rejected {
     pub orientation: usize,
 }
 
-/// What happened on the way.
+/// Counts of the steps.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Counts {
-    /// Different points.
+    /// Distinct points.
     pub points: usize,
-    /// Triples that three cells, two or one see.
+    /// Triples with count three, two and one.
     pub t3: usize,
     pub t2: usize,
     pub t1: usize,
-    /// Rounds of relaxing, and points in patches that moved.
+    /// Rounds of relaxing, and the sum over rounds of the points in patches that moved.
     pub rounds: u32,
     pub moved: usize,
     /// Rough patches that stayed because their region is curved.
     pub curved: usize,
-    /// Rough patches that stayed because no noise shows in their region.
+    /// Rough patches that stayed because their region has no noise.
     pub clean: usize,
     /// Points off the surface.
     pub off_surface: usize,
@@ -159,16 +160,16 @@ pub struct Counts {
     pub flat_candidates: usize,
     /// T3 flagged in section 6.1.
     pub flagged: usize,
-    /// T3 that would close a Möbius band.
+    /// T3 removed because they would close a Möbius band.
     pub one_sided: usize,
-    /// Robust: how they were oriented.
+    /// Robust: counts of the orientation.
     pub met: Weighing,
-    /// T3 that are left.
+    /// T3 in the base.
     pub base: usize,
     pub candidates: usize,
-    /// Inserted by blocks for themselves; removed joints are counted here.
+    /// Inserted inside blocks; removed tentative merges are counted here.
     pub inserted_interior: usize,
-    /// Inserted when blocks were put together, interior candidates tried again among them.
+    /// Inserted across blocks, with interior candidates tried again.
     pub inserted_crossing: usize,
     pub joints: usize,
     pub joints_removed: usize,
@@ -179,14 +180,14 @@ pub struct Counts {
     /// Triangles of the small components.
     pub small_triangles: usize,
     pub holes: Filling,
-    /// Vertices added for the fans of pinched ones.
+    /// Vertices added for the fans of pinched vertices.
     pub copies: usize,
 }
 
 /// The mesh.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Mesh {
-    /// Positions of all different points in the order of their ids, after smoothing.
+    /// Positions of all distinct points in the order of their ids, after smoothing.
     pub ids: Vec<Point>,
     /// The id of each output vertex, copies of pinched vertices last.
     pub vertices: Vec<u32>,
@@ -223,9 +224,9 @@ pub fn reconstruct(points: &[Point], settings: &Settings) -> Mesh {
     mesh
 }
 
-/// Sections 6 to 9, from points in the order of their ids and the number of cells that see
-/// each triple. Triples need not come from cells: what cells see has, for one, never an edge with
-/// more than two T3, as each cell has at most two corners on a bisector.
+/// Sections 6 to 9, from points in the order of their ids and triples with their counts. Triples need not
+/// come from cells: those of cells, for example, never have an edge with more than two T3, as each cell has
+/// at most two corners on a bisector.
 pub fn from_triples(
     points: Vec<Point>,
     triples: &BTreeMap<Triangle, u32>,
@@ -234,7 +235,7 @@ pub fn from_triples(
     connect(&points.clone(), points, triples, None, settings)
 }
 
-/// The same with positions to connect by, the shape, and positions in the file.
+/// As [`from_triples`], with a shape and file positions.
 pub fn connect(
     shape: &[Point],
     file: Vec<Point>,
@@ -291,8 +292,8 @@ pub fn connect(
     }
 }
 
-/// Section 8: flips, bridges, small components, which way components face,
-/// holes, in this order. Gives the way the triangles run.
+/// Section 8: flips, bridges, small components, orientation of components, holes, in this order. Returns the
+/// orientations of the triangles.
 fn repair_and_orient(
     shape: &[Point],
     file: &[Point],

@@ -1,10 +1,10 @@
-//! What stays of a filling of which some triangles are too wide (section 8.7).
+//! The part of a filling that remains if some of its triangles are too wide (section 8.7).
 
 /// A triangle of a filling by the positions of its corners in the loop.
 type Corners = [usize; 3];
 
-/// Which triangles of the filling of a loop of so many corners are left out: the wide ones, and at each
-/// corner those between two that are left out, until there is none.
+/// For each triangle of the filling of a loop of `count` corners: it is left out. These are the wide ones,
+/// and repeatedly at each corner those between two that are left out.
 pub fn left_out(count: usize, filling: &[Corners], wide: impl Fn(&Corners) -> bool) -> Vec<bool> {
     let mut out: Vec<bool> = filling.iter().map(wide).collect();
     loop {
@@ -25,9 +25,9 @@ pub fn left_out(count: usize, filling: &[Corners], wide: impl Fn(&Corners) -> bo
     }
 }
 
-/// The triangles at a corner, side by side from the edge after it to the edge before it.
+/// The triangles at a corner, in order from the edge after it to the edge before it.
 fn around(corner: usize, count: usize, filling: &[Corners]) -> Vec<usize> {
-    // How far along the loop from the corner the other two corners are, the nearer one first.
+    // Distances along the loop from the corner to the other two corners, the nearer one first.
     let others = |t: usize| {
         let mut far = filling[t].map(|k| (k + count - corner) % count);
         far.sort_unstable();

@@ -4,7 +4,7 @@ use super::repair::run;
 use super::surface::{Component, Fan, Surface, Triangle};
 use std::collections::BTreeMap;
 
-/// The id of each output vertex, and the triangles as indices into them.
+/// The id of each vertex in the file, and the triangles as indices of these.
 pub fn in_file_order(
     surface: &Surface,
     turned: &Component,

@@ -1,4 +1,4 @@
-//! Patches of a block and what connects them (section 6.3, steps 1 to 3).
+//! Patches of a block and their connections (section 6.3, steps 1 to 3).
 
 use super::Weighing;
 use super::contract::Graph;
@@ -8,14 +8,14 @@ use super::surface::{Edge, Surface, Triangle, alike, edges};
 use outcrop::geom::Point;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// The normal of the run i → j → k, of length one.
+/// The unit normal of the run i → j → k.
 pub fn unit_normal(points: &[Point], t: Triangle) -> [f64; 3] {
     let n = normal(points, t).map(|x| x as f64);
     let length = (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]).sqrt();
     n.map(|x| if length > 0.0 { x / length } else { x })
 }
 
-/// The cosine between two triangles at an edge, run alike, by the normals that `unit` gives.
+/// The cosine between two triangles at an edge, oriented alike, by the normals of `unit`.
 pub fn cosine(unit: impl Fn(Triangle) -> [f64; 3], a: Triangle, b: Triangle, edge: Edge) -> f64 {
     let (n, m) = (unit(a), unit(b));
     let dot = n[0] * m[0] + n[1] * m[1] + n[2] * m[2];
@@ -44,7 +44,7 @@ pub fn highest(points: &[Point]) -> BTreeSet<u32> {
     for (id, p) in (0..).zip(points) {
         let column = [(i64::from(p[0]) - x) / side, (i64::from(p[1]) - y) / side];
         let best = highest.entry(column).or_insert(id);
-        // Of equally high ones the smallest id was first.
+        // Among equally high points the smallest id came first.
         if p[2] > points[*best as usize][2] {
             *best = id;
         }
@@ -52,13 +52,13 @@ pub fn highest(points: &[Point]) -> BTreeSet<u32> {
     highest.into_values().collect()
 }
 
-/// What there is of a block.
+/// Input: a block.
 pub struct Block<'a> {
-    /// Of the shape.
+    /// The shape.
     pub points: &'a [Point],
     /// Its interior triangles.
     pub surface: Surface,
-    /// The crossing T3 that no vertex of it flags.
+    /// The crossing T3 that no vertex of the block flags.
     pub crossing: BTreeSet<Triangle>,
     /// Its interior candidates.
     pub candidates: BTreeSet<Triangle>,
@@ -70,14 +70,14 @@ pub struct Block<'a> {
 
 /// The patches of a block.
 pub struct Patches {
-    /// The patch of each triangle, and whether it is turned in it.
+    /// The patch of each triangle; true if it is turned in it.
     pub of: BTreeMap<Triangle, Side>,
     pub graph: Graph,
 }
 
 impl Block<'_> {
-    /// The edges between its triangles, by the smaller triangle, then in the order of its edges:
-    /// smaller and larger triangle, and the edge.
+    /// The edges between its triangles, by the smaller triangle, then in the order of its edges: smaller and
+    /// larger triangle, and the edge.
     pub fn joints(&self) -> Vec<(Triangle, Triangle, Edge)> {
         let mut joints = Vec::new();
         for &t in self.surface.triangles() {
@@ -110,7 +110,7 @@ impl Block<'_> {
         patches
     }
 
-    /// Step 1. A patch runs as its smallest triangle does.
+    /// Step 1. A patch has the orientation of its smallest triangle.
     fn joined(&self, met: &mut Weighing) -> BTreeMap<Triangle, Side> {
         let all: Vec<Triangle> = self.surface.triangles().iter().copied().collect();
         let number = |t| Side {
@@ -152,7 +152,7 @@ impl Block<'_> {
         of
     }
 
-    /// Step 2, and the numbers of triangles.
+    /// Step 2: evidence, and the numbers of triangles.
     fn add_evidence(&self, patches: &mut Patches) {
         for (&t, side) in &patches.of {
             let node = &mut patches.graph.nodes[side.home];
@@ -175,7 +175,7 @@ impl Block<'_> {
         }
     }
 
-    /// The orientation that `other` asks of `t`.
+    /// The orientation that `other` implies for `t`.
     fn asks(&self, patches: &Patches, other: Triangle, t: Triangle, edge: Edge) -> Side {
         let side = patches.of[&other];
         Side {

@@ -6,16 +6,16 @@ use super::spacing::Density;
 use outcrop::geom::lattice::COORDINATE_LIMIT;
 use outcrop::geom::{Point, distance2};
 
-/// What relaxing came to.
+/// The result of relaxing.
 pub struct Relaxed {
     pub shape: Vec<Point>,
     /// Rounds in which points moved.
     pub rounds: u32,
-    /// Points that moved, once for each round.
+    /// Points that moved, counted in each round.
     pub moved: usize,
-    /// Rough patches that stay because most of the rough ones of their region are curved.
+    /// Rough patches that stay because most rough ones of their region are curved.
     pub curved: usize,
-    /// Rough patches that stay because no noise shows in their region.
+    /// Rough patches that stay because their region has no noise.
     pub clean: usize,
 }
 
@@ -28,8 +28,8 @@ const RUN: usize = 16;
 /// Patches in a region.
 const REGION: usize = 256;
 
-/// Where a point goes, and whether it is rough. A point without a plane, or off the surface, stays and is
-/// not.
+/// The new position of a point; true if it is rough. A point without a plane, or off the surface, stays and
+/// is not rough.
 fn foot(points: &[Point], i: usize, k: usize, density: Option<&Density>) -> (Point, bool) {
     let others = by_distance(points, i);
     let used = &others[..k.min(others.len())];
@@ -51,18 +51,18 @@ fn foot(points: &[Point], i: usize, k: usize, density: Option<&Density>) -> (Poi
     (to, square > 0.2 * 0.2 * spacing2)
 }
 
-/// Whether a patch moves, by the points of it that were looked at.
+/// True if a patch is rough, by its samples.
 fn uneven(rough: &[bool]) -> bool {
     16 * rough.iter().filter(|r| **r).count() > rough.len()
 }
 
-/// Whether a rough patch is one by noise, by its points that tell.
+/// True if a rough patch has noise, by its telling points.
 fn noisy(points: &[Point], telling: &[usize], k: usize) -> bool {
     let curved = telling.iter().filter(|&&id| is_curved(points, id, k));
     2 * curved.count() < telling.len()
 }
 
-/// At most `rounds` rounds; of points that were smoothed none is clean.
+/// At most `rounds` rounds; smoothed points are never clean.
 pub fn relax(
     points: &[Point],
     k: usize,
@@ -88,7 +88,7 @@ pub fn relax(
         |all: &[usize], p: usize| all.iter().filter(|&&q| q / REGION == p / REGION).count();
     let in_region = |p: usize| (0..patches).filter(|q| q / REGION == p / REGION).count();
     let rough = moving.clone();
-    // The first rough points of a patch that were looked at.
+    // The first rough samples of a patch.
     let telling = |p: usize| -> Vec<usize> {
         some(p)
             .filter(|&id| foot(points, id, k).1)

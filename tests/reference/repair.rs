@@ -1,4 +1,4 @@
-//! Sections 8.2 to 8.4: bridges, small components, and which way components face.
+//! Sections 8.2 to 8.4: bridges, small components, and the orientation of components.
 
 use super::big::{Big, Big3, cross, determinant, dot, plus, vector};
 use super::insert::normal;
@@ -6,10 +6,10 @@ use super::surface::{Component, Edge, Surface, Triangle, edges};
 use outcrop::geom::Point;
 use std::collections::BTreeSet;
 
-/// Enough for every product below: the largest has about 300 bits.
+/// Wide enough for every product below: the largest has about 300 bits.
 type Wide = Big<8>;
 
-/// Removes bridges, all at once; gives how many there were.
+/// Removes bridges, all at once; returns their number.
 pub fn remove_bridges(surface: &mut Surface) -> usize {
     let is_bridge = |&t: &Triangle| {
         let border: Vec<Edge> = edges(t)
@@ -19,7 +19,7 @@ pub fn remove_bridges(surface: &mut Surface) -> usize {
         t.into_iter().any(|v| {
             let both = border.iter().filter(|edge| edge.contains(&v)).count() == 2;
             let fans = surface.fans(v);
-            // Where all fans are single triangles, the smallest stays.
+            // If all fans are single triangles, the smallest stays.
             let smallest = fans.iter().flat_map(|fan| &fan.triangles).min();
             let stays = fans.iter().all(|fan| fan.triangles.len() == 1) && smallest == Some(&t);
             both && fans.len() > 1 && !stays
@@ -35,7 +35,7 @@ pub fn remove_bridges(surface: &mut Surface) -> usize {
     bridges.len()
 }
 
-/// Removes components of fewer than `least` triangles; gives how many components and triangles.
+/// Removes components of fewer than `least` triangles; returns the numbers of components and triangles.
 pub fn remove_small_components(surface: &mut Surface, least: usize) -> (usize, usize) {
     let mut removed = (0, 0);
     for component in surface.components().expect("the mesh is orientable") {
@@ -47,12 +47,12 @@ pub fn remove_small_components(surface: &mut Surface, least: usize) -> (usize, u
     removed
 }
 
-/// The corners of `t` as it runs, beginning with the smallest.
+/// The corners of `t` as it runs, the smallest first.
 pub fn run([i, j, k]: Triangle, turned: bool) -> [u32; 3] {
     if turned { [i, k, j] } else { [i, j, k] }
 }
 
-/// All triangles with the way they run once every component faces as it should.
+/// All triangles as they run after every component is oriented by its volume or area.
 pub fn oriented(points: &[Point], surface: &Surface) -> Vec<Component> {
     let mut components = surface.components().expect("the mesh is orientable");
     for component in &mut components {
@@ -66,7 +66,7 @@ pub fn oriented(points: &[Point], surface: &Surface) -> Vec<Component> {
     components
 }
 
-/// Whether a component, in which the smallest triangle runs i → j → k, has to be turned over.
+/// True if a component, in which the smallest triangle runs i → j → k, has to be turned over.
 ///
 /// Sums over its triangles (p, q, r), as they run, all exact:
 /// * `volume6` = Σ det(p, q, r) with positions from the lattice's origin, six times the volume;
@@ -78,8 +78,9 @@ pub fn oriented(points: &[Point], surface: &Surface) -> Vec<Component> {
 /// Closed (no edge with one triangle): turned over if `volume6 < 0`. Open with
 /// `16 |area2|² ≥ size2²`: turned over if the first component of `area2` that is not zero, in the
 /// order z, y, x, is negative. Otherwise, turned over if the volume about the centroid is negative:
-/// `count · volume6 − corners · area2 < 0` (six times the volume, times `count`). A sum of zero
-/// leaves the component as it is: its smallest triangle runs i → j → k.
+/// order z, y, x, is negative. Otherwise, turned over if the volume about the centroid is negative: `count ·
+/// volume6 − corners · area2 < 0` (six times the volume, times `count`). With a sum of zero the component
+/// stays: its smallest triangle runs i → j → k.
 fn faces_wrongly(points: &[Point], component: &Component, open: bool) -> bool {
     let mut volume6 = Wide::ZERO;
     let mut area2: Big3<8> = [Wide::ZERO; 3];
@@ -106,14 +107,13 @@ fn faces_wrongly(points: &[Point], component: &Component, open: bool) -> bool {
     (count * volume6 - dot(corners, area2)).sign() < 0
 }
 
-/// For each hole to be matched at a vertex: the angle from one edge to another, turned clockwise
-/// about `axis`, compared exactly. A vanishing angle counts as a full turn.
+/// The angle from one edge to another, clockwise about `axis`, for the order of holes at a vertex. Angles are
+/// compared exactly; zero counts as a full turn.
 #[derive(Debug, Clone, Copy)]
 pub struct ClockwiseAngle {
     /// 0 for less than half a turn, 1 for half a turn, 2 for more, 3 for a full turn.
     quarter: u8,
-    /// Cosine and sine, times a common positive factor each that does not depend on the angle but
-    /// for the lengths of the edges.
+    /// Cosine and sine, each times a positive factor that depends only on the lengths of the edges.
     cosine: Wide,
     sine: Wide,
 }
@@ -141,7 +141,7 @@ impl ClockwiseAngle {
     }
 
     pub fn compare(&self, other: &Self) -> std::cmp::Ordering {
-        // Within half a turn the angle grows with the cross product's sign.
+        // Within half a turn the order of angles is the sign of the cross product.
         let turn = self.cosine * other.sine - self.sine * other.cosine;
         let within = if self.quarter.is_multiple_of(2) {
             0.cmp(&turn.sign())

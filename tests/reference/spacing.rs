@@ -1,4 +1,4 @@
-//! How dense the surface is (sections 4.1 and 4.2), and what is too far apart for that.
+//! The density of the surface (sections 4.1 and 4.2), and the limits of distance.
 
 use super::Settings;
 use super::cells::{by_distance, plane_of};
@@ -10,13 +10,13 @@ use outcrop::geom::{Point, distance2};
 const PATCH: usize = 256;
 const REGION: usize = 256;
 
-/// How far neighbours usually reach, by patch, and the limits that follow.
+/// The usual reach of neighbours, by patch, and the resulting limits.
 pub struct Density {
     usual2: Vec<u64>,
     settings: Settings,
 }
 
-/// The squared distance of the last of `N_k`, and whether `i` and these fill space.
+/// The squared distance of the last of `N_k`; true if `i` and these fill space.
 fn reach(points: &[Point], i: usize, k: usize) -> (u64, bool) {
     let others = by_distance(points, i);
     let used = &others[..k.min(others.len())];
@@ -30,12 +30,12 @@ fn lower_quartile(mut all: Vec<u64>) -> u64 {
     all[all.len() / 4]
 }
 
-/// True if neighbours that reach this far reach more than five times as far as is usual.
+/// True if neighbours reach more than five times as far as is usual.
 fn is_far(last2: u64, usual2: u64) -> bool {
     u128::from(last2) > 25 * u128::from(usual2)
 }
 
-/// Measures a cloud before it is relaxed.
+/// Measures a cloud before relaxing.
 pub fn measure(points: &[Point], settings: &Settings) -> Density {
     let ids: Vec<usize> = (0..points.len()).collect();
     let looks: Vec<Vec<(u64, bool)>> = ids
@@ -70,7 +70,7 @@ pub fn measure(points: &[Point], settings: &Settings) -> Density {
 }
 
 impl Density {
-    /// True if a point is off the surface whose last of `N_k` is so far away.
+    /// True if a point with the last of `N_k` at this distance is off the surface.
     pub fn is_off_surface(&self, id: usize, last2: u64) -> bool {
         !self.settings.keep_all && is_far(last2, self.usual2[id / PATCH])
     }
@@ -81,7 +81,7 @@ impl Density {
         std::f64::consts::PI * usual2 as f64 / self.settings.neighbors as f64
     }
 
-    /// True if a side of a triangle is longer than `spacings` at both ends.
+    /// True if a side of a triangle is longer than `spacings` local spacings at both ends.
     fn exceeds(&self, spacings: f64, t: Triangle, points: &[Point]) -> bool {
         [(0, 1), (0, 2), (1, 2)].into_iter().any(|(a, b)| {
             let side2 = distance2(points[t[a] as usize], points[t[b] as usize]) as f64;
@@ -90,7 +90,7 @@ impl Density {
         })
     }
 
-    /// True if a triangle is too long, where its points are in the file.
+    /// True if a triangle, by its file positions, is too long.
     pub fn is_long(&self, t: Triangle, file: &[Point]) -> bool {
         self.exceeds(self.settings.max_edge, t, file)
     }

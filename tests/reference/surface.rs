@@ -1,4 +1,4 @@
-//! A set of triangles with what there is at each edge and vertex, found by looking.
+//! A set of triangles with the triangles at each edge and vertex, found by a search.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -7,7 +7,7 @@ pub type Triangle = [u32; 3];
 /// Two ids, ascending.
 pub type Edge = [u32; 2];
 
-/// The edges of a triangle in the order that the conventions of the method give them: (i,j), (i,k), (j,k).
+/// The edges of a triangle in the order of the method's conventions: (i,j), (i,k), (j,k).
 pub fn edges([i, j, k]: Triangle) -> [Edge; 3] {
     [[i, j], [i, k], [j, k]]
 }
@@ -19,27 +19,26 @@ pub fn opposite(t: Triangle, edge: Edge) -> u32 {
         .expect("a triangle has a corner beside its edge")
 }
 
-/// Whether the run i → j → k → i goes along `edge` from its lower to its higher id.
+/// True if the run i → j → k → i has `edge` from its lower to its higher id.
 pub fn runs_up(t: Triangle, edge: Edge) -> bool {
     edge != [t[0], t[2]]
 }
 
-/// Whether two triangles with a common edge, both run i → j → k, run along it in opposite
-/// directions, as neighbours on an oriented surface do.
+/// True if two triangles with a common edge, both run i → j → k, run along it in opposite directions, as
+/// neighbours on an oriented surface do.
 pub fn alike(a: Triangle, b: Triangle, edge: Edge) -> bool {
     runs_up(a, edge) != runs_up(b, edge)
 }
 
-/// A component of a vertex's link, as the triangles that make it.
+/// A component of a vertex's link, as its triangles.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Fan {
     pub triangles: BTreeSet<Triangle>,
-    /// A closed cycle rather than a path.
+    /// True for a closed cycle, false for a path.
     pub closed: bool,
 }
 
-/// The components of the link of `v` that `triangles` (all at `v`) make, in order of their
-/// smallest triangles.
+/// The components of the link of `v` in `triangles` (all at `v`), in order of their smallest triangles.
 pub fn fans(v: u32, triangles: &BTreeSet<Triangle>) -> Vec<Fan> {
     let others = |t: &Triangle| t.iter().copied().filter(|&x| x != v).collect::<Vec<u32>>();
     let mut left = triangles.clone();
@@ -68,8 +67,8 @@ pub fn fans(v: u32, triangles: &BTreeSet<Triangle>) -> Vec<Fan> {
     found
 }
 
-/// Triangles connected through edges, each with whether it must be turned (i → k → j) to run as
-/// the smallest one does.
+/// Triangles connected through edges; true for those that must be turned (i → k → j) to be oriented like the
+/// smallest one.
 pub type Component = BTreeMap<Triangle, bool>;
 
 #[derive(Debug, Clone, Default)]
@@ -143,8 +142,8 @@ impl Surface {
         self.at_edge(edge).len() == 1
     }
 
-    /// The triangles connected to `start` through edges, with turns relative to `start`; `None`
-    /// if they cannot all run alike.
+    /// The triangles connected to `start` through edges, with turns relative to `start`; `None` if they
+    /// cannot all be oriented alike.
     pub fn component(&self, start: Triangle) -> Option<Component> {
         let mut turned = Component::from([(start, false)]);
         let mut queue = vec![start];

@@ -1,33 +1,33 @@
-//! What is met while the base is oriented by evidence: tests ask that everything is.
+//! Counts of cases in the orientation by evidence; tests check that all cases occur.
 
-/// How often things happened.
+/// Numbers of cases.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Weighing {
-    /// Step 1: joins of triangles that contradicted those before.
+    /// Step 1: joins of triangles that contradicted earlier ones.
     pub folded: usize,
     /// Step 3: pairs of patches that candidates voted on, and candidates with more than three triangles.
     pub votes: usize,
     pub crowded: usize,
     /// Step 3: crossing T3 at an edge of a block that only vertices of other blocks flag.
     pub flagged_elsewhere: usize,
-    /// Step 4: contracted only because the pair dominates; not contracted because of the number of
-    /// triangles; and because facing up was against it.
+    /// Step 4: contracted only because the pair dominates; not contracted because of the number of triangles;
+    /// and because evidence for facing up was against it.
     pub dominated: usize,
     pub capped: usize,
     pub against: usize,
-    /// Steps 4 and 6: contracted with a sum of 0, and called by the larger number.
+    /// Steps 4 and 6: contracted with a sum of 0, and named by the larger number.
     pub zero: usize,
     pub renamed: usize,
     /// Step 5: triangles removed.
     pub cut_inside: usize,
     /// Step 6: crossing triangles with a node of their own.
     pub own_nodes: usize,
-    /// Step 6: nodes contracted with the sky, and those of them that were turned.
+    /// Step 6: nodes contracted with the sky, and the number of those that were turned.
     pub under_sky: usize,
     pub turned_by_sky: usize,
-    /// Step 6: pairs with the sky looked at and not contracted.
+    /// Step 6: pairs with the sky that were examined and not contracted.
     pub left_free: usize,
-    /// Step 7: crossing triangles removed, and triangles at edges between labels.
+    /// Step 7: crossing triangles removed, and triangles removed at edges between labels.
     pub cut_crossing: usize,
     pub cut_between: usize,
 }
@@ -101,7 +101,7 @@ impl Weighing {
         self.cut_between += cut_between;
     }
 
-    /// The names of those that never happened, but for the given ones.
+    /// The names of cases that never occurred, except the given ones.
     pub fn missing(&self, but: &[&str]) -> Vec<&'static str> {
         let all = self.all().into_iter();
         all.filter(|(name, count)| *count == 0 && !but.contains(name))

@@ -1,11 +1,11 @@
-//! Scratch files that are damaged, cut short, gone, or something else; disks that are full.
+//! Scratch files that are damaged, cut short, deleted or replaced; full disks.
 
 use crate::run::{Case, ROBUST, copy};
 use crate::util;
 use std::collections::BTreeSet;
 use std::path::Path;
 
-/// What can happen to a file.
+/// Damages a file in one of several ways.
 fn spoil(path: &Path, how: usize) -> &'static str {
     let mut bytes = std::fs::read(path).unwrap();
     match how % 4 {
@@ -36,7 +36,7 @@ fn spoil(path: &Path, how: usize) -> &'static str {
 #[test]
 fn damage_to_any_file_is_found_and_mended() {
     let case = Case::new(ROBUST);
-    // At the end the journal says of every file that it is deleted.
+    // At the end the journal records the deletion of every file.
     let records = case.events["recorded"] - case.events["delete"];
     let saved = case.bench.path("saved");
     let mut named = BTreeSet::new();
@@ -48,7 +48,7 @@ fn damage_to_any_file_is_found_and_mended() {
             saved.join("lock"),
         );
         if part_file.exists() {
-            // The mesh on its way, in the place of a file that holds nothing.
+            // The unfinished mesh, in the place of an empty file.
             std::fs::rename(&part_file, &saved_part).unwrap();
         }
         for (number, name) in util::listing(&saved).into_iter().enumerate() {
@@ -63,9 +63,9 @@ fn damage_to_any_file_is_found_and_mended() {
             let how = spoil(&case.scratch.join(&name), turn + number);
             let what = format!("{name} {how} at {part} %");
             let said = case.go_on(&what);
-            // A file that is not needed any more may look as it likes.
+            // Damage to a file that is not needed any more has no effect.
             if said.contains("damaged") {
-                // A journal that was cut short names files that it does not know to be deleted.
+                // A journal that was cut short has no record that these files are deleted.
                 assert!(said.contains(&name) || name == "journal", "{what}: {said}");
                 assert_eq!(said.lines().count(), 1, "{what}: {said}");
                 named.insert(name);
@@ -98,7 +98,7 @@ fn a_damaged_manifest_alone_is_no_loss() {
     let said = util::run(["resume".into(), case.scratch.clone().into_os_string()]);
     case.check(&said, "resume");
     assert!(said.err.contains("manifest: damaged"), "{}", said.err);
-    // Without manifest and journal nobody knows what the run was.
+    // Without manifest and journal the run is unknown.
     case.killed("recorded:120");
     spoil(&case.scratch.join("manifest"), 0);
     spoil(&case.scratch.join("journal"), 0);
@@ -108,7 +108,7 @@ fn a_damaged_manifest_alone_is_no_loss() {
     assert!(case.go_on("both").contains("begins again"));
 }
 
-/// One line that names a file, and a run that goes on.
+/// The error is one line that names a file, and the run can be resumed.
 fn fails(case: &Case, fault: &str, reason: &str) {
     case.clear();
     let ended = case.attempt(fault, &["--threads", "2"]);

@@ -1,9 +1,9 @@
-//! Killed at points where something becomes durable. `scripts/kill-test` has all of them.
+//! Runs killed at events after which something is durable. `scripts/kill-test` covers all events.
 
 use crate::run::{Case, FILTERS, PAPER, ROBUST};
 use crate::util;
 
-/// Kills a run at every `step`th event of some kinds and goes on.
+/// Kills a run at every `step`th event of some kinds and resumes it.
 fn survives(options: &[&str], step: u64, kinds: &[&str]) {
     let case = Case::new(options);
     let mut kills = 0;
@@ -54,10 +54,10 @@ fn killed_while_scratch_is_removed() {
     for number in (1..=case.events["delete"]).step_by(3) {
         let fault = format!("delete:{number}");
         case.killed(&fault);
-        // The first files are deleted while the run is at work, the rest when the mesh is there.
+        // The first files are deleted during the run, the rest when the mesh is complete.
         assert!(case.scratch.exists(), "{fault}");
         let said = case.go_on(&fault);
-        // The manifest goes first of what the run is known by.
+        // Of the files that identify the run, the manifest is deleted first.
         assert!(said.is_empty() || said.contains("manifest"), "{said}");
     }
 }
@@ -67,8 +67,8 @@ fn killed_again_and_again() {
     let case = Case::new(ROBUST);
     case.killed("recorded:9");
     let mut attempts = 1;
-    // Every attempt is killed after its fourth record: several die inside the same step, of which they
-    // know all that came before.
+    // Every attempt is killed after its fourth record: several end inside the same step, of which they know
+    // all earlier units.
     while case.scratch.exists() {
         let threads = ["1", "2", "3"][attempts % 3];
         let more = ["--resume", "--threads", threads];

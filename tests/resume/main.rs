@@ -1,4 +1,4 @@
-//! A run that is killed, stopped, starved of disk or damaged goes on and gives the same bytes.
+//! A run that is killed, stopped, short of disk or damaged is resumed with the same bytes.
 
 #[path = "../end_to_end/util.rs"]
 #[allow(dead_code, reason = "written for another test")]

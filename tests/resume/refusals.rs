@@ -1,11 +1,11 @@
-//! What is not resumed, and why.
+//! Runs that are not resumed, and the reasons.
 
 use crate::run::{Case, PAPER, ROBUST};
 use crate::util::{self, Said};
 use std::os::unix::fs::PermissionsExt;
 use std::process::Stdio;
 
-/// The program with the arguments of the case and more.
+/// The program with the arguments of the case and `more`.
 fn again(case: &Case, more: &[&str]) -> Said {
     let arguments = case.arguments().into_iter();
     util::run(arguments.chain(more.iter().map(ToString::to_string)))
@@ -26,7 +26,7 @@ fn an_unfinished_run_is_not_thrown_away() {
     refused(&again(&case, &[]), &["--resume", "--restart"]);
     let said = again(&case, &["--restart"]);
     case.check(&said, "--restart");
-    // Without one, --resume begins.
+    // Without an unfinished run, --resume begins one.
     case.clear();
     case.check(&again(&case, &["--resume"]), "--resume");
     let said = util::run(["resume".as_ref(), case.scratch.as_os_str()]);
@@ -77,7 +77,7 @@ fn what_changed_is_named() {
 fn two_runs_do_not_share_a_folder() {
     let case = Case::new(ROBUST);
     case.killed("recorded:20");
-    // A run that does nothing for a while.
+    // A run that waits for a while.
     let mut command = util::program(case.arguments());
     command.args(["--resume", "--smooth", "0"]);
     let lock = case.scratch.join("lock");
@@ -101,12 +101,12 @@ fn scratch_is_private() {
     for name in util::listing(&case.scratch) {
         assert_eq!(mode(&case.scratch.join(&name)), 0o600, "{name}");
     }
-    // A folder that others can write to may hold anything.
+    // A folder to which others can write may have any content.
     let open = std::fs::Permissions::from_mode(0o777);
     std::fs::set_permissions(&case.scratch, open).unwrap();
     refused(&again(&case, &["--resume"]), &["open to other users"]);
     case.clear();
-    // Neither is a link followed, nor a folder of something else emptied.
+    // A link is not followed, and a folder with other content is not emptied.
     let elsewhere = case.bench.subfolder("elsewhere");
     std::fs::write(elsewhere.join("dear"), "something dear").unwrap();
     std::os::unix::fs::symlink(&elsewhere, &case.scratch).unwrap();

@@ -1,4 +1,4 @@
-//! One small cloud in many blocks and tiles, and runs of it that go wrong.
+//! A small cloud with many blocks and tiles, and interrupted runs of it.
 
 use crate::util::{self, Bench, Said};
 use outcrop_cloudgen::{Cloud, Kind};
@@ -10,7 +10,7 @@ use std::process::Output;
 /// Blocks, and tiles inside them.
 const PARTS: [&str; 4] = ["--block-points", "4096", "--tile-points", "1500"];
 
-/// Options that lead through different stages.
+/// Options that cover different stages.
 pub const ROBUST: &[&str] = &[];
 pub const PAPER: &[&str] = &["--method", "paper", "--smooth", "1", "--relax", "1"];
 pub const FILTERS: &[&str] = &["--thin", "6", "--drop-outliers"];
@@ -23,13 +23,13 @@ pub struct Case {
     pub scratch: PathBuf,
     options: Vec<String>,
     expected: u64,
-    /// What the report counts.
+    /// The counts of the report.
     counts: serde_json::Value,
-    /// How many events there are of each kind in an undisturbed run.
+    /// Number of events of each kind in an undisturbed run.
     pub events: HashMap<String, u64>,
 }
 
-/// How an attempt ended.
+/// The result of an attempt.
 #[derive(Debug)]
 pub struct Ended {
     pub said: Said,
@@ -46,7 +46,7 @@ impl From<Output> for Ended {
 }
 
 impl Case {
-    /// A noisy terrain with outliers: every stage has something to do.
+    /// A noisy terrain with outliers: every stage has work to do.
     pub fn new(options: &[&str]) -> Self {
         let bench = Bench::new();
         let mut cloud = Cloud::new(Kind::Terrain).points(30_000).noise(0.6);
@@ -79,7 +79,7 @@ impl Case {
         case
     }
 
-    /// What the last report counts: all of it but for limits, peaks and times.
+    /// The last report, without limits, peaks and times.
     fn report(&self) -> serde_json::Value {
         let text = std::fs::read_to_string(self.bench.path("report.json")).unwrap();
         let mut report: serde_json::Value = serde_json::from_str(&text).unwrap();
@@ -107,29 +107,29 @@ impl Case {
         fixed.chain(self.options.iter().cloned()).collect()
     }
 
-    /// Runs the program, in which something goes wrong.
+    /// Runs the program with a fault.
     pub fn attempt(&self, fault: &str, more: &[&str]) -> Ended {
         let mut command = util::program(self.arguments());
         command.args(more).env("OUTCROP_FAULT", fault);
         command.output().unwrap().into()
     }
 
-    /// Removes all that runs have left.
+    /// Removes all files of runs.
     pub fn clear(&self) {
         let _ = std::fs::remove_dir_all(&self.scratch);
         let _ = std::fs::remove_file(&self.mesh);
     }
 
-    /// Makes a run that is killed at this event; other threads and memory than later on.
+    /// Makes a run that is killed at this event, with other threads and memory than later attempts.
     pub fn killed(&self, fault: &str) {
         self.clear();
         let ended = self.attempt(fault, &["--threads", "2", "--memory", "192MiB"]);
-        // The number of events differs a bit from run to run.
+        // The number of events differs slightly between runs.
         let alive = ended.said.code == Some(0);
         assert!(alive || ended.signal == Some(9), "{fault}: {ended:?}");
     }
 
-    /// Goes on with the run; it must end well. What it said.
+    /// Resumes the run, which must succeed; returns its messages.
     pub fn go_on(&self, what: &str) -> String {
         let report = self.bench.path("report.json").display().to_string();
         let more = ["--resume", "--threads", "1", "--memory", "256MiB"].map(String::from);
@@ -140,7 +140,7 @@ impl Case {
         said.err
     }
 
-    /// The run has ended well, and left nothing but the mesh.
+    /// Checks that the run succeeded and left only the mesh.
     pub fn check(&self, said: &Said, what: &str) {
         assert_eq!(said.code, Some(0), "{what}: {said:?}");
         assert!(

@@ -1,5 +1,5 @@
-//! A checker in core, written apart from the one it is compared with: an edge map, a walk around
-//! each vertex, breadth-first searches, and the genus component by component.
+//! A checker in memory, independent of the program: an edge map, a walk around each vertex, breadth-first
+//! searches, and the genus component by component.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 

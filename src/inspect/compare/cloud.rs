@@ -8,10 +8,10 @@ use crate::stages::order::order;
 use crate::workspace::Workspace;
 use std::path::Path;
 
-/// Points of a page of the store that lies between the files and the pages.
+/// Points per page of the store between ingest and the pages.
 const STORE_PAGE: usize = 1 << 12;
 
-/// Reads everything that ingest reads; duplicates become one point.
+/// Reads a cloud in any format of ingest; duplicates become one point.
 pub(super) fn read(path: &Path, name: &str, workspace: &Workspace) -> Result<Shape> {
     let observer = &workspace.observer;
     observer.begin("read cloud", "points", 0);

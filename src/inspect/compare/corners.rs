@@ -1,5 +1,5 @@
-//! A mesh whose vertices do not fit into memory: corners are sorted to their vertices, take the
-//! position with them, and are sorted back to their triangles.
+//! A mesh whose vertices do not fit into memory: its corners are sorted by vertex, receive their positions,
+//! and are sorted back by triangle.
 
 use super::shape::{Choice, Shape, unusable, usable};
 use super::triangles::{Chooser, keyed, no_vertex, not_triangles, pages, shape, sorter};
@@ -11,7 +11,7 @@ use crate::workspace::Workspace;
 use crate::workspace::memory::Reservation;
 use std::path::Path;
 
-/// Vertices of a section of positions.
+/// Vertices per section of the positions.
 const SECTION: usize = 1 << 14;
 
 row! {
@@ -28,7 +28,7 @@ row! {
 row! {
     /// The position of a corner.
     pub(super) struct PlacedCorner {
-        /// As [`Corner`] has it.
+        /// Number of the corner, as in [`Corner`].
         number: [u32; 2],
         /// The bits of three `f64`.
         position: [u32; 6],
@@ -118,7 +118,7 @@ impl<'a> Joined<'a> {
     }
 }
 
-/// Sends every corner's position back to its triangle; the number of vertices that have corners.
+/// Sends the position of every corner to its triangle; returns the number of vertices with corners.
 fn place(
     corners: &Corners,
     positions: &Table<V3>,
@@ -181,7 +181,7 @@ impl Sink for Joined<'_> {
     }
 }
 
-/// All corners by vertex; can be gone through more than once.
+/// All corners by vertex; they can be read more than once.
 enum Corners {
     Memory(Vec<Corner>),
     Disk(Sorted<Corner>),

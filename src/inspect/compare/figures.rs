@@ -1,4 +1,4 @@
-//! The outcome of a comparison.
+//! The result of a comparison.
 
 use super::measure::Sums;
 use super::shape::{Kind, Side};
@@ -11,17 +11,17 @@ use std::fmt;
 /// Directions: of the first side, of the second, of both.
 const WAYS: usize = 3;
 
-/// Shares of the samples whose distance is at most the percentile, in thousandths.
+/// Percentiles, in thousandths.
 const SHARES: [u64; 4] = [500, 900, 990, 999];
 
 /// Distances over one set of samples, in the unit of the files or in per cent.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Figures {
-    /// The largest over all samples.
+    /// The maximum over all samples.
     pub max: f64,
-    /// Mean. Here and below, vertices of a mesh that has an area do not count.
+    /// Mean. Here and below, vertices of a mesh with an area do not count.
     pub mean: f64,
-    /// Root of the mean square.
+    /// Root mean square.
     pub rms: f64,
     /// Median: the smallest distance that at least half of the samples do not exceed.
     pub p50: f64,
@@ -38,27 +38,27 @@ pub struct Figures {
 pub struct Distances {
     /// Places where the distance was taken.
     pub samples: u64,
-    /// Of these, vertices that count only in `max`.
+    /// Samples among them that count only in `max`.
     pub vertex_samples: u64,
-    /// In the unit of the files.
+    /// Figures in the unit of the files.
     #[serde(flatten)]
     pub figures: Figures,
-    /// A place with the largest distance.
+    /// A sample with the largest distance.
     pub max_at: [f64; 3],
-    /// In per cent of the diagonal of the first side's box; absent if that is a point.
+    /// In per cent of the diagonal of the first side's box; absent if the diagonal is zero.
     pub percent: Option<Figures>,
 }
 
-/// How far two shapes are from each other.
+/// Distances between two shapes.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Comparison {
     /// The first side.
     pub a: Side,
     /// The second side.
     pub b: Side,
-    /// Diagonal of the first side's box: what `percent` refers to.
+    /// Diagonal of the first side's box, the reference of `percent`.
     pub diagonal: f64,
-    /// Most samples that a side could get.
+    /// Largest number of samples of a side.
     pub most_samples: u64,
     /// Seed of the random choices.
     pub seed: u64,
@@ -66,14 +66,14 @@ pub struct Comparison {
     pub a_to_b: Distances,
     /// From samples of the second side to the first.
     pub b_to_a: Distances,
-    /// Over the samples of both directions together; `max` is the Hausdorff distance, as sampled.
+    /// Both directions together; `max` is the sampled Hausdorff distance.
     pub symmetric: Distances,
 }
 
 row! {
-    /// A distance; sorts by size.
+    /// A distance; rows sort by size.
     pub(super) struct DistanceRow {
-        /// The bits of an `f64`, which is not negative; the upper 32 first.
+        /// The bits of an `f64` that is not negative; the upper 32 first.
         bits: [u32; 2],
         /// 0 from the first side, 1 from the second.
         way: u32,
@@ -96,7 +96,7 @@ impl DistanceRow {
     }
 }
 
-/// Counts off percentiles in distances that come in ascending order.
+/// Finds percentiles by counting distances in ascending order.
 #[derive(Debug, Clone, Copy, Default)]
 struct Ranks {
     of: u64,
@@ -116,7 +116,7 @@ impl Ranks {
     }
 }
 
-/// Percentiles of each direction and of both, exactly, out of `sorter`.
+/// Exact percentiles of each direction and of both from the rows of `sorter`.
 pub(super) fn percentiles(
     sorter: Sorter<DistanceRow>,
     sums: [Sums; 2],
@@ -171,7 +171,7 @@ impl Figures {
         }
     }
 
-    /// Name and value of each.
+    /// Names and values.
     #[must_use]
     pub fn named(&self) -> [(&'static str, f64); 7] {
         [

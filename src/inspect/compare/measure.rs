@@ -1,4 +1,4 @@
-//! Distances of samples, on all threads, handed on in the order of the samples.
+//! Distances of samples, measured on all threads and passed on in the order of the samples.
 
 use super::pages::{Best, Cache, Item, Pages};
 use super::samples::Sample;
@@ -10,22 +10,22 @@ use crate::workspace::memory::Reservation;
 use rayon::prelude::*;
 use std::sync::{Mutex, PoisonError};
 
-/// Samples that one thread takes at a time. The search for one starts from what is nearest to the one
-/// before it, so this number is fixed.
+/// Samples that one thread takes at a time. A search begins with the nearest item of the sample before, so
+/// this number is fixed.
 const CHUNK: usize = 1024;
 
 /// Samples in memory at a time.
 const WAVE: usize = 64 * CHUNK;
 
-/// Takes samples in and hands their distances on.
+/// Receives samples and passes on their distances.
 pub(super) trait Measure {
-    /// The next sample.
+    /// Adds a sample.
     fn push(&mut self, sample: Sample) -> Result<()>;
-    /// No more samples.
+    /// Ends input.
     fn finish(&mut self) -> Result<()>;
 }
 
-/// Distances to a shape; each goes to `each` with its sample.
+/// Distances to a shape; `each` is called with every sample and its distance.
 pub(super) fn to<'a>(
     shape: &'a Shape,
     workspace: &'a Workspace,
@@ -37,7 +37,7 @@ pub(super) fn to<'a>(
     })
 }
 
-/// Finds what is nearest, with a cache for each thread.
+/// Finds nearest items, with a page cache for each thread.
 struct Search<'a, T: Item> {
     pages: &'a Pages<T>,
     caches: Mutex<Vec<Cache<T>>>,

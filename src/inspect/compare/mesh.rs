@@ -1,8 +1,8 @@
 //! A mesh as pages of triangles in curve order, and a choice of its vertices.
 //!
-//! The vertices stay in memory while triangles look up their corners, if a quarter of the free memory
-//! holds them. Else corners are sorted to their vertices and back to their triangles, on disk.
-//! Both ways give the same pages and the same choice.
+//! The vertices stay in memory while the triangles obtain their positions, if they fit a quarter of the free
+//! memory. Otherwise corners are sorted by vertex and back by triangle, on disk. Both ways give the same
+//! pages and the same choice.
 
 use super::corners::Joined;
 use super::shape::{Choice, Shape, unusable, usable};
@@ -17,7 +17,7 @@ use crate::workspace::Workspace;
 use crate::workspace::memory::Reservation;
 use std::path::Path;
 
-/// Bytes of a vertex in memory, with its bit.
+/// Bytes of a vertex in memory, with a bit for its use.
 const VERTEX: u64 = 25;
 
 /// Reads a mesh.
@@ -48,7 +48,7 @@ pub(super) fn read(
     }
 }
 
-/// Reads a mesh whose vertices fit into memory and come before the faces.
+/// Reads a mesh whose vertices fit into memory and precede the faces.
 struct Direct<'a> {
     path: &'a Path,
     name: &'a str,

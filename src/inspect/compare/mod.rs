@@ -1,20 +1,19 @@
-//! How far are two meshes or clouds from each other? Answered in bounded memory, whatever their size.
+//! Distances between two meshes or clouds of any size, in bounded memory.
 //!
-//! Each side is read once and put in curve order, in pages on disk with a tree of boxes in memory
-//! (`pages`). Then distances are taken at *samples* of one side, to the nearest point of the other:
-//! of the surface if that is a mesh, else the nearest of its points. The distance of a sample is
-//! exact up to rounding; only where samples are is a matter of chance.
+//! Each side is read once and written in curve order to pages on disk, with a tree of boxes in memory
+//! (`pages`). Distances are taken at *samples* of one side, to the nearest point of the other: of its surface
+//! if it is a mesh, otherwise of its points. The distance of a sample is exact up to rounding; only the
+//! positions of the samples are random.
 //!
-//! * A cloud is sampled at its points, without repetition; if there are more than
-//!   [`Options::samples`], at so many of them, drawn with equal chances.
-//! * A mesh is sampled at the vertices that its triangles use, or if these are more than half of the
-//!   samples at so many of them, drawn likewise; the other samples are points on its faces: the
-//!   area is cut into as many equal parts, along the curve, and each gets one point at random. Mean,
-//!   RMS and percentiles are those of the points on faces, so they do not depend on how the surface
-//!   is cut into triangles; vertices count for the maximum. A mesh without area is sampled at its
-//!   vertices alone, and then these count.
+//! * A cloud is sampled at its points, without repetition; if there are more than [`Options::samples`], that
+//!   number of them is drawn with equal chances.
+//! * A mesh is sampled at the vertices of its triangles, at most half of the samples, drawn likewise if
+//!   there are more. The other samples are points on its faces: the area is divided into equal parts, along
+//!   the curve, with a random point in each. Mean, RMS and percentiles are those of the points on faces, so
+//!   they do not depend on the triangulation of the surface; vertices count for the maximum. A mesh without
+//!   area is sampled at its vertices alone, and then these count.
 //!
-//! The result depends on the files, the number of samples and the seed, and on nothing else.
+//! The result depends only on the files, the number of samples and the seed.
 
 mod cloud;
 mod corners;
@@ -42,12 +41,12 @@ use samples::Numbers;
 use shape::{Choice, Shape};
 use std::path::Path;
 
-/// How many samples, and which.
+/// Number and seed of the samples.
 #[derive(Debug, Clone, Copy)]
 pub struct Options {
-    /// Most samples of each side.
+    /// Largest number of samples of each side.
     pub samples: u64,
-    /// Decides every random choice.
+    /// Seed of all random choices.
     pub seed: u64,
 }
 
@@ -60,7 +59,7 @@ impl Default for Options {
     }
 }
 
-/// Reads a mesh or a cloud; `name` keeps the scratch files of the two sides apart.
+/// Reads a mesh or a cloud; `name` distinguishes the scratch files of the two sides.
 fn read_side(path: &Path, name: &str, choice: Choice, workspace: &Workspace) -> Result<Shape> {
     if path.is_file() && holds_faces(path)? {
         mesh::read(PlyMesh::open(path)?, path, name, choice, workspace)
@@ -69,7 +68,7 @@ fn read_side(path: &Path, name: &str, choice: Choice, workspace: &Workspace) -> 
     }
 }
 
-/// Distances between two shapes, each a mesh (PLY with faces) or a cloud (whatever ingest reads).
+/// Distances between two shapes, each a mesh (PLY with faces) or a cloud (in any format of ingest).
 ///
 /// # Errors
 /// [`Error::Input`] for a file that cannot be read, is empty, or has faces that are not triangles;
@@ -131,7 +130,7 @@ pub fn compare(a: &Path, b: &Path, options: &Options, workspace: &Workspace) -> 
     })
 }
 
-/// Distances handed to the sorter at a time.
+/// Distances passed to the sorter at a time.
 const RECORDS: usize = 4096;
 
 fn shape_diagonal(shape: &Shape) -> f64 {
@@ -160,19 +159,19 @@ fn measure_way(
 /// A point of a cloud and its distance to a shape.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Measured {
-    /// Rank among the distinct points of the cloud in curve order, as a reconstruction numbers them.
+    /// Rank among the distinct points of the cloud in curve order: its id in a reconstruction.
     pub index: u64,
-    /// Where it is.
+    /// Its position.
     pub position: [f64; 3],
     /// Distance to the nearest point of the other shape.
     pub distance: f64,
 }
 
-/// Distances of all distinct points of a cloud to a mesh or cloud, in order of their index, and
-/// their number. A mesh as `cloud` is the cloud of its vertices.
+/// Distances of all distinct points of a cloud to a mesh or cloud, in order of their index. Returns their
+/// number. If `cloud` is a mesh, its vertices are the points.
 ///
 /// # Errors
-/// What `each` returned; see [`compare`].
+/// Errors of `each`; see [`compare`].
 pub fn distances(
     cloud: &Path,
     to: &Path,

@@ -1,8 +1,8 @@
-//! What distances are measured to: triangles or points in curve order, in pages on disk, with a tree
-//! of boxes around the pages in memory.
+//! Triangles or points to which distances are measured: in curve order, in pages on disk, with a tree of
+//! boxes around the pages in memory.
 //!
-//! The size of a page depends on the number of items alone: with more items pages grow, and not
-//! their number, so the tree stays small for any file.
+//! The size of a page depends only on the number of items. For more items pages grow, and not their number,
+//! so the tree stays small.
 
 use super::triangle;
 use super::vector::{Box3, V3, dot, sub};
@@ -12,10 +12,10 @@ use crate::workspace::Workspace;
 use crate::workspace::memory::Reservation;
 use rustc_hash::FxHashMap;
 
-/// Fewest items of a page.
+/// Least number of items per page.
 const LEAST: u64 = 64;
 
-/// Most pages.
+/// Largest number of pages.
 const MOST_PAGES: u64 = 1 << 17;
 
 /// Children of a node of the tree.
@@ -24,7 +24,7 @@ const FAN: usize = 8;
 /// Items that share a box within a page.
 const LEAF: usize = 8;
 
-/// Something that has a distance from a point.
+/// An item with a distance from a point.
 pub(super) trait Item: Row {
     fn bounds(&self) -> Box3;
     fn distance2(&self, p: V3) -> f64;
@@ -61,18 +61,18 @@ impl Item for [V3; 3] {
     }
 }
 
-/// Items in pages.
+/// Pages of items.
 #[derive(Debug)]
 pub(super) struct Pages<T: Row> {
     stored: Table<T>,
-    /// `levels[0]` has a box for each page, each further level one for `FAN` of the last.
+    /// `levels[0]` has a box for each page, each further level a box for `FAN` boxes of the level before.
     levels: Vec<Vec<Box3>>,
     page: usize,
     _held: Reservation,
 }
 
 impl<T: Item> Pages<T> {
-    /// The box around everything.
+    /// The box around all items.
     pub(super) fn bounds(&self) -> Box3 {
         let top = self.levels.last().map_or(&[][..], Vec::as_slice);
         top.iter().fold(Box3::EMPTY, |a, b| a.union(*b))
@@ -83,7 +83,7 @@ impl<T: Item> Pages<T> {
         self.levels[0].len()
     }
 
-    /// Bytes of a page in memory, with what reading it takes.
+    /// Bytes of a page in memory, with those for reading it.
     pub(super) fn page_bytes(&self) -> u64 {
         let boxes = self.page.div_ceil(LEAF) * size_of::<Box3>();
         (2 * self.page * size_of::<T>() + boxes + 128) as u64
@@ -111,7 +111,7 @@ impl<T: Item> Pages<T> {
         })
     }
 
-    /// Lowers `best`, a squared distance from `p`, to that of the nearest item, if that is nearer.
+    /// Updates `best`, a squared distance from `p`, if an item is nearer.
     pub(super) fn nearest(&self, p: V3, best: &mut Best<T>, cache: &mut Cache<T>) -> Result<()> {
         let top = self.levels.len() - 1;
         let mut stack = std::mem::take(&mut cache.stack);
@@ -189,7 +189,7 @@ impl<T> Page<T> {
     }
 }
 
-/// Recently read pages, for one thread.
+/// Cache of recently read pages, for one thread.
 #[derive(Debug)]
 pub(super) struct Cache<T> {
     pages: FxHashMap<usize, Page<T>>,
@@ -212,7 +212,7 @@ impl<T> Cache<T> {
         T: Item,
     {
         if self.pages.len() >= self.most && !self.pages.contains_key(&page) {
-            // Samples come in curve order: soon everything here is new again.
+            // Samples come in curve order, so the old pages are not needed any more.
             self.pages.clear();
         }
         match self.pages.entry(page) {
@@ -237,7 +237,7 @@ impl<T: Item> PageWriter<T> {
     pub(super) fn new(workspace: &Workspace, name: &str, count: u64) -> Result<Self> {
         let page = count.div_ceil(MOST_PAGES).max(LEAST) as usize;
         let pages = count.div_ceil(page as u64);
-        // A box of the tree (an eighth more for the levels above) and a place in the file for each.
+        // For each page a box of the tree (an eighth more for the levels above) and a place in the file.
         let index = pages * (2 * size_of::<Box3>() as u64) + (page * 2 * size_of::<T>()) as u64;
         Ok(Self {
             held: workspace.reserve("compare: boxes", index + 4096)?,

@@ -1,4 +1,4 @@
-//! Where distances are taken: positions on one side, in curve order.
+//! Samples: positions on one side, in curve order.
 
 use super::pages::Pages;
 use super::shape::{Items, Shape};
@@ -9,35 +9,35 @@ use crate::spill::{Sorter, Table, row};
 use crate::workspace::Workspace;
 use oorandom::Rand64;
 
-/// Added to the seed, so that points on faces are not chosen by the numbers that chose vertices.
+/// Added to the seed, so that points on faces and vertices are chosen by independent numbers.
 const FACES: u128 = 1 << 64;
 const POINTS: u128 = 2 << 64;
 
-/// Samples handed to the sorter at a time.
+/// Samples passed to the sorter at a time.
 const BATCH: usize = 4096;
 
-/// A place at which a distance is taken.
+/// A position at which a distance is taken.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sample {
     pub(super) position: V3,
-    /// It counts in the mean and so on; if not, only in the maximum.
+    /// True if it counts in all figures; false if only in the maximum.
     pub(super) counts: bool,
 }
 
 row! {
-    /// A sample with the key of its position; sorts by key.
+    /// A sample with the key of its position; rows sort by key.
     struct KeyedSample {
         /// The key on the curve.
         key: [u32; 3],
         /// The bits of three `f64`.
         position: [u32; 6],
-        /// 1 if it counts in the mean and so on.
+        /// 1 if it counts in all figures, 0 if only in the maximum.
         counts: u32,
     }
     unpacked
 }
 
-/// How many samples a shape gets.
+/// Numbers of samples of a shape.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Numbers {
     /// Vertices of a mesh.
@@ -47,7 +47,7 @@ pub(super) struct Numbers {
 }
 
 impl Numbers {
-    /// With at most `most` samples in all.
+    /// The numbers for at most `most` samples in all.
     pub(super) fn of(shape: &Shape, most: u64) -> Self {
         match &shape.items {
             Items::Cloud(_) => Self {
@@ -71,8 +71,8 @@ impl Numbers {
     }
 }
 
-/// Calls `each` with every sample of a shape, in an order that depends on nothing but the shape, the
-/// seed and their number. Leaves the stage of the distances begun.
+/// Calls `each` with every sample of a shape, in an order that depends only on the shape, the seed and their
+/// number. On return the progress stage of the distances has begun.
 pub(super) fn for_each(
     shape: &Shape,
     name: &str,
@@ -89,7 +89,7 @@ pub(super) fn for_each(
             let (mut left, mut wanted) = (shape.side.points, numbers.points);
             return points.for_each_page(|page| {
                 for &position in page {
-                    // Knuth's algorithm S: exactly as many as wanted.
+                    // Knuth's algorithm S: chooses exactly the wanted number.
                     let all = wanted == left;
                     if wanted > 0 && (all || rng.rand_range(0..left) < wanted) {
                         wanted -= 1;
@@ -130,7 +130,7 @@ pub(super) fn for_each(
     })
 }
 
-/// Samples on their way to the sorter.
+/// A buffer of samples for the sorter.
 struct Batch<'a> {
     sorter: &'a Sorter<KeyedSample>,
     bounds: Box3,
@@ -171,7 +171,7 @@ fn take_vertices(vertices: &Table<V3>, counts: bool, batch: &mut Batch<'_>) -> R
     Ok(())
 }
 
-/// Divides the area into as many equal parts as samples, and puts one at random in each.
+/// Divides the area into equal parts, one for each sample, and chooses a random point in each.
 fn take_faces(
     triangles: &Pages<[V3; 3]>,
     all: f64,
@@ -202,7 +202,7 @@ fn take_faces(
         }
         Ok(())
     })?;
-    // Rounding may leave the last one at the very end.
+    // Rounding may leave the last sample at the very end.
     while let (Some(_), Some(triangle)) = (next, &last) {
         batch.push(within(triangle, &mut rng), true)?;
         next = place(&mut rng);

@@ -1,4 +1,4 @@
-//! One side of a comparison, brought into pages.
+//! One side of a comparison, as pages.
 
 use super::pages::Pages;
 use super::vector::{Box3, V3};
@@ -7,10 +7,10 @@ use crate::spill::Table;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
-/// Largest coordinate: up to here no product of four lengths overflows.
+/// Largest coordinate for which no product of four lengths overflows.
 const LARGEST: f64 = 1e70;
 
-/// What one of the two sides is.
+/// Description of one side.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Side {
     /// The file or folder.
@@ -21,14 +21,14 @@ pub struct Side {
     pub points: u64,
     /// Triangles; 0 for a cloud.
     pub triangles: u64,
-    /// Their area in all.
+    /// Sum of their areas.
     pub area: f64,
-    /// Lowest corner of the box around it.
+    /// Lowest corner of the box around the shape.
     pub min: [f64; 3],
     /// Highest corner.
     pub max: [f64; 3],
-    /// True if all positions are as in the file. Only a cloud that spans more than 2^30 of its own
-    /// steps is rounded, to 2^-30 of its extent.
+    /// True if all positions are exact. Only a cloud that spans more than 2^30 of its own steps is rounded,
+    /// to 2^-30 of its extent.
     pub exact: bool,
 }
 
@@ -42,7 +42,7 @@ pub enum Kind {
     Cloud,
 }
 
-/// One side, ready to be sampled and measured to.
+/// One side, ready for sampling and measuring.
 pub(super) struct Shape {
     pub(super) side: Side,
     pub(super) items: Items,
@@ -57,14 +57,14 @@ pub(super) enum Items {
     Cloud(Pages<V3>),
 }
 
-/// What to choose of a mesh's vertices.
+/// The choice of a mesh's vertices.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Choice {
     pub(super) samples: u64,
     pub(super) seed: u64,
 }
 
-/// The side of a comparison that these numbers describe.
+/// The description of a side with these numbers.
 pub(super) fn side(path: &Path, kind: Kind, bounds: Box3) -> Side {
     Side {
         path: path.to_path_buf(),

@@ -2,7 +2,7 @@ use super::triangle::distance2;
 use super::vector::{Box3, V3, add, dot, scale, sub};
 use proptest::prelude::*;
 
-/// The least value of a convex function on `0..=1`.
+/// Minimum of a convex function on `0..=1`.
 fn least(f: impl Fn(f64) -> f64) -> f64 {
     let (mut low, mut high) = (0.0, 1.0);
     for _ in 0..100 {
@@ -16,7 +16,7 @@ fn least(f: impl Fn(f64) -> f64) -> f64 {
     f(low).min(f(high)).min(f(0.0)).min(f(1.0))
 }
 
-/// A search in a search, along all segments from the first corner: no algebra about regions.
+/// Nested search along all segments from the first corner, without a case distinction of regions.
 fn searched([a, b, c]: &[V3; 3], p: V3) -> f64 {
     let mix = |x: V3, y: V3, t: f64| add(scale(x, 1.0 - t), scale(y, t));
     let across = |t: f64| {
@@ -70,7 +70,7 @@ proptest! {
         let c = add(add(a, scale(sub(b, a), t)), [0.0, 0.0, thin]);
         for triangle in [[a, b, c], [b, c, a], [c, a, b]] {
             check(&triangle, p);
-            // Corners are at no distance at all.
+            // Corners have distance zero.
             prop_assert_eq!(distance2(&triangle, triangle[1]), 0.0);
         }
     }

@@ -1,9 +1,9 @@
-//! The distance from a point to a triangle, whatever the triangle's shape.
+//! The distance from a point to a triangle of any shape.
 
 use super::vector::{V3, add, dot, scale, sub};
 
-/// Squared height over squared side below which the edges are asked too: what is computed about the
-/// inside of such a needle is less certain than its edges.
+/// Squared height over squared side below which the edges are always examined: for such a needle the result
+/// for the inside is less accurate than that for the edges.
 const NEEDLE: f64 = 1e-4;
 
 /// Squared distance from `p` to the nearest point of a triangle, which may be a segment or a point.
@@ -15,13 +15,13 @@ pub(super) fn distance2(triangle: &[V3; 3], p: V3) -> f64 {
     if base2 == 0.0 {
         return edges();
     }
-    // `height` is at right angles to `ab`, so each coordinate is found by itself.
+    // `height` is orthogonal to `ab`, so each coordinate is computed separately.
     let along = dot(ac, ab) / base2;
     let height = sub(ac, scale(ab, along));
     let height2 = dot(height, height);
     let w = -dot(a, height) / height2;
     let v = -dot(a, ab) / base2 - w * along;
-    // Not so for any that is not a number.
+    // The negated form is also true if one of them is not a number.
     if !(v >= 0.0 && w >= 0.0 && v + w <= 1.0) {
         return edges();
     }
@@ -30,7 +30,7 @@ pub(super) fn distance2(triangle: &[V3; 3], p: V3) -> f64 {
     if height2 < NEEDLE * (base2 + dot(ac, ac)) {
         inside.min(edges())
     } else {
-        // A corner is at no distance from itself, whatever rounding has done above.
+        // The distance from a corner is zero, in spite of rounding above.
         inside.min(dot(a, a)).min(dot(b, b)).min(dot(c, c))
     }
 }

@@ -1,5 +1,5 @@
-//! The triangles of a mesh in pages of curve order, and a choice of its vertices: what both ways to read
-//! a mesh share.
+//! Triangles of a mesh as pages in curve order, and the choice of its vertices: shared by both readers of
+//! meshes.
 
 use super::pages::{PageWriter, Pages};
 use super::shape::{Choice, Items, Kind, Shape, side};
@@ -12,7 +12,7 @@ use oorandom::Rand64;
 use std::path::Path;
 
 row! {
-    /// A triangle with the key of its centroid; sorts by key.
+    /// A triangle with the key of its centroid; rows sort by key.
     pub(super) struct KeyedTriangle {
         /// The key on the curve.
         key: [u32; 3],
@@ -25,7 +25,7 @@ row! {
 /// Chosen vertices written at a time.
 pub(super) const BLOCK: usize = 4096;
 
-/// A sorter with its memory: growing a buffer holds the old and the new one for a moment.
+/// A sorter with its memory: while a buffer grows, the old and the new one exist.
 pub(super) fn sorter<R: Row>(
     workspace: &Workspace,
     name: &str,
@@ -35,13 +35,13 @@ pub(super) fn sorter<R: Row>(
     Ok((Sorter::new(workspace, name, buffer), held))
 }
 
-/// The error for faces that have not three corners.
+/// The error for faces that do not have three corners.
 pub(super) fn not_triangles(path: &Path, count: u64) -> Error {
     let found = format!("{count} that are not triangles");
     Error::input(path, "faces", found, "triangles; split them first")
 }
 
-/// The error for a corner that is no vertex.
+/// The error for a corner whose index is no vertex.
 pub(super) fn no_vertex(path: &Path, vertices: u64) -> Error {
     let expected = format!("vertices below {vertices}");
     Error::input(path, "faces", "a corner that is no vertex", expected)
@@ -62,7 +62,7 @@ pub(super) fn area([a, b, c]: &[V3; 3]) -> f64 {
     dot(normal, normal).sqrt() / 2.0
 }
 
-/// The sorted triangles in pages, and their area.
+/// Writes the sorted triangles to pages; returns their area too.
 pub(super) fn pages(
     sorter: Sorter<KeyedTriangle>,
     name: &str,
@@ -88,10 +88,10 @@ pub(super) fn pages(
     Ok((writer.finish()?, all))
 }
 
-/// Chooses vertices, each with the same chance, as they come by in order of the file.
+/// Chooses vertices with equal chances, in order of the file.
 pub(super) struct Chooser {
     rng: Rand64,
-    /// Still to be seen, still to be chosen.
+    /// Number of vertices to come, and of those to choose.
     left: u64,
     wanted: u64,
     chosen: Table<V3>,
@@ -106,7 +106,7 @@ impl Chooser {
         area: f64,
         choice: Choice,
     ) -> Result<Self> {
-        // Half of the samples, but all if there is no surface to put the others on.
+        // Half of the samples, but all if there is no surface for the others.
         let most = if area > 0.0 {
             choice.samples.div_ceil(2)
         } else {
@@ -122,7 +122,7 @@ impl Chooser {
     }
 
     pub(super) fn offer(&mut self, p: V3) -> Result<()> {
-        // Exactly as many as wanted are chosen (Knuth, algorithm S).
+        // Chooses exactly the wanted number (Knuth, algorithm S).
         if self.wanted > 0 && self.rng.rand_range(0..self.left) < self.wanted {
             self.wanted -= 1;
             self.block.push(p);

@@ -27,7 +27,7 @@ pub(super) fn cross(a: V3, b: V3) -> V3 {
     ]
 }
 
-/// A closed box; [`Box3::EMPTY`] holds nothing.
+/// A closed box; [`Box3::EMPTY`] is empty.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Box3 {
     pub(super) min: V3,
@@ -73,7 +73,7 @@ impl Box3 {
     /// The key of a position on a Hilbert curve through this box.
     pub(super) fn key(&self, p: V3) -> crate::geom::hilbert::Key {
         let side = (0..3).fold(0.0, |s: f64, i| s.max(self.max[i] - self.min[i]));
-        // A cast takes what is no number to 0 and what is too large to the end.
+        // The cast maps NaN to 0 and too large values to the maximum.
         let steps = f64::from((1u32 << crate::geom::hilbert::BITS) - 1) / side;
         let most = (1 << crate::geom::hilbert::BITS) - 1;
         let cell: crate::geom::Point =

@@ -1,4 +1,4 @@
-//! Bodies of ascii PLY files: numbers between blanks; where lines end does not matter.
+//! Bodies of ascii PLY files: numbers separated by white space; line ends have no meaning.
 
 use super::binary::index;
 use super::source::Source;
@@ -77,7 +77,7 @@ fn skip_property(name: &str, property: Property, source: &mut Source) -> Result<
     }
 }
 
-/// Reads a number, so that a body out of step with its header does not pass unseen.
+/// Parses a number to be skipped, so that a body that does not fit its header is noticed.
 fn skip_number(name: &str, scalar: Scalar, source: &mut Source) -> Result<()> {
     if scalar.is_integer() {
         number::<i64>(source, name, "an integer").map(drop)

@@ -137,7 +137,7 @@ fn faces<const BIG: bool>(
             };
             left -= layout.triangles::<BIG>(source, most, &mut slice)? as u64;
         }
-        // What the fast path left: the end of the file, or a face that is not a triangle.
+        // After the fast path: the end of the file, or a face that is not a triangle.
         if left > 0 && slice.len() < SLICE {
             skip_properties::<BIG>(before, source)?;
             let length = list_length::<BIG>(count, source)?;
@@ -169,7 +169,7 @@ struct Layout {
 }
 
 impl Layout {
-    /// Decodes up to `most` triangles out of what is at hand; stops before any other face.
+    /// Decodes up to `most` triangles from the buffer; stops before any other face.
     fn triangles<const BIG: bool>(
         &self,
         source: &mut Source,

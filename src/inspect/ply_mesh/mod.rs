@@ -1,9 +1,9 @@
 //! Streaming reader of triangle meshes in PLY files: ascii and binary of either byte order.
 //!
-//! Vertices are the properties `x`, `y`, `z` (any scalar type) of element `vertex`; faces are the
-//! list `vertex_indices` or `vertex_index` of element `face`. Everything else is skipped. The file
-//! is read once, front to back, in a buffer of fixed size; what the header claims is checked
-//! against the size of the file before anything is read on its account.
+//! Vertices are the properties `x`, `y`, `z` (any scalar type) of element `vertex`; faces are the list
+//! `vertex_indices` or `vertex_index` of element `face`. All other data are skipped. The file is read once,
+//! front to back, in a buffer of fixed size. The counts of the header are checked against the size of the
+//! file before reading.
 
 mod ascii;
 mod binary;
@@ -16,43 +16,43 @@ use outcrop_ply::{Element, Encoding, Header, Scalar};
 use source::Source;
 use std::path::Path;
 
-/// Items handed to a [`Sink`] at a time, at most.
+/// Largest number of items passed to a [`Sink`] at a time.
 pub const SLICE: usize = 8192;
 
-/// Index reported for every number in the file that no vertex of a mesh can have.
+/// Index reported for a number that is no index of any mesh.
 pub const NO_VERTEX: u32 = u32::MAX;
 
-/// Takes in the mesh, slice by slice, in the order of the file.
+/// Receives the mesh, slice by slice, in the order of the file.
 pub trait Sink {
-    /// The next vertices' positions.
+    /// Receives the positions of the next vertices.
     ///
     /// # Errors
-    /// Whatever should end the reading.
+    /// Any error; it ends the reading.
     fn vertices(&mut self, positions: &[[f64; 3]]) -> Result<()>;
 
-    /// The next triangles' corners. Indices are as in the file, not checked against the number of
-    /// vertices; those below 0 or above [`NO_VERTEX`] come as [`NO_VERTEX`].
+    /// Receives the corners of the next triangles. Indices are as in the file, not checked against the number
+    /// of vertices; those below 0 or above [`NO_VERTEX`] are reported as [`NO_VERTEX`].
     ///
     /// # Errors
-    /// Whatever should end the reading.
+    /// Any error; it ends the reading.
     fn triangles(&mut self, triangles: &[[u32; 3]]) -> Result<()>;
 
-    /// `count` more faces do not have exactly three corners.
+    /// Counts `count` further faces without exactly three corners.
     ///
     /// # Errors
-    /// Whatever should end the reading.
+    /// Any error; it ends the reading.
     fn non_triangles(&mut self, count: u64) -> Result<()>;
 }
 
-/// A PLY mesh whose header was read and found plausible.
+/// A PLY mesh with a checked header.
 #[derive(Debug)]
 pub struct PlyMesh {
     header: Header,
     source: Source,
 }
 
-/// True for a PLY file whose header announces faces: a mesh and not a cloud. What is no PLY file, or
-/// has a header that cannot be read, is for others to judge.
+/// True for a PLY file whose header has faces: a mesh and not a cloud. False for other files and for headers
+/// that cannot be read; their readers report the error.
 ///
 /// # Errors
 /// [`Error::Io`].
@@ -82,7 +82,7 @@ impl PlyMesh {
     /// Opens a file and reads its header.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Input`] if it is not a PLY mesh, or claims more than it can hold.
+    /// [`Error::Io`]; [`Error::Input`] if it is no PLY mesh, or has counts that do not fit its size.
     pub fn open(path: &Path) -> Result<Self> {
         let mut source = Source::open(path)?;
         let header = read_header(&mut source)?;
@@ -91,7 +91,7 @@ impl PlyMesh {
         Ok(mesh)
     }
 
-    /// Number of vertices; less than [`NO_VERTEX`] + 1, so `u32` names them all.
+    /// Number of vertices; at most [`NO_VERTEX`], so that indices fit `u32`.
     #[must_use]
     pub fn vertices(&self) -> u64 {
         self.count("vertex")
@@ -121,7 +121,7 @@ impl PlyMesh {
         Error::input(self.source.path(), place, found, expected)
     }
 
-    /// Checks that the elements a mesh needs are there and that their counts fit the file.
+    /// Checks that the required elements exist and that their counts fit the file.
     fn check(&self) -> Result<()> {
         let wrong = |e| Error::ply(self.source.path(), e);
         let elements = &self.header.elements;
@@ -137,7 +137,7 @@ impl PlyMesh {
             return Err(self.refuse("PLY header", found, "at most 4294967295"));
         }
         let body = self.source.length().saturating_sub(self.source.position());
-        // The last number of an ascii file needs no character after it.
+        // The last number of an ascii file needs no separator after it.
         let room = u128::from(body) + u128::from(self.header.encoding == Encoding::Ascii);
         let mut needed = 0u128;
         for element in elements {
@@ -158,8 +158,8 @@ impl PlyMesh {
     /// Reads the whole mesh.
     ///
     /// # Errors
-    /// What the sink returned; [`Error::Io`]; [`Error::Input`] with the byte offset at which the
-    /// file ends early or does not hold what its header announced.
+    /// Errors of the sink; [`Error::Io`]; [`Error::Input`] with the byte offset at which the file ends early
+    /// or does not match its header.
     pub fn read(mut self, sink: &mut impl Sink) -> Result<()> {
         let source = &mut self.source;
         for element in &self.header.elements {
@@ -174,13 +174,13 @@ impl PlyMesh {
     }
 }
 
-/// Places and types of `x`, `y` and `z` among the properties of element `vertex`.
+/// Positions and types of `x`, `y` and `z` among the properties of element `vertex`.
 type Axes = [(usize, Scalar); 3];
 
-/// What an element means to the reader.
+/// The use of an element.
 enum Role {
     Vertices(Axes),
-    /// Faces: place of the property with the corners, the types of their count and of each.
+    /// Faces: position of the property with the corners, and the types of its count and its items.
     Faces(usize, Scalar, Scalar),
     Other,
 }

@@ -6,7 +6,7 @@ use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-/// Bytes of buffer; not less than the longest header, so that one entry always fits.
+/// Bytes of the buffer; not less than the longest header, so that one entry always fits.
 const BUFFER: usize = Header::LONGEST;
 
 #[derive(Debug)]
@@ -17,9 +17,9 @@ pub(super) struct Source {
     buffer: Vec<u8>,
     at: usize,
     filled: usize,
-    /// The file has no more bytes than are in the buffer.
+    /// True if the rest of the file is in the buffer.
     drained: bool,
-    /// Offset in the file of the end of what is in the buffer.
+    /// File offset of the end of the buffer.
     end: u64,
 }
 
@@ -56,7 +56,7 @@ impl Source {
         self.end - (self.filled - self.at) as u64
     }
 
-    /// The bytes at hand: `wanted` or more, fewer only at the end of the file.
+    /// The buffered bytes: at least `wanted`, fewer only at the end of the file.
     pub(super) fn peek(&mut self, wanted: usize) -> Result<&[u8]> {
         if self.filled - self.at < wanted.min(BUFFER) && !self.drained {
             self.buffer.copy_within(self.at..self.filled, 0);
@@ -80,12 +80,12 @@ impl Source {
         Ok(&self.buffer[self.at..self.filled])
     }
 
-    /// Steps over bytes seen by [`Source::peek`].
+    /// Consumes bytes returned by [`Source::peek`].
     pub(super) fn consume(&mut self, bytes: usize) {
         self.at = (self.at + bytes).min(self.filled);
     }
 
-    /// The next `wanted` bytes (at most those of the buffer), stepped over.
+    /// Consumes and returns the next `wanted` bytes, at most those of the buffer.
     pub(super) fn take(&mut self, wanted: usize, what: &str) -> Result<&[u8]> {
         let at_hand = self.peek(wanted)?.len();
         if at_hand < wanted {
@@ -95,7 +95,7 @@ impl Source {
         Ok(&self.buffer[self.at - wanted..self.at])
     }
 
-    /// Steps over `bytes` without reading them.
+    /// Skips `bytes`.
     pub(super) fn skip(&mut self, bytes: u64, what: &str) -> Result<()> {
         let at_hand = (self.filled - self.at) as u64;
         if bytes <= at_hand {
@@ -118,14 +118,14 @@ impl Source {
         self.refuse(self.position(), &found, expected)
     }
 
-    /// The error for something wrong at a byte offset.
+    /// The error for invalid content at a byte offset.
     pub(super) fn refuse(&self, offset: u64, found: &str, expected: &str) -> Error {
         Error::input(&self.path, format!("byte {offset}"), found, expected)
     }
 
     /// The next word of an ascii body.
     pub(super) fn word(&mut self, expected: &str) -> Result<&[u8]> {
-        // No number that a program writes is longer.
+        // Longer than any number that programs write.
         const WORD: usize = 400;
         loop {
             let bytes = self.peek(1)?;

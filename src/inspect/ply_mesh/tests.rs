@@ -1,4 +1,4 @@
-//! Variants of the format, and files that lie.
+//! Variants of the format, and files with wrong headers.
 
 use super::*;
 use proptest::prelude::*;
@@ -49,7 +49,7 @@ fn refusal(bytes: &[u8]) -> String {
     }
 }
 
-/// A file in one of the encodings: `numbers` are (type, value), header lines come before.
+/// A file in one of the encodings: `numbers` are (type, value); header lines precede.
 fn file(encoding: &str, header: &str, numbers: &[(&str, f64)]) -> Vec<u8> {
     let format = format!("ply\nformat {encoding} 1.0\ncomment made up\n{header}end_header\n");
     let mut bytes = format.into_bytes();
@@ -208,13 +208,13 @@ fn every_truncation_is_refused() {
     for encoding in ENCODINGS {
         let whole = small(encoding);
         assert_eq!(read(&whole).unwrap().others, 1);
-        // The last ascii number is complete without the blanks after it.
+        // The last ascii number is complete without the white space after it.
         let end = whole.len() - if encoding == "ascii" { 2 } else { 0 };
         for length in 0..end {
             refusal(&whole[..length]);
         }
     }
-    // Long enough for the header's claims, but not for the second face.
+    // Long enough for the counts of the header, but not for the second face.
     let whole = small("binary_little_endian");
     let text = refusal(&whole[..whole.len() - 3]);
     let place = whole.len() - 16;
@@ -243,8 +243,8 @@ proptest! {
     }
 }
 
-/// What is replaced in a good header, by what, where that is noticed, and part of what is found
-/// there. `~` is a line end.
+/// For each line: the replaced part of a valid header, the replacement, the place in the error, and a part of
+/// its text. `~` is a line end.
 const HOSTILE: &str = "\
 vertex 2 | vertex 4000000000 | PLY header, element vertex | 4000000000 entries of 12
 vertex 2 | vertex 4294967296 | PLY header | 4294967296 vertices

@@ -1,8 +1,8 @@
 //! Triangles without area, found without random access to positions.
 //!
-//! A triangle is looked at in the range of its highest corner. Positions that are not in memory
-//! there are found later: the triangle travels down to the ranges of its other corners and takes
-//! the positions known so far along.
+//! A triangle is examined in the range of its highest corner. Positions that are not in memory there are
+//! found later: the triangle, with the positions known so far, is sent down to the ranges of its other
+//! corners.
 
 use super::buckets::Buckets;
 use super::collinear::collinear;
@@ -13,7 +13,7 @@ use crate::spill::row;
 use crate::workspace::Workspace;
 
 row! {
-    /// A triangle on its way to the ranges of its middle and lowest corner.
+    /// A triangle sent to the ranges of its middle and lowest corner.
     struct Travelling {
         /// The middle corner, [`KNOWN`] once its position is known.
         middle: u32,
@@ -27,10 +27,10 @@ row! {
     unpacked
 }
 
-/// No vertex has this number.
+/// A number that no vertex has.
 const KNOWN: u32 = u32::MAX;
 
-/// Counts the triangles that have no area.
+/// Counts triangles without area.
 #[derive(Debug)]
 pub(super) struct Areas {
     plan: Plan,
@@ -53,7 +53,7 @@ impl Areas {
         }
     }
 
-    /// Brings the positions of range `k` into memory and looks at the triangles that wait for it.
+    /// Loads the positions of range `k` and examines the triangles that wait for it.
     pub(super) fn enter(&mut self, k: usize, first: u32) -> Result<()> {
         self.positions.load(k, first)?;
         let mut block = std::mem::take(&mut self.block);
@@ -72,8 +72,8 @@ impl Areas {
         Ok(())
     }
 
-    /// Looks at triangles with sound corners, those whose highest corner is from `first` on, in
-    /// the current range of `length` vertices.
+    /// Examines triangles with valid corners, whose highest corner is at least `first` and in the current
+    /// range of `length` vertices.
     pub(super) fn look(&mut self, triangles: &[[u32; 3]], first: u32, length: usize) -> Result<()> {
         for &triangle in triangles {
             let mut sorted = triangle;

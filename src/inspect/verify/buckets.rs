@@ -1,8 +1,8 @@
-//! Records sorted into numbered buckets without a sort: one block a bucket in memory, the full
-//! blocks in one scratch file, chained from the last to the first.
+//! Rows distributed to numbered buckets without sorting: one block of each bucket in memory, the full blocks
+//! in one scratch file, linked from the last to the first.
 //!
-//! Only the offset of a bucket's last block is kept, so memory does not grow with the number of
-//! records. Records come back in another order than they went in.
+//! Only the offset of a bucket's last block is kept, so memory does not grow with the number of rows. Rows
+//! are read in another order than they were written.
 
 use crate::error::{Error, Result};
 use crate::spill::Row;
@@ -12,11 +12,11 @@ use std::os::unix::fs::FileExt;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// Offset that stands for "no block".
+/// The offset for "no block".
 const NONE: u64 = u64::MAX;
 
-/// Bytes before the records of a block: offset of the block before (8), number of records (4),
-/// CRC-32 of both and the records (4).
+/// Bytes before the rows of a block: offset of the block before (8), number of rows (4), CRC-32 of both and
+/// the rows (4).
 const HEAD: u64 = 16;
 
 /// Buckets of rows.
@@ -31,7 +31,7 @@ pub(super) struct Buckets<R: Row> {
     io: Arc<IoCounters>,
 }
 
-/// How far a bucket has been read.
+/// The read position in a bucket.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Cursor {
     bucket: usize,
@@ -39,7 +39,7 @@ pub(super) struct Cursor {
 }
 
 impl<R: Row> Buckets<R> {
-    /// `count` buckets that spill to the scratch file `name`, with blocks of `bytes` bytes.
+    /// `count` buckets with blocks of `bytes` bytes; full blocks go to the scratch file `name`.
     pub(super) fn new(workspace: &Workspace, name: &str, count: usize, bytes: u64) -> Self {
         Self {
             path: workspace.file(name),
@@ -52,11 +52,11 @@ impl<R: Row> Buckets<R> {
         }
     }
 
-    /// Puts a row into a bucket.
+    /// Adds a row to a bucket.
     pub(super) fn push(&mut self, bucket: usize, row: R) -> Result<()> {
         let open = &mut self.open[bucket];
         if open.len() == open.capacity() {
-            // Doubling, but never past one block.
+            // Doubles the buffer, up to one block.
             let target = (2 * open.len()).clamp(1, self.block);
             open.reserve_exact(target - open.len());
         }
@@ -93,13 +93,13 @@ impl<R: Row> Buckets<R> {
         Ok(())
     }
 
-    /// Starts to read a bucket.
+    /// A cursor at the start of a bucket.
     pub(super) fn cursor(&self, bucket: usize) -> Cursor {
         Cursor { bucket, next: None }
     }
 
-    /// Reads the next block of a bucket into `block`; `false` after the last. What is put into
-    /// that bucket meanwhile may be missed.
+    /// Reads the next block of a bucket into `block`; `false` after the last. Rows added to that bucket
+    /// meanwhile may be missed.
     pub(super) fn next(&self, cursor: &mut Cursor, block: &mut Vec<R>) -> Result<bool> {
         block.clear();
         let offset = match cursor.next {
@@ -148,7 +148,7 @@ impl<R: Row> Buckets<R> {
         }
     }
 
-    /// Forgets what is in a bucket and frees its memory.
+    /// Empties a bucket and frees its memory.
     pub(super) fn clear(&mut self, bucket: usize) {
         self.open[bucket] = Vec::new();
         self.last[bucket] = NONE;
@@ -159,13 +159,13 @@ impl<R: Row> Drop for Buckets<R> {
     fn drop(&mut self) {
         self.io.shrink_scratch(self.end);
         if self.file.is_some() {
-            // A scratch file that cannot be deleted goes with its folder.
+            // A scratch file that cannot be deleted is deleted with its folder.
             let _ = std::fs::remove_file(&self.path);
         }
     }
 }
 
-/// Words of a block's head.
+/// The header of a block, as words.
 struct Head([u32; 4]);
 
 impl Head {

@@ -1,15 +1,14 @@
 //! The exact test for triangles without area.
 
-/// True if three points with finite coordinates lie exactly on one line, or coincide.
+/// True if three points with finite coordinates lie exactly on a line or coincide.
 ///
-/// Exact as long as the coordinates of the three points that are not 0 are within a factor of
-/// 2^400 of each other.
+/// Exact if the nonzero coordinates of the three points are within a factor of 2^400 of each other.
 pub(super) fn collinear(points: [[f64; 3]; 3]) -> bool {
     const PLANES: [[usize; 2]; 3] = [[0, 1], [1, 2], [2, 0]];
     if PLANES.iter().any(|&plane| surely_turns(points, plane)) {
         return false;
     }
-    // By a power of two, so nothing is rounded; no product overflows then.
+    // Scaling by a power of two rounds nothing and avoids overflow of products.
     let largest = points
         .iter()
         .flatten()
@@ -23,7 +22,8 @@ pub(super) fn collinear(points: [[f64; 3]; 3]) -> bool {
     !PLANES.iter().any(|&plane| turns(points, plane))
 }
 
-/// True only if the points' shadow on a coordinate plane has an area, beyond rounding.
+/// True only if the projection of the points to a coordinate plane has an area larger than the rounding
+/// error.
 fn surely_turns([p, q, r]: [[f64; 3]; 3], [x, y]: [usize; 2]) -> bool {
     let left = (p[x] - r[x]) * (q[y] - r[y]);
     let right = (p[y] - r[y]) * (q[x] - r[x]);
@@ -31,7 +31,7 @@ fn surely_turns([p, q, r]: [[f64; 3]; 3], [x, y]: [usize; 2]) -> bool {
     (left - right).abs() > 3.330_669_073_875_471_6e-16 * (left.abs() + right.abs()) + 1e-300
 }
 
-/// True if the points' shadow on a coordinate plane has an area, exactly.
+/// True if the projection of the points to a coordinate plane has an area, computed exactly.
 fn turns([p, q, r]: [[f64; 3]; 3], [x, y]: [usize; 2]) -> bool {
     let products = [
         (p[x], q[y]),
@@ -50,7 +50,7 @@ fn turns([p, q, r]: [[f64; 3]; 3], [x, y]: [usize; 2]) -> bool {
     !sum.is_zero()
 }
 
-/// An exact sum: the terms are added without rounding and do not overlap.
+/// An exact sum: terms that do not overlap, added without rounding.
 #[derive(Default)]
 struct Expansion {
     terms: [f64; 12],
@@ -80,7 +80,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// On integers that fit, `i128` decides.
+    /// The answer by `i128`, for integers that fit.
     fn expected(p: [[i64; 3]; 3]) -> bool {
         let d = |i: usize, j: usize| i128::from(p[i][j]) - i128::from(p[2][j]);
         (0..3).all(|j| {

@@ -1,10 +1,9 @@
 //! Connected components of a graph on vertices, one range of vertices in memory at a time.
 //!
-//! Ranges come from the last to the first. Edges whose higher end is in the current range either
-//! join two vertices of it or leave it downwards. Once a range is closed it is contracted: each of
-//! its components keeps its lowest outside neighbour, and instead of its vertices that neighbour
-//! is joined to the component's other outside neighbours. A component that leaves nowhere is
-//! complete and counted.
+//! Ranges are processed from the last to the first. The higher end of an edge is in the current range; its
+//! lower end is there too or in a range below. When a range is closed it is contracted: each of its
+//! components keeps its lowest outside neighbour, and this neighbour is joined to the other outside
+//! neighbours of the component. A component without outside neighbours is complete and counted.
 
 use super::buckets::Buckets;
 use super::plan::Plan;
@@ -12,10 +11,10 @@ use crate::error::Result;
 use crate::spill::row;
 use crate::workspace::Workspace;
 
-/// Marks a vertex not met, a component without outside neighbour.
+/// Marks an unvisited vertex, or a component without outside neighbours.
 const NONE: u32 = u32::MAX;
 
-/// Edges remembered so as not to hand them down twice in a row.
+/// Recent edges remembered to avoid sending them down twice.
 const RECENT: usize = 1 << 12;
 
 /// Union–find over one range of vertices.
@@ -27,7 +26,7 @@ pub(super) struct Forest {
 }
 
 impl Forest {
-    /// Starts over with the range of `length` vertices from `first`.
+    /// Resets it to the range of `length` vertices from `first`.
     pub(super) fn reset(&mut self, first: u32, length: usize) {
         self.first = first;
         for words in [&mut self.parent, &mut self.lowest] {
@@ -37,7 +36,7 @@ impl Forest {
         }
     }
 
-    /// Says that a vertex of the range belongs to the graph.
+    /// Notes that a vertex of the range belongs to the graph.
     pub(super) fn touch(&mut self, vertex: u32) {
         let at = vertex - self.first;
         let parent = &mut self.parent[at as usize];
@@ -82,7 +81,7 @@ pub(super) struct Contraction {
     edges: Buckets<Edge>,
     plan: Plan,
     block: Vec<Edge>,
-    /// Components complete so far.
+    /// Number of complete components.
     pub(super) complete: u64,
 }
 
@@ -106,7 +105,7 @@ impl Contraction {
             .push(self.plan.range_of(high), Edge { low, high })
     }
 
-    /// Contracts range `k`, to which nothing will be added any more.
+    /// Contracts range `k`, to which nothing more is added.
     pub(super) fn close(&mut self, forest: &mut Forest, k: usize) -> Result<()> {
         let mut block = std::mem::take(&mut self.block);
         let first = forest.first;

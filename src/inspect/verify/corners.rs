@@ -1,10 +1,10 @@
-//! The triangles around each vertex of one range, side by side in memory.
+//! The triangles around each vertex of one range, contiguous in memory.
 
 use super::star::{Inspector, NO_MORE, Tally};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Vertices inspected by one task.
+/// Vertices examined by one task.
 const TASK: usize = 4096;
 
 /// The stars of a range of vertices, or of a part of it.
@@ -13,14 +13,14 @@ pub(super) struct Corners {
     first: u32,
     /// Triangles at each vertex of the range.
     degree: Vec<u32>,
-    /// Of each vertex of the part, where its next triangle goes; in the end, the end of its star.
+    /// For each vertex of the part the place of its next triangle; at the end, the end of its star.
     end: Vec<u32>,
     part: Range<usize>,
     links: Vec<[u32; 2]>,
 }
 
 impl Corners {
-    /// Starts over with the range of `length` vertices from `first`.
+    /// Resets it to the range of `length` vertices from `first`.
     pub(super) fn reset(&mut self, first: u32, length: usize) {
         self.first = first;
         for words in [&mut self.degree, &mut self.end] {
@@ -36,7 +36,7 @@ impl Corners {
     }
 
     fn local(&self, vertex: u32) -> usize {
-        // Vertices below the range wrap around to numbers beyond it.
+        // Vertices below the range wrap around to numbers above it.
         vertex.wrapping_sub(self.first) as usize
     }
 
@@ -56,8 +56,8 @@ impl Corners {
         degrees.filter(|(_, degree)| **degree > 0).map(|(v, _)| v)
     }
 
-    /// The part from vertex `start` of the range that has at most `most` corners; one vertex at
-    /// least. Also the number of its corners.
+    /// The part from vertex `start` of the range with at most `most` corners, but at least one vertex; and
+    /// its number of corners.
     pub(super) fn part_from(&self, start: usize, most: usize) -> (Range<usize>, usize) {
         let mut corners = 0;
         for (at, &degree) in self.degree.iter().enumerate().skip(start) {
@@ -69,7 +69,7 @@ impl Corners {
         (start..self.degree.len(), corners)
     }
 
-    /// Makes room for the stars of a part; they are then filled in by [`Corners::fill`].
+    /// Allocates the stars of a part; [`Corners::fill`] fills them.
     pub(super) fn begin(&mut self, part: Range<usize>, corners: usize) {
         let mut next = 0;
         for at in part.clone() {
@@ -84,7 +84,7 @@ impl Corners {
         self.links.resize(corners, [0; 2]);
     }
 
-    /// Files triangles under their corners in the part.
+    /// Adds triangles to the stars of their corners in the part.
     pub(super) fn fill(&mut self, triangles: &[[u32; 3]]) {
         for &[x, y, z] in triangles {
             for (v, link) in [(x, [y, z]), (y, [z, x]), (z, [x, y])] {
@@ -97,7 +97,7 @@ impl Corners {
         }
     }
 
-    /// Gives the memory of the stars back if it is more than `most` corners.
+    /// Frees the memory of the stars if it exceeds `most` corners.
     pub(super) fn trim(&mut self, most: usize) {
         if self.links.capacity() > most {
             self.links = Vec::new();
@@ -109,7 +109,7 @@ impl Corners {
         end - self.degree[at] as usize..end
     }
 
-    /// Inspects all stars of up to `most` triangles, on all threads.
+    /// Examines all stars of up to `most` triangles, on all threads.
     pub(super) fn inspect(&mut self, most: usize) -> Tally {
         let mut tasks = Vec::with_capacity(self.part.len() / TASK + 1);
         let (mut rest, mut start) = (&mut self.links[..], self.part.start);
@@ -139,8 +139,8 @@ impl Corners {
             .reduce(Tally::default, |a, b| a + b)
     }
 
-    /// The next vertex of the part from `at` on whose star has more than `most` triangles, as its
-    /// number in the range, and its star.
+    /// The next vertex of the part, from `at` on, with more than `most` triangles: its number in the range,
+    /// and its star.
     pub(super) fn large(&mut self, at: usize, most: usize) -> Option<(usize, &mut [[u32; 2]])> {
         let mut rest = at.max(self.part.start)..self.part.end;
         let found = rest.find(|&at| self.degree[at] as usize > most)?;
@@ -148,7 +148,8 @@ impl Corners {
         Some((found, &mut self.links[star]))
     }
 
-    /// After inspection: each vertex of the part that ends boundary edges, with their other ends.
+    /// After the examination: each vertex of the part that is the higher end of boundary edges, with their
+    /// other ends.
     pub(super) fn boundaries(&self) -> impl Iterator<Item = (u32, &[u32])> {
         self.part.clone().filter_map(|at| {
             let words: &[u32] = bytemuck::cast_slice(&self.links[self.star(at)]);

@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::inspect::ply_mesh::{PlyMesh, Sink};
 use crate::workspace::Workspace;
 
-/// What is counted while reading.
+/// Counts from reading.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Counts {
     pub(super) vertices: u64,
@@ -19,14 +19,14 @@ pub(super) struct Counts {
     pub(super) degenerate_triangles: u64,
 }
 
-/// The mesh, ready for the sweep over its ranges.
+/// The mesh, ready for the sweep over the ranges.
 pub(super) struct Intake<'a> {
     plan: &'a Plan,
     workspace: &'a Workspace,
     pub(super) counts: Counts,
     pub(super) bounds: Option<Bounds>,
     pub(super) positions: Positions,
-    /// Triangles with three distinct, valid corners, in the bucket of each corner's range.
+    /// Triangles with three distinct, valid corners, in the buckets of the ranges of their corners.
     pub(super) triangles: Buckets<[u32; 3]>,
 }
 

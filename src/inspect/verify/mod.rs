@@ -1,12 +1,11 @@
-//! Is a mesh file a clean manifold? Decided in bounded memory, whatever the size of the mesh.
+//! Checks that a mesh file is a clean manifold, in bounded memory, for meshes of any size.
 //!
-//! The file is read once. Every triangle goes to the *range* of consecutive vertex ids of each of
-//! its corners; then the ranges are visited from the last to the first, one in memory at a time.
-//! Inside a range all triangles around a vertex are known, so everything local is decided there.
-//! What is not local moves down: an edge that leaves a range by its lower end is contracted to the
-//! roots of a union–find and handed to the range of that end (`contract`), and so is a triangle
-//! whose corners' positions are not all at hand (`area`). No result depends on the size of the
-//! ranges.
+//! The file is read once. Every triangle is sent to the *range* of consecutive vertex ids of each of its
+//! corners. Then the ranges are processed from the last to the first, one in memory at a time. All triangles
+//! around a vertex of the range are known there, so local properties are decided at once. Other data move
+//! down: an edge to a lower range is contracted to the roots of a union–find and sent to the range of its
+//! lower end (`contract`), and so is a triangle with corners whose positions are not in memory (`area`). No
+//! result depends on the size of the ranges.
 
 mod area;
 mod bounds;
@@ -32,18 +31,17 @@ use crate::workspace::Workspace;
 use plan::Plan;
 use std::path::Path;
 
-/// What [`verify_with`] should let pass, and how it works.
+/// Options of [`verify_with`].
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Options {
-    /// Vertices that no triangle uses are not a defect.
+    /// Accept vertices without a triangle.
     pub allow_unreferenced: bool,
-    /// Vertices held in memory at a time, rounded down to a power of two, but at least one in
-    /// 65536 of the mesh; by default as many as the memory budget allows. The verdict does not
-    /// depend on it.
+    /// Vertices held in memory at a time, rounded down to a power of two, but at least 1/65536 of the mesh.
+    /// Default: as many as the memory budget allows. The verdict does not depend on it.
     pub range: Option<u32>,
 }
 
-/// Checks the mesh file `mesh` (PLY) against every defect that [`Verdict`] counts.
+/// Checks the mesh file `mesh` (PLY) for every defect in [`Verdict`].
 ///
 /// # Errors
 /// [`crate::Error::Input`] if the file is not a readable PLY mesh; [`crate::Error::Io`],

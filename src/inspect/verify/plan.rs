@@ -1,24 +1,24 @@
-//! How the memory at hand is shared out.
+//! Division of the free memory.
 
 use super::star;
 use crate::error::Result;
 use crate::workspace::Workspace;
 use crate::workspace::memory::Reservation;
 
-/// Largest block a bucket collects before it goes to disk, in bytes.
+/// Largest block that a bucket collects before it is written, in bytes.
 const LARGEST_BLOCK: u64 = 256 << 10;
 
-/// Smallest such block, unless tiny ranges are asked for.
+/// Smallest such block, except for very small ranges.
 const SMALLEST_BLOCK: u64 = 512;
 
-/// Most ranges, whatever was asked for.
+/// Largest number of ranges.
 const MOST_RANGES: u64 = 1 << 16;
 
-/// Bytes a range takes in four kinds of buckets and in the table of positions, while it is empty.
+/// Bytes of an empty range in four kinds of buckets and in the table of positions.
 const PER_RANGE: u64 = 4 * 32 + 24;
 
-/// Bytes a vertex takes while its range is in memory, without triangles and position: union–find
-/// (8), number of triangles and place of the first (8).
+/// Bytes of a vertex while its range is in memory, without triangles and position: union–find (8), number of
+/// triangles and place of the first (8).
 const PER_VERTEX: u64 = 16;
 
 /// Bytes of a position.
@@ -27,7 +27,7 @@ const POSITION: u64 = 24;
 /// Bytes of a triangle at one of its corners.
 const PER_CORNER: u64 = 8;
 
-/// Sizes of everything large.
+/// Sizes of all large buffers.
 #[derive(Debug, Clone)]
 pub(super) struct Plan {
     /// Number of vertices of the mesh; every valid id is below.
@@ -36,28 +36,27 @@ pub(super) struct Plan {
     pub(super) shift: u32,
     /// Number of ranges.
     pub(super) ranges: usize,
-    /// All positions stay in memory.
+    /// True if all positions stay in memory.
     pub(super) all_positions: bool,
-    /// Corners held at a time, in number.
+    /// Number of corners held at a time.
     pub(super) corners: usize,
-    /// Bytes of one block of the buckets of triangles, of a contraction, of triangles on the way.
+    /// Bytes of a block in the buckets of triangles, of contractions, and of triangles without all positions.
     pub(super) blocks: [u64; 3],
-    /// Stars above this number of triangles are inspected one at a time.
+    /// Larger stars, in triangles, are examined one at a time.
     pub(super) large_star: usize,
 }
 
 impl Plan {
-    /// The plan for a mesh in `free` bytes; `range` is the wanted number of vertices of a range.
+    /// The plan for a mesh in `free` bytes; `range` is the requested number of vertices per range.
     pub(super) fn new(vertices: u64, faces: u64, free: u64, range: Option<u32>) -> Self {
         let all = vertices * POSITION;
         let all_positions = range.is_none() && all <= free / 4;
         let rest = if all_positions { free - all } else { free };
-        // An eighth for triangles on their way into buckets, a sixteenth for those on the way to
-        // their other positions, a thirty-second for each of two contractions, half for the range;
-        // the rest is left for large stars.
+        // An eighth for the buckets of triangles, a sixteenth for triangles without all positions, a
+        // thirty-second for each of two contractions, half for the range; the rest for large stars.
         let (quotas, quota) = ([rest / 8, rest / 32, rest / 16], rest / 2);
         let fixed = PER_VERTEX + if all_positions { 0 } else { POSITION };
-        // A quarter more corners than the mean, for ranges that have more than others.
+        // A quarter more corners than the mean, for ranges above the mean.
         let degree = (3 * u128::from(faces)).div_ceil(u128::from(vertices.max(1)));
         let each = u128::from(fixed) + degree * u128::from(PER_CORNER) * 5 / 4;
         let fitting = (u128::from(quota) / each).clamp(1, 1 << 31) as u64;
@@ -78,7 +77,7 @@ impl Plan {
         let ranges = (vertices.div_ceil(1 << shift)).max(1);
         let corners = quota.saturating_sub(fixed << shift).max(1 << 20) / PER_CORNER;
         Self {
-            // The reader refuses more.
+            // The reader refuses larger numbers.
             vertices: u32::try_from(vertices).unwrap_or(u32::MAX),
             shift,
             ranges: ranges as usize,
@@ -106,7 +105,7 @@ impl Plan {
         (vertex >> self.shift) as usize
     }
 
-    /// Reserves all that is planned.
+    /// Reserves the planned memory.
     pub(super) fn reserve(&self, workspace: &Workspace) -> Result<Vec<Reservation>> {
         let [triangles, contraction, area] = self.blocks.map(|b| b * self.ranges as u64);
         let held = if self.all_positions {

@@ -1,4 +1,4 @@
-//! Vertex positions: all of them in memory, or those of one range.
+//! Vertex positions: all in memory, or those of one range.
 
 use super::plan::Plan;
 use crate::error::Result;
@@ -10,7 +10,7 @@ use crate::workspace::Workspace;
 pub(super) struct Positions {
     first: u32,
     window: Vec<[f64; 3]>,
-    /// One section a range, unless all positions stay in memory.
+    /// One section for each range, unless all positions stay in memory.
     stored: Option<Table<[f64; 3]>>,
     length: usize,
     next: usize,
@@ -37,7 +37,7 @@ impl Positions {
         })
     }
 
-    /// Takes in the next vertices.
+    /// Adds the positions of the next vertices.
     pub(super) fn append(&mut self, mut positions: &[[f64; 3]]) -> Result<()> {
         while !positions.is_empty() {
             let room = self.length - self.window.len();
@@ -72,7 +72,7 @@ impl Positions {
         }
     }
 
-    /// Brings a range into memory.
+    /// Loads a range into memory.
     pub(super) fn load(&mut self, k: usize, first: u32) -> Result<()> {
         if let Some(stored) = &self.stored {
             stored.get_into(k, &mut self.window)?;

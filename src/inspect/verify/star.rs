@@ -1,7 +1,6 @@
-//! All that is decided at one vertex, from the triangles around it.
+//! Properties of one vertex, decided by the triangles around it.
 
-/// Counts of what was found at some vertices. Each edge counts at its higher vertex, each triangle
-/// at its highest.
+/// Counts over some vertices. An edge counts at its higher vertex, a triangle at its highest.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(super) struct Tally {
     pub(super) referenced: u64,
@@ -29,33 +28,33 @@ impl std::ops::Add for Tally {
     }
 }
 
-/// Stands after the last neighbour left in a star, see [`Inspector::inspect`].
+/// Follows the last neighbour in a star, see [`Inspector::inspect`].
 pub(super) const NO_MORE: u32 = u32::MAX;
 
-/// Looks at stars one after the other.
+/// Examines stars one after another.
 #[derive(Debug, Default)]
 pub(super) struct Inspector {
     pub(super) tally: Tally,
     /// (neighbour, slot): slot `2i` runs from the vertex to the neighbour in triangle `i`,
     /// slot `2i + 1` from the neighbour to the vertex.
     ends: Vec<u64>,
-    /// Of each slot, the number of its neighbour.
+    /// The neighbour of each slot, by number.
     neighbour: Vec<u32>,
     /// Union–find over the neighbours.
     parent: Vec<u32>,
 }
 
-/// Bytes an [`Inspector`] needs for stars of up to `triangles` triangles.
+/// Bytes of an [`Inspector`] for stars of up to `triangles` triangles.
 pub(super) fn scratch_bytes(triangles: usize) -> u64 {
-    // Two slots a triangle; vectors may have grown to twice what they hold.
+    // Two slots for a triangle; the capacity of a vector may be twice its length.
     2 * 2 * triangles as u64 * (8 + 4 + 4)
 }
 
 impl Inspector {
-    /// Inspects the star of `vertex`: for each triangle (vertex, a, b) around it the pair (a, b).
+    /// Examines the star of `vertex`, given as the pair (a, b) of each triangle (vertex, a, b).
     ///
-    /// Leaves in `star`, read as words, the neighbours at the end of boundary edges, then
-    /// [`NO_MORE`] if there is room.
+    /// Afterwards `star`, as words, has the neighbours at the ends of boundary edges, then [`NO_MORE`] if
+    /// there is room.
     pub(super) fn inspect(&mut self, vertex: u32, star: &mut [[u32; 2]]) {
         if star.is_empty() {
             return;
@@ -103,7 +102,7 @@ impl Inspector {
         }
     }
 
-    /// Triangles with the same corners as another one, at their highest corner.
+    /// Triangles with the same corners as another one, counted at their highest corner.
     fn count_repeated(&mut self, vertex: u32, star: &[[u32; 2]]) {
         let highest = star.iter().filter(|[a, b]| *a < vertex && *b < vertex);
         self.ends.clear();
@@ -114,7 +113,7 @@ impl Inspector {
         self.tally.repeated_triangles += again.count() as u64;
     }
 
-    /// Connected pieces the triangles form around the vertex.
+    /// Number of connected components of the triangles around the vertex.
     fn pieces(&mut self) -> usize {
         let mut pieces = self.parent.len();
         for pair in self.neighbour.chunks_exact(2) {

@@ -1,4 +1,4 @@
-//! The visit to all ranges of vertices, from the last to the first.
+//! The sweep over all ranges of vertices, from the last to the first.
 
 use super::area::Areas;
 use super::buckets::Buckets;
@@ -10,7 +10,7 @@ use super::star::{Inspector, Tally, scratch_bytes};
 use crate::error::Result;
 use crate::workspace::Workspace;
 
-/// What the sweep counted.
+/// Counts of the sweep.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(super) struct Swept {
     pub(super) tally: Tally,
@@ -32,7 +32,7 @@ struct Sweep<'a> {
     tally: Tally,
 }
 
-/// Visits all ranges of the mesh.
+/// Processes all ranges of the mesh.
 pub(super) fn run(intake: Intake<'_>, plan: &Plan, workspace: &Workspace) -> Result<Swept> {
     let mut sweep = Sweep {
         plan,
@@ -119,7 +119,7 @@ impl Sweep<'_> {
         self.surface.close(&mut self.forest, k)
     }
 
-    /// Brings the stars of the current part together; looks at the areas too the `first_time`.
+    /// Collects the stars of the current part; examines the areas the `first_time`.
     fn gather(&mut self, k: usize, first_time: bool) -> Result<()> {
         let (first, length) = self.plan.range(k);
         let mut cursor = self.triangles.cursor(k);
@@ -136,7 +136,7 @@ impl Sweep<'_> {
         Ok(())
     }
 
-    /// Inspects the stars of the current part.
+    /// Examines the stars of the current part.
     fn inspect(&mut self) -> Result<()> {
         self.tally = self.tally + self.corners.inspect(self.plan.large_star);
         let (first, mut from) = (self.corners.first(), 0);

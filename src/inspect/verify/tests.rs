@@ -1,4 +1,4 @@
-//! Plans too odd to come about by themselves must not change a verdict.
+//! Unusual plans must not change a verdict.
 
 use super::*;
 use crate::error::Error;

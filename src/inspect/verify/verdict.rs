@@ -1,4 +1,4 @@
-//! The outcome of a check.
+//! The result of a check.
 
 use super::Options;
 use super::bounds::Bounds;
@@ -6,18 +6,18 @@ use super::intake::Counts;
 use super::sweep::Swept;
 use std::fmt;
 
-/// What a mesh file holds and what is wrong with it.
+/// Counts and defects of a mesh file.
 ///
-/// A *sound* triangle has three distinct corners that all exist. Edges, components and everything
-/// else about how the mesh hangs together concern sound triangles only.
+/// A *sound* triangle has three distinct corners that all exist. Edges, components and all other topological
+/// properties refer to sound triangles only.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Verdict {
-    /// The mesh has none of the defects; zero-area triangles are not one, nor are unreferenced
+    /// True if the mesh has none of the defects. Zero-area triangles are no defect, nor are unreferenced
     /// vertices if they were allowed.
     pub manifold: bool,
     /// Defect: faces that do not have exactly three corners.
     pub non_triangles: u64,
-    /// Defect: triangles with a corner that no vertex of the file is.
+    /// Defect: triangles with an index that is no vertex of the file.
     pub index_out_of_range: u64,
     /// Defect: triangles with existing corners, two of which are the same vertex.
     pub degenerate_triangles: u64,
@@ -25,7 +25,7 @@ pub struct Verdict {
     pub repeated_triangles: u64,
     /// Defect: edges with more than two triangles.
     pub non_manifold_edges: u64,
-    /// Defect: edges with two triangles that run through it in the same direction.
+    /// Defect: edges whose two triangles run along it in the same direction.
     pub inconsistent_edges: u64,
     /// Defect: vertices, all of whose edges have at most two triangles, whose triangles form
     /// neither one disk nor one half-disk.
@@ -34,7 +34,7 @@ pub struct Verdict {
     pub non_finite_vertices: u64,
     /// Defect unless allowed: vertices without sound triangle.
     pub unreferenced_vertices: u64,
-    /// Unreferenced vertices were allowed.
+    /// True if unreferenced vertices were allowed.
     pub unreferenced_allowed: bool,
     /// Sound triangles whose corners have finite positions exactly on one line, or coincident.
     pub zero_area_triangles: u64,

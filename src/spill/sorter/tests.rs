@@ -1,4 +1,4 @@
-//! The sorter against the standard library, damaged, and in several attempts.
+//! The sorter against the standard library, with damaged files, and over several attempts.
 
 use super::*;
 use crate::error::Error;
@@ -37,7 +37,7 @@ proptest! {
         mut records in prop::collection::vec([0u32..50, 0u32..9], 0..30_000),
         buffer in prop::sample::select(vec![16u64, 4096, 100_000, 10_000_000]),
     ) {
-        // A tiny buffer makes a run of every few records, so it gets few records.
+        // With a tiny buffer a run has only a few rows, so the number of rows is small.
         if buffer == 16 { records.truncate(900); }
         let workspace = workspace();
         let sorter = Sorter::<[u32; 2]>::new(&workspace, "s", buffer);
@@ -84,7 +84,7 @@ fn only_what_was_filled_is_held() {
         for n in 0..30_000u32 {
             sorter.push(&[[n % 100, n]]).unwrap();
         }
-        // To grow takes the old one and its copy.
+        // Growing takes the old buffer and its copy.
         let most = if whole { 30_000 } else { 2 << 14 };
         assert_eq!(pool.take_held(), before + most * 8);
         let (all, held) = sorter.finish(&workspace).unwrap().in_memory().unwrap();
@@ -93,7 +93,7 @@ fn only_what_was_filled_is_held() {
         assert_eq!(pool.take_held(), before + 30_000 * 8);
         drop(held);
     }
-    // What is merged takes frames, and not the buffer that it went through.
+    // Merging takes frames, and no sort buffer.
     let reserved = workspace.promise("sorted", 1 << 20).unwrap();
     let sorter = Sorter::<[u32; 2]>::new(&workspace, "m", 1 << 20).telling(reserved);
     for n in 0..300_000u32 {
@@ -134,7 +134,7 @@ fn damage_is_found_and_named() {
     }
 }
 
-/// A workspace in which a later one can go on.
+/// A workspace that a later attempt can continue.
 fn attempt(path: &std::path::Path) -> Workspace {
     let folder = match Folder::find(path).unwrap() {
         Found::Run(folder) => folder,
@@ -144,7 +144,7 @@ fn attempt(path: &std::path::Path) -> Workspace {
     Workspace::resumable(folder, memory, 2, Arc::new(Silent), Cancel::new()).unwrap()
 }
 
-/// Parts of an input: numbers with gaps, of some records each.
+/// Parts of an input: numbers with gaps, each with its number of rows.
 fn parts() -> Vec<(u32, u64)> {
     (0..40)
         .map(|n| (3 * n + n % 2, u64::from(200 + n)))
@@ -164,7 +164,7 @@ fn goes_on_where_it_was_stopped() {
     for kept in [false, true] {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("run");
-        // Buffers of other sizes every time; the one but last has done it all, and died then.
+        // A different buffer size in each attempt; the last but one finished all runs before it ended.
         for (stop, buffer) in [(2, 6000), (1, 20_000), (1, 9000), (99, 9000), (99, 500_000)] {
             let workspace = attempt(&path);
             let sorter = Sorter::<[u32; 2]>::new(&workspace, "s", buffer);

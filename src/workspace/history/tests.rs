@@ -1,9 +1,9 @@
-//! What is done again, by what was damaged and what is gone.
+//! The units that are repeated after damage and deletion.
 
 use super::super::place::Put;
 use super::*;
 
-/// A journal in short: the offset of a record is its number.
+/// A short journal: the offset of a record is its number.
 struct Script(Vec<Entry>);
 
 impl Script {
@@ -39,7 +39,7 @@ impl Script {
     }
 }
 
-/// Two stages: one makes `a`, the next reads it and makes `b` and `letters`, and of these `c`.
+/// Two stages: one writes `a`; the next reads it and writes `b` and `letters`, and from these `c`.
 fn script() -> Script {
     let mut script = Script(Vec::new());
     script.begin("/one");
@@ -47,10 +47,10 @@ fn script() -> Script {
     script.unit("/one/tiles", 1, &[("a", 1)]);
     script.unit("/one", 0, &[]);
     script.begin("/two");
-    script.unit("/two/tiles", 0, &[("b", 0), ("letters", 0)]);
-    script.unit("/two/tiles", 1, &[("b", 1), ("letters", 1)]);
+    script.unit("/two/tiles", 0, &[("b", 0), ("sent", 0)]);
+    script.unit("/two/tiles", 1, &[("b", 1), ("sent", 1)]);
     script.unit("/two/deliver", 0, &[("c", 0)]);
-    script.deleted("letters");
+    script.deleted("sent");
     script.unit("/two", 0, &[]);
     script
 }
@@ -73,7 +73,7 @@ fn nothing_is_done_about_no_damage() {
     let history = History::of(&script().0);
     assert_eq!(history.mend(&[]), None);
     assert_eq!(history.needed().len(), 5);
-    assert!(history.is_deleted("letters") && !history.is_deleted("a"));
+    assert!(history.is_deleted("sent") && !history.is_deleted("a"));
 }
 
 #[test]
@@ -83,7 +83,7 @@ fn a_unit_is_done_again_if_its_inputs_are_there() {
     let found = history.mend(&[damage("b", 1)]);
     assert_eq!(found, Some(Mending::Redo(units.clone())));
     history.forget(&units);
-    // The unit, and the stage around it; not what was made of it.
+    // The unit and the stage around it, but not the units that used its result.
     assert_eq!(history.units("/two/tiles"), [0]);
     assert!(history.units("/two").is_empty());
     assert_eq!(history.units("/two/deliver"), [0]);
@@ -93,7 +93,7 @@ fn a_unit_is_done_again_if_its_inputs_are_there() {
 
 #[test]
 fn a_stage_begins_again_if_they_are_not() {
-    // What was sent is gone, so it cannot be delivered again.
+    // The rows that were sent are deleted, so they cannot be delivered again.
     let history = History::of(&script().0);
     assert_eq!(history.mend(&[damage("c", 0)]), rewind(4, "/two"));
     let mut later = script();
@@ -106,7 +106,7 @@ fn a_stage_begins_again_if_they_are_not() {
 #[test]
 fn a_unit_that_was_done_again_counts_as_it_is() {
     let mut again = script();
-    again.unit("/two/tiles", 1, &[("b", 1), ("letters", 1)]);
+    again.unit("/two/tiles", 1, &[("b", 1), ("sent", 1)]);
     let history = History::of(&again.0);
     assert_eq!(history.needed().len(), 5);
     assert_eq!(history.units("/two/tiles"), [0, 1]);

@@ -1,10 +1,10 @@
-//! Memory that the allocator keeps for later.
+//! Freed memory that the allocator keeps.
 
-/// True if the allocator can be told; others are left alone.
+/// True if the allocator is glibc's; others are left as they are.
 pub(super) const CAN: bool = cfg!(all(target_os = "linux", target_env = "gnu"));
 
-/// Gives back to the system what was freed on `threads` and elsewhere: what a stage has freed is of little
-/// use to the next one, whose lists have other sizes. From then on large lists go back at once.
+/// Returns freed memory of `threads` and of the other threads to the system: the next stage has lists of
+/// other sizes and makes little use of it. From then on large lists are returned as soon as they are freed.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 pub(super) fn trim(threads: &rayon::ThreadPool) {
     glibc::trim(threads);
@@ -22,27 +22,28 @@ mod glibc {
     use std::ffi::c_int;
     use std::hint::black_box;
 
-    /// Larger lists go back at once when they are freed, and need no copy to grow.
+    /// Larger lists are returned to the system as soon as they are freed, and grow without a copy.
     const MAPPED: c_int = 1 << 20;
 
-    /// What is free at the end of a thread's heap stays up to this.
+    /// Up to this size free memory at the end of a thread's heap is kept.
     const KEPT: c_int = 4 << 20;
 
-    /// Freeing a list so large makes glibc look at the end of the thread's heap.
+    /// Freeing a list of this size makes glibc check the end of the thread's heap.
     const NOTICED: usize = 96 << 10;
 
     pub(super) fn trim(threads: &rayon::ThreadPool) {
         set(libc::M_TRIM_THRESHOLD, 0);
         threads.broadcast(|_| drop(black_box(Vec::<u8>::with_capacity(NOTICED))));
-        // The first setting ends what glibc does by itself.
+        // The first setting ends the automatic adjustment by glibc.
         set(libc::M_TRIM_THRESHOLD, KEPT);
         set(libc::M_MMAP_THRESHOLD, MAPPED);
-        // SAFETY: any thread may call it at any time; it takes only memory that is free.
+        // SAFETY: any thread may call it at any time; it affects only free memory.
         unsafe { libc::malloc_trim(0) };
     }
 
     fn set(parameter: c_int, value: c_int) {
-        // SAFETY: these two are single words, which glibc itself changes while threads are at work (in `free`).
+        // SAFETY: these two are single words, which glibc itself changes while threads are at work (in
+        // `free`).
         unsafe { libc::mallopt(parameter, value) };
     }
 }

@@ -1,26 +1,26 @@
-//! What the unit of work on this thread holds.
+//! The memory that the unit of work on this thread holds.
 
 use super::{MemoryPool, Reservation};
 use std::cell::{Cell, RefCell};
 use std::collections::HashMap;
 
-/// Changes below this are told later.
+/// Smaller changes are not reported at once.
 const STEP: u64 = 64 << 10;
 
 thread_local! {
     static NOW: Cell<u64> = const { Cell::new(0) };
     static MOST: Cell<u64> = const { Cell::new(0) };
-    /// What the pool knows of it; `None` if it is told only when the unit has ended.
+    /// The usage last reported to the pool; `None` if it is reported only when the unit ends.
     static TOLD: Cell<Option<u64>> = const { Cell::new(None) };
     static RESERVED: RefCell<Option<Reservation>> = const { RefCell::new(None) };
 }
 
-/// Bytes that the unit on this thread holds until this is dropped, on the same thread.
+/// Bytes that the unit on this thread holds until this value is dropped, on the same thread.
 #[derive(Debug, Default)]
 pub struct Holding(u64);
 
 impl Holding {
-    /// Now it is so many bytes.
+    /// Changes the number of bytes.
     pub fn set(&mut self, bytes: u64) {
         let now = NOW.get().saturating_sub(self.0).saturating_add(bytes);
         self.0 = bytes;
@@ -35,7 +35,7 @@ impl Drop for Holding {
     }
 }
 
-/// Now the unit on this thread holds so much.
+/// Sets the number of bytes that the unit on this thread holds.
 fn change(now: u64) {
     NOW.set(now);
     if TOLD.get().is_some_and(|told| told.abs_diff(now) >= STEP) {
@@ -48,26 +48,25 @@ fn change(now: u64) {
     }
 }
 
-/// Says that the unit on this thread holds `bytes` as long as the result lives.
+/// Reports that the unit on this thread holds `bytes` as long as the result lives.
 pub fn hold(bytes: u64) -> Holding {
     let mut holding = Holding::default();
     holding.set(bytes);
     holding
 }
 
-/// Bytes that a list has room for.
+/// Bytes of a list's capacity.
 pub fn bytes_of<T>(list: &Vec<T>) -> u64 {
     (list.capacity() * size_of::<T>()) as u64
 }
 
-/// Bytes that a table has room for.
+/// Bytes of a hash table's capacity.
 pub fn table_bytes<K, V, S>(table: &HashMap<K, V, S>) -> u64 {
-    // Seven eighths of the places may be taken; each has a byte beside it.
+    // At most seven eighths of the places are in use; each place has a byte of control data.
     (table.capacity().div_ceil(7) * 8 * (size_of::<(K, V)>() + 1)) as u64
 }
 
-/// Gives back part of what the unit on this thread has reserved: its sizes are known, and it will not
-/// take that.
+/// Reduces the reservation of the unit on this thread by `bytes`, once its sizes are known.
 pub fn give_back(bytes: u64) {
     RESERVED.with_borrow_mut(|reserved| {
         if let Some(reserved) = reserved {
@@ -80,7 +79,7 @@ pub fn give_back(bytes: u64) {
 pub(in crate::workspace) struct Unit;
 
 impl Unit {
-    /// Begins a unit that has `reserved` so much.
+    /// Begins a unit with the reservation `reserved`.
     pub(in crate::workspace) fn begin(reserved: Reservation) -> Self {
         NOW.set(0);
         MOST.set(0);
@@ -89,7 +88,7 @@ impl Unit {
         Self
     }
 
-    /// What it held at most; all that it reserved, if it said nothing.
+    /// Largest usage of the unit; its whole reservation if it reported none.
     fn most(&self) -> u64 {
         match MOST.get() {
             0 => RESERVED.with_borrow(|reserved| reserved.as_ref().map_or(0, Reservation::bytes)),
@@ -105,7 +104,7 @@ impl Drop for Unit {
     }
 }
 
-/// A thread that does one unit after the other.
+/// A thread that does one unit after another.
 pub(in crate::workspace) struct Slot {
     pool: MemoryPool,
     name: &'static str,
@@ -123,7 +122,7 @@ impl Slot {
         }
     }
 
-    /// A unit has ended.
+    /// Notes the end of a unit.
     pub(in crate::workspace) fn ended(&mut self, unit: Unit) {
         let (most, said) = (unit.most(), MOST.get() > 0);
         drop(unit);
@@ -131,14 +130,14 @@ impl Slot {
         if !self.used {
             self.used = true;
             state.threads.0 += 1;
-            // A thread that has worked keeps that as long as it lives.
+            // A thread that has worked keeps its own memory as long as it lives.
             if state.threads.0 > state.threads.1 {
                 state.threads.1 += 1;
                 state.held.add("threads", self.pool.thread());
             }
         }
         if self.pool.is_tight() {
-            // The pool was told, if there was anything to tell.
+            // Usage that the unit reported is in the pool already.
             let silent = if said { 0 } else { most };
             state.held.add(self.name, silent);
             state.held.take(self.name, silent);

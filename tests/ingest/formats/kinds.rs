@@ -1,10 +1,10 @@
-//! The kinds of files: how to make them, and which of other programs are of them.
+//! The kinds of files: their makers, and files of other programs by kind.
 
 use super::{las, ply, text};
 use crate::bench::Bench;
 use std::path::PathBuf;
 
-/// Makes files of a kind.
+/// Makes the files of a kind.
 pub type Kind = fn(&Bench) -> Vec<PathBuf>;
 
 /// All kinds.
@@ -205,7 +205,7 @@ pub const KINDS: &[(&str, Kind)] = &[
     ("what is no regular file", |_| vec!["/dev/null".into()]),
 ];
 
-/// Files of other programs by the kind that they are of.
+/// Files of other programs by kind.
 pub const ZOO: &[(&str, &[&str])] = &[
     (
         "LAS 1.2, point formats 0 to 3",

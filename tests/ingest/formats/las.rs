@@ -39,7 +39,7 @@ pub fn old_laz(bench: &Bench) -> Vec<PathBuf> {
     files
 }
 
-/// With the record that makes a file COPC, as far as its points go: they are LAZ.
+/// With the record that makes a file COPC, as far as its points are concerned: they are LAZ.
 pub fn copc(bench: &Bench) -> Vec<PathBuf> {
     let path = bench.path("a.copc.laz");
     let mut builder = las::Builder::from((1, 4));
@@ -111,7 +111,7 @@ pub fn no_table(bench: &Bench) -> Vec<PathBuf> {
         let mut bytes = std::fs::read(&path).unwrap();
         let data = data_start(&bytes);
         bytes[data..data + 8].copy_from_slice(&(-1i64).to_le_bytes());
-        // Nor at the end of the file.
+        // Nor is it at the end of the file.
         bytes.extend((-1i64).to_le_bytes());
         if variable {
             let at = chunk_size(&bytes);
@@ -122,7 +122,7 @@ pub fn no_table(bench: &Bench) -> Vec<PathBuf> {
     files
 }
 
-/// A LAS file with these bytes in these places.
+/// A LAS file with these bytes at these offsets.
 pub fn patched(bench: &Bench, patches: &[(usize, &[u8])]) -> Vec<PathBuf> {
     let mut bytes = std::fs::read(make(bench, "good.las", 2, 0)).unwrap();
     for (at, patch) in patches {
@@ -147,7 +147,7 @@ pub fn boxes(bench: &Bench) -> Vec<PathBuf> {
 
 pub fn trailing(bench: &Bench) -> Vec<PathBuf> {
     let mut bytes = std::fs::read(make(bench, "a.las", 2, 0)).unwrap();
-    // Not a whole number of records.
+    // Not a multiple of the size of a record.
     bytes.extend([7; 1001]);
     vec![bench.write("b.las", bytes)]
 }

@@ -1,4 +1,4 @@
-//! `docs/formats.md` says what becomes of which kind of file: here it does.
+//! The outcomes in `docs/formats.md`, checked for each kind of file.
 
 mod kinds;
 mod las;
@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 
 const PAGE: &str = include_str!("../../../docs/formats.md");
 
-/// A row of a table: kind of file, outcome, what is said.
+/// A row of a table: kind of file, outcome, message.
 struct Row {
     kind: &'static str,
     outcome: &'static str,
@@ -36,7 +36,7 @@ fn rows() -> Vec<Row> {
     .collect()
 }
 
-/// True if `text` has the parts of `pattern` between `…` in their order.
+/// True if `text` contains the parts of `pattern` between `…` in this order.
 fn has(text: &str, pattern: &str) -> bool {
     let mut rest = text;
     pattern.split('…').all(|part| match rest.find(part) {
@@ -48,7 +48,7 @@ fn has(text: &str, pattern: &str) -> bool {
     })
 }
 
-/// What is wrong with what becomes of a file.
+/// The difference between the outcome of a file and its row; none if they agree.
 fn check(bench: &Bench, row: &Row, path: &Path) -> Option<String> {
     let outcome = bench.read(&[path.to_path_buf()]);
     let (outcome, said) = match outcome {
@@ -79,7 +79,7 @@ fn the_page_says_what_becomes_of_every_kind_of_file() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// Where a folder with odd files of other programs is there, those that belong to a row.
+/// Files of other programs, if their folder exists, have the outcomes of their rows.
 #[test]
 fn files_of_other_programs_are_as_the_page_says() {
     let zoo = PathBuf::from("../shared/data/zoo");

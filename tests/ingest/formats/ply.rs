@@ -33,7 +33,7 @@ pub fn lists(bench: &Bench) -> Vec<PathBuf> {
     made(bench, &["double"], true)
 }
 
-/// A text file with so many vertices, by its header.
+/// A text file with this number of vertices in its header.
 pub fn text(count: &str, body: &str) -> String {
     format!("ply\nformat ascii 1.0\nelement vertex {count}\n{XYZ}end_header\n{body}")
 }

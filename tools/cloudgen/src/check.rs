@@ -1,4 +1,4 @@
-//! What is impossible in a description.
+//! Checks of a description.
 
 use crate::cloud::{Cloud, DEFAULT_SIZE, Order};
 use crate::error::{Error, Result};
@@ -6,7 +6,7 @@ use crate::kind::Kind;
 use crate::outdoor::{HIGHEST_WALL, MOST_TREES, MOST_WIRES, Objects};
 use crate::sampling::Sampling;
 
-/// Most layers of a cloud.
+/// Largest number of layers of a cloud.
 const MOST_LAYERS: u32 = 100;
 
 /// Refuses numbers out of range and settings that exclude each other.
@@ -86,7 +86,7 @@ fn objects(objects: &Objects) -> Result<()> {
     }
 }
 
-/// Two settings that exclude each other, and why.
+/// Two settings that exclude each other, and the reason.
 fn excluded(cloud: &Cloud) -> Option<(&'static str, &'static str, &'static str)> {
     let special = if cloud.falloff {
         Some("falloff")

@@ -11,13 +11,13 @@ use crate::reference;
 use crate::sampling::Sampling;
 use crate::write::{self, Format};
 
-/// Diagonal of the bounding box where none is given.
+/// Default diagonal of the bounding box.
 pub(crate) const DEFAULT_SIZE: f64 = 1000.0;
 
 /// Order of the points.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Order {
-    /// No order.
+    /// Random order.
     #[default]
     Random,
     /// Along a sweep over the surface; with scan lines, line after line.
@@ -34,7 +34,7 @@ pub enum NoiseMode {
     Isotropic,
 }
 
-/// Everything that determines a cloud. Equal descriptions give equal points, to the bit.
+/// The description of a cloud. Equal descriptions give equal points, to the bit.
 ///
 /// ```
 /// use outcrop_cloudgen::{Cloud, Kind};
@@ -52,38 +52,37 @@ pub enum NoiseMode {
 pub struct Cloud {
     /// The surface.
     pub kind: Kind,
-    /// The mesh file, OBJ or PLY, for the kind of that name. It is moved to the origin and scaled
-    /// to the size.
+    /// The mesh file, OBJ or PLY, for the kind `Mesh`. It is moved to the origin and scaled to the size.
     pub mesh: Option<PathBuf>,
-    /// How the points lie on the surface.
+    /// Distribution of the points on the surface.
     pub sampling: Sampling,
     /// Number of points, outliers and duplicates included.
     pub points: u64,
     /// Seed of all random numbers.
     pub seed: u64,
-    /// Diagonal of the bounding box. The outdoor world has a size of its own.
+    /// Diagonal of the bounding box. The outdoor world has a fixed size.
     pub size: f64,
     /// Standard deviation of the noise.
     pub noise: f64,
     /// Direction of the noise.
     pub noise_mode: NoiseMode,
-    /// Fraction of points placed anywhere in a box 1.5 times the size; outdoors in the air, up to
-    /// 30 above the ground.
+    /// Fraction of outliers: random points in a box 1.5 times the size; outdoors in the air, up to 30 above
+    /// the ground.
     pub outliers: f64,
-    /// Fraction of points that are exact copies of an earlier one.
+    /// Fraction of duplicates: exact copies of an earlier point.
     pub duplicates: f64,
-    /// Copies of the surface that the points are dealt out to.
+    /// Number of copies of the surface among which the points are distributed.
     pub layers: u32,
-    /// Distance of each layer from the one before, along the normal.
+    /// Distance between successive layers, along the normal.
     pub layer_offset: f64,
-    /// Let the density fall with the squared distance from the scanner.
+    /// If true, density falls with the squared distance from the scanner.
     pub falloff: bool,
-    /// Place of the scanner in fractions of the bounding box; None for a place that suits the kind.
+    /// Position of the scanner in fractions of the bounding box; None for a default of the kind.
     pub scanner: Option<[f64; 3]>,
-    /// Put the points on lines, this many times closer along than across.
+    /// Scan lines: points are this many times closer along a line than the lines are to each other.
     pub scanlines: Option<f64>,
-    /// Turn everything by the frame (2 1 2)/3, (-2 2 1)/3, (-1 -2 2)/3. A grid stays integer: its
-    /// steps are then multiples of (2 1 2) and (-2 2 1).
+    /// Rotation by the frame (2 1 2)/3, (-2 2 1)/3, (-1 -2 2)/3. A grid stays integer: its steps are then
+    /// multiples of (2 1 2) and (-2 2 1).
     pub rotated: bool,
     /// Added to every coordinate at the end.
     pub offset: [f64; 3],
@@ -127,12 +126,12 @@ impl Cloud {
         }
     }
 
-    /// Sets how the points lie on the surface.
+    /// Sets the distribution of the points on the surface.
     pub fn sampling(self, sampling: Sampling) -> Self {
         Cloud { sampling, ..self }
     }
 
-    /// Deals the points out to layers, each `offset` further along the normal.
+    /// Distributes the points among layers, each `offset` further along the normal.
     pub fn layers(self, layers: u32, offset: f64) -> Self {
         Cloud {
             layers,
@@ -181,7 +180,7 @@ impl Cloud {
         Cloud { falloff, ..self }
     }
 
-    /// Sets the place of the scanner, in fractions of the bounding box.
+    /// Sets the position of the scanner, in fractions of the bounding box.
     pub fn scanner(self, scanner: [f64; 3]) -> Self {
         Cloud {
             scanner: Some(scanner),
@@ -222,7 +221,7 @@ impl Cloud {
         self.kind.euler_characteristic()
     }
 
-    /// Prepares the surface. This is where impossible settings are refused.
+    /// Prepares the surface; checks the settings.
     pub fn generator(&self) -> Result<Generator> {
         check(self)?;
         Generator::new(self)
@@ -254,8 +253,8 @@ impl Cloud {
         Ok(paths)
     }
 
-    /// Writes the true surface as a PLY mesh, in the coordinates of the points: the first layer,
-    /// without noise. Curved surfaces are met to within `tolerance` of the size, terrain roughly.
+    /// Writes the true surface as a PLY mesh, in the coordinates of the points: the first layer, without
+    /// noise. Curved surfaces are approximated within `tolerance` times the size, terrain roughly.
     pub fn write_reference(&self, path: impl AsRef<Path>, tolerance: f64) -> Result<()> {
         check(self)?;
         write::write_reference(&reference::reference(self, tolerance)?, path.as_ref())
@@ -272,8 +271,8 @@ impl Cloud {
         Ok(discs)
     }
 
-    /// Measures how a mesh of the outdoor world, a binary PLY file, meets the ground. Of the
-    /// description only seed, objects and offset matter.
+    /// Compares a mesh of the outdoor world, a binary PLY file, with the ground. Only seed, objects and
+    /// offset of the description are used.
     pub fn measure_mesh(&self, path: impl AsRef<Path>) -> Result<GroundReport> {
         let discs = self.land_discs("measuring a mesh")?;
         outdoor::measure(&discs, self.offset, path.as_ref())

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 /// Result with this crate's [`Error`].
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
-/// Why a cloud could not be made or written.
+/// The errors of making or writing a cloud.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -14,9 +14,9 @@ pub enum Error {
     Parameter {
         /// Name of the setting.
         name: &'static str,
-        /// The value given.
+        /// The given value.
         found: String,
-        /// What is accepted.
+        /// The accepted values.
         expected: String,
     },
     /// Two settings exclude each other.
@@ -35,12 +35,12 @@ pub enum Error {
         /// The output file.
         path: PathBuf,
     },
-    /// The operating system refused to write a file.
+    /// A file cannot be written.
     #[error("{path}: cannot {action}: {source}", path = path.display())]
     Io {
         /// The output file.
         path: PathBuf,
-        /// What was being done.
+        /// The failed action.
         action: &'static str,
         /// The system's reason.
         source: std::io::Error,
@@ -50,7 +50,7 @@ pub enum Error {
     Mesh {
         /// The mesh file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The reason.
         what: String,
     },
     /// The cloud cannot be expressed in LAS.
@@ -58,7 +58,7 @@ pub enum Error {
     Las {
         /// The output file.
         path: PathBuf,
-        /// What the LAS writer says.
+        /// The error of the LAS writer.
         source: las::Error,
     },
 }

@@ -1,4 +1,4 @@
-//! Making the points of a cloud.
+//! The points of a cloud.
 
 use std::thread;
 
@@ -14,16 +14,17 @@ use crate::sampling::{Sampling, choose};
 use crate::surface::{Grid, Line, Sample, Surface, box_distance, box_point, turned, turned_back};
 use crate::vec3::{Vec3, add, length, scale, sub};
 
-/// Draws until a point survives the falloff; far more than any sensible scanner place needs.
+/// Largest number of attempts for a point with the density falloff; far more than needed for sensible
+/// positions of the scanner.
 const FALLOFF_TRIES: u32 = 4096;
 
-/// Size of the box of outliers in terms of the bounding box.
+/// Size of the box of outliers, in units of the bounding box.
 const OUTLIER_BOX: f64 = 1.5;
 
-/// Points below this number are not worth a second thread.
+/// Fewer points are made on one thread.
 const PARALLEL_FROM: usize = 4096;
 
-/// Where positions come from.
+/// Source of the positions.
 #[derive(Debug)]
 enum Source {
     Grid(Grid),
@@ -33,32 +34,32 @@ enum Source {
         surface: Box<dyn Surface>,
         scan: Option<(Vec<Line>, Picker)>,
     },
-    /// Points that were chosen beforehand.
+    /// Points chosen in advance.
     Chosen {
         surface: Box<dyn Surface>,
         samples: Vec<Sample>,
     },
 }
 
-/// How point `i` gets its place in the sweep over the surface.
+/// Position of point `i` in the sweep over the surface.
 #[derive(Debug)]
 enum Sweep {
-    /// By chance, independent of all others.
+    /// Random, independent of all others.
     Chance,
-    /// Point `i` lies in the `i`-th of equal parts of the sweep.
+    /// Random in the `i`-th of equal parts of the sweep.
     InOrder,
-    /// As in order, but through a permutation.
+    /// As in order, but with a permutation of the parts.
     Shuffled(Permutation),
 }
 
-/// Makes any point of a cloud on demand. Point `i` depends on the description and `i` only.
+/// Makes any point of a cloud on demand. Point `i` depends only on the description and `i`.
 #[derive(Debug)]
 pub struct Generator {
     cloud: Cloud,
     source: Source,
     sweep: Sweep,
     scanner: Vec3,
-    /// Distance of the scanner within which the density is constant.
+    /// Distance from the scanner within which the density is constant.
     near: f64,
     /// Box of the outliers, before rotation and offset.
     outlier_box: [Vec3; 2],
@@ -114,7 +115,7 @@ impl Generator {
             Order::Random => Sweep::Chance,
         };
         let low = (1.0 - OUTLIER_BOX) / 2.0;
-        // A flat box gets the depth of a cube that size: outliers must leave the surface.
+        // A flat box gets a quarter of the size as depth: outliers must leave the surface.
         let depth = cloud.size / 4.0;
         let mut fat = bounds;
         for k in 0..3 {
@@ -145,7 +146,7 @@ impl Generator {
         self.cloud.points
     }
 
-    /// Whether there is no point.
+    /// True if there is no point.
     pub fn is_empty(&self) -> bool {
         self.cloud.points == 0
     }
@@ -154,7 +155,7 @@ impl Generator {
     pub fn sample(&self, index: u64) -> Sample {
         let mut index = index % self.cloud.points.max(1);
         if self.cloud.duplicates > 0.0 {
-            // A copy is always of an earlier point, so this ends.
+            // A copy is always of an earlier point, so the loop ends.
             while index > 0 {
                 let mut rng = Rng::at(self.cloud.seed, Purpose::Duplicate, index);
                 if rng.uniform() >= self.cloud.duplicates {
@@ -166,7 +167,7 @@ impl Generator {
         self.original(index)
     }
 
-    /// Area of the surface, one layer of it; `None` for a grid and where there is no single surface.
+    /// Area of one layer of the surface; `None` for a grid and if there is no single surface.
     pub fn area(&self) -> Option<f64> {
         match &self.source {
             Source::Grid(_) | Source::Odd(_) | Source::Outdoor(_) => None,
@@ -183,7 +184,7 @@ impl Generator {
         }
     }
 
-    /// Side of the square of the outdoor world that has one point on a roof; None for other kinds.
+    /// Side of the square with one point on a roof of the outdoor world; None for other kinds.
     pub fn outdoor_spacing(&self) -> Option<f64> {
         match &self.source {
             Source::Outdoor(outdoor) => Some(outdoor.spacing()),
@@ -196,9 +197,9 @@ impl Generator {
         (0..self.cloud.points).map(|index| self.sample(index).position)
     }
 
-    /// Distance of a position to the true surface, the first layer: exact for the kinds with a
-    /// closed form and for meshes (where it is slow: it looks at every triangle), of first order
-    /// for `bumpy` and `terrain`; not a number where there is no single surface.
+    /// Distance of a position from the true surface, the first layer: exact for the kinds with a closed form
+    /// and for meshes (slow: all triangles are examined), of first order for `bumpy` and `terrain`; NaN if
+    /// there is no single surface.
     pub fn distance(&self, position: [f64; 3]) -> f64 {
         let p = sub(position, self.cloud.offset);
         match &self.source {
@@ -235,7 +236,7 @@ impl Generator {
         });
     }
 
-    /// Largest absolute coordinate before the offset that can reasonably occur.
+    /// Upper bound for absolute coordinates before the offset, for sensible settings.
     pub(crate) fn reach(&self) -> f64 {
         let corner = self
             .outlier_box
@@ -308,7 +309,7 @@ impl Generator {
         sample
     }
 
-    /// Place of point `index` in the order of the source.
+    /// Position of point `index` in the order of the source.
     fn rank(&self, index: u64) -> u64 {
         match &self.sweep {
             Sweep::Shuffled(permutation) => permutation.apply(index),
@@ -346,14 +347,14 @@ impl Generator {
         }
     }
 
-    /// Whether a point survives the falloff.
+    /// True if a point survives the falloff.
     fn seen(&self, sample: &Sample, rng: &mut Rng) -> bool {
         let near = self.near / length(sub(sample.position, self.scanner)).max(self.near);
         rng.uniform() < near * near
     }
 
     fn turn(&self, sample: Sample) -> Sample {
-        // The box of a grid, and so its outliers, is in the turned frame already.
+        // The box of a grid, and so its outliers, is already rotated.
         if !self.cloud.rotated || matches!(self.source, Source::Grid(_)) {
             return sample;
         }

@@ -13,7 +13,7 @@ pub enum Kind {
     Sphere,
     /// A torus around the z axis, its tube 0.4 of the ring.
     Torus,
-    /// A bumpy smooth closed surface of genus 5.
+    /// A smooth closed surface of genus 5 with bumps.
     Bumpy,
     /// A height field with hills and roughness over a square.
     Terrain,
@@ -27,14 +27,14 @@ pub enum Kind {
     Corner,
     /// A given triangle mesh.
     Mesh,
-    /// Hilly ground with houses, trees, walls and wires, from the air; always 400 x 400.
+    /// Hilly ground with houses, trees, walls and wires, as an aerial scan; always 400 x 400.
     Outdoor,
-    /// A cloud without a surface, or with one that is not fit to be reconstructed.
+    /// A cloud without a surface, or with one unfit for reconstruction.
     Odd(Odd),
 }
 
 impl Kind {
-    /// All kinds that have one surface and need no file.
+    /// All kinds with one surface that need no file.
     pub const ALL: [Kind; 8] = [
         Kind::Sphere,
         Kind::Torus,

@@ -1,11 +1,10 @@
 //! Point clouds with known ground truth, for tests and measurements.
 //!
-//! A [`Cloud`] describes a cloud: the surface ([`Kind`]), the number of points, the seed and what
-//! a real scanner would do to it (noise, outliers, duplicates, uneven density). Its
-//! [`Generator`] makes any point on demand, and [`Cloud::write`] streams all of them to a file, in
-//! a few megabytes of memory whatever the number of points.
+//! A [`Cloud`] describes a cloud: the surface ([`Kind`]), the number of points, the seed, and the effects of
+//! a real scanner (noise, outliers, duplicates, uneven density). Its [`Generator`] makes any point on demand,
+//! and [`Cloud::write`] streams all of them to a file, in a few megabytes of memory for any number of points.
 //!
-//! Uniform clouds are like that. For other [`Sampling`] all points are chosen first and held in memory.
+//! This holds for uniform clouds. For other [`Sampling`] all points are chosen in advance and held in memory.
 //!
 //! Every point is a pure function of the description and its index, and all transcendental
 //! functions come from `libm`: the same description gives the same bytes everywhere.
@@ -13,7 +12,7 @@
 //! Surfaces other than the grid are centred on the origin before the offset; the grid and the
 //! outdoor world start at the origin.
 //!
-//! [`Cloud::measure_mesh`] tells how a mesh of the outdoor world meets its ground.
+//! [`Cloud::measure_mesh`] compares a mesh of the outdoor world with its ground.
 
 mod check;
 mod cloud;

@@ -28,16 +28,16 @@ struct Args {
     #[arg(long, value_name = "FILE")]
     mesh: Option<PathBuf>,
 
-    /// How the points lie on the surface; regular and adaptive hold all points in memory (400 bytes
-    /// each) and take 10 million at most
+    /// Distribution of the points on the surface; regular and adaptive hold all points in memory (400 bytes
+    /// each) and are limited to 10 million
     #[arg(long, value_enum, value_name = "PATTERN", default_value = "uniform")]
     sampling: SamplingArg,
 
-    /// Write the true surface as well, a PLY mesh in the coordinates of the points
+    /// Also write the true surface, as a PLY mesh in the coordinates of the points
     #[arg(long, value_name = "FILE.ply")]
     reference: Option<PathBuf>,
 
-    /// Distance of that mesh from curved surfaces, in terms of the size; a millionth takes a million
+    /// Distance of that mesh from curved surfaces, in units of the size; a millionth takes a million
     /// triangles for a sphere
     #[arg(long, value_name = "FRACTION", default_value_t = 1e-6)]
     reference_tolerance: f64,
@@ -46,7 +46,7 @@ struct Args {
     #[arg(short, long, value_name = "N", default_value = "100k", value_parser = parse_count)]
     points: u64,
 
-    /// Output file; its extension decides on the format: .las, .laz, .ply, .xyz
+    /// Output file; its extension selects the format: .las, .laz, .ply, .xyz
     #[arg(
         short,
         long,
@@ -55,10 +55,10 @@ struct Args {
     )]
     output: Option<PathBuf>,
 
-    /// Write no cloud, but measure a mesh of the outdoor world with the same seed, trees and offset,
-    /// a binary PLY file, and print one line of JSON: the share of the near-horizontal area that
-    /// faces down, in all and on open ground (away from houses, trees, walls and the border),
-    /// boundary edges there, and the area of triangles there that are more than 1 off the ground
+    /// Write no cloud, but measure a mesh of the outdoor world with the same seed, trees and offset, a binary
+    /// PLY file, and print one line of JSON: the share of the near-horizontal area that faces down, in all
+    /// and on open ground (away from houses, trees, walls and the border), boundary edges there, and the area
+    /// of triangles there that are more than 1 off the ground
     #[arg(
         long,
         value_name = "FILE.ply",
@@ -87,7 +87,7 @@ struct Args {
     #[arg(long, value_enum, value_name = "MODE", default_value = "normal")]
     noise_mode: NoiseModeArg,
 
-    /// Fraction of points anywhere in an inflated box; outdoors in the air, up to 30 above ground
+    /// Fraction of random points in an enlarged box; outdoors in the air, up to 30 above ground
     #[arg(long, value_name = "FRACTION", default_value_t = 0.0)]
     outliers: f64,
 
@@ -95,11 +95,11 @@ struct Args {
     #[arg(long, value_name = "FRACTION", default_value_t = 0.0)]
     duplicates: f64,
 
-    /// Deal the points out to N layers, each shifted along the normal
+    /// Distribute the points among N layers, each shifted along the normal
     #[arg(long, value_name = "N", default_value_t = 1)]
     layers: u32,
 
-    /// Distance of each layer from the one before
+    /// Distance between successive layers
     #[arg(long, value_name = "UNITS", default_value_t = 0.0)]
     layer_offset: f64,
 
@@ -115,19 +115,19 @@ struct Args {
     #[arg(long, value_name = "UNITS")]
     wall_height: Option<f64>,
 
-    /// Let the density fall with the squared distance from a scanner
+    /// Let density fall with the squared distance from a scanner
     #[arg(long)]
     falloff: bool,
 
-    /// Place of that scanner in fractions of the bounding box, e.g. 0.5,0.5,2
+    /// Position of that scanner in fractions of the bounding box, e.g. 0.5,0.5,2
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_triple, allow_hyphen_values = true)]
     scanner: Option<Triple>,
 
-    /// Put the points on lines, RATIO times closer along than across
+    /// Put the points on scan lines, RATIO times closer along than across
     #[arg(long, value_name = "RATIO")]
     scanlines: Option<f64>,
 
-    /// Turn everything by the frame (2 1 2)/3, (-2 2 1)/3, (-1 -2 2)/3; a grid stays integer
+    /// Rotate by the frame (2 1 2)/3, (-2 2 1)/3, (-1 -2 2)/3; a grid stays integer
     #[arg(long)]
     rotated: bool,
 
@@ -164,9 +164,9 @@ enum NoiseModeArg {
 enum SamplingArg {
     /// Each point independent of the others
     Uniform,
-    /// Evenly spaced without a direction (blue noise)
+    /// Evenly spaced, without a preferred direction (blue noise)
     Regular,
-    /// Evenly spaced, closer where the surface is curved
+    /// Evenly spaced, closer where curvature is high
     Adaptive,
 }
 
@@ -179,7 +179,7 @@ enum OrderArg {
     Sorted,
 }
 
-/// Three coordinates; a type of its own since clap reads a bare array as repeated values.
+/// Three coordinates; a type of its own because clap reads a bare array as repeated values.
 #[derive(Clone, Copy, Debug)]
 struct Triple([f64; 3]);
 

@@ -1,4 +1,4 @@
-//! Reading a reference mesh: OBJ or PLY, told by the extension.
+//! Reading a reference mesh: OBJ or PLY, by the extension.
 
 use std::{
     fs::File,
@@ -66,13 +66,13 @@ fn obj(mut file: impl BufRead) -> Result<Tessellation, String> {
         ignore_lines: true,
         ..tobj::LoadOptions::default()
     };
-    // Materials are of no interest, and must not be looked for.
+    // Materials are not needed and not loaded.
     let no_material = |_: &Path| Ok(Default::default());
     let (models, _) =
         tobj::load_obj_buf(&mut file, &options, no_material).map_err(|e| e.to_string())?;
     let mut mesh = Tessellation::default();
     for model in models {
-        // Vertices are numbered by model.
+        // Vertices are numbered by object.
         let first = u32::try_from(mesh.vertices.len()).map_err(|e| e.to_string())?;
         mesh.vertices
             .extend(model.mesh.positions.as_chunks().0.iter().copied());

@@ -1,4 +1,4 @@
-//! Clouds that no scanner should make: what breaks programs that expect a surface.
+//! Clouds that are no scans of a surface, as tests of programs that expect one.
 
 use std::f64::consts::TAU;
 
@@ -11,11 +11,11 @@ const PLACES: u64 = 1000;
 /// Patches of [`Odd::Patches`].
 const PATCHES: u64 = 100;
 
-/// A cloud without a surface, or with one that is not fit to be reconstructed.
+/// A cloud without a surface, or with one unfit for reconstruction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Odd {
-    /// Two spheres, ten thousand times as far apart as they are wide.
+    /// Two spheres whose distance is ten thousand times their diameter.
     TwoClusters,
     /// Integer steps along one direction.
     LineGrid,
@@ -27,21 +27,21 @@ pub enum Odd {
     FewPlaces,
     /// The corners of an icosahedron.
     Icosahedron,
-    /// By chance along a line that no lattice meets exactly.
+    /// Random points on a line off every lattice.
     Line,
-    /// By chance in a cube.
+    /// Random points in a cube.
     Volume,
-    /// By chance in direction and in the logarithm of the distance, over nine powers of ten.
+    /// Random in direction and in the logarithm of the distance, over nine powers of ten.
     Powers,
-    /// Half of the points over a field, half over a millionth of it.
+    /// Half of the points on a field, half on a millionth of it.
     DenseInSparse,
-    /// A profile of hills: everything is on one line of a scanner.
+    /// A profile of hills: all points are on one scan line.
     ScanLine,
     /// A circle and its centre.
     Wheel,
     /// A sphere and its centre.
     Shell,
-    /// Spheres that take a hundredth of the volume together.
+    /// Spheres that together fill a hundredth of the volume.
     Patches,
 }
 
@@ -84,7 +84,7 @@ impl Odd {
         }
     }
 
-    /// No coordinate is farther from zero.
+    /// Upper bound for absolute coordinates.
     pub(crate) fn reach(self, points: u64, size: f64) -> f64 {
         match self {
             Odd::LineGrid => 2.0 * points as f64,
@@ -94,7 +94,7 @@ impl Odd {
         }
     }
 
-    /// Point `index` of `points`, in a cloud of this diagonal, about; integer grids have steps of one.
+    /// Point `index` of `points`, in a cloud of about this diagonal; integer grids have steps of one.
     pub(crate) fn point(self, index: u64, points: u64, size: f64, rng: &mut Rng) -> Vec3 {
         let side = size / 3f64.sqrt();
         match self {
@@ -152,7 +152,7 @@ impl Odd {
     }
 }
 
-/// A direction by chance.
+/// A random direction.
 fn direction(rng: &mut Rng) -> Vec3 {
     let z = 2.0 * rng.uniform() - 1.0;
     let ring = (1.0 - z * z).sqrt();
@@ -160,7 +160,7 @@ fn direction(rng: &mut Rng) -> Vec3 {
     [ring * cos, ring * sin, z]
 }
 
-/// A corner of an icosahedron, at distance one from the middle.
+/// A corner of an icosahedron, at distance one from the centre.
 fn icosahedron(corner: u64) -> Vec3 {
     let golden = f64::midpoint(1.0, 5f64.sqrt());
     let sign = |bit: u64| if corner >> bit & 1 == 0 { 1.0 } else { -1.0 };

@@ -1,9 +1,9 @@
-//! Choosing an item in proportion to its weight, monotone in the random number.
+//! Choice of an item in proportion to its weight, monotone in the random number.
 
-/// Cumulative weights with a guide table, so that a pick costs constant time on average.
+/// Cumulative weights with a guide table, for choices in constant time on average.
 ///
-/// Unlike an alias table it keeps the order: growing numbers give growing items, which makes
-/// sorted and stratified sampling possible.
+/// Unlike an alias table it keeps the order: larger numbers give later items, as sorted and stratified
+/// sampling need.
 #[derive(Clone, Debug)]
 pub(crate) struct Picker {
     /// `bounds[k]..bounds[k + 1]` of the unit interval belongs to item `k`.
@@ -52,7 +52,7 @@ impl Picker {
         let items = self.guide.len();
         let part = ((u * items as f64) as usize).min(items - 1);
         let mut item = self.guide[part] as usize;
-        // The product above rounds: it may name a part that begins a little after `u`.
+        // The product above is rounded: it may give a part that begins slightly after `u`.
         while item > 0 && self.bounds[item] > u {
             item -= 1;
         }

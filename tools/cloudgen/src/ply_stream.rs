@@ -1,4 +1,4 @@
-//! Reading a large binary PLY mesh face by face, without holding it.
+//! Reading a large binary PLY mesh face by face, in bounded memory.
 
 use std::{
     fs::File,
@@ -10,14 +10,14 @@ use outcrop_ply::{Element, Encoding, Header, Property, Scalar, TRIANGLE, real};
 
 use crate::error::{Error, Result};
 
-/// A triangle mesh in a file: little-endian, vertices first, no lists but the corners of triangles.
+/// A triangle mesh in a file: little-endian, vertices first, no lists except the corners of triangles.
 #[derive(Debug)]
 pub(crate) struct PlyStream {
     path: PathBuf,
     layout: Layout,
 }
 
-/// Where things are in the file.
+/// Layout of the file.
 #[derive(Debug)]
 struct Layout {
     /// Bytes of the header.
@@ -26,12 +26,12 @@ struct Layout {
     faces: u64,
     /// Bytes of a vertex.
     stride: usize,
-    /// Of x, y and z: place in a vertex, and type.
+    /// Offset in a vertex and type of x, y and z.
     places: [(usize, Scalar); 3],
 }
 
 impl PlyStream {
-    /// Reads the header, and checks that the file is as long as it says.
+    /// Reads the header, and checks the length of the file.
     pub(crate) fn open(path: &Path) -> Result<Self> {
         let file = File::open(path).map_err(|e| Error::io(path, "open the mesh", e))?;
         let metadata = file

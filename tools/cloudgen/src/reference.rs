@@ -9,10 +9,10 @@ use crate::surface::{
 };
 use crate::vec3::add;
 
-/// Finer than this a surface would have some hundred million triangles.
+/// A finer mesh would have some hundred million triangles.
 const LEAST_TOLERANCE: f64 = 1e-8;
 
-/// Surface of a kind that is not a grid.
+/// The surface of a kind that is not a grid.
 pub(crate) fn surface(cloud: &Cloud) -> Result<Option<Box<dyn Surface>>> {
     let size = cloud.size;
     Ok(Some(match cloud.kind {
@@ -31,7 +31,7 @@ pub(crate) fn surface(cloud: &Cloud) -> Result<Option<Box<dyn Surface>>> {
     }))
 }
 
-/// The first layer, without noise; `tolerance` in terms of the size.
+/// The first layer, without noise; `tolerance` in units of the size.
 pub(crate) fn reference(cloud: &Cloud, tolerance: f64) -> Result<Tessellation> {
     if !(LEAST_TOLERANCE..1.0).contains(&tolerance) {
         let expected = format!("{LEAST_TOLERANCE:e} to below 1");

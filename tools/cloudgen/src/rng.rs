@@ -17,7 +17,7 @@ fn unit(bits: u64) -> f64 {
     (bits >> 11) as f64 * (1.0 / (1u64 << 53) as f64)
 }
 
-/// What a stream is used for; streams of different purposes are independent.
+/// The purpose of a stream; streams of different purposes are independent.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Purpose {
     Position = 1,
@@ -37,7 +37,7 @@ impl Rng {
     /// The stream for item `index`.
     pub(crate) fn at(seed: u64, purpose: Purpose, index: u64) -> Self {
         let key = mix(seed.wrapping_add(GOLDEN.wrapping_mul(purpose as u64)));
-        // Mixed twice: neighbouring indices must not give overlapping streams.
+        // Mixed twice, so that the streams of neighbouring indices do not overlap.
         Rng(mix(mix(key ^ index).wrapping_add(key)))
     }
 
@@ -65,8 +65,8 @@ impl Rng {
     }
 }
 
-/// A pseudo-random permutation of `0..n`: a Feistel network on the next even power of two,
-/// walked until it lands inside.
+/// A pseudo-random permutation of `0..n`: a Feistel network on the next even power of two, repeated until the
+/// result is below `n`.
 #[derive(Clone, Debug)]
 pub(crate) struct Permutation {
     n: u64,

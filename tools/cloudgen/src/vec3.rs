@@ -1,4 +1,4 @@
-//! The few vector operations that the surfaces need.
+//! Vector operations.
 
 /// A point or vector.
 pub(crate) type Vec3 = [f64; 3];
@@ -31,7 +31,7 @@ pub(crate) fn length(a: Vec3) -> f64 {
     dot(a, a).sqrt()
 }
 
-/// `a` at length one; the zero vector stays zero.
+/// `a` scaled to unit length; the zero vector stays zero.
 pub(crate) fn normalize(a: Vec3) -> Vec3 {
     let len = length(a);
     if len > 0.0 { scale(a, 1.0 / len) } else { a }

@@ -1,4 +1,4 @@
-//! Files hold what was asked for.
+//! Content of the written files.
 
 use std::{fs, path::Path};
 
@@ -208,7 +208,7 @@ fn failures_are_errors() {
     assert!(!path.exists(), "refused before the file is touched");
 }
 
-/// A device that is always full shows that write errors surface, and do so without a panic.
+/// A device that is always full: write errors are reported, without a panic.
 #[cfg(target_os = "linux")]
 #[test]
 fn full_disk_is_an_error() {

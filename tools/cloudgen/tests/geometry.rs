@@ -1,4 +1,4 @@
-//! The points are where the ground truth says.
+//! Points agree with the ground truth.
 
 use outcrop_cloudgen::{Cloud, Error, Kind, NoiseMode, Order, Sampling};
 
@@ -176,7 +176,7 @@ fn layers_share_the_points() {
         let all: Vec<[f64; 3]> = generator.iter().collect();
         let count = |at| all.iter().filter(|p| near(p, at)).count();
         assert_eq!((count(0.0), count(3.0)), (1000, 1000));
-        // The second one is outside.
+        // The second point is outside.
         let outside = |p: &[f64; 3]| length(*p) > 0.0 && near(p, 3.0);
         let farthest = |points: &mut dyn Iterator<Item = &[f64; 3]>| {
             points.map(|p| length(*p)).fold(0.0, f64::max)
@@ -214,7 +214,7 @@ fn falloff_follows_the_squared_distance() {
             .count() as f64
     };
     let all = points(&cloud);
-    // Density times area of two rings with the same ratio of radii is the same.
+    // Two rings with the same ratio of radii have the same density times area.
     let (inner, outer) = (in_ring(&all, 60.0, 120.0), in_ring(&all, 150.0, 300.0));
     assert!((inner / outer - 1.0).abs() < 0.05, "{inner} {outer}");
 }

@@ -44,7 +44,7 @@ fn reference(cloud: &Cloud, folder: &Path) -> Mesh {
     )
 }
 
-/// Whether every edge has one triangle on either side, the Euler characteristic, six volumes.
+/// True if every edge has a triangle on either side; the Euler characteristic; six times the volume.
 fn properties((vertices, triangles): &Mesh) -> (bool, i64, f64) {
     let mut edges: HashMap<(u32, u32), i32> = HashMap::new();
     let mut volume = 0.0;
@@ -85,7 +85,7 @@ fn references_are_the_surface() {
             .step_by(97)
             .map(|t| generator.distance(middle(t)));
         let flat = flat.fold(0.0, f64::max);
-        // The terrain is as rough as fractals are.
+        // The terrain is rough at every scale.
         let most = if kind == Kind::Terrain { 0.1 } else { 0.025 };
         assert!(flat < most, "{kind}: {flat}");
         if let (Some(euler), false) = (cloud.euler_characteristic(), kind == Kind::Room) {

@@ -1,4 +1,4 @@
-//! The outdoor world, and how meshes of it are measured.
+//! The outdoor world, and the measures of meshes of it.
 
 use std::{fmt::Write, fs, path::Path};
 
@@ -14,7 +14,7 @@ fn points(cloud: &Cloud) -> Vec<[f64; 3]> {
     cloud.generator().unwrap().iter().collect()
 }
 
-/// Height of the ground, written down again.
+/// Height of the ground, written independently.
 fn ground(x: f64, y: f64) -> f64 {
     12.0 * (x / 61.0).sin() * (y / 47.0).cos()
         + 4.0 * (x / 17.0 + 1.0).sin() * (y / 23.0).sin()
@@ -37,7 +37,7 @@ fn equal_descriptions_give_equal_points() {
     assert_eq!(piece, all[7777..7797]);
     assert_ne!(all, points(&cloud.clone().seed(2)));
 
-    // The same points part by part, the ground first.
+    // The same points by part, the ground first.
     let clean = world(20_000);
     let mut sorted = points(&clean.clone().order(Order::Sorted));
     let on_ground = |p: &[f64; 3]| (p[2] - ground(p[0], p[1])).abs() < 1e-9;
@@ -99,13 +99,13 @@ fn parts_have_their_share() {
         let within = |p: &&[f64; 3]| (from..to).contains(&(p[2] - ground(p[0], p[1])));
         all.iter().filter(within).count() as f64 / n as f64
     };
-    // Ground, by what the houses and trees of this seed leave.
+    // Ground, without the part under this seed's houses and trees.
     let bare = share(world(n), -1e-9, 1e-9);
     assert!((0.80..0.86).contains(&bare), "{bare}");
-    // Nothing else is that high.
+    // No other point is that high.
     let birds = share(world(n).outliers(0.1), 16.0, 40.0);
     assert!((birds - 0.1 * 14.0 / 29.5).abs() < 0.004, "{birds}");
-    // Twice the trees: the others make room.
+    // With twice the trees the other parts have fewer points.
     let trees = Objects {
         trees: 800,
         ..Objects::default()
@@ -183,7 +183,7 @@ fn settings_that_do_not_fit_are_refused() {
 /// Cells across the patch of the measured meshes.
 const CELLS: usize = 10;
 
-/// A patch of ground, half a unit each cell, on open ground; the place of its first corner.
+/// A patch of open ground, half a unit each cell; and the position of its first corner.
 fn patch(cloud: &Cloud) -> ([f64; 2], Vec<[f64; 3]>, Vec<[u32; 3]>) {
     let discs = cloud.discs().unwrap();
     let places = (20..760).flat_map(|i| (20..760).map(move |j| [i, j].map(|k| 0.5 * f64::from(k))));
@@ -219,7 +219,7 @@ fn area(vertices: &[[f64; 3]], triangle: [u32; 3]) -> f64 {
     cross.iter().map(|c| c * c).sum::<f64>().sqrt() / 2.0
 }
 
-/// A binary mesh with more properties than needed.
+/// A binary mesh with additional properties.
 fn bytes(vertices: &[[f64; 3]], triangles: &[[u32; 3]], double: bool) -> Vec<u8> {
     let mut header = String::from("ply\nformat binary_little_endian 1.0\ncomment a test\n");
     let kind = if double { "double" } else { "float" };

@@ -8,7 +8,7 @@ fn points(cloud: &Cloud) -> Vec<[f64; 3]> {
     cloud.generator().unwrap().iter().collect()
 }
 
-/// Distance of every point to its nearest neighbour, none of which is beyond `reach`.
+/// Distance of every point to its nearest neighbour; none is beyond `reach`.
 fn spacing(points: &[[f64; 3]], reach: f64) -> Vec<f64> {
     let cell = |p: &[f64; 3]| p.map(|c| (c / reach).floor() as i64);
     let mut cells: HashMap<[i64; 3], Vec<usize>> = HashMap::new();
@@ -75,7 +75,7 @@ fn adaptive_points_follow_the_curvature() {
         gaps[1000],
         gaps[19_000]
     );
-    // A sphere is curved the same everywhere.
+    // A sphere has the same curvature everywhere.
     let sphere = Cloud::new(Kind::Sphere).points(3000);
     let adaptive = points(&sphere.clone().sampling(Sampling::Adaptive));
     let [least, mean, most] = least_mean_most(&spacing(&adaptive, 100.0));

@@ -1,4 +1,4 @@
-//! The main function of a tool: arguments in, a line for what is wrong, an exit code.
+//! The main function of a tool: arguments, one line for an error, exit code.
 
 use clap::Parser;
 use clap::error::ErrorKind;
@@ -8,10 +8,10 @@ use std::process::ExitCode;
 /// Exit code for errors.
 const FAILED: u8 = 2;
 
-/// Without a command there is help, which is more than a line.
+/// Without a command clap prints help, which is more than one line.
 const HELP: ErrorKind = ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand;
 
-/// Reads the arguments and runs the tool. What is wrong goes to standard error, on one line.
+/// Reads the arguments and runs the tool. Errors are printed to standard error, on one line.
 #[must_use]
 pub fn main<A: Parser, E: Display>(run: impl FnOnce(&A) -> Result<(), E>) -> ExitCode {
     let args = match A::try_parse() {

@@ -1,4 +1,4 @@
-//! Uncompressed LAS, by its name.
+//! Uncompressed LAS, by its extension.
 #![no_main]
 
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| outcrop_fuzz::cloud::read("las", bytes));

@@ -1,4 +1,4 @@
-//! LAZ, by its name.
+//! LAZ, by its extension.
 #![no_main]
 
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| outcrop_fuzz::cloud::read("laz", bytes));

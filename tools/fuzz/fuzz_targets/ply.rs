@@ -1,4 +1,4 @@
-//! PLY as a cloud, by its name.
+//! PLY as a cloud, by its extension.
 #![no_main]
 
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| outcrop_fuzz::cloud::read("ply", bytes));

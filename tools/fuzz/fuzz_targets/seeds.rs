@@ -1,5 +1,5 @@
-//! No target: writes the files that fuzzing starts with into the folder `SEEDS`, and ends. It is built as
-//! the targets are, since they are built with what only libFuzzer can link.
+//! No target: writes the initial files of all targets into the folder `SEEDS`, and ends. It is built like the
+//! targets, since these link with libFuzzer only.
 #![no_main]
 #![allow(unreachable_code, reason = "the program ends before there is an input")]
 

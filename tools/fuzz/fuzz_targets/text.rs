@@ -1,4 +1,4 @@
-//! Text with a point a line, and whatever content makes of a file without a telling name.
+//! Text with a point on each line, and any content in a file without a known extension.
 #![no_main]
 
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| outcrop_fuzz::cloud::read("txt", bytes));

@@ -19,7 +19,7 @@ pub fn read(extension: &str, bytes: &[u8]) {
     bench.check_memory();
 }
 
-/// Checks what must hold of every cloud.
+/// Checks properties of every cloud.
 pub fn check(spool: &Spool) {
     let stats = spool.stats();
     let left_out = stats.dropped_non_finite + stats.withheld + stats.dropped_by_class;

@@ -5,18 +5,18 @@ use outcrop::Classes;
 use outcrop::inspect::info::info;
 use outcrop::stages::ingest::{expand, ingest_classes, probe};
 
-/// What is between two files.
+/// Separator between two files.
 pub const BETWEEN: &[u8] = b"\n=====\n";
 
-/// The extensions of files, by their first byte.
+/// The extensions of files, selected by their first byte.
 pub const EXTENSIONS: [&str; 10] = [
     "las", "laz", "ply", "xyz", "txt", "csv", "pts", "asc", "bin", "dat",
 ];
 
-/// Most points of which [`info`] is asked.
+/// Largest number of points for which [`info`] is called.
 const FEW: u64 = 2000;
 
-/// Reads the files in `bytes`: the first byte of each says of which extension it is.
+/// Reads the files in `bytes`: the first byte of each selects its extension.
 pub fn read(bytes: &[u8]) {
     let bench = Bench::get();
     let folder = bench.path("folder");

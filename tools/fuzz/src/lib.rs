@@ -1,6 +1,6 @@
-//! What the fuzz targets do with their bytes: what a user's file would go through.
+//! The work of the fuzz targets: the bytes are processed as a user's file would be.
 //!
-//! A target fails by a panic, by taking longer than libFuzzer allows, or by asking for more memory than
+//! A target fails by a panic, by taking longer than libFuzzer allows, or by allocating more memory than
 //! [`HEAP`]. Errors of the kinds that a file may cause are the expected outcome.
 
 pub mod cloud;
@@ -17,9 +17,8 @@ use outcrop::workspace::progress::{Cancel, Silent};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
-/// Most bytes that may be allocated at any time: the least budget that the program accepts, so that no
-/// file can make a run exceed the budget it was given. Buffers count when they are asked for, filled
-/// or not.
+/// Largest number of bytes that may be allocated at any time: the least budget of the program, so that no
+/// file can make a run exceed its budget. Buffers count when they are allocated, filled or not.
 pub const HEAP: usize = MINIMUM_BUDGET as usize;
 
 #[global_allocator]
@@ -28,12 +27,12 @@ static ALLOCATOR: cap::Cap<std::alloc::System> = cap::Cap::new(std::alloc::Syste
 /// A folder for files, and a workspace in it.
 pub struct Bench {
     folder: tempfile::TempDir,
-    /// Where files are read into.
+    /// The workspace for reading files.
     pub workspace: Workspace,
 }
 
 impl Bench {
-    /// The one of this process; its folder is in `TMPDIR`.
+    /// The bench of this process; its folder is in `TMPDIR`.
     pub fn get() -> &'static Self {
         static BENCH: OnceLock<Bench> = OnceLock::new();
         BENCH.get_or_init(|| {
@@ -60,7 +59,7 @@ impl Bench {
         path
     }
 
-    /// Checks that a read has left nothing behind.
+    /// Checks that no memory is reserved after reading.
     pub fn check_memory(&self) {
         let memory = &self.workspace.memory;
         assert_eq!(
@@ -71,13 +70,13 @@ impl Bench {
     }
 }
 
-/// Checks that an error is one that a file can cause, in one line that names it.
+/// Checks that an error can be caused by a file, and is one line with its name.
 pub fn check_error(error: &Error, folder: &Path) {
     let text = error.to_string();
     assert!(!text.contains('\n'), "{text:?} is more than one line");
     match error {
         Error::Input { path, .. } => assert!(path.starts_with(folder), "{text}"),
-        // A file may need more than the least budget, and is refused with the number that would do.
+        // A file may need more than the least budget; the error has a number that would suffice.
         Error::Memory { .. } => {}
         other => panic!("no error of a file: {other:?}"),
     }

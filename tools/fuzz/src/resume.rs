@@ -1,4 +1,4 @@
-//! Damage to what a stopped run left behind: it is found, and the mesh comes out the same.
+//! Damage to the files of a stopped run: it is found, and the mesh is the same.
 
 use crate::Bench;
 use outcrop::workspace::memory::MINIMUM_BUDGET;
@@ -9,10 +9,10 @@ use std::os::unix::fs::DirBuilderExt;
 use std::path::PathBuf;
 use std::sync::{Arc, OnceLock};
 
-/// Stages at whose beginning a run is stopped.
+/// Stages at the beginning of which a run is stopped.
 const STAGES: [&str; 6] = ["order", "relax", "cells", "triples", "repair", "export"];
 
-/// What a run left behind: names and bytes.
+/// The files of a stopped run: names and bytes.
 pub type Snapshot = Vec<(String, Vec<u8>)>;
 
 struct Runs {
@@ -95,13 +95,13 @@ fn runs() -> &'static Runs {
     })
 }
 
-/// What runs left that were stopped at different stages.
+/// Snapshots of runs that were stopped at different stages.
 pub fn snapshots() -> &'static [Snapshot] {
     &runs().stopped
 }
 
-/// Does `edits` to the files of a stopped run: of each six bytes the first says which file, the second
-/// what is done, two or three say where, and the last is what is written there.
+/// Applies `edits` to the files of a stopped run, six bytes each: the first selects the file, the second the
+/// kind of damage, two or three the place, and the last is the byte to write.
 fn damaged(snapshot: &Snapshot, edits: &[u8]) -> Snapshot {
     let mut files = snapshot.clone();
     for edit in edits.chunks_exact(6) {
@@ -132,7 +132,7 @@ fn damaged(snapshot: &Snapshot, edits: &[u8]) -> Snapshot {
     files
 }
 
-/// Damages what a stopped run left, and goes on with it.
+/// Damages the files of a stopped run and resumes it.
 pub fn go_on(bytes: &[u8]) {
     let runs = runs();
     let Some((which, edits)) = bytes.split_first() else {

@@ -1,8 +1,8 @@
-//! What is decoded from disk on resume, behind its checksums.
+//! Decoding of scratch files, behind their checksums.
 //!
-//! Checksums notice damage, so a fuzzer would never get past them: here every checksum is right. A
-//! scratch folder is private, so nobody but a fuzzer writes such files; still nothing must panic or ask
-//! for memory without bounds.
+//! Checksums detect damage, so a fuzzer would never get past them: here every checksum is valid. A scratch
+//! folder is private, so only a fuzzer writes such files; still there must be no panic and no unbounded
+//! allocation.
 
 use crate::Bench;
 use outcrop::geom::lattice::Lattice;
@@ -18,13 +18,13 @@ use std::os::unix::fs::DirBuilderExt;
 use std::path::Path;
 use std::sync::Arc;
 
-/// What a journal begins with.
+/// The first bytes of a journal.
 const MAGIC: &[u8] = b"OUTCROP1";
 
-/// What is between journal, saved values, and the content of files.
+/// Separator of journal, saved values, and the content of files.
 pub const BETWEEN: u8 = 0xfe;
 
-/// Names of files that a journal may speak of.
+/// Names of files that a journal may contain.
 pub const FILES: [&str; 6] = [
     "ingest-0.spool",
     "points",
@@ -88,7 +88,7 @@ fn all<R: Row>(table: &Table<R>) {
     }
 }
 
-/// The journal of records in `bytes`, each its length and its body, with right checksums.
+/// The journal of the records in `bytes`, each its length and its body, with valid checksums.
 fn forged(bytes: &[u8]) -> Vec<u8> {
     let mut out = MAGIC.to_vec();
     let mut record = |body: &[u8]| {

@@ -1,14 +1,14 @@
-//! The files that fuzzing starts with.
+//! The initial files for fuzzing.
 
 use crate::{folder, resume, scratch};
 use outcrop_cloudgen::{Cloud, Encoding, Format, Kind, LasOptions, PointFormat, Precision};
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
-/// Whatever goes wrong is for the one who started the program.
+/// Errors are passed to the caller of the program.
 pub type Result<T = ()> = std::result::Result<T, Box<dyn Error>>;
 
-/// Where seeds go.
+/// The folder of the seeds.
 struct Seeds(PathBuf);
 
 impl Seeds {
@@ -23,7 +23,7 @@ impl Seeds {
     }
 }
 
-/// Writes a folder of them for each target into `folder`.
+/// Writes a folder of seeds for each target into `folder`.
 pub fn write(folder: &Path) -> Result {
     let seeds = Seeds(folder.to_path_buf());
     las_files(&seeds)?;
@@ -42,7 +42,7 @@ pub fn write(folder: &Path) -> Result {
     Ok(())
 }
 
-/// Damage: file, kind, three bytes of place, value.
+/// Damage: file, kind, three bytes of the place, value.
 const EDITS: [&[u8]; 5] = [
     &[],
     &[0, 0, 9, 0, 0, 0],
@@ -138,7 +138,7 @@ fn clouds(seeds: &Seeds) -> Result {
             cloud.write(seeds.path(target, &format!("{points}-{name}"))?, format)?;
         }
     }
-    // Chunks: more points than one holds.
+    // Several chunks: more points than one holds.
     let cloud = Cloud::new(Kind::Grid).points(60_000);
     cloud.write(seeds.path("laz", "chunks.laz")?, Format::Laz(extended))?;
     Ok(())
@@ -168,7 +168,7 @@ fn ply_files(seeds: &Seeds) -> Result {
     seeds.put("ply", "points.ply", "1 2 3\n4 5 6\n")
 }
 
-/// Lists of points as programs write them, and what only looks like one.
+/// Lists of points as programs write them, and text that only resembles one.
 const TEXTS: [&str; 16] = [
     "1.5 2 -3.25\n4 5 6\n",
     "1.5\t2\t-3.25\r\n4\t5\t6",
@@ -201,7 +201,7 @@ fn texts(seeds: &Seeds) -> Result {
     seeds.put("text", "columns", format!("{}\n", "1 ".repeat(30_000)))
 }
 
-/// Files of several formats beside each other.
+/// Files of several formats in one folder.
 fn folders(seeds: &Seeds) -> Result {
     let read = |target: &str, name: &str| {
         std::fs::read(seeds.path(target, name)?).map_err(Box::<dyn Error>::from)
@@ -297,7 +297,7 @@ fn bodies(journal: &[u8]) -> Vec<&[u8]> {
     bodies
 }
 
-/// Journals of runs that were stopped, with what the last of their records say, and their files.
+/// Journals of stopped runs, with the content of their last records, and their files.
 fn scratch_files(seeds: &Seeds) -> Result {
     for (number, snapshot) in resume::snapshots().iter().enumerate() {
         let file = |wanted: &str| {
@@ -314,7 +314,7 @@ fn scratch_files(seeds: &Seeds) -> Result {
         };
         for (part, name) in scratch::FILES.iter().enumerate() {
             let saved = all[(part + 1) * all.len() / 8];
-            // What is saved follows after the name of the step, the number of the unit and the parts.
+            // The saved value follows the name of the step, the number of the unit and the parts.
             let from = saved.len().saturating_sub(60);
             let between = [scratch::BETWEEN];
             let journal = records(3 + 10 * part);

@@ -5,17 +5,17 @@ use std::path::{Path, PathBuf};
 /// Result with this program's [`Error`].
 pub(crate) type Result<T, E = Error> = std::result::Result<T, E>;
 
-/// Why there is no answer.
+/// The errors of this program.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum Error {
-    /// The operating system refused to read or write a file.
+    /// A file cannot be read or written.
     #[error("{path}: cannot {action}: {source}", path = path.display())]
     Io {
         path: PathBuf,
         action: &'static str,
         source: std::io::Error,
     },
-    /// A file is not what it should be.
+    /// A file is invalid.
     #[error("{path}: {what}", path = path.display())]
     Input { path: PathBuf, what: String },
     /// A setting is out of range.
@@ -25,7 +25,7 @@ pub(crate) enum Error {
         found: String,
         expected: &'static str,
     },
-    /// The library says no.
+    /// An error of the library.
     #[error(transparent)]
     Outcrop(#[from] outcrop::Error),
 }

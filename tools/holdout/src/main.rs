@@ -1,8 +1,8 @@
-//! The error of a reconstruction where no ground truth is known: some points of a scan are left out,
-//! the others are made into a mesh, and the distance of the left-out points to it is measured.
+//! The error of a reconstruction without known ground truth: some points of a scan are left out, a mesh is
+//! made from the others, and the distances of the left-out points to it are measured.
 //!
-//! `split` draws the points, `measure` takes the distances, `row` prints what came of it as a line
-//! of a Markdown table. All three hold their points in memory.
+//! `split` draws the points, `measure` takes the distances, `row` prints the result as a line of a Markdown
+//! table. All three hold their points in memory.
 
 mod error;
 mod measure;
@@ -23,7 +23,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
 
-/// Measures a reconstruction by points that it did not see.
+/// Measures a reconstruction by points that were left out of it.
 #[derive(Debug, Parser)]
 #[command(name = "holdout", version, max_term_width = 100)]
 struct Arguments {
@@ -37,19 +37,19 @@ enum Command {
     Split(split::Split),
     /// Distance of the points left out to the mesh of the others, in units of the local spacing
     ///
-    /// The local spacing at a point left out is the mean, over the 8 points nearest to it of those that
-    /// stayed, of the distance from each to the nearest other point that stayed. Percentiles are the
-    /// smallest value that so many points do not exceed.
+    /// The local spacing at a left-out point is the mean, over the 8 remaining points nearest to it, of the
+    /// distance from each to the nearest other remaining point. A percentile is the smallest value that this
+    /// share of the points does not exceed.
     Measure(measure::Measure),
     /// Print a row of a Markdown table from the JSON files of one run
     Row(row::Row),
 }
 
-/// Limits of what the library does for this program.
+/// Resources of the library.
 #[derive(Debug, Args)]
 struct Limits {
-    /// Ceiling for the memory of outcrop's part, e.g. 1GiB; points come on top
-    /// [default: half of what machine and cgroup allow]
+    /// Memory budget of outcrop's part, e.g. 1GiB, without the points [default: half of what machine and
+    /// cgroup allow]
     #[arg(long, value_name = "SIZE")]
     memory: Option<ByteSize>,
     /// Worker threads [default: all available]

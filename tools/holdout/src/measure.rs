@@ -1,4 +1,4 @@
-//! Distances of the points left out, in units of the local spacing.
+//! Distances of the left-out points, in units of the local spacing.
 
 use crate::error::{Error, Result};
 use crate::{Limits, read};
@@ -11,13 +11,13 @@ use serde::{Deserialize, Serialize};
 use std::num::NonZero;
 use std::path::PathBuf;
 
-/// Points around a point left out whose spacing is its local spacing.
+/// Points around a left-out point from which its local spacing is computed.
 const AROUND: usize = 8;
 
 /// `holdout measure`; the program's help defines the local spacing.
 #[derive(Debug, Args)]
 pub(crate) struct Measure {
-    /// The points that the mesh was made of
+    /// The points from which the mesh was made
     #[arg(value_name = "TRAIN.ply")]
     train: PathBuf,
     /// The points left out
@@ -26,14 +26,14 @@ pub(crate) struct Measure {
     /// The mesh
     #[arg(value_name = "MESH.ply")]
     mesh: PathBuf,
-    /// Answer as JSON
+    /// Print JSON
     #[arg(long)]
     json: bool,
     #[command(flatten)]
     limits: Limits,
 }
 
-/// Figures of one quantity over all points left out.
+/// Figures of one quantity over all left-out points.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Figures {
     pub(crate) p50: f64,
@@ -44,10 +44,10 @@ pub(crate) struct Figures {
     pub(crate) max: f64,
 }
 
-/// The answer.
+/// The result.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct HeldOut {
-    /// Distinct points that stayed.
+    /// Distinct points that remained.
     pub(crate) train: u64,
     /// Distinct points left out.
     pub(crate) held: u64,
@@ -59,7 +59,7 @@ pub(crate) struct HeldOut {
     pub(crate) spacing: Figures,
 }
 
-/// Measures.
+/// Measures the distances.
 pub(crate) fn run(args: &Measure) -> Result<String> {
     let workspace = args.limits.workspace()?;
     let found = measure(args, &workspace)?;
@@ -112,8 +112,8 @@ fn measure(args: &Measure, workspace: &Workspace) -> Result<HeldOut> {
     })
 }
 
-/// The local spacing of `train` at each of `places`; the mean of the distances from the nearest
-/// [`AROUND`] of them to their own nearest neighbours.
+/// The local spacing of `train` at each of `places`: the mean distance from the nearest [`AROUND`] points to
+/// their own nearest neighbours.
 fn spacings(train: &[[f64; 3]], places: &[[f64; 3]]) -> Vec<f64> {
     let tree: ImmutableKdTree<f64, 3> = ImmutableKdTree::new_from_slice(train);
     let two = NonZero::<usize>::MIN.saturating_add(1);
@@ -165,7 +165,7 @@ mod tests {
             &[[5.5, 5.5, 0.0], [0.0, 0.0, 9.0], [1001.0, 2.0, 0.0]],
         );
         assert_eq!(found, [1.0, 1.0, 3.0]);
-        // Fewer points than are asked for.
+        // Fewer points than [`AROUND`].
         let found = spacings(&train[..2], &[[7.0, 0.0, 0.0]]);
         assert_eq!(found, [1.0]);
     }

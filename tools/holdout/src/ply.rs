@@ -1,4 +1,4 @@
-//! Writes clouds: binary PLY in double precision.
+//! Writes clouds as binary PLY in double precision.
 
 use crate::error::{Error, Result};
 use outcrop_ply::{Encoding, Layout, Scalar};

@@ -1,4 +1,4 @@
-//! A line of a Markdown table from what programs wrote about one run.
+//! A line of a Markdown table from the output files of one run.
 
 use crate::error::{Error, Result};
 use crate::measure::HeldOut;
@@ -38,16 +38,16 @@ pub(crate) struct Row {
         allow_hyphen_values = true
     )]
     options: String,
-    /// Instead of all files: why the run came to nothing
+    /// Instead of all files: the reason why the run failed
     #[arg(long, value_name = "TEXT", conflicts_with_all = ["report", "verdict", "held_out"])]
     failed: Option<String>,
-    /// Written by `outcrop reconstruct --report`
+    /// The file of `outcrop reconstruct --report`
     #[arg(long, value_name = "FILE", required_unless_present_any = ["head", "failed"])]
     report: Option<PathBuf>,
-    /// Written by `outcrop verify --json`
+    /// The output of `outcrop verify --json`
     #[arg(long, value_name = "FILE", required_unless_present_any = ["head", "failed"])]
     verdict: Option<PathBuf>,
-    /// Written by `holdout measure --json`
+    /// The output of `holdout measure --json`
     #[arg(long, value_name = "FILE", required_unless_present_any = ["head", "failed"])]
     held_out: Option<PathBuf>,
 }
@@ -76,7 +76,7 @@ pub(crate) fn run(args: &Row) -> Result<String> {
     Ok(format!("| {} |", cells.join(" | ")))
 }
 
-/// Text that does not end a cell or a row.
+/// Text without characters that end a cell or a row.
 fn clean(text: &str) -> String {
     text.replace('|', "\\|").replace(['\n', '\r'], " ")
 }

@@ -12,23 +12,23 @@ pub(crate) struct Split {
     /// The scan: LAS, LAZ, PLY, text, E57, PCD, or a folder of what outcrop reads
     #[arg(value_name = "SCAN")]
     scan: PathBuf,
-    /// Decides which points are left out
+    /// Seed of the choice of points
     #[arg(long, value_name = "SEED", default_value_t = 0)]
     seed: u64,
     /// Share of the points that is left out
     #[arg(long, value_name = "SHARE", default_value_t = 0.2)]
     fraction: f64,
-    /// Where the points that stay go, binary PLY in double precision
+    /// Output for the points that remain, binary PLY in double precision
     #[arg(long, value_name = "FILE.ply")]
     train: PathBuf,
-    /// Where the points left out go, likewise
+    /// Output for the points left out, likewise
     #[arg(long, value_name = "FILE.ply")]
     held: PathBuf,
     #[command(flatten)]
     limits: Limits,
 }
 
-/// Splits; says how many points there are.
+/// Splits the scan; returns a message with the numbers of points.
 pub(crate) fn run(args: &Split) -> Result<String> {
     if !(args.fraction > 0.0 && args.fraction < 1.0) {
         return Err(Error::Parameter {
@@ -63,7 +63,7 @@ pub(crate) fn run(args: &Split) -> Result<String> {
     ))
 }
 
-/// The points that stay and those left out; every choice of as many is as likely.
+/// The remaining and the left-out points; all choices of the same number are equally likely.
 fn divide(points: Vec<[f64; 3]>, fraction: f64, seed: u64) -> (Vec<[f64; 3]>, Vec<[f64; 3]>) {
     let mut rng = Rand64::new(u128::from(seed));
     let mut left = points.len() as u64;
@@ -97,7 +97,7 @@ mod tests {
         assert_eq!(all, points);
         assert_eq!(divide(points.clone(), 0.2, 1).1, held);
         assert_ne!(divide(points, 0.2, 2).1, held);
-        // Left out all over, not at one end.
+        // Points are left out everywhere, not at one end.
         let early = held.iter().filter(|p| p[0] < 500.0).count();
         assert!((70..130).contains(&early), "{early}");
     }

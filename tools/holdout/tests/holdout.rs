@@ -57,7 +57,7 @@ fn from_scan_to_row() {
         (&found["train"], &found["held"]),
         (&1280.into(), &320.into())
     );
-    // A distance of 0.25 everywhere, and hardly a point without a neighbour at 1.
+    // A distance of 0.25 everywhere, and nearly all points with a neighbour at 1.
     assert_eq!(found["distance"]["max"], 0.25);
     assert_eq!(found["spacing"]["p50"], 1.0);
     assert_eq!(found["error"]["p50"], 0.25);
@@ -137,7 +137,7 @@ fn what_cannot_be_done_is_said_in_one_line() {
     }
 }
 
-/// Real scans that are used where they are, if they are: name, and its distinct finite points.
+/// Real scans, if available: name, and number of distinct finite points.
 const SCANS: [(&str, &str); 5] = [
     ("pump.e57", "155201"),
     ("facade-steps.pcd", "108104"),

@@ -1,18 +1,18 @@
-//! What else was tried for normals.
+//! Other methods for normals, for comparison.
 
 use outcrop::geom::plane::{Moments, Plane, least_direction};
 use outcrop::kernels::Level;
 use outcrop::stages::tiles::neighbors::Neighbors;
 
-/// A way to a normal.
+/// A method for normals.
 pub(crate) struct Candidate {
     pub(crate) name: &'static str,
-    /// Neighbours it looks at, at most, in terms of `k`.
+    /// Largest number of neighbours, in units of `k`.
     pub(crate) most: usize,
     pub(crate) normal: fn(&Neighbors, usize) -> Option<[f64; 3]>,
 }
 
-/// All of them.
+/// All methods.
 pub(crate) const ALL: &[Candidate] = &[
     Candidate {
         name: "wide at 1/9",
@@ -67,7 +67,7 @@ fn taken(near: &Neighbors, count: usize) -> (Moments, Plane) {
     (moments, moments.plane())
 }
 
-/// How many neighbours the plane of a cell takes by the robust method.
+/// Number of neighbours for the plane of a cell in the robust method.
 fn count_on_lines(near: &Neighbors, k: usize) -> usize {
     let mut count = k;
     while count < 8 * k && !taken(near, count).1.wide {
@@ -86,7 +86,7 @@ fn eigenvalues(near: &Neighbors, count: usize) -> [f64; 3] {
     .0;
     let largest = s[0].max(s[1]).max(s[2]);
     s = s.map(|x| x / largest);
-    // The trigonometric solution is exact enough for a measurement.
+    // The trigonometric solution is accurate enough for a measurement.
     let q = (s[0] + s[1] + s[2]) / 3.0;
     let off = s[3] * s[3] + s[4] * s[4] + s[5] * s[5];
     let p2 = (s[0] - q).powi(2) + (s[1] - q).powi(2) + (s[2] - q).powi(2) + 2.0 * off;
@@ -110,7 +110,7 @@ fn eigenvalues(near: &Neighbors, count: usize) -> [f64; 3] {
     [least.max(0.0), 3.0 * q - top - least, top]
 }
 
-/// As for cells, but until the middle eigenvalue is `line` of the largest, and `flat` times the least.
+/// As for cells, but until the middle eigenvalue is `line` times the largest, and `flat` times the least.
 fn widened(near: &Neighbors, k: usize, line: f64, flat: f64) -> Option<[f64; 3]> {
     let mut count = k;
     while count < 8 * k {
@@ -147,13 +147,13 @@ fn scatter(points: impl Iterator<Item = ([f64; 3], f64)>) -> ([f64; 6], [f64; 3]
 #[derive(Clone, Copy, PartialEq)]
 enum Height {
     None,
-    /// Over the plane.
+    /// Heights over the plane.
     Plane,
-    /// Over the point itself.
+    /// Heights over the point itself.
     Own,
 }
 
-/// Planes with weights that fall with the distance and the height over the plane before.
+/// Planes with weights that fall with distance and with the height over the plane before.
 fn reweighted(near: &Neighbors, k: usize, times: u32, height: Height) -> Option<[f64; 3]> {
     let count = count_on_lines(near, k);
     let (moments, plane) = taken(near, count);
@@ -200,7 +200,7 @@ fn reweighted(near: &Neighbors, k: usize, times: u32, height: Height) -> Option<
     Some(normal)
 }
 
-/// Of eight sectors around the normal of the widest plane, the nearest of each.
+/// The nearest point in each of eight sectors around the normal of the widest plane.
 fn sectors(near: &Neighbors, k: usize) -> Option<[f64; 3]> {
     if taken(near, k).1.wide {
         return taken(near, k).1.normal.map(|n| n.map(f64::from));

@@ -3,16 +3,16 @@
 /// Result with this program's [`Error`].
 pub(crate) type Result<T, E = Error> = std::result::Result<T, E>;
 
-/// Why there is no answer.
+/// The errors of this program.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum Error {
-    /// The table could not be written.
+    /// The table cannot be written.
     #[error("standard output: cannot write: {0}")]
     Output(#[from] std::io::Error),
-    /// The generator says no.
+    /// An error of the generator.
     #[error(transparent)]
     Cloud(#[from] outcrop_cloudgen::Error),
-    /// The library says no.
+    /// An error of the library.
     #[error(transparent)]
     Outcrop(#[from] outcrop::Error),
 }

@@ -1,7 +1,7 @@
-//! Angle errors of normals: clouds whose surface is known, the normals that the program and others find
-//! at their points, and the angles between these and the true ones, without regard to sides.
+//! Angle errors of normals: for clouds with known surfaces, the angles between the true normals and those of
+//! the program and of other methods, without regard to orientation.
 //!
-//! Holds the cloud in memory.
+//! The cloud is held in memory.
 
 mod candidates;
 mod error;
@@ -23,7 +23,7 @@ struct Arguments {
     /// Print the head of the table instead
     #[arg(long)]
     head: bool,
-    /// Surface, as cloudgen has it
+    /// Surface, by its name in cloudgen
     #[arg(required_unless_present = "head")]
     kind: Option<Kind>,
     /// Number of points
@@ -38,16 +38,16 @@ struct Arguments {
     /// Standard deviation of noise along the normal, in mean spacings (root of area per point)
     #[arg(long, value_name = "SPACINGS", default_value_t = 0.0)]
     noise: f64,
-    /// Deal the points out to two layers so many mean spacings apart
+    /// Distribute the points among two layers this many mean spacings apart
     #[arg(long, value_name = "SPACINGS")]
     layers: Option<f64>,
     /// Neighbours for a plane
     #[arg(long, value_name = "N", default_value_t = 30)]
     neighbors: usize,
-    /// Measure what else was tried, too
+    /// Also measure other methods
     #[arg(long)]
     tried: bool,
-    /// Measure instead how far points are from the surface before and after smoothing, in mean spacings
+    /// Measure instead the distances of points from the surface before and after smoothing, in mean spacings
     #[arg(long)]
     smoothing: bool,
 }

@@ -1,4 +1,4 @@
-//! How far points are from the true surface, before and after smoothing.
+//! Distances of points from the true surface, before and after smoothing.
 
 use crate::Arguments;
 use crate::error::Result;
@@ -17,7 +17,8 @@ pub(crate) fn head() -> String {
         .to_owned()
 }
 
-/// Rows of a world: as it is, and after one and two rounds of each kind. Distances in mean spacings.
+/// Rows of a world: before, and after one and two rounds of each kind of smoothing. Distances in mean
+/// spacings.
 pub(crate) fn rows(kind: Kind, world: &World, name: &str, args: &Arguments) -> Result<Vec<String>> {
     let store = &world.store;
     let near_edge = world.near_edges(EDGE)?;
@@ -57,7 +58,7 @@ pub(crate) fn rows(kind: Kind, world: &World, name: &str, args: &Arguments) -> R
     Ok(rows)
 }
 
-/// Root of the mean square, and the 99th percentile.
+/// Root mean square, and the 99th percentile.
 fn figures(mut values: Vec<f64>) -> String {
     if values.is_empty() {
         return " | ".to_owned();

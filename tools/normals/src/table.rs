@@ -1,6 +1,6 @@
 //! Lines of the table.
 
-/// Largest angle, in degrees, that is not wild.
+/// Largest angle, in degrees, that does not count as wild.
 const WILD: f64 = 30.0;
 
 /// The head.

@@ -1,4 +1,4 @@
-//! A cloud as the program sees it, with the true normals.
+//! A cloud as the program processes it, with the true normals.
 
 use crate::Arguments;
 use crate::candidates::Candidate;
@@ -17,7 +17,7 @@ use outcrop_cloudgen::{Cloud, Generator, Kind};
 use std::collections::HashMap;
 use std::sync::Arc;
 
-/// Steps of the lattice in the size of a cloud.
+/// Steps of the lattice per size of a cloud.
 const STEPS: f64 = (1u64 << 28) as f64;
 
 /// A cloud, ordered and relaxed.
@@ -25,7 +25,7 @@ pub(crate) struct World {
     pub(crate) store: PointStore,
     pub(crate) generator: Generator,
     pub(crate) workspace: Workspace,
-    /// Root of the area for each point.
+    /// Root of the area per point.
     pub(crate) spacing: f64,
     relaxed: Relaxed,
     neighbors: usize,
@@ -33,7 +33,7 @@ pub(crate) struct World {
     truth: Vec<[f64; 3]>,
 }
 
-/// What the world is called in the table.
+/// Name of the world in the table.
 pub(crate) fn name(kind: Kind, args: &Arguments) -> String {
     let mut name = kind.to_string();
     if let Some(ratio) = args.scanlines {
@@ -110,7 +110,7 @@ impl World {
         Ok(store.slice(0..store.len())?.iter().map(unit).collect())
     }
 
-    /// By id: is there one among the neighbours whose true normal makes an angle with `cosine` or less?
+    /// For each id: a neighbour's true normal makes an angle with this cosine or less.
     pub(crate) fn near_edges(&self, cosine: f64) -> Result<Vec<bool>> {
         let k = self.neighbors;
         let mut found = vec![false; self.store.len()];
@@ -127,7 +127,7 @@ impl World {
         Ok(found)
     }
 
-    /// The shape that the robust method connects points by.
+    /// The relaxed positions, by which the robust method connects points.
     pub(crate) fn shape(&self) -> &PointStore {
         self.relaxed.store.as_ref().unwrap_or(&self.store)
     }
@@ -148,7 +148,7 @@ impl World {
         Ok(normals)
     }
 
-    /// Normals by a candidate.
+    /// Normals by another method.
     pub(crate) fn tried(
         &self,
         store: &PointStore,

@@ -3,20 +3,20 @@
 /// Result with this crate's [`Error`].
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
-/// Why a file was not read.
+/// The errors of reading a file.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// The operating system refused to read it.
+    /// The file cannot be read.
     #[error("cannot read: {0}")]
     Io(#[from] std::io::Error),
-    /// It is no PLY file, or not one of the kind that was asked for.
+    /// It is no PLY file, or lacks the required elements.
     #[error("{place}: found {found}, expected {expected}")]
     Input {
-        /// Where in the file: a line of the header, or an entry of an element.
+        /// Place in the file: a line of the header, or an entry of an element.
         place: String,
-        /// What is there, in printable characters.
+        /// The content found, in printable characters.
         found: String,
-        /// What would have been right.
+        /// The expected content.
         expected: String,
     },
 }

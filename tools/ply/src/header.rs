@@ -1,4 +1,4 @@
-//! What a header says.
+//! The header of a file.
 
 use crate::error::{Error, Result};
 use crate::types::{Encoding, Property, Scalar};
@@ -6,11 +6,11 @@ use crate::types::{Encoding, Property, Scalar};
 /// The header of a PLY file.
 #[derive(Debug, Clone)]
 pub struct Header {
-    /// How the elements are written.
+    /// Encoding of the elements.
     pub encoding: Encoding,
     /// The elements, in the order of the file.
     pub elements: Vec<Element>,
-    /// Bytes of the header: where the elements start.
+    /// Bytes of the header: the offset of the elements.
     pub bytes: u64,
 }
 
@@ -26,7 +26,7 @@ pub struct Element {
 }
 
 impl Header {
-    /// The element of a name, and its place among all.
+    /// The element with this name, and its index.
     ///
     /// # Errors
     /// [`Error::Input`] if there are several.
@@ -82,7 +82,7 @@ impl Element {
         Ok(coordinates)
     }
 
-    /// Number of the property that lists the corners of a face, and its types: of their count and of each.
+    /// Index of the property that lists the corners of a face, and the types of its count and items.
     ///
     /// # Errors
     /// [`Error::Input`] unless there is one, of integers.
@@ -112,13 +112,13 @@ impl Element {
         format!("properties [{}]", names.join(", ").escape_debug())
     }
 
-    /// Bytes of an entry in a binary file; none if there is a list.
+    /// Bytes of an entry in a binary file; none if it has a list.
     #[must_use]
     pub fn record_bytes(&self) -> Option<usize> {
         self.bytes_before(self.properties.len())
     }
 
-    /// Bytes of an entry before the property of a number; none if there is a list.
+    /// Bytes of an entry before the property with this index; none if there is a list.
     #[must_use]
     pub fn bytes_before(&self, property: usize) -> Option<usize> {
         self.properties[..property]
@@ -127,7 +127,7 @@ impl Element {
             .sum()
     }
 
-    /// Fewest bytes that an entry can take.
+    /// Least number of bytes of an entry.
     #[must_use]
     pub fn least_bytes(&self, encoding: Encoding) -> u64 {
         let least = |(_, property): &(String, Property)| match *property {

@@ -1,11 +1,11 @@
-//! Writing clouds and triangle meshes, with records of fixed size.
+//! Writing clouds and triangle meshes with entries of fixed size.
 
 use crate::types::{Encoding, Scalar};
 
-/// A file with vertices x, y and z, and maybe triangles.
+/// A file with vertices x, y and z, and possibly triangles.
 #[derive(Debug, Clone, Copy)]
 pub struct Layout<'a> {
-    /// How numbers are written.
+    /// Encoding of numbers.
     pub encoding: Encoding,
     /// A comment, on one line.
     pub comment: Option<&'a str>,
@@ -17,7 +17,7 @@ pub struct Layout<'a> {
     pub triangles: Option<(u64, Scalar)>,
 }
 
-/// Bytes of a triangle with 32-bit corners: their number, a byte, and the corners.
+/// Bytes of a triangle with 32-bit corners: their count, a byte, and the corners.
 pub const TRIANGLE: usize = 13;
 
 /// Appends a triangle with 32-bit corners, in little-endian order.

@@ -1,8 +1,8 @@
 //! PLY files: the header, read and written, and whole meshes.
 //!
-//! [`Header::read`] is the one parser of PLY headers; the readers of outcrop and of its tools differ in
-//! what they do with the elements after it. [`Layout`] is the one writer: a cloud or a triangle mesh with
-//! records of fixed size. [`Mesh::read`] holds a mesh, or a cloud, in memory.
+//! [`Header::read`] is the only parser of PLY headers; the readers of outcrop and of its tools differ in the
+//! processing of the elements after it. [`Layout`] is the only writer: a cloud or a triangle mesh with
+//! entries of fixed size. [`Mesh::read`] holds a mesh, or a cloud, in memory.
 
 mod error;
 mod header;

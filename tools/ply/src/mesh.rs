@@ -10,16 +10,16 @@ use std::io::BufRead;
 pub struct Mesh {
     /// Positions of the vertices.
     pub vertices: Vec<[f64; 3]>,
-    /// Corners of the triangles, each the number of a vertex; polygons become fans.
+    /// Corners of the triangles, as indices of vertices; polygons become fans.
     pub triangles: Vec<[u32; 3]>,
 }
 
 impl Mesh {
-    /// Reads a file of `bytes` bytes, which bounds what is reserved on account of the header. Elements
-    /// other than vertices and faces are skipped, and what is behind both is not read.
+    /// Reads a file of `bytes` bytes, which bounds the memory allocated by the counts of the header. Elements
+    /// other than vertices and faces are skipped; data after both are not read.
     ///
     /// # Errors
-    /// [`Error`], naming the entry.
+    /// [`Error`] with the entry.
     pub fn read(mut input: impl BufRead, bytes: u64) -> Result<Self> {
         let header = Header::read(&mut input)?;
         let mut numbers = Numbers {
@@ -168,7 +168,7 @@ mod tests {
             let mesh = parse(&bytes).unwrap();
             assert_eq!(mesh.vertices, corners);
             assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3], [0, 1, 2]]);
-            // Cut anywhere it is an error, never a panic.
+            // A file cut at any place is an error, never a panic.
             for end in 0..bytes.len() - 1 {
                 assert!(parse(&bytes[..end]).is_err(), "cut at {end}");
             }

@@ -1,11 +1,11 @@
-//! What is behind a header, as a sequence of numbers.
+//! The data after a header, as a sequence of numbers.
 
 use crate::error::Result;
 use crate::types::{Encoding, Property, Scalar};
 use std::io::{BufRead, ErrorKind};
 
-/// The number in the first bytes, in little-endian order unless `big`; all types fit into `f64`. The
-/// caller has checked the length.
+/// The number in the first bytes, in little-endian order unless `big`; all types fit into `f64`. The caller
+/// has checked the length.
 #[must_use]
 #[inline]
 pub fn real(scalar: Scalar, bytes: &[u8], big: bool) -> f64 {
@@ -16,7 +16,7 @@ pub fn real(scalar: Scalar, bytes: &[u8], big: bool) -> f64 {
     }
 }
 
-/// As [`real`], cut to a whole number.
+/// As [`real`], truncated to an integer.
 #[must_use]
 #[inline]
 pub fn integer(scalar: Scalar, bytes: &[u8], big: bool) -> i64 {
@@ -42,14 +42,14 @@ fn array<const N: usize>(bytes: &[u8], big: bool) -> [u8; N] {
     value
 }
 
-/// Reads numbers one after the other, whatever the encoding. Errors are what was found.
+/// Reads a sequence of numbers in any encoding. Errors are the content found.
 pub(crate) struct Numbers<R> {
     pub(crate) input: R,
     pub(crate) encoding: Encoding,
     pub(crate) token: Vec<u8>,
 }
 
-/// A number in text is not longer.
+/// Upper bound for the length of a number in text.
 const LONGEST: usize = 400;
 
 impl<R: BufRead> Numbers<R> {
@@ -73,7 +73,7 @@ impl<R: BufRead> Numbers<R> {
             if buffer.is_empty() {
                 break;
             }
-            // Leading blanks first, then up to the next blank, over as many buffers as it takes.
+            // Leading white space first, then up to the next, over any number of buffers.
             let blank = |b: &&u8| b.is_ascii_whitespace();
             let begin = match self.token.is_empty() {
                 true => buffer.iter().take_while(blank).count(),

@@ -5,18 +5,18 @@ use crate::header::{Element, Header};
 use crate::types::{Encoding, Property, Scalar};
 use std::io::BufRead;
 
-/// Longest header that is read, in bytes. It also bounds the size of one entry: a property takes at least
-/// 18 bytes here and at most 8 there.
+/// Longest header that is read, in bytes. It also bounds the size of one entry: a property takes at least 18
+/// bytes in the header and at most 8 in an entry.
 const LONGEST: usize = 1 << 20;
 
 impl Header {
     /// Longest header that is read, in bytes.
     pub const LONGEST: usize = LONGEST;
 
-    /// Reads a header from its first line on, and nothing of what is behind it.
+    /// Reads a header from its first line on, and none of the data after it.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Input`] naming the line.
+    /// [`Error::Io`]; [`Error::Input`] with the line.
     pub fn read(input: &mut impl BufRead) -> Result<Self> {
         let mut lines = Lines {
             input,
@@ -49,7 +49,7 @@ impl Header {
         }
     }
 
-    /// Takes a line; the error is what was expected of it.
+    /// Processes a line; the error is the expected content.
     fn take(&mut self, text: &str, encoding: &mut Option<Encoding>) -> Result<(), &'static str> {
         let words: Vec<&str> = text.split_ascii_whitespace().collect();
         match words[..] {
@@ -95,13 +95,13 @@ impl Header {
 /// The lines of a header.
 struct Lines<'a, R> {
     input: &'a mut R,
-    /// The last line that was read, without its end.
+    /// The last line, without its end.
     line: Vec<u8>,
     /// Bytes read so far.
     bytes: usize,
     /// Lines read so far.
     number: usize,
-    /// What ends a line: a carriage return alone only if it ends the first one.
+    /// The byte that ends lines; a carriage return alone only if it ends the first line.
     end: u8,
 }
 

@@ -1,6 +1,6 @@
-//! Types that a header names.
+//! Types in a header.
 
-/// How the elements are written.
+/// Encoding of the elements.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Encoding {
     /// Numbers as text.
@@ -58,7 +58,7 @@ impl Scalar {
         })
     }
 
-    /// The name in a header, of the two that which every reader knows.
+    /// The name in a header; of two names the one that every reader knows.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -84,7 +84,7 @@ impl Scalar {
         }
     }
 
-    /// True for whole numbers.
+    /// True for integer types.
     #[must_use]
     pub fn is_integer(self) -> bool {
         !matches!(self, Self::F32 | Self::F64)
@@ -96,11 +96,11 @@ impl Scalar {
 pub enum Property {
     /// One number.
     One(Scalar),
-    /// As many as a number before them says.
+    /// A list: a count, followed by this number of items.
     List {
-        /// Type of that number, an integer.
+        /// Type of the count, an integer.
         count: Scalar,
-        /// Type of the others.
+        /// Type of the items.
         item: Scalar,
     },
 }

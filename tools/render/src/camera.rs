@@ -4,7 +4,7 @@ use std::str::FromStr;
 
 use crate::vec3::{Vec3, cross, dot, sub};
 
-/// Direction from which to look, as azimuth and elevation of the camera in degrees.
+/// Viewing direction, as azimuth and elevation of the camera in degrees.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct View {
     azimuth: f64,
@@ -34,14 +34,14 @@ impl FromStr for View {
     }
 }
 
-/// What part of the scene to show.
+/// Part of the scene in the image.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Framing {
     /// Size of the image in pixels.
     pub size: [usize; 2],
     /// Magnification after fitting.
     pub zoom: f64,
-    /// Point in the middle of the image; None for the middle of the scene.
+    /// Point at the centre of the image; None for the centre of the scene.
     pub centre: Option<Vec3>,
     /// Percentage of coordinates left out at either end when fitting.
     pub crop: f64,
@@ -52,7 +52,7 @@ pub(crate) struct Framing {
 pub(crate) struct Camera {
     pub right: Vec3,
     pub up: Vec3,
-    /// From the scene to the viewer.
+    /// Direction from the scene to the viewer.
     pub towards: Vec3,
     /// Pixels per unit.
     pub scale: f64,
@@ -63,10 +63,10 @@ pub(crate) struct Camera {
 /// Part of the image that the scene fills.
 const FILL: f64 = 0.9;
 
-/// Margin around the cropped extent, in terms of that.
+/// Margin around the cropped extent, relative to it.
 const CROP_MARGIN: f64 = 0.15;
 
-/// Positions looked at for the framing; more do not change the percentiles visibly.
+/// Positions sampled for the framing; more do not change the percentiles visibly.
 const FRAMING_SAMPLES: usize = 1 << 21;
 
 impl Camera {
@@ -88,14 +88,14 @@ impl Camera {
             right,
             up,
             towards,
-            // A single point, or nothing, leaves nothing to fit.
+            // A single point, or none, has no extent to fit.
             scale: if scale.is_finite() { scale } else { 1.0 } * framing.zoom,
             centre: framing.centre.unwrap_or(auto),
             middle: size.map(|pixels| pixels / 2.0),
         }
     }
 
-    /// Pixel coordinates, and depth in units, growing towards the viewer.
+    /// Pixel coordinates, and depth in units, increasing towards the viewer.
     pub(crate) fn project(&self, p: Vec3) -> Vec3 {
         let p = sub(p, self.centre);
         [
@@ -106,8 +106,8 @@ impl Camera {
     }
 }
 
-/// The extent to fit: that without the outermost percentiles, with a margin for thinly covered
-/// ends, but no more than there is.
+/// The extent to fit: without the outermost percentiles, plus a margin for sparse ends, limited to the whole
+/// extent.
 fn framed(positions: &[Vec3], axis: Vec3, crop: f64) -> [f64; 2] {
     let ([low, high], all) = (span(positions, axis, crop), span(positions, axis, 0.0));
     let margin = CROP_MARGIN * (high - low);

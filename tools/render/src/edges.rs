@@ -1,16 +1,16 @@
-//! Finding the edges that do not have exactly two triangles.
+//! Edges that do not have exactly two triangles.
 
-/// Edges by the number of their triangles.
+/// Edges by number of triangles.
 #[derive(Debug, Default)]
 pub(crate) struct Edges {
     /// With one triangle.
     pub boundary: Vec<[u32; 2]>,
-    /// With three and more.
+    /// With three or more.
     pub non_manifold: Vec<[u32; 2]>,
 }
 
-/// Counts the triangles of each edge. The edges are grouped by their smaller vertex with a
-/// counting sort, which takes a quarter of the memory of sorting them all.
+/// Counts the triangles of each edge. The edges are grouped by their smaller vertex with a counting sort,
+/// which takes a quarter of the memory of sorting all edges.
 pub(crate) fn find(vertices: usize, triangles: &[[u32; 3]]) -> Edges {
     let sides = |t: &[u32; 3]| {
         let [a, b, c] = *t;

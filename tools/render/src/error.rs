@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 /// Result with this program's [`Error`].
 pub(crate) type Result<T, E = Error> = std::result::Result<T, E>;
 
-/// Why no image came out.
+/// The errors of this program.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum Error {
-    /// The operating system refused to read or write a file.
+    /// A file cannot be read or written.
     #[error("{path}: cannot {action}: {source}", path = path.display())]
     Io {
         path: PathBuf,

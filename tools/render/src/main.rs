@@ -57,7 +57,7 @@ struct Args {
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0)]
     zoom: f64,
 
-    /// Point in the middle of the image, X,Y,Z or auto
+    /// Point at the centre of the image, X,Y,Z or auto
     #[arg(long, value_name = "POINT", default_value = "auto", allow_hyphen_values = true,
           value_parser = parse_centre)]
     center: Centre,
@@ -66,8 +66,8 @@ struct Args {
     #[arg(long, value_name = "N", default_value_t = 2)]
     supersample: usize,
 
-    /// Leave out this percentage of coordinates at either end when fitting, so that outliers do
-    /// not shrink the object; 0 to fit everything
+    /// Leave out this percentage of coordinates at either end when fitting, so that outliers do not shrink
+    /// the object; 0 fits all points
     #[arg(long, value_name = "PERCENT", default_value_t = 1.0)]
     crop_percentile: f64,
 
@@ -88,7 +88,7 @@ struct Args {
     point_size: f64,
 }
 
-/// Middle of the image; None for the middle of the scene.
+/// Centre of the image; None for the centre of the scene.
 #[derive(Clone, Copy, Debug)]
 struct Centre(Option<Vec3>);
 
@@ -103,7 +103,7 @@ fn parse_centre(text: &str) -> Result<Centre, String> {
     }
 }
 
-/// Pixels of the raster, which takes some twelve bytes for each.
+/// Largest number of pixels of the raster, at some twelve bytes each.
 const PIXEL_LIMIT: usize = 1 << 28;
 
 fn check(args: &Args) -> Result<()> {

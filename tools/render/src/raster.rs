@@ -1,9 +1,9 @@
-//! The depth buffer and what is drawn into it.
+//! The depth buffer and the drawing into it.
 
 use crate::camera::Camera;
 use crate::vec3::{Vec3, cross, dot, sub};
 
-/// Marks on top of the surface, the later the more important.
+/// Marks on top of the surface; later ones have priority.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Mark {
     None,
@@ -12,15 +12,15 @@ pub(crate) enum Mark {
     NonManifold,
 }
 
-/// The number of no triangle or point.
+/// Stands for no triangle or point.
 pub(crate) const NOTHING: u32 = u32::MAX;
 
-/// For each pixel the nearest triangle or point. Colours come later, once per pixel.
+/// For each pixel the nearest triangle or point. Colours are computed later, once per pixel.
 #[derive(Debug)]
 pub(crate) struct Raster {
     pub width: usize,
     pub height: usize,
-    /// Growing towards the viewer.
+    /// Depth, increasing towards the viewer.
     pub depth: Vec<f32>,
     pub item: Vec<u32>,
     pub mark: Vec<Mark>,
@@ -59,9 +59,9 @@ impl Raster {
         }
     }
 
-    /// The pixels `low..high` of an axis whose middle lies in the closed interval.
+    /// The pixels `low..high` of an axis whose centre is in the closed interval.
     fn pixels(low: f64, high: f64, size: usize) -> std::ops::Range<usize> {
-        // The casts saturate, and what is not a number becomes an empty range.
+        // The casts saturate, and NaN gives an empty range.
         let first = (low - 0.5).ceil().max(0.0) as usize;
         let end = ((high - 0.5).floor() + 1.0).max(0.0) as usize;
         first.min(size)..end.min(size)
@@ -80,7 +80,7 @@ impl Raster {
         if columns.is_empty() || rows.is_empty() {
             return;
         }
-        // Barycentric weights of b and c and the depth are linear over the image.
+        // Barycentric weights of b and c and the depth are linear in the image.
         let (by_x, by_y) = ((c[1] - a[1]) * inverse, (a[0] - c[0]) * inverse);
         let (cx_x, cx_y) = ((a[1] - b[1]) * inverse, (b[0] - a[0]) * inverse);
         for y in rows {
@@ -115,7 +115,7 @@ impl Raster {
         }
     }
 
-    /// Marks a line where the surface does not hide it.
+    /// Marks the part of a line that the surface does not hide.
     pub(crate) fn line(&mut self, camera: &Camera, ends: [Vec3; 2], mark: Mark, thickness: f64) {
         let [a, b] = ends.map(|p| camera.project(p));
         let along = sub(b, a);
@@ -123,7 +123,7 @@ impl Raster {
         let Some((from, to)) = self.visible_part(a, along, margin) else {
             return;
         };
-        // In front of the surface that it belongs to, also where that is steep.
+        // In front of its own surface, even where that is steep.
         let lift = 3.0 / camera.scale;
         let pixels = along[0].abs().max(along[1].abs()) * (to - from);
         let steps = pixels.ceil().max(1.0) as usize;
@@ -143,7 +143,7 @@ impl Raster {
         }
     }
 
-    /// The part of a line inside the image and a margin, as fractions of its length.
+    /// The part of a line inside the image with a margin, as fractions of its length.
     fn visible_part(&self, start: Vec3, along: Vec3, margin: f64) -> Option<(f64, f64)> {
         let (mut from, mut to) = (0.0f64, 1.0f64);
         for (k, size) in [self.width, self.height].into_iter().enumerate() {

@@ -1,4 +1,4 @@
-//! The mesh or cloud of a PLY file, about its middle.
+//! The mesh or cloud of a PLY file, relative to its centre.
 
 use crate::error::{Error, Result};
 use crate::vec3::{Vec3, sub};
@@ -7,17 +7,17 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
-/// What is drawn: a cloud if there are no triangles.
+/// The drawn data: a cloud if there are no triangles.
 #[derive(Debug)]
 pub(crate) struct Scene {
     /// Vertices relative to `origin`.
     pub positions: Vec<Vec3>,
     pub triangles: Vec<[u32; 3]>,
-    /// Middle of the bounding box, so that the numbers stay small far from the zero point.
+    /// Centre of the bounding box; subtracted so that coordinates are small.
     pub origin: Vec3,
 }
 
-/// Reads a file whole.
+/// Reads a whole file.
 pub(crate) fn read(path: &Path) -> Result<Scene> {
     let file = File::open(path).map_err(|e| Error::io(path, "open", e))?;
     let bytes = file.metadata().map_err(|e| Error::io(path, "examine", e))?;

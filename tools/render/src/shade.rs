@@ -1,4 +1,4 @@
-//! From the depth buffer to colours.
+//! Colours from the depth buffer.
 
 use crate::camera::{Camera, span};
 use crate::raster::{Mark, NOTHING, Raster};
@@ -14,7 +14,7 @@ const FRONT: Colour = [236.0, 224.0, 206.0];
 const BACK: Colour = [92.0, 132.0, 232.0];
 const BOUNDARY: Colour = [225.0, 20.0, 20.0];
 const NON_MANIFOLD: Colour = [225.0, 0.0, 225.0];
-/// Wires darken what they lie on.
+/// Factor of the surface colour under wires.
 const WIRE: f64 = 0.35;
 
 /// Colours of points from the lowest to the highest.
@@ -27,19 +27,19 @@ const RAMP: [Colour; 6] = [
     [245.0, 225.0, 80.0],
 ];
 
-/// Colours pixels.
+/// Computes the colours of pixels.
 pub(crate) struct Shader<'a> {
     mesh: &'a Scene,
     camera: &'a Camera,
     light: Vec3,
     heights: [f64; 2],
-    /// How strongly a depth step darkens a point, per unit.
+    /// Darkening of a point per unit of depth step.
     relief: f64,
 }
 
 impl<'a> Shader<'a> {
     pub(crate) fn new(mesh: &'a Scene, camera: &'a Camera, raster: &Raster) -> Self {
-        // A headlight over the left shoulder: straight from the viewer it would flatten shapes.
+        // A headlight over the left shoulder: light from the viewer's direction would flatten shapes.
         let light = std::array::from_fn(|k| {
             camera.towards[k] + 0.45 * camera.up[k] - 0.35 * camera.right[k]
         });
@@ -81,8 +81,8 @@ impl<'a> Shader<'a> {
         std::array::from_fn(|k| shade * (RAMP[step][k] * (1.0 - blend) + RAMP[step + 1][k] * blend))
     }
 
-    /// Darkens a pixel whose surroundings are nearer to the viewer, which gives a cloud without
-    /// normals its shape.
+    /// Darkens a pixel whose surroundings are nearer to the viewer, which shows the shape of a cloud without
+    /// normals.
     fn eye_dome(&self, raster: &Raster, pixel: usize) -> f64 {
         const REACH: isize = 2;
         let (x, y) = (
@@ -126,7 +126,7 @@ impl<'a> Shader<'a> {
         }
     }
 
-    /// The image, each pixel the mean of `factor` squared pixels of the raster, as RGB bytes.
+    /// The image as RGB bytes; each pixel is the mean of `factor` squared pixels of the raster.
     pub(crate) fn image(&self, raster: &Raster, factor: usize) -> Vec<u8> {
         let (width, height) = (raster.width / factor, raster.height / factor);
         let mut bytes = Vec::with_capacity(width * height * 3);

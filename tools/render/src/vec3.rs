@@ -1,4 +1,4 @@
-//! The few vector operations that drawing needs.
+//! Vector operations.
 
 pub(crate) type Vec3 = [f64; 3];
 
@@ -18,7 +18,7 @@ pub(crate) fn cross(a: Vec3, b: Vec3) -> Vec3 {
     ]
 }
 
-/// `a` at length one; the zero vector stays zero.
+/// `a` scaled to unit length; the zero vector stays zero.
 pub(crate) fn normalize(a: Vec3) -> Vec3 {
     let length = dot(a, a).sqrt();
     if length > 0.0 {

@@ -1,4 +1,4 @@
-//! The cloud to measure with, and its points as the k-d tree wants them.
+//! The cloud of a measurement, and its points in the form for the k-d tree.
 
 use crate::Result;
 use outcrop::stages::ingest;
@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 /// A generated cloud: a uniform sample of a surface.
 #[derive(Debug, clap::Args)]
 pub struct Sample {
-    /// Surface to sample, as cloudgen names them
+    /// Surface to sample, by its name in cloudgen
     #[arg(
         long,
         value_name = "NAME",
@@ -21,7 +21,7 @@ pub struct Sample {
     /// Number of points, e.g. 1e6
     #[arg(long, value_name = "N", default_value = "1e6", value_parser = count)]
     points: u64,
-    /// Format of the cloud, as cloudgen names them
+    /// Format of the cloud, by its name in cloudgen
     #[arg(
         long,
         value_name = "NAME",
@@ -41,7 +41,7 @@ fn count(text: &str) -> std::result::Result<u64, String> {
 }
 
 impl Sample {
-    /// Writes the cloud into `folder`; its path.
+    /// Writes the cloud into `folder`; returns its path.
     pub fn write(&self, folder: &Path) -> Result<PathBuf> {
         let extension = match self.format {
             Format::Las(_) => "las",
@@ -53,14 +53,14 @@ impl Sample {
         Cloud::new(self.kind)
             .points(self.points)
             .write(&path, self.format)?;
-        // Or the disk would still be busy with it while the clock runs.
+        // Otherwise the disk would be busy with it during the measurement.
         std::fs::File::open(&path)?.sync_all()?;
         Ok(path)
     }
 }
 
-/// The distinct points of a cloud along the Hilbert curve: what is left after the pipeline's own
-/// ingest and order; and the length of a lattice step.
+/// The distinct points of a cloud along the Hilbert curve, by the pipeline's own ingest and order; and the
+/// length of a lattice step.
 pub fn ordered(cloud: &Path, workspace: &Workspace) -> Result<(PointStore, f64)> {
     let spool = ingest::ingest(&[cloud.to_owned()], workspace)?;
     let lattice = spool.choose_lattice(0)?;
@@ -70,7 +70,7 @@ pub fn ordered(cloud: &Path, workspace: &Workspace) -> Result<(PointStore, f64)>
     Ok((store, lattice.step))
 }
 
-/// The same points as the k-d tree wants them, relative to the cloud's lowest corner.
+/// The same points in the form for the k-d tree, relative to the cloud's lowest corner.
 pub fn points(store: &PointStore, step: f64) -> Result<Vec<[f32; 3]>> {
     let scaled = |p: [i32; 3]| p.map(|c| (f64::from(c) * step) as f32);
     Ok(store

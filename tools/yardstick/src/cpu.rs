@@ -1,8 +1,8 @@
-//! Processor time, which other programs on the machine disturb less than wall-clock time.
+//! Processor time, which is less affected by other programs than wall-clock time.
 
 use crate::Result;
 
-/// Clock ticks a second in `/proc`: fixed by Linux for all programs.
+/// Clock ticks per second in `/proc`: fixed by Linux for all programs.
 const TICKS: f64 = 100.0;
 
 /// User and system seconds of this process so far.
@@ -15,9 +15,9 @@ pub fn children() -> Result<f64> {
     ticks(&std::fs::read_to_string("/proc/self/stat")?, 15)
 }
 
-/// Seconds from the field at `first`, counted from 0, and the one after it.
+/// Seconds in the field `first`, counted from 0, and the one after it.
 fn ticks(stat: &str, first: usize) -> Result<f64> {
-    // The name, field 1, stands in brackets and may hold anything.
+    // The name, field 1, is in brackets and may have any characters.
     let (_, rest) = stat
         .rsplit_once(')')
         .ok_or("no process name in /proc/self/stat")?;

@@ -1,4 +1,4 @@
-//! K: a k-d tree answers one query after the other.
+//! K: queries of a k-d tree, one after another.
 
 use crate::{Result, cpu};
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use std::num::NonZero;
 use std::time::Instant;
 
-/// Neighbours asked for; the query itself is one of them.
+/// Neighbours per query; the query itself is one of them.
 const NEIGHBORS: usize = 30;
 
 /// The k-d tree's times in seconds.
@@ -21,7 +21,7 @@ pub struct Times {
     pub cpu: f64,
 }
 
-/// Answers `nearest_n(30)` for all points on the workspace's threads.
+/// Measures `nearest_n(30)` for all points on the workspace's threads.
 pub fn time(points: &[[f32; 3]], workspace: &Workspace) -> Result<Times> {
     let neighbors = NonZero::new(NEIGHBORS).ok_or("no neighbours asked for")?;
     let start = Instant::now();
@@ -35,7 +35,7 @@ pub fn time(points: &[[f32; 3]], workspace: &Workspace) -> Result<Times> {
     let sum: f64 = workspace.install(|| points.par_iter().map(answer).sum());
     let queries = start.elapsed().as_secs_f64();
     let cpu = cpu::own()? - cpu;
-    // The sum keeps the compiler from leaving the queries out.
+    // The sum prevents the compiler from removing the queries.
     if !sum.is_finite() {
         return Err("the k-d tree's distances are not finite".into());
     }

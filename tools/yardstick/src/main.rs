@@ -1,8 +1,8 @@
-//! Times whole reconstructions against a yardstick that is carried along.
+//! Measures whole reconstructions in units of a yardstick that is measured with them.
 //!
-//! **K** is the time in which kiddo's `ImmutableKdTree<f32, 3>`, over points sorted along a curve,
-//! answers `nearest_n(30)` for all points, on the same number of threads and in the same run.
-//! Machines differ and drift; the ratio of a reconstruction to K does so much less.
+//! **K** is the time of `nearest_n(30)` for all points in kiddo's `ImmutableKdTree<f32, 3>`, over points
+//! sorted along a curve, on the same number of threads and in the same run. Machines differ and drift; the
+//! ratio of a reconstruction to K does so much less.
 
 mod cloud;
 mod cpu;
@@ -17,10 +17,10 @@ use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// What went wrong, in words.
+/// Result with an error in words.
 type Result<T> = std::result::Result<T, Box<dyn std::error::Error>>;
 
-/// Times whole reconstructions against K, the time of a k-d tree's 30-NN for the same points.
+/// Measures whole reconstructions in units of K, the time of a k-d tree's 30-NN for the same points.
 #[derive(Debug, Parser)]
 #[command(name = "yardstick", version, max_term_width = 100)]
 struct Arguments {
@@ -30,7 +30,7 @@ struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Measure K and the whole pipeline, in turn
+    /// Measure K and the whole pipeline, alternately
     Run(Run),
     /// Print measurements, written by `run --json`, as Markdown tables
     Table {
@@ -57,13 +57,13 @@ struct Run {
     /// Memory budget of the pipeline, e.g. 512MiB [default: outcrop's]
     #[arg(long, value_name = "SIZE")]
     memory: Option<ByteSize>,
-    /// Pairs of K and pipeline to measure; medians count
+    /// Pairs of K and pipeline to measure; results are medians
     #[arg(long, value_name = "N", default_value_t = 1)]
     repeat: usize,
     /// Folder for the cloud, scratch files and the mesh, all removed at the end
     #[arg(long, value_name = "DIR")]
     scratch: Option<PathBuf>,
-    /// Write the measurement as JSON too
+    /// Also write the measurement as JSON
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
 }

@@ -10,7 +10,7 @@ use serde_json::Value;
 use std::path::Path;
 use std::sync::Arc;
 
-/// What was measured; the content of the JSON file.
+/// A measurement; the content of the JSON file.
 #[derive(Debug, Serialize, Deserialize)]
 pub struct Measurement {
     /// Name of the cloud's file.
@@ -31,7 +31,7 @@ pub struct Measurement {
     pub ratio: f64,
     /// Median over the pairs of the pipeline's own neighbour search alone / K.
     pub neighbors_ratio: f64,
-    /// The same as `ratio`, of processor times: what a busy machine disturbs least.
+    /// The same as `ratio`, of processor times, which a busy machine affects least.
     pub cpu_ratio: f64,
     /// Share of the threads' wall-clock time that the pipeline spent computing, median.
     pub utilisation: f64,
@@ -49,12 +49,12 @@ pub struct Measurement {
     pub report: Value,
 }
 
-/// One pair, in the order it ran.
+/// One pair, in the order of measurement.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub struct Pair {
     /// Seconds of all queries.
     pub k_seconds: f64,
-    /// Seconds of the pipeline right after.
+    /// Seconds of the pipeline, directly after.
     pub pipeline_seconds: f64,
     /// Seconds of the pipeline's own neighbour search alone, between the two.
     pub neighbors_seconds: f64,
@@ -77,14 +77,14 @@ pub struct Stage {
     pub bytes_written: u64,
 }
 
-/// Where it was measured.
+/// The machine of the measurement.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Machine {
     /// The processor's name.
     pub model: String,
     /// Threads it offers.
     pub cores: usize,
-    /// Memory that may be used, in bytes.
+    /// Memory available to this process, in bytes.
     pub memory: u64,
 }
 
@@ -134,7 +134,7 @@ fn measure(options: &Run, folder: &Path) -> Result<Measurement> {
         Some(path) => path.clone(),
         None => options.sample.write(folder)?,
     };
-    // K has all the memory there is; only the pipeline has a budget.
+    // K has all available memory; only the pipeline has a budget.
     let all = MemoryPool::new(limits::memory_allowed())?;
     let workspace = Workspace::new(folder, all, threads, Arc::new(Silent), Cancel::new())?;
     let (store, step) = cloud::ordered(&input, &workspace)?;

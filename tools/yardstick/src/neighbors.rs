@@ -10,10 +10,10 @@ use std::ops::Range;
 use std::sync::Mutex;
 use std::time::Instant;
 
-/// Neighbours asked for, besides the query itself.
+/// Neighbours per query, without the query itself.
 const NEIGHBORS: usize = 30;
 
-/// Points a tile, as in the pipeline.
+/// Points per tile, as in the pipeline.
 const TILE: usize = 1 << 16;
 
 /// Seconds for all points, read from the ordered store tile by tile.
@@ -31,7 +31,7 @@ pub fn time(store: &PointStore, workspace: &Workspace) -> Result<f64> {
         Ok(())
     })?;
     let seconds = start.elapsed().as_secs_f64();
-    // The sum keeps the compiler from leaving the queries out.
+    // The sum prevents the compiler from removing the queries.
     if !total.into_inner()?.is_finite() {
         return Err("the neighbours' distances are not finite".into());
     }

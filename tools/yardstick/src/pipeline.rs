@@ -1,5 +1,5 @@
-//! One reconstruction, cloud to mesh, in a process of its own: so its peak memory is its own, and
-//! its time holds all that a user waits for.
+//! One reconstruction, from cloud to mesh, in a process of its own: so its peak memory is its own, and its
+//! time includes all that a user waits for.
 
 use crate::{Result, cpu};
 use outcrop::Reconstruction;
@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use std::process::{Command, Stdio};
 use std::time::Instant;
 
-/// What to reconstruct, and in which limits.
+/// A reconstruction with its resources.
 #[derive(Debug, Clone, clap::Args)]
 pub struct Job {
     /// The cloud
@@ -23,7 +23,7 @@ pub struct Job {
     pub memory: u64,
 }
 
-/// The child's part: reconstructs and prints the report.
+/// The child process: reconstructs and prints the report.
 pub fn work(job: &Job) -> Result<()> {
     let report = Reconstruction::builder()
         .input(&job.input)
@@ -36,7 +36,7 @@ pub fn work(job: &Job) -> Result<()> {
     Ok(())
 }
 
-/// What the parent sees of a reconstruction.
+/// Measurements of the parent process.
 #[derive(Debug)]
 pub struct Outcome {
     /// Wall-clock seconds of the whole process.
@@ -47,7 +47,7 @@ pub struct Outcome {
     pub report: Value,
 }
 
-/// The parent's part: starts the child and waits for it.
+/// The parent process: starts the child and waits for it.
 pub fn time(job: &Job) -> Result<Outcome> {
     let mut command = Command::new(std::env::current_exe()?);
     command.arg("pipeline").arg(&job.input).arg(&job.output);

@@ -105,7 +105,7 @@ fn markdown(all: &[Measurement]) -> Result<String> {
             m.peak_scratch_bytes as f64 / m.points as f64,
         )?;
     }
-    // Seconds of each stage; those of one name, as several rounds of smoothing, are added up.
+    // Seconds of each stage; stages of one name, such as several rounds of smoothing, are added.
     let mut names: Vec<&str> = Vec::new();
     for stage in all.iter().flat_map(|m| &m.stages) {
         if !names.contains(&stage.name.as_str()) {

@@ -1,4 +1,4 @@
-//! Objects on the ground, and their places.
+//! Objects on the ground, and their positions.
 
 use std::f64::consts::PI;
 
@@ -21,7 +21,7 @@ pub(crate) struct House {
 }
 
 impl House {
-    /// Whether the ground at a place is under the roof.
+    /// True if the ground at this position is under the roof.
     pub(crate) fn covers(&self, [x, y]: [f64; 2]) -> bool {
         (x - self.centre[0]).abs() < self.width / 2.0
             && (y - self.centre[1]).abs() < self.depth / 2.0
@@ -45,7 +45,7 @@ pub(crate) struct Wall {
     pub height: f64,
 }
 
-/// A power line that hangs through.
+/// A power line that sags.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Wire {
     pub centre: [f64; 2],
@@ -53,7 +53,7 @@ pub(crate) struct Wire {
     pub along: [f64; 2],
 }
 
-/// Objects on the ground. They depend on the seed and their number only, not on the points.
+/// Objects on the ground. They depend only on the seed and their numbers, not on the points.
 #[derive(Clone, Debug)]
 pub(crate) struct Land {
     pub houses: Vec<House>,
@@ -63,7 +63,7 @@ pub(crate) struct Land {
 }
 
 impl Land {
-    /// The first trees and wires are the same however many there are.
+    /// The first trees and wires are the same for any number of them.
     pub(crate) fn new(seed: u64, objects: &Objects) -> Self {
         let house = |mut rng: Rng| House {
             centre: place(&mut rng, 20.0),
@@ -103,8 +103,8 @@ impl Land {
         }
     }
 
-    /// Discs (x, y, radius) that hold all houses, trees and walls, with a margin. Ground outside
-    /// is open. Wires are too high to count.
+    /// Discs (x, y, radius) around all houses, trees and walls, with a margin. Ground outside is open. Wires
+    /// are too high to matter.
     pub(crate) fn discs(&self) -> Vec<[f64; 3]> {
         let mut discs = Vec::new();
         for house in &self.houses {
@@ -116,7 +116,7 @@ impl Land {
             discs.push([x, y, tree.radius + 2.0]);
         }
         for wall in &self.walls {
-            // At least ten long, so there are ten discs or more.
+            // At least ten long, so at least ten discs.
             let count = wall.length.floor().max(2.0);
             for k in 0..count as u32 {
                 let t = wall.length * (f64::from(k) / (count - 1.0) - 0.5);
@@ -127,7 +127,7 @@ impl Land {
         discs
     }
 
-    /// Area under roofs; where houses overlap it counts once.
+    /// Area under roofs; overlaps count once.
     pub(crate) fn built_area(&self) -> f64 {
         let cuts = |low: fn(&House) -> f64, high: fn(&House) -> f64| {
             let mut cuts: Vec<f64> = self
@@ -164,7 +164,7 @@ pub(super) fn between(rng: &mut Rng, low: f64, high: f64) -> f64 {
     low + (high - low) * rng.uniform()
 }
 
-/// A place at least `margin` from the border.
+/// A random position at least `margin` from the border.
 fn place(rng: &mut Rng, margin: f64) -> [f64; 2] {
     std::array::from_fn(|_| between(rng, margin, OUTDOOR_SIDE - margin))
 }

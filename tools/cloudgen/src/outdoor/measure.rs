@@ -1,4 +1,4 @@
-//! How a mesh of the outdoor world meets the open ground.
+//! Comparison of a mesh of the outdoor world with the open ground.
 
 use std::path::Path;
 
@@ -7,46 +7,46 @@ use crate::error::{Error, Result};
 use crate::ply_stream::PlyStream;
 use crate::vec3::{Vec3, cross, length, sub};
 
-/// Width of the cells that tell whether ground is open.
+/// Width of the cells that mark open ground.
 const CELL: f64 = 0.1;
 
-/// Discs are drawn this much larger, since cells are judged by a corner.
+/// Discs are enlarged by this, since a cell is judged by one corner.
 const CELL_MARGIN: f64 = 0.15;
 
 /// Ground closer to the border is not open.
 const BORDER: f64 = 3.0;
 
-/// A triangle is near horizontal if its unit normal has more than this along z.
+/// A triangle is near-horizontal if the z component of its unit normal is larger.
 const FLAT: f64 = 0.7;
 
-/// A triangle is a sail if its middle is farther above or below the ground.
+/// A triangle is a sail if its centroid is farther above or below the ground.
 const SAIL: f64 = 1.0;
 
-/// The edge is of a triangle over open ground; beside the vertex at its other end.
+/// Marks an edge of a triangle over open ground, in the word of its other end.
 const OPEN: u32 = 1 << 31;
 
-/// How a mesh meets the ground. Open ground is away from every house, tree and wall, and from the
-/// border; what is over it should face up, have no boundary and be near.
+/// Comparison of a mesh with the ground. Open ground is away from every house, tree and wall, and from the
+/// border. The mesh over it should face up, have no boundary and be near.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GroundReport {
     /// Triangles of the mesh.
     pub triangles: u64,
-    /// Of the area that is near horizontal, the share that faces down; not a number if there is none.
+    /// Share of the near-horizontal area that faces down; NaN if there is none.
     pub down_share: f64,
-    /// The same over open ground.
+    /// The same share over open ground.
     pub open_down_share: f64,
     /// Area of all triangles over open ground.
     pub open_area: f64,
-    /// Area of triangles over open ground whose middle is more than 1 above or below it.
+    /// Area of triangles over open ground whose centroid is more than 1 above or below it.
     pub open_sail_area: f64,
-    /// Edges of one triangle only.
+    /// Edges with one triangle.
     pub boundary_edges: u64,
-    /// Those whose triangle is over open ground.
+    /// Those with a triangle over open ground.
     pub open_boundary_edges: u64,
 }
 
 impl GroundReport {
-    /// All numbers as JSON, on one line.
+    /// All figures as JSON, on one line.
     pub fn to_json(&self) -> String {
         let number = |value: f64| match value.is_finite() {
             true => value.to_string(),
@@ -66,8 +66,8 @@ impl GroundReport {
     }
 }
 
-/// Measures a mesh whose coordinates are those of the land plus `offset`. Takes 24 bytes for each
-/// vertex, or 4 for each vertex and 12 for each triangle, whichever is more.
+/// Measures a mesh whose coordinates are those of the land plus `offset`. Takes 24 bytes for each vertex, or
+/// 4 for each vertex and 12 for each triangle, whichever is more.
 pub(crate) fn measure(discs: &[[f64; 3]], offset: Vec3, path: &Path) -> Result<GroundReport> {
     let mesh = PlyStream::open(path)?;
     let most = u32::MAX as usize / 3;
@@ -100,7 +100,7 @@ pub(crate) fn measure(discs: &[[f64; 3]], offset: Vec3, path: &Path) -> Result<G
     })
 }
 
-/// Areas; those of near horizontal triangles are of the ones that face down, and of all.
+/// Areas; of near-horizontal triangles, the area that faces down, and all.
 #[derive(Default)]
 struct Areas {
     all: [f64; 2],
@@ -110,7 +110,7 @@ struct Areas {
 }
 
 impl Areas {
-    /// Takes in a triangle, and tells whether it is over open ground.
+    /// Adds a triangle; returns true if it is over open ground.
     fn add(&mut self, ground: &Ground, [a, b, c]: &[Vec3; 3]) -> bool {
         let normal = cross(sub(*b, *a), sub(*c, *a));
         let double = length(normal);
@@ -132,7 +132,7 @@ impl Areas {
     }
 }
 
-/// Where the ground is open, cell by cell.
+/// Open ground, by cells.
 struct Ground {
     row: usize,
     near: Vec<bool>,
@@ -143,7 +143,7 @@ impl Ground {
         let row = (OUTDOOR_SIDE / CELL) as usize + 1;
         let mut near = vec![false; row * row];
         for &[x, y, radius] in discs {
-            // Out of the range of numbers means its end.
+            // The cast saturates.
             let range = |middle: f64| {
                 let low = ((middle - radius) / CELL) as usize;
                 let high = ((middle + radius) / CELL) as usize + 3;
@@ -170,10 +170,9 @@ impl Ground {
     }
 }
 
-/// Edges of one triangle only: all, and those of triangles that are open. None if the file is not
-/// the same each time.
+/// Edges with one triangle: all, and those of open triangles. None if the file changed between reads.
 fn boundary(mesh: &PlyStream, open: &[bool]) -> Result<Option<[u64; 2]>> {
-    // Edges belong to their vertex of lower number: counted first, then put side by side.
+    // Edges belong to their lower vertex: counted first, then stored contiguously.
     let edges = |[a, b, c]: [u32; 3]| [(a, b), (b, c), (c, a)];
     let mut ends = vec![0u32; mesh.vertex_count()];
     mesh.for_each_face(|_, corners| {
@@ -183,7 +182,7 @@ fn boundary(mesh: &PlyStream, open: &[bool]) -> Result<Option<[u64; 2]>> {
     })?;
     let mut total = 0;
     for end in &mut ends {
-        // From here on the place of the first, which grows to the place behind the last.
+        // From here on the start of each group, which becomes its end.
         total += std::mem::replace(end, total);
     }
     let mut others = vec![0u32; total as usize];

@@ -1,5 +1,5 @@
-//! A hilly piece of land as a survey from the air sees it: ground, houses, trees, walls, wires.
-//! Where nothing stands, the ground is a height field, so it has a side that is up and no border.
+//! An aerial scan of hilly land: ground, houses, trees, walls, wires. Open ground is a height field, so it
+//! faces up and has no boundary.
 
 mod land;
 mod measure;
@@ -13,21 +13,21 @@ pub(crate) use points::Outdoor;
 /// Side of the square that the land covers.
 pub const OUTDOOR_SIDE: f64 = 400.0;
 
-/// Most trees.
+/// Largest number of trees.
 pub(crate) const MOST_TREES: u32 = 20_000;
 
-/// Most wires.
+/// Largest number of wires.
 pub(crate) const MOST_WIRES: u32 = 1000;
 
-/// Highest free-standing wall.
+/// Largest height of a free-standing wall.
 pub(crate) const HIGHEST_WALL: f64 = 100.0;
 
-/// How much stands on the ground of [`Kind::Outdoor`](crate::Kind::Outdoor).
+/// Objects on the ground of [`Kind::Outdoor`](crate::Kind::Outdoor).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Objects {
     /// Number of trees.
     pub trees: u32,
-    /// Number of power lines, each 180 long and 12 to 18 up.
+    /// Number of power lines, each 180 long and at a height of 12 to 18.
     pub wires: u32,
     /// Height of the free-standing walls; None for heights from 1 to 3.
     pub wall_height: Option<f64>,

@@ -1,4 +1,4 @@
-//! The points: ground, and what stands on it.
+//! The points: ground and objects.
 
 use super::land::{House, Land, Tree, Wall, Wire, between};
 use super::{HIGHEST_WALL, OUTDOOR_SIDE, height, slopes};
@@ -6,30 +6,30 @@ use crate::rng::Rng;
 use crate::surface::Sample;
 use crate::vec3::{Vec3, normalize, scale};
 
-/// Points of the ground, in terms of a square with one point for each square of the spacing.
+/// Density of points on the ground, relative to one point per square of the spacing.
 const GROUND: f64 = 0.8;
 
-/// Points of the sides of houses, in terms of that density: they are seen from above.
+/// Density on the sides of houses, likewise: they are scanned from above.
 const SIDES: f64 = 0.25;
 
-/// Points of walls, in terms of that density.
+/// Density on walls, likewise.
 const WALL: f64 = 0.5;
 
-/// Points of a crown for each of the square, at radius 2.
+/// Points of a crown of radius 2, relative to those of the whole land.
 const CROWN: f64 = 0.6e-4;
 
-/// Points of a trunk, in terms of those of its crown.
+/// Points of a trunk, relative to those of its crown.
 const TRUNK: f64 = 1.0 / 8.0;
 
 /// Length of a wire.
 const WIRE_LENGTH: f64 = 180.0;
 
-/// Spacings between two points of a wire.
+/// Distance of points on a wire, in spacings.
 const WIRE_STEP: f64 = 3.0;
 
 const AREA: f64 = OUTDOOR_SIDE * OUTDOOR_SIDE;
 
-/// Where points lie.
+/// Parts of the land.
 #[derive(Clone, Copy, Debug)]
 enum Part {
     Ground,
@@ -41,7 +41,7 @@ enum Part {
     Wire(Wire),
 }
 
-/// The points of the land, each made on demand.
+/// The points of the land, made on demand.
 #[derive(Debug)]
 pub(crate) struct Outdoor {
     houses: Vec<House>,
@@ -56,7 +56,7 @@ impl Outdoor {
         let parts = parts(land);
         let open = 1.0 - land.built_area() / AREA;
         let share = |part: &Part| share(part, open);
-        // Wires grow with the root of the square only: points = rate * root^2 + wire * root.
+        // The points of wires grow only with the root: points = rate * root^2 + wire * root.
         let rate: f64 = parts.iter().map(share).sum();
         let wire = land.wires.len() as f64 * WIRE_LENGTH / WIRE_STEP / OUTDOOR_SIDE;
         let discriminant = wire * wire + 4.0 * rate * points as f64;
@@ -66,7 +66,7 @@ impl Outdoor {
             Part::Wire(_) => (WIRE_LENGTH / WIRE_STEP * root / OUTDOOR_SIDE) as u64,
             _ => (share(part) * root * root) as u64,
         };
-        // The ground has the rest, and comes first.
+        // The rest is ground, which comes first.
         let objects: u64 = parts.iter().map(count).sum();
         let ground = points.saturating_sub(objects);
         let mut next = 0;
@@ -86,15 +86,15 @@ impl Outdoor {
         }
     }
 
-    /// Side of the square that has one point on a roof.
+    /// Side of the square with one point on a roof.
     pub(crate) fn spacing(&self) -> f64 {
         self.spacing
     }
 
-    /// Corners of a box that holds all points, without noise.
+    /// Corners of a box with all points, without noise.
     pub(crate) fn bounds() -> [Vec3; 2] {
-        // Walls reach over the border by 10 at most. The ground is within 17 of zero, and nothing is
-        // higher above it than the highest wall that is allowed.
+        // Walls reach over the border by 10 at most. The ground is within 17 of zero, and nothing is higher
+        // above it than the highest allowed wall.
         let far = OUTDOOR_SIDE + 10.0;
         [[-10.0, -10.0, -17.0], [far, far, 17.0 + HIGHEST_WALL]]
     }
@@ -114,14 +114,14 @@ impl Outdoor {
         }
     }
 
-    /// Something in the air.
+    /// A random point in the air.
     pub(crate) fn outlier(rng: &mut Rng) -> Vec3 {
         let [x, y] = [0, 1].map(|_| OUTDOOR_SIDE * rng.uniform());
         [x, y, height(x, y) + between(rng, 0.5, 30.0)]
     }
 
     fn ground(&self, rng: &mut Rng) -> Sample {
-        // Houses cover at most a seventh, so this ends.
+        // Houses cover at most a seventh, so the loop ends.
         let mut place = [0.0; 2];
         loop {
             place.fill_with(|| OUTDOOR_SIDE * rng.uniform());
@@ -165,7 +165,7 @@ fn parts(land: &Land) -> Vec<Part> {
         .collect()
 }
 
-/// Points of a part, in terms of those of the square; `open` is the share that no house covers.
+/// Points of a part, relative to those of the whole square; `open` is the share without houses.
 fn share(part: &Part, open: f64) -> f64 {
     match part {
         Part::Ground => GROUND * open,
@@ -247,7 +247,7 @@ mod tests {
         Outdoor::new(&Land::new(seed, objects), points)
     }
 
-    /// Points on the ground, roofs, sides, crowns, trunks, walls and wires, in terms of all.
+    /// Shares of ground, roofs, sides, crowns, trunks, walls and wires.
     fn shares(outdoor: &Outdoor, points: u64) -> [f64; 7] {
         let mut counts = [0.0; 7];
         let ends = outdoor.starts[1..].iter().chain([&points]);
@@ -268,7 +268,7 @@ mod tests {
 
     #[test]
     fn parts_share_the_points() {
-        // Means of the sizes that places are drawn from; seeds are some per cent around them.
+        // Means of the distributions of the sizes; seeds differ from them by some per cent.
         let points = 4_500_000;
         let wires = Objects {
             wires: 4,

@@ -1,6 +1,6 @@
-//! Sample elimination: from many candidates the most crowded one goes, again and again, until the
-//! number asked for is left (Yuksel, *Sample elimination for generating Poisson disk sample sets*,
-//! Computer Graphics Forum 34, 2015).
+//! Sample elimination: from many candidates the most crowded one is removed, repeatedly, until the wanted
+//! number remains (Yuksel, *Sample elimination for generating Poisson disk sample sets*, Computer Graphics
+//! Forum 34, 2015).
 
 use std::collections::BinaryHeap;
 
@@ -8,15 +8,15 @@ use super::grid::Grid;
 use crate::surface::Sample;
 use crate::vec3::{dot, length, sub};
 
-/// Two points whose normals differ by more than 120 degrees are on two sides of something thin.
+/// Points whose normals differ by more than 120 degrees are on two sides of a thin part.
 const OTHER_SIDE: f64 = -0.5;
 
-/// A candidate goes if it is the most crowded one, or nearly: the difference cannot be seen, and
-/// most of the sorting is saved.
+/// A candidate is removed if its crowding is nearly the largest: the difference is invisible, and saves most
+/// of the sorting.
 const NEARLY: f64 = 0.98;
 
-/// Which of the candidates stay. Each comes with its density, in `(0, 1]`; `area` is that of the
-/// surface, weighted with the density.
+/// Indices of the remaining candidates. Each candidate comes with its density, in `(0, 1]`; `area` is that of
+/// the surface, weighted with the density.
 pub(super) fn eliminate(candidates: &[(Sample, f64)], wanted: usize, area: f64) -> Vec<bool> {
     let mut keep = vec![true; candidates.len()];
     if candidates.len() <= wanted {
@@ -30,8 +30,8 @@ pub(super) fn eliminate(candidates: &[(Sample, f64)], wanted: usize, area: f64) 
             sum
         })
         .collect();
-    // Not negative, so their bits are in the same order. An entry can be out of date, but then it
-    // is too large, for crowding only falls: it is put back when it comes up.
+    // Values are not negative, so their bits have the same order. An outdated entry is too large, since
+    // crowding only falls: it is put back when it comes up.
     let entry = |crowding: f64, i: usize| (crowding.max(0.0).to_bits(), i);
     let mut heap: BinaryHeap<_> = (0..candidates.len())
         .map(|i| entry(crowding[i], i))
@@ -55,14 +55,14 @@ pub(super) fn eliminate(candidates: &[(Sample, f64)], wanted: usize, area: f64) 
     keep
 }
 
-/// The candidates and how they crowd each other.
+/// The candidates and their crowding.
 struct Crowd<'a> {
     candidates: &'a [(Sample, f64)],
-    /// One for each doubling of the reach; a candidate is in one of them.
+    /// One grid for each doubling of the reach; a candidate is in one of them.
     grids: Vec<Grid>,
-    /// Distance at which two candidates of density 1 do not matter to each other.
+    /// Distance beyond which two candidates of density 1 do not affect each other.
     reach: f64,
-    /// Closer than this is no worse.
+    /// Smaller distances count like this one.
     close: f64,
 }
 
@@ -92,7 +92,7 @@ impl<'a> Crowd<'a> {
         crowd
     }
 
-    /// Reach of a candidate in doublings of that of density 1, rounded down.
+    /// Doublings of the reach from that of density 1 to that of a candidate, rounded down.
     fn level(&self, i: usize) -> usize {
         let mut level = 0;
         while self.candidates[i].1 * (4u64 << (2 * level)) as f64 <= 1.0 {
@@ -101,11 +101,11 @@ impl<'a> Crowd<'a> {
         level
     }
 
-    /// Calls `visit` with every other candidate that matters to `i`, and how much.
+    /// Calls `visit` with every other candidate that affects `i`, and its effect.
     fn around(&self, i: usize, mut visit: impl FnMut(usize, f64)) {
         let (sample, density) = &self.candidates[i];
         for grid in &self.grids {
-            // The denser of the two decides, so neither its own reach nor that of the level must
+            // The denser of the two decides, so neither the candidate's own reach nor that of the level may
             // be exceeded.
             let most = (self.reach / density.sqrt()).min(grid.cell());
             grid.within(sample.position, most, |place, j| {

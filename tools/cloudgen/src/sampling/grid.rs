@@ -4,11 +4,11 @@ use rustc_hash::FxHashMap;
 
 use crate::vec3::Vec3;
 
-/// Points and their numbers, sorted by the cell that they are in.
+/// Points with their indices, sorted by cell.
 pub(super) struct Grid {
     cell: f64,
     members: Vec<(Vec3, u32)>,
-    /// Where in `members` those of a cell are.
+    /// For each cell the range of its points in `members`.
     ranges: FxHashMap<[i64; 3], (u32, u32)>,
 }
 

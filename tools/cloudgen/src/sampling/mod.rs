@@ -1,4 +1,4 @@
-//! How the points lie on the surface.
+//! Distribution of the points on the surface.
 
 mod eliminate;
 mod grid;
@@ -8,37 +8,37 @@ use crate::error::{Error, Result};
 use crate::rng::{Purpose, Rng};
 use crate::surface::{Sample, Surface};
 
-/// How the points lie on the surface.
+/// Distribution of the points on the surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Sampling {
     /// Each independent of the others.
     #[default]
     Uniform,
-    /// Evenly spaced but without a direction (blue noise): no two are close together.
+    /// Evenly spaced, without a preferred direction (blue noise): no two are close together.
     Regular,
-    /// Like regular, with more points where the surface is curved: up to 16 times as many.
+    /// Like regular, with up to 16 times the density where curvature is high.
     Adaptive,
 }
 
-/// Most points of a cloud that must be held in memory.
+/// Largest number of points of a cloud that is held in memory.
 pub const MOST_HELD: u64 = 10_000_000;
 
-/// Candidates for each point that is kept.
+/// Candidates per remaining point.
 const CANDIDATES: u64 = 4;
 
-/// Candidates beyond that, so that small clouds have a choice too.
+/// Further candidates, so that small clouds have a choice too.
 const EXTRA: u64 = 64;
 
-/// Samples that the mean curvature is taken from.
+/// Samples for the mean curvature.
 const PILOT: u64 = 1 << 14;
 
-/// Least density where the surface is flat, in terms of the highest.
+/// Density of flat parts, relative to the largest.
 const LEAST_DENSITY: f64 = 1.0 / 16.0;
 
-/// Density is the highest where the curvature is this many times its mean.
+/// Density is largest where curvature is this multiple of its mean.
 const SHARP: f64 = 4.0;
 
-/// Chooses exactly the points asked for, in the order of a sweep over the surface.
+/// Chooses exactly the wanted number of points, in the order of a sweep over the surface.
 pub(crate) fn choose(cloud: &Cloud, surface: &dyn Surface) -> Result<Vec<Sample>> {
     let wanted = cloud.points;
     if wanted > MOST_HELD {
@@ -60,7 +60,7 @@ pub(crate) fn choose(cloud: &Cloud, surface: &dyn Surface) -> Result<Vec<Sample>
             spare.push(candidate);
         }
     }
-    // Hardly ever needed: the chances were against far too many candidates.
+    // Rarely needed: far too many candidates were rejected by chance.
     let lack = (wanted as usize).saturating_sub(chosen.len());
     chosen.extend(spare.into_iter().take(lack));
     let area = surface.area() * density.mean;
@@ -70,7 +70,7 @@ pub(crate) fn choose(cloud: &Cloud, surface: &dyn Surface) -> Result<Vec<Sample>
     Ok(chosen.into_iter().map(|(sample, _)| sample).collect())
 }
 
-/// How dense the points should be, from [`LEAST_DENSITY`] to 1.
+/// Wanted density of points, from [`LEAST_DENSITY`] to 1.
 struct Density {
     /// Curvature of density 1; none if the density is the same everywhere.
     sharp: Option<f64>,

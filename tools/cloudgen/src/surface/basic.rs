@@ -84,7 +84,7 @@ fn octahedron(radius: f64) -> Tessellation {
     }
     for octant in 0..8u32 {
         let corner = |axis: u32| 2 * axis + (octant >> axis & 1);
-        // Every mirror turns the triangle over.
+        // Every reflection reverses the orientation.
         let mirrored = octant.count_ones() % 2 == 1;
         let (second, third) = if mirrored { (2, 1) } else { (1, 2) };
         mesh.triangles
@@ -101,7 +101,7 @@ pub(crate) struct Torus {
 }
 
 impl Torus {
-    /// Radius of the tube in terms of the radius of the ring.
+    /// Radius of the tube, relative to that of the ring.
     const TUBE: f64 = 0.4;
 
     pub(crate) fn new(size: f64) -> Self {
@@ -124,8 +124,8 @@ impl Torus {
         }
     }
 
-    /// Tube angle below which the fraction `v` of the area lies: Kepler's equation
-    /// `angle + e sin(angle) = 2 pi v`, by Newton's method.
+    /// Tube angle below which the fraction `v` of the area lies: Kepler's equation `angle + e sin(angle) = 2
+    /// pi v`, by Newton's method.
     fn tube_angle(v: f64) -> f64 {
         let mean = TAU * v;
         let mut angle = mean;
@@ -175,7 +175,7 @@ impl Surface for Torus {
     }
 
     fn reference(&self, tolerance: f64) -> Tessellation {
-        // Angle over which an arc leaves its chord by the tolerance.
+        // Angle at which an arc deviates from its chord by the tolerance.
         let cells = [self.major + self.minor, self.minor].map(|radius| {
             let angle = (8.0 * tolerance / radius).sqrt();
             (TAU / angle).ceil().max(3.0) as usize

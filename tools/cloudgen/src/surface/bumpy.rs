@@ -9,9 +9,8 @@ use crate::vec3::{Vec3, add, cross, dot, length, normalize, scale, sub};
 /// Zero set of a "tangle cube": eight blobs at the corners of a cube joined along its twelve edges,
 /// with a wavy term on top. A cube's edge graph has 12 - 8 + 1 = 5 loops.
 ///
-/// Points are drawn from a fixed tessellation and moved onto the surface along the gradient. Each
-/// triangle is weighted with the area of the surface piece that it stands for, so that the density
-/// is uniform to about a percent.
+/// Points are drawn from a fixed tessellation and moved onto the surface along the gradient. Each triangle is
+/// weighted with the area of its piece of the surface, so the density is uniform to about a percent.
 #[derive(Debug)]
 pub(crate) struct Bumpy {
     triangles: Vec<[Vec3; 3]>,
@@ -21,16 +20,16 @@ pub(crate) struct Bumpy {
     bounds: [Vec3; 2],
 }
 
-/// Smaller values make the joints thicker; the topology holds between 6.25 and 12.5.
+/// Smaller values make the tubes thicker; the topology is the same between 6.25 and 12.5.
 const LEVEL: f64 = 10.0;
 const BUMP: f64 = 1.0;
 const BUMP_WAVES: f64 = 4.0;
 const HALF: f64 = 2.5;
-/// Step of the differences that give the curvature.
+/// Step of the finite differences for the curvature.
 const TURN_STEP: f64 = 1e-4;
 const CELLS: usize = 80;
 
-/// Normal of the planes whose cuts are the scan lines, off every symmetry plane.
+/// Normal of the planes of the scan lines, not in any symmetry plane.
 const SCAN_NORMAL: Vec3 = [2.0 / 7.0, 3.0 / 7.0, 6.0 / 7.0];
 
 /// The implicit function, negative inside.
@@ -53,7 +52,7 @@ fn value_and_gradient(p: Vec3) -> (f64, Vec3) {
     (sum, gradient)
 }
 
-/// Moves a point near the surface onto it; gives the gradient there.
+/// Moves a point near the surface onto it; returns it with the gradient there.
 fn project(mut p: Vec3) -> (Vec3, Vec3) {
     let (mut f, mut gradient) = value_and_gradient(p);
     for _ in 0..8 {
@@ -66,8 +65,8 @@ fn project(mut p: Vec3) -> (Vec3, Vec3) {
     (p, gradient)
 }
 
-/// Moves a point of the surface within it to the plane `SCAN_NORMAL . p = level`. None where the
-/// surface runs along the plane.
+/// Moves a point along the surface to the plane `SCAN_NORMAL . p = level`. None where the surface is parallel
+/// to the plane.
 fn slide(start: Vec3, level: f64, reach: f64) -> Option<(Vec3, Vec3)> {
     let mut p = start;
     for _ in 0..12 {
@@ -76,7 +75,7 @@ fn slide(start: Vec3, level: f64, reach: f64) -> Option<(Vec3, Vec3)> {
         if f.abs() < 1e-12 && miss.abs() < 1e-12 {
             return Some((p, gradient));
         }
-        // The shortest step that meets both linearised conditions.
+        // The shortest step that satisfies both linearised conditions.
         let (gg, gn) = (dot(gradient, gradient), dot(gradient, SCAN_NORMAL));
         let determinant = gg - gn * gn;
         if determinant < 0.05 * gg {
@@ -122,8 +121,8 @@ impl Bumpy {
     }
 }
 
-/// Area of the surface piece over a triangle: the triangle's own, divided by the cosine between
-/// the two, for the gradient projection stretches a tilted triangle by that.
+/// Area of the surface piece over a triangle: the triangle's area divided by the cosine between the two,
+/// since the projection along the gradient stretches a tilted triangle by that.
 fn piece_area([a, b, c]: &[Vec3; 3]) -> f64 {
     let normal = cross(sub(*b, *a), sub(*c, *a));
     let area = length(normal) / 2.0;
@@ -132,7 +131,7 @@ fn piece_area([a, b, c]: &[Vec3; 3]) -> f64 {
     }
     let (_, gradient) = value_and_gradient(scale(add(add(*a, *b), *c), 1.0 / 3.0));
     let cosine = dot(normalize(normal), normalize(gradient)).abs();
-    // Slivers can stand askew; their share is negligible, but it must stay finite.
+    // Slivers may be tilted strongly; their share is negligible, but must be finite.
     area / cosine.max(0.25)
 }
 
@@ -151,7 +150,7 @@ impl Surface for Bumpy {
     }
 
     fn scan_lines(&self, spacing: f64) -> Vec<Line> {
-        // One entry per triangle: its points slide to the nearest of the parallel planes.
+        // One entry per triangle: its points move to the nearest of the parallel planes.
         let at = spacing / self.unit;
         let line = |(patch, t)| Line {
             patch: patch as u32,
@@ -195,7 +194,7 @@ impl Surface for Bumpy {
     }
 
     fn distance(&self, p: Vec3) -> f64 {
-        // First order is good near the surface only; further out follow the gradient down.
+        // First order is good only near the surface; farther out the gradient is followed.
         let native = scale(p, 1.0 / self.unit);
         let (f, gradient) = value_and_gradient(native);
         let first_order = f.abs() / length(gradient).max(1e-9);
@@ -236,7 +235,7 @@ mod tests {
 
     #[test]
     fn density_is_uniform() {
-        // Compare with the areas of a finer tessellation, in slabs of space.
+        // Compared with the areas of a finer tessellation, in slabs of space.
         let surface = Bumpy::new(1.0);
         let cell = |p: Vec3| {
             p.map(|c| ((c + HALF) / HALF * 2.0) as usize)

@@ -5,7 +5,7 @@ use super::tessellate::Tessellation;
 use super::{Line, Sample, Surface, box_distance, midpoints};
 use crate::vec3::{Vec3, sub};
 
-/// Three orthogonal squares with one corner in common, seen from between them.
+/// Three orthogonal squares with a common corner, seen from between them.
 #[derive(Debug)]
 pub(crate) struct Corner {
     side: f64,

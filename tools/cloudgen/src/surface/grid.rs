@@ -20,8 +20,8 @@ pub(crate) struct Grid {
 pub(crate) const FRAME: [[i64; 3]; 3] = [[2, 1, 2], [-2, 2, 1], [-1, -2, 2]];
 
 impl Grid {
-    /// A nearly square grid of that many nodes whose diagonal is about `size`, or more if unit
-    /// steps need more.
+    /// A nearly square grid with this number of nodes and a diagonal of about `size`, or more if unit steps
+    /// need more.
     pub(crate) fn new(points: u64, size: f64, rotated: bool) -> Result<Self> {
         let columns = points.isqrt().max(1);
         let rows = points.div_ceil(columns).max(1);
@@ -80,7 +80,7 @@ impl Grid {
         [fold(f64::min), fold(f64::max)]
     }
 
-    /// The patch that the grid spans.
+    /// The rectangle of the grid.
     pub(crate) fn reference(&self) -> Tessellation {
         let mut mesh = Tessellation::default();
         let [u, v] = [
@@ -91,7 +91,7 @@ impl Grid {
         mesh
     }
 
-    /// Distance of a point to the patch that the grid spans.
+    /// Distance of a point from the rectangle of the grid.
     pub(crate) fn distance(&self, p: Vec3) -> f64 {
         let mut nearest = [0.0; 3];
         for (axis, count) in [(self.u, self.columns), (self.v, self.rows)] {

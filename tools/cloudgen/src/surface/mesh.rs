@@ -13,13 +13,13 @@ use crate::vec3::{Vec3, add, cross, dot, length, normalize, scale, sub};
 pub(crate) struct Mesh {
     mesh: Tessellation,
     picker: Picker,
-    /// Change of the normal by length at each vertex.
+    /// Curvature at each vertex: change of the normal per length.
     curvature: Vec<f64>,
     bounds: [Vec3; 2],
 }
 
 impl Mesh {
-    /// `path` is for messages.
+    /// `path` is for error messages.
     pub(crate) fn new(mesh: &Tessellation, size: f64, path: &Path) -> Result<Self> {
         let mut mesh = weld(mesh);
         let [low, high] = bounds(&mesh);
@@ -29,7 +29,7 @@ impl Mesh {
             *vertex = scale(sub(*vertex, middle), unit);
         }
         let area: f64 = (0..mesh.triangles.len()).map(|t| area(&mesh, t)).sum();
-        // Also refuses a mesh that is not finite, or whose size is.
+        // Also refuses a mesh with coordinates that are not finite.
         if !(area > 0.0 && area.is_finite()) {
             return Err(Error::mesh(path, "no triangle with an area"));
         }
@@ -47,13 +47,13 @@ impl Mesh {
     }
 }
 
-/// Vertices at one place become one, what is in no triangle goes.
+/// Merges vertices at one position; removes unused ones.
 fn weld(mesh: &Tessellation) -> Tessellation {
     let mut known: HashMap<[u64; 3], u32> = HashMap::new();
     let mut out = Tessellation::default();
     for triangle in &mesh.triangles {
         let triangle = triangle.map(|v| {
-            // Adding zero makes one zero of the two.
+            // Adding zero gives both zeros the same sign.
             let place = mesh.vertices[v as usize].map(|c| c + 0.0);
             *known.entry(place.map(f64::to_bits)).or_insert_with(|| {
                 out.vertices.push(place);
@@ -82,7 +82,7 @@ fn corners(mesh: &Tessellation, triangle: usize) -> [Vec3; 3] {
     mesh.triangles[triangle].map(|v| mesh.vertices[v as usize])
 }
 
-/// The normal, twice the area long.
+/// The normal; its length is twice the area.
 fn normal([a, b, c]: [Vec3; 3]) -> Vec3 {
     cross(sub(b, a), sub(c, a))
 }
@@ -91,7 +91,7 @@ fn area(mesh: &Tessellation, triangle: usize) -> f64 {
     length(normal(corners(mesh, triangle))) / 2.0
 }
 
-/// At each vertex the mean over its edges of how much the vertex normal turns by length.
+/// For each vertex the mean over its edges of the change of the vertex normal per length.
 fn curvature(mesh: &Tessellation) -> Vec<f64> {
     let mut normals = vec![[0.0; 3]; mesh.vertices.len()];
     for (t, triangle) in mesh.triangles.iter().enumerate() {
@@ -155,7 +155,7 @@ impl Surface for Mesh {
         }
     }
 
-    /// None: a mesh has no direction in which it could be scanned.
+    /// None: a mesh has no direction for scanning.
     fn scan_lines(&self, _spacing: f64) -> Vec<Line> {
         Vec::new()
     }

@@ -22,28 +22,28 @@ pub(crate) use tessellate::Tessellation;
 
 use crate::vec3::{Vec3, add, dot, length, scale, sub};
 
-/// A point of the cloud with the normal of the surface it was taken from.
+/// A point of the cloud with the normal of its surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
     /// The position, noise included.
     pub position: [f64; 3],
-    /// Outward unit normal of the surface (up for open surfaces, towards the free space in a room),
-    /// or zero where there is none: for outliers and wires.
+    /// Outward unit normal of the surface (up for open surfaces, towards the free space in a room), or zero
+    /// if there is none: for outliers and wires.
     pub normal: [f64; 3],
 }
 
 /// One line of a scan.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Line {
-    /// Part of the surface that carries it, with a meaning private to the surface.
+    /// Part of the surface that has the line; its meaning depends on the surface.
     pub patch: u32,
-    /// Place of the line in the part.
+    /// Position of the line in that part.
     pub at: f64,
     /// Share of the points, in proportion to the length.
     pub weight: f64,
 }
 
-/// A surface that can be sampled uniformly. Coordinates are centred on the origin.
+/// A surface that is sampled uniformly. Coordinates are centred on the origin.
 pub(crate) trait Surface: std::fmt::Debug + Send + Sync {
     /// Area, for the spacing of scan lines.
     fn area(&self) -> f64;
@@ -51,21 +51,20 @@ pub(crate) trait Surface: std::fmt::Debug + Send + Sync {
     /// Corners of the bounding box.
     fn bounds(&self) -> [Vec3; 2];
 
-    /// Uniform in area when `u` and `v` are uniform; growing `u` sweeps over the surface.
+    /// Uniform in area if `u` and `v` are uniform; increasing `u` sweeps over the surface.
     fn at(&self, u: f64, v: f64) -> Sample;
 
-    /// Lines about `spacing` apart that cover the surface.
+    /// Lines over the whole surface, about `spacing` apart.
     fn scan_lines(&self, spacing: f64) -> Vec<Line>;
 
     /// The point at fraction `t` of a line; `v` is a spare random number.
     fn on_line(&self, line: &Line, t: f64, v: f64) -> Sample;
 
-    /// The surface as a mesh that is nowhere much further than `tolerance` from it, except that
-    /// the terrain has the same mesh for all.
+    /// The surface as a mesh within `tolerance` of it; the terrain has the same mesh for any tolerance.
     fn reference(&self, tolerance: f64) -> Tessellation;
 
-    /// Curvature where [`at`](Self::at) is: the root of the sum of the squares of both principal
-    /// curvatures, or what stands for it. None if points cannot follow it.
+    /// Curvature at [`at`](Self::at): the root of the sum of the squares of both principal curvatures, or a
+    /// substitute. None if the density cannot follow it.
     fn curvature(&self, _u: f64, _v: f64) -> Option<f64> {
         None
     }
@@ -73,7 +72,7 @@ pub(crate) trait Surface: std::fmt::Debug + Send + Sync {
     /// Distance of a point to the surface, to first order where there is no closed form.
     fn distance(&self, p: Vec3) -> f64;
 
-    /// Place of the scanner when none is given: outside, off every symmetry plane.
+    /// Default position of the scanner: outside, not in any symmetry plane.
     fn scanner(&self) -> Vec3 {
         box_point(self.bounds(), [1.4, 1.2, 1.1])
     }
@@ -94,14 +93,14 @@ fn frame() -> [Vec3; 3] {
     FRAME.map(|axis| axis.map(|c| c as f64 / 3.0))
 }
 
-/// A point or vector turned by the frame.
+/// A point or vector rotated by the frame.
 pub(crate) fn turned(p: Vec3) -> Vec3 {
     let frame = frame();
     let [a, b, c] = [0, 1, 2].map(|k| scale(frame[k], p[k]));
     add(add(a, b), c)
 }
 
-/// The point that [`turned`] takes to `p`.
+/// The point that [`turned`] maps to `p`.
 pub(crate) fn turned_back(p: Vec3) -> Vec3 {
     frame().map(|axis| dot(axis, p))
 }

@@ -1,22 +1,22 @@
-//! Fine triangle meshes of surfaces with a formula.
+//! Fine triangle meshes of surfaces with a closed form.
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::tessellate::Tessellation;
 use crate::vec3::{Vec3, add, cross, dot, length, scale, sub};
 
-/// Every round makes edges half as long. A few slivers would go on for ever between two shapes that
-/// both have a long edge.
+/// Every round halves edges. The limit stops a few slivers that alternate between two shapes with a long
+/// edge.
 const ROUNDS: usize = 12;
 
-/// Cuts edges in two, and the triangles with them, until no middle of an edge is further than
-/// `tolerance` from the surface. New vertices are on it.
+/// Bisects edges, and their triangles, until the middle of every edge is within `tolerance` of the surface.
+/// New vertices are on it.
 pub(super) fn refine(
     mut mesh: Tessellation,
     tolerance: f64,
     project: impl Fn(Vec3) -> Vec3,
 ) -> Tessellation {
-    // Edges that are flat enough, so that they are not looked at again.
+    // Edges that are flat enough, so that they are not examined again.
     let mut flat: FxHashSet<[u32; 2]> = FxHashSet::default();
     for _ in 0..ROUNDS {
         let mut middles: FxHashMap<[u32; 2], u32> = FxHashMap::default();
@@ -29,8 +29,7 @@ pub(super) fn refine(
                 let middle = scale(add(p, q), 0.5);
                 let place = project(middle);
                 let bulge = length(sub(place, middle));
-                // An arc of more than half a circle is no part of this surface: the projection
-                // went astray.
+                // An arc of more than half a circle is not on this surface: the projection failed.
                 if bulge > tolerance && bulge < length(sub(p, q)) / 2.0 {
                     middles.insert(edge, mesh.vertices.len() as u32);
                     mesh.vertices.push(place);
@@ -56,7 +55,7 @@ fn sorted([p, q]: [u32; 2]) -> [u32; 2] {
     [p.min(q), p.max(q)]
 }
 
-/// Cuts a triangle at the vertices in the middle of its edges, as far as there are any.
+/// Divides a triangle at the new vertices on its edges, if there are any.
 fn cut([a, b, c]: [u32; 3], [ab, bc, ca]: [Option<u32>; 3], out: &mut Vec<[u32; 3]>) {
     match (ab, bc, ca) {
         (None, None, None) => out.push([a, b, c]),
@@ -65,13 +64,13 @@ fn cut([a, b, c]: [u32; 3], [ab, bc, ca]: [Option<u32>; 3], out: &mut Vec<[u32; 
         (Some(ab), Some(bc), Some(ca)) => {
             out.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
         }
-        // Turned until it is one of the above.
+        // Rotated until it is one of the cases above.
         _ => cut([b, c, a], [bc, ca, ab], out),
     }
 }
 
-/// Turns the triangles of a closed surface in one piece such that they are anticlockwise as seen
-/// from outside. Looks at neighbours only, since the normals of slivers mean nothing.
+/// Orients the triangles of a connected closed surface anticlockwise as seen from outside. Uses neighbours
+/// only, since the normals of slivers are unreliable.
 pub(super) fn orient(mesh: &mut Tessellation) {
     let mut beside: FxHashMap<[u32; 2], Vec<usize>> = FxHashMap::default();
     for (t, &[a, b, c]) in mesh.triangles.iter().enumerate() {
@@ -105,8 +104,8 @@ pub(super) fn orient(mesh: &mut Tessellation) {
     }
 }
 
-/// A grid of `cells` quadrilaterals over the unit square, each cut in two; anticlockwise as seen
-/// along `-(du x dv)`. An axis that is `closed` meets itself at the end.
+/// A grid of `cells` quadrilaterals over the unit square, each divided in two; anticlockwise as seen along
+/// `-(du x dv)`. An axis that is `closed` is periodic.
 pub(super) fn patch(
     cells: [usize; 2],
     closed: [bool; 2],

@@ -9,8 +9,8 @@ use crate::vec3::{Vec3, cross, dot, length, sub};
 /// Two rooms joined by a doorway, with a pillar and a table: the boundary between the air and the
 /// solids, all faces axis-parallel, in metres before scaling.
 ///
-/// The air is bounded by one closed surface. The doorway joins two balls to one; the pillar from
-/// floor to ceiling and the three extra legs of the table add a handle each.
+/// The air is bounded by one closed surface. The doorway joins two balls to one; the pillar from floor to
+/// ceiling and the three further legs of the table add a handle each.
 #[derive(Debug)]
 pub(crate) struct Room {
     faces: Vec<Face>,
@@ -54,7 +54,7 @@ impl Face {
     }
 }
 
-/// The room cut along all planes of the solids into cells that are wholly air or wholly solid.
+/// The room divided along all planes of the solids into cells of air and solid cells.
 struct Cells {
     /// Sorted coordinates of the cuts along each axis.
     cuts: [Vec<f64>; 3],
@@ -72,7 +72,7 @@ impl Cells {
         Cells { cuts }
     }
 
-    /// Whether a cell is solid; all outside the room is.
+    /// True if a cell is solid; all cells outside the room are.
     fn solid(&self, cell: [isize; 3]) -> bool {
         let mut middle = [0.0; 3];
         for (axis, &k) in cell.iter().enumerate() {
@@ -139,7 +139,7 @@ impl Room {
             }
         };
         let mut faces: Vec<Face> = cells.boundary().into_iter().map(face).collect();
-        // Coplanar faces together: a sweep then goes wall by wall.
+        // Coplanar faces are grouped: a sweep covers wall by wall.
         let key = |f: &Face| (f.run, f.across, f.low[3 - f.run - f.across]);
         faces.sort_by(|a, b| {
             let (a, b) = (key(a), key(b));
@@ -188,7 +188,7 @@ impl Surface for Room {
     fn scan_lines(&self, spacing: f64) -> Vec<Line> {
         let mut lines = Vec::new();
         for (patch, face) in self.faces.iter().enumerate() {
-            // Multiples of the spacing in the whole room: lines run on over neighbouring faces.
+            // Multiples of the spacing in the whole room: lines continue over neighbouring faces.
             let first = (face.low[face.across] / spacing).ceil() as i64;
             let weight = face.width(face.run);
             lines.extend(
@@ -203,7 +203,7 @@ impl Surface for Room {
             );
         }
         if lines.is_empty() {
-            // So few points that no line hits any face: one along the middle of each.
+            // If there are so few points that no line meets a face: one line along the middle of each.
             lines.extend(self.faces.iter().enumerate().map(|(patch, face)| Line {
                 patch: patch as u32,
                 at: f64::midpoint(face.low[face.across], face.high[face.across]),

@@ -6,8 +6,8 @@ use super::{Line, Sample, Surface, box_point, midpoints};
 use crate::rng::mix;
 use crate::vec3::{Vec3, normalize};
 
-/// Height field over a square, a sum of octaves of smooth lattice noise. Points are uniform in the
-/// ground plan, as an airborne scanner leaves them.
+/// Height field over a square, a sum of octaves of smooth lattice noise. Points are uniform in the ground
+/// plan, as those of an airborne scanner.
 #[derive(Debug)]
 pub(crate) struct Terrain {
     side: f64,
@@ -15,8 +15,8 @@ pub(crate) struct Terrain {
     high: f64,
 }
 
-/// Lattice cells across the square, and height in terms of the side, of each octave.
-/// The first three make the hills, the others the roughness.
+/// For each octave the lattice cells across the square, and the height relative to the side. The first three
+/// make the hills, the others the roughness.
 const OCTAVES: [(f64, f64); 8] = [
     (3.0, 0.070),
     (6.0, 0.030),
@@ -31,7 +31,7 @@ const OCTAVES: [(f64, f64); 8] = [
 /// Cells per side used to find the lowest and highest point.
 const SURVEY: u32 = 192;
 
-/// Cells per side of the reference. The finest octave has two to three of them for each of its own.
+/// Cells per side of the reference: two to three for each cell of the finest octave.
 const REFERENCE: usize = 1024;
 
 impl Terrain {
@@ -61,7 +61,7 @@ impl Terrain {
     }
 }
 
-/// Value at a lattice node, in `-1..1`. Fixed: the shape does not depend on the seed of the cloud.
+/// Value at a lattice node, in `-1..1`, independent of the seed of the cloud.
 fn node(octave: usize, x: i64, y: i64) -> f64 {
     let key = (octave as u64) << 60 ^ ((x as u64) & 0x3fff_ffff) << 30 ^ ((y as u64) & 0x3fff_ffff);
     (mix(key.wrapping_mul(0x2545_f491_4f6c_dd1d)) >> 11) as f64 / (1u64 << 52) as f64 - 1.0
@@ -79,7 +79,7 @@ fn blend(t: f64) -> (f64, f64) {
 fn height(x: f64, y: f64) -> (f64, f64, f64) {
     let (mut sum, mut slope_x, mut slope_y) = (0.0, 0.0, 0.0);
     for (octave, (cells, amplitude)) in OCTAVES.into_iter().enumerate() {
-        // Shifted, so that the nodes of the octaves do not line up.
+        // Shifted, so that the nodes of the octaves do not coincide.
         let (px, py) = (
             x * cells + 0.37 * octave as f64,
             y * cells + 0.73 * octave as f64,
@@ -99,7 +99,7 @@ fn height(x: f64, y: f64) -> (f64, f64, f64) {
 
 impl Surface for Terrain {
     fn area(&self) -> f64 {
-        // The ground plan: that is what the points are spread over.
+        // The area of the ground plan, over which points are distributed.
         self.side * self.side
     }
 
@@ -128,7 +128,7 @@ impl Surface for Terrain {
     }
 
     fn distance(&self, p: Vec3) -> f64 {
-        // Beyond the border the height field continues, so clamp to the square first.
+        // Beyond the border the height field continues, so the position is clamped to the square first.
         let half = self.side / 2.0;
         let (x, y) = (p[0].clamp(-half, half), p[1].clamp(-half, half));
         let ground = self.point(x / self.side + 0.5, y / self.side + 0.5);

@@ -1,19 +1,19 @@
-//! Triangles of an implicit surface by marching tetrahedra, which has no ambiguous case: the
-//! result is a closed manifold whenever the surface stays inside the box.
+//! Triangles of an implicit surface by marching tetrahedra, which have no ambiguous case: the result is a
+//! closed manifold if the surface is inside the box.
 
 use std::collections::HashMap;
 
 use crate::vec3::{Vec3, add, scale, sub};
 
-/// A welded triangle mesh. Marching leaves its triangles in no orientation.
+/// A welded triangle mesh. Marching leaves its triangles without a consistent orientation.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Tessellation {
     pub vertices: Vec<Vec3>,
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// The six tetrahedra of a cube around its main diagonal. Bit `k` of a corner number is the step
-/// along axis `k`. All cubes are cut alike, so that neighbours agree on the shared diagonals.
+/// The six tetrahedra of a cube around its main diagonal. Bit `k` of a corner number is the step along axis
+/// `k`. All cubes are divided alike, so neighbours have the same diagonals on common faces.
 const TETRAHEDRA: [[usize; 4]; 6] = [
     [0, 1, 3, 7],
     [0, 1, 5, 7],
@@ -23,7 +23,7 @@ const TETRAHEDRA: [[usize; 4]; 6] = [
     [0, 4, 6, 7],
 ];
 
-/// Zero set of `function` in the cube of half width `half`, cut into `cells` per side.
+/// Zero set of `function` in the cube with half side `half`, with `cells` per side.
 pub(crate) fn tessellate(function: impl Fn(Vec3) -> f64, half: f64, cells: usize) -> Tessellation {
     Marching::new(function, half, cells).run()
 }
@@ -88,7 +88,7 @@ impl<F: Fn(Vec3) -> f64> Marching<F> {
     }
 
     fn tetrahedron(&mut self, nodes: [usize; 4]) {
-        // Nodes below zero first, the order otherwise kept.
+        // Nodes below zero first; otherwise the order is kept.
         let mut sorted = nodes;
         sorted.sort_by_key(|&n| self.values[n] >= 0.0);
         let [a, b, c, d] = sorted;
@@ -147,7 +147,7 @@ impl<F: Fn(Vec3) -> f64> Marching<F> {
     }
 }
 
-/// Vertices minus edges plus faces, and whether each edge has exactly two triangles.
+/// Vertices minus edges plus faces; true if each edge has exactly two triangles.
 #[cfg(test)]
 pub(crate) fn topology(mesh: &Tessellation) -> (i64, bool) {
     let mut edges: HashMap<(u32, u32), u32> = HashMap::new();

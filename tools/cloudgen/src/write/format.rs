@@ -19,8 +19,7 @@ pub enum PointFormat {
 pub struct LasOptions {
     /// Point data record format.
     pub point_format: PointFormat,
-    /// Step of the integer coordinates; None for 0.001, or for 1/1024 for a grid, whose nodes
-    /// then come out exact.
+    /// Step of the integer coordinates; None for 0.001, or for 1/1024 for a grid, whose nodes are then exact.
     pub scale: Option<f64>,
 }
 
@@ -53,7 +52,7 @@ pub enum Format {
     Laz(LasOptions),
     /// PLY.
     Ply(Encoding, Precision),
-    /// Text with three numbers per line, written such that they read back exactly.
+    /// Text with three numbers per line, which are read back exactly.
     Xyz,
 }
 
@@ -61,7 +60,7 @@ const NAMES: &str = "las, laz, ply (= ply-le-f64), ply-le-f32, ply-be-f32, ply-b
                      ply-ascii (= ply-ascii-f64), ply-ascii-f32 or xyz";
 
 impl Format {
-    /// The format that a file name stands for.
+    /// The format by the extension of a file name.
     pub fn from_path(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         let extension = path

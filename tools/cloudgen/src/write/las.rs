@@ -17,7 +17,7 @@ use crate::error::{Error, Result};
 use crate::generator::Generator;
 use crate::kind::Kind;
 
-/// The header of a file, once it is certain that the coordinates fit.
+/// The header of a file; checks that the coordinates fit.
 pub(super) fn header(
     generator: &Generator,
     path: &Path,
@@ -66,7 +66,7 @@ pub(super) fn header(
     builder.into_header().map_err(|e| Error::las(path, e))
 }
 
-/// The first error of a file, for whoever looks.
+/// The first error of a file.
 #[derive(Clone, Default)]
 struct Fault(Arc<Mutex<Option<io::Error>>>);
 
@@ -79,8 +79,8 @@ impl Fault {
     }
 }
 
-/// A file that keeps its first error and from then on only pretends to work. The LAS writer
-/// panics when it is dropped and cannot complete its header, so it must not see errors.
+/// A file that keeps its first error and ignores all later calls. The LAS writer panics when it is dropped
+/// and cannot complete its header, so errors are hidden from it.
 struct Quiet {
     file: BufWriter<File>,
     failed: bool,
@@ -109,7 +109,7 @@ impl Quiet {
 
 impl Write for Quiet {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        // Whole or not at all: a partial write could hide an error from the fault.
+        // All or nothing: a partial write could hide an error.
         self.attempt((), |file| file.write_all(bytes));
         Ok(bytes.len())
     }

@@ -54,7 +54,7 @@ pub(crate) fn write_part(
     };
     let count = match parts {
         1 => generator.len(),
-        // Counted first, since most headers hold the number of points.
+        // Counted first, since most headers contain the number of points.
         _ => (0..generator.len()).filter(belongs).count() as u64,
     };
     let mut sink = open(generator, path, format, count)?;
@@ -74,7 +74,7 @@ pub(crate) fn write_part(
 }
 
 fn open(generator: &Generator, path: &Path, format: Format, count: u64) -> Result<Box<dyn Sink>> {
-    // All that can be refused is refused before the file is touched.
+    // All checks precede the creation of the file.
     let header = match format {
         Format::Las(options) | Format::Laz(options) => {
             let compressed = matches!(format, Format::Laz(_));

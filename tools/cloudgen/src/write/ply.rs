@@ -10,7 +10,7 @@ use super::{Encoding, Precision, Sink};
 use crate::error::{Error, Result};
 use outcrop_ply::{Layout, Scalar};
 
-/// Writes vertices as they come.
+/// Writes vertices in batches.
 pub(super) struct PlySink {
     file: BufWriter<File>,
     path: PathBuf,

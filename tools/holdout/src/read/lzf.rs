@@ -1,6 +1,6 @@
-//! LZF, the compression inside PCD files. The one crate that is in use has been given up.
+//! LZF, the compression of PCD files. The one crate in use is no longer maintained.
 
-/// Unpacks exactly `length` bytes, or nothing if `packed` does not hold them.
+/// Unpacks exactly `length` bytes; None if `packed` does not hold them.
 pub(super) fn unpack(packed: &[u8], length: usize) -> Option<Vec<u8>> {
     let mut out = Vec::with_capacity(length.min(packed.len().saturating_mul(264)));
     let mut rest = packed;
@@ -24,7 +24,7 @@ pub(super) fn unpack(packed: &[u8], length: usize) -> Option<Vec<u8>> {
         rest = after;
         let back = ((control & 31) << 8 | usize::from(low)) + 1;
         let from = out.len().checked_sub(back)?;
-        // Source and target may overlap: byte by byte.
+        // Source and target may overlap, so bytes are copied one by one.
         for at in from..from + count + 2 {
             out.push(out[at]);
         }
@@ -45,7 +45,7 @@ mod tests {
         assert_eq!(unpack(&packed, 19), Some(b"abababaaaaaaaaaaaaa".to_vec()));
         assert_eq!(unpack(&packed, 18), None);
         assert_eq!(unpack(&packed[..6], 19), None);
-        // Further back than there is anything.
+        // A reference to before the start.
         assert_eq!(unpack(&[0, b'a', 1 << 5, 1], 4), None);
     }
 

@@ -13,9 +13,9 @@ use std::path::Path;
 
 /// All distinct points with finite coordinates, sorted by coordinates.
 ///
-/// LAS, LAZ, PLY and text come as `outcrop` reads them: LAS positions as the file states them, and
-/// floating-point ones exactly too unless they span more than 2^30 of their own steps. E57 has all its
-/// scans in the common frame.
+/// LAS, LAZ, PLY and text are read by `outcrop`: LAS positions are those of the file, and floating-point ones
+/// are exact too unless they span more than 2^30 of their own steps. All scans of an E57 file are in its
+/// common frame.
 pub(crate) fn points(path: &Path, workspace: &Workspace) -> Result<Vec<[f64; 3]>> {
     let mut points = match head(path)? {
         Some(head) if head.starts_with(b"ASTM-E57") => e57(path)?,
@@ -23,7 +23,7 @@ pub(crate) fn points(path: &Path, workspace: &Workspace) -> Result<Vec<[f64; 3]>
         _ => cloud(path, workspace)?,
     };
     points.retain(|p| p.iter().all(|c| c.is_finite()));
-    // Zero has one sign, or equal points would differ.
+    // Zero gets one sign, otherwise equal points would differ.
     points.iter_mut().flatten().for_each(|c| *c += 0.0);
     points.sort_unstable_by(|a, b| a.partial_cmp(b).unwrap_or(std::cmp::Ordering::Equal));
     points.dedup();

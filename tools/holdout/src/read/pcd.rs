@@ -11,7 +11,7 @@ pub(super) fn is(head: &[u8]) -> bool {
     first.is_some_and(|line| line.starts_with(b"VERSION") || line.starts_with(b"FIELDS"))
 }
 
-/// All points, those that are no numbers included.
+/// All points, including those with coordinates that are not finite.
 pub(super) fn read(path: &Path) -> Result<Vec<[f64; 3]>> {
     let bytes = std::fs::read(path).map_err(|e| Error::io(path, "read", e))?;
     let bad = |what: &str| Error::input(path, format!("PCD: {what}"));
@@ -52,7 +52,7 @@ pub(super) fn read(path: &Path) -> Result<Vec<[f64; 3]>> {
     }
 }
 
-/// A field: so many numbers of one type.
+/// A field: one or more numbers of one type.
 #[derive(Debug, Clone, Default)]
 struct Field {
     name: String,
@@ -90,7 +90,7 @@ struct Header {
 }
 
 impl Header {
-    /// The header and what follows it.
+    /// The header and the bytes after it.
     fn read(bytes: &[u8]) -> Result<(Self, &[u8]), String> {
         let mut header = Self::default();
         let mut rest = bytes;
@@ -166,7 +166,7 @@ impl Header {
         Ok(())
     }
 
-    /// What the fields before `field` take together.
+    /// Sum over the fields before `field`.
     fn before(&self, field: usize, each: impl Fn(&Field) -> usize) -> usize {
         self.fields[..field].iter().map(each).sum()
     }
