@@ -226,3 +226,74 @@ fn options_exist() {
     }
     assert!(unknown.is_empty(), "{unknown:#?}");
 }
+
+/// Text of all source files of the library, without tests.
+fn sources() -> Vec<String> {
+    let (mut folders, mut all) = (vec![root().join("src")], Vec::new());
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder).expect("a folder") {
+            let path = entry.expect("an entry").path();
+            let name = path.file_name().unwrap_or_default().to_string_lossy();
+            if path.is_dir() {
+                folders.push(path);
+            } else if !name.contains("tests") {
+                let text = std::fs::read_to_string(&path).expect("text");
+                let own = text.split("#[cfg(test)]\nmod tests {").next();
+                all.extend(own.map(str::to_owned));
+            }
+        }
+    }
+    all
+}
+
+/// Rows that the library defines: the name of each, and its fields.
+fn rows() -> BTreeMap<String, Vec<String>> {
+    let mut all = BTreeMap::new();
+    for text in sources() {
+        for definition in text.split("\nrow! {\n").skip(1) {
+            let (_, rest) = definition.split_once("struct ").expect("a struct");
+            let (name, rest) = rest.split_once(" {").expect("its fields");
+            let (body, _) = rest.split_once("\n    }").expect("its end");
+            let lines = body.lines().map(str::trim);
+            let fields = lines.filter(|line| !line.starts_with("//"));
+            let fields = fields.filter_map(|line| line.split_once(": "));
+            let fields = fields.map(|(field, _)| field.to_owned()).collect();
+            all.insert(name.to_owned(), fields);
+        }
+    }
+    assert!(all.len() > 30, "{} rows", all.len());
+    all
+}
+
+#[test]
+fn records_are_the_rows_of_the_program() {
+    let path = root().join("docs/records.md");
+    let document = std::fs::read_to_string(path).expect("the list of files");
+    let cells = |line: &str| -> Vec<String> { line.split(" | ").map(str::to_owned).collect() };
+    let lines: Vec<Vec<String>> = document.lines().map(cells).collect();
+    for (name, fields) in rows() {
+        let quoted = format!("`{name}`");
+        let line = lines
+            .iter()
+            .find(|line| line.iter().any(|cell| cell.contains(&quoted)));
+        let line = line.unwrap_or_else(|| panic!("docs/records.md has no row {name}"));
+        let place = line.iter().position(|cell| cell.contains(&quoted));
+        let listed = line[place.expect("found") + 1].split(", ");
+        // A type in brackets may follow.
+        let listed: Vec<&str> = listed.filter_map(|field| field.split(' ').next()).collect();
+        assert_eq!(listed, fields, "fields of {name} in docs/records.md");
+    }
+    // Files with a name of their own.
+    for text in sources() {
+        for creation in [
+            "Table::create(workspace, \"",
+            "Shuffle::between_units(workspace, \"",
+        ] {
+            for rest in text.split(creation).skip(1) {
+                let name = rest.split('"').next().expect("a name");
+                let listed = document.contains(&format!("`{name}`"));
+                assert!(listed, "docs/records.md has no file {name}");
+            }
+        }
+    }
+}

@@ -16,9 +16,6 @@ pub enum Word {
 
 /// A row of a scratch file: a plain struct of 32-bit words, defined by `row!`.
 pub trait Row: bytemuck::Pod + PartialEq + Debug + Send + Sync {
-    /// Names and types of the fields.
-    const FIELDS: &'static str;
-
     /// The packing of each word; `None` for rows that are stored unpacked. It affects only the size of the
     /// file.
     const PACKING: Option<&'static [Word]>;
@@ -48,7 +45,6 @@ pub trait Row: bytemuck::Pod + PartialEq + Debug + Send + Sync {
 
 /// Plain words, without names: for tests of this module.
 impl<const N: usize> Row for [u32; N] {
-    const FIELDS: &'static str = "words";
     const PACKING: Option<&'static [Word]> = Some(&[Word::Above; N]);
 }
 
@@ -99,8 +95,6 @@ macro_rules! row {
         $vis struct $name { $($(#[$doc])* pub $field: $type,)* }
 
         impl $crate::spill::Row for $name {
-            const FIELDS: &'static str =
-                concat!($(stringify!($field), ": ", stringify!($type), "; ",)*);
             const PACKING: Option<&'static [$crate::spill::Word]> = $packing;
         }
     };

@@ -31,12 +31,10 @@ pub(super) trait Item: Row {
 }
 
 impl Row for V3 {
-    const FIELDS: &'static str = "position: [f64; 3]; ";
     const PACKING: Option<&'static [Word]> = None;
 }
 
 impl Row for [V3; 3] {
-    const FIELDS: &'static str = "corners: [[f64; 3]; 3]; ";
     const PACKING: Option<&'static [Word]> = None;
 }
 
