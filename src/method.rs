@@ -115,7 +115,7 @@ constants! {
         /// A patch is rough if more than one in this number of its samples are rough.
         patch: usize = 16, "one in";
         /// Number of witnesses: rough points of a patch that decide whether it is curved or noisy.
-        telling: usize = 3, "points";
+        witnesses: usize = 3, "points";
         /// A point is curved if a curved surface leaves a smaller share of the squared heights over the
         /// plane: edges leave a quarter to a half, noise nearly all.
         curved: f64 = 0.5, "share", [0.4, 0.65];

@@ -122,7 +122,7 @@ fn pipeline(
         min_component: settings.min_component as u64,
         max_hole_edges: settings.max_hole_edges,
         flip: settings.robust,
-        zip: settings.robust,
+        clip_ears: settings.robust,
     };
     let (repaired, mended) = repair(places, stitched, blocks, options, workspace)?;
     let lattice = outcrop::geom::lattice::Lattice {

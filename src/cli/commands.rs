@@ -19,7 +19,7 @@ pub fn run(command: Command) -> Result<Answer> {
     match command {
         Command::Reconstruct(args) => reconstruct(&args),
         Command::Resume(args) => resume(&args),
-        Command::Info(args) => tell(&args),
+        Command::Info(args) => info(&args),
         Command::Verify(args) => check(&args),
         Command::Compare(args) => measure(&args),
         Command::Demo(args) => demo(&args),
@@ -168,7 +168,7 @@ fn left_out(report: &Report) -> String {
     }
 }
 
-fn tell(args: &Info) -> Result<Answer> {
+fn info(args: &Info) -> Result<Answer> {
     let workspace = workspace(&args.limits, &std::env::temp_dir())?;
     let info = info::info(&args.inputs, &args.points.classes(), &workspace)?;
     print(&if args.json {

@@ -85,7 +85,7 @@ impl Boxes {
 /// A box, and the largest squared distance to it. Squared distances between boxes are computed with a
 /// relative error below 2^-21.
 #[derive(Debug, Clone, Copy)]
-pub struct Around {
+pub struct SearchBox {
     /// Lowest corner.
     pub min: [i32; 3],
     /// Highest corner.
@@ -97,11 +97,11 @@ pub struct Around {
 kernel! {
     /// Writes the numbers of the `boxes` within the limit, in their order, to the front of `to`, and returns
     /// how many there are. `to` must be one block longer than there are boxes.
-    pub fn near_boxes(boxes: &Boxes, around: Around, to: &mut [u32]) -> usize = near_body<Eight>
+    pub fn near_boxes(boxes: &Boxes, around: SearchBox, to: &mut [u32]) -> usize = near_body<Eight>
 }
 
 #[inline(always)]
-fn near_body<P: Pick>(boxes: &Boxes, around: Around, to: &mut [u32]) -> usize {
+fn near_body<P: Pick>(boxes: &Boxes, around: SearchBox, to: &mut [u32]) -> usize {
     let mut count = 0;
     for start in (0..boxes.len).step_by(BLOCK) {
         let Some(block) = boxes.block(start) else {
@@ -117,11 +117,11 @@ fn near_body<P: Pick>(boxes: &Boxes, around: Around, to: &mut [u32]) -> usize {
 kernel! {
     /// Copies the boxes within the limit out of `blocks`: each a block of 16 boxes and the number of them to
     /// test.
-    pub fn take_boxes(from: &Boxes, blocks: &[(u32, u32)], around: Around, to: &mut Boxes) = take_body<Eight>
+    pub fn take_boxes(from: &Boxes, blocks: &[(u32, u32)], around: SearchBox, to: &mut Boxes) = take_body<Eight>
 }
 
 #[inline(always)]
-fn take_body<P: Pick>(from: &Boxes, blocks: &[(u32, u32)], around: Around, to: &mut Boxes) {
+fn take_body<P: Pick>(from: &Boxes, blocks: &[(u32, u32)], around: SearchBox, to: &mut Boxes) {
     to.reserve(to.len + blocks.len() * BLOCK);
     for &(number, meant) in blocks {
         let Some(block) = from.block(number as usize * BLOCK) else {
@@ -139,7 +139,7 @@ fn take_body<P: Pick>(from: &Boxes, blocks: &[(u32, u32)], around: Around, to: &
 }
 
 #[inline(always)]
-fn within_body<P: Pick>(block: [&[u32; BLOCK]; 7], around: Around) -> u32 {
+fn within_body<P: Pick>(block: [&[u32; BLOCK]; 7], around: SearchBox) -> u32 {
     let [x0, y0, z0, x1, y1, z1, _] = block;
     let gap = |low: u32, high: u32, axis: usize| {
         let below = (low as i32).wrapping_sub(around.max[axis]);
@@ -194,7 +194,7 @@ mod tests {
             let Aabb { min, max } = all[0];
             let exact = |b: &Aabb| b.distance2_box(&all[0]) as f64;
             let limit = (share * all.iter().map(exact).fold(0.0, f64::max)) as f32;
-            let around = Around { min, max, limit };
+            let around = SearchBox { min, max, limit };
             let blocks: Vec<(u32, u32)> = (0..all.len() as u32).step_by(BLOCK)
                 .map(|start| (start / BLOCK as u32, all.len() as u32 - start)).collect();
             let error = f64::from(limit) / f64::from(1 << 21);

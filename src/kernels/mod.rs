@@ -15,7 +15,7 @@ mod ranks;
 mod sums;
 
 pub(crate) use boxes::point_box_body;
-pub use boxes::{Around, Boxes, near_boxes, take_boxes};
+pub use boxes::{Boxes, SearchBox, near_boxes, take_boxes};
 pub(crate) use corners::SLACK;
 pub use corners::{
     CornerGroup, Frame, LANES, Line, LineGroup, bisectors, cut_corners, farthest, touching_lines,

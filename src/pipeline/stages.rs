@@ -318,7 +318,7 @@ impl<'a> Stages<'a> {
             min_component: params.least_component(points, noisy),
             max_hole_edges: params.max_hole_edges,
             flip: robust,
-            zip: robust,
+            clip_ears: robust,
         };
         workspace.trim();
         let items = 2 * blocks.count() as u64;

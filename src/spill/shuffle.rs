@@ -22,7 +22,7 @@ impl<R: Row> Shuffle<R> {
     pub fn new(workspace: &Workspace, name: &str, buffer: u64) -> Result<Self> {
         let held = workspace.promise("shuffle", buffer)?;
         Ok(Self {
-            sorter: Sorter::new(workspace, name, buffer).telling(held),
+            sorter: Sorter::new(workspace, name, buffer).reporting(held),
             sent: None,
             name: name.to_owned(),
         })

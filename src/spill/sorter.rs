@@ -47,7 +47,7 @@ impl<R: Row> State<R> {
         }
     }
 
-    fn tell(&mut self, bytes: u64) {
+    fn report_usage(&mut self, bytes: u64) {
         if let Some(held) = &mut self.held {
             held.set_held(bytes);
         }
@@ -70,7 +70,7 @@ impl<R: Row> Sorter<R> {
 
     /// Reports the usage of the buffer to the reservation `held`.
     #[must_use]
-    pub fn telling(self, held: Reservation) -> Self {
+    pub fn reporting(self, held: Reservation) -> Self {
         self.state().held = Some(held);
         self
     }
@@ -109,13 +109,13 @@ impl<R: Row> Sorter<R> {
                 // The old buffer and its copy.
                 let both = 2 * size_of_val(state.buffer.as_slice()) as u64;
                 state.buffer.reserve_exact(more);
-                state.tell(both);
+                state.report_usage(both);
             }
             state.buffer.extend_from_slice(now);
             if state.buffer.len() > state.touched {
                 state.touched = state.buffer.len();
                 let taken = size_of_val(state.buffer.as_slice()) as u64;
-                state.tell(taken);
+                state.report_usage(taken);
             }
             records = later;
             if state.buffer.len() == self.capacity {
@@ -214,7 +214,7 @@ impl<R: Row> Sorter<R> {
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
-    pub(crate) fn take_up<T: Persist>(
+    pub(crate) fn reopen_runs<T: Persist>(
         &self,
         workspace: &Workspace,
         step: &Step,
@@ -274,7 +274,7 @@ impl<R: Row> Sorter<R> {
             self.spill(&mut state)?;
         }
         state.buffer = Vec::new();
-        state.tell(0);
+        state.report_usage(0);
         let step = workspace.step(&format!("merges {}", self.name))?;
         for (number, (name, merged)) in step.finished::<(String, Vec<String>)>(workspace)? {
             state.made = state.made.max(number as usize + 1);
@@ -287,14 +287,14 @@ impl<R: Row> Sorter<R> {
             let rest = state.runs.split_off(fan_in.min(state.runs.len()));
             let batch = std::mem::replace(&mut state.runs, rest);
             let number = state.made as u64;
-            state.tell(merge_bytes(&batch));
+            state.report_usage(merge_bytes(&batch));
             let run = self.merge_runs(workspace, &batch, &mut state.made)?;
             if run.is_kept() {
                 let merged: Vec<String> = batch.iter().map(Run::name).collect();
                 step.finish(number, &(run.name(), merged), || run.put())?;
             }
             drop(batch);
-            workspace.let_go()?;
+            workspace.delete_dropped()?;
             state.runs.push(run);
         }
         let mut sorted = Sorted {
@@ -302,7 +302,7 @@ impl<R: Row> Sorter<R> {
             runs: state.runs,
             held: state.held,
         };
-        sorted.tell(sorted.merge_bytes());
+        sorted.report_usage(sorted.merge_bytes());
         Ok(sorted)
     }
 
@@ -392,7 +392,7 @@ impl<R: Row> Sorted<R> {
 
     /// Reports usage to the reservation. The caller of [`Sorted::for_range`] reports the memory of that
     /// merge; all other usage is reported here.
-    pub fn tell(&mut self, bytes: u64) {
+    pub fn report_usage(&mut self, bytes: u64) {
         if let Some(held) = &mut self.held {
             held.set_held(bytes);
         }

@@ -4,7 +4,7 @@ use super::IoCounters;
 use super::fault;
 use super::open::{failed_write, options};
 use super::place::{Place, Put};
-use super::run::Run;
+use super::run::ResumableRun;
 use crate::error::{Error, Result};
 use std::fs::File;
 use std::os::unix::fs::FileExt;
@@ -18,7 +18,7 @@ pub struct Shared {
     /// Bytes moved.
     pub io: Arc<IoCounters>,
     /// The run, if it can be resumed.
-    pub run: Option<Arc<Run>>,
+    pub run: Option<Arc<ResumableRun>>,
     /// Expected peak of scratch bytes.
     pub expected: AtomicU64,
 }

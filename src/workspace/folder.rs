@@ -7,7 +7,7 @@ use super::keeper::Keeper;
 use super::open::{failed_write, open_existing, options};
 use super::progress::{Cancel, Observer};
 use super::recover::{Whereabouts, recover};
-use super::run::Run;
+use super::run::ResumableRun;
 use crate::error::{Error, Result};
 use std::collections::HashSet;
 use std::fs::File;
@@ -250,7 +250,7 @@ impl Folder {
         io: &Arc<IoCounters>,
         observer: &dyn Observer,
         cancel: &Cancel,
-    ) -> Result<Run> {
+    ) -> Result<ResumableRun> {
         self.warnings.iter().for_each(|w| observer.warn(w));
         if self.rewrite {
             self.write_manifest()?;
@@ -279,7 +279,9 @@ impl Folder {
         let keeper = File::open(&self.path)
             .and_then(|folder| Keeper::start(journal.file(), folder, io.clone()))
             .map_err(|e| Error::io(&self.path, "start a thread for", e))?;
-        Ok(Run::new(self.path, journal, keeper, history, self.lock))
+        Ok(ResumableRun::new(
+            self.path, journal, keeper, history, self.lock,
+        ))
     }
 
     /// True if an earlier attempt has finished a unit of work.

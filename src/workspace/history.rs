@@ -46,7 +46,7 @@ pub struct Needed {
 
 /// The repair after damage.
 #[derive(Debug, PartialEq, Eq)]
-pub enum Mending {
+pub enum Remedy {
     /// These units are repeated; all others stay finished.
     Redo(Vec<(String, u64)>),
     /// The journal is cut at `end`: a stage is repeated from its start.
@@ -157,7 +157,7 @@ impl History {
 
     /// The repair for damaged parts; `None` if there are none.
     #[must_use]
-    pub fn mend(&self, damaged: &[Needed]) -> Option<Mending> {
+    pub fn remedy(&self, damaged: &[Needed]) -> Option<Remedy> {
         let parts: Vec<&Part> = damaged
             .iter()
             .filter_map(|d| self.files.get(&d.file)?.parts.get(&d.section))
@@ -169,7 +169,7 @@ impl History {
             let mut units: Vec<_> = parts.iter().map(|p| (p.step.clone(), p.unit)).collect();
             units.sort();
             units.dedup();
-            return Some(Mending::Redo(units));
+            return Some(Remedy::Redo(units));
         }
         let holds = |start: u64| {
             let damage = parts.iter().any(|part| part.record < start);
@@ -180,7 +180,7 @@ impl History {
             !damage && !missing
         };
         let stage = self.begun.iter().rev().find(|(_, start)| holds(*start));
-        stage.map(|(stage, start)| Mending::Rewind {
+        stage.map(|(stage, start)| Remedy::Rewind {
             end: *start,
             stage: Some(stage.clone()),
         })

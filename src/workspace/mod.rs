@@ -272,8 +272,11 @@ impl Workspace {
     ///
     /// # Errors
     /// [`Error::Io`], [`Error::Disk`].
-    pub fn let_go(&self) -> Result<()> {
-        self.shared.run.as_ref().map_or(Ok(()), |run| run.let_go())
+    pub fn delete_dropped(&self) -> Result<()> {
+        self.shared
+            .run
+            .as_ref()
+            .map_or(Ok(()), |run| run.delete_dropped())
     }
 
     /// Sets the estimated peak of the scratch space in bytes, for the message when the disk is full.

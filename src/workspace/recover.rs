@@ -1,7 +1,7 @@
 //! Recovery: all parts of files that are still needed are read and checked, and damaged ones are made again,
 //! with as little work as possible.
 
-use super::history::{History, Mending, Needed};
+use super::history::{History, Needed, Remedy};
 use super::journal::Entry;
 use super::open::open_existing;
 use super::progress::{Cancel, Observer};
@@ -110,14 +110,16 @@ pub fn recover(
     let names: BTreeSet<&str> = bad.iter().map(|part| part.file.as_str()).collect();
     let names = names.into_iter().collect::<Vec<_>>().join(", ");
     // A journal with parts before any stage was not written by this program and is ignored.
-    let first = || Mending::Rewind {
+    let first = || Remedy::Rewind {
         end: entries.get(1).map_or(end, |entry| entry.offset),
         stage: None,
     };
-    let mending = history.mend(&bad).or_else(|| (!bad.is_empty()).then(first));
-    match mending {
+    let remedy = history
+        .remedy(&bad)
+        .or_else(|| (!bad.is_empty()).then(first));
+    match remedy {
         None => Ok((history, end)),
-        Some(Mending::Redo(units)) => {
+        Some(Remedy::Redo(units)) => {
             observer.warn(&format!(
                 "{}: damaged: {names}; {} unit(s) of work are done again",
                 places.folder.display(),
@@ -126,7 +128,7 @@ pub fn recover(
             history.forget(&units);
             Ok((history, end))
         }
-        Some(Mending::Rewind { end, stage }) => {
+        Some(Remedy::Rewind { end, stage }) => {
             let stage = stage
                 .as_deref()
                 .unwrap_or("the run")

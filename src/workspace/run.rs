@@ -16,7 +16,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// The state of a run that can be resumed.
 #[derive(Debug)]
-pub struct Run {
+pub struct ResumableRun {
     folder: PathBuf,
     journal: Journal,
     /// Syncs and deletes files.
@@ -94,7 +94,7 @@ impl Drop for Notes {
     }
 }
 
-impl Run {
+impl ResumableRun {
     /// A run in a locked folder.
     #[must_use]
     pub fn new(
@@ -141,7 +141,7 @@ impl Run {
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Disk`].
     pub fn begin(&self, name: &str) -> Result<String> {
-        self.let_go()?;
+        self.delete_dropped()?;
         let mut scopes = lock(&self.scopes);
         let (depth, Some(scope)) = (scopes.len(), scopes.last_mut()) else {
             return Ok(String::new());
@@ -247,7 +247,7 @@ impl Run {
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Disk`].
-    pub fn let_go(&self) -> Result<()> {
+    pub fn delete_dropped(&self) -> Result<()> {
         let dropped = std::mem::take(&mut *lock(&self.dropped));
         let mut leaving = Vec::with_capacity(dropped.len());
         for (name, bytes) in dropped {

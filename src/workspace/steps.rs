@@ -3,7 +3,7 @@
 use super::Workspace;
 use super::persist::{Persist, Saved};
 use super::place::{Place, Put};
-use super::run::{Notes, Run};
+use super::run::{Notes, ResumableRun};
 use crate::error::Result;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -28,7 +28,7 @@ impl<S: Into<String>> From<(S, &'static str)> for UnitsName {
 }
 
 /// Inside a step until it is dropped.
-struct Inside<'a>(&'a Run);
+struct Inside<'a>(&'a ResumableRun);
 
 impl Drop for Inside<'_> {
     fn drop(&mut self) {
@@ -64,7 +64,7 @@ impl Workspace {
         let value = work()?;
         drop(inside);
         run.finish(&path, 0, notes.finish().puts, bytes(&value))?;
-        run.let_go()?;
+        run.delete_dropped()?;
         Ok(value)
     }
 
@@ -144,7 +144,7 @@ impl Workspace {
         self.run().map_or_else(Vec::new, |run| run.places(file))
     }
 
-    pub(super) fn run(&self) -> Option<&Run> {
+    pub(super) fn run(&self) -> Option<&ResumableRun> {
         self.shared.run.as_deref()
     }
 
@@ -158,7 +158,7 @@ impl Workspace {
 /// A step whose units are not known in advance.
 #[derive(Debug, Default)]
 pub(crate) struct Step {
-    run: Option<Arc<Run>>,
+    run: Option<Arc<ResumableRun>>,
     path: String,
 }
 

@@ -78,7 +78,7 @@ fn only_what_was_filled_is_held() {
     let before = pool.peak_held();
     for whole in [true, false] {
         let reserved = workspace.promise("sorted", 1 << 20).unwrap();
-        let sorter = Sorter::<[u32; 2]>::new(&workspace, "h", 1 << 20).telling(reserved);
+        let sorter = Sorter::<[u32; 2]>::new(&workspace, "h", 1 << 20).reporting(reserved);
         let sorter = if whole { sorter.whole() } else { sorter };
         let _ = pool.take_held();
         for n in 0..30_000u32 {
@@ -95,7 +95,7 @@ fn only_what_was_filled_is_held() {
     }
     // Merging takes frames, and no sort buffer.
     let reserved = workspace.promise("sorted", 1 << 20).unwrap();
-    let sorter = Sorter::<[u32; 2]>::new(&workspace, "m", 1 << 20).telling(reserved);
+    let sorter = Sorter::<[u32; 2]>::new(&workspace, "m", 1 << 20).reporting(reserved);
     for n in 0..300_000u32 {
         sorter.push(&[[n % 100, n]]).unwrap();
     }

@@ -6,7 +6,7 @@ use std::ops::Range;
 
 /// Triples of the cells of one tile, and memory for sorting them.
 #[derive(Debug)]
-pub(super) struct Seen {
+pub(super) struct TileTriples {
     ids: Range<usize>,
     /// Triples whose smallest vertex is in the tile: its rank there, and the other two vertices in one word.
     here: Vec<(u32, u32, u32)>,
@@ -19,7 +19,7 @@ pub(super) struct Seen {
 /// Counted triples of this tile and those sent to other tiles, both ascending.
 pub(super) type Folded = (Vec<CountedTriple>, Vec<SentTriple>);
 
-impl Seen {
+impl TileTriples {
     /// Upper estimate of the bytes for the triples of `points` cells: usual cells have five or six corners
     /// between bisectors.
     pub fn bytes(points: usize) -> u64 {
@@ -35,12 +35,12 @@ impl Seen {
             held: Holding::default(),
             ids,
         };
-        seen.tell(0);
+        seen.report_usage(0);
         seen
     }
 
     /// Reports the memory in use: the lists and `more` bytes. Room that was never written to is not counted.
-    pub fn tell(&mut self, more: u64) {
+    pub fn report_usage(&mut self, more: u64) {
         let lists = size_of_val(&*self.here) + size_of_val(&*self.elsewhere);
         self.held.set(lists as u64 + bytes_of(&self.begins) + more);
     }
@@ -66,7 +66,7 @@ impl Seen {
 
     /// Merges equal triples into one row with a count.
     pub fn fold(mut self, tiles: &TileRanges) -> Folded {
-        self.tell(self.here.len() as u64 * 8);
+        self.report_usage(self.here.len() as u64 * 8);
         // A counting sort by smallest vertex; then one small sort for each vertex, of about six triples.
         let mut start = std::mem::take(&mut self.begins);
         for rank in 1..start.len() {
@@ -94,7 +94,7 @@ impl Seen {
                 });
             }
         }
-        self.tell((size_of_val(&*sorted) + size_of_val(&*kept)) as u64);
+        self.report_usage((size_of_val(&*sorted) + size_of_val(&*kept)) as u64);
         drop(sorted);
         self.elsewhere.sort_unstable();
         let sent = self.elsewhere.chunk_by(|a, b| a == b).map(|group| {
@@ -123,7 +123,7 @@ mod tests {
         ) {
             let tiles = TileRanges::new(Blocks::new(60, 30), 20);
             let ids = tiles.ids(1);
-            let mut here = Seen::new(ids.clone());
+            let mut here = TileTriples::new(ids.clone());
             let mut counts: BTreeMap<[u32; 3], u32> = BTreeMap::new();
             for triple in &seen {
                 let t: Vec<u32> = triple.iter().copied().collect();

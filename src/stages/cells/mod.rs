@@ -19,7 +19,7 @@ use crate::stages::tiles::walk::PageCache;
 use crate::workspace::Workspace;
 use crate::workspace::memory::hold;
 use crate::workspace::persist::persist;
-use fold::Seen;
+use fold::TileTriples;
 use serde::Serialize;
 use std::ops::Range;
 
@@ -176,11 +176,11 @@ pub fn cells(
     let shuffle = Shuffle::between_units(workspace, "cells.sent", SHUFFLE_BUFFER, tiles.count())?;
     let bytes = |tile: usize| {
         let points = tiles.ids(tile).len() as u64;
-        Tile::bytes(points as usize) + PageCache::bytes(store) + Seen::bytes(points as usize)
+        Tile::bytes(points as usize) + PageCache::bytes(store) + TileTriples::bytes(points as usize)
     };
     let work = |tile| {
         let ids = tiles.ids(tile);
-        let mut seen = Seen::new(ids.clone());
+        let mut seen = TileTriples::new(ids.clone());
         let mut maker = CellMaker::new(neighbors, radius, widen, density);
         let (mut stats, mut no_cell) =
             one_tile(store, ids.clone(), neighbors, &mut maker, &mut seen)?;
@@ -219,7 +219,7 @@ fn one_tile(
     ids: Range<usize>,
     neighbors: usize,
     maker: &mut CellMaker<'_>,
-    seen: &mut Seen,
+    seen: &mut TileTriples,
 ) -> Result<(CellStats, Vec<Id>)> {
     let tile = Tile::load(store, ids)?;
     let mut search = Search::default();
@@ -244,7 +244,7 @@ fn one_tile(
         return Err(error);
     }
     // The list has grown beside the tile and the search.
-    seen.tell(0);
+    seen.report_usage(0);
     drop(tile);
     let mut cache = PageCache::default();
     for &(id, point) in &uncertain {

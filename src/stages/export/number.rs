@@ -89,8 +89,8 @@ pub fn number<'a>(
     workspace: &Workspace,
 ) -> Result<Numbering<'a>> {
     let count = blocks.count();
-    let outline = &repaired.outline;
-    let words = outline.used.len();
+    let input = &repaired.numbering;
+    let words = input.used.len();
     let held = workspace.reserve("export: numbers", (words * 4 + count * 16) as u64)?;
     let (mut firsts, copies, splits): (Vec<Firsts>, _, _) =
         workspace.once("number", || split(repaired, blocks, workspace))?;
@@ -101,7 +101,7 @@ pub fn number<'a>(
         total.copies += own.copies;
         total.faces += own.faces;
     }
-    let points_used = outline.used.iter().map(|w| u64::from(w.count_ones())).sum();
+    let points_used = input.used.iter().map(|w| u64::from(w.count_ones())).sum();
     let vertices = points_used + total.copies;
     let limit = u64::from(u32::MAX) - 1;
     if vertices > limit {
@@ -112,7 +112,7 @@ pub fn number<'a>(
     }
     let mut before = 0;
     let mut rank = Vec::with_capacity(words);
-    for word in &outline.used {
+    for word in &input.used {
         rank.push(before);
         before += word.count_ones();
     }
@@ -121,10 +121,10 @@ pub fn number<'a>(
         points_used,
         pinched_copies: total.copies,
         triangles: total.faces,
-        boundary_edges: outline.boundary_edges,
+        boundary_edges: input.boundary_edges,
     };
     Ok(Numbering {
-        used: &outline.used,
+        used: &input.used,
         rank,
         firsts,
         copies,
@@ -141,22 +141,22 @@ fn split(
     blocks: Blocks,
     workspace: &Workspace,
 ) -> Result<(Vec<Firsts>, Table<Id>, Table<Split>)> {
-    let outline = &repaired.outline;
+    let input = &repaired.numbering;
     let shuffle = Shuffle::new(workspace, "export.splits", SHUFFLE_BUFFER)?;
     let copies = Table::create(workspace, "export.copies", blocks.count())?;
     let mut firsts = Vec::with_capacity(blocks.count());
     for block in 0..blocks.count() {
         workspace.check_cancel()?;
-        let records = outline.pinched.rows(block) + repaired.filled.rows(block);
-        let pinches = outline.pinches.get(block)?;
+        let records = input.pinched.rows(block) + repaired.filled.rows(block);
+        let pinches = input.pinches.get(block)?;
         let size = blocks.ids(block).len() * 8 * usize::from(!pinches.is_empty());
         let _held = workspace.reserve("export: block", (120 * records + size) as u64)?;
         let filled = repaired.filled.get(block)?;
         let own = |f: &&FilledTriangle| blocks.of(f.triangle[0]) == f.to;
-        let faces = u64::from(outline.faces[block]) + filled.iter().filter(own).count() as u64;
+        let faces = u64::from(input.faces[block]) + filled.iter().filter(own).count() as u64;
         let mut again = Vec::new();
         if !pinches.is_empty() {
-            let mut triangles: Vec<Triangle> = outline
+            let mut triangles: Vec<Triangle> = input
                 .pinched
                 .get(block)?
                 .into_iter()

@@ -91,7 +91,7 @@ impl Orderer {
         let held = workspace.promise("order: sort buffer", buffer)?;
         let sorter = Sorter::new(workspace, "order", buffer);
         Ok(Self {
-            sorter: sorter.telling(held).whole(),
+            sorter: sorter.reporting(held).whole(),
             taken: AtomicU64::new(0),
             buffer,
         })
@@ -145,7 +145,7 @@ impl Orderer {
         S: Persist + Default,
     {
         let step = workspace.step("runs")?;
-        let last: Option<Note<M, S>> = self.sorter.take_up(workspace, &step)?;
+        let last: Option<Note<M, S>> = self.sorter.reopen_runs(workspace, &step)?;
         let ((mark, counts), (taken, complete)) =
             last.unwrap_or(((None, S::default()), (0, false)));
         self.taken.store(taken, Ordering::Relaxed);
@@ -272,7 +272,7 @@ fn merge(
     // A part reads up to one extra frame of each run, and its list grows by doubling.
     let (list, merging) = ((PART * size_of::<CurveKey>()) as u64, sorted.merge_bytes());
     let threads = (memory / (3 * list + 4 * merging)).clamp(1, workspace.threads as u64) as usize;
-    sorted.tell(threads as u64 * (list + merging));
+    sorted.report_usage(threads as u64 * (list + merging));
     let one = |&(from, to): &Part| {
         workspace.check_cancel()?;
         let mut keys = Vec::with_capacity(PART);

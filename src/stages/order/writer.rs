@@ -79,12 +79,12 @@ impl StoreWriter {
             index: workspace.is_resumable().then(index).transpose()?,
             step: Step::default(),
         };
-        writer.take_up()?;
+        writer.read_index()?;
         Ok(writer)
     }
 
     /// Reads the index of the existing pages; false if there is none.
-    pub(super) fn take_up(&mut self) -> Result<bool> {
+    pub(super) fn read_index(&mut self) -> Result<bool> {
         let index = self.index.as_ref().filter(|_| !self.is_gone());
         let Some(index) = index else {
             return Ok(false);
@@ -288,7 +288,7 @@ impl StoreWriter {
         pages: Vec<PageEnd>,
         workspace: &Workspace,
     ) -> Result<PointStore> {
-        if !self.take_up()? {
+        if !self.read_index()? {
             (self.checks, self.boxes) = pages.into_iter().unzip();
         }
         self.len = len;

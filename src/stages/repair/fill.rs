@@ -27,7 +27,7 @@ pub enum Filling {
     /// Filled completely, by these oriented triangles.
     Filled(Vec<[u32; 3]>),
     /// Closed in part, by these oriented triangles; and the number of open edges left.
-    Zipped(Vec<[u32; 3]>, usize),
+    Clipped(Vec<[u32; 3]>, usize),
     /// The loop is an outline: it goes around a piece of surface and not around a hole.
     Outline,
     /// No valid triangulation was found.

@@ -29,7 +29,7 @@ pub fn flip(
     let moved: Vec<bool> = points.iter().zip(shape).map(|(p, s)| p != s).collect();
     let inside = |t: &Triangle| ids.contains(&t[0]) && ids.contains(&t[2]);
     let moved = |t: &Triangle| t.iter().any(|v| moved[(v - ids.start) as usize]);
-    let mut shut = vec![false; ids.len()];
+    let mut fixed = vec![false; ids.len()];
     let mut numbers = Vec::new();
     let mut these: Vec<Triangle> = Vec::new();
     for (number, t) in triangles.iter().enumerate() {
@@ -38,11 +38,11 @@ pub fn flip(
             these.push(t.map(|v| v - ids.start));
         } else {
             for v in t.iter().filter(|v| ids.contains(v)) {
-                shut[(v - ids.start) as usize] = true;
+                fixed[(v - ids.start) as usize] = true;
             }
         }
     }
-    let mut sheet = Sheet::of(&these, shut, points);
+    let mut sheet = Sheet::of(&these, fixed, points);
     drop(these);
     let _held = hold(sheet.bytes() + bytes_of(&numbers));
     let mut flips = 0;
@@ -78,7 +78,7 @@ struct Sheet<'a> {
     slots: Vec<Slot>,
     /// Fixed vertices, which take part in no flip: some of their triangles are outside the sheet, or they are
     /// on the boundary.
-    shut: Vec<bool>,
+    fixed: Vec<bool>,
     /// Edges to examine, with four bits for each triangle and 16 triangles in a word: bit `k` is the edge
     /// opposite corner `k`.
     due: Vec<u64>,
@@ -94,7 +94,7 @@ struct Flip {
 
 impl<'a> Sheet<'a> {
     /// From triangles with corners by index in the block, ascending.
-    fn of(these: &[Triangle], shut: Vec<bool>, points: &'a [Point]) -> Self {
+    fn of(these: &[Triangle], fixed: Vec<bool>, points: &'a [Point]) -> Self {
         let across = across(0..points.len() as u32, these);
         let _held = hold(bytes_of(&across));
         let slot = |(t, across): (&Triangle, &[u32; 3])| Slot {
@@ -106,26 +106,29 @@ impl<'a> Sheet<'a> {
         let mut sheet = Self {
             points,
             slots: these.iter().zip(&across).map(slot).collect(),
-            shut,
+            fixed,
             due: vec![0; these.len().div_ceil(16)],
             flipped: vec![false; these.len()],
         };
-        sheet.shut();
+        sheet.fixed();
         sheet.bend();
         sheet
     }
 
     /// Bytes allocated by its lists.
     fn bytes(&self) -> u64 {
-        bytes_of(&self.slots) + bytes_of(&self.shut) + bytes_of(&self.due) + bytes_of(&self.flipped)
+        bytes_of(&self.slots)
+            + bytes_of(&self.fixed)
+            + bytes_of(&self.due)
+            + bytes_of(&self.flipped)
     }
 
     /// Fixes the vertices of boundary edges.
-    fn shut(&mut self) {
+    fn fixed(&mut self) {
         for slot in &self.slots {
             for k in (0..3).filter(|&k| slot.across[k] == NONE) {
                 for v in [slot.corners[next(k)], slot.corners[last(k)]] {
-                    self.shut[v as usize] = true;
+                    self.fixed[v as usize] = true;
                 }
             }
         }
@@ -226,7 +229,7 @@ impl<'a> Sheet<'a> {
         let (other, corner) = parts(behind);
         let (c, u, v) = self.named(number, k);
         let d = self.slots[other].corners[corner];
-        if [c, u, d, v].into_iter().any(|v| self.shut[v as usize]) {
+        if [c, u, d, v].into_iter().any(|v| self.fixed[v as usize]) {
             return None;
         }
         let (one, two) = (

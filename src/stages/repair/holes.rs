@@ -1,9 +1,9 @@
 //! Finds boundary loops and has them filled: loops inside a block immediately, loops across blocks later,
 //! from the fragments that the blocks write.
 
+use super::boundary::LoopRules;
 use super::fill::{Corner, Filling};
-use super::mend::Mending;
-use super::rim::{BlockRim, FragmentRow, Outline, RimCounts, RimFiles};
+use super::rim::{BlockRim, FragmentRow, NumberingInput, RimCounts, RimFiles};
 use super::surface::Surface;
 use super::{FilledTriangle, RepairStats, SHUFFLE_BUFFER, from_smallest};
 use crate::error::Result;
@@ -56,11 +56,11 @@ persist!(Found {
 pub fn fill(
     places: Places<'_>,
     surface: &Surface,
-    mending: Option<Mending<'_>>,
+    rules: Option<LoopRules<'_>>,
     blocks: Blocks,
     stats: &mut RepairStats,
     workspace: &Workspace,
-) -> Result<(Table<FilledTriangle>, Outline)> {
+) -> Result<(Table<FilledTriangle>, NumberingInput)> {
     let count = blocks.count();
     let shuffle = Shuffle::between_units(workspace, "repair.filled", SHUFFLE_BUFFER, count)?;
     let kept = Table::create(workspace, "repair.fragments", 0)?;
@@ -70,8 +70,8 @@ pub fn fill(
     let work = |block| {
         let rim = BlockRim::load(places, surface, blocks, block)?;
         let mut settled = Settled::default();
-        let fragments = match mending {
-            Some(mending) => fill_inside(&rim, mending, &kept, &mut settled)?,
+        let fragments = match rules {
+            Some(rules) => fill_inside(&rim, rules, &kept, &mut settled)?,
             None => Vec::new(),
         };
         shuffle.send_from(block, &addressed(&settled.triangles, blocks))?;
@@ -94,13 +94,13 @@ pub fn fill(
         rims[block] = found.rim;
         Ok(())
     })?;
-    let mut outline = files.outline(&rims, blocks, workspace)?;
+    let mut numbering = files.numbering_input(&rims, blocks, workspace)?;
     // Sorted, since blocks finish in any order.
     fragments.sort_unstable_by_key(|fragment: &Fragment| fragment.start);
     let _fragments = workspace.reserve("fragments", fragments.len() as u64 * 120)?;
     let parts = Fragments {
         places,
-        mending,
+        rules,
         fragments: &fragments,
         kept: &kept,
     };
@@ -124,31 +124,31 @@ pub fn fill(
         settled.edges += edges;
     }
     stats.add(&settled.stats);
-    outline.boundary_edges -= settled.edges;
-    Ok((shuffle.deliver(workspace, blocks.count())?, outline))
+    numbering.boundary_edges -= settled.edges;
+    Ok((shuffle.deliver(workspace, blocks.count())?, numbering))
 }
 
 /// Fills the loops that lie inside a block, and stores the fragments of the others.
 fn fill_inside(
     rim: &BlockRim,
-    mending: Mending<'_>,
+    rules: LoopRules<'_>,
     kept: &Table<FragmentRow>,
     settled: &mut Settled,
 ) -> Result<Vec<Fragment>> {
     let (loops, open) = rim.trace();
     for ring in loops {
-        if ring.len() > mending.longest_loop() {
+        if ring.len() > rules.longest_loop() {
             settled.too_long();
             continue;
         }
         let corners = ring.iter().map(|s| rim.corner(s)).collect();
-        let filling = mending.mend(corners, |a, b| rim.has_edge(a, b));
+        let filling = rules.close(corners, |a, b| rim.has_edge(a, b));
         settled.settle(filling, ring.len());
     }
     let mut fragments = Vec::with_capacity(open.len());
     for part in open {
         let (first, last) = (part[0], part[part.len() - 1]);
-        let rows = (part.len() <= mending.longest_loop()).then(|| rim.rows(&part));
+        let rows = (part.len() <= rules.longest_loop()).then(|| rim.rows(&part));
         fragments.push(Fragment {
             start: (first.from, first.at),
             end: (last.at, last.to),
@@ -182,7 +182,7 @@ impl Settled {
                 self.stats.hole_triangles += new.len() as u64;
                 self.close(new, edges);
             }
-            Filling::Zipped(new, left) => {
+            Filling::Clipped(new, left) => {
                 self.stats.holes_zipped += 1;
                 self.stats.hole_triangles += new.len() as u64;
                 self.close(new, edges - left);
@@ -243,7 +243,7 @@ const RINGS: usize = 256;
 /// Fragments of loops across blocks, and the rules for filling them.
 struct Fragments<'a> {
     places: Places<'a>,
-    mending: Option<Mending<'a>>,
+    rules: Option<LoopRules<'a>>,
     fragments: &'a [Fragment],
     kept: &'a Table<FragmentRow>,
 }
@@ -255,11 +255,11 @@ impl Fragments<'_> {
         for ring in rings {
             workspace.check_cancel()?;
             let edges: usize = ring.iter().map(|&f| self.fragments[f].steps).sum();
-            let Some(mending) = self.mending.filter(|m| edges <= m.longest_loop()) else {
+            let Some(rules) = self.rules.filter(|m| edges <= m.longest_loop()) else {
                 settled.too_long();
                 continue;
             };
-            let filling = fill_across(self.places, ring, self.fragments, self.kept, mending)?;
+            let filling = fill_across(self.places, ring, self.fragments, self.kept, rules)?;
             settled.settle(filling, edges);
         }
         Ok(settled)
@@ -271,7 +271,7 @@ fn fill_across(
     ring: &[usize],
     fragments: &[Fragment],
     kept: &Table<FragmentRow>,
-    mending: Mending<'_>,
+    rules: LoopRules<'_>,
 ) -> Result<Filling> {
     let mut parts: Vec<(u32, u32, bool)> = Vec::new();
     let mut edges: FxHashMap<u32, Vec<u32>> = FxHashMap::default();
@@ -306,7 +306,7 @@ fn fill_across(
         pinched,
     };
     let corners = parts.iter().map(corner).collect();
-    Ok(mending.mend(corners, |a, b| {
+    Ok(rules.close(corners, |a, b| {
         edges.get(&a).is_some_and(|around| around.contains(&b))
     }))
 }

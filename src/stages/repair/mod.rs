@@ -5,14 +5,15 @@
 //! found.
 
 mod around;
+mod boundary;
 mod bridges;
 mod components;
+mod ear_clipping;
 mod facing;
 mod fill;
 mod flips;
 mod holes;
 mod loops;
-mod mend;
 mod parts;
 mod patch;
 mod rim;
@@ -20,10 +21,9 @@ mod rows;
 mod surface;
 #[cfg(test)]
 mod tests;
-mod zip;
 
-pub use rim::Outline;
-pub use surface::{Run, Surface};
+pub use rim::NumberingInput;
+pub use surface::{ComponentRun, Surface};
 
 use crate::error::Result;
 use crate::spill::{Table, row};
@@ -32,7 +32,7 @@ use crate::stages::located::Places;
 use crate::stages::stitch::Stitched;
 use crate::workspace::Workspace;
 use crate::workspace::persist::persist;
-use mend::Mending;
+use boundary::LoopRules;
 use serde::Serialize;
 
 const SHUFFLE_BUFFER: u64 = 8 << 20;
@@ -80,7 +80,7 @@ pub struct Repaired {
     /// Triangles that fill holes.
     pub filled: Table<FilledTriangle>,
     /// The input for numbering vertices and triangles.
-    pub outline: Outline,
+    pub numbering: NumberingInput,
 }
 
 /// The parameters of repair.
@@ -95,7 +95,7 @@ pub struct RepairOptions {
     /// Flip edges where this makes the surface bend less.
     pub flip: bool,
     /// Close torn boundaries of any length by ear clipping, and do not fill openings.
-    pub zip: bool,
+    pub clip_ears: bool,
 }
 
 /// Counts of this stage.
@@ -138,13 +138,13 @@ impl RepairOptions {
     }
 
     /// The rules for boundary loops; `None` if all stay open.
-    fn filling<'a>(&self, places: Places<'a>) -> Option<Mending<'a>> {
-        let filling = Mending {
+    fn filling<'a>(&self, places: Places<'a>) -> Option<LoopRules<'a>> {
+        let filling = LoopRules {
             density: places.density,
             longest: self.max_hole_edges,
-            zip: self.zip,
+            clip_ears: self.clip_ears,
         };
-        Some(filling).filter(|f| self.repair && (f.zip || f.longest >= 3))
+        Some(filling).filter(|f| self.repair && (f.clip_ears || f.longest >= 3))
     }
 }
 
@@ -169,7 +169,7 @@ impl RepairStats {
 persist!(Repaired {
     surface,
     filled,
-    outline
+    numbering
 });
 persist!(RepairStats {
     edges_flipped,
@@ -203,11 +203,11 @@ pub fn repair(
         surface::build(places, stitched, blocks, options, workspace)
     })?;
     let limit = options.filling(places);
-    let (filled, outline) = holes::fill(places, &surface, limit, blocks, &mut stats, workspace)?;
+    let (filled, numbering) = holes::fill(places, &surface, limit, blocks, &mut stats, workspace)?;
     let repaired = Repaired {
         surface,
         filled,
-        outline,
+        numbering,
     };
     Ok((repaired, stats))
 }

@@ -43,7 +43,7 @@ row! {
 
 /// The input for numbering the vertices and triangles of the mesh.
 #[derive(Debug)]
-pub struct Outline {
+pub struct NumberingInput {
     /// One bit for each point, 64 in a word: set if it is a vertex.
     pub used: Vec<u64>,
     /// For each block, the number of triangles whose smallest vertex is in it, without those that fill holes.
@@ -104,16 +104,16 @@ impl RimFiles {
     }
 
     /// Collects the boundaries of all blocks.
-    pub(super) fn outline(
+    pub(super) fn numbering_input(
         self,
         found: &[RimCounts],
         blocks: Blocks,
         workspace: &Workspace,
-    ) -> Result<Outline> {
+    ) -> Result<NumberingInput> {
         let faces = found.iter().map(|counts| counts.faces).collect();
         let boundary_edges = found.iter().map(|counts| counts.steps).sum();
         let (used, held) = bits(&self.bits, blocks, workspace)?;
-        Ok(Outline {
+        Ok(NumberingInput {
             used,
             faces,
             boundary_edges,
@@ -151,7 +151,7 @@ fn bits(
     Ok((used, held))
 }
 
-impl Persist for Outline {
+impl Persist for NumberingInput {
     fn save(&self, out: &mut Vec<u8>) {
         self.faces.save(out);
         self.boundary_edges.save(out);

@@ -45,7 +45,7 @@ pub struct Surface {
 
 /// A run of consecutive triangles of one component.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Run {
+pub struct ComponentRun {
     /// Number of triangles.
     pub count: usize,
     /// The component; the number is only meaningful within a block.
@@ -63,7 +63,7 @@ impl Surface {
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
-    pub fn load(&self, block: usize) -> Result<(Vec<OrientedTriangle>, Vec<Run>)> {
+    pub fn load(&self, block: usize) -> Result<(Vec<OrientedTriangle>, Vec<ComponentRun>)> {
         let mut triangles: Vec<OrientedTriangle> = bytemuck::cast_vec(self.triangles.get(block)?);
         let bridges = self.bridges.get(block)?;
         let is_bridge = |[i, a, b]: OrientedTriangle| {
@@ -80,7 +80,7 @@ impl Surface {
         for LabelRun { count, label } in runs {
             let all = from..from + count as usize;
             from = all.end;
-            let run = |component, before, after| Run {
+            let run = |component, before, after| ComponentRun {
                 count: after - before,
                 component,
             };

@@ -1,9 +1,9 @@
 //! Tests of filling and ear clipping of single loops, and of edge flips, on synthetic surfaces.
 
+use super::boundary::LoopRules;
+use super::ear_clipping::zip;
 use super::fill::{Corner, Filling};
 use super::flips::flip;
-use super::mend::Mending;
-use super::zip::zip;
 use crate::geom::{Point, distance2};
 use crate::stages::surface::star::Triangle;
 use proptest::prelude::*;
@@ -104,17 +104,17 @@ impl Sheet {
     }
 
     /// Mends the loop for which `which` is largest.
-    fn mend(&self, which: impl Fn(&Vec<Corner>) -> usize) -> (Filling, usize) {
+    fn close(&self, which: impl Fn(&Vec<Corner>) -> usize) -> (Filling, usize) {
         let ring = self.loops().into_iter().max_by_key(which).unwrap();
         let edges = ring.len();
-        (MENDING.mend(ring, self.has_edge()), edges)
+        (MENDING.close(ring, self.has_edge()), edges)
     }
 }
 
-const MENDING: Mending<'static> = Mending {
+const MENDING: LoopRules<'static> = LoopRules {
     density: None,
     longest: 500,
-    zip: true,
+    clip_ears: true,
 };
 
 /// Sheets with random gaps, with points on or near the plane.
@@ -141,20 +141,20 @@ proptest! {
     fn zipping_closes_a_part_of_the_loop_and_leaves_the_rest(sheet in torn()) {
         for ring in sheet.loops() {
             let ids: Vec<u32> = ring.iter().map(|c| c.id).collect();
-            let zipped = zip(ring, sheet.has_edge());
-            let left: Vec<u32> = zipped.left.iter().map(|c| c.id).collect();
+            let clipped = zip(ring, sheet.has_edge());
+            let left: Vec<u32> = clipped.left.iter().map(|c| c.id).collect();
 
             let mut chain = BTreeMap::new();
             count(&mut chain, &ids, 1);
             count(&mut chain, &left, -1);
-            zipped.triangles.iter().for_each(|t| count(&mut chain, t, -1));
+            clipped.triangles.iter().for_each(|t| count(&mut chain, t, -1));
             prop_assert!(chain.values().all(|n| *n == 0), "{chain:?}");
 
             let mut edges = sheet.half_edges();
-            for (a, b, c) in zipped.triangles.iter().flat_map(|t| around(*t)) {
+            for (a, b, c) in clipped.triangles.iter().flat_map(|t| around(*t)) {
                 prop_assert!(edges.insert((a, b), c).is_none(), "two triangles run from {a} to {b}");
             }
-            let all = sheet.triangles.iter().chain(&zipped.triangles);
+            let all = sheet.triangles.iter().chain(&clipped.triangles);
             let mut different = BTreeSet::new();
             prop_assert!(all.map(|t| sorted(*t)).all(|t| different.insert(t)));
         }
@@ -162,12 +162,12 @@ proptest! {
 
     #[test]
     fn a_loop_is_mended_alike_wherever_it_begins(sheet in torn(), turn in 0usize..100, rough in any::<bool>()) {
-        let mending = Mending { longest: if rough { 3 } else { 500 }, ..MENDING };
+        let rules = LoopRules { longest: if rough { 3 } else { 500 }, ..MENDING };
         for mut ring in sheet.loops() {
-            let first = mending.mend(ring.clone(), sheet.has_edge());
+            let first = rules.close(ring.clone(), sheet.has_edge());
             let turn = turn % ring.len();
             ring.rotate_left(turn);
-            prop_assert_eq!(mending.mend(ring, sheet.has_edge()), first);
+            prop_assert_eq!(rules.close(ring, sheet.has_edge()), first);
         }
     }
 }
@@ -177,16 +177,16 @@ proptest! {
 fn a_loop_on_a_grid_is_mended_alike_wherever_it_begins() {
     let gap = |x, y| (4..7).contains(&x) && (3..9).contains(&y);
     let sheet = Sheet::grid([12, 12], |_| [0; 3], gap);
-    let zipping = Mending {
+    let zipping = LoopRules {
         longest: 3,
         ..MENDING
     };
     for ring in sheet.loops() {
-        let first = zipping.mend(ring.clone(), sheet.has_edge());
+        let first = zipping.close(ring.clone(), sheet.has_edge());
         for turn in 1..ring.len() {
             let mut ring = ring.clone();
             ring.rotate_left(turn);
-            assert_eq!(zipping.mend(ring, sheet.has_edge()), first);
+            assert_eq!(zipping.close(ring, sheet.has_edge()), first);
         }
     }
 }
@@ -205,7 +205,7 @@ fn the_ends_of_a_slit_tube_stay_open() {
     let ring = tube.loops().remove(0);
     assert_eq!(ring.len() as i32, 2 * (long - 1) + 2 * (high - 1));
     let longest = |filling: Filling| {
-        let (Filling::Filled(new) | Filling::Zipped(new, _)) = filling else {
+        let (Filling::Filled(new) | Filling::Clipped(new, _)) = filling else {
             return 0.0;
         };
         let edges = new.iter().flat_map(|t| around(*t));
@@ -215,12 +215,12 @@ fn the_ends_of_a_slit_tube_stay_open() {
         };
         edges.map(length).fold(0.0, f64::max)
     };
-    let plain = Mending {
-        zip: false,
+    let plain = LoopRules {
+        clip_ears: false,
         ..MENDING
     };
-    assert!(longest(plain.mend(ring.clone(), tube.has_edge())) > 200.0);
-    assert!(longest(MENDING.mend(ring, tube.has_edge())) < 80.0);
+    assert!(longest(plain.close(ring.clone(), tube.has_edge())) > 200.0);
+    assert!(longest(MENDING.close(ring, tube.has_edge())) < 80.0);
 }
 
 #[test]
@@ -236,8 +236,8 @@ fn the_outline_of_a_disk_stays_open() {
             points: (0..count).map(at).chain([[1000, 1000, 2000]]).collect(),
             triangles: (0..middle).map(|k| [middle, k, (k + 1) % middle]).collect(),
         };
-        let (mended, edges) = sheet.mend(Vec::len);
-        assert_eq!(mended, Filling::Zipped(Vec::new(), edges));
+        let (mended, edges) = sheet.close(Vec::len);
+        assert_eq!(mended, Filling::Clipped(Vec::new(), edges));
     }
 }
 
@@ -247,8 +247,8 @@ fn the_outline_of_a_lone_triangle_stays_open() {
         points: vec![[0, 0, 0], [9, 0, 0], [0, 9, 1]],
         triangles: vec![[0, 1, 2]],
     };
-    let (mended, _) = sheet.mend(Vec::len);
-    assert_eq!(mended, Filling::Zipped(Vec::new(), 3));
+    let (mended, _) = sheet.close(Vec::len);
+    assert_eq!(mended, Filling::Clipped(Vec::new(), 3));
 }
 
 #[test]
@@ -261,7 +261,7 @@ fn a_long_narrow_tear_is_closed() {
         ]
     };
     let sheet = Sheet::grid([400, 7], off, |x, y| y == 3 && (1..398).contains(&x));
-    let (mended, edges) = sheet.mend(|ring| usize::from(ring.iter().all(|c| inside(c, 400, 7))));
+    let (mended, edges) = sheet.close(|ring| usize::from(ring.iter().all(|c| inside(c, 400, 7))));
     assert!(edges > MENDING.longest);
     let Filling::Filled(triangles) = mended else {
         panic!("{mended:?}");
@@ -282,8 +282,8 @@ fn a_wide_door_stays_open() {
     for rough in 0..3 {
         let off = |n: usize| [0, 0, (n % 3) as i32 * rough];
         let sheet = Sheet::grid([70, 70], off, door);
-        let (mended, edges) = sheet.mend(|r| usize::from(r.iter().all(|c| inside(c, 70, 70))));
-        let Filling::Zipped(triangles, left) = mended else {
+        let (mended, edges) = sheet.close(|r| usize::from(r.iter().all(|c| inside(c, 70, 70))));
+        let Filling::Clipped(triangles, left) = mended else {
             panic!("filled");
         };
         assert_eq!((edges, left), (240, edges - triangles.len()));

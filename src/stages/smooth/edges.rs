@@ -14,13 +14,13 @@ const TERMS: usize = 6;
 
 /// Neighbours of a point, in memory that is reused.
 #[derive(Debug, Default)]
-pub(super) struct Around {
+pub(super) struct WeightedNeighbors {
     /// Differences to the point, divided by the reach; the first is the point itself.
     at: Vec<[f64; 3]>,
     weights: Vec<f64>,
 }
 
-impl Around {
+impl WeightedNeighbors {
     /// Offset of the point's new position, in steps, from the first `count` neighbours.
     pub(super) fn offset(&mut self, near: &Neighbors, count: usize) -> [f64; 3] {
         let Some(reach) = self.gather(near, count) else {

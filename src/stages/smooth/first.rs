@@ -2,9 +2,9 @@
 //! rough patches move if the roughness of their region is noise.
 
 use super::Relaxing;
-use super::edges::Around;
+use super::edges::WeightedNeighbors;
 use super::fits::Planes;
-use super::seen::Seen;
+use super::seen::Roughness;
 use crate::error::Result;
 use crate::geom::Point;
 use crate::method::METHOD;
@@ -28,7 +28,7 @@ fn region() -> usize {
 type Target = (u32, Point, bool);
 
 /// The results for the samples of some regions.
-struct Looked {
+struct Examined {
     /// The target of each sample.
     targets: Vec<Target>,
     /// The usual reach, squared, by patch.
@@ -40,7 +40,7 @@ pub(super) struct Done {
     /// For each run, true if it moves.
     pub active: Vec<bool>,
     /// The number of rough points in each run.
-    pub seen: Seen,
+    pub seen: Roughness,
     /// See [`Spacings`](crate::stages::spacing::Spacings).
     pub usual2: Vec<u64>,
 }
@@ -52,7 +52,7 @@ persist!(Done {
 });
 
 /// Moves the `points` of the regions with the ids `ids`.
-pub(super) fn look_and_move(
+pub(super) fn examine_and_move(
     store: &PointStore,
     ids: Range<usize>,
     relaxing: Relaxing,
@@ -60,14 +60,14 @@ pub(super) fn look_and_move(
 ) -> Result<Done> {
     let neighbors = relaxing.neighbors;
     let planes = Planes::load(store, ids.clone(), neighbors)?;
-    let Looked { targets, usual2 } = look(&planes, relaxing, &ids)?;
+    let Examined { targets, usual2 } = look(&planes, relaxing, &ids)?;
     let _held = hold(bytes_of(&targets) + bytes_of(&usual2));
     let active = if relaxing.rounds > 0 {
         choose(&planes, relaxing, &targets, &ids)?
     } else {
         vec![false; ids.len().div_ceil(METHOD.curve.run)]
     };
-    let mut seen = Seen::of(&ids);
+    let mut seen = Roughness::of(&ids);
     let moves = |id: usize| active[(id - ids.start) / METHOD.curve.run];
     let mut put = |id: usize, to, rough| {
         seen.note(id, rough);
@@ -97,7 +97,7 @@ fn is_sampled(id: usize) -> bool {
 }
 
 /// Examines the samples.
-fn look(planes: &Planes<'_>, relaxing: Relaxing, ids: &Range<usize>) -> Result<Looked> {
+fn look(planes: &Planes<'_>, relaxing: Relaxing, ids: &Range<usize>) -> Result<Examined> {
     let curve = METHOD.curve;
     let mut samples: Vec<Sample> = Vec::with_capacity(ids.len() / curve.sample + curve.run);
     planes.each(is_sampled, |id, point, fit| {
@@ -121,7 +121,7 @@ fn look(planes: &Planes<'_>, relaxing: Relaxing, ids: &Range<usize>) -> Result<L
             sample.target
         }
     };
-    Ok(Looked {
+    Ok(Examined {
         targets: samples.iter().map(target).collect(),
         usual2,
     })
@@ -182,18 +182,18 @@ fn lower_quartile(mut all: Vec<u64>) -> u64 {
 fn choose(
     planes: &Planes<'_>,
     relaxing: Relaxing,
-    looked: &[Target],
+    examined: &[Target],
     ids: &Range<usize>,
 ) -> Result<Vec<bool>> {
-    let rough = rough_patches(looked, ids);
-    let told = ask(planes, relaxing, looked, ids, &rough)?;
-    let _held = hold(bytes_of(&told));
+    let rough = rough_patches(examined, ids);
+    let counts = count_witnesses(planes, relaxing, examined, ids, &rough)?;
+    let _held = hold(bytes_of(&counts));
     let run = METHOD.curve.run;
     let (of_patch, of_region) = (METHOD.curve.patch / run, METHOD.curve.block as usize / run);
     let mut active = vec![false; ids.len().div_ceil(run)];
-    let of_patches = rough.chunks(region()).zip(told.chunks(region()));
-    for (runs, (rough, told)) in active.chunks_mut(of_region).zip(of_patches) {
-        if is_noise(rough, told, relaxing.smoothed) {
+    let of_patches = rough.chunks(region()).zip(counts.chunks(region()));
+    for (runs, (rough, counts)) in active.chunks_mut(of_region).zip(of_patches) {
+        if is_noise(rough, counts, relaxing.smoothed) {
             for (runs, rough) in runs.chunks_mut(of_patch).zip(rough) {
                 runs.fill(*rough);
             }
@@ -208,9 +208,9 @@ fn patch(id: u32, ids: &Range<usize>) -> usize {
 
 /// The rough patches: those with a large enough share of rough samples; none in a region with too few of
 /// them.
-fn rough_patches(looked: &[Target], ids: &Range<usize>) -> Vec<bool> {
+fn rough_patches(examined: &[Target], ids: &Range<usize>) -> Vec<bool> {
     let mut counts = vec![(0, 0); ids.len().div_ceil(METHOD.curve.patch)];
-    for (id, _, far) in looked {
+    for (id, _, far) in examined {
         let (seen, rough) = &mut counts[patch(*id, ids)];
         *seen += 1;
         *rough += usize::from(*far);
@@ -231,7 +231,7 @@ fn count(patches: &[bool]) -> usize {
 
 /// Counts of the witnesses of a patch.
 #[derive(Debug, Clone, Copy, Default)]
-struct Told {
+struct WitnessCounts {
     points: u8,
     /// Witnesses that are curved: their neighbours lie on a curved surface.
     curved: u8,
@@ -242,7 +242,7 @@ struct Told {
     clean: u8,
 }
 
-impl Told {
+impl WitnessCounts {
     fn is_noisy(self) -> bool {
         METHOD.relax.noisy as u8 * self.curved < self.points
     }
@@ -250,9 +250,10 @@ impl Told {
 
 /// True if the patches of a region are rough because of noise, not because of edges or of details too fine
 /// for the points.
-fn is_noise(rough: &[bool], told: &[Told], smoothed: bool) -> bool {
-    let sum = |of: fn(&Told) -> u8| told.iter().map(|t| usize::from(of(t))).sum::<usize>();
-    let noisy = told.iter().filter(|told| told.is_noisy()).count();
+fn is_noise(rough: &[bool], counts: &[WitnessCounts], smoothed: bool) -> bool {
+    let sum =
+        |of: fn(&WitnessCounts) -> u8| counts.iter().map(|t| usize::from(of(t))).sum::<usize>();
+    let noisy = counts.iter().filter(|counts| counts.is_noisy()).count();
     let (fine, clean) = (sum(|t| t.fine), sum(|t| t.clean));
     let limits = METHOD.relax;
     let is_clean = fine * limits.fine >= sum(|t| t.points)
@@ -263,49 +264,49 @@ fn is_noise(rough: &[bool], told: &[Told], smoothed: bool) -> bool {
 }
 
 /// Counts the properties of the witnesses of every rough patch.
-fn ask(
+fn count_witnesses(
     planes: &Planes<'_>,
     relaxing: Relaxing,
-    looked: &[Target],
+    examined: &[Target],
     ids: &Range<usize>,
     rough: &[bool],
-) -> Result<Vec<Told>> {
+) -> Result<Vec<WitnessCounts>> {
     let neighbors = relaxing.neighbors;
-    let telling = telling_points(looked, ids, rough);
-    let _held = hold(bytes_of(&telling));
-    let mut told = vec![Told::default(); rough.len()];
-    let mut around = Around::default();
+    let is_witness = witnesses(examined, ids, rough);
+    let _held = hold(bytes_of(&is_witness));
+    let mut counts = vec![WitnessCounts::default(); rough.len()];
+    let mut around = WeightedNeighbors::default();
     planes.each_neighborhood(
-        |id| telling[id - ids.start],
+        |id| is_witness[id - ids.start],
         |_, near| {
             let curved = around.is_curved(near, neighbors);
             (curved, around.is_clean(near, neighbors))
         },
         |id, _, known| {
-            let told = &mut told[patch(id as u32, ids)];
+            let counts = &mut counts[patch(id as u32, ids)];
             let (curved, clean) = known;
-            told.points += 1;
-            told.curved += u8::from(curved);
-            told.fine += u8::from(clean.is_some());
-            told.clean += u8::from(clean == Some(true));
+            counts.points += 1;
+            counts.curved += u8::from(curved);
+            counts.fine += u8::from(clean.is_some());
+            counts.clean += u8::from(clean == Some(true));
         },
     )?;
-    Ok(told)
+    Ok(counts)
 }
 
 /// The witnesses: of each rough patch, the first rough samples by id.
-fn telling_points(looked: &[Target], ids: &Range<usize>, rough: &[bool]) -> Vec<bool> {
-    let wanted = |rough: &bool| if *rough { METHOD.relax.telling } else { 0 };
+fn witnesses(examined: &[Target], ids: &Range<usize>, rough: &[bool]) -> Vec<bool> {
+    let wanted = |rough: &bool| if *rough { METHOD.relax.witnesses } else { 0 };
     let mut left: Vec<usize> = rough.iter().map(wanted).collect();
-    let mut found: Vec<u32> = looked.iter().filter(|l| l.2).map(|l| l.0).collect();
+    let mut found: Vec<u32> = examined.iter().filter(|l| l.2).map(|l| l.0).collect();
     found.sort_unstable();
-    let mut telling = vec![false; ids.len()];
+    let mut is_witness = vec![false; ids.len()];
     for id in found {
         let left = &mut left[patch(id, ids)];
         if *left > 0 {
             *left -= 1;
-            telling[id as usize - ids.start] = true;
+            is_witness[id as usize - ids.start] = true;
         }
     }
-    telling
+    is_witness
 }

@@ -24,7 +24,7 @@ use crate::stages::cells::{Fit, TileRanges};
 use crate::stages::order::PointStore;
 use crate::stages::tiles::neighbors::Neighbors;
 use crate::workspace::Workspace;
-use edges::Around;
+use edges::WeightedNeighbors;
 use fits::each_fit;
 use pass::Pass;
 use std::ops::Range;
@@ -90,7 +90,7 @@ pub fn smooth(
         }
         Smoothing::Edges => {
             let count = neighbors * METHOD.smoothing.neighbors;
-            let mut around = Around::default();
+            let mut around = WeightedNeighbors::default();
             let of = |point: Point, near: &Neighbors| moved(point, around.offset(near, count));
             each_neighborhood(store, ids.clone(), count, of, |id, _, to| {
                 points[id - ids.start] = to;

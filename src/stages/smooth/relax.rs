@@ -9,7 +9,7 @@ use super::Relaxing;
 use super::first::{self, Done};
 use super::fits::each_fit;
 use super::pass::Pass;
-use super::seen::Seen;
+use super::seen::Roughness;
 use crate::error::Result;
 use crate::geom::Point;
 use crate::method::METHOD;
@@ -150,7 +150,7 @@ fn first_round(
         ..Pass::new("relaxed1", "relax: tile", tiles)
     };
     let work = |ids: Range<usize>, points: &mut [Point]| {
-        first::look_and_move(store, ids, relaxing, points)
+        first::examine_and_move(store, ids, relaxing, points)
     };
     let mut moved = 0;
     let next = pass.over(store, workspace, work, |done: Done| {
@@ -178,7 +178,7 @@ fn one_round(
     let Runs { active, rough, .. } = runs;
     let work = |ids: Range<usize>, points: &mut [Point]| {
         let wanted = |id: usize| active[id / METHOD.curve.run];
-        let mut seen = Seen::of(&ids);
+        let mut seen = Roughness::of(&ids);
         let neighbors = relaxing.neighbors;
         if ids.clone().step_by(METHOD.curve.run).any(wanted) {
             each_fit(store, ids.clone(), neighbors, wanted, |id, point, fit| {
@@ -191,7 +191,7 @@ fn one_round(
         Ok(seen)
     };
     let mut moved = 0;
-    let next = pass.over(store, workspace, work, |seen: Seen| {
+    let next = pass.over(store, workspace, work, |seen: Roughness| {
         moved += seen.moved;
         seen.put(rough);
     })?;

@@ -9,7 +9,7 @@ use crate::workspace::persist::persist;
 use std::ops::Range;
 
 /// Rough points in a range of ids.
-pub(super) struct Seen {
+pub(super) struct Roughness {
     /// Its first run.
     pub first: usize,
     /// Rough points of each run.
@@ -17,13 +17,13 @@ pub(super) struct Seen {
     pub moved: u64,
 }
 
-persist!(Seen {
+persist!(Roughness {
     first,
     rough,
     moved
 });
 
-impl Seen {
+impl Roughness {
     pub fn of(ids: &Range<usize>) -> Self {
         let first = ids.start / METHOD.curve.run;
         Self {

@@ -2,9 +2,9 @@
 //! order. Results that later turns need are on disk.
 
 use super::base::Base;
+use super::deferred::Deferred;
 use super::insertion::{Candidate, CandidateRow, insert_candidates};
 use super::interior::{Follower, Interior, block_bytes};
-use super::mail::Mail;
 use super::stats::InsertStats;
 use super::surroundings::Surroundings;
 use crate::error::Result;
@@ -103,7 +103,7 @@ struct Pass<'a> {
     /// vertices.
     order: Vec<u32>,
     /// Candidates that wait for the turn of a later block.
-    waiting: Mail<CandidateRow>,
+    waiting: Deferred<CandidateRow>,
     counts: InsertStats,
     /// The block whose turn is next, and the number of blocks of `order` known to be ready.
     group: usize,
@@ -131,7 +131,7 @@ impl<'a> Pass<'a> {
         Ok(Self {
             mesh: Surroundings::new(base, interior, blocks, workspace)?,
             order,
-            waiting: Mail::new(workspace, "stitch.waiting", blocks.count())?,
+            waiting: Deferred::new(workspace, "stitch.waiting", blocks.count())?,
             counts: InsertStats::default(),
             group: 0,
             ready: 0,

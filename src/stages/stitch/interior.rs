@@ -281,14 +281,14 @@ impl BlockWork {
             ids,
         };
         work.add_base(&interior, &crossing, &active, base, block);
-        work.tell(bytes_of(&interior) + bytes_of(&crossing) + bytes_of(&active));
+        work.report_usage(bytes_of(&interior) + bytes_of(&crossing) + bytes_of(&active));
         drop((interior, crossing));
-        work.see_crossing(places, base, blocks, block)?;
+        work.load_crossing_candidates(places, base, blocks, block)?;
         Ok(work)
     }
 
     /// Reports the bytes of its lists and `more` bytes.
-    fn tell(&mut self, more: u64) {
+    fn report_usage(&mut self, more: u64) {
         let triangles = bytes_of(&self.mesh) + bytes_of(&self.triangles);
         let candidates = bytes_of(&self.candidates) + bytes_of(&self.crossing_candidates);
         let vertices = bytes_of(&self.changed) + bytes_of(&self.marks);
@@ -297,7 +297,7 @@ impl BlockWork {
     }
 
     /// Determines which crossing triples are candidates, and the positions of their vertices.
-    fn see_crossing(
+    fn load_crossing_candidates(
         &mut self,
         places: Places<'_>,
         base: &Base,
@@ -326,7 +326,7 @@ impl BlockWork {
             Candidate::new(triple, count, triple.map(|v| self.position(v)))
         };
         self.crossing_candidates = candidates.iter().map(new).collect();
-        self.tell(bytes_of(&candidates));
+        self.report_usage(bytes_of(&candidates));
         Ok(())
     }
 
@@ -389,7 +389,7 @@ impl BlockWork {
             }
         }
         ranked.sort_unstable();
-        self.tell(bytes_of(&ranked) + 20 * ranked.len() as u64);
+        self.report_usage(bytes_of(&ranked) + 20 * ranked.len() as u64);
         let ranked: Vec<_> = ranked.iter().map(Candidate::row).collect();
         out.ranked.put(block, &ranked)?;
         drop(ranked);
@@ -403,7 +403,7 @@ impl BlockWork {
         let mut mesh = std::mem::take(&mut self.mesh);
         mesh.extend_from_slice(inserted);
         // The sort needs the same memory again.
-        self.tell(2 * bytes_of(&mesh));
+        self.report_usage(2 * bytes_of(&mesh));
         // Consists of two ascending runs, which this sort merges.
         mesh.sort();
         out.mesh.put(block, bytemuck::cast_slice(&mesh))

@@ -12,9 +12,9 @@ mod across;
 mod admissibility;
 mod base;
 mod components;
+mod deferred;
 mod insertion;
 mod interior;
-mod mail;
 mod stats;
 mod surroundings;
 

@@ -3,9 +3,9 @@
 use super::admissibility::Neighborhood;
 use super::base::Base;
 use super::components::{ComponentRef, NOTHING};
+use super::deferred::Deferred;
 use super::insertion::{Candidate, Mesh};
 use super::interior::{Interior, TriangleIn, VertexAt};
-use super::mail::Mail;
 use crate::error::Result;
 use crate::geom::Point;
 use crate::spill::row;
@@ -78,7 +78,7 @@ pub struct Surroundings<'a> {
     stars: FxHashMap<u32, VertexStar>,
     /// Triangles inserted in this turn.
     inserted: Vec<u32>,
-    changes: Mail<Change>,
+    changes: Deferred<Change>,
     pub workspace: &'a Workspace,
     reserved: Vec<Reservation>,
     /// The memory reported by a turn that is taken inside a unit of work, whose reservation it uses.
@@ -201,7 +201,7 @@ impl<'a> Surroundings<'a> {
             triangles: Vec::new(),
             stars: FxHashMap::default(),
             inserted: Vec::new(),
-            changes: Mail::new(workspace, "stitch.changes", blocks.count())?,
+            changes: Deferred::new(workspace, "stitch.changes", blocks.count())?,
             workspace,
             reserved: Vec::new(),
             held: None,
@@ -274,7 +274,7 @@ impl<'a> Surroundings<'a> {
             self.stars.insert(v, star);
         }
         self.enter_all(&found, &positions, block);
-        self.tell(lists + tables);
+        self.report_usage(lists + tables);
         drop(reading);
         Ok(true)
     }
@@ -353,7 +353,7 @@ impl<'a> Surroundings<'a> {
     }
 
     /// Reports the bytes of the lists and `more` bytes.
-    fn tell(&mut self, more: u64) {
+    fn report_usage(&mut self, more: u64) {
         let stars = self.stars.values();
         let lists: u64 = stars.map(|star| bytes_of(&star.triangles) + 16).sum();
         let turn = lists + table_bytes(&self.stars) + bytes_of(&self.triangles) + more;
@@ -370,7 +370,7 @@ impl<'a> Surroundings<'a> {
         self.stars = FxHashMap::default();
         self.inserted.clear();
         self.held = None;
-        self.tell(0);
+        self.report_usage(0);
         self.reserved.clear();
     }
 

@@ -68,11 +68,11 @@ pub(super) fn settle(
     reserved.set_held(graph.bytes());
     let clusters = graph.contract(Limit::None);
     // One label of the surface that represents each cluster.
-    let mut standing = vec![None; graph.len()];
+    let mut representative = vec![None; graph.len()];
     for label in 0..surface.sets.len() as u32 {
         let (root, flip) = clusters.look(label);
-        match standing[root as usize] {
-            None => standing[root as usize] = Some((label, flip)),
+        match representative[root as usize] {
+            None => representative[root as usize] = Some((label, flip)),
             Some((first, turned)) => _ = surface.sets.join(first, label, flip ^ turned),
         }
     }

@@ -55,7 +55,7 @@ pub fn thin(spool: Spool, lattice: &Lattice, grid: Grid, workspace: &Workspace) 
     let buffer = (workspace.memory.available() / 4).max(16 << 20);
     // While a buffer grows, both the old and the new one are allocated.
     let held = workspace.promise("thin: sort buffer", buffer + buffer / 2)?;
-    let sorter = Sorter::new(workspace, "thin", buffer).telling(held);
+    let sorter = Sorter::new(workspace, "thin", buffer).reporting(held);
     let take = |points: &[Point]| {
         workspace.check_cancel()?;
         let mut rows = Vec::with_capacity(CHUNK.min(points.len()));

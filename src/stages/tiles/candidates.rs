@@ -4,7 +4,8 @@ use super::{LEAVES, OwnPage, Tile};
 use crate::geom::Point;
 use crate::geom::aabb::Aabb;
 use crate::kernels::{
-    Around, BLOCK, Boxes, Level, Pick, first_bits, kernel, near_boxes, point_box_body, take_boxes,
+    BLOCK, Boxes, Level, Pick, SearchBox, first_bits, kernel, near_boxes, point_box_body,
+    take_boxes,
 };
 use crate::workspace::memory::bytes_of;
 
@@ -180,8 +181,8 @@ fn keep(numbers: &mut [u32], wanted: impl Fn(u32) -> bool) -> usize {
 }
 
 /// The box `bounds` with a squared distance that includes all points within `d2`, and possibly others.
-pub(super) fn within(bounds: &Aabb, d2: u64) -> Around {
-    Around {
+pub(super) fn within(bounds: &Aabb, d2: u64) -> SearchBox {
+    SearchBox {
         min: bounds.min,
         max: bounds.max,
         limit: above(d2),
@@ -190,14 +191,14 @@ pub(super) fn within(bounds: &Aabb, d2: u64) -> Around {
 
 kernel! {
     /// Copies the points of `leaves` that are within `around`; returns how many there are.
-    fn pick_leaves(tile: &Tile, leaves: &[u32], around: Around, out: &mut Columns) -> usize = pick_leaves_body<Eight>
+    fn pick_leaves(tile: &Tile, leaves: &[u32], around: SearchBox, out: &mut Columns) -> usize = pick_leaves_body<Eight>
 }
 
 #[inline(always)]
 fn pick_leaves_body<P: Pick>(
     tile: &Tile,
     leaves: &[u32],
-    around: Around,
+    around: SearchBox,
     out: &mut Columns,
 ) -> usize {
     let [to_x, to_y, to_z, to_ids] = out.slices_mut();

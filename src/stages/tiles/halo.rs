@@ -40,7 +40,7 @@ pub(super) struct Reach {
 /// are shorter than usual where the halo would be too large for the tile, as around scattered outliers.
 pub(super) fn halo(store: &PointStore, own: &[usize], size: usize) -> (Vec<usize>, Vec<Reach>) {
     let most = size * (1 + MOST_HALO) + MOST_NEAR;
-    let mut around = Around::of(store, own, size);
+    let mut around = ReachablePages::of(store, own, size);
     let mut shrink = 1;
     loop {
         let near = |&page: &usize| {
@@ -65,7 +65,12 @@ pub(super) fn halo(store: &PointStore, own: &[usize], size: usize) -> (Vec<usize
 
 /// Restores reaches that were shortened, if the pages they touch are already in the tile or are few for all
 /// shortened reaches together: around a dense centre, all outer pages reach the same pages.
-fn share(around: &mut Around<'_>, wanted: &mut Vec<usize>, reaches: &mut [Reach], most: usize) {
+fn share(
+    around: &mut ReachablePages<'_>,
+    wanted: &mut Vec<usize>,
+    reaches: &mut [Reach],
+    most: usize,
+) {
     let short: Vec<_> = (reaches.iter_mut())
         .filter(|short| short.reach2 < reach(around, short.page, 1).pow(2))
         .collect();
@@ -89,7 +94,7 @@ fn share(around: &mut Around<'_>, wanted: &mut Vec<usize>, reaches: &mut [Reach]
 }
 
 /// The desired reach of a page.
-fn reach(around: &mut Around<'_>, page: usize, shrink: u64) -> u64 {
+fn reach(around: &mut ReachablePages<'_>, page: usize, shrink: u64) -> u64 {
     let reach = full(around.store.page_box(page).longest_side());
     if shrink == 1 {
         // Along a line, neighbours are far and pages few.
@@ -104,7 +109,7 @@ fn full(longest: i64) -> u64 {
 }
 
 /// The longest reach, up to `reach`, that touches at most `most` pages; found by halving.
-fn near_pages(around: &mut Around<'_>, page: usize, mut reach: u64, most: usize) -> Reach {
+fn near_pages(around: &mut ReachablePages<'_>, page: usize, mut reach: u64, most: usize) -> Reach {
     loop {
         let (near, all) = around.pages(page, reach, most);
         if all || reach <= 1 {
@@ -123,7 +128,7 @@ fn near_pages(around: &mut Around<'_>, page: usize, mut reach: u64, most: usize)
 }
 
 /// The factor by which a reach can be lengthened and still touch few pages.
-fn lonely(around: &mut Around<'_>, page: usize, reach: u64) -> u64 {
+fn lonely(around: &mut ReachablePages<'_>, page: usize, reach: u64) -> u64 {
     for times in [MOST_TIMES, MOST_TIMES / 2] {
         if around.pages(page, reach * times, FEW_NEAR).1 {
             return times;
@@ -134,7 +139,7 @@ fn lonely(around: &mut Around<'_>, page: usize, reach: u64) -> u64 {
 
 /// The pages that any page of a tile can reach, if they are not too many; then the box tree need not be
 /// searched for each page.
-struct Around<'a> {
+struct ReachablePages<'a> {
     store: &'a PointStore,
     level: Level,
     /// The boxes of the pages within `reach` of the tile's box, with their numbers.
@@ -143,7 +148,7 @@ struct Around<'a> {
     found: Vec<u32>,
 }
 
-impl<'a> Around<'a> {
+impl<'a> ReachablePages<'a> {
     fn of(store: &'a PointStore, own: &[usize], size: usize) -> Self {
         let boxes = || own.iter().map(|page| store.page_box(*page));
         let all = boxes().fold(Aabb::EMPTY, |all, page| all.union(*page));

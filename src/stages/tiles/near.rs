@@ -152,7 +152,7 @@ impl Tile {
                     guess = Some(wider.max(farthest + farthest / 2));
                 }
             }
-            search.tell();
+            search.report_usage();
         }
     }
 
@@ -223,7 +223,7 @@ impl Search {
     }
 
     /// Reports the bytes of its lists.
-    fn tell(&mut self) {
+    fn report_usage(&mut self) {
         let candidates = [
             Some(&self.candidates),
             self.aside.as_ref(),

@@ -63,15 +63,15 @@ fn damage(file: &str, section: u32) -> Needed {
     }
 }
 
-fn rewind(end: u64, stage: &str) -> Option<Mending> {
+fn rewind(end: u64, stage: &str) -> Option<Remedy> {
     let stage = Some(stage.into());
-    Some(Mending::Rewind { end, stage })
+    Some(Remedy::Rewind { end, stage })
 }
 
 #[test]
 fn nothing_is_done_about_no_damage() {
     let history = History::of(&script().0);
-    assert_eq!(history.mend(&[]), None);
+    assert_eq!(history.remedy(&[]), None);
     assert_eq!(history.needed().len(), 5);
     assert!(history.is_deleted("sent") && !history.is_deleted("a"));
 }
@@ -80,8 +80,8 @@ fn nothing_is_done_about_no_damage() {
 fn a_unit_is_done_again_if_its_inputs_are_there() {
     let mut history = History::of(&script().0);
     let units = vec![("/two/tiles".to_owned(), 1)];
-    let found = history.mend(&[damage("b", 1)]);
-    assert_eq!(found, Some(Mending::Redo(units.clone())));
+    let found = history.remedy(&[damage("b", 1)]);
+    assert_eq!(found, Some(Remedy::Redo(units.clone())));
     history.forget(&units);
     // The unit and the stage around it, but not the units that used its result.
     assert_eq!(history.units("/two/tiles"), [0]);
@@ -95,12 +95,12 @@ fn a_unit_is_done_again_if_its_inputs_are_there() {
 fn a_stage_begins_again_if_they_are_not() {
     // The rows that were sent are deleted, so they cannot be delivered again.
     let history = History::of(&script().0);
-    assert_eq!(history.mend(&[damage("c", 0)]), rewind(4, "/two"));
+    assert_eq!(history.remedy(&[damage("c", 0)]), rewind(4, "/two"));
     let mut later = script();
     later.deleted("a");
     let history = History::of(&later.0);
-    assert_eq!(history.mend(&[damage("b", 0)]), rewind(0, "/one"));
-    assert_eq!(history.mend(&[damage("c", 0)]), rewind(0, "/one"));
+    assert_eq!(history.remedy(&[damage("b", 0)]), rewind(0, "/one"));
+    assert_eq!(history.remedy(&[damage("c", 0)]), rewind(0, "/one"));
 }
 
 #[test]

@@ -7,13 +7,13 @@ use crate::workspace::Workspace;
 /// Rows for numbered receivers, on disk, in the parts in which they were sent. They are not kept if the run
 /// is interrupted.
 #[derive(Debug)]
-pub struct Mail<R: Row> {
+pub struct Deferred<R: Row> {
     parts: Table<R>,
     /// The parts for each receiver.
     of: Vec<Vec<u32>>,
 }
 
-impl<R: Row> Mail<R> {
+impl<R: Row> Deferred<R> {
     /// Creates the file `name`.
     ///
     /// # Errors
@@ -78,16 +78,16 @@ mod tests {
         let folder = std::env::temp_dir();
         let workspace =
             Workspace::new(&folder, memory, 1, Arc::new(Silent), Cancel::new()).unwrap();
-        let mut mail = Mail::new(&workspace, "mail", 3).unwrap();
+        let mut deferred = Deferred::new(&workspace, "deferred", 3).unwrap();
         for i in 0..90u32 {
             let records: Vec<_> = (0..i % 4).map(|k| [i, k]).collect();
-            mail.send(i % 3, &records).unwrap();
+            deferred.send(i % 3, &records).unwrap();
         }
         for to in 0..3u32 {
             let sent = (0..90).filter(|i| i % 3 == to);
             let want: Vec<_> = sent.flat_map(|i| (0..i % 4).map(move |k| [i, k])).collect();
-            assert_eq!(mail.rows(to as usize), want.len());
-            assert_eq!(mail.get(to as usize).unwrap(), want);
+            assert_eq!(deferred.rows(to as usize), want.len());
+            assert_eq!(deferred.get(to as usize).unwrap(), want);
         }
     }
 }

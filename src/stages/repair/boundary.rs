@@ -1,9 +1,9 @@
 //! Treatment of a boundary loop: a hole is filled, any other loop is closed by ear clipping as far as it is
 //! torn.
 
+use super::ear_clipping::zip;
 use super::fill::{Corner, Filling, begin_at_smallest, fill, ids, is_outline, triangulate};
 use super::parts::Part;
-use super::zip::zip;
 use crate::geom::distance2;
 use crate::geom::triangle::{area, length, normal};
 use crate::method::METHOD;
@@ -12,25 +12,25 @@ use rustc_hash::FxHashSet;
 
 /// The rules for boundary loops.
 #[derive(Debug, Clone, Copy)]
-pub struct Mending<'a> {
+pub struct LoopRules<'a> {
     /// The density of the surface, if holes too wide for it are to stay open.
     pub density: Option<Density<'a>>,
     /// Most edges of a hole that is filled; with less than three no hole is filled.
     pub longest: usize,
     /// Close loops that are not filled by ear clipping, and leave openings open.
-    pub zip: bool,
+    pub clip_ears: bool,
 }
 
 /// Number of edges of a gap: a loop closed by one triangle that no cell saw. It is not a hole, and is closed
 /// even if no holes are to be filled.
 const GAP: usize = 3;
 
-impl Mending<'_> {
+impl LoopRules<'_> {
     /// The most edges of a loop that is examined.
     pub fn longest_loop(&self) -> usize {
         if self.only_gaps() {
             GAP
-        } else if self.zip {
+        } else if self.clip_ears {
             self.longest.max(METHOD.ear_clipping.longest)
         } else {
             self.longest
@@ -58,12 +58,12 @@ impl Mending<'_> {
     }
 
     fn only_gaps(&self) -> bool {
-        self.zip && self.longest < GAP
+        self.clip_ears && self.longest < GAP
     }
 
     /// Fills or closes the loop of `corners` by the rules; `edge(a, b)` is true if the mesh has that edge.
-    pub fn mend(&self, mut corners: Vec<Corner>, edge: impl Fn(u32, u32) -> bool) -> Filling {
-        if !self.zip {
+    pub fn close(&self, mut corners: Vec<Corner>, edge: impl Fn(u32, u32) -> bool) -> Filling {
+        if !self.clip_ears {
             return fill(corners, 0, edge);
         }
         begin_at_smallest(&mut corners);
@@ -77,7 +77,7 @@ impl Mending<'_> {
         {
             let new = ids(&corners, &part.triangles);
             return match new[..] {
-                _ if part.left > 0 => Filling::Zipped(new, part.left),
+                _ if part.left > 0 => Filling::Clipped(new, part.left),
                 [gap] => Filling::Gap(gap),
                 _ => Filling::Filled(new),
             };
@@ -85,8 +85,8 @@ impl Mending<'_> {
         if self.only_gaps() {
             return Filling::Impossible;
         }
-        let zipped = zip(corners, &edge);
-        let (mut triangles, mut left) = (zipped.triangles, zipped.left);
+        let clipped = zip(corners, &edge);
+        let (mut triangles, mut left) = (clipped.triangles, clipped.left);
         let mut open = left.len();
         if !triangles.is_empty() && !left.is_empty() && fillable(&left) {
             let new = edges_of(&triangles);
@@ -100,7 +100,7 @@ impl Mending<'_> {
         if open == 0 {
             Filling::Filled(triangles)
         } else {
-            Filling::Zipped(triangles, open)
+            Filling::Clipped(triangles, open)
         }
     }
 }

@@ -9,7 +9,7 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 /// A loop after ear clipping.
-pub struct Zipped {
+pub struct Clipped {
     /// The ears, as oriented triangles.
     pub triangles: Vec<[u32; 3]>,
     /// The remaining corners in order; none if the loop is closed.
@@ -35,7 +35,7 @@ struct Zipper<E> {
 }
 
 /// Clips ears of the loop of `corners`; `edge(a, b)` is true if the mesh has that edge.
-pub fn zip(corners: Vec<Corner>, edge: impl Fn(u32, u32) -> bool) -> Zipped {
+pub fn zip(corners: Vec<Corner>, edge: impl Fn(u32, u32) -> bool) -> Clipped {
     let n = corners.len();
     let mut zipper = Zipper {
         spacing: spacing(&corners),
@@ -59,7 +59,7 @@ pub fn zip(corners: Vec<Corner>, edge: impl Fn(u32, u32) -> bool) -> Zipped {
             x = zipper.after[x];
         }
     }
-    Zipped {
+    Clipped {
         triangles: zipper.out,
         left,
     }
