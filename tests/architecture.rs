@@ -1,8 +1,10 @@
 //! The map of ARCHITECTURE.md, checked by the `use` lines of `src`: the permitted imports of each folder, no
 //! circle of imports, rows with named fields, and files of limited length.
 
+mod source;
+
+use source::modules;
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::{Path, PathBuf};
 
 /// Each part of the program, and the parts whose items it may use, besides `error`. A part is a folder of
 /// `src`, a folder or file of `src/stages`, or a file of `src`.
@@ -73,35 +75,6 @@ const COMMON: &str = "error geom method spill workspace";
 
 /// Largest number of lines of a file, without its tests.
 const MOST_LINES: usize = 500;
-
-fn source() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("src")
-}
-
-/// Every module that is not a test; its text without comments and tests.
-fn modules() -> BTreeMap<String, String> {
-    fn walk(folder: &Path, all: &mut BTreeMap<String, String>) {
-        for entry in std::fs::read_dir(folder).unwrap() {
-            let path = entry.unwrap().path();
-            let name = path.file_stem().unwrap().to_str().unwrap();
-            if path.is_dir() {
-                walk(&path, all);
-            } else if !name.contains("tests") && !["main", "lib"].contains(&name) {
-                let relative = path.strip_prefix(source()).unwrap().with_extension("");
-                let relative = relative.to_str().unwrap();
-                let module = relative.strip_suffix("/mod").unwrap_or(relative);
-                let text = std::fs::read_to_string(&path).unwrap();
-                let text = text.split("#[cfg(test)]\nmod tests {").next().unwrap();
-                let lines = text.lines().map(|line| line.split("//").next().unwrap());
-                all.insert(module.to_owned(), lines.collect::<Vec<_>>().join("\n"));
-            }
-        }
-    }
-    let mut all = BTreeMap::new();
-    walk(&source(), &mut all);
-    assert!(all.len() > 100, "only {} modules found", all.len());
-    all
-}
 
 /// `a::{b, c::{d, e}}` as `a::b`, `a::c::d`, `a::c::e`.
 fn expand(path: &str) -> Vec<String> {

@@ -1,5 +1,8 @@
 //! The documents: not too long, without dead links, and without options that the program does not have.
 
+mod source;
+
+use source::modules;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -227,35 +230,15 @@ fn options_exist() {
     assert!(unknown.is_empty(), "{unknown:#?}");
 }
 
-/// Text of all source files of the library, without tests.
-fn sources() -> Vec<String> {
-    let (mut folders, mut all) = (vec![root().join("src")], Vec::new());
-    while let Some(folder) = folders.pop() {
-        for entry in std::fs::read_dir(folder).expect("a folder") {
-            let path = entry.expect("an entry").path();
-            let name = path.file_name().unwrap_or_default().to_string_lossy();
-            if path.is_dir() {
-                folders.push(path);
-            } else if !name.contains("tests") {
-                let text = std::fs::read_to_string(&path).expect("text");
-                let own = text.split("#[cfg(test)]\nmod tests {").next();
-                all.extend(own.map(str::to_owned));
-            }
-        }
-    }
-    all
-}
-
 /// Rows that the library defines: the name of each, and its fields.
 fn rows() -> BTreeMap<String, Vec<String>> {
     let mut all = BTreeMap::new();
-    for text in sources() {
+    for text in modules().into_values() {
         for definition in text.split("\nrow! {\n").skip(1) {
             let (_, rest) = definition.split_once("struct ").expect("a struct");
             let (name, rest) = rest.split_once(" {").expect("its fields");
             let (body, _) = rest.split_once("\n    }").expect("its end");
-            let lines = body.lines().map(str::trim);
-            let fields = lines.filter(|line| !line.starts_with("//"));
+            let fields = body.lines().map(str::trim);
             let fields = fields.filter_map(|line| line.split_once(": "));
             let fields = fields.map(|(field, _)| field.to_owned()).collect();
             all.insert(name.to_owned(), fields);
@@ -284,7 +267,7 @@ fn records_are_the_rows_of_the_program() {
         assert_eq!(listed, fields, "fields of {name} in docs/records.md");
     }
     // Files with a name of their own.
-    for text in sources() {
+    for text in modules().into_values() {
         for creation in [
             "Table::create(workspace, \"",
             "Shuffle::between_units(workspace, \"",

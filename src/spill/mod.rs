@@ -12,7 +12,7 @@ mod sorter;
 mod table;
 
 pub(crate) use row::row;
-pub use row::{Id, Row, Word, row_bytes};
+pub use row::{Id, Row, Word};
 pub use shuffle::Shuffle;
 pub use sorter::{Sorted, Sorter};
 pub use table::Table;

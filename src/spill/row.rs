@@ -48,12 +48,6 @@ impl<const N: usize> Row for [u32; N] {
     const PACKING: Option<&'static [Word]> = Some(&[Word::Above; N]);
 }
 
-/// Bytes of `count` rows.
-#[must_use]
-pub fn row_bytes<R>(count: usize) -> u64 {
-    (count * size_of::<R>()) as u64
-}
-
 /// Defines a row: a struct whose fields are words or arrays of words, and how each word is packed.
 ///
 /// `packed` takes one [`Word`] for each word, arrays counted word by word. A row with `unpacked` is

@@ -137,7 +137,7 @@ mod tests {
 
     #[test]
     fn delivers_sorted_to_each_receiver() {
-        let workspace = crate::spill::sorter::tests::workspace();
+        let workspace = Workspace::for_tests(2);
         let shuffle = Shuffle::<[u32; 2]>::new(&workspace, "shuffle", 64).unwrap();
         for i in (0..100u32).rev() {
             shuffle.send(&[[i % 7, i]]).unwrap();

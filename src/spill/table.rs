@@ -219,8 +219,8 @@ mod tests {
 
     #[test]
     fn damage_is_found_and_named() {
-        damage::<[u32; 2]>(&crate::spill::sorter::tests::workspace());
-        damage::<Plain>(&crate::spill::sorter::tests::workspace());
+        damage::<[u32; 2]>(&Workspace::for_tests(2));
+        damage::<Plain>(&Workspace::for_tests(2));
     }
 
     row! {
@@ -251,9 +251,9 @@ mod tests {
     /// Found by fuzzing a journal with valid checksums and invalid content.
     #[test]
     fn places_that_cannot_be_ask_for_no_memory() {
-        let workspace = crate::spill::sorter::tests::workspace();
+        let workspace = Workspace::for_tests(2);
         bad_places::<[u32; 2]>(&workspace);
-        bad_places::<Plain>(&crate::spill::sorter::tests::workspace());
+        bad_places::<Plain>(&Workspace::for_tests(2));
         let mut saved = Vec::new();
         String::from("table").save(&mut saved);
         (1usize << 58).save(&mut saved);

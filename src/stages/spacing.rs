@@ -175,17 +175,12 @@ impl Persist for Spacings {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
-    use crate::workspace::progress::{Cancel, Silent};
+
     use proptest::prelude::*;
-    use std::sync::Arc;
 
     fn spacings(usual2: Vec<u64>) -> Spacings {
-        let memory = MemoryPool::new(MINIMUM_BUDGET).unwrap();
-        let folder = std::env::temp_dir();
-        let workspace =
-            crate::workspace::Workspace::new(&folder, memory, 1, Arc::new(Silent), Cancel::new());
-        let held = workspace.unwrap().reserve("patch spacings", 0).unwrap();
+        let workspace = crate::workspace::Workspace::for_tests(1);
+        let held = workspace.reserve("patch spacings", 0).unwrap();
         Spacings::new(usual2, held)
     }
 

@@ -167,6 +167,15 @@ impl Workspace {
         })
     }
 
+    /// A workspace with the least budget, for unit tests.
+    #[cfg(test)]
+    pub(crate) fn for_tests(threads: usize) -> Self {
+        let memory = MemoryPool::new(memory::MINIMUM_BUDGET).expect("the least budget");
+        let (observer, cancel) = (Arc::new(progress::Silent), Cancel::new());
+        Self::new(&std::env::temp_dir(), memory, threads, observer, cancel)
+            .expect("a scratch folder for tests")
+    }
+
     /// Uses a folder from which a run can be resumed, and resumes the run of earlier attempts in it.
     ///
     /// # Errors

@@ -2,18 +2,12 @@
 
 use super::*;
 use crate::error::Error;
-use crate::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
+use crate::workspace::memory::MemoryPool;
 use crate::workspace::progress::{Cancel, Silent};
 use buckets::Buckets;
 use proptest::prelude::*;
 use std::fmt::Write as _;
 use std::sync::Arc;
-
-fn workspace() -> Workspace {
-    let memory = MemoryPool::new(MINIMUM_BUDGET).unwrap();
-    let parent = std::env::temp_dir();
-    Workspace::new(&parent, memory, 2, Arc::new(Silent), Cancel::new()).unwrap()
-}
 
 fn write(workspace: &Workspace, vertices: u32, faces: &[[u32; 3]]) -> std::path::PathBuf {
     let mut text = format!(
@@ -34,7 +28,7 @@ fn write(workspace: &Workspace, vertices: u32, faces: &[[u32; 3]]) -> std::path:
 
 #[test]
 fn no_plan_changes_the_verdict() {
-    let workspace = workspace();
+    let workspace = Workspace::for_tests(2);
     let options = Options::default();
     let faces = prop::collection::vec(prop::array::uniform3(0u32..40), 0..120);
     let plan = (0u32..7, 1usize..40, 1u64..200, 0usize..6, any::<bool>());
@@ -65,7 +59,7 @@ fn no_plan_changes_the_verdict() {
 /// A fan around one vertex, larger than a range may be.
 #[test]
 fn large_stars() {
-    let workspace = workspace();
+    let workspace = Workspace::for_tests(2);
     let n = 30_000;
     let fan: Vec<_> = (0..n).map(|i| [n, i, (i + 1) % n]).collect();
     let path = write(&workspace, n + 1, &fan);
@@ -122,7 +116,7 @@ fn plans_fit_what_is_free() {
 
 #[test]
 fn damage_to_a_bucket_is_found_and_named() {
-    let workspace = workspace();
+    let workspace = Workspace::for_tests(2);
     let mut buckets = Buckets::<[u32; 2]>::new(&workspace, "bucket", 3, 80);
     for i in 0..1000u32 {
         buckets.push(i as usize % 3, [i, 7 * i]).unwrap();

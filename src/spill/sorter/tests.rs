@@ -7,18 +7,6 @@ use crate::workspace::progress::{Cancel, Silent};
 use crate::workspace::{Folder, Found};
 use proptest::prelude::*;
 
-pub(in crate::spill) fn workspace() -> Workspace {
-    let memory = MemoryPool::new(MINIMUM_BUDGET).unwrap();
-    Workspace::new(
-        &std::env::temp_dir(),
-        memory,
-        2,
-        Arc::new(Silent),
-        Cancel::new(),
-    )
-    .unwrap()
-}
-
 fn collect<R: Row>(sorted: Sorted<R>) -> Vec<R> {
     let mut all = Vec::new();
     sorted
@@ -39,7 +27,7 @@ proptest! {
     ) {
         // With a tiny buffer a run has only a few rows, so the number of rows is small.
         if buffer == 16 { records.truncate(900); }
-        let workspace = workspace();
+        let workspace = Workspace::for_tests(2);
         let sorter = Sorter::<[u32; 2]>::new(&workspace, "s", buffer);
         for chunk in records.chunks(1000) { sorter.push(chunk).unwrap(); }
         let got = collect(sorter.finish(&workspace).unwrap());
@@ -52,7 +40,7 @@ proptest! {
         mut records in prop::collection::vec([0u32..5000, 0u32..2], 1..40_000),
         part in prop::sample::select(vec![1usize, 9000, 100_000]),
     ) {
-        let workspace = workspace();
+        let workspace = Workspace::for_tests(2);
         let sorter = Sorter::<[u32; 2]>::new(&workspace, "s", 80_000);
         for chunk in records.chunks(1000) { sorter.push(chunk).unwrap(); }
         let sorted = sorter.finish(&workspace).unwrap();
@@ -73,7 +61,7 @@ proptest! {
 
 #[test]
 fn only_what_was_filled_is_held() {
-    let workspace = workspace();
+    let workspace = Workspace::for_tests(2);
     let pool = &workspace.memory;
     let before = pool.peak_held();
     for whole in [true, false] {
@@ -109,7 +97,7 @@ fn only_what_was_filled_is_held() {
 
 #[test]
 fn damage_is_found_and_named() {
-    let workspace = workspace();
+    let workspace = Workspace::for_tests(2);
     let sorter = Sorter::<[u32; 2]>::new(&workspace, "d", 800);
     for i in 0..1000u32 {
         sorter.push(&[[i * 7 % 1000, i]]).unwrap();

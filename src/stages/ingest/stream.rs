@@ -39,7 +39,7 @@ impl Spool {
     /// The order of the points has no meaning.
     ///
     /// # Errors
-    /// What `each` returned; [`Error::Io`], [`Error::Cancelled`]; [`Error::Corrupt`] if a frame does not
+    /// Errors of `each`, [`Error::Io`], [`Error::Cancelled`]; [`Error::Corrupt`] if a frame does not
     /// match its checksum; [`Error::Parameter`] if the lattice was not chosen for this spool.
     pub fn for_each(
         &self,

@@ -117,7 +117,7 @@ impl Orderer {
     /// part to `self`. In a run that can be resumed, parts that are already sorted are not read again.
     ///
     /// # Errors
-    /// What `push` returned, [`Error::Io`], [`Error::Disk`].
+    /// Errors of `push`, [`Error::Io`], [`Error::Disk`].
     pub fn take_parts(
         &self,
         workspace: &Workspace,
@@ -134,7 +134,7 @@ impl Orderer {
     /// the mark after them and the counts up to there, and returns the counts of all.
     ///
     /// # Errors
-    /// What `stream` returned, [`Error::Io`], [`Error::Disk`], [`Error::Cancelled`].
+    /// Errors of `stream`, [`Error::Io`], [`Error::Disk`], [`Error::Cancelled`].
     pub fn take_stream<M, S>(
         &self,
         workspace: &Workspace,

@@ -211,18 +211,12 @@ mod tests {
     use crate::error::Error;
     use crate::stages::order::Orderer;
     use crate::workspace::Workspace;
-    use crate::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
-    use crate::workspace::progress::{Cancel, Silent};
-    use std::sync::Arc;
 
     /// Found by fuzzing: the journal gives a number of points for a file that no longer exists, and a stage
     /// reads it nevertheless.
     #[test]
     fn a_store_whose_file_is_gone_is_not_read() {
-        let memory = MemoryPool::new(MINIMUM_BUDGET).unwrap();
-        let folder = std::env::temp_dir();
-        let workspace =
-            Workspace::new(&folder, memory, 1, Arc::new(Silent), Cancel::new()).unwrap();
+        let workspace = Workspace::for_tests(1);
         let orderer = Orderer::new(&workspace).unwrap();
         let points: Vec<Point> = (0..10).map(|k| [k, k * k, 1]).collect();
         orderer.push(&workspace, &points).unwrap();

@@ -1,16 +1,7 @@
 use super::*;
 use crate::geom::distance2;
 use crate::stages::order::Orderer;
-use crate::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
-use crate::workspace::progress::{Cancel, Silent};
 use outcrop_cloudgen::{Cloud, Generator, Kind, Sampling};
-use std::sync::Arc;
-
-fn workspace() -> Workspace {
-    let memory = MemoryPool::new(MINIMUM_BUDGET).unwrap();
-    let folder = std::env::temp_dir();
-    Workspace::new(&folder, memory, 2, Arc::new(Silent), Cancel::new()).unwrap()
-}
 
 /// Lattice steps in a unit, and the shift of a cloud's centre.
 const STEPS: f64 = 100_000.0;
@@ -26,7 +17,7 @@ fn coordinates(point: Point) -> [f64; 3] {
 }
 
 fn kept(points: &[Point], factor: f64, tile: u32, page: usize) -> (Vec<Point>, OutlierStats) {
-    let workspace = workspace();
+    let workspace = Workspace::for_tests(2);
     let orderer = Orderer::new(&workspace).unwrap();
     orderer.push(&workspace, points).unwrap();
     let (store, _) = orderer.finish(&workspace, page).unwrap();
@@ -113,7 +104,7 @@ fn it_is_what_the_definition_says() {
         .outliers(0.05)
         .noise(4.0);
     let mut all = points(&cloud.generator().unwrap());
-    let workspace = workspace();
+    let workspace = Workspace::for_tests(2);
     let orderer = Orderer::new(&workspace).unwrap();
     orderer.push(&workspace, &all).unwrap();
     let (store, _) = orderer.finish(&workspace, 256).unwrap();

@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::geom::Point;
 use crate::spill::Table;
 use crate::stages::order::PointStore;
-use crate::stages::surface::parity::ParitySets;
+use crate::stages::surface::parity::{ParitySets, constraint};
 use crate::stages::surface::rows::TriangleTo;
 use crate::workspace::Workspace;
 use crate::workspace::memory::{bytes_of, hold, table_bytes};
@@ -28,10 +28,13 @@ pub(super) fn join(
         let _held = workspace.reserve("labels seen", seen.rows(block) as u64 * 24)?;
         let all = seen.get(block)?;
         for same in all.chunk_by(|a, b| a.triangle == b.triangle) {
-            let global = |s: &SeenTriangle| globals[s.block as usize].0 + s.label();
-            for other in &same[1..] {
-                let turned = same[0].flip() ^ other.flip();
-                sets.join(global(&same[0]), global(other), turned);
+            let global = |s: &SeenTriangle| {
+                let (label, flip) = constraint(s.label_flip);
+                (globals[s.block as usize].0 + label, flip)
+            };
+            let (first, flip) = global(&same[0]);
+            for (label, other) in same[1..].iter().map(global) {
+                sets.join(first, label, flip ^ other);
             }
         }
     }
@@ -115,12 +118,14 @@ impl Parts<'_> {
             if bridges.binary_search(&TriangleTo { to, triangle }).is_ok() {
                 continue;
             }
-            let label = self.globals[first.block as usize].0 + first.label();
+            let (label, flip) = constraint(first.label_flip);
+            let label = self.globals[first.block as usize].0 + label;
             let (root, turned) = self.sets.look(label);
             // The positions of all corners were fetched.
             let corners = triangle.map(|v| points[ids.partition_point(|id| *id < v)]);
-            let flip = turned ^ first.flip();
-            own.entry(root).or_default().add(triangle, corners, flip);
+            own.entry(root)
+                .or_default()
+                .add(triangle, corners, turned ^ flip);
         }
         Ok(own)
     }

@@ -19,18 +19,6 @@ row! {
     packed Above Above Rising Rising Above Above
 }
 
-impl SeenTriangle {
-    /// The label of the triangle in the block.
-    pub fn label(&self) -> u32 {
-        self.label_flip >> 1
-    }
-
-    /// True if it is turned against its ascending ids.
-    pub fn flip(&self) -> bool {
-        self.label_flip & 1 == 1
-    }
-}
-
 row! {
     /// A run of consecutive triangles with the same label.
     pub struct LabelRun {

@@ -18,6 +18,7 @@ use crate::spill::{Shuffle, Table};
 use crate::stages::blocks::Blocks;
 use crate::stages::located::Places;
 use crate::stages::stitch::Stitched;
+use crate::stages::surface::parity::constraint;
 use crate::stages::surface::rows::TriangleTo;
 use crate::stages::surface::star::Triangle;
 use crate::workspace::Workspace;
@@ -313,7 +314,8 @@ impl<'a> Build<'a> {
         let _held = hold(bytes_of(&sums));
         let mut bridges = bridges.iter().peekable();
         for (number, t) in triangles.iter().enumerate() {
-            let sum = &mut sums[(patch.words[number] >> 1) as usize];
+            let (label, flip) = constraint(patch.words[number]);
+            let sum = &mut sums[label as usize];
             if patch.open[number] {
                 sum.open();
             }
@@ -322,7 +324,7 @@ impl<'a> Build<'a> {
             }
             if ids.contains(&t[0]) && ids.contains(&t[2]) {
                 let corners = t.map(|v| points[(v - ids.start) as usize]);
-                sum.add(*t, corners, patch.words[number] & 1 == 1);
+                sum.add(*t, corners, flip);
             }
         }
         sums
@@ -378,7 +380,7 @@ impl<'a> Build<'a> {
                 continue;
             }
             let t = triangles[number];
-            let (label, flip) = (patch.words[number] >> 1, patch.words[number] & 1 == 1);
+            let (label, flip) = constraint(patch.words[number]);
             let fate = match label.checked_sub(patch.global) {
                 Some(local) => fates[local as usize],
                 None => Fate::UNKNOWN,

@@ -3,15 +3,6 @@
 use super::*;
 use crate::stages::blocks::Blocks;
 use crate::stages::order::Orderer;
-use crate::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
-use crate::workspace::progress::{Cancel, Silent};
-use std::sync::Arc;
-
-fn workspace() -> Workspace {
-    let memory = MemoryPool::new(MINIMUM_BUDGET).unwrap();
-    let folder = std::env::temp_dir();
-    Workspace::new(&folder, memory, 2, Arc::new(Silent), Cancel::new()).unwrap()
-}
 
 /// A square sheet of `side * side` points, a hundred steps apart, with height `high`.
 fn sheet(side: i32, high: impl Fn(i32, i32) -> i32) -> Vec<Point> {
@@ -55,7 +46,7 @@ fn relaxed_as(
     tile: u32,
     page: usize,
 ) -> (Vec<Point>, RelaxStats) {
-    let workspace = &workspace();
+    let workspace = &Workspace::for_tests(2);
     let (store, tiles) = ordered(points, tile, page, workspace);
     let relaxed = relax(&store, tiles, relaxing, workspace).unwrap();
     let shape = relaxed.store.as_ref().unwrap_or(&store);
@@ -154,7 +145,7 @@ fn details_too_fine_for_the_points_stay_unless_there_is_noise() {
 
 /// The number of rough points among all points.
 fn rough_points(points: &[Point]) -> usize {
-    let workspace = &workspace();
+    let workspace = &Workspace::for_tests(2);
     let (store, _) = ordered(points, 1000, 256, workspace);
     let mut rough = 0;
     let relaxing = Relaxing {
@@ -192,7 +183,7 @@ fn only_rough_patches_move_and_tiles_do_not_matter() {
 #[test]
 fn regions_move_by_themselves_however_they_are_divided() {
     let in_order = |points: &[Point]| {
-        let workspace = &workspace();
+        let workspace = &Workspace::for_tests(2);
         let (store, _) = ordered(points, 1, 256, workspace);
         store.slice(0..store.len()).unwrap()
     };
@@ -227,7 +218,7 @@ fn smoothed(
     tile: u32,
     page: usize,
 ) -> (Vec<Point>, Vec<Point>) {
-    let workspace = &workspace();
+    let workspace = &Workspace::for_tests(2);
     let (store, tiles) = ordered(points, tile, page, workspace);
     let after = smooth(&store, tiles, 12, smoothing, 1, workspace).unwrap();
     let all = |store: &PointStore| store.slice(0..store.len()).unwrap();

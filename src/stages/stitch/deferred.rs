@@ -68,16 +68,10 @@ impl<R: Row> Deferred<R> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
-    use crate::workspace::progress::{Cancel, Silent};
-    use std::sync::Arc;
 
     #[test]
     fn what_was_sent_comes_in_order() {
-        let memory = MemoryPool::new(MINIMUM_BUDGET).unwrap();
-        let folder = std::env::temp_dir();
-        let workspace =
-            Workspace::new(&folder, memory, 1, Arc::new(Silent), Cancel::new()).unwrap();
+        let workspace = Workspace::for_tests(1);
         let mut deferred = Deferred::new(&workspace, "deferred", 3).unwrap();
         for i in 0..90u32 {
             let records: Vec<_> = (0..i % 4).map(|k| [i, k]).collect();

@@ -1,6 +1,6 @@
 //! The edges of crossing triangles, during the pass over these triangles in ascending order.
 
-use super::parity::OrientationConstraint;
+use super::parity::{OrientationConstraint, constraint};
 use super::star::{EDGES, Triangle, opposed};
 use crate::error::Result;
 use crate::stages::blocks::Blocks;
@@ -58,8 +58,8 @@ impl CrossingEdges {
             let at = self.edges.get(&(t[a], t[b])).into_iter().flatten();
             at.map(move |&(other, word, normal)| {
                 let opposed = opposed(t, other, t[a], t[b]);
-                let flip = opposed ^ (word & 1 == 1);
-                ((word >> 1, flip), opposed, normal.map(f64::from))
+                let (label, flip) = constraint(word);
+                ((label, opposed ^ flip), opposed, normal.map(f64::from))
             })
         })
     }
@@ -78,16 +78,10 @@ impl CrossingEdges {
 mod tests {
     use super::*;
     use crate::error::Error;
-    use crate::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
-    use crate::workspace::progress::{Cancel, Silent};
-    use std::sync::Arc;
 
     #[test]
     fn takes_no_more_than_is_reserved() {
-        let memory = MemoryPool::new(MINIMUM_BUDGET).unwrap();
-        let folder = std::env::temp_dir();
-        let workspace =
-            Workspace::new(&folder, memory, 1, Arc::new(Silent), Cancel::new()).unwrap();
+        let workspace = Workspace::for_tests(1);
         let pool = &workspace.memory;
         let mut edges = CrossingEdges::new(&workspace).unwrap();
         let blocks = Blocks::new(1000, 10);

@@ -112,7 +112,7 @@ impl Thinned {
     /// so far. Starts at `from` with the counts `stats`, as passed to `each` in an earlier call.
     ///
     /// # Errors
-    /// What `each` returned; [`crate::Error::Io`], [`crate::Error::Corrupt`].
+    /// Errors of `each`, [`crate::Error::Io`], [`crate::Error::Corrupt`].
     pub fn for_each(self, from: Mark, mut stats: ThinStats, each: Each<'_>) -> Result<ThinStats> {
         let Self { sorted, grid } = self;
         let mut kept = Vec::with_capacity(BATCH);

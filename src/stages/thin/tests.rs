@@ -12,24 +12,9 @@ fn lattice(step: f64, base: [i64; 3]) -> Lattice {
     }
 }
 
-fn workspace() -> Workspace {
-    use crate::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
-    use crate::workspace::progress::{Cancel, Silent};
-    let memory = MemoryPool::new(MINIMUM_BUDGET).unwrap();
-    let folder = std::env::temp_dir();
-    Workspace::new(
-        &folder,
-        memory,
-        2,
-        std::sync::Arc::new(Silent),
-        Cancel::new(),
-    )
-    .unwrap()
-}
-
 /// The points kept, from points in the given order, with a sort buffer of `buffer` bytes.
 fn thinned(grid: &Grid, points: &[Point], buffer: u64) -> (Vec<Point>, ThinStats) {
-    let workspace = workspace();
+    let workspace = Workspace::for_tests(2);
     let sorter = Sorter::new(&workspace, "thin", buffer);
     for &point in points {
         sorter.push(&[grid.in_cell(point)]).unwrap();

@@ -10,20 +10,11 @@ use crate::geom::{Point, distance2};
 use crate::kernels::Level;
 use crate::stages::order::Orderer;
 use crate::workspace::Workspace;
-use crate::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
-use crate::workspace::progress::{Cancel, Silent};
 use proptest::prelude::*;
-use std::sync::Arc;
-
-fn workspace() -> Workspace {
-    let memory = MemoryPool::new(MINIMUM_BUDGET).unwrap();
-    let folder = std::env::temp_dir();
-    Workspace::new(&folder, memory, 1, Arc::new(Silent), Cancel::new()).unwrap()
-}
 
 /// The store of a cloud in pages of `page` points, its workspace, and its points by id.
 fn ordered(cloud: &[Point], page: usize) -> (Workspace, PointStore, Vec<Point>) {
-    let workspace = workspace();
+    let workspace = Workspace::for_tests(1);
     let orderer = Orderer::new(&workspace).unwrap();
     orderer.push(&workspace, cloud).unwrap();
     let store = orderer.finish(&workspace, page).unwrap().0;

@@ -8,9 +8,6 @@ use crate::stages::cells::{DiskRadius, TileRanges, Widen, cells};
 use crate::stages::located::Places;
 use crate::stages::order::Orderer;
 use crate::stages::triples::triples;
-use crate::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
-use crate::workspace::progress::{Cancel, Silent};
-use std::sync::Arc;
 
 /// Points in a row of the sheet, and in a block.
 const SIDE: i32 = 50;
@@ -37,9 +34,7 @@ struct Left {
 /// Takes the pass over the sheet. If `starved`, each turn is first tried without memory, and then with more
 /// and more. Returns the result, the number of turns, and how often one was abandoned.
 fn across(starved: bool) -> (Left, [usize; 2]) {
-    let memory = MemoryPool::new(MINIMUM_BUDGET).unwrap();
-    let folder = std::env::temp_dir();
-    let workspace = &Workspace::new(&folder, memory, 1, Arc::new(Silent), Cancel::new()).unwrap();
+    let workspace = &Workspace::for_tests(1);
     let orderer = Orderer::new(workspace).unwrap();
     orderer.push(workspace, &sheet()).unwrap();
     let store = orderer.finish(workspace, 64).unwrap().0;

@@ -1,0 +1,33 @@
+//! The source text of the library, for tests of the code itself.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+fn source() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("src")
+}
+
+/// Every module that is not a test; its text without comments and tests.
+pub fn modules() -> BTreeMap<String, String> {
+    fn walk(folder: &Path, all: &mut BTreeMap<String, String>) {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            let name = path.file_stem().unwrap().to_str().unwrap();
+            if path.is_dir() {
+                walk(&path, all);
+            } else if !name.contains("tests") && !["main", "lib"].contains(&name) {
+                let relative = path.strip_prefix(source()).unwrap().with_extension("");
+                let relative = relative.to_str().unwrap();
+                let module = relative.strip_suffix("/mod").unwrap_or(relative);
+                let text = std::fs::read_to_string(&path).unwrap();
+                let text = text.split("#[cfg(test)]\nmod tests {").next().unwrap();
+                let lines = text.lines().map(|line| line.split("//").next().unwrap());
+                all.insert(module.to_owned(), lines.collect::<Vec<_>>().join("\n"));
+            }
+        }
+    }
+    let mut all = BTreeMap::new();
+    walk(&source(), &mut all);
+    assert!(all.len() > 100, "only {} modules found", all.len());
+    all
+}
