@@ -44,8 +44,6 @@ constants! {
         band: f64 = 1.0 / 25.0, "share of the largest eigenvalue";
         /// Most doublings of the number of neighbours that lie on a line or a band.
         doublings: u32 = 3, "times";
-        /// Most steps of Newton's method for the least eigenvalue.
-        newton_steps: usize = 40, "steps";
     }
     /// The disk to which a cell is restricted.
     disk: Disk {

@@ -142,7 +142,7 @@ fn minors<F: Numbers>(m: &[F; 6]) -> F {
 }
 
 /// Newton's method for the least root of the characteristic polynomial, from below, where the polynomial is
-/// monotone.
+/// monotone. It ends where the next value is no larger: values only grow, and not beyond the root.
 #[inline(always)]
 fn least_eigenvalue<F: Numbers>(m: &[F; 6]) -> F {
     let (zero, two, three) = (F::splat(0.0), F::splat(2.0), F::splat(3.0));
@@ -152,7 +152,7 @@ fn least_eigenvalue<F: Numbers>(m: &[F; 6]) -> F {
         + m[4] * (m[3] * m[5] - m[1] * m[4]);
     let mut x = zero;
     let mut going = F::ALL;
-    for _ in 0..METHOD.plane.newton_steps {
+    loop {
         let value = ((trace - x) * x - minors) * x + determinant;
         let slope = (two * trace - three * x) * x - minors;
         going &= value.greater(zero) & zero.greater(slope);
