@@ -97,8 +97,6 @@ constants! {
         height2: f64 = 4.0, "mean squares";
         /// Ridge that keeps a surface bounded where the points do not determine it.
         ridge: f64 = 1e-3, "weights of all points";
-        /// Mean square height that is taken as rounding error.
-        exact2: f64 = 1e-24, "squared reaches";
         /// A curved surface is used if the squared heights over a plane are more than this many times those
         /// over it: in noise a plane is more accurate.
         gain: f64 = 1.25, "times", [1.1, 1.5];

@@ -44,7 +44,7 @@ fn moved(points: &[Point], i: usize, k: usize) -> Point {
     let total: f64 = all.iter().map(|p| p.weight).sum();
     let squares: f64 = all.iter().map(|p| p.weight * (off(p.at) * off(p.at))).sum();
     let limit = 4.0 * (squares / total);
-    if squares / total > 1e-24 {
+    if squares / total > 0.0 {
         for p in &mut all {
             let rest = (1.0 - off(p.at) * off(p.at) / limit).max(0.0);
             p.weight *= rest * rest;

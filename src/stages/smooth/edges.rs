@@ -125,7 +125,7 @@ impl WeightedNeighbors {
             sum += w * off2(a);
         }
         let mean2 = sum / total;
-        if mean2 > METHOD.smoothing.exact2 {
+        if mean2 > 0.0 {
             let limit = METHOD.smoothing.height2 * mean2;
             for (a, w) in self.at.iter().zip(&mut self.weights) {
                 let t = (1.0 - off2(a) / limit).max(0.0);
