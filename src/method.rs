@@ -201,8 +201,6 @@ constants! {
     }
     /// Ear clipping along a torn boundary.
     ear_clipping: EarClipping {
-        /// Longest loop, which bounds the memory.
-        longest: usize = 100_000, "edges";
         /// Longest chord of an ear.
         reach: f64 = 6.0, "widths of the triangles around";
         /// Cosine of the largest angle between an ear and its neighbours: 100 degrees.

@@ -25,13 +25,17 @@ pub struct LoopRules<'a> {
 /// even if no holes are to be filled.
 const GAP: usize = 3;
 
+/// Edges of the longest loop that is closed by ear clipping. A loop is held as a whole, so this bounds the
+/// memory.
+const LONGEST: usize = 100_000;
+
 impl LoopRules<'_> {
     /// The most edges of a loop that is examined.
     pub fn longest_loop(&self) -> usize {
         if self.only_gaps() {
             GAP
         } else if self.clip_ears {
-            self.longest.max(METHOD.ear_clipping.longest)
+            self.longest.max(LONGEST)
         } else {
             self.longest
         }
