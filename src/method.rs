@@ -122,14 +122,12 @@ constants! {
         /// Nothing moves in a region where a smaller share of the rough patches is noisy: the others are
         /// edges. A machine part has 27 % at most, a carved lion 35 % at least.
         edges: usize = 30, "% of the rough patches";
-        /// Nothing moves in a region where at least this share of the fine points is clean: the details are
-        /// too fine for the points. Clean parts have 16 % and more, real scans 4 % at most.
-        clean: usize = 10, "% of the fine points";
-        /// If a larger share is clean, the points lie in clean layers, which relaxing merges into one
-        /// surface.
-        layers: usize = 70, "% of the fine points", [50, 90];
-        /// If fewer than one in this number of the witnesses are fine, clean points are not considered.
-        fine: usize = 4, "one in";
+        /// Nothing moves in a region where more than this share of the fine witnesses is clean: the details
+        /// are too fine for the points. Clean parts have 16 % and more, real scans 4 % at most.
+        clean: usize = 10, "% of the fine witnesses";
+        /// If more than this share is clean, the points lie in clean layers, which relaxing merges into one
+        /// surface if they are up to three spacings apart.
+        layers: usize = 70, "% of the fine witnesses", [50, 90];
         /// Nearest neighbours used to measure noise, whatever the shape of the surface.
         nearest: usize = 12, "points", [9, 18];
         /// A point is fine if it and these neighbours have at least this number of different coordinates on

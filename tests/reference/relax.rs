@@ -103,7 +103,7 @@ pub fn relax(
         let told = telling.iter().filter_map(|&id| is_clean(points, id, k));
         let told: Vec<bool> = told.collect();
         let (fine, clean) = (told.len(), told.iter().filter(|c| **c).count());
-        !smoothed && 4 * fine >= telling.len() && 10 * clean >= fine && 10 * clean <= 7 * fine
+        !smoothed && 10 * clean > fine && 10 * clean <= 7 * fine
     };
     let regions = patches.div_ceil(REGION);
     let clean: Vec<bool> = (0..regions)

@@ -256,9 +256,7 @@ fn is_noise(rough: &[bool], counts: &[WitnessCounts], smoothed: bool) -> bool {
     let noisy = counts.iter().filter(|counts| counts.is_noisy()).count();
     let (fine, clean) = (sum(|t| t.fine), sum(|t| t.clean));
     let limits = METHOD.relax;
-    let is_clean = fine * limits.fine >= sum(|t| t.points)
-        && 100 * clean >= fine * limits.clean
-        && 100 * clean <= fine * limits.layers;
+    let is_clean = 100 * clean > fine * limits.clean && 100 * clean <= fine * limits.layers;
     let is_edges = 100 * noisy < count(rough) * limits.edges;
     noisy * limits.region >= rough.len() && !is_edges && (smoothed || !is_clean)
 }
