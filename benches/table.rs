@@ -38,8 +38,10 @@ fn put(bencher: Bencher<'_, '_>) {
     let rows = triples();
     let items = ItemsCount::new(rows.len());
     bencher.counter(items).bench_local(|| {
-        let table = Table::create(&workspace, "bench", 1).expect("scratch space");
-        table.put(0, &rows).expect("scratch space");
+        let table = Table::new("bench", 1);
+        table
+            .put(&workspace.unit(), 0, &rows)
+            .expect("scratch space");
     });
 }
 
@@ -47,12 +49,13 @@ fn put(bencher: Bencher<'_, '_>) {
 fn get(bencher: Bencher<'_, '_>) {
     let workspace = util::workspace();
     let rows = triples();
-    let table = Table::create(&workspace, "bench", 1).expect("scratch space");
-    table.put(0, &rows).expect("scratch space");
+    let table = Table::new("bench", 1);
+    let unit = workspace.unit();
+    table.put(&unit, 0, &rows).expect("scratch space");
     let items = ItemsCount::new(rows.len());
     let mut back = Vec::new();
     bencher.counter(items).bench_local(|| {
-        table.get_into(0, &mut back).expect("scratch file");
+        table.get_into(&unit, 0, &mut back).expect("scratch file");
         black_box(&back);
     });
 }

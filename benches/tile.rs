@@ -37,9 +37,14 @@ fn neighbors(bencher: Bencher<'_, '_>, k: usize) {
     bencher
         .counter(ItemsCount::new(TILE.len()))
         .bench_local(|| {
-            tile.for_each_query(k, &mut search, |_, _, query| {
-                black_box(query.map_or(0, |q| q.near().len()));
-            });
+            tile.for_each_query(
+                k,
+                &mut search,
+                |_| (),
+                |_, _, query| {
+                    black_box(query.map_or(0, |q| q.near().len()));
+                },
+            );
         });
 }
 
@@ -54,6 +59,7 @@ fn sums(bencher: Bencher<'_, '_>, k: usize) {
                 k,
                 &mut search,
                 |_| true,
+                |_| (),
                 |_, _, sums| {
                     black_box(sums.map_or(0, |sums| sums.last2));
                 },

@@ -102,16 +102,18 @@ impl Reconstruction {
     fn reconstruct(&self, workspace: &Workspace) -> Result<Report> {
         let mut stages = Stages::begin(self, workspace)?;
         let (spool, lattice) = stages.ingest()?;
-        let store = stages.order(spool, &lattice)?;
-        let store = stages.without_outliers(store)?;
-        let radius = stages.radius(&store, &lattice);
-        let store = stages.smooth(store)?;
+        let points = stages.order(&spool, &lattice)?;
+        let points = stages.without_outliers(points)?;
+        let radius = stages.radius(&points, &lattice);
+        let points = stages.smooth(points)?;
+        let store = points.open(workspace)?;
         let relaxed = stages.relax(&store)?;
-        let places = stages.places(&store, relaxed.as_ref(), &lattice);
+        let shape = stages.open_shape(relaxed)?;
+        let places = stages.places(&store, &shape, &lattice);
         let seen = stages.cells(places, radius)?;
-        let triples = stages.triples(seen)?;
-        let stitched = stages.stitch(places, triples)?;
-        let repaired = stages.repair(places, stitched)?;
+        let triples = stages.triples(&seen)?;
+        let stitched = stages.stitch(places, &triples)?;
+        let repaired = stages.repair(places, &stitched)?;
         stages.export(&store, &repaired, &lattice)?;
         Ok(stages.report())
     }

@@ -268,10 +268,7 @@ fn records_are_the_rows_of_the_program() {
     }
     // Files with a name of their own.
     for text in modules().into_values() {
-        for creation in [
-            "Table::create(workspace, \"",
-            "Shuffle::between_units(workspace, \"",
-        ] {
+        for creation in ["Table::new(\"", "Shuffle::new(\""] {
             for rest in text.split(creation).skip(1) {
                 let name = rest.split('"').next().expect("a name");
                 let listed = document.contains(&format!("`{name}`"));

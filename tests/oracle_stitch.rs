@@ -59,16 +59,19 @@ fn workspace() -> Workspace {
 fn store_of(points: &[Point], workspace: &Workspace) -> PointStore {
     let orderer = Orderer::new(workspace).unwrap();
     orderer.push(workspace, points).unwrap();
-    orderer.finish(workspace, 16).unwrap().0
+    let (stored, _) = orderer.finish(workspace, 16).unwrap();
+    stored.open(workspace).unwrap()
 }
 
 fn tables(all: &BTreeMap<[u32; 3], u32>, blocks: Blocks, workspace: &Workspace) -> Triples {
-    let own = spill::Table::create(workspace, "own", blocks.count()).unwrap();
-    let visiting = spill::Table::create(workspace, "visiting", blocks.count()).unwrap();
+    let own = spill::Table::new("own", blocks.count());
+    let visiting = spill::Shuffle::new("visiting");
+    let unit = workspace.unit();
     for block in 0..blocks.count() as u32 {
         let first = all.iter().filter(|(t, _)| blocks.of(t[0]) == block);
         let first = first.map(|(&triple, &count)| CountedTriple { triple, count });
-        own.put(block as usize, &first.collect::<Vec<_>>()).unwrap();
+        own.put(&unit, block as usize, &first.collect::<Vec<_>>())
+            .unwrap();
         let visits = all
             .iter()
             .filter(|(t, _)| blocks.visited(**t).any(|b| b == block));
@@ -78,7 +81,7 @@ fn tables(all: &BTreeMap<[u32; 3], u32>, blocks: Blocks, workspace: &Workspace) 
             count,
         });
         visiting
-            .put(block as usize, &visits.collect::<Vec<_>>())
+            .send(&unit, block as usize, visits.collect())
             .unwrap();
     }
     Triples { own, visiting }
@@ -88,7 +91,7 @@ fn tables(all: &BTreeMap<[u32; 3], u32>, blocks: Blocks, workspace: &Workspace) 
 fn shape_of(shape: &[Point], workspace: &Workspace) -> PointStore {
     let mut writer = StoreWriter::create(workspace, "shape", 16).unwrap();
     writer.push(shape).unwrap();
-    writer.finish(workspace).unwrap()
+    writer.finish().unwrap().open(workspace).unwrap()
 }
 
 /// The triangles, and the counts of [`counted`].
@@ -116,7 +119,7 @@ fn pipeline(
         cos_max_angle: settings.cos_max_angle,
         weigh: settings.robust.then_some(division),
     };
-    let (stitched, base, inserted) = stitch(places, triples, blocks, extraction, workspace)?;
+    let (stitched, base, inserted) = stitch(places, &triples, blocks, extraction, workspace)?;
     let options = RepairOptions {
         repair: settings.repair,
         min_component: settings.min_component as u64,
@@ -124,7 +127,7 @@ fn pipeline(
         flip: settings.robust,
         clip_ears: settings.robust,
     };
-    let (repaired, mended) = repair(places, stitched, blocks, options, workspace)?;
+    let (repaired, mended) = repair(places, &stitched, blocks, options, workspace)?;
     let lattice = outcrop::geom::lattice::Lattice {
         step: 1.0,
         offset: [0.0; 3],

@@ -35,7 +35,7 @@ fn written(mesh: &Mesh, workspace: &Workspace) -> PathBuf {
         let corners: Vec<_> = face.iter().map(i64::to_string).collect();
         writeln!(text, "{} {}", face.len(), corners.join(" ")).unwrap();
     }
-    let path = workspace.file("mesh.ply");
+    let path = workspace.path("mesh.ply");
     std::fs::write(&path, text).unwrap();
     path
 }
@@ -423,7 +423,7 @@ fn random_damage() {
 #[test]
 fn errors_name_file_and_place() {
     let workspace = workspace(MINIMUM_BUDGET, 1);
-    let path = workspace.file("mesh.ply");
+    let path = workspace.path("mesh.ply");
     let missing = verify(&path, &workspace).unwrap_err();
     assert!(matches!(missing, Error::Io { .. }), "{missing}");
     std::fs::write(&path, "solid cube\nfacet normal 0 0 1\n").unwrap();

@@ -43,7 +43,7 @@ fn check_stream(spool: &Spool, workspace: &Workspace) {
     let mut count = 0;
     let (mut low, mut high) = ([i32::MAX; 3], [i32::MIN; 3]);
     spool
-        .for_each(&lattice, |points| {
+        .for_each(workspace, &lattice, |points| {
             count += points.len() as u64;
             for p in points {
                 for axis in 0..3 {
@@ -66,7 +66,6 @@ fn check_stream(spool: &Spool, workspace: &Workspace) {
             "axis {axis}: {found} for {want}, {lattice:?}"
         );
     }
-    assert_eq!(workspace.memory.available(), workspace.memory.capacity());
 }
 
 /// Number of points, or the error.
@@ -74,6 +73,8 @@ fn read(path: &Path, workspace: &Workspace) -> Result<u64, String> {
     match ingest(&[PathBuf::from(path)], workspace) {
         Ok(spool) => {
             check_stream(&spool, workspace);
+            spool.release(workspace).unwrap();
+            assert_eq!(workspace.memory.available(), workspace.memory.capacity());
             Ok(spool.stats().read - spool.stats().dropped_non_finite)
         }
         Err(error) => {
@@ -174,7 +175,7 @@ fn coordinates(path: PathBuf, workspace: &Workspace) -> Vec<[f64; 3]> {
     let lattice = spool.choose_lattice(0).unwrap();
     let mut all = Vec::new();
     spool
-        .for_each(&lattice, |points| {
+        .for_each(workspace, &lattice, |points| {
             all.extend(points.iter().map(|p| lattice.position(*p)));
             Ok(())
         })

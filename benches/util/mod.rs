@@ -59,7 +59,8 @@ pub fn store(count: usize, workspace: &Workspace) -> PointStore {
     orderer
         .push(workspace, &points(count))
         .expect("scratch space");
-    orderer.finish(workspace, PAGE).expect("scratch space").0
+    let (stored, _) = orderer.finish(workspace, PAGE).expect("scratch space");
+    stored.open(workspace).expect("scratch file")
 }
 
 /// The id and nearest neighbours of every point, at least [`NEIGHBORS`], nearest first.
@@ -68,8 +69,13 @@ pub fn neighbors(count: usize) -> Vec<(u32, Neighbors)> {
     let store = store(count, &workspace);
     let tile = Tile::load(&store, 0..store.len()).expect("scratch file");
     let mut all = Vec::with_capacity(count);
-    tile.for_each_query(NEIGHBORS, &mut Search::default(), |id, _, query| {
-        all.extend(query.map(|q| (id, q.near().clone())));
-    });
+    tile.for_each_query(
+        NEIGHBORS,
+        &mut Search::default(),
+        |_| (),
+        |id, _, query| {
+            all.extend(query.map(|q| (id, q.near().clone())));
+        },
+    );
     all
 }

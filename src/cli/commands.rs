@@ -2,7 +2,7 @@
 
 use super::args::{Command, Compare, Demo, Ends, Info, Limits, Reconstruct, Resume, Verify};
 use super::progress::{Bars, Warnings};
-use super::{Answer, stop, style};
+use super::{stop, style};
 use crate::error::{Error, Result};
 use crate::inspect::{compare, info, verify};
 use crate::pipeline::{Builder, Reconstruction, Start, default_memory, default_threads};
@@ -10,12 +10,14 @@ use crate::report::Report;
 use crate::workspace::Workspace;
 use crate::workspace::memory::MemoryPool;
 use crate::workspace::progress::{Cancel, Observer, Silent};
+use serde::Serialize;
+use std::fmt::Display;
 use std::io::{IsTerminal, Write};
 use std::path::Path;
 use std::sync::Arc;
 
-/// Runs a command.
-pub fn run(command: Command) -> Result<Answer> {
+/// Runs a command; `false` for a negative answer.
+pub fn run(command: Command) -> Result<bool> {
     match command {
         Command::Reconstruct(args) => reconstruct(&args),
         Command::Resume(args) => resume(&args),
@@ -40,8 +42,12 @@ fn threads(limits: &Limits) -> usize {
     limits.threads.map_or_else(default_threads, usize::from)
 }
 
+fn memory(limits: &Limits) -> u64 {
+    limits.memory.unwrap_or_else(default_memory)
+}
+
 fn workspace(limits: &Limits, beside: &Path) -> Result<Workspace> {
-    let memory = MemoryPool::new(limits.memory.unwrap_or_else(default_memory))?;
+    let memory = MemoryPool::new(memory(limits))?;
     let scratch = limits.scratch.as_deref().unwrap_or(beside);
     Workspace::new(
         scratch,
@@ -57,33 +63,42 @@ fn print(text: &str) -> Result<()> {
     writeln!(out, "{text}").map_err(|e| Error::io("standard output", "write", e))
 }
 
-fn json<T: serde::Serialize>(value: &T) -> Result<String> {
+fn json<T: Serialize>(value: &T) -> Result<String> {
     serde_json::to_string_pretty(value)
         .map_err(|e| Error::io("standard output", "write JSON", e.into()))
 }
 
-fn reconstruct(args: &Reconstruct) -> Result<Answer> {
+/// Prints a value as JSON or as text.
+fn show<T: Serialize + Display>(value: &T, as_json: bool) -> Result<()> {
+    print(&if as_json {
+        json(value)?
+    } else {
+        value.to_string()
+    })
+}
+
+fn write_report(path: &Path, report: &Report) -> Result<()> {
+    std::fs::write(path, json(report)? + "\n").map_err(|e| Error::io(path, "write the report", e))
+}
+
+fn reconstruct(args: &Reconstruct) -> Result<bool> {
     let mut builder = Reconstruction::builder()
         .output(&args.output)
         .params(args.params())
         .threads(threads(&args.limits))
+        .memory(memory(&args.limits))
+        .tile_points(args.tile_points.unwrap_or(args.block_points))
         .start(args.again.start());
     for input in &args.inputs {
         builder = builder.input(input);
     }
-    if let Some(memory) = args.limits.memory {
-        builder = builder.memory(memory);
-    }
     if let Some(scratch) = &args.limits.scratch {
         builder = builder.scratch(scratch);
-    }
-    if let Some(points) = args.tile_points {
-        builder = builder.tile_points(points);
     }
     run_reconstruction(builder, &args.ends, args.limits.quiet)
 }
 
-fn resume(args: &Resume) -> Result<Answer> {
+fn resume(args: &Resume) -> Result<bool> {
     let mut builder = Reconstruction::resume(&args.folder)?;
     if let Some(memory) = args.memory {
         builder = builder.memory(memory);
@@ -94,7 +109,7 @@ fn resume(args: &Resume) -> Result<Answer> {
     run_reconstruction(builder, &args.ends, args.quiet)
 }
 
-fn run_reconstruction(builder: Builder, ends: &Ends, quiet: bool) -> Result<Answer> {
+fn run_reconstruction(builder: Builder, ends: &Ends, quiet: bool) -> Result<bool> {
     let cancel = stop::on_signal();
     let mut builder = builder.observer(observer(quiet)).cancel(cancel.clone());
     if let Some(limit) = ends.time_limit {
@@ -111,15 +126,16 @@ fn run_reconstruction(builder: Builder, ends: &Ends, quiet: bool) -> Result<Answ
     let new_report = ends.report.as_ref().is_some_and(|path| !path.exists());
     if let Some(path) = &ends.report {
         // An unwritable report is an error before the work, not after it.
-        let mut options = std::fs::File::options();
-        let opened = options.append(true).create(true).open(path);
+        let opened = std::fs::File::options()
+            .append(true)
+            .create(true)
+            .open(path);
         opened.map_err(|e| Error::io(path, "write the report", e))?;
     }
     stop::watch(&run, &cancel);
     let outcome = run.run();
     match (&outcome, &ends.report) {
-        (Ok(report), Some(path)) => std::fs::write(path, json(report)? + "\n")
-            .map_err(|e| Error::io(path, "write the report", e))?,
+        (Ok(report), Some(path)) => write_report(path, report)?,
         // No empty report of a failed run.
         (Err(_), Some(path)) if new_report => drop(std::fs::remove_file(path)),
         _ => {}
@@ -128,7 +144,7 @@ fn run_reconstruction(builder: Builder, ends: &Ends, quiet: bool) -> Result<Answ
     if !quiet && std::io::stdout().is_terminal() {
         print(&summary(&report, run.output()))?;
     }
-    Ok(Answer::Yes)
+    Ok(true)
 }
 
 fn summary(report: &Report, output: &Path) -> String {
@@ -162,58 +178,40 @@ fn left_out(report: &Report) -> String {
     .filter(|(count, _)| *count > 0)
     .map(|(count, why)| format!("{} {why}", style::grouped(*count)))
     .collect();
-    match reasons.as_slice() {
-        [] => String::new(),
-        reasons => format!("\npoints left out: {}", reasons.join(", ")),
+    if reasons.is_empty() {
+        return String::new();
     }
+    format!("\npoints left out: {}", reasons.join(", "))
 }
 
-fn info(args: &Info) -> Result<Answer> {
+fn info(args: &Info) -> Result<bool> {
     let workspace = workspace(&args.limits, &std::env::temp_dir())?;
     let info = info::info(&args.inputs, &args.points.classes(), &workspace)?;
-    print(&if args.json {
-        json(&info)?
-    } else {
-        info.to_string()
-    })?;
-    Ok(Answer::Yes)
+    show(&info, args.json)?;
+    Ok(true)
 }
 
-fn check(args: &Verify) -> Result<Answer> {
+fn check(args: &Verify) -> Result<bool> {
     let workspace = workspace(&args.limits, &std::env::temp_dir())?;
     let options = verify::Options {
         allow_unreferenced: args.allow_unreferenced,
-        ..verify::Options::default()
+        range: None,
     };
     let verdict = verify::verify_with(&args.mesh, &options, &workspace)?;
-    print(&if args.json {
-        json(&verdict)?
-    } else {
-        verdict.to_string()
-    })?;
-    Ok(if verdict.manifold {
-        Answer::Yes
-    } else {
-        Answer::No
-    })
+    show(&verdict, args.json)?;
+    Ok(verdict.manifold)
 }
 
-fn measure(args: &Compare) -> Result<Answer> {
+fn measure(args: &Compare) -> Result<bool> {
     let workspace = workspace(&args.limits, &std::env::temp_dir())?;
-    let options = compare::Options {
-        samples: args.samples,
-        seed: args.seed,
-    };
+    let (samples, seed) = (args.samples, args.seed);
+    let options = compare::Options { samples, seed };
     let comparison = compare::compare(&args.a, &args.b, &options, &workspace)?;
-    print(&if args.json {
-        json(&comparison)?
-    } else {
-        comparison.to_string()
-    })?;
-    Ok(Answer::Yes)
+    show(&comparison, args.json)?;
+    Ok(true)
 }
 
-fn demo(args: &Demo) -> Result<Answer> {
+fn demo(args: &Demo) -> Result<bool> {
     use outcrop_cloudgen::{Cloud, Format, Kind};
     let folder = &args.folder;
     std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, "make the folder", e))?;
@@ -228,23 +226,20 @@ fn demo(args: &Demo) -> Result<Answer> {
         .write(&cloud, format)
         .map_err(|e| generator_error(&cloud, &e))?;
     let mesh = folder.join("bumpy.ply");
-    let observer = observer(args.limits.quiet);
-    let mut builder = Reconstruction::builder()
+    let report = Reconstruction::builder()
         .input(&cloud)
         .output(&mesh)
         .threads(threads(&args.limits))
-        .observer(observer)
+        .memory(memory(&args.limits))
+        .observer(observer(args.limits.quiet))
         .start(Start::Restart)
-        .cancel(stop::on_signal());
-    if let Some(memory) = args.limits.memory {
-        builder = builder.memory(memory);
-    }
-    let report = builder.build()?.run()?;
+        .cancel(stop::on_signal())
+        .build()?
+        .run()?;
     let path = folder.join("report.json");
-    std::fs::write(&path, json(&report)? + "\n")
-        .map_err(|e| Error::io(&path, "write the report", e))?;
+    write_report(&path, &report)?;
     print(&summary(&report, &mesh))?;
-    let memory = MemoryPool::new(args.limits.memory.unwrap_or_else(default_memory))?;
+    let memory = MemoryPool::new(memory(&args.limits))?;
     let threads = threads(&args.limits);
     let workspace = Workspace::new(folder, memory, threads, Arc::new(Silent), Cancel::new())?;
     let verdict = verify::verify(&mesh, &workspace)?;
@@ -255,17 +250,10 @@ fn demo(args: &Demo) -> Result<Answer> {
         mesh.display(),
         path.display()
     ))?;
-    Ok(if verdict.manifold {
-        Answer::Yes
-    } else {
-        Answer::No
-    })
+    Ok(verdict.manifold)
 }
 
 fn generator_error(path: &Path, error: &outcrop_cloudgen::Error) -> Error {
-    Error::io(
-        path,
-        "make the demo cloud",
-        std::io::Error::other(error.to_string()),
-    )
+    let error = std::io::Error::other(error.to_string());
+    Error::io(path, "make the demo cloud", error)
 }

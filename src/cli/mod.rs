@@ -15,12 +15,6 @@ const NO: u8 = 1;
 /// Exit code for errors.
 const FAILED: u8 = 2;
 
-/// The result of a command.
-enum Answer {
-    Yes,
-    No,
-}
-
 /// Runs the command line. Exit codes: 0 success, 1 negative answer, 2 error, 75 time limit, 128 + signal.
 #[must_use]
 pub fn main() -> ExitCode {
@@ -38,16 +32,12 @@ pub fn main() -> ExitCode {
     }
     let args = args::Args::parse();
     match commands::run(args.command) {
-        Ok(Answer::Yes) => ExitCode::SUCCESS,
-        Ok(Answer::No) => ExitCode::from(NO),
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::from(NO),
         Err(error) => {
             // A closed pipe (`| head`) is no error.
             if !style::is_broken_pipe(&error) {
-                let hint = if error.can_resume() {
-                    stop::hint()
-                } else {
-                    String::new()
-                };
+                let hint = error.can_resume().then(stop::hint).unwrap_or_default();
                 eprintln!("outcrop: {error}{hint}");
             }
             ExitCode::from(match error {

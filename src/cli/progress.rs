@@ -1,7 +1,7 @@
 //! Progress on a terminal: stage, rate, time left, memory; one line for each stage.
 
-use crate::workspace::limits;
 use crate::workspace::progress::Observer;
+use crate::workspace::{limits, lock};
 use indicatif::{HumanCount, ProgressBar, ProgressState, ProgressStyle};
 use std::fmt::Write;
 use std::sync::Mutex;
@@ -13,20 +13,15 @@ pub struct Bars {
     current: Mutex<Option<ProgressBar>>,
 }
 
-const KNOWN: &str = "{prefix:>8} [{bar:24}] {pos}/{len} {msg}  {rate}  {eta} left  {memory}";
-const UNKNOWN: &str = "{prefix:>8} {spinner} {pos} {msg}  {rate}  {elapsed}  {memory}";
-const DONE: &str = "{prefix:>8} {pos} {msg} in {elapsed_precise}";
+const KNOWN: &str =
+    "{prefix:>8} [{bar:24}] {human_pos}/{human_len} {msg}  {rate}  {eta} left  {memory}";
+const UNKNOWN: &str = "{prefix:>8} {spinner} {human_pos} {msg}  {rate}  {elapsed}  {memory}";
+const DONE: &str = "{prefix:>8} {human_pos} {msg} in {elapsed_precise}";
 
 fn style(template: &str) -> ProgressStyle {
     ProgressStyle::with_template(template)
         .unwrap_or_else(|_| ProgressStyle::default_bar())
         .progress_chars("=> ")
-        .with_key("pos", |state: &ProgressState, out: &mut dyn Write| {
-            let _ = write!(out, "{}", HumanCount(state.pos()));
-        })
-        .with_key("len", |state: &ProgressState, out: &mut dyn Write| {
-            let _ = write!(out, "{}", HumanCount(state.len().unwrap_or(0)));
-        })
         .with_key("rate", |state: &ProgressState, out: &mut dyn Write| {
             let _ = write!(out, "{}/s", HumanCount(state.per_sec() as u64));
         })
@@ -37,11 +32,7 @@ fn style(template: &str) -> ProgressStyle {
 
 impl Bars {
     fn with(&self, work: impl FnOnce(&ProgressBar)) {
-        let current = self
-            .current
-            .lock()
-            .unwrap_or_else(std::sync::PoisonError::into_inner);
-        if let Some(bar) = current.as_ref() {
+        if let Some(bar) = &*lock(&self.current) {
             work(bar);
         }
     }
@@ -56,11 +47,7 @@ impl Observer for Bars {
         };
         let bar = bar.with_prefix(name).with_message(unit);
         bar.enable_steady_tick(Duration::from_millis(200));
-        let mut current = self
-            .current
-            .lock()
-            .unwrap_or_else(std::sync::PoisonError::into_inner);
-        *current = Some(bar);
+        *lock(&self.current) = Some(bar);
     }
 
     fn advance(&self, count: u64) {

@@ -1,8 +1,8 @@
 //! Stopping: signals, time limits, and the messages about them.
 
 use crate::pipeline::Reconstruction;
-use crate::workspace::fault;
 use crate::workspace::progress::Cancel;
+use crate::workspace::{Folder, fault, lock};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 use std::sync::Mutex;
@@ -55,9 +55,7 @@ pub fn on_signal() -> Cancel {
 
 /// Ends the program if the run does not stop soon after its flag is raised.
 pub fn watch(run: &Reconstruction, cancel: &Cancel) {
-    if let Ok(mut folder) = FOLDER.lock() {
-        *folder = Some(run.scratch_folder().to_path_buf());
-    }
+    *lock(&FOLDER) = Some(run.scratch_folder().to_path_buf());
     let cancel = cancel.clone();
     std::thread::spawn(move || {
         while !cancel.is_cancelled() {
@@ -74,13 +72,12 @@ pub fn watch(run: &Reconstruction, cancel: &Cancel) {
 
 /// A line about resuming the run, if that is possible.
 pub fn hint() -> String {
-    let folder = FOLDER.lock().ok().and_then(|folder| folder.clone());
-    match folder {
-        Some(folder) if crate::workspace::Folder::has_progress(&folder) => {
-            format!("; go on with: outcrop resume {}", quoted(&folder))
-        }
-        _ => String::new(),
-    }
+    let folder = lock(&FOLDER)
+        .clone()
+        .filter(|folder| Folder::has_progress(folder));
+    folder.map_or(String::new(), |folder| {
+        format!("; go on with: outcrop resume {}", quoted(&folder))
+    })
 }
 
 /// A path quoted for a shell.

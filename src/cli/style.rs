@@ -4,15 +4,7 @@ use crate::error::Error;
 
 /// 12345678 as `12 345 678`.
 pub fn grouped(number: u64) -> String {
-    let digits = number.to_string();
-    let mut out = String::with_capacity(digits.len() * 4 / 3);
-    for (i, digit) in digits.chars().enumerate() {
-        if i > 0 && (digits.len() - i).is_multiple_of(3) {
-            out.push(' ');
-        }
-        out.push(digit);
-    }
-    out
+    indicatif::HumanCount(number).to_string().replace(',', " ")
 }
 
 /// A number with its noun.

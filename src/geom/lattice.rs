@@ -1,6 +1,7 @@
 //! The integer lattice on which all positions lie.
 
 use super::Point;
+use serde::{Deserialize, Serialize};
 
 /// Lattice coordinates are in `0..COORDINATE_LIMIT`, so that all products in the exact predicates fit 128
 /// bits.
@@ -10,7 +11,7 @@ pub const COORDINATE_LIMIT: i64 = 1 << 30;
 ///
 /// For LAS input with one scale and offset this is the map of the file, so the coordinates written are
 /// exactly those of the file.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Lattice {
     /// Length of one step, the same along each axis, in the input's unit.
     pub step: f64,
@@ -21,13 +22,6 @@ pub struct Lattice {
     /// True if every input position is on the lattice without rounding.
     pub exact: bool,
 }
-
-crate::workspace::persist::persist!(Lattice {
-    step,
-    offset,
-    base,
-    exact
-});
 
 impl Lattice {
     /// The input coordinates of a lattice position.

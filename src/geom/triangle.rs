@@ -33,6 +33,11 @@ pub fn length(v: [i128; 3]) -> f64 {
     v.iter().map(|x| *x as f64 * *x as f64).sum::<f64>().sqrt()
 }
 
+/// Adds a vector to a sum.
+pub fn add(sum: &mut [i128; 3], part: [i128; 3]) {
+    (0..3).for_each(|axis| sum[axis] += part[axis]);
+}
+
 /// The area of a triangle.
 #[must_use]
 pub fn area([a, b, c]: [Point; 3]) -> f64 {

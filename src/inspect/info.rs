@@ -7,8 +7,7 @@ use crate::params::Params;
 use crate::pipeline::Known;
 use crate::stages::cells::{CellMaker, DiskRadius, Widen};
 use crate::stages::ingest::{Classes, CoordinateType, IngestStats, ingest_classes};
-use crate::stages::order::order;
-use crate::stages::order::{PAGE, PointStore};
+use crate::stages::order::{PAGE, PointStore, order};
 use crate::stages::tiles::Tile;
 use crate::stages::tiles::near::Search;
 use crate::workspace::Workspace;
@@ -82,11 +81,13 @@ pub fn info(inputs: &[PathBuf], classes: &Classes, workspace: &Workspace) -> Res
     let double = spool.source_precision() == CoordinateType::F64;
     let spool_bytes = spool.bytes();
     observer.begin("order", "points", input.kept);
-    let (store, duplicates) = order(spool, &lattice, PAGE, workspace)?;
+    let (stored, duplicates) = order(&spool, &lattice, PAGE, workspace)?;
     observer.end();
+    let store = stored.open(workspace)?;
     let read = start.elapsed().as_secs_f64();
     let sample = sample(&store, workspace)?;
     let Aabb { min, max } = store.bounds();
+    stored.release(workspace)?;
     let points = store.len() as u64;
     let cells = sample.seconds / sample.points.max(1) as f64 * points as f64;
     let known = Known {
@@ -136,21 +137,23 @@ fn sample(store: &PointStore, workspace: &Workspace) -> Result<Sample> {
         let tile = Tile::load(store, ids.clone())?;
         let begin = Instant::now();
         let mut failed = None;
-        tile.for_each_query(neighbors, &mut search, |_, _, query| {
-            let Some(mut query) = query else { return };
-            let near = query.near();
-            if let Some(last) = near.get(neighbors - 1) {
-                let first2 = near.get(0).map_or(0, |n| n.distance2);
-                sample.nearest.push((first2 as f64).sqrt());
-                sample
-                    .radius
-                    .push(METHOD.disk.reach * (last.distance2 as f64).sqrt());
-            }
-            failed = maker
-                .from_tile(&mut query, |_, _| {})
-                .err()
-                .or(failed.take());
-        });
+        tile.for_each_query(
+            neighbors,
+            &mut search,
+            |_| (),
+            |_, _, query| {
+                let Some(mut query) = query else { return };
+                let near = query.near();
+                if let Some(last) = near.get(neighbors - 1) {
+                    let first2 = near.get(0).map_or(0, |n| n.distance2);
+                    sample.nearest.push((first2 as f64).sqrt());
+                    let radius = METHOD.disk.reach * (last.distance2 as f64).sqrt();
+                    sample.radius.push(radius);
+                }
+                let made = maker.from_tile(&mut query, |_, _| {});
+                failed = made.err().or(failed.take());
+            },
+        );
         sample.seconds += begin.elapsed().as_secs_f64();
         sample.points += ids.len();
         if let Some(error) = failed {
@@ -176,48 +179,47 @@ fn percentiles(mut lengths: Vec<f64>, step: f64) -> Percentiles {
 impl fmt::Display for Info {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for file in &self.input.files {
-            writeln!(
-                f,
-                "{}: {}, {} points",
-                file.path.display(),
-                file.format,
-                file.points
-            )?;
+            let path = file.path.display();
+            writeln!(f, "{path}: {}, {} points", file.format, file.points)?;
         }
         let three = |p: &[f64; 3]| format!("{} {} {}", p[0], p[1], p[2]);
         let spread =
             |p: &Percentiles| format!("{:.4} (5-95 %: {:.4} to {:.4})", p.p50, p.p5, p.p95);
-        let mib = |bytes: u64| bytes.div_ceil(1 << 20);
-        writeln!(
-            f,
-            "points       {} distinct of {} read",
-            self.points, self.input.read
-        )?;
-        writeln!(
-            f,
-            "left out     {} duplicates, {} not finite, {} withheld, {} of other classes",
-            self.duplicates,
-            self.input.dropped_non_finite,
-            self.input.withheld,
-            self.input.dropped_by_class
-        )?;
-        writeln!(f, "lowest       {}", three(&self.min))?;
-        writeln!(f, "highest      {}", three(&self.max))?;
+        let mib = |bytes: u64| format!("{} MiB", bytes.div_ceil(1 << 20));
+        let input = &self.input;
+        let left_out = format!(
+            "{} duplicates, {} not finite, {} withheld, {} of other classes",
+            self.duplicates, input.dropped_non_finite, input.withheld, input.dropped_by_class
+        );
         let rounding = if self.lattice_exact {
             "exact"
         } else {
             "rounded"
         };
-        writeln!(f, "lattice      step {} ({rounding})", self.lattice_step)?;
-        writeln!(f, "spacing      {}", spread(&self.spacing))?;
-        writeln!(f, "auto radius  {}", spread(&self.auto_radius))?;
-        writeln!(
-            f,
-            "memory       any budget from {} MiB",
-            mib(self.memory_minimum)
-        )?;
-        writeln!(f, "scratch      about {} MiB", mib(self.scratch_bytes))?;
-        writeln!(f, "mesh         about {} MiB", mib(self.output_bytes))?;
+        let rows = [
+            (
+                "points",
+                format!("{} distinct of {} read", self.points, input.read),
+            ),
+            ("left out", left_out),
+            ("lowest", three(&self.min)),
+            ("highest", three(&self.max)),
+            (
+                "lattice",
+                format!("step {} ({rounding})", self.lattice_step),
+            ),
+            ("spacing", spread(&self.spacing)),
+            ("auto radius", spread(&self.auto_radius)),
+            (
+                "memory",
+                format!("any budget from {}", mib(self.memory_minimum)),
+            ),
+            ("scratch", format!("about {}", mib(self.scratch_bytes))),
+            ("mesh", format!("about {}", mib(self.output_bytes))),
+        ];
+        for (name, text) in rows {
+            writeln!(f, "{name:<13}{text}")?;
+        }
         write!(f, "time         about {:.0} s", self.seconds.ceil())
     }
 }

@@ -1,6 +1,6 @@
 //! One attempt at a run: its beginning, its time limit, and the removal of its scratch files.
 
-use super::manifest::{Asked, Manifest};
+use super::manifest::Manifest;
 use super::{Reconstruction, Start};
 use crate::error::{Error, Result};
 use crate::stages::export;
@@ -46,13 +46,7 @@ impl Reconstruction {
     }
 
     pub(super) fn open(&self) -> Result<Workspace> {
-        let manifest = Manifest::of(&Asked {
-            inputs: &self.inputs,
-            output: &self.output,
-            params: &self.params,
-            tile_points: self.tile_points,
-            page_points: self.page_points,
-        })?;
+        let manifest = Manifest::of(self)?;
         let bytes = manifest.to_bytes()?;
         let found = Folder::find(&self.folder)?;
         let mut folder = match (found, self.start) {

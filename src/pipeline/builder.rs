@@ -117,20 +117,6 @@ impl Builder {
         self
     }
 
-    /// The settings in the manifest of a scratch folder.
-    pub(super) fn of(manifest: &Manifest, folder: &Path) -> Self {
-        Self {
-            inputs: manifest.inputs().collect(),
-            output: manifest.output(),
-            params: manifest.params(),
-            tile_points: Some(manifest.tile_points()),
-            page_points: Some(manifest.page_points()),
-            start: Start::Resume,
-            folder: Some(folder.to_path_buf()),
-            ..Self::default()
-        }
-    }
-
     /// Checks everything that can be checked in advance.
     ///
     /// # Errors
@@ -188,5 +174,7 @@ pub(super) fn unfinished(folder: &Path) -> Result<Builder> {
         }
     };
     let manifest = Manifest::from_bytes(folder, &found.manifest)?;
-    Ok(Builder::of(&manifest, folder))
+    let mut builder = manifest.settings().start(Start::Resume);
+    builder.folder = Some(folder.to_path_buf());
+    Ok(builder)
 }

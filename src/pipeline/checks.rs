@@ -7,7 +7,7 @@ use crate::report::DiskEstimate;
 use crate::stages::cells::{CellStats, DiskRadius};
 use crate::stages::export::folder_of;
 use crate::stages::ingest;
-use crate::stages::order::PointStore;
+use crate::stages::order::StoredPoints;
 use crate::workspace::{Workspace, limits};
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 const LARGEST_RADIUS: f64 = (1u64 << 34) as f64;
 
 /// The radius in lattice steps.
-pub(super) fn disk_radius(radius: Radius, store: &PointStore, lattice: &Lattice) -> DiskRadius {
+pub(super) fn disk_radius(radius: Radius, store: &StoredPoints, lattice: &Lattice) -> DiskRadius {
     match radius {
         Radius::Auto => DiskRadius::Auto,
         Radius::Length(length) => DiskRadius::Steps((length / lattice.step).min(LARGEST_RADIUS)),
@@ -82,7 +82,7 @@ pub(super) fn not_an_input(output: &Path, inputs: &[PathBuf]) -> Result<()> {
     Ok(())
 }
 
-pub(super) fn enough(store: &PointStore) -> Result<()> {
+pub(super) fn enough(store: &StoredPoints) -> Result<()> {
     if store.len() >= 3 {
         return Ok(());
     }

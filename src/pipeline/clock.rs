@@ -3,7 +3,8 @@
 use crate::error::Result;
 use crate::report::{PartReport, StageReport};
 use crate::workspace::Workspace;
-use crate::workspace::persist::{Persist, persist};
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
 /// Runs stages and measures them.
@@ -16,6 +17,7 @@ pub(crate) struct Clock<'a> {
 }
 
 /// Measurements of a stage.
+#[derive(Serialize, Deserialize)]
 struct Took {
     seconds: f64,
     read: u64,
@@ -24,15 +26,6 @@ struct Took {
     held: u64,
     parts: Vec<(String, f64)>,
 }
-
-persist!(Took {
-    seconds,
-    read,
-    written,
-    scratch,
-    held,
-    parts
-});
 
 impl<'a> Clock<'a> {
     pub(crate) fn new(workspace: &'a Workspace) -> Self {
@@ -43,7 +36,7 @@ impl<'a> Clock<'a> {
         }
     }
 
-    pub(crate) fn stage<T: Persist>(
+    pub(crate) fn stage<T: Serialize + DeserializeOwned>(
         &mut self,
         name: &'static str,
         unit: &'static str,
@@ -54,7 +47,7 @@ impl<'a> Clock<'a> {
     }
 
     /// A stage with the name `step` among the steps of the run: one of several rounds of stage `name`.
-    pub(crate) fn round<T: Persist>(
+    pub(crate) fn round<T: Serialize + DeserializeOwned>(
         &mut self,
         name: &'static str,
         step: &str,
@@ -64,7 +57,7 @@ impl<'a> Clock<'a> {
     ) -> Result<T> {
         let workspace = self.workspace;
         let mut now = false;
-        let (value, took) = workspace.once(step, || {
+        let (value, took) = workspace.once(step, |_| {
             now = true;
             let io = &workspace.io;
             let (start, read, written) = (Instant::now(), io.read(), io.written());

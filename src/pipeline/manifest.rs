@@ -1,6 +1,7 @@
 //! The manifest: parameters, output and the identity of every input of a run. It ensures that a run is
 //! resumed only with the same ones.
 
+use super::{Builder, Reconstruction};
 use crate::error::{Error, Result};
 use crate::params::Params;
 use crate::stages::ingest;
@@ -13,7 +14,7 @@ use std::os::unix::fs::{FileExt, MetadataExt};
 use std::path::{Path, PathBuf};
 
 /// The format of scratch folders that this program writes and reads.
-const FORMAT: u32 = 2;
+const FORMAT: u32 = 3;
 
 /// Bytes of each sample of an input.
 const SAMPLE: u64 = 64 << 10;
@@ -79,6 +80,21 @@ impl Identity {
     }
 }
 
+impl Identity {
+    /// All but the path, each with its name.
+    fn facts(&self) -> [(&'static str, String); 3] {
+        let (seconds, nanoseconds) = self.modified;
+        [
+            ("size", format!("{} bytes", self.bytes)),
+            ("content", format!("checksum {:08x}", self.sample)),
+            (
+                "time of last change",
+                format!("{seconds}.{nanoseconds:09} s"),
+            ),
+        ]
+    }
+}
+
 /// The manifest of a run.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct Manifest {
@@ -95,30 +111,20 @@ pub(super) struct Manifest {
     files: Vec<Identity>,
 }
 
-/// The settings from which a manifest is made.
-#[derive(Debug)]
-pub(super) struct Asked<'a> {
-    pub inputs: &'a [PathBuf],
-    pub output: &'a Path,
-    pub params: &'a Params,
-    pub tile_points: u32,
-    pub page_points: usize,
-}
-
 impl Manifest {
-    /// Makes the manifest; samples every input.
-    pub fn of(asked: &Asked<'_>) -> Result<Self> {
-        let files = ingest::expand(asked.inputs)?;
+    /// Makes the manifest of a run; samples every input.
+    pub fn of(job: &Reconstruction) -> Result<Self> {
+        let files = ingest::expand(&job.inputs)?;
         Ok(Self {
             format: FORMAT,
             version: env!("CARGO_PKG_VERSION").into(),
-            output: Name::of(asked.output)?,
-            params: asked.params.clone(),
-            block: asked.params.block,
-            division: asked.params.division,
-            tile_points: asked.tile_points,
-            page_points: asked.page_points,
-            inputs: asked
+            output: Name::of(&job.output)?,
+            params: job.params.clone(),
+            block: job.params.block,
+            division: job.params.division,
+            tile_points: job.tile_points,
+            page_points: job.page_points,
+            inputs: job
                 .inputs
                 .iter()
                 .map(|p| Name::of(p))
@@ -151,28 +157,20 @@ impl Manifest {
         serde_json::from_value(value).map_err(|e| not(format!("its manifest cannot be read: {e}")))
     }
 
-    pub fn output(&self) -> PathBuf {
-        self.output.path()
-    }
-
-    pub fn inputs(&self) -> impl Iterator<Item = PathBuf> {
-        self.inputs.iter().map(Name::path)
-    }
-
-    pub fn params(&self) -> Params {
-        Params {
+    /// The settings of the run.
+    pub fn settings(self) -> Builder {
+        let params = Params {
             block: self.block,
             division: self.division,
-            ..self.params.clone()
-        }
-    }
-
-    pub fn tile_points(&self) -> u32 {
-        self.tile_points
-    }
-
-    pub fn page_points(&self) -> usize {
-        self.page_points
+            ..self.params
+        };
+        let inputs = self.inputs.iter().map(Name::path);
+        inputs
+            .fold(Reconstruction::builder(), Builder::input)
+            .output(self.output.path())
+            .params(params)
+            .tile_points(self.tile_points)
+            .page_points(self.page_points)
     }
 
     /// # Errors
@@ -217,20 +215,11 @@ impl Manifest {
                 let shown = |name: &Name| name.path().display().to_string();
                 return differ("an input".into(), shown(&was.path), shown(&now.path));
             }
-            let path = was.path.path();
-            let file = |what: &str| format!("the {what} of {}", path.display());
-            if was.bytes != now.bytes {
-                let bytes = |n: u64| format!("{n} bytes");
-                return differ(file("size"), bytes(was.bytes), bytes(now.bytes));
-            }
-            if was.sample != now.sample {
-                let sum = |crc: u32| format!("checksum {crc:08x}");
-                return differ(file("content"), sum(was.sample), sum(now.sample));
-            }
-            if was.modified != now.modified {
-                let time = |(s, n): (i64, i64)| format!("{s}.{n:09} s");
-                let what = file("time of last change");
-                return differ(what, time(was.modified), time(now.modified));
+            for ((what, was_so), (_, is_so)) in was.facts().into_iter().zip(now.facts()) {
+                if was_so != is_so {
+                    let path = was.path.path();
+                    return differ(format!("the {what} of {}", path.display()), was_so, is_so);
+                }
             }
         }
         let (was, now) = (self.files.len(), now.files.len());

@@ -13,16 +13,24 @@ use crate::stages::cells::{CellTriples, DiskRadius, TileRanges, Widen, cells};
 use crate::stages::export::{CoordinateType, export};
 use crate::stages::ingest::{self, Spool, ingest_classes};
 use crate::stages::located::Places;
-use crate::stages::order::{Orderer, PointStore, order};
+use crate::stages::order::{Orderer, PointStore, StoredPoints, order};
 use crate::stages::outliers::{OutlierOptions, drop_outliers};
 use crate::stages::repair::{RepairOptions, Repaired, repair};
 use crate::stages::smooth::{Relaxed, Relaxing, relax, smooth};
-use crate::stages::spacing::Density;
+use crate::stages::spacing::{Density, Spacings};
 use crate::stages::stitch::{StitchOptions, Stitched, stitch};
-use crate::stages::thin::{Grid, thin};
+use crate::stages::thin::{Grid, LeftOut, thin};
 use crate::stages::triples::{Triples, triples};
 use crate::workspace::{Workspace, limits};
 use std::time::Instant;
+
+/// The positions that decide which points are connected, if they are not those of the mesh, and the local
+/// spacings.
+#[derive(Debug, Default)]
+pub(super) struct Shape {
+    store: Option<PointStore>,
+    spacings: Option<Spacings>,
+}
 
 /// The stages of one run.
 pub(super) struct Stages<'a> {
@@ -105,7 +113,7 @@ impl<'a> Stages<'a> {
     }
 
     /// Sorts the points along the curve, thinned if requested; duplicates become one point.
-    pub fn order(&mut self, spool: Spool, lattice: &Lattice) -> Result<PointStore> {
+    pub fn order(&mut self, spool: &Spool, lattice: &Lattice) -> Result<StoredPoints> {
         let (job, workspace) = (self.job, self.workspace);
         let (points, page) = (spool.points(), job.page_points);
         let grid = job.params.thin.and_then(|side| Grid::new(lattice, side));
@@ -113,16 +121,18 @@ impl<'a> Stages<'a> {
             let thinned = self.clock.stage("thin", "points", points, || {
                 thin(spool, lattice, grid, workspace)
             })?;
-            let (store, stats) = self.clock.stage("order", "points", 0, || {
+            let (store, left_out) = self.clock.stage("order", "points", 0, || {
                 let orderer = Orderer::for_points(workspace, points)?;
-                let stats = orderer.take_stream(workspace, |from, stats, each| {
-                    thinned.for_each(from, stats, each)
-                })?;
+                let left_out: LeftOut = orderer
+                    .take_stream(workspace, |from, left_out, each| {
+                        thinned.for_each(workspace, from, left_out, each)
+                    })?;
                 let (store, _) = orderer.finish(workspace, page)?;
-                Ok((store, stats))
+                Ok((store, left_out))
             })?;
-            self.report.duplicates_folded = stats.duplicates;
-            self.report.thin = stats;
+            thinned.release(workspace)?;
+            self.report.duplicates_folded = left_out.duplicates;
+            self.report.thin = left_out.thin;
             store
         } else {
             let (store, folded) = self.clock.stage("order", "points", points, || {
@@ -131,6 +141,7 @@ impl<'a> Stages<'a> {
             self.report.duplicates_folded = folded;
             store
         };
+        spool.release(workspace)?;
         self.warn_of_input(lattice);
         enough(&store)?;
         self.known.points = store.len() as u64;
@@ -161,7 +172,7 @@ impl<'a> Stages<'a> {
     }
 
     /// Drops outliers, if requested.
-    pub fn without_outliers(&mut self, store: PointStore) -> Result<PointStore> {
+    pub fn without_outliers(&mut self, store: StoredPoints) -> Result<StoredPoints> {
         let (job, workspace) = (self.job, self.workspace);
         let Some(factor) = job.params.drop_outliers else {
             self.report.points = store.len() as u64;
@@ -182,7 +193,7 @@ impl<'a> Stages<'a> {
     }
 
     /// The radius of the disks; a percentage refers to the points before smoothing.
-    pub fn radius(&mut self, store: &PointStore, lattice: &Lattice) -> DiskRadius {
+    pub fn radius(&mut self, store: &StoredPoints, lattice: &Lattice) -> DiskRadius {
         let radius = disk_radius(self.job.params.radius, store, lattice);
         self.report.radius = match radius {
             DiskRadius::Auto => None,
@@ -200,16 +211,19 @@ impl<'a> Stages<'a> {
     }
 
     /// Smooths the points, if requested.
-    pub fn smooth(&mut self, mut store: PointStore) -> Result<PointStore> {
+    pub fn smooth(&mut self, mut store: StoredPoints) -> Result<StoredPoints> {
         let (params, workspace, tiles) = (&self.job.params, self.workspace, self.tiles());
         workspace.trim();
         let points = self.report.points;
         for round in 1..=params.smooth {
             let step = format!("smooth {round}");
-            store = self.clock.round("smooth", &step, "points", points, || {
+            let next = self.clock.round("smooth", &step, "points", points, || {
                 let (k, smoothing) = (params.neighbors, params.smoothing);
+                let store = store.open(workspace)?;
                 smooth(&store, tiles, k, smoothing, round, workspace)
             })?;
+            store.release(workspace)?;
+            store = next;
         }
         Ok(store)
     }
@@ -238,21 +252,34 @@ impl<'a> Stages<'a> {
         Ok(relaxed)
     }
 
+    /// Opens the shape.
+    pub fn open_shape(&self, relaxed: Option<Relaxed>) -> Result<Shape> {
+        let workspace = self.workspace;
+        let Some(relaxed) = relaxed else {
+            return Ok(Shape::default());
+        };
+        let store = relaxed.store.as_ref();
+        Ok(Shape {
+            store: store.map(|store| store.open(workspace)).transpose()?,
+            spacings: Some(relaxed.spacings.open(workspace)?),
+        })
+    }
+
     /// The positions from which the surface is made.
     pub fn places<'p>(
         &self,
         store: &'p PointStore,
-        relaxed: Option<&'p Relaxed>,
+        shape: &'p Shape,
         lattice: &Lattice,
     ) -> Places<'p> {
         let params = &self.job.params;
-        let robust = relaxed.filter(|_| params.method == Method::Robust);
-        let shape = relaxed.and_then(|relaxed| relaxed.store.as_ref());
+        let spacings = shape.spacings.as_ref();
+        let robust = spacings.filter(|_| params.method == Method::Robust);
         Places {
-            shape: shape.unwrap_or(store),
+            shape: shape.store.as_ref().unwrap_or(store),
             file: store,
-            density: robust.map(|relaxed| Density {
-                spacings: &relaxed.spacings,
+            density: robust.map(|spacings| Density {
+                spacings,
                 neighbors: params.neighbors,
                 limits: params.limits(lattice.step),
             }),
@@ -278,18 +305,19 @@ impl<'a> Stages<'a> {
     }
 
     /// Adds up the number of cells of each triple.
-    pub fn triples(&mut self, seen: CellTriples) -> Result<Triples> {
+    pub fn triples(&mut self, seen: &CellTriples) -> Result<Triples> {
         let (workspace, blocks) = (self.workspace, self.blocks());
         workspace.trim();
         let (all, stats) = self
             .clock
             .stage("triples", "triples", 0, || triples(seen, blocks, workspace))?;
+        seen.release(workspace)?;
         self.report.triples = stats;
         Ok(all)
     }
 
     /// Makes an oriented manifold from the triples.
-    pub fn stitch(&mut self, places: Places<'_>, triples: Triples) -> Result<Stitched> {
+    pub fn stitch(&mut self, places: Places<'_>, triples: &Triples) -> Result<Stitched> {
         let (params, workspace, blocks) = (&self.job.params, self.workspace, self.blocks());
         let options = StitchOptions {
             cos_max_angle: params.cos_max_angle(),
@@ -305,7 +333,7 @@ impl<'a> Stages<'a> {
     }
 
     /// Removes bridges and small components, and fills holes.
-    pub fn repair(&mut self, places: Places<'_>, stitched: Stitched) -> Result<Repaired> {
+    pub fn repair(&mut self, places: Places<'_>, stitched: &Stitched) -> Result<Repaired> {
         let (params, workspace, blocks) = (&self.job.params, self.workspace, self.blocks());
         let points = self.report.points;
         let noisy = self

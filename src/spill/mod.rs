@@ -3,7 +3,9 @@
 //! A row is a struct of 32-bit words, compared lexicographically; its fields are known only to the
 //! stage that writes it. Every part of a file carries a CRC-32 that is checked when it is read.
 
+mod local;
 mod pack;
+mod release;
 mod row;
 mod runs;
 mod shuffle;
@@ -11,8 +13,10 @@ mod sort;
 mod sorter;
 mod table;
 
+pub use local::LocalTable;
+pub(crate) use release::release;
 pub(crate) use row::row;
 pub use row::{Id, Row, Word};
-pub use shuffle::Shuffle;
-pub use sorter::{Sorted, Sorter};
+pub use shuffle::{Inbox, Shuffle};
+pub use sorter::{Sorted, SortedRuns, Sorter};
 pub use table::Table;

@@ -2,16 +2,15 @@
 
 use super::Row;
 use crate::error::{Error, Result};
-use crate::workspace::Workspace;
 use crate::workspace::file::ScratchFile;
 use crate::workspace::open::open_existing;
-use crate::workspace::persist::{Persist, Saved};
 use crate::workspace::place::Place;
+use crate::workspace::{Files, Unit};
 use std::cmp::{Ordering, Reverse};
 use std::collections::BinaryHeap;
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
-use std::os::unix::fs::FileExt;
+use std::sync::Arc;
 
 /// Rows in a checksummed frame of a run.
 pub(super) const FRAME: usize = 4096;
@@ -22,11 +21,10 @@ pub(super) const FILE_BUFFER: usize = 1 << 15;
 /// A sorted file of frames: `u32` number of rows, `u32` CRC-32, rows.
 #[derive(Debug)]
 pub(super) struct Run<R: Row> {
-    file: ScratchFile,
-    bytes: u64,
+    file: Arc<ScratchFile>,
     /// The first row of each frame; all frames but the last are full.
     pub(super) firsts: Vec<R>,
-    /// The whole file.
+    /// The whole file, which is one segment.
     place: Place,
 }
 
@@ -38,7 +36,7 @@ const fn frame_bytes<R: Row>() -> u64 {
 impl<R: Row> Run<R> {
     /// Name of the file.
     pub(super) fn name(&self) -> String {
-        self.file.name.to_string()
+        self.file.name.clone()
     }
 
     /// True if a resumed run can use the file.
@@ -46,46 +44,30 @@ impl<R: Row> Run<R> {
         self.file.is_kept()
     }
 
-    /// Notes the file in the journal.
-    pub(super) fn put(&self) -> Result<()> {
-        self.file.put(0, self.place)
+    /// Notes that a unit wrote the file.
+    pub(super) fn put(&self, unit: &Unit<'_>) -> Result<()> {
+        self.file.put(unit, 0, self.place)
     }
 
-    /// The run `name` of an earlier attempt. It has no frames if it was deleted since.
-    pub(super) fn reopen(workspace: &Workspace, name: &str) -> Result<Self> {
-        let (mut file, places) = workspace.keep_file(name)?;
-        let place = places.first().map_or(Place::default(), |(_, place)| *place);
-        let bytes = place.bytes as u64;
+    /// The run `name`, written before. It has no frames if an earlier attempt deleted it.
+    pub(super) fn reopen(files: &Files, name: &str) -> Result<Self> {
+        let file = files.open(name, true)?;
+        let place = file.section(0);
         let mut firsts = Vec::new();
         if !file.is_gone() {
-            let io = |e| Error::io(&file.path, "read", e);
-            let handle = open_existing(&file.path).map_err(io)?;
             let mut first = R::zeroed();
-            for frame in 0..bytes.div_ceil(frame_bytes::<R>()) {
+            for frame in 0..(place.bytes as u64).div_ceil(frame_bytes::<R>()) {
                 let at = frame * frame_bytes::<R>() + 8;
-                let first_bytes = bytemuck::bytes_of_mut(&mut first);
-                handle.read_exact_at(first_bytes, at).map_err(io)?;
+                file.read(place.segment, at, bytemuck::bytes_of_mut(&mut first))?;
                 firsts.push(first);
             }
             file.close();
         }
         Ok(Self {
             file,
-            bytes,
             firsts,
             place,
         })
-    }
-}
-
-impl<R: Row> Persist for Run<R> {
-    fn save(&self, out: &mut Vec<u8>) {
-        self.file.name.to_string().save(out);
-    }
-
-    fn load(from: &mut Saved<'_>) -> Result<Self> {
-        let name = String::load(from)?;
-        Self::reopen(from.workspace, &name)
     }
 }
 
@@ -121,6 +103,7 @@ pub(super) fn merge<R: Row>(
 ) -> Result<()> {
     let mut readers = runs
         .iter()
+        .filter(|run| run.place.bytes > 0)
         .map(|run| RunReader::open(run, from, to))
         .collect::<Result<Vec<_>>>()?;
     let mut heap = BinaryHeap::with_capacity(readers.len());
@@ -144,23 +127,25 @@ pub(super) fn merge<R: Row>(
 
 /// Writes a run.
 pub(super) struct RunWriter<R: Row> {
-    file: ScratchFile,
-    bytes: u64,
+    file: Arc<ScratchFile>,
+    worker: usize,
     firsts: Vec<R>,
-    /// CRC-32 of the whole file, if a resumed run may need it.
-    crc: Option<crc32fast::Hasher>,
+    place: Place,
+    crc: crc32fast::Hasher,
     frame: Vec<u8>,
 }
 
 impl<R: Row> RunWriter<R> {
-    pub(super) fn new(file: ScratchFile, kept: bool) -> Self {
-        Self {
-            file,
-            bytes: 0,
+    /// A writer of the new file `name`, for a later attempt at the run if `kept`.
+    pub(super) fn new(files: &Files, name: &str, kept: bool) -> Result<Self> {
+        Ok(Self {
+            file: files.open(name, kept)?,
+            worker: files.worker(),
             firsts: Vec::new(),
-            crc: kept.then(crc32fast::Hasher::new),
+            place: Place::default(),
+            crc: crc32fast::Hasher::new(),
             frame: Vec::new(),
-        }
+        })
     }
 
     pub(super) fn frame(&mut self, records: &[R]) -> Result<()> {
@@ -173,27 +158,23 @@ impl<R: Row> RunWriter<R> {
         self.frame.clear();
         self.frame.extend_from_slice(bytemuck::cast_slice(&head));
         self.frame.extend_from_slice(bytes);
-        if let Some(crc) = &mut self.crc {
-            crc.update(&self.frame);
-        }
-        self.file.append(&self.frame)?;
-        self.bytes += self.frame.len() as u64;
+        self.crc.update(&self.frame);
+        let place = self.file.append(self.worker, &self.frame, records.len())?;
+        self.place.segment = place.segment;
+        self.place.bytes += place.bytes;
+        self.place.records += place.records;
         Ok(())
     }
 
-    pub(super) fn finish(mut self) -> Run<R> {
+    pub(super) fn finish(mut self) -> Result<Run<R>> {
         self.file.close();
-        Run {
-            place: Place {
-                offset: 0,
-                bytes: self.bytes as usize,
-                records: 0,
-                crc: self.crc.map_or(0, crc32fast::Hasher::finalize),
-            },
+        self.place.crc = self.crc.finalize();
+        self.file.set(0, self.place)?;
+        Ok(Run {
             file: self.file,
-            bytes: self.bytes,
             firsts: self.firsts,
-        }
+            place: self.place,
+        })
     }
 }
 
@@ -209,8 +190,12 @@ struct RunReader<'a, R: Row> {
 impl<'a, R: Row> RunReader<'a, R> {
     /// Positioned before the first row that is not below `from`.
     fn open(run: &'a Run<R>, from: Option<R>, to: Option<R>) -> Result<Self> {
-        let io = |action: &'static str| move |e| Error::io(&run.file.path, action, e);
-        let mut file = open_existing(&run.file.path).map_err(io("open"))?;
+        let path = run.file.path(run.place.segment);
+        let io = |action: &'static str| {
+            let path = path.clone();
+            move |e| Error::io(path, action, e)
+        };
+        let mut file = open_existing(&path).map_err(io("open"))?;
         // The frame before the first that begins at or above `from` may end above `from`.
         let is_below = |from: R| move |row: &R| row.compare(&from) == Ordering::Less;
         let below = from.map_or(0, |from| run.firsts.partition_point(is_below(from)));
@@ -235,7 +220,7 @@ impl<'a, R: Row> RunReader<'a, R> {
 
     fn next(&mut self) -> Result<Option<R>> {
         if self.at == self.frame.len() {
-            if self.offset == self.run.bytes {
+            if self.offset == self.run.place.bytes as u64 {
                 return Ok(None);
             }
             self.read_frame()?;
@@ -252,14 +237,15 @@ impl<'a, R: Row> RunReader<'a, R> {
     }
 
     fn corrupt(&self, found: String, expected: String) -> Error {
-        self.run.file.damaged(self.offset, found, expected)
+        let segment = self.run.place.segment;
+        self.run.file.damaged(segment, self.offset, found, expected)
     }
 
     fn failed(&self, error: std::io::Error) -> Error {
         if error.kind() == std::io::ErrorKind::UnexpectedEof {
             return self.corrupt("the end of the file".into(), "a frame of records".into());
         }
-        Error::io(&self.run.file.path, "read", error)
+        Error::io(self.run.file.path(self.run.place.segment), "read", error)
     }
 
     fn read_frame(&mut self) -> Result<()> {

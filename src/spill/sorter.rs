@@ -3,14 +3,14 @@
 use super::runs::{FILE_BUFFER, FRAME, Run, RunWriter, merge};
 use super::{Row, sort};
 use crate::error::Result;
-use crate::workspace::Workspace;
-use crate::workspace::file::Maker;
 use crate::workspace::memory::Reservation;
-use crate::workspace::persist::{Persist, Raw, Saved};
 use crate::workspace::steps::Step;
-use std::cmp::Ordering;
+use crate::workspace::{Files, Workspace, lock};
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::marker::PhantomData;
+use std::sync::{Mutex, MutexGuard};
 
 /// Largest number of rows of a run that can be resumed. It bounds the work that is lost with an attempt.
 const MOST_IN_RUN: usize = 1 << 27;
@@ -21,8 +21,7 @@ pub struct Sorter<R: Row> {
     state: Mutex<State<R>>,
     capacity: usize,
     name: String,
-    files: Maker,
-    pool: Arc<rayon::ThreadPool>,
+    files: Files,
 }
 
 #[derive(Debug)]
@@ -63,8 +62,7 @@ impl<R: Row> Sorter<R> {
             state: Mutex::new(State::new()),
             capacity,
             name: name.to_owned(),
-            files: workspace.maker(),
-            pool: workspace.pool(),
+            files: workspace.files.clone(),
         }
     }
 
@@ -89,7 +87,7 @@ impl<R: Row> Sorter<R> {
     }
 
     fn state(&self) -> MutexGuard<'_, State<R>> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.state)
     }
 
     /// Adds rows; may be called from several threads.
@@ -133,19 +131,19 @@ impl<R: Row> Sorter<R> {
 
     /// Sorts the rows in the buffer and writes them as a run.
     fn write_run(&self, state: &mut State<R>, kept: bool) -> Result<Run<R>> {
-        self.pool.install(|| sort::sort(&mut state.buffer));
+        self.files.pool().install(|| sort::sort(&mut state.buffer));
         let mut writer = self.run_writer(&mut state.made, kept)?;
         for frame in state.buffer.chunks(FRAME) {
             writer.frame(frame)?;
         }
         state.buffer.clear();
-        Ok(writer.finish())
+        writer.finish()
     }
 
     fn run_writer(&self, made: &mut usize, kept: bool) -> Result<RunWriter<R>> {
         let name = format!("{}.run{made}", self.name);
         *made += 1;
-        Ok(RunWriter::new(self.files.make(&name, kept)?, kept))
+        RunWriter::new(&self.files, &name, kept)
     }
 
     /// Adds the rows of parts of an input, given by their numbers and row counts; `push` adds the parts with
@@ -170,12 +168,12 @@ impl<R: Row> Sorter<R> {
         }
         let step = workspace.step(&format!("runs {}", self.name))?;
         let mut left: BTreeMap<u32, u64> = parts.iter().copied().collect();
-        for (number, (name, taken)) in step.finished::<(String, Vec<u32>)>(workspace)? {
+        for (number, (name, taken)) in step.finished::<(String, Vec<u32>)>()? {
             let mut state = self.state();
             state.made = state.made.max(number as usize + 1);
             if taken.iter().all(|part| left.contains_key(part)) {
                 left.retain(|part, _| !taken.contains(part));
-                state.runs.push(Run::reopen(workspace, &name)?);
+                state.runs.push(Run::reopen(&self.files, &name)?);
             }
         }
         // A full buffer would be written by [`Sorter::push`], as a run that does not survive the attempt.
@@ -197,7 +195,7 @@ impl<R: Row> Sorter<R> {
             }
             let number = state.made as u64;
             let run = self.write_run(&mut state, true)?;
-            step.finish(number, &(run.name(), numbers), || run.put())?;
+            step.finish(number, &(run.name(), numbers), |unit| run.put(unit))?;
             state.runs.push(run);
         }
         Ok(all)
@@ -214,16 +212,12 @@ impl<R: Row> Sorter<R> {
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
-    pub(crate) fn reopen_runs<T: Persist>(
-        &self,
-        workspace: &Workspace,
-        step: &Step,
-    ) -> Result<Option<T>> {
+    pub(crate) fn reopen_runs<T: DeserializeOwned>(&self, step: &Step<'_>) -> Result<Option<T>> {
         let mut state = self.state();
         let mut last = None;
-        for (number, (name, note)) in step.finished::<(String, T)>(workspace)? {
+        for (number, (name, note)) in step.finished::<(String, T)>()? {
             if number as usize == state.runs.len() {
-                state.runs.push(Run::reopen(workspace, &name)?);
+                state.runs.push(Run::reopen(&self.files, &name)?);
                 last = Some(note);
             }
         }
@@ -235,14 +229,11 @@ impl<R: Row> Sorter<R> {
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Disk`].
-    pub(crate) fn close_run<T: Persist>(&self, step: &Step, note: &T) -> Result<()> {
+    pub(crate) fn close_run<T: Serialize>(&self, step: &Step<'_>, note: &T) -> Result<()> {
         let mut state = self.state();
         let number = state.made as u64;
         let run = self.write_run(&mut state, true)?;
-        let mut value = Vec::new();
-        run.name().save(&mut value);
-        note.save(&mut value);
-        step.finish(number, &Raw(value), || run.put())?;
+        step.finish(number, &(run.name(), note), |unit| run.put(unit))?;
         state.runs.push(run);
         Ok(())
     }
@@ -263,11 +254,12 @@ impl<R: Row> Sorter<R> {
             std::mem::replace(&mut *guard, State::new())
         };
         if state.runs.is_empty() {
-            self.pool.install(|| sort::sort(&mut state.buffer));
+            self.files.pool().install(|| sort::sort(&mut state.buffer));
             return Ok(Sorted {
                 buffer: state.buffer,
                 runs: Vec::new(),
                 held: state.held,
+                files: self.files,
             });
         }
         if !state.buffer.is_empty() {
@@ -276,10 +268,10 @@ impl<R: Row> Sorter<R> {
         state.buffer = Vec::new();
         state.report_usage(0);
         let step = workspace.step(&format!("merges {}", self.name))?;
-        for (number, (name, merged)) in step.finished::<(String, Vec<String>)>(workspace)? {
+        for (number, (name, merged)) in step.finished::<(String, Vec<String>)>()? {
             state.made = state.made.max(number as usize + 1);
             state.runs.retain(|run| !merged.contains(&run.name()));
-            state.runs.push(Run::reopen(workspace, &name)?);
+            state.runs.push(Run::reopen(&self.files, &name)?);
         }
         // Each open run has one frame of rows and a file buffer of the same size.
         let fan_in = (self.capacity / (2 * FRAME)).clamp(2, 512);
@@ -289,21 +281,37 @@ impl<R: Row> Sorter<R> {
             let number = state.made as u64;
             state.report_usage(merge_bytes(&batch));
             let run = self.merge_runs(workspace, &batch, &mut state.made)?;
+            let merged: Vec<String> = batch.iter().map(Run::name).collect();
             if run.is_kept() {
-                let merged: Vec<String> = batch.iter().map(Run::name).collect();
-                step.finish(number, &(run.name(), merged), || run.put())?;
+                step.finish(number, &(run.name(), &merged), |unit| run.put(unit))?;
             }
             drop(batch);
-            workspace.delete_dropped()?;
+            merged
+                .iter()
+                .try_for_each(|name| self.files.release(name))?;
             state.runs.push(run);
         }
         let mut sorted = Sorted {
             buffer: Vec::new(),
             runs: state.runs,
             held: state.held,
+            files: self.files,
         };
         sorted.report_usage(sorted.merge_bytes());
         Ok(sorted)
+    }
+
+    /// As [`Sorter::finish`], with all rows on disk.
+    ///
+    /// # Errors
+    /// See [`Sorter::finish`].
+    pub fn finish_on_disk(self, workspace: &Workspace) -> Result<SortedRuns<R>> {
+        let mut state = self.state();
+        if state.runs.is_empty() {
+            self.spill(&mut state)?;
+        }
+        drop(state);
+        Ok(self.finish(workspace)?.runs())
     }
 
     /// Merges several runs into one.
@@ -326,7 +334,7 @@ impl<R: Row> Sorter<R> {
             Ok(())
         })?;
         writer.frame(&frame)?;
-        Ok(writer.finish())
+        writer.finish()
     }
 }
 
@@ -339,6 +347,7 @@ pub struct Sorted<R: Row> {
     buffer: Vec<R>,
     runs: Vec<Run<R>>,
     held: Option<Reservation>,
+    files: Files,
 }
 
 /// Bytes of memory for merging the runs.
@@ -346,27 +355,39 @@ fn merge_bytes<R: Row>(runs: &[Run<R>]) -> u64 {
     (runs.len() * (FRAME * size_of::<R>() + FILE_BUFFER)) as u64
 }
 
-impl<R: Row> Persist for Sorted<R> {
-    fn save(&self, out: &mut Vec<u8>) {
-        self.runs.save(out);
-        let bytes: &[u8] = bytemuck::cast_slice(&self.buffer);
-        bytes.len().save(out);
-        out.extend_from_slice(bytes);
+/// Sorted rows on disk, by the names of their files.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(bound = "")]
+pub struct SortedRuns<R: Row> {
+    runs: Vec<String>,
+    #[serde(skip)]
+    rows: PhantomData<fn() -> R>,
+}
+
+impl<R: Row> SortedRuns<R> {
+    /// Opens the runs; the memory of a merge is reserved as `name`.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`].
+    pub fn open(&self, workspace: &Workspace, name: &'static str) -> Result<Sorted<R>> {
+        let files = workspace.files.clone();
+        let runs = self.runs.iter().map(|name| Run::reopen(&files, name));
+        let runs = runs.collect::<Result<Vec<_>>>()?;
+        Ok(Sorted {
+            buffer: Vec::new(),
+            held: Some(workspace.reserve(name, merge_bytes(&runs))?),
+            runs,
+            files,
+        })
     }
 
-    fn load(from: &mut Saved<'_>) -> Result<Self> {
-        let runs = Persist::load(from)?;
-        let length = usize::load(from)?;
-        let bytes = from.take(length)?;
-        if !length.is_multiple_of(size_of::<R>()) {
-            return Err(from.wrong("whole rows"));
-        }
-        let rows = bytes.chunks_exact(size_of::<R>());
-        Ok(Self {
-            runs,
-            buffer: rows.map(bytemuck::pod_read_unaligned).collect(),
-            held: None,
-        })
+    /// Deletes the files.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], [`crate::Error::Disk`].
+    pub fn release(&self, workspace: &Workspace) -> Result<()> {
+        let mut runs = self.runs.iter();
+        runs.try_for_each(|name| workspace.files.release(name))
     }
 }
 
@@ -383,13 +404,6 @@ impl<R: Row> Sorted<R> {
         }
     }
 
-    /// Attaches the reservation of the rows.
-    #[must_use]
-    pub fn holding(mut self, reserved: Reservation) -> Self {
-        self.held = Some(reserved);
-        self
-    }
-
     /// Reports usage to the reservation. The caller of [`Sorted::for_range`] reports the memory of that
     /// merge; all other usage is reported here.
     pub fn report_usage(&mut self, bytes: u64) {
@@ -398,7 +412,7 @@ impl<R: Row> Sorted<R> {
         }
     }
 
-    /// Calls `each` with every row in ascending order.
+    /// Calls `each` with every row in ascending order; then the rows are deleted.
     ///
     /// # Errors
     /// Errors of `each`, [`crate::Error::Io`], [`crate::Error::Corrupt`].
@@ -406,23 +420,37 @@ impl<R: Row> Sorted<R> {
         if self.runs.is_empty() {
             return self.buffer.into_iter().try_for_each(each);
         }
-        merge(&self.runs, None, None, &mut each)
+        merge(&self.runs, None, None, &mut each)?;
+        self.release()
     }
 
-    /// As [`Sorted::for_each`], beginning with the first row that is not below `from`.
+    /// The rows on disk, to be released later.
+    #[must_use]
+    pub fn runs(&self) -> SortedRuns<R> {
+        SortedRuns {
+            runs: self.runs.iter().map(Run::name).collect(),
+            rows: PhantomData,
+        }
+    }
+
+    /// Deletes the rows on disk.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], [`crate::Error::Disk`].
+    pub fn release(self) -> Result<()> {
+        let mut runs = self.runs.iter();
+        runs.try_for_each(|run| self.files.release(&run.name()))
+    }
+
+    /// Calls `each` with every row from the first one that is not below `from`; the rows stay.
     ///
     /// # Errors
     /// See [`Sorted::for_each`].
     pub fn for_each_from(
-        self,
+        &self,
         from: Option<R>,
         mut each: impl FnMut(R) -> Result<()>,
     ) -> Result<()> {
-        if self.runs.is_empty() {
-            let records = self.buffer.into_iter();
-            let wanted = |r: &R| from.is_none_or(|from| r.compare(&from) != Ordering::Less);
-            return records.filter(wanted).try_for_each(each);
-        }
         merge(&self.runs, from, None, &mut each)
     }
 

@@ -1,213 +1,221 @@
 //! A table: a file of numbered sections of rows.
 //!
-//! Sections may be written by several threads in any order; each is one contiguous range of the
-//! file with its own CRC-32, packed, and is read back whole.
+//! Sections may be written by several threads in any order; each is one contiguous range of the file with its
+//! own CRC-32, packed, and is read back whole.
 
 use super::Row;
 use super::pack::{pack, unpack};
 use crate::error::Result;
-use crate::workspace::Workspace;
 use crate::workspace::file::ScratchFile;
-use crate::workspace::memory::{bytes_of, hold};
-use crate::workspace::persist::{Persist, Saved};
+use crate::workspace::memory::bytes_of;
 use crate::workspace::place::Place;
+use crate::workspace::{Unit, Workspace};
+use serde::{Deserialize, Serialize};
 use std::marker::PhantomData;
-use std::sync::Mutex;
+use std::sync::Arc;
 
-/// Largest number of sections whose list of places is allocated without a reservation.
-const LARGE: usize = 1 << 20;
-
-/// Numbered sections of rows in one scratch file. The file is deleted on drop.
-#[derive(Debug)]
+/// Numbered sections of rows in one scratch file, by the name of the file.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(bound = "")]
 pub struct Table<R: Row> {
-    file: ScratchFile,
-    places: Mutex<Vec<Place>>,
-    rows: PhantomData<R>,
+    name: String,
+    count: usize,
+    /// True if it survives the attempt.
+    kept: bool,
+    #[serde(skip)]
+    rows: PhantomData<fn() -> R>,
 }
 
 impl<R: Row> Table<R> {
-    /// Creates the file `name` in the scratch folder, with `count` empty sections. While a section is written
-    /// or read, its packed bytes are in memory too, unless its rows are unpacked.
+    /// The table `name` of `count` sections, empty ones unless an earlier attempt wrote them. While a section
+    /// is written or read, its packed bytes are in memory too, unless its rows are unpacked.
+    #[must_use]
+    pub fn new(name: &str, count: usize) -> Self {
+        Self {
+            name: name.to_owned(),
+            count,
+            kept: true,
+            rows: PhantomData,
+        }
+    }
+
+    /// A table that does not survive the attempt.
+    #[must_use]
+    pub fn temporary(name: &str, count: usize) -> Self {
+        Self {
+            kept: false,
+            ..Self::new(name, count)
+        }
+    }
+
+    fn file(&self, workspace: &Workspace) -> Result<Arc<ScratchFile>> {
+        workspace.files.open(&self.name, self.kept)
+    }
+
+    /// Deletes the file.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Disk`].
-    pub fn create(workspace: &Workspace, name: &str, count: usize) -> Result<Self> {
-        let (file, known) = workspace.keep_file(name)?;
-        let count = known.iter().fold(count, |n, (s, _)| n.max(*s as usize + 1));
-        if count > LARGE {
-            // A number that exceeds the budget can only come from a damaged journal.
-            let bytes = (count as u64).saturating_mul(size_of::<Place>() as u64);
-            drop(workspace.reserve("table of sections", bytes)?);
-        }
-        let mut places = vec![Place::default(); count];
-        for (section, place) in known {
-            places[section as usize] = place;
-        }
-        Ok(Self {
-            file,
-            places: Mutex::new(places),
-            rows: PhantomData,
-        })
-    }
-
-    /// A table without sections that does not survive the attempt.
-    ///
-    /// # Errors
-    /// [`crate::Error::Io`], [`crate::Error::Disk`].
-    pub fn temporary(workspace: &Workspace, name: &str) -> Result<Self> {
-        Ok(Self {
-            file: workspace.create_file(name)?,
-            places: Mutex::default(),
-            rows: PhantomData,
-        })
-    }
-
-    fn places(&self) -> std::sync::MutexGuard<'_, Vec<Place>> {
-        self.places
-            .lock()
-            .unwrap_or_else(std::sync::PoisonError::into_inner)
+    pub fn release(&self, workspace: &Workspace) -> Result<()> {
+        workspace.files.release(&self.name)
     }
 
     /// Number of sections.
     #[must_use]
     pub fn count(&self) -> usize {
-        self.places().len()
-    }
-
-    /// True if the file was deleted by an earlier attempt at the run.
-    #[must_use]
-    pub fn is_gone(&self) -> bool {
-        self.file.is_gone()
+        self.count
     }
 
     /// Number of rows in a section.
     #[must_use]
-    pub fn rows(&self, section: usize) -> usize {
-        self.places()[section].records
+    pub fn rows(&self, workspace: &Workspace, section: usize) -> usize {
+        self.file(workspace)
+            .map_or(0, |file| file.section(section).records)
     }
 
     /// Number of rows in all sections.
     #[must_use]
-    pub fn total(&self) -> u64 {
-        self.places().iter().map(|p| p.records as u64).sum()
-    }
-
-    /// Adds an empty section; returns its number.
-    pub fn grow(&self) -> usize {
-        let mut places = self.places();
-        places.push(Place::default());
-        places.len() - 1
-    }
-
-    /// Writes a new section; returns its number.
-    ///
-    /// # Errors
-    /// [`crate::Error::Io`], [`crate::Error::Disk`].
-    pub fn append(&self, rows: &[R]) -> Result<usize> {
-        let section = self.grow();
-        self.put(section, rows)?;
-        Ok(section)
+    pub fn total(&self, workspace: &Workspace) -> u64 {
+        self.file(workspace).map_or(0, |file| file.records())
     }
 
     /// Writes a section; replaces its earlier content.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Disk`].
-    pub fn put(&self, section: usize, rows: &[R]) -> Result<()> {
+    pub fn put(&self, unit: &Unit<'_>, section: usize, rows: &[R]) -> Result<()> {
+        let place = self.append(unit, rows)?;
+        self.file(unit)?.put(unit, section as u32, place)
+    }
+
+    /// Writes rows that are no section; returns their place.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], [`crate::Error::Disk`].
+    pub fn append(&self, unit: &Unit<'_>, rows: &[R]) -> Result<Place> {
         let mut packed = Vec::new();
-        let bytes = if R::PACKING.is_some() {
-            pack(rows, &mut packed);
-            drop(hold(bytes_of(&packed)));
-            &packed
-        } else {
-            bytemuck::cast_slice(rows)
-        };
-        let place = Place {
-            offset: self.file.append(bytes)?,
-            bytes: bytes.len(),
-            records: rows.len(),
-            crc: crc32fast::hash(bytes),
-        };
-        self.places()[section] = place;
-        self.file.put(section as u32, place)
+        let bytes = packed_bytes(rows, &mut packed);
+        let in_memory = if R::PACKING.is_some() { bytes.len() } else { 0 };
+        let _held = unit.hold(in_memory as u64);
+        self.file(unit)?.append(unit.worker(), bytes, rows.len())
+    }
+
+    /// Writes a section that consists of parts which are read one by one; returns the place of each.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], [`crate::Error::Disk`].
+    pub fn put_parts(
+        &self,
+        unit: &Unit<'_>,
+        section: usize,
+        parts: &[Vec<R>],
+    ) -> Result<Vec<Place>> {
+        let (mut all, mut packed) = (Vec::new(), Vec::new());
+        let mut places = Vec::with_capacity(parts.len());
+        for rows in parts {
+            let bytes = packed_bytes(rows, &mut packed);
+            places.push(Place {
+                offset: all.len() as u64,
+                bytes: bytes.len(),
+                records: rows.len(),
+                crc: crc32fast::hash(bytes),
+                segment: 0,
+            });
+            all.extend_from_slice(bytes);
+        }
+        let _held = unit.hold(bytes_of(&all) + bytes_of(&packed));
+        let file = self.file(unit)?;
+        let records = parts.iter().map(Vec::len).sum();
+        let whole = file.append(unit.worker(), &all, records)?;
+        file.put(unit, section as u32, whole)?;
+        for place in &mut places {
+            place.segment = whole.segment;
+            place.offset += whole.offset;
+        }
+        Ok(places)
+    }
+
+    /// Reads the rows at `place` into `rows`, which is cleared first.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`]; [`crate::Error::Corrupt`] if the bytes do not match their checksum.
+    pub fn read(&self, unit: &Unit<'_>, place: Place, rows: &mut Vec<R>) -> Result<()> {
+        rows.clear();
+        let file = self.file(unit)?;
+        read_rows(&file, place, rows, |bytes| unit.hold(bytes))
     }
 
     /// Reads a section into `rows`, which is cleared first.
     ///
     /// # Errors
-    /// [`crate::Error::Io`]; [`crate::Error::Corrupt`] if the bytes do not match their checksum.
-    pub fn get_into(&self, section: usize, rows: &mut Vec<R>) -> Result<()> {
-        let place = self.places()[section];
-        rows.clear();
-        let mut bytes = Vec::new();
-        let packed = R::PACKING.map_or(0, |_| place.bytes);
-        // A size from a damaged journal must not abort the program, so the allocation may fail.
-        let room = bytes.try_reserve_exact(packed).is_ok()
-            && Self::fits(place)
-            && rows.try_reserve(place.records).is_ok();
-        if !room {
-            let found = format!("{} bytes", place.bytes);
-            let expected = format!("{} rows of {} words", place.records, R::WORDS);
-            return Err(self.file.damaged(place.offset, found, expected));
-        }
-        if R::PACKING.is_none() {
-            rows.resize(place.records, R::zeroed());
-            return self.read(place, bytemuck::cast_slice_mut(rows));
-        }
-        bytes.resize(place.bytes, 0);
-        let _held = hold(bytes_of(&bytes));
-        self.read(place, &mut bytes)?;
-        rows.resize(place.records, R::zeroed());
-        unpack(&bytes, rows).ok_or_else(|| {
-            let found = format!("{} bytes that do not unpack", place.bytes);
-            let expected = format!("{} rows", place.records);
-            self.file.damaged(place.offset, found, expected)
-        })
-    }
-
-    /// True if the number of rows is possible for the number of bytes.
-    fn fits(place: Place) -> bool {
-        if R::PACKING.is_some() {
-            // Packed, a word takes at least the two bits of its length.
-            place.records.saturating_mul(R::WORDS).div_ceil(4) <= place.bytes
-        } else {
-            place.records.checked_mul(size_of::<R>()) == Some(place.bytes)
-        }
-    }
-
-    fn read(&self, place: Place, bytes: &mut [u8]) -> Result<()> {
-        if bytes.is_empty() {
-            return Ok(());
-        }
-        self.file.read_at(bytes, place.offset)?;
-        let crc = crc32fast::hash(bytes);
-        if crc == place.crc {
-            return Ok(());
-        }
-        let (found, expected) = (format!("checksum {crc:08x}"), format!("{:08x}", place.crc));
-        Err(self.file.damaged(place.offset, found, expected))
+    /// See [`Table::read`].
+    pub fn get_into(&self, unit: &Unit<'_>, section: usize, rows: &mut Vec<R>) -> Result<()> {
+        let place = self.file(unit)?.section(section);
+        self.read(unit, place, rows)
     }
 
     /// Reads a section.
     ///
     /// # Errors
-    /// See [`Table::get_into`].
-    pub fn get(&self, section: usize) -> Result<Vec<R>> {
+    /// See [`Table::read`].
+    pub fn get(&self, unit: &Unit<'_>, section: usize) -> Result<Vec<R>> {
         let mut rows = Vec::new();
-        self.get_into(section, &mut rows)?;
+        self.get_into(unit, section, &mut rows)?;
         Ok(rows)
     }
 }
 
-impl<R: Row> Persist for Table<R> {
-    fn save(&self, out: &mut Vec<u8>) {
-        self.file.name.to_string().save(out);
-        self.count().save(out);
+/// The rows as they are stored; `packed` is memory for them.
+pub(super) fn packed_bytes<'a, R: Row>(rows: &'a [R], packed: &'a mut Vec<u8>) -> &'a [u8] {
+    if R::PACKING.is_none() {
+        return bytemuck::cast_slice(rows);
     }
+    packed.clear();
+    pack(rows, packed);
+    packed
+}
 
-    fn load(from: &mut Saved<'_>) -> Result<Self> {
-        let (name, count) = (String::load(from)?, usize::load(from)?);
-        Self::create(from.workspace, &name, count)
+/// Appends the rows at `place` of a file; `hold` is called with the bytes of memory that this takes besides.
+pub(super) fn read_rows<R: Row, H>(
+    file: &ScratchFile,
+    place: Place,
+    rows: &mut Vec<R>,
+    hold: impl FnOnce(u64) -> H,
+) -> Result<()> {
+    let mut bytes = Vec::new();
+    let packed = R::PACKING.map_or(0, |_| place.bytes);
+    // A size from a damaged journal must not abort the program, so the allocation may fail.
+    let room = bytes.try_reserve_exact(packed).is_ok()
+        && fits::<R>(place)
+        && rows.try_reserve(place.records).is_ok();
+    if !room {
+        let found = format!("{} bytes", place.bytes);
+        let expected = format!("{} rows of {} words", place.records, R::WORDS);
+        return Err(file.damaged(place.segment, place.offset, found, expected));
+    }
+    let before = rows.len();
+    rows.resize(before + place.records, R::zeroed());
+    let rows = &mut rows[before..];
+    if R::PACKING.is_none() {
+        return file.read_part(place, bytemuck::cast_slice_mut(rows));
+    }
+    bytes.resize(place.bytes, 0);
+    let _held = hold(bytes_of(&bytes));
+    file.read_part(place, &mut bytes)?;
+    unpack(&bytes, rows).ok_or_else(|| {
+        let found = format!("{} bytes that do not unpack", place.bytes);
+        let expected = format!("{} rows", place.records);
+        file.damaged(place.segment, place.offset, found, expected)
+    })
+}
+
+/// True if the number of rows is possible for the number of bytes.
+fn fits<R: Row>(place: Place) -> bool {
+    if R::PACKING.is_some() {
+        // Packed, a word takes at least the two bits of its length.
+        place.records.saturating_mul(R::WORDS).div_ceil(4) <= place.bytes
+    } else {
+        place.records.checked_mul(size_of::<R>()) == Some(place.bytes)
     }
 }
 
@@ -230,49 +238,70 @@ mod tests {
     }
 
     fn damage<R: Row>(workspace: &Workspace) {
-        let table = Table::<R>::create(workspace, "table", 2).unwrap();
+        let unit = workspace.unit();
+        let table = Table::<R>::new("table", 2);
         let words: Vec<_> = (0..3000u32).map(|i| [i, i * i]).collect();
         let rows: &[R] = bytemuck::cast_slice(&words);
-        table.put(1, rows).unwrap();
-        assert_eq!(table.get(1).unwrap(), rows);
-        assert!(table.get(0).unwrap().is_empty());
-        let mut bytes = std::fs::read(&table.file.path).unwrap();
+        table.put(&unit, 1, rows).unwrap();
+        assert_eq!(table.get(&unit, 1).unwrap(), rows);
+        assert!(table.get(&unit, 0).unwrap().is_empty());
+        let file = table.file(workspace).unwrap().path(unit.worker() as u32);
+        let mut bytes = std::fs::read(&file).unwrap();
         for at in (0..bytes.len()).step_by(997) {
             bytes[at] ^= 16;
-            std::fs::write(&table.file.path, &bytes).unwrap();
-            match table.get(1) {
-                Err(Error::Corrupt { path, .. }) => assert_eq!(path, table.file.path),
+            std::fs::write(&file, &bytes).unwrap();
+            match table.get(&unit, 1) {
+                Err(Error::Corrupt { path, .. }) => assert_eq!(path, file),
                 other => panic!("{other:?}"),
             }
             bytes[at] ^= 16;
         }
     }
 
+    #[test]
+    fn parts_of_a_section_are_read_one_by_one() {
+        let workspace = Workspace::for_tests(1);
+        let unit = workspace.unit();
+        let table = Table::<[u32; 2]>::new("table", 2);
+        let parts: Vec<Vec<_>> = (0..5u32).map(|n| vec![[n, 7]; 300 * n as usize]).collect();
+        table.put(&unit, 0, &[[1, 2]]).unwrap();
+        let places = table.put_parts(&unit, 1, &parts).unwrap();
+        let mut rows = Vec::new();
+        for (place, part) in places.iter().zip(&parts) {
+            table.read(&unit, *place, &mut rows).unwrap();
+            assert_eq!(rows, *part);
+        }
+        assert_eq!(table.rows(&workspace, 1), 3000);
+    }
+
     /// Found by fuzzing a journal with valid checksums and invalid content.
     #[test]
     fn places_that_cannot_be_ask_for_no_memory() {
-        let workspace = Workspace::for_tests(2);
-        bad_places::<[u32; 2]>(&workspace);
+        bad_places::<[u32; 2]>(&Workspace::for_tests(2));
         bad_places::<Plain>(&Workspace::for_tests(2));
-        let mut saved = Vec::new();
-        String::from("table").save(&mut saved);
-        (1usize << 58).save(&mut saved);
-        let loaded = Table::<Plain>::load(&mut Saved::new(&saved, &workspace));
-        assert!(matches!(loaded, Err(Error::Memory { .. })));
     }
 
     fn bad_places<R: Row>(workspace: &Workspace) {
-        let table = Table::<R>::create(workspace, "table", 1).unwrap();
-        table.put(0, bytemuck::cast_slice(&[[1, 2]; 100])).unwrap();
-        for rows in [101 * 8, usize::MAX / 16, usize::MAX] {
-            table.places()[0].records = rows;
-            let error = table.get(0).unwrap_err();
+        let unit = workspace.unit();
+        let table = Table::<R>::new("table", 1);
+        table
+            .put(&unit, 0, bytemuck::cast_slice(&[[1, 2]; 100]))
+            .unwrap();
+        let place = table.file(workspace).unwrap().section(0);
+        let mut rows = Vec::new();
+        let mut refused = |place| {
+            let error = table.read(&unit, place, &mut rows).unwrap_err();
             assert!(matches!(error, Error::Corrupt { .. }), "{error}");
+        };
+        for records in [101 * 8, usize::MAX / 16, usize::MAX] {
+            refused(Place { records, ..place });
         }
         // More rows than the bytes can hold, and than any memory can.
-        table.places()[0].records = 1 << 57;
-        table.places()[0].bytes = 8 << 57;
-        let error = table.get(0).unwrap_err();
-        assert!(matches!(error, Error::Corrupt { .. }), "{error}");
+        let (records, bytes) = (1 << 57, 8 << 57);
+        refused(Place {
+            records,
+            bytes,
+            ..place
+        });
     }
 }

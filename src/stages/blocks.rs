@@ -1,15 +1,14 @@
 //! Blocks: the fixed id ranges by which the mesh is computed.
 
+use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
 /// Division of the ids `0..points` into blocks of `size`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Blocks {
     points: u32,
     size: u32,
 }
-
-crate::workspace::persist::persist!(Blocks { points, size });
 
 impl Blocks {
     /// Divides `points` points into blocks of `size` ids.

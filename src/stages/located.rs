@@ -7,7 +7,7 @@ use super::spacing::Density;
 use crate::error::Result;
 use crate::geom::Point;
 use crate::geom::triangle::on_a_line;
-use crate::workspace::memory::{Holding, bytes_of, hold, table_bytes};
+use crate::workspace::memory::{bytes_of, table_bytes};
 use rustc_hash::FxHashMap;
 use std::ops::Range;
 
@@ -60,7 +60,6 @@ pub struct Located {
     ids: Range<u32>,
     own: Vec<Point>,
     foreign: FxHashMap<u32, Point>,
-    held: Holding,
 }
 
 impl Located {
@@ -79,7 +78,6 @@ impl Located {
             own: store.slice(ids.start as usize..ids.end as usize)?,
             ids,
             foreign: FxHashMap::default(),
-            held: Holding::default(),
         };
         located.add(store, vertices)?;
         Ok(located)
@@ -92,7 +90,6 @@ impl Located {
             ids: 0..points.len() as u32,
             own: points.to_vec(),
             foreign: FxHashMap::default(),
-            held: Holding::default(),
         }
     }
 
@@ -104,15 +101,18 @@ impl Located {
         let count = self.ids.len() as u32;
         let is_far = |v: &u32| v.wrapping_sub(self.ids.start) >= count;
         let mut far: Vec<u32> = vertices.filter(is_far).collect();
-        let _far = hold(bytes_of(&far));
         far.sort_unstable();
         far.dedup();
         let mut points = Vec::with_capacity(far.len());
         store.fetch(&far, &mut points)?;
         self.foreign.extend(far.into_iter().zip(points));
-        self.held
-            .set(bytes_of(&self.own) + table_bytes(&self.foreign));
         Ok(())
+    }
+
+    /// Allocated bytes.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        bytes_of(&self.own) + table_bytes(&self.foreign)
     }
 
     /// The position of a vertex that was loaded.

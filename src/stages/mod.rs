@@ -1,5 +1,17 @@
 //! The stages of a reconstruction, one folder each, in the order of the data flow.
 
+/// Implements `add` for counts: each of the named fields is added.
+macro_rules! adds {
+    ($name:ty: $($field:ident),*) => {
+        impl $name {
+            /// Adds other counts.
+            pub(super) fn add(&mut self, more: &Self) {
+                $(self.$field += more.$field;)*
+            }
+        }
+    };
+}
+
 pub mod ingest;
 pub mod order;
 

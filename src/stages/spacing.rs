@@ -5,8 +5,9 @@ use crate::geom::Point;
 use crate::geom::distance2;
 use crate::geom::triangle::area;
 use crate::method::METHOD;
+use crate::workspace::Workspace;
 use crate::workspace::memory::Reservation;
-use crate::workspace::persist::{Persist, Saved};
+use serde::{Deserialize, Serialize};
 
 /// A limit of length.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,9 +43,15 @@ pub struct Limits {
 
 /// For each patch, the squared distance that the `k` nearest neighbours of a point usually reach (the usual
 /// reach).
+#[derive(Debug, Serialize, Deserialize)]
+pub struct StoredSpacings {
+    usual2: Vec<u64>,
+}
+
+/// [`StoredSpacings`] with a reservation of memory.
 #[derive(Debug)]
 pub struct Spacings {
-    usual2: Vec<u64>,
+    stored: StoredSpacings,
     _held: Reservation,
 }
 
@@ -73,20 +80,32 @@ pub fn spacing2(last2: u64, neighbors: usize) -> f64 {
     std::f64::consts::PI * last2 as f64 / neighbors as f64
 }
 
-impl Spacings {
+impl StoredSpacings {
     /// From the measured values.
     #[must_use]
-    pub fn new(usual2: Vec<u64>, held: Reservation) -> Self {
-        Self {
-            usual2,
-            _held: held,
-        }
+    pub fn new(usual2: Vec<u64>) -> Self {
+        Self { usual2 }
     }
 
-    /// Bytes for a number of points.
-    #[must_use]
-    pub fn bytes(points: usize) -> u64 {
-        8 * points.div_ceil(METHOD.curve.patch) as u64
+    /// Reserves memory for a number of points.
+    ///
+    /// # Errors
+    /// [`crate::Error::Memory`].
+    pub fn reserve(points: usize, workspace: &Workspace) -> Result<Reservation> {
+        let bytes = 8 * points.div_ceil(METHOD.curve.patch) as u64;
+        workspace.reserve("patch spacings", bytes)
+    }
+
+    /// The spacings with a reservation of their memory.
+    ///
+    /// # Errors
+    /// [`crate::Error::Memory`].
+    pub fn open(self, workspace: &Workspace) -> Result<Spacings> {
+        let held = workspace.reserve("patch spacings", 8 * self.usual2.len() as u64)?;
+        Ok(Spacings {
+            stored: self,
+            _held: held,
+        })
     }
 
     /// The squared distance that the nearest neighbours of a point usually reach.
@@ -94,6 +113,15 @@ impl Spacings {
     #[inline(always)]
     pub fn usual2(&self, id: u32) -> u64 {
         self.usual2[id as usize / METHOD.curve.patch]
+    }
+}
+
+impl Spacings {
+    /// See [`StoredSpacings::usual2`].
+    #[must_use]
+    #[inline(always)]
+    pub fn usual2(&self, id: u32) -> u64 {
+        self.stored.usual2(id)
     }
 }
 
@@ -159,19 +187,6 @@ impl Density<'_> {
     }
 }
 
-impl Persist for Spacings {
-    fn save(&self, out: &mut Vec<u8>) {
-        self.usual2.save(out);
-    }
-
-    fn load(from: &mut Saved<'_>) -> Result<Self> {
-        let usual2: Vec<u64> = Persist::load(from)?;
-        let bytes = 8 * usual2.len() as u64;
-        let held = from.workspace.reserve("patch spacings", bytes)?;
-        Ok(Self::new(usual2, held))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -179,9 +194,8 @@ mod tests {
     use proptest::prelude::*;
 
     fn spacings(usual2: Vec<u64>) -> Spacings {
-        let workspace = crate::workspace::Workspace::for_tests(1);
-        let held = workspace.reserve("patch spacings", 0).unwrap();
-        Spacings::new(usual2, held)
+        let workspace = Workspace::for_tests(1);
+        StoredSpacings::new(usual2).open(&workspace).unwrap()
     }
 
     proptest! {

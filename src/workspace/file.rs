@@ -1,26 +1,41 @@
 //! Files of the scratch folder: private, never opened through a symbolic link; all bytes are counted.
+//!
+//! A file consists of segments `NAME.0`, `NAME.1` …, each written by one thread of one attempt at the run.
+//! Its numbered sections are contiguous parts of segments.
 
-use super::IoCounters;
 use super::fault;
-use super::open::{failed_write, options};
+use super::keeper::Leaving;
+use super::memory::{MemoryPool, Reservation};
+use super::open::{failed_write, open_existing, options};
 use super::place::{Place, Put};
 use super::run::ResumableRun;
+use super::{IoCounters, Unit, lock};
 use crate::error::{Error, Result};
 use std::fs::File;
 use std::os::unix::fs::FileExt;
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
+
+/// Bytes of memory for a section.
+const SECTION: u64 = size_of::<Place>() as u64;
+
+/// Lists of up to this number of sections are not reserved by name.
+const FEW: usize = 1024;
 
 /// State shared by the files of a workspace.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Shared {
+    /// Path of the scratch folder.
+    pub folder: PathBuf,
     /// Bytes moved.
     pub io: Arc<IoCounters>,
     /// The run, if it can be resumed.
-    pub run: Option<Arc<ResumableRun>>,
+    pub run: Option<ResumableRun>,
     /// Expected peak of scratch bytes.
     pub expected: AtomicU64,
+    /// The budget, from which the lists of sections are reserved.
+    pub memory: MemoryPool,
 }
 
 impl Shared {
@@ -31,225 +46,300 @@ impl Shared {
     }
 }
 
+/// A part of a scratch file that one thread writes.
 #[derive(Debug)]
-enum Handle {
-    Open(Arc<File>),
-    /// Closed after writing: a large number of files then needs no handles.
-    Closed,
-    /// Deleted already; it will not be read.
-    Gone,
+struct Segment {
+    name: Arc<str>,
+    path: PathBuf,
+    /// The handle; closed segments are opened again by their readers.
+    file: Mutex<Option<Arc<File>>>,
+    /// End of the bytes allocated so far.
+    end: AtomicU64,
+    /// Set by writing, reset by syncing.
+    dirty: Arc<AtomicBool>,
 }
 
-/// Creates scratch files.
-#[derive(Debug, Clone)]
-pub struct Maker {
-    pub(super) folder: PathBuf,
-    pub(super) shared: Arc<Shared>,
-}
-
-impl Maker {
-    /// Creates the scratch file `name`; `kept` if a resumed run needs it.
-    ///
-    /// # Errors
-    /// [`Error::Io`], [`Error::Disk`].
-    pub fn make(&self, name: &str, kept: bool) -> Result<ScratchFile> {
-        let path = self.folder.join(name);
-        if self.shared.run.is_some() {
-            // A file of an earlier attempt that was killed before it noted the file.
-            let _ = std::fs::remove_file(&path);
-        }
-        let file = options().create_new(true).open(&path);
-        let file = file.map_err(|e| Error::io(&path, "create", e))?;
-        let file = ScratchFile::new(name, path, Some(file), kept, self.shared.clone());
-        if let (Some(run), true) = (&self.shared.run, kept) {
-            run.keeper.made(&file.name);
-        }
-        Ok(file)
-    }
-}
-
-/// A scratch file. It is deleted when it is dropped: at once, or, in a run that can be resumed, when the next
-/// step has begun.
+/// A scratch file. It exists until it is released.
 #[derive(Debug)]
 pub struct ScratchFile {
     /// Name in the folder.
-    pub name: Arc<str>,
-    /// Path of the file.
-    pub path: PathBuf,
-    handle: Handle,
-    /// Set by writing, reset by syncing.
-    dirty: Arc<AtomicBool>,
-    /// End of the bytes allocated so far.
-    end: AtomicU64,
+    pub name: String,
     /// True if a resumed run needs the file.
     kept: bool,
+    /// True if an earlier attempt deleted it.
+    gone: bool,
     shared: Arc<Shared>,
+    segments: Mutex<Vec<(u32, Arc<Segment>)>>,
+    sections: Mutex<Vec<Place>>,
+    reserved: Mutex<Reservation>,
 }
 
 impl ScratchFile {
-    pub(super) fn new(
-        name: &str,
-        path: PathBuf,
-        file: Option<File>,
-        kept: bool,
-        shared: Arc<Shared>,
-    ) -> Self {
-        let handle = file.map_or(Handle::Gone, |file| Handle::Open(Arc::new(file)));
-        let name: Arc<str> = name.into();
-        if let (Some(run), true, Handle::Open(_)) = (&shared.run, kept, &handle) {
-            run.hold(&name);
-        }
-        Self {
-            name,
-            path,
-            handle,
-            dirty: Arc::default(),
-            end: AtomicU64::new(0),
+    pub(super) fn open(name: &str, kept: bool, shared: &Arc<Shared>) -> Result<Self> {
+        let run = shared.run.as_ref().filter(|_| kept);
+        let file = Self {
+            name: name.to_owned(),
             kept,
-            shared,
+            gone: run.is_some_and(|run| run.is_deleted(name)),
+            shared: shared.clone(),
+            segments: Mutex::default(),
+            sections: Mutex::default(),
+            reserved: Mutex::new(shared.memory.promise("sections", 0)?),
+        };
+        for (section, place) in run.map(|run| run.places(name)).unwrap_or_default() {
+            file.set(section, place)?;
+            if !file.gone {
+                let segment = file.segment(place.segment);
+                let end = place.end().unwrap_or(0);
+                let before = segment.end.fetch_max(end, Ordering::Relaxed);
+                shared.io.grow_scratch(end.saturating_sub(before));
+            }
         }
+        Ok(file)
     }
 
-    /// Notes the part `section` in the journal, if a resumed run may need it.
-    ///
-    /// # Errors
-    /// [`Error::Io`], [`Error::Disk`].
-    pub fn put(&self, section: u32, place: Place) -> Result<()> {
+    /// The segment with this number.
+    fn segment(&self, number: u32) -> Arc<Segment> {
+        let mut segments = lock(&self.segments);
+        if let Some((_, segment)) = segments.iter().find(|(n, _)| *n == number) {
+            return segment.clone();
+        }
+        let name = format!("{}.{number}", self.name);
+        let segment = Arc::new(Segment {
+            path: self.shared.folder.join(&name),
+            name: name.into(),
+            file: Mutex::new(None),
+            end: AtomicU64::new(0),
+            dirty: Arc::default(),
+        });
+        segments.push((number, segment.clone()));
+        segment
+    }
+
+    fn segments(&self) -> Vec<Arc<Segment>> {
+        let segments = lock(&self.segments);
+        segments
+            .iter()
+            .map(|(_, segment)| segment.clone())
+            .collect()
+    }
+
+    /// Path of a segment.
+    #[must_use]
+    pub fn path(&self, segment: u32) -> PathBuf {
+        self.segment(segment).path.clone()
+    }
+
+    /// Deletes the file; a later attempt does not need it any more.
+    pub(super) fn delete(&self) -> Result<()> {
+        if self.gone {
+            return Ok(());
+        }
+        let leaving = self.segments().into_iter().map(|segment| Leaving {
+            name: segment.name.clone(),
+            path: segment.path.clone(),
+            bytes: segment.end.load(Ordering::Relaxed),
+        });
         match &self.shared.run {
-            Some(run) if self.kept => run.put(Put {
-                file: self.name.clone(),
-                section,
-                place,
-            }),
-            _ => Ok(()),
+            Some(run) if self.kept => run.delete(&self.name, leaving.collect()),
+            _ => {
+                leaving.for_each(|file| file.delete(&self.shared.io));
+                Ok(())
+            }
         }
     }
 
     /// True if a resumed run needs the file.
     #[must_use]
     pub fn is_kept(&self) -> bool {
-        self.kept
+        self.kept && self.shared.run.is_some()
     }
 
-    /// True if the file is deleted already.
+    /// True if an earlier attempt deleted the file.
     #[must_use]
     pub fn is_gone(&self) -> bool {
-        matches!(self.handle, Handle::Gone)
+        self.gone
     }
 
-    /// Closes the handle; later reads open the file by its path.
-    pub fn close(&mut self) {
-        if !self.is_gone() {
-            self.handle = Handle::Closed;
-        }
-    }
-
-    /// End of the bytes allocated so far.
+    /// Number of sections.
     #[must_use]
-    pub fn end(&self) -> u64 {
-        self.end.load(Ordering::Relaxed)
+    pub fn count(&self) -> usize {
+        lock(&self.sections).len()
     }
 
-    /// Reserves the bytes up to `end`, which an earlier attempt wrote.
-    pub(crate) fn reach(&self, end: u64) {
-        let before = self.end.fetch_max(end, Ordering::Relaxed);
-        if !self.is_gone() {
-            self.shared.io.grow_scratch(end.saturating_sub(before));
-        }
+    /// The place of a section; an empty one if it was not written.
+    #[must_use]
+    pub fn section(&self, section: usize) -> Place {
+        let sections = lock(&self.sections);
+        sections.get(section).copied().unwrap_or_default()
     }
 
-    /// Writes at the end; returns the offset.
+    /// Rows in all sections.
+    #[must_use]
+    pub fn records(&self) -> u64 {
+        let sections = lock(&self.sections);
+        sections.iter().map(|place| place.records as u64).sum()
+    }
+
+    /// Sets the place of a section.
     ///
     /// # Errors
-    /// See [`ScratchFile::write_at`].
-    pub fn append(&self, bytes: &[u8]) -> Result<u64> {
-        let offset = self.end.fetch_add(bytes.len() as u64, Ordering::Relaxed);
-        self.shared.io.grow_scratch(bytes.len() as u64);
-        self.write_counted(bytes, offset)?;
-        Ok(offset)
-    }
-
-    /// Writes at `offset`.
-    ///
-    /// # Errors
-    /// [`Error::Io`]; [`Error::Disk`] if the disk is full.
-    pub fn write_at(&self, bytes: &[u8], offset: u64) -> Result<()> {
-        self.reach(offset + bytes.len() as u64);
-        self.write_counted(bytes, offset)
-    }
-
-    fn write_counted(&self, bytes: &[u8], offset: u64) -> Result<()> {
-        // A step whose result is in the journal writes no file.
-        let Handle::Open(file) = &self.handle else {
-            return Ok(());
-        };
-        if bytes.is_empty() {
-            return Ok(());
+    /// [`Error::Memory`] if there is no room for the list of sections.
+    pub(crate) fn set(&self, section: u32, place: Place) -> Result<()> {
+        let mut sections = lock(&self.sections);
+        if section as usize >= sections.len() {
+            let count = (section as usize + 1).next_power_of_two();
+            if count > sections.capacity() {
+                // A number from a damaged journal must not decide how much memory is allocated.
+                if count > FEW {
+                    lock(&self.reserved).at_least(count as u64 * SECTION)?;
+                }
+                let more = count - sections.len();
+                sections.reserve_exact(more);
+            }
+            sections.resize(section as usize + 1, Place::default());
+            if sections.len() > FEW {
+                lock(&self.reserved).set_held(sections.len() as u64 * SECTION);
+            }
         }
-        fault::write()
-            .and_then(|()| file.write_all_at(bytes, offset))
-            .map_err(|e| failed_write(&self.path, bytes.len(), self.shared.more(), e))?;
-        self.shared.io.add_written(bytes.len() as u64);
-        if let Some(run) = &self.shared.run
-            && self.kept
-            && !self.dirty.swap(true, Ordering::Relaxed)
-        {
-            run.keeper.sync_later(&self.name, file, &self.dirty);
-        }
+        sections[section as usize] = place;
         Ok(())
     }
 
-    /// Fills `bytes` from `offset`.
+    /// Records that a unit wrote the section `section`.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Corrupt`] if the file is too short.
-    pub fn read_at(&self, bytes: &mut [u8], offset: u64) -> Result<()> {
-        let wanted = bytes.len();
-        let read = match &self.handle {
-            Handle::Open(file) => file.read_exact_at(bytes, offset),
-            Handle::Closed | Handle::Gone => Err(std::io::ErrorKind::UnexpectedEof.into()),
+    /// [`Error::Memory`].
+    pub fn put(&self, unit: &Unit<'_>, section: u32, place: Place) -> Result<()> {
+        if self.kept && !self.gone {
+            let file = self.name.clone();
+            unit.note(Put {
+                file,
+                section,
+                place,
+            });
+        }
+        self.set(section, place)
+    }
+
+    /// Closes the handles; later reads open the file by its path.
+    pub fn close(&self) {
+        for segment in self.segments() {
+            *lock(&segment.file) = None;
+        }
+    }
+
+    /// Writes `bytes` with `records` rows to the segment of thread `worker`.
+    ///
+    /// # Errors
+    /// [`Error::Io`]; [`Error::Disk`] if the disk is full.
+    pub fn append(&self, worker: usize, bytes: &[u8], records: usize) -> Result<Place> {
+        let mut place = Place {
+            segment: self.shared.run.as_ref().map_or(0, ResumableRun::first) + worker as u32,
+            offset: 0,
+            bytes: bytes.len(),
+            records,
+            crc: crc32fast::hash(bytes),
         };
-        read.map_err(|e| {
-            if e.kind() == std::io::ErrorKind::UnexpectedEof {
+        // A step that is done again may write to a file that is not needed any more.
+        if self.gone || bytes.is_empty() {
+            return Ok(place);
+        }
+        let segment = self.segment(place.segment);
+        let file = self.created(&segment)?;
+        let length = bytes.len() as u64;
+        place.offset = segment.end.fetch_add(length, Ordering::Relaxed);
+        self.shared.io.grow_scratch(length);
+        fault::write()
+            .and_then(|()| file.write_all_at(bytes, place.offset))
+            .map_err(|e| failed_write(&segment.path, bytes.len(), self.shared.more(), e))?;
+        self.shared.io.add_written(length);
+        if let Some(run) = &self.shared.run
+            && self.kept
+            && !segment.dirty.swap(true, Ordering::Relaxed)
+        {
+            run.keeper.sync_later(&segment.name, &file, &segment.dirty);
+        }
+        Ok(place)
+    }
+
+    /// The handle of a segment of this attempt.
+    fn created(&self, segment: &Segment) -> Result<Arc<File>> {
+        let mut handle = lock(&segment.file);
+        if let Some(file) = &*handle {
+            return Ok(file.clone());
+        }
+        let file = options().create_new(true).open(&segment.path);
+        let file = Arc::new(file.map_err(|e| Error::io(&segment.path, "create", e))?);
+        *handle = Some(file.clone());
+        if let (Some(run), true) = (&self.shared.run, self.kept) {
+            run.keeper.made(&segment.name);
+        }
+        Ok(file)
+    }
+
+    /// Fills `bytes` from `offset` of a segment.
+    ///
+    /// # Errors
+    /// [`Error::Io`]; [`Error::Corrupt`] if the segment is too short.
+    pub fn read(&self, segment: u32, offset: u64, bytes: &mut [u8]) -> Result<()> {
+        let wanted = bytes.len();
+        if wanted == 0 {
+            return Ok(());
+        }
+        let of = self.segment(segment);
+        let read = self
+            .opened(&of)
+            .and_then(|f| f.read_exact_at(bytes, offset));
+        read.map_err(|e| match e.kind() {
+            std::io::ErrorKind::UnexpectedEof | std::io::ErrorKind::NotFound => {
                 let found = "the end of the file".to_owned();
-                return self.damaged(offset, found, format!("{wanted} bytes"));
+                self.damaged(segment, offset, found, format!("{wanted} bytes"))
             }
-            Error::io(&self.path, format!("read {wanted} bytes"), e)
+            _ => Error::io(&of.path, format!("read {wanted} bytes"), e),
         })?;
         self.shared.io.add_read(wanted as u64);
         Ok(())
     }
 
-    /// Counts bytes that were read without [`ScratchFile::read_at`].
+    /// The handle of an existing segment.
+    fn opened(&self, segment: &Segment) -> std::io::Result<Arc<File>> {
+        let mut handle = lock(&segment.file);
+        if let Some(file) = &*handle {
+            return Ok(file.clone());
+        }
+        let file = Arc::new(open_existing(&segment.path)?);
+        *handle = Some(file.clone());
+        Ok(file)
+    }
+
+    /// Fills `bytes` with the part at `place`.
+    ///
+    /// # Errors
+    /// [`Error::Io`]; [`Error::Corrupt`] if the bytes do not match their checksum.
+    pub fn read_part(&self, place: Place, bytes: &mut [u8]) -> Result<()> {
+        self.read(place.segment, place.offset, bytes)?;
+        let crc = crc32fast::hash(bytes);
+        if crc == place.crc || bytes.is_empty() {
+            return Ok(());
+        }
+        let (found, expected) = (format!("checksum {crc:08x}"), format!("{:08x}", place.crc));
+        Err(self.damaged(place.segment, place.offset, found, expected))
+    }
+
+    /// Counts bytes that were read without [`ScratchFile::read`].
     pub fn count_read(&self, bytes: u64) {
         self.shared.io.add_read(bytes);
     }
 
     /// The error for content that differs from what was written.
     #[must_use]
-    pub fn damaged(&self, offset: u64, found: String, expected: String) -> Error {
+    pub fn damaged(&self, segment: u32, offset: u64, found: String, expected: String) -> Error {
         Error::Corrupt {
-            path: self.path.clone(),
+            path: self.path(segment),
             offset,
             found,
             expected,
-        }
-    }
-}
-
-impl Drop for ScratchFile {
-    fn drop(&mut self) {
-        match (&self.shared.run, self.kept) {
-            (Some(run), true) => {
-                if !self.is_gone() && !run.drop_later(&self.name, self.end()) {
-                    self.shared.io.shrink_scratch(self.end());
-                }
-            }
-            _ => {
-                self.shared.io.shrink_scratch(self.end());
-                // A scratch file that cannot be deleted is deleted with its folder.
-                let _ = std::fs::remove_file(&self.path);
-            }
         }
     }
 }

@@ -2,8 +2,10 @@
 
 use super::IoCounters;
 use super::fault::{self, Event};
-use super::journal::{self, Entry, Journal, Record};
+use super::history::History;
+use super::journal::{self, Journal, Record};
 use super::keeper::Keeper;
+use super::memory::MemoryPool;
 use super::open::{failed_write, open_existing, options};
 use super::progress::{Cancel, Observer};
 use super::recover::{Whereabouts, recover};
@@ -34,9 +36,8 @@ pub struct Folder {
     /// The temporary path of the output, and its final path.
     pub output: [PathBuf; 2],
     lock: File,
-    entries: Vec<Entry>,
-    /// End of the last whole record of the journal; none without a journal.
-    end: Option<u64>,
+    /// True if there is a journal with the manifest.
+    begun: bool,
     /// Warnings about the state of the folder.
     warnings: Vec<String>,
     /// True if the manifest must be written again.
@@ -86,41 +87,41 @@ impl Folder {
         if names.is_empty() {
             return Ok(Found::Nothing);
         }
-        if !names.iter().any(|name| OURS.contains(&name.as_str())) {
+        if !names.iter().any(|name| is_ours(name)) {
             return Err(not_resumable(path, "it is not a scratch folder of outcrop"));
         }
-        let lock = lock(path)?;
-        let folder = Self {
+        Self::locked(path, Vec::new())?.read()
+    }
+
+    /// Locks the folder `path`.
+    fn locked(path: &Path, manifest: Vec<u8>) -> Result<Self> {
+        Ok(Self {
+            lock: lock(path)?,
             path: path.to_path_buf(),
-            manifest: Vec::new(),
+            manifest,
             output: Default::default(),
-            lock,
-            entries: Vec::new(),
-            end: None,
+            begun: false,
             warnings: Vec::new(),
             rewrite: false,
-        };
-        folder.read()
+        })
     }
 
     fn read(mut self) -> Result<Found> {
-        let path = self.path.join(journal::NAME);
-        let read = open_existing(&path).map(|file| journal::read(&path, &file));
-        if let Ok(Some((entries, end))) = read.unwrap_or(Ok(None)) {
-            self.entries = entries;
-            self.end = Some(end);
-        }
-        let in_journal = match self.entries.first().map(|e| &e.record) {
-            Some(Record::Manifest(bytes)) => Some(bytes.clone()),
-            _ => None,
-        };
+        let mut in_journal = None;
+        let _ = journal::read(&self.path, None, |entry| {
+            if let Record::Manifest(bytes) = entry.record {
+                in_journal = Some(bytes.clone());
+            }
+            false
+        });
+        self.begun = in_journal.is_some();
         let path = self.path.join(MANIFEST);
         let bytes = open_existing(&path).and_then(|file| {
             let mut bytes = vec![0; file.metadata()?.len().min(64 << 20) as usize];
             file.read_exact_at(&mut bytes, 0)?;
             Ok(bytes)
         });
-        let begun = bytes.is_ok() || in_journal.is_some();
+        let begun = bytes.is_ok() || self.begun;
         match (bytes.ok().and_then(|b| unsealed(&b)), in_journal) {
             (Some(manifest), Some(_)) => self.manifest = manifest,
             (Some(manifest), None) => {
@@ -130,7 +131,6 @@ impl Folder {
                 if bytes.is_none_or(|bytes| bytes <= first) && data(&self.path)?.is_empty() {
                     return Ok(Found::Nothing);
                 }
-                self.end = None;
                 self.warn_of(journal::NAME, "the run begins again");
                 self.manifest = manifest;
             }
@@ -170,23 +170,8 @@ impl Folder {
             // Another process may have created it meanwhile.
             _ => is_private(path)?,
         };
-        let folder = Self {
-            path: path.to_path_buf(),
-            manifest,
-            output: Default::default(),
-            lock: lock(path)?,
-            entries: Vec::new(),
-            end: None,
-            warnings: Vec::new(),
-            rewrite: false,
-        };
-        let begun = folder
-            .clean(&HashSet::from([LOCK]))
-            .and_then(|()| folder.write_manifest());
-        if begun.is_err() {
-            Self::remove(path, false);
-        }
-        begun.map(|()| folder)
+        let begun = Self::locked(path, Vec::new())?.restart(manifest);
+        begun.inspect_err(|_| Self::remove(path, false))
     }
 
     /// Empties the folder for a new run.
@@ -195,8 +180,7 @@ impl Folder {
     /// [`Error::Io`], [`Error::Disk`].
     pub fn restart(mut self, manifest: Vec<u8>) -> Result<Self> {
         self.manifest = manifest;
-        self.entries.clear();
-        self.end = None;
+        self.begun = false;
         self.clean(&HashSet::from([LOCK]))?;
         self.write_manifest()?;
         Ok(self)
@@ -236,17 +220,24 @@ impl Folder {
             delete(journal::NAME);
             delete(MANIFEST);
         }
-        let names = listing(path).unwrap_or_default().into_iter();
-        names
-            .filter(|name| !OURS.contains(&name.as_str()))
-            .for_each(|name| delete(&name));
-        [MANIFEST, journal::NAME, LOCK].into_iter().for_each(delete);
+        let (ours, data): (Vec<String>, Vec<String>) = listing(path)
+            .unwrap_or_default()
+            .into_iter()
+            .partition(|name| is_ours(name));
+        data.iter().for_each(|name| delete(name));
+        [MANIFEST, journal::NAME].into_iter().for_each(delete);
+        // Without these, the journal of the program would seem damaged.
+        let workers = ours.iter().filter(|name| journal::worker(name).is_some());
+        workers.for_each(|name| delete(name));
+        delete(LOCK);
         let _ = std::fs::remove_dir(path);
     }
 
-    /// Opens the run in the folder, with the results of earlier attempts.
+    /// Opens the run in the folder on `threads` threads, with the results of earlier attempts.
     pub(super) fn open(
         self,
+        threads: usize,
+        memory: &MemoryPool,
         io: &Arc<IoCounters>,
         observer: &dyn Observer,
         cancel: &Cancel,
@@ -256,46 +247,120 @@ impl Folder {
             self.write_manifest()?;
         }
         let path = self.path.join(journal::NAME);
-        let places = Whereabouts {
-            folder: &self.path,
-            output: &self.output,
-        };
-        let (history, journal) = match self.end {
-            Some(end) => {
-                let (history, end) = recover(&self.entries, end, &places, observer, cancel)?;
-                let file = open_existing(&path).map_err(|e| Error::io(&path, "open", e))?;
-                (history, Journal::go_on(&path, file, end)?)
+        let (history, journal) = if self.begun {
+            let places = Whereabouts {
+                folder: &self.path,
+                output: &self.output,
+            };
+            let (mut history, mut ends) = read_history(&self.path, u64::MAX)?;
+            if let Some(until) = recover(&mut history, &places, observer, cancel)? {
+                (history, ends) = read_history(&self.path, until)?;
             }
-            None => {
-                let _ = std::fs::remove_file(&path);
-                let file = options().create_new(true).open(&path);
-                let file = file.map_err(|e| Error::io(&path, "create", e))?;
-                let journal = Journal::create(&path, file)?;
-                journal.append(&Record::Manifest(self.manifest.clone()))?;
-                (Default::default(), journal)
-            }
+            (history, self.go_on(&ends)?)
+        } else {
+            self.clean(&HashSet::from([LOCK, MANIFEST]))?;
+            let journal = Journal::create(&path)?;
+            journal.append(Record::Manifest(self.manifest.clone()))?;
+            (History::default(), journal)
         };
-        self.clean(&history.live().chain(OURS).collect())?;
+        let held = memory.reserve("history", history.bytes())?;
+        let segments = history.segments();
+        let journals = workers(&self.path)?.into_iter().map(journal::of_worker);
+        let journals: Vec<String> = journals.collect();
+        let known = segments.iter().chain(&journals).map(String::as_str);
+        self.clean(&known.chain(OURS).collect())?;
+        // Also larger than the numbers of an attempt whose record was lost.
+        let used = listing(&self.path)?;
+        let used = used
+            .iter()
+            .filter_map(|name| name.rsplit_once('.')?.1.parse::<u32>().ok());
+        let first = used.fold(history.next_worker(), |next, n| {
+            next.max(n.saturating_add(1))
+        });
+        let next = first.checked_add(threads as u32 + 1);
+        let next = next.ok_or_else(|| not_resumable(&self.path, "it had too many attempts"))?;
+        journal.append(Record::Attempt(next))?;
         let keeper = File::open(&self.path)
             .and_then(|folder| Keeper::start(journal.file(), folder, io.clone()))
             .map_err(|e| Error::io(&self.path, "start a thread for", e))?;
+        let history = (history, held);
         Ok(ResumableRun::new(
-            self.path, journal, keeper, history, self.lock,
+            self.path, first, threads, journal, keeper, history, self.lock,
         ))
+    }
+
+    /// Cuts all journals at these ends, and continues that of the program.
+    fn go_on(&self, ends: &Ends) -> Result<Journal> {
+        for (number, end) in &ends.workers {
+            let path = self.path.join(journal::of_worker(*number));
+            match end {
+                Some((bytes, records)) => _ = Journal::go_on(&path, *bytes, *records)?,
+                None => std::fs::remove_file(&path).map_err(|e| Error::io(&path, "delete", e))?,
+            }
+        }
+        let (bytes, records) = ends.program;
+        Journal::go_on(&self.path.join(journal::NAME), bytes, records)
     }
 
     /// True if an earlier attempt has finished a unit of work.
     #[must_use]
     pub fn has_progress(path: &Path) -> bool {
-        let path = path.join(journal::NAME);
-        let read = open_existing(&path).map(|file| journal::read(&path, &file));
-        let Ok(Ok(Some((entries, _)))) = read else {
-            return false;
-        };
-        entries
-            .iter()
-            .any(|e| matches!(e.record, Record::Unit { .. }))
+        let workers = workers(path).unwrap_or_default().into_iter().map(Some);
+        let mut journals = std::iter::once(None).chain(workers);
+        journals.any(|worker| {
+            let mut found = false;
+            let _ = journal::read(path, worker, |entry| {
+                found |= matches!(entry.record, Record::Unit { .. });
+                !found
+            });
+            found
+        })
     }
+}
+
+/// The ends of the journals, and the numbers of records before them.
+struct Ends {
+    program: (u64, u64),
+    /// By worker; none if the file is no journal.
+    workers: Vec<(u32, Option<(u64, u64)>)>,
+}
+
+/// The history in the journals of a folder before time `until`.
+fn read_history(path: &Path, until: u64) -> Result<(History, Ends)> {
+    let mut history = History::default();
+    let mut add = |entry: &journal::Entry<'_>, until: u64| {
+        let valid = entry.at < until;
+        if valid {
+            history.add(entry);
+        }
+        valid
+    };
+    let program = journal::read(path, None, |entry| add(entry, until))?.unwrap_or_default();
+    // A worker cannot have seen more records than there are.
+    let until = until.min(2 * program.1 + 1);
+    let mut ends = Vec::new();
+    for worker in workers(path)? {
+        let unit = |entry: &journal::Entry<'_>| matches!(entry.record, Record::Unit { .. });
+        let each = |entry: &journal::Entry<'_>| unit(entry) && add(entry, until);
+        ends.push((worker, journal::read(path, Some(worker), each)?));
+    }
+    let workers = ends;
+    Ok((history, Ends { program, workers }))
+}
+
+/// The numbers of the workers that have journals in a folder, ascending.
+fn workers(path: &Path) -> Result<Vec<u32>> {
+    let mut all: Vec<u32> = listing(path)?
+        .iter()
+        .filter_map(|n| journal::worker(n))
+        .collect();
+    all.sort_unstable();
+    Ok(all)
+}
+
+/// True if a file of this name is not data.
+fn is_ours(name: &str) -> bool {
+    OURS.contains(&name) || journal::worker(name).is_some()
 }
 
 /// False if there is nothing at `path`; an error unless it is a private folder of this user.
@@ -323,7 +388,7 @@ fn path_bytes(path: &Path) -> Option<u64> {
 /// Names of the data files in the folder.
 pub(super) fn data(path: &Path) -> Result<Vec<String>> {
     let mut names = listing(path)?;
-    names.retain(|name| !OURS.contains(&name.as_str()));
+    names.retain(|name| !is_ours(name));
     Ok(names)
 }
 

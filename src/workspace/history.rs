@@ -1,36 +1,63 @@
-//! The finished work of earlier attempts according to the journal, and the part of it that survives damage.
+//! The finished work of earlier attempts according to the journals, and the part of it that survives damage.
 
-use super::journal::{Entry, Record};
+use super::journal::{Entry, PayloadPlace, Record};
 use super::place::Place;
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+
+/// Estimated bytes of memory for a section and for a unit of work.
+const SECTION: u64 = 84;
+const UNIT: u64 = 64;
 
 /// Finished units, files and their parts.
 #[derive(Debug, Default)]
 pub struct History {
-    /// For each unit of each step the offset and length of its payload in the journal.
-    steps: HashMap<String, BTreeMap<u64, (u64, usize)>>,
+    steps: Vec<StepHistory>,
+    /// The places of steps in `steps` by name.
+    numbers: HashMap<String, u32>,
     files: HashMap<String, FileHistory>,
-    /// Stages begun, with the offsets of their records.
+    /// Stages begun, with the times of their records.
     begun: Vec<(String, u64)>,
+    /// Larger than the numbers of all workers.
+    next_worker: u32,
 }
 
 #[derive(Debug, Default)]
+struct StepHistory {
+    name: String,
+    /// Finished units, each with the time of its record and the place of its payload.
+    units: BTreeMap<u64, (u64, PayloadPlace)>,
+    /// If all are finished: the time of this record, their number, and the files that they wrote.
+    end: Option<(u64, u64, BTreeSet<String>)>,
+}
+
+#[derive(Debug)]
 struct FileHistory {
     parts: BTreeMap<u32, Part>,
-    /// Offset of the first record about the file.
+    /// Time of the first record about the file.
     first: u64,
     deleted: Option<u64>,
     /// Steps that wrote to the file.
-    steps: HashSet<String>,
+    steps: BTreeSet<u32>,
+}
+
+impl Default for FileHistory {
+    fn default() -> Self {
+        Self {
+            parts: BTreeMap::new(),
+            first: u64::MAX,
+            deleted: None,
+            steps: BTreeSet::new(),
+        }
+    }
 }
 
 /// A part of a file, and the unit that wrote it.
 #[derive(Debug, Clone)]
 struct Part {
     place: Place,
-    step: String,
+    step: u32,
     unit: u64,
-    record: u64,
+    at: u64,
 }
 
 /// A part of a file that the run needs to continue.
@@ -47,57 +74,112 @@ pub struct Needed {
 /// The repair after damage.
 #[derive(Debug, PartialEq, Eq)]
 pub enum Remedy {
-    /// These units are repeated; all others stay finished.
+    /// These units are repeated, and all units of their steps without a record; all others stay finished.
     Redo(Vec<(String, u64)>),
-    /// The journal is cut at `end`: a stage is repeated from its start.
+    /// Records from time `end` on are dropped: a stage is repeated from its start.
     Rewind {
-        /// Offset of the cut.
+        /// Time of the first record that is dropped.
         end: u64,
-        /// The stage that follows; none if the journal has no stage.
+        /// The stage that follows; none if no stage began.
         stage: Option<String>,
     },
 }
 
-impl History {
-    /// The history in the records of a journal.
-    #[must_use]
-    pub fn of(entries: &[Entry]) -> Self {
-        let mut history = Self::default();
-        for entry in entries {
-            history.add(entry);
-        }
-        history
-    }
+/// Lost work: a unit of a step, and the time after which its inputs may have been deleted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Lost {
+    step: u32,
+    unit: u64,
+    at: u64,
+}
 
-    fn add(&mut self, entry: &Entry) {
-        match &entry.record {
+impl History {
+    /// Adds a record. Of two records of one unit or one part the later one counts; of equally late ones the
+    /// one that is added last.
+    pub fn add(&mut self, entry: &Entry<'_>) {
+        let at = entry.at;
+        match entry.record {
             Record::Manifest(_) => {}
-            Record::Begin(stage) => self.begun.push((stage.clone(), entry.offset)),
+            Record::Attempt(next) => self.next_worker = self.next_worker.max(*next),
+            Record::Begin(stage) => self.begun.push((stage.clone(), at)),
             Record::Deleted(name) => {
-                let file = self.files.entry(name.clone()).or_default();
-                file.deleted.get_or_insert(entry.offset);
+                let deleted = &mut self.file(name).deleted;
+                *deleted = Some(deleted.map_or(at, |before| before.min(at)));
+            }
+            Record::End { step, units, files } => {
+                let number = self.step(step);
+                for name in files {
+                    let file = self.file(name);
+                    file.first = file.first.min(at);
+                    file.steps.insert(number);
+                }
+                let files = files.iter().cloned().collect();
+                self.steps[number as usize].end = Some((at, *units, files));
             }
             Record::Unit {
                 step, unit, puts, ..
             } => {
-                let units = self.steps.entry(step.clone()).or_default();
-                units.insert(*unit, entry.payload);
+                let number = self.step(step);
+                let known = self.steps[number as usize].units.entry(*unit);
+                let known = known.or_insert((at, entry.payload));
+                if known.0 <= at {
+                    *known = (at, entry.payload);
+                }
                 for put in puts {
-                    let file = self.files.entry(put.file.to_string()).or_default();
-                    if file.steps.is_empty() {
-                        file.first = entry.offset;
-                    }
-                    file.steps.insert(step.clone());
+                    let file = self.file(&put.file);
+                    file.first = file.first.min(at);
+                    file.steps.insert(number);
                     let part = Part {
                         place: put.place,
-                        step: step.clone(),
+                        step: number,
                         unit: *unit,
-                        record: entry.offset,
+                        at,
                     };
-                    file.parts.insert(put.section, part);
+                    let known = file
+                        .parts
+                        .entry(put.section)
+                        .or_insert_with(|| part.clone());
+                    if known.at <= at {
+                        *known = part;
+                    }
                 }
             }
         }
+    }
+
+    fn file(&mut self, name: &str) -> &mut FileHistory {
+        self.files.entry(name.to_owned()).or_default()
+    }
+
+    fn step(&mut self, name: &str) -> u32 {
+        if let Some(number) = self.numbers.get(name) {
+            return *number;
+        }
+        let number = self.steps.len() as u32;
+        self.numbers.insert(name.to_owned(), number);
+        self.steps.push(StepHistory {
+            name: name.to_owned(),
+            ..StepHistory::default()
+        });
+        number
+    }
+
+    fn known(&self, step: &str) -> Option<&StepHistory> {
+        Some(&self.steps[*self.numbers.get(step)? as usize])
+    }
+
+    /// Bytes of memory.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        let sections: usize = self.files.values().map(|file| file.parts.len()).sum();
+        let units: usize = self.steps.iter().map(|step| step.units.len()).sum();
+        sections as u64 * SECTION + units as u64 * UNIT
+    }
+
+    /// A number that is larger than those of all workers of earlier attempts.
+    #[must_use]
+    pub fn next_worker(&self) -> u32 {
+        self.next_worker
     }
 
     /// True if an earlier attempt began the stage.
@@ -109,14 +191,29 @@ impl History {
     /// Finished units, ascending.
     #[must_use]
     pub fn units(&self, step: &str) -> Vec<u64> {
-        let units = self.steps.get(step);
-        units.map_or_else(Vec::new, |units| units.keys().copied().collect())
+        let units = self.known(step);
+        units.map_or_else(Vec::new, |step| step.units.keys().copied().collect())
     }
 
-    /// Offset and length of the payload of a unit.
+    /// The files that the units of a step wrote, if an earlier attempt finished all units.
     #[must_use]
-    pub fn payload(&self, step: &str, unit: u64) -> Option<(u64, usize)> {
-        self.steps.get(step)?.get(&unit).copied()
+    pub fn ended(&self, step: &str) -> Option<&BTreeSet<String>> {
+        self.known(step)?.end.as_ref().map(|end| &end.2)
+    }
+
+    /// The files to which finished units of a step wrote.
+    pub fn files_of(&self, step: &str) -> impl Iterator<Item = &str> {
+        let number = self.numbers.get(step).copied();
+        let files = self.files.iter();
+        files
+            .filter(move |(_, file)| number.is_some_and(|n| file.steps.contains(&n)))
+            .map(|(name, _)| name.as_str())
+    }
+
+    /// Place of the payload of a unit.
+    #[must_use]
+    pub fn payload(&self, step: &str, unit: u64) -> Option<PayloadPlace> {
+        Some(self.known(step)?.units.get(&unit)?.1)
     }
 
     /// Parts of a file, ascending.
@@ -135,17 +232,25 @@ impl History {
         self.files.get(file).is_some_and(|f| f.deleted.is_some())
     }
 
-    /// Names of the files that exist.
-    pub fn live(&self) -> impl Iterator<Item = &str> {
-        let live = self.files.iter().filter(|(_, file)| file.deleted.is_none());
-        live.map(|(name, _)| name.as_str())
+    fn live(&self) -> impl Iterator<Item = (&String, &FileHistory)> {
+        self.files.iter().filter(|(_, file)| file.deleted.is_none())
+    }
+
+    /// Names of the segments that have parts of files that exist.
+    #[must_use]
+    pub fn segments(&self) -> BTreeSet<String> {
+        let parts = self.live().flat_map(|(name, file)| {
+            let segments: BTreeSet<u32> = file.parts.values().map(|p| p.place.segment).collect();
+            segments.into_iter().map(move |n| format!("{name}.{n}"))
+        });
+        parts.collect()
     }
 
     /// All parts of files that exist.
     #[must_use]
     pub fn needed(&self) -> Vec<Needed> {
-        let live = self.files.iter().filter(|(_, file)| file.deleted.is_none());
-        let parts = live.flat_map(|(name, file)| file.parts.iter().map(move |part| (name, part)));
+        let parts = self.live();
+        let parts = parts.flat_map(|(name, file)| file.parts.iter().map(move |part| (name, part)));
         parts
             .map(|(name, (section, part))| Needed {
                 file: name.clone(),
@@ -155,28 +260,59 @@ impl History {
             .collect()
     }
 
-    /// The repair for damaged parts; `None` if there are none.
+    /// The first unit without a record of each finished step, as far as the run needs what it did. A forged
+    /// journal may claim any number of units.
+    fn lost(&self) -> Vec<Lost> {
+        let mut lost = Vec::new();
+        for (number, step) in (0..).zip(&self.steps) {
+            let Some((at, units, files)) = &step.end else {
+                continue;
+            };
+            let ends = step.name.match_indices('/').map(|(end, _)| end);
+            let around = ends.skip(1).filter_map(|end| self.known(&step.name[..end]));
+            let over = around.into_iter().any(|step| step.units.contains_key(&0));
+            if over && files.iter().all(|file| self.is_deleted(file)) {
+                continue;
+            }
+            let known = (0..).zip(step.units.keys());
+            let first = known.take_while(|(n, unit)| n == *unit).count() as u64;
+            if first < *units {
+                lost.push(Lost {
+                    step: number,
+                    unit: first,
+                    at: *at,
+                });
+            }
+        }
+        lost
+    }
+
+    /// The repair for damaged parts and lost records; `None` if there are none.
     #[must_use]
     pub fn remedy(&self, damaged: &[Needed]) -> Option<Remedy> {
-        let parts: Vec<&Part> = damaged
+        let parts = damaged
             .iter()
-            .filter_map(|d| self.files.get(&d.file)?.parts.get(&d.section))
+            .filter_map(|d| self.files.get(&d.file)?.parts.get(&d.section));
+        let mut lost: Vec<Lost> = parts
+            .map(|&Part { step, unit, at, .. }| Lost { step, unit, at })
+            .chain(self.lost())
             .collect();
-        if parts.is_empty() {
+        lost.sort_unstable();
+        lost.dedup_by_key(|lost| (lost.step, lost.unit));
+        if lost.is_empty() {
             return None;
         }
-        if parts.iter().all(|part| self.can_redo(part)) {
-            let mut units: Vec<_> = parts.iter().map(|p| (p.step.clone(), p.unit)).collect();
-            units.sort();
-            units.dedup();
-            return Some(Remedy::Redo(units));
+        if lost.iter().all(|lost| self.can_redo(*lost)) {
+            let name = |step: u32| self.steps[step as usize].name.clone();
+            let units = lost.iter().map(|lost| (name(lost.step), lost.unit));
+            return Some(Remedy::Redo(units.collect()));
         }
         let holds = |start: u64| {
-            let damage = parts.iter().any(|part| part.record < start);
-            let missing = self.files.values().any(|file| {
-                let needed = !file.steps.is_empty() && file.first < start;
-                needed && file.deleted.is_some_and(|at| at >= start)
-            });
+            let damage = lost.iter().any(|lost| lost.at < start);
+            let missing = self
+                .files
+                .values()
+                .any(|file| file.first < start && file.deleted.is_some_and(|at| at >= start));
             !damage && !missing
         };
         let stage = self.begun.iter().rev().find(|(_, start)| holds(*start));
@@ -188,28 +324,31 @@ impl History {
 
     /// True if all inputs of the unit still exist: since then only files were deleted that the unit's own
     /// step or later ones made.
-    fn can_redo(&self, part: &Part) -> bool {
-        !part.step.is_empty()
+    fn can_redo(&self, lost: Lost) -> bool {
+        !self.steps[lost.step as usize].name.is_empty()
             && self.files.values().all(|file| {
-                let later = file.deleted.is_some_and(|at| at > part.record);
-                !later || file.first > part.record || file.steps.contains(&part.step)
+                let later = file.deleted.is_some_and(|at| at > lost.at);
+                // Nothing is known of a file without writers.
+                let made_later = file.first > lost.at && !file.steps.is_empty();
+                !later || made_later || file.steps.contains(&lost.step)
             })
     }
 
     /// Marks units, and the steps around them, as not finished.
     pub fn forget(&mut self, units: &[(String, u64)]) {
         for (step, unit) in units {
-            if let Some(known) = self.steps.get_mut(step) {
-                known.remove(unit);
-            }
+            let Some(number) = self.numbers.get(step).copied() else {
+                continue;
+            };
+            self.steps[number as usize].units.remove(unit);
             for (at, _) in step.match_indices('/').skip(1) {
-                if let Some(around) = self.steps.get_mut(&step[..at]) {
-                    around.remove(&0);
+                if let Some(around) = self.numbers.get(&step[..at]) {
+                    self.steps[*around as usize].units.remove(&0);
                 }
             }
             for file in self.files.values_mut() {
                 file.parts
-                    .retain(|_, part| (&part.step, part.unit) != (step, *unit));
+                    .retain(|_, part| (part.step, part.unit) != (number, *unit));
             }
         }
     }

@@ -1,31 +1,51 @@
-//! The journal: the finished work of a run as checksummed records, append-only.
+//! Journals: the finished work of a run as checksummed records, append-only.
+//!
+//! The thread that runs the program writes `journal`; the workers of every attempt write `journal.0`,
+//! `journal.1` …, each its own. A record of a worker tells how many records were in `journal` when its step
+//! was at work, which puts all records in order.
 //!
 //! A record is `length, CRC-32` (two `u32`) and its body. Bytes after the last whole record are ignored: an
 //! attempt ended while it wrote them.
 
 use super::fault;
-use super::open::failed_write;
-use super::place::{Place, Put};
+use super::lock;
+use super::open::{failed_write, open_existing, options};
+use super::place::Put;
 use crate::error::{Error, Result};
+use serde::{Deserialize, Serialize};
 use std::fs::File;
 use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 
-/// Name of the file in the scratch folder.
+/// Name of the program's journal in the scratch folder.
 pub const NAME: &str = "journal";
 
 /// The first bytes of the file; the digit is the version of the journal's format.
-const MAGIC: &[u8; 8] = b"OUTCROP1";
+const MAGIC: &[u8; 8] = b"OUTCROP2";
 
 /// Bytes before the body of a record.
 const HEAD: u64 = 8;
 
+/// Name of the journal of a worker.
+pub fn of_worker(number: u32) -> String {
+    format!("{NAME}.{number}")
+}
+
+/// The number of the worker to which a file of this name belongs, if it is the journal of a worker.
+pub fn worker(name: &str) -> Option<u32> {
+    let number = name.strip_prefix(NAME)?.strip_prefix('.')?;
+    let number = number.parse().ok()?;
+    (name == of_worker(number)).then_some(number)
+}
+
 /// A record of finished work.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Record {
     /// The manifest of the run; the first record.
     Manifest(Vec<u8>),
+    /// An attempt began; this number is larger than those of its workers.
+    Attempt(u32),
     /// A stage began.
     Begin(String),
     /// A unit of a step is finished.
@@ -34,24 +54,47 @@ pub enum Record {
         step: String,
         /// Its number within the step.
         unit: u64,
+        /// Number of records in the program's journal when it was finished.
+        after: u64,
         /// Parts of files that the unit wrote.
         puts: Vec<Put>,
         /// The saved result of the unit.
         payload: Vec<u8>,
     },
+    /// All units of a step are finished.
+    End {
+        /// Name of the step.
+        step: String,
+        /// Number of its units.
+        units: u64,
+        /// Files that they wrote.
+        files: Vec<String>,
+    },
     /// A file is not needed any more.
     Deleted(String),
 }
 
-/// A record and its offset.
-#[derive(Debug, Clone)]
-pub struct Entry {
-    /// Offset of the record.
+/// The place of a payload: the worker whose journal has it (`None`: the program's), offset and length.
+pub type PayloadPlace = (Option<u32>, u64, usize);
+
+/// A record and its places.
+#[derive(Debug)]
+pub struct Entry<'a> {
+    /// The time of the record: the odd number `2 n + 1` for record `n` of the program's journal; for one of a
+    /// worker twice the number of records before it.
+    pub at: u64,
+    /// Offset of the record in its journal.
     pub offset: u64,
-    /// Offset and length of its payload.
-    pub payload: (u64, usize),
-    /// The record itself.
-    pub record: Record,
+    /// Place of its payload.
+    pub payload: PayloadPlace,
+    /// The record itself, without its payload.
+    pub record: &'a Record,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct End {
+    bytes: u64,
+    records: u64,
 }
 
 /// Appends records.
@@ -59,145 +102,44 @@ pub struct Entry {
 pub struct Journal {
     path: PathBuf,
     file: Arc<File>,
-    end: Mutex<u64>,
+    end: Mutex<End>,
 }
 
-fn text(out: &mut Vec<u8>, text: &str) {
-    out.extend_from_slice(&(text.len() as u32).to_le_bytes());
-    out.extend_from_slice(text.as_bytes());
-}
-
-fn encode(record: &Record) -> Vec<u8> {
-    let mut out = vec![0; HEAD as usize];
-    match record {
-        Record::Manifest(bytes) => {
-            out.push(0);
-            out.extend_from_slice(bytes);
-        }
-        Record::Begin(stage) => {
-            out.push(1);
-            text(&mut out, stage);
-        }
-        Record::Deleted(file) => {
-            out.push(2);
-            text(&mut out, file);
-        }
-        Record::Unit {
-            step,
-            unit,
-            puts,
-            payload,
-        } => {
-            out.push(3);
-            text(&mut out, step);
-            out.extend_from_slice(&unit.to_le_bytes());
-            out.extend_from_slice(&(puts.len() as u32).to_le_bytes());
-            for put in puts {
-                text(&mut out, &put.file);
-                out.extend_from_slice(&put.section.to_le_bytes());
-                out.extend_from_slice(&put.place.offset.to_le_bytes());
-                out.extend_from_slice(&(put.place.bytes as u64).to_le_bytes());
-                out.extend_from_slice(&(put.place.records as u64).to_le_bytes());
-                out.extend_from_slice(&put.place.crc.to_le_bytes());
-            }
-            out.extend_from_slice(payload);
-        }
-    }
+fn encode(record: &Record) -> postcard::Result<Vec<u8>> {
+    let mut out = postcard::to_extend(record, vec![0; HEAD as usize])?;
     let length = (out.len() as u64 - HEAD) as u32;
     let crc = crc32fast::hash(&out[HEAD as usize..]);
     out[..4].copy_from_slice(&length.to_le_bytes());
     out[4..8].copy_from_slice(&crc.to_le_bytes());
-    out
-}
-
-/// Reads the fields of a body.
-struct Fields<'a>(&'a [u8]);
-
-impl Fields<'_> {
-    fn array<const N: usize>(&mut self) -> Option<[u8; N]> {
-        let (head, rest) = self.0.split_first_chunk::<N>()?;
-        self.0 = rest;
-        Some(*head)
-    }
-
-    fn u32(&mut self) -> Option<u32> {
-        self.array().map(u32::from_le_bytes)
-    }
-
-    fn u64(&mut self) -> Option<u64> {
-        self.array().map(u64::from_le_bytes)
-    }
-
-    fn text(&mut self) -> Option<String> {
-        let length = self.u32()? as usize;
-        let (head, rest) = self.0.split_at_checked(length)?;
-        self.0 = rest;
-        String::from_utf8(head.to_vec()).ok()
-    }
-
-    fn put(&mut self) -> Option<Put> {
-        Some(Put {
-            file: self.text()?.into(),
-            section: self.u32()?,
-            place: Place {
-                offset: self.u64()?,
-                bytes: self.u64()? as usize,
-                records: self.u64()? as usize,
-                crc: self.u32()?,
-            },
-        })
-    }
-}
-
-/// A record and the offset of its payload in `body`.
-fn decode(body: &[u8]) -> Option<(Record, usize)> {
-    let (kind, rest) = body.split_first()?;
-    let mut fields = Fields(rest);
-    let record = match kind {
-        0 => return Some((Record::Manifest(rest.to_vec()), 1)),
-        1 => Record::Begin(fields.text()?),
-        2 => Record::Deleted(fields.text()?),
-        3 => {
-            let (step, unit, count) = (fields.text()?, fields.u64()?, fields.u32()?);
-            let puts = (0..count).map(|_| fields.put()).collect::<Option<_>>()?;
-            // Payloads are read from disk when they are needed.
-            let at = body.len() - fields.0.len();
-            let payload = Vec::new();
-            let record = Record::Unit {
-                step,
-                unit,
-                puts,
-                payload,
-            };
-            return Some((record, at));
-        }
-        _ => return None,
-    };
-    Some((record, body.len()))
+    Ok(out)
 }
 
 impl Journal {
-    /// Begins a journal in the new file at `path`.
+    /// Begins the journal `path`, a new file.
     ///
     /// # Errors
     /// [`Error::Io`].
-    pub fn create(path: &Path, file: File) -> Result<Self> {
+    pub fn create(path: &Path) -> Result<Self> {
+        let file = options().create_new(true).open(path);
+        let file = file.map_err(|e| Error::io(path, "create", e))?;
         file.write_all_at(MAGIC, 0)
             .map_err(|e| failed_write(path, MAGIC.len(), 0, e))?;
-        Ok(Self::at(path, file, MAGIC.len() as u64))
+        let bytes = MAGIC.len() as u64;
+        Ok(Self::at(path, file, End { bytes, records: 0 }))
     }
 
-    /// Continues a journal at `end`; the bytes after it are cut off.
+    /// Continues a journal of `records` records with `bytes` bytes; what comes after them is cut off.
     ///
     /// # Errors
     /// [`Error::Io`].
-    pub fn go_on(path: &Path, file: File, end: u64) -> Result<Self> {
-        file.set_len(end)
+    pub fn go_on(path: &Path, bytes: u64, records: u64) -> Result<Self> {
+        let file = open_existing(path).map_err(|e| Error::io(path, "open", e))?;
+        file.set_len(bytes)
             .map_err(|e| Error::io(path, "cut its torn end off", e))?;
-        Ok(Self::at(path, file, end))
+        Ok(Self::at(path, file, End { bytes, records }))
     }
 
-    fn at(path: &Path, file: File, end: u64) -> Self {
+    fn at(path: &Path, file: File, end: End) -> Self {
         Self {
             path: path.to_path_buf(),
             file: Arc::new(file),
@@ -210,39 +152,57 @@ impl Journal {
         self.file.clone()
     }
 
+    /// Number of records.
+    pub fn records(&self) -> u64 {
+        lock(&self.end).records
+    }
+
     /// Appends a record.
     ///
     /// # Errors
     /// [`Error::Io`], [`Error::Disk`].
-    pub fn append(&self, record: &Record) -> Result<()> {
-        let bytes = encode(record);
-        let mut end = self.end.lock().unwrap_or_else(PoisonError::into_inner);
+    pub fn append(&self, record: Record) -> Result<()> {
+        let bytes = encode(&record)
+            .map_err(|e| Error::io(&self.path, "encode a record for", std::io::Error::other(e)))?;
+        let mut end = lock(&self.end);
         // An incomplete record is overwritten by the next one.
-        fault::record(&bytes, |bytes| self.file.write_all_at(bytes, *end))
+        fault::record(&bytes, |bytes| self.file.write_all_at(bytes, end.bytes))
             .map_err(|e| failed_write(&self.path, bytes.len(), 0, e))?;
-        *end += bytes.len() as u64;
+        end.bytes += bytes.len() as u64;
+        end.records += 1;
         Ok(())
-    }
-
-    /// Reads a payload.
-    ///
-    /// # Errors
-    /// [`Error::Io`].
-    pub fn payload(&self, offset: u64, bytes: usize) -> Result<Vec<u8>> {
-        let mut payload = vec![0; bytes];
-        self.file
-            .read_exact_at(&mut payload, offset)
-            .map_err(|e| Error::io(&self.path, format!("read {bytes} bytes"), e))?;
-        Ok(payload)
     }
 }
 
-/// All whole records of a journal and the end of the last; `None` if the file is no journal.
+/// Reads a payload of a journal in `folder`.
 ///
 /// # Errors
 /// [`Error::Io`].
-pub fn read(path: &Path, file: &File) -> Result<Option<(Vec<Entry>, u64)>> {
-    let io = |e| Error::io(path, "read", e);
+pub fn payload(folder: &Path, (worker, offset, bytes): PayloadPlace) -> Result<Vec<u8>> {
+    let path = folder.join(worker.map_or(NAME.to_owned(), of_worker));
+    let mut payload = vec![0; bytes];
+    open_existing(&path)
+        .and_then(|file| file.read_exact_at(&mut payload, offset))
+        .map_err(|e| Error::io(&path, format!("read {bytes} bytes"), e))?;
+    Ok(payload)
+}
+
+/// Calls `each` with the whole records of the journal of `worker` (`None`: the program's) in `folder`, until
+/// it returns false. Returns the end of the last record for which it returned true, and their number; `None`
+/// if the file is no journal.
+///
+/// # Errors
+/// [`Error::Io`].
+pub fn read(
+    folder: &Path,
+    worker: Option<u32>,
+    mut each: impl FnMut(&Entry<'_>) -> bool,
+) -> Result<Option<(u64, u64)>> {
+    let path = folder.join(worker.map_or(NAME.to_owned(), of_worker));
+    let io = |e| Error::io(&path, "read", e);
+    let Ok(file) = open_existing(&path) else {
+        return Ok(None);
+    };
     let length = file.metadata().map_err(io)?.len();
     let mut magic = [0; MAGIC.len()];
     if length < magic.len() as u64 {
@@ -252,8 +212,7 @@ pub fn read(path: &Path, file: &File) -> Result<Option<(Vec<Entry>, u64)>> {
     if magic != *MAGIC {
         return Ok(None);
     }
-    let mut entries = Vec::new();
-    let mut at = MAGIC.len() as u64;
+    let (mut at, mut records) = (MAGIC.len() as u64, 0);
     let mut body = Vec::new();
     while at + HEAD <= length {
         let mut head = [0u32; 2];
@@ -268,21 +227,36 @@ pub fn read(path: &Path, file: &File) -> Result<Option<(Vec<Entry>, u64)>> {
         if crc32fast::hash(&body) != crc {
             break;
         }
-        let Some((record, payload)) = decode(&body) else {
+        let Ok(mut record) = postcard::from_bytes::<Record>(&body) else {
             break;
         };
-        entries.push(Entry {
+        // Payloads are read again when they are needed; they come last in a record.
+        let (mut length, mut time) = (0, 2 * records + 1);
+        if let Record::Unit { payload, after, .. } = &mut record {
+            length = std::mem::take(payload).len();
+            if worker.is_some() {
+                time = after.saturating_mul(2);
+            }
+        }
+        let next = at + HEAD + u64::from(bytes);
+        let entry = Entry {
+            at: time,
             offset: at,
-            payload: (at + HEAD + payload as u64, body.len() - payload),
-            record,
-        });
-        at += HEAD + u64::from(bytes);
+            payload: (worker, next - length as u64, length),
+            record: &record,
+        };
+        if !each(&entry) {
+            break;
+        }
+        at = next;
+        records += 1;
     }
-    Ok(Some((entries, at)))
+    Ok(Some((at, records)))
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::place::Place;
     use super::*;
 
     fn records() -> Vec<Record> {
@@ -290,6 +264,7 @@ mod tests {
             file: "cells.own".into(),
             section,
             place: Place {
+                segment: 2,
                 offset: 1 << 40,
                 bytes: 77,
                 records: 3,
@@ -298,12 +273,19 @@ mod tests {
         };
         vec![
             Record::Manifest(b"{}".to_vec()),
+            Record::Attempt(3),
             Record::Begin("cells#0".into()),
             Record::Unit {
                 step: "cells#0/tile#0".into(),
                 unit: 9,
+                after: 3,
                 puts: vec![put(1), put(2)],
                 payload: Vec::new(),
+            },
+            Record::End {
+                step: "cells#0/tile#0".into(),
+                units: 10,
+                files: vec!["cells.own".into()],
             },
             Record::Deleted("points".into()),
         ]
@@ -313,22 +295,22 @@ mod tests {
     fn a_torn_or_damaged_end_is_cut_off() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join(NAME);
-        let open = || {
-            let mut options = File::options();
-            options.read(true).write(true).create(true).truncate(false);
-            options.open(&path).unwrap()
-        };
-        let journal = Journal::create(&path, open()).unwrap();
+        let journal = Journal::create(&path).unwrap();
         let mut ends = vec![MAGIC.len() as u64];
         for record in records() {
-            journal.append(&record).unwrap();
-            ends.push(*journal.end.lock().unwrap());
+            journal.append(record).unwrap();
+            ends.push(lock(&journal.end).bytes);
         }
         let whole = std::fs::read(&path).unwrap();
         let read_back = || {
-            let (entries, end) = read(&path, &open()).unwrap().unwrap();
-            let records: Vec<_> = entries.into_iter().map(|e| e.record).collect();
-            (records, end)
+            let mut found = Vec::new();
+            let end = read(folder.path(), None, |entry| {
+                found.push(entry.record.clone());
+                true
+            });
+            let (end, count) = end.unwrap().unwrap();
+            assert_eq!(count as usize, found.len());
+            (found, end)
         };
         assert_eq!(read_back(), (records(), whole.len() as u64));
         for cut in MAGIC.len()..whole.len() {
@@ -343,5 +325,40 @@ mod tests {
             let count = ends.partition_point(|end| *end <= at as u64) - 1;
             assert_eq!(read_back().1, ends[count], "a flip at {at}");
         }
+    }
+
+    #[test]
+    fn a_payload_is_found_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let journal = Journal::create(&folder.path().join(of_worker(4))).unwrap();
+        for unit in 0..3 {
+            let payload = vec![unit as u8; 200 * unit as usize];
+            let (step, puts) = ("a".into(), Vec::new());
+            let record = Record::Unit {
+                step,
+                unit,
+                after: 7,
+                puts,
+                payload,
+            };
+            journal.append(record).unwrap();
+        }
+        let mut found = Vec::new();
+        let each = |entry: &Entry<'_>| {
+            assert_eq!(entry.at, 14);
+            found.push(entry.payload);
+            true
+        };
+        assert!(read(folder.path(), Some(4), each).unwrap().is_some());
+        for (unit, place) in (0..).zip(found) {
+            assert_eq!(
+                payload(folder.path(), place).unwrap(),
+                vec![unit; 200 * unit as usize]
+            );
+        }
+        assert_eq!(
+            (worker("journal.4"), worker("journal"), worker("journal.04")),
+            (Some(4), None, None)
+        );
     }
 }

@@ -4,8 +4,8 @@
 //! A killed process needs no sync, since written data are in the system's cache. No other thread waits for
 //! this one, so a loss of power costs at most a few seconds of work.
 
-use super::IoCounters;
 use super::fault::{self, Event};
+use super::{IoCounters, lock};
 use std::collections::HashSet;
 use std::fs::File;
 use std::path::PathBuf;
@@ -29,7 +29,8 @@ pub struct Leaving {
 }
 
 impl Leaving {
-    fn delete(&self, io: &IoCounters) {
+    /// Deletes the file at once.
+    pub fn delete(&self, io: &IoCounters) {
         fault::point(Event::Delete);
         // A scratch file that cannot be deleted is deleted with its folder.
         let _ = std::fs::remove_file(&self.path);
@@ -47,6 +48,7 @@ struct Dirty {
 
 #[derive(Debug, Default)]
 struct State {
+    journals: Vec<Arc<File>>,
     dirty: Vec<Dirty>,
     /// Files of this attempt without any synced data.
     fresh: HashSet<Arc<str>>,
@@ -69,7 +71,7 @@ pub struct Keeper {
 
 impl Table {
     fn state(&self) -> MutexGuard<'_, State> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.state)
     }
 
     /// Waits for the next round or for a file to delete; false if the thread has to stop.
@@ -79,14 +81,15 @@ impl Table {
         !waited.unwrap_or_else(PoisonError::into_inner).0.stop
     }
 
-    fn round(&self, journal: &File, folder: &File, io: &IoCounters) {
-        let (dirty, leaving) = {
+    fn round(&self, folder: &File, io: &IoCounters) {
+        let (dirty, leaving, journals) = {
             let mut state = self.state();
             let dirty = std::mem::take(&mut state.dirty);
             for file in &dirty {
                 state.fresh.remove(&file.name);
             }
-            (dirty, std::mem::take(&mut state.leaving))
+            let leaving = std::mem::take(&mut state.leaving);
+            (dirty, leaving, state.journals.clone())
         };
         for Dirty { file, flag, .. } in dirty {
             if self.state().stop {
@@ -98,7 +101,9 @@ impl Table {
         }
         // Syncs the names of new files.
         let _ = folder.sync_all();
-        let _ = journal.sync_data();
+        for journal in journals {
+            let _ = journal.sync_data();
+        }
         fault::point(Event::Synced);
         for file in leaving {
             // After the run the folder may belong to another run.
@@ -127,15 +132,21 @@ impl Keeper {
         io: Arc<IoCounters>,
     ) -> std::io::Result<Self> {
         let table = Arc::new(Table::default());
+        table.state().journals.push(journal);
         let (shared, counters) = (table.clone(), io.clone());
         let work = move || {
             while shared.wait(time) {
-                shared.round(&journal, &folder, &counters);
+                shared.round(&folder, &counters);
             }
         };
         let thread = std::thread::Builder::new().name("outcrop-keeper".into());
         thread.spawn(work)?;
         Ok(Self { table, io })
+    }
+
+    /// Notes a journal that is synced in every round.
+    pub fn journal(&self, file: Arc<File>) {
+        self.table.state().journals.push(file);
     }
 
     /// Notes a new file.

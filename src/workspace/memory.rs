@@ -2,16 +2,17 @@
 //!
 //! Two figures are kept. A *reservation* is an upper bound of the memory that its holder may take.
 //! Reservations gate admission. The memory *held* is the usage, which is reported. A unit of work reports the
-//! size of its large buffers with [`hold`], a shuffle as its buffer grows; other reservations count as held
-//! in full. The largest usage of a unit counts for its thread until the loop over the units ends, since the
+//! size of its large buffers with [`Unit::hold`](super::Unit::hold), a sorter as its buffer grows; other
+//! reservations count as held in full. The largest usage of a unit counts for its thread until the loop over the units ends, since the
 //! allocator keeps that memory for the next unit.
 
 mod trim;
-mod unit;
+mod usage;
 
-pub use unit::{Holding, bytes_of, give_back, hold, table_bytes};
-pub(super) use unit::{Slot, Unit};
+pub use usage::{Holding, bytes_of, table_bytes};
+pub(super) use usage::{Slot, Usage};
 
+use super::lock;
 use crate::error::{Error, Result};
 use std::collections::BTreeMap;
 use std::sync::{Arc, Condvar, Mutex};
@@ -205,10 +206,7 @@ impl MemoryPool {
     }
 
     fn state(&self) -> std::sync::MutexGuard<'_, State> {
-        self.0
-            .state
-            .lock()
-            .unwrap_or_else(std::sync::PoisonError::into_inner)
+        lock(&self.0.state)
     }
 
     /// Reserves `bytes` under `name`; the error has a budget that would suffice.
@@ -430,19 +428,19 @@ mod tests {
             return;
         }
         let mut slot = Slot::new(&pool, "unit");
-        let at_work = Unit::begin(pool.promise_waiting("unit", 8 << 20).unwrap());
-        let first = hold(3 << 20);
-        drop(hold(2 << 20));
+        let at_work = Usage::of(pool.promise_waiting("unit", 8 << 20).unwrap());
+        let first = at_work.hold(3 << 20);
+        drop(at_work.hold(2 << 20));
         let _ = pool.take_held();
         assert_eq!(pool.take_held(), PROGRAM + (3 << 20));
-        let second = hold(4 << 20);
+        let second = at_work.hold(4 << 20);
         drop((first, second));
         assert_eq!(pool.peak_held(), PROGRAM + (7 << 20));
         slot.ended(at_work);
         let _ = pool.take_held();
         assert_eq!(pool.take_held(), PROGRAM + TIGHT_THREAD);
         // A unit that reports no usage counts with its whole reservation.
-        let silent = Unit::begin(pool.promise_waiting("unit", 9 << 20).unwrap());
+        let silent = Usage::of(pool.promise_waiting("unit", 9 << 20).unwrap());
         slot.ended(silent);
         assert_eq!(pool.peak_held(), PROGRAM + TIGHT_THREAD + (9 << 20));
         assert_eq!(pool.available(), pool.capacity());
@@ -453,13 +451,13 @@ mod tests {
         let pool = MemoryPool::new(TIGHT).unwrap();
         let mut slot = Slot::new(&pool, "unit");
         for bytes in [3 << 20, 5 << 20, 2 << 20] {
-            let at_work = Unit::begin(pool.promise_waiting("unit", 8 << 20).unwrap());
-            let first = hold(bytes / 2);
-            let second = hold(bytes / 2);
+            let at_work = Usage::of(pool.promise_waiting("unit", 8 << 20).unwrap());
+            let first = at_work.hold(bytes / 2);
+            let second = at_work.hold(bytes / 2);
             drop(first);
-            give_back(1 << 20);
+            at_work.give_back(1 << 20);
             assert_eq!(pool.available(), pool.capacity() - (7 << 20));
-            drop((second, hold(7)));
+            drop((second, at_work.hold(7)));
             slot.ended(at_work);
         }
         assert_eq!(pool.held_at_peak()["unit"], 5 << 20);

@@ -4,6 +4,7 @@
 
 pub mod fault;
 pub mod file;
+mod files;
 mod folder;
 mod history;
 mod journal;
@@ -11,26 +12,26 @@ mod keeper;
 pub mod limits;
 pub mod memory;
 pub mod open;
-pub mod persist;
 pub mod place;
 pub mod progress;
 mod recover;
 mod run;
 pub(crate) mod steps;
+mod unit;
 mod units;
 
+pub use files::Files;
 pub use folder::{Folder, Found};
 pub use recover::{OUTPUT, RENAMED};
+pub use unit::Unit;
 
 use crate::error::{Error, Result};
-use file::{Maker, ScratchFile, Shared};
+use file::Shared;
 use memory::{MemoryPool, Reservation};
-use open::open_existing;
-use place::Place;
 use progress::{Cancel, Observer};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 /// Bytes moved and scratch space held, counted where files are read and written.
@@ -118,9 +119,16 @@ pub struct Workspace {
     /// Bytes moved so far.
     pub io: Arc<IoCounters>,
     shared: Arc<Shared>,
+    /// The scratch files.
+    pub files: Files,
     numbers: AtomicU64,
     parts: Mutex<Vec<(&'static str, f64)>>,
     pool: Arc<rayon::ThreadPool>,
+}
+
+/// Locks a mutex; whoever panicked with it left consistent data.
+pub(crate) fn lock<T: ?Sized>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 fn pool(threads: usize, folder: &Path) -> Result<Arc<rayon::ThreadPool>> {
@@ -151,20 +159,44 @@ impl Workspace {
             .tempdir_in(parent)
             .map_err(|e| Error::io(parent, "make a scratch folder in it", e))?;
         let threads = threads.max(1);
-        let shared = Arc::new(Shared::default());
-        Ok(Self {
-            pool: pool(threads, parent)?,
-            folder: folder.path().to_path_buf(),
-            _temporary: Some(folder),
+        let pool = pool(threads, parent)?;
+        let path = folder.path().to_path_buf();
+        let mut workspace = Self::of(path, Arc::default(), None, memory, pool, observer, cancel);
+        workspace._temporary = Some(folder);
+        Ok(workspace)
+    }
+
+    fn of(
+        folder: PathBuf,
+        io: Arc<IoCounters>,
+        run: Option<run::ResumableRun>,
+        memory: MemoryPool,
+        pool: Arc<rayon::ThreadPool>,
+        observer: Arc<dyn Observer>,
+        cancel: Cancel,
+    ) -> Self {
+        limits::open_many_files();
+        let shared = Arc::new(Shared {
+            folder: folder.clone(),
+            io: io.clone(),
+            run,
+            expected: AtomicU64::new(0),
+            memory: memory.clone(),
+        });
+        Self {
+            folder,
+            _temporary: None,
             memory,
-            threads,
+            threads: pool.current_num_threads(),
             cancel,
             observer,
-            io: shared.io.clone(),
+            io,
+            files: Files::new(shared.clone(), pool.clone()),
             shared,
             numbers: AtomicU64::new(0),
             parts: Mutex::default(),
-        })
+            pool,
+        }
     }
 
     /// A workspace with the least budget, for unit tests.
@@ -191,70 +223,22 @@ impl Workspace {
         let pool = pool(threads, &folder.path)?;
         let path = folder.path.clone();
         let io: Arc<IoCounters> = Arc::default();
-        let run = pool.install(|| folder.open(&io, &*observer, &cancel))?;
-        let shared = Arc::new(Shared {
-            io: io.clone(),
-            run: Some(Arc::new(run)),
-            ..Shared::default()
-        });
-        Ok(Self {
-            folder: path,
-            _temporary: None,
-            memory,
-            threads,
-            cancel,
-            observer,
+        let run = pool.install(|| folder.open(threads, &memory, &io, &*observer, &cancel))?;
+        Ok(Self::of(
+            path,
             io,
-            shared,
-            numbers: AtomicU64::new(0),
-            parts: Mutex::default(),
+            Some(run),
+            memory,
             pool,
-        })
+            observer,
+            cancel,
+        ))
     }
 
-    /// Path of the scratch file `name`.
+    /// Path of `name` in the scratch folder.
     #[must_use]
-    pub fn file(&self, name: &str) -> PathBuf {
+    pub fn path(&self, name: &str) -> PathBuf {
         self.folder.join(name)
-    }
-
-    /// Creates the scratch file `name`.
-    ///
-    /// # Errors
-    /// [`Error::Io`].
-    pub fn create_file(&self, name: &str) -> Result<ScratchFile> {
-        self.maker().make(name, false)
-    }
-
-    /// The scratch file `name`, with its parts from earlier attempts if the run can be resumed; a new file
-    /// otherwise. The caller notes the parts that it writes by [`ScratchFile::put`].
-    ///
-    /// # Errors
-    /// [`Error::Io`].
-    pub fn keep_file(&self, name: &str) -> Result<(ScratchFile, Vec<(u32, Place)>)> {
-        let Some(run) = &self.shared.run else {
-            return Ok((self.maker().make(name, false)?, Vec::new()));
-        };
-        let places = run.places(name);
-        let path = self.file(name);
-        let file = if run.is_deleted(name) {
-            ScratchFile::new(name, path, None, true, self.shared.clone())
-        } else if places.is_empty() {
-            self.maker().make(name, true)?
-        } else {
-            let file = open_existing(&path).map_err(|e| Error::io(&path, "open", e))?;
-            ScratchFile::new(name, path, Some(file), true, self.shared.clone())
-        };
-        let end = places.iter().filter_map(|(_, p)| p.end()).max();
-        file.reach(end.unwrap_or(0));
-        Ok((file, places))
-    }
-
-    /// Reports progress to the observer. A unit that is found finished when a run is resumed reports the same
-    /// progress again.
-    pub fn advance(&self, items: u64) {
-        run::Notes::advance(items);
-        self.observer.advance(items);
     }
 
     /// The next of the numbers 0, 1, 2 …, for names that are unique in the workspace.
@@ -262,30 +246,10 @@ impl Workspace {
         self.numbers.fetch_add(1, Ordering::Relaxed)
     }
 
-    /// Creates scratch files on any thread.
-    #[must_use]
-    pub fn maker(&self) -> Maker {
-        Maker {
-            folder: self.folder.clone(),
-            shared: self.shared.clone(),
-        }
-    }
-
     /// Removes the folder if the run is `finished` or cannot be resumed.
     pub fn remove(&self, finished: bool) {
         let finished = finished && self.shared.run.as_ref().is_some_and(|r| r.retire().is_ok());
         Folder::remove(&self.folder, finished);
-    }
-
-    /// Deletes dropped files. To be called only after a step without an error.
-    ///
-    /// # Errors
-    /// [`Error::Io`], [`Error::Disk`].
-    pub fn delete_dropped(&self) -> Result<()> {
-        self.shared
-            .run
-            .as_ref()
-            .map_or(Ok(()), |run| run.delete_dropped())
     }
 
     /// Sets the estimated peak of the scratch space in bytes, for the message when the disk is full.
@@ -342,13 +306,12 @@ impl Workspace {
 
     /// Notes a part of the stage that took `seconds`.
     pub fn note_part(&self, name: &'static str, seconds: f64) {
-        let mut parts = self.parts.lock().unwrap_or_else(PoisonError::into_inner);
-        parts.push((name, seconds));
+        lock(&self.parts).push((name, seconds));
     }
 
     /// The parts noted since the last call.
     pub fn take_parts(&self) -> Vec<(&'static str, f64)> {
-        std::mem::take(&mut *self.parts.lock().unwrap_or_else(PoisonError::into_inner))
+        std::mem::take(&mut *lock(&self.parts))
     }
 
     /// # Errors

@@ -1,11 +1,13 @@
 //! Parts of files: their place, length and checksum.
 
-use std::sync::Arc;
+use serde::{Deserialize, Serialize};
 
 /// Place, length and checksum of a part of a file.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Place {
-    /// Offset of the first byte.
+    /// Number of the segment of the file.
+    pub segment: u32,
+    /// Offset of the first byte in the segment.
     pub offset: u64,
     /// Number of bytes.
     pub bytes: usize,
@@ -24,11 +26,11 @@ impl Place {
     }
 }
 
-/// A part of a file that is written.
-#[derive(Debug, Clone, PartialEq, Eq)]
+/// A part of a file that a unit of work wrote.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Put {
     /// Name of the file.
-    pub file: Arc<str>,
+    pub file: String,
     /// Number of the part.
     pub section: u32,
     /// Its place.

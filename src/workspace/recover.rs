@@ -2,7 +2,6 @@
 //! with as little work as possible.
 
 use super::history::{History, Needed, Remedy};
-use super::journal::Entry;
 use super::open::open_existing;
 use super::progress::{Cancel, Observer};
 use crate::error::Result;
@@ -49,7 +48,15 @@ fn is_whole(file: &File, part: &Needed) -> bool {
     crc.finalize() == part.place.crc
 }
 
-/// The parts that do not match the journal.
+/// The name of the file on disk that has the part.
+fn segment(part: &Needed) -> String {
+    match part.file.as_str() {
+        OUTPUT => OUTPUT.to_owned(),
+        file => format!("{file}.{}", part.place.segment),
+    }
+}
+
+/// The parts that do not match the journals.
 fn damaged(
     parts: Vec<Needed>,
     places: &Whereabouts<'_>,
@@ -58,9 +65,9 @@ fn damaged(
 ) -> Result<Vec<Needed>> {
     let mut by_file: BTreeMap<String, Vec<Needed>> = BTreeMap::new();
     for part in parts {
-        // A name with a path in it was not written by this program.
-        if !part.file.contains('/') {
-            by_file.entry(part.file.clone()).or_default().push(part);
+        // A name with a path in it was not written by this program. An empty part has no bytes to check.
+        if !part.file.contains('/') && (part.place.bytes > 0 || part.file == OUTPUT) {
+            by_file.entry(segment(&part)).or_default().push(part);
         }
     }
     let sizes = by_file.values().flatten().map(|p| p.place.bytes as u64);
@@ -97,36 +104,38 @@ fn damaged(
     Ok(all)
 }
 
-/// The entries of a journal that stay valid, and their end, given the surviving files.
+/// Checks the surviving files. Units that are to be done again are forgotten; returns the time from which on
+/// all records are to be dropped, if this does not suffice.
 pub fn recover(
-    entries: &[Entry],
-    end: u64,
+    history: &mut History,
     places: &Whereabouts<'_>,
     observer: &dyn Observer,
     cancel: &Cancel,
-) -> Result<(History, u64)> {
-    let mut history = History::of(entries);
+) -> Result<Option<u64>> {
     let bad = damaged(history.needed(), places, observer, cancel)?;
-    let names: BTreeSet<&str> = bad.iter().map(|part| part.file.as_str()).collect();
-    let names = names.into_iter().collect::<Vec<_>>().join(", ");
-    // A journal with parts before any stage was not written by this program and is ignored.
+    let names: BTreeSet<String> = bad.iter().map(segment).collect();
+    let names = match names.len() {
+        0 => super::journal::NAME.to_owned(),
+        _ => names.into_iter().collect::<Vec<_>>().join(", "),
+    };
+    // Journals with parts before any stage were not written by this program: all but the manifest is dropped.
     let first = || Remedy::Rewind {
-        end: entries.get(1).map_or(end, |entry| entry.offset),
+        end: 2,
         stage: None,
     };
     let remedy = history
         .remedy(&bad)
         .or_else(|| (!bad.is_empty()).then(first));
+    let folder = places.folder.display();
     match remedy {
-        None => Ok((history, end)),
+        None => Ok(None),
         Some(Remedy::Redo(units)) => {
             observer.warn(&format!(
-                "{}: damaged: {names}; {} unit(s) of work are done again",
-                places.folder.display(),
+                "{folder}: damaged: {names}; {} unit(s) of work, or more, are done again",
                 units.len()
             ));
             history.forget(&units);
-            Ok((history, end))
+            Ok(None)
         }
         Some(Remedy::Rewind { end, stage }) => {
             let stage = stage
@@ -134,23 +143,17 @@ pub fn recover(
                 .unwrap_or("the run")
                 .trim_start_matches('/');
             observer.warn(&format!(
-                "{}: damaged: {names}; what it was made from is gone, so the run goes back to the \
+                "{folder}: damaged: {names}; what it was made from is gone, so the run goes back to the \
                  beginning of {stage}",
-                places.folder.display(),
             ));
-            let kept: Vec<Entry> = entries
-                .iter()
-                .filter(|entry| entry.offset < end)
-                .cloned()
-                .collect();
-            Ok((History::of(&kept), end))
+            Ok(Some(end))
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::journal::Record;
+    use super::super::journal::{Entry, Record};
     use super::super::place::{Place, Put};
     use super::super::progress::Silent;
     use super::*;
@@ -159,11 +162,12 @@ mod tests {
     #[test]
     fn damage_before_any_stage_leaves_nothing_that_counts() {
         let folder = tempfile::tempdir().unwrap();
-        std::fs::write(folder.path().join("a"), "0123").unwrap();
+        std::fs::write(folder.path().join("a.0"), "0123").unwrap();
         let put = Put {
             file: "a".into(),
             section: 0,
             place: Place {
+                segment: 0,
                 offset: 0,
                 bytes: 1 << 40,
                 records: 1 << 38,
@@ -173,26 +177,27 @@ mod tests {
         let unit = Record::Unit {
             step: "/step".into(),
             unit: 0,
+            after: 1,
             puts: vec![put],
             payload: Vec::new(),
         };
         let gone = Record::Deleted("b".into());
         let records = [Record::Manifest(Vec::new()), unit, gone];
-        let entries = records.into_iter().zip(0..);
-        let entries: Vec<Entry> = entries
-            .map(|(record, offset)| Entry {
+        let mut history = History::default();
+        for (record, offset) in records.iter().zip(0..) {
+            history.add(&Entry {
+                at: 2 * offset + 1,
                 offset,
-                payload: (offset, 0),
+                payload: (None, offset, 0),
                 record,
-            })
-            .collect();
+            });
+        }
         let places = Whereabouts {
             folder: folder.path(),
             output: &Default::default(),
         };
-        let (history, end) = recover(&entries, 3, &places, &Silent, &Cancel::new()).unwrap();
-        assert!(history.places("a").is_empty() && history.units("/step").is_empty());
-        assert_eq!(end, 1);
+        let end = recover(&mut history, &places, &Silent, &Cancel::new()).unwrap();
+        assert_eq!(end, Some(2));
     }
 
     #[test]
@@ -203,6 +208,7 @@ mod tests {
             file: "a".into(),
             section: 0,
             place: Place {
+                segment: 0,
                 offset,
                 bytes,
                 records: 0,

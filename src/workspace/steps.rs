@@ -1,11 +1,15 @@
 //! Steps that a resumed run does not repeat.
 
-use super::Workspace;
-use super::persist::{Persist, Saved};
-use super::place::{Place, Put};
-use super::run::{Notes, ResumableRun};
-use crate::error::Result;
-use std::sync::{Arc, Mutex, PoisonError};
+use super::memory::Usage;
+use super::place::Place;
+use super::run::ResumableRun;
+use super::unit::Notes;
+use super::{Unit, Workspace, journal, lock};
+use crate::error::{Error, Result};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use std::collections::BTreeSet;
+use std::sync::Mutex;
 
 /// The name of a step that consists of units, and the name under which their memory is reserved.
 #[derive(Debug)]
@@ -36,12 +40,6 @@ impl Drop for Inside<'_> {
     }
 }
 
-fn bytes(value: &impl Persist) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    value.save(&mut bytes);
-    bytes
-}
-
 impl Workspace {
     /// Does `work`, or restores its result if an earlier attempt finished it.
     ///
@@ -49,23 +47,67 @@ impl Workspace {
     /// input and the parameters.
     ///
     /// # Errors
-    /// Errors of `work`, [`crate::Error::Io`], [`crate::Error::Disk`].
-    pub fn once<T: Persist>(&self, name: &str, work: impl FnOnce() -> Result<T>) -> Result<T> {
-        let Some(run) = &self.shared.run else {
-            return work();
+    /// Errors of `work`, [`Error::Io`], [`Error::Disk`].
+    pub fn once<T: Serialize + DeserializeOwned>(
+        &self,
+        name: &str,
+        work: impl FnOnce(&Unit<'_>) -> Result<T>,
+    ) -> Result<T> {
+        let unit = self.unit();
+        let Some(run) = self.run() else {
+            return work(&unit);
         };
         let path = run.begin(name)?;
         if let Some(payload) = run.payload(&path, 0)? {
-            return T::load(&mut Saved::new(&payload, self));
+            return self.restored(&payload);
         }
-        let notes = Notes::begin();
         run.enter(&path);
         let inside = Inside(run);
-        let value = work()?;
+        let value = work(&unit)?;
         drop(inside);
-        run.finish(&path, 0, notes.finish().puts, bytes(&value))?;
-        run.delete_dropped()?;
+        run.finish(
+            unit.worker(),
+            &path,
+            0,
+            unit.end().0.puts,
+            self.saved(&value)?,
+        )?;
         Ok(value)
+    }
+
+    /// A unit of work without a reservation of its own, for work on one thread.
+    #[must_use]
+    pub fn unit(&self) -> Unit<'_> {
+        Unit::new(self, 0, Usage::default())
+    }
+
+    fn saved(&self, value: &impl Serialize) -> Result<Vec<u8>> {
+        // Results have sizes that are known, so this cannot happen.
+        postcard::to_allocvec(value).map_err(|e| {
+            Error::io(
+                self.path(journal::NAME),
+                "save a result for",
+                std::io::Error::other(e),
+            )
+        })
+    }
+
+    /// A result from an earlier attempt.
+    fn restored<T: DeserializeOwned>(&self, payload: &[u8]) -> Result<T> {
+        let corrupt = |found: String| Error::Corrupt {
+            path: self.path(journal::NAME),
+            offset: 0,
+            found,
+            expected: std::any::type_name::<T>().to_owned(),
+        };
+        match postcard::take_from_bytes(payload) {
+            Ok((value, [])) => Ok(value),
+            Ok((_, rest)) => Err(corrupt(format!("a result with {} bytes more", rest.len()))),
+            Err(error) => Err(corrupt(format!(
+                "a result of {} bytes: {error}",
+                payload.len()
+            ))),
+        }
     }
 
     /// As [`Workspace::for_each_unit`], but units that an earlier attempt finished are not repeated. The
@@ -74,22 +116,21 @@ impl Workspace {
     ///
     /// # Errors
     /// Errors of [`Workspace::for_each_unit`] and of `each`.
-    pub fn units<T: Persist + Send>(
+    pub fn units<T: Serialize + DeserializeOwned + Send>(
         &self,
         name: impl Into<UnitsName>,
         count: usize,
-        bytes_of: impl Fn(usize) -> u64 + Sync,
-        work: impl Fn(usize) -> Result<T> + Sync,
+        bytes: impl Fn(usize) -> u64 + Sync,
+        work: impl Fn(&Unit<'_>) -> Result<T> + Sync,
         each: impl FnMut(usize, T) -> Result<()> + Send,
     ) -> Result<()> {
         let each = Mutex::new(each);
-        let hand_on = |unit, value| {
-            let mut each = each.lock().unwrap_or_else(PoisonError::into_inner);
-            (*each)(unit, value)
-        };
+        let hand_on = |unit, value| (*lock(&each))(unit, value);
         let UnitsName { step, memory } = name.into();
-        let Some(run) = &self.shared.run else {
-            return self.for_each_unit(memory, count, bytes_of, |unit| hand_on(unit, work(unit)?));
+        let Some(run) = self.run() else {
+            return self.for_each_unit(memory, count, bytes, |unit| {
+                hand_on(unit.number(), work(unit)?)
+            });
         };
         let step = run.begin(&step)?;
         let mut left: Vec<usize> = Vec::new();
@@ -100,43 +141,39 @@ impl Workspace {
                 continue;
             }
             let payload = run.payload(&step, unit as u64)?.unwrap_or_default();
-            let (items, value) = Persist::load(&mut Saved::new(&payload, self))?;
+            let (items, value) = self.restored(&payload)?;
             self.observer.advance(items);
             hand_on(unit, value)?;
         }
-        let bytes_of = |n: usize| bytes_of(left[n]);
-        self.for_each_unit(memory, left.len(), bytes_of, |n| {
-            let unit = left[n];
-            let notes = Notes::begin();
-            let value = work(unit)?;
-            let noted = notes.finish();
-            let mut payload = bytes(&noted.items);
-            value.save(&mut payload);
-            run.finish(&step, unit as u64, noted.puts, payload)?;
-            hand_on(unit, value)
-        })
+        let files = Mutex::new(BTreeSet::new());
+        self.for_units(memory, &left, bytes, |unit| {
+            let value = work(&unit)?;
+            let (number, worker) = (unit.number(), unit.worker());
+            let (Notes { puts, items }, usage) = unit.end();
+            lock(&files).extend(puts.iter().map(|put| put.file.clone()));
+            run.finish(
+                worker,
+                &step,
+                number as u64,
+                puts,
+                self.saved(&(items, &value))?,
+            )?;
+            hand_on(number, value)?;
+            Ok(usage)
+        })?;
+        run.end(&step, count as u64, std::mem::take(&mut *lock(&files)))
     }
 
     /// Begins the next step `name` of the program, for callers that manage its units themselves.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], [`crate::Error::Disk`].
-    pub(crate) fn step(&self, name: &str) -> Result<Step> {
-        let run = self.shared.run.clone();
+    /// [`Error::Io`], [`Error::Disk`].
+    pub(crate) fn step(&self, name: &str) -> Result<Step<'_>> {
+        let run = self.run();
         Ok(Step {
-            path: run
-                .as_ref()
-                .map_or(Ok(String::new()), |run| run.begin(name))?,
-            run,
+            path: run.map_or(Ok(String::new()), |run| run.begin(name))?,
+            workspace: self,
         })
-    }
-
-    /// Notes a part of a file that is not in the scratch folder.
-    ///
-    /// # Errors
-    /// [`crate::Error::Io`], [`crate::Error::Disk`].
-    pub(crate) fn put(&self, put: Put) -> Result<()> {
-        self.run().map_or(Ok(()), |run| run.put(put))
     }
 
     /// The parts of a file that earlier attempts wrote.
@@ -145,7 +182,7 @@ impl Workspace {
     }
 
     pub(super) fn run(&self) -> Option<&ResumableRun> {
-        self.shared.run.as_deref()
+        self.shared.run.as_ref()
     }
 
     /// True if the run can be resumed.
@@ -155,27 +192,26 @@ impl Workspace {
     }
 }
 
-/// A step whose units are not known in advance.
-#[derive(Debug, Default)]
-pub(crate) struct Step {
-    run: Option<Arc<ResumableRun>>,
+/// A step whose units are not known in advance. One thread does all of them.
+pub(crate) struct Step<'w> {
+    workspace: &'w Workspace,
     path: String,
 }
 
-impl Step {
+impl Step<'_> {
     /// The finished units and their results.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
-    pub fn finished<T: Persist>(&self, workspace: &Workspace) -> Result<Vec<(u64, T)>> {
-        let Some(run) = &self.run else {
+    /// [`Error::Io`], [`Error::Corrupt`].
+    pub fn finished<T: DeserializeOwned>(&self) -> Result<Vec<(u64, T)>> {
+        let Some(run) = self.workspace.run() else {
             return Ok(Vec::new());
         };
         let units = run.finished(&self.path).into_iter();
         units
             .map(|unit| {
                 let payload = run.payload(&self.path, unit)?.unwrap_or_default();
-                Ok((unit, T::load(&mut Saved::new(&payload, workspace))?))
+                Ok((unit, self.workspace.restored(&payload)?))
             })
             .collect()
     }
@@ -183,18 +219,25 @@ impl Step {
     /// Records as one unit the parts of files that `put` writes, and `value`.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], [`crate::Error::Disk`].
+    /// [`Error::Io`], [`Error::Disk`].
     pub fn finish(
         &self,
         unit: u64,
-        value: &impl Persist,
-        put: impl FnOnce() -> Result<()>,
+        value: &impl Serialize,
+        put: impl FnOnce(&Unit<'_>) -> Result<()>,
     ) -> Result<()> {
-        let Some(run) = &self.run else {
-            return put();
+        let at_work = self.workspace.unit();
+        put(&at_work)?;
+        let Some(run) = self.workspace.run() else {
+            return Ok(());
         };
-        let notes = Notes::begin();
-        put()?;
-        run.finish(&self.path, unit, notes.finish().puts, bytes(value))
+        let value = self.workspace.saved(value)?;
+        run.finish(
+            at_work.worker(),
+            &self.path,
+            unit,
+            at_work.end().0.puts,
+            value,
+        )
     }
 }

@@ -1,7 +1,7 @@
 //! Units of work on all threads; the memory budget limits the number of simultaneous units.
 
-use super::Workspace;
-use super::memory::{Slot, Unit};
+use super::memory::{Slot, Usage};
+use super::{Unit, Workspace, lock};
 use crate::error::{Error, Result};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -21,7 +21,19 @@ impl Workspace {
         name: &'static str,
         count: usize,
         bytes: impl Fn(usize) -> u64 + Sync,
-        work: impl Fn(usize) -> Result<()> + Sync,
+        work: impl Fn(&Unit<'_>) -> Result<()> + Sync,
+    ) -> Result<()> {
+        let all: Vec<usize> = (0..count).collect();
+        self.for_units(name, &all, bytes, |unit| Ok((work(&unit)?, unit.end().1).1))
+    }
+
+    /// As [`Workspace::for_each_unit`], for the `units` with these numbers; `work` ends the unit.
+    pub(super) fn for_units(
+        &self,
+        name: &'static str,
+        units: &[usize],
+        bytes: impl Fn(usize) -> u64 + Sync,
+        work: impl Fn(Unit<'_>) -> Result<Usage> + Sync,
     ) -> Result<()> {
         let next = AtomicUsize::new(0);
         let stop = AtomicBool::new(false);
@@ -31,42 +43,27 @@ impl Workspace {
         let worker = || {
             let mut slot = Slot::new(&self.memory, name);
             while !stop.load(Ordering::Relaxed) {
-                let unit = next.fetch_add(1, Ordering::Relaxed);
-                if unit >= count {
+                let Some(&unit) = units.get(next.fetch_add(1, Ordering::Relaxed)) else {
                     break;
-                }
+                };
                 let outcome = self
                     .check_cancel()
                     .and_then(|()| self.memory.promise_waiting(name, bytes(unit)))
-                    .and_then(|reserved| {
-                        let at_work = Unit::begin(reserved);
-                        let outcome = work(unit);
-                        slot.ended(at_work);
-                        outcome
-                    });
+                    .and_then(|reserved| work(Unit::new(self, unit, Usage::of(reserved))))
+                    .map(|usage| slot.ended(usage));
                 if let Err(error) = outcome {
                     stop.store(true, Ordering::Relaxed);
-                    let mut first = failed
-                        .lock()
-                        .unwrap_or_else(std::sync::PoisonError::into_inner);
+                    let mut first = lock(&failed);
                     if first.as_ref().is_none_or(|(u, _)| unit < *u) {
                         *first = Some((unit, error));
                     }
                 }
             }
-            slots
-                .lock()
-                .unwrap_or_else(std::sync::PoisonError::into_inner)
-                .push(slot);
+            lock(&slots).push(slot);
         };
         // Always the same threads: memory that the allocator keeps for one is of no use to another.
         self.pool.broadcast(|_| worker());
-        match failed
-            .into_inner()
-            .unwrap_or_else(std::sync::PoisonError::into_inner)
-        {
-            Some((_, error)) => Err(error),
-            None => Ok(()),
-        }
+        let failed = lock(&failed).take();
+        failed.map_or(Ok(()), |(_, error)| Err(error))
     }
 }

@@ -411,7 +411,7 @@ fn a_scratch_folder_that_is_too_small() {
     }
     let program = Path::new(env!("CARGO_BIN_EXE_outcrop"));
     // Too small from the start, or with a limit on the number of files, which free space does not show.
-    let few = ["64m,nr_inodes=6", "64m,nr_inodes=8"];
+    let few = ["64m,nr_inodes=10", "64m,nr_inodes=13"];
     for size in ["64k", "512k", "2m"].into_iter().chain(few) {
         // Once there is room, the run is resumed.
         let script = format!(

@@ -55,10 +55,10 @@ impl Bench {
 }
 
 /// The points of the spool on a lattice, sorted.
-pub fn positions(spool: &Spool, lattice: &Lattice) -> Vec<[i32; 3]> {
+pub fn positions(bench: &Bench, spool: &Spool, lattice: &Lattice) -> Vec<[i32; 3]> {
     let mut all = Vec::new();
     spool
-        .for_each(lattice, |points| {
+        .for_each(&bench.workspace, lattice, |points| {
             all.extend_from_slice(points);
             Ok(())
         })
@@ -66,7 +66,7 @@ pub fn positions(spool: &Spool, lattice: &Lattice) -> Vec<[i32; 3]> {
     all.sort_unstable();
     let parallel = Mutex::new(Vec::new());
     spool
-        .par_for_each(3, lattice, |points| {
+        .par_for_each(&bench.workspace, 3, lattice, |points| {
             parallel.lock().unwrap().extend_from_slice(points);
             Ok(())
         })

@@ -79,7 +79,10 @@ fn no_damage_makes_it_panic() {
             if let Ok(spool) = bench.read(&[path])
                 && let Ok(lattice) = spool.choose_lattice(1)
             {
-                assert_eq!(positions(&spool, &lattice).len() as u64, spool.points());
+                assert_eq!(
+                    positions(&bench, &spool, &lattice).len() as u64,
+                    spool.points()
+                );
             }
         }
     }
@@ -108,16 +111,20 @@ fn a_damaged_spool_is_noticed() {
         let mut copy = good.clone();
         copy[at] ^= 0x10;
         std::fs::write(&file, copy).unwrap();
-        let error = spool.for_each(&lattice, |_| Ok(())).unwrap_err();
+        let error = spool
+            .for_each(&bench.workspace, &lattice, |_| Ok(()))
+            .unwrap_err();
         assert!(matches!(error, Error::Corrupt { .. }), "byte {at}: {error}");
     }
     std::fs::write(&file, &good[..good.len() / 2]).unwrap();
-    let error = spool.par_for_each(2, &lattice, |_| Ok(())).unwrap_err();
+    let error = spool
+        .par_for_each(&bench.workspace, 2, &lattice, |_| Ok(()))
+        .unwrap_err();
     assert!(
         error.to_string().contains("scratch file damaged"),
         "{error}"
     );
-    drop(spool);
+    spool.release(&bench.workspace).unwrap();
     assert!(!file.exists());
 }
 

@@ -41,7 +41,7 @@ fn the_order_of_files_does_not_matter() {
     for order in [[&a, &b, &c, &d], [&d, &c, &b, &a], [&b, &d, &a, &c]] {
         let spool = bench.read(&order.map(PathBuf::clone)).unwrap();
         let lattice = spool.choose_lattice(0).unwrap();
-        let points = positions(&spool, &lattice);
+        let points = positions(&bench, &spool, &lattice);
         outcomes.push((lattice, points));
     }
     assert!(outcomes[0].0.exact);
@@ -92,7 +92,10 @@ fn refines_and_coarsens_to_what_fits() {
     let spool = bench.read(std::slice::from_ref(&path)).unwrap();
     let lattice = spool.choose_lattice(3).unwrap();
     assert_eq!((lattice.step, lattice.exact), (0.05, false));
-    assert_eq!(positions(&spool, &lattice).last().unwrap()[0], 858_993_459);
+    assert_eq!(
+        positions(&bench, &spool, &lattice).last().unwrap()[0],
+        858_993_459
+    );
     write_las(&path, (1, 2), 0, (0.01, [0.0; 3]), &cloud(9, 1), false);
     let spool = bench.read(&[path]).unwrap();
     let (coarse, fine) = (
@@ -100,10 +103,10 @@ fn refines_and_coarsens_to_what_fits() {
         spool.choose_lattice(2).unwrap(),
     );
     assert_eq!((fine.step, fine.exact), (0.0025, true));
-    let scaled = positions(&spool, &coarse)
+    let scaled = positions(&bench, &spool, &coarse)
         .into_iter()
         .map(|p| p.map(|c| 4 * c));
-    assert!(scaled.eq(positions(&spool, &fine)));
+    assert!(scaled.eq(positions(&bench, &spool, &fine)));
     assert!(spool.choose_lattice(40).unwrap().step > 0.01 / (1 << 14) as f64);
 }
 
@@ -119,7 +122,7 @@ fn floats_lie_on_a_power_of_two() {
     assert_eq!((spool.points(), spool.stats().dropped_non_finite), (2, 1));
     let lattice = spool.choose_lattice(0).unwrap();
     assert_eq!((lattice.step, lattice.exact), (0.25, true));
-    assert_eq!(positions(&spool, &lattice), [[0, 0, 0], [2, 18, 4]]);
+    assert_eq!(positions(&bench, &spool, &lattice), [[0, 0, 0], [2, 18, 4]]);
     let points = [[0.1, 1e-9, 0.0], [1000.0, 0.3, 0.7]];
     let path = bench.write("b.ply", ply("ascii", "double", false, &points));
     std::fs::write(
@@ -144,5 +147,5 @@ fn a_file_without_points_may_be_anywhere() {
     let near = bench.write("near.xyz", "1.5 2 -3.25\n1 2 3\n");
     let spool = bench.read(&[far, near]).unwrap();
     let lattice = spool.choose_lattice(0).unwrap();
-    assert_eq!(positions(&spool, &lattice).len(), 2);
+    assert_eq!(positions(&bench, &spool, &lattice).len(), 2);
 }

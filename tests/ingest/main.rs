@@ -30,7 +30,11 @@ fn reads_every_version_and_point_format() {
                 let lattice = spool.choose_lattice(0).unwrap();
                 assert!(lattice.exact && lattice.step == 0.001, "{path:?}");
                 assert_eq!(lattice.offset, [4e5, 5e6, 0.0]);
-                assert_eq!(positions(&spool, &lattice), based(&points), "{path:?}");
+                assert_eq!(
+                    positions(&bench, &spool, &lattice),
+                    based(&points),
+                    "{path:?}"
+                );
                 let seen = probe(&path).unwrap();
                 assert_eq!(seen.points_claimed, Some(1234));
                 assert_eq!(seen.format == Format::LAZ, kind == "laz");
@@ -54,7 +58,7 @@ fn reads_many_chunks_with_and_without_a_chunk_table() {
             let kept: Vec<_> = (0..points.len()).filter(|i| i % 100 != 0).collect();
             let kept: Vec<_> = kept.into_iter().map(|i| points[i]).collect();
             let lattice = spool.choose_lattice(0).unwrap();
-            assert_eq!(positions(&spool, &lattice), based(&kept));
+            assert_eq!(positions(&bench, &spool, &lattice), based(&kept));
         };
         check(path.clone());
         let mut bytes = std::fs::read(&path).unwrap();
@@ -93,7 +97,7 @@ fn reads_every_kind_of_ply() {
                     (1.0, true),
                     "{body} {kind} {list}"
                 );
-                seen.push(positions(&spool, &lattice));
+                seen.push(positions(&bench, &spool, &lattice));
                 assert_eq!(spool.source_precision(), CoordinateType::F32);
             }
         }
@@ -115,7 +119,7 @@ fn reads_text_of_many_slabs_and_finds_the_line_that_is_wrong() {
         let spool = bench.read(&[path]).unwrap();
         let lattice = spool.choose_lattice(0).unwrap();
         assert_eq!((lattice.step, lattice.exact), (0.001, true));
-        assert_eq!(positions(&spool, &lattice), based(&points));
+        assert_eq!(positions(&bench, &spool, &lattice), based(&points));
         let cut = text.trim_end().len() - 14;
         let error = bench.error(bench.write("b.txt", &text[..cut]));
         assert!(error.contains("line 200002"), "{error}");
@@ -157,7 +161,9 @@ fn reads_a_large_scan() {
     let spool = bench.read(&[path]).unwrap();
     let read = start.elapsed();
     let lattice = spool.choose_lattice(0).unwrap();
-    spool.for_each(&lattice, |_| Ok(())).unwrap();
+    spool
+        .for_each(&bench.workspace, &lattice, |_| Ok(()))
+        .unwrap();
     println!(
         "{} points: decoded in {read:.2?}, streamed in {:.2?}, at most {} MiB resident; {lattice:?}",
         spool.points(),

@@ -88,7 +88,7 @@ fn the_largest_and_smallest_numbers_fit_one_lattice() {
     let spool = spool.unwrap();
     let lattice = spool.choose_lattice(10).unwrap();
     assert!(!lattice.exact && lattice.step.is_finite());
-    assert_eq!(positions(&spool, &lattice)[0], [0, 0, 0]);
+    assert_eq!(positions(&bench, &spool, &lattice)[0], [0, 0, 0]);
 }
 
 #[test]

@@ -51,9 +51,14 @@ fn killed_while_the_mesh_gets_its_name() {
 #[test]
 fn killed_while_scratch_is_removed() {
     let case = Case::new(ROBUST);
-    for number in (1..=case.events["delete"]).step_by(3) {
+    let events = case.events["delete"];
+    for number in (1..=events).step_by(3) {
         let fault = format!("delete:{number}");
         case.killed(&fault);
+        // How many threads wrote to a file, and so the number of its segments, differs between runs.
+        if 10 * number > 9 * events && !case.scratch.exists() {
+            break;
+        }
         // The first files are deleted during the run, the rest when the mesh is complete.
         assert!(case.scratch.exists(), "{fault}");
         let said = case.go_on(&fault);

@@ -12,7 +12,7 @@ use std::path::Path;
 const STORE_PAGE: usize = 1 << 12;
 
 /// Reads a cloud in any format of ingest; duplicates become one point.
-pub(super) fn read(path: &Path, name: &str, workspace: &Workspace) -> Result<Shape> {
+pub(super) fn read(path: &Path, name: &'static str, workspace: &Workspace) -> Result<Shape> {
     let observer = &workspace.observer;
     observer.begin("read cloud", "points", 0);
     let spool = ingest(&[path.to_path_buf()], workspace)?;
@@ -32,8 +32,9 @@ pub(super) fn read(path: &Path, name: &str, workspace: &Workspace) -> Result<Sha
         other => other,
     })?;
     observer.begin("order", "points", kept);
-    let (store, _) = order(spool, &lattice, STORE_PAGE, workspace)?;
+    let (stored, _) = order(&spool, &lattice, STORE_PAGE, workspace)?;
     observer.end();
+    let store = stored.open(workspace)?;
 
     let count = store.len() as u64;
     let mut writer = PageWriter::new(workspace, name, count)?;
@@ -51,11 +52,13 @@ pub(super) fn read(path: &Path, name: &str, workspace: &Workspace) -> Result<Sha
             writer.push(position)?;
         }
     }
+    stored.release(workspace)?;
     let pages = writer.finish()?;
     let mut side = side(path, Kind::Cloud, pages.bounds());
     side.points = count;
     side.exact = lattice.exact;
     Ok(Shape {
+        name,
         side,
         items: Items::Cloud(pages),
     })

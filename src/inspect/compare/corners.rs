@@ -1,15 +1,13 @@
 //! A mesh whose vertices do not fit into memory: its corners are sorted by vertex, receive their positions,
 //! and are sorted back by triangle.
 
-use super::shape::{Choice, Shape, unusable, usable};
-use super::triangles::{Chooser, keyed, no_vertex, not_triangles, pages, shape, sorter};
-use super::vector::{Box3, V3};
+use super::shape::Shape;
+use super::triangles::Reading;
+use super::vector::V3;
 use crate::error::Result;
 use crate::inspect::ply_mesh::Sink;
-use crate::spill::{Sorted, Sorter, Table, row};
-use crate::workspace::Workspace;
+use crate::spill::{LocalTable, Sorted, Sorter, row};
 use crate::workspace::memory::Reservation;
-use std::path::Path;
 
 /// Vertices per section of the positions.
 const SECTION: usize = 1 << 14;
@@ -38,50 +36,34 @@ row! {
 
 /// Reads a mesh of any size, its elements in any order.
 pub(super) struct Joined<'a> {
-    path: &'a Path,
-    name: &'a str,
-    workspace: &'a Workspace,
+    reading: Reading<'a>,
     sorter: Sorter<Corner>,
     held: Reservation,
-    positions: Table<V3>,
+    positions: LocalTable<V3>,
     pending: Vec<V3>,
-    bounds: Box3,
-    vertices: u64,
     corners: u64,
     batch: Vec<Corner>,
 }
 
 impl<'a> Joined<'a> {
-    pub(super) fn new(
-        path: &'a Path,
-        name: &'a str,
-        vertices: u64,
-        workspace: &'a Workspace,
-    ) -> Result<Self> {
-        let buffer = workspace.memory.available() / 5;
-        let (sorter, held) = sorter(workspace, &format!("{name}.corners"), buffer)?;
+    pub(super) fn new(reading: Reading<'a>) -> Result<Self> {
+        let workspace = reading.workspace;
+        let (sorter, held) = reading.sorter("corners", workspace.memory.available() / 5)?;
+        let name = format!("{}.positions", reading.name);
         Ok(Self {
-            path,
-            name,
-            workspace,
+            reading,
             sorter,
             held,
-            positions: Table::create(workspace, &format!("{name}.positions"), 0)?,
+            positions: LocalTable::create(workspace, &name)?,
             pending: Vec::with_capacity(SECTION),
-            bounds: Box3::EMPTY,
-            vertices,
             corners: 0,
             batch: Vec::new(),
         })
     }
 
-    pub(super) fn finish(self, faces: u64, choice: Choice) -> Result<Shape> {
-        let Self {
-            path,
-            name,
-            workspace,
-            ..
-        } = self;
+    pub(super) fn finish(self) -> Result<Shape> {
+        let reading = self.reading;
+        let workspace = reading.workspace;
         if !self.pending.is_empty() {
             self.positions.append(&self.pending)?;
         }
@@ -90,55 +72,53 @@ impl<'a> Joined<'a> {
         let corners = Corners::new(self.sorter.finish(workspace)?);
 
         let buffer = workspace.memory.available() / 4;
-        let (placed, placed_held) = sorter(workspace, &format!("{name}.placed"), buffer)?;
+        let (placed, placed_held) = reading.sorter("placed", buffer)?;
         workspace.observer.begin("corners", "corners", self.corners);
-        let used = place(&corners, &self.positions, &placed, path, workspace)?;
+        let used = place(&corners, &self.positions, &placed, &reading)?;
         workspace.observer.end();
 
         let buffer = workspace.memory.available() / 2;
-        let (keys, keys_held) = sorter(workspace, &format!("{name}.order"), buffer)?;
+        let (keys, keys_held) = reading.sorter("order", buffer)?;
         let mut triangle = [[0.0; 3]; 3];
         placed.finish(workspace)?.for_each(|placed: PlacedCorner| {
             let [high, low] = placed.number.map(u64::from);
             let corner = (high << 32 | low) % 3;
             triangle[corner as usize] = bytemuck::cast(placed.position);
             if corner == 2 {
-                keys.push(&[keyed(triangle, &self.bounds)])?;
+                keys.push(&[reading.keyed(triangle)])?;
             }
             Ok(())
         })?;
         drop(placed_held);
-        let triangles = pages(keys, name, faces, workspace)?;
+        let triangles = reading.pages(keys)?;
         drop(keys_held);
 
-        let mut chooser = Chooser::new(workspace, name, used, triangles.1, choice)?;
-        corners.for_each_vertex(&self.positions, |_, p| chooser.offer(p))?;
+        let shape = reading.shape(triangles, used, |chooser| {
+            corners.for_each_vertex(&self.positions, |_, p| chooser.offer(p))
+        })?;
+        corners.release()?;
         drop((self.held, index));
-        Ok(shape(path, triangles, [used, faces], chooser.finish()?))
+        Ok(shape)
     }
 }
 
 /// Sends the position of every corner to its triangle; returns the number of vertices with corners.
 fn place(
     corners: &Corners,
-    positions: &Table<V3>,
+    positions: &LocalTable<V3>,
     placed: &Sorter<PlacedCorner>,
-    path: &Path,
-    workspace: &Workspace,
+    reading: &Reading<'_>,
 ) -> Result<u64> {
     let mut used = 0;
     corners.for_each_vertex(positions, |v, p| {
         used += 1;
-        if usable(p) {
-            workspace.check_cancel()
-        } else {
-            Err(unusable(path, &format!("vertex {v}"), p))
-        }
+        reading.check(v, p)?;
+        reading.workspace.check_cancel()
     })?;
     let mut window = Window::new(positions);
     corners.for_each(|Corner { vertex, number }| {
         let position = bytemuck::cast(window.get(vertex)?);
-        workspace.observer.advance(1);
+        reading.workspace.observer.advance(1);
         placed.push(&[PlacedCorner { number, position }])
     })?;
     Ok(used)
@@ -146,9 +126,6 @@ fn place(
 
 impl Sink for Joined<'_> {
     fn vertices(&mut self, positions: &[V3]) -> Result<()> {
-        self.workspace.check_cancel()?;
-        let good = positions.iter().filter(|p| usable(**p));
-        self.bounds = good.fold(self.bounds, |b, p| b.with(*p));
         for p in positions {
             self.pending.push(*p);
             if self.pending.len() == SECTION {
@@ -156,28 +133,25 @@ impl Sink for Joined<'_> {
                 self.pending.clear();
             }
         }
-        self.workspace.observer.advance(positions.len() as u64);
-        Ok(())
+        self.reading.see(positions)
     }
 
     fn triangles(&mut self, triangles: &[[u32; 3]]) -> Result<()> {
-        self.workspace.check_cancel()?;
         self.batch.clear();
         for &vertex in triangles.iter().flatten() {
-            if u64::from(vertex) >= self.vertices {
-                return Err(no_vertex(self.path, self.vertices));
+            if u64::from(vertex) >= self.reading.vertices {
+                return Err(self.reading.no_vertex());
             }
             let number = [(self.corners >> 32) as u32, self.corners as u32];
             self.batch.push(Corner { vertex, number });
             self.corners += 1;
         }
         self.sorter.push(&self.batch)?;
-        self.workspace.observer.advance(triangles.len() as u64);
-        Ok(())
+        self.reading.advance(triangles.len())
     }
 
     fn non_triangles(&mut self, count: u64) -> Result<()> {
-        Err(not_triangles(self.path, count))
+        Err(self.reading.not_triangles(count))
     }
 }
 
@@ -195,19 +169,25 @@ impl Corners {
         }
     }
 
+    /// Deletes the corners on disk.
+    fn release(self) -> Result<()> {
+        match self {
+            Self::Memory(_) => Ok(()),
+            Self::Disk(sorted) => sorted.release(),
+        }
+    }
+
     fn for_each(&self, mut each: impl FnMut(Corner) -> Result<()>) -> Result<()> {
         match self {
             Self::Memory(all) => all.iter().try_for_each(|c| each(*c)),
             Self::Disk(sorted) => sorted.for_range(None, None, each),
         }
     }
-}
 
-impl Corners {
     /// Calls `each` with every vertex that has corners, ascending, and its position.
     fn for_each_vertex(
         &self,
-        positions: &Table<V3>,
+        positions: &LocalTable<V3>,
         mut each: impl FnMut(u32, V3) -> Result<()>,
     ) -> Result<()> {
         let mut last = None;
@@ -224,13 +204,13 @@ impl Corners {
 
 /// Positions of ascending vertices.
 struct Window<'a> {
-    positions: &'a Table<V3>,
+    positions: &'a LocalTable<V3>,
     section: usize,
     rows: Vec<V3>,
 }
 
 impl<'a> Window<'a> {
-    fn new(positions: &'a Table<V3>) -> Self {
+    fn new(positions: &'a LocalTable<V3>) -> Self {
         Self {
             positions,
             section: usize::MAX,

@@ -1,7 +1,8 @@
 //! The result of a comparison.
 
-use super::measure::Sums;
+use super::samples::Sample;
 use super::shape::{Kind, Side};
+use super::vector::V3;
 use crate::error::Result;
 use crate::spill::{Sorter, row};
 use crate::workspace::Workspace;
@@ -70,6 +71,45 @@ pub struct Comparison {
     pub symmetric: Distances,
 }
 
+/// Running sums of one direction.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Sums {
+    pub(super) samples: u64,
+    pub(super) counted: u64,
+    pub(super) sum: f64,
+    pub(super) squares: f64,
+    pub(super) max: f64,
+    pub(super) max_at: Option<V3>,
+}
+
+impl Sums {
+    pub(super) fn add(&mut self, sample: &Sample, distance: f64) {
+        self.samples += 1;
+        if sample.counts {
+            self.counted += 1;
+            self.sum += distance;
+            self.squares += distance * distance;
+        }
+        if self.max_at.is_none() || distance > self.max {
+            self.max = distance;
+            self.max_at = Some(sample.position);
+        }
+    }
+
+    /// Both directions together.
+    pub(super) fn with(self, other: Self) -> Self {
+        let far = if other.max > self.max { other } else { self };
+        Self {
+            samples: self.samples + other.samples,
+            counted: self.counted + other.counted,
+            sum: self.sum + other.sum,
+            squares: self.squares + other.squares,
+            max: far.max,
+            max_at: far.max_at,
+        }
+    }
+}
+
 row! {
     /// A distance; rows sort by size.
     pub(super) struct DistanceRow {
@@ -119,13 +159,13 @@ impl Ranks {
 /// Exact percentiles of each direction and of both from the rows of `sorter`.
 pub(super) fn percentiles(
     sorter: Sorter<DistanceRow>,
-    sums: [Sums; 2],
+    sums: &[Sums; WAYS],
     workspace: &Workspace,
 ) -> Result<[[f64; SHARES.len()]; WAYS]> {
-    let mut ranks = [Ranks::default(); WAYS];
-    ranks[0].of = sums[0].counted;
-    ranks[1].of = sums[1].counted;
-    ranks[2].of = sums[0].counted + sums[1].counted;
+    let mut ranks = sums.map(|sums| Ranks {
+        of: sums.counted,
+        ..Ranks::default()
+    });
     sorter.finish(workspace)?.for_each(|row| {
         let distance = row.distance();
         ranks[usize::from(row.way == 1)].see(distance);
@@ -139,38 +179,26 @@ impl Distances {
     pub(super) fn new(sums: &Sums, percentiles: [f64; SHARES.len()], diagonal: f64) -> Self {
         let [p50, p90, p99, p99_9] = percentiles;
         let counted = sums.counted.max(1) as f64;
-        let figures = Figures {
-            max: sums.max,
-            mean: sums.sum / counted,
-            rms: (sums.squares / counted).sqrt(),
-            p50,
-            p90,
-            p99,
-            p99_9,
+        let figures = |unit: f64| Figures {
+            max: sums.max * unit,
+            mean: sums.sum / counted * unit,
+            rms: (sums.squares / counted).sqrt() * unit,
+            p50: p50 * unit,
+            p90: p90 * unit,
+            p99: p99 * unit,
+            p99_9: p99_9 * unit,
         };
         Self {
             samples: sums.samples,
             vertex_samples: sums.samples - sums.counted,
-            figures,
+            figures: figures(1.0),
             max_at: sums.max_at.unwrap_or_default(),
-            percent: (diagonal > 0.0).then(|| figures.scaled(100.0 / diagonal)),
+            percent: (diagonal > 0.0).then(|| figures(100.0 / diagonal)),
         }
     }
 }
 
 impl Figures {
-    fn scaled(&self, by: f64) -> Self {
-        Self {
-            max: self.max * by,
-            mean: self.mean * by,
-            rms: self.rms * by,
-            p50: self.p50 * by,
-            p90: self.p90 * by,
-            p99: self.p99 * by,
-            p99_9: self.p99_9 * by,
-        }
-    }
-
     /// Names and values.
     #[must_use]
     pub fn named(&self) -> [(&'static str, f64); 7] {

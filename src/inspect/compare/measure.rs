@@ -1,14 +1,14 @@
 //! Distances of samples, measured on all threads and passed on in the order of the samples.
 
+use super::Options;
 use super::pages::{Best, Cache, Item, Pages};
-use super::samples::Sample;
+use super::samples::{self, Sample};
 use super::shape::{Items, Shape};
-use super::vector::V3;
 use crate::error::Result;
-use crate::workspace::Workspace;
 use crate::workspace::memory::Reservation;
+use crate::workspace::{Workspace, lock};
 use rayon::prelude::*;
-use std::sync::{Mutex, PoisonError};
+use std::sync::Mutex;
 
 /// Samples that one thread takes at a time. A search begins with the nearest item of the sample before, so
 /// this number is fixed.
@@ -17,41 +17,64 @@ const CHUNK: usize = 1024;
 /// Samples in memory at a time.
 const WAVE: usize = 64 * CHUNK;
 
-/// Receives samples and passes on their distances.
-pub(super) trait Measure {
-    /// Adds a sample.
-    fn push(&mut self, sample: Sample) -> Result<()>;
-    /// Ends input.
-    fn finish(&mut self) -> Result<()>;
+/// Finds the distances of a chunk of samples.
+type Search<'a> = Box<dyn Fn(&[Sample]) -> Result<Vec<f64>> + Sync + 'a>;
+
+/// Calls `each` with every sample of `from` and its distance to `to`.
+pub(super) fn distances(
+    from: &Shape,
+    to: &Shape,
+    options: &Options,
+    workspace: &Workspace,
+    mut each: impl FnMut(Sample, f64) -> Result<()>,
+) -> Result<()> {
+    let (search, _held) = match &to.items {
+        Items::Mesh { triangles, .. } => search(triangles, workspace)?,
+        Items::Cloud(points) => search(points, workspace)?,
+    };
+    let mut measure = |wave: &mut Vec<Sample>| {
+        workspace.check_cancel()?;
+        let distances: Vec<Vec<f64>> = workspace.install(|| {
+            let chunks = wave.par_chunks(CHUNK).with_max_len(1);
+            chunks.map(&search).collect::<Result<_>>()
+        })?;
+        for (sample, distance) in wave.iter().zip(distances.iter().flatten()) {
+            each(*sample, *distance)?;
+        }
+        workspace.observer.advance(wave.len() as u64);
+        wave.clear();
+        Ok(())
+    };
+    let mut wave = Vec::with_capacity(WAVE);
+    samples::for_each(from, options, workspace, |sample| {
+        wave.push(sample);
+        if wave.len() < WAVE {
+            Ok(())
+        } else {
+            measure(&mut wave)
+        }
+    })?;
+    measure(&mut wave)?;
+    workspace.observer.end();
+    Ok(())
 }
 
-/// Distances to a shape; `each` is called with every sample and its distance.
-pub(super) fn to<'a>(
-    shape: &'a Shape,
-    workspace: &'a Workspace,
-    each: impl FnMut(Sample, f64) -> Result<()> + 'a,
-) -> Result<Box<dyn Measure + 'a>> {
-    Ok(match &shape.items {
-        Items::Mesh { triangles, .. } => Box::new(Waves::new(triangles, workspace, each)?),
-        Items::Cloud(points) => Box::new(Waves::new(points, workspace, each)?),
-    })
-}
-
-/// Finds nearest items, with a page cache for each thread.
-struct Search<'a, T: Item> {
+/// Search for nearest items, with a page cache for each thread, and the memory of these caches and of the
+/// samples.
+fn search<'a, T: Item>(
     pages: &'a Pages<T>,
-    caches: Mutex<Vec<Cache<T>>>,
-    cached: usize,
-}
-
-impl<T: Item> Search<'_, T> {
-    fn caches(&self) -> std::sync::MutexGuard<'_, Vec<Cache<T>>> {
-        self.caches.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    fn chunk(&self, samples: &[Sample]) -> Result<Vec<f64>> {
-        let cache = self.caches().pop();
-        let mut cache = cache.unwrap_or_else(|| Cache::new(self.cached));
+    workspace: &Workspace,
+) -> Result<(Search<'a>, Reservation)> {
+    let threads = workspace.threads as u64;
+    let share = workspace.memory.available() / 4 / threads;
+    let cached = (share / pages.page_bytes()).clamp(1, pages.count().max(1) as u64);
+    let wave = WAVE * (size_of::<Sample>() + 2 * size_of::<f64>());
+    let bytes = threads * cached * pages.page_bytes() + wave as u64;
+    let held = workspace.reserve("compare: pages at hand", bytes)?;
+    let caches = Mutex::new(Vec::new());
+    let search = move |samples: &[Sample]| {
+        let cache = lock(&caches).pop();
+        let mut cache = cache.unwrap_or_else(|| Cache::new(cached as usize));
         let mut item: Option<T> = None;
         let mut distances = Vec::with_capacity(samples.len());
         for sample in samples {
@@ -60,121 +83,12 @@ impl<T: Item> Search<'_, T> {
                 distance2: item.map_or(f64::INFINITY, from),
                 item,
             };
-            self.pages.nearest(sample.position, &mut best, &mut cache)?;
+            pages.nearest(sample.position, &mut best, &mut cache)?;
             item = best.item;
             distances.push(best.distance2.sqrt());
         }
-        self.caches().push(cache);
+        lock(&caches).push(cache);
         Ok(distances)
-    }
-}
-
-struct Waves<'a, T: Item, F> {
-    search: Search<'a, T>,
-    workspace: &'a Workspace,
-    each: F,
-    wave: Vec<Sample>,
-    _held: Reservation,
-}
-
-impl<'a, T, F> Waves<'a, T, F>
-where
-    T: Item,
-    F: FnMut(Sample, f64) -> Result<()>,
-{
-    fn new(pages: &'a Pages<T>, workspace: &'a Workspace, each: F) -> Result<Self> {
-        let threads = workspace.threads as u64;
-        let share = workspace.memory.available() / 4 / threads;
-        let cached = (share / pages.page_bytes()).clamp(1, pages.count().max(1) as u64);
-        let wave = WAVE * (size_of::<Sample>() + 2 * size_of::<f64>());
-        let bytes = threads * cached * pages.page_bytes() + wave as u64;
-        let held = workspace.reserve("compare: pages at hand", bytes)?;
-        let search = Search {
-            pages,
-            caches: Mutex::default(),
-            cached: cached as usize,
-        };
-        Ok(Self {
-            search,
-            workspace,
-            each,
-            wave: Vec::with_capacity(WAVE),
-            _held: held,
-        })
-    }
-
-    fn flush(&mut self) -> Result<()> {
-        self.workspace.check_cancel()?;
-        let (search, wave) = (&self.search, &self.wave);
-        let distances: Vec<Vec<f64>> = self.workspace.install(|| {
-            let chunks = wave.par_chunks(CHUNK).with_max_len(1);
-            chunks
-                .map(|chunk| search.chunk(chunk))
-                .collect::<Result<_>>()
-        })?;
-        let all = distances.iter().flatten();
-        for (sample, distance) in self.wave.iter().zip(all) {
-            (self.each)(*sample, *distance)?;
-        }
-        self.workspace.observer.advance(self.wave.len() as u64);
-        self.wave.clear();
-        Ok(())
-    }
-}
-
-impl<T, F> Measure for Waves<'_, T, F>
-where
-    T: Item,
-    F: FnMut(Sample, f64) -> Result<()>,
-{
-    fn push(&mut self, sample: Sample) -> Result<()> {
-        self.wave.push(sample);
-        if self.wave.len() == WAVE {
-            self.flush()?;
-        }
-        Ok(())
-    }
-
-    fn finish(&mut self) -> Result<()> {
-        self.flush()
-    }
-}
-
-/// Running sums of one direction.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Sums {
-    pub(super) samples: u64,
-    pub(super) counted: u64,
-    pub(super) sum: f64,
-    pub(super) squares: f64,
-    pub(super) max: f64,
-    pub(super) max_at: Option<V3>,
-}
-
-impl Sums {
-    pub(super) fn add(&mut self, sample: &Sample, distance: f64) {
-        self.samples += 1;
-        if sample.counts {
-            self.counted += 1;
-            self.sum += distance;
-            self.squares += distance * distance;
-        }
-        if self.max_at.is_none() || distance > self.max {
-            self.max = distance;
-            self.max_at = Some(sample.position);
-        }
-    }
-
-    /// Both directions together.
-    pub(super) fn with(self, other: Self) -> Self {
-        let far = if other.max > self.max { other } else { self };
-        Self {
-            samples: self.samples + other.samples,
-            counted: self.counted + other.counted,
-            sum: self.sum + other.sum,
-            squares: self.squares + other.squares,
-            max: far.max,
-            max_at: far.max_at,
-        }
-    }
+    };
+    Ok((Box::new(search), held))
 }

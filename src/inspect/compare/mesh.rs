@@ -4,11 +4,10 @@
 //! memory. Otherwise corners are sorted by vertex and back by triangle, on disk. Both ways give the same
 //! pages and the same choice.
 
+use super::Options;
 use super::corners::Joined;
-use super::shape::{Choice, Shape, unusable, usable};
-use super::triangles::{
-    Chooser, KeyedTriangle, keyed, no_vertex, not_triangles, pages, shape, sorter,
-};
+use super::shape::Shape;
+use super::triangles::{KeyedTriangle, Reading};
 use super::vector::{Box3, V3};
 use crate::error::Result;
 use crate::inspect::ply_mesh::{PlyMesh, Sink};
@@ -24,128 +23,97 @@ const VERTEX: u64 = 25;
 pub(super) fn read(
     mesh: PlyMesh,
     path: &Path,
-    name: &str,
-    choice: Choice,
+    name: &'static str,
+    options: &Options,
     workspace: &Workspace,
 ) -> Result<Shape> {
-    let (vertices, faces) = (mesh.vertices(), mesh.faces());
-    let total = vertices + faces;
+    let reading = Reading {
+        path,
+        name,
+        options,
+        workspace,
+        vertices: mesh.vertices(),
+        faces: mesh.faces(),
+        bounds: Box3::EMPTY,
+    };
     let observer = &workspace.observer;
-    let free = workspace.memory.available();
-    let small = vertices * VERTEX <= free / 4 && mesh.vertices_first();
+    let bytes = reading.vertices * VERTEX;
+    let small = bytes <= workspace.memory.available() / 4 && mesh.vertices_first();
+    let total = reading.vertices + reading.faces;
     observer.begin("read mesh", "vertices and faces", total);
     if small {
-        let _held = workspace.reserve("compare: vertices", vertices * VERTEX)?;
-        let mut direct = Direct::new(path, name, vertices, faces, workspace)?;
+        let _held = workspace.reserve("compare: vertices", bytes)?;
+        let mut direct = Direct::new(reading)?;
         mesh.read(&mut direct)?;
         observer.end();
-        direct.finish(choice)
+        direct.finish()
     } else {
-        let mut joined = Joined::new(path, name, vertices, workspace)?;
+        let mut joined = Joined::new(reading)?;
         mesh.read(&mut joined)?;
         observer.end();
-        joined.finish(faces, choice)
+        joined.finish()
     }
 }
 
 /// Reads a mesh whose vertices fit into memory and precede the faces.
 struct Direct<'a> {
-    path: &'a Path,
-    name: &'a str,
-    workspace: &'a Workspace,
+    reading: Reading<'a>,
     sorter: Sorter<KeyedTriangle>,
     _held: Reservation,
-    bounds: Box3,
-    expected: u64,
     vertices: Vec<V3>,
     referenced: Vec<u64>,
-    triangles: u64,
     batch: Vec<KeyedTriangle>,
 }
 
 impl<'a> Direct<'a> {
-    fn new(
-        path: &'a Path,
-        name: &'a str,
-        vertices: u64,
-        faces: u64,
-        workspace: &'a Workspace,
-    ) -> Result<Self> {
-        let wanted = faces * size_of::<KeyedTriangle>() as u64;
-        let buffer = wanted.min(workspace.memory.available() / 3) + (1 << 20);
-        let (sorter, held) = sorter(workspace, &format!("{name}.order"), buffer)?;
-        let mut all = Vec::new();
-        all.reserve_exact(vertices as usize);
+    fn new(reading: Reading<'a>) -> Result<Self> {
+        let wanted = reading.faces * size_of::<KeyedTriangle>() as u64;
+        let buffer = wanted.min(reading.workspace.memory.available() / 3) + (1 << 20);
+        let (sorter, held) = reading.sorter("order", buffer)?;
         Ok(Self {
-            path,
-            name,
-            workspace,
             sorter,
             _held: held,
-            bounds: Box3::EMPTY,
-            expected: vertices,
-            vertices: all,
-            referenced: vec![0; vertices.div_ceil(64) as usize],
-            triangles: 0,
+            vertices: Vec::with_capacity(reading.vertices as usize),
+            referenced: vec![0; reading.vertices.div_ceil(64) as usize],
             batch: Vec::new(),
+            reading,
         })
     }
 
-    fn finish(self, choice: Choice) -> Result<Shape> {
-        let Self {
-            name,
-            path,
-            workspace,
-            ..
-        } = self;
-        let triangles = pages(self.sorter, name, self.triangles, workspace)?;
+    fn finish(self) -> Result<Shape> {
+        let triangles = self.reading.pages(self.sorter)?;
         let used = self.referenced.iter().map(|w| u64::from(w.count_ones()));
-        let used = used.sum();
-        let mut chooser = Chooser::new(workspace, name, used, triangles.1, choice)?;
-        for (v, p) in self.vertices.iter().enumerate() {
-            if self.referenced[v / 64] >> (v % 64) & 1 == 1 {
-                chooser.offer(*p)?;
-            }
-        }
-        let counts = [used, self.triangles];
-        Ok(shape(path, triangles, counts, chooser.finish()?))
+        self.reading.shape(triangles, used.sum(), |chooser| {
+            let mut all = self.vertices.iter().enumerate();
+            let used = |v: usize| self.referenced[v / 64] >> (v % 64) & 1 == 1;
+            all.try_for_each(|(v, p)| if used(v) { chooser.offer(*p) } else { Ok(()) })
+        })
     }
 }
 
 impl Sink for Direct<'_> {
     fn vertices(&mut self, positions: &[V3]) -> Result<()> {
-        self.workspace.check_cancel()?;
-        let good = positions.iter().filter(|p| usable(**p));
-        self.bounds = good.fold(self.bounds, |b, p| b.with(*p));
         self.vertices.extend_from_slice(positions);
-        self.workspace.observer.advance(positions.len() as u64);
-        Ok(())
+        self.reading.see(positions)
     }
 
     fn triangles(&mut self, triangles: &[[u32; 3]]) -> Result<()> {
-        self.workspace.check_cancel()?;
         self.batch.clear();
         for corners in triangles {
             let mut triangle = [[0.0; 3]; 3];
             for (at, &v) in triangle.iter_mut().zip(corners) {
-                let Some(&p) = self.vertices.get(v as usize) else {
-                    return Err(no_vertex(self.path, self.expected));
-                };
-                if !usable(p) {
-                    return Err(unusable(self.path, &format!("vertex {v}"), p));
-                }
+                let p = self.vertices.get(v as usize);
+                *at = *p.ok_or_else(|| self.reading.no_vertex())?;
+                self.reading.check(v, *at)?;
                 self.referenced[v as usize / 64] |= 1 << (v % 64);
-                *at = p;
             }
-            self.batch.push(keyed(triangle, &self.bounds));
+            self.batch.push(self.reading.keyed(triangle));
         }
-        self.triangles += triangles.len() as u64;
         self.sorter.push(&self.batch)?;
-        self.workspace.observer.advance(triangles.len() as u64);
-        Ok(())
+        self.reading.advance(triangles.len())
     }
 
     fn non_triangles(&mut self, count: u64) -> Result<()> {
-        Err(not_triangles(self.path, count))
+        Err(self.reading.not_triangles(count))
     }
 }

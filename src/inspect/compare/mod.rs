@@ -36,9 +36,9 @@ pub use shape::{Kind, Side};
 use crate::error::{Error, Result};
 use crate::inspect::ply_mesh::{PlyMesh, holds_faces};
 use crate::workspace::Workspace;
-use measure::Sums;
+use figures::Sums;
 use samples::Numbers;
-use shape::{Choice, Shape};
+use shape::Shape;
 use std::path::Path;
 
 /// Number and seed of the samples.
@@ -60,9 +60,14 @@ impl Default for Options {
 }
 
 /// Reads a mesh or a cloud; `name` distinguishes the scratch files of the two sides.
-fn read_side(path: &Path, name: &str, choice: Choice, workspace: &Workspace) -> Result<Shape> {
+fn read_side(
+    path: &Path,
+    name: &'static str,
+    options: &Options,
+    workspace: &Workspace,
+) -> Result<Shape> {
     if path.is_file() && holds_faces(path)? {
-        mesh::read(PlyMesh::open(path)?, path, name, choice, workspace)
+        mesh::read(PlyMesh::open(path)?, path, name, options, workspace)
     } else {
         cloud::read(path, name, workspace)
     }
@@ -83,77 +88,37 @@ pub fn compare(a: &Path, b: &Path, options: &Options, workspace: &Workspace) -> 
             expected: "1 or more".into(),
         });
     }
-    let choice = Choice { samples, seed };
-    let a = read_side(a, "compare.a", choice, workspace)?;
-    let b = read_side(b, "compare.b", choice, workspace)?;
-    let numbers = [Numbers::of(&a, samples), Numbers::of(&b, samples)];
-    let bytes = numbers.iter().map(|n| n.all()).sum::<u64>() * size_of::<DistanceRow>() as u64;
+    let a = read_side(a, "compare.a", options, workspace)?;
+    let b = read_side(b, "compare.b", options, workspace)?;
+    let number = Numbers::of(&a, samples).all() + Numbers::of(&b, samples).all();
+    let bytes = number * size_of::<DistanceRow>() as u64;
     let buffer = bytes.min(workspace.memory.available() / 8) + (1 << 20);
     let (sorter, _held) = triangles::sorter(workspace, "compare.distances", buffer)?;
     let mut sums = [Sums::default(); 2];
     for (way, (from, to)) in [(&a, &b), (&b, &a)].into_iter().enumerate() {
-        let mut records = Vec::with_capacity(RECORDS);
-        let name = ["compare.a", "compare.b"][way];
-        measure_way(
-            from,
-            to,
-            name,
-            numbers[way],
-            seed,
-            workspace,
-            |sample, distance| {
-                sums[way].add(&sample, distance);
-                if sample.counts {
-                    records.push(DistanceRow::new(distance, way));
-                }
-                if records.len() == RECORDS {
-                    sorter.push(&records)?;
-                    records.clear();
-                }
-                Ok(())
-            },
-        )?;
-        sorter.push(&records)?;
+        measure::distances(from, to, options, workspace, |sample, distance| {
+            sums[way].add(&sample, distance);
+            if sample.counts {
+                sorter.push(&[DistanceRow::new(distance, way)])?;
+            }
+            Ok(())
+        })?;
     }
-    let percentiles = figures::percentiles(sorter, sums, workspace)?;
-    let diagonal = shape_diagonal(&a);
-    let distances = |sums: &Sums, way: usize| Distances::new(sums, percentiles[way], diagonal);
+    let sums = [sums[0], sums[1], sums[0].with(sums[1])];
+    let percentiles = figures::percentiles(sorter, &sums, workspace)?;
+    let (min, max) = (a.side.min, a.side.max);
+    let diagonal = vector::Box3 { min, max }.diagonal();
+    let distances = |way: usize| Distances::new(&sums[way], percentiles[way], diagonal);
     Ok(Comparison {
-        a_to_b: distances(&sums[0], 0),
-        b_to_a: distances(&sums[1], 1),
-        symmetric: distances(&sums[0].with(sums[1]), 2),
+        a_to_b: distances(0),
+        b_to_a: distances(1),
+        symmetric: distances(2),
         a: a.side,
         b: b.side,
         diagonal,
         most_samples: samples,
         seed,
     })
-}
-
-/// Distances passed to the sorter at a time.
-const RECORDS: usize = 4096;
-
-fn shape_diagonal(shape: &Shape) -> f64 {
-    let (min, max) = (shape.side.min, shape.side.max);
-    vector::Box3 { min, max }.diagonal()
-}
-
-fn measure_way(
-    from: &Shape,
-    to: &Shape,
-    name: &str,
-    numbers: Numbers,
-    seed: u64,
-    workspace: &Workspace,
-    each: impl FnMut(samples::Sample, f64) -> Result<()>,
-) -> Result<()> {
-    let mut measure = measure::to(to, workspace, each)?;
-    samples::for_each(from, name, numbers, seed, workspace, |sample| {
-        measure.push(sample)
-    })?;
-    measure.finish()?;
-    workspace.observer.end();
-    Ok(())
 }
 
 /// A point of a cloud and its distance to a shape.
@@ -179,29 +144,19 @@ pub fn distances(
     mut each: impl FnMut(Measured) -> Result<()>,
 ) -> Result<u64> {
     let cloud = cloud::read(cloud, "compare.a", workspace)?;
-    let choice = Choice {
-        samples: 0,
-        seed: 0,
-    };
-    let to = read_side(to, "compare.b", choice, workspace)?;
-    let numbers = Numbers::of(&cloud, u64::MAX);
+    let options = |samples| Options { samples, seed: 0 };
+    let to = read_side(to, "compare.b", &options(0), workspace)?;
     let mut index = 0;
-    measure_way(
-        &cloud,
-        &to,
-        "compare.a",
-        numbers,
-        0,
-        workspace,
-        |sample, distance| {
-            each(Measured {
-                index,
-                position: sample.position,
-                distance,
-            })?;
-            index += 1;
-            Ok(())
-        },
-    )?;
+    let all = options(u64::MAX);
+    measure::distances(&cloud, &to, &all, workspace, |sample, distance| {
+        let position = sample.position;
+        each(Measured {
+            index,
+            position,
+            distance,
+        })?;
+        index += 1;
+        Ok(())
+    })?;
     Ok(index)
 }

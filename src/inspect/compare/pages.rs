@@ -7,7 +7,7 @@
 use super::triangle;
 use super::vector::{Box3, V3, dot, sub};
 use crate::error::Result;
-use crate::spill::{Row, Table, Word};
+use crate::spill::{LocalTable, Row, Word};
 use crate::workspace::Workspace;
 use crate::workspace::memory::Reservation;
 use rustc_hash::FxHashMap;
@@ -62,7 +62,7 @@ impl Item for [V3; 3] {
 /// Pages of items.
 #[derive(Debug)]
 pub(super) struct Pages<T: Row> {
-    stored: Table<T>,
+    stored: LocalTable<T>,
     /// `levels[0]` has a box for each page, each further level a box for `FAN` boxes of the level before.
     levels: Vec<Vec<Box3>>,
     page: usize,
@@ -223,7 +223,7 @@ impl<T> Cache<T> {
 /// Writes [`Pages`] in order.
 #[derive(Debug)]
 pub(super) struct PageWriter<T: Row> {
-    stored: Table<T>,
+    stored: LocalTable<T>,
     page: usize,
     pending: Vec<T>,
     boxes: Vec<Box3>,
@@ -239,7 +239,7 @@ impl<T: Item> PageWriter<T> {
         let index = pages * (2 * size_of::<Box3>() as u64) + (page * 2 * size_of::<T>()) as u64;
         Ok(Self {
             held: workspace.reserve("compare: boxes", index + 4096)?,
-            stored: Table::create(workspace, name, pages as usize)?,
+            stored: LocalTable::create(workspace, name)?,
             page,
             pending: Vec::with_capacity(page),
             boxes: Vec::with_capacity(pages as usize),

@@ -1,20 +1,18 @@
 //! Samples: positions on one side, in curve order.
 
+use super::Options;
 use super::pages::Pages;
 use super::shape::{Items, Shape};
 use super::triangles::{area, sorter};
-use super::vector::{Box3, V3, add, scale, sub};
+use super::vector::{V3, add, scale, sub};
 use crate::error::Result;
-use crate::spill::{Sorter, Table, row};
+use crate::spill::row;
 use crate::workspace::Workspace;
 use oorandom::Rand64;
 
 /// Added to the seed, so that points on faces and vertices are chosen by independent numbers.
 const FACES: u128 = 1 << 64;
 const POINTS: u128 = 2 << 64;
-
-/// Samples passed to the sorter at a time.
-const BATCH: usize = 4096;
 
 /// A position at which a distance is taken.
 #[derive(Debug, Clone, Copy)]
@@ -75,13 +73,12 @@ impl Numbers {
 /// number. On return the progress stage of the distances has begun.
 pub(super) fn for_each(
     shape: &Shape,
-    name: &str,
-    numbers: Numbers,
-    seed: u64,
+    options: &Options,
     workspace: &Workspace,
     mut each: impl FnMut(Sample) -> Result<()>,
 ) -> Result<()> {
-    let observer = &workspace.observer;
+    let (observer, seed) = (&workspace.observer, options.seed);
+    let numbers = Numbers::of(shape, options.samples);
     let (triangles, vertices) = match &shape.items {
         Items::Cloud(points) => {
             observer.begin("distances", "samples", numbers.all());
@@ -109,17 +106,23 @@ pub(super) fn for_each(
     let bounds = triangles.bounds();
     let bytes = numbers.all() * size_of::<KeyedSample>() as u64;
     let buffer = bytes.min(workspace.memory.available() / 4) + (1 << 20);
-    let (sorter, _held) = sorter(workspace, &format!("{name}.samples"), buffer)?;
+    let (sorter, _held) = sorter(workspace, &format!("{}.samples", shape.name), buffer)?;
     observer.begin("sample", "samples", numbers.all());
-    let mut batch = Batch {
-        sorter: &sorter,
-        bounds,
-        workspace,
-        rows: Vec::with_capacity(BATCH),
+    let push = |position, counts| {
+        workspace.check_cancel()?;
+        observer.advance(1);
+        sorter.push(&[KeyedSample {
+            key: bounds.key(position),
+            position: bytemuck::cast(position),
+            counts: u32::from(counts),
+        }])
     };
-    take_vertices(vertices, numbers.points == 0, &mut batch)?;
-    take_faces(triangles, shape.side.area, numbers.points, seed, &mut batch)?;
-    batch.flush()?;
+    for section in 0..vertices.count() {
+        let mut positions = vertices.get(section)?.into_iter();
+        positions.try_for_each(|position| push(position, numbers.points == 0))?;
+    }
+    let on_face = |position| push(position, true);
+    take_faces(triangles, shape.side.area, numbers.points, seed, on_face)?;
     observer.end();
     observer.begin("distances", "samples", numbers.all());
     sorter.finish(workspace)?.for_each(|sample: KeyedSample| {
@@ -130,54 +133,13 @@ pub(super) fn for_each(
     })
 }
 
-/// A buffer of samples for the sorter.
-struct Batch<'a> {
-    sorter: &'a Sorter<KeyedSample>,
-    bounds: Box3,
-    workspace: &'a Workspace,
-    rows: Vec<KeyedSample>,
-}
-
-impl Batch<'_> {
-    fn push(&mut self, position: V3, counts: bool) -> Result<()> {
-        self.rows.push(KeyedSample {
-            key: self.bounds.key(position),
-            position: bytemuck::cast(position),
-            counts: counts.into(),
-        });
-        if self.rows.len() == BATCH {
-            self.flush()?;
-        }
-        Ok(())
-    }
-
-    fn flush(&mut self) -> Result<()> {
-        self.workspace.check_cancel()?;
-        self.sorter.push(&self.rows)?;
-        self.workspace.observer.advance(self.rows.len() as u64);
-        self.rows.clear();
-        Ok(())
-    }
-}
-
-fn take_vertices(vertices: &Table<V3>, counts: bool, batch: &mut Batch<'_>) -> Result<()> {
-    let mut positions = Vec::new();
-    for section in 0..vertices.count() {
-        vertices.get_into(section, &mut positions)?;
-        for position in &positions {
-            batch.push(*position, counts)?;
-        }
-    }
-    Ok(())
-}
-
 /// Divides the area into equal parts, one for each sample, and chooses a random point in each.
 fn take_faces(
     triangles: &Pages<[V3; 3]>,
     all: f64,
     wanted: u64,
     seed: u64,
-    batch: &mut Batch<'_>,
+    each: impl Fn(V3) -> Result<()>,
 ) -> Result<()> {
     let mut rng = Rand64::new(u128::from(seed) + FACES);
     let mut taken = 0;
@@ -196,7 +158,7 @@ fn take_faces(
             }
             passed += area;
             while next.is_some_and(|at| at < passed) {
-                batch.push(within(triangle, &mut rng), true)?;
+                each(within(triangle, &mut rng))?;
                 next = place(&mut rng);
             }
         }
@@ -204,7 +166,7 @@ fn take_faces(
     })?;
     // Rounding may leave the last sample at the very end.
     while let (Some(_), Some(triangle)) = (next, &last) {
-        batch.push(within(triangle, &mut rng), true)?;
+        each(within(triangle, &mut rng))?;
         next = place(&mut rng);
     }
     Ok(())

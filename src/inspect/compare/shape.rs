@@ -3,7 +3,7 @@
 use super::pages::Pages;
 use super::vector::{Box3, V3};
 use crate::error::Error;
-use crate::spill::Table;
+use crate::spill::LocalTable;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -44,6 +44,8 @@ pub enum Kind {
 
 /// One side, ready for sampling and measuring.
 pub(super) struct Shape {
+    /// Begins the names of its scratch files.
+    pub(super) name: &'static str,
     pub(super) side: Side,
     pub(super) items: Items,
 }
@@ -52,16 +54,9 @@ pub(super) enum Items {
     Mesh {
         triangles: Pages<[V3; 3]>,
         /// Vertices chosen as samples.
-        vertices: Table<V3>,
+        vertices: LocalTable<V3>,
     },
     Cloud(Pages<V3>),
-}
-
-/// The choice of a mesh's vertices.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Choice {
-    pub(super) samples: u64,
-    pub(super) seed: u64,
 }
 
 /// The description of a side with these numbers.

@@ -1,11 +1,12 @@
 //! Triangles of a mesh as pages in curve order, and the choice of its vertices: shared by both readers of
 //! meshes.
 
+use super::Options;
 use super::pages::{PageWriter, Pages};
-use super::shape::{Choice, Items, Kind, Shape, side};
+use super::shape::{Items, Kind, Shape, side, unusable, usable};
 use super::vector::{Box3, V3, add, cross, dot, scale, sub};
 use crate::error::{Error, Result};
-use crate::spill::{Row, Sorter, Table, row};
+use crate::spill::{LocalTable, Row, Sorter, row};
 use crate::workspace::Workspace;
 use crate::workspace::memory::Reservation;
 use oorandom::Rand64;
@@ -23,7 +24,7 @@ row! {
 }
 
 /// Chosen vertices written at a time.
-pub(super) const BLOCK: usize = 4096;
+const BLOCK: usize = 4096;
 
 /// A sorter with its memory: while a buffer grows, the old and the new one exist.
 pub(super) fn sorter<R: Row>(
@@ -35,57 +36,121 @@ pub(super) fn sorter<R: Row>(
     Ok((Sorter::new(workspace, name, buffer), held))
 }
 
-/// The error for faces that do not have three corners.
-pub(super) fn not_triangles(path: &Path, count: u64) -> Error {
-    let found = format!("{count} that are not triangles");
-    Error::input(path, "faces", found, "triangles; split them first")
-}
-
-/// The error for a corner whose index is no vertex.
-pub(super) fn no_vertex(path: &Path, vertices: u64) -> Error {
-    let expected = format!("vertices below {vertices}");
-    Error::input(path, "faces", "a corner that is no vertex", expected)
-}
-
-/// A triangle with its key on the curve through `bounds`.
-pub(super) fn keyed(triangle: [V3; 3], bounds: &Box3) -> KeyedTriangle {
-    let [a, b, c] = triangle;
-    KeyedTriangle {
-        key: bounds.key(scale(add(add(a, b), c), 1.0 / 3.0)),
-        corners: bytemuck::cast(triangle),
-    }
-}
-
 /// Area of a triangle.
 pub(super) fn area([a, b, c]: &[V3; 3]) -> f64 {
     let normal = cross(sub(*b, *a), sub(*c, *a));
     dot(normal, normal).sqrt() / 2.0
 }
 
-/// Writes the sorted triangles to pages; returns their area too.
-pub(super) fn pages(
-    sorter: Sorter<KeyedTriangle>,
-    name: &str,
-    count: u64,
-    workspace: &Workspace,
-) -> Result<(Pages<[V3; 3]>, f64)> {
-    let observer = &workspace.observer;
-    observer.begin("order", "triangles", count);
-    let mut writer = PageWriter::new(workspace, name, count)?;
-    let mut all = 0.0;
-    let mut ticks = 0u64;
-    sorter.finish(workspace)?.for_each(|keyed| {
-        let triangle = bytemuck::cast(keyed.corners);
-        all += area(&triangle);
-        ticks += 1;
-        if ticks.is_multiple_of(BLOCK as u64) {
-            workspace.check_cancel()?;
-            observer.advance(BLOCK as u64);
+/// A mesh that is being read, for both readers.
+pub(super) struct Reading<'a> {
+    pub(super) path: &'a Path,
+    /// Begins the names of scratch files.
+    pub(super) name: &'static str,
+    pub(super) options: &'a Options,
+    pub(super) workspace: &'a Workspace,
+    /// Number of vertices in the header.
+    pub(super) vertices: u64,
+    /// Number of faces in the header.
+    pub(super) faces: u64,
+    /// Box around the vertices read so far.
+    pub(super) bounds: Box3,
+}
+
+impl Reading<'_> {
+    /// See [`sorter`]; `part` is the end of the name.
+    pub(super) fn sorter<R: Row>(
+        &self,
+        part: &str,
+        buffer: u64,
+    ) -> Result<(Sorter<R>, Reservation)> {
+        sorter(self.workspace, &format!("{}.{part}", self.name), buffer)
+    }
+
+    /// Counts vertices and extends the box.
+    pub(super) fn see(&mut self, positions: &[V3]) -> Result<()> {
+        let good = positions.iter().filter(|p| usable(**p));
+        self.bounds = good.fold(self.bounds, |b, p| b.with(*p));
+        self.advance(positions.len())
+    }
+
+    /// Reports progress.
+    pub(super) fn advance(&self, count: usize) -> Result<()> {
+        self.workspace.observer.advance(count as u64);
+        self.workspace.check_cancel()
+    }
+
+    /// The error for faces that do not have three corners.
+    pub(super) fn not_triangles(&self, count: u64) -> Error {
+        let found = format!("{count} that are not triangles");
+        Error::input(self.path, "faces", found, "triangles; split them first")
+    }
+
+    /// The error for a corner whose index is no vertex.
+    pub(super) fn no_vertex(&self) -> Error {
+        let expected = format!("vertices below {}", self.vertices);
+        Error::input(self.path, "faces", "a corner that is no vertex", expected)
+    }
+
+    /// An error if distances from vertex `v` cannot be computed.
+    pub(super) fn check(&self, v: u32, p: V3) -> Result<()> {
+        if usable(p) {
+            Ok(())
+        } else {
+            Err(unusable(self.path, &format!("vertex {v}"), p))
         }
-        writer.push(triangle)
-    })?;
-    observer.end();
-    Ok((writer.finish()?, all))
+    }
+
+    /// A triangle with its key on the curve through the box.
+    pub(super) fn keyed(&self, triangle: [V3; 3]) -> KeyedTriangle {
+        let [a, b, c] = triangle;
+        KeyedTriangle {
+            key: self.bounds.key(scale(add(add(a, b), c), 1.0 / 3.0)),
+            corners: bytemuck::cast(triangle),
+        }
+    }
+
+    /// Writes the sorted triangles to pages; returns their area too.
+    pub(super) fn pages(&self, sorter: Sorter<KeyedTriangle>) -> Result<(Pages<[V3; 3]>, f64)> {
+        let (observer, workspace) = (&self.workspace.observer, self.workspace);
+        observer.begin("order", "triangles", self.faces);
+        let mut writer = PageWriter::new(workspace, self.name, self.faces)?;
+        let mut all = 0.0;
+        let mut ticks = 0u64;
+        sorter.finish(workspace)?.for_each(|keyed| {
+            let triangle = bytemuck::cast(keyed.corners);
+            all += area(&triangle);
+            ticks += 1;
+            if ticks.is_multiple_of(BLOCK as u64) {
+                workspace.check_cancel()?;
+                observer.advance(BLOCK as u64);
+            }
+            writer.push(triangle)
+        })?;
+        observer.end();
+        Ok((writer.finish()?, all))
+    }
+
+    /// The finished shape; `offer` gives its `used` vertices to the chooser.
+    pub(super) fn shape(
+        &self,
+        (triangles, area): (Pages<[V3; 3]>, f64),
+        used: u64,
+        offer: impl FnOnce(&mut Chooser) -> Result<()>,
+    ) -> Result<Shape> {
+        let mut chooser = Chooser::new(self, used, area)?;
+        offer(&mut chooser)?;
+        let mut side = side(self.path, Kind::Mesh, triangles.bounds());
+        (side.points, side.triangles, side.area) = (used, self.faces, area);
+        Ok(Shape {
+            name: self.name,
+            side,
+            items: Items::Mesh {
+                triangles,
+                vertices: chooser.finish()?,
+            },
+        })
+    }
 }
 
 /// Chooses vertices with equal chances, in order of the file.
@@ -94,29 +159,25 @@ pub(super) struct Chooser {
     /// Number of vertices to come, and of those to choose.
     left: u64,
     wanted: u64,
-    chosen: Table<V3>,
+    chosen: LocalTable<V3>,
     block: Vec<V3>,
 }
 
 impl Chooser {
-    pub(super) fn new(
-        workspace: &Workspace,
-        name: &str,
-        of: u64,
-        area: f64,
-        choice: Choice,
-    ) -> Result<Self> {
+    fn new(reading: &Reading<'_>, of: u64, area: f64) -> Result<Self> {
+        let Options { samples, seed } = *reading.options;
         // Half of the samples, but all if there is no surface for the others.
         let most = if area > 0.0 {
-            choice.samples.div_ceil(2)
+            samples.div_ceil(2)
         } else {
-            choice.samples
+            samples
         };
+        let name = format!("{}.vertices", reading.name);
         Ok(Self {
-            rng: Rand64::new(u128::from(choice.seed)),
+            rng: Rand64::new(seed.into()),
             left: of,
             wanted: of.min(most),
-            chosen: Table::create(workspace, &format!("{name}.vertices"), 0)?,
+            chosen: LocalTable::create(reading.workspace, &name)?,
             block: Vec::with_capacity(BLOCK),
         })
     }
@@ -135,30 +196,10 @@ impl Chooser {
         Ok(())
     }
 
-    pub(super) fn finish(self) -> Result<Table<V3>> {
+    fn finish(self) -> Result<LocalTable<V3>> {
         if !self.block.is_empty() {
             self.chosen.append(&self.block)?;
         }
         Ok(self.chosen)
-    }
-}
-
-/// The finished shape.
-pub(super) fn shape(
-    path: &Path,
-    triangles: (Pages<[V3; 3]>, f64),
-    counts: [u64; 2],
-    vertices: Table<V3>,
-) -> Shape {
-    let (triangles, area) = triangles;
-    let mut side = side(path, Kind::Mesh, triangles.bounds());
-    [side.points, side.triangles] = counts;
-    side.area = area;
-    Shape {
-        side,
-        items: Items::Mesh {
-            triangles,
-            vertices,
-        },
     }
 }

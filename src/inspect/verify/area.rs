@@ -36,30 +36,27 @@ pub(super) struct Areas {
     plan: Plan,
     positions: Positions,
     travelling: Buckets<Travelling>,
-    block: Vec<Travelling>,
     /// Triangles without area so far.
     pub(super) zero: u64,
 }
 
 impl Areas {
-    pub(super) fn new(workspace: &Workspace, plan: &Plan, positions: Positions) -> Self {
+    pub(super) fn new(workspace: &Workspace, plan: &Plan, positions: Positions) -> Result<Self> {
         let name = "verify.areas";
-        Self {
+        Ok(Self {
             plan: plan.clone(),
             positions,
-            travelling: Buckets::new(workspace, name, plan.ranges, plan.blocks[2]),
-            block: Vec::new(),
+            travelling: Buckets::new(workspace, name, plan.ranges, plan.blocks[2])?,
             zero: 0,
-        }
+        })
     }
 
     /// Loads the positions of range `k` and examines the triangles that wait for it.
     pub(super) fn enter(&mut self, k: usize, first: u32) -> Result<()> {
         self.positions.load(k, first)?;
-        let mut block = std::mem::take(&mut self.block);
         let mut cursor = self.travelling.cursor(k);
-        while self.travelling.next(&mut cursor, &mut block)? {
-            for row in &block {
+        while let Some(block) = self.travelling.next(&mut cursor)? {
+            for row in block {
                 let middle = match row.middle {
                     KNOWN => Some(row.middle_at),
                     vertex => self.positions.get(vertex),
@@ -68,7 +65,6 @@ impl Areas {
             }
         }
         self.travelling.clear(k);
-        self.block = block;
         Ok(())
     }
 
@@ -97,11 +93,9 @@ impl Areas {
         known: Option<[f64; 3]>,
     ) -> Result<()> {
         if let (Some(known), Some(lowest)) = (known, self.positions.get(low)) {
-            let finite = [high, known, lowest]
-                .iter()
-                .flatten()
-                .all(|c| c.is_finite());
-            self.zero += u64::from(finite && collinear([high, known, lowest]));
+            let corners = [high, known, lowest];
+            let finite = corners.iter().flatten().all(|c| c.is_finite());
+            self.zero += u64::from(finite && collinear(corners));
             return Ok(());
         }
         let row = Travelling {

@@ -9,15 +9,9 @@ pub(super) fn collinear(points: [[f64; 3]; 3]) -> bool {
         return false;
     }
     // Scaling by a power of two rounds nothing and avoids overflow of products.
-    let largest = points
-        .iter()
-        .flatten()
-        .fold(0.0, |m: f64, c| m.max(c.abs()));
-    let scale = if largest > 0.0 {
-        -(largest.log2().clamp(-1000.0, 1000.0) as i32)
-    } else {
-        0
-    };
+    let all = points.iter().flatten();
+    let largest = all.fold(f64::MIN_POSITIVE, |m, c| m.max(c.abs()));
+    let scale = -(largest.log2().clamp(-1000.0, 1000.0) as i32);
     let points = points.map(|p| p.map(|c| c * 2f64.powi(scale)));
     !PLANES.iter().any(|&plane| turns(points, plane))
 }

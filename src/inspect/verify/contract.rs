@@ -7,6 +7,7 @@
 
 use super::buckets::Buckets;
 use super::plan::Plan;
+use super::star;
 use crate::error::Result;
 use crate::spill::row;
 use crate::workspace::Workspace;
@@ -47,13 +48,7 @@ impl Forest {
 
     fn root(&mut self, vertex: u32) -> u32 {
         self.touch(vertex);
-        let mut at = vertex - self.first;
-        while self.parent[at as usize] != at {
-            let up = self.parent[self.parent[at as usize] as usize];
-            self.parent[at as usize] = up;
-            at = up;
-        }
-        at
+        star::root(&mut self.parent, vertex - self.first)
     }
 
     fn join(&mut self, a: u32, b: u32) {
@@ -80,19 +75,17 @@ pub(super) struct Contraction {
     /// Edges in the bucket of the range of their higher end.
     edges: Buckets<Edge>,
     plan: Plan,
-    block: Vec<Edge>,
     /// Number of complete components.
     pub(super) complete: u64,
 }
 
 impl Contraction {
-    pub(super) fn new(workspace: &Workspace, plan: &Plan, name: &str) -> Self {
-        Self {
-            edges: Buckets::new(workspace, name, plan.ranges, plan.blocks[1]),
+    pub(super) fn new(workspace: &Workspace, plan: &Plan, name: &str) -> Result<Self> {
+        Ok(Self {
+            edges: Buckets::new(workspace, name, plan.ranges, plan.blocks[1])?,
             plan: plan.clone(),
-            block: Vec::new(),
             complete: 0,
-        }
+        })
     }
 
     /// Adds an edge whose higher end is in the range of `forest`.
@@ -107,16 +100,15 @@ impl Contraction {
 
     /// Contracts range `k`, to which nothing more is added.
     pub(super) fn close(&mut self, forest: &mut Forest, k: usize) -> Result<()> {
-        let mut block = std::mem::take(&mut self.block);
         let first = forest.first;
         let mut cursor = self.edges.cursor(k);
-        while self.edges.next(&mut cursor, &mut block)? {
+        while let Some(block) = self.edges.next(&mut cursor)? {
             for &Edge { low, high } in block.iter().filter(|edge| edge.low >= first) {
                 forest.join(low, high);
             }
         }
         let mut cursor = self.edges.cursor(k);
-        while self.edges.next(&mut cursor, &mut block)? {
+        while let Some(block) = self.edges.next(&mut cursor)? {
             for &Edge { low, high } in block.iter().filter(|edge| edge.low < first) {
                 let root = forest.root(high) as usize;
                 forest.lowest[root] = forest.lowest[root].min(low);
@@ -128,7 +120,7 @@ impl Contraction {
         };
         let mut recent = vec![none; RECENT];
         let mut cursor = self.edges.cursor(k);
-        while self.edges.next(&mut cursor, &mut block)? {
+        while let Some(block) = self.edges.next(&mut cursor)? {
             for &Edge { low: other, high } in block.iter().filter(|edge| edge.low < first) {
                 let root = forest.root(high) as usize;
                 let edge = Edge {
@@ -146,7 +138,6 @@ impl Contraction {
         let roots = forest.parent.iter().zip(&forest.lowest).enumerate();
         let complete = roots.filter(|&(i, (&up, &low))| up == i as u32 && low == NONE);
         self.complete += complete.count() as u64;
-        self.block = block;
         Ok(())
     }
 }

@@ -4,27 +4,17 @@ use super::bounds::Bounds;
 use super::buckets::Buckets;
 use super::plan::Plan;
 use super::positions::Positions;
+use super::verdict::Verdict;
 use crate::error::Result;
 use crate::inspect::ply_mesh::{PlyMesh, Sink};
 use crate::workspace::Workspace;
-
-/// Counts from reading.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Counts {
-    pub(super) vertices: u64,
-    pub(super) non_finite_vertices: u64,
-    pub(super) triangles: u64,
-    pub(super) non_triangles: u64,
-    pub(super) index_out_of_range: u64,
-    pub(super) degenerate_triangles: u64,
-}
 
 /// The mesh, ready for the sweep over the ranges.
 pub(super) struct Intake<'a> {
     plan: &'a Plan,
     workspace: &'a Workspace,
-    pub(super) counts: Counts,
-    pub(super) bounds: Option<Bounds>,
+    /// All that reading can tell.
+    pub(super) verdict: Verdict,
     pub(super) positions: Positions,
     /// Triangles with three distinct, valid corners, in the buckets of the ranges of their corners.
     pub(super) triangles: Buckets<[u32; 3]>,
@@ -43,10 +33,9 @@ pub(super) fn read<'a>(
     let mut intake = Intake {
         plan,
         workspace,
-        counts: Counts::default(),
-        bounds: None,
+        verdict: Verdict::default(),
         positions: Positions::new(workspace, plan)?,
-        triangles: Buckets::new(workspace, "verify.triangles", plan.ranges, plan.blocks[0]),
+        triangles: Buckets::new(workspace, "verify.triangles", plan.ranges, plan.blocks[0])?,
     };
     mesh.read(&mut intake)?;
     intake.positions.finish()?;
@@ -57,12 +46,12 @@ pub(super) fn read<'a>(
 impl Sink for Intake<'_> {
     fn vertices(&mut self, positions: &[[f64; 3]]) -> Result<()> {
         self.workspace.check_cancel()?;
-        self.counts.vertices += positions.len() as u64;
+        self.verdict.vertices += positions.len() as u64;
         for &position in positions {
             if position.iter().all(|c| c.is_finite()) {
-                self.bounds = Some(Bounds::with(self.bounds, position));
+                self.verdict.bounds = Some(Bounds::with(self.verdict.bounds, position));
             } else {
-                self.counts.non_finite_vertices += 1;
+                self.verdict.non_finite_vertices += 1;
             }
         }
         self.positions.append(positions)?;
@@ -72,23 +61,21 @@ impl Sink for Intake<'_> {
 
     fn triangles(&mut self, triangles: &[[u32; 3]]) -> Result<()> {
         self.workspace.check_cancel()?;
-        self.counts.triangles += triangles.len() as u64;
+        self.verdict.triangles += triangles.len() as u64;
         for &[x, y, z] in triangles {
             if x.max(y).max(z) >= self.plan.vertices {
-                self.counts.index_out_of_range += 1;
+                self.verdict.index_out_of_range += 1;
                 continue;
             }
             if x == y || y == z || z == x {
-                self.counts.degenerate_triangles += 1;
+                self.verdict.degenerate_triangles += 1;
                 continue;
             }
             let [a, b, c] = [x, y, z].map(|v| self.plan.range_of(v));
-            self.triangles.push(a, [x, y, z])?;
-            if b != a {
-                self.triangles.push(b, [x, y, z])?;
-            }
-            if c != a && c != b {
-                self.triangles.push(c, [x, y, z])?;
+            for (range, new) in [(a, true), (b, b != a), (c, c != a && c != b)] {
+                if new {
+                    self.triangles.push(range, [x, y, z])?;
+                }
             }
         }
         self.workspace.observer.advance(triangles.len() as u64);
@@ -96,7 +83,7 @@ impl Sink for Intake<'_> {
     }
 
     fn non_triangles(&mut self, count: u64) -> Result<()> {
-        self.counts.non_triangles += count;
+        self.verdict.non_triangles += count;
         self.workspace.observer.advance(count);
         Ok(())
     }

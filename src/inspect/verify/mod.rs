@@ -66,7 +66,6 @@ pub fn verify_with(mesh: &Path, options: &Options, workspace: &Workspace) -> Res
 fn check(mesh: PlyMesh, plan: &Plan, options: &Options, workspace: &Workspace) -> Result<Verdict> {
     let _held = plan.reserve(workspace)?;
     let intake = intake::read(mesh, plan, workspace)?;
-    let (counts, bounds) = (intake.counts, intake.bounds);
-    let swept = workspace.install(|| sweep::run(intake, plan, workspace))?;
-    Ok(Verdict::new(&counts, bounds, &swept, options))
+    let verdict = workspace.install(|| sweep::run(intake, plan, workspace))?;
+    Ok(verdict.judged(options))
 }

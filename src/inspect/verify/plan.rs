@@ -15,7 +15,7 @@ const SMALLEST_BLOCK: u64 = 512;
 const MOST_RANGES: u64 = 1 << 16;
 
 /// Bytes of an empty range in four kinds of buckets and in the table of positions.
-const PER_RANGE: u64 = 4 * 32 + 24;
+const PER_RANGE: u64 = 4 * 48 + 24;
 
 /// Bytes of a vertex while its range is in memory, without triangles and position: union–find (8), number of
 /// triangles and place of the first (8).
@@ -105,30 +105,36 @@ impl Plan {
         (vertex >> self.shift) as usize
     }
 
+    /// Number of positions in memory.
+    pub(super) fn held_positions(&self) -> usize {
+        let all = self.vertices as usize;
+        if self.all_positions {
+            all
+        } else {
+            self.range_length().min(all)
+        }
+    }
+
     /// Reserves the planned memory.
     pub(super) fn reserve(&self, workspace: &Workspace) -> Result<Vec<Reservation>> {
         let [triangles, contraction, area] = self.blocks.map(|b| b * self.ranges as u64);
-        let held = if self.all_positions {
-            self.vertices as usize
-        } else {
-            self.range_length()
-        };
-        let held = held.min(self.vertices as usize) as u64;
+        let held = self.held_positions() as u64;
         let range = self.range_length().min(self.vertices as usize) as u64;
-        let blocks = self.blocks.iter().sum::<u64>() + (1 << 20);
+        // The bytes of a block and its rows.
+        let blocks = 2 * self.blocks.iter().sum::<u64>() + (1 << 20);
         let tables = self.ranges as u64 * PER_RANGE;
         let stars = star::scratch_bytes(self.large_star) * workspace.threads as u64;
-        Ok(vec![
-            workspace.reserve("verify: buckets of triangles", triangles)?,
-            workspace.reserve("verify: buckets of edges", 2 * contraction)?,
-            workspace.reserve("verify: triangles between ranges", area)?,
-            workspace.reserve("verify: positions", held * POSITION)?,
-            workspace.reserve("verify: vertices of one range", range * PER_VERTEX)?,
-            workspace.reserve(
-                "verify: corners of one range",
-                self.corners as u64 * PER_CORNER,
-            )?,
-            workspace.reserve("verify: blocks and stars at hand", blocks + tables + stars)?,
-        ])
+        let corners = self.corners as u64 * PER_CORNER;
+        let parts = [
+            ("verify: buckets of triangles", triangles),
+            ("verify: buckets of edges", 2 * contraction),
+            ("verify: triangles between ranges", area),
+            ("verify: positions", held * POSITION),
+            ("verify: vertices of one range", range * PER_VERTEX),
+            ("verify: corners of one range", corners),
+            ("verify: blocks and stars at hand", blocks + tables + stars),
+        ];
+        let reserve = |(name, bytes)| workspace.reserve(name, bytes);
+        parts.into_iter().map(reserve).collect()
     }
 }

@@ -2,7 +2,7 @@
 
 use super::plan::Plan;
 use crate::error::Result;
-use crate::spill::Table;
+use crate::spill::LocalTable;
 use crate::workspace::Workspace;
 
 /// Positions of the vertices.
@@ -11,29 +11,20 @@ pub(super) struct Positions {
     first: u32,
     window: Vec<[f64; 3]>,
     /// One section for each range, unless all positions stay in memory.
-    stored: Option<Table<[f64; 3]>>,
+    stored: Option<LocalTable<[f64; 3]>>,
     length: usize,
-    next: usize,
 }
 
 impl Positions {
     pub(super) fn new(workspace: &Workspace, plan: &Plan) -> Result<Self> {
-        let length = match plan.all_positions {
-            true => plan.vertices as usize,
-            false => plan.range_length().min(plan.vertices as usize),
-        };
-        let stored = match plan.all_positions {
-            true => None,
-            false => Some(Table::create(workspace, "verify.positions", plan.ranges)?),
-        };
-        let mut window = Vec::new();
-        window.reserve_exact(length);
+        let length = plan.held_positions();
+        let stored =
+            (!plan.all_positions).then(|| LocalTable::create(workspace, "verify.positions"));
         Ok(Self {
             first: 0,
-            window,
-            stored,
+            window: Vec::with_capacity(length),
+            stored: stored.transpose()?,
             length,
-            next: 0,
         })
     }
 
@@ -56,8 +47,7 @@ impl Positions {
 
     fn store(&mut self) -> Result<()> {
         if let Some(stored) = &self.stored {
-            stored.put(self.next, &self.window)?;
-            self.next += 1;
+            stored.append(&self.window)?;
             self.window.clear();
         }
         Ok(())

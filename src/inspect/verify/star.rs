@@ -1,7 +1,8 @@
 //! Properties of one vertex, decided by the triangles around it.
 
 /// Counts over some vertices. An edge counts at its higher vertex, a triangle at its highest.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
 pub(super) struct Tally {
     pub(super) referenced: u64,
     pub(super) edges: u64,
@@ -16,15 +17,8 @@ impl std::ops::Add for Tally {
     type Output = Self;
 
     fn add(self, other: Self) -> Self {
-        Self {
-            referenced: self.referenced + other.referenced,
-            edges: self.edges + other.edges,
-            boundary_edges: self.boundary_edges + other.boundary_edges,
-            non_manifold_edges: self.non_manifold_edges + other.non_manifold_edges,
-            inconsistent_edges: self.inconsistent_edges + other.inconsistent_edges,
-            pinched_vertices: self.pinched_vertices + other.pinched_vertices,
-            repeated_triangles: self.repeated_triangles + other.repeated_triangles,
-        }
+        let (a, b): ([u64; 7], [u64; 7]) = (bytemuck::cast(self), bytemuck::cast(other));
+        bytemuck::cast(std::array::from_fn::<_, 7, _>(|i| a[i] + b[i]))
     }
 }
 
@@ -117,10 +111,7 @@ impl Inspector {
     fn pieces(&mut self) -> usize {
         let mut pieces = self.parent.len();
         for pair in self.neighbour.chunks_exact(2) {
-            let (a, b) = (
-                root(&mut self.parent, pair[0]),
-                root(&mut self.parent, pair[1]),
-            );
+            let [a, b] = [pair[0], pair[1]].map(|end| root(&mut self.parent, end));
             if a != b {
                 self.parent[a.max(b) as usize] = a.min(b);
                 pieces -= 1;
@@ -130,7 +121,8 @@ impl Inspector {
     }
 }
 
-fn root(parent: &mut [u32], mut at: u32) -> u32 {
+/// The root of `at` in a union–find; shortens the way to it.
+pub(super) fn root(parent: &mut [u32], mut at: u32) -> u32 {
     while parent[at as usize] != at {
         let up = parent[parent[at as usize] as usize];
         parent[at as usize] = up;

@@ -7,23 +7,17 @@ use super::corners::Corners;
 use super::intake::Intake;
 use super::plan::Plan;
 use super::star::{Inspector, Tally, scratch_bytes};
+use super::verdict::Verdict;
 use crate::error::Result;
 use crate::workspace::Workspace;
 
-/// Counts of the sweep.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(super) struct Swept {
-    pub(super) tally: Tally,
-    pub(super) components: u64,
-    pub(super) boundary_loops: u64,
-    pub(super) zero_area_triangles: u64,
-}
+/// The name of the memory for a star that is too large for the plan.
+const STAR: &str = "verify: star of one vertex";
 
 struct Sweep<'a> {
     plan: &'a Plan,
     workspace: &'a Workspace,
     triangles: Buckets<[u32; 3]>,
-    block: Vec<[u32; 3]>,
     corners: Corners,
     areas: Areas,
     forest: Forest,
@@ -32,18 +26,17 @@ struct Sweep<'a> {
     tally: Tally,
 }
 
-/// Processes all ranges of the mesh.
-pub(super) fn run(intake: Intake<'_>, plan: &Plan, workspace: &Workspace) -> Result<Swept> {
+/// Processes all ranges of the mesh; completes the counts of the verdict.
+pub(super) fn run(intake: Intake<'_>, plan: &Plan, workspace: &Workspace) -> Result<Verdict> {
     let mut sweep = Sweep {
         plan,
         workspace,
-        areas: Areas::new(workspace, plan, intake.positions),
+        areas: Areas::new(workspace, plan, intake.positions)?,
         triangles: intake.triangles,
-        block: Vec::new(),
         corners: Corners::default(),
         forest: Forest::default(),
-        surface: Contraction::new(workspace, plan, "verify.surface"),
-        boundary: Contraction::new(workspace, plan, "verify.boundary"),
+        surface: Contraction::new(workspace, plan, "verify.surface")?,
+        boundary: Contraction::new(workspace, plan, "verify.boundary")?,
         tally: Tally::default(),
     };
     let vertices = u64::from(plan.vertices);
@@ -54,11 +47,19 @@ pub(super) fn run(intake: Intake<'_>, plan: &Plan, workspace: &Workspace) -> Res
         workspace.observer.advance(plan.range(k).1 as u64);
     }
     workspace.observer.end();
-    Ok(Swept {
-        tally: sweep.tally,
-        components: sweep.surface.complete,
-        boundary_loops: sweep.boundary.complete,
+    let tally = sweep.tally;
+    Ok(Verdict {
+        repeated_triangles: tally.repeated_triangles,
+        non_manifold_edges: tally.non_manifold_edges,
+        inconsistent_edges: tally.inconsistent_edges,
+        pinched_vertices: tally.pinched_vertices,
+        unreferenced_vertices: intake.verdict.vertices - tally.referenced,
         zero_area_triangles: sweep.areas.zero,
+        edges: tally.edges,
+        boundary_edges: tally.boundary_edges,
+        boundary_loops: sweep.boundary.complete,
+        components: sweep.surface.complete,
+        ..intake.verdict
     })
 }
 
@@ -75,9 +76,7 @@ impl Sweep<'_> {
             let (part, corners) = self.corners.part_from(start, self.plan.corners);
             let end = part.end;
             let more = corners.saturating_sub(self.plan.corners) as u64;
-            let _held = self
-                .workspace
-                .reserve("verify: star of one vertex", 8 * more)?;
+            let _held = self.workspace.reserve(STAR, 8 * more)?;
             self.corners.begin(part, corners);
             self.gather(k, start == 0)?;
             self.inspect()?;
@@ -93,9 +92,9 @@ impl Sweep<'_> {
     fn join_surface(&mut self, k: usize) -> Result<()> {
         let (first, length) = self.plan.range(k);
         let mut cursor = self.triangles.cursor(k);
-        while self.triangles.next(&mut cursor, &mut self.block)? {
+        while let Some(block) = self.triangles.next(&mut cursor)? {
             self.workspace.check_cancel()?;
-            let (block, corners) = (&self.block, &mut self.corners);
+            let corners = &mut self.corners;
             let (surface, forest) = (&mut self.surface, &mut self.forest);
             let join = || {
                 for triangle in block {
@@ -123,9 +122,9 @@ impl Sweep<'_> {
     fn gather(&mut self, k: usize, first_time: bool) -> Result<()> {
         let (first, length) = self.plan.range(k);
         let mut cursor = self.triangles.cursor(k);
-        while self.triangles.next(&mut cursor, &mut self.block)? {
+        while let Some(block) = self.triangles.next(&mut cursor)? {
             self.workspace.check_cancel()?;
-            let (block, corners, areas) = (&self.block, &mut self.corners, &mut self.areas);
+            let (corners, areas) = (&mut self.corners, &mut self.areas);
             if first_time {
                 let look = || areas.look(block, first, length);
                 rayon::join(|| corners.fill(block), look).1?;
@@ -143,9 +142,7 @@ impl Sweep<'_> {
         while let Some((at, star)) = self.corners.large(from, self.plan.large_star) {
             self.workspace.check_cancel()?;
             let bytes = scratch_bytes(star.len());
-            let _held = self
-                .workspace
-                .reserve("verify: star of one vertex", bytes)?;
+            let _held = self.workspace.reserve(STAR, bytes)?;
             let mut inspector = Inspector::default();
             inspector.inspect(first + at as u32, star);
             self.tally = self.tally + inspector.tally;

@@ -21,7 +21,7 @@ fn write(workspace: &Workspace, vertices: u32, faces: &[[u32; 3]]) -> std::path:
     for [x, y, z] in faces {
         writeln!(text, "3 {x} {y} {z}").unwrap();
     }
-    let path = workspace.file("mesh.ply");
+    let path = workspace.path("mesh.ply");
     std::fs::write(&path, text).unwrap();
     path
 }
@@ -117,14 +117,14 @@ fn plans_fit_what_is_free() {
 #[test]
 fn damage_to_a_bucket_is_found_and_named() {
     let workspace = Workspace::for_tests(2);
-    let mut buckets = Buckets::<[u32; 2]>::new(&workspace, "bucket", 3, 80);
+    let mut buckets = Buckets::<[u32; 2]>::new(&workspace, "bucket", 3, 80).unwrap();
     for i in 0..1000u32 {
         buckets.push(i as usize % 3, [i, 7 * i]).unwrap();
     }
-    let (mut all, mut block) = (Vec::new(), Vec::new());
+    let mut all = Vec::new();
     let mut cursor = buckets.cursor(1);
-    while buckets.next(&mut cursor, &mut block).unwrap() {
-        all.extend_from_slice(&block);
+    while let Some(block) = buckets.next(&mut cursor).unwrap() {
+        all.extend_from_slice(block);
     }
     all.sort_unstable();
     let expected: Vec<_> = (0..1000u32)
@@ -132,7 +132,7 @@ fn damage_to_a_bucket_is_found_and_named() {
         .map(|i| [i, 7 * i])
         .collect();
     assert_eq!(all, expected);
-    let path = workspace.file("bucket");
+    let path = workspace.path("bucket.0");
     let whole = std::fs::read(&path).unwrap();
     for at in [0, 9, 13, 20, 95] {
         let mut bytes = whole.clone();
@@ -140,14 +140,14 @@ fn damage_to_a_bucket_is_found_and_named() {
         std::fs::write(&path, bytes).unwrap();
         let mut cursor = buckets.cursor(0);
         let error = loop {
-            match buckets.next(&mut cursor, &mut block) {
-                Ok(true) => {}
-                Ok(false) => panic!("byte {at} unnoticed"),
+            match buckets.next(&mut cursor) {
+                Ok(Some(_)) => {}
+                Ok(None) => panic!("byte {at} unnoticed"),
                 Err(error) => break error,
             }
         };
         assert!(matches!(error, Error::Corrupt { .. }), "{error}");
     }
     buckets.clear(0);
-    assert!(!buckets.next(&mut buckets.cursor(0), &mut block).unwrap());
+    assert_eq!(buckets.next(&mut buckets.cursor(0)).unwrap(), None);
 }

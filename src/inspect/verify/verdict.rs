@@ -2,15 +2,13 @@
 
 use super::Options;
 use super::bounds::Bounds;
-use super::intake::Counts;
-use super::sweep::Swept;
 use std::fmt;
 
 /// Counts and defects of a mesh file.
 ///
 /// A *sound* triangle has three distinct corners that all exist. Edges, components and all other topological
 /// properties refer to sound triangles only.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize)]
 pub struct Verdict {
     /// True if the mesh has none of the defects. Zero-area triangles are no defect, nor are unreferenced
     /// vertices if they were allowed.
@@ -61,53 +59,30 @@ pub struct Verdict {
 }
 
 impl Verdict {
-    pub(super) fn new(
-        counts: &Counts,
-        bounds: Option<Bounds>,
-        swept: &Swept,
-        options: &Options,
-    ) -> Self {
-        let tally = swept.tally;
-        let unsound = counts.index_out_of_range + counts.degenerate_triangles;
-        let sound = counts.triangles - unsound;
-        let euler = tally.referenced as i64 - tally.edges as i64 + sound as i64;
-        let surface_defects = counts.non_triangles
+    /// Fills in what follows from the counts.
+    pub(super) fn judged(self, options: &Options) -> Self {
+        let unsound = self.index_out_of_range + self.degenerate_triangles;
+        let sound = self.triangles - unsound;
+        let referenced = self.vertices - self.unreferenced_vertices;
+        let euler = referenced as i64 - self.edges as i64 + sound as i64;
+        let surface_defects = self.non_triangles
             + unsound
-            + tally.repeated_triangles
-            + tally.non_manifold_edges
-            + tally.inconsistent_edges
-            + tally.pinched_vertices;
-        let unreferenced = counts.vertices - tally.referenced;
-        let counted = if options.allow_unreferenced {
-            0
-        } else {
-            unreferenced
-        };
+            + self.repeated_triangles
+            + self.non_manifold_edges
+            + self.inconsistent_edges
+            + self.pinched_vertices;
         // χ = 2 (components − genus) − boundary loops
-        let twice = 2 * swept.components as i64 - swept.boundary_loops as i64 - euler;
-        let genus = (surface_defects == 0 && sound > 0).then_some(twice.max(0) as u64 / 2);
-        Self {
-            manifold: surface_defects + counts.non_finite_vertices + counted == 0,
-            non_triangles: counts.non_triangles,
-            index_out_of_range: counts.index_out_of_range,
-            degenerate_triangles: counts.degenerate_triangles,
-            repeated_triangles: tally.repeated_triangles,
-            non_manifold_edges: tally.non_manifold_edges,
-            inconsistent_edges: tally.inconsistent_edges,
-            pinched_vertices: tally.pinched_vertices,
-            non_finite_vertices: counts.non_finite_vertices,
-            unreferenced_vertices: unreferenced,
+        let twice = 2 * self.components as i64 - self.boundary_loops as i64 - euler;
+        let verdict = Self {
             unreferenced_allowed: options.allow_unreferenced,
-            zero_area_triangles: swept.zero_area_triangles,
-            vertices: counts.vertices,
-            triangles: counts.triangles,
-            edges: tally.edges,
-            boundary_edges: tally.boundary_edges,
-            boundary_loops: swept.boundary_loops,
-            components: swept.components,
             euler_characteristic: euler,
-            genus,
-            bounds,
+            genus: (surface_defects == 0 && sound > 0).then_some(twice.max(0) as u64 / 2),
+            ..self
+        };
+        let manifold = verdict.defects().iter().all(|(_, count)| *count == 0);
+        Self {
+            manifold,
+            ..verdict
         }
     }
 
@@ -142,35 +117,33 @@ impl fmt::Display for Verdict {
             writeln!(f, "  {name:<38}{count:>14}")?;
         }
         let genus = self.genus.map_or("-".to_owned(), |g| g.to_string());
-        let mut counts = vec![
-            ("vertices", self.vertices.to_string()),
-            ("triangles", self.triangles.to_string()),
-            ("edges", self.edges.to_string()),
-            ("boundary edges", self.boundary_edges.to_string()),
-            ("boundary loops", self.boundary_loops.to_string()),
-            ("components", self.components.to_string()),
-            (
-                "Euler characteristic",
-                self.euler_characteristic.to_string(),
-            ),
-            ("genus", genus),
+        let counts: [(&str, &dyn fmt::Display); 9] = [
+            ("vertices", &self.vertices),
+            ("triangles", &self.triangles),
+            ("edges", &self.edges),
+            ("boundary edges", &self.boundary_edges),
+            ("boundary loops", &self.boundary_loops),
+            ("components", &self.components),
+            ("Euler characteristic", &self.euler_characteristic),
+            ("genus", &genus),
             (
                 "zero-area triangles (not a defect)",
-                self.zero_area_triangles.to_string(),
+                &self.zero_area_triangles,
             ),
         ];
-        if self.unreferenced_allowed {
-            let count = self.unreferenced_vertices.to_string();
-            counts.push(("unreferenced vertices (allowed)", count));
-        }
         for (name, count) in counts {
             writeln!(f, "{name:<40}{count:>14}")?;
         }
+        if self.unreferenced_allowed {
+            let (name, count) = (
+                "unreferenced vertices (allowed)",
+                self.unreferenced_vertices,
+            );
+            writeln!(f, "{name:<40}{count:>14}")?;
+        }
         match self.bounds {
-            Some(Bounds {
-                min: [a, b, c],
-                max: [x, y, z],
-            }) => {
+            Some(Bounds { min, max }) => {
+                let ([a, b, c], [x, y, z]) = (min, max);
                 write!(f, "box  {a} {b} {c}  to  {x} {y} {z}")
             }
             None => write!(f, "box  empty"),

@@ -6,16 +6,21 @@ use crate::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
 use crate::workspace::progress::{Cancel, Silent};
 use crate::workspace::{Folder, Found};
 use proptest::prelude::*;
+use std::sync::Arc;
 
 fn collect<R: Row>(sorted: Sorted<R>) -> Vec<R> {
-    let mut all = Vec::new();
-    sorted
-        .for_each(|r| {
-            all.push(r);
-            Ok(())
-        })
-        .unwrap();
-    all
+    sorted.in_memory().map_or_else(
+        |sorted| {
+            let mut all = Vec::new();
+            let each = |row| {
+                all.push(row);
+                Ok(())
+            };
+            sorted.for_each_from(None, each).unwrap();
+            all
+        },
+        |(all, _)| all,
+    )
 }
 
 proptest! {
@@ -102,7 +107,7 @@ fn damage_is_found_and_named() {
     for i in 0..1000u32 {
         sorter.push(&[[i * 7 % 1000, i]]).unwrap();
     }
-    let path = workspace.file("d.run3");
+    let path = workspace.path("d.run3.2");
     let mut bytes = std::fs::read(&path).unwrap();
     let middle = bytes.len() / 2;
     bytes[middle] ^= 4;
@@ -182,7 +187,7 @@ fn a_run_that_was_damaged_is_made_again() {
     let path = folder.path().join("run");
     let mut want: Vec<_> = parts().iter().flat_map(|p| part(p.0)).collect();
     want.sort_unstable();
-    for damage in [None, Some("s.run1"), Some("s.run0")] {
+    for damage in [None, Some("s.run1.2"), Some("s.run0.2")] {
         if let Some(name) = damage {
             let path = path.join(name);
             let mut bytes = std::fs::read(&path).unwrap();
@@ -193,7 +198,7 @@ fn a_run_that_was_damaged_is_made_again() {
         let sorter = Sorter::<[u32; 2]>::new(&workspace, "s", 20_000);
         let push = |numbers: &[u32]| numbers.iter().try_for_each(|n| sorter.push(&part(*n)));
         sorter.take_parts(&workspace, &parts(), true, push).unwrap();
-        if damage == Some("s.run0") {
+        if damage == Some("s.run0.2") {
             assert!(collect(sorter.finish(&workspace).unwrap()) == want);
         }
     }

@@ -62,31 +62,26 @@ impl Source for Query<'_> {
     }
 }
 
-/// Neighbours searched in the whole store.
-struct Walked<'a> {
-    walk: Walk<'a>,
-    near: Neighbors,
-}
-
-impl Source for Walked<'_> {
+/// A walk through the whole store, and the neighbours found so far.
+impl Source for (Walk<'_>, Neighbors) {
     fn near(&self) -> &Neighbors {
-        &self.near
+        &self.1
     }
 
     fn reach(&mut self, count: usize) -> Result<bool> {
-        while self.near.len() < count {
-            match self.walk.advance()? {
-                Some(near) => self.near.push(near),
-                None => break,
-            }
+        let (walk, near) = self;
+        while near.len() < count
+            && let Some(next) = walk.advance()?
+        {
+            near.push(next);
         }
         Ok(true)
     }
 
     fn sums(&mut self, count: usize) -> Result<Option<(Sums, usize)>> {
         self.reach(count)?;
-        let used = count.min(self.near.len());
-        Ok(Some((self.near.sums(used, Level::best()), used)))
+        let used = count.min(self.1.len());
+        Ok(Some((self.1.sums(used, Level::best()), used)))
     }
 }
 
@@ -227,11 +222,8 @@ impl<'a> CellMaker<'a> {
                 return Ok(Outcome::Complete);
             }
             // On scan lines, thousands of points are nearer than the farthest one that can touch the cell.
-            let touching = Touching {
-                cell: &self.cell,
-                own: query.point(),
-            };
-            if !query.extend_where(self.cell.reach2(), &touching) {
+            let (cell, own) = (&self.cell, query.point());
+            if !query.extend_where(cell.reach2(), &Touching { cell, own }) {
                 return Ok(Outcome::Uncertain);
             }
         }
@@ -249,23 +241,17 @@ impl<'a> CellMaker<'a> {
         point: Point,
         each: impl FnMut(u32, u32),
     ) -> Result<Outcome> {
-        let mut source = Walked {
-            walk: Walk::new(store, cache, id, point),
-            near: Neighbors::default(),
-        };
+        let mut source = (Walk::new(store, cache, id, point), Neighbors::default());
         let Some(fit) = fit_from(&mut source, self.neighbors, self.widen)? else {
             return Ok(Outcome::Uncertain);
         };
         if let Some(outcome) = self.start(id, &fit) {
             return Ok(outcome);
         }
-        let Walked { mut walk, mut near } = source;
+        let (mut walk, mut near) = source;
         while !near.is_empty() && self.cell.clip_nearest(near.columns(), 0) == near.len() {
-            let touching = Touching {
-                cell: &self.cell,
-                own: point,
-            };
-            walk.list_where(self.cell.reach2(), &touching, &mut near)?;
+            let (cell, own) = (&self.cell, point);
+            walk.list_where(cell.reach2(), &Touching { cell, own }, &mut near)?;
         }
         self.cell.triples(each);
         Ok(Outcome::Complete)
@@ -310,10 +296,7 @@ pub fn fit_in_store(
     neighbors: usize,
     widen: Widen,
 ) -> Result<Option<Fit>> {
-    let mut source = Walked {
-        walk: Walk::new(store, cache, id, point),
-        near: Neighbors::default(),
-    };
+    let mut source = (Walk::new(store, cache, id, point), Neighbors::default());
     fit_from(&mut source, neighbors, widen)
 }
 
@@ -328,10 +311,7 @@ pub fn near_in_store(
     point: Point,
     count: usize,
 ) -> Result<Neighbors> {
-    let mut source = Walked {
-        walk: Walk::new(store, cache, id, point),
-        near: Neighbors::default(),
-    };
+    let mut source = (Walk::new(store, cache, id, point), Neighbors::default());
     source.reach(count)?;
-    Ok(source.near)
+    Ok(source.1)
 }

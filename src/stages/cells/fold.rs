@@ -1,7 +1,7 @@
 //! The distinct triples of the cells of a tile with their counts (paper, section 3.4).
 
 use super::{CountedTriple, SentTriple, TileRanges};
-use crate::workspace::memory::{Holding, bytes_of};
+use crate::workspace::memory::bytes_of;
 use std::ops::Range;
 
 /// Triples of the cells of one tile, and memory for sorting them.
@@ -13,7 +13,6 @@ pub(super) struct TileTriples {
     /// The number of triples in `here` for each smallest vertex.
     begins: Vec<u32>,
     elsewhere: Vec<[u32; 3]>,
-    held: Holding,
 }
 
 /// Counted triples of this tile and those sent to other tiles, both ascending.
@@ -22,27 +21,29 @@ pub(super) type Folded = (Vec<CountedTriple>, Vec<SentTriple>);
 impl TileTriples {
     /// Upper estimate of the bytes for the triples of `points` cells: usual cells have five or six corners
     /// between bisectors.
-    pub fn bytes(points: usize) -> u64 {
+    pub fn estimate(points: usize) -> u64 {
         points as u64 * 200
     }
 
     /// For the cells of the points `ids`.
     pub fn new(ids: Range<usize>) -> Self {
-        let mut seen = Self {
+        Self {
             here: Vec::with_capacity(ids.len() * 6),
             begins: vec![0; ids.len() + 1],
             elsewhere: Vec::new(),
-            held: Holding::default(),
             ids,
-        };
-        seen.report_usage(0);
-        seen
+        }
     }
 
-    /// Reports the memory in use: the lists and `more` bytes. Room that was never written to is not counted.
-    pub fn report_usage(&mut self, more: u64) {
+    /// Bytes of its lists. Room that was never written to is not counted.
+    pub fn bytes(&self) -> u64 {
         let lists = size_of_val(&*self.here) + size_of_val(&*self.elsewhere);
-        self.held.set(lists as u64 + bytes_of(&self.begins) + more);
+        lists as u64 + bytes_of(&self.begins)
+    }
+
+    /// Bytes of the list that [`TileTriples::fold`] makes for itself.
+    pub fn fold_bytes(&self) -> u64 {
+        self.here.len() as u64 * 8
     }
 
     /// Number of triples so far, with repetitions.
@@ -66,7 +67,6 @@ impl TileTriples {
 
     /// Merges equal triples into one row with a count.
     pub fn fold(mut self, tiles: &TileRanges) -> Folded {
-        self.report_usage(self.here.len() as u64 * 8);
         // A counting sort by smallest vertex; then one small sort for each vertex, of about six triples.
         let mut start = std::mem::take(&mut self.begins);
         for rank in 1..start.len() {
@@ -94,7 +94,6 @@ impl TileTriples {
                 });
             }
         }
-        self.report_usage((size_of_val(&*sorted) + size_of_val(&*kept)) as u64);
         drop(sorted);
         self.elsewhere.sort_unstable();
         let sent = self.elsewhere.chunk_by(|a, b| a == b).map(|group| {

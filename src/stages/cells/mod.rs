@@ -1,30 +1,26 @@
 //! Restricted Voronoi cells of all points, tile by tile (paper, sections 3.3 and 3.4).
 
 mod cell;
+mod fits;
 mod fold;
 
-pub use cell::{
-    CellMaker, DiskRadius, Fit, Outcome, Widen, fit_in_store, fit_in_tile, near_in_store,
-};
+pub use cell::{CellMaker, DiskRadius, Fit, Outcome, Widen};
+pub(crate) use fits::Planes;
+pub use fits::{each_neighborhood, each_plane};
 
 use crate::error::Result;
 use crate::geom::Point;
-use crate::spill::{Id, Shuffle, Table, row};
+use crate::spill::{Id, Shuffle, Table, release, row};
 use crate::stages::blocks::Blocks;
 use crate::stages::order::PointStore;
 use crate::stages::spacing::Density;
 use crate::stages::tiles::Tile;
 use crate::stages::tiles::near::Search;
 use crate::stages::tiles::walk::PageCache;
-use crate::workspace::Workspace;
-use crate::workspace::memory::hold;
-use crate::workspace::persist::persist;
+use crate::workspace::{Unit, Workspace};
 use fold::TileTriples;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::ops::Range;
-
-/// Bytes reserved for sorting the triples that are sent to other tiles.
-const SHUFFLE_BUFFER: u64 = 16 << 20;
 
 row! {
     /// A triple of ids, ascending, and the number of cells that see it.
@@ -51,20 +47,22 @@ row! {
 }
 
 /// The triples seen by cells, sorted, by the tile of their smallest vertex.
-#[derive(Debug)]
+#[derive(Debug, Serialize, Deserialize)]
 pub struct CellTriples {
     /// Division into tiles.
     pub tiles: TileRanges,
     /// Triples of the tile's own cells.
     pub own: Table<CountedTriple>,
-    /// Triples seen by the cells of later tiles.
-    pub received: Table<SentTriple>,
+    /// Triples sent to each tile by the cells of later tiles.
+    pub sent: Shuffle<SentTriple>,
     /// Points off the surface of their neighbours, ascending, by tile.
     pub off: Table<Id>,
 }
 
+release!(CellTriples: own, sent, off);
+
 /// Counts of this stage.
-#[derive(Debug, Clone, Copy, Default, Serialize, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize, PartialEq, Eq)]
 pub struct CellStats {
     /// Cells not certified by the halo of their tile, which were computed from the whole store.
     pub second_looks: u64,
@@ -77,7 +75,7 @@ pub struct CellStats {
 }
 
 /// Tiles: ranges of at most `size` ids, none of which crosses the boundary of a block.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub struct TileRanges {
     blocks: Blocks,
     block: u32,
@@ -108,12 +106,8 @@ impl TileRanges {
     /// Number of tiles.
     #[must_use]
     pub fn count(&self) -> usize {
-        let points = self.blocks.points();
-        if points == 0 {
-            0
-        } else {
-            self.of(points as u32 - 1) as usize + 1
-        }
+        let last = self.blocks.points().checked_sub(1);
+        last.map_or(0, |last| self.of(last as u32) as usize + 1)
     }
 
     /// The tile of an id.
@@ -138,25 +132,6 @@ impl TileRanges {
     }
 }
 
-persist!(CellTriples {
-    tiles,
-    own,
-    received,
-    off
-});
-persist!(CellStats {
-    second_looks,
-    no_plane,
-    off_surface,
-    raw_triples
-});
-persist!(TileRanges {
-    blocks,
-    block,
-    size,
-    per_block
-});
-
 /// Computes all cells and collects their triples.
 ///
 /// # Errors
@@ -171,27 +146,33 @@ pub fn cells(
     density: Option<Density<'_>>,
     workspace: &Workspace,
 ) -> Result<(CellTriples, CellStats)> {
-    let own = Table::create(workspace, "cells.own", tiles.count())?;
-    let off = Table::create(workspace, "cells.off", tiles.count())?;
-    let shuffle = Shuffle::between_units(workspace, "cells.sent", SHUFFLE_BUFFER, tiles.count())?;
+    let own = Table::new("cells.own", tiles.count());
+    let off = Table::new("cells.off", tiles.count());
+    let shuffle = Shuffle::new("cells.sent");
     let bytes = |tile: usize| {
-        let points = tiles.ids(tile).len() as u64;
-        Tile::bytes(points as usize) + PageCache::bytes(store) + TileTriples::bytes(points as usize)
+        let points = tiles.ids(tile).len();
+        Tile::estimate(points) + PageCache::estimate(store) + TileTriples::estimate(points)
     };
-    let work = |tile| {
+    let work = |unit: &Unit<'_>| {
+        let tile = unit.number();
         let ids = tiles.ids(tile);
         let mut seen = TileTriples::new(ids.clone());
         let mut maker = CellMaker::new(neighbors, radius, widen, density);
         let (mut stats, mut no_cell) =
-            one_tile(store, ids.clone(), neighbors, &mut maker, &mut seen)?;
+            one_tile(unit, store, ids.clone(), neighbors, &mut maker, &mut seen)?;
         no_cell.sort_unstable();
-        off.put(tile, &no_cell)?;
+        off.put(unit, tile, &no_cell)?;
         stats.raw_triples = seen.len() as u64;
+        let folding = seen.fold_bytes();
+        let mut held = unit.hold(seen.bytes() + folding);
         let (kept, sent) = seen.fold(&tiles);
-        let _held = hold((size_of_val(&*kept) + size_of_val(&*sent)) as u64);
-        own.put(tile, &kept)?;
-        shuffle.send_from(tile, &sent)?;
-        workspace.advance(ids.len() as u64);
+        let folded = (size_of_val(&*kept) + size_of_val(&*sent)) as u64;
+        // As it was at the end of folding.
+        held.set(folding + folded);
+        held.set(folded);
+        own.put(unit, tile, &kept)?;
+        shuffle.send(unit, tile, sent)?;
+        unit.advance(ids.len() as u64);
         Ok(stats)
     };
     let mut stats = CellStats::default();
@@ -202,19 +183,17 @@ pub fn cells(
         stats.raw_triples += more.raw_triples;
         Ok(())
     })?;
-    let received = shuffle.deliver(workspace, tiles.count())?;
-    Ok((
-        CellTriples {
-            tiles,
-            own,
-            received,
-            off,
-        },
-        stats,
-    ))
+    let triples = CellTriples {
+        tiles,
+        own,
+        sent: shuffle,
+        off,
+    };
+    Ok((triples, stats))
 }
 
 fn one_tile(
+    unit: &Unit<'_>,
     store: &PointStore,
     ids: Range<usize>,
     neighbors: usize,
@@ -222,12 +201,16 @@ fn one_tile(
     seen: &mut TileTriples,
 ) -> Result<(CellStats, Vec<Id>)> {
     let tile = Tile::load(store, ids)?;
+    let mut held = unit.hold(tile.bytes() + seen.bytes());
+    unit.give_back(tile.spare());
     let mut search = Search::default();
     let mut uncertain: Vec<(u32, Point)> = Vec::new();
     let mut no_plane = 0;
     let mut off = Vec::new();
     let mut failed = None;
-    tile.for_each_query(neighbors, &mut search, |id, point, query| {
+    let mut searching = unit.hold(0);
+    let grown = |bytes| searching.set(bytes);
+    tile.for_each_query(neighbors, &mut search, grown, |id, point, query| {
         let outcome = match query {
             None => Ok(Outcome::Uncertain),
             Some(mut query) => maker.from_tile(&mut query, |a, b| seen.see(id, a, b)),
@@ -243,9 +226,9 @@ fn one_tile(
     if let Some(error) = failed {
         return Err(error);
     }
-    // The list has grown beside the tile and the search.
-    seen.report_usage(0);
-    drop(tile);
+    // The lists have grown beside the tile.
+    held.set(tile.bytes() + seen.bytes());
+    drop((tile, search, searching));
     let mut cache = PageCache::default();
     for &(id, point) in &uncertain {
         let each = |a, b| seen.see(id, a, b);
@@ -254,6 +237,7 @@ fn one_tile(
             Outcome::OffSurface => off.push(Id { id }),
             Outcome::Complete | Outcome::Uncertain => {}
         }
+        held.set(cache.bytes() + seen.bytes());
     }
     let stats = CellStats {
         second_looks: uncertain.len() as u64,

@@ -2,14 +2,16 @@
 
 use super::number::{Numbering, Split};
 use crate::error::Result;
-use crate::stages::repair::Repaired;
+use crate::spill::Inbox;
+use crate::stages::repair::{FilledTriangle, Surface};
 use crate::stages::surface::star::sorted;
+use crate::workspace::Unit;
 use crate::workspace::memory::bytes_of;
 use std::ops::Range;
 
 /// The triangles whose smallest vertex is in a block.
 pub struct Faces<'a> {
-    numbering: &'a Numbering<'a>,
+    numbering: &'a Numbering,
     ids: Range<u32>,
     /// Numbers in the file of the block's vertices.
     numbers: Vec<u32>,
@@ -24,13 +26,15 @@ pub struct Faces<'a> {
 impl<'a> Faces<'a> {
     /// Reads the triangles of the block whose ids are `ids`.
     pub fn load(
-        repaired: &Repaired,
-        numbering: &'a Numbering<'a>,
+        unit: &Unit<'_>,
+        surface: &Surface<'_>,
+        filled: &Inbox<FilledTriangle>,
+        numbering: &'a Numbering,
         ids: Range<u32>,
-        block: usize,
     ) -> Result<Self> {
-        let (triangles, _) = repaired.surface.load(block)?;
-        let filled = repaired.filled.get(block)?;
+        let block = unit.number();
+        let (triangles, _) = surface.load(unit, block)?;
+        let filled = filled.get(unit, block)?;
         let filled = filled.iter().map(|f| f.triangle);
         let mut filled: Vec<_> = filled.filter(|t| t[0] >= ids.start).collect();
         filled.sort_unstable_by_key(|t| sorted(*t));
@@ -40,12 +44,12 @@ impl<'a> Faces<'a> {
             ids,
             triangles,
             filled,
-            splits: numbering.splits.get(block)?,
+            splits: numbering.splits.get(unit, block)?,
         })
     }
 
-    /// Bytes allocated by the lists.
-    pub fn taken(&self) -> u64 {
+    /// Allocated bytes.
+    pub fn bytes(&self) -> u64 {
         let triangles = bytes_of(&self.triangles) + bytes_of(&self.filled);
         triangles + bytes_of(&self.numbers) + bytes_of(&self.splits)
     }

@@ -1,11 +1,11 @@
 //! The mesh file while it is being written: slices at known offsets, under a temporary name.
 
-use super::format::{Layout, Mesh, MeshFormat, Records};
+use super::format::{Layout, Mesh, MeshFormat};
 use crate::error::{Error, Result};
 use crate::workspace::fault::{self, Event};
 use crate::workspace::open::{failed_write, open_existing, options};
 use crate::workspace::place::{Place, Put};
-use crate::workspace::{OUTPUT, RENAMED, Workspace, limits};
+use crate::workspace::{OUTPUT, RENAMED, Unit, Workspace, limits};
 use std::fs::File;
 use std::os::unix::fs::{FileExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
@@ -22,7 +22,8 @@ pub struct MeshFile<'a> {
     file: Option<File>,
     format: &'static dyn MeshFormat,
     mesh: Mesh,
-    layout: Layout,
+    /// The offsets of its parts.
+    pub layout: Layout,
     workspace: &'a Workspace,
 }
 
@@ -65,14 +66,14 @@ impl<'a> MeshFile<'a> {
         } else {
             // All parts were verified, in the temporary or in the final file.
             match open_existing(&file.temporary) {
-                Ok(found) => {
-                    file.file = Some(found);
-                    file.write(HEADER, &file.layout.header, 0)?;
-                }
+                Ok(found) => file.file = Some(found),
                 Err(e) if e.kind() == std::io::ErrorKind::NotFound => {}
                 Err(e) => return Err(Error::io(&file.temporary, "open", e)),
             }
         }
+        workspace.once("header", |unit| {
+            file.write(unit, HEADER, &file.layout.header, 0)
+        })?;
         Ok(file)
     }
 
@@ -99,48 +100,31 @@ impl<'a> MeshFile<'a> {
             full => full,
         })?;
         self.file = Some(file);
-        self.write(HEADER, &self.layout.header, 0)
+        Ok(())
     }
 
-    fn write(&self, part: u32, bytes: &[u8], offset: u64) -> Result<()> {
+    /// Writes encoded `bytes` at `offset`, as part `part` of the mesh.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn write(&self, unit: &Unit<'_>, part: u32, bytes: &[u8], offset: u64) -> Result<()> {
         let Some(file) = &self.file else {
             let gone = std::io::ErrorKind::NotFound.into();
             return Err(Error::io(&self.temporary, "open", gone));
         };
-        self.workspace.io.add_written(bytes.len() as u64);
+        unit.io.add_written(bytes.len() as u64);
         fault::write()
             .and_then(|()| file.write_all_at(bytes, offset))
             .map_err(|e| failed_write(&self.output, bytes.len(), 0, e))?;
+        let resumable = unit.is_resumable();
         let place = Place {
             offset,
             bytes: bytes.len(),
-            records: 0,
-            crc: if self.workspace.is_resumable() {
-                crc32fast::hash(bytes)
-            } else {
-                0
-            },
+            crc: if resumable { crc32fast::hash(bytes) } else { 0 },
+            ..Place::default()
         };
-        self.put(part, place)
-    }
-
-    fn put(&self, section: u32, place: Place) -> Result<()> {
-        let file = OUTPUT.into();
-        self.workspace.put(Put {
-            file,
-            section,
-            place,
-        })
-    }
-
-    /// Bytes of one vertex record.
-    pub fn vertex_bytes(&self) -> usize {
-        self.layout.vertices.bytes as usize
-    }
-
-    /// Bytes of one triangle record.
-    pub fn triangle_bytes(&self) -> usize {
-        self.layout.triangles.bytes as usize
+        note(unit, part, place);
+        Ok(())
     }
 
     /// Appends the encoded vertices to `bytes`.
@@ -156,26 +140,6 @@ impl<'a> MeshFile<'a> {
         Batch::new(|batch: &[[u32; 3]]| self.format.put_triangles(&self.mesh, batch, bytes))
     }
 
-    /// Writes encoded vertices, starting with number `first`, as part `part` of the mesh.
-    ///
-    /// # Errors
-    /// [`Error::Io`].
-    pub fn write_vertices(&self, part: u32, first: u64, bytes: &[u8]) -> Result<()> {
-        self.write_records(part, self.layout.vertices, first, bytes)
-    }
-
-    /// Writes encoded triangles, starting with number `first`, as part `part` of the mesh.
-    ///
-    /// # Errors
-    /// [`Error::Io`].
-    pub fn write_triangles(&self, part: u32, first: u64, bytes: &[u8]) -> Result<()> {
-        self.write_records(part, self.layout.triangles, first, bytes)
-    }
-
-    fn write_records(&self, part: u32, of: Records, first: u64, bytes: &[u8]) -> Result<()> {
-        self.write(part, bytes, of.at + first * of.bytes)
-    }
-
     /// Flushes the file to disk and renames it to its final name.
     ///
     /// # Errors
@@ -185,7 +149,10 @@ impl<'a> MeshFile<'a> {
             file.sync_all()
                 .map_err(|e| Error::io(&self.output, "sync", e))?;
             let step = self.workspace.step("rename")?;
-            step.finish(0, &(), || self.put(RENAMED, Place::default()))?;
+            step.finish(0, &(), |unit| {
+                note(unit, RENAMED, Place::default());
+                Ok(())
+            })?;
             fault::point(Event::Rename);
             std::fs::rename(&self.temporary, &self.output)
                 .map_err(|e| Error::io(&self.output, "rename the finished file to it", e))?;
@@ -204,6 +171,15 @@ impl Drop for MeshFile<'_> {
             let _ = std::fs::remove_file(&self.temporary);
         }
     }
+}
+
+/// Notes a part of the mesh.
+fn note(unit: &Unit<'_>, section: u32, place: Place) {
+    unit.note(Put {
+        file: OUTPUT.to_owned(),
+        section,
+        place,
+    });
 }
 
 /// Collects records and passes them on in batches.
@@ -225,18 +201,14 @@ impl<T, F: FnMut(&[T])> Batch<T, F> {
     pub fn push(&mut self, record: T) {
         self.records.push(record);
         if self.records.len() == BATCH {
-            self.flush();
+            (self.put)(&self.records);
+            self.records.clear();
         }
-    }
-
-    fn flush(&mut self) {
-        (self.put)(&self.records);
-        self.records.clear();
     }
 
     /// Passes on the remaining records.
     pub fn finish(mut self) {
-        self.flush();
+        (self.put)(&self.records);
     }
 }
 

@@ -59,3 +59,10 @@ pub struct Records {
     /// Bytes of one record.
     pub bytes: u64,
 }
+
+impl Records {
+    /// Offset of record `number`.
+    pub fn offset(&self, number: u64) -> u64 {
+        self.at + number * self.bytes
+    }
+}

@@ -14,17 +14,17 @@ pub use format::CoordinateType;
 
 use crate::error::{Error, Result};
 use crate::geom::lattice::Lattice;
+use crate::spill::Inbox;
 use crate::stages::blocks::Blocks;
 use crate::stages::order::PointStore;
-use crate::stages::repair::Repaired;
-use crate::workspace::Workspace;
-use crate::workspace::memory::{bytes_of, hold};
-use crate::workspace::persist::persist;
+use crate::stages::repair::{FilledTriangle, Repaired, Surface};
+use crate::workspace::memory::bytes_of;
+use crate::workspace::{Unit, Workspace};
 use faces::Faces;
 use file::MeshFile;
 use format::{Mesh, MeshFormat};
 use number::Numbering;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 /// All formats. The first is used if the extension is not known.
@@ -50,7 +50,7 @@ pub(crate) fn mesh_bytes(vertices: u64, triangles: u64, coordinates: CoordinateT
 }
 
 /// Counts of the finished mesh.
-#[derive(Debug, Clone, Copy, Default, Serialize, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize, PartialEq, Eq)]
 pub struct MeshStats {
     /// Vertices, copies included.
     pub vertices: u64,
@@ -62,11 +62,6 @@ pub struct MeshStats {
     pub triangles: u64,
     /// Edges with exactly one triangle.
     pub boundary_edges: u64,
-}
-
-fn block_bytes(repaired: &Repaired, blocks: Blocks, block: usize) -> u64 {
-    let records = repaired.surface.records(block) + repaired.filled.rows(block);
-    60 * records as u64 + blocks.ids(block).len() as u64 * 60 + (1 << 20)
 }
 
 /// Writes the mesh to `output`.
@@ -83,7 +78,9 @@ pub fn export(
     output: &Path,
     workspace: &Workspace,
 ) -> Result<MeshStats> {
-    let numbering = number::number(repaired, blocks, workspace)?;
+    let surface = repaired.surface.open(workspace)?;
+    let filled = repaired.filled.open(workspace, blocks.count())?;
+    let numbering = number::number(&repaired.numbering, &filled, blocks, workspace)?;
     let stats = numbering.stats;
     if stats.triangles == 0 {
         return Err(Error::NoTriangles {
@@ -95,59 +92,73 @@ pub fn export(
         triangles: stats.triangles,
         coordinates,
     };
-    let file = MeshFile::open(output, format_of(output), mesh, workspace)?;
-    let bytes = |block| block_bytes(repaired, blocks, block);
-    let work = |block| {
-        write_block(store, repaired, &numbering, blocks, lattice, &file, block)?;
-        workspace.advance(1);
-        Ok(())
+    let writer = Writer {
+        store,
+        surface,
+        filled,
+        numbering,
+        blocks,
+        lattice,
+        file: MeshFile::open(output, format_of(output), mesh, workspace)?,
     };
+    let bytes = |block| writer.bytes(workspace, block);
+    let work = |unit: &Unit<'_>| writer.block(unit).inspect(|_| unit.advance(1));
     workspace.units("export: block", blocks.count(), bytes, work, |_, ()| Ok(()))?;
-    file.finish()?;
+    writer.file.finish()?;
+    writer.numbering.release(workspace)?;
     Ok(stats)
 }
-
-persist!(MeshStats {
-    vertices,
-    points_used,
-    pinched_copies,
-    triangles,
-    boundary_edges
-});
 
 const NO_TRIANGLES: &str = "no three cells agree on one that belongs to a component large enough; \
     try a larger --radius, --smooth 1 for noisy scans, or a smaller --min-component";
 
-fn write_block(
-    store: &PointStore,
-    repaired: &Repaired,
-    numbering: &Numbering<'_>,
+/// Writes the blocks of a mesh.
+struct Writer<'a> {
+    store: &'a PointStore,
+    surface: Surface<'a>,
+    filled: Inbox<FilledTriangle>,
+    numbering: Numbering,
     blocks: Blocks,
-    lattice: &Lattice,
-    file: &MeshFile<'_>,
-    block: usize,
-) -> Result<()> {
-    let ids = blocks.ids(block);
-    let points = store.slice(ids.start as usize..ids.end as usize)?;
-    let at = |v: u32| lattice.position(points[(v - ids.start) as usize]);
-    let mut bytes = Vec::with_capacity(file.vertex_bytes() * ids.len());
-    let mut held = hold(bytes_of(&points) + bytes_of(&bytes));
-    let used = ids.clone().filter(|v| numbering.used(*v));
-    file.encode_vertices(used.map(at), &mut bytes);
-    // Three parts for each block; the number only identifies a part.
-    let part = 3 * block as u32;
-    file.write_vertices(part, numbering.vertex(ids.start).into(), &bytes)?;
-    bytes.clear();
-    let copies = numbering.copies.get(block)?;
-    file.encode_vertices(copies.iter().map(|c| at(c.id)), &mut bytes);
-    file.write_vertices(part + 1, numbering.first_copy(block), &bytes)?;
-    drop(points);
-    bytes.clear();
-    let faces = Faces::load(repaired, numbering, ids, block)?;
-    bytes.reserve_exact(faces.len() * file.triangle_bytes());
-    let mut batch = file.triangles(&mut bytes);
-    faces.for_each(|t| batch.push(t));
-    batch.finish();
-    held.set(faces.taken() + bytes_of(&bytes));
-    file.write_triangles(part + 2, numbering.first_face(block), &bytes)
+    lattice: &'a Lattice,
+    file: MeshFile<'a>,
+}
+
+impl Writer<'_> {
+    /// Bytes for a block.
+    fn bytes(&self, workspace: &Workspace, block: usize) -> u64 {
+        let records = self.surface.records(workspace, block) + self.filled.rows(block);
+        60 * records as u64 + self.blocks.ids(block).len() as u64 * 60 + (1 << 20)
+    }
+
+    /// Writes a block.
+    fn block(&self, unit: &Unit<'_>) -> Result<()> {
+        let (block, numbering, file) = (unit.number(), &self.numbering, &self.file);
+        let (vertices, triangles) = (file.layout.vertices, file.layout.triangles);
+        let ids = self.blocks.ids(block);
+        let points = self.store.slice(ids.start as usize..ids.end as usize)?;
+        let at = |v: u32| self.lattice.position(points[(v - ids.start) as usize]);
+        let mut bytes = Vec::with_capacity(vertices.bytes as usize * ids.len());
+        let mut held = unit.hold(bytes_of(&points) + bytes_of(&bytes));
+        let used = ids.clone().filter(|v| numbering.used(*v));
+        file.encode_vertices(used.map(at), &mut bytes);
+        // Three parts for each block; the number only identifies a part.
+        let part = 3 * block as u32;
+        let first = numbering.vertex(ids.start).into();
+        file.write(unit, part, &bytes, vertices.offset(first))?;
+        bytes.clear();
+        let copies = numbering.copies.get(unit, block)?;
+        file.encode_vertices(copies.iter().map(|c| at(c.id)), &mut bytes);
+        let first = numbering.first_copy(block);
+        file.write(unit, part + 1, &bytes, vertices.offset(first))?;
+        drop(points);
+        bytes.clear();
+        let faces = Faces::load(unit, &self.surface, &self.filled, numbering, ids)?;
+        bytes.reserve_exact(faces.len() * triangles.bytes as usize);
+        let mut batch = file.triangles(&mut bytes);
+        faces.for_each(|t| batch.push(t));
+        batch.finish();
+        held.set(faces.bytes() + bytes_of(&bytes));
+        let first = numbering.first_face(block);
+        file.write(unit, part + 2, &bytes, triangles.offset(first))
+    }
 }

@@ -2,32 +2,34 @@
 
 use super::MeshStats;
 use crate::error::{Error, Result};
-use crate::spill::{Id, Shuffle, Table, row};
+use crate::spill::{Id, Inbox, Shuffle, Table, release, row};
 use crate::stages::blocks::Blocks;
-use crate::stages::repair::{FilledTriangle, Repaired};
+use crate::stages::repair::{FilledTriangle, NumberingInput, Vertices};
 use crate::stages::surface::star::{Link, Star, Triangle, sorted};
-use crate::workspace::Workspace;
 use crate::workspace::memory::Reservation;
-
-const SHUFFLE_BUFFER: u64 = 8 << 20;
+use crate::workspace::{Unit, Workspace};
+use serde::{Deserialize, Serialize};
 
 /// The points that are vertices, and the numbers of all vertices and triangles in the file. With the bits of
-/// `used` it takes a fifth of a byte for each point.
+/// `vertices` it takes a fifth of a byte for each point.
 #[derive(Debug)]
-pub struct Numbering<'a> {
-    /// One bit for each point, 64 in a word.
-    used: &'a [u64],
-    /// The number of vertices before each word.
+pub struct Numbering {
+    vertices: Vertices,
+    /// The number of vertices before each word of their bits.
     rank: Vec<u32>,
     firsts: Vec<Firsts>,
     /// The points of the copies, by block.
     pub copies: Table<Id>,
     /// The corners that use copies, by block of the triangle.
-    pub splits: Table<Split>,
+    pub splits: Inbox<Split>,
+    /// The file of `splits`.
+    sent: Shuffle<Split>,
     /// Counts of the mesh.
     pub stats: MeshStats,
     _held: Reservation,
 }
+
+release!(Numbering: copies, sent);
 
 row! {
     /// A corner of a triangle that uses a copy of its pinched vertex.
@@ -47,23 +49,21 @@ row! {
 }
 
 /// Counts of a block; later the sums over all blocks before it.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 struct Firsts {
     copies: u64,
     faces: u64,
 }
 
-crate::workspace::persist::persist!(Firsts { copies, faces });
-
-impl Numbering<'_> {
+impl Numbering {
     /// True if a point is a vertex.
     pub fn used(&self, v: u32) -> bool {
-        self.used[v as usize / 64] >> (v % 64) & 1 == 1
+        self.vertices.used[v as usize / 64] >> (v % 64) & 1 == 1
     }
 
     /// The number of a point if it is a vertex, else that of the next point that is one.
     pub fn vertex(&self, v: u32) -> u32 {
-        let below = self.used[v as usize / 64] & ((1 << (v % 64)) - 1);
+        let below = self.vertices.used[v as usize / 64] & ((1 << (v % 64)) - 1);
         self.rank[v as usize / 64] + below.count_ones()
     }
 
@@ -83,17 +83,18 @@ impl Numbering<'_> {
 /// # Errors
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
 /// [`crate::Error::Cancelled`], [`Error::TooManyPoints`].
-pub fn number<'a>(
-    repaired: &'a Repaired,
+pub fn number(
+    input: &NumberingInput,
+    filled: &Inbox<FilledTriangle>,
     blocks: Blocks,
     workspace: &Workspace,
-) -> Result<Numbering<'a>> {
+) -> Result<Numbering> {
     let count = blocks.count();
-    let input = &repaired.numbering;
-    let words = input.used.len();
+    let bits = input.open(workspace)?;
+    let words = bits.used.len();
     let held = workspace.reserve("export: numbers", (words * 4 + count * 16) as u64)?;
-    let (mut firsts, copies, splits): (Vec<Firsts>, _, _) =
-        workspace.once("number", || split(repaired, blocks, workspace))?;
+    let (mut firsts, copies, sent): (Vec<Firsts>, _, Shuffle<Split>) =
+        workspace.once("number", |unit| split(unit, input, filled, blocks))?;
     let mut total = Firsts::default();
     for block in &mut firsts {
         let own = *block;
@@ -101,7 +102,7 @@ pub fn number<'a>(
         total.copies += own.copies;
         total.faces += own.faces;
     }
-    let points_used = input.used.iter().map(|w| u64::from(w.count_ones())).sum();
+    let points_used = bits.used.iter().map(|w| u64::from(w.count_ones())).sum();
     let vertices = points_used + total.copies;
     let limit = u64::from(u32::MAX) - 1;
     if vertices > limit {
@@ -112,7 +113,7 @@ pub fn number<'a>(
     }
     let mut before = 0;
     let mut rank = Vec::with_capacity(words);
-    for word in &input.used {
+    for word in &bits.used {
         rank.push(before);
         before += word.count_ones();
     }
@@ -124,11 +125,12 @@ pub fn number<'a>(
         boundary_edges: input.boundary_edges,
     };
     Ok(Numbering {
-        used: &input.used,
+        vertices: bits,
         rank,
         firsts,
         copies,
-        splits,
+        splits: sent.open(workspace, count)?,
+        sent,
         stats,
         _held: held,
     })
@@ -137,54 +139,49 @@ pub fn number<'a>(
 /// Counts the vertices and triangles of each block, copies its pinched vertices, and lists the corners that
 /// use copies.
 fn split(
-    repaired: &Repaired,
+    unit: &Unit<'_>,
+    input: &NumberingInput,
+    filled: &Inbox<FilledTriangle>,
     blocks: Blocks,
-    workspace: &Workspace,
-) -> Result<(Vec<Firsts>, Table<Id>, Table<Split>)> {
-    let input = &repaired.numbering;
-    let shuffle = Shuffle::new(workspace, "export.splits", SHUFFLE_BUFFER)?;
-    let copies = Table::create(workspace, "export.copies", blocks.count())?;
+) -> Result<(Vec<Firsts>, Table<Id>, Shuffle<Split>)> {
+    let shuffle = Shuffle::new("export.splits");
+    let copies = Table::new("export.copies", blocks.count());
     let mut firsts = Vec::with_capacity(blocks.count());
     for block in 0..blocks.count() {
-        workspace.check_cancel()?;
-        let records = input.pinched.rows(block) + repaired.filled.rows(block);
-        let pinches = input.pinches.get(block)?;
+        unit.check_cancel()?;
+        let records = input.pinched.rows(unit, block) + filled.rows(block);
+        let pinches = input.pinches.get(unit, block)?;
         let size = blocks.ids(block).len() * 8 * usize::from(!pinches.is_empty());
-        let _held = workspace.reserve("export: block", (120 * records + size) as u64)?;
-        let filled = repaired.filled.get(block)?;
+        let _held = unit.reserve("export: block", (120 * records + size) as u64)?;
+        let filled = filled.get(unit, block)?;
         let own = |f: &&FilledTriangle| blocks.of(f.triangle[0]) == f.to;
         let faces = u64::from(input.faces[block]) + filled.iter().filter(own).count() as u64;
         let mut again = Vec::new();
         if !pinches.is_empty() {
-            let mut triangles: Vec<Triangle> = input
-                .pinched
-                .get(block)?
-                .into_iter()
-                .map(|t| t.corners)
-                .collect();
+            let mut triangles: Vec<Triangle> = bytemuck::cast_vec(input.pinched.get(unit, block)?);
             triangles.extend(filled.iter().map(|f| f.triangle));
             triangles.sort_unstable_by_key(|t| sorted(*t));
-            again = split_block(&pinches, &triangles, blocks, block, &shuffle)?;
+            let (copied, splits) = split_block(&pinches, &triangles, blocks, block);
+            shuffle.send(unit, block, splits)?;
+            again = copied;
         }
         firsts.push(Firsts {
             copies: again.len() as u64,
             faces,
         });
-        copies.put(block, &again)?;
-        workspace.observer.advance(1);
+        copies.put(unit, block, &again)?;
+        unit.advance(1);
     }
-    Ok((firsts, copies, shuffle.deliver(workspace, blocks.count())?))
+    Ok((firsts, copies, shuffle))
 }
 
-/// Copies the pinched vertices of a block, and sends the corners that use the copies to the blocks of their
-/// triangles.
+/// Copies the pinched vertices of a block; returns the copies, and the corners that use them.
 fn split_block(
     pinches: &[Id],
     triangles: &[[u32; 3]],
     blocks: Blocks,
     block: usize,
-    shuffle: &Shuffle<Split>,
-) -> Result<Vec<Id>> {
+) -> (Vec<Id>, Vec<Split>) {
     let star = Star::of(blocks.ids(block), triangles);
     let mut link = Link::default();
     let mut copies = Vec::new();
@@ -208,6 +205,5 @@ fn split_block(
         }
         copies.extend((1..link.groups()).map(|_| Id { id: v }));
     }
-    shuffle.send(&splits)?;
-    Ok(copies)
+    (copies, splits)
 }

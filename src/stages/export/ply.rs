@@ -34,14 +34,14 @@ impl MeshFormat for Ply {
             bytes: 3 * coordinates.bytes() as u64,
         };
         let triangles = Records {
-            at: vertices.at + mesh.vertices * vertices.bytes,
+            at: vertices.offset(mesh.vertices),
             bytes: TRIANGLE as u64,
         };
         Layout {
             header,
             vertices,
             triangles,
-            bytes: triangles.at + mesh.triangles * triangles.bytes,
+            bytes: triangles.offset(mesh.triangles),
         }
     }
 

@@ -95,17 +95,13 @@ fn far_apart(boxes: &[Extent<'_>]) -> Option<String> {
 
 /// A warning with the largest and the smallest file, if one of them seems to be in another unit.
 fn unlike_sizes(boxes: &[Extent<'_>]) -> Option<String> {
-    let filled = || {
-        boxes
-            .iter()
-            .filter(|b| b.file.kept >= FEWEST && b.diagonal > 0.0)
-    };
-    let large = filled().max_by(|a, b| a.diagonal.total_cmp(&b.diagonal))?;
-    let small = filled().min_by(|a, b| a.diagonal.total_cmp(&b.diagonal))?;
-    let (size, spacing) = (
-        large.diagonal / small.diagonal,
-        large.spacing() / small.spacing(),
-    );
+    let is_filled = |b: &&Extent<'_>| b.file.kept >= FEWEST && b.diagonal > 0.0;
+    let filled = boxes.iter().filter(is_filled);
+    let by_size = |a: &&Extent<'_>, b: &&Extent<'_>| a.diagonal.total_cmp(&b.diagonal);
+    let large = filled.clone().max_by(by_size)?;
+    let small = filled.min_by(by_size)?;
+    let size = large.diagonal / small.diagonal;
+    let spacing = large.spacing() / small.spacing();
     (size > LARGER && spacing > LARGER).then(|| {
         format!(
             "{}: it is {size:.0} times as large as {}, and its points are {spacing:.0} times as far apart; \

@@ -14,11 +14,10 @@ pub(super) struct Crs {
 impl Crs {
     /// True if the two systems are certainly different.
     pub(super) fn differs(&self, other: &Self) -> bool {
-        let unlike =
-            |a: Option<u32>, b: Option<u32>| matches!((a, b), (Some(a), Some(b)) if a != b);
         match (self.horizontal, other.horizontal) {
-            (Some(_), Some(_)) => {
-                unlike(self.horizontal, other.horizontal) || unlike(self.vertical, other.vertical)
+            (Some(a), Some(b)) => {
+                let heights = self.vertical.zip(other.vertical);
+                a != b || heights.is_some_and(|(a, b)| a != b)
             }
             // Without codes, two texts of the same kind are compared.
             (None, None) => {

@@ -11,6 +11,12 @@ pub struct Format {
     pub(super) name: &'static str,
 }
 
+impl Format {
+    pub(super) const fn new(id: &'static str, name: &'static str) -> Self {
+        Self { id, name }
+    }
+}
+
 impl Serialize for Format {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.serialize_str(self.id)

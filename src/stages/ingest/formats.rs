@@ -7,7 +7,8 @@ use super::ply::Ply;
 use super::point_format::{Head, PointFile, PointFormat, Refusal, has_extension};
 use super::text::Text;
 use crate::error::Result;
-use crate::workspace::persist::{Persist, Saved};
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -83,15 +84,13 @@ pub(super) fn is_points(path: &Path) -> Result<bool> {
     })
 }
 
-impl Persist for Format {
-    fn save(&self, out: &mut Vec<u8>) {
-        self.id.to_owned().save(out);
-    }
-
-    fn load(from: &mut Saved<'_>) -> Result<Self> {
-        let id = String::load(from)?;
+impl<'de> Deserialize<'de> for Format {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let id = String::deserialize(deserializer)?;
         let mut known = FORMATS.iter().flat_map(|f| f.formats());
         let found = known.find(|f| f.id == id);
-        found.copied().ok_or_else(|| from.wrong("a format"))
+        found
+            .copied()
+            .ok_or_else(|| D::Error::custom(format!("{id:?} is not a format")))
     }
 }

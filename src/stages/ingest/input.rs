@@ -107,15 +107,9 @@ pub(super) const STREAM_BUFFER: usize = 256 << 10;
 #[derive(Debug)]
 pub(super) struct Range<'a> {
     input: &'a Input,
-    at: u64,
-    end: u64,
-}
-
-impl Range<'_> {
     /// Offset of the next byte.
-    pub(super) fn position(&self) -> u64 {
-        self.at
-    }
+    pub(super) at: u64,
+    end: u64,
 }
 
 impl Seek for Range<'_> {

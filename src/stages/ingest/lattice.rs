@@ -9,12 +9,6 @@ use crate::geom::lattice::{COORDINATE_LIMIT, Lattice};
 /// Largest factor by which the step is refined so that the offsets of all files are on the lattice.
 const MOST_REFINEMENT: i64 = 1000;
 
-/// The maps of all sources to a candidate lattice.
-struct Placed {
-    base: [i64; 3],
-    exact: bool,
-}
-
 /// The lattice of the sources; see `Spool::choose_lattice`.
 pub(super) fn choose(sources: &[Source], stats: &IngestStats, refine: u32) -> Result<Lattice> {
     let sources: Vec<&Source> = sources.iter().filter(|s| s.stats.kept > 0).collect();
@@ -28,9 +22,9 @@ pub(super) fn choose(sources: &[Source], stats: &IngestStats, refine: u32) -> Re
     };
     // In a forged spool the scale may be zero, and doubling zero would not end.
     step = step.max(f64::MIN_POSITIVE);
-    let placed = loop {
+    let mut chosen = loop {
         match place(&sources, step, offset) {
-            Some(placed) => break placed,
+            Some(lattice) => break lattice,
             None => step *= 2.0,
         }
         if !step.is_finite() {
@@ -39,21 +33,13 @@ pub(super) fn choose(sources: &[Source], stats: &IngestStats, refine: u32) -> Re
             });
         }
     };
-    let mut chosen = (step, placed);
     for _ in 0..refine {
-        let half = chosen.0 / 2.0;
-        match place(&sources, half, offset) {
-            Some(placed) if half.is_normal() => chosen = (half, placed),
+        match place(&sources, chosen.step / 2.0, offset) {
+            Some(finer) if finer.step.is_normal() => chosen = finer,
             _ => break,
         }
     }
-    let (step, Placed { base, exact }) = chosen;
-    Ok(Lattice {
-        step,
-        offset,
-        base,
-        exact,
-    })
+    Ok(chosen)
 }
 
 fn no_points(stats: &IngestStats) -> Error {
@@ -65,25 +51,19 @@ fn no_points(stats: &IngestStats) -> Error {
         (stats.withheld, "withheld"),
         (stats.dropped_by_class, "of classes that are not wanted"),
     ];
-    let reasons: Vec<String> = reasons
-        .iter()
-        .filter(|(count, _)| *count > 0)
+    let counted = reasons.iter().filter(|(count, _)| *count > 0);
+    let reasons: Vec<String> = counted
         .map(|(count, why)| format!("{count} {why}"))
         .collect();
-    let left_out = match reasons.as_slice() {
-        [] => String::new(),
-        reasons => format!(" ({} were left out)", reasons.join(", ")),
-    };
-    Error::Degenerate {
-        found: format!(
-            "no usable point in {} input file(s){left_out}",
-            stats.files.len()
-        ),
+    let mut found = format!("no usable point in {} input file(s)", stats.files.len());
+    if !reasons.is_empty() {
+        found += &format!(" ({} were left out)", reasons.join(", "));
     }
+    Error::Degenerate { found }
 }
 
-/// Base and exactness of a lattice; `None` if the sources do not fit it.
-fn place(sources: &[&Source], step: f64, offset: [f64; 3]) -> Option<Placed> {
+/// The lattice of a step and an offset; `None` if the sources do not fit it.
+fn place(sources: &[&Source], step: f64, offset: [f64; 3]) -> Option<Lattice> {
     let mut low = [i64::MAX; 3];
     let mut high = [i64::MIN; 3];
     let mut exact = true;
@@ -96,12 +76,14 @@ fn place(sources: &[&Source], step: f64, offset: [f64; 3]) -> Option<Placed> {
             high[axis] = high[axis].max(b);
         }
     }
-    let fits = (0..3).all(|a| {
-        high[a]
-            .checked_sub(low[a])
-            .is_some_and(|e| e < COORDINATE_LIMIT)
-    });
-    fits.then_some(Placed { base: low, exact })
+    let extent = |axis: usize| high[axis].checked_sub(low[axis]);
+    let fits = (0..3).all(|axis| extent(axis).is_some_and(|e| e < COORDINATE_LIMIT));
+    fits.then_some(Lattice {
+        step,
+        offset,
+        base: low,
+        exact,
+    })
 }
 
 /// The lowest offset of all sources on a grid, which does not depend on their order.
@@ -132,23 +114,12 @@ fn grid_step(sources: &[&Source], offset: [f64; 3]) -> Option<f64> {
             .map(move |(_, o)| (o - offset[a], offset[a]))
     });
     let parts = common.and_then(|step| offset_parts(step, shifts));
-    if let Some(parts) = parts {
-        let fine = divided(step, parts);
-        if place(sources, fine, offset).is_some() {
-            return Some(fine);
-        }
-    }
-    if parts.is_none() {
-        // Not exact, but a tenth of a step keeps rounding errors invisible.
-        let fine = divided(step, 10);
-        if place(sources, fine, offset).is_some() {
-            return Some(fine);
-        }
-    }
+    // Ten parts are not exact, but a tenth of a step keeps rounding errors invisible.
+    let fine = divided(step, parts.unwrap_or(10));
     let factors = (0..).flat_map(|k| [1.0, 2.0, 5.0].map(|f: f64| f * 10f64.powi(k)));
-    factors
-        .take(60)
-        .map(|factor| nice(step * factor))
+    let coarser = factors.take(60).map(|factor| nice(step * factor));
+    std::iter::once(fine)
+        .chain(coarser)
         .find(|step| place(sources, *step, offset).is_some())
         .or(Some(step))
 }
@@ -229,8 +200,7 @@ fn refine_for_floats(sources: &[&Source], offset: [f64; 3], mut step: f64) -> f6
 /// The step for floating-point sources alone: the largest power of two of which all values are multiples, or
 /// the finest that fits.
 fn float_step(sources: &[&Source]) -> f64 {
-    let exponent = sources.iter().map(|s| s.stats.exponent).min();
-    match exponent {
+    match sources.iter().map(|s| s.stats.exponent).min() {
         None | Some(i32::MAX) => 1.0,
         // The step must stay a normal number so that its inverse is finite.
         Some(e) => pow2(e.max(-1000)),

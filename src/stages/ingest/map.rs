@@ -102,54 +102,33 @@ pub(super) struct SourceMap {
 impl SourceMap {
     /// The map to a lattice of `step` and `offset`; `None` if positions would exceed the limits.
     pub(super) fn new(source: &Source, step: f64, offset: [f64; 3]) -> Option<Self> {
-        let mut axes = [AxisMap::Real {
-            scale: 1.0,
-            shift: 0.0,
-            step,
-        }; 3];
-        let mut exact = true;
-        for axis in 0..3 {
-            let (map, on) = match source.grid(axis) {
-                Some((scale, shift)) => grid_map(scale, shift - offset[axis], offset[axis], step)?,
-                None => float_map(source, offset[axis], step),
-            };
-            axes[axis] = map;
-            exact &= on;
-        }
+        let [x, y, z] = [0, 1, 2].map(|axis| match source.grid(axis) {
+            Some((scale, shift)) => grid_map(scale, shift - offset[axis], offset[axis], step),
+            None => Some(float_map(source, offset[axis], step)),
+        });
+        let maps = [x?, y?, z?];
         Some(Self {
-            axes,
+            axes: maps.map(|(map, _)| map),
             decimal: source.decimals().map(|d| 10f64.powi(d as i32)),
-            exact,
+            exact: maps.iter().all(|(_, exact)| *exact),
         })
     }
 
     /// Lowest and highest position along an axis; `None` if they exceed the limits.
     pub(super) fn extent(&self, source: &Source, axis: usize) -> Option<[i64; 2]> {
-        let ends = [source.stats.min[axis], source.stats.max[axis]];
-        let ends = ends.map(|end| self.position(source.native, axis, end));
-        match ends {
-            [Some(a), Some(b)] => Some([a.min(b), a.max(b)]),
-            _ => None,
-        }
+        let a = self.position(source.native, axis, source.stats.min[axis])?;
+        let b = self.position(source.native, axis, source.stats.max[axis])?;
+        Some([a.min(b), a.max(b)])
     }
 
     fn position(&self, native: Native, axis: usize, value: f64) -> Option<i64> {
-        let integer = match (native, self.decimal) {
-            (Native::Las { .. }, _) => Some(value),
-            (_, Some(power)) => Some((value * power).round()),
-            _ => None,
+        let map = self.axes[axis];
+        let position = match (native, self.decimal) {
+            (Native::Las { .. }, _) => map.integer(value as i64),
+            (_, Some(power)) => map.integer((value * power).round() as i64),
+            _ => Some(map.real(value)).filter(|p| !p.is_nan())? as i128,
         };
-        let position = match integer {
-            Some(i) => self.axes[axis].integer(i as i64) as f64,
-            None => self.axes[axis].real(value),
-        };
-        if position.abs() >= POSITION_LIMIT || position.is_nan() {
-            return None;
-        }
-        Some(match integer {
-            Some(i) => i64::try_from(self.axes[axis].integer(i as i64)).ok()?,
-            None => position as i64,
-        })
+        ((position as f64).abs() < POSITION_LIMIT).then_some(position as i64)
     }
 
     /// Converts a frame of the source to positions, minus `base`.

@@ -38,13 +38,12 @@ pub use stream::READ_BUFFERS;
 
 use crate::error::Result;
 use crate::geom::lattice::Lattice;
-use crate::workspace::persist::{Persist, Saved};
-use crate::workspace::progress::Cancel;
 use crate::workspace::{IoCounters, Workspace};
 use input::Input;
 use point_format::{Claims, PointFile};
+use serde::{Deserialize, Serialize};
 use source::{Native, Source};
-use spool::{SourceWriter, SpoolFile};
+use spool::{Frame, SourceWriter};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -58,13 +57,13 @@ pub enum CoordinateType {
     F64,
 }
 
-/// All points of the inputs in one scratch file, which is deleted on drop.
-#[derive(Debug)]
+/// All points of the inputs in one scratch file.
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Spool {
-    file: SpoolFile,
+    name: String,
+    frames: Vec<Frame>,
     sources: Vec<Source>,
     stats: IngestStats,
-    cancel: Cancel,
 }
 
 /// Decodes all inputs, which may be files and folders, into a spool.
@@ -89,14 +88,29 @@ pub fn ingest_classes(
     workspace: &Workspace,
 ) -> Result<Spool> {
     let name = format!("ingest-{}.spool", workspace.number());
-    let file = SpoolFile::open(workspace, &name)?;
+    let spool = read_all(inputs, classes, &name, workspace);
+    if spool.is_err() && !workspace.is_resumable() {
+        workspace.files.release(&name)?;
+    }
+    spool
+}
+
+/// Decodes all inputs into the spool `name`.
+fn read_all(
+    inputs: &[PathBuf],
+    classes: &Classes,
+    name: &str,
+    workspace: &Workspace,
+) -> Result<Spool> {
+    let (mut section, mut frames) = (0, Vec::new());
     let mut sources = Vec::new();
     let mut systems = Vec::new();
     let mut stats = IngestStats::default();
     for path in expand(inputs)? {
         workspace.check_cancel()?;
         let opened = Opened::new(&path, workspace.io.clone())?;
-        let target = SourceWriter::new(workspace, &file, sources.len() as u32, classes);
+        let number = sources.len() as u32;
+        let target = SourceWriter::new(workspace, name, section, number, classes)?;
         let mut warnings = opened.file.read(&opened.input, &target)?;
         if *classes != Classes::All && !opened.claims.classes {
             warnings.push("its points have no class, all of them are kept".to_owned());
@@ -111,15 +125,18 @@ pub fn ingest_classes(
         stats.add(&opened, &source);
         systems.push(opened.file.crs(&opened.input));
         sources.push(source);
+        let (next, more) = target.end();
+        section = next;
+        frames.extend(more);
     }
     stats
         .warnings
         .extend(belong::warnings(&stats.files, &systems));
     Ok(Spool {
-        file,
+        name: name.to_owned(),
+        frames,
         sources,
         stats,
-        cancel: workspace.cancel.clone(),
     })
 }
 
@@ -139,24 +156,6 @@ impl Opened {
             input,
             file,
             claims,
-        })
-    }
-}
-
-impl Persist for Spool {
-    fn save(&self, out: &mut Vec<u8>) {
-        self.file.file.name.to_string().save(out);
-        self.sources.save(out);
-        self.stats.save(out);
-    }
-
-    fn load(from: &mut Saved<'_>) -> Result<Self> {
-        let name = String::load(from)?;
-        Ok(Self {
-            file: SpoolFile::open(from.workspace, &name)?,
-            sources: Persist::load(from)?,
-            stats: Persist::load(from)?,
-            cancel: from.workspace.cancel.clone(),
         })
     }
 }
@@ -191,6 +190,14 @@ impl Spool {
     #[must_use]
     pub fn stats(&self) -> &IngestStats {
         &self.stats
+    }
+
+    /// Deletes the scratch file.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], [`crate::Error::Disk`].
+    pub fn release(&self, workspace: &Workspace) -> Result<()> {
+        workspace.files.release(&self.name)
     }
 
     /// Approximate bytes of the points in the spool.
@@ -241,12 +248,8 @@ impl Spool {
 /// The precision needed for writing multiples of `step` up to `largest`.
 pub(crate) fn enough_for(step: f64, largest: f64) -> CoordinateType {
     // Rounding to single precision moves a coordinate by at most 2^-24 of the largest power of two not above
-    // it.
-    let half_unit = if largest == 0.0 {
-        0.0
-    } else {
-        largest.log2().floor().exp2() * 2f64.powi(-24)
-    };
+    // it; for zero this is zero.
+    let half_unit = largest.log2().floor().exp2() * 2f64.powi(-24);
     if half_unit < step / 10.0 {
         CoordinateType::F32
     } else {

@@ -10,10 +10,9 @@ pub(super) fn parse(token: &[u8], decimal_comma: bool, decimals: &mut u32) -> Op
     let token = if decimal_comma {
         // Longer tokens are not numbers.
         let copy = copy.get_mut(..token.len())?;
-        copy.copy_from_slice(token);
-        copy.iter_mut()
-            .filter(|b| **b == b',')
-            .for_each(|b| *b = b'.');
+        for (to, from) in copy.iter_mut().zip(token) {
+            *to = if *from == b',' { b'.' } else { *from };
+        }
         &*copy
     } else {
         token
@@ -25,10 +24,8 @@ pub(super) fn parse(token: &[u8], decimal_comma: bool, decimals: &mut u32) -> Op
         Err(_) => return None,
     };
     if value.is_finite() {
-        let found = match token
-            .iter()
-            .position(|b| !matches!(b, b'0'..=b'9' | b'+' | b'-'))
-        {
+        let is_other = |b: &u8| !matches!(b, b'0'..=b'9' | b'+' | b'-');
+        let found = match token.iter().position(is_other) {
             None => 0,
             Some(dot) if token[dot + 1..].iter().all(u8::is_ascii_digit) && token[dot] == b'.' => {
                 (token.len() - dot - 1) as u32

@@ -2,11 +2,10 @@
 
 use super::number::NOT_FIXED;
 use super::stats::SourceStats;
-use crate::error::Result;
-use crate::workspace::persist::{Persist, Saved, persist};
+use serde::{Deserialize, Serialize};
 
 /// The type of a source's coordinates in the spool.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(super) enum Native {
     /// Integers; the coordinate is `i * scale + offset`.
     Las { scale: [f64; 3], offset: [f64; 3] },
@@ -27,36 +26,8 @@ impl Native {
     }
 }
 
-impl Persist for Native {
-    fn save(&self, out: &mut Vec<u8>) {
-        match self {
-            Self::Las { scale, offset } => (0u8, *scale, *offset).save(out),
-            Self::F32 => 1u8.save(out),
-            Self::F64 => 2u8.save(out),
-        }
-    }
-
-    fn load(from: &mut Saved<'_>) -> Result<Self> {
-        match u8::load(from)? {
-            0 => {
-                let (scale, offset) = Persist::load(from)?;
-                Ok(Self::Las { scale, offset })
-            }
-            1 => Ok(Self::F32),
-            2 => Ok(Self::F64),
-            _ => Err(from.wrong("a type of coordinates")),
-        }
-    }
-}
-
-persist!(Source {
-    native,
-    stats,
-    text
-});
-
 /// The points of one input file in the spool.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct Source {
     pub(super) native: Native,
     pub(super) stats: SourceStats,

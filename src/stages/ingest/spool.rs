@@ -1,17 +1,20 @@
 //! The spool: all points in their native form, in checksummed frames of one scratch file.
 //!
 //! A frame is `magic, source, points, CRC-32` (four `u32`), followed by the coordinates. The CRC also covers
-//! the other header words. Several threads may append frames; their order has no meaning.
+//! the other header words. A unit of work writes its frames one after another, as one section of the file;
+//! frames are numbered in the order of units.
 
 use super::classes::Classes;
 use super::source::Source;
 use super::stats::SourceStats;
 use crate::error::Result;
-use crate::workspace::Workspace;
 use crate::workspace::file::ScratchFile;
 use crate::workspace::place::Place;
+use crate::workspace::{Unit, Workspace, lock};
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Arc, Mutex};
 
 /// Most points in a frame.
 pub(super) const FRAME: usize = 1 << 14;
@@ -20,48 +23,16 @@ const MAGIC: u32 = 0x4c50_534f;
 const HEADER: usize = 16;
 
 /// A coordinate as a file stores it.
-pub(super) trait Coordinate: bytemuck::Pod + PartialEq {
+pub(super) trait Coordinate: bytemuck::Pod + PartialEq + Into<f64> {
     /// False for infinity and NaN.
-    fn is_finite(self) -> bool;
-    /// The value, converted exactly.
-    fn value(self) -> f64;
+    fn is_finite(self) -> bool {
+        let value: f64 = self.into();
+        value.is_finite()
+    }
     /// The highest power of two of which the value is a multiple; `i32::MAX` for zero.
-    fn exponent(self) -> i32;
-}
-
-impl Coordinate for i32 {
-    fn is_finite(self) -> bool {
-        true
-    }
-    fn value(self) -> f64 {
-        f64::from(self)
-    }
     fn exponent(self) -> i32 {
-        0
-    }
-}
-
-impl Coordinate for f32 {
-    fn is_finite(self) -> bool {
-        self.is_finite()
-    }
-    fn value(self) -> f64 {
-        f64::from(self)
-    }
-    fn exponent(self) -> i32 {
-        f64::from(self).exponent()
-    }
-}
-
-impl Coordinate for f64 {
-    fn is_finite(self) -> bool {
-        self.is_finite()
-    }
-    fn value(self) -> f64 {
-        self
-    }
-    fn exponent(self) -> i32 {
-        let bits = self.to_bits();
+        let value: f64 = self.into();
+        let bits = value.to_bits();
         let power = (bits >> 52 & 0x7ff) as i32;
         let fraction = bits & ((1 << 52) - 1);
         match (power, fraction) {
@@ -72,128 +43,127 @@ impl Coordinate for f64 {
     }
 }
 
-/// The scratch file; it is deleted on drop.
-#[derive(Debug)]
-pub(super) struct SpoolFile {
-    pub(super) file: ScratchFile,
-    /// Frames by number; the numbers have no meaning.
-    frames: Mutex<BTreeMap<u32, Place>>,
-}
+impl Coordinate for f32 {}
 
-impl SpoolFile {
-    /// Opens the spool `name`, with the frames that earlier attempts of the run completed.
-    pub(super) fn open(workspace: &Workspace, name: &str) -> Result<Self> {
-        let (file, frames) = workspace.keep_file(name)?;
-        Ok(Self {
-            file,
-            frames: Mutex::new(frames.into_iter().collect()),
-        })
+impl Coordinate for f64 {}
+
+impl Coordinate for i32 {
+    fn is_finite(self) -> bool {
+        true
     }
-
-    fn places(&self) -> MutexGuard<'_, BTreeMap<u32, Place>> {
-        self.frames.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// The number of each frame, and its number of points.
-    pub(super) fn frames(&self) -> Vec<(u32, u64)> {
-        let places = self.places();
-        let frames = places.iter();
-        frames
-            .map(|(n, place)| (*n, place.records as u64))
-            .collect()
-    }
-
-    fn append(&self, frame: &[u8], points: usize) -> Result<()> {
-        let place = Place {
-            offset: self.file.append(frame)?,
-            bytes: frame.len(),
-            records: points,
-            crc: if self.file.is_kept() {
-                crc32fast::hash(frame)
-            } else {
-                0
-            },
-        };
-        let number = {
-            let mut places = self.places();
-            let number = places.last_key_value().map_or(0, |(last, _)| last + 1);
-            places.insert(number, place);
-            number
-        };
-        self.file.put(number, place)
+    fn exponent(self) -> i32 {
+        0
     }
 }
+
+/// A frame of the spool.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+pub(super) struct Frame {
+    /// The segment of the file.
+    pub(super) segment: u32,
+    /// Offset in the segment.
+    pub(super) offset: u64,
+    /// Number of points.
+    pub(super) points: u32,
+}
+
+/// The result of a unit: its counts and its frames.
+pub(super) type Taken = (SourceStats, Vec<Frame>);
 
 /// Receives the points of one source, from several threads.
 pub(super) struct SourceWriter<'a> {
     pub(super) workspace: &'a Workspace,
-    file: &'a SpoolFile,
+    file: Arc<ScratchFile>,
     source: u32,
     /// The classes to keep, if points have a class.
     pub(super) classes: &'a Classes,
+    /// The section of the next unit.
+    next: AtomicU32,
     stats: Mutex<SourceStats>,
+    /// The frames by section.
+    frames: Mutex<BTreeMap<u32, Vec<Frame>>>,
 }
 
 impl<'a> SourceWriter<'a> {
+    /// A writer whose units are the sections from `first` on of the spool `name`.
     pub(super) fn new(
         workspace: &'a Workspace,
-        file: &'a SpoolFile,
+        name: &str,
+        first: u32,
         source: u32,
         classes: &'a Classes,
-    ) -> Self {
-        Self {
+    ) -> Result<Self> {
+        Ok(Self {
             workspace,
-            file,
+            file: workspace.files.open(name, true)?,
             source,
             classes,
+            next: first.into(),
             stats: Mutex::default(),
-        }
+            frames: Mutex::default(),
+        })
     }
 
     /// A buffer for one unit; its points are counted when it is finished.
-    pub(super) fn sink<T: Coordinate>(&self) -> Sink<'_, T> {
+    pub(super) fn sink<'u, T: Coordinate>(&'u self, unit: &'u Unit<'u>) -> Sink<'u, T> {
         let mut bytes = Vec::with_capacity(HEADER + FRAME * size_of::<[T; 3]>());
         bytes.resize(HEADER, 0);
         Sink {
             target: self,
+            unit,
             bytes,
             points: Vec::with_capacity(FRAME),
             stats: SourceStats::default(),
             reported: 0,
+            frames: Vec::new(),
+            whole: Place::default(),
+            crc: crc32fast::Hasher::new(),
         }
     }
 
-    /// Reads units of the source on all threads, as [`Workspace::units`]; `work` fills and finishes a sink
-    /// for each.
-    pub(super) fn units(
+    /// Reads units of the source on all threads, as [`Workspace::units`]; `work` fills a sink for each.
+    pub(super) fn units<T: Coordinate>(
         &self,
         name: &'static str,
         count: usize,
         bytes: impl Fn(usize) -> u64 + Sync,
-        work: impl Fn(usize) -> Result<SourceStats> + Sync,
+        work: impl Fn(usize, &mut Sink<'_, T>) -> Result<()> + Sync,
     ) -> Result<()> {
         let step = format!("{name} of source {}", self.source);
-        self.workspace
-            .units((step, name), count, bytes, work, |_, stats| {
-                let mut all = self.stats.lock().unwrap_or_else(PoisonError::into_inner);
-                all.merge(&stats);
-                Ok(())
-            })
+        let first = self.next.fetch_add(count as u32, Ordering::Relaxed);
+        let one = |unit: &Unit<'_>| {
+            let mut sink = self.sink(unit);
+            work(unit.number(), &mut sink)?;
+            sink.finish(first + unit.number() as u32)
+        };
+        let each = |unit: usize, (stats, frames): Taken| {
+            lock(&self.stats).merge(&stats);
+            lock(&self.frames).insert(first + unit as u32, frames);
+            Ok(())
+        };
+        self.workspace.units((step, name), count, bytes, one, each)
     }
 
     /// Reads the source as one unit that takes `bytes` of memory.
-    pub(super) fn whole(
+    pub(super) fn whole<T: Coordinate>(
         &self,
         name: &'static str,
         bytes: u64,
-        work: impl Fn() -> Result<SourceStats> + Sync,
+        work: impl Fn(&mut Sink<'_, T>) -> Result<()> + Sync,
     ) -> Result<()> {
-        self.units(name, 1, |_| bytes, |_| work())
+        self.units(name, 1, |_| bytes, |_, sink| work(sink))
     }
 
     /// Statistics of the finished units.
     pub(super) fn stats(&self) -> SourceStats {
-        *self.stats.lock().unwrap_or_else(PoisonError::into_inner)
+        *lock(&self.stats)
+    }
+
+    /// The section after those of the source, and all frames in the order of units.
+    pub(super) fn end(self) -> (u32, Vec<Frame>) {
+        let frames = std::mem::take(&mut *lock(&self.frames));
+        let frames = frames.into_values().flatten().collect();
+        (self.next.into_inner(), frames)
     }
 }
 
@@ -205,11 +175,16 @@ pub(super) const fn sink_bytes<T>() -> u64 {
 /// Collects points of one source into frames.
 pub(super) struct Sink<'a, T: Coordinate> {
     target: &'a SourceWriter<'a>,
+    unit: &'a Unit<'a>,
     bytes: Vec<u8>,
     points: Vec<[T; 3]>,
     /// Statistics so far; extents and kept points are added when a frame is full.
     pub(super) stats: SourceStats,
     reported: u64,
+    frames: Vec<Frame>,
+    /// The place of all frames.
+    whole: Place,
+    crc: crc32fast::Hasher,
 }
 
 impl<T: Coordinate> Sink<'_, T> {
@@ -243,9 +218,8 @@ impl<T: Coordinate> Sink<'_, T> {
     }
 
     fn flush(&mut self) -> Result<()> {
-        let workspace = self.target.workspace;
-        workspace.check_cancel()?;
-        workspace.advance(self.stats.read - self.reported);
+        self.unit.check_cancel()?;
+        self.unit.advance(self.stats.read - self.reported);
         self.reported = self.stats.read;
         if self.points.is_empty() {
             return Ok(());
@@ -253,7 +227,7 @@ impl<T: Coordinate> Sink<'_, T> {
         self.stats.kept += self.points.len() as u64;
         for point in &self.points {
             for (axis, coordinate) in point.iter().enumerate() {
-                let value = coordinate.value();
+                let value = (*coordinate).into();
                 self.stats.min[axis] = self.stats.min[axis].min(value);
                 self.stats.max[axis] = self.stats.max[axis].max(value);
                 self.stats.exponent = self.stats.exponent.min(coordinate.exponent());
@@ -268,13 +242,31 @@ impl<T: Coordinate> Sink<'_, T> {
         self.bytes[12..HEADER].copy_from_slice(&crc.to_ne_bytes());
         let points = self.points.len();
         self.points.clear();
-        self.target.file.append(&self.bytes, points)
+        let file = &self.target.file;
+        let place = file.append(self.unit.worker(), &self.bytes, points)?;
+        self.crc.update(&self.bytes);
+        self.frames.push(Frame {
+            segment: place.segment,
+            offset: place.offset,
+            points: points as u32,
+        });
+        if self.frames.len() == 1 {
+            self.whole = place;
+        } else {
+            self.whole.bytes += place.bytes;
+            self.whole.records += points;
+        }
+        Ok(())
     }
 
-    /// Writes the remaining points; returns the statistics.
-    pub(super) fn finish(mut self) -> Result<SourceStats> {
+    /// Writes the remaining points, and ends the section; returns the counts and the frames.
+    fn finish(mut self, section: u32) -> Result<Taken> {
         self.flush()?;
-        Ok(self.stats)
+        if !self.frames.is_empty() {
+            self.whole.crc = self.crc.finalize();
+            self.target.file.put(self.unit, section, self.whole)?;
+        }
+        Ok((self.stats, self.frames))
     }
 }
 
@@ -292,8 +284,6 @@ pub(super) struct FrameBuffer {
     pub(super) source: usize,
     /// Number of points.
     pub(super) points: usize,
-    /// Offset of the frame in the file.
-    pub(super) offset: u64,
     /// Coordinates, in `u64` words so that every coordinate type is aligned.
     words: Vec<u64>,
 }
@@ -306,53 +296,37 @@ impl FrameBuffer {
     }
 }
 
-impl SpoolFile {
-    /// Reads a frame.
-    pub(super) fn read_frame(
-        &self,
-        sources: &[Source],
-        number: u32,
-        frame: &mut FrameBuffer,
-    ) -> Result<()> {
-        let place = self.places().get(&number).copied().unwrap_or_default();
-        let offset = place.offset;
-        let mut words = [0u32; 4];
-        self.file
-            .read_at(bytemuck::bytes_of_mut(&mut words), offset)?;
-        let [magic, source, points, crc] = words;
-        let (source, points) = (source as usize, points as usize);
-        let bytes = |source: usize| points * sources[source].native.point_bytes();
-        let fits = magic == MAGIC
-            && source < sources.len()
-            && points <= FRAME
-            && HEADER + bytes(source) == place.bytes;
-        if !fits {
-            return Err(self.file.damaged(
-                offset,
-                format!("frame header {words:08x?}"),
-                format!(
-                    "a frame of {} bytes with points of one of {} sources",
-                    place.bytes,
-                    sources.len()
-                ),
-            ));
-        }
-        let bytes = bytes(source);
-        frame.words.clear();
-        frame.words.resize(bytes.div_ceil(8), 0);
-        let body = &mut bytemuck::cast_slice_mut::<u64, u8>(&mut frame.words)[..bytes];
-        self.file.read_at(body, offset + HEADER as u64)?;
-        let found = frame_crc(&bytemuck::bytes_of(&words)[..12], body);
-        if found != crc {
-            let (found, expected) = (
-                format!("checksum {found:08x}"),
-                format!("checksum {crc:08x}"),
-            );
-            return Err(self.file.damaged(offset, found, expected));
-        }
-        frame.source = source;
-        frame.points = points;
-        frame.offset = offset;
-        Ok(())
+/// Reads a frame of the spool `file`.
+pub(super) fn read_frame(
+    file: &ScratchFile,
+    sources: &[Source],
+    at: Frame,
+    frame: &mut FrameBuffer,
+) -> Result<()> {
+    let (segment, offset) = (at.segment, at.offset);
+    let mut words = [0u32; 4];
+    file.read(segment, offset, bytemuck::bytes_of_mut(&mut words))?;
+    let [magic, source, points, crc] = words;
+    let (source, points) = (source as usize, points as usize);
+    let fits =
+        magic == MAGIC && source < sources.len() && points <= FRAME && points == at.points as usize;
+    if !fits {
+        let (points, sources) = (at.points, sources.len());
+        let found = format!("frame header {words:08x?}");
+        let expected = format!("a frame of {points} points of one of {sources} sources");
+        return Err(file.damaged(segment, offset, found, expected));
     }
+    let bytes = points * sources[source].native.point_bytes();
+    frame.words.clear();
+    frame.words.resize(bytes.div_ceil(8), 0);
+    let body = &mut bytemuck::cast_slice_mut::<u64, u8>(&mut frame.words)[..bytes];
+    file.read(segment, offset + HEADER as u64, body)?;
+    let found = frame_crc(&bytemuck::bytes_of(&words)[..12], body);
+    if found != crc {
+        let checksum = |crc: u32| format!("checksum {crc:08x}");
+        return Err(file.damaged(segment, offset, checksum(found), checksum(crc)));
+    }
+    frame.source = source;
+    frame.points = points;
+    Ok(())
 }

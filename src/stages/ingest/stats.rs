@@ -1,12 +1,11 @@
 //! Statistics of the input: counts and extents of each file and in total.
 
 use super::format::Format;
-use crate::workspace::persist::persist;
-use serde::Serialize;
-use std::path::PathBuf;
+use serde::{Deserialize, Serialize, Serializer};
+use std::path::{Path, PathBuf};
 
 /// Counts of one run over all input files.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct IngestStats {
     /// Points in the files.
     pub read: u64,
@@ -24,10 +23,16 @@ pub struct IngestStats {
     pub warnings: Vec<String>,
 }
 
+/// Writes a path as text; bytes that are not UTF-8 are replaced.
+fn as_text<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(&path.to_string_lossy())
+}
+
 /// Counts and extents of one input file.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct FileStats {
     /// The file.
+    #[serde(serialize_with = "as_text")]
     pub path: PathBuf,
     /// Its format, detected by content.
     pub format: Format,
@@ -52,7 +57,7 @@ pub struct FileStats {
 }
 
 /// Exact statistics of one source, in its native form; merging is commutative.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(super) struct SourceStats {
     pub(super) read: u64,
     pub(super) kept: u64,
@@ -103,38 +108,3 @@ impl SourceStats {
         self.claimed = self.claimed.saturating_add(other.claimed);
     }
 }
-
-persist!(IngestStats {
-    read,
-    kept,
-    dropped_non_finite,
-    withheld,
-    dropped_by_class,
-    files,
-    warnings
-});
-persist!(FileStats {
-    path,
-    format,
-    bytes,
-    claimed,
-    points,
-    kept,
-    dropped_non_finite,
-    withheld,
-    dropped_by_class,
-    min,
-    max
-});
-persist!(SourceStats {
-    read,
-    kept,
-    dropped,
-    withheld,
-    unwanted,
-    min,
-    max,
-    exponent,
-    decimals,
-    claimed
-});

@@ -3,11 +3,13 @@
 use super::Spool;
 use super::map::SourceMap;
 use super::source::Source;
-use super::spool::{FRAME, FrameBuffer};
+use super::spool::{FRAME, FrameBuffer, read_frame};
 use crate::error::{Error, Result};
 use crate::geom::Point;
 use crate::geom::lattice::{COORDINATE_LIMIT, Lattice};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use crate::workspace::file::ScratchFile;
+use crate::workspace::{Workspace, lock};
+use std::sync::Mutex;
 
 /// Bytes of the buffers of one thread that streams a [`Spool`].
 pub const READ_BUFFERS: u64 = (FRAME * (24 + 24 + 12)) as u64;
@@ -23,15 +25,12 @@ struct Buffers {
 /// The remaining frames; empty after a thread has failed.
 type Next<'a> = Mutex<std::slice::Iter<'a, u32>>;
 
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
 impl Spool {
     /// The number of each frame, and its number of points.
     #[must_use]
     pub fn frames(&self) -> Vec<(u32, u64)> {
-        self.file.frames()
+        let frames = (0..).zip(&self.frames);
+        frames.map(|(n, frame)| (n, frame.points.into())).collect()
     }
 
     /// Streams all points as positions on `lattice`, in chunks, with buffers of [`READ_BUFFERS`] bytes.
@@ -43,13 +42,16 @@ impl Spool {
     /// match its checksum; [`Error::Parameter`] if the lattice was not chosen for this spool.
     pub fn for_each(
         &self,
+        workspace: &Workspace,
         lattice: &Lattice,
         mut each: impl FnMut(&[Point]) -> Result<()>,
     ) -> Result<()> {
         let maps = self.maps(lattice)?;
         let mut buffers = Buffers::default();
+        let file = workspace.files.open(&self.name, true)?;
         for (frame, _) in self.frames() {
-            self.read(frame, &maps, lattice, &mut buffers)?;
+            workspace.check_cancel()?;
+            self.read(&file, frame, &maps, lattice, &mut buffers)?;
             each(&buffers.points)?;
         }
         Ok(())
@@ -61,12 +63,13 @@ impl Spool {
     /// See [`Spool::for_each`]; the first error of any thread.
     pub fn par_for_each(
         &self,
+        workspace: &Workspace,
         threads: usize,
         lattice: &Lattice,
         each: impl Fn(&[Point]) -> Result<()> + Sync,
     ) -> Result<()> {
         let frames: Vec<u32> = self.frames().into_iter().map(|frame| frame.0).collect();
-        self.par_for_frames(threads, lattice, &frames, each)
+        self.par_for_frames(workspace, threads, lattice, &frames, each)
     }
 
     /// Streams the points of some `frames`, on `threads` threads, each with its own [`READ_BUFFERS`].
@@ -75,12 +78,14 @@ impl Spool {
     /// See [`Spool::for_each`]; the first error of any thread.
     pub fn par_for_frames(
         &self,
+        workspace: &Workspace,
         threads: usize,
         lattice: &Lattice,
         frames: &[u32],
         each: impl Fn(&[Point]) -> Result<()> + Sync,
     ) -> Result<()> {
         let maps = self.maps(lattice)?;
+        let file = workspace.files.open(&self.name, true)?;
         let next: Next<'_> = Mutex::new(frames.iter());
         let failed = Mutex::new(None);
         let worker = || {
@@ -90,7 +95,8 @@ impl Spool {
                     let Some(frame) = lock(&next).next() else {
                         return Ok(());
                     };
-                    self.read(*frame, &maps, lattice, &mut buffers)?;
+                    workspace.check_cancel()?;
+                    self.read(&file, *frame, &maps, lattice, &mut buffers)?;
                     each(&buffers.points)?;
                 }
             };
@@ -105,10 +111,8 @@ impl Spool {
             }
             worker();
         });
-        match failed.into_inner().unwrap_or_else(PoisonError::into_inner) {
-            Some(error) => Err(error),
-            None => Ok(()),
-        }
+        let failed = lock(&failed).take();
+        failed.map_or(Ok(()), Err)
     }
 
     /// The maps of all sources to `lattice`; `None` for sources without kept points, which had no influence
@@ -128,50 +132,36 @@ impl Spool {
         self.sources.iter().map(map).collect()
     }
 
-    /// Reads and converts a frame.
+    /// Reads a frame and converts it to positions.
     fn read(
         &self,
+        file: &ScratchFile,
         frame: u32,
         maps: &[Option<SourceMap>],
         lattice: &Lattice,
         buffers: &mut Buffers,
     ) -> Result<()> {
-        self.cancel.check()?;
-        self.file
-            .read_frame(&self.sources, frame, &mut buffers.frame)?;
-        self.convert(maps, lattice, buffers)
-    }
-
-    /// Converts a frame to positions.
-    fn convert(
-        &self,
-        maps: &[Option<SourceMap>],
-        lattice: &Lattice,
-        buffers: &mut Buffers,
-    ) -> Result<()> {
-        let Buffers {
-            frame,
-            wide,
-            points,
-        } = buffers;
+        let at = self.frames[frame as usize];
+        read_frame(file, &self.sources, at, &mut buffers.frame)?;
+        let Buffers { frame, wide, .. } = buffers;
         let Some(map) = &maps[frame.source] else {
             let found = format!("points of source {}", frame.source);
             let expected = "none of it were kept".into();
-            return Err(self.file.file.damaged(frame.offset, found, expected));
+            return Err(file.damaged(at.segment, at.offset, found, expected));
         };
         map.apply(self.sources[frame.source].native, frame, lattice.base, wide);
-        points.clear();
-        points.extend(wide.iter().map(|p| p.map(|c| c as i32)));
+        buffers.points.clear();
+        buffers
+            .points
+            .extend(wide.iter().map(|p| p.map(|c| c as i32)));
         let outside = wide
             .iter()
             .find(|p| !p.iter().all(|c| (0..COORDINATE_LIMIT).contains(c)));
-        match outside {
-            None => Ok(()),
-            Some(found) => Err(self.file.file.damaged(
-                frame.offset,
-                format!("position {found:?}"),
-                format!("0 to {}", COORDINATE_LIMIT - 1),
-            )),
-        }
+        let Some(outside) = outside else {
+            return Ok(());
+        };
+        let found = format!("position {outside:?}");
+        let expected = format!("0 to {}", COORDINATE_LIMIT - 1);
+        Err(file.damaged(at.segment, at.offset, found, expected))
     }
 }

@@ -6,7 +6,7 @@ mod store;
 mod writer;
 
 pub use rewrite::Rewriter;
-pub use store::{PAGE, PointStore};
+pub use store::{PAGE, PointStore, StoredPoints};
 pub use writer::{Position, StoreWriter};
 
 use crate::error::{Error, Result};
@@ -15,8 +15,9 @@ use crate::geom::{Point, hilbert};
 use crate::spill::{Sorted, Sorter, row};
 use crate::stages::ingest::{READ_BUFFERS, Spool};
 use crate::workspace::Workspace;
-use crate::workspace::persist::Persist;
 use rayon::prelude::*;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Keys encoded at a time.
@@ -141,13 +142,12 @@ impl Orderer {
         stream: impl FnOnce(Option<M>, S, Each<'_, M, S>) -> Result<S>,
     ) -> Result<S>
     where
-        M: Persist,
-        S: Persist + Default,
+        M: Serialize + DeserializeOwned,
+        S: Serialize + DeserializeOwned + Default,
     {
         let step = workspace.step("runs")?;
-        let last: Option<Note<M, S>> = self.sorter.reopen_runs(workspace, &step)?;
-        let ((mark, counts), (taken, complete)) =
-            last.unwrap_or(((None, S::default()), (0, false)));
+        let last: Option<Note<M, S>> = self.sorter.reopen_runs(&step)?;
+        let ((mark, counts), (taken, complete)) = last.unwrap_or_default();
         self.taken.store(taken, Ordering::Relaxed);
         if complete {
             return Ok(counts);
@@ -186,45 +186,42 @@ impl Orderer {
     ///
     /// # Errors
     /// [`Error::Io`], [`Error::Corrupt`], [`Error::TooManyPoints`], [`Error::Cancelled`].
-    pub fn finish(self, workspace: &Workspace, page: usize) -> Result<(PointStore, u64)> {
-        let Self {
-            sorter,
-            taken,
-            buffer,
-        } = self;
-        let mut writer = StoreWriter::create(workspace, "points", page)?;
-        match sorter.finish(workspace)?.in_memory() {
-            Ok((mut keys, _held)) => {
-                keys.dedup();
-                let left = &keys[writer.len().min(keys.len())..];
-                writer.append(workspace, left, CurveKey::point)?;
+    pub fn finish(self, workspace: &Workspace, page: usize) -> Result<(StoredPoints, u64)> {
+        // The runs are deleted only when the store is known to be finished.
+        let (store, runs) = workspace.once("sort", |_| {
+            let mut writer = StoreWriter::create(workspace, "points", page)?;
+            let sorted = self.sorter.finish(workspace)?;
+            let runs = sorted.runs();
+            match sorted.in_memory() {
+                Ok((mut keys, _held)) => {
+                    keys.dedup();
+                    let left = &keys[writer.len.min(keys.len())..];
+                    writer.append(left, CurveKey::point)?;
+                }
+                Err(sorted) => merge(sorted, self.buffer, &mut writer, workspace)?,
             }
-            Err(sorted) => merge(sorted, buffer, &mut writer, workspace)?,
+            Ok((writer.finish()?, runs))
+        })?;
+        runs.release(workspace)?;
+        let (found, limit) = (store.len() as u64, u64::from(u32::MAX) - 1);
+        if found > limit {
+            return Err(Error::TooManyPoints { found, limit });
         }
-        let store = writer.finish(workspace)?;
-        let limit = u64::from(u32::MAX) - 1;
-        if store.len() as u64 > limit {
-            return Err(Error::TooManyPoints {
-                found: store.len() as u64,
-                limit,
-            });
-        }
-        let folded = taken.into_inner() - store.len() as u64;
-        Ok((store, folded))
+        Ok((store, self.taken.into_inner() - found))
     }
 }
 
-/// Sorts all points of a spool, with `page` points in a page, and deletes the spool. Returns the store and
-/// the number of duplicates removed.
+/// Sorts all points of a spool, with `page` points in a page. Returns the store and the number of duplicates
+/// removed.
 ///
 /// # Errors
 /// [`Error::Io`], [`Error::Corrupt`], [`Error::TooManyPoints`], [`Error::Memory`], [`Error::Cancelled`].
 pub fn order(
-    spool: Spool,
+    spool: &Spool,
     lattice: &Lattice,
     page: usize,
     workspace: &Workspace,
-) -> Result<(PointStore, u64)> {
+) -> Result<(StoredPoints, u64)> {
     // The read buffers may only take a small part of the memory for sorting.
     let most = workspace.memory.available() / (8 * READ_BUFFERS);
     let threads = workspace.threads.min(most as usize).max(1);
@@ -232,12 +229,13 @@ pub fn order(
     let orderer = Orderer::for_points(workspace, spool.points())?;
     orderer.take_parts(workspace, &spool.frames(), |frames| {
         let push = |points: &[_]| orderer.push(workspace, points);
-        spool.par_for_frames(threads, lattice, frames, push)
+        spool.par_for_frames(workspace, threads, lattice, frames, push)
     })?;
     drop(held);
-    // After an interruption, the points that were only in memory have to be read again.
-    let read_again = workspace.is_resumable() && !orderer.is_sorted();
-    let _spool = read_again.then_some(spool);
+    // After an interruption, points that were only in memory have to be read again.
+    if orderer.is_sorted() || !workspace.is_resumable() {
+        spool.release(workspace)?;
+    }
     orderer.finish(workspace, page)
 }
 
@@ -260,7 +258,7 @@ fn next(mut key: CurveKey) -> CurveKey {
 fn merge(
     mut sorted: Sorted<CurveKey>,
     memory: u64,
-    writer: &mut StoreWriter,
+    writer: &mut StoreWriter<'_>,
     workspace: &Workspace,
 ) -> Result<()> {
     // A key can be computed from a position, so the last point written determines where to continue.
@@ -288,7 +286,7 @@ fn merge(
         let merged: Result<Vec<Vec<CurveKey>>> =
             workspace.install(|| wave.par_iter().with_max_len(1).map(one).collect());
         for keys in merged? {
-            writer.append(workspace, &keys, CurveKey::point)?;
+            writer.append(&keys, CurveKey::point)?;
         }
     }
     Ok(())

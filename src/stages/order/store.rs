@@ -6,7 +6,11 @@ use crate::geom::aabb::Aabb;
 use crate::spill::{Table, row};
 use crate::workspace::file::ScratchFile;
 use crate::workspace::memory::Reservation;
+use crate::workspace::place::Place;
+use crate::workspace::{Unit, Workspace};
+use serde::{Deserialize, Serialize};
 use std::ops::Range;
+use std::sync::Arc;
 
 row! {
     /// Checksum and bounding box of a page.
@@ -21,29 +25,234 @@ row! {
     unpacked
 }
 
+impl PageRow {
+    pub fn bounds(&self) -> Aabb {
+        let Self { min, max, .. } = *self;
+        Aabb { min, max }
+    }
+}
+
 /// The pages of a store. Pages written together form a section; its number is that of its first page divided
-/// by 16.
-pub(super) type Index = Table<PageRow>;
+/// by [`STEP`].
+type Index = Table<PageRow>;
+
+/// The first page of every write has a number that is a multiple of this.
+pub(super) const STEP: usize = 16;
 
 /// Points in a page, except in tests.
 pub const PAGE: usize = 256;
 
 /// Children of a node of the box tree.
-pub(super) const FAN: usize = 8;
+const FAN: usize = 8;
+
+/// An ordered store in the scratch folder: the name of its file and its size.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct StoredPoints {
+    pub(super) name: String,
+    pub(super) len: usize,
+    pub(super) page: usize,
+    /// The bounding box of all points.
+    pub(super) bounds: [Point; 2],
+}
+
+/// The table of pages of the store `name`.
+fn index_of(name: &str) -> Index {
+    Index::new(&format!("{name}.index"), 0)
+}
+
+/// Pages that were written together, and their place in the file.
+pub(super) type Written = (Vec<PageRow>, Place);
+
+/// The file and the index of a store that is written.
+#[derive(Debug)]
+pub(super) struct StoreFiles {
+    pub file: Arc<ScratchFile>,
+    pub index: Index,
+    pub page: usize,
+}
+
+impl StoreFiles {
+    pub fn open(workspace: &Workspace, name: &str, page: usize) -> Result<Self> {
+        Ok(Self {
+            file: workspace.files.open(name, true)?,
+            index: index_of(name),
+            page: page.max(1),
+        })
+    }
+
+    /// Writes pages to the segment of the current thread.
+    pub fn write(&self, workspace: &Workspace, points: &[Point]) -> Result<Written> {
+        let (worker, bytes) = (workspace.files.worker(), bytemuck::cast_slice(points));
+        let place = self.file.append(worker, bytes, points.len())?;
+        let page = |page: &[Point]| {
+            let crc = crc32fast::hash(bytemuck::cast_slice(page));
+            let Aabb { min, max } = Aabb::of(page);
+            PageRow { crc, min, max }
+        };
+        Ok((points.chunks(self.page).map(page).collect(), place))
+    }
+
+    /// Records in the index pages that were written, the first with number `first`.
+    pub fn keep(&self, unit: &Unit<'_>, first: usize, written: &[Written]) -> Result<()> {
+        let mut rows = Vec::new();
+        for (pages, place) in written {
+            let part = (first + rows.len()) / STEP;
+            self.file.put(unit, part as u32, *place)?;
+            rows.extend_from_slice(pages);
+        }
+        self.index.put(unit, first / STEP, &rows)
+    }
+
+    /// The store of `len` points with all pages written.
+    pub fn stored(&self, len: usize, bounds: Aabb) -> StoredPoints {
+        StoredPoints {
+            name: self.file.name.clone(),
+            len,
+            page: self.page,
+            bounds: [bounds.min, bounds.max],
+        }
+    }
+
+    /// Calls `each` with all pages up to `end`.
+    pub fn read_index(
+        &self,
+        unit: &Unit<'_>,
+        end: usize,
+        each: impl FnMut(&PageRow),
+    ) -> Result<()> {
+        let (mut at, mut rows, mut each) = (0, Vec::new(), each);
+        while at < end {
+            self.index.get_into(unit, at / STEP, &mut rows)?;
+            if rows.is_empty() {
+                let expected = self.index.total(unit).to_string();
+                return Err(self.file.damaged(0, 0, format!("{at} pages"), expected));
+            }
+            rows.iter().for_each(&mut each);
+            at += rows.len().next_multiple_of(STEP);
+        }
+        Ok(())
+    }
+
+    /// The bounding box of all pages up to `end`.
+    pub fn bounds(&self, unit: &Unit<'_>, end: usize) -> Result<Aabb> {
+        let mut bounds = Aabb::EMPTY;
+        // Points that an earlier attempt deleted are not read any more.
+        if !self.file.is_gone() {
+            self.read_index(unit, end, |row| bounds = bounds.union(row.bounds()))?;
+        }
+        Ok(bounds)
+    }
+}
+
+impl StoredPoints {
+    /// Number of points.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.len
+    }
+
+    /// True if there is no point.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
+    /// The bounding box of all points.
+    #[must_use]
+    pub fn bounds(&self) -> Aabb {
+        let [min, max] = self.bounds;
+        Aabb { min, max }
+    }
+
+    /// Opens the store: reads its index and builds the tree of boxes.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`].
+    pub fn open(&self, workspace: &Workspace) -> Result<PointStore> {
+        let files = StoreFiles::open(workspace, &self.name, self.page)?;
+        let (file, page) = (files.file.clone(), files.page);
+        let (mut parts, mut checks, mut boxes) = (Vec::new(), Vec::new(), Vec::new());
+        let mut held = workspace.promise("point index", 4096)?;
+        if file.is_gone() {
+            // The points will not be read any more, but their bounding box may be.
+            boxes.push(self.bounds());
+        } else {
+            let (pages, end) = (files.index.total(workspace), self.len.div_ceil(page));
+            if file.records() < self.len as u64 || pages < end as u64 {
+                let found = format!("{} points in {pages} pages", file.records());
+                return Err(file.damaged(0, 0, found, format!("{} points", self.len)));
+            }
+            // A tree of boxes has a seventh more of them than there are pages.
+            held.at_least(pages * 32 + 4096)?;
+            held.set_held(pages * 32 + 4096);
+            files.read_index(&workspace.unit(), end, |row| {
+                checks.push(row.crc);
+                boxes.push(row.bounds());
+            })?;
+            let mut first = 0;
+            while first < end {
+                let place = file.section(first / STEP);
+                let (segment, offset) = (place.segment, place.offset);
+                parts.push(Part {
+                    first,
+                    segment,
+                    offset,
+                });
+                let pages = place.records.div_ceil(page);
+                first += pages.next_multiple_of(STEP).max(STEP);
+            }
+        }
+        let mut levels = vec![boxes];
+        while levels.last().is_some_and(|top| top.len() > FAN) {
+            let next = levels[levels.len() - 1]
+                .chunks(FAN)
+                .map(|boxes| boxes.iter().fold(Aabb::EMPTY, |a, b| a.union(*b)))
+                .collect();
+            levels.push(next);
+        }
+        Ok(PointStore {
+            file,
+            parts,
+            len: self.len,
+            page,
+            checks,
+            levels,
+            _held: held,
+        })
+    }
+
+    /// Deletes the files.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], [`crate::Error::Disk`].
+    pub fn release(&self, workspace: &Workspace) -> Result<()> {
+        workspace.files.release(&self.name)?;
+        index_of(&self.name).release(workspace)
+    }
+}
+
+/// Pages that lie one after another in a segment.
+#[derive(Debug)]
+struct Part {
+    /// Number of the first page.
+    first: usize,
+    segment: u32,
+    /// Offset of the first page.
+    offset: u64,
+}
 
 /// Positions of all points by id; 12 bytes for each point on disk, 28/256 in memory.
 #[derive(Debug)]
 pub struct PointStore {
-    pub(super) file: ScratchFile,
-    pub(super) len: usize,
-    pub(super) page: usize,
-    pub(super) checks: Vec<u32>,
+    file: Arc<ScratchFile>,
+    parts: Vec<Part>,
+    len: usize,
+    page: usize,
+    checks: Vec<u32>,
     /// `levels[0]` has a box for each page; each further level has one box for `FAN` boxes of the previous
     /// level.
-    pub(super) levels: Vec<Vec<Aabb>>,
-    /// Checksums and boxes on disk, needed if the run is resumed.
-    pub(super) _index: Option<Index>,
-    pub(super) _held: Reservation,
+    levels: Vec<Vec<Aabb>>,
+    _held: Reservation,
 }
 
 impl PointStore {
@@ -113,11 +322,8 @@ impl PointStore {
     /// returns false.
     pub fn pages_near(&self, target: &Aabb, d2: u64, each: &mut dyn FnMut(usize) -> bool) {
         let top = self.levels.len() - 1;
-        for node in 0..self.levels[top].len() {
-            if !self.descend(top, node, target, d2, each) {
-                return;
-            }
-        }
+        let mut nodes = 0..self.levels[top].len();
+        nodes.all(|node| self.descend(top, node, target, d2, each));
     }
 
     fn descend(
@@ -144,25 +350,35 @@ impl PointStore {
     /// [`crate::Error::Io`]; [`crate::Error::Corrupt`] if a page does not match its checksum.
     pub fn read_pages(&self, pages: Range<usize>, points: &mut Vec<Point>) -> Result<()> {
         if pages.end > self.checks.len() {
-            let offset = (self.checks.len() * self.page * 12) as u64;
             let found = format!("{} pages", self.checks.len());
-            return Err(self
-                .file
-                .damaged(offset, found, format!("page {}", pages.end)));
+            let expected = format!("page {}", pages.end);
+            return Err(self.file.damaged(0, 0, found, expected));
         }
+        let mut part = self.parts.partition_point(|part| part.first <= pages.start);
+        let mut start = pages.start;
+        while start < pages.end {
+            let next = self.parts.get(part).map_or(pages.end, |next| next.first);
+            let end = next.min(pages.end);
+            self.read_from(&self.parts[part - 1], start..end, points)?;
+            (start, part) = (end, part + 1);
+        }
+        Ok(())
+    }
+
+    /// Reads pages of one part.
+    fn read_from(&self, part: &Part, pages: Range<usize>, points: &mut Vec<Point>) -> Result<()> {
         let ids = pages.start * self.page..(pages.end * self.page).min(self.len);
         let before = points.len();
         points.resize(before + ids.len(), [0; 3]);
         let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut points[before..]);
-        let offset = ids.start as u64 * 12;
-        self.file.read_at(bytes, offset)?;
-        for (page, part) in pages.zip(bytes.chunks(self.page * 12)) {
-            let crc = crc32fast::hash(part);
+        let at = |page: usize| part.offset + ((page - part.first) * self.page * 12) as u64;
+        self.file.read(part.segment, at(pages.start), bytes)?;
+        for (page, bytes) in pages.zip(bytes.chunks(self.page * 12)) {
+            let crc = crc32fast::hash(bytes);
             if crc != self.checks[page] {
-                let offset = (page * self.page * 12) as u64;
                 let expected = format!("{:08x}", self.checks[page]);
                 let found = format!("checksum {crc:08x}");
-                return Err(self.file.damaged(offset, found, expected));
+                return Err(self.file.damaged(part.segment, at(page), found, expected));
             }
         }
         Ok(())
@@ -220,7 +436,8 @@ mod tests {
         let orderer = Orderer::new(&workspace).unwrap();
         let points: Vec<Point> = (0..10).map(|k| [k, k * k, 1]).collect();
         orderer.push(&workspace, &points).unwrap();
-        let (mut store, _) = orderer.finish(&workspace, 4).unwrap();
+        let (stored, _) = orderer.finish(&workspace, 4).unwrap();
+        let mut store = stored.open(&workspace).unwrap();
         assert_eq!(store.slice(0..10).unwrap().len(), 10);
         store.checks.clear();
         store.len = usize::MAX / 64;

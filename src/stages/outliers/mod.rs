@@ -15,26 +15,24 @@ use crate::geom::Point;
 use crate::method::METHOD;
 use crate::spill::Table;
 use crate::stages::blocks::Blocks;
-use crate::stages::cells::{TileRanges, near_in_store};
-use crate::stages::order::{PointStore, Position, StoreWriter};
+use crate::stages::cells::{TileRanges, each_neighborhood};
+use crate::stages::order::{PointStore, Position, StoreWriter, StoredPoints};
 use crate::stages::tiles::Tile;
-use crate::stages::tiles::near::Search;
+use crate::stages::tiles::neighbors::Neighbors;
 use crate::stages::tiles::walk::PageCache;
-use crate::workspace::Workspace;
-use serde::Serialize;
+use crate::workspace::{Unit, Workspace};
+use serde::{Deserialize, Serialize};
 use spacing::{SpacingCache, Spacings};
 use std::ops::Range;
 
 /// Counts of this stage.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct OutlierStats {
     /// Points dropped.
     pub dropped: u64,
     /// Rounds, including the last one, which dropped nothing.
     pub rounds: u32,
 }
-
-crate::workspace::persist::persist!(OutlierStats { dropped, rounds });
 
 /// The definition of outliers, and the division of the work.
 #[derive(Debug, Clone, Copy)]
@@ -47,28 +45,32 @@ pub struct OutlierOptions {
     pub tile: u32,
 }
 
-/// The points that are not outliers, with new ids: their ranks among themselves.
+/// The points that are not outliers, with new ids: their ranks among themselves. Deletes the file of the
+/// input, unless no point is an outlier.
 ///
 /// # Errors
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
 /// [`crate::Error::Cancelled`].
 pub fn drop_outliers(
-    mut store: PointStore,
+    mut stored: StoredPoints,
     options: OutlierOptions,
     workspace: &Workspace,
-) -> Result<(PointStore, OutlierStats)> {
+) -> Result<(StoredPoints, OutlierStats)> {
     let mut stats = OutlierStats::default();
-    while stats.rounds < METHOD.outliers.rounds && store.len() > METHOD.outliers.nearest {
+    while stats.rounds < METHOD.outliers.rounds && stored.len() > METHOD.outliers.nearest {
         stats.rounds += 1;
+        let store = stored.open(workspace)?;
         let kept = round(&store, options, stats.rounds, workspace)?;
-        let dropped = (store.len() - kept.len()) as u64;
-        store = kept;
-        stats.dropped += dropped;
+        drop(store);
+        let dropped = (stored.len() - kept.len()) as u64;
         if dropped == 0 {
+            kept.release(workspace)?;
             break;
         }
+        stats.dropped += dropped;
+        std::mem::replace(&mut stored, kept).release(workspace)?;
     }
-    Ok((store, stats))
+    Ok((stored, stats))
 }
 
 fn round(
@@ -76,67 +78,61 @@ fn round(
     options: OutlierOptions,
     number: u32,
     workspace: &Workspace,
-) -> Result<PointStore> {
+) -> Result<StoredPoints> {
     let tiles = TileRanges::new(Blocks::new(store.len(), options.block), options.tile);
     let spacings = Spacings::measure(store, tiles, number, workspace)?;
     let name = format!("outliers{number}");
-    let kept = Table::<Position>::create(workspace, &name, tiles.count())?;
+    let kept = Table::<Position>::new(&name, tiles.count());
     let bytes = |tile: usize| {
         let points = tiles.ids(tile).len();
-        Tile::bytes(points) + PageCache::bytes(store) + SpacingCache::BYTES + points as u64 * 12
+        let of_points = Tile::estimate(points) + points as u64 * 12;
+        of_points + PageCache::estimate(store) + SpacingCache::BYTES
     };
-    let work = |tile| {
+    let work = |unit: &Unit<'_>| {
+        let tile = unit.number();
         let ids = tiles.ids(tile);
-        workspace.advance(ids.len() as u64);
-        let points = one_tile(store, ids, options.factor, SpacingCache::new(&spacings))?;
-        kept.put(tile, bytemuck::cast_slice(&points))
+        unit.advance(ids.len() as u64);
+        let cache = SpacingCache::new(unit, &spacings);
+        let points = one_tile(unit, store, ids, options.factor, cache)?;
+        kept.put(unit, tile, bytemuck::cast_slice(&points))
     };
     let step = (name, "outliers: tile");
     workspace.units(step, tiles.count(), bytes, work, |_, ()| Ok(()))?;
+    spacings.release(workspace)?;
     let name = format!("points-kept{number}");
-    StoreWriter::gather(workspace, &name, store.page_size(), &kept)
+    let gathered = StoreWriter::gather(workspace, &name, store.page_size(), &kept)?;
+    kept.release(workspace)?;
+    Ok(gathered)
 }
 
 /// The points of a tile that are kept.
 fn one_tile(
+    unit: &Unit<'_>,
     store: &PointStore,
     ids: Range<usize>,
     factor: f64,
     mut spacings: SpacingCache<'_>,
 ) -> Result<Vec<Point>> {
-    let around = METHOD.outliers.around.min(store.len() - 1);
-    let tile = Tile::load(store, ids.clone())?;
-    let mut points = Vec::with_capacity(ids.len());
-    let mut stays = vec![true; ids.len()];
-    let mut search = Search::default();
-    let mut uncertain = Vec::new();
-    let mut failed = None;
-    tile.for_each_query(around, &mut search, |id, point, query| {
-        points.push(point);
-        let Some(query) = query else {
-            uncertain.push((id, point));
-            return;
-        };
-        let near = query.near().columns().ids[..around].iter().copied();
-        match spacings.stand_out(id, near, factor) {
-            Ok(out) => stays[id as usize - ids.start] = !out,
-            Err(error) => failed = Some(error),
-        }
-    });
-    if let Some(error) = failed {
-        return Err(error);
-    }
-    drop(tile);
-    let mut cache = PageCache::default();
-    for (id, point) in uncertain {
-        let near = near_in_store(store, &mut cache, id, point, around)?;
-        let near = near.iter().take(around).map(|n| n.id);
-        let out = spacings.stand_out(id, near, factor)?;
-        stays[id as usize - ids.start] = !out;
-    }
-    let mut stays = stays.into_iter();
-    points.retain(|_| stays.next() == Some(true));
-    Ok(points)
+    let count = METHOD.outliers.around.min(store.len() - 1);
+    let mut kept = vec![None; ids.len()];
+    let mut failed = Ok(());
+    let of = |id, near: &Neighbors| {
+        let around = near.columns().ids[..count].iter().copied();
+        spacings.stand_out(id, around, factor)
+    };
+    each_neighborhood(
+        unit,
+        store,
+        ids.clone(),
+        count,
+        of,
+        |id, point, out| match out {
+            Ok(out) => kept[id - ids.start] = (!out).then_some(point),
+            Err(error) => failed = Err(error),
+        },
+    )?;
+    failed?;
+    Ok(kept.into_iter().flatten().collect())
 }
 
 #[cfg(test)]

@@ -2,14 +2,14 @@
 
 use crate::error::Result;
 use crate::method::METHOD;
-use crate::spill::{Table, row};
-use crate::stages::cells::TileRanges;
+use crate::spill::{Table, release, row};
+use crate::stages::cells::{TileRanges, each_neighborhood};
 use crate::stages::order::PointStore;
 use crate::stages::tiles::Tile;
-use crate::stages::tiles::near::Search;
-use crate::stages::tiles::walk::{PageCache, Walk};
-use crate::workspace::Workspace;
+use crate::stages::tiles::neighbors::Neighbors;
+use crate::stages::tiles::walk::PageCache;
 use crate::workspace::memory::Holding;
+use crate::workspace::{Unit, Workspace};
 use rustc_hash::FxHashMap;
 use std::ops::Range;
 
@@ -29,6 +29,8 @@ pub(super) struct Spacings {
     sections: Table<Spacing>,
 }
 
+release!(Spacings: sections);
+
 impl Spacings {
     /// Measures all spacings. There must be more points than the neighbours used for a spacing.
     pub(super) fn measure(
@@ -38,47 +40,34 @@ impl Spacings {
         workspace: &Workspace,
     ) -> Result<Self> {
         let name = format!("spacings{round}");
-        let sections = Table::create(workspace, &name, tiles.count())?;
+        let sections = Table::new(&name, tiles.count());
         let bytes = |tile: usize| {
             let points = tiles.ids(tile).len();
-            Tile::bytes(points) + PageCache::bytes(store) + points as u64 * 4
+            Tile::estimate(points) + PageCache::estimate(store) + points as u64 * 4
         };
-        let work = |tile| sections.put(tile, &one_tile(store, tiles.ids(tile))?);
+        let work = |unit: &Unit<'_>| {
+            let tile = unit.number();
+            sections.put(unit, tile, &one_tile(unit, store, tiles.ids(tile))?)
+        };
         let name = (name, "outliers: spacings");
         workspace.units(name, tiles.count(), bytes, work, |_, ()| Ok(()))?;
         Ok(Self { tiles, sections })
     }
 }
 
-fn one_tile(store: &PointStore, ids: Range<usize>) -> Result<Vec<Spacing>> {
-    let tile = Tile::load(store, ids.clone())?;
+fn one_tile(unit: &Unit<'_>, store: &PointStore, ids: Range<usize>) -> Result<Vec<Spacing>> {
     let mut spacings = vec![Spacing::default(); ids.len()];
-    let mut search = Search::default();
-    let mut uncertain = Vec::new();
-    let nearest = METHOD.outliers.nearest;
-    tile.for_each_query(nearest, &mut search, |id, point, query| match query {
-        Some(query) => {
-            let near = query.near().columns().distances2[..nearest].iter();
-            spacings[id as usize - ids.start] = mean(near.copied());
-        }
-        None => uncertain.push((id, point)),
-    });
-    drop(tile);
-    let mut cache = PageCache::default();
-    for (id, point) in uncertain {
-        let mut near = Vec::with_capacity(nearest);
-        let mut walk = Walk::new(store, &mut cache, id, point);
-        for _ in 0..nearest {
-            near.push(walk.advance()?.map_or(0, |n| n.distance2));
-        }
-        spacings[id as usize - ids.start] = mean(near.into_iter());
-    }
+    let count = METHOD.outliers.nearest;
+    let of = |_, near: &Neighbors| mean(&near.columns().distances2[..count]);
+    each_neighborhood(unit, store, ids.clone(), count, of, |id, _, spacing| {
+        spacings[id - ids.start] = spacing;
+    })?;
     Ok(spacings)
 }
 
 /// Mean of the distances, summed nearest first so that rounding is reproducible.
-fn mean(distances2: impl Iterator<Item = u64>) -> Spacing {
-    let sum: f64 = distances2.map(|d2| (d2 as f64).sqrt()).sum();
+fn mean(distances2: &[u64]) -> Spacing {
+    let sum: f64 = distances2.iter().map(|&d2| (d2 as f64).sqrt()).sum();
     let bits = ((sum / METHOD.outliers.nearest as f64) as f32).to_bits();
     Spacing { bits }
 }
@@ -86,11 +75,12 @@ fn mean(distances2: impl Iterator<Item = u64>) -> Spacing {
 /// A cache of sections of spacings.
 #[derive(Debug)]
 pub(super) struct SpacingCache<'a> {
+    unit: &'a Unit<'a>,
     spacings: &'a Spacings,
     sections: FxHashMap<u32, Vec<Spacing>>,
     held: usize,
     around: Vec<u32>,
-    taken: Holding,
+    taken: Holding<'a>,
 }
 
 impl<'a> SpacingCache<'a> {
@@ -100,13 +90,14 @@ impl<'a> SpacingCache<'a> {
     /// Bytes of a full cache: one section, of at most a block, more than it holds.
     pub(super) const BYTES: u64 = 4 * (Self::HELD as u64 + (1 << 16)) + (1 << 16);
 
-    pub(super) fn new(spacings: &'a Spacings) -> Self {
+    pub(super) fn new(unit: &'a Unit<'_>, spacings: &'a Spacings) -> Self {
         Self {
+            unit,
             spacings,
             sections: FxHashMap::default(),
             held: 0,
             around: Vec::new(),
-            taken: Holding::default(),
+            taken: unit.hold(0),
         }
     }
 
@@ -124,7 +115,7 @@ impl<'a> SpacingCache<'a> {
             self.sections.clear();
             self.held = 0;
         }
-        let section = self.spacings.sections.get(tile as usize)?;
+        let section = self.spacings.sections.get(self.unit, tile as usize)?;
         let found = section[place].bits;
         self.held += section.len();
         self.taken.set(4 * self.held as u64);

@@ -20,13 +20,14 @@ fn kept(points: &[Point], factor: f64, tile: u32, page: usize) -> (Vec<Point>, O
     let workspace = Workspace::for_tests(2);
     let orderer = Orderer::new(&workspace).unwrap();
     orderer.push(&workspace, points).unwrap();
-    let (store, _) = orderer.finish(&workspace, page).unwrap();
+    let (stored, _) = orderer.finish(&workspace, page).unwrap();
     let options = OutlierOptions {
         factor,
         block: 1 << 16,
         tile,
     };
-    let (store, stats) = drop_outliers(store, options, &workspace).unwrap();
+    let (stored, stats) = drop_outliers(stored, options, &workspace).unwrap();
+    let store = stored.open(&workspace).unwrap();
     (store.slice(0..store.len()).unwrap(), stats)
 }
 
@@ -107,7 +108,8 @@ fn it_is_what_the_definition_says() {
     let workspace = Workspace::for_tests(2);
     let orderer = Orderer::new(&workspace).unwrap();
     orderer.push(&workspace, &all).unwrap();
-    let (store, _) = orderer.finish(&workspace, 256).unwrap();
+    let (stored, _) = orderer.finish(&workspace, 256).unwrap();
+    let store = stored.open(&workspace).unwrap();
     all = store.slice(0..store.len()).unwrap();
     loop {
         let near = |i: usize| {
@@ -138,7 +140,9 @@ fn it_is_what_the_definition_says() {
         block: 1 << 16,
         tile: 400,
     };
-    let (store, stats) = drop_outliers(store, options, &workspace).unwrap();
+    drop(store);
+    let (stored, stats) = drop_outliers(stored, options, &workspace).unwrap();
+    let store = stored.open(&workspace).unwrap();
     assert!(
         stats.dropped > 50 && stats.rounds < METHOD.outliers.rounds,
         "{stats:?}"

@@ -1,27 +1,56 @@
 //! The triangles of the stitched surface that touch a block.
 
 use crate::error::Result;
+use crate::spill::{Inbox, Table};
+use crate::stages::blocks::Blocks;
 use crate::stages::stitch::Stitched;
-use crate::stages::surface::rows::TriangleTo;
+use crate::stages::surface::rows::{TriangleRow, TriangleTo};
 use crate::stages::surface::star::Triangle;
+use crate::workspace::{Unit, Workspace};
 
-/// All triangles that touch a block, ascending.
-///
-/// # Errors
-/// [`crate::Error::Io`], [`crate::Error::Corrupt`].
-pub fn load(stitched: &Stitched, block: usize) -> Result<Vec<Triangle>> {
-    let mut triangles: Vec<Triangle> = bytemuck::cast_vec(stitched.interior.get(block)?);
-    let removed = stitched.removed.get(block)?;
-    if !removed.is_empty() {
-        let gone = |&triangle: &Triangle| {
-            let to = block as u32;
-            removed.binary_search(&TriangleTo { to, triangle })
-        };
-        triangles.retain(|t| gone(t).is_err());
+/// The stitched surface while it is read.
+pub struct Around<'a> {
+    interior: &'a Table<TriangleRow>,
+    added: Inbox<TriangleTo>,
+    removed: Inbox<TriangleTo>,
+}
+
+impl<'a> Around<'a> {
+    /// Opens the stitched surface.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`].
+    pub fn open(stitched: &'a Stitched, blocks: Blocks, workspace: &Workspace) -> Result<Self> {
+        Ok(Self {
+            interior: &stitched.interior,
+            added: stitched.added.open(workspace, blocks.count())?,
+            removed: stitched.removed.open(workspace, blocks.count())?,
+        })
     }
-    let added = stitched.added.get(block)?;
-    merge(&mut triangles, added.iter().map(|t| t.triangle));
-    Ok(triangles)
+
+    /// An upper bound on the number of triangles that touch a block.
+    pub fn records(&self, workspace: &Workspace, block: usize) -> usize {
+        self.interior.rows(workspace, block) + self.added.rows(block)
+    }
+
+    /// All triangles that touch a block, ascending.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+    pub fn load(&self, unit: &Unit<'_>, block: usize) -> Result<Vec<Triangle>> {
+        let mut triangles: Vec<Triangle> = bytemuck::cast_vec(self.interior.get(unit, block)?);
+        let removed = self.removed.get(unit, block)?;
+        if !removed.is_empty() {
+            let gone = |&triangle: &Triangle| {
+                let to = block as u32;
+                removed.binary_search(&TriangleTo { to, triangle })
+            };
+            triangles.retain(|t| gone(t).is_err());
+        }
+        let added = self.added.get(unit, block)?;
+        merge(&mut triangles, added.iter().map(|t| t.triangle));
+        Ok(triangles)
+    }
 }
 
 /// Merges ascending triangles into a list of ascending ones, in place and from the back.

@@ -2,10 +2,13 @@
 //! torn.
 
 use super::ear_clipping::zip;
-use super::fill::{Corner, Filling, begin_at_smallest, fill, ids, is_outline, triangulate};
+use super::fill::{
+    Corner, Filling, begin_at_smallest, edges, fill, ids, is_outline, triangulate, undirected,
+    vector_area,
+};
 use super::parts::Part;
 use crate::geom::distance2;
-use crate::geom::triangle::{area, length, normal};
+use crate::geom::triangle::{area, length};
 use crate::method::METHOD;
 use crate::stages::spacing::Density;
 use rustc_hash::FxHashSet;
@@ -94,7 +97,7 @@ impl LoopRules<'_> {
         let mut open = left.len();
         if !triangles.is_empty() && !left.is_empty() && fillable(&left) {
             let new = edges_of(&triangles);
-            let taken = |a: u32, b: u32| edge(a, b) || new.contains(&(a.min(b), a.max(b)));
+            let taken = |a: u32, b: u32| edge(a, b) || new.contains(&undirected(a, b));
             begin_at_smallest(&mut left);
             if let Some(part) = self.filled(&left, METHOD.filling.sure, &found, taken) {
                 triangles.extend(ids(&left, &part.triangles));
@@ -110,9 +113,8 @@ impl LoopRules<'_> {
 }
 
 fn edges_of(triangles: &[[u32; 3]]) -> FxHashSet<(u32, u32)> {
-    let edges = |t: &[u32; 3]| [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])];
-    let ordered = |(a, b): (u32, u32)| (a.min(b), a.max(b));
-    triangles.iter().flat_map(edges).map(ordered).collect()
+    let edges = |&[a, b, c]: &[u32; 3]| [undirected(a, b), undirected(b, c), undirected(c, a)];
+    triangles.iter().flat_map(edges).collect()
 }
 
 /// The limit for the width of a loop. It follows from the edges of the loop as it was found, since ear
@@ -124,24 +126,16 @@ struct Width {
 
 impl Width {
     fn of(corners: &[Corner]) -> Self {
-        let n = corners.len();
-        let square = |x: usize| u128::from(distance2(corners[(x + n - 1) % n].at, corners[x].at));
+        let square = |(from, to): (&Corner, &Corner)| u128::from(distance2(from.at, to.at));
         Self {
-            edges: n,
-            squares: (0..n).map(square).sum(),
+            edges: corners.len(),
+            squares: edges(corners).map(square).sum(),
         }
     }
 
     /// True if a loop is wide for its edges: an opening such as a door, not a tear.
     fn is_opening(&self, corners: &[Corner]) -> bool {
-        let n = corners.len();
-        let mut area = [0i128; 3];
-        for x in 0..n {
-            let (from, to) = (&corners[(x + n - 1) % n], &corners[x]);
-            let part = normal(corners[0].at, from.at, to.at);
-            (0..3).for_each(|k| area[k] += part[k]);
-        }
-        self.is_wide(0.5 * length(area), n)
+        self.is_wide(0.5 * length(vector_area(corners)), corners.len())
     }
 
     /// True if the triangles that fill a loop are too large for its edges. The vector area does not show this

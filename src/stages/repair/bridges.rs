@@ -1,5 +1,6 @@
 //! Bridges: triangles connected by one edge only, whose opposite vertex touches another part of the surface.
 
+use super::ascending;
 use super::patch::Patch;
 use crate::stages::surface::star::{Link, Star, Triangle};
 use std::ops::Range;
@@ -36,7 +37,5 @@ pub fn find(ids: Range<u32>, triangles: &[Triangle], patch: &Patch) -> Vec<u32> 
             }
         }
     }
-    found.sort_unstable();
-    found.dedup();
-    found
+    ascending(found)
 }

@@ -3,30 +3,30 @@
 
 use super::facing::{Fate, Sums, SumsRow, judge};
 use super::rows::SeenTriangle;
-use super::{RepairOptions, RepairStats};
+use super::{RepairOptions, RepairStats, ascending};
 use crate::error::Result;
 use crate::geom::Point;
-use crate::spill::Table;
+use crate::spill::{Inbox, Table};
 use crate::stages::order::PointStore;
 use crate::stages::surface::parity::{ParitySets, constraint};
 use crate::stages::surface::rows::TriangleTo;
-use crate::workspace::Workspace;
-use crate::workspace::memory::{bytes_of, hold, table_bytes};
+use crate::workspace::memory::{bytes_of, table_bytes};
+use crate::workspace::{Unit, lock};
 use rustc_hash::FxHashMap;
-use std::sync::{Mutex, PoisonError};
+use std::sync::Mutex;
 
 /// Merges the global labels that different blocks give to the same triangle.
 pub(super) fn join(
-    seen: &Table<SeenTriangle>,
+    unit: &Unit<'_>,
+    seen: &Inbox<SeenTriangle>,
     globals: &[(u32, u32)],
     labels: u32,
-    workspace: &Workspace,
 ) -> Result<ParitySets> {
     let mut sets = ParitySets::new(labels as usize);
     for block in 0..globals.len() {
-        workspace.check_cancel()?;
-        let _held = workspace.reserve("labels seen", seen.rows(block) as u64 * 24)?;
-        let all = seen.get(block)?;
+        unit.check_cancel()?;
+        let _held = unit.reserve("labels seen", seen.rows(block) as u64 * 24)?;
+        let all = seen.get(unit, block)?;
         for same in all.chunk_by(|a, b| a.triangle == b.triangle) {
             let global = |s: &SeenTriangle| {
                 let (label, flip) = constraint(s.label_flip);
@@ -47,11 +47,11 @@ pub(super) struct Parts<'a> {
     /// Positions that decide the connectivity.
     pub store: &'a PointStore,
     /// Labels and orientations of crossing triangles in the blocks that they touch.
-    pub seen: &'a Table<SeenTriangle>,
+    pub seen: &'a Inbox<SeenTriangle>,
     /// Sums over the interior triangles of each block's global labels.
     pub sums: &'a Table<SumsRow>,
     /// Bridges that several blocks see.
-    pub bridges: &'a Table<TriangleTo>,
+    pub bridges: &'a Inbox<TriangleTo>,
     /// For each block, the number of its first global label, and how many global labels it has.
     pub globals: &'a [(u32, u32)],
     /// The merged labels.
@@ -62,25 +62,25 @@ impl Parts<'_> {
     /// The component and the fate of each global label.
     pub fn judge(
         &self,
+        unit: &Unit<'_>,
         options: RepairOptions,
         stats: &mut RepairStats,
-        workspace: &Workspace,
     ) -> Result<(Vec<u32>, Vec<Fate>)> {
         let all: Mutex<FxHashMap<u32, Sums>> = Mutex::default();
         let bytes = |block: usize| {
             let labels = self.globals[block].1;
             self.seen.rows(block) as u64 * 150 + u64::from(labels) * 500 + (1 << 16)
         };
-        workspace.for_each_unit("repair: borders", self.globals.len(), bytes, |block| {
-            let own = self.sum(block)?;
-            let mut all = all.lock().unwrap_or_else(PoisonError::into_inner);
+        unit.for_each_unit("repair: borders", self.globals.len(), bytes, |unit| {
+            let own = self.sum(unit)?;
+            let mut all = lock(&all);
             for (root, sums) in own {
                 all.entry(root).or_default().merge(&sums, false);
             }
             Ok(())
         })?;
-        let all = all.into_inner().unwrap_or_else(PoisonError::into_inner);
-        let _held = workspace.reserve("components", all.len() as u64 * 500)?;
+        let all = std::mem::take(&mut *lock(&all));
+        let _held = unit.reserve("components", all.len() as u64 * 500)?;
         let fates: FxHashMap<u32, Fate> = all
             .iter()
             .map(|(root, sums)| (*root, judge(sums, options.least(), stats)))
@@ -97,21 +97,21 @@ impl Parts<'_> {
 
     /// Sums over a block's interior triangles and over the crossing ones whose smallest vertex is in it, by
     /// the roots of their labels.
-    fn sum(&self, block: usize) -> Result<FxHashMap<u32, Sums>> {
+    fn sum(&self, unit: &Unit<'_>) -> Result<FxHashMap<u32, Sums>> {
+        let block = unit.number();
         let mut own: FxHashMap<u32, Sums> = FxHashMap::default();
-        for (label, row) in (self.globals[block].0..).zip(self.sums.get(block)?) {
+        for (label, row) in (self.globals[block].0..).zip(self.sums.get(unit, block)?) {
             let (root, turned) = self.sets.look(label);
             let sums = Sums::of(&row);
             own.entry(root).or_default().merge(&sums, turned);
         }
-        let seen = self.seen.get(block)?;
-        let bridges = self.bridges.get(block)?;
-        let mut ids: Vec<u32> = seen.iter().flat_map(|s| s.triangle).collect();
-        ids.sort_unstable();
-        ids.dedup();
+        let seen = self.seen.get(unit, block)?;
+        let bridges = self.bridges.get(unit, block)?;
+        let ids = ascending(seen.iter().flat_map(|s| s.triangle));
         let mut points: Vec<Point> = Vec::with_capacity(ids.len());
         self.store.fetch(&ids, &mut points)?;
-        let _held = hold(table_bytes(&own) + bytes_of(&seen) + bytes_of(&ids) + bytes_of(&points));
+        let bytes = table_bytes(&own) + bytes_of(&seen) + bytes_of(&ids) + bytes_of(&points);
+        let _held = unit.hold(bytes);
         for same in seen.chunk_by(|a, b| a.triangle == b.triangle) {
             let first = same[0];
             let SeenTriangle { to, triangle, .. } = first;

@@ -1,9 +1,9 @@
 //! Ear clipping of a boundary loop, sharpest corners first, as far as the surface is torn. Where it is open,
 //! as at doors and at the outline of a survey, ears would be longer than the spacing of the surface allows.
 
-use super::fill::Corner;
+use super::fill::{Corner, distance, edges, undirected};
+use crate::geom::Point;
 use crate::geom::triangle::{length, normal, on_a_line};
-use crate::geom::{Point, distance2};
 use crate::method::METHOD;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -68,19 +68,16 @@ pub fn zip(corners: Vec<Corner>, edge: impl Fn(u32, u32) -> bool) -> Clipped {
 /// For each corner, the mean side length of the triangles at its two edges and at the edges next to them.
 fn spacing(corners: &[Corner]) -> Vec<f64> {
     let n = corners.len();
-    let far = |a: Point, b: Point| (distance2(a, b) as f64).sqrt();
-    let own: Vec<f64> = (0..n)
-        .map(|x| {
-            let (from, to) = (&corners[(x + n - 1) % n], &corners[x]);
-            (far(from.at, to.at) + far(to.at, to.apex) + far(from.at, to.apex)) / 3.0
-        })
-        .collect();
-    (0..n)
-        .map(|x| {
-            let near = [(x + n - 1) % n, x, (x + 1) % n, (x + 2) % n];
-            near.iter().map(|&y| own[y]).sum::<f64>() / 4.0
-        })
-        .collect()
+    let width = |(from, to): (&Corner, &Corner)| {
+        let sides = [(from.at, to.at), (to.at, to.apex), (from.at, to.apex)];
+        sides.map(|(a, b)| distance(a, b)).iter().sum::<f64>() / 3.0
+    };
+    let own: Vec<f64> = edges(corners).map(width).collect();
+    let mean = |x: usize| {
+        let near = [(x + n - 1) % n, x, (x + 1) % n, (x + 2) % n];
+        near.iter().map(|&y| own[y]).sum::<f64>() / 4.0
+    };
+    (0..n).map(mean).collect()
 }
 
 impl<E: Fn(u32, u32) -> bool> Zipper<E> {
@@ -106,7 +103,7 @@ impl<E: Fn(u32, u32) -> bool> Zipper<E> {
                 return some;
             }
             let (a, b) = (self.corners[s].id, self.corners[e].id);
-            self.chords.insert((a.min(b), a.max(b)));
+            self.chords.insert(undirected(a, b));
             self.corners[e].apex = self.corners[x].at;
             self.after[s] = e;
             self.before[e] = s;
@@ -130,14 +127,13 @@ impl<E: Fn(u32, u32) -> bool> Zipper<E> {
             return None;
         }
         let closes = self.count == 3;
-        let chord = (distance2(cs.at, ce.at) as f64).sqrt();
-        let way = (distance2(cs.at, cx.at) as f64).sqrt() + (distance2(cx.at, ce.at) as f64).sqrt();
+        let chord = distance(cs.at, ce.at);
+        let way = distance(cs.at, cx.at) + distance(cx.at, ce.at);
         if !closes {
             let spacing = 0.5 * (self.spacing[s] + self.spacing[e]);
-            let key = (cs.id.min(ce.id), cs.id.max(ce.id));
             if chord > METHOD.ear_clipping.reach * spacing
                 || cs.pinched && ce.pinched
-                || self.chords.contains(&key)
+                || self.chords.contains(&undirected(cs.id, ce.id))
                 || (self.edge)(cs.id, ce.id)
             {
                 return None;

@@ -3,10 +3,12 @@
 //! Sums over a component are exact integers, so they do not depend on the order of triangles.
 
 use super::RepairStats;
-use crate::geom::{Point, sub};
+use crate::geom::Point;
+use crate::geom::triangle::small_normal;
 use crate::method::METHOD;
 use crate::spill::row;
 use crate::stages::surface::star::Triangle;
+use serde::{Deserialize, Serialize};
 
 /// Exact sums over the triangles of a component.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -63,13 +65,7 @@ impl Sums {
     /// Adds a triangle with corners at `corners`; `flip` if it is turned against its ascending ids.
     pub fn add(&mut self, t: Triangle, [a, b, c]: [Point; 3], flip: bool) {
         self.see(t, flip);
-        let (u, v) = (sub(b, a), sub(c, a));
-        // Coordinates have 30 bits, so twice the area has 61.
-        let mut n = [
-            u[1] * v[2] - u[2] * v[1],
-            u[2] * v[0] - u[0] * v[2],
-            u[0] * v[1] - u[1] * v[0],
-        ];
+        let mut n = small_normal(a, b, c);
         let length2 = n.iter().map(|x| (*x as f64) * (*x as f64)).sum::<f64>();
         self.triangles += 1;
         self.area += u128::from((length2.sqrt() as i64).cast_unsigned());
@@ -188,15 +184,13 @@ fn sign(x: i128) -> Option<bool> {
 }
 
 /// The decision about a component.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Fate {
     /// True if it is large enough to be kept.
     pub keep: bool,
     /// True if its triangles must be turned.
     pub turn: bool,
 }
-
-crate::workspace::persist::persist!(Fate { keep, turn });
 
 impl Fate {
     /// Before the decision, everything is kept as it is.

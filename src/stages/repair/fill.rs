@@ -1,6 +1,6 @@
 //! Filling a hole by splitting its boundary loop (paper, section 3.6).
 
-use crate::geom::triangle::{length, normal, on_a_line};
+use crate::geom::triangle::{add, length, normal, on_a_line};
 use crate::geom::{Point, distance2};
 use crate::method::METHOD;
 
@@ -78,13 +78,35 @@ pub fn triangulate(
 /// the corner at which the loop was found.
 pub fn begin_at_smallest(corners: &mut [Corner]) {
     let n = corners.len();
-    // Edge x runs from corner x - 1 to corner x.
-    let first = (0..n)
-        .min_by_key(|&x| (corners[(x + n - 1) % n].id, corners[x].id))
-        .unwrap_or(0);
-    if n > 0 {
+    let keys = edges(corners).map(|(from, to)| (from.id, to.id));
+    if let Some((_, first)) = keys.zip(0..).min() {
         corners.rotate_left((first + n - 1) % n);
     }
+}
+
+/// The edges of a loop; the first one leads to the first corner.
+pub fn edges(corners: &[Corner]) -> impl Iterator<Item = (&Corner, &Corner)> + Clone {
+    let from = corners.last().into_iter().chain(corners);
+    from.zip(corners)
+}
+
+/// An edge as a key that does not depend on its direction.
+pub fn undirected(a: u32, b: u32) -> (u32, u32) {
+    (a.min(b), a.max(b))
+}
+
+/// Twice the vector area of a loop.
+pub fn vector_area(corners: &[Corner]) -> [i128; 3] {
+    let mut area = [0i128; 3];
+    for (from, to) in edges(corners) {
+        add(&mut area, normal(corners[0].at, from.at, to.at));
+    }
+    area
+}
+
+/// The distance of two points.
+pub fn distance(a: Point, b: Point) -> f64 {
+    (distance2(a, b) as f64).sqrt()
 }
 
 /// True if the loop goes around a single triangle without neighbours.
@@ -95,20 +117,14 @@ fn goes_around_a_triangle(corners: &[Corner]) -> bool {
 /// True if the vector area of the loop points away from the triangles along it: its product with the sum of
 /// their normals is below minus one half of the product of the lengths.
 pub fn is_outline(corners: &[Corner]) -> bool {
-    let n = corners.len();
-    let mut area = [0i128; 3];
     let mut normals = [0i128; 3];
     let mut lengths = 0.0;
-    for x in 0..n {
-        let (from, to) = (&corners[(x + n - 1) % n], &corners[x]);
-        let a = normal(corners[0].at, from.at, to.at);
+    for (from, to) in edges(corners) {
         let m = normal(to.at, from.at, to.apex);
         lengths += length(m);
-        for k in 0..3 {
-            area[k] += a[k];
-            normals[k] += m[k];
-        }
+        add(&mut normals, m);
     }
+    let area = vector_area(corners);
     let product: f64 = (0..3).map(|k| area[k] as f64 * normals[k] as f64).sum();
     product < -METHOD.filling.outline * length(area) * lengths
 }
@@ -137,7 +153,7 @@ impl<E: Fn(u32, u32) -> bool> Splitter<'_, E> {
                 return false;
             };
             let (a, b) = (self.corners[ring[i]].id, self.corners[ring[j]].id);
-            self.chords.push((a.min(b), a.max(b)));
+            self.chords.push(undirected(a, b));
             rings.push(ring[..=i].iter().chain(&ring[j..]).copied().collect());
             rings.push(ring[i..=j].to_vec());
         }
@@ -152,9 +168,8 @@ impl<E: Fn(u32, u32) -> bool> Splitter<'_, E> {
     /// The chord with the smallest ratio of its length to the length of the shorter way around.
     fn best_chord(&self, ring: &[usize]) -> Option<(usize, usize)> {
         let n = ring.len();
-        let length = |x: usize, y: usize| {
-            (distance2(self.corners[ring[x]].at, self.corners[ring[y]].at) as f64).sqrt()
-        };
+        let at = |x: usize| self.corners[ring[x]].at;
+        let length = |x: usize, y: usize| distance(at(x), at(y));
         let mut along = Vec::with_capacity(n);
         let mut total = 0.0;
         for x in 0..n {
@@ -179,10 +194,11 @@ impl<E: Fn(u32, u32) -> bool> Splitter<'_, E> {
 
     fn allowed(&self, ring: &[usize], i: usize, j: usize) -> bool {
         let (a, b) = (&self.corners[ring[i]], &self.corners[ring[j]]);
-        if a.id == b.id || a.pinched && b.pinched || (self.edge)(a.id, b.id) {
-            return false;
-        }
-        if self.chords.contains(&(a.id.min(b.id), a.id.max(b.id))) {
+        if a.id == b.id
+            || a.pinched && b.pinched
+            || (self.edge)(a.id, b.id)
+            || self.chords.contains(&undirected(a.id, b.id))
+        {
             return false;
         }
         let n = ring.len();

@@ -14,50 +14,8 @@ use crate::geom::{Point, sub};
 use crate::method::METHOD;
 use crate::stages::surface::sides::{NONE, across, parts, side};
 use crate::stages::surface::star::Triangle;
-use crate::workspace::memory::{bytes_of, hold};
+use crate::workspace::memory::bytes_of;
 use std::ops::Range;
-
-/// Flips edges of the ascending `triangles` that touch the vertices `ids`, and returns the number of flips.
-/// `points` are the positions in the file, `shape` those that decide the connectivity. Triangles none of
-/// whose points were moved are kept.
-pub fn flip(
-    ids: Range<u32>,
-    triangles: &mut Vec<Triangle>,
-    points: &[Point],
-    shape: &[Point],
-) -> u64 {
-    let moved: Vec<bool> = points.iter().zip(shape).map(|(p, s)| p != s).collect();
-    let inside = |t: &Triangle| ids.contains(&t[0]) && ids.contains(&t[2]);
-    let moved = |t: &Triangle| t.iter().any(|v| moved[(v - ids.start) as usize]);
-    let mut fixed = vec![false; ids.len()];
-    let mut numbers = Vec::new();
-    let mut these: Vec<Triangle> = Vec::new();
-    for (number, t) in triangles.iter().enumerate() {
-        if inside(t) && moved(t) {
-            numbers.push(number as u32);
-            these.push(t.map(|v| v - ids.start));
-        } else {
-            for v in t.iter().filter(|v| ids.contains(v)) {
-                fixed[(v - ids.start) as usize] = true;
-            }
-        }
-    }
-    let mut sheet = Sheet::of(&these, fixed, points);
-    drop(these);
-    let _held = hold(sheet.bytes() + bytes_of(&numbers));
-    let mut flips = 0;
-    for _ in 0..METHOD.flips.sweeps {
-        let more = sheet.sweep();
-        flips += more;
-        if more == 0 {
-            break;
-        }
-    }
-    if flips > 0 {
-        sheet.write(ids.start, &numbers, triangles);
-    }
-    flips
-}
 
 /// A triangle that may be changed, and its neighbours.
 #[derive(Debug, Clone, Copy)]
@@ -73,8 +31,12 @@ struct Slot {
 }
 
 /// The triangles of a block that may be changed.
-struct Sheet<'a> {
+pub struct Sheet<'a> {
+    /// The first vertex of the block.
+    first: u32,
     points: &'a [Point],
+    /// Their numbers among all triangles of the block.
+    numbers: Vec<u32>,
     slots: Vec<Slot>,
     /// Fixed vertices, which take part in no flip: some of their triangles are outside the sheet, or they are
     /// on the boundary.
@@ -93,10 +55,32 @@ struct Flip {
 }
 
 impl<'a> Sheet<'a> {
-    /// From triangles with corners by index in the block, ascending.
-    fn of(these: &[Triangle], fixed: Vec<bool>, points: &'a [Point]) -> Self {
-        let across = across(0..points.len() as u32, these);
-        let _held = hold(bytes_of(&across));
+    /// From the ascending `triangles` that touch the vertices `ids`. `points` are the positions in the file,
+    /// `shape` those that decide the connectivity. Triangles none of whose points were moved are kept.
+    pub fn of(
+        ids: Range<u32>,
+        triangles: &[Triangle],
+        points: &'a [Point],
+        shape: &[Point],
+    ) -> Self {
+        let moved: Vec<bool> = points.iter().zip(shape).map(|(p, s)| p != s).collect();
+        let inside = |t: &Triangle| ids.contains(&t[0]) && ids.contains(&t[2]);
+        let moved = |t: &Triangle| t.iter().any(|v| moved[(v - ids.start) as usize]);
+        let mut fixed = vec![false; ids.len()];
+        let mut numbers = Vec::new();
+        // With corners by index in the block.
+        let mut these: Vec<Triangle> = Vec::new();
+        for (number, t) in triangles.iter().enumerate() {
+            if inside(t) && moved(t) {
+                numbers.push(number as u32);
+                these.push(t.map(|v| v - ids.start));
+            } else {
+                for v in t.iter().filter(|v| ids.contains(v)) {
+                    fixed[(v - ids.start) as usize] = true;
+                }
+            }
+        }
+        let across = across(0..points.len() as u32, &these);
         let slot = |(t, across): (&Triangle, &[u32; 3])| Slot {
             corners: *t,
             across: *across,
@@ -104,7 +88,9 @@ impl<'a> Sheet<'a> {
             bends: [0.0; 3],
         };
         let mut sheet = Self {
+            first: ids.start,
             points,
+            numbers,
             slots: these.iter().zip(&across).map(slot).collect(),
             fixed,
             due: vec![0; these.len().div_ceil(16)],
@@ -115,12 +101,29 @@ impl<'a> Sheet<'a> {
         sheet
     }
 
-    /// Bytes allocated by its lists.
-    fn bytes(&self) -> u64 {
-        bytes_of(&self.slots)
+    /// Allocated bytes.
+    pub fn bytes(&self) -> u64 {
+        bytes_of(&self.numbers)
+            + bytes_of(&self.slots)
             + bytes_of(&self.fixed)
             + bytes_of(&self.due)
             + bytes_of(&self.flipped)
+    }
+
+    /// Flips edges in the `triangles` of the block, and returns the number of flips.
+    pub fn flip(mut self, triangles: &mut Vec<Triangle>) -> u64 {
+        let mut flips = 0;
+        for _ in 0..METHOD.flips.sweeps {
+            let more = self.sweep();
+            flips += more;
+            if more == 0 {
+                break;
+            }
+        }
+        if flips > 0 {
+            self.write(triangles);
+        }
+        flips
     }
 
     /// Fixes the vertices of boundary edges.
@@ -378,14 +381,14 @@ impl<'a> Sheet<'a> {
     }
 
     /// Writes the flipped triangles back to their places.
-    fn write(&self, first: u32, numbers: &[u32], triangles: &mut Vec<Triangle>) {
+    fn write(&self, triangles: &mut Vec<Triangle>) {
         let mut new: Vec<Triangle> = Vec::new();
         let mut gone = Vec::new();
         for (number, _) in self.flipped.iter().enumerate().filter(|(_, f)| **f) {
-            let mut t = self.slots[number].corners.map(|v| v + first);
+            let mut t = self.slots[number].corners.map(|v| v + self.first);
             t.sort_unstable();
             new.push(t);
-            gone.push(numbers[number]);
+            gone.push(self.numbers[number]);
         }
         new.sort_unstable();
         let (mut number, mut gone) = (0, gone.into_iter().peekable());

@@ -3,36 +3,32 @@
 
 use super::boundary::LoopRules;
 use super::fill::{Corner, Filling};
-use super::rim::{BlockRim, FragmentRow, NumberingInput, RimCounts, RimFiles};
-use super::surface::Surface;
-use super::{FilledTriangle, RepairStats, SHUFFLE_BUFFER, from_smallest};
+use super::loops::Step;
+use super::rim::{BlockRim, FragmentRow, NumberingInput, RimCounts};
+use super::surface::StoredSurface;
+use super::{FilledTriangle, RepairStats, ascending, from_smallest};
 use crate::error::Result;
 use crate::spill::{Shuffle, Table};
 use crate::stages::blocks::Blocks;
 use crate::stages::located::Places;
 use crate::stages::surface::star::sorted;
-use crate::workspace::Workspace;
-use crate::workspace::persist::persist;
+use crate::workspace::place::Place;
+use crate::workspace::{Unit, Workspace};
 use rustc_hash::FxHashMap;
+use serde::{Deserialize, Serialize};
 
 /// Part of a loop inside one block: it enters at `start` (from, at) and leaves at `end` (at, to).
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct Fragment {
     start: (u32, u32),
     end: (u32, u32),
     steps: usize,
-    /// Index of its stored steps; `None` if the fragment alone exceeds the longest loop.
-    kept: Option<usize>,
+    /// Its stored steps; `None` if the fragment alone exceeds the longest loop.
+    kept: Option<Place>,
 }
 
-persist!(Fragment {
-    start,
-    end,
-    steps,
-    kept
-});
-
 /// The loops of a block and the outcome for them.
+#[derive(Serialize, Deserialize)]
 struct Found {
     fragments: Vec<Fragment>,
     stats: RepairStats,
@@ -40,14 +36,7 @@ struct Found {
     rim: RimCounts,
 }
 
-persist!(Found {
-    fragments,
-    stats,
-    edges,
-    rim
-});
-
-/// Fills holes as `mending` prescribes, or none. Returns the triangles that fill them and the boundary that
+/// Fills holes by the `rules`, or none. Returns the triangles that fill them and the boundary that
 /// is left.
 ///
 /// # Errors
@@ -55,49 +44,55 @@ persist!(Found {
 /// [`crate::Error::Cancelled`].
 pub fn fill(
     places: Places<'_>,
-    surface: &Surface,
+    surface: &StoredSurface,
     rules: Option<LoopRules<'_>>,
     blocks: Blocks,
     stats: &mut RepairStats,
     workspace: &Workspace,
-) -> Result<(Table<FilledTriangle>, NumberingInput)> {
+) -> Result<(Shuffle<FilledTriangle>, NumberingInput)> {
     let count = blocks.count();
-    let shuffle = Shuffle::between_units(workspace, "repair.filled", SHUFFLE_BUFFER, count)?;
-    let kept = Table::create(workspace, "repair.fragments", 0)?;
-    let files = RimFiles::create(workspace, count)?;
-    let bytes =
-        |b: usize| 150 * surface.records(b) as u64 + blocks.ids(b).len() as u64 * 40 + (1 << 20);
-    let work = |block| {
-        let rim = BlockRim::load(places, surface, blocks, block)?;
+    let surface = surface.open(workspace)?;
+    let shuffle = Shuffle::new("repair.filled");
+    let kept = Table::new("repair.fragments", count);
+    let mut numbering = NumberingInput::new(blocks);
+    let bytes = |b: usize| {
+        let records = surface.records(workspace, b);
+        150 * records as u64 + blocks.ids(b).len() as u64 * 40 + (1 << 20)
+    };
+    let work = |unit: &Unit<'_>| {
+        let rim = BlockRim::load(unit, places, &surface, blocks)?;
+        let _held = unit.hold(rim.bytes());
         let mut settled = Settled::default();
         let fragments = match rules {
-            Some(rules) => fill_inside(&rim, rules, &kept, &mut settled)?,
+            Some(rules) => fill_inside(unit, &rim, rules, &kept, &mut settled)?,
             None => Vec::new(),
         };
-        shuffle.send_from(block, &addressed(&settled.triangles, blocks))?;
+        let sent = addressed(&settled.triangles, blocks);
+        shuffle.send(unit, unit.number(), sent)?;
         let found = Found {
             fragments,
             stats: settled.stats,
             edges: settled.edges,
-            rim: files.put(block, &rim)?,
+            rim: numbering.put(unit, &rim)?,
         };
-        workspace.advance(1);
+        unit.advance(1);
         Ok(found)
     };
-    let mut rims = vec![RimCounts::default(); count];
+    let (mut faces, mut steps) = (vec![0; count], 0);
     let mut fragments = Vec::new();
     let mut settled = Settled::default();
     workspace.units("repair: block", count, bytes, work, |block, found| {
         fragments.extend(found.fragments);
         settled.stats.add(&found.stats);
         settled.edges += found.edges;
-        rims[block] = found.rim;
+        faces[block] = found.rim.faces;
+        steps += found.rim.steps;
         Ok(())
     })?;
-    let mut numbering = files.numbering_input(&rims, blocks, workspace)?;
+    (numbering.faces, numbering.boundary_edges) = (faces, steps);
     // Sorted, since blocks finish in any order.
     fragments.sort_unstable_by_key(|fragment: &Fragment| fragment.start);
-    let _fragments = workspace.reserve("fragments", fragments.len() as u64 * 120)?;
+    let _fragments = workspace.reserve("fragments", fragments.len() as u64 * 144)?;
     let parts = Fragments {
         places,
         rules,
@@ -105,7 +100,7 @@ pub fn fill(
         kept: &kept,
     };
     let step = workspace.step("rings")?;
-    let known: FxHashMap<u64, (RepairStats, u64)> = step.finished(workspace)?.into_iter().collect();
+    let known: FxHashMap<u64, (RepairStats, u64)> = step.finished()?.into_iter().collect();
     let rings = link_up(&fragments);
     for (number, batch) in (0u64..).zip(rings.chunks(RINGS)) {
         workspace.check_cancel()?;
@@ -116,7 +111,7 @@ pub fn fill(
                 let value = (done.stats, done.edges);
                 let sent = addressed(&done.triangles, blocks);
                 let sender = count + number as usize;
-                step.finish(number, &value, || shuffle.send_from(sender, &sent))?;
+                step.finish(number, &value, |unit| shuffle.send(unit, sender, sent))?;
                 value
             }
         };
@@ -125,11 +120,13 @@ pub fn fill(
     }
     stats.add(&settled.stats);
     numbering.boundary_edges -= settled.edges;
-    Ok((shuffle.deliver(workspace, blocks.count())?, numbering))
+    kept.release(workspace)?;
+    Ok((shuffle, numbering))
 }
 
 /// Fills the loops that lie inside a block, and stores the fragments of the others.
 fn fill_inside(
+    unit: &Unit<'_>,
     rim: &BlockRim,
     rules: LoopRules<'_>,
     kept: &Table<FragmentRow>,
@@ -145,18 +142,20 @@ fn fill_inside(
         let filling = rules.close(corners, |a, b| rim.has_edge(a, b));
         settled.settle(filling, ring.len());
     }
-    let mut fragments = Vec::with_capacity(open.len());
-    for part in open {
+    let is_kept = |part: &&Vec<Step>| part.len() <= rules.longest_loop();
+    let short = open.iter().filter(is_kept);
+    let rows: Vec<_> = short.map(|part| rim.rows(part)).collect();
+    let mut stored = kept.put_parts(unit, unit.number(), &rows)?.into_iter();
+    let fragment = |part: &Vec<Step>| {
         let (first, last) = (part[0], part[part.len() - 1]);
-        let rows = (part.len() <= rules.longest_loop()).then(|| rim.rows(&part));
-        fragments.push(Fragment {
+        Fragment {
             start: (first.from, first.at),
             end: (last.at, last.to),
             steps: part.len(),
-            kept: rows.map(|rows| kept.append(&rows)).transpose()?,
-        });
-    }
-    Ok(fragments)
+            kept: if is_kept(&part) { stored.next() } else { None },
+        }
+    };
+    Ok(open.iter().map(fragment).collect())
 }
 
 /// The outcome for several loops.
@@ -170,30 +169,21 @@ struct Settled {
 
 impl Settled {
     fn settle(&mut self, filling: Filling, edges: usize) {
-        if matches!(filling, Filling::Gap(_)) {
-            self.stats.gaps_closed += 1;
-        } else {
-            self.stats.holes_found += 1;
+        let is_gap = matches!(filling, Filling::Gap(_));
+        let stats = &mut self.stats;
+        let (count, new, left) = match filling {
+            Filling::Gap(gap) => (&mut stats.gaps_closed, vec![gap], 0),
+            Filling::Filled(new) => (&mut stats.holes_filled, new, 0),
+            Filling::Clipped(new, left) => (&mut stats.holes_zipped, new, left),
+            Filling::Outline => (&mut stats.holes_outline, Vec::new(), edges),
+            Filling::Impossible => (&mut stats.holes_not_filled, Vec::new(), edges),
+        };
+        *count += 1;
+        if !is_gap {
+            stats.holes_found += 1;
+            stats.hole_triangles += new.len() as u64;
         }
-        match filling {
-            Filling::Gap(t) => self.close(vec![t], edges),
-            Filling::Filled(new) => {
-                self.stats.holes_filled += 1;
-                self.stats.hole_triangles += new.len() as u64;
-                self.close(new, edges);
-            }
-            Filling::Clipped(new, left) => {
-                self.stats.holes_zipped += 1;
-                self.stats.hole_triangles += new.len() as u64;
-                self.close(new, edges - left);
-            }
-            Filling::Outline => self.stats.holes_outline += 1,
-            Filling::Impossible => self.stats.holes_not_filled += 1,
-        }
-    }
-
-    fn close(&mut self, new: Vec<[u32; 3]>, edges: usize) {
-        self.edges += edges as u64;
+        self.edges += (edges - left) as u64;
         self.triangles.extend(new.into_iter().map(from_smallest));
     }
 
@@ -215,11 +205,8 @@ fn addressed(triangles: &[[u32; 3]], blocks: Blocks) -> Vec<FilledTriangle> {
 
 /// Chains fragments into loops; every fragment belongs to one.
 fn link_up(fragments: &[Fragment]) -> Vec<Vec<usize>> {
-    let by_start: FxHashMap<(u32, u32), usize> = fragments
-        .iter()
-        .enumerate()
-        .map(|(i, f)| (f.start, i))
-        .collect();
+    let starts = fragments.iter().map(|f| f.start);
+    let by_start: FxHashMap<(u32, u32), usize> = starts.zip(0..).collect();
     let mut seen = vec![false; fragments.len()];
     let mut loops = Vec::new();
     for first in 0..fragments.len() {
@@ -252,6 +239,7 @@ impl Fragments<'_> {
     /// Fills the loops `rings`, each a list of fragments.
     fn fill(&self, rings: &[Vec<usize>], workspace: &Workspace) -> Result<Settled> {
         let mut settled = Settled::default();
+        let unit = workspace.unit();
         for ring in rings {
             workspace.check_cancel()?;
             let edges: usize = ring.iter().map(|&f| self.fragments[f].steps).sum();
@@ -259,54 +247,53 @@ impl Fragments<'_> {
                 settled.too_long();
                 continue;
             };
-            let filling = fill_across(self.places, ring, self.fragments, self.kept, rules)?;
+            let filling = self.fill_across(&unit, ring, rules)?;
             settled.settle(filling, edges);
         }
         Ok(settled)
     }
-}
 
-fn fill_across(
-    places: Places<'_>,
-    ring: &[usize],
-    fragments: &[Fragment],
-    kept: &Table<FragmentRow>,
-    rules: LoopRules<'_>,
-) -> Result<Filling> {
-    let mut parts: Vec<(u32, u32, bool)> = Vec::new();
-    let mut edges: FxHashMap<u32, Vec<u32>> = FxHashMap::default();
-    for &f in ring {
-        let Some(section) = fragments[f].kept else {
-            return Ok(Filling::Impossible);
-        };
-        for step in kept.get(section)?.chunk_by(|a, b| a.id == b.id) {
-            let FragmentRow {
-                id, apex, pinched, ..
-            } = step[0];
-            edges.insert(id, step.iter().map(|row| row.neighbor).collect());
-            parts.push((id, apex, pinched == 1));
+    /// Fills the loop of fragments `ring`.
+    fn fill_across(
+        &self,
+        unit: &Unit<'_>,
+        ring: &[usize],
+        rules: LoopRules<'_>,
+    ) -> Result<Filling> {
+        let places = self.places;
+        let mut rows = Vec::new();
+        let mut parts: Vec<(u32, u32, bool)> = Vec::new();
+        let mut edges: FxHashMap<u32, Vec<u32>> = FxHashMap::default();
+        for &f in ring {
+            let Some(place) = self.fragments[f].kept else {
+                return Ok(Filling::Impossible);
+            };
+            self.kept.read(unit, place, &mut rows)?;
+            for step in rows.chunk_by(|a, b| a.id == b.id) {
+                let first = step[0];
+                edges.insert(first.id, step.iter().map(|row| row.neighbor).collect());
+                parts.push((first.id, first.apex, first.pinched == 1));
+            }
         }
+        let ids = ascending(parts.iter().flat_map(|&(id, apex, _)| [id, apex]));
+        let mut points = Vec::with_capacity(ids.len());
+        places.shape.fetch(&ids, &mut points)?;
+        let mut in_file = Vec::new();
+        if places.differ() {
+            places.file.fetch(&ids, &mut in_file)?;
+        }
+        let rank = |v: u32| ids.partition_point(|x| *x < v);
+        let at = |v: u32| points[rank(v)];
+        let corner = |&(id, apex, pinched): &(u32, u32, bool)| Corner {
+            id,
+            at: at(id),
+            apex: at(apex),
+            file: *in_file.get(rank(id)).unwrap_or(&at(id)),
+            pinched,
+        };
+        let corners = parts.iter().map(corner).collect();
+        Ok(rules.close(corners, |a, b| {
+            edges.get(&a).is_some_and(|around| around.contains(&b))
+        }))
     }
-    let mut ids: Vec<u32> = parts.iter().flat_map(|&(id, apex, _)| [id, apex]).collect();
-    ids.sort_unstable();
-    ids.dedup();
-    let mut points = Vec::with_capacity(ids.len());
-    places.shape.fetch(&ids, &mut points)?;
-    let mut in_file = Vec::new();
-    if places.differ() {
-        places.file.fetch(&ids, &mut in_file)?;
-    }
-    let rank = |v: u32| ids.partition_point(|x| *x < v);
-    let at = |v: u32| points[rank(v)];
-    let corner = |&(id, apex, pinched): &(u32, u32, bool)| Corner {
-        id,
-        at: at(id),
-        apex: at(apex),
-        file: *in_file.get(rank(id)).unwrap_or(&at(id)),
-        pinched,
-    };
-    let corners = parts.iter().map(corner).collect();
-    Ok(rules.close(corners, |a, b| {
-        edges.get(&a).is_some_and(|around| around.contains(&b))
-    }))
 }

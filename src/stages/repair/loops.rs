@@ -1,7 +1,7 @@
 //! Boundary loops: the succession of boundary edges at the vertices of a block.
 
-use super::OrientedTriangle;
-use crate::geom::triangle::normal;
+use super::{OrientedTriangle, ascending};
+use crate::geom::triangle::{add, normal};
 use crate::geom::{Point, sub};
 use crate::stages::surface::star::{Link, Star, others};
 
@@ -113,12 +113,9 @@ fn ids(t: &[u32; 4]) -> OrientedTriangle {
 
 /// The other two vertices of an oriented triangle, in their order after `v`.
 fn after(t: OrientedTriangle, v: u32) -> [u32; 2] {
-    if t[0] == v {
-        [t[1], t[2]]
-    } else if t[1] == v {
-        [t[2], t[0]]
-    } else {
-        [t[0], t[1]]
+    match t {
+        [at, a, b] | [b, at, a] if at == v => [a, b],
+        [a, b, _] => [a, b],
     }
 }
 
@@ -134,16 +131,13 @@ fn fan<'a>(
     let mut sum = [0i128; 3];
     for [a, b] in edges {
         let n = normal(position(v), position(a), position(b));
-        for axis in 0..3 {
-            sum[axis] += n[axis];
-        }
+        add(&mut sum, n);
     }
-    let component = members.clone().next()?[3];
     Some(Fan {
         start,
         end,
         apex,
-        component,
+        component: members.clone().next()?[3],
         normal: sum,
     })
 }
@@ -161,9 +155,7 @@ fn pair_up(
     for (x, a) in fans.iter().enumerate() {
         let mut axis = [0i128; 3];
         for b in fans.iter().filter(|b| b.component == a.component) {
-            for (sum, part) in axis.iter_mut().zip(b.normal) {
-                *sum += part;
-            }
+            add(&mut axis, b.normal);
         }
         let axis = axis.map(|c| c as f64);
         for (y, b) in fans.iter().enumerate() {
@@ -232,12 +224,6 @@ fn clockwise(axis: [f64; 3], s: [f64; 3], e: [f64; 3]) -> u64 {
 
 /// The one-ring of a vertex: all vertices connected to it by an edge.
 pub fn neighbors(star: &Star, triangles: &[[u32; 4]], v: u32) -> Vec<u32> {
-    let mut all: Vec<u32> = star
-        .at(v)
-        .iter()
-        .flat_map(|&n| others(ids(&triangles[n as usize]), v))
-        .collect();
-    all.sort_unstable();
-    all.dedup();
-    all
+    let around = star.at(v).iter();
+    ascending(around.flat_map(|&n| others(ids(&triangles[n as usize]), v)))
 }

@@ -22,20 +22,17 @@ mod surface;
 #[cfg(test)]
 mod tests;
 
-pub use rim::NumberingInput;
-pub use surface::{ComponentRun, Surface};
+pub use rim::{NumberingInput, Vertices};
+pub use surface::{ComponentRun, StoredSurface, Surface};
 
 use crate::error::Result;
-use crate::spill::{Table, row};
+use crate::spill::{Shuffle, release, row};
 use crate::stages::blocks::Blocks;
 use crate::stages::located::Places;
 use crate::stages::stitch::Stitched;
 use crate::workspace::Workspace;
-use crate::workspace::persist::persist;
 use boundary::LoopRules;
-use serde::Serialize;
-
-const SHUFFLE_BUFFER: u64 = 8 << 20;
+use serde::{Deserialize, Serialize};
 
 /// An oriented triangle, starting with its smallest vertex.
 pub type OrientedTriangle = [u32; 3];
@@ -50,6 +47,14 @@ pub fn from_smallest([a, b, c]: [u32; 3]) -> OrientedTriangle {
     } else {
         [c, a, b]
     }
+}
+
+/// All different items, ascending.
+fn ascending<T: Ord>(items: impl IntoIterator<Item = T>) -> Vec<T> {
+    let mut all: Vec<T> = items.into_iter().collect();
+    all.sort_unstable();
+    all.dedup();
+    all
 }
 
 row! {
@@ -73,15 +78,17 @@ row! {
 }
 
 /// The finished surface.
-#[derive(Debug)]
+#[derive(Debug, Serialize, Deserialize)]
 pub struct Repaired {
     /// The triangles of each block, except those that fill holes.
-    pub surface: Surface,
+    pub surface: StoredSurface,
     /// Triangles that fill holes.
-    pub filled: Table<FilledTriangle>,
+    pub filled: Shuffle<FilledTriangle>,
     /// The input for numbering vertices and triangles.
     pub numbering: NumberingInput,
 }
+
+release!(Repaired: surface, filled, numbering);
 
 /// The parameters of repair.
 #[derive(Debug, Clone, Copy)]
@@ -99,7 +106,7 @@ pub struct RepairOptions {
 }
 
 /// Counts of this stage.
-#[derive(Debug, Clone, Copy, Default, Serialize, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize, PartialEq, Eq)]
 pub struct RepairStats {
     /// Edges flipped.
     pub edges_flipped: u64,
@@ -148,44 +155,11 @@ impl RepairOptions {
     }
 }
 
-impl RepairStats {
-    fn add(&mut self, more: &Self) {
-        self.edges_flipped += more.edges_flipped;
-        self.bridges_removed += more.bridges_removed;
-        self.components_found += more.components_found;
-        self.components_removed += more.components_removed;
-        self.component_triangles_removed += more.component_triangles_removed;
-        self.gaps_closed += more.gaps_closed;
-        self.holes_found += more.holes_found;
-        self.holes_filled += more.holes_filled;
-        self.holes_zipped += more.holes_zipped;
-        self.holes_outline += more.holes_outline;
-        self.holes_too_long += more.holes_too_long;
-        self.holes_not_filled += more.holes_not_filled;
-        self.hole_triangles += more.hole_triangles;
-    }
-}
-
-persist!(Repaired {
-    surface,
-    filled,
-    numbering
-});
-persist!(RepairStats {
-    edges_flipped,
-    bridges_removed,
-    components_found,
-    components_removed,
-    component_triangles_removed,
-    gaps_closed,
-    holes_found,
-    holes_filled,
-    holes_zipped,
-    holes_outline,
-    holes_too_long,
-    holes_not_filled,
-    hole_triangles
-});
+adds!(
+    RepairStats: edges_flipped, bridges_removed, components_found, components_removed,
+    component_triangles_removed, gaps_closed, holes_found, holes_filled, holes_zipped,
+    holes_outline, holes_too_long, holes_not_filled, hole_triangles
+);
 
 /// Repairs and orients the surface.
 ///
@@ -194,14 +168,12 @@ persist!(RepairStats {
 /// [`crate::Error::Cancelled`].
 pub fn repair(
     places: Places<'_>,
-    stitched: Stitched,
+    stitched: &Stitched,
     blocks: Blocks,
     options: RepairOptions,
     workspace: &Workspace,
 ) -> Result<(Repaired, RepairStats)> {
-    let (surface, mut stats) = workspace.once("surface", || {
-        surface::build(places, stitched, blocks, options, workspace)
-    })?;
+    let (surface, mut stats) = surface::build(places, stitched, blocks, options, workspace)?;
     let limit = options.filling(places);
     let (filled, numbering) = holes::fill(places, &surface, limit, blocks, &mut stats, workspace)?;
     let repaired = Repaired {

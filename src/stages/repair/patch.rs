@@ -7,7 +7,7 @@
 use crate::stages::surface::parity::ParitySets;
 use crate::stages::surface::sides::{pair_edges, parts};
 use crate::stages::surface::star::{EDGES, Triangle};
-use crate::workspace::memory::{Holding, bytes_of, hold};
+use crate::workspace::memory::bytes_of;
 use std::ops::Range;
 
 /// Labels and boundary of the triangles that touch a block. Triangles with the same label are connected.
@@ -23,7 +23,6 @@ pub struct Patch {
     pub open: Vec<bool>,
     /// For each vertex of the block, the number of boundary edges at it, up to 255.
     pub rims: Vec<u8>,
-    _held: Holding,
 }
 
 /// The word of a triangle without a label.
@@ -87,12 +86,23 @@ impl Patch {
             ids,
             triangles,
         };
-        let words = bytes_of(&builder.labels.words);
-        let held = hold(words + bytes_of(&builder.open) + bytes_of(&builder.rims));
         builder.inside();
         builder.across();
         builder.labels.complete();
-        builder.number(held)
+        builder.number()
+    }
+
+    /// Bytes needed to build the patch of a number of triangles and vertices: its own lists, and those with
+    /// which pairs of triangles are found.
+    #[must_use]
+    pub fn estimate(triangles: usize, vertices: usize) -> u64 {
+        (9 * triangles + 17 * vertices) as u64
+    }
+
+    /// Allocated bytes.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        bytes_of(&self.words) + bytes_of(&self.open) + bytes_of(&self.rims)
     }
 }
 
@@ -125,7 +135,11 @@ impl Builder<'_> {
             if self.ids.contains(&t[0]) && self.ids.contains(&t[2]) {
                 continue;
             }
-            self.mixed_edges(number as u32, *t, &mut edges);
+            for (a, b, _, up) in EDGES {
+                if self.ids.contains(&t[a]) != self.ids.contains(&t[b]) {
+                    edges.push((t[a], t[b], number as u32, up));
+                }
+            }
         }
         edges.sort_unstable();
         let mut rest = &edges[..];
@@ -146,23 +160,14 @@ impl Builder<'_> {
         }
     }
 
-    fn mixed_edges(&self, number: u32, t: Triangle, edges: &mut Vec<(u32, u32, u32, bool)>) {
-        for (a, b, _, up) in EDGES {
-            if self.ids.contains(&t[a]) != self.ids.contains(&t[b]) {
-                edges.push((t[a], t[b], number, up));
-            }
-        }
-    }
-
     /// Numbers the labels; those with triangles that are not interior come first.
-    fn number(self, held: Holding) -> Patch {
+    fn number(self) -> Patch {
         let Labels {
             mut words,
             mut sets,
         } = self.labels;
         sets.flatten();
         let mut numbers = vec![NONE; sets.len()];
-        let _numbers = hold(2 * bytes_of(&numbers));
         let mut labels = 0;
         let mut number = |label: u32| {
             let (root, flip) = sets.look(label);
@@ -188,7 +193,6 @@ impl Builder<'_> {
             global,
             open: self.open,
             rims: self.rims,
-            _held: held,
         }
     }
 }

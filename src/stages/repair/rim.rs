@@ -1,18 +1,18 @@
 //! The boundary of the surface in a block: triangles, steps of boundary loops and pinched vertices.
 
-use super::SurfaceTriangle;
 use super::fill::Corner;
 use super::loops::{Step, neighbors, steps};
 use super::rows::RimBits;
 use super::surface::Surface;
+use super::{SurfaceTriangle, ascending};
 use crate::error::Result;
-use crate::spill::{Id, Table, row};
+use crate::spill::{Id, Table, release, row};
 use crate::stages::blocks::Blocks;
 use crate::stages::located::{Located, Places};
 use crate::stages::surface::star::Star;
-use crate::workspace::Workspace;
-use crate::workspace::memory::{Holding, Reservation, bytes_of, hold};
-use crate::workspace::persist::{Persist, Saved, persist};
+use crate::workspace::memory::{Reservation, bytes_of};
+use crate::workspace::{Unit, Workspace};
+use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
 row! {
@@ -42,10 +42,8 @@ row! {
 }
 
 /// The input for numbering the vertices and triangles of the mesh.
-#[derive(Debug)]
+#[derive(Debug, Serialize, Deserialize)]
 pub struct NumberingInput {
-    /// One bit for each point, 64 in a word: set if it is a vertex.
-    pub used: Vec<u64>,
     /// For each block, the number of triangles whose smallest vertex is in it, without those that fill holes.
     pub faces: Vec<u32>,
     /// Edges with exactly one triangle, after holes were filled.
@@ -54,128 +52,83 @@ pub struct NumberingInput {
     pub pinches: Table<Id>,
     /// All triangles at these vertices before holes were filled, oriented.
     pub pinched: Table<SurfaceTriangle>,
-    /// The bits of `used`, by block.
+    /// The points that are vertices, by block.
     bits: Table<UsedBits>,
     blocks: Blocks,
+}
+
+release!(NumberingInput: pinches, pinched, bits);
+
+/// The points that are vertices of the mesh.
+#[derive(Debug)]
+pub struct Vertices {
+    /// One bit for each point, 64 in a word: set if it is a vertex.
+    pub used: Vec<u64>,
     _held: Reservation,
 }
 
-/// The tables to which blocks write their boundary.
-#[derive(Debug)]
-pub(super) struct RimFiles {
-    bits: Table<UsedBits>,
-    pinches: Table<Id>,
-    pinched: Table<SurfaceTriangle>,
-}
-
 /// Counts of a block's boundary.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 pub(super) struct RimCounts {
-    faces: u32,
-    steps: u64,
+    /// Number of triangles whose smallest vertex is in the block.
+    pub faces: u32,
+    /// Number of steps of boundary loops.
+    pub steps: u64,
 }
 
-persist!(RimCounts { faces, steps });
-
-impl RimFiles {
-    /// Creates the tables.
-    pub(super) fn create(workspace: &Workspace, count: usize) -> Result<Self> {
-        Ok(Self {
-            bits: Table::create(workspace, "repair.used", count)?,
-            pinches: Table::create(workspace, "repair.pinches", count)?,
-            pinched: Table::create(workspace, "repair.pinched", count)?,
-        })
+impl NumberingInput {
+    /// The tables to which the blocks write their boundary, without counts.
+    pub(super) fn new(blocks: Blocks) -> Self {
+        let count = blocks.count();
+        Self {
+            faces: Vec::new(),
+            boundary_edges: 0,
+            pinches: Table::new("repair.pinches", count),
+            pinched: Table::new("repair.pinched", count),
+            bits: Table::new("repair.used", count),
+            blocks,
+        }
     }
 
     /// Writes the boundary of a block.
-    pub(super) fn put(&self, block: usize, found: &BlockRim) -> Result<RimCounts> {
-        let words = found.used.iter();
+    pub(super) fn put(&self, unit: &Unit<'_>, found: &BlockRim) -> Result<RimCounts> {
+        let block = unit.number();
         let bits = |word: &u64| UsedBits {
             low: *word as u32,
             high: (*word >> 32) as u32,
         };
-        self.bits.put(block, &words.map(bits).collect::<Vec<_>>())?;
-        self.pinches.put(block, &found.pinches)?;
-        self.pinched.put(block, &found.pinched())?;
+        let words: Vec<_> = found.used.iter().map(bits).collect();
+        self.bits.put(unit, block, &words)?;
+        self.pinches.put(unit, block, &found.pinches)?;
+        self.pinched.put(unit, block, &found.pinched())?;
         Ok(RimCounts {
             faces: found.faces,
             steps: found.steps.len() as u64,
         })
     }
 
-    /// Collects the boundaries of all blocks.
-    pub(super) fn numbering_input(
-        self,
-        found: &[RimCounts],
-        blocks: Blocks,
-        workspace: &Workspace,
-    ) -> Result<NumberingInput> {
-        let faces = found.iter().map(|counts| counts.faces).collect();
-        let boundary_edges = found.iter().map(|counts| counts.steps).sum();
-        let (used, held) = bits(&self.bits, blocks, workspace)?;
-        Ok(NumberingInput {
-            used,
-            faces,
-            boundary_edges,
-            pinches: self.pinches,
-            pinched: self.pinched,
-            bits: self.bits,
-            blocks,
-            _held: held,
-        })
-    }
-}
-
-/// The bits of all blocks, concatenated.
-fn bits(
-    bits: &Table<UsedBits>,
-    blocks: Blocks,
-    workspace: &Workspace,
-) -> Result<(Vec<u64>, Reservation)> {
-    let (words, count) = (blocks.points().div_ceil(64) + 1, blocks.count());
-    let held = workspace.reserve("vertices", (words * 8 + count * 4) as u64)?;
-    let mut used = vec![0u64; words];
-    // In a finished run the bits are not read any more.
-    let count = if bits.is_gone() { 0 } else { count };
-    for block in 0..count {
-        let ids = blocks.ids(block);
-        let (first, shift) = (ids.start as usize / 64, ids.start % 64);
-        for (n, UsedBits { low, high }) in bits.get(block)?.into_iter().enumerate() {
-            let word = u64::from(high) << 32 | u64::from(low);
-            used[first + n] |= word << shift;
-            if shift > 0 {
-                used[first + n + 1] |= word >> (64 - shift);
+    /// Reads which points are vertices.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`].
+    pub fn open(&self, workspace: &Workspace) -> Result<Vertices> {
+        let (blocks, unit) = (self.blocks, workspace.unit());
+        let (words, count) = (blocks.points().div_ceil(64) + 1, blocks.count());
+        let held = workspace.reserve("vertices", (words * 8 + count * 4) as u64)?;
+        let mut used = vec![0u64; words];
+        for block in 0..count {
+            let ids = blocks.ids(block);
+            let (first, shift) = (ids.start as usize / 64, ids.start % 64);
+            let bits = self.bits.get(&unit, block)?.into_iter();
+            for (n, UsedBits { low, high }) in bits.enumerate() {
+                let word = u64::from(high) << 32 | u64::from(low);
+                used[first + n] |= word << shift;
+                if shift > 0 {
+                    used[first + n + 1] |= word >> (64 - shift);
+                }
             }
         }
-    }
-    Ok((used, held))
-}
-
-impl Persist for NumberingInput {
-    fn save(&self, out: &mut Vec<u8>) {
-        self.faces.save(out);
-        self.boundary_edges.save(out);
-        self.pinches.save(out);
-        self.pinched.save(out);
-        self.bits.save(out);
-        self.blocks.save(out);
-    }
-
-    fn load(from: &mut Saved<'_>) -> Result<Self> {
-        let (faces, boundary_edges) = Persist::load(from)?;
-        let (pinches, pinched) = Persist::load(from)?;
-        let (files, blocks) = <(Table<UsedBits>, Blocks)>::load(from)?;
-        let (used, held) = bits(&files, blocks, from.workspace)?;
-        Ok(Self {
-            used,
-            faces,
-            boundary_edges,
-            pinches,
-            pinched,
-            bits: files,
-            blocks,
-            _held: held,
-        })
+        Ok(Vertices { used, _held: held })
     }
 }
 
@@ -196,18 +149,18 @@ pub struct BlockRim {
     pub steps: Vec<Step>,
     /// Vertices with several fans, ascending.
     pub pinches: Vec<Id>,
-    held: Holding,
 }
 
 impl BlockRim {
     pub(super) fn load(
+        unit: &Unit<'_>,
         places: Places<'_>,
-        surface: &Surface,
+        surface: &Surface<'_>,
         blocks: Blocks,
-        block: usize,
     ) -> Result<Self> {
+        let block = unit.number();
         let ids = blocks.ids(block);
-        let rims = surface.rims(block)?;
+        let rims = surface.rims(unit, block)?;
         let mut rim = Self {
             used: vec![0; ids.len().div_ceil(64)],
             faces: 0,
@@ -217,26 +170,17 @@ impl BlockRim {
             file: None,
             steps: Vec::new(),
             pinches: Vec::new(),
-            held: Holding::default(),
             ids: ids.clone(),
         };
-        rim.pick(surface, block, &rims)?;
+        rim.pick(unit, surface, &rims)?;
         if rim.triangles.is_empty() {
             return Ok(rim);
         }
         let plain = || rim.triangles.iter().map(|t| [t[0], t[1], t[2]]);
         rim.star = Star::of(ids.clone(), &plain().collect::<Vec<_>>());
-        rim.shape = Located::load(places.shape, blocks, block, plain().flatten())?;
-        rim.file = if places.differ() {
-            Some(Located::load(
-                places.file,
-                blocks,
-                block,
-                plain().flatten(),
-            )?)
-        } else {
-            None
-        };
+        let load = |store| Located::load(store, blocks, block, plain().flatten());
+        rim.shape = load(places.shape)?;
+        rim.file = places.differ().then(|| load(places.file)).transpose()?;
         let on_rim = |v: &u32| bit(&rims, v - ids.start);
         let mut pinches = Vec::new();
         let position = |v| rim.shape.at(v);
@@ -244,15 +188,20 @@ impl BlockRim {
         let vertices = ids.clone().filter(on_rim);
         rim.steps = steps(vertices, &rim.star, &rim.triangles, position, pinch);
         rim.pinches = pinches;
-        rim.held
-            .set(bytes_of(&rim.triangles) + bytes_of(&rim.steps) + bytes_of(&rim.used));
         Ok(rim)
     }
 
+    /// Allocated bytes.
+    pub fn bytes(&self) -> u64 {
+        let lists = bytes_of(&self.triangles) + bytes_of(&self.steps) + bytes_of(&self.used);
+        let file = self.file.as_ref().map_or(0, Located::bytes);
+        lists + self.star.bytes() + self.shape.bytes() + file
+    }
+
     /// Selects the triangles at vertices with a boundary edge from all triangles of the block.
-    fn pick(&mut self, surface: &Surface, block: usize, rims: &[RimBits]) -> Result<()> {
-        let (triangles, runs) = surface.load(block)?;
-        let mut held = hold(bytes_of(&triangles) + bytes_of(&runs));
+    fn pick(&mut self, unit: &Unit<'_>, surface: &Surface<'_>, rims: &[RimBits]) -> Result<()> {
+        let (triangles, runs) = surface.load(unit, unit.number())?;
+        let mut held = unit.hold(bytes_of(&triangles) + bytes_of(&runs));
         let size = self.ids.len() as u32;
         let mut rest = &triangles[..];
         for run in runs {
@@ -299,13 +248,10 @@ impl BlockRim {
     /// All triangles at pinched vertices, ascending by sorted ids.
     pub fn pinched(&self) -> Vec<SurfaceTriangle> {
         let at = |v: &Id| self.star.at(v.id).iter().copied();
-        let mut numbers: Vec<u32> = self.pinches.iter().flat_map(at).collect();
-        numbers.sort_unstable();
-        numbers.dedup();
+        let numbers = ascending(self.pinches.iter().flat_map(at));
         let row = |n: u32| {
             let [a, b, c, _] = self.triangles[n as usize];
-            let corners = [a, b, c];
-            SurfaceTriangle { corners }
+            SurfaceTriangle { corners: [a, b, c] }
         };
         numbers.into_iter().map(row).collect()
     }

@@ -4,43 +4,58 @@
 //! orients the components that lie entirely in the block, and removes small ones. The labels of components
 //! that extend further are merged through the triangles that several blocks see.
 
+use super::around::Around;
 use super::components::{Parts, join};
 use super::facing::{Fate, Sums, SumsRow, judge};
+use super::flips::Sheet;
 use super::patch::Patch;
 use super::rows::{LabelRun, RimBits, SeenTriangle};
-use super::{
-    OrientedTriangle, RepairOptions, RepairStats, SHUFFLE_BUFFER, SurfaceTriangle, around, bridges,
-    flips,
-};
+use super::{OrientedTriangle, RepairOptions, RepairStats, SurfaceTriangle, bridges};
 use crate::error::Result;
 use crate::geom::Point;
-use crate::spill::{Shuffle, Table};
+use crate::spill::{Inbox, Shuffle, Table, release};
 use crate::stages::blocks::Blocks;
 use crate::stages::located::Places;
 use crate::stages::stitch::Stitched;
 use crate::stages::surface::parity::constraint;
 use crate::stages::surface::rows::TriangleTo;
 use crate::stages::surface::star::Triangle;
-use crate::workspace::Workspace;
-use crate::workspace::memory::{Reservation, bytes_of, hold};
-use crate::workspace::persist::{Persist, Saved};
+use crate::workspace::memory::{Reservation, bytes_of};
+use crate::workspace::{Unit, Workspace};
+use serde::{Deserialize, Serialize};
 
 /// The oriented surface, without small components and bridges.
-#[derive(Debug)]
-pub struct Surface {
+#[derive(Debug, Serialize, Deserialize)]
+pub struct StoredSurface {
     /// Triangles that touch each block, ascending, oriented relative to their label.
     triangles: Table<SurfaceTriangle>,
     /// The labels of these triangles; global labels come first.
     runs: Table<LabelRun>,
     /// The vertices of each block that have a boundary edge.
     rims: Table<RimBits>,
-    /// Bridges at crossing triangles, once for each block that they touch.
-    bridges: Table<TriangleTo>,
+    /// Bridges at crossing triangles, once or more for each block that they touch.
+    bridges: Shuffle<TriangleTo>,
+    labels: Labels,
+}
+
+release!(StoredSurface: triangles, runs, rims, bridges);
+
+/// The global labels: those of triangles that several blocks see.
+#[derive(Debug, Serialize, Deserialize)]
+struct Labels {
     /// For each block, the number of its first global label, and how many global labels it has.
     globals: Vec<(u32, u32)>,
     /// For each global label its component, and the decision about it.
     components: Vec<u32>,
     fates: Vec<Fate>,
+}
+
+/// The surface while it is read.
+#[derive(Debug)]
+pub struct Surface<'a> {
+    stored: &'a StoredSurface,
+    /// Bridges at crossing triangles, once for each block that they touch.
+    bridges: Inbox<TriangleTo>,
     _held: Reservation,
 }
 
@@ -53,20 +68,45 @@ pub struct ComponentRun {
     pub component: u32,
 }
 
-impl Surface {
+impl StoredSurface {
+    /// Opens the surface.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`].
+    pub fn open(&self, workspace: &Workspace) -> Result<Surface<'_>> {
+        let (labels, blocks) = (self.labels.components.len(), self.labels.globals.len());
+        Ok(Surface {
+            _held: workspace.reserve("labels", label_bytes(labels, blocks))?,
+            bridges: self.bridges.open(workspace, blocks)?.unique(),
+            stored: self,
+        })
+    }
+}
+
+impl Surface<'_> {
     /// An upper bound on the number of triangles that touch a block.
     #[must_use]
-    pub fn records(&self, block: usize) -> usize {
-        self.triangles.rows(block)
+    pub fn records(&self, workspace: &Workspace, block: usize) -> usize {
+        self.stored.triangles.rows(workspace, block)
     }
 
     /// All triangles that touch a block, oriented, ascending by sorted ids; and their components.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
-    pub fn load(&self, block: usize) -> Result<(Vec<OrientedTriangle>, Vec<ComponentRun>)> {
-        let mut triangles: Vec<OrientedTriangle> = bytemuck::cast_vec(self.triangles.get(block)?);
-        let bridges = self.bridges.get(block)?;
+    pub fn load(
+        &self,
+        unit: &Unit<'_>,
+        block: usize,
+    ) -> Result<(Vec<OrientedTriangle>, Vec<ComponentRun>)> {
+        let StoredSurface {
+            triangles,
+            runs,
+            labels,
+            ..
+        } = self.stored;
+        let mut triangles: Vec<OrientedTriangle> = bytemuck::cast_vec(triangles.get(unit, block)?);
+        let bridges = self.bridges.get(unit, block)?;
         let is_bridge = |[i, a, b]: OrientedTriangle| {
             let key = TriangleTo {
                 to: block as u32,
@@ -74,8 +114,8 @@ impl Surface {
             };
             !bridges.is_empty() && bridges.binary_search(&key).is_ok()
         };
-        let (first, globals) = self.globals[block];
-        let runs = self.runs.get(block)?;
+        let (first, globals) = labels.globals[block];
+        let runs = runs.get(unit, block)?;
         let mut kept = Vec::with_capacity(runs.len());
         let (mut from, mut to) = (0, 0);
         for LabelRun { count, label } in runs {
@@ -93,7 +133,7 @@ impl Surface {
                 continue;
             }
             let label = (first + label) as usize;
-            let Fate { keep, turn } = self.fates[label];
+            let Fate { keep, turn } = labels.fates[label];
             if !keep {
                 continue;
             }
@@ -105,7 +145,7 @@ impl Surface {
                 }
             }
             if to > before {
-                kept.push(run(self.components[label] << 1 | 1, before, to));
+                kept.push(run(labels.components[label] << 1 | 1, before, to));
             }
         }
         triangles.truncate(to);
@@ -116,15 +156,14 @@ impl Surface {
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
-    pub fn rims(&self, block: usize) -> Result<Vec<RimBits>> {
-        self.rims.get(block)
+    pub fn rims(&self, unit: &Unit<'_>, block: usize) -> Result<Vec<RimBits>> {
+        self.stored.rims.get(unit, block)
     }
 }
 
-/// The tables to which the blocks write, and the totals.
+/// The tables to which the blocks write.
 struct Build<'a> {
     places: Places<'a>,
-    stitched: &'a Stitched,
     blocks: Blocks,
     options: RepairOptions,
     triangles: Table<SurfaceTriangle>,
@@ -143,62 +182,33 @@ struct Build<'a> {
 /// [`crate::Error::Cancelled`].
 pub fn build(
     places: Places<'_>,
-    stitched: Stitched,
+    stitched: &Stitched,
     blocks: Blocks,
     options: RepairOptions,
     workspace: &Workspace,
-) -> Result<(Surface, RepairStats)> {
-    let build = Build::create(places, &stitched, blocks, options, workspace)?;
-    let bytes = |b: usize| {
-        let records = stitched.interior.rows(b) + stitched.added.rows(b);
-        230 * records as u64 + blocks.ids(b).len() as u64 * 30 + (1 << 20)
+) -> Result<(StoredSurface, RepairStats)> {
+    let count = blocks.count();
+    let build = Build {
+        places,
+        blocks,
+        options,
+        triangles: Table::new("repair.surface", count),
+        runs: Table::new("repair.runs", count),
+        rims: Table::new("repair.rims", count),
+        sums: Table::new("repair.sums", count),
+        bridges: Shuffle::new("repair.bridges"),
+        seen: Shuffle::new("repair.seen"),
     };
-    let work = |block| {
-        let done = build.block(block);
-        done.inspect(|_| workspace.advance(1))
-    };
-    let mut stats = RepairStats::default();
-    let mut own_globals = vec![0u32; blocks.count()];
-    let name = "repair: block";
-    workspace.units(name, blocks.count(), bytes, work, |block, (own, more)| {
-        own_globals[block] = own;
-        stats.add(&more);
-        Ok(())
-    })?;
-    let bridges = build.bridges.deliver_unique(workspace, blocks.count())?;
-    for block in 0..blocks.count() {
-        let own = |b: &&TriangleTo| blocks.of(b.triangle[0]) == b.to;
-        stats.bridges_removed += bridges.get(block)?.iter().filter(own).count() as u64;
-    }
-    let seen = build.seen.deliver(workspace, blocks.count())?;
-    let (triangles, runs, rims, sums) = (build.triangles, build.runs, build.rims, build.sums);
-    drop(stitched);
-    let mut next = 0;
-    let mut globals = Vec::with_capacity(blocks.count());
-    for own in own_globals {
-        globals.push((next, own));
-        next += own;
-    }
-    let held = workspace.reserve("labels", label_bytes(next as usize, globals.len()))?;
-    let sets = join(&seen, &globals, next, workspace)?;
-    let parts = Parts {
-        store: places.shape,
-        seen: &seen,
-        sums: &sums,
-        bridges: &bridges,
-        globals: &globals,
-        sets: &sets,
-    };
-    let (components, fates) = parts.judge(options, &mut stats, workspace)?;
-    let surface = Surface {
-        triangles,
-        runs,
-        rims,
-        bridges,
-        globals,
-        components,
-        fates,
-        _held: held,
+    let (labels, stats) = workspace.once("surface", |unit| build.surface(unit, stitched))?;
+    // The step that reads them is finished.
+    build.sums.release(workspace)?;
+    build.seen.release(workspace)?;
+    let surface = StoredSurface {
+        triangles: build.triangles,
+        runs: build.runs,
+        rims: build.rims,
+        bridges: build.bridges,
+        labels,
     };
     Ok((surface, stats))
 }
@@ -208,73 +218,89 @@ fn label_bytes(labels: usize, blocks: usize) -> u64 {
     (labels * 10 + blocks * 8 + 1024) as u64
 }
 
-impl Persist for Surface {
-    fn save(&self, out: &mut Vec<u8>) {
-        self.triangles.save(out);
-        self.runs.save(out);
-        self.rims.save(out);
-        self.bridges.save(out);
-        self.globals.save(out);
-        self.components.save(out);
-        self.fates.save(out);
-    }
-
-    fn load(from: &mut Saved<'_>) -> Result<Self> {
-        let (triangles, runs, rims) = Persist::load(from)?;
-        let bridges = Persist::load(from)?;
-        let (globals, components, fates): (Vec<_>, Vec<_>, _) = Persist::load(from)?;
-        let bytes = label_bytes(components.len(), globals.len());
-        Ok(Self {
-            triangles,
-            runs,
-            rims,
-            bridges,
-            _held: from.workspace.reserve("labels", bytes)?,
+impl Build<'_> {
+    /// Processes all blocks, and merges their labels.
+    fn surface(&self, unit: &Unit<'_>, stitched: &Stitched) -> Result<(Labels, RepairStats)> {
+        let count = self.blocks.count();
+        let mut stats = RepairStats::default();
+        let (globals, labels) = self.all_blocks(unit, stitched, &mut stats)?;
+        stitched.release(unit)?;
+        let bridges = self.bridges.open(unit, count)?.unique();
+        for block in 0..count {
+            let own = |b: &&TriangleTo| self.blocks.of(b.triangle[0]) == b.to;
+            stats.bridges_removed += bridges.get(unit, block)?.iter().filter(own).count() as u64;
+        }
+        let seen = self.seen.open(unit, count)?;
+        let _held = unit.reserve("labels", label_bytes(labels as usize, count))?;
+        let sets = join(unit, &seen, &globals, labels)?;
+        let parts = Parts {
+            store: self.places.shape,
+            seen: &seen,
+            sums: &self.sums,
+            bridges: &bridges,
+            globals: &globals,
+            sets: &sets,
+        };
+        let (components, fates) = parts.judge(unit, self.options, &mut stats)?;
+        let labels = Labels {
             globals,
             components,
             fates,
-        })
+        };
+        Ok((labels, stats))
     }
-}
 
-impl<'a> Build<'a> {
-    fn create(
-        places: Places<'a>,
-        stitched: &'a Stitched,
-        blocks: Blocks,
-        options: RepairOptions,
+    /// Processes all blocks; returns the numbers of their global labels as in [`Labels`], and how many there
+    /// are.
+    fn all_blocks(
+        &self,
         workspace: &Workspace,
-    ) -> Result<Self> {
-        let (count, buffer) = (blocks.count(), SHUFFLE_BUFFER);
-        Ok(Self {
-            places,
-            stitched,
-            blocks,
-            options,
-            triangles: Table::create(workspace, "repair.surface", count)?,
-            runs: Table::create(workspace, "repair.runs", count)?,
-            rims: Table::create(workspace, "repair.rims", count)?,
-            sums: Table::create(workspace, "repair.sums", count)?,
-            bridges: Shuffle::between_units(workspace, "repair.bridges", buffer, count)?,
-            seen: Shuffle::between_units(workspace, "repair.seen", buffer, count)?,
-        })
+        stitched: &Stitched,
+        stats: &mut RepairStats,
+    ) -> Result<(Vec<(u32, u32)>, u32)> {
+        let count = self.blocks.count();
+        let around = Around::open(stitched, self.blocks, workspace)?;
+        let bytes = |b: usize| {
+            let records = around.records(workspace, b);
+            230 * records as u64 + self.blocks.ids(b).len() as u64 * 30 + (1 << 20)
+        };
+        let work = |unit: &Unit<'_>| {
+            let done = self.block(unit, &around);
+            done.inspect(|_| unit.advance(1))
+        };
+        let mut globals = vec![(0, 0); count];
+        workspace.units("repair: block", count, bytes, work, |block, (own, more)| {
+            globals[block].1 = own;
+            stats.add(&more);
+            Ok(())
+        })?;
+        let mut next = 0;
+        for (first, own) in &mut globals {
+            *first = next;
+            next += *own;
+        }
+        Ok((globals, next))
     }
 
     /// Processes a block; returns the number of its global labels, and counts.
-    fn block(&self, block: usize) -> Result<(u32, RepairStats)> {
+    fn block(&self, unit: &Unit<'_>, around: &Around<'_>) -> Result<(u32, RepairStats)> {
+        let block = unit.number();
         let ids = self.blocks.ids(block);
-        let mut triangles = around::load(self.stitched, block)?;
-        let _held = hold(bytes_of(&triangles));
+        let mut triangles = around.load(unit, block)?;
         let range = ids.start as usize..ids.end as usize;
         let shape = self.places.shape.slice(range.clone())?;
-        let _shape = hold(bytes_of(&shape));
+        let lists = bytes_of(&triangles) + bytes_of(&shape);
+        let mut held = unit.hold(lists);
         let mut stats = RepairStats::default();
         if self.options.repair && self.options.flip && self.places.differ() {
             let points = self.places.file.slice(range)?;
-            let _held = hold(bytes_of(&points));
-            stats.edges_flipped = flips::flip(ids.clone(), &mut triangles, &points, &shape);
+            let sheet = Sheet::of(ids.clone(), &triangles, &points, &shape);
+            held.set(lists + bytes_of(&points) + sheet.bytes());
+            stats.edges_flipped = sheet.flip(&mut triangles);
         }
+        held.set(lists + Patch::estimate(triangles.len(), ids.len()));
         let patch = Patch::of(ids.clone(), &triangles);
+        held.set(lists + patch.bytes());
         let bridges = if self.options.repair {
             bridges::find(ids.clone(), &triangles, &patch)
         } else {
@@ -284,19 +310,19 @@ impl<'a> Build<'a> {
         for (v, _) in patch.rims.iter().enumerate().filter(|(_, n)| **n > 0) {
             rims[v / 32].bits |= 1 << (v % 32);
         }
-        self.rims.put(block, &rims)?;
+        self.rims.put(unit, block, &rims)?;
         let sums = self.sum(block, &shape, &triangles, &patch, &bridges);
         let (global, local) = sums.split_at(patch.global as usize);
         let global: Vec<SumsRow> = global.iter().map(Sums::row).collect();
-        let held = hold(bytes_of(&sums) + bytes_of(&global));
-        self.sums.put(block, &global)?;
+        let more = unit.hold(bytes_of(&sums) + bytes_of(&global));
+        self.sums.put(unit, block, &global)?;
         let least = self.options.least();
         let fates: Vec<Fate> = local.iter().map(|s| judge(s, least, &mut stats)).collect();
-        drop((sums, global, held));
+        drop((sums, global, more));
         let interior = |n: &&u32| !self.blocks.crossing(triangles[**n as usize]);
         stats.bridges_removed = bridges.iter().filter(interior).count() as u64;
-        self.send(block, &triangles, &patch, &bridges)?;
-        self.write(block, triangles, &patch, &bridges, &fates)?;
+        self.send(unit, &triangles, &patch, &bridges)?;
+        self.write(unit, triangles, &patch, &bridges, &fates)?;
         Ok((patch.global, stats))
     }
 
@@ -311,7 +337,6 @@ impl<'a> Build<'a> {
     ) -> Vec<Sums> {
         let ids = self.blocks.ids(block);
         let mut sums = vec![Sums::default(); patch.labels as usize];
-        let _held = hold(bytes_of(&sums));
         let mut bridges = bridges.iter().peekable();
         for (number, t) in triangles.iter().enumerate() {
             let (label, flip) = constraint(patch.words[number]);
@@ -334,11 +359,12 @@ impl<'a> Build<'a> {
     /// them.
     fn send(
         &self,
-        block: usize,
+        unit: &Unit<'_>,
         triangles: &[Triangle],
         patch: &Patch,
         bridges: &[u32],
     ) -> Result<()> {
+        let block = unit.number();
         let ids = self.blocks.ids(block);
         let mut seen = Vec::new();
         let mut found = Vec::new();
@@ -359,14 +385,14 @@ impl<'a> Build<'a> {
                 found.extend(self.blocks.visited(t).map(to));
             }
         }
-        self.seen.send_from(block, &seen)?;
-        self.bridges.send_from(block, &found)
+        self.seen.send(unit, block, seen)?;
+        self.bridges.send(unit, block, found)
     }
 
     /// Writes the remaining triangles, oriented.
     fn write(
         &self,
-        block: usize,
+        unit: &Unit<'_>,
         mut triangles: Vec<Triangle>,
         patch: &Patch,
         bridges: &[u32],
@@ -397,7 +423,7 @@ impl<'a> Build<'a> {
             }
         }
         let rows = bytemuck::cast_slice(&triangles[..kept]);
-        self.triangles.put(block, rows)?;
-        self.runs.put(block, &runs)
+        self.triangles.put(unit, unit.number(), rows)?;
+        self.runs.put(unit, unit.number(), &runs)
     }
 }

@@ -3,11 +3,12 @@
 use super::boundary::LoopRules;
 use super::ear_clipping::zip;
 use super::fill::{Corner, Filling};
-use super::flips::flip;
+use super::flips;
 use crate::geom::{Point, distance2};
 use crate::stages::surface::star::Triangle;
 use proptest::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
 
 /// A surface near a plane, with oriented triangles.
 #[derive(Debug, Clone)]
@@ -303,6 +304,11 @@ fn valley(across: bool) -> (Vec<Point>, Vec<Triangle>) {
     let mut triangles: Vec<Triangle> = squares.flat_map(halves).collect();
     triangles.sort_unstable();
     ((0..36).map(point).collect(), triangles)
+}
+
+/// Flips edges of `triangles`, and returns the number of flips.
+fn flip(ids: Range<u32>, triangles: &mut Vec<Triangle>, points: &[Point], shape: &[Point]) -> u64 {
+    flips::Sheet::of(ids, triangles, points, shape).flip(triangles)
 }
 
 /// Displaced points, as after relaxing.

@@ -3,15 +3,16 @@
 
 use super::Relaxing;
 use super::edges::WeightedNeighbors;
-use super::fits::Planes;
 use super::seen::Roughness;
 use crate::error::Result;
 use crate::geom::Point;
 use crate::method::METHOD;
+use crate::stages::cells::Planes;
 use crate::stages::order::PointStore;
 use crate::stages::spacing::is_far;
-use crate::workspace::memory::{bytes_of, hold};
-use crate::workspace::persist::persist;
+use crate::workspace::Unit;
+use crate::workspace::memory::bytes_of;
+use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
 /// Bytes for each point of a region: the results for samples, the set of witnesses, and lists.
@@ -27,15 +28,8 @@ fn region() -> usize {
 /// A sample: its id, the position to which it would move, and true if it is rough.
 type Target = (u32, Point, bool);
 
-/// The results for the samples of some regions.
-struct Examined {
-    /// The target of each sample.
-    targets: Vec<Target>,
-    /// The usual reach, squared, by patch.
-    usual2: Vec<u64>,
-}
-
 /// The result of the first round for some regions.
+#[derive(Serialize, Deserialize)]
 pub(super) struct Done {
     /// For each run, true if it moves.
     pub active: Vec<bool>,
@@ -45,23 +39,18 @@ pub(super) struct Done {
     pub usual2: Vec<u64>,
 }
 
-persist!(Done {
-    active,
-    seen,
-    usual2
-});
-
 /// Moves the `points` of the regions with the ids `ids`.
 pub(super) fn examine_and_move(
+    unit: &Unit<'_>,
     store: &PointStore,
     ids: Range<usize>,
     relaxing: Relaxing,
     points: &mut [Point],
 ) -> Result<Done> {
     let neighbors = relaxing.neighbors;
-    let planes = Planes::load(store, ids.clone(), neighbors)?;
-    let Examined { targets, usual2 } = look(&planes, relaxing, &ids)?;
-    let _held = hold(bytes_of(&targets) + bytes_of(&usual2));
+    let planes = Planes::load(unit, store, ids.clone(), |_| true, neighbors)?;
+    let (targets, usual2) = look(&planes, relaxing, &ids)?;
+    let _held = unit.hold(bytes_of(&targets) + bytes_of(&usual2));
     let active = if relaxing.rounds > 0 {
         choose(&planes, relaxing, &targets, &ids)?
     } else {
@@ -96,8 +85,12 @@ fn is_sampled(id: usize) -> bool {
     (id / METHOD.curve.run).is_multiple_of(METHOD.curve.sample)
 }
 
-/// Examines the samples.
-fn look(planes: &Planes<'_>, relaxing: Relaxing, ids: &Range<usize>) -> Result<Examined> {
+/// Examines the samples: returns the target of each sample, and the usual reach, squared, by patch.
+fn look(
+    planes: &Planes<'_>,
+    relaxing: Relaxing,
+    ids: &Range<usize>,
+) -> Result<(Vec<Target>, Vec<u64>)> {
     let curve = METHOD.curve;
     let mut samples: Vec<Sample> = Vec::with_capacity(ids.len() / curve.sample + curve.run);
     planes.each(is_sampled, |id, point, fit| {
@@ -111,7 +104,7 @@ fn look(planes: &Planes<'_>, relaxing: Relaxing, ids: &Range<usize>) -> Result<E
             fills: fit.plane.normal.is_some_and(fills),
         });
     })?;
-    let _held = hold(bytes_of(&samples));
+    let _held = planes.unit.hold(bytes_of(&samples));
     let usual2 = usual_reach(&samples, ids);
     let target = |sample: &Sample| {
         let id = sample.target.0;
@@ -121,10 +114,7 @@ fn look(planes: &Planes<'_>, relaxing: Relaxing, ids: &Range<usize>) -> Result<E
             sample.target
         }
     };
-    Ok(Examined {
-        targets: samples.iter().map(target).collect(),
-        usual2,
-    })
+    Ok((samples.iter().map(target).collect(), usual2))
 }
 
 /// A sample for the usual reach.
@@ -187,7 +177,7 @@ fn choose(
 ) -> Result<Vec<bool>> {
     let rough = rough_patches(examined, ids);
     let counts = count_witnesses(planes, relaxing, examined, ids, &rough)?;
-    let _held = hold(bytes_of(&counts));
+    let _held = planes.unit.hold(bytes_of(&counts));
     let run = METHOD.curve.run;
     let (of_patch, of_region) = (METHOD.curve.patch / run, METHOD.curve.block as usize / run);
     let mut active = vec![false; ids.len().div_ceil(run)];
@@ -271,7 +261,7 @@ fn count_witnesses(
 ) -> Result<Vec<WitnessCounts>> {
     let neighbors = relaxing.neighbors;
     let is_witness = witnesses(examined, ids, rough);
-    let _held = hold(bytes_of(&is_witness));
+    let _held = planes.unit.hold(bytes_of(&is_witness));
     let mut counts = vec![WitnessCounts::default(); rough.len()];
     let mut around = WeightedNeighbors::default();
     planes.each_neighborhood(

@@ -5,14 +5,12 @@
 
 mod edges;
 mod first;
-mod fits;
 mod pass;
 mod relax;
 mod seen;
 #[cfg(test)]
 mod tests;
 
-pub use fits::{each_neighborhood, each_plane};
 pub use relax::{RelaxStats, Relaxed, relax};
 
 use crate::error::Result;
@@ -20,12 +18,11 @@ use crate::geom::Point;
 use crate::geom::lattice::COORDINATE_LIMIT;
 use crate::geom::round::rounded;
 use crate::method::METHOD;
-use crate::stages::cells::{Fit, TileRanges};
-use crate::stages::order::PointStore;
+use crate::stages::cells::{Fit, TileRanges, Widen, each_neighborhood, each_plane};
+use crate::stages::order::{PointStore, StoredPoints};
 use crate::stages::tiles::neighbors::Neighbors;
-use crate::workspace::Workspace;
+use crate::workspace::{Unit, Workspace};
 use edges::WeightedNeighbors;
-use fits::each_fit;
 use pass::Pass;
 use std::ops::Range;
 
@@ -78,22 +75,24 @@ pub fn smooth(
     smoothing: Smoothing,
     round: u32,
     workspace: &Workspace,
-) -> Result<PointStore> {
+) -> Result<StoredPoints> {
     let file = format!("points{round}");
     let pass = Pass::new(&file, "smooth: tile", tiles);
-    let work = |ids: Range<usize>, points: &mut [Point]| match smoothing {
+    let work = |unit: &Unit<'_>, ids: Range<usize>, points: &mut [Point]| match smoothing {
         Smoothing::Plain => {
-            let all = |_: usize| true;
-            each_fit(store, ids.clone(), neighbors, all, |id, point, fit| {
+            let all = |_| true;
+            let each = |id: usize, point: Point, fit: Fit| {
                 points[id - ids.start] = project(point, &fit);
-            })
+            };
+            let (ids, count) = (ids.clone(), neighbors);
+            each_plane(unit, store, ids, count, Widen::Never, all, each)
         }
         Smoothing::Edges => {
             let count = neighbors * METHOD.smoothing.neighbors;
             let mut around = WeightedNeighbors::default();
-            let of = |point: Point, near: &Neighbors| moved(point, around.offset(near, count));
-            each_neighborhood(store, ids.clone(), count, of, |id, _, to| {
-                points[id - ids.start] = to;
+            let of = |_, near: &Neighbors| around.offset(near, count);
+            each_neighborhood(unit, store, ids.clone(), count, of, |id, point, offset| {
+                points[id - ids.start] = moved(point, offset);
             })
         }
     };

@@ -4,12 +4,13 @@ use crate::error::Result;
 use crate::geom::Point;
 use crate::method::METHOD;
 use crate::stages::cells::TileRanges;
-use crate::stages::order::{PointStore, Rewriter};
+use crate::stages::order::{PointStore, Rewriter, StoredPoints};
 use crate::stages::tiles::Tile;
 use crate::stages::tiles::walk::PageCache;
-use crate::workspace::Workspace;
-use crate::workspace::memory::{bytes_of, hold};
-use crate::workspace::persist::Persist;
+use crate::workspace::memory::bytes_of;
+use crate::workspace::{Unit, Workspace};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 use std::ops::Range;
 
 /// The names of a pass and the division of its work.
@@ -39,30 +40,30 @@ impl<'a> Pass<'a> {
         }
     }
 
-    /// Moves the points of `store`. `work` is called with a range of ids and their positions, which it
-    /// changes; `each` receives its result.
-    pub fn over<T: Persist + Send>(
+    /// Moves the points of `store`. `work` is called in a unit with a range of ids and their positions, which
+    /// it changes; `each` receives its result.
+    pub fn over<T: Serialize + DeserializeOwned + Send>(
         self,
         store: &PointStore,
         workspace: &Workspace,
-        work: impl Fn(Range<usize>, &mut [Point]) -> Result<T> + Sync,
+        work: impl Fn(&Unit<'_>, Range<usize>, &mut [Point]) -> Result<T> + Sync,
         mut each: impl FnMut(T) + Send,
-    ) -> Result<PointStore> {
+    ) -> Result<StoredPoints> {
         let whole = common_multiple(store.page_size() * METHOD.curve.run, self.whole);
         let size = (self.tile as usize).next_multiple_of(whole);
         let piece = |number: usize| number * size..((number + 1) * size).min(store.len());
         let bytes = |number: usize| {
             let points = piece(number).len();
-            Tile::bytes(points) + PageCache::bytes(store) + points as u64 * (12 + self.bytes)
+            Tile::estimate(points) + PageCache::estimate(store) + points as u64 * (12 + self.bytes)
         };
         let moved = Rewriter::of(store, workspace, self.file)?;
-        let one = |number| {
-            let ids = piece(number);
+        let one = |unit: &Unit<'_>| {
+            let ids = piece(unit.number());
             let mut points = store.slice(ids.clone())?;
-            let _held = hold(bytes_of(&points));
-            let found = work(ids.clone(), &mut points)?;
-            workspace.advance(points.len() as u64);
-            moved.put(ids.start, &points)?;
+            let _held = unit.hold(bytes_of(&points));
+            let found = work(unit, ids.clone(), &mut points)?;
+            unit.advance(points.len() as u64);
+            moved.put(unit, ids.start, &points)?;
             Ok(found)
         };
         let count = store.len().div_ceil(size);

@@ -7,45 +7,52 @@
 
 use super::Relaxing;
 use super::first::{self, Done};
-use super::fits::each_fit;
 use super::pass::Pass;
 use super::seen::Roughness;
 use crate::error::Result;
 use crate::geom::Point;
 use crate::method::METHOD;
-use crate::stages::cells::TileRanges;
-use crate::stages::order::PointStore;
-use crate::stages::spacing::Spacings;
-use crate::workspace::Workspace;
+use crate::stages::cells::{Fit, TileRanges, Widen, each_plane};
+use crate::stages::order::{PointStore, StoredPoints};
+use crate::stages::spacing::StoredSpacings;
 use crate::workspace::memory::Reservation;
-use crate::workspace::persist::persist;
-use serde::Serialize;
+use crate::workspace::{Unit, Workspace};
+use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
 /// The shape: positions that decide the connectivity.
-#[derive(Debug)]
+#[derive(Debug, Serialize, Deserialize)]
 pub struct Relaxed {
     /// The store with moved positions; `None` if no point moved.
-    pub store: Option<PointStore>,
+    pub store: Option<StoredPoints>,
     /// The local spacings.
-    pub spacings: Spacings,
+    pub spacings: StoredSpacings,
     /// Counts of the rounds.
     pub stats: RelaxStats,
 }
 
 impl Relaxed {
-    /// Records the positions after a round, and the number of points that moved.
-    fn take(&mut self, round: u32, (store, moved): (PointStore, u64)) {
-        if moved > 0 {
-            self.store = Some(store);
+    /// Records the positions after a round, and the number of points that moved. Deletes the positions that
+    /// are not needed: those before the round, or those after it if no point moved.
+    fn take(
+        &mut self,
+        round: u32,
+        (store, moved): (StoredPoints, u64),
+        workspace: &Workspace,
+    ) -> Result<()> {
+        let old = if moved > 0 {
             self.stats.rounds = round;
             self.stats.moved += moved;
-        }
+            self.store.replace(store)
+        } else {
+            Some(store)
+        };
+        old.map_or(Ok(()), |old| old.release(workspace))
     }
 }
 
 /// Counts of this stage.
-#[derive(Debug, Clone, Copy, Default, Serialize, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize, PartialEq, Eq)]
 pub struct RelaxStats {
     /// Rounds in which points moved.
     pub rounds: u32,
@@ -79,11 +86,6 @@ impl Runs {
     }
 }
 
-persist!(Relaxed {
-    store,
-    spacings,
-    stats
-});
 impl RelaxStats {
     /// True if the sum of moved points over all rounds is at least half the number of points: the whole cloud
     /// is noisy, not only parts of it.
@@ -92,8 +94,6 @@ impl RelaxStats {
         METHOD.components.noisy * self.moved >= points
     }
 }
-
-persist!(RelaxStats { rounds, moved });
 
 /// Rounds of relaxing: points move to the planes of their nearest neighbours. After the first round, only the
 /// points of runs that were rough in the previous round move.
@@ -107,16 +107,16 @@ pub fn relax(
     relaxing: Relaxing,
     workspace: &Workspace,
 ) -> Result<Relaxed> {
-    let held = workspace.reserve("patch spacings", Spacings::bytes(store.len()))?;
+    let _held = StoredSpacings::reserve(store.len(), workspace)?;
     let mut runs = Runs::new(store.len(), workspace)?;
     let mut usual2 = vec![0; store.len().div_ceil(METHOD.curve.patch)];
     let first = first_round(store, tiles, relaxing, &mut runs, &mut usual2, workspace)?;
     let mut relaxed = Relaxed {
         store: None,
-        spacings: Spacings::new(usual2, held),
+        spacings: StoredSpacings::new(usual2),
         stats: RelaxStats::default(),
     };
-    relaxed.take(1, first);
+    relaxed.take(1, first, workspace)?;
     runs.settle();
     for round in 2..=relaxing.rounds {
         if !runs.active.contains(&true) {
@@ -124,12 +124,15 @@ pub fn relax(
             workspace.observer.advance(left);
             break;
         }
-        let current = relaxed.store.as_ref().unwrap_or(store);
+        let before = relaxed.store.as_ref();
+        let before = before.map(|store| store.open(workspace)).transpose()?;
+        let current = before.as_ref().unwrap_or(store);
         let spacings = &relaxed.spacings;
         let next = one_round(
             current, tiles, relaxing, round, &mut runs, spacings, workspace,
         )?;
-        relaxed.take(round, next);
+        drop(before);
+        relaxed.take(round, next, workspace)?;
         runs.settle();
     }
     Ok(relaxed)
@@ -143,14 +146,14 @@ fn first_round(
     runs: &mut Runs,
     usual2: &mut [u64],
     workspace: &Workspace,
-) -> Result<(PointStore, u64)> {
+) -> Result<(StoredPoints, u64)> {
     let pass = Pass {
         whole: METHOD.curve.block as usize,
         bytes: first::bytes(),
         ..Pass::new("relaxed1", "relax: tile", tiles)
     };
-    let work = |ids: Range<usize>, points: &mut [Point]| {
-        first::examine_and_move(store, ids, relaxing, points)
+    let work = |unit: &Unit<'_>, ids: Range<usize>, points: &mut [Point]| {
+        first::examine_and_move(unit, store, ids, relaxing, points)
     };
     let mut moved = 0;
     let next = pass.over(store, workspace, work, |done: Done| {
@@ -170,23 +173,24 @@ fn one_round(
     relaxing: Relaxing,
     round: u32,
     runs: &mut Runs,
-    spacings: &Spacings,
+    spacings: &StoredSpacings,
     workspace: &Workspace,
-) -> Result<(PointStore, u64)> {
+) -> Result<(StoredPoints, u64)> {
     let file = format!("relaxed{round}");
     let pass = Pass::new(&file, "relax: tile", tiles);
     let Runs { active, rough, .. } = runs;
-    let work = |ids: Range<usize>, points: &mut [Point]| {
+    let work = |unit: &Unit<'_>, ids: Range<usize>, points: &mut [Point]| {
         let wanted = |id: usize| active[id / METHOD.curve.run];
         let mut seen = Roughness::of(&ids);
-        let neighbors = relaxing.neighbors;
+        let count = relaxing.neighbors;
         if ids.clone().step_by(METHOD.curve.run).any(wanted) {
-            each_fit(store, ids.clone(), neighbors, wanted, |id, point, fit| {
+            let each = |id: usize, point: Point, fit: Fit| {
                 let (to, rough) = relaxing.target(point, &fit, spacings.usual2(id as u32));
                 seen.note(id, rough);
                 points[id - ids.start] = to;
                 seen.moved += 1;
-            })?;
+            };
+            each_plane(unit, store, ids.clone(), count, Widen::Never, wanted, each)?;
         }
         Ok(seen)
     };

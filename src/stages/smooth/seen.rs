@@ -5,10 +5,11 @@ use crate::geom::Point;
 use crate::method::METHOD;
 use crate::stages::cells::Fit;
 use crate::stages::spacing::{is_far, spacing2};
-use crate::workspace::persist::persist;
+use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
 /// Rough points in a range of ids.
+#[derive(Serialize, Deserialize)]
 pub(super) struct Roughness {
     /// Its first run.
     pub first: usize,
@@ -16,12 +17,6 @@ pub(super) struct Roughness {
     pub rough: Vec<u8>,
     pub moved: u64,
 }
-
-persist!(Roughness {
-    first,
-    rough,
-    moved
-});
 
 impl Roughness {
     pub fn of(ids: &Range<usize>) -> Self {

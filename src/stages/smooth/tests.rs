@@ -24,7 +24,8 @@ fn ordered(
 ) -> (PointStore, TileRanges) {
     let orderer = Orderer::new(workspace).unwrap();
     orderer.push(workspace, points).unwrap();
-    let store = orderer.finish(workspace, page).unwrap().0;
+    let (stored, _) = orderer.finish(workspace, page).unwrap();
+    let store = stored.open(workspace).unwrap();
     let tiles = TileRanges::new(Blocks::new(store.len(), 1000), tile);
     (store, tiles)
 }
@@ -49,8 +50,9 @@ fn relaxed_as(
     let workspace = &Workspace::for_tests(2);
     let (store, tiles) = ordered(points, tile, page, workspace);
     let relaxed = relax(&store, tiles, relaxing, workspace).unwrap();
-    let shape = relaxed.store.as_ref().unwrap_or(&store);
-    (shape.slice(0..store.len()).unwrap(), relaxed.stats)
+    let shape = relaxed.store.map(|shape| shape.open(workspace).unwrap());
+    let shape = shape.unwrap_or(store);
+    (shape.slice(0..shape.len()).unwrap(), relaxed.stats)
 }
 
 fn off_plane(points: &[Point]) -> f64 {
@@ -155,10 +157,12 @@ fn rough_points(points: &[Point]) -> usize {
         off_surface: true,
     };
     let all = 0..store.len();
-    each_fit(
+    each_plane(
+        &workspace.unit(),
         &store,
         all,
         12,
+        Widen::Never,
         |_| true,
         |_, point, fit| {
             rough += usize::from(relaxing.target(point, &fit, fit.last2).1);
@@ -221,6 +225,7 @@ fn smoothed(
     let workspace = &Workspace::for_tests(2);
     let (store, tiles) = ordered(points, tile, page, workspace);
     let after = smooth(&store, tiles, 12, smoothing, 1, workspace).unwrap();
+    let after = after.open(workspace).unwrap();
     let all = |store: &PointStore| store.slice(0..store.len()).unwrap();
     (all(&store), all(&after))
 }

@@ -1,33 +1,18 @@
 //! T12 insertion across blocks (paper, section 3.5, second part): one turn for each block, in ascending
 //! order. Results that later turns need are on disk.
 
-use super::base::Base;
 use super::deferred::Deferred;
 use super::insertion::{Candidate, CandidateRow, insert_candidates};
-use super::interior::{Follower, Interior, block_bytes};
+use super::interior::{block_bytes, insert};
 use super::stats::InsertStats;
 use super::surroundings::Surroundings;
+use super::{Insertion, Stitched};
 use crate::error::Result;
-use crate::spill::{Shuffle, Table};
-use crate::stages::blocks::Blocks;
+use crate::spill::Shuffle;
 use crate::stages::surface::rows::{LabelledTo, TriangleTo};
-use crate::workspace::Workspace;
+use crate::workspace::Unit;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
-
-const SHUFFLE_BUFFER: u64 = 8 << 20;
-
-/// The crossing part of the mesh.
-#[derive(Debug)]
-pub struct Crossing {
-    /// Crossing triangles of the mesh and interior candidates that were inserted late, once for each block
-    /// that they touch.
-    pub added: Table<TriangleTo>,
-    /// Interior triangles that are removed again.
-    pub removed: Table<TriangleTo>,
-}
-
-crate::workspace::persist::persist!(Crossing { added, removed });
 
 /// The pass across blocks, which advances while other threads still work inside blocks: a thread that has
 /// finished a block advances it as far as the finished blocks allow.
@@ -45,17 +30,11 @@ impl<'a> Across<'a> {
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Memory`].
-    pub fn new(
-        base: &'a Base,
-        interior: &'a Interior,
-        blocks: Blocks,
-        cos_max_angle: f64,
-        workspace: &'a Workspace,
-    ) -> Result<Self> {
-        let pass = Pass::new(base, interior, blocks, cos_max_angle, workspace)?;
-        let all = 0..blocks.count();
-        let most = all.clone().map(|block| block_bytes(base, block)).max();
-        let at_work = most.unwrap_or(0) * workspace.threads as u64;
+    pub fn new(insertion: Insertion<'a>) -> Result<Self> {
+        let (workspace, all) = (insertion.workspace, 0..insertion.blocks.count());
+        let pass = Pass::new(insertion)?;
+        let bytes = all.clone().map(|block| block_bytes(insertion, block));
+        let at_work = bytes.max().unwrap_or(0) * workspace.threads as u64;
         Ok(Self {
             order: pass.order.clone(),
             done: all.map(|_| AtomicBool::new(false)).collect(),
@@ -64,31 +43,61 @@ impl<'a> Across<'a> {
         })
     }
 
+    /// Inserts the interior candidates of all blocks; returns the counts, and how many triangles of the base
+    /// were cut. Meanwhile the pass advances.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
+    /// [`crate::Error::Cancelled`].
+    pub fn insert_inside(&self, insertion: Insertion<'_>) -> Result<(InsertStats, u64)> {
+        let order = &self.order;
+        let mut all = InsertStats {
+            unfit: insertion.base.flat_candidates,
+            ..InsertStats::default()
+        };
+        let mut all_cut = 0;
+        let work = |unit: &Unit<'_>| {
+            let block = order[unit.number()];
+            let found = insert(insertion, block as usize, unit)?;
+            unit.advance(1);
+            self.finished(block);
+            self.go_on(unit)?;
+            Ok(found)
+        };
+        let bytes = |unit: usize| block_bytes(insertion, order[unit] as usize);
+        let each = |unit: usize, (counts, cut): (InsertStats, u64)| {
+            // The block may have been finished in an earlier attempt.
+            self.finished(order[unit]);
+            all.add(&counts);
+            all_cut += cut;
+            Ok(())
+        };
+        let workspace = insertion.workspace;
+        workspace.units("stitch: block", order.len(), bytes, work, each)?;
+        Ok((all, all_cut))
+    }
+
     /// Takes the remaining turns, after all blocks are finished.
     ///
     /// # Errors
     /// See [`Pass::advance`].
-    pub fn finish(self) -> Result<(Crossing, InsertStats)> {
+    pub fn finish(self, unit: &Unit<'_>) -> Result<(Stitched, InsertStats)> {
         let pass = self.pass.into_inner();
         let mut pass = pass.unwrap_or_else(PoisonError::into_inner);
-        pass.advance(|_| true, None)?;
-        pass.finish()
-    }
-}
-
-impl Follower for Across<'_> {
-    fn order(&self) -> &[u32] {
-        &self.order
+        pass.advance(unit, |_| true, None)?;
+        pass.finish(unit)
     }
 
+    /// Records that a block is finished.
     fn finished(&self, block: u32) {
         self.done[block as usize].store(true, Ordering::Release);
     }
 
-    fn go_on(&self) -> Result<()> {
+    /// Advances as far as the finished blocks allow. A thread calls this at the end of its `unit`.
+    fn go_on(&self, unit: &Unit<'_>) -> Result<()> {
         let ready = |block: u32| self.done[block as usize].load(Ordering::Acquire);
         match self.pass.try_lock() {
-            Ok(mut pass) => pass.advance(ready, Some(self.spare)),
+            Ok(mut pass) => pass.advance(unit, ready, Some(self.spare)),
             // Another thread is advancing the pass.
             Err(_) => Ok(()),
         }
@@ -108,9 +117,10 @@ struct Pass<'a> {
     /// The block whose turn is next, and the number of blocks of `order` known to be ready.
     group: usize,
     ready: usize,
-    added: Shuffle<TriangleTo>,
-    removed: Shuffle<TriangleTo>,
-    cos_max_angle: f64,
+    /// The triangles that each turn adds and removes, see [`Stitched`]. A turn may be taken inside a unit of
+    /// another step, whose record must not contain them.
+    added: Deferred<TriangleTo>,
+    removed: Deferred<TriangleTo>,
 }
 
 impl<'a> Pass<'a> {
@@ -118,26 +128,19 @@ impl<'a> Pass<'a> {
     ///
     /// # Errors
     /// [`crate::Error::Memory`].
-    pub fn new(
-        base: &'a Base,
-        interior: &'a Interior,
-        blocks: Blocks,
-        cos_max_angle: f64,
-        workspace: &'a Workspace,
-    ) -> Result<Self> {
-        let shuffle = |name| Shuffle::new(workspace, name, SHUFFLE_BUFFER);
-        let mut order: Vec<u32> = (0..blocks.count() as u32).collect();
-        order.sort_by_key(|block| base.spans[*block as usize].0);
+    pub fn new(insertion: Insertion<'a>) -> Result<Self> {
+        let (spans, count) = (&insertion.base.spans, insertion.blocks.count());
+        let mut order: Vec<u32> = (0..count as u32).collect();
+        order.sort_by_key(|block| spans[*block as usize].0);
         Ok(Self {
-            mesh: Surroundings::new(base, interior, blocks, workspace)?,
+            mesh: Surroundings::new(insertion)?,
             order,
-            waiting: Deferred::new(workspace, "stitch.waiting", blocks.count())?,
+            waiting: Deferred::new("stitch.waiting", count),
             counts: InsertStats::default(),
             group: 0,
             ready: 0,
-            added: shuffle("stitch.added")?,
-            removed: shuffle("stitch.removed")?,
-            cos_max_angle,
+            added: Deferred::new("stitch.turns.added", count),
+            removed: Deferred::new("stitch.turns.removed", count),
         })
     }
 
@@ -147,10 +150,15 @@ impl<'a> Pass<'a> {
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
     /// [`crate::Error::Cancelled`].
-    fn advance(&mut self, ready: impl Fn(u32) -> bool, most: Option<u64>) -> Result<()> {
-        while self.group < self.mesh.blocks.count() {
-            self.mesh.workspace.check_cancel()?;
-            let spans = &self.mesh.base.spans;
+    fn advance(
+        &mut self,
+        unit: &Unit<'_>,
+        ready: impl Fn(u32) -> bool,
+        most: Option<u64>,
+    ) -> Result<()> {
+        while self.group < self.mesh.insertion.blocks.count() {
+            unit.check_cancel()?;
+            let spans = &self.mesh.insertion.base.spans;
             while let Some(&block) = self.order.get(self.ready)
                 && spans[block as usize].0 as usize <= self.group
             {
@@ -159,30 +167,32 @@ impl<'a> Pass<'a> {
                 }
                 self.ready += 1;
             }
-            if !self.turn(self.group, most)? {
+            if !self.turn(unit, self.group, most)? {
                 return Ok(());
             }
             self.group += 1;
-            self.mesh.workspace.observer.advance(1);
+            // Not as progress of the unit, which would be reported again when the run is resumed.
+            unit.observer.advance(1);
         }
         Ok(())
     }
 
     /// Takes the turn of a block; false if it would need more than `most` bytes.
-    fn turn(&mut self, group: usize, most: Option<u64>) -> Result<bool> {
-        let blocks = self.mesh.blocks;
-        let mut tried = self.waiting.get(group)?;
-        tried.append(&mut self.mesh.interior.ranked.get(group)?);
+    fn turn(&mut self, unit: &Unit<'_>, group: usize, most: Option<u64>) -> Result<bool> {
+        let blocks = self.mesh.insertion.blocks;
+        let mut tried = self.waiting.get(unit, group)?;
+        tried.append(&mut self.mesh.insertion.interior.ranked.get(unit, group)?);
         let mut tried: Vec<_> = tried.into_iter().map(Candidate::of).collect();
-        if !self.mesh.gather(&tried, most)? {
+        let mut held = most.map(|_| unit.hold(0));
+        if !self.mesh.gather(unit, &tried, most, &mut held)? {
             return Ok(false);
         }
-        let gone = self.mesh.confirm_merges(group)?;
+        let gone = self.mesh.confirm_merges(unit, group)?;
         self.counts.joints_removed += gone.len() as u64;
-        self.removed.send(&gone)?;
+        self.removed.send(unit, group as u32, &gone)?;
         // Consists of ascending runs, which this sort merges.
         tried.sort();
-        let (angle, counts) = (self.cos_max_angle, &mut self.counts);
+        let (angle, counts) = (self.mesh.insertion.cos_max_angle, &mut self.counts);
         insert_candidates(&mut self.mesh, &mut tried, angle, counts);
         // A candidate without a vertex in a later block is not tried again.
         let mut waiting = Vec::new();
@@ -196,32 +206,40 @@ impl<'a> Pass<'a> {
         waiting.sort_unstable();
         for part in waiting.chunk_by(|a, b| a.0 == b.0) {
             let rows: Vec<_> = part.iter().map(|(_, row)| *row).collect();
-            self.waiting.send(part[0].0, &rows)?;
+            self.waiting.send(unit, part[0].0, &rows)?;
         }
-        let spans = &self.mesh.base.spans;
+        let spans = &self.mesh.insertion.base.spans;
         let later = |block: u32| spans[block as usize].1 > group as u32;
-        self.added.send(&self.mesh.end(later)?)?;
+        let added = self.mesh.end(unit, later)?;
+        self.added.send(unit, group as u32, &added)?;
         Ok(true)
     }
 
     /// Ends the pass after all turns.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
-    pub fn finish(self) -> Result<(Crossing, InsertStats)> {
-        let (blocks, workspace) = (self.mesh.blocks, self.mesh.workspace);
-        // The crossing triangles of the base belong to the mesh as well.
-        let base = &self.mesh.base.surface;
-        for block in 0..blocks.count() {
-            let rows = base.crossing.get(block)?.into_iter();
-            let rows = rows.map(|LabelledTo { to, triangle, .. }| TriangleTo { to, triangle });
-            self.added.send(&rows.collect::<Vec<_>>())?;
-        }
-        let crossing = Crossing {
-            added: self.added.deliver(workspace, blocks.count())?,
-            removed: self.removed.deliver(workspace, blocks.count())?,
+    /// [`crate::Error::Io`], [`crate::Error::Disk`], [`crate::Error::Corrupt`].
+    pub fn finish(self, unit: &Unit<'_>) -> Result<(Stitched, InsertStats)> {
+        let stitched = Stitched {
+            interior: self.mesh.insertion.interior.mesh.clone(),
+            added: Shuffle::new("stitch.added"),
+            removed: Shuffle::new("stitch.removed"),
         };
-        Ok((crossing, self.counts))
+        let Insertion { base, blocks, .. } = self.mesh.insertion;
+        for group in 0..blocks.count() {
+            let mut added = self.added.get(unit, group)?;
+            // The crossing triangles of the base belong to the mesh as well.
+            let rows = base.surface.crossing.get(unit, group)?.into_iter();
+            added.extend(rows.map(|LabelledTo { to, triangle, .. }| TriangleTo { to, triangle }));
+            stitched.added.send(unit, group, added)?;
+            let removed = self.removed.get(unit, group)?;
+            stitched.removed.send(unit, group, removed)?;
+        }
+        self.mesh.changes.release(unit)?;
+        self.waiting.release(unit)?;
+        self.added.release(unit)?;
+        self.removed.release(unit)?;
+        Ok((stitched, self.counts))
     }
 }
 

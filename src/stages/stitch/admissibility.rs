@@ -52,12 +52,10 @@ pub fn examine(
     link: &mut Vec<[u32; 2]>,
 ) -> Result<[Option<Adjacent>; 3], Refusal> {
     let (counts, found) = at_edges(t, mesh, HUB);
-    let used = t.map(|v| mesh.count(v) > 0);
-    let connected = counts.iter().filter(|c| **c > 0).count();
-    let lone = (0..3).find(|&e| counts[e] > 0);
-    match (connected, lone) {
-        (0, _) | (_, None) => return Err(Refusal::Unconnected),
-        (1, Some(edge)) if used[EDGES[edge].2] => return Err(Refusal::Unconnected),
+    let mut connected = (0..3).filter(|&edge| counts[edge] > 0);
+    match (connected.next(), connected.next()) {
+        (Some(edge), None) if mesh.count(t[EDGES[edge].2]) == 0 => {}
+        (_, None) => return Err(Refusal::Unconnected),
         _ => {}
     }
     if counts.iter().any(|c| *c > 1) {
@@ -74,14 +72,12 @@ pub fn examine(
         let Some((number, far)) = found[edge] else {
             continue;
         };
-        if !angle_fits(
-            [t[a], t[b], t[c]].map(|v| mesh.position(v)),
-            mesh.position_in(number, far),
-            cos_max_angle,
-        ) {
+        let corners = [t[a], t[b], t[c]].map(|v| mesh.position(v));
+        if !angle_fits(corners, mesh.position_in(number, far), cos_max_angle) {
             return Err(Refusal::Angle);
         }
-        let other = with_edge(t[a], t[b], far);
+        let mut other = [t[a], t[b], far];
+        other.sort_unstable();
         adjacent[edge] = Some((number, opposed(t, other, t[a], t[b])));
     }
     Ok(adjacent)
@@ -124,17 +120,6 @@ fn at_edges(
         }
     }
     (counts, found)
-}
-
-/// The triangle with the edge `low < high` and a third vertex.
-fn with_edge(low: u32, high: u32, third: u32) -> Triangle {
-    if third < low {
-        [third, low, high]
-    } else if third < high {
-        [low, third, high]
-    } else {
-        [low, high, third]
-    }
 }
 
 /// True if `t`, both of whose edges at `v` have one triangle, would give the link of `v` a cycle and another

@@ -3,7 +3,7 @@
 
 use super::BaseStats;
 use crate::error::Result;
-use crate::spill::{Id, Shuffle, Table};
+use crate::spill::{Id, Inbox, Shuffle, Table, release};
 use crate::stages::blocks::Blocks;
 use crate::stages::cells::{CountedTriple, SentTriple};
 use crate::stages::located::{Located, Places};
@@ -13,11 +13,9 @@ use crate::stages::surface::orient::{BlockTriangles, Oriented, orient_inside};
 use crate::stages::surface::rows::TriangleTo;
 use crate::stages::surface::star::{Link, Star, Triangle, has, others};
 use crate::stages::triples::Triples;
-use crate::workspace::Workspace;
-use crate::workspace::memory::{bytes_of, hold};
-use crate::workspace::persist::persist;
-
-const SHUFFLE_BUFFER: u64 = 8 << 20;
+use crate::workspace::memory::bytes_of;
+use crate::workspace::{Unit, Workspace};
+use serde::{Deserialize, Serialize};
 
 /// The base, and the candidates for insertion.
 #[derive(Debug)]
@@ -29,49 +27,54 @@ pub(super) struct Base {
     /// All crossing triples by the block of their smallest vertex.
     pub crossing: Table<CountedTriple>,
     /// Crossing triples by the blocks of their other vertices.
-    pub visiting: Table<SentTriple>,
+    pub visiting: Inbox<SentTriple>,
     /// Crossing T3 triangles that are flagged, by the block of their smallest vertex.
-    pub flags: Table<TriangleTo>,
+    pub flags: Inbox<TriangleTo>,
+    sent_flags: Shuffle<TriangleTo>,
     /// For each block, the first and the last block touched by a triple of it.
     pub spans: Vec<(u32, u32)>,
     /// Interior candidates left out because their points are collinear in the file.
     pub flat_candidates: u64,
 }
 
-/// Computes the base. The triples are read once; the part needed later is written to separate tables.
+release!(Base: surface, candidates, crossing, sent_flags);
+
+/// Computes the base. The triples are read once; the part needed later is written to separate tables, and
+/// `triples.own` is deleted.
 ///
 /// # Errors
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
 /// [`crate::Error::Cancelled`].
 pub(super) fn base(
     places: Places<'_>,
-    triples: Triples,
+    triples: &Triples,
     blocks: Blocks,
     division: Option<Division>,
     workspace: &Workspace,
 ) -> Result<(Base, BaseStats)> {
     let count = blocks.count();
-    let buffer = SHUFFLE_BUFFER;
-    let highest = || columns::highest(places.shape, blocks, workspace);
+    let visiting = triples.visiting.open(workspace, count)?;
+    let highest = |unit: &Unit<'_>| columns::highest(places.shape, blocks, unit);
     let by_evidence = match division {
         Some(division) => Some((division, workspace.once("columns", highest)?)),
         None => None,
     };
     let weigh = by_evidence.is_some();
     let look = Look {
-        candidates: Table::create(workspace, "stitch.candidates", count)?,
-        crossing: Table::create(workspace, "stitch.crossing", count)?,
-        flags: Shuffle::between_units(workspace, "stitch.flags", buffer, count)?,
-        triples: &triples,
+        candidates: Table::new("stitch.candidates", count),
+        crossing: Table::new("stitch.crossing", count),
+        flags: Shuffle::new("stitch.flags"),
+        own: &triples.own,
+        visiting: &visiting,
         places,
         by_evidence,
         blocks,
     };
     let bytes = |block: usize| {
-        let records = triples.own.rows(block) + triples.visiting.rows(block);
+        let records = triples.own.rows(workspace, block) + visiting.rows(block);
         100 * records as u64 + (3 << 20)
     };
-    let around = |block| look.block(block);
+    let around = |unit: &Unit<'_>| look.block(unit);
     let name = "stitch.base";
     let mut all = Found::default();
     let mut spans = vec![(0, 0); count];
@@ -85,25 +88,31 @@ pub(super) fn base(
         orient_inside(name, around, each, bytes, blocks, weigh, workspace)
     })?;
     let start = std::time::Instant::now();
-    let flags = look.flags.deliver_unique(workspace, count)?;
-    let (candidates, crossing) = (look.candidates, look.crossing);
-    let flagged = all.flagged + flags.total();
-    let Triples { own, visiting } = triples;
-    drop(own);
-    let surface = workspace.once("join", || inside.join(name, &flags, blocks, workspace))?;
+    let flags = look.flags.open(workspace, count)?.unique();
+    triples.own.release(workspace)?;
+    let (surface, flagged) = workspace.once("join", |unit| {
+        let counts = (0..count).map(|block| Ok(flags.get(unit, block)?.len() as u64));
+        let flagged: u64 = counts.sum::<Result<_>>()?;
+        Ok((inside.join(name, &flags, blocks, unit)?, flagged))
+    })?;
+    inside.release(workspace)?;
+    if let Some((_, highest)) = &look.by_evidence {
+        highest.release(workspace)?;
+    }
     workspace.note_part("orient", start.elapsed().as_secs_f64());
     let stats = BaseStats {
-        flagged,
+        flagged: all.flagged + flagged,
         unfit: all.flat,
         mobius: surface.mobius,
         triangles: surface.triangles,
     };
     let base = Base {
-        surface,
-        candidates,
-        crossing,
-        visiting,
+        surface: surface.open(workspace, blocks)?,
+        candidates: look.candidates,
+        crossing: look.crossing,
         flags,
+        sent_flags: look.flags,
+        visiting,
         spans,
         flat_candidates: all.flat_candidates,
     };
@@ -112,7 +121,8 @@ pub(super) fn base(
 
 /// The single pass over the triples.
 struct Look<'a> {
-    triples: &'a Triples,
+    own: &'a Table<CountedTriple>,
+    visiting: &'a Inbox<SentTriple>,
     places: Places<'a>,
     /// The division of blocks and the highest points of columns, if the base is oriented by evidence.
     by_evidence: Option<(Division, Table<Id>)>,
@@ -123,7 +133,7 @@ struct Look<'a> {
 }
 
 /// Counts of a block.
-#[derive(Default)]
+#[derive(Default, Serialize, Deserialize)]
 struct Found {
     /// Interior triangles that were flagged.
     flagged: u64,
@@ -134,23 +144,20 @@ struct Found {
     span: (u32, u32),
 }
 
-persist!(Found {
-    flagged,
-    flat,
-    flat_candidates,
-    span
-});
-
 impl Look<'_> {
-    /// The T3 triangles that touch a block and are not flagged by a vertex of it, ascending.
-    fn block(&self, block: usize) -> Result<BlockTriangles<Found>> {
-        let mut found = Found::default();
-        let (mut triangles, mut candidates) = self.part(block, &mut found)?;
-        let mut held = hold(bytes_of(&triangles) + bytes_of(&candidates));
+    /// The T3 triangles that touch the block of a unit and are not flagged by a vertex of it, ascending.
+    fn block(&self, unit: &Unit<'_>) -> Result<BlockTriangles<Found>> {
+        let (block, mut found) = (unit.number(), Found::default());
+        let (mut triangles, mut candidates) = self.part(unit, &mut found)?;
+        let lists = bytes_of(&triangles) + bytes_of(&candidates);
+        let mut held = unit.hold(lists);
         let file = self.drop_unfit(block, &mut triangles, &mut candidates, &mut found)?;
+        held.set(lists + file.as_ref().map_or(0, Located::bytes));
         // If no point was relaxed, the positions in the file are also those of the shape.
         let located = file.filter(|_| self.by_evidence.is_some() && !self.places.differ());
+        let of_located = located.as_ref().map_or(0, Located::bytes);
         let star = Star::of(self.blocks.ids(block), &triangles);
+        held.set(lists + of_located + star.bytes());
         let mut flagged = Vec::new();
         let mut refusing = Refusing::default();
         for v in self.blocks.ids(block) {
@@ -163,42 +170,36 @@ impl Look<'_> {
             flagged.dedup();
             let interior = candidates.len();
             for &number in &flagged {
-                let t = triangles[number as usize];
-                if self.blocks.crossing(t) {
-                    sent.push(TriangleTo {
-                        to: self.blocks.of(t[0]),
-                        triangle: t,
-                    });
+                let triangle = triangles[number as usize];
+                if self.blocks.crossing(triangle) {
+                    let to = self.blocks.of(triangle[0]);
+                    sent.push(TriangleTo { to, triangle });
                 } else {
-                    candidates.push(CountedTriple {
-                        triple: t,
-                        count: 3,
-                    });
+                    let (triple, count) = (triangle, 3);
+                    candidates.push(CountedTriple { triple, count });
                 }
             }
             found.flagged = (candidates.len() - interior) as u64;
             candidates.sort_unstable();
-            let (mut number, mut next) = (0, 0);
+            let (mut numbers, mut gone) = (0.., flagged.iter().peekable());
             triangles.retain(|_| {
-                let gone = flagged.get(next) == Some(&number);
-                number += 1;
-                next += usize::from(gone);
-                !gone
+                let number = numbers.next();
+                gone.next_if(|gone| number == Some(**gone)).is_none()
             });
         }
-        self.flags.send_from(block, &sent)?;
-        self.candidates.put(block, &candidates)?;
-        held.set(bytes_of(&triangles) + bytes_of(&candidates) + bytes_of(&flagged));
+        let lists = bytes_of(&triangles) + bytes_of(&candidates) + bytes_of(&flagged);
+        held.set(lists + of_located);
+        self.flags.send(unit, block, sent)?;
+        self.candidates.put(unit, block, &candidates)?;
         let evidence = match &self.by_evidence {
-            Some(by) => Some(self.evidence(block, located, &triangles, &candidates, by)?),
+            Some(by) => Some(self.evidence(unit, located, &triangles, &candidates, by)?),
             None => None,
         };
-        held.set(bytes_of(&triangles));
+        held.set(lists + evidence.as_ref().map_or(0, Evidence::bytes));
         Ok(BlockTriangles {
             triangles,
             evidence,
             found,
-            held,
         })
     }
 
@@ -206,24 +207,20 @@ impl Look<'_> {
     /// they are known.
     fn evidence(
         &self,
-        block: usize,
+        unit: &Unit<'_>,
         located: Option<Located>,
         triangles: &[Triangle],
         candidates: &[CountedTriple],
         (division, highest): &(Division, Table<Id>),
     ) -> Result<Evidence> {
-        let places = match located {
-            Some(located) => located,
-            None => {
-                let vertices = self.foreign(block, triangles);
-                Located::load(self.places.shape, self.blocks, block, vertices)?
-            }
-        };
+        let block = unit.number();
+        let vertices = self.foreign(block, triangles);
+        let load = || Located::load(self.places.shape, self.blocks, block, vertices);
+        let places = located.map_or_else(load, Ok)?;
         let candidates: Vec<Triangle> = candidates.iter().map(|c| c.triple).collect();
         Ok(Evidence {
             division: *division,
-            highest: bytemuck::cast_vec(highest.get(block)?),
-            held: hold(bytes_of(&candidates)),
+            highest: bytemuck::cast_vec(highest.get(unit, block)?),
             places,
             candidates,
         })
@@ -261,11 +258,16 @@ impl Look<'_> {
         Ok(None)
     }
 
-    /// The T3 triangles that touch a block, ascending, and its interior candidates so far. The crossing
-    /// triples are written to separate tables.
-    fn part(&self, block: usize, found: &mut Found) -> Result<(Vec<Triangle>, Vec<CountedTriple>)> {
-        let visiting = self.triples.visiting.get(block)?;
-        let own = self.triples.own.get(block)?;
+    /// The T3 triangles that touch the block of a unit, ascending, and its interior candidates so far. The
+    /// crossing triples are written to separate tables.
+    fn part(
+        &self,
+        unit: &Unit<'_>,
+        found: &mut Found,
+    ) -> Result<(Vec<Triangle>, Vec<CountedTriple>)> {
+        let block = unit.number();
+        let visiting = self.visiting.get(unit, block)?;
+        let own = self.own.get(unit, block)?;
         let t3 = visiting.iter().filter(|t| t.count == 3).count()
             + own.iter().filter(|t| t.count == 3).count();
         let mut triangles = Vec::with_capacity(t3);
@@ -295,8 +297,8 @@ impl Look<'_> {
             }
         }
         let read = bytes_of(&visiting) + bytes_of(&own) + bytes_of(&crossing);
-        drop(hold(read + bytes_of(&triangles) + bytes_of(&candidates)));
-        self.crossing.put(block, &crossing)?;
+        let _held = unit.hold(read + bytes_of(&triangles) + bytes_of(&candidates));
+        self.crossing.put(unit, block, &crossing)?;
         found.span = span;
         Ok((triangles, candidates))
     }
@@ -320,27 +322,19 @@ impl Refusing {
         if one_fan(v, around, triangles) {
             return;
         }
-        let degree = |node: u32| {
-            around
-                .iter()
-                .filter(|&&n| has(triangles[n as usize], node))
-                .count()
-        };
-        let crowded = |n: u32| {
-            others(triangles[n as usize], v)
-                .into_iter()
-                .any(|node| degree(node) > 2)
-        };
+        let triangle = |n: &u32| triangles[*n as usize];
+        let degree = |node: u32| around.iter().filter(|n| has(triangle(n), node)).count();
+        let crowded = |n: &u32| others(triangle(n), v).map(degree).iter().any(|d| *d > 2);
         self.kept.clear();
-        for &n in around {
+        for n in around {
             if crowded(n) {
-                flagged.push(n);
+                flagged.push(*n);
             } else {
-                self.kept.push(n);
+                self.kept.push(*n);
             }
         }
         let (link, kept) = (&mut self.link, &self.kept);
-        link.set(v, kept.iter().map(|&n| triangles[n as usize]));
+        link.set(v, kept.iter().map(triangle));
         if link.groups() < 2 {
             return;
         }
@@ -349,11 +343,8 @@ impl Refusing {
             return;
         };
         let keep = link.group(first);
-        flagged.extend(
-            (0..kept.len())
-                .filter(|&i| link.group(i) != keep)
-                .map(|i| kept[i]),
-        );
+        let beside = (0..kept.len()).filter(|&i| link.group(i) != keep);
+        flagged.extend(beside.map(|i| kept[i]));
     }
 }
 

@@ -6,7 +6,7 @@
 //! block alone, so merging it with another one is final.
 
 use crate::spill::row;
-use crate::stages::surface::orient::Oriented;
+use crate::stages::surface::orient::OrientedSurface;
 use crate::stages::surface::parity::{OrientationConstraint, ParitySets, constraint, word};
 use crate::stages::surface::star::Triangle;
 use crate::workspace::memory::bytes_of;
@@ -26,39 +26,10 @@ row! {
     packed Above Above Above Above Above Above
 }
 
-/// The component of a triangle, packed in a word as `number << 2 | local << 1 | flip`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct ComponentRef {
-    /// The global label, or the number within the block.
-    pub number: u32,
-    /// True if `number` is a number within the block.
-    pub local: bool,
-    /// Orientation of the triangle relative to its component.
-    pub flip: bool,
-}
-
-impl ComponentRef {
-    /// Packs it in a word.
-    #[must_use]
-    pub fn word(self) -> u32 {
-        self.number << 2 | u32::from(self.local) << 1 | u32::from(self.flip)
-    }
-
-    /// Unpacks a word.
-    #[must_use]
-    pub fn from_word(word: u32) -> Self {
-        Self {
-            number: word >> 2,
-            local: word & 2 != 0,
-            flip: word & 1 != 0,
-        }
-    }
-}
-
 /// The components of the base in a block, numbered in the order of first use. All labels of a set with a
 /// crossing triangle are one component; every other label is a component of its own.
 pub struct BaseComponents<'a> {
-    surface: &'a Oriented,
+    surface: &'a OrientedSurface,
     of_root: FxHashMap<u32, u32>,
     of_label: Vec<OrientationConstraint>,
     /// Global label of each component, or [`NOTHING`].
@@ -67,7 +38,7 @@ pub struct BaseComponents<'a> {
 
 impl<'a> BaseComponents<'a> {
     /// The components of the interior triangles of a block.
-    pub fn of(surface: &'a Oriented, block: usize) -> Self {
+    pub fn of(surface: &'a OrientedSurface, block: usize) -> Self {
         let (first, globals) = surface.globals[block];
         let mut components = Self {
             surface,
@@ -154,16 +125,15 @@ impl BlockComponents {
         (root, flip ^ up)
     }
 
-    /// The same in a form that other blocks understand.
-    pub fn reference(&mut self, number: u32) -> ComponentRef {
+    /// The same in a form that other blocks understand: the word `number << 2 | local << 1 | flip`, where
+    /// `number` is a number within the block if it is local, else the global label.
+    pub fn reference(&mut self, number: u32) -> u32 {
         let (root, flip) = self.find(number);
-        let label = self.global[root as usize];
-        let local = label == NOTHING;
-        ComponentRef {
-            number: if local { root } else { label },
-            local,
-            flip,
-        }
+        let component = match self.global[root as usize] {
+            NOTHING => word((root, true)),
+            label => word((label, false)),
+        };
+        word((component, flip))
     }
 
     /// Adds a triangle at which the components of `constraints` meet. A local component is merged with its

@@ -1,6 +1,7 @@
 //! T12 insertion inside blocks (paper, section 3.5, second part): candidates whose vertices are all in one
 //! block. Blocks are independent.
 
+use super::Insertion;
 use super::admissibility::Neighborhood;
 use super::base::Base;
 use super::components::{BaseComponents, BlockComponents, Merge};
@@ -8,15 +9,14 @@ use super::insertion::{Candidate, CandidateRow, Mesh, insert_candidates};
 use super::stats::InsertStats;
 use crate::error::Result;
 use crate::geom::Point;
-use crate::spill::{Table, row};
-use crate::stages::blocks::Blocks;
+use crate::spill::{Table, release, row};
 use crate::stages::cells::CountedTriple;
-use crate::stages::located::{Located, Places};
+use crate::stages::located::Located;
 use crate::stages::surface::parity::{OrientationConstraint, ParitySets};
 use crate::stages::surface::rows::{LabelledTo, LabelledTriangle, TriangleRow, TriangleTo};
 use crate::stages::surface::star::{ByVertex, Triangle, others};
-use crate::workspace::Workspace;
-use crate::workspace::memory::{Holding, bytes_of, hold};
+use crate::workspace::Unit;
+use crate::workspace::memory::{Holding, bytes_of};
 use std::ops::Range;
 
 row! {
@@ -24,7 +24,7 @@ row! {
     pub struct TriangleIn {
         /// Ids, ascending.
         triangle: Triangle,
-        /// See [`ComponentRef`](super::components::ComponentRef).
+        /// See [`BlockComponents::reference`].
         component: u32,
     }
     packed Above Rising Rising Above
@@ -57,100 +57,54 @@ pub struct Interior {
     pub ranked: Table<CandidateRow>,
 }
 
+release!(Interior: merges, context, vertices, ranked);
+
 impl Interior {
-    /// Creates the tables.
-    ///
-    /// # Errors
-    /// [`crate::Error::Io`].
-    pub fn create(workspace: &Workspace, count: usize) -> Result<Self> {
-        Ok(Self {
-            mesh: Table::create(workspace, "stitch.mesh", count)?,
-            merges: Table::create(workspace, "stitch.merges", count)?,
-            context: Table::create(workspace, "stitch.context", count)?,
-            vertices: Table::create(workspace, "stitch.vertices", count)?,
-            ranked: Table::create(workspace, "stitch.ranked", count)?,
-        })
+    /// The tables for `count` blocks.
+    pub fn new(count: usize) -> Self {
+        Self {
+            mesh: Table::new("stitch.mesh", count),
+            merges: Table::new("stitch.merges", count),
+            context: Table::new("stitch.context", count),
+            vertices: Table::new("stitch.vertices", count),
+            ranked: Table::new("stitch.ranked", count),
+        }
     }
 }
 
 /// Upper estimate of the bytes for a block.
-pub fn block_bytes(base: &Base, block: usize) -> u64 {
-    let triangles = base.surface.interior.rows(block) + base.surface.crossing.rows(block);
-    let candidates = base.candidates.rows(block) + base.crossing.rows(block);
+pub(super) fn block_bytes(insertion: Insertion<'_>, block: usize) -> u64 {
+    let (base, workspace) = (insertion.base, insertion.workspace);
+    let interior = base.surface.interior.rows(workspace, block);
+    let triangles = interior + base.surface.crossing.rows(block);
+    let candidates = base.candidates.rows(workspace, block) + base.crossing.rows(workspace, block);
     let records = triangles + candidates + base.visiting.rows(block);
     180 * records as u64 + (4 << 20)
 }
 
-/// Work that follows the finished blocks, interleaved with the work inside other blocks.
-pub trait Follower: Sync {
-    /// The blocks in the order in which they are needed.
-    fn order(&self) -> &[u32];
-    /// Records that a block is finished.
-    fn finished(&self, block: u32);
-    /// Advances as far as the finished blocks allow. A thread calls this between two blocks.
-    fn go_on(&self) -> Result<()>;
-}
-
-/// Inserts the interior candidates of all blocks; returns the counts.
-///
-/// # Errors
-/// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
-/// [`crate::Error::Cancelled`], and those of `follower`.
-pub fn insert_all(
-    places: Places<'_>,
-    base: &Base,
-    out: &Interior,
-    blocks: Blocks,
-    cos_max_angle: f64,
-    follower: &impl Follower,
-    workspace: &Workspace,
-) -> Result<InsertStats> {
-    let order = follower.order();
-    let mut all = InsertStats {
-        unfit: base.flat_candidates,
-        ..InsertStats::default()
-    };
-    let work = |unit: usize| {
-        let block = order[unit];
-        let counts = insert(places, base, out, blocks, block as usize, cos_max_angle)?;
-        workspace.advance(1);
-        follower.finished(block);
-        follower.go_on()?;
-        Ok(counts)
-    };
-    let bytes = |unit: usize| block_bytes(base, order[unit] as usize);
-    workspace.units("stitch: block", order.len(), bytes, work, |unit, counts| {
-        // The block may have been finished in an earlier attempt.
-        follower.finished(order[unit]);
-        all.add(&counts);
-        Ok(())
-    })?;
-    Ok(all)
-}
-
-/// Inserts the interior candidates of a block; returns the counts.
+/// Inserts the interior candidates of a block; returns the counts, and how many triangles of the base were
+/// cut.
 ///
 /// # Errors
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
-pub fn insert(
-    places: Places<'_>,
-    base: &Base,
-    out: &Interior,
-    blocks: Blocks,
+pub(super) fn insert(
+    insertion: Insertion<'_>,
     block: usize,
-    cos_max_angle: f64,
-) -> Result<InsertStats> {
-    let mut work = BlockWork::load(places, base, blocks, block)?;
+    unit: &Unit<'_>,
+) -> Result<(InsertStats, u64)> {
+    let mut held = unit.hold(0);
+    let mut work = BlockWork::load(insertion, block, &mut held, unit)?;
     let mut counts = InsertStats {
         unfit: work.flat,
-        cut: work.cut,
         ..InsertStats::default()
     };
     let mut undecided = std::mem::take(&mut work.candidates);
-    insert_candidates(&mut work, &mut undecided, cos_max_angle, &mut counts);
-    let _undecided = hold(bytes_of(&undecided));
-    work.write(out, block, &undecided, &mut counts)?;
-    Ok(counts)
+    let angle = insertion.cos_max_angle;
+    insert_candidates(&mut work, &mut undecided, angle, &mut counts);
+    let _undecided = unit.hold(bytes_of(&undecided));
+    let out = insertion.interior;
+    work.write(out, block, &undecided, &mut counts, &mut held, unit)?;
+    Ok((counts, work.cut))
 }
 
 /// Mark of a vertex: it is in a crossing triple.
@@ -159,7 +113,13 @@ const CROSSING: u8 = 1;
 const OPEN: u8 = 2;
 
 /// The marks [`CROSSING`] and [`OPEN`] of the vertices of a block; `crossing` is the crossing base around it.
-fn marks(base: &Base, crossing: &[LabelledTo], ids: &Range<u32>, block: usize) -> Result<Vec<u8>> {
+fn marks(
+    base: &Base,
+    crossing: &[LabelledTo],
+    ids: &Range<u32>,
+    block: usize,
+    unit: &Unit<'_>,
+) -> Result<Vec<u8>> {
     let mut marks = vec![0; ids.len()];
     let mut mark = |t: Triangle, count: u32| {
         let in_base = || crossing.binary_search_by_key(&t, |c| c.triangle);
@@ -168,16 +128,17 @@ fn marks(base: &Base, crossing: &[LabelledTo], ids: &Range<u32>, block: usize) -
             marks[(v - ids.start) as usize] |= if open { CROSSING | OPEN } else { CROSSING };
         }
     };
-    for t in &base.visiting.get(block)? {
+    for t in &base.visiting.get(unit, block)? {
         mark(t.triple, t.count);
     }
-    for t in &base.crossing.get(block)? {
+    for t in &base.crossing.get(unit, block)? {
         mark(t.triple, t.count);
     }
     Ok(marks)
 }
 
 /// The mesh around a block during insertion.
+#[derive(Default)]
 struct BlockWork {
     ids: Range<u32>,
     /// The interior triangles of the base.
@@ -202,7 +163,6 @@ struct BlockWork {
     cut: u64,
     /// Crossing candidates whose points are collinear in the file.
     flat: u64,
-    held: Holding,
 }
 
 impl Neighborhood for BlockWork {
@@ -242,11 +202,17 @@ impl Mesh for BlockWork {
 }
 
 impl BlockWork {
-    fn load(places: Places<'_>, base: &Base, blocks: Blocks, block: usize) -> Result<Self> {
-        let ids = blocks.ids(block);
-        let located = Located::load(places.shape, blocks, block, std::iter::empty())?;
-        let mut candidates: Vec<Candidate> = Vec::with_capacity(base.candidates.rows(block));
-        for &CountedTriple { triple, count } in &base.candidates.get(block)? {
+    fn load(
+        insertion: Insertion<'_>,
+        block: usize,
+        held: &mut Holding<'_>,
+        unit: &Unit<'_>,
+    ) -> Result<Self> {
+        let Insertion { base, blocks, .. } = insertion;
+        let (ids, shape) = (blocks.ids(block), insertion.places.shape);
+        let located = Located::load(shape, blocks, block, std::iter::empty())?;
+        let mut candidates: Vec<Candidate> = Vec::with_capacity(base.candidates.rows(unit, block));
+        for &CountedTriple { triple, count } in &base.candidates.get(unit, block)? {
             let at = triple.map(|v| located.at(v));
             candidates.push(Candidate::new(triple, count, at));
         }
@@ -255,9 +221,9 @@ impl BlockWork {
         for v in candidates.iter().flat_map(|c| c.ids) {
             active[(v - ids.start) as usize] = true;
         }
-        let (interior, cut) = base.surface.inside(block)?;
-        let crossing = base.surface.crossing.get(block)?;
-        let marks = marks(base, &crossing, &ids, block)?;
+        let (interior, cut) = base.surface.inside(unit, block)?;
+        let crossing = base.surface.crossing.get(unit, block)?;
+        let marks = marks(base, &crossing, &ids, block, unit)?;
         let inside = interior.iter().map(|t| t.triangle);
         let across = crossing.iter().map(|t| t.triangle);
         let all = inside.chain(across).chain(candidates.iter().map(|c| c.ids));
@@ -267,45 +233,41 @@ impl BlockWork {
             mesh: Vec::with_capacity(interior.len()),
             stars,
             changed: vec![0; ids.len()],
-            triangles: Vec::new(),
-            components: BlockComponents::default(),
-            interior_base: 0,
-            base: 0,
             candidates,
-            crossing_candidates: Vec::new(),
             located,
             marks,
             cut,
-            flat: 0,
-            held: Holding::default(),
             ids,
+            ..Self::default()
         };
         work.add_base(&interior, &crossing, &active, base, block);
-        work.report_usage(bytes_of(&interior) + bytes_of(&crossing) + bytes_of(&active));
+        let read = bytes_of(&interior) + bytes_of(&crossing) + bytes_of(&active);
+        held.set(work.bytes() + read);
         drop((interior, crossing));
-        work.load_crossing_candidates(places, base, blocks, block)?;
+        work.load_crossing_candidates(insertion, block, held, unit)?;
         Ok(work)
     }
 
-    /// Reports the bytes of its lists and `more` bytes.
-    fn report_usage(&mut self, more: u64) {
+    /// Allocated bytes.
+    fn bytes(&self) -> u64 {
         let triangles = bytes_of(&self.mesh) + bytes_of(&self.triangles);
         let candidates = bytes_of(&self.candidates) + bytes_of(&self.crossing_candidates);
         let vertices = bytes_of(&self.changed) + bytes_of(&self.marks);
-        self.held
-            .set(triangles + candidates + self.components.bytes() + vertices + more);
+        let around = self.components.bytes() + self.stars.bytes() + self.located.bytes();
+        triangles + candidates + vertices + around
     }
 
     /// Determines which crossing triples are candidates, and the positions of their vertices.
     fn load_crossing_candidates(
         &mut self,
-        places: Places<'_>,
-        base: &Base,
-        blocks: Blocks,
+        insertion: Insertion<'_>,
         block: usize,
+        held: &mut Holding<'_>,
+        unit: &Unit<'_>,
     ) -> Result<()> {
-        let flags = base.flags.get(block)?;
-        let mut candidates = base.crossing.get(block)?;
+        let (places, base, blocks) = (insertion.places, insertion.base, insertion.blocks);
+        let flags = base.flags.get(unit, block)?;
+        let mut candidates = base.crossing.get(unit, block)?;
         candidates.retain(|candidate| {
             let (to, triangle) = (block as u32, candidate.triple);
             candidate.count < 3 || flags.binary_search(&TriangleTo { to, triangle }).is_ok()
@@ -319,6 +281,7 @@ impl BlockWork {
                 .differ()
                 .then(|| Located::load(places.file, blocks, block, all.into_iter()))
                 .transpose()?;
+            held.set(self.bytes() + moved.as_ref().map_or(0, Located::bytes));
             let file = moved.as_ref().unwrap_or(&self.located);
             self.flat = places.drop_unfit(&mut candidates, file);
         }
@@ -326,7 +289,7 @@ impl BlockWork {
             Candidate::new(triple, count, triple.map(|v| self.position(v)))
         };
         self.crossing_candidates = candidates.iter().map(new).collect();
-        self.report_usage(bytes_of(&candidates));
+        held.set(self.bytes() + bytes_of(&candidates));
         Ok(())
     }
 
@@ -340,16 +303,12 @@ impl BlockWork {
     ) {
         let mut components = BaseComponents::of(&base.surface, block);
         let mut of = Vec::new();
-        for &LabelledTriangle {
-            triangle: t,
-            label_flip,
-        } in interior
-        {
-            self.mesh.push(t);
-            let slots = t.map(|v| (v - self.ids.start) as usize);
+        for t in interior {
+            self.mesh.push(t.triangle);
+            let slots = t.triangle.map(|v| (v - self.ids.start) as usize);
             if slots.iter().any(|&v| active[v] || self.marks[v] != 0) {
-                of.push(components.interior(label_flip));
-                self.enter(t);
+                of.push(components.interior(t.label_flip));
+                self.enter(t.triangle);
             }
         }
         self.interior_base = self.triangles.len();
@@ -376,6 +335,8 @@ impl BlockWork {
         block: usize,
         undecided: &[Candidate],
         counts: &mut InsertStats,
+        held: &mut Holding<'_>,
+        unit: &Unit<'_>,
     ) -> Result<()> {
         let slot = |v: u32| (v - self.ids.start) as usize;
         let mut context: Vec<bool> = self.marks.iter().map(|m| m & OPEN != 0).collect();
@@ -389,36 +350,38 @@ impl BlockWork {
             }
         }
         ranked.sort_unstable();
-        self.report_usage(bytes_of(&ranked) + 20 * ranked.len() as u64);
+        held.set(self.bytes() + bytes_of(&ranked) + 20 * ranked.len() as u64);
         let ranked: Vec<_> = ranked.iter().map(Candidate::row).collect();
-        out.ranked.put(block, &ranked)?;
+        out.ranked.put(unit, block, &ranked)?;
         drop(ranked);
         let around = self.around_context(&context);
-        out.context.put(block, &around)?;
-        out.vertices.put(block, &self.located(&context, &around))?;
+        out.context.put(unit, block, &around)?;
+        out.vertices
+            .put(unit, block, &self.located(&context, &around))?;
         drop(around);
-        out.merges.put(block, &self.components.tentative)?;
+        out.merges.put(unit, block, &self.components.tentative)?;
         let inserted = &mut self.triangles[self.base..];
         inserted.sort_unstable();
         let mut mesh = std::mem::take(&mut self.mesh);
         mesh.extend_from_slice(inserted);
         // The sort needs the same memory again.
-        self.report_usage(2 * bytes_of(&mesh));
+        held.set(self.bytes() + 2 * bytes_of(&mesh));
         // Consists of two ascending runs, which this sort merges.
         mesh.sort();
-        out.mesh.put(block, bytemuck::cast_slice(&mesh))
+        out.mesh.put(unit, block, bytemuck::cast_slice(&mesh))
     }
 
     /// The interior triangles at context vertices, with their components.
     fn around_context(&mut self, context: &[bool]) -> Vec<TriangleIn> {
         let mut around = Vec::new();
         for number in (0..self.interior_base).chain(self.base..self.triangles.len()) {
-            let t = self.triangles[number];
-            if t.iter().any(|v| context[(v - self.ids.start) as usize]) {
+            let triangle = self.triangles[number];
+            let mut slots = triangle.iter().map(|v| (v - self.ids.start) as usize);
+            if slots.any(|v| context[v]) {
                 let component = self.components.reference(number as u32);
                 around.push(TriangleIn {
-                    triangle: t,
-                    component: component.word(),
+                    triangle,
+                    component,
                 });
             }
         }
@@ -435,11 +398,10 @@ impl BlockWork {
         ids.extend(self.ids.clone().filter(in_context));
         ids.sort_unstable();
         ids.dedup();
-        ids.into_iter()
-            .map(|id| VertexAt {
-                id,
-                position: self.position(id),
-            })
-            .collect()
+        let at = |id| VertexAt {
+            id,
+            position: self.position(id),
+        };
+        ids.into_iter().map(at).collect()
     }
 }

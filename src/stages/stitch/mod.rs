@@ -21,27 +21,30 @@ mod surroundings;
 pub use stats::{BaseStats, InsertStats};
 
 use crate::error::Result;
-use crate::spill::Table;
+use crate::spill::{Shuffle, Table, release};
 use crate::stages::blocks::Blocks;
 use crate::stages::located::Places;
 use crate::stages::surface::evidence::Division;
 use crate::stages::surface::rows::{TriangleRow, TriangleTo};
 use crate::stages::triples::Triples;
 use crate::workspace::Workspace;
-use crate::workspace::persist::persist;
 use across::Across;
+use base::Base;
 use interior::Interior;
+use serde::{Deserialize, Serialize};
 
 /// The manifold mesh; triangles by ascending ids, orientable but not yet oriented.
-#[derive(Debug)]
+#[derive(Debug, Serialize, Deserialize)]
 pub struct Stitched {
     /// Interior triangles by block.
     pub interior: Table<TriangleRow>,
     /// Additional triangles, for each block they touch: all crossing ones, and interior ones inserted late.
-    pub added: Table<TriangleTo>,
+    pub added: Shuffle<TriangleTo>,
     /// Triangles to be removed from `interior`.
-    pub removed: Table<TriangleTo>,
+    pub removed: Shuffle<TriangleTo>,
 }
+
+release!(Stitched: interior, added, removed);
 
 /// The parameters of the extraction.
 #[derive(Debug, Clone, Copy)]
@@ -52,43 +55,52 @@ pub struct StitchOptions {
     pub weigh: Option<Division>,
 }
 
-persist!(Stitched {
-    interior,
-    added,
-    removed
-});
+/// Input and output of the insertion of candidates.
+#[derive(Clone, Copy)]
+struct Insertion<'a> {
+    places: Places<'a>,
+    base: &'a Base,
+    interior: &'a Interior,
+    blocks: Blocks,
+    cos_max_angle: f64,
+    workspace: &'a Workspace,
+}
 
-/// Extracts the manifold.
+/// Extracts the manifold, and deletes the files of `triples`.
 ///
 /// # Errors
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
 /// [`crate::Error::Cancelled`].
 pub fn stitch(
     places: Places<'_>,
-    triples: Triples,
+    triples: &Triples,
     blocks: Blocks,
     options: StitchOptions,
     workspace: &Workspace,
 ) -> Result<(Stitched, BaseStats, InsertStats)> {
     let (base, mut counts) = base::base(places, triples, blocks, options.weigh, workspace)?;
-    let interior = Interior::create(workspace, blocks.count())?;
-    let cos = options.cos_max_angle;
+    let interior = Interior::new(blocks.count());
     // The pass across blocks is short, and starts from the beginning when the run is resumed.
-    let (crossing, inserted) = workspace.once("insert", || {
-        let across = Across::new(&base, &interior, blocks, cos, workspace)?;
-        let inside =
-            || interior::insert_all(places, &base, &interior, blocks, cos, &across, workspace);
-        let mut inserted = workspace.part("insert", inside)?;
-        let (crossing, more) = workspace.part("cross", || across.finish())?;
+    let (stitched, inserted, cut) = workspace.once("insert", |unit| {
+        let insertion = Insertion {
+            places,
+            base: &base,
+            interior: &interior,
+            blocks,
+            cos_max_angle: options.cos_max_angle,
+            workspace,
+        };
+        let across = Across::new(insertion)?;
+        let inside = || across.insert_inside(insertion);
+        let (mut inserted, cut) = workspace.part("insert", inside)?;
+        let (stitched, more) = workspace.part("cross", || across.finish(unit))?;
         inserted.add(&more);
-        Ok((crossing, inserted))
+        Ok((stitched, inserted, cut))
     })?;
-    counts.mobius += inserted.cut;
-    counts.triangles -= inserted.cut;
-    let stitched = Stitched {
-        interior: interior.mesh,
-        added: crossing.added,
-        removed: crossing.removed,
-    };
+    counts.mobius += cut;
+    counts.triangles -= cut;
+    base.release(workspace)?;
+    triples.visiting.release(workspace)?;
+    interior.release(workspace)?;
     Ok((stitched, counts, inserted))
 }

@@ -1,11 +1,10 @@
 //! Counts of the base and of the insertion.
 
 use super::admissibility::Refusal;
-use crate::workspace::persist::persist;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Counts of the base.
-#[derive(Debug, Clone, Copy, Default, Serialize, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize, PartialEq, Eq)]
 pub struct BaseStats {
     /// T3 triangles flagged at non-manifold edges and at vertices by excess.
     pub flagged: u64,
@@ -18,7 +17,7 @@ pub struct BaseStats {
 }
 
 /// Counts of the candidates by outcome.
-#[derive(Debug, Clone, Copy, Default, Serialize, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize, PartialEq, Eq)]
 pub struct InsertStats {
     /// Inserted candidates.
     pub accepted: u64,
@@ -37,9 +36,6 @@ pub struct InsertStats {
     /// Inserted candidates that were removed again because the merges of different blocks contradict each
     /// other.
     pub joints_removed: u64,
-    /// Triangles of the base that were cut; they are counted with the base.
-    #[serde(skip)]
-    pub(super) cut: u64,
 }
 
 impl InsertStats {
@@ -63,24 +59,5 @@ impl InsertStats {
         self.orientation += more.orientation;
         self.unfit += more.unfit;
         self.joints_removed += more.joints_removed;
-        self.cut += more.cut;
     }
 }
-
-persist!(BaseStats {
-    flagged,
-    unfit,
-    mobius,
-    triangles
-});
-persist!(InsertStats {
-    accepted,
-    unconnected,
-    full_edge,
-    excess,
-    angle,
-    orientation,
-    unfit,
-    joints_removed,
-    cut
-});

@@ -9,8 +9,8 @@ use crate::method::METHOD;
 use crate::spill::{Id, Table};
 use crate::stages::blocks::Blocks;
 use crate::stages::order::PointStore;
-use crate::workspace::Workspace;
-use crate::workspace::memory::{bytes_of, hold};
+use crate::workspace::Unit;
+use crate::workspace::memory::bytes_of;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Division of a cloud's bounding box into columns.
@@ -58,18 +58,18 @@ impl Columns {
 /// # Errors
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
 /// [`crate::Error::Cancelled`].
-pub fn highest(store: &PointStore, blocks: Blocks, workspace: &Workspace) -> Result<Table<Id>> {
+pub fn highest(store: &PointStore, blocks: Blocks, unit: &Unit<'_>) -> Result<Table<Id>> {
     let columns = Columns::of(store);
     let count = columns.wide * columns.deep;
-    let reserved = workspace.reserve("columns", 8 * count as u64)?;
+    let reserved = unit.reserve("columns", 8 * count as u64)?;
     // The height is in the upper half of the word, so that a larger word is higher; in the lower half a
     // smaller id gives a larger value.
     let highest: Vec<AtomicU64> = (0..count).map(|_| AtomicU64::new(0)).collect();
     let bytes = |block: usize| 12 * blocks.ids(block).len() as u64;
-    workspace.for_each_unit("columns: block", blocks.count(), bytes, |block| {
-        let ids = blocks.ids(block);
+    unit.for_each_unit("columns: block", blocks.count(), bytes, |unit| {
+        let ids = blocks.ids(unit.number());
         let points = store.slice(ids.start as usize..ids.end as usize)?;
-        let _held = hold(bytes_of(&points));
+        let _held = unit.hold(bytes_of(&points));
         for (id, p) in ids.zip(&points) {
             let place = (p[2] as u64) << 32 | u64::from(!id);
             let highest = &highest[columns.at(*p)];
@@ -80,19 +80,16 @@ pub fn highest(store: &PointStore, blocks: Blocks, workspace: &Workspace) -> Res
         }
         Ok(())
     })?;
-    let mut ids: Vec<u32> = highest
-        .iter()
-        .map(|place| place.load(Ordering::Relaxed))
-        .filter(|place| *place != 0)
-        .map(|place| !(place as u32))
-        .collect();
+    let places = highest.iter().map(|place| place.load(Ordering::Relaxed));
+    let places = places.filter(|place| *place != 0);
+    let mut ids: Vec<u32> = places.map(|place| !(place as u32)).collect();
     drop((highest, reserved));
-    let _held = workspace.reserve("columns", bytes_of(&ids))?;
+    let _held = unit.reserve("columns", bytes_of(&ids))?;
     ids.sort_unstable();
-    let sections = Table::create(workspace, "stitch.highest", blocks.count())?;
+    let sections = Table::new("stitch.highest", blocks.count());
     for part in ids.chunk_by(|a, b| blocks.of(*a) == blocks.of(*b)) {
-        let records: Vec<Id> = part.iter().map(|&id| Id { id }).collect();
-        sections.put(blocks.of(part[0]) as usize, &records)?;
+        let block = blocks.of(part[0]) as usize;
+        sections.put(unit, block, bytemuck::cast_slice(part))?;
     }
     Ok(sections)
 }

@@ -6,7 +6,7 @@
 //! last, possibly against earlier decisions, are those with the weakest connection (Keuper et al., *Efficient
 //! decomposition of image and mesh graphs by lifted multicuts*, ICCV 2015, for signed instead of cut edges).
 
-use super::parity::ParitySets;
+use super::parity::{ParitySets, signed};
 use crate::method::METHOD;
 use crate::workspace::memory::{bytes_of, table_bytes};
 use rustc_hash::FxHashMap;
@@ -95,11 +95,10 @@ impl Graph {
     pub fn push_sky(&mut self) {
         let sky = self.push();
         self.sky = Some(sky);
-        for node in (0..sky)
-            .filter(|&v| self.up[v as usize] != 0)
-            .collect::<Vec<_>>()
-        {
-            self.add(node, sky, 0);
+        for node in 0..sky {
+            if self.up[node as usize] != 0 {
+                self.add(node, sky, 0);
+            }
         }
     }
 
@@ -194,10 +193,8 @@ impl Graph {
             totals[a as usize] += sum.abs();
             totals[b as usize] += sum.abs();
         }
-        let pairs = self
-            .sums
-            .iter()
-            .map(|(&(a, b), &sum)| due(a, b, self.weight(a, b, sum)));
+        let pairs = self.pairs();
+        let pairs = pairs.map(|(a, b, sum)| due(a, b, self.weight(a, b, sum)));
         let mut queue: BinaryHeap<Due> = pairs.collect();
         while let Some((size, Reverse((a, b)))) = queue.pop() {
             let Some(&sum) = self.sums.get(&(a, b)) else {
@@ -225,11 +222,8 @@ impl Graph {
                 }
             }
             let degree = |v: u32| (self.sky == Some(v), self.degrees[v as usize]);
-            let (a, b) = if degree(b) > degree(a) {
-                (b, a)
-            } else {
-                (a, b)
-            };
+            let swap = degree(b) > degree(a);
+            let (a, b) = if swap { (b, a) } else { (a, b) };
             sets.join(a, b, sum < 0);
             self.merge(a, b, sum, &mut totals, &mut queue);
         }
@@ -244,7 +238,7 @@ impl Graph {
         self.degrees[b as usize] = 0;
         self.outside[a as usize] += std::mem::take(&mut self.outside[b as usize]);
         let up = std::mem::take(&mut self.up[b as usize]);
-        self.up[a as usize] += if sum < 0 { -up } else { up };
+        self.up[a as usize] += signed(sum < 0, up);
         totals[a as usize] += totals[b as usize] - 2 * sum.abs();
         self.bare[a as usize] &= self.bare[b as usize];
         for x in std::mem::take(&mut self.neighbors[b as usize]) {
@@ -253,7 +247,7 @@ impl Graph {
             };
             self.degrees[x as usize] -= 1;
             self.bare[x as usize] &= self.sky != Some(a);
-            let moved = if sum < 0 { -moved } else { moved };
+            let moved = signed(sum < 0, moved);
             let before = self.add_to_pair(a, x, moved).unwrap_or(0);
             let now = before + moved;
             let lost = now.abs() - before.abs() - moved.abs();

@@ -1,17 +1,15 @@
 //! The orientation of the crossing triangles, which merges the labels of blocks.
 
 use super::crossing_edges::CrossingEdges;
-use super::orient::{Oriented, OrientedInside, label_bytes};
-use super::parity::{OrientationConstraint, ParitySets, word};
+use super::orient::{OrientedInside, OrientedSurface, label_bytes};
+use super::parity::{ParitySets, word};
 use super::rows::{LabelledTo, Relation, TriangleTo, interior_constraints};
 use super::settle::settle;
 use super::star::Triangle;
 use crate::error::Result;
-use crate::spill::{Shuffle, Table};
+use crate::spill::{Inbox, Shuffle};
 use crate::stages::blocks::Blocks;
-use crate::workspace::Workspace;
-
-const SHUFFLE_BUFFER: u64 = 8 << 20;
+use crate::workspace::Unit;
 
 impl OrientedInside {
     /// The second part of [`orient_inside`]: orients the crossing triangles, ascending, given by the block of
@@ -21,61 +19,50 @@ impl OrientedInside {
     /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
     /// [`crate::Error::Cancelled`].
     pub fn join(
-        self,
+        &self,
         name: &str,
-        removed: &Table<TriangleTo>,
+        removed: &Inbox<TriangleTo>,
         blocks: Blocks,
-        workspace: &Workspace,
-    ) -> Result<Oriented> {
+        unit: &Unit<'_>,
+    ) -> Result<OrientedSurface> {
         let mut globals = Vec::with_capacity(self.labels.len());
         let mut next = 0u32;
         for (global, _) in &self.labels {
             globals.push((next, *global));
             next += global;
         }
-        let held = workspace.reserve("labels", label_bytes(next as usize))?;
-        let mut surface = Oriented {
-            interior: self.interior,
-            crossing: Table::create(workspace, &format!("{name}.none"), 0)?,
+        let _held = unit.reserve("labels", label_bytes(next as usize))?;
+        let relations = self.relations.open(unit, blocks.count())?;
+        let mut surface = OrientedSurface {
+            interior: self.interior.clone(),
+            sent: Shuffle::new(&format!("{name}.crossing")),
             globals,
-            labels: self.labels.into_iter().map(|(_, all)| all).collect(),
+            labels: self.labels.iter().map(|(_, all)| *all).collect(),
             sets: ParitySets::new(next as usize),
             crosses: vec![false; next as usize],
-            seams: None,
+            seams: self.weighed.as_ref().map(|weighed| weighed.seams.clone()),
             mobius: self.mobius,
             triangles: self.triangles,
-            _held: held,
         };
         let crossing = |block: usize| {
-            let mut triangles: Vec<Triangle> = bytemuck::cast_vec(self.crossing.get(block)?);
-            let removed = removed.get(block)?;
+            let mut triangles: Vec<Triangle> = bytemuck::cast_vec(self.crossing.get(unit, block)?);
+            let removed = removed.get(unit, block)?;
             triangles.retain(|t| is_present(block, t, &removed));
             Ok(triangles)
         };
         if let Some(weighed) = &self.weighed {
-            let with_normals = |block: usize| {
-                let (triangles, removed) = (self.crossing.get(block)?, removed.get(block)?);
-                let normals = weighed.normals.get(block)?.into_iter();
+            let crossing = |block: usize| {
+                let triangles = self.crossing.get(unit, block)?;
+                let removed = removed.get(unit, block)?;
+                let normals = weighed.normals.get(unit, block)?.into_iter();
                 let normals = normals.map(|n| n.normal.map(f64::from));
                 let all = triangles.into_iter().map(|t| t.triangle).zip(normals);
-                Ok(all
-                    .filter(|(t, _)| is_present(block, t, &removed))
-                    .collect())
+                let present = all.filter(|(t, _)| is_present(block, t, &removed));
+                Ok(present.collect())
             };
-            let relations = &self.relations;
-            settle(
-                &mut surface,
-                with_normals,
-                relations,
-                weighed,
-                blocks,
-                workspace,
-            )?;
+            settle(&mut surface, crossing, &relations, weighed, blocks, unit)?;
         }
-        let relations = &self.relations;
-        orient_crossing(&mut surface, name, crossing, relations, blocks, workspace)?;
-        // Only now: a table dropped during a step might be missing if the step is repeated.
-        surface.seams = self.weighed.map(|weighed| weighed.seams);
+        orient_crossing(&mut surface, crossing, &relations, blocks, unit)?;
         Ok(surface)
     }
 }
@@ -89,18 +76,16 @@ fn is_present(block: usize, t: &Triangle, removed: &[TriangleTo]) -> bool {
 
 /// Orients the crossing triangles in ascending order, each relative to those before it.
 fn orient_crossing(
-    base: &mut Oriented,
-    name: &str,
+    base: &mut OrientedSurface,
     crossing: impl Fn(usize) -> Result<Vec<Triangle>>,
-    relations: &Table<Relation>,
+    relations: &Inbox<Relation>,
     blocks: Blocks,
-    workspace: &Workspace,
+    unit: &Unit<'_>,
 ) -> Result<()> {
-    let shuffle = Shuffle::new(workspace, &format!("{name}.crossing"), SHUFFLE_BUFFER)?;
-    let mut edges = CrossingEdges::new(workspace)?;
+    let mut edges = CrossingEdges::new(unit)?;
     for group in 0..blocks.count() {
-        workspace.check_cancel()?;
-        let relations = relations.get(group)?;
+        unit.check_cancel()?;
+        let relations = relations.get(unit, group)?;
         let mut sent = Vec::new();
         let triangles = crossing(group)?;
         edges.make_room(triangles.len())?;
@@ -119,10 +104,9 @@ fn orient_crossing(
             sent.push(to(blocks.of(t[0])));
             sent.extend(blocks.visited(t).map(to));
         }
-        shuffle.send(&sent)?;
+        base.sent.send(unit, group, sent)?;
         edges.end(group, blocks);
     }
-    base.crossing = shuffle.deliver(workspace, blocks.count())?;
     base.sets.flatten();
     // The marks were set on labels; they apply to whole sets.
     for label in 0..base.sets.len() as u32 {
@@ -136,16 +120,15 @@ fn orient_crossing(
 
 /// Orients one crossing triangle; returns its label and flip, or `None` if it closes a Möbius band.
 fn orient_one(
-    base: &mut Oriented,
+    base: &mut OrientedSurface,
     t: Triangle,
     relations: &[Relation],
     group: usize,
     edges: &CrossingEdges,
 ) -> Option<u32> {
     let interior = interior_constraints(&base.globals, relations, group, t);
-    let mut constraints: Vec<OrientationConstraint> =
-        interior.map(|(constraint, _)| constraint).collect();
-    constraints.extend(edges.adjacent(t).map(|(constraint, ..)| constraint));
+    let before = edges.adjacent(t).map(|(constraint, ..)| constraint);
+    let constraints: Vec<_> = interior.map(|(c, _)| c).chain(before).collect();
     if !base.sets.merge(&constraints) {
         return None;
     }

@@ -7,7 +7,7 @@ use super::star::Triangle;
 use crate::geom::triangle::small_normal;
 use crate::method::METHOD;
 use crate::stages::located::Located;
-use crate::workspace::memory::Holding;
+use crate::workspace::memory::bytes_of;
 
 /// The division of a base into patches and clusters for its orientation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -39,11 +39,15 @@ pub struct Evidence {
     pub division: Division,
     /// Vertices of the block that are the highest in their columns, ascending.
     pub highest: Vec<u32>,
-    /// The memory that the evidence holds.
-    pub held: Holding,
 }
 
 impl Evidence {
+    /// Allocated bytes.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        self.places.bytes() + bytes_of(&self.candidates)
+    }
+
     /// The normal of a triangle with ascending ids, rounded to `f64`, and its squared length.
     #[must_use]
     #[inline(always)]

@@ -1,14 +1,14 @@
 //! The labels of a block: the relative orientations of its interior triangles, as far as edges inside the
 //! block determine them.
 
-use super::parity::{ParitySets, word};
+use super::parity::{ParitySets, signed, word};
 use super::patches::SharedEdge;
 use super::rows::{LabelledTriangle, PairSum, Relation, Seam, Upward, words};
 use super::star::{EDGES, EdgesUp, Triangle, opposed};
 use crate::stages::blocks::Blocks;
-use crate::workspace::memory::{Holding, bytes_of, hold};
+use crate::workspace::memory::bytes_of;
 
-/// The labels of a block; the rows are described at [`super::orient::Oriented`] and
+/// The labels of a block; the rows are described at [`super::orient::OrientedSurface`] and
 /// [`super::orient::Weighed`].
 pub(super) struct OrientedBlock {
     pub interior: Vec<LabelledTriangle>,
@@ -20,7 +20,16 @@ pub(super) struct OrientedBlock {
     pub global: u32,
     pub labels: u32,
     pub mobius: u64,
-    _held: Holding,
+    /// Most bytes that were in use while the block was oriented.
+    pub most: u64,
+}
+
+impl OrientedBlock {
+    /// Allocated bytes.
+    pub fn bytes(&self) -> u64 {
+        let relations = bytes_of(&self.relations) + bytes_of(&self.pairs);
+        bytes_of(&self.interior) + relations + bytes_of(&self.seams)
+    }
 }
 
 /// Orients the interior triangles of a block and numbers their labels.
@@ -35,7 +44,7 @@ pub(super) fn orient_block(
     let mut sets = ParitySets::new(inner.len());
     let mut kept = Vec::with_capacity(inner.len());
     let mut constraints = Vec::new();
-    let (_held, mut mobius) = (hold(8 * inner.len() as u64), 0);
+    let mut mobius = 0;
     for (number, &t) in inner.iter().enumerate() {
         let number = number as u32;
         // The adjacent triangles agree and are joined, or this triangle is removed.
@@ -60,7 +69,9 @@ pub(super) fn orient_block(
             connections.relations.push((c, other, flip, 1));
         });
     }
-    number_labels(inner, &kept, connections, &mut sets, blocks, block, mobius)
+    let mut done = number_labels(inner, &kept, connections, &mut sets, blocks, block, mobius);
+    done.most = edges.bytes() + 8 * inner.len() as u64 + done.bytes();
+    done
 }
 
 /// The connections of a block's sets that influence their orientation.
@@ -121,22 +132,15 @@ pub(super) fn number_labels(
     let mut pairs = Vec::with_capacity(connections.pairs.len());
     for (a, b, sum) in connections.pairs {
         let ((a, turned_a, _), (b, turned_b, _)) = (find(a), find(b));
-        let sum = if turned_a ^ turned_b { -sum } else { sum };
-        pairs.push(PairSum {
-            a,
-            b,
-            sum: words(sum),
-        });
+        let sum = words(signed(turned_a ^ turned_b, sum));
+        pairs.push(PairSum { a, b, sum });
     }
     let mut ups = Vec::with_capacity(connections.ups.len());
     for (a, up) in connections.ups {
         let (label, turned, _) = find(a);
         if label < global {
-            let up = if turned { -up } else { up };
-            ups.push(Upward {
-                label,
-                evidence: words(up),
-            });
+            let evidence = words(signed(turned, up));
+            ups.push(Upward { label, evidence });
         }
     }
     let mut interior = Vec::with_capacity(kept.len());
@@ -153,9 +157,7 @@ pub(super) fn number_labels(
         b_flip: word((place(edge.b), edge.flip)),
     };
     let seams: Vec<_> = connections.seams.iter().map(seam).collect();
-    let held = bytes_of(&interior) + bytes_of(&sent) + bytes_of(&pairs) + bytes_of(&seams);
     OrientedBlock {
-        _held: hold(held),
         interior,
         relations: sent,
         pairs,
@@ -164,6 +166,7 @@ pub(super) fn number_labels(
         global,
         labels,
         mobius,
+        most: 0,
     }
 }
 

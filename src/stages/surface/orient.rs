@@ -10,22 +10,22 @@ use super::rows::{
 use super::star::Triangle;
 use super::weigh::weigh_block;
 use crate::error::Result;
-use crate::spill::{Shuffle, Table};
+use crate::spill::{Inbox, Shuffle, Table, release};
 use crate::stages::blocks::Blocks;
-use crate::workspace::Workspace;
-use crate::workspace::memory::{Holding, Reservation, bytes_of, hold};
-use crate::workspace::persist::{Persist, Saved};
-
-const SHUFFLE_BUFFER: u64 = 8 << 20;
+use crate::workspace::memory::{Reservation, bytes_of};
+use crate::workspace::{Unit, Workspace};
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use std::ops::Deref;
 
 /// An oriented surface: every triangle has a label and an orientation relative to it. Triangles with the same
 /// label are in the same component; the labels of a component are merged in `sets`.
-#[derive(Debug)]
-pub struct Oriented {
+#[derive(Debug, Serialize, Deserialize)]
+pub struct OrientedSurface {
     /// Interior triangles by block; labels are numbered within the block.
     pub interior: Table<LabelledTriangle>,
     /// Crossing triangles, once for each block they touch; labels are global.
-    pub crossing: Table<LabelledTo>,
+    pub sent: Shuffle<LabelledTo>,
     /// For each block, the global label of its label 0 and the number of labels that are global.
     pub globals: Vec<(u32, u32)>,
     /// For each block, the number of its labels.
@@ -41,14 +41,32 @@ pub struct Oriented {
     pub mobius: u64,
     /// Triangles that are left.
     pub triangles: u64,
-    pub(super) _held: Reservation,
+}
+
+release!(OrientedSurface: interior, sent; seams);
+
+/// An oriented surface that can be read.
+#[derive(Debug)]
+pub struct Oriented {
+    surface: OrientedSurface,
+    /// Crossing triangles, once for each block they touch; labels are global.
+    pub crossing: Inbox<LabelledTo>,
+    _held: Reservation,
+}
+
+impl Deref for Oriented {
+    type Target = OrientedSurface;
+
+    fn deref(&self) -> &OrientedSurface {
+        &self.surface
+    }
 }
 
 /// A surface with oriented blocks, before the blocks are oriented relative to each other.
 #[derive(Debug)]
 pub struct OrientedInside {
     pub(super) interior: Table<LabelledTriangle>,
-    pub(super) relations: Table<Relation>,
+    pub(super) relations: Shuffle<Relation>,
     pub(super) weighed: Option<Weighed>,
     /// Crossing triangles by the block of their smallest vertex.
     pub(super) crossing: Table<TriangleRow>,
@@ -58,6 +76,8 @@ pub struct OrientedInside {
     pub(super) triangles: u64,
 }
 
+release!(OrientedInside: relations, crossing; weighed);
+
 /// Evidence for the orientation of each block's labels, by block.
 #[derive(Debug)]
 pub(super) struct Weighed {
@@ -65,21 +85,23 @@ pub(super) struct Weighed {
     pub pairs: Table<PairSum>,
     /// Evidence that global labels face up.
     pub ups: Table<Upward>,
-    /// See [`Oriented::seams`].
+    /// See [`OrientedSurface::seams`].
     pub seams: Table<Seam>,
     /// Unit normals of the crossing triangles, in their order.
     pub normals: Table<Normal>,
 }
 
+release!(Weighed: pairs, ups, normals);
+
 impl Weighed {
-    fn create(workspace: &Workspace, name: &str, count: usize) -> Result<Self> {
+    fn new(name: &str, count: usize) -> Self {
         let table = |part: &str| format!("{name}.{part}");
-        Ok(Self {
-            pairs: Table::create(workspace, &table("pairs"), count)?,
-            ups: Table::create(workspace, &table("ups"), count)?,
-            seams: Table::create(workspace, &table("seams"), count)?,
-            normals: Table::create(workspace, &table("normals"), count)?,
-        })
+        Self {
+            pairs: Table::new(&table("pairs"), count),
+            ups: Table::new(&table("ups"), count),
+            seams: Table::new(&table("seams"), count),
+            normals: Table::new(&table("normals"), count),
+        }
     }
 }
 
@@ -91,22 +113,24 @@ pub struct BlockTriangles<T> {
     pub evidence: Option<Evidence>,
     /// Additional results for the caller.
     pub found: T,
-    /// The memory that it holds.
-    pub held: Holding,
 }
+
+/// The result for a block: the numbers of its global labels and of all its labels, of triangles removed and
+/// kept, and the additional results.
+type Done<T> = ((u32, u32), (u64, usize), T);
 
 /// Orients a surface: first the interior triangles of every block on its own, ascending; the crossing ones
 /// follow in [`OrientedInside::join`]. A triangle that would make the surface non-orientable is removed.
 ///
-/// `around(block)` returns all triangles that touch a block, ascending; `bytes(block)` estimates the memory
-/// for that; `each` receives the additional results of each block.
+/// `around(unit)` returns all triangles that touch the block of a unit, ascending; `bytes(block)` estimates
+/// the memory for that; `each` receives the additional results of each block.
 ///
 /// # Errors
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
 /// [`crate::Error::Cancelled`].
-pub fn orient_inside<T: Persist + Send>(
+pub fn orient_inside<T: Serialize + DeserializeOwned + Send>(
     name: &str,
-    around: impl Fn(usize) -> Result<BlockTriangles<T>> + Sync,
+    around: impl Fn(&Unit<'_>) -> Result<BlockTriangles<T>> + Sync,
     mut each: impl FnMut(usize, T) + Send,
     bytes: impl Fn(usize) -> u64 + Sync,
     blocks: Blocks,
@@ -115,63 +139,58 @@ pub fn orient_inside<T: Persist + Send>(
 ) -> Result<OrientedInside> {
     let count = blocks.count();
     let table = |part: &str| format!("{name}.{part}");
-    let interior = Table::create(workspace, &table("interior"), count)?;
-    let first = Table::create(workspace, &table("border"), count)?;
-    let relations = table("relations");
-    let shuffle = Shuffle::between_units(workspace, &relations, SHUFFLE_BUFFER, count)?;
-    let weighed = evidence
-        .then(|| Weighed::create(workspace, name, count))
-        .transpose()?;
-    let work = |block| {
+    let interior = Table::new(&table("interior"), count);
+    let first = Table::new(&table("border"), count);
+    let relations = Shuffle::new(&table("relations"));
+    let weighed = evidence.then(|| Weighed::new(name, count));
+    let work = |unit: &Unit<'_>| {
+        let block = unit.number();
         let BlockTriangles {
             triangles: mut inner,
             evidence,
             found,
-            held: _held,
-        } = around(block)?;
+        } = around(unit)?;
         let crossing: Vec<Triangle> = inner.extract_if(.., |t| blocks.crossing(*t)).collect();
-        let _crossing = hold(bytes_of(&crossing));
+        let of_evidence = evidence.as_ref().map_or(0, Evidence::bytes);
+        let _held = unit.hold(bytes_of(&inner) + bytes_of(&crossing) + of_evidence);
         let done = match &evidence {
             Some(evidence) => weigh_block(&inner, &crossing, evidence, blocks, block),
             None => orient_block(&inner, &crossing, blocks, block),
         };
-        interior.put(block, &done.interior)?;
-        shuffle.send_from(block, &done.relations)?;
+        drop(unit.hold(done.most));
+        let _done = unit.hold(done.bytes());
+        interior.put(unit, block, &done.interior)?;
+        relations.send(unit, block, done.relations)?;
         let mine = |t: &Triangle| blocks.of(t[0]) == block as u32;
         let mine: Vec<Triangle> = crossing.iter().copied().filter(mine).collect();
-        first.put(block, bytemuck::cast_slice(&mine))?;
+        first.put(unit, block, bytemuck::cast_slice(&mine))?;
         if let (Some(weighed), Some(evidence)) = (&weighed, &evidence) {
-            weighed.pairs.put(block, &done.pairs)?;
-            weighed.ups.put(block, &done.ups)?;
-            weighed.seams.put(block, &done.seams)?;
+            weighed.pairs.put(unit, block, &done.pairs)?;
+            weighed.ups.put(unit, block, &done.ups)?;
+            weighed.seams.put(unit, block, &done.seams)?;
             let normal = |t: &Triangle| Normal {
                 normal: evidence.normal(*t).map(|x| x as f32),
             };
             let normals: Vec<_> = mine.iter().map(normal).collect();
-            weighed.normals.put(block, &normals)?;
+            weighed.normals.put(unit, block, &normals)?;
         }
-        workspace.advance(1);
+        unit.advance(1);
         let own = (done.global, done.labels);
         Ok((own, (done.mobius, done.interior.len()), found))
     };
     let mut labels = vec![(0u32, 0u32); count];
     let (mut mobius, mut triangles) = (0, 0);
-    workspace.units(
-        "orient: block",
-        count,
-        &bytes,
-        work,
-        |block, (own, more, found)| {
-            labels[block] = own;
-            mobius += more.0;
-            triangles += more.1 as u64;
-            each(block, found);
-            Ok(())
-        },
-    )?;
+    let each = |block: usize, (own, more, found): Done<T>| {
+        labels[block] = own;
+        mobius += more.0;
+        triangles += more.1 as u64;
+        each(block, found);
+        Ok(())
+    };
+    workspace.units("orient: block", count, &bytes, work, each)?;
     Ok(OrientedInside {
         interior,
-        relations: shuffle.deliver(workspace, count)?,
+        relations,
         weighed,
         crossing: first,
         labels,
@@ -180,14 +199,26 @@ pub fn orient_inside<T: Persist + Send>(
     })
 }
 
-impl Oriented {
+impl OrientedSurface {
+    /// Opens it for reading.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`].
+    pub fn open(self, workspace: &Workspace, blocks: Blocks) -> Result<Oriented> {
+        Ok(Oriented {
+            crossing: self.sent.open(workspace, blocks.count())?,
+            _held: workspace.reserve("labels", label_bytes(self.sets.len()))?,
+            surface: self,
+        })
+    }
+
     /// The interior triangles of a block without those that are cut where labels are not oriented alike, and
     /// the number of the latter.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
-    pub fn inside(&self, block: usize) -> Result<(Vec<LabelledTriangle>, u64)> {
-        let mut interior = self.interior.get(block)?;
+    pub fn inside(&self, unit: &Unit<'_>, block: usize) -> Result<(Vec<LabelledTriangle>, u64)> {
+        let mut interior = self.interior.get(unit, block)?;
         let Some(seams) = &self.seams else {
             return Ok((interior, 0));
         };
@@ -200,7 +231,7 @@ impl Oriented {
         };
         let mut gone = 0;
         let mut cut = vec![false; interior.len()];
-        for Seam { a, b_flip } in seams.get(block)? {
+        for Seam { a, b_flip } in seams.get(unit, block)? {
             let (b, flip) = constraint(b_flip);
             let (a, b) = (a as usize, b as usize);
             if !cut[a] && !cut[b] && turned(&interior[a]) ^ turned(&interior[b]) != flip {
@@ -208,48 +239,9 @@ impl Oriented {
                 gone += 1;
             }
         }
-        if gone > 0 {
-            let mut number = 0;
-            interior.retain(|_| {
-                number += 1;
-                !cut[number - 1]
-            });
-        }
+        let mut cut = cut.into_iter();
+        interior.retain(|_| cut.next() == Some(false));
         Ok((interior, gone))
-    }
-}
-
-impl Persist for Oriented {
-    fn save(&self, out: &mut Vec<u8>) {
-        self.interior.save(out);
-        self.crossing.save(out);
-        self.globals.save(out);
-        self.labels.save(out);
-        self.sets.save(out);
-        self.crosses.save(out);
-        self.seams.save(out);
-        (self.mobius, self.triangles).save(out);
-    }
-
-    fn load(from: &mut Saved<'_>) -> Result<Self> {
-        let (interior, crossing) = Persist::load(from)?;
-        let (globals, labels) = Persist::load(from)?;
-        let sets = ParitySets::load(from)?;
-        let (crosses, seams) = Persist::load(from)?;
-        let (mobius, triangles) = Persist::load(from)?;
-        let bytes = label_bytes(sets.len());
-        Ok(Self {
-            interior,
-            crossing,
-            globals,
-            labels,
-            _held: from.workspace.reserve("labels", bytes)?,
-            sets,
-            crosses,
-            seams,
-            mobius,
-            triangles,
-        })
     }
 }
 

@@ -18,14 +18,18 @@ pub fn constraint(word: u32) -> OrientationConstraint {
     (word >> 1, word & 1 == 1)
 }
 
+/// A weight, negative if `flip`.
+#[inline]
+pub(super) fn signed(flip: bool, weight: i64) -> i64 {
+    if flip { -weight } else { weight }
+}
+
 /// Sets of labels with relative orientations.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub struct ParitySets {
     /// Parent and, in the lowest bit, orientation relative to the parent.
     parent: Vec<u32>,
 }
-
-crate::workspace::persist::persist!(ParitySets { parent });
 
 impl ParitySets {
     /// `count` sets of one label each.
@@ -88,28 +92,21 @@ impl ParitySets {
         if root_a == root_b {
             return !turned;
         }
-        self.parent[root_b as usize] = root_a << 1 | u32::from(turned);
+        self.parent[root_b as usize] = word((root_a, turned));
         true
     }
 
     /// As [`ParitySets::join`], but the smaller of the two roots stays a root.
     pub fn join_to_smaller(&mut self, a: u32, b: u32, flip: bool) -> bool {
-        let (root_a, flip_a) = self.find(a);
-        let (root_b, flip_b) = self.find(b);
-        let turned = flip ^ flip_a ^ flip_b;
-        if root_a == root_b {
-            return !turned;
-        }
-        let (root, part) = (root_a.min(root_b), root_a.max(root_b));
-        self.parent[part as usize] = root << 1 | u32::from(turned);
-        true
+        let ((a, flip_a), (b, flip_b)) = (self.find(a), self.find(b));
+        self.join(a.min(b), a.max(b), flip ^ flip_a ^ flip_b)
     }
 
     /// Makes the parent of every label its root.
     pub fn flatten(&mut self) {
         for label in 0..self.parent.len() as u32 {
             let (root, flip) = self.find(label);
-            self.parent[label as usize] = root << 1 | u32::from(flip);
+            self.parent[label as usize] = word((root, flip));
         }
     }
 

@@ -4,7 +4,7 @@ use super::evidence::{Evidence, LongNormal};
 use super::parity::ParitySets;
 use super::sides::{NONE, across, parts};
 use super::star::{EDGES, Triangle};
-use crate::workspace::memory::{Holding, bytes_of, hold};
+use crate::workspace::memory::bytes_of;
 use std::ops::Range;
 
 /// An edge between two triangles inside a block.
@@ -32,7 +32,6 @@ pub struct Patches {
     /// Edges between patches, and edges inside a patch whose triangles are not oriented alike, by ascending
     /// triangles.
     pub shared: Vec<SharedEdge>,
-    _held: Holding,
 }
 
 impl Patches {
@@ -41,7 +40,6 @@ impl Patches {
     #[must_use]
     pub fn of(ids: Range<u32>, triangles: &[Triangle], evidence: &Evidence, patch: u32) -> Self {
         let across = across(ids, triangles);
-        let mut held = hold(bytes_of(&across) + 8 * triangles.len() as u64);
         let mut sets = ParitySets::new(triangles.len());
         let mut runs = Runs {
             triangles,
@@ -59,8 +57,6 @@ impl Patches {
             first += count;
         }
         let mut shared = runs.shared;
-        let held_before = bytes_of(&across) + bytes_of(&shared);
-        held.set(held_before + 8 * triangles.len() as u64);
         drop(across);
         let (of, roots) = number(&mut sets);
         let apart = |j: &SharedEdge| of[j.a as usize] != of[j.b as usize];
@@ -69,14 +65,19 @@ impl Patches {
             let [a, b] = [j.a, j.b].map(|n| evidence.long_normal(triangles[n as usize]));
             j.weight = a.weight(b, j.flip) as u8;
         }
-        held.set(bytes_of(&shared) + bytes_of(&of) + bytes_of(&roots) + 4 * of.len() as u64);
         Self {
             sets,
             of,
             roots,
             shared,
-            _held: held,
         }
+    }
+
+    /// Allocated bytes.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        let sets = 4 * self.sets.len() as u64;
+        bytes_of(&self.shared) + bytes_of(&self.of) + bytes_of(&self.roots) + sets
     }
 }
 

@@ -4,42 +4,42 @@
 use super::contract::{Graph, Limit};
 use super::crossing_edges::CrossingEdges;
 use super::evidence::{cosine, weight};
-use super::orient::{Oriented, Weighed};
-use super::parity::{OrientationConstraint, word};
+use super::orient::{OrientedSurface, Weighed};
+use super::parity::{OrientationConstraint, signed, word};
 use super::rows::{Relation, interior_constraints, sum};
 use super::star::Triangle;
 use crate::error::Result;
 use crate::method::METHOD;
-use crate::spill::Table;
+use crate::spill::Inbox;
 use crate::stages::blocks::Blocks;
-use crate::workspace::Workspace;
+use crate::workspace::Unit;
 
 /// Decides the relative orientations of global labels. `crossing` returns the crossing triangles of a block
 /// with their normals.
 pub(super) fn settle(
-    surface: &mut Oriented,
+    surface: &mut OrientedSurface,
     crossing: impl Fn(usize) -> Result<Vec<(Triangle, [f64; 3])>>,
-    relations: &Table<Relation>,
+    relations: &Inbox<Relation>,
     weighed: &Weighed,
     blocks: Blocks,
-    workspace: &Workspace,
+    unit: &Unit<'_>,
 ) -> Result<()> {
     let mut graph = Graph::new(surface.sets.len());
-    let mut reserved = workspace.promise("labels: graph", 0)?;
+    let mut reserved = unit.promise("labels: graph", 0)?;
     for block in 0..blocks.count() {
         let first = surface.globals[block].0;
-        for pair in weighed.pairs.get(block)? {
+        for pair in weighed.pairs.get(unit, block)? {
             graph.add(first + pair.a, first + pair.b, sum(pair.sum));
         }
-        for up in weighed.ups.get(block)? {
+        for up in weighed.ups.get(unit, block)? {
             graph.add_up(first + up.label, sum(up.evidence));
         }
         reserved.at_least(graph.bytes())?;
     }
-    let mut edges = CrossingEdges::new(workspace)?;
+    let mut edges = CrossingEdges::new(unit)?;
     for group in 0..blocks.count() {
-        workspace.check_cancel()?;
-        let relations = relations.get(group)?;
+        unit.check_cancel()?;
+        let relations = relations.get(unit, group)?;
         let triangles = crossing(group)?;
         edges.make_room(triangles.len())?;
         for (t, normal) in triangles {
@@ -55,7 +55,7 @@ pub(super) fn settle(
                 None => (graph.push(), false),
             };
             for &((other, turned), weight) in &neighbors {
-                let sum = if flip ^ turned { -weight } else { weight };
+                let sum = signed(flip ^ turned, weight);
                 graph.add(label, other, METHOD.orientation.edge * sum);
             }
             edges.put(t, word((label, flip)), normal);

@@ -1,7 +1,6 @@
 //! Pairs of triangles that share an edge inside a block.
 
 use super::star::{ByVertex, Triangle};
-use crate::workspace::memory::{bytes_of, hold};
 use std::ops::Range;
 
 /// Stands for an edge without a second triangle inside the block.
@@ -45,7 +44,6 @@ pub fn pair_edges(
     // For each vertex, the last lower end from which an edge to it was found, plus one, and the side of this
     // edge.
     let mut seen = vec![(0u32, NONE); size as usize];
-    let _held = hold(bytes_of(&seen));
     let mut next = triangles.partition_point(|t| t[0] < start) as u32;
     for v in 0..size {
         let first = next;

@@ -1,6 +1,6 @@
 //! The triangles around the vertices and edges of a block.
 
-use crate::workspace::memory::{Holding, bytes_of, hold};
+use crate::workspace::memory::bytes_of;
 use std::ops::Range;
 
 /// A triangle as ascending ids.
@@ -44,7 +44,7 @@ pub fn has(t: Triangle, v: u32) -> bool {
 /// Lists for the vertices of a block, contiguous in memory. The room is counted first, so filling them
 /// allocates nothing. Used for [`Star`] and [`EdgesUp`], and by the insertion of candidates for the triangles
 /// around a vertex.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct ByVertex<T> {
     ids: Range<u32>,
     /// Index of the first entry of each vertex.
@@ -52,7 +52,6 @@ pub struct ByVertex<T> {
     /// Index after the last entry of each vertex.
     end: Vec<u32>,
     list: Vec<T>,
-    _held: Holding,
 }
 
 impl<T: Copy + Default> ByVertex<T> {
@@ -71,12 +70,17 @@ impl<T: Copy + Default> ByVertex<T> {
         let end = start[..ids.len()].to_vec();
         let list = vec![T::default(); start[ids.len()] as usize];
         Self {
-            _held: hold(bytes_of(&start) + bytes_of(&end) + bytes_of(&list)),
             ids,
             start,
             end,
             list,
         }
+    }
+
+    /// Allocated bytes.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        bytes_of(&self.start) + bytes_of(&self.end) + bytes_of(&self.list)
     }
 
     /// Appends an entry to the list of `v`; ignored if `v` is not in the block or its list is full.
@@ -156,7 +160,7 @@ impl EdgesUp {
 /// vertex. Only for links whose nodes have at most two edges. The memory is reused for each vertex.
 #[derive(Debug, Default)]
 pub struct Link {
-    edges: Vec<(u32, u32)>,
+    edges: Vec<[u32; 2]>,
     group: Vec<usize>,
     /// For each component, true if it is a closed cycle.
     closed: Vec<bool>,
@@ -166,8 +170,7 @@ impl Link {
     /// Reads the triangles around `v`.
     pub fn set(&mut self, v: u32, triangles: impl Iterator<Item = Triangle>) {
         self.edges.clear();
-        self.edges
-            .extend(triangles.map(|t| others(t, v)).map(|[a, b]| (a, b)));
+        self.edges.extend(triangles.map(|t| others(t, v)));
         self.group.clear();
         self.group.resize(self.edges.len(), usize::MAX);
         self.closed.clear();
@@ -175,7 +178,7 @@ impl Link {
             if self.group[seed] == usize::MAX {
                 let number = self.closed.len();
                 self.group[seed] = number;
-                let (a, b) = self.edges[seed];
+                let [a, b] = self.edges[seed];
                 let closed = self.follow(a, b, number);
                 if !closed {
                     self.follow(b, a, number);
@@ -188,18 +191,17 @@ impl Link {
     /// Walks from node `from` along edges without a component; true if it ends at `goal`.
     fn follow(&mut self, from: u32, goal: u32, number: usize) -> bool {
         let mut node = from;
-        loop {
-            if node == goal {
-                return true;
-            }
-            let next = (0..self.edges.len()).find(|&e| {
-                self.group[e] == usize::MAX && (self.edges[e].0 == node || self.edges[e].1 == node)
-            });
-            let Some(edge) = next else { return false };
+        while node != goal {
+            let is_next =
+                |e: &usize| self.group[*e] == usize::MAX && self.edges[*e].contains(&node);
+            let Some(edge) = (0..self.edges.len()).find(is_next) else {
+                return false;
+            };
             self.group[edge] = number;
-            let (a, b) = self.edges[edge];
-            node = if a == node { b } else { a };
+            let [a, b] = self.edges[edge];
+            node ^= a ^ b;
         }
+        true
     }
 
     /// Number of components.

@@ -4,11 +4,12 @@
 use super::contract::{Graph, Limit};
 use super::evidence::{Evidence, cosine, weight};
 use super::labels::{Connections, OrientedBlock, adjacent, number_labels};
+use super::parity::signed;
 use super::patches::Patches;
 use super::star::{EdgesUp, Triangle};
 use crate::method::METHOD;
 use crate::stages::blocks::Blocks;
-use crate::workspace::memory::{bytes_of, hold};
+use crate::workspace::memory::bytes_of;
 use std::ops::Range;
 
 /// Orients a block by evidence.
@@ -27,28 +28,31 @@ pub(super) fn weigh_block(
         inner,
         evidence,
         ids,
+        most: 0,
     };
     weigher.add_patches();
     let mut connections = Connections::default();
     weigher.add_connections(crossing, &mut connections);
-    let _graph = hold(weigher.graph.bytes());
+    let patches = weigher.patches.bytes();
+    let most = weigher.most.max(patches + weigher.graph.bytes());
     weigher.contract(division.cluster, &mut connections);
     let dead = weigher.cut();
     let kept: Vec<u32> = (0..inner.len() as u32)
         .filter(|n| !dead[*n as usize])
         .collect();
     connections.relations.retain(|r| !dead[r.1 as usize]);
-    connections.seams = std::mem::take(&mut weigher.patches.shared);
-    connections
-        .seams
-        .retain(|j| !dead[j.a as usize] && !dead[j.b as usize]);
+    let seams = &mut weigher.patches.shared;
+    seams.retain(|j| !dead[j.a as usize] && !dead[j.b as usize]);
+    connections.seams = std::mem::take(seams);
     let connected = bytes_of(&connections.relations)
         + bytes_of(&connections.pairs)
         + bytes_of(&connections.seams);
-    let _held = hold(9 * inner.len() as u64 + bytes_of(&kept) + connected);
+    let lists = patches + 9 * inner.len() as u64 + bytes_of(&kept) + connected;
     let removed = (inner.len() - kept.len()) as u64;
     let sets = &mut weigher.patches.sets;
-    number_labels(inner, &kept, connections, sets, blocks, block, removed)
+    let mut done = number_labels(inner, &kept, connections, sets, blocks, block, removed);
+    done.most = most.max(lists + done.bytes());
+    done
 }
 
 /// The patches of a block, and the graph that decides their relative orientations.
@@ -58,10 +62,8 @@ struct Weigher<'a> {
     inner: &'a [Triangle],
     evidence: &'a Evidence,
     ids: Range<u32>,
-}
-
-fn signed(flip: bool, weight: i64) -> i64 {
-    if flip { -weight } else { weight }
+    /// Most bytes that the patches and the lists for their connections took.
+    most: u64,
 }
 
 impl Weigher<'_> {
@@ -74,8 +76,8 @@ impl Weigher<'_> {
     /// Adds to the sum of the patches of two triangles; one of the two must be turned if `flip`.
     fn connect(&mut self, a: u32, b: u32, flip: bool, weight: i64) {
         let ((of_a, up_a), (of_b, up_b)) = (self.patch(a), self.patch(b));
-        self.graph
-            .add(of_a, of_b, signed(flip ^ up_a ^ up_b, weight));
+        let weight = signed(flip ^ up_a ^ up_b, weight);
+        self.graph.add(of_a, of_b, weight);
     }
 
     /// Makes the patches nodes, with the evidence that they face up.
@@ -108,7 +110,8 @@ impl Weigher<'_> {
             let weight = METHOD.orientation.edge * i64::from(edge.weight);
             self.connect(edge.a, edge.b, edge.flip, weight);
         }
-        let edges = self.edges_of(crossing.iter().chain(&self.evidence.candidates));
+        let evidence = self.evidence;
+        let edges = self.edges_of(crossing.iter().chain(&evidence.candidates));
         for &c in crossing {
             let mut constraints = Vec::new();
             let mut note = |other, flip| constraints.push((other, flip));
@@ -122,13 +125,14 @@ impl Weigher<'_> {
                 self.graph.add_outside(of, most);
             }
         }
-        for &c in &self.evidence.candidates {
+        for &c in &evidence.candidates {
             self.vote(c, &edges);
         }
     }
 
     /// The triangles at the edges inside the block that `others` may share.
-    fn edges_of<'t>(&self, others: impl Iterator<Item = &'t Triangle>) -> EdgesUp {
+    fn edges_of<'t>(&mut self, others: impl Iterator<Item = &'t Triangle>) -> EdgesUp {
+        let inner = self.inner;
         let mut seen = vec![false; self.ids.len()];
         for v in others.flatten().filter(|v| self.ids.contains(v)) {
             seen[(v - self.ids.start) as usize] = true;
@@ -136,14 +140,15 @@ impl Weigher<'_> {
         let place = |v: u32| (v - self.ids.start) as usize;
         // True if an edge of the triangle joins two of their vertices.
         let beside = |t: &Triangle| t.iter().filter(|v| seen[place(**v)]).count() > 1;
-        let some = (0..).zip(self.inner).filter(|(_, t)| beside(t));
+        let some = (0..).zip(inner).filter(|(_, t)| beside(t));
         let numbers: Vec<u32> = some.map(|(number, _)| number).collect();
-        let _held = hold(bytes_of(&numbers) + bytes_of(&seen));
-        let triangle = |n: &u32| &self.inner[*n as usize];
+        let triangle = |n: &u32| &inner[*n as usize];
         let mut edges = EdgesUp::with_room_for(self.ids.clone(), numbers.iter().map(triangle));
         for number in &numbers {
             edges.add(*triangle(number), *number);
         }
+        let lists = bytes_of(&numbers) + bytes_of(&seen);
+        self.most = self.patches.bytes() + edges.bytes() + lists;
         edges
     }
 

@@ -3,26 +3,20 @@
 use crate::geom::Point;
 use crate::geom::lattice::Lattice;
 use crate::spill::row;
-use crate::workspace::persist::persist;
+use serde::{Deserialize, Serialize};
 
 /// Cubic cells of one size, with a corner at the origin of the input's coordinates.
 ///
 /// The index of a cell along an axis is a monotone function of the coordinate, however it is rounded. So
 /// every position is in exactly one cell, and cells are boxes.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Grid {
-    lattice: Lattice,
+    pub(super) lattice: Lattice,
     /// Side of a cell, in the input's unit.
-    side: f64,
+    pub(super) side: f64,
     /// For each axis, the cell of the lowest lattice coordinate.
     lowest: [f64; 3],
 }
-
-persist!(Grid {
-    lattice,
-    side,
-    lowest
-});
 
 impl Grid {
     /// Cells of side `length` over the lattice; `None` if they are so small that no two points can share one.
@@ -33,29 +27,14 @@ impl Grid {
             side: length,
             lowest: [0.0; 3],
         };
-        grid.lowest = grid.along([0; 3]).map(|c| (c / length).floor());
+        grid.lowest = lattice.position([0; 3]).map(|c| (c / length).floor());
         (length > lattice.step).then_some(grid)
-    }
-
-    #[cfg(test)]
-    pub(super) fn lattice(&self) -> &Lattice {
-        &self.lattice
-    }
-
-    #[cfg(test)]
-    pub(super) fn side(&self) -> f64 {
-        self.side
-    }
-
-    /// The coordinates of a lattice position in the input's unit.
-    fn along(&self, position: Point) -> [f64; 3] {
-        self.lattice.position(position)
     }
 
     /// The cell of a position, counted from the lowest cell of the lattice. A cell is wider than a step, so
     /// the number of cells along an axis is at most the number of steps.
     fn cell(&self, position: Point) -> [u32; 3] {
-        let along = self.along(position);
+        let along = self.lattice.position(position);
         std::array::from_fn(|axis| ((along[axis] / self.side).floor() - self.lowest[axis]) as u32)
     }
 
@@ -70,7 +49,7 @@ impl Grid {
 
     /// Squared distance of a position to the centre of its cell, in the input's unit.
     pub(super) fn distance2(&self, row: InCell) -> f64 {
-        let along = self.along(row.position());
+        let along = self.lattice.position(row.position());
         let off = |axis: usize| {
             let centre = (f64::from(row.cell[axis]) + self.lowest[axis] + 0.5) * self.side;
             along[axis] - centre

@@ -13,11 +13,10 @@ use grid::InCell;
 use crate::error::Result;
 use crate::geom::Point;
 use crate::geom::lattice::Lattice;
-use crate::spill::{Sorted, Sorter};
+use crate::spill::{SortedRuns, Sorter, release};
 use crate::stages::ingest::{READ_BUFFERS, Spool};
 use crate::workspace::Workspace;
-use crate::workspace::persist::{Persist, Saved, persist};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Points passed on at a time.
 const BATCH: usize = 1 << 14;
@@ -26,28 +25,41 @@ const BATCH: usize = 1 << 14;
 const CHUNK: usize = 1 << 12;
 
 /// Counts of this stage.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ThinStats {
     /// Distinct points left out because another point of their cell is kept.
     pub dropped: u64,
+}
+
+/// The points left out so far.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct LeftOut {
+    /// Counts of this stage.
+    pub thin: ThinStats,
     /// Points that have the same position as another point.
-    #[serde(skip)]
     pub duplicates: u64,
 }
 
 /// All points, sorted by cell.
-#[derive(Debug)]
+#[derive(Debug, Serialize, Deserialize)]
 pub struct Thinned {
-    sorted: Sorted<InCell>,
+    sorted: SortedRuns<InCell>,
     grid: Grid,
 }
 
-/// Sorts the points of a spool by the cells of `grid`; the spool is deleted.
+release!(Thinned: sorted);
+
+/// Sorts the points of a spool by the cells of `grid`.
 ///
 /// # Errors
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
 /// [`crate::Error::Cancelled`].
-pub fn thin(spool: Spool, lattice: &Lattice, grid: Grid, workspace: &Workspace) -> Result<Thinned> {
+pub fn thin(
+    spool: &Spool,
+    lattice: &Lattice,
+    grid: Grid,
+    workspace: &Workspace,
+) -> Result<Thinned> {
     let most = workspace.memory.available() / (8 * READ_BUFFERS);
     let threads = workspace.threads.min(most as usize).max(1);
     let frames = workspace.reserve("thin: frames", threads as u64 * READ_BUFFERS)?;
@@ -68,44 +80,21 @@ pub fn thin(spool: Spool, lattice: &Lattice, grid: Grid, workspace: &Workspace) 
         Ok(())
     };
     sorter.take_parts(workspace, &spool.frames(), true, |frames| {
-        spool.par_for_frames(threads, lattice, frames, take)
+        spool.par_for_frames(workspace, threads, lattice, frames, take)
     })?;
     drop(frames);
-    drop(spool);
+    spool.release(workspace)?;
     Ok(Thinned {
-        sorted: sorter.finish(workspace)?,
+        sorted: sorter.finish_on_disk(workspace)?,
         grid,
     })
 }
-
-impl Persist for Thinned {
-    fn save(&self, out: &mut Vec<u8>) {
-        self.sorted.save(out);
-        self.grid.save(out);
-    }
-
-    fn load(from: &mut Saved<'_>) -> Result<Self> {
-        let sorted = Sorted::load(from)?;
-        let held = from
-            .workspace
-            .reserve("thin: merge", sorted.merge_bytes())?;
-        Ok(Self {
-            sorted: sorted.holding(held),
-            grid: Grid::load(from)?,
-        })
-    }
-}
-
-persist!(ThinStats {
-    dropped,
-    duplicates
-});
 
 /// The first row of the cell at which to continue; `None` at the beginning.
 pub type Mark = Option<[u32; 6]>;
 
 /// Receives points that are kept, the mark of the next ones, and the counts up to there.
-pub type Each<'a> = &'a mut dyn FnMut(&[Point], Mark, ThinStats) -> Result<()>;
+pub type Each<'a> = &'a mut dyn FnMut(&[Point], Mark, LeftOut) -> Result<()>;
 
 impl Thinned {
     /// Calls `each` with batches of the points that are kept, with the mark of the next ones and the counts
@@ -113,8 +102,15 @@ impl Thinned {
     ///
     /// # Errors
     /// Errors of `each`, [`crate::Error::Io`], [`crate::Error::Corrupt`].
-    pub fn for_each(self, from: Mark, mut stats: ThinStats, each: Each<'_>) -> Result<ThinStats> {
-        let Self { sorted, grid } = self;
+    pub fn for_each(
+        &self,
+        workspace: &Workspace,
+        from: Mark,
+        mut stats: LeftOut,
+        each: Each<'_>,
+    ) -> Result<LeftOut> {
+        let grid = &self.grid;
+        let sorted = self.sorted.open(workspace, "thin: merge")?;
         let mut kept = Vec::with_capacity(BATCH);
         let mut best: Option<(InCell, f64)> = None;
         let mut last = None;
@@ -127,7 +123,7 @@ impl Thinned {
             let distance2 = grid.distance2(row);
             match &mut best {
                 Some((nearest, least)) if nearest.cell == row.cell => {
-                    stats.dropped += 1;
+                    stats.thin.dropped += 1;
                     // Rows of a cell ascend by position, so the first of equally near points is kept.
                     if distance2 < *least {
                         (*nearest, *least) = (row, distance2);

@@ -13,19 +13,19 @@ fn lattice(step: f64, base: [i64; 3]) -> Lattice {
 }
 
 /// The points kept, from points in the given order, with a sort buffer of `buffer` bytes.
-fn thinned(grid: &Grid, points: &[Point], buffer: u64) -> (Vec<Point>, ThinStats) {
+fn thinned(grid: &Grid, points: &[Point], buffer: u64) -> (Vec<Point>, LeftOut) {
     let workspace = Workspace::for_tests(2);
     let sorter = Sorter::new(&workspace, "thin", buffer);
     for &point in points {
         sorter.push(&[grid.in_cell(point)]).unwrap();
     }
     let thinned = Thinned {
-        sorted: sorter.finish(&workspace).unwrap(),
+        sorted: sorter.finish_on_disk(&workspace).unwrap(),
         grid: grid.clone(),
     };
     let mut kept = Vec::new();
     let stats = thinned
-        .for_each(None, ThinStats::default(), &mut |points, _, _| {
+        .for_each(&workspace, None, LeftOut::default(), &mut |points, _, _| {
             kept.extend_from_slice(points);
             Ok(())
         })
@@ -37,9 +37,9 @@ fn thinned(grid: &Grid, points: &[Point], buffer: u64) -> (Vec<Point>, ThinStats
 fn naive(grid: &Grid, points: &[Point]) -> Vec<Point> {
     let mut cells: BTreeMap<[i64; 3], (f64, Point)> = BTreeMap::new();
     for &point in points {
-        let along = grid.lattice().position(point);
-        let cell = along.map(|c| (c / grid.side()).floor() as i64);
-        let square = |k: usize| (along[k] - (cell[k] as f64 + 0.5) * grid.side()).powi(2);
+        let along = grid.lattice.position(point);
+        let cell = along.map(|c| (c / grid.side).floor() as i64);
+        let square = |k: usize| (along[k] - (cell[k] as f64 + 0.5) * grid.side).powi(2);
         let entry = (square(0) + square(1) + square(2), point);
         let best = cells.entry(cell).or_insert(entry);
         if entry < *best {
@@ -66,7 +66,7 @@ proptest! {
         let on_disk = thinned(&grid, &backwards, 24 * 64);
         prop_assert_eq!(&on_disk.0, &kept);
         prop_assert_eq!(on_disk.1, stats);
-        prop_assert_eq!(points.len() as u64, kept.len() as u64 + stats.dropped + stats.duplicates);
+        prop_assert_eq!(points.len() as u64, kept.len() as u64 + stats.thin.dropped + stats.duplicates);
         kept.sort_unstable();
         prop_assert_eq!(kept, naive(&grid, &points));
     }

@@ -110,31 +110,23 @@ fn full(longest: i64) -> u64 {
 
 /// The longest reach, up to `reach`, that touches at most `most` pages; found by halving.
 fn near_pages(around: &mut ReachablePages<'_>, page: usize, mut reach: u64, most: usize) -> Reach {
-    loop {
-        let (near, all) = around.pages(page, reach, most);
-        if all || reach <= 1 {
-            return Reach {
-                page,
-                reach2: if all { reach * reach } else { 0 },
-                near: if all {
-                    near.to_vec()
-                } else {
-                    vec![page as u32]
-                },
-            };
+    let mut near = vec![page as u32];
+    while reach > 0 {
+        if let (found, true) = around.pages(page, reach, most) {
+            near = found.to_vec();
+            break;
         }
         reach /= 2;
     }
+    let reach2 = reach * reach;
+    Reach { page, reach2, near }
 }
 
 /// The factor by which a reach can be lengthened and still touch few pages.
 fn lonely(around: &mut ReachablePages<'_>, page: usize, reach: u64) -> u64 {
-    for times in [MOST_TIMES, MOST_TIMES / 2] {
-        if around.pages(page, reach * times, FEW_NEAR).1 {
-            return times;
-        }
-    }
-    1
+    let mut factors = [MOST_TIMES, MOST_TIMES / 2].into_iter();
+    let few = |times: &u64| around.pages(page, reach * times, FEW_NEAR).1;
+    factors.find(few).unwrap_or(1)
 }
 
 /// The pages that any page of a tile can reach, if they are not too many; then the box tree need not be
@@ -153,12 +145,8 @@ impl<'a> ReachablePages<'a> {
         let boxes = || own.iter().map(|page| store.page_box(*page));
         let all = boxes().fold(Aabb::EMPTY, |all, page| all.union(*page));
         let mut sides: Vec<_> = boxes().map(Aabb::longest_side).collect();
-        let (at, none) = (sides.len() * 3 / 4, sides.is_empty());
-        let longest = if none {
-            0
-        } else {
-            *sides.select_nth_unstable(at).1
-        };
+        sides.sort_unstable();
+        let longest = sides.get(sides.len() * 3 / 4).copied().unwrap_or(0);
         let mut around = Self {
             store,
             level: Level::best(),

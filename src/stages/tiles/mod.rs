@@ -16,7 +16,7 @@ use crate::error::Result;
 use crate::geom::aabb::Aabb;
 use crate::kernels::{BLOCK, Boxes};
 use crate::stages::order::PointStore;
-use crate::workspace::memory::{Holding, bytes_of, give_back};
+use crate::workspace::memory::bytes_of;
 use halo::{Reach, halo};
 use points::Points;
 use std::ops::Range;
@@ -67,13 +67,12 @@ pub struct Tile {
     leaf_boxes: Boxes,
     own: Vec<OwnPage>,
     near: Vec<u32>,
-    held: Holding,
 }
 
 impl Tile {
     /// Upper estimate of the bytes of a tile of `points` points with the largest halo, and of a search in it.
     #[must_use]
-    pub fn bytes(points: usize) -> u64 {
+    pub fn estimate(points: usize) -> u64 {
         let most = (points as u64 + 256) * (1 + MOST_HALO as u64);
         most * (15 + near::CANDIDATE) + (3 << 20)
     }
@@ -105,17 +104,11 @@ impl Tile {
         let (wanted, reaches) = halo(store, &own_pages, ids.len().div_ceil(page));
         let mut points = Points::with_capacity(wanted.len() * page);
         let mut read = Vec::new();
-        let mut start = 0;
-        while start < wanted.len() {
-            let mut end = start + 1;
-            let next = |end: usize| wanted[end] == wanted[end - 1] + 1;
-            while end < wanted.len() && end - start < READ && next(end) {
-                end += 1;
-            }
+        let runs = wanted.chunk_by(|page, next| page + 1 == *next);
+        for run in runs.flat_map(|run| run.chunks(READ)) {
             read.clear();
-            store.read_pages(wanted[start]..wanted[end - 1] + 1, &mut read)?;
+            store.read_pages(run[0]..run[0] + run.len(), &mut read)?;
             points.extend(&read);
-            start = end;
         }
         let leaf = page.div_ceil(LEAVES);
         let page_boxes = wanted.iter().map(|&p| *store.page_box(p)).collect();
@@ -129,23 +122,23 @@ impl Tile {
             leaf_boxes: Boxes::default(),
             own: Vec::new(),
             near: Vec::new(),
-            held: Holding::default(),
         };
         tile.index(reaches);
-        tile.held.set(tile.taken());
-        let needed = tile.taken() + tile.searched();
-        give_back(Self::bytes(tile.ids.len()).saturating_sub(needed));
         Ok(tile)
     }
 
-    /// Upper estimate of the bytes of a search: all points near a page are candidates of one of its points.
-    fn searched(&self) -> u64 {
+    /// Bytes of [`Tile::estimate`] that neither the tile nor a search in it takes.
+    #[must_use]
+    pub fn spare(&self) -> u64 {
+        // At most all points near a page are candidates of one of its points.
         let pages = self.own.iter().map(|own| own.near.len()).max();
-        (pages.unwrap_or(0) * self.page) as u64 * near::CANDIDATE
+        let search = (pages.unwrap_or(0) * self.page) as u64 * near::CANDIDATE;
+        Self::estimate(self.ids.len()).saturating_sub(self.bytes() + search)
     }
 
-    /// Bytes allocated by its lists.
-    fn taken(&self) -> u64 {
+    /// Allocated bytes of its lists.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
         let lists = bytes_of(&self.pages) + self.points.bytes() + bytes_of(&self.page_boxes);
         lists + self.leaf_boxes.bytes() + bytes_of(&self.own) + bytes_of(&self.near)
     }

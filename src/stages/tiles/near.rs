@@ -11,7 +11,7 @@ use super::{OwnPage, Tile};
 use crate::geom::aabb::Aabb;
 use crate::geom::{Point, distance2};
 use crate::kernels::{BLOCK, Level};
-use crate::workspace::memory::{Holding, bytes_of};
+use crate::workspace::memory::bytes_of;
 use std::ops::Range;
 
 mod list;
@@ -55,7 +55,6 @@ pub struct Search {
     widened: (usize, u64),
     /// The largest such distance in the current leaf.
     wider2: u64,
-    held: Holding,
 }
 
 /// The neighbours of one point, nearest first, as far as they are known.
@@ -72,14 +71,16 @@ pub struct Query<'a> {
 
 impl Tile {
     /// Calls `each` with a [`Query`] for every point of the tile, in order of id. The query lists at least
-    /// the `k` nearest neighbours; it is `None` if the halo cannot certify them.
+    /// the `k` nearest neighbours; it is `None` if the halo cannot certify them. `grown` is called after each
+    /// page with the bytes of the search.
     pub fn for_each_query(
         &self,
         k: usize,
         search: &mut Search,
+        grown: impl FnMut(u64),
         each: impl FnMut(u32, Point, Option<Query<'_>>),
     ) {
-        self.for_some_queries(k, search, |_| true, each);
+        self.for_some_queries(k, search, |_| true, grown, each);
     }
 
     /// As [`Tile::for_each_query`], for the points whose ids are `wanted`.
@@ -88,9 +89,10 @@ impl Tile {
         k: usize,
         search: &mut Search,
         wanted: impl Fn(usize) -> bool,
+        grown: impl FnMut(u64),
         mut each: impl FnMut(u32, Point, Option<Query<'_>>),
     ) {
-        self.for_groups(k, search, wanted, |own, index, id, search| {
+        self.for_groups(k, search, wanted, grown, |own, index, id, search| {
             let point = self.points.get(index);
             let Some(complete2) = self.nearest(own, index, id, k, search) else {
                 each(id, point, None);
@@ -117,6 +119,7 @@ impl Tile {
         k: usize,
         search: &mut Search,
         wanted: impl Fn(usize) -> bool,
+        mut grown: impl FnMut(u64),
         mut one: impl FnMut(&OwnPage, usize, u32, &mut Search) -> u64,
     ) {
         let mut guess = None;
@@ -152,7 +155,7 @@ impl Tile {
                     guess = Some(wider.max(farthest + farthest / 2));
                 }
             }
-            search.report_usage();
+            grown(search.bytes());
         }
     }
 
@@ -222,8 +225,9 @@ impl Search {
         }
     }
 
-    /// Reports the bytes of its lists.
-    fn report_usage(&mut self) {
+    /// Allocated bytes of its lists, which only grow.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
         let candidates = [
             Some(&self.candidates),
             self.aside.as_ref(),
@@ -232,9 +236,7 @@ impl Search {
         let candidates = candidates.into_iter().flatten().map(|c| c.columns.bytes());
         let picked = self.picked.bytes() + bytes_of(&self.keys) + bytes_of(&self.places);
         let lists = bytes_of(&self.distances) + bytes_of(&self.long_keys) + bytes_of(&self.window);
-        let bytes = candidates.sum::<u64>() + picked + lists;
-        self.held
-            .set(bytes + self.leaves.bytes() + self.near.bytes());
+        candidates.sum::<u64>() + picked + lists + self.leaves.bytes() + self.near.bytes()
     }
 
     /// Whole blocks of distances; those after the last candidate are infinite.

@@ -17,7 +17,8 @@ fn ordered(cloud: &[Point], page: usize) -> (Workspace, PointStore, Vec<Point>) 
     let workspace = Workspace::for_tests(1);
     let orderer = Orderer::new(&workspace).unwrap();
     orderer.push(&workspace, cloud).unwrap();
-    let store = orderer.finish(&workspace, page).unwrap().0;
+    let (stored, _) = orderer.finish(&workspace, page).unwrap();
+    let store = stored.open(&workspace).unwrap();
     let points = store.slice(0..store.len()).unwrap();
     (workspace, store, points)
 }
@@ -78,57 +79,62 @@ impl Wanted for Half {
 /// Tests all functions of a query; it must not claim more than it knows.
 fn check(points: &[Point], tile: &Tile, k: usize, search: &mut Search) {
     let mut next = tile.ids().start;
-    tile.for_each_query(k, search, |id, point, query| {
-        assert_eq!(id as usize, next);
-        next += 1;
-        assert_eq!(point, points[id as usize]);
-        let Some(mut query) = query else { return };
-        let expected = all_near(points, id as usize);
-        let agrees = |query: &near::Query<'_>| {
-            let complete = expected.partition_point(|(d2, _)| *d2 <= query.complete2());
-            let got = query.near().iter().map(|n| (n.distance2, n.id));
-            assert!(got.eq(expected[..complete].iter().copied()));
-        };
-        agrees(&query);
-        assert!(query.near().len() >= k);
-        for count in [k, 2 * k, 4 * k] {
-            let nearest = expected.get(..count);
-            if let Some(sums) = query.sums(count) {
-                assert_eq!(
-                    Some(sums),
-                    nearest.map(|near| sums_over(points, point, near))
-                );
+    tile.for_each_query(
+        k,
+        search,
+        |_| (),
+        |id, point, query| {
+            assert_eq!(id as usize, next);
+            next += 1;
+            assert_eq!(point, points[id as usize]);
+            let Some(mut query) = query else { return };
+            let expected = all_near(points, id as usize);
+            let agrees = |query: &near::Query<'_>| {
+                let complete = expected.partition_point(|(d2, _)| *d2 <= query.complete2());
+                let got = query.near().iter().map(|n| (n.distance2, n.id));
+                assert!(got.eq(expected[..complete].iter().copied()));
+            };
+            agrees(&query);
+            assert!(query.near().len() >= k);
+            for count in [k, 2 * k, 4 * k] {
+                let nearest = expected.get(..count);
+                if let Some(sums) = query.sums(count) {
+                    assert_eq!(
+                        Some(sums),
+                        nearest.map(|near| sums_over(points, point, near))
+                    );
+                }
+                agrees(&query);
+            }
+            for near in query.near().iter() {
+                let there = points[near.id as usize];
+                assert_eq!(near.difference, crate::geom::sub(there, point));
+            }
+            if query.extend_to(2 * k) {
+                assert!(query.near().len() >= 2 * k);
             }
             agrees(&query);
-        }
-        for near in query.near().iter() {
-            let there = points[near.id as usize];
-            assert_eq!(near.difference, crate::geom::sub(there, point));
-        }
-        if query.extend_to(2 * k) {
-            assert!(query.near().len() >= 2 * k);
-        }
-        agrees(&query);
-        // Of the farther points, all wanted ones in the half-space must be listed, and no unwanted ones.
-        let known = query.complete2();
-        let farther = known.saturating_mul(2).saturating_add(1);
-        let half = |p: &Point| p[0] >= point[0];
-        if query.extend_where(farther, &Half { from: point }) {
-            assert!(query.complete2() >= farther);
-            let got: Vec<_> = query.near().iter().map(|n| (n.distance2, n.id)).collect();
-            assert!(got.is_sorted());
-            let beyond = expected
-                .iter()
-                .filter(|(d2, _)| known < *d2 && *d2 <= farther);
-            let beyond = beyond
-                .filter(|(_, id)| picked(&points[*id as usize]))
-                .copied();
-            let beyond: Vec<_> = beyond.collect();
-            assert!(got.iter().all(|near| beyond.contains(near)));
-            let wanted = beyond.iter().filter(|(_, id)| half(&points[*id as usize]));
-            assert!(wanted.into_iter().all(|near| got.contains(near)));
-        }
-    });
+            // Of the farther points, all wanted ones in the half-space must be listed, and no unwanted ones.
+            let known = query.complete2();
+            let farther = known.saturating_mul(2).saturating_add(1);
+            let half = |p: &Point| p[0] >= point[0];
+            if query.extend_where(farther, &Half { from: point }) {
+                assert!(query.complete2() >= farther);
+                let got: Vec<_> = query.near().iter().map(|n| (n.distance2, n.id)).collect();
+                assert!(got.is_sorted());
+                let beyond = expected
+                    .iter()
+                    .filter(|(d2, _)| known < *d2 && *d2 <= farther);
+                let beyond = beyond
+                    .filter(|(_, id)| picked(&points[*id as usize]))
+                    .copied();
+                let beyond: Vec<_> = beyond.collect();
+                assert!(got.iter().all(|near| beyond.contains(near)));
+                let wanted = beyond.iter().filter(|(_, id)| half(&points[*id as usize]));
+                assert!(wanted.into_iter().all(|near| got.contains(near)));
+            }
+        },
+    );
     assert_eq!(next, tile.ids().end);
 }
 
@@ -147,13 +153,19 @@ fn sums_over(points: &[Point], point: Point, nearest: &[(u64, u32)]) -> near::Su
 fn check_sums(points: &[Point], tile: &Tile, k: usize, search: &mut Search) {
     let wanted = |id: usize| !id.is_multiple_of(3);
     let mut next: Vec<usize> = tile.ids().filter(|id| wanted(*id)).rev().collect();
-    tile.for_some_sums(k, search, wanted, |id, point, sums| {
-        assert_eq!(Some(id as usize), next.pop());
-        assert_eq!(point, points[id as usize]);
-        let Some(sums) = sums else { return };
-        let nearest = &all_near(points, id as usize)[..k];
-        assert_eq!(*sums, sums_over(points, point, nearest));
-    });
+    tile.for_some_sums(
+        k,
+        search,
+        wanted,
+        |_| (),
+        |id, point, sums| {
+            assert_eq!(Some(id as usize), next.pop());
+            assert_eq!(point, points[id as usize]);
+            let Some(sums) = sums else { return };
+            let nearest = &all_near(points, id as usize)[..k];
+            assert_eq!(*sums, sums_over(points, point, nearest));
+        },
+    );
     assert!(next.is_empty());
 }
 

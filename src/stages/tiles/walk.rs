@@ -7,7 +7,7 @@ use super::wanted::{All, Wanted};
 use crate::error::Result;
 use crate::geom::{Point, distance2, sub};
 use crate::stages::order::PointStore;
-use crate::workspace::memory::{Holding, bytes_of};
+use crate::workspace::memory::bytes_of;
 use rustc_hash::FxHashMap;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -25,14 +25,21 @@ pub struct PageCache {
     read: Vec<Point>,
     /// The largest number of words so far.
     most: usize,
-    held: Holding,
+    /// Bytes of the largest walk so far.
+    walk: u64,
 }
 
 impl PageCache {
     /// Bytes of a full cache.
     #[must_use]
-    pub fn bytes(store: &PointStore) -> u64 {
+    pub fn estimate(store: &PointStore) -> u64 {
         (CACHED_PAGES * store.page_size() * 12) as u64
+    }
+
+    /// Bytes that it and the largest walk with it have used.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        self.most as u64 * 4 + self.walk
     }
 
     /// The coordinates of a page's points.
@@ -63,7 +70,6 @@ impl PageCache {
             self.words.extend(self.read.iter().map(|at| at[axis]));
         }
         self.most = self.most.max(self.words.len());
-        self.held.set(self.most as u64 * 4);
         self.pages.insert(page, found);
         Ok(found)
     }
@@ -90,7 +96,6 @@ pub struct Walk<'a> {
     /// Places of points in a page.
     places: Vec<u32>,
     batch: usize,
-    held: Holding,
 }
 
 impl<'a> Walk<'a> {
@@ -109,7 +114,6 @@ impl<'a> Walk<'a> {
             later: Vec::new(),
             places: Vec::new(),
             batch: BATCH,
-            held: Holding::default(),
         };
         (0..count).for_each(|index| walk.wait(level, index));
         walk
@@ -183,8 +187,8 @@ impl<'a> Walk<'a> {
         self.narrow(limit);
         self.ready.sort_unstable_by_key(|p| Reverse((p.0, p.1)));
         let nodes = self.nodes.capacity() * size_of::<Node>();
-        self.held
-            .set(nodes as u64 + bytes_of(&self.ready) + bytes_of(&self.later));
+        let bytes = nodes as u64 + bytes_of(&self.ready) + bytes_of(&self.later);
+        self.cache.walk = self.cache.walk.max(bytes);
         self.batch *= 2;
         Ok(())
     }

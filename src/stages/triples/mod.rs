@@ -4,24 +4,21 @@ use crate::error::Result;
 use crate::spill::{Shuffle, Table};
 use crate::stages::blocks::Blocks;
 use crate::stages::cells::{CellTriples, CountedTriple, SentTriple};
-use crate::workspace::Workspace;
-use crate::workspace::memory::{Holding, bytes_of};
-use crate::workspace::persist::persist;
-use serde::Serialize;
-
-const SHUFFLE_BUFFER: u64 = 16 << 20;
+use crate::workspace::memory::bytes_of;
+use crate::workspace::{Unit, Workspace};
+use serde::{Deserialize, Serialize};
 
 /// All triples with their counts, ascending.
-#[derive(Debug)]
+#[derive(Debug, Serialize, Deserialize)]
 pub struct Triples {
     /// Triples by the block of their smallest vertex.
     pub own: Table<CountedTriple>,
-    /// Crossing triples, by each other block that contains one of their vertices.
-    pub visiting: Table<SentTriple>,
+    /// Crossing triples, sent to each other block that contains one of their vertices.
+    pub visiting: Shuffle<SentTriple>,
 }
 
 /// Distinct triples by count.
-#[derive(Debug, Clone, Copy, Default, Serialize, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize, PartialEq, Eq)]
 pub struct TripleStats {
     /// All distinct triples.
     pub triples: u64,
@@ -35,46 +32,39 @@ pub struct TripleStats {
     pub crossing: u64,
 }
 
-persist!(Triples { own, visiting });
-persist!(TripleStats {
-    triples,
-    t3,
-    t2,
-    t1,
-    crossing
-});
-
 /// Adds up the counts of all tiles.
 ///
 /// # Errors
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
 /// [`crate::Error::Cancelled`].
 pub fn triples(
-    cells: CellTriples,
+    cells: &CellTriples,
     blocks: Blocks,
     workspace: &Workspace,
 ) -> Result<(Triples, TripleStats)> {
-    let own = Table::create(workspace, "triples.own", blocks.count())?;
-    let shuffle =
-        Shuffle::between_units(workspace, "triples.sent", SHUFFLE_BUFFER, blocks.count())?;
-    let count: u64 = cells.off.total();
+    let own = Table::new("triples.own", blocks.count());
+    let visiting = Shuffle::new("triples.sent");
+    let inbox = cells.sent.open(workspace, cells.tiles.count())?;
+    let count: u64 = cells.off.total(workspace);
     let _off = workspace.reserve("off the surface", 4 * count)?;
     let mut off: Vec<u32> = Vec::with_capacity(count as usize);
+    let unit = workspace.unit();
     for tile in 0..cells.off.count() {
-        off.extend(cells.off.get(tile)?.into_iter().map(|off| off.id));
+        off.extend(cells.off.get(&unit, tile)?.into_iter().map(|off| off.id));
     }
     let is_off = |v: &u32| off.binary_search(v).is_ok();
     let bytes = |block: usize| {
         let tiles = cells.tiles.of_block(block);
         tiles
-            .map(|t| 50 * (cells.own.rows(t) + cells.received.rows(t)) as u64)
+            .map(|t| 50 * (cells.own.rows(workspace, t) + inbox.rows(t)) as u64)
             .sum()
     };
-    let work = |block| {
+    let work = |unit: &Unit<'_>| {
+        let block = unit.number();
         let mut all = Vec::new();
-        let mut held = Holding::default();
+        let mut held = unit.hold(0);
         for tile in cells.tiles.of_block(block) {
-            let (seen, received) = (cells.own.get(tile)?, cells.received.get(tile)?);
+            let (seen, received) = (cells.own.get(unit, tile)?, inbox.get(unit, tile)?);
             all.reserve_exact(seen.len() + received.len());
             merge(&seen, &received, &mut all);
             held.set(bytes_of(&all) + bytes_of(&seen) + bytes_of(&received));
@@ -91,9 +81,9 @@ pub fn triples(
             local[3] += u64::from(blocks.crossing(triple));
         }
         held.set(bytes_of(&all) + bytes_of(&sent));
-        own.put(block, &all)?;
-        shuffle.send_from(block, &sent)?;
-        workspace.advance(all.len() as u64);
+        own.put(unit, block, &all)?;
+        visiting.send(unit, block, sent)?;
+        unit.advance(all.len() as u64);
         Ok(local)
     };
     let mut counts = [0u64; 4];
@@ -101,18 +91,15 @@ pub fn triples(
         counts.iter_mut().zip(more).for_each(|(n, more)| *n += more);
         Ok(())
     })?;
-    let visiting = shuffle.deliver(workspace, blocks.count())?;
     let [t1, t2, t3, crossing] = counts;
-    Ok((
-        Triples { own, visiting },
-        TripleStats {
-            triples: t1 + t2 + t3,
-            t3,
-            t2,
-            t1,
-            crossing,
-        },
-    ))
+    let stats = TripleStats {
+        triples: t1 + t2 + t3,
+        t3,
+        t2,
+        t1,
+        crossing,
+    };
+    Ok((Triples { own, visiting }, stats))
 }
 
 /// Merges two ascending lists and adds up the counts; `received` may contain a triple more than once.
@@ -124,15 +111,12 @@ fn merge(own: &[CountedTriple], received: &[SentTriple], all: &mut Vec<CountedTr
     let mut a = own.iter().copied().peekable();
     let mut b = received.peekable();
     loop {
-        let take_a = match (a.peek(), b.peek()) {
-            (Some(x), Some(y)) => x.triple <= y.triple,
-            (Some(_), None) => true,
-            (None, Some(_)) => false,
-            (None, None) => break,
+        let next = match (a.peek(), b.peek()) {
+            (Some(x), Some(y)) if y.triple < x.triple => b.next(),
+            (None, _) => b.next(),
+            _ => a.next(),
         };
-        let Some(next) = (if take_a { a.next() } else { b.next() }) else {
-            break;
-        };
+        let Some(next) = next else { break };
         match all.last_mut() {
             Some(last) if last.triple == next.triple => last.count += next.count,
             _ => all.push(next),

@@ -13,7 +13,10 @@ pub fn read(extension: &str, bytes: &[u8]) {
         check_error(&error, &folder);
     }
     match ingest(&[path], &bench.workspace) {
-        Ok(spool) => check(&spool),
+        Ok(spool) => {
+            check(&spool);
+            spool.release(&bench.workspace).expect("a spool");
+        }
         Err(error) => check_error(&error, &folder),
     }
     bench.check_memory();
@@ -21,6 +24,7 @@ pub fn read(extension: &str, bytes: &[u8]) {
 
 /// Checks properties of every cloud.
 pub fn check(spool: &Spool) {
+    let workspace = &Bench::get().workspace;
     let stats = spool.stats();
     let left_out = stats.dropped_non_finite + stats.withheld + stats.dropped_by_class;
     assert_eq!(stats.read, stats.kept + left_out);
@@ -43,7 +47,7 @@ pub fn check(spool: &Spool) {
         );
         let mut count = 0;
         let mut low = [i32::MAX; 3];
-        let streamed = spool.for_each(&lattice, |points| {
+        let streamed = spool.for_each(workspace, &lattice, |points| {
             count += points.len() as u64;
             for point in points {
                 low = std::array::from_fn(|axis| low[axis].min(point[axis]));

@@ -46,7 +46,7 @@ pub fn read(bytes: &[u8]) {
         Ok(spool) => {
             cloud::check(&spool);
             let few = (1..FEW).contains(&spool.points());
-            drop(spool);
+            spool.release(&bench.workspace).expect("a spool");
             if few {
                 info(&inputs, &classes, &bench.workspace).expect("a cloud that was read once");
             }

@@ -6,25 +6,25 @@
 
 use crate::Bench;
 use outcrop::geom::lattice::Lattice;
-use outcrop::spill::{Row, Sorted, Table};
+use outcrop::spill::{Row, Shuffle, SortedRuns, Table};
 use outcrop::stages::ingest::{IngestStats, Spool};
-use outcrop::stages::order::{PointStore, Position};
+use outcrop::stages::order::{Position, StoredPoints};
 use outcrop::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
-use outcrop::workspace::persist::{Persist, Saved};
 use outcrop::workspace::progress::{Cancel, Silent};
 use outcrop::workspace::{Folder, Found, Workspace};
+use serde::de::DeserializeOwned;
 use std::fs::DirBuilder;
 use std::os::unix::fs::DirBuilderExt;
 use std::path::Path;
 use std::sync::Arc;
 
 /// The first bytes of a journal.
-const MAGIC: &[u8] = b"OUTCROP1";
+const MAGIC: &[u8] = b"OUTCROP2";
 
 /// Separator of journal, saved values, and the content of files.
 pub const BETWEEN: u8 = 0xfe;
 
-/// Names of files that a journal may contain.
+/// Names of files that a journal may contain; each has three segments of the same content.
 pub const FILES: [&str; 6] = [
     "ingest-0.spool",
     "points",
@@ -48,43 +48,60 @@ pub fn read(bytes: &[u8]) {
     };
     put("journal", &forged(journal));
     put("manifest", &sealed(b"{}"));
-    FILES.iter().for_each(|name| put(name, file));
+    for (name, segment) in FILES
+        .iter()
+        .flat_map(|name| [(name, 0), (name, 1), (name, 2)])
+    {
+        put(&format!("{name}.{segment}"), file);
+    }
     let Some(workspace) = open(&folder) else {
         return;
     };
-    load::<IngestStats>(saved, &workspace, |_| {});
-    load::<Lattice>(saved, &workspace, |_| {});
-    load::<Vec<String>>(saved, &workspace, |_| {});
-    load::<Spool>(saved, &workspace, |spool| {
+    load::<IngestStats>(saved, |_| {});
+    load::<Lattice>(saved, |_| {});
+    load::<Vec<String>>(saved, |_| {});
+    load::<Spool>(saved, |spool| {
         if let Ok(lattice) = spool.choose_lattice(0) {
-            let _ = spool.for_each(&lattice, |_| Ok(()));
+            let _ = spool.for_each(&workspace, &lattice, |_| Ok(()));
         }
     });
-    load::<PointStore>(saved, &workspace, |store| {
-        let _ = store.slice(0..store.len().min(1000));
+    load::<StoredPoints>(saved, |stored| {
+        if let Ok(store) = stored.open(&workspace) {
+            let _ = store.slice(0..store.len().min(1000));
+        }
     });
-    load::<Table<[u32; 3]>>(saved, &workspace, |table| all(&table));
-    load::<Sorted<[u32; 3]>>(saved, &workspace, |sorted| {
-        let _ = sorted.for_each(|_| Ok(()));
+    load::<Table<[u32; 3]>>(saved, |table| all(&table, &workspace));
+    load::<Shuffle<[u32; 3]>>(saved, |shuffle| received(&shuffle, &workspace));
+    load::<SortedRuns<[u32; 3]>>(saved, |runs| {
+        if let Ok(sorted) = runs.open(&workspace, "fuzz") {
+            let _ = sorted.for_each_from(None, |_| Ok(()));
+        }
     });
     for name in FILES {
-        let packed = Table::<[u32; 4]>::create(&workspace, name, 3);
-        let _ = packed.map(|table| all(&table));
-        let plain = Table::<Position>::create(&workspace, name, 3);
-        let _ = plain.map(|table| all(&table));
+        all(&Table::<[u32; 4]>::new(name, 3), &workspace);
+        all(&Table::<Position>::new(name, 3), &workspace);
+        received(&Shuffle::<[u32; 4]>::new(name), &workspace);
     }
     workspace.remove(false);
 }
 
-fn load<T: Persist>(bytes: &[u8], workspace: &Workspace, then: impl FnOnce(T)) {
-    if let Ok(value) = T::load(&mut Saved::new(bytes, workspace)) {
+fn load<T: DeserializeOwned>(bytes: &[u8], then: impl FnOnce(T)) {
+    if let Ok(value) = postcard::from_bytes(bytes) {
         then(value);
     }
 }
 
-fn all<R: Row>(table: &Table<R>) {
+fn all<R: Row>(table: &Table<R>, workspace: &Workspace) {
     for section in 0..table.count().min(64) {
-        let _ = table.get(section);
+        let _ = table.get(&workspace.unit(), section);
+    }
+}
+
+fn received<R: Row>(shuffle: &Shuffle<R>, workspace: &Workspace) {
+    if let Ok(inbox) = shuffle.open(workspace, 64) {
+        for receiver in 0..64 {
+            let _ = inbox.get(&workspace.unit(), receiver);
+        }
     }
 }
 
@@ -96,7 +113,8 @@ fn forged(bytes: &[u8]) -> Vec<u8> {
         out.extend_from_slice(&crc32fast::hash(body).to_le_bytes());
         out.extend_from_slice(body);
     };
-    record(b"\0{}");
+    // The manifest: record 0, two bytes.
+    record(b"\0\x02{}");
     let mut rest = bytes;
     while let Some((length, after)) = rest.split_first_chunk::<2>() {
         let length = usize::from(u16::from_le_bytes(*length)).min(after.len());

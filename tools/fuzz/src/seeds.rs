@@ -301,10 +301,14 @@ fn bodies(journal: &[u8]) -> Vec<&[u8]> {
 fn scratch_files(seeds: &Seeds) -> Result {
     for (number, snapshot) in resume::snapshots().iter().enumerate() {
         let file = |wanted: &str| {
-            let found = snapshot.iter().find(|(name, _)| name == wanted);
+            let segment = |name: &String| name.rsplit_once('.').is_some_and(|(n, _)| n == wanted);
+            let found = snapshot.iter().find(|(name, _)| segment(name));
             found.map_or(&[][..], |(_, bytes)| bytes)
         };
-        let all = bodies(file("journal"));
+        let journals = snapshot
+            .iter()
+            .filter(|(name, _)| name.starts_with("journal"));
+        let all: Vec<&[u8]> = journals.flat_map(|(_, bytes)| bodies(bytes)).collect();
         let records = |count: usize| -> Vec<u8> {
             let some = all.iter().skip(1).take(count);
             let some = some.filter(|body| body.len() < usize::from(u16::MAX));

@@ -51,6 +51,7 @@ pub(crate) fn rows(kind: Kind, world: &World, name: &str, args: &Arguments) -> R
             let tiles = world.tiles();
             let k = args.neighbors;
             let next = smooth(before, tiles, k, smoothing, round, &world.workspace)?;
+            let next = next.open(&world.workspace)?;
             rows.push(row(what, round, &world.positions(&next)?));
             smoothed = Some(next);
         }

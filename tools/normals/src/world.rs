@@ -7,8 +7,9 @@ use outcrop::geom::Point;
 use outcrop::params::Params;
 use outcrop::stages::blocks::Blocks;
 use outcrop::stages::cells::{TileRanges, Widen};
+use outcrop::stages::cells::{each_neighborhood, each_plane};
 use outcrop::stages::order::{Orderer, PAGE, PointStore};
-use outcrop::stages::smooth::{Relaxed, Relaxing, each_neighborhood, each_plane, relax};
+use outcrop::stages::smooth::{Relaxing, relax};
 use outcrop::stages::tiles::neighbors::Neighbors;
 use outcrop::workspace::Workspace;
 use outcrop::workspace::memory::MemoryPool;
@@ -27,7 +28,8 @@ pub(crate) struct World {
     pub(crate) workspace: Workspace,
     /// Root of the area per point.
     pub(crate) spacing: f64,
-    relaxed: Relaxed,
+    /// The relaxed positions, if any point moved.
+    relaxed: Option<PointStore>,
     neighbors: usize,
     /// True normals by id.
     truth: Vec<[f64; 3]>,
@@ -75,7 +77,7 @@ impl World {
         let workspace = Workspace::new(&folder, pool, threads, Arc::new(Silent), Cancel::new())?;
         let orderer = Orderer::new(&workspace)?;
         orderer.push(&workspace, &points)?;
-        let store = orderer.finish(&workspace, PAGE)?.0;
+        let store = orderer.finish(&workspace, PAGE)?.0.open(&workspace)?;
         let block = Params::default().block;
         let tiles = TileRanges::new(Blocks::new(store.len(), block), block);
         let relaxing = Relaxing {
@@ -84,7 +86,8 @@ impl World {
             smoothed: false,
             off_surface: true,
         };
-        let relaxed = relax(&store, tiles, relaxing, &workspace)?;
+        let relaxed = relax(&store, tiles, relaxing, &workspace)?.store;
+        let relaxed = relaxed.map(|store| store.open(&workspace)).transpose()?;
         let ordered = store.slice(0..store.len())?;
         let truth = ordered.iter().map(|p| normals.get(p).copied());
         Ok(Self {
@@ -114,10 +117,9 @@ impl World {
     pub(crate) fn near_edges(&self, cosine: f64) -> Result<Vec<bool>> {
         let k = self.neighbors;
         let mut found = vec![false; self.store.len()];
-        let of = |_: Point, near: &Neighbors| -> Vec<u32> {
-            near.iter().take(k).map(|n| n.id).collect()
-        };
-        each_neighborhood(&self.store, 0..self.store.len(), k, of, |id, _, near| {
+        let of = |_, near: &Neighbors| -> Vec<u32> { near.iter().take(k).map(|n| n.id).collect() };
+        let (unit, all) = (self.workspace.unit(), 0..self.store.len());
+        each_neighborhood(&unit, &self.store, all, k, of, |id, _, near| {
             let own = self.truth[id];
             found[id] = near.iter().any(|&n| {
                 let other = self.truth[n as usize];
@@ -129,13 +131,14 @@ impl World {
 
     /// The relaxed positions, by which the robust method connects points.
     pub(crate) fn shape(&self) -> &PointStore {
-        self.relaxed.store.as_ref().unwrap_or(&self.store)
+        self.relaxed.as_ref().unwrap_or(&self.store)
     }
 
     /// Normals of the program's planes.
     pub(crate) fn planes(&self, store: &PointStore, widen: Widen) -> Result<Vec<Option<[f64; 3]>>> {
         let mut normals = vec![None; store.len()];
         each_plane(
+            &self.workspace.unit(),
             store,
             0..store.len(),
             self.neighbors,
@@ -156,8 +159,9 @@ impl World {
     ) -> Result<Vec<Option<[f64; 3]>>> {
         let mut normals = vec![None; store.len()];
         let count = candidate.most * self.neighbors;
-        let of = |_: Point, near: &_| (candidate.normal)(near, self.neighbors);
-        each_neighborhood(store, 0..store.len(), count, of, |id, _, normal| {
+        let of = |_, near: &_| (candidate.normal)(near, self.neighbors);
+        let (unit, all) = (self.workspace.unit(), 0..store.len());
+        each_neighborhood(&unit, store, all, count, of, |id, _, normal| {
             normals[id] = normal;
         })?;
         Ok(normals)

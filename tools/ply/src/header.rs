@@ -121,10 +121,7 @@ impl Element {
     /// Bytes of an entry before the property with this index; none if there is a list.
     #[must_use]
     pub fn bytes_before(&self, property: usize) -> Option<usize> {
-        self.properties[..property]
-            .iter()
-            .map(|p| p.1.bytes())
-            .sum()
+        bytes_of(&self.properties[..property])
     }
 
     /// Least number of bytes of an entry.
@@ -140,7 +137,6 @@ impl Element {
 }
 
 /// Bytes of these properties in a binary file; none if one is a list.
-#[must_use]
-pub fn bytes_of(properties: &[(String, Property)]) -> Option<usize> {
+pub(crate) fn bytes_of(properties: &[(String, Property)]) -> Option<usize> {
     properties.iter().map(|p| p.1.bytes()).sum()
 }

@@ -2,7 +2,8 @@
 //!
 //! [`Header::read`] is the only parser of PLY headers; the readers of outcrop and of its tools differ in the
 //! processing of the elements after it. [`Layout`] is the only writer: a cloud or a triangle mesh with
-//! entries of fixed size. [`Mesh::read`] holds a mesh, or a cloud, in memory.
+//! entries of fixed size. [`Mesh::read`] holds a mesh, or a cloud, in memory; [`MeshStream`] passes a mesh on
+//! in parts.
 
 mod error;
 mod header;
@@ -10,11 +11,13 @@ mod layout;
 mod mesh;
 mod numbers;
 mod parse;
+mod stream;
 mod types;
 
-pub use error::{Error, Result};
-pub use header::{Element, Header, bytes_of};
+pub use error::{Error, FileError, Result};
+pub use header::{Element, Header};
 pub use layout::{Layout, TRIANGLE, put_triangle};
 pub use mesh::Mesh;
-pub use numbers::{integer, real};
+pub use numbers::{Numbers, real};
+pub use stream::{MeshStream, NO_VERTEX, Part, SLICE};
 pub use types::{Encoding, Property, Scalar};

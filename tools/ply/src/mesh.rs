@@ -22,11 +22,7 @@ impl Mesh {
     /// [`Error`] with the entry.
     pub fn read(mut input: impl BufRead, bytes: u64) -> Result<Self> {
         let header = Header::read(&mut input)?;
-        let mut numbers = Numbers {
-            input,
-            encoding: header.encoding,
-            token: Vec::new(),
-        };
+        let mut numbers = Numbers::new(input, header.encoding);
         let mut mesh = Self::default();
         let place = |name| header.element(name).map(|e| e.map(|(at, _)| at));
         let (vertex, face) = (place("vertex")?, place("face")?);
@@ -50,8 +46,7 @@ impl Mesh {
                 read_faces(&mut numbers, element, vertices, &mut mesh.triangles)?;
             } else if !element.properties.is_empty() {
                 for row in 0..element.count {
-                    let mut properties = element.properties.iter();
-                    let skipped = properties.try_for_each(|p| numbers.skip(p.1));
+                    let skipped = numbers.skip_entry(element);
                     skipped.map_err(|found| wrong(element, row, found))?;
                 }
             }
@@ -72,15 +67,8 @@ fn read_vertices(
 ) -> Result<()> {
     let coordinates = element.coordinates()?;
     for row in 0..element.count {
-        let mut place = [0.0; 3];
-        for (at, (_, property)) in element.properties.iter().enumerate() {
-            match coordinates.iter().position(|c| c.0 == at) {
-                Some(k) => numbers.next(coordinates[k].1).map(|c| place[k] = c),
-                None => numbers.skip(*property),
-            }
-            .map_err(|found| wrong(element, row, found))?;
-        }
-        out.push(place);
+        let point = numbers.point(element, &coordinates);
+        out.push(point.map_err(|found| wrong(element, row, found))?);
     }
     Ok(())
 }

@@ -1,8 +1,9 @@
 //! The data after a header, as a sequence of numbers.
 
 use crate::error::Result;
+use crate::header::Element;
 use crate::types::{Encoding, Property, Scalar};
-use std::io::{BufRead, ErrorKind};
+use std::io::{self, BufRead, ErrorKind, Read};
 
 /// The number in the first bytes, in little-endian order unless `big`; all types fit into `f64`. The caller
 /// has checked the length.
@@ -17,9 +18,8 @@ pub fn real(scalar: Scalar, bytes: &[u8], big: bool) -> f64 {
 }
 
 /// As [`real`], truncated to an integer.
-#[must_use]
 #[inline]
-pub fn integer(scalar: Scalar, bytes: &[u8], big: bool) -> i64 {
+pub(crate) fn integer(scalar: Scalar, bytes: &[u8], big: bool) -> i64 {
     match scalar {
         Scalar::I8 => i8::from_le_bytes(array(bytes, big)).into(),
         Scalar::U8 => u8::from_le_bytes(array(bytes, big)).into(),
@@ -43,16 +43,29 @@ fn array<const N: usize>(bytes: &[u8], big: bool) -> [u8; N] {
 }
 
 /// Reads a sequence of numbers in any encoding. Errors are the content found.
-pub(crate) struct Numbers<R> {
-    pub(crate) input: R,
-    pub(crate) encoding: Encoding,
-    pub(crate) token: Vec<u8>,
+#[derive(Debug)]
+pub struct Numbers<R> {
+    /// The data.
+    pub input: R,
+    encoding: Encoding,
+    token: Vec<u8>,
 }
 
 /// Upper bound for the length of a number in text.
 const LONGEST: usize = 400;
 
+const END: &str = "the end of the file";
+
 impl<R: BufRead> Numbers<R> {
+    /// Numbers from the begin of `input` on.
+    pub fn new(input: R, encoding: Encoding) -> Self {
+        Self {
+            input,
+            encoding,
+            token: Vec::new(),
+        }
+    }
+
     pub(crate) fn next(&mut self, scalar: Scalar) -> Result<f64, String> {
         if self.encoding == Encoding::Ascii {
             return self.next_token();
@@ -60,10 +73,38 @@ impl<R: BufRead> Numbers<R> {
         let mut bytes = [0; 8];
         let read = self.input.read_exact(&mut bytes[..scalar.bytes()]);
         read.map_err(|e| match e.kind() {
-            ErrorKind::UnexpectedEof => "the end of the file".to_owned(),
+            ErrorKind::UnexpectedEof => END.to_owned(),
             _ => e.to_string(),
         })?;
         Ok(real(scalar, &bytes, self.encoding == Encoding::Big))
+    }
+
+    /// Reads an entry with coordinates; they are from [`Element::coordinates`].
+    ///
+    /// # Errors
+    /// The content found instead of the entry.
+    pub fn point(
+        &mut self,
+        element: &Element,
+        coordinates: &[(usize, Scalar); 3],
+    ) -> Result<[f64; 3], String> {
+        let mut point = [0.0; 3];
+        for (at, (_, property)) in element.properties.iter().enumerate() {
+            match coordinates.iter().position(|c| c.0 == at) {
+                Some(axis) => point[axis] = self.next(coordinates[axis].1)?,
+                None => self.skip(*property)?,
+            }
+        }
+        Ok(point)
+    }
+
+    /// Skips an entry.
+    ///
+    /// # Errors
+    /// The content found instead of the entry.
+    pub fn skip_entry(&mut self, element: &Element) -> Result<(), String> {
+        let mut properties = element.properties.iter();
+        properties.try_for_each(|p| self.skip(p.1))
     }
 
     fn next_token(&mut self) -> Result<f64, String> {
@@ -88,7 +129,7 @@ impl<R: BufRead> Numbers<R> {
             }
         }
         if self.token.is_empty() {
-            return Err("the end of the file".to_owned());
+            return Err(END.to_owned());
         }
         let text = String::from_utf8_lossy(&self.token);
         let short: String = text.chars().take(40).collect();
@@ -108,8 +149,16 @@ impl<R: BufRead> Numbers<R> {
     pub(crate) fn skip(&mut self, property: Property) -> Result<(), String> {
         match property {
             Property::One(scalar) => self.next(scalar).map(drop),
-            Property::List { count, item } => {
+            Property::List { count, item } if self.encoding == Encoding::Ascii => {
                 (0..self.length(count)?).try_for_each(|_| self.next(item).map(drop))
+            }
+            Property::List { count, item } => {
+                let bytes = self.length(count)? * item.bytes() as u64;
+                let skipped = io::copy(&mut self.input.by_ref().take(bytes), &mut io::sink());
+                match skipped.map_err(|e| e.to_string())? == bytes {
+                    true => Ok(()),
+                    false => Err(END.to_owned()),
+                }
             }
         }
     }

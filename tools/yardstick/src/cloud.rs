@@ -65,9 +65,11 @@ pub fn ordered(cloud: &Path, workspace: &Workspace) -> Result<(PointStore, f64)>
     let spool = ingest::ingest(&[cloud.to_owned()], workspace)?;
     let lattice = spool.choose_lattice(0)?;
     let orderer = order::Orderer::new(workspace)?;
-    spool.for_each(&lattice, |points| orderer.push(workspace, points))?;
-    let (store, _) = orderer.finish(workspace, order::PAGE)?;
-    Ok((store, lattice.step))
+    spool.for_each(workspace, &lattice, |points| {
+        orderer.push(workspace, points)
+    })?;
+    let (stored, _) = orderer.finish(workspace, order::PAGE)?;
+    Ok((stored.open(workspace)?, lattice.step))
 }
 
 /// The same points in the form for the k-d tree, relative to the cloud's lowest corner.

@@ -21,8 +21,9 @@ pub fn time(store: &PointStore, workspace: &Workspace) -> Result<f64> {
     let start = Instant::now();
     let total = Mutex::new(0.0);
     let tiles = store.len().div_ceil(TILE);
-    let bytes = |_| Tile::bytes(TILE) + PageCache::bytes(store);
-    workspace.for_each_unit("neighbors: tile", tiles, bytes, |tile| {
+    let bytes = |_| Tile::estimate(TILE) + PageCache::estimate(store);
+    workspace.for_each_unit("neighbors: tile", tiles, bytes, |unit| {
+        let tile = unit.number();
         let ids = tile * TILE..((tile + 1) * TILE).min(store.len());
         let sum = one_tile(store, ids)?;
         if let Ok(mut total) = total.lock() {
@@ -46,6 +47,7 @@ fn one_tile(store: &PointStore, ids: Range<usize>) -> outcrop::Result<f64> {
     tile.for_each_query(
         NEIGHBORS,
         &mut Search::default(),
+        |_| (),
         |id, point, query| match query.and_then(|q| q.near().get(NEIGHBORS - 1)) {
             Some(last) => sum += (last.distance2 as f64).sqrt(),
             None => uncertain.push((id, point)),

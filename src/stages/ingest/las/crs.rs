@@ -16,7 +16,7 @@ const TEXTS: u16 = 34737;
 const WELL_KNOWN: u16 = 2112;
 
 /// Limits for the number of records read and for the size of one.
-const MOST_RECORDS: usize = 200;
+const MOST_RECORDS: u32 = 200;
 const LARGEST: u64 = 64 << 10;
 
 /// GeoTIFF keys with the code of a system, and keys that only describe one.
@@ -40,21 +40,14 @@ struct Records {
 /// The reference system of a file, if it gives one.
 pub(super) fn read(input: &Input, header: &Header) -> Option<Crs> {
     let mut records = Records::default();
-    let mut at = header.vlrs;
-    for _ in 0..MOST_RECORDS {
-        let next = records.take(input, at, 54, header.data);
-        at = match next {
-            Some(next) => next,
-            None => break,
-        };
-    }
-    if let Some((start, count)) = header.extended {
-        let mut at = start;
-        for _ in 0..MOST_RECORDS.min(count as usize) {
-            at = match records.take(input, at, 60, input.bytes) {
-                Some(next) => next,
-                None => break,
-            };
+    let plain = (header.vlrs, u32::MAX, 54, header.data);
+    let extended = header
+        .extended
+        .map(|(start, count)| (start, count, 60, input.bytes));
+    for (start, count, head_bytes, end) in std::iter::once(plain).chain(extended) {
+        let mut at = Some(start);
+        for _ in 0..count.min(MOST_RECORDS) {
+            at = at.and_then(|at| records.take(input, at, head_bytes, end));
         }
     }
     records.crs()

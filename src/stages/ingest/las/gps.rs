@@ -13,8 +13,10 @@ use std::io::Read;
 /// Multiples of the last difference that have their own symbol: 1 to 500, then -1 to -10.
 const MULTIPLES: i32 = 500;
 const NEGATIVE_MULTIPLES: i32 = 10;
+/// Symbol of the last of them.
+const LAST_MULTIPLE: i32 = MULTIPLES + NEGATIVE_MULTIPLES;
 /// Symbol of a time that did not change.
-const UNCHANGED: i32 = MULTIPLES + NEGATIVE_MULTIPLES + 1;
+const UNCHANGED: i32 = LAST_MULTIPLE + 1;
 /// Symbol of a time that is stored in full; larger symbols switch to another sequence.
 const WHOLE: i32 = UNCHANGED + 1;
 
@@ -50,17 +52,6 @@ impl Default for GpsTimes {
 }
 
 impl GpsTimes {
-    /// Decodes a difference predicted as `multiple` times the last one.
-    fn predicted<R: Read>(
-        &mut self,
-        decoder: &mut ArithmeticDecoder<R>,
-        multiple: i32,
-        context: u32,
-    ) -> std::io::Result<i32> {
-        let prediction = multiple.wrapping_mul(self.differences[self.last]);
-        self.integers.decompress(decoder, prediction, context)
-    }
-
     /// After four extreme differences in a row, the last one becomes the prediction.
     fn extreme(&mut self, difference: i32) {
         self.extremes[self.last] += 1;
@@ -99,39 +90,29 @@ impl GpsTimes {
             }
             return Ok(false);
         }
-        let multiple = decoder.decode_symbol(&mut self.multiple)? as i32;
-        match multiple {
-            1 => {
-                self.predicted(decoder, 1, 1)?;
-                self.extremes[self.last] = 0;
-            }
-            0 => {
-                let difference = self.integers.decompress(decoder, 0, 7)?;
-                self.extreme(difference);
-            }
-            2..10 => {
-                self.predicted(decoder, multiple, 2)?;
-            }
-            10..MULTIPLES => {
-                self.predicted(decoder, multiple, 3)?;
-            }
-            MULTIPLES => {
-                let difference = self.predicted(decoder, multiple, 4)?;
-                self.extreme(difference);
-            }
-            _ if multiple < MULTIPLES + NEGATIVE_MULTIPLES => {
-                self.predicted(decoder, MULTIPLES - multiple, 5)?;
-            }
-            _ if multiple < UNCHANGED => {
-                let difference = self.predicted(decoder, -NEGATIVE_MULTIPLES, 6)?;
-                self.extreme(difference);
-            }
-            UNCHANGED => {}
-            WHOLE => self.whole(decoder)?,
+        // The difference is predicted as a multiple of the last one.
+        let symbol = decoder.decode_symbol(&mut self.multiple)? as i32;
+        let (multiple, context) = match symbol {
+            0 => (0, 7),
+            1 => (1, 1),
+            2..10 => (symbol, 2),
+            10..MULTIPLES => (symbol, 3),
+            MULTIPLES => (symbol, 4),
+            ..LAST_MULTIPLE => (MULTIPLES - symbol, 5),
+            LAST_MULTIPLE => (-NEGATIVE_MULTIPLES, 6),
+            UNCHANGED => return Ok(false),
+            WHOLE => return self.whole(decoder).map(|()| false),
             switch => {
                 self.last = (self.last + (switch - WHOLE) as usize) & 3;
                 return Ok(true);
             }
+        };
+        let prediction = multiple.wrapping_mul(self.differences[self.last]);
+        let difference = self.integers.decompress(decoder, prediction, context)?;
+        match context {
+            1 => self.extremes[self.last] = 0,
+            4 | 6 | 7 => self.extreme(difference),
+            _ => {}
         }
         Ok(false)
     }

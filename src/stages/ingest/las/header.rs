@@ -68,13 +68,16 @@ impl Header {
         }
         let header_bytes = usize::from(u16_at(&head, 94));
         let full = version[1] >= 4 && header_bytes >= LARGEST && head.len() >= LARGEST;
-        let compressed = head[104] & 0x80 != 0;
+        // Formats from 6 on leave the legacy count at zero; writers of lower formats fill in one of the two,
+        // or both.
+        let count = if full { u64_at(&head, 247) } else { 0 };
+        let legacy_count = u64::from(u32_at(&head, 107));
         let mut header = Self {
             version,
-            compressed,
+            compressed: head[104] & 0x80 != 0,
             point_format: head[104] & 0x3f,
             record_bytes: u16_at(&head, 105),
-            claimed: u64::from(u32_at(&head, 107)),
+            claimed: if count > 0 { count } else { legacy_count },
             data: u64::from(u32_at(&head, 96)),
             data_end: input.bytes,
             vlrs: header_bytes.max(SMALLEST) as u64,
@@ -84,14 +87,6 @@ impl Header {
             bounds: [[187, 203, 219], [179, 195, 211]].map(|ends| ends.map(|at| f64_at(&head, at))),
             warnings,
         };
-        if full {
-            // Formats from 6 on leave the legacy count at zero; writers of lower formats fill in one of the
-            // two, or both.
-            match u64_at(&head, 247) {
-                0 => {}
-                count => header.claimed = count,
-            }
-        }
         header.check_layout(input, head[104])?;
         header.find_end(input, &head, header_bytes);
         if header.claimed > 0 || header.data < header.data_end {
@@ -127,16 +122,14 @@ impl Header {
 
     /// Ends the points where other data are known to start.
     fn find_end(&mut self, input: &Input, head: &[u8], header_bytes: usize) {
-        let mut starts = Vec::new();
-        if let Some((start, 1..)) = self.extended {
-            starts.push(start);
-        }
+        let extended = self.extended.filter(|(_, count)| *count > 0);
         // Waveform packets in this file are an extended record too.
-        if self.version[1] >= 3 && header_bytes >= 235 && head.len() >= 235 {
-            starts.push(u64_at(head, 227));
-        }
-        self.data_end = starts
+        let has_waveforms = self.version[1] >= 3 && header_bytes >= 235 && head.len() >= 235;
+        let waveforms = has_waveforms.then(|| u64_at(head, 227));
+        self.data_end = extended
+            .map(|(start, _)| start)
             .into_iter()
+            .chain(waveforms)
             .filter(|start| (self.data + 1..input.bytes).contains(start))
             .min()
             .unwrap_or(input.bytes);

@@ -1,7 +1,7 @@
 //! LAZ: chunks are decoded on all threads if their offsets are known, else one after another.
 
 use super::super::input::{Input, STREAM_BUFFER};
-use super::super::spool::{SourceWriter, sink_bytes};
+use super::super::spool::{Sink, SourceWriter, sink_bytes};
 use super::chunks::{Decoder, LayerHead};
 use super::table::{self, Chunk, Table};
 use super::vlr::{self, Laszip, Layout};
@@ -95,22 +95,21 @@ fn in_parallel(decoder: &Decoder<'_>, chunks: &[Chunk], writer: &SourceWriter<'_
                 false => STREAM_BUFFER as u64,
             }
     };
-    let work = |unit: usize| {
+    let work = |unit: usize, sink: &mut Sink<'_, i32>| {
         let chunk = chunks[unit];
-        let mut sink = writer.sink::<i32>();
         if layered {
-            decoder.layers(chunk, &mut sink)?;
+            decoder.layers(chunk, sink)?;
         } else if chunk.bytes <= IN_MEMORY {
             let mut bytes = vec![0u8; chunk.bytes as usize];
             decoder
                 .input
                 .read_exact_at(chunk.at, &mut bytes, "LAZ chunk")?;
-            decoder.stream(&bytes[..], chunk.at, chunk.points, &mut sink)?;
+            decoder.stream(&bytes[..], chunk.at, chunk.points, sink)?;
         } else {
             let source = decoder.input.stream(chunk.at, chunk.at + chunk.bytes);
-            decoder.stream(source, chunk.at, chunk.points, &mut sink)?;
+            decoder.stream(source, chunk.at, chunk.points, sink)?;
         }
-        sink.finish()
+        Ok(())
     };
     writer.units("LAZ chunks", chunks.len(), memory, work)
 }
@@ -130,18 +129,17 @@ fn one_by_one(decoder: &Decoder<'_>, writer: &SourceWriter<'_>) -> Result<()> {
         }
     };
     let memory = models(decoder.laszip) + sink_bytes::<i32>() + STREAM_BUFFER as u64;
-    writer.whole("LAZ stream", memory, || {
+    writer.whole("LAZ stream", memory, |sink: &mut Sink<'_, i32>| {
         let mut at = start;
         let mut source = input.stream(at, input.bytes);
-        let mut sink = writer.sink::<i32>();
         let mut left = header.claimed;
         while left > 0 {
             let points = left.min(per_chunk);
-            source = decoder.stream(source, at, points, &mut sink)?;
-            at = source.get_ref().position() - source.buffer().len() as u64;
+            source = decoder.stream(source, at, points, sink)?;
+            at = source.get_ref().at - source.buffer().len() as u64;
             left -= points;
         }
-        sink.finish()
+        Ok(())
     })
 }
 

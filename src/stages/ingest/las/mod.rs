@@ -28,15 +28,9 @@ use crate::error::Result;
 
 impl Format {
     /// ASPRS LAS.
-    pub const LAS: Self = Self {
-        id: "las",
-        name: "LAS",
-    };
+    pub const LAS: Self = Self::new("las", "LAS");
     /// LAS compressed by laszip, COPC included.
-    pub const LAZ: Self = Self {
-        id: "laz",
-        name: "LAZ",
-    };
+    pub const LAZ: Self = Self::new("laz", "LAZ");
 }
 
 /// Both formats; the header distinguishes them.
@@ -131,16 +125,15 @@ impl<'a> Record<'a> {
     /// Passes a point on, or counts why it is left out.
     #[inline]
     fn take(self, record: &[u8], sink: &mut Sink<'_, i32>) -> Result<()> {
+        let (byte, bits) = self.class;
         if record[FLAGS] & self.withheld != 0 {
             sink.withhold();
-            return Ok(());
-        }
-        let (byte, bits) = self.class;
-        if self.wanted.is_some_and(|c| !c.wants(record[byte] & bits)) {
+        } else if self.wanted.is_some_and(|c| !c.wants(record[byte] & bits)) {
             sink.leave_out();
-            return Ok(());
+        } else {
+            return sink.push(position(record));
         }
-        sink.push(position(record))
+        Ok(())
     }
 }
 

@@ -1,7 +1,7 @@
 //! Uncompressed LAS: slabs of records, converted on all threads.
 
 use super::super::input::Input;
-use super::super::spool::{SourceWriter, sink_bytes};
+use super::super::spool::{Sink, SourceWriter, sink_bytes};
 use super::{Header, Record};
 use crate::error::Result;
 
@@ -24,17 +24,16 @@ pub(super) fn read(
         "LAS records",
         units,
         |_| memory,
-        |unit| {
+        |unit, sink: &mut Sink<'_, i32>| {
             let first = unit as u64 * rows;
             let rows = rows.min(points - first);
             let mut slab = vec![0u8; (rows * record_bytes) as usize];
             let what = format!("records {first} to {}", first + rows - 1);
             input.read_exact_at(header.data + first * record_bytes, &mut slab, &what)?;
-            let mut sink = writer.sink::<i32>();
             for bytes in slab.chunks_exact(header.record_bytes.into()) {
-                record.take(bytes, &mut sink)?;
+                record.take(bytes, sink)?;
             }
-            sink.finish()
+            Ok(())
         },
     )?;
     Ok(warnings)

@@ -69,11 +69,9 @@ fn parse(input: &Input, header: &Header, at: u64, record: &[u8]) -> Result<Laszi
     let items = vlr.items();
     let sum: u64 = items.iter().map(|i| u64::from(i.size())).sum();
     let layered = header.point_format >= 6;
-    let versions = if layered { 3..=4 } else { 1..=2 };
-    let first = if layered {
-        LazItemType::Point14
-    } else {
-        LazItemType::Point10
+    let (versions, first) = match layered {
+        true => (3..=4, LazItemType::Point14),
+        false => (1..=2, LazItemType::Point10),
     };
     let fits = items.first().is_some_and(|i| i.item_type() == first)
         && items.iter().all(|i| {
@@ -95,11 +93,10 @@ fn parse(input: &Input, header: &Header, at: u64, record: &[u8]) -> Result<Laszi
         (2, false) => Layout::Chunks,
         (3, true) => Layout::Layers,
         (other, _) => {
+            let format = header.point_format;
+            let found = format!("compressor {other} for point format {format}");
             return wrong(
-                format!(
-                    "compressor {other} for point format {}",
-                    header.point_format
-                ),
+                found,
                 "1 or 2 for point formats 0 to 5, 3 for 6 to 10".into(),
             );
         }

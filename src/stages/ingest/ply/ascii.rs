@@ -2,9 +2,8 @@
 
 use super::super::input::{Input, Range, STREAM_BUFFER};
 use super::super::number;
-use super::super::spool::{SourceWriter, sink_bytes};
-use super::super::stats::SourceStats;
-use super::{Cloud, FromScalar, Vertex};
+use super::super::spool::{Sink, SourceWriter, sink_bytes};
+use super::{Cloud, FromScalar, Vertex, position};
 use crate::error::{Error, Result};
 use outcrop_ply::Property;
 use std::io::{BufRead, BufReader};
@@ -19,8 +18,8 @@ pub(super) fn read<T: FromScalar>(
     writer: &SourceWriter<'_>,
 ) -> Result<()> {
     let memory = sink_bytes::<T>() + (STREAM_BUFFER + LONGEST_LINE) as u64;
-    writer.whole("PLY lines", memory, || {
-        vertices::<T>(input, cloud, vertex, writer)
+    writer.whole("PLY lines", memory, |sink| {
+        vertices::<T>(input, cloud, vertex, writer, sink)
     })
 }
 
@@ -29,7 +28,8 @@ fn vertices<T: FromScalar>(
     cloud: &Cloud,
     vertex: &Vertex,
     writer: &SourceWriter<'_>,
-) -> Result<SourceStats> {
+    sink: &mut Sink<'_, T>,
+) -> Result<()> {
     let mut lines = Lines {
         input,
         source: input.stream(cloud.data, input.bytes),
@@ -44,13 +44,12 @@ fn vertices<T: FromScalar>(
             lines.next(&element.name, number, element.count)?;
         }
     }
-    let mut sink = writer.sink::<T>();
     for number in 0..vertex.element.count {
         lines.next("vertex", number, vertex.element.count)?;
         let point = lines.point(vertex, number, &mut sink.stats.decimals)?;
         sink.push(point)?;
     }
-    sink.finish()
+    Ok(())
 }
 
 struct Lines<'a> {
@@ -73,7 +72,7 @@ impl Lines<'_> {
         };
         self.line.clear();
         loop {
-            self.at = self.source.get_ref().position() - self.source.buffer().len() as u64;
+            self.at = position(&self.source);
             let buffer = match self.source.fill_buf() {
                 Ok(buffer) => buffer,
                 Err(e) => return Err(Error::io(&self.input.path, "read a line", e)),
@@ -141,13 +140,12 @@ impl Lines<'_> {
         }
         let shown = &self.line[..self.line.len().min(60)];
         Err(self.input.error(
-            format!("vertex {number}, line before byte {}", self.position()),
+            format!(
+                "vertex {number}, line before byte {}",
+                position(&self.source)
+            ),
             format!("\"{}\"", shown.escape_ascii()),
             format!("{} numbers", vertex.element.properties.len()),
         ))
-    }
-
-    fn position(&self) -> u64 {
-        self.source.get_ref().position() - self.source.buffer().len() as u64
     }
 }

@@ -1,18 +1,14 @@
 //! Binary PLY: slabs of records on all threads, or one record after another if vertices contain lists.
 
 use super::super::input::{Input, Range, STREAM_BUFFER};
-use super::super::spool::{SourceWriter, sink_bytes};
-use super::{Cloud, FromScalar, Vertex};
+use super::super::spool::{Sink, SourceWriter, sink_bytes};
+use super::{Cloud, FromScalar, Vertex, position};
 use crate::error::{Error, Result};
-use outcrop_ply::{Element, Encoding, Property, Scalar};
-use std::io::{BufReader, Read};
+use outcrop_ply::{Encoding, Numbers, real};
+use std::io::BufReader;
 
 /// Bytes of records read at a time.
 const SLAB: u64 = 2 << 20;
-
-fn scalar<T: FromScalar>(bytes: &[u8], kind: Scalar, encoding: Encoding) -> T {
-    T::from_double(outcrop_ply::real(kind, bytes, encoding == Encoding::Big))
-}
 
 pub(super) fn read<T: FromScalar>(
     input: &Input,
@@ -51,7 +47,8 @@ fn skip_elements(input: &Input, cloud: &Cloud, writer: &SourceWriter<'_>) -> Res
                 writer.workspace.check_cancel()?;
             }
             records
-                .skip(element)
+                .numbers
+                .skip_entry(element)
                 .map_err(|e| records.error(&element.name, number, element.count, e))?;
         }
         at = records.position();
@@ -86,17 +83,17 @@ fn fixed<T: FromScalar>(
     let rows = (SLAB / bytes).max(1);
     let units = usize::try_from(count.div_ceil(rows)).unwrap_or(usize::MAX);
     let memory = rows * bytes + sink_bytes::<T>();
-    let work = |unit: usize| {
+    let big = encoding == Encoding::Big;
+    let work = |unit: usize, sink: &mut Sink<'_, T>| {
         let first = unit as u64 * rows;
         let rows = rows.min(count - first);
         let mut slab = vec![0u8; (rows * bytes) as usize];
         let what = format!("vertices {first} to {}", first + rows - 1);
         input.read_exact_at(start + first * bytes, &mut slab, &what)?;
-        let mut sink = writer.sink::<T>();
         for record in slab.chunks_exact(bytes as usize) {
-            sink.push(places.map(|(at, kind)| scalar(&record[at..], kind, encoding)))?;
+            sink.push(places.map(|(at, kind)| T::from_double(real(kind, &record[at..], big))))?;
         }
-        sink.finish()
+        Ok(())
     };
     writer.units("PLY vertices", units, |_| memory, work)
 }
@@ -110,87 +107,36 @@ fn one_by_one<T: FromScalar>(
 ) -> Result<()> {
     let count = vertex.element.count;
     let memory = sink_bytes::<T>() + STREAM_BUFFER as u64;
-    writer.whole("PLY vertices", memory, || {
+    writer.whole("PLY vertices", memory, |sink: &mut Sink<'_, T>| {
         let mut records = Records::new(input, encoding, start);
-        let mut sink = writer.sink::<T>();
         for number in 0..count {
             let point = records
-                .point(vertex)
+                .numbers
+                .point(&vertex.element, &vertex.coordinates)
                 .map_err(|e| records.error("vertex", number, count, e))?;
-            sink.push(point)?;
+            sink.push(point.map(T::from_double))?;
         }
-        sink.finish()
+        Ok(())
     })
 }
 
 /// Reader of records with lists, one after another.
 struct Records<'a> {
     input: &'a Input,
-    encoding: Encoding,
-    source: BufReader<Range<'a>>,
+    numbers: Numbers<BufReader<Range<'a>>>,
 }
 
 impl<'a> Records<'a> {
     fn new(input: &'a Input, encoding: Encoding, at: u64) -> Self {
-        Self {
-            input,
-            encoding,
-            source: input.stream(at, input.bytes),
-        }
+        let numbers = Numbers::new(input.stream(at, input.bytes), encoding);
+        Self { input, numbers }
     }
 
     fn position(&self) -> u64 {
-        self.source.get_ref().position() - self.source.buffer().len() as u64
+        position(&self.numbers.input)
     }
 
-    fn scalar<T: FromScalar>(&mut self, kind: Scalar) -> std::io::Result<T> {
-        let mut bytes = [0u8; 8];
-        self.source.read_exact(&mut bytes[..kind.bytes()])?;
-        Ok(scalar(&bytes, kind, self.encoding))
-    }
-
-    fn skip_property(&mut self, property: Property) -> std::io::Result<()> {
-        match property {
-            Property::One(kind) => self.scalar::<f64>(kind).map(|_| ()),
-            Property::List { count, item } => {
-                let count = self.scalar::<f64>(count)?;
-                if count < 0.0 {
-                    return Err(std::io::Error::other(format!("a list of {count} items")));
-                }
-                let bytes = count as u64 * item.bytes() as u64;
-                let skipped =
-                    std::io::copy(&mut self.source.by_ref().take(bytes), &mut std::io::sink())?;
-                if skipped < bytes {
-                    return Err(std::io::ErrorKind::UnexpectedEof.into());
-                }
-                Ok(())
-            }
-        }
-    }
-
-    fn skip(&mut self, element: &Element) -> std::io::Result<()> {
-        let mut properties = element.properties.iter();
-        properties.try_for_each(|p| self.skip_property(p.1))
-    }
-
-    fn point<T: FromScalar>(&mut self, vertex: &Vertex) -> std::io::Result<[T; 3]> {
-        let mut point = [T::from_double(0.0); 3];
-        for (number, (_, property)) in vertex.element.properties.iter().enumerate() {
-            let axis = vertex.coordinates.iter().position(|c| c.0 == number);
-            match (axis, *property) {
-                (Some(axis), Property::One(kind)) => point[axis] = self.scalar(kind)?,
-                (_, property) => self.skip_property(property)?,
-            }
-        }
-        Ok(point)
-    }
-
-    fn error(&self, element: &str, number: u64, count: u64, error: std::io::Error) -> Error {
-        let found = if error.kind() == std::io::ErrorKind::UnexpectedEof {
-            "the end of the file".to_owned()
-        } else {
-            error.to_string()
-        };
+    fn error(&self, element: &str, number: u64, count: u64, found: String) -> Error {
         self.input.error(
             format!("{element} {number} at byte {}", self.position()),
             found,

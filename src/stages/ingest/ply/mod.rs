@@ -4,13 +4,14 @@ mod ascii;
 mod binary;
 
 use super::format::Format;
-use super::input::Input;
+use super::input::{Input, Range};
 use super::number;
 use super::point_format::{Claims, Head, PointFile, PointFormat, Refusal};
 use super::source::Native;
 use super::spool::SourceWriter;
 use crate::error::{Error, Result};
 use outcrop_ply::{Element, Encoding, Header, Scalar};
+use std::io::BufReader;
 
 impl Format {
     /// PLY with numbers as text.
@@ -153,6 +154,11 @@ impl PointFile for Cloud {
         }?;
         Ok(Vec::new())
     }
+}
+
+/// Offset in the file of the next byte.
+fn position(source: &BufReader<Range<'_>>) -> u64 {
+    source.get_ref().at - source.buffer().len() as u64
 }
 
 /// A coordinate that can be converted from any scalar.

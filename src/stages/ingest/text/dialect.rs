@@ -83,20 +83,15 @@ impl Dialect {
             Separator::Semicolon => *b == b';',
         })
         .filter(move |t| separator != Separator::Space || !t.is_empty())
-        .map(|t| t.trim_ascii().trim_quotes())
+        .map(bare)
     }
 }
 
-trait TrimQuotes {
-    fn trim_quotes(&self) -> &Self;
-}
-
-impl TrimQuotes for [u8] {
-    fn trim_quotes(&self) -> &[u8] {
-        self.strip_prefix(b"\"")
-            .and_then(|t| t.strip_suffix(b"\""))
-            .unwrap_or(self)
-    }
+/// A word without spaces and quotes around it.
+fn bare(word: &[u8]) -> &[u8] {
+    let word = word.trim_ascii();
+    let inner = word.strip_prefix(b"\"").and_then(|t| t.strip_suffix(b"\""));
+    inner.unwrap_or(word)
 }
 
 fn is_blank(line: &[u8]) -> bool {
@@ -134,20 +129,19 @@ pub(super) fn lines(head: &[u8], whole: bool) -> Vec<(usize, usize, &[u8])> {
 
 /// Infers the layout; the error explains why this is not a text with points.
 pub(super) fn guess(head: &[u8], whole: bool) -> Result<Dialect, String> {
-    let mark = if head.starts_with(b"\xef\xbb\xbf") {
-        3
-    } else {
-        0
-    };
+    let mark = 3 * usize::from(head.starts_with(b"\xef\xbb\xbf"));
     let lines = lines(&head[mark..], whole);
     let Some(&(_, first_end, first)) = lines.first() else {
-        return Err(
-            match head.iter().any(|b| matches!(b, b'\n' | b'\r')) || whole {
-                true if whole => "no line with numbers".into(),
-                true => format!("no line with numbers in the first {} bytes", head.len()),
-                false => format!("no line end in the first {} bytes", head.len()),
-            },
-        );
+        if whole {
+            return Err("no line with numbers".into());
+        }
+        let ends = head.iter().any(|b| matches!(b, b'\n' | b'\r'));
+        let missing = if ends {
+            "line with numbers"
+        } else {
+            "line end"
+        };
+        return Err(format!("no {missing} in the first {} bytes", head.len()));
     };
     let styles = [
         (Separator::Space, false),
@@ -201,7 +195,7 @@ fn explains(dialect: &Dialect, lines: &[(usize, usize, &[u8])]) -> bool {
 
 pub(super) fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
     line.split(|b| matches!(b, b' ' | b'\t' | b',' | b';'))
-        .map(|w| w.trim_ascii().trim_quotes())
+        .map(bare)
         .filter(|w| !w.is_empty())
 }
 

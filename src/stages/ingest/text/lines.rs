@@ -29,18 +29,13 @@ impl Lines {
         let mut bytes = vec![0u8; (SLAB + before) as usize];
         let got = input.read_at(start - before, &mut bytes)?;
         bytes.truncate(got);
-        let skip = if before == 0 {
-            0
-        } else {
-            match bytes.iter().position(|b| is_end(*b)) {
-                Some(end) => end + 1,
-                None if got as u64 == SLAB + before => {
-                    return Err(Self::too_long(input, start));
-                }
-                None => got,
-            }
-        };
         let full = got as u64 == SLAB + before;
+        let skip = match bytes.iter().position(|b| is_end(*b)) {
+            _ if before == 0 => 0,
+            Some(end) => end + 1,
+            None if full => return Err(Self::too_long(input, start)),
+            None => got,
+        };
         // A line that starts exactly at the end of the slab belongs to the next one.
         if full && bytes.len() > skip && !bytes.last().is_some_and(|b| is_end(*b)) {
             Self::complete(input, start - before, &mut bytes)?;

@@ -9,16 +9,13 @@ use super::input::Input;
 use super::point_format::{Claims, Head, PointFile, PointFormat, Refusal};
 use super::source::Native;
 use super::spool::{Sink, SourceWriter, sink_bytes};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use dialect::{Dialect, Row};
 use lines::{LONGEST_LINE, Lines, SLAB};
 
 impl Format {
     /// Lines of numbers: XYZ, TXT, CSV, PTS.
-    pub const TEXT: Self = Self {
-        id: "text",
-        name: "text",
-    };
+    pub const TEXT: Self = Self::new("text", "text");
 }
 
 /// Bytes of a line with a point: the minimum, and a typical value.
@@ -81,14 +78,13 @@ impl PointFile for Dialect {
     fn read(&self, input: &Input, target: &SourceWriter<'_>) -> Result<Vec<String>> {
         let slabs = input.bytes.saturating_sub(self.start).div_ceil(SLAB);
         let memory = SLAB + LONGEST_LINE + sink_bytes::<f64>();
-        let work = |unit: usize| {
+        let work = |unit: usize, sink: &mut Sink<'_, f64>| {
             let start = self.start + unit as u64 * SLAB;
             let lines = Lines::read(input, self.start, start)?;
-            let mut sink = target.sink::<f64>();
             for (at, line) in lines.iter() {
-                take(input, self, at, line, &mut sink)?;
+                take(input, self, at, line, sink)?;
             }
-            sink.finish()
+            Ok(())
         };
         let slabs = usize::try_from(slabs).unwrap_or(usize::MAX);
         target.units("text lines", slabs, |_| memory, work)?;
@@ -112,23 +108,16 @@ fn take(
     sink: &mut Sink<'_, f64>,
 ) -> Result<()> {
     match dialect.row(line, &mut sink.stats.decimals) {
-        Row::Blank => Ok(()),
-        Row::Point(point) => sink.push(point),
+        Row::Blank => {}
+        Row::Point(point) => sink.push(point)?,
         Row::Count(count) => {
             sink.stats.claimed = sink.stats.claimed.saturating_add(count);
-            Ok(())
         }
-        Row::Wrong(found) => Err(wrong_row(input, dialect, at, found)),
+        Row::Wrong(found) => {
+            let place = format!("line {}", lines::number_of(input, at)?);
+            let expected = format!("three coordinates, {}", dialect.separator.describe());
+            return Err(input.error(place, found, expected));
+        }
     }
-}
-
-fn wrong_row(input: &Input, dialect: &Dialect, at: u64, found: String) -> Error {
-    match lines::number_of(input, at) {
-        Ok(number) => input.error(
-            format!("line {number}"),
-            found,
-            format!("three coordinates, {}", dialect.separator.describe()),
-        ),
-        Err(e) => e,
-    }
+    Ok(())
 }

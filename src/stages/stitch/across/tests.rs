@@ -1,13 +1,15 @@
 //! Tests: turns that are abandoned for lack of memory, and repeated.
 
 use super::super::base::base;
-use super::super::interior::insert;
+use super::super::interior::Interior;
 use super::*;
 use crate::geom::Point;
+use crate::stages::blocks::Blocks;
 use crate::stages::cells::{DiskRadius, TileRanges, Widen, cells};
 use crate::stages::located::Places;
 use crate::stages::order::Orderer;
 use crate::stages::triples::triples;
+use crate::workspace::Workspace;
 
 /// Points in a row of the sheet, and in a block.
 const SIDE: i32 = 50;
@@ -37,26 +39,36 @@ fn across(starved: bool) -> (Left, [usize; 2]) {
     let workspace = &Workspace::for_tests(1);
     let orderer = Orderer::new(workspace).unwrap();
     orderer.push(workspace, &sheet()).unwrap();
-    let store = orderer.finish(workspace, 64).unwrap().0;
+    let stored = orderer.finish(workspace, 64).unwrap().0;
+    let store = stored.open(workspace).unwrap();
     let blocks = Blocks::new(store.len(), BLOCK);
     let tiles = TileRanges::new(blocks, BLOCK);
     let (radius, widen) = (DiskRadius::Auto, Widen::OnLines);
     let seen = cells(&store, tiles, 12, radius, widen, None, workspace)
         .unwrap()
         .0;
-    let triples = triples(seen, blocks, workspace).unwrap().0;
+    let triples = triples(&seen, blocks, workspace).unwrap().0;
     let places = Places {
         shape: &store,
         file: &store,
         density: None,
     };
     let division = Some(crate::Division::default());
-    let (base, _) = base(places, triples, blocks, division, workspace).unwrap();
-    let interior = Interior::create(workspace, blocks.count()).unwrap();
+    let (base, _) = base(places, &triples, blocks, division, workspace).unwrap();
+    let interior = Interior::new(blocks.count());
+    let unit = &workspace.unit();
+    let insertion = Insertion {
+        places,
+        base: &base,
+        interior: &interior,
+        blocks,
+        cos_max_angle: -0.5,
+        workspace,
+    };
     for block in 0..blocks.count() {
-        insert(places, &base, &interior, blocks, block, -0.5).unwrap();
+        insert(insertion, block, unit).unwrap();
     }
-    let mut pass = Pass::new(&base, &interior, blocks, -0.5, workspace).unwrap();
+    let mut pass = Pass::new(insertion).unwrap();
     let (mut turns, mut given_up) = (0, 0);
     while pass.group < blocks.count() {
         let group = pass.group;
@@ -65,7 +77,7 @@ fn across(starved: bool) -> (Left, [usize; 2]) {
         let mut most = starved.then_some(0);
         let free = workspace.memory.available();
         loop {
-            pass.advance(ready, most).unwrap();
+            pass.advance(unit, ready, most).unwrap();
             if pass.group > group {
                 break;
             }
@@ -75,14 +87,17 @@ fn across(starved: bool) -> (Left, [usize; 2]) {
         }
         turns += 1;
     }
-    let (crossing, counts) = pass.finish().unwrap();
-    let all = |table: &Table<TriangleTo>| {
-        let all = 0..blocks.count();
-        all.map(|block| table.get(block).unwrap()).collect()
+    let (stitched, counts) = pass.finish(unit).unwrap();
+    let all = |sent: &Shuffle<TriangleTo>| {
+        let (all, inbox) = (
+            0..blocks.count(),
+            sent.open(workspace, blocks.count()).unwrap(),
+        );
+        all.map(|block| inbox.get(unit, block).unwrap()).collect()
     };
     let left = Left {
-        added: all(&crossing.added),
-        removed: all(&crossing.removed),
+        added: all(&stitched.added),
+        removed: all(&stitched.removed),
         counts,
     };
     (left, [turns, given_up])

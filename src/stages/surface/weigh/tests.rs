@@ -21,6 +21,7 @@ fn oriented(
         inner: triangles,
         evidence,
         ids,
+        most: 0,
     };
     let mut connections = Connections::default();
     weigher.add_patches();

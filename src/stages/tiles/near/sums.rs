@@ -27,10 +27,11 @@ impl Tile {
         k: usize,
         search: &mut Search,
         wanted: impl Fn(usize) -> bool,
+        grown: impl FnMut(u64),
         mut each: impl FnMut(u32, Point, Option<&Sums>),
     ) {
         let mut sums = Sums::default();
-        self.for_groups(k, search, wanted, |own, index, id, search| {
+        self.for_groups(k, search, wanted, grown, |own, index, id, search| {
             let known = self.sums(own, index, id, k, search, &mut sums);
             let sums = known.then_some(&sums);
             each(id, self.points.get(index), sums);

@@ -47,11 +47,12 @@ fn cloud(path: &Path, workspace: &Workspace) -> Result<Vec<[f64; 3]>> {
     let mut points = Vec::with_capacity(usize::try_from(spool.points()).unwrap_or(0));
     if spool.points() > 0 {
         let lattice = spool.choose_lattice(0)?;
-        spool.for_each(&lattice, |part| {
+        spool.for_each(workspace, &lattice, |part| {
             points.extend(part.iter().map(|p| lattice.position(*p)));
             Ok(())
         })?;
     }
+    spool.release(workspace)?;
     Ok(points)
 }
 

@@ -10,34 +10,37 @@ struct Read {
     others: u64,
 }
 
-impl Sink for Read {
-    fn vertices(&mut self, positions: &[[f64; 3]]) -> Result<()> {
-        self.vertices.extend_from_slice(positions);
-        Ok(())
-    }
-    fn triangles(&mut self, triangles: &[[u32; 3]]) -> Result<()> {
-        assert!(triangles.len() <= SLICE);
-        self.triangles.extend_from_slice(triangles);
-        Ok(())
-    }
-    fn non_triangles(&mut self, count: u64) -> Result<()> {
-        self.others += count;
-        Ok(())
+impl Read {
+    fn take(&mut self, part: Part<'_>) {
+        match part {
+            Part::Vertices(positions) => {
+                assert!(positions.len() <= SLICE);
+                self.vertices.extend_from_slice(positions);
+            }
+            Part::Triangles(triangles) => {
+                assert!(triangles.len() <= SLICE);
+                self.triangles.extend_from_slice(triangles);
+            }
+            Part::NonTriangle => self.others += 1,
+        }
     }
 }
 
-fn read(bytes: &[u8]) -> Result<Read> {
+fn read(bytes: &[u8]) -> Result<Read, FileError> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("mesh.ply");
     std::fs::write(&path, bytes).unwrap();
     let mut read = Read::default();
-    PlyMesh::open(&path)?.read(&mut read)?;
+    MeshStream::open(&path)?.read(|part| {
+        read.take(part);
+        Ok::<(), FileError>(())
+    })?;
     Ok(read)
 }
 
 fn refusal(bytes: &[u8]) -> String {
     match read(bytes) {
-        Err(error @ Error::Input { .. }) => {
+        Err(error @ FileError::Content { .. }) => {
             let text = error.to_string();
             assert!(
                 !text.contains('\n') && text.contains("mesh.ply: "),

@@ -1,0 +1,130 @@
+//! Streaming reader of triangle meshes in PLY files; see [`MeshStream`].
+
+use crate::error::{Error, Result};
+use outcrop_ply::{FileError, MeshStream, Part};
+use std::path::Path;
+
+pub use outcrop_ply::{NO_VERTEX, SLICE};
+
+/// Receives the mesh, slice by slice, in the order of the file.
+pub trait Sink {
+    /// Receives the positions of the next vertices, at most [`SLICE`].
+    ///
+    /// # Errors
+    /// Any error; it ends the reading.
+    fn vertices(&mut self, positions: &[[f64; 3]]) -> Result<()>;
+
+    /// Receives the corners of the next triangles, at most [`SLICE`]. Indices are as in the file, not checked
+    /// against the number of vertices; those below 0 or above [`NO_VERTEX`] are reported as [`NO_VERTEX`].
+    ///
+    /// # Errors
+    /// Any error; it ends the reading.
+    fn triangles(&mut self, triangles: &[[u32; 3]]) -> Result<()>;
+
+    /// Counts `count` further faces without exactly three corners.
+    ///
+    /// # Errors
+    /// Any error; it ends the reading.
+    fn non_triangles(&mut self, count: u64) -> Result<()>;
+}
+
+/// A PLY mesh with a checked header.
+#[derive(Debug)]
+pub struct PlyMesh(MeshStream);
+
+/// True for a PLY file whose header has faces: a mesh and not a cloud. False for other files and for headers
+/// that cannot be read; their readers report the error.
+///
+/// # Errors
+/// [`Error::Io`].
+pub fn holds_faces(path: &Path) -> Result<bool> {
+    MeshStream::holds_faces(path).map_err(converted)
+}
+
+impl PlyMesh {
+    /// Opens a file and reads its header.
+    ///
+    /// # Errors
+    /// [`Error::Io`]; [`Error::Input`] if it is no PLY mesh, or has counts that do not fit its size.
+    pub fn open(path: &Path) -> Result<Self> {
+        MeshStream::open(path).map(Self).map_err(converted)
+    }
+
+    /// Number of vertices; at most [`NO_VERTEX`], so that indices fit `u32`.
+    #[must_use]
+    pub fn vertices(&self) -> u64 {
+        self.0.vertices()
+    }
+
+    /// Number of faces, of any number of corners.
+    #[must_use]
+    pub fn faces(&self) -> u64 {
+        self.0.faces()
+    }
+
+    /// True if all vertices come before the first face.
+    #[must_use]
+    pub fn vertices_first(&self) -> bool {
+        self.0.vertices_first()
+    }
+
+    /// Reads the whole mesh.
+    ///
+    /// # Errors
+    /// Errors of the sink; [`Error::Io`]; [`Error::Input`] with the byte offset at which the file ends early
+    /// or does not match its header.
+    pub fn read(self, sink: &mut impl Sink) -> Result<()> {
+        let mut take = |part: Part<'_>| match part {
+            Part::Vertices(positions) => sink.vertices(positions),
+            Part::Triangles(triangles) => sink.triangles(triangles),
+            Part::NonTriangle => sink.non_triangles(1),
+        };
+        let read = self.0.read(|part| take(part).map_err(Failure));
+        read.map_err(converted)
+    }
+}
+
+/// An error as the reader returns it: its own, or that of a sink.
+struct Failure(Error);
+
+impl From<FileError> for Failure {
+    fn from(error: FileError) -> Self {
+        Self(match error {
+            FileError::Io {
+                path,
+                action,
+                source,
+            } => Error::io(path, action, source),
+            FileError::Content { path, source } => Error::ply(&path, source),
+        })
+    }
+}
+
+fn converted(error: impl Into<Failure>) -> Error {
+    error.into().0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn errors_keep_their_words() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("mesh.ply");
+        let said = |error: Error| {
+            let text = error.to_string();
+            text.strip_prefix(&format!("{}: ", path.display()))
+                .unwrap()
+                .to_owned()
+        };
+        let missing = PlyMesh::open(&path).unwrap_err();
+        assert!(matches!(missing, Error::Io { .. }));
+        assert!(said(missing).starts_with("cannot open: "));
+        std::fs::write(&path, "ply\nformat ascii 1.0\nend_header\n").unwrap();
+        let empty = PlyMesh::open(&path).unwrap_err();
+        assert!(matches!(empty, Error::Input { .. }));
+        let words = "PLY header: found elements [], expected an element vertex";
+        assert_eq!(said(empty), words);
+    }
+}

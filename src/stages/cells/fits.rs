@@ -1,0 +1,227 @@
+//! The planes and neighbours of the points of a tile, for stages other than this one.
+
+use super::cell::{Fit, Widen, fit_in_store, fit_in_tile, near_in_store};
+use crate::error::Result;
+use crate::geom::Point;
+use crate::geom::plane::{Moments, planes};
+use crate::kernels::{LANES, Level};
+use crate::stages::order::PointStore;
+use crate::stages::tiles::Tile;
+use crate::stages::tiles::near::{Query, Search, Sums};
+use crate::stages::tiles::neighbors::Neighbors;
+use crate::stages::tiles::walk::PageCache;
+use crate::workspace::Unit;
+use crate::workspace::memory::Holding;
+use std::cell::RefCell;
+use std::ops::Range;
+
+/// Calls `each` with the plane of every point of a tile whose id is `wanted`: through exactly `neighbors`
+/// neighbours, or widened as for a cell.
+///
+/// # Errors
+/// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+pub fn each_plane(
+    unit: &Unit<'_>,
+    store: &PointStore,
+    ids: Range<usize>,
+    neighbors: usize,
+    widen: Widen,
+    wanted: impl Fn(usize) -> bool,
+    each: impl FnMut(usize, Point, Fit),
+) -> Result<()> {
+    let planes = Planes::load(unit, store, ids, &wanted, neighbors)?;
+    Planes { widen, ..planes }.each(wanted, each)
+}
+
+/// A tile in which planes through the nearest neighbours, or these neighbours, can be requested repeatedly.
+pub(crate) struct Planes<'a> {
+    pub unit: &'a Unit<'a>,
+    store: &'a PointStore,
+    tile: Tile,
+    neighbors: usize,
+    widen: Widen,
+    _held: Holding<'a>,
+}
+
+impl<'a> Planes<'a> {
+    /// Loads the tile of the points `ids`, of which only those `wanted` can be requested, for planes through
+    /// exactly `neighbors` neighbours.
+    pub fn load(
+        unit: &'a Unit<'_>,
+        store: &'a PointStore,
+        ids: Range<usize>,
+        wanted: impl Fn(usize) -> bool,
+        neighbors: usize,
+    ) -> Result<Self> {
+        let tile = Tile::load_some(store, ids, wanted)?;
+        unit.give_back(tile.spare());
+        Ok(Self {
+            unit,
+            store,
+            _held: unit.hold(tile.bytes()),
+            tile,
+            neighbors,
+            widen: Widen::Never,
+        })
+    }
+
+    /// Calls `each` with the plane of every point whose id is `wanted`.
+    pub fn each(
+        &self,
+        wanted: impl Fn(usize) -> bool,
+        each: impl FnMut(usize, Point, Fit),
+    ) -> Result<()> {
+        let (count, widen) = (self.neighbors, self.widen);
+        let in_tile = |(search, grown): Watched<'_, '_>, found: &mut Found<'_, Fit>| {
+            if widen == Widen::Never {
+                return each_sum(&self.tile, count, (search, grown), wanted, found);
+            }
+            let look = |id: u32, point: Point, query: Option<Query<'_>>| {
+                let fit = query.map(|mut query| fit_in_tile(&mut query, count, widen));
+                found(id, point, fit.transpose().map(Option::flatten));
+            };
+            self.tile
+                .for_some_queries(count, search, wanted, grown, look);
+        };
+        let in_store = |cache: &mut PageCache, id: u32, point: Point| {
+            fit_in_store(self.store, cache, id, point, count, widen)
+        };
+        look(self.unit, in_tile, in_store, each)
+    }
+
+    /// Calls `each` with the value of `of` for the neighbours of every point whose id is `wanted`.
+    pub fn each_neighborhood<T>(
+        &self,
+        wanted: impl Fn(usize) -> bool,
+        of: impl FnMut(u32, &Neighbors) -> T,
+        each: impl FnMut(usize, Point, T),
+    ) -> Result<()> {
+        let (of, count) = (RefCell::new(of), self.neighbors);
+        let in_tile = |(search, grown): Watched<'_, '_>, found: &mut Found<'_, T>| {
+            let look = |id: u32, point: Point, query: Option<Query<'_>>| {
+                let known = query.and_then(|mut query| {
+                    let known = query.extend_to(count);
+                    known.then(|| (of.borrow_mut())(id, query.near()))
+                });
+                found(id, point, Ok(known));
+            };
+            self.tile
+                .for_some_queries(count, search, wanted, grown, look);
+        };
+        let in_store = |cache: &mut PageCache, id: u32, point: Point| {
+            let near = near_in_store(self.store, cache, id, point, count)?;
+            Ok(Some((of.borrow_mut())(id, &near)))
+        };
+        look(self.unit, in_tile, in_store, each)
+    }
+}
+
+/// Calls `found` with the planes of the `wanted` points.
+fn each_sum(
+    tile: &Tile,
+    neighbors: usize,
+    (search, grown): Watched<'_, '_>,
+    wanted: impl Fn(usize) -> bool,
+    found: &mut Found<'_, Fit>,
+) {
+    let mut several = Several::default();
+    let look = |id: u32, point: Point, sums: Option<&Sums>| match sums {
+        Some(sums) => several.add(id, point, sums, found),
+        None => found(id, point, Ok(None)),
+    };
+    tile.for_some_sums(neighbors, search, wanted, grown, look);
+    several.fit(found);
+}
+
+/// Calls `each` with the value of `of` for the neighbours of every point of a tile: at least the `count`
+/// nearest, or all points if there are fewer.
+///
+/// # Errors
+/// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+pub fn each_neighborhood<T>(
+    unit: &Unit<'_>,
+    store: &PointStore,
+    ids: Range<usize>,
+    count: usize,
+    of: impl FnMut(u32, &Neighbors) -> T,
+    each: impl FnMut(usize, Point, T),
+) -> Result<()> {
+    let all = |_| true;
+    Planes::load(unit, store, ids, all, count)?.each_neighborhood(all, of, each)
+}
+
+/// Points with summed neighbours, collected until their planes are computed together.
+#[derive(Default)]
+struct Several {
+    level: Level,
+    count: usize,
+    points: [(u32, Point); LANES],
+    moments: [Moments; LANES],
+    /// Squared distances of the last neighbours.
+    lasts: [u64; LANES],
+}
+
+impl Several {
+    fn add(&mut self, id: u32, point: Point, sums: &Sums, found: &mut Found<'_, Fit>) {
+        self.points[self.count] = (id, point);
+        self.moments[self.count] = sums.moments;
+        self.lasts[self.count] = sums.last2;
+        self.count += 1;
+        if self.count == LANES {
+            self.fit(found);
+        }
+    }
+
+    /// Computes the planes and passes them on.
+    fn fit(&mut self, found: &mut Found<'_, Fit>) {
+        let planes = planes(self.level, &self.moments);
+        for (lane, plane) in planes.into_iter().enumerate().take(self.count) {
+            let (id, point) = self.points[lane];
+            let (moments, last2) = (self.moments[lane], self.lasts[lane]);
+            let fit = Fit {
+                plane,
+                moments,
+                last2,
+                near2: last2,
+            };
+            found(id, point, Ok(Some(fit)));
+        }
+        self.count = 0;
+    }
+}
+
+/// Receives the result for a point; `None` if the tile cannot certify it.
+type Found<'a, T> = dyn FnMut(u32, Point, Result<Option<T>>) + 'a;
+
+/// A search, and the function that is told how large it has grown.
+type Watched<'a, 'g> = (&'a mut Search, &'a mut (dyn FnMut(u64) + 'g));
+
+/// Calls `each` with the results of `in_tile`, and with those of `in_store` for the points that the tile
+/// cannot certify.
+fn look<T>(
+    unit: &Unit<'_>,
+    in_tile: impl FnOnce(Watched<'_, '_>, &mut Found<'_, T>),
+    mut in_store: impl FnMut(&mut PageCache, u32, Point) -> Result<Option<T>>,
+    mut each: impl FnMut(usize, Point, T),
+) -> Result<()> {
+    let mut uncertain = Vec::new();
+    let mut failed = Ok(());
+    let mut search = Search::default();
+    let mut held = unit.hold(0);
+    let watched: Watched<'_, '_> = (&mut search, &mut |bytes| held.set(bytes));
+    in_tile(watched, &mut |id, point, found| match found {
+        Ok(Some(found)) => each(id as usize, point, found),
+        Ok(None) => uncertain.push((id, point)),
+        Err(error) => failed = Err(error),
+    });
+    failed?;
+    drop(search);
+    let mut cache = PageCache::default();
+    for (id, point) in uncertain {
+        if let Some(found) = in_store(&mut cache, id, point)? {
+            each(id as usize, point, found);
+        }
+        held.set(cache.bytes());
+    }
+    Ok(())
+}

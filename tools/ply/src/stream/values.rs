@@ -1,0 +1,107 @@
+//! Numbers and lists, in any encoding.
+
+use super::index;
+use super::source::Source;
+use crate::error::FileError;
+use crate::header::Element;
+use crate::numbers::{integer, real};
+use crate::types::{Property, Scalar};
+use std::fmt::Display;
+
+impl Source {
+    /// The next number, of the property `name`. In text, a coordinate of an integer type may have a fraction.
+    pub(super) fn number(
+        &mut self,
+        name: &str,
+        scalar: Scalar,
+        coordinate: bool,
+    ) -> Result<f64, FileError> {
+        match self.big() {
+            Some(big) => Ok(real(scalar, self.take(scalar.bytes(), name)?, big)),
+            None if coordinate || !scalar.is_integer() => self.parse(name, "a number"),
+            None => Ok(self.parse::<i64>(name, "an integer")? as f64),
+        }
+    }
+
+    fn length(&mut self, name: &str, count: Scalar) -> Result<u64, FileError> {
+        const EXPECTED: &str = "a list's length";
+        let Some(big) = self.big() else {
+            return self.parse(name, EXPECTED);
+        };
+        let length = integer(count, self.take(count.bytes(), EXPECTED)?, big);
+        let found = || format!("a list of {length} items");
+        u64::try_from(length).map_err(|_| self.refuse(count.bytes(), found(), "0 or more"))
+    }
+
+    /// Skips numbers of the property `name`. Numbers in text are parsed, so that a body that does not fit its
+    /// header is noticed.
+    fn skip_numbers(
+        &mut self,
+        count: u64,
+        scalar: Scalar,
+        name: &str,
+        what: impl Display,
+    ) -> Result<(), FileError> {
+        if self.big().is_none() {
+            return (0..count).try_for_each(|_| self.number(name, scalar, false).map(drop));
+        }
+        self.skip(count.saturating_mul(scalar.bytes() as u64), what)
+    }
+
+    pub(super) fn skip_property(
+        &mut self,
+        name: &str,
+        property: Property,
+    ) -> Result<(), FileError> {
+        let (count, scalar) = match property {
+            Property::One(scalar) => (1, scalar),
+            Property::List { count, item } => (self.length(name, count)?, item),
+        };
+        self.skip_numbers(count, scalar, name, format_args!("property {name}"))
+    }
+
+    /// Reads a vertex with these positions and types of the coordinates.
+    pub(super) fn vertex(
+        &mut self,
+        element: &Element,
+        axes: [(usize, Scalar); 3],
+    ) -> Result<[f64; 3], FileError> {
+        let mut position = [0.0; 3];
+        for (at, (name, property)) in element.properties.iter().enumerate() {
+            let axis = axes.iter().position(|axis| axis.0 == at);
+            match (axis, *property) {
+                (Some(axis), Property::One(scalar)) => {
+                    position[axis] = self.number(name, scalar, true)?;
+                }
+                (None, Property::One(scalar)) => drop(self.number(name, scalar, false)?),
+                (_, list) => self.skip_property(name, list)?,
+            }
+        }
+        Ok(position)
+    }
+
+    /// Reads the list of a face; none if it has not three corners.
+    pub(super) fn corners(
+        &mut self,
+        name: &str,
+        (_, count, item): (usize, Scalar, Scalar),
+    ) -> Result<Option<[u32; 3]>, FileError> {
+        let length = self.length(name, count)?;
+        if length != 3 {
+            self.skip_numbers(length, item, name, "a face")?;
+            return Ok(None);
+        }
+        let mut corners = [0; 3];
+        if let Some(big) = self.big() {
+            let bytes = self.take(3 * item.bytes(), "a face")?;
+            for (corner, bytes) in corners.iter_mut().zip(bytes.chunks_exact(item.bytes())) {
+                *corner = index(integer(item, bytes, big));
+            }
+        } else {
+            for corner in &mut corners {
+                *corner = index(self.parse(name, "an integer")?);
+            }
+        }
+        Ok(Some(corners))
+    }
+}
