@@ -204,8 +204,8 @@ fn same(what: &str, mesh: &ReadBack, report: &Report, expected: &Mesh, scale: f6
         "{what}: rejected"
     );
     assert_eq!(
-        [i.joints_removed, i.unfit].map(|x| x as usize),
-        [counts.joints_removed, counts.flat_candidates],
+        [i.merges_reverted, i.unfit].map(|x| x as usize),
+        [counts.merges_reverted, counts.flat_candidates],
         "{what}: joints removed, on a line"
     );
     assert_eq!(
@@ -236,9 +236,9 @@ fn same(what: &str, mesh: &ReadBack, report: &Report, expected: &Mesh, scale: f6
         "{what}: outlines"
     );
     assert_eq!(
-        (r.holes_zipped as usize, r.hole_triangles as usize),
-        (counts.holes.zipped, counts.holes.triangles),
-        "{what}: zipped"
+        (r.holes_clipped as usize, r.hole_triangles as usize),
+        (counts.holes.clipped, counts.holes.triangles),
+        "{what}: clipped"
     );
     let differ = mesh.triangles.iter().zip(&expected.triangles);
     let first = differ.into_iter().find(|(a, b)| a != b);
@@ -283,14 +283,14 @@ struct Reached {
     on_a_line: usize,
     one_sided: usize,
     met: Weighing,
-    joints_removed: usize,
+    merges_reverted: usize,
     flips: usize,
     openings: usize,
     spanned: usize,
     partly_zipped: usize,
-    zipped_whole: usize,
+    clipped_whole: usize,
     left_open: usize,
-    left_open_zipped: usize,
+    left_open_clipped: usize,
     between: usize,
     wide: usize,
 }
@@ -303,14 +303,14 @@ impl Reached {
         self.on_a_line += counts.flat + counts.flat_candidates;
         self.one_sided += counts.one_sided;
         self.met.add(&counts.met);
-        self.joints_removed += counts.joints_removed;
+        self.merges_reverted += counts.merges_reverted;
         self.flips += counts.flips;
         self.openings += counts.holes.openings;
         self.spanned += counts.holes.spanned;
         self.partly_zipped += counts.holes.partly;
-        self.zipped_whole += counts.holes.zipped_whole;
+        self.clipped_whole += counts.holes.clipped_whole;
         self.left_open += counts.holes.left_open;
-        self.left_open_zipped += counts.holes.left_open_zipped;
+        self.left_open_clipped += counts.holes.left_open_clipped;
         self.between += counts.holes.between;
         self.wide += counts.holes.wide;
     }
@@ -411,15 +411,15 @@ fn robust() {
         reached.curved,
         reached.on_a_line,
         reached.one_sided,
-        reached.joints_removed,
+        reached.merges_reverted,
     ];
     let mended = [
         reached.flips,
         reached.partly_zipped,
-        reached.zipped_whole,
+        reached.clipped_whole,
         reached.spanned,
         reached.left_open,
-        reached.left_open_zipped,
+        reached.left_open_clipped,
         reached.between,
         reached.wide,
     ];

@@ -146,7 +146,7 @@ fn pipeline(
         base.unfit,
         base.mobius,
         inserted.unfit,
-        inserted.joints_removed,
+        inserted.merges_reverted,
         mended.holes_filled,
         mended.hole_triangles,
     ];
@@ -159,7 +159,7 @@ fn counted(c: &Counts) -> [u64; 7] {
         c.flat,
         c.one_sided,
         c.flat_candidates,
-        c.joints_removed,
+        c.merges_reverted,
         c.holes.filled,
         c.holes.triangles,
     ];
@@ -378,14 +378,14 @@ fn compare(
         let c = expected.counts;
         reached.flagged += c.flagged;
         reached.one_sided += c.one_sided;
-        reached.joints_removed += c.joints_removed;
+        reached.merges_reverted += c.merges_reverted;
         reached.flat += c.flat;
         reached.flat_candidates += c.flat_candidates;
         reached.met.add(&c.met);
         reached.flips += c.flips;
         reached.holes.filled += c.holes.filled;
         reached.holes.partly += c.holes.partly;
-        reached.holes.zipped_whole += c.holes.zipped_whole;
+        reached.holes.clipped_whole += c.holes.clipped_whole;
     }
     reached
 }
@@ -403,7 +403,7 @@ fn varied(seed: u64) -> Settings {
 #[test]
 fn arbitrary_triples() {
     let reached = compare(0..400, false, varied, |_| 200, |p, _| p);
-    let parts = [reached.flagged, reached.one_sided, reached.joints_removed];
+    let parts = [reached.flagged, reached.one_sided, reached.merges_reverted];
     assert!(parts.iter().all(|n| *n > 0), "parts not reached: {parts:?}");
 }
 
@@ -443,7 +443,7 @@ fn arbitrary_triples_the_robust_way() {
         reached.flips,
         holes.filled,
         holes.partly,
-        holes.zipped_whole,
+        holes.clipped_whole,
     ];
     assert!(parts.iter().all(|n| *n > 0), "parts not reached: {parts:?}");
     let met = &reached.met;

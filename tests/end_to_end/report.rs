@@ -38,7 +38,7 @@ const KEYS: &[&str] = &[
     "/lattice/step",
     "/lattice/exact",
     "/radius",
-    "/cells/second_looks",
+    "/cells/global_fallbacks",
     "/cells/no_plane",
     "/cells/off_surface",
     "/cells/raw_triples",
@@ -60,14 +60,14 @@ const KEYS: &[&str] = &[
     "/insertion/angle",
     "/insertion/orientation",
     "/insertion/unfit",
-    "/insertion/joints_removed",
+    "/insertion/merges_reverted",
     "/repair/bridges_removed",
     "/repair/components_found",
     "/repair/components_removed",
     "/repair/component_triangles_removed",
     "/repair/holes_found",
     "/repair/holes_filled",
-    "/repair/holes_zipped",
+    "/repair/holes_clipped",
     "/repair/holes_outline",
     "/repair/holes_too_long",
     "/repair/holes_not_filled",
@@ -201,7 +201,7 @@ fn the_numbers_agree_with_each_other_and_with_the_files() {
     );
 
     let filled = n("/repair/holes_filled");
-    let left = ["zipped", "outline", "too_long", "not_filled"];
+    let left = ["clipped", "outline", "too_long", "not_filled"];
     let left: u64 = left
         .iter()
         .map(|why| n(&format!("/repair/holes_{why}")))

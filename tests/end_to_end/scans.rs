@@ -11,7 +11,7 @@ fn manifold(scan: &Path, params: &Params) {
     let report = util::reconstruct(scan, &mesh, params);
     let verdict = util::verdict(&mesh);
     println!(
-        "{} (smooth {}, repair {}): {} points, {} triangles, T3 {}, T12 {}, {} second looks",
+        "{} (smooth {}, repair {}): {} points, {} triangles, T3 {}, T12 {}, {} global fallbacks",
         scan.display(),
         params.smooth,
         params.repair,
@@ -19,7 +19,7 @@ fn manifold(scan: &Path, params: &Params) {
         verdict.triangles,
         report.triples.t3,
         report.triples.t2 + report.triples.t1,
-        report.cells.second_looks,
+        report.cells.global_fallbacks,
     );
     assert!(verdict.manifold, "{}: {verdict}", scan.display());
     assert_eq!(verdict.triangles, report.mesh.triangles);

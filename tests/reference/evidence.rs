@@ -141,7 +141,7 @@ impl Weigher<'_> {
 
     /// Step 5: cuts.
     fn cut_clusters(&mut self, block: &Block<'_>, of: &BTreeMap<Triangle, Side>) {
-        for (t, other, edge) in block.joints() {
+        for (t, other, edge) in block.shared_edges() {
             let (a, b) = (of[&t], of[&other]);
             if a.home != b.home {
                 self.seams.push((t, other, edge));

@@ -19,10 +19,10 @@ pub struct Filling {
     pub filled: usize,
     pub triangles: usize,
     /// Robust: neither filled as a whole nor closed by ear clipping; and the number of them closed in part.
-    pub zipped: usize,
+    pub clipped: usize,
     pub partly: usize,
     /// Robust: filled only after ear clipping, or closed by ear clipping alone.
-    pub zipped_whole: usize,
+    pub clipped_whole: usize,
     /// Robust: short enough to be filled, but an opening.
     pub openings: usize,
     /// Robust: likewise, but only its filling shows that.
@@ -32,7 +32,7 @@ pub struct Filling {
     /// Robust: of those closed in part, loops of which a part was filled as they were found, and after ear
     /// clipping; and the triangles left out that were not wide themselves.
     pub left_open: usize,
-    pub left_open_zipped: usize,
+    pub left_open_clipped: usize,
     pub between: usize,
     /// Robust: loops of three edges, closed before holes are counted.
     pub gaps: usize,

@@ -170,14 +170,14 @@ fn candidates(
 
 /// A tentative merge: a triangle at which two global components meet, and the orientations that its
 /// neighbours imply.
-struct Joint {
+struct TentativeMerge {
     triangle: Triangle,
     asked: Vec<Side>,
 }
 
 /// The result of a block.
 struct Block {
-    joints: Vec<Joint>,
+    merges: Vec<TentativeMerge>,
     /// Interior candidates that failed only test I.
     left: BTreeSet<Candidate>,
 }
@@ -188,8 +188,8 @@ pub struct Inserted {
     pub candidates: usize,
     pub interior: usize,
     pub crossing: usize,
-    pub joints: usize,
-    pub joints_removed: usize,
+    pub merges: usize,
+    pub merges_reverted: usize,
     pub rejected: Rejected,
 }
 
@@ -234,10 +234,10 @@ pub fn insert(
         mesh.insert(t, side);
     }
 
-    let joints = by_block.iter().map(|b| b.joints.len()).sum();
+    let merges = by_block.iter().map(|b| b.merges.len()).sum();
     let crossing_triples = triples.keys().filter(|&&t| !is_interior(t, block));
     let near_border: BTreeSet<u32> = crossing_triples.flatten().copied().collect();
-    let (crossing_inserted, joints_removed) = across(
+    let (crossing_inserted, merges_reverted) = across(
         &mut mesh,
         by_block,
         crossing,
@@ -251,8 +251,8 @@ pub fn insert(
         candidates: all.len(),
         interior: inserted_inside.len(),
         crossing: crossing_inserted,
-        joints,
-        joints_removed,
+        merges,
+        merges_reverted,
         rejected,
     }
 }
@@ -268,7 +268,7 @@ fn by_itself(
 ) -> (Vec<(Triangle, Side)>, Block) {
     let mut mesh = base.clone();
     let mut joined = homes.clone();
-    let mut joints = Vec::new();
+    let mut merges = Vec::new();
     let mut agree = |triangle: Triangle, asked: &[Side]| {
         if joined.conflict(asked) {
             return false;
@@ -290,7 +290,7 @@ fn by_itself(
             (global[a], global[b]) = (either, either);
         }
         if is_joint {
-            joints.push(Joint {
+            merges.push(TentativeMerge {
                 triangle,
                 asked: asked.to_vec(),
             });
@@ -299,7 +299,7 @@ fn by_itself(
     };
     let (inserted, left) = mesh.rounds(own, rejected, &mut agree);
     let inserted = inserted.into_iter().map(|t| (t, mesh.sides[&t])).collect();
-    (inserted, Block { joints, left })
+    (inserted, Block { merges, left })
 }
 
 /// Tentative merges and crossing candidates, block by block, in the whole mesh. Returns the numbers of
@@ -315,13 +315,13 @@ fn across(
 ) -> (usize, usize) {
     let (mut inserted, mut removed) = (0, 0);
     for (g, own) in blocks.into_iter().enumerate() {
-        for joint in own.joints {
-            if homes.conflict(&joint.asked) {
-                mesh.surface.remove(joint.triangle);
-                mesh.sides.remove(&joint.triangle);
+        for merge in own.merges {
+            if homes.conflict(&merge.asked) {
+                mesh.surface.remove(merge.triangle);
+                mesh.sides.remove(&merge.triangle);
                 removed += 1;
             } else {
-                homes.join_all(&joint.asked);
+                homes.join_all(&merge.asked);
             }
         }
         // A vertex in block g implies that the smallest vertex is in block g or before.

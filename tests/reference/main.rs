@@ -322,7 +322,7 @@ fn of_points_in_one_place_only_the_first_is_seen() {
 /// Cells never give an edge with three T3; other triples do.
 #[test]
 fn triples_with_any_counts_make_manifolds() {
-    let (mut flagged, mut joints_removed) = (0, 0);
+    let (mut flagged, mut merges_reverted) = (0, 0);
     for seed in 50..56 {
         let mut random = Random::new(seed);
         for (name, points) in clouds::one_of_each(seed) {
@@ -335,10 +335,10 @@ fn triples_with_any_counts_make_manifolds() {
             let mesh = from_triples(points, &triples, &settings);
             check(&mesh, true).unwrap_or_else(|e| panic!("{name} {seed}: {e}"));
             flagged += mesh.counts.flagged;
-            joints_removed += mesh.counts.joints_removed;
+            merges_reverted += mesh.counts.merges_reverted;
         }
     }
-    assert!(flagged > 0 && joints_removed > 0);
+    assert!(flagged > 0 && merges_reverted > 0);
 }
 
 #[test]

@@ -95,7 +95,7 @@ pub fn mend(
 
 /// Counts a loop that stays open in part, and the triangles of its closed part.
 fn in_part(triangles: Vec<[u32; 3]>, filling: &mut Filling) -> Vec<[u32; 3]> {
-    filling.zipped += 1;
+    filling.clipped += 1;
     filling.partly += usize::from(!triangles.is_empty());
     filling.triangles += triangles.len();
     triangles
@@ -156,7 +156,7 @@ impl Found<'_> {
                     whole = true;
                 }
                 Outcome::Part(patch, between) => {
-                    filling.left_open_zipped += 1;
+                    filling.left_open_clipped += 1;
                     filling.between += between;
                     triangles.extend(patch);
                 }
@@ -167,7 +167,7 @@ impl Found<'_> {
             return in_part(triangles, filling);
         }
         filling.filled += 1;
-        filling.zipped_whole += 1;
+        filling.clipped_whole += 1;
         filling.triangles += triangles.len();
         triangles
     }

@@ -171,8 +171,8 @@ pub struct Counts {
     pub inserted_interior: usize,
     /// Inserted across blocks, with interior candidates tried again.
     pub inserted_crossing: usize,
-    pub joints: usize,
-    pub joints_removed: usize,
+    pub merges: usize,
+    pub merges_reverted: usize,
     pub rejected: Rejected,
     pub flips: usize,
     pub bridges: usize,
@@ -277,7 +277,7 @@ pub fn connect(
     counts.candidates = inserted.candidates;
     counts.inserted_interior = inserted.interior;
     counts.inserted_crossing = inserted.crossing;
-    (counts.joints, counts.joints_removed) = (inserted.joints, inserted.joints_removed);
+    (counts.merges, counts.merges_reverted) = (inserted.merges, inserted.merges_reverted);
     counts.rejected = inserted.rejected;
 
     let mut surface = inserted.surface;

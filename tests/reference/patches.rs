@@ -78,15 +78,15 @@ pub struct Patches {
 impl Block<'_> {
     /// The edges between its triangles, by the smaller triangle, then in the order of its edges: smaller and
     /// larger triangle, and the edge.
-    pub fn joints(&self) -> Vec<(Triangle, Triangle, Edge)> {
-        let mut joints = Vec::new();
+    pub fn shared_edges(&self) -> Vec<(Triangle, Triangle, Edge)> {
+        let mut shared_edges = Vec::new();
         for &t in self.surface.triangles() {
             for edge in edges(t) {
                 let others = self.surface.at_edge(edge).into_iter();
-                joints.extend(others.filter(|o| t < *o).map(|other| (t, other, edge)));
+                shared_edges.extend(others.filter(|o| t < *o).map(|other| (t, other, edge)));
             }
         }
-        joints
+        shared_edges
     }
 
     fn cosine(&self, a: Triangle, b: Triangle, edge: Edge) -> f64 {
@@ -118,7 +118,7 @@ impl Block<'_> {
             turned: false,
         };
         let mut sets = Homes::apart(all.len());
-        for (t, other, edge) in self.joints() {
+        for (t, other, edge) in self.shared_edges() {
             let near = t[0] / self.run == other[0] / self.run;
             if near && self.cosine(t, other, edge) > 0.9 {
                 let turned = !alike(t, other, edge);
@@ -168,7 +168,7 @@ impl Block<'_> {
 
     /// Step 3: edges.
     fn add_edges(&self, patches: &mut Patches) {
-        for (t, other, edge) in self.joints() {
+        for (t, other, edge) in self.shared_edges() {
             let weight = 8 * weight(self.cosine(t, other, edge));
             let (a, b) = (patches.of[&t], self.asks(patches, other, t, edge));
             patches.graph.add(a, b, weight);

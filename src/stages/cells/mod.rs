@@ -65,7 +65,7 @@ release!(CellTriples: own, sent, off);
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize, PartialEq, Eq)]
 pub struct CellStats {
     /// Cells not certified by the halo of their tile, which were computed from the whole store.
-    pub second_looks: u64,
+    pub global_fallbacks: u64,
     /// Points without a plane: all their neighbours are on one line.
     pub no_plane: u64,
     /// Points off the surface of their neighbours; they are not in the mesh.
@@ -177,7 +177,7 @@ pub fn cells(
     };
     let mut stats = CellStats::default();
     workspace.units("cells: tile", tiles.count(), bytes, work, |_, more| {
-        stats.second_looks += more.second_looks;
+        stats.global_fallbacks += more.global_fallbacks;
         stats.no_plane += more.no_plane;
         stats.off_surface += more.off_surface;
         stats.raw_triples += more.raw_triples;
@@ -240,7 +240,7 @@ fn one_tile(
         held.set(cache.bytes() + seen.bytes());
     }
     let stats = CellStats {
-        second_looks: uncertain.len() as u64,
+        global_fallbacks: uncertain.len() as u64,
         no_plane,
         off_surface: off.len() as u64,
         raw_triples: 0,

@@ -20,7 +20,7 @@ pub struct Clipped {
 /// entry is outdated if the corner has another age by then.
 type Ear = Reverse<(u64, usize, u32)>;
 
-struct Zipper<E> {
+struct EarClipper<E> {
     corners: Vec<Corner>,
     /// Local width of the triangles at each corner of the loop.
     spacing: Vec<f64>,
@@ -37,7 +37,7 @@ struct Zipper<E> {
 /// Clips ears of the loop of `corners`; `edge(a, b)` is true if the mesh has that edge.
 pub fn zip(corners: Vec<Corner>, edge: impl Fn(u32, u32) -> bool) -> Clipped {
     let n = corners.len();
-    let mut zipper = Zipper {
+    let mut clipper = EarClipper {
         spacing: spacing(&corners),
         before: (0..n).map(|x| (x + n - 1) % n).collect(),
         after: (0..n).map(|x| (x + 1) % n).collect(),
@@ -49,18 +49,18 @@ pub fn zip(corners: Vec<Corner>, edge: impl Fn(u32, u32) -> bool) -> Clipped {
         heap: BinaryHeap::new(),
         out: Vec::new(),
     };
-    (0..n).for_each(|x| zipper.consider(x));
-    let last = zipper.run();
+    (0..n).for_each(|x| clipper.consider(x));
+    let last = clipper.run();
     let mut left = Vec::new();
-    if zipper.count >= 3 {
+    if clipper.count >= 3 {
         let mut x = last;
-        for _ in 0..zipper.count {
-            left.push(zipper.corners[x]);
-            x = zipper.after[x];
+        for _ in 0..clipper.count {
+            left.push(clipper.corners[x]);
+            x = clipper.after[x];
         }
     }
     Clipped {
-        triangles: zipper.out,
+        triangles: clipper.out,
         left,
     }
 }
@@ -80,7 +80,7 @@ fn spacing(corners: &[Corner]) -> Vec<f64> {
     (0..n).map(mean).collect()
 }
 
-impl<E: Fn(u32, u32) -> bool> Zipper<E> {
+impl<E: Fn(u32, u32) -> bool> EarClipper<E> {
     /// Enters the ear at a corner if it may be closed.
     fn consider(&mut self, x: usize) {
         if let Some(sharpness) = self.ear(x) {

@@ -174,7 +174,7 @@ impl Settled {
         let (count, new, left) = match filling {
             Filling::Gap(gap) => (&mut stats.gaps_closed, vec![gap], 0),
             Filling::Filled(new) => (&mut stats.holes_filled, new, 0),
-            Filling::Clipped(new, left) => (&mut stats.holes_zipped, new, left),
+            Filling::Clipped(new, left) => (&mut stats.holes_clipped, new, left),
             Filling::Outline => (&mut stats.holes_outline, Vec::new(), edges),
             Filling::Impossible => (&mut stats.holes_not_filled, Vec::new(), edges),
         };

@@ -127,7 +127,7 @@ pub struct RepairStats {
     pub holes_filled: u64,
     /// Boundary loops of torn, open or wide parts that were processed by ear clipping, with or without
     /// effect.
-    pub holes_zipped: u64,
+    pub holes_clipped: u64,
     /// Boundary loops left open because they are outlines of the surface.
     pub holes_outline: u64,
     /// Boundary loops left open because they are too long.
@@ -157,7 +157,7 @@ impl RepairOptions {
 
 adds!(
     RepairStats: edges_flipped, bridges_removed, components_found, components_removed,
-    component_triangles_removed, gaps_closed, holes_found, holes_filled, holes_zipped,
+    component_triangles_removed, gaps_closed, holes_found, holes_filled, holes_clipped,
     holes_outline, holes_too_long, holes_not_filled, hole_triangles
 );
 

@@ -139,7 +139,7 @@ fn count(edges: &mut BTreeMap<(u32, u32), i32>, way: &[u32], sign: i32) {
 
 proptest! {
     #[test]
-    fn zipping_closes_a_part_of_the_loop_and_leaves_the_rest(sheet in torn()) {
+    fn clipping_closes_a_part_of_the_loop_and_leaves_the_rest(sheet in torn()) {
         for ring in sheet.loops() {
             let ids: Vec<u32> = ring.iter().map(|c| c.id).collect();
             let clipped = zip(ring, sheet.has_edge());
@@ -178,16 +178,16 @@ proptest! {
 fn a_loop_on_a_grid_is_mended_alike_wherever_it_begins() {
     let gap = |x, y| (4..7).contains(&x) && (3..9).contains(&y);
     let sheet = Sheet::grid([12, 12], |_| [0; 3], gap);
-    let zipping = LoopRules {
+    let clipping = LoopRules {
         longest: 3,
         ..MENDING
     };
     for ring in sheet.loops() {
-        let first = zipping.close(ring.clone(), sheet.has_edge());
+        let first = clipping.close(ring.clone(), sheet.has_edge());
         for turn in 1..ring.len() {
             let mut ring = ring.clone();
             ring.rotate_left(turn);
-            assert_eq!(zipping.close(ring, sheet.has_edge()), first);
+            assert_eq!(clipping.close(ring, sheet.has_edge()), first);
         }
     }
 }

@@ -188,7 +188,7 @@ impl<'a> Pass<'a> {
             return Ok(false);
         }
         let gone = self.mesh.confirm_merges(unit, group)?;
-        self.counts.joints_removed += gone.len() as u64;
+        self.counts.merges_reverted += gone.len() as u64;
         self.removed.send(unit, group as u32, &gone)?;
         // Consists of ascending runs, which this sort merges.
         tried.sort();

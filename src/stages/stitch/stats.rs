@@ -35,7 +35,7 @@ pub struct InsertStats {
     pub unfit: u64,
     /// Inserted candidates that were removed again because the merges of different blocks contradict each
     /// other.
-    pub joints_removed: u64,
+    pub merges_reverted: u64,
 }
 
 impl InsertStats {
@@ -58,6 +58,6 @@ impl InsertStats {
         self.angle += more.angle;
         self.orientation += more.orientation;
         self.unfit += more.unfit;
-        self.joints_removed += more.joints_removed;
+        self.merges_reverted += more.merges_reverted;
     }
 }
