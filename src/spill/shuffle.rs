@@ -162,7 +162,7 @@ fn receiver(row: &impl Row) -> u32 {
     row.words()[0]
 }
 
-/// What was sent to each receiver.
+/// The rows sent to each receiver.
 #[derive(Debug)]
 pub struct Inbox<R: Row> {
     file: Arc<ScratchFile>,
