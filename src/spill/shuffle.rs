@@ -4,7 +4,7 @@
 //! senders and merges them. So nothing depends on the order in which senders are done.
 
 use super::Row;
-use super::table::{packed_bytes, read_rows};
+use super::table::{append_packed, read_rows};
 use crate::error::Result;
 use crate::workspace::file::ScratchFile;
 use crate::workspace::memory::{Reservation, bytes_of};
@@ -62,14 +62,13 @@ impl<R: Row> Shuffle<R> {
         rows.sort_unstable_by(R::compare);
         let (mut index, mut body, mut packed) = (Vec::new(), Vec::new(), Vec::new());
         for part in rows.chunk_by(|a, b| receiver(a) == receiver(b)) {
-            let bytes = packed_bytes(part, &mut packed);
+            let place = append_packed(part, &mut packed, &mut body);
             index.push(Part {
                 receiver: receiver(&part[0]),
-                rows: part.len() as u32,
-                bytes: bytes.len() as u32,
-                crc: crc32fast::hash(bytes),
+                rows: place.records as u32,
+                bytes: place.bytes as u32,
+                crc: place.crc,
             });
-            body.extend_from_slice(bytes);
         }
         let mut all = Vec::with_capacity(4 + size_of_val(&*index) + body.len());
         all.extend_from_slice(&(index.len() as u32).to_ne_bytes());
@@ -201,13 +200,8 @@ impl<R: Row> Inbox<R> {
     /// # Errors
     /// [`crate::Error::Io`]; [`crate::Error::Corrupt`] if the bytes do not match their checksum.
     pub fn get(&self, unit: &Unit<'_>, receiver: usize) -> Result<Vec<R>> {
-        let mut rows = Vec::new();
+        let mut rows = Vec::with_capacity(self.fitting(receiver));
         for (_, place) in self.of(receiver) {
-            rows.reserve_exact(if rows.is_empty() {
-                self.fitting(receiver)
-            } else {
-                0
-            });
             read_rows(&self.file, *place, &mut rows, |bytes| unit.hold(bytes))?;
         }
         // Consists of ascending runs, which this sort merges.

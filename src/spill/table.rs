@@ -67,16 +67,26 @@ impl<R: Row> Table<R> {
     }
 
     /// Number of rows in a section.
+    ///
+    /// # Errors
+    /// [`crate::Error::Memory`] if there is no room for the list of sections.
+    pub fn rows(&self, workspace: &Workspace, section: usize) -> Result<usize> {
+        Ok(self.file(workspace)?.section(section).records)
+    }
+
+    /// Number of rows in a section, for the size of a reservation: 0 if the file cannot be opened, which
+    /// reading the section reports.
     #[must_use]
-    pub fn rows(&self, workspace: &Workspace, section: usize) -> usize {
-        self.file(workspace)
-            .map_or(0, |file| file.section(section).records)
+    pub fn expected_rows(&self, workspace: &Workspace, section: usize) -> usize {
+        self.rows(workspace, section).unwrap_or(0)
     }
 
     /// Number of rows in all sections.
-    #[must_use]
-    pub fn total(&self, workspace: &Workspace) -> u64 {
-        self.file(workspace).map_or(0, |file| file.records())
+    ///
+    /// # Errors
+    /// [`crate::Error::Memory`] if there is no room for the list of sections.
+    pub fn total(&self, workspace: &Workspace) -> Result<u64> {
+        Ok(self.file(workspace)?.records())
     }
 
     /// Writes a section; replaces its earlier content.
@@ -113,15 +123,7 @@ impl<R: Row> Table<R> {
         let (mut all, mut packed) = (Vec::new(), Vec::new());
         let mut places = Vec::with_capacity(parts.len());
         for rows in parts {
-            let bytes = packed_bytes(rows, &mut packed);
-            places.push(Place {
-                offset: all.len() as u64,
-                bytes: bytes.len(),
-                records: rows.len(),
-                crc: crc32fast::hash(bytes),
-                segment: 0,
-            });
-            all.extend_from_slice(bytes);
+            places.push(append_packed(rows, &mut packed, &mut all));
         }
         let _held = unit.hold(bytes_of(&all) + bytes_of(&packed));
         let file = self.file(unit)?;
@@ -173,6 +175,20 @@ pub(super) fn packed_bytes<'a, R: Row>(rows: &'a [R], packed: &'a mut Vec<u8>) -
     packed.clear();
     pack(rows, packed);
     packed
+}
+
+/// Appends the bytes of rows to `all`; returns their place in it. `packed` is a buffer.
+pub(super) fn append_packed<R: Row>(rows: &[R], packed: &mut Vec<u8>, all: &mut Vec<u8>) -> Place {
+    let bytes = packed_bytes(rows, packed);
+    let place = Place {
+        segment: 0,
+        offset: all.len() as u64,
+        bytes: bytes.len(),
+        records: rows.len(),
+        crc: crc32fast::hash(bytes),
+    };
+    all.extend_from_slice(bytes);
+    place
 }
 
 /// Appends the rows at `place` of a file; `hold` is called with the bytes of memory that this takes besides.
@@ -271,7 +287,7 @@ mod tests {
             table.read(&unit, *place, &mut rows).unwrap();
             assert_eq!(rows, *part);
         }
-        assert_eq!(table.rows(&workspace, 1), 3000);
+        assert_eq!(table.rows(&workspace, 1).unwrap(), 3000);
     }
 
     /// Found by fuzzing a journal with valid checksums and invalid content.

@@ -149,7 +149,7 @@ fn split(
     let mut firsts = Vec::with_capacity(blocks.count());
     for block in 0..blocks.count() {
         unit.check_cancel()?;
-        let records = input.pinched.rows(unit, block) + filled.rows(block);
+        let records = input.pinched.rows(unit, block)? + filled.rows(block);
         let pinches = input.pinches.get(unit, block)?;
         let size = blocks.ids(block).len() * 8 * usize::from(!pinches.is_empty());
         let _held = unit.reserve("export: block", (120 * records + size) as u64)?;

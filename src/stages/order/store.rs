@@ -124,7 +124,7 @@ impl StoreFiles {
         while at < end {
             self.index.get_into(unit, at / STEP, &mut rows)?;
             if rows.is_empty() {
-                let expected = self.index.total(unit).to_string();
+                let expected = self.index.total(unit)?.to_string();
                 return Err(self.file.damaged(0, 0, format!("{at} pages"), expected));
             }
             rows.iter().for_each(&mut each);
@@ -177,7 +177,7 @@ impl StoredPoints {
             // The points will not be read any more, but their bounding box may be.
             boxes.push(self.bounds());
         } else {
-            let (pages, end) = (files.index.total(workspace), self.len.div_ceil(page));
+            let (pages, end) = (files.index.total(workspace)?, self.len.div_ceil(page));
             if file.records() < self.len as u64 || pages < end as u64 {
                 let found = format!("{} points in {pages} pages", file.records());
                 return Err(file.damaged(0, 0, found, format!("{} points", self.len)));

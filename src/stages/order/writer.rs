@@ -45,7 +45,7 @@ impl<'w> StoreWriter<'w> {
         // The end of the points may have cut the last group short; it is written again.
         let (mut pages, mut more) = (0, usize::MAX);
         while more >= GROUP {
-            more = files.index.rows(workspace, pages / STEP) / GROUP * GROUP;
+            more = files.index.rows(workspace, pages / STEP)? / GROUP * GROUP;
             pages += more;
         }
         Ok(Self {
@@ -92,7 +92,7 @@ impl<'w> StoreWriter<'w> {
             let mut first = 0;
             for section in 0..sections.count() {
                 workspace.check_cancel()?;
-                let end = first + sections.rows(unit, section);
+                let end = first + sections.rows(unit, section)?;
                 let done = writer.len.clamp(first, end) - first;
                 if first + done < end {
                     let points = sections.get(unit, section)?;

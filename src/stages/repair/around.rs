@@ -30,7 +30,7 @@ impl<'a> Around<'a> {
 
     /// An upper bound on the number of triangles that touch a block.
     pub fn records(&self, workspace: &Workspace, block: usize) -> usize {
-        self.interior.rows(workspace, block) + self.added.rows(block)
+        self.interior.expected_rows(workspace, block) + self.added.rows(block)
     }
 
     /// All triangles that touch a block, ascending.

@@ -87,7 +87,7 @@ impl Surface<'_> {
     /// An upper bound on the number of triangles that touch a block.
     #[must_use]
     pub fn records(&self, workspace: &Workspace, block: usize) -> usize {
-        self.stored.triangles.rows(workspace, block)
+        self.stored.triangles.expected_rows(workspace, block)
     }
 
     /// All triangles that touch a block, oriented, ascending by sorted ids; and their components.

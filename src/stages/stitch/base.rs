@@ -71,7 +71,7 @@ pub(super) fn base(
         blocks,
     };
     let bytes = |block: usize| {
-        let records = triples.own.rows(workspace, block) + visiting.rows(block);
+        let records = triples.own.expected_rows(workspace, block) + visiting.rows(block);
         100 * records as u64 + (3 << 20)
     };
     let around = |unit: &Unit<'_>| look.block(unit);

@@ -75,9 +75,10 @@ impl Interior {
 /// Upper estimate of the bytes for a block.
 pub(super) fn block_bytes(insertion: Insertion<'_>, block: usize) -> u64 {
     let (base, workspace) = (insertion.base, insertion.workspace);
-    let interior = base.surface.interior.rows(workspace, block);
+    let interior = base.surface.interior.expected_rows(workspace, block);
     let triangles = interior + base.surface.crossing.rows(block);
-    let candidates = base.candidates.rows(workspace, block) + base.crossing.rows(workspace, block);
+    let candidates = base.candidates.expected_rows(workspace, block)
+        + base.crossing.expected_rows(workspace, block);
     let records = triangles + candidates + base.visiting.rows(block);
     180 * records as u64 + (4 << 20)
 }
@@ -211,7 +212,7 @@ impl BlockWork {
         let Insertion { base, blocks, .. } = insertion;
         let (ids, shape) = (blocks.ids(block), insertion.places.shape);
         let located = Located::load(shape, blocks, block, std::iter::empty())?;
-        let mut candidates: Vec<Candidate> = Vec::with_capacity(base.candidates.rows(unit, block));
+        let mut candidates: Vec<Candidate> = Vec::with_capacity(base.candidates.rows(unit, block)?);
         for &CountedTriple { triple, count } in &base.candidates.get(unit, block)? {
             let at = triple.map(|v| located.at(v));
             candidates.push(Candidate::new(triple, count, at));

@@ -231,8 +231,8 @@ impl<'a> Surroundings<'a> {
         let block = blocks.of(wanted[0]);
         let section = block as usize;
         let files = [
-            (interior.vertices.rows(unit, section), 16),
-            (interior.context.rows(unit, section), 16),
+            (interior.vertices.rows(unit, section)?, 16),
+            (interior.context.rows(unit, section)?, 16),
             (base.surface.crossing.rows(section), 20),
             (self.changes.rows(section), 52),
         ];

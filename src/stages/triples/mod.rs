@@ -45,7 +45,7 @@ pub fn triples(
     let own = Table::new("triples.own", blocks.count());
     let visiting = Shuffle::new("triples.sent");
     let inbox = cells.sent.open(workspace, cells.tiles.count())?;
-    let count: u64 = cells.off.total(workspace);
+    let count: u64 = cells.off.total(workspace)?;
     let _off = workspace.reserve("off the surface", 4 * count)?;
     let mut off: Vec<u32> = Vec::with_capacity(count as usize);
     let unit = workspace.unit();
@@ -56,7 +56,7 @@ pub fn triples(
     let bytes = |block: usize| {
         let tiles = cells.tiles.of_block(block);
         tiles
-            .map(|t| 50 * (cells.own.rows(workspace, t) + inbox.rows(t)) as u64)
+            .map(|t| 50 * (cells.own.expected_rows(workspace, t) + inbox.rows(t)) as u64)
             .sum()
     };
     let work = |unit: &Unit<'_>| {
