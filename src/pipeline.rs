@@ -14,7 +14,7 @@ use crate::params::Params;
 use crate::report::Report;
 use crate::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
 use crate::workspace::progress::{Cancel, Observer};
-use crate::workspace::{Workspace, limits};
+use crate::workspace::{Storage, Workspace, limits};
 use attempt::Alarm;
 pub use builder::Builder;
 use checks::{not_an_input, writable};
@@ -38,6 +38,7 @@ pub struct Reconstruction {
     page_points: usize,
     observer: Arc<dyn Observer>,
     cancel: Cancel,
+    storage: Storage,
     start: Start,
     time_limit: Option<Duration>,
 }

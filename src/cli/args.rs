@@ -4,6 +4,8 @@ use crate::method::METHOD;
 use crate::params::{MaxWidth, Method, Params, Radius, Smoothing};
 use crate::pipeline::Start;
 use crate::stages::ingest::Classes;
+use crate::workspace::mapped::Io;
+use crate::workspace::{Compression, Storage};
 use clap::{Args as ClapArgs, Parser, Subcommand};
 use std::path::PathBuf;
 use std::time::Duration;
@@ -66,9 +68,33 @@ pub struct Limits {
     /// Folder for scratch files, which are removed at the end [default: beside the output]
     #[arg(long, value_name = "DIR")]
     pub scratch: Option<PathBuf>,
+    #[command(flatten)]
+    pub storing: Storing,
     /// Show no progress, even on a terminal
     #[arg(long, short)]
     pub quiet: bool,
+}
+
+/// How scratch files are read and written.
+#[derive(Debug, Clone, Copy, ClapArgs)]
+pub struct Storing {
+    /// Reading of points in scratch files: map (mapped into memory if the budget has room), read (into
+    /// buffers), or auto (mapped on local disks if they take at most a quarter of the budget)
+    #[arg(long, value_name = "auto|map|read", default_value = "auto")]
+    pub io: Io,
+    /// Compression of scratch files with Zstandard: none, a level from 1 to 19, or auto (level 1 if many
+    /// gigabytes go to a slow disk or to a network)
+    #[arg(long, value_name = "auto|none|LEVEL", default_value = "auto")]
+    pub scratch_compression: Compression,
+}
+
+impl Storing {
+    pub fn storage(self) -> Storage {
+        Storage {
+            io: self.io,
+            compression: self.scratch_compression,
+        }
+    }
 }
 
 /// Selection of points by class.
@@ -264,6 +290,8 @@ pub struct Resume {
     /// Worker threads; may differ from the earlier number
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub threads: Option<u16>,
+    #[command(flatten)]
+    pub storing: Storing,
     #[command(flatten)]
     pub ends: Ends,
     /// Show no progress, even on a terminal

@@ -49,13 +49,15 @@ fn memory(limits: &Limits) -> u64 {
 fn workspace(limits: &Limits, beside: &Path) -> Result<Workspace> {
     let memory = MemoryPool::new(memory(limits))?;
     let scratch = limits.scratch.as_deref().unwrap_or(beside);
-    Workspace::new(
+    let workspace = Workspace::new(
         scratch,
         memory,
         threads(limits),
         observer(limits.quiet),
         stop::on_signal(),
-    )
+    )?;
+    workspace.set_storage(limits.storing.storage());
+    Ok(workspace)
 }
 
 fn print(text: &str) -> Result<()> {
@@ -87,6 +89,7 @@ fn reconstruct(args: &Reconstruct) -> Result<bool> {
         .params(args.params())
         .threads(threads(&args.limits))
         .memory(memory(&args.limits))
+        .storage(args.limits.storing.storage())
         .tile_points(args.tile_points.unwrap_or(args.block_points))
         .start(args.again.start());
     for input in &args.inputs {
@@ -106,6 +109,7 @@ fn resume(args: &Resume) -> Result<bool> {
     if let Some(threads) = args.threads {
         builder = builder.threads(threads.into());
     }
+    let builder = builder.storage(args.storing.storage());
     run_reconstruction(builder, &args.ends, args.quiet)
 }
 

@@ -71,6 +71,9 @@ impl Reconstruction {
             self.observer.clone(),
             self.cancel.clone(),
         );
+        if let Ok(workspace) = &workspace {
+            workspace.set_storage(self.storage);
+        }
         if workspace.is_err() && !self.is_unfinished() {
             Folder::remove(&self.folder, false);
         }

@@ -8,7 +8,7 @@ use crate::params::Params;
 use crate::stages::order::PAGE;
 use crate::workspace::memory::MemoryPool;
 use crate::workspace::progress::{Cancel, Observer, Silent};
-use crate::workspace::{Folder, Found};
+use crate::workspace::{Folder, Found, Storage};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
@@ -26,6 +26,7 @@ pub struct Builder {
     page_points: Option<usize>,
     observer: Option<Arc<dyn Observer>>,
     cancel: Cancel,
+    storage: Storage,
     start: Start,
     /// The scratch folder, if an unfinished run is continued.
     folder: Option<PathBuf>,
@@ -96,6 +97,13 @@ impl Builder {
         self
     }
 
+    /// How scratch files are read and written; does not change the result.
+    #[must_use]
+    pub fn storage(mut self, storage: Storage) -> Self {
+        self.storage = storage;
+        self
+    }
+
     /// The flag that stops the run.
     #[must_use]
     pub fn cancel(mut self, cancel: Cancel) -> Self {
@@ -149,6 +157,7 @@ impl Builder {
             params: self.params,
             observer: self.observer.unwrap_or_else(|| Arc::new(Silent)),
             cancel: self.cancel,
+            storage: self.storage,
             start: self.start,
             time_limit: self.time_limit,
         })

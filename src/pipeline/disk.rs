@@ -4,7 +4,7 @@
 //! and all triples twice. The number of triples depends on noise, which is measured when the points are
 //! relaxed: noisy points move, and a second store is written. This store is the only size that headers do not
 //! determine: where noise makes more triples it makes fewer triangles, so scratch and mesh together have the
-//! same size otherwise. Half a store is assumed, which is wrong by 6 bytes a point either way.
+//! same size otherwise. Half a store is assumed, which is wrong by 4 bytes a point either way.
 //!
 //! Unneeded files are not counted. They are deleted as soon as the deletion is synced
 //! (`workspace/keeper.rs`), within a moment.
@@ -15,8 +15,13 @@ use crate::stages::export::{self, CoordinateType};
 use crate::stages::ingest::{self, Probe};
 use std::path::PathBuf;
 
-/// Bytes of a position in the ordered store, and in the spool if its source has integers or `f32`.
+/// Bytes of a position that is not packed: in sorted runs, and in the spool if its source has integers or
+/// `f32`.
 const POSITION: f64 = 12.0;
+
+/// Bytes of a position in an ordered store. Measured: 4 to 8 for scans, 8.4 to 9.4 for coordinates of full
+/// precision, fewer the more points there are.
+const STORED: f64 = 8.5;
 
 /// Scratch bytes per triple at the peak: two copies, packed. Measured: 7.4 where nearly all are triangles,
 /// 8.5 where most are candidates.
@@ -71,17 +76,17 @@ impl Known {
     pub fn estimate(&self, params: &Params) -> DiskEstimate {
         let points = self.points as f64;
         let (moved, triples, triangles) = self.surface(params);
-        let stores = POSITION * (1.0 + moved);
+        let stores = STORED * (1.0 + moved);
         // While points are read and sorted they are on disk twice.
-        let mut early = self.spool as f64 + POSITION * points;
+        let mut early = self.spool as f64 + STORED * points;
         if params.thin.is_some() {
             early = early.max(self.spool as f64 + 2.0 * POSITION * self.read as f64);
         }
         if params.smooth > 0 || params.drop_outliers.is_some() {
-            early = early.max(2.0 * POSITION * points);
+            early = early.max(2.0 * STORED * points);
         }
         if params.relax > 1 {
-            early = early.max(POSITION * (1.0 + 2.0 * moved) * points);
+            early = early.max(STORED * (1.0 + 2.0 * moved) * points);
         }
         let late = (stores + TRIPLE * triples) * points;
         let small = |bytes: f64| bytes + SMALL.0 * points + SMALL.1;

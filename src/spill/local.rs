@@ -1,7 +1,7 @@
 //! A table for the work of one function, which deletes it.
 
 use super::Row;
-use super::table::{packed_bytes, read_rows};
+use super::table::{read_rows, stored_bytes};
 use crate::error::Result;
 use crate::workspace::file::ScratchFile;
 use crate::workspace::{Files, Workspace};
@@ -47,9 +47,8 @@ impl<R: Row> LocalTable<R> {
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Disk`].
     pub fn put(&self, section: usize, rows: &[R]) -> Result<()> {
-        let mut packed = Vec::new();
-        let bytes = packed_bytes(rows, &mut packed);
-        let place = self.file.append(self.files.worker(), bytes, rows.len())?;
+        let bytes = stored_bytes(&self.file, rows, |_| ());
+        let place = self.file.append(self.files.worker(), &bytes, rows.len())?;
         self.file.set(section as u32, place)
     }
 

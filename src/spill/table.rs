@@ -4,6 +4,7 @@
 //! own CRC-32, packed, and is read back whole.
 
 use super::Row;
+use super::compress::{compress, expand};
 use super::pack::{pack, unpack};
 use crate::error::Result;
 use crate::workspace::file::ScratchFile;
@@ -11,6 +12,7 @@ use crate::workspace::memory::bytes_of;
 use crate::workspace::place::Place;
 use crate::workspace::{Unit, Workspace};
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 use std::marker::PhantomData;
 use std::sync::Arc;
 
@@ -103,11 +105,9 @@ impl<R: Row> Table<R> {
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Disk`].
     pub fn append(&self, unit: &Unit<'_>, rows: &[R]) -> Result<Place> {
-        let mut packed = Vec::new();
-        let bytes = packed_bytes(rows, &mut packed);
-        let in_memory = if R::PACKING.is_some() { bytes.len() } else { 0 };
-        let _held = unit.hold(in_memory as u64);
-        self.file(unit)?.append(unit.worker(), bytes, rows.len())
+        let file = self.file(unit)?;
+        let bytes = stored_bytes(&file, rows, |bytes| unit.hold(bytes));
+        file.append(unit.worker(), &bytes, rows.len())
     }
 
     /// Writes a section that consists of parts which are read one by one; returns the place of each.
@@ -167,8 +167,27 @@ impl<R: Row> Table<R> {
     }
 }
 
-/// The rows as they are stored; `packed` is memory for them.
-pub(super) fn packed_bytes<'a, R: Row>(rows: &'a [R], packed: &'a mut Vec<u8>) -> &'a [u8] {
+/// The rows as they are stored as a section of `file`: packed, and compressed if the run says so. `hold` is
+/// called with the bytes of memory that this takes.
+pub(super) fn stored_bytes<'a, R: Row, H>(
+    file: &ScratchFile,
+    rows: &'a [R],
+    hold: impl Fn(u64) -> H,
+) -> Cow<'a, [u8]> {
+    if R::PACKING.is_none() {
+        return Cow::Borrowed(bytemuck::cast_slice(rows));
+    }
+    let mut packed = Vec::new();
+    pack(rows, &mut packed);
+    let level = file.compression();
+    // A compressed copy has room for as many bytes.
+    let copies = if level.is_some() { 2 } else { 1 };
+    let _held = hold(copies * bytes_of(&packed));
+    Cow::Owned(compress(packed, level))
+}
+
+/// The rows packed; `packed` is memory for them.
+fn packed_bytes<'a, R: Row>(rows: &'a [R], packed: &'a mut Vec<u8>) -> &'a [u8] {
     if R::PACKING.is_none() {
         return bytemuck::cast_slice(rows);
     }
@@ -198,40 +217,50 @@ pub(super) fn read_rows<R: Row, H>(
     rows: &mut Vec<R>,
     hold: impl FnOnce(u64) -> H,
 ) -> Result<()> {
-    let mut bytes = Vec::new();
-    let packed = R::PACKING.map_or(0, |_| place.bytes);
-    // A size from a damaged journal must not abort the program, so the allocation may fail.
-    let room = bytes.try_reserve_exact(packed).is_ok()
-        && fits::<R>(place)
-        && rows.try_reserve(place.records).is_ok();
-    if !room {
-        let found = format!("{} bytes", place.bytes);
+    let bad = |found: String| {
         let expected = format!("{} rows of {} words", place.records, R::WORDS);
-        return Err(file.damaged(place.segment, place.offset, found, expected));
-    }
+        file.damaged(place.segment, place.offset, found, expected)
+    };
     let before = rows.len();
-    rows.resize(before + place.records, R::zeroed());
-    let rows = &mut rows[before..];
+    // A size from a damaged journal must not abort the program, so allocations may fail.
+    let grow = |rows: &mut Vec<R>, bytes: usize| {
+        if !fits::<R>(place.records, bytes) || rows.try_reserve(place.records).is_err() {
+            return Err(bad(format!("{bytes} bytes")));
+        }
+        rows.resize(before + place.records, R::zeroed());
+        Ok(())
+    };
     if R::PACKING.is_none() {
-        return file.read_part(place, bytemuck::cast_slice_mut(rows));
+        grow(rows, place.bytes)?;
+        return file.read_part(place, bytemuck::cast_slice_mut(&mut rows[before..]));
+    }
+    let mut bytes = Vec::new();
+    if bytes.try_reserve_exact(place.bytes).is_err() {
+        return Err(bad(format!("{} bytes", place.bytes)));
     }
     bytes.resize(place.bytes, 0);
-    let _held = hold(bytes_of(&bytes));
     file.read_part(place, &mut bytes)?;
-    unpack(&bytes, rows).ok_or_else(|| {
-        let found = format!("{} bytes that do not unpack", place.bytes);
-        let expected = format!("{} rows", place.records);
-        file.damaged(place.segment, place.offset, found, expected)
-    })
+    let packed = expand(&bytes);
+    let packed =
+        packed.ok_or_else(|| bad(format!("{} bytes that do not decompress", place.bytes)))?;
+    let copy = if matches!(packed, Cow::Owned(_)) {
+        packed.len()
+    } else {
+        0
+    };
+    let _held = hold(bytes_of(&bytes) + copy as u64);
+    grow(rows, packed.len())?;
+    unpack(&packed, &mut rows[before..])
+        .ok_or_else(|| bad(format!("{} bytes that do not unpack", packed.len())))
 }
 
-/// True if the number of rows is possible for the number of bytes.
-fn fits<R: Row>(place: Place) -> bool {
+/// True if the number of rows is possible for the number of bytes, which are packed or the rows themselves.
+fn fits<R: Row>(records: usize, bytes: usize) -> bool {
     if R::PACKING.is_some() {
         // Packed, a word takes at least the two bits of its length.
-        place.records.saturating_mul(R::WORDS).div_ceil(4) <= place.bytes
+        records.saturating_mul(R::WORDS).div_ceil(4) <= bytes
     } else {
-        place.records.checked_mul(size_of::<R>()) == Some(place.bytes)
+        records.checked_mul(size_of::<R>()) == Some(bytes)
     }
 }
 

@@ -5,17 +5,21 @@
 
 use super::fault;
 use super::keeper::Leaving;
+use super::mapped::{Io, Mapping};
 use super::memory::{MemoryPool, Reservation};
 use super::open::{failed_write, open_existing, options};
 use super::place::{Place, Put};
 use super::run::ResumableRun;
 use super::{IoCounters, Unit, lock};
 use crate::error::{Error, Result};
+use std::borrow::Cow;
+use std::collections::HashMap;
 use std::fs::File;
 use std::os::unix::fs::FileExt;
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex};
+use std::str::FromStr;
+use std::sync::atomic::{AtomicBool, AtomicI32, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, OnceLock};
 
 /// Bytes of memory for a section.
 const SECTION: u64 = size_of::<Place>() as u64;
@@ -36,9 +40,57 @@ pub struct Shared {
     pub expected: AtomicU64,
     /// The budget, from which the lists of sections are reserved.
     pub memory: MemoryPool,
+    /// How files are read and written.
+    pub storage: OnceLock<Storage>,
+    /// The level at which rows are compressed; 0: they are not, as long as it is [`UNDECIDED`].
+    pub level: AtomicI32,
+}
+
+/// The level before it is known whether compression pays.
+pub(super) const UNDECIDED: i32 = -1;
+
+/// How files are read and written; it changes no result.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Storage {
+    /// The way in which files are read.
+    pub io: Io,
+    /// The compression of rows.
+    pub compression: Compression,
+}
+
+/// Compression of rows in scratch files with Zstandard.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Compression {
+    /// At level 1 where the disk is not local, or is slower than compression; else none.
+    #[default]
+    Auto,
+    /// None.
+    None,
+    /// At a level of Zstandard, 1 to 19.
+    Level(i32),
+}
+
+impl FromStr for Compression {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        match (text, text.parse()) {
+            ("auto", _) => Ok(Self::Auto),
+            ("none", _) => Ok(Self::None),
+            (_, Ok(level @ 1..=19)) => Ok(Self::Level(level)),
+            _ => Err(format!(
+                "{text:?} is not auto, none or a level from 1 to 19"
+            )),
+        }
+    }
 }
 
 impl Shared {
+    /// How files are read and written.
+    pub fn storage(&self) -> Storage {
+        self.storage.get().copied().unwrap_or_default()
+    }
+
     /// Scratch bytes still to be written, as far as that is known.
     pub fn more(&self) -> u64 {
         let expected = self.expected.load(Ordering::Relaxed);
@@ -57,6 +109,12 @@ struct Segment {
     end: AtomicU64,
     /// Set by writing, reset by syncing.
     dirty: Arc<AtomicBool>,
+}
+
+impl Segment {
+    fn end(&self) -> u64 {
+        self.end.load(Ordering::Relaxed)
+    }
 }
 
 /// A scratch file. It exists until it is released.
@@ -138,7 +196,7 @@ impl ScratchFile {
         let leaving = self.segments().into_iter().map(|segment| Leaving {
             name: segment.name.clone(),
             path: segment.path.clone(),
-            bytes: segment.end.load(Ordering::Relaxed),
+            bytes: segment.end(),
         });
         match &self.shared.run {
             Some(run) if self.kept => run.delete(&self.name, leaving.collect()),
@@ -300,6 +358,57 @@ impl ScratchFile {
         })?;
         self.shared.io.add_read(wanted as u64);
         Ok(())
+    }
+
+    /// The level at which rows are to be compressed; `None` if they are not.
+    #[must_use]
+    pub fn compression(&self) -> Option<i32> {
+        Some(self.shared.level.load(Ordering::Relaxed)).filter(|level| *level > 0)
+    }
+
+    /// Bytes in the segments.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        let segments = self.segments();
+        segments.iter().map(|segment| segment.end()).sum()
+    }
+
+    /// Maps the segments, none of which is written any more, if files are to be mapped and the budget has
+    /// room for these. The segments that are mapped, by number, and their reservation.
+    #[must_use]
+    pub fn map(&self) -> Option<(HashMap<u32, Mapping>, Reservation)> {
+        let (bytes, memory) = (self.bytes(), &self.shared.memory);
+        let io = self.shared.storage().io;
+        if bytes == 0 || !io.maps(&self.shared.folder, bytes, memory.available()) {
+            return None;
+        }
+        let held = memory.reserve("mapped points", bytes).ok()?;
+        let segments: Vec<_> = lock(&self.segments).clone();
+        let map = |(number, segment): (u32, Arc<Segment>)| {
+            let file = self.opened(&segment).ok()?;
+            Some((number, Mapping::of(&file)?))
+        };
+        Some((segments.into_iter().filter_map(map).collect(), held))
+    }
+
+    /// Bytes of a segment, from its mapping if that has them.
+    ///
+    /// # Errors
+    /// See [`ScratchFile::read`].
+    pub fn view<'a>(
+        &self,
+        segment: u32,
+        mapping: Option<&'a Mapping>,
+        offset: u64,
+        bytes: usize,
+    ) -> Result<Cow<'a, [u8]>> {
+        if let Some(mapped) = mapping.and_then(|mapping| mapping.get(offset, bytes)) {
+            self.shared.io.add_read(bytes as u64);
+            return Ok(Cow::Borrowed(mapped));
+        }
+        let mut copy = vec![0; bytes];
+        self.read(segment, offset, &mut copy)?;
+        Ok(Cow::Owned(copy))
     }
 
     /// The handle of an existing segment.

@@ -2,6 +2,7 @@
 //!
 //! The workspace knows neither stages nor rows. Stages obtain memory, files and threads from it.
 
+mod disk;
 pub mod fault;
 pub mod file;
 mod files;
@@ -10,6 +11,7 @@ mod history;
 mod journal;
 mod keeper;
 pub mod limits;
+pub mod mapped;
 pub mod memory;
 pub mod open;
 pub mod place;
@@ -20,6 +22,7 @@ pub(crate) mod steps;
 mod unit;
 mod units;
 
+pub use file::{Compression, Storage};
 pub use files::Files;
 pub use folder::{Folder, Found};
 pub use recover::{OUTPUT, RENAMED};
@@ -30,8 +33,8 @@ use file::Shared;
 use memory::{MemoryPool, Reservation};
 use progress::{Cancel, Observer};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::atomic::{AtomicI32, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Instant;
 
 /// Bytes moved and scratch space held, counted where files are read and written.
@@ -182,6 +185,8 @@ impl Workspace {
             run,
             expected: AtomicU64::new(0),
             memory: memory.clone(),
+            storage: OnceLock::new(),
+            level: AtomicI32::new(file::UNDECIDED),
         });
         Self {
             folder,
@@ -235,6 +240,16 @@ impl Workspace {
         ))
     }
 
+    /// Sets how files are read and written; to be called before the first file is. Automatic compression is
+    /// decided where the disk need is known, see [`Workspace::expect_scratch`].
+    pub fn set_storage(&self, storage: Storage) {
+        // The first setting holds.
+        let _ = self.shared.storage.set(storage);
+        if let Compression::Level(level) = storage.compression {
+            self.shared.level.store(level, Ordering::Relaxed);
+        }
+    }
+
     /// Path of `name` in the scratch folder.
     #[must_use]
     pub fn path(&self, name: &str) -> PathBuf {
@@ -252,9 +267,15 @@ impl Workspace {
         Folder::remove(&self.folder, finished);
     }
 
-    /// Sets the estimated peak of the scratch space in bytes, for the message when the disk is full.
+    /// Sets the estimated peak of the scratch space in bytes: for the message when the disk is full, and to
+    /// decide on automatic compression.
     pub fn expect_scratch(&self, bytes: u64) {
         self.shared.expected.store(bytes, Ordering::Relaxed);
+        let auto = self.shared.storage().compression == Compression::Auto;
+        if auto && self.shared.level.load(Ordering::Relaxed) == file::UNDECIDED {
+            let level = disk::compression_pays(&self.folder, bytes, self.threads);
+            self.shared.level.store(level.into(), Ordering::Relaxed);
+        }
     }
 
     /// Scratch bytes still to be written, according to that estimate.

@@ -1,6 +1,7 @@
 //! Sorts points along the Hilbert curve, on disk, and removes duplicates; the rank of a point is its id (not
 //! in the paper). This makes all later stages independent of memory and threads.
 
+mod packed;
 mod rewrite;
 mod store;
 mod writer;
@@ -262,7 +263,7 @@ fn merge(
     workspace: &Workspace,
 ) -> Result<()> {
     // A key can be computed from a position, so the last point written determines where to continue.
-    let start = writer.last()?.map(|point| next(CurveKey::of(point)));
+    let start = writer.last_found()?.map(|point| next(CurveKey::of(point)));
     let cuts = sorted.cuts(PART).into_iter().map(Some);
     let cuts = cuts.filter(|cut| *cut > start);
     let ends: Vec<_> = [start].into_iter().chain(cuts).chain([None]).collect();

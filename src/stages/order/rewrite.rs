@@ -1,6 +1,6 @@
 //! Writes a store of the same points at other positions, in any order.
 
-use super::store::{PointStore, StoreFiles, StoredPoints};
+use super::store::{GROUP, PointStore, StoreFiles, StoredPoints};
 use crate::error::Result;
 use crate::geom::Point;
 use crate::workspace::{Unit, Workspace};
@@ -29,8 +29,9 @@ impl Rewriter {
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Disk`].
     pub fn put(&self, unit: &Unit<'_>, first: usize, points: &[Point]) -> Result<()> {
-        let written = self.files.write(unit, points)?;
-        self.files.keep(unit, first / self.files.page, &[written])
+        let groups = points.chunks(GROUP * self.files.page);
+        let written: Result<Vec<_>> = groups.map(|group| self.files.write(unit, group)).collect();
+        self.files.keep(unit, first / self.files.page, &written?)
     }
 
     /// Returns the store; every page must have been written.

@@ -1,22 +1,27 @@
 //! The ordered store: positions by id in one file, in pages, with a tree of page boxes in memory.
 
+use super::packed::{Packing, pack};
 use crate::error::Result;
 use crate::geom::Point;
 use crate::geom::aabb::Aabb;
 use crate::spill::{Table, row};
 use crate::workspace::file::ScratchFile;
+use crate::workspace::mapped::Mapping;
 use crate::workspace::memory::Reservation;
 use crate::workspace::place::Place;
 use crate::workspace::{Unit, Workspace};
 use serde::{Deserialize, Serialize};
+use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::Arc;
 
 row! {
-    /// Checksum and bounding box of a page.
+    /// Checksum, packing and bounding box of a page.
     pub struct PageRow {
-        /// CRC-32 of the page.
+        /// CRC-32 of the packed page.
         crc: u32,
+        /// Bits left out of each coordinate.
+        shift: u32,
         /// Lowest coordinates.
         min: Point,
         /// Highest coordinates.
@@ -30,6 +35,10 @@ impl PageRow {
         let Self { min, max, .. } = *self;
         Aabb { min, max }
     }
+
+    fn packing(&self) -> Packing {
+        Packing::of(&self.bounds(), self.shift.min(31) as u8)
+    }
 }
 
 /// The pages of a store. Pages written together form a section; its number is that of its first page divided
@@ -38,6 +47,9 @@ type Index = Table<PageRow>;
 
 /// The first page of every write has a number that is a multiple of this.
 pub(super) const STEP: usize = 16;
+
+/// Pages written at a time, a multiple of [`STEP`].
+pub(super) const GROUP: usize = 64;
 
 /// Points in a page, except in tests.
 pub const PAGE: usize = 256;
@@ -80,16 +92,44 @@ impl StoreFiles {
         })
     }
 
-    /// Writes pages to the segment of the current thread.
+    /// Writes up to a group of pages to the segment of the current thread.
     pub fn write(&self, workspace: &Workspace, points: &[Point]) -> Result<Written> {
-        let (worker, bytes) = (workspace.files.worker(), bytemuck::cast_slice(points));
-        let place = self.file.append(worker, bytes, points.len())?;
+        let mut bytes = Vec::new();
         let page = |page: &[Point]| {
-            let crc = crc32fast::hash(bytemuck::cast_slice(page));
-            let Aabb { min, max } = Aabb::of(page);
-            PageRow { crc, min, max }
+            let before = bytes.len();
+            let (Aabb { min, max }, shift) = pack(page, &mut bytes);
+            PageRow {
+                crc: crc32fast::hash(&bytes[before..]),
+                shift: shift.into(),
+                min,
+                max,
+            }
         };
-        Ok((points.chunks(self.page).map(page).collect(), place))
+        let pages = points.chunks(self.page).map(page).collect();
+        let worker = workspace.files.worker();
+        Ok((pages, self.file.append(worker, &bytes, points.len())?))
+    }
+
+    /// The last point of the whole groups before page `end`, of which those from page `first` on were
+    /// recorded together.
+    pub fn last_before(&self, unit: &Unit<'_>, first: usize, end: usize) -> Result<Option<Point>> {
+        let mut rows = Vec::new();
+        self.index.get_into(unit, first / STEP, &mut rows)?;
+        let group = end.saturating_sub(GROUP);
+        let group_rows = rows.get(group.saturating_sub(first)..end.saturating_sub(first));
+        let Some((last, others)) = group_rows.and_then(<[_]>::split_last) else {
+            return Ok(None);
+        };
+        let (place, packing) = (self.file.section(group / STEP), last.packing());
+        let before: usize = (others.iter())
+            .map(|row| row.packing().bytes(self.page))
+            .sum();
+        let mut bytes = vec![0; packing.bytes(self.page)];
+        self.file
+            .read(place.segment, place.offset + before as u64, &mut bytes)?;
+        let mut columns = [0, 1, 2].map(|_| vec![0; self.page]);
+        packing.unpack(&bytes, columns.each_mut().map(Vec::as_mut_slice));
+        Ok(Some(columns.map(|column| column[self.page - 1])))
     }
 
     /// Records in the index pages that were written, the first with number `first`.
@@ -172,6 +212,7 @@ impl StoredPoints {
         let files = StoreFiles::open(workspace, &self.name, self.page)?;
         let (file, page) = (files.file.clone(), files.page);
         let (mut parts, mut checks, mut boxes) = (Vec::new(), Vec::new(), Vec::new());
+        let mut shifts = Vec::new();
         let mut held = workspace.promise("point index", 4096)?;
         if file.is_gone() {
             // The points will not be read any more, but their bounding box may be.
@@ -183,20 +224,20 @@ impl StoredPoints {
                 return Err(file.damaged(0, 0, found, format!("{} points", self.len)));
             }
             // A tree of boxes has a seventh more of them than there are pages.
-            held.at_least(pages * 32 + 4096)?;
-            held.set_held(pages * 32 + 4096);
+            held.at_least(pages * 33 + 4096)?;
+            held.set_held(pages * 33 + 4096);
             files.read_index(&workspace.unit(), end, |row| {
                 checks.push(row.crc);
+                shifts.push(row.shift.min(31) as u8);
                 boxes.push(row.bounds());
             })?;
             let mut first = 0;
             while first < end {
                 let place = file.section(first / STEP);
-                let (segment, offset) = (place.segment, place.offset);
                 parts.push(Part {
                     first,
-                    segment,
-                    offset,
+                    segment: place.segment,
+                    offset: place.offset,
                 });
                 let pages = place.records.div_ceil(page);
                 first += pages.next_multiple_of(STEP).max(STEP);
@@ -210,12 +251,15 @@ impl StoredPoints {
                 .collect();
             levels.push(next);
         }
+        let mapped = if file.is_gone() { None } else { file.map() };
         Ok(PointStore {
+            mapped,
             file,
             parts,
             len: self.len,
             page,
             checks,
+            shifts,
             levels,
             _held: held,
         })
@@ -241,17 +285,22 @@ struct Part {
     offset: u64,
 }
 
-/// Positions of all points by id; 12 bytes for each point on disk, 28/256 in memory.
+/// Positions of all points by id, in packed pages on disk; 29/256 bytes for each point in memory.
 #[derive(Debug)]
 pub struct PointStore {
     file: Arc<ScratchFile>,
     parts: Vec<Part>,
     len: usize,
     page: usize,
+    /// CRC-32 of each page.
     checks: Vec<u32>,
+    /// Bits left out of each coordinate, for each page.
+    shifts: Vec<u8>,
     /// `levels[0]` has a box for each page; each further level has one box for `FAN` boxes of the previous
     /// level.
     levels: Vec<Vec<Aabb>>,
+    /// The segments that are mapped, by number, and their reservation.
+    mapped: Option<(HashMap<u32, Mapping>, Reservation)>,
     _held: Reservation,
 }
 
@@ -344,44 +393,91 @@ impl PointStore {
             .all(|child| self.descend(level - 1, child, target, d2, each))
     }
 
-    /// Reads consecutive pages and appends their points to `points`.
-    ///
-    /// # Errors
-    /// [`crate::Error::Io`]; [`crate::Error::Corrupt`] if a page does not match its checksum.
-    pub fn read_pages(&self, pages: Range<usize>, points: &mut Vec<Point>) -> Result<()> {
+    fn packing(&self, page: usize) -> Packing {
+        Packing::of(&self.levels[0][page], self.shifts[page])
+    }
+
+    /// Calls `each` with the layout and the packed bytes of consecutive pages, in order.
+    fn packed_pages(
+        &self,
+        pages: Range<usize>,
+        mut each: impl FnMut(usize, Packing, &[u8]),
+    ) -> Result<()> {
         if pages.end > self.checks.len() {
             let found = format!("{} pages", self.checks.len());
             let expected = format!("page {}", pages.end);
             return Err(self.file.damaged(0, 0, found, expected));
         }
-        let mut part = self.parts.partition_point(|part| part.first <= pages.start);
+        let mut number = self.parts.partition_point(|part| part.first <= pages.start);
         let mut start = pages.start;
         while start < pages.end {
-            let next = self.parts.get(part).map_or(pages.end, |next| next.first);
+            let next = self.parts.get(number).map_or(pages.end, |next| next.first);
             let end = next.min(pages.end);
-            self.read_from(&self.parts[part - 1], start..end, points)?;
-            (start, part) = (end, part + 1);
+            self.part_pages(&self.parts[number - 1], start..end, &mut each)?;
+            (start, number) = (end, number + 1);
         }
         Ok(())
     }
 
-    /// Reads pages of one part.
-    fn read_from(&self, part: &Part, pages: Range<usize>, points: &mut Vec<Point>) -> Result<()> {
-        let ids = pages.start * self.page..(pages.end * self.page).min(self.len);
-        let before = points.len();
-        points.resize(before + ids.len(), [0; 3]);
-        let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut points[before..]);
-        let at = |page: usize| part.offset + ((page - part.first) * self.page * 12) as u64;
-        self.file.read(part.segment, at(pages.start), bytes)?;
-        for (page, bytes) in pages.zip(bytes.chunks(self.page * 12)) {
-            let crc = crc32fast::hash(bytes);
+    /// As [`PointStore::packed_pages`], for pages of one part.
+    fn part_pages(
+        &self,
+        part: &Part,
+        pages: Range<usize>,
+        each: &mut impl FnMut(usize, Packing, &[u8]),
+    ) -> Result<()> {
+        let bytes = |page| self.packing(page).bytes(self.page_ids(page).len());
+        let before: usize = (part.first..pages.start).map(bytes).sum();
+        let (mut at, wanted) = (part.offset + before as u64, pages.clone().map(bytes).sum());
+        let mapping = self
+            .mapped
+            .as_ref()
+            .and_then(|map| map.0.get(&part.segment));
+        let view = self.file.view(part.segment, mapping, at, wanted)?;
+        let mut left: &[u8] = &view;
+        for page in pages {
+            let (packed, rest) = left.split_at(bytes(page));
+            let crc = crc32fast::hash(packed);
             if crc != self.checks[page] {
                 let expected = format!("{:08x}", self.checks[page]);
                 let found = format!("checksum {crc:08x}");
-                return Err(self.file.damaged(part.segment, at(page), found, expected));
+                return Err(self.file.damaged(part.segment, at, found, expected));
             }
+            each(page, self.packing(page), packed);
+            (left, at) = (rest, at + packed.len() as u64);
         }
         Ok(())
+    }
+
+    /// Reads consecutive pages into columns, which are as long as the pages have points.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`]; [`crate::Error::Corrupt`] if a page does not match its checksum.
+    pub fn read_columns(&self, pages: Range<usize>, columns: [&mut [i32]; 3]) -> Result<()> {
+        let mut columns = columns;
+        self.packed_pages(pages, |page, packing, bytes| {
+            let points = self.page_ids(page).len();
+            let page = columns.each_mut().map(|column| {
+                let (page, rest) = std::mem::take(column).split_at_mut(points);
+                *column = rest;
+                page
+            });
+            packing.unpack(bytes, page);
+        })
+    }
+
+    /// Reads consecutive pages and appends their points to `points`.
+    ///
+    /// # Errors
+    /// See [`PointStore::read_columns`].
+    pub fn read_pages(&self, pages: Range<usize>, points: &mut Vec<Point>) -> Result<()> {
+        let mut columns = [0, 1, 2].map(|_| vec![0; self.page]);
+        self.packed_pages(pages, |page, packing, bytes| {
+            let count = self.page_ids(page).len();
+            packing.unpack(bytes, columns.each_mut().map(|column| &mut column[..count]));
+            let [x, y, z] = &columns;
+            points.extend((0..count).map(|n| [x[n], y[n], z[n]]));
+        })
     }
 
     /// Appends the positions of ascending `ids` to `points`, in the same order.

@@ -1,6 +1,6 @@
 //! Writes the ordered store: in id order, or, with `rewrite`, in any order.
 
-use super::store::{STEP, StoreFiles, StoredPoints, Written};
+use super::store::{GROUP, STEP, StoreFiles, StoredPoints, Written};
 use crate::error::Result;
 use crate::geom::Point;
 use crate::geom::aabb::Aabb;
@@ -18,15 +18,14 @@ row! {
     unpacked
 }
 
-/// Pages written at a time.
-const GROUP: usize = 64;
-
 /// Writes a store in id order.
 pub struct StoreWriter<'w> {
     workspace: &'w Workspace,
     files: StoreFiles,
     /// Number of points written so far.
     pub(super) len: usize,
+    /// The first of the pages that an earlier attempt recorded last.
+    recorded: usize,
     /// Points not written yet, less than a group of pages.
     pending: Vec<Point>,
     bounds: Aabb,
@@ -43,13 +42,17 @@ impl<'w> StoreWriter<'w> {
     pub fn create(workspace: &'w Workspace, name: &str, page: usize) -> Result<Self> {
         let files = StoreFiles::open(workspace, name, page)?;
         // The end of the points may have cut the last group short; it is written again.
-        let (mut pages, mut more) = (0, usize::MAX);
-        while more >= GROUP {
-            more = files.index.rows(workspace, pages / STEP)? / GROUP * GROUP;
-            pages += more;
+        let (mut recorded, mut pages) = (0, 0);
+        loop {
+            let more = files.index.rows(workspace, pages / STEP)? / GROUP * GROUP;
+            if more == 0 {
+                break;
+            }
+            (recorded, pages) = (pages, pages + more);
         }
         Ok(Self {
             len: pages * files.page,
+            recorded,
             bounds: files.bounds(&workspace.unit(), pages)?,
             workspace,
             files,
@@ -58,22 +61,14 @@ impl<'w> StoreWriter<'w> {
         })
     }
 
-    /// The last point written.
+    /// The last point that an earlier attempt wrote.
     ///
     /// # Errors
-    /// [`crate::Error::Io`].
-    pub fn last(&self) -> Result<Option<Point>> {
-        let Some(last) = self.len.checked_sub(1) else {
-            return Ok(None);
-        };
-        let mut point: Point = [0; 3];
-        // Only whole groups are there, each a section.
-        let group = last / (GROUP * self.files.page);
-        let place = self.files.file.section(group * GROUP / STEP);
-        let offset = place.offset + (last - group * GROUP * self.files.page) as u64 * 12;
-        let bytes = bytemuck::cast_slice_mut(&mut point);
-        self.files.file.read(place.segment, offset, bytes)?;
-        Ok(Some(point))
+    /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+    pub fn last_found(&self) -> Result<Option<Point>> {
+        let pages = self.len / self.files.page;
+        let unit = self.workspace.unit();
+        self.files.last_before(&unit, self.recorded, pages)
     }
 
     /// A whole store from the points of the sections, in their order.

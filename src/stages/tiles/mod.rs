@@ -103,12 +103,11 @@ impl Tile {
         let own_pages: Vec<usize> = own_pages.collect();
         let (wanted, reaches) = halo(store, &own_pages, ids.len().div_ceil(page));
         let mut points = Points::with_capacity(wanted.len() * page);
-        let mut read = Vec::new();
         let runs = wanted.chunk_by(|page, next| page + 1 == *next);
         for run in runs.flat_map(|run| run.chunks(READ)) {
-            read.clear();
-            store.read_pages(run[0]..run[0] + run.len(), &mut read)?;
-            points.extend(&read);
+            let pages = run[0]..run[0] + run.len();
+            let ids = store.page_ids(pages.start).start..store.page_ids(pages.end - 1).end;
+            points.extend(ids.len(), |columns| store.read_columns(pages, columns))?;
         }
         let leaf = page.div_ceil(LEAVES);
         let page_boxes = wanted.iter().map(|&p| *store.page_box(p)).collect();

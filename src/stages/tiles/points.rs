@@ -1,5 +1,6 @@
 //! The points of a tile in columns.
 
+use crate::error::Result;
 use crate::geom::Point;
 use crate::geom::aabb::Aabb;
 use crate::kernels::BLOCK;
@@ -28,15 +29,17 @@ impl Points {
         }
     }
 
-    /// Appends points, for which there must be room.
-    pub fn extend(&mut self, points: &[Point]) {
-        let end = self.len + points.len();
-        for (axis, column) in self.words.chunks_exact_mut(self.column).enumerate() {
-            for (to, point) in column[self.len..end].iter_mut().zip(points) {
-                *to = point[axis];
-            }
-        }
-        self.len = end;
+    /// Appends the coordinates of `count` points, for which there must be room: `fill` writes them.
+    pub fn extend(
+        &mut self,
+        count: usize,
+        fill: impl FnOnce([&mut [i32]; 3]) -> Result<()>,
+    ) -> Result<()> {
+        let (x, others) = self.words.split_at_mut(self.column);
+        let (y, z) = others.split_at_mut(self.column);
+        let added = self.len..self.len + count;
+        self.len = added.end;
+        fill([x, y, z].map(|column| &mut column[added.clone()]))
     }
 
     #[inline(always)]

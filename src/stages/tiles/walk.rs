@@ -22,7 +22,6 @@ pub struct PageCache {
     words: Vec<i32>,
     /// For each page, the index of its first word and its number of points.
     pages: FxHashMap<usize, (usize, usize)>,
-    read: Vec<Point>,
     /// The largest number of words so far.
     most: usize,
     /// Bytes of the largest walk so far.
@@ -63,12 +62,12 @@ impl PageCache {
             let room = CACHED_PAGES * store.page_size() * 3;
             self.words.reserve_exact(room);
         }
-        self.read.clear();
-        store.read_pages(page..page + 1, &mut self.read)?;
-        let found = (self.words.len(), self.read.len());
-        for axis in 0..3 {
-            self.words.extend(self.read.iter().map(|at| at[axis]));
-        }
+        let found = (self.words.len(), store.page_ids(page).len());
+        let (start, count) = found;
+        self.words.resize(start + 3 * count, 0);
+        let (x, others) = self.words[start..].split_at_mut(count);
+        let (y, z) = others.split_at_mut(count);
+        store.read_columns(page..page + 1, [x, y, z])?;
         self.most = self.most.max(self.words.len());
         self.pages.insert(page, found);
         Ok(found)

@@ -1,0 +1,136 @@
+//! Packed pages: each coordinate is a difference to the lowest one of its page, in as few bits as the largest
+//! difference takes.
+//!
+//! A page is cut into blocks of [`BLOCK`] points; the last one is filled with the lowest coordinates. A block
+//! has all x, then all y, then all z. Where all differences of a page are multiples of a power of two, as
+//! those of a scan on a refined lattice are, their zero bits are left out.
+
+use crate::geom::Point;
+use crate::geom::aabb::Aabb;
+use bitpacking::{BitPacker, BitPacker8x};
+
+/// Points in a block.
+pub(super) const BLOCK: usize = BitPacker8x::BLOCK_LEN;
+
+/// The layout of a packed page.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Packing {
+    min: Point,
+    /// Zero bits at the low end of every difference, which are left out.
+    shift: u8,
+    /// Bits of a difference along each axis.
+    bits: [u8; 3],
+}
+
+impl Packing {
+    /// The layout of a page with these bounds.
+    pub fn of(bounds: &Aabb, shift: u8) -> Self {
+        let Aabb { min, max } = *bounds;
+        let shift = shift.min(31);
+        let bits = |axis: usize| {
+            let largest = max[axis].wrapping_sub(min[axis]).cast_unsigned() >> shift;
+            (u32::BITS - largest.leading_zeros()) as u8
+        };
+        Self {
+            min,
+            shift,
+            bits: [0, 1, 2].map(bits),
+        }
+    }
+
+    /// Bytes of a page of `points` points.
+    pub fn bytes(&self, points: usize) -> usize {
+        let bits: usize = self.bits.iter().map(|bits| usize::from(*bits)).sum();
+        points.div_ceil(BLOCK) * bits * BLOCK / 8
+    }
+
+    /// Writes the points of a page in columns, each as long as there are points; `bytes` must have the length
+    /// of the page.
+    pub fn unpack(&self, mut bytes: &[u8], columns: [&mut [i32]; 3]) {
+        let packer = BitPacker8x::new();
+        let mut values = [0; BLOCK];
+        let [x, y, z] = columns;
+        let blocks = x
+            .chunks_mut(BLOCK)
+            .zip(y.chunks_mut(BLOCK))
+            .zip(z.chunks_mut(BLOCK));
+        for ((x, y), z) in blocks {
+            for (axis, column) in [x, y, z].into_iter().enumerate() {
+                let (block, rest) = bytes.split_at(usize::from(self.bits[axis]) * BLOCK / 8);
+                packer.decompress(block, &mut values, self.bits[axis]);
+                for (to, value) in column.iter_mut().zip(&values) {
+                    *to = self.min[axis].wrapping_add((value << self.shift).cast_signed());
+                }
+                bytes = rest;
+            }
+        }
+    }
+}
+
+/// Appends a packed page to `bytes`; returns its bounds and its shift.
+pub(super) fn pack(page: &[Point], bytes: &mut Vec<u8>) -> (Aabb, u8) {
+    let bounds = Aabb::of(page);
+    let difference =
+        |point: &Point, axis: usize| (point[axis].wrapping_sub(bounds.min[axis])).cast_unsigned();
+    let all = |all, point| (0..3).fold(all, |all, axis| all | difference(point, axis));
+    // A single position has differences of zero, and no bits at any shift.
+    let shift = page.iter().fold(0, all).trailing_zeros().min(31) as u8;
+    let packing = Packing::of(&bounds, shift);
+    let packer = BitPacker8x::new();
+    let mut to = bytes.len();
+    bytes.resize(to + packing.bytes(page.len()), 0);
+    for block in page.chunks(BLOCK) {
+        for (axis, bits) in packing.bits.into_iter().enumerate() {
+            let mut values = [0; BLOCK];
+            for (value, point) in values.iter_mut().zip(block) {
+                *value = difference(point, axis) >> shift;
+            }
+            to += packer.compress(&values, &mut bytes[to..], bits);
+        }
+    }
+    (bounds, shift)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn comes_back(page: &[Point]) -> usize {
+        let mut bytes = vec![7];
+        let (bounds, shift) = pack(page, &mut bytes);
+        assert_eq!(bounds, Aabb::of(page));
+        let packing = Packing::of(&bounds, shift);
+        assert_eq!(bytes.len(), 1 + packing.bytes(page.len()));
+        assert!(bytes.len() <= 1 + page.len().next_multiple_of(BLOCK) * 12);
+        let mut columns = [0, 1, 2].map(|_| vec![-1; page.len()]);
+        packing.unpack(&bytes[1..], columns.each_mut().map(Vec::as_mut_slice));
+        let [x, y, z] = &columns;
+        let back: Vec<Point> = (0..page.len()).map(|n| [x[n], y[n], z[n]]).collect();
+        assert_eq!(back, page);
+        bytes.len() - 1
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(300))]
+        #[test]
+        fn any_page_comes_back(
+            page in prop::collection::vec(prop::array::uniform3(0i32..1 << 30), 1..600),
+            width in 0u32..31,
+            zeros in 0u32..31,
+        ) {
+            let cut = |c: i32| ((c % (1 << width)) >> zeros) << zeros;
+            comes_back(&page);
+            comes_back(&page.iter().map(|p| p.map(cut)).collect::<Vec<_>>());
+        }
+    }
+
+    #[test]
+    fn bits_that_are_zero_everywhere_take_no_room() {
+        let page: Vec<Point> = (0..256)
+            .map(|n| [5 + (n << 10), 7 - ((n % 16) << 10), 3])
+            .collect();
+        assert_eq!(comes_back(&page), 256 * (8 + 4) / 8);
+        assert_eq!(comes_back(&[[9, 9, 9]; 256]), 0);
+    }
+}

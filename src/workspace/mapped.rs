@@ -1,0 +1,124 @@
+//! Files mapped into memory.
+
+use memmap2::{Advice, Mmap};
+use std::fs::File;
+use std::path::Path;
+use std::str::FromStr;
+
+/// The way in which points in scratch files are read. It changes no result.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Io {
+    /// Mapped on local disks where the budget has ample room, else read.
+    #[default]
+    Auto,
+    /// Mapped wherever the system allows it and the budget has room.
+    Map,
+    /// Read into buffers.
+    Read,
+}
+
+impl FromStr for Io {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "auto" => Ok(Self::Auto),
+            "map" => Ok(Self::Map),
+            "read" => Ok(Self::Read),
+            _ => Err(format!("{text:?} is not auto, map or read")),
+        }
+    }
+}
+
+/// Types of local file systems, on which a page of a mapped file cannot be lost with a connection or with
+/// another process: ext2 to ext4, XFS, Btrfs, F2FS, ZFS, bcachefs, tmpfs and overlays (`f_type` of statfs).
+const LOCAL: [u32; 8] = [
+    0xef53,
+    0x5846_5342,
+    0x9123_683e,
+    0xf2f5_2010,
+    0x2fc1_2fc1,
+    0xca45_1a4e,
+    0x0102_1994,
+    0x794c_7630,
+];
+
+/// With [`Io::Auto`], the part of the free budget that one file may take: a quarter.
+const SHARE: u64 = 4;
+
+/// True if `path` is on a file system that is known to be local.
+pub(super) fn is_local(path: &Path) -> bool {
+    rustix::fs::statfs(path).is_ok_and(|found| LOCAL.contains(&(found.f_type as u32)))
+}
+
+impl Io {
+    /// True if the file at `path`, of this size, is to be mapped when this much of the budget is free.
+    #[must_use]
+    pub fn maps(self, path: &Path, bytes: u64, free: u64) -> bool {
+        match self {
+            Self::Auto => bytes <= free / SHARE && is_local(path),
+            Self::Map => bytes <= free,
+            Self::Read => false,
+        }
+    }
+}
+
+/// A mapped file, all of it in memory.
+#[derive(Debug)]
+pub struct Mapping(Mmap);
+
+impl Mapping {
+    /// Maps the file as long as it is now, and brings it into memory; `None` if that cannot be done.
+    #[must_use]
+    pub fn of(file: &File) -> Option<Self> {
+        #[expect(
+            unsafe_code,
+            reason = "no mapping of a file can be proved to be constant"
+        )]
+        // SAFETY: the bytes are only read, and decoded with bounds after a CRC matched. A scratch file is
+        // private and is not written any more when it is mapped. Whoever cuts it meanwhile ends the run by
+        // SIGBUS.
+        let map = unsafe { Mmap::map(file) }.ok()?;
+        // Fails where a later access would raise SIGBUS. Older systems read at the first access.
+        match map.advise(Advice::PopulateRead) {
+            Err(e) if e.kind() != std::io::ErrorKind::InvalidInput => None,
+            _ => Some(Self(map)),
+        }
+    }
+
+    /// A part of the file; `None` if it is not within it.
+    #[must_use]
+    pub fn get(&self, offset: u64, bytes: usize) -> Option<&[u8]> {
+        let offset = usize::try_from(offset).ok()?;
+        self.0.get(offset..offset.checked_add(bytes)?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Write;
+
+    #[test]
+    fn a_mapping_has_the_bytes_of_the_file_and_nothing_beyond() {
+        let mut file = tempfile::tempfile().unwrap();
+        let bytes: Vec<u8> = (0..70_001u32).map(|n| (n % 251) as u8).collect();
+        file.write_all(&bytes).unwrap();
+        let map = Mapping::of(&file).unwrap();
+        assert_eq!(map.get(0, bytes.len()), Some(&bytes[..]));
+        assert_eq!(map.get(69_999, 2), Some(&bytes[69_999..]));
+        assert_eq!(map.get(69_999, 3), None);
+        assert_eq!(map.get(u64::MAX, 1), None);
+        assert_eq!(map.get(5, usize::MAX), None);
+    }
+
+    #[test]
+    fn files_are_mapped_where_the_budget_has_room() {
+        let here = std::env::temp_dir();
+        assert!(Io::Map.maps(&here, 10, 10) && !Io::Map.maps(&here, 11, 10));
+        assert!(!Io::Read.maps(&here, 1, 1 << 30));
+        assert!(!Io::Auto.maps(&here, 3, 8));
+        assert!(!Io::Auto.maps(Path::new("/proc"), 1, 8));
+        assert_eq!(Io::Auto.maps(&here, 2, 8), is_local(&here));
+    }
+}
