@@ -149,8 +149,3 @@ pub(super) fn u32_at(bytes: &[u8], at: usize) -> u32 {
 pub(super) fn u64_at(bytes: &[u8], at: usize) -> u64 {
     u64::from(u32_at(bytes, at)) | u64::from(u32_at(bytes, at + 4)) << 32
 }
-
-/// Little-endian `f64` at `at`; the caller has checked the length.
-pub(super) fn f64_at(bytes: &[u8], at: usize) -> f64 {
-    f64::from_bits(u64_at(bytes, at))
-}

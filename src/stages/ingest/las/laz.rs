@@ -4,7 +4,7 @@ use super::super::input::{Input, STREAM_BUFFER};
 use super::super::spool::{Sink, SourceWriter, sink_bytes};
 use super::chunks::{Decoder, LayerHead};
 use super::table::{self, Chunk, Table};
-use super::vlr::{self, Laszip, Layout};
+use super::vlr::{self, Laszip};
 use super::{Header, Record};
 use crate::error::Result;
 
@@ -38,14 +38,14 @@ pub(super) fn read(
         laszip: &laszip,
         record: Record::of(header, writer.classes),
     };
-    let table = match laszip.layout {
-        Layout::Stream => None,
-        Layout::Chunks | Layout::Layers => table::read(input, header, &laszip, workspace)?,
+    let table = match laszip.stream {
+        true => None,
+        false => table::read(input, header, &laszip, workspace)?,
     };
-    let mut table = match (table, laszip.layout) {
-        (Some(table), _) => table,
-        (None, Layout::Layers) => table::walk(input, header, &laszip, workspace)?,
-        (None, Layout::Stream | Layout::Chunks) => {
+    let mut table = match table {
+        Some(table) => table,
+        None if header.format.is_extended => table::walk(input, header, &laszip, workspace)?,
+        None => {
             one_by_one(&decoder, writer)?;
             return Ok(warnings);
         }
@@ -70,21 +70,17 @@ fn plausible(input: &Input, points: u64) -> Result<()> {
 
 /// Memory of the models for all items.
 fn models(laszip: &Laszip) -> u64 {
-    let extra: u64 = match laszip.layout {
-        Layout::Layers => 0,
-        Layout::Stream | Layout::Chunks => laszip
-            .items
-            .iter()
-            .filter(|i| matches!(i.item_type(), laz::LazItemType::Byte(_)))
-            .map(|i| u64::from(i.size()))
-            .sum(),
-    };
+    let items = laszip.items.iter();
+    let extra: u64 = items
+        .filter(|i| matches!(i.item_type(), laz::LazItemType::Byte(_)))
+        .map(|i| u64::from(i.size()))
+        .sum();
     MODELS + extra * MODELS_PER_BYTE
 }
 
 fn in_parallel(decoder: &Decoder<'_>, chunks: &[Chunk], writer: &SourceWriter<'_>) -> Result<()> {
     let fixed = models(decoder.laszip) + sink_bytes::<i32>();
-    let layered = decoder.laszip.layout == Layout::Layers;
+    let layered = decoder.header.format.is_extended;
     let memory = |unit: usize| {
         let bytes = chunks[unit].bytes;
         fixed
@@ -117,8 +113,8 @@ fn in_parallel(decoder: &Decoder<'_>, chunks: &[Chunk], writer: &SourceWriter<'_
 /// Decodes a file in which the offset of a chunk is only known after the previous one has been decoded.
 fn one_by_one(decoder: &Decoder<'_>, writer: &SourceWriter<'_>) -> Result<()> {
     let (input, header) = (decoder.input, decoder.header);
-    let (start, per_chunk) = match (decoder.laszip.layout, decoder.laszip.chunk_points) {
-        (Layout::Stream, _) => (header.data, u64::MAX),
+    let (start, per_chunk) = match (decoder.laszip.stream, decoder.laszip.chunk_points) {
+        (true, _) => (header.data, u64::MAX),
         (_, Some(points)) => (header.data + 8, points),
         (_, None) => {
             return Err(input.error(
@@ -152,7 +148,7 @@ fn limit(
     warnings: &mut Vec<String>,
 ) -> Result<()> {
     let claimed = header.claimed;
-    let layered = laszip.layout == Layout::Layers;
+    let layered = header.format.is_extended;
     if claimed == 0 && layered {
         // Each chunk has its own number of points.
         for chunk in &mut table.chunks {
