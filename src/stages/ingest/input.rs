@@ -89,14 +89,18 @@ impl Input {
         Ok(head)
     }
 
-    /// A buffered reader of the bytes `start..end`.
-    pub(super) fn stream(&self, start: u64, end: u64) -> std::io::BufReader<Range<'_>> {
-        let range = Range {
+    /// A reader of the bytes `start..end`.
+    pub(super) fn range(&self, start: u64, end: u64) -> Range<'_> {
+        Range {
             input: self,
             at: start,
             end: end.min(self.bytes),
-        };
-        std::io::BufReader::with_capacity(STREAM_BUFFER, range)
+        }
+    }
+
+    /// A buffered reader of the bytes `start..end`.
+    pub(super) fn stream(&self, start: u64, end: u64) -> std::io::BufReader<Range<'_>> {
+        std::io::BufReader::with_capacity(STREAM_BUFFER, self.range(start, end))
     }
 }
 

@@ -7,11 +7,13 @@ use super::table::{self, Chunk, Table};
 use super::vlr::{self, Laszip};
 use super::{Header, Record};
 use crate::error::Result;
+use laz::LazItemType;
 
 /// Memory of the decoder's models, without those of extra bytes.
 const MODELS: u64 = 1 << 20;
-/// Memory of the models of one extra byte: 256 symbols with their tables.
+/// Memory of the models of one extra byte: 256 symbols with their tables, in layers for each of four channels.
 const MODELS_PER_BYTE: u64 = 4 << 10;
+const MODELS_PER_BYTE_IN_LAYERS: u64 = 4 * MODELS_PER_BYTE;
 /// Chunks of whole points up to this size are read into memory first.
 const IN_MEMORY: u64 = 8 << 20;
 /// Most points for each byte of a file, and number of points that is always accepted. Scans take several
@@ -70,12 +72,12 @@ fn plausible(input: &Input, points: u64) -> Result<()> {
 
 /// Memory of the models for all items.
 fn models(laszip: &Laszip) -> u64 {
-    let items = laszip.items.iter();
-    let extra: u64 = items
-        .filter(|i| matches!(i.item_type(), laz::LazItemType::Byte(_)))
-        .map(|i| u64::from(i.size()))
-        .sum();
-    MODELS + extra * MODELS_PER_BYTE
+    let extra = laszip.items.iter().map(|item| match item.item_type() {
+        LazItemType::Byte(bytes) => u64::from(bytes) * MODELS_PER_BYTE,
+        LazItemType::Byte14(bytes) => u64::from(bytes) * MODELS_PER_BYTE_IN_LAYERS,
+        _ => 0,
+    });
+    MODELS + extra.sum::<u64>()
 }
 
 fn in_parallel(decoder: &Decoder<'_>, chunks: &[Chunk], writer: &SourceWriter<'_>) -> Result<()> {
@@ -84,10 +86,8 @@ fn in_parallel(decoder: &Decoder<'_>, chunks: &[Chunk], writer: &SourceWriter<'_
     let memory = |unit: usize| {
         let bytes = chunks[unit].bytes;
         fixed
-            + match layered {
-                // The decoder copies each layer once.
-                true => 2 * bytes,
-                false if bytes <= IN_MEMORY => bytes,
+            + match layered || bytes <= IN_MEMORY {
+                true => bytes,
                 false => STREAM_BUFFER as u64,
             }
     };
