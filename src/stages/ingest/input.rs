@@ -89,14 +89,18 @@ impl Input {
         Ok(head)
     }
 
-    /// A buffered reader of the bytes `start..end`.
-    pub(super) fn stream(&self, start: u64, end: u64) -> std::io::BufReader<Range<'_>> {
-        let range = Range {
+    /// A reader of the bytes `start..end`.
+    pub(super) fn range(&self, start: u64, end: u64) -> Range<'_> {
+        Range {
             input: self,
             at: start,
             end: end.min(self.bytes),
-        };
-        std::io::BufReader::with_capacity(STREAM_BUFFER, range)
+        }
+    }
+
+    /// A buffered reader of the bytes `start..end`.
+    pub(super) fn stream(&self, start: u64, end: u64) -> std::io::BufReader<Range<'_>> {
+        std::io::BufReader::with_capacity(STREAM_BUFFER, self.range(start, end))
     }
 }
 
@@ -148,9 +152,4 @@ pub(super) fn u32_at(bytes: &[u8], at: usize) -> u32 {
 /// Little-endian `u64` at `at`; the caller has checked the length.
 pub(super) fn u64_at(bytes: &[u8], at: usize) -> u64 {
     u64::from(u32_at(bytes, at)) | u64::from(u32_at(bytes, at + 4)) << 32
-}
-
-/// Little-endian `f64` at `at`; the caller has checked the length.
-pub(super) fn f64_at(bytes: &[u8], at: usize) -> f64 {
-    f64::from_bits(u64_at(bytes, at))
 }

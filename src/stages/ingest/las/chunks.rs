@@ -11,22 +11,11 @@ use crate::error::{Error, Result};
 use laz::record::{
     LayeredPointRecordDecompressor, RecordDecompressor, SequentialPointRecordDecompressor,
 };
-use laz::{LazItem, LazItemType};
-use std::io::{Cursor, Read};
+use laz::{DecompressionSelection, LazItem, LazItemType};
+use std::io::Read;
 
 /// Bytes decoded before they are passed to the sink.
 const BATCH: usize = 64 << 10;
-
-/// Layers of the point item: x and y, z, class, flags, …
-const POINT_LAYERS: usize = 9;
-/// Layer of the class, decoded only if points are selected by class.
-const CLASS_LAYER: usize = 2;
-/// Layers that are always decoded: x and y, z, flags.
-const WANTED: [usize; 3] = [0, 1, 3];
-
-fn is_wanted(layer: usize, class: bool) -> bool {
-    WANTED.contains(&layer) || class && layer == CLASS_LAYER
-}
 
 /// The head of a layered chunk: first record, number of points, sizes of the layers.
 pub(super) struct LayerHead {
@@ -34,12 +23,6 @@ pub(super) struct LayerHead {
     pub(super) points: u64,
     /// Size of the whole chunk.
     pub(super) bytes: u64,
-    /// The first 30 bytes of the first record.
-    first: [u8; 30],
-    /// Sizes of the layers of the point item.
-    sizes: [u32; POINT_LAYERS],
-    /// Offset of the first layer in the file.
-    layers_at: u64,
 }
 
 impl LayerHead {
@@ -49,10 +32,8 @@ impl LayerHead {
         let count: usize = laszip.items.iter().map(layers).sum();
         let mut head = vec![0u8; record + 4 + 4 * count];
         input.read_exact_at(at, &mut head, "head of a LAZ chunk")?;
-        let mut first = [0u8; 30];
-        first.copy_from_slice(&head[..30]);
-        let size = |layer: usize| u32_at(&head, record + 4 + 4 * layer);
-        let layers: u64 = (0..count).map(|l| u64::from(size(l))).sum();
+        let size = |layer: usize| u64::from(u32_at(&head, record + 4 + 4 * layer));
+        let layers: u64 = (0..count).map(size).sum();
         let bytes = head.len() as u64 + layers;
         if bytes > input.bytes - at {
             return Err(input.error(
@@ -64,37 +45,7 @@ impl LayerHead {
         Ok(Self {
             points: u64::from(u32_at(&head, record)),
             bytes,
-            first,
-            sizes: std::array::from_fn(size),
-            layers_at: at + head.len() as u64,
         })
-    }
-
-    /// The chunk reduced to the point item and the needed layers, with or without the class according to
-    /// `class`.
-    ///
-    /// An empty layer is legal: the field keeps its first value.
-    fn reduced(&self, input: &Input, class: bool) -> Result<Vec<u8>> {
-        let wanted = self.sizes.iter().enumerate();
-        let wanted = wanted.filter(|(layer, _)| is_wanted(*layer, class));
-        let bytes: u64 = wanted.map(|(_, size)| u64::from(*size)).sum();
-        let mut chunk = Vec::with_capacity(70 + bytes as usize);
-        chunk.extend_from_slice(&self.first);
-        chunk.extend_from_slice(&(self.points as u32).to_le_bytes());
-        for (layer, size) in self.sizes.iter().enumerate() {
-            let kept = if is_wanted(layer, class) { *size } else { 0 };
-            chunk.extend_from_slice(&kept.to_le_bytes());
-        }
-        let mut at = self.layers_at;
-        for (layer, size) in self.sizes.iter().enumerate() {
-            if is_wanted(layer, class) {
-                let start = chunk.len();
-                chunk.resize(start + *size as usize, 0);
-                input.read_exact_at(at, &mut chunk[start..], "layer of a LAZ chunk")?;
-            }
-            at += u64::from(*size);
-        }
-        Ok(chunk)
     }
 }
 
@@ -117,9 +68,18 @@ impl Decoder<'_> {
                 format!("{} points in {} bytes", chunk.points, chunk.bytes),
             ));
         }
-        let source = Cursor::new(head.reduced(self.input, self.record.wanted.is_some())?);
-        let mut decoder = LayeredPointRecordDecompressor::new(source);
-        self.add_item(&mut decoder, &self.laszip.items[0])?;
+        let end = chunk.at + head.bytes;
+        let mut decoder = LayeredPointRecordDecompressor::new(self.input.range(chunk.at, end));
+        for item in &self.laszip.items {
+            self.add_item(&mut decoder, item)?;
+        }
+        let wanted = DecompressionSelection::base()
+            .decompress_z()
+            .decompress_flags();
+        decoder.set_selection(match self.record.wanted {
+            Some(_) => wanted.decompress_classification(),
+            None => wanted,
+        });
         self.points(&mut decoder, chunk.at, chunk.points, sink)
     }
 

@@ -3,145 +3,87 @@
 //! Coordinates are read unchanged; the records only serve for a warning. So errors in them are ignored.
 
 use super::super::crs::Crs;
-use super::super::input::{Input, u16_at, u64_at};
+use super::super::input::Input;
 use super::Header;
+use super::vlr::Records;
+use las::Vlr;
+use las::crs::{GeoTiffCrs, GeoTiffData};
+use std::collections::BTreeMap;
 
-/// User id of the records of reference systems.
-const USER: &[u8] = b"LASF_Projection";
+/// Limit for the number of records read, and for the size of those with GeoTIFF keys: each key has a copy of
+/// the numbers or the text that it names.
+const MOST_RECORDS: usize = 200;
+const LARGEST_KEYS: usize = 4 << 10;
 
-/// Record ids: GeoTIFF keys, their numbers and their texts, and well-known text.
-const KEYS: u16 = 34735;
+/// Records with the numbers and the texts of GeoTIFF keys.
 const NUMBERS: u16 = 34736;
 const TEXTS: u16 = 34737;
-const WELL_KNOWN: u16 = 2112;
 
-/// Limits for the number of records read and for the size of one.
-const MOST_RECORDS: u32 = 200;
-const LARGEST: u64 = 64 << 10;
-
-/// GeoTIFF keys with the code of a system, and keys that only describe one.
-const GEOGRAPHIC: u16 = 2048;
-const PROJECTED: u16 = 3072;
-const VERTICAL: u16 = 4096;
+/// GeoTIFF keys that only describe a system.
 const CITATIONS: [u16; 4] = [1026, 2049, 3073, 4097];
 
 /// Deepest nesting accepted in well-known text.
 const DEEPEST: usize = 32;
 
-/// The records of a file that describe its reference system.
-#[derive(Default)]
-struct Records {
-    keys: Vec<u8>,
-    numbers: Vec<u8>,
-    texts: Vec<u8>,
-    well_known: Vec<u8>,
-}
-
 /// The reference system of a file, if it gives one.
 pub(super) fn read(input: &Input, header: &Header) -> Option<Crs> {
-    let mut records = Records::default();
-    let plain = (header.vlrs, u32::MAX, 54, header.data);
-    let extended = header
-        .extended
-        .map(|(start, count)| (start, count, 60, input.bytes));
-    for (start, count, head_bytes, end) in std::iter::once(plain).chain(extended) {
-        let mut at = Some(start);
-        for _ in 0..count.min(MOST_RECORDS) {
-            at = at.and_then(|at| records.take(input, at, head_bytes, end));
-        }
-    }
-    records.crs()
+    let plain = Records::plain(input, header).take(MOST_RECORDS);
+    let extended = header.raw.evlr.map(|evlr| {
+        let most = MOST_RECORDS.min(evlr.number_of_evlrs as usize);
+        Records::extended(input, evlr.start_of_first_evlr).take(most)
+    });
+    let records = std::iter::once(plain).chain(extended);
+    // The last record of a kind counts.
+    let records: BTreeMap<u16, Vlr> = records
+        .flat_map(|records| records.map_while(Result::ok))
+        .filter(|(_, r)| r.is_wkt_crs() || r.is_geotiff_crs() && r.data.len() <= LARGEST_KEYS)
+        .map(|(_, record)| (record.record_id, record))
+        .collect();
+    crs(records)
 }
 
-impl Records {
-    /// Reads the record at `at` if it is relevant; returns the offset of the next one.
-    fn take(&mut self, input: &Input, at: u64, head_bytes: usize, end: u64) -> Option<u64> {
-        let data = at.checked_add(head_bytes as u64)?;
-        if data > end {
-            return None;
-        }
-        let mut head = [0u8; 60];
-        let head = &mut head[..head_bytes];
-        (input.read_at(at, head).ok()? == head_bytes).then_some(())?;
-        let bytes = match head_bytes {
-            60 => u64_at(head, 20),
-            _ => u64::from(u16_at(head, 20)),
-        };
-        let next = data.checked_add(bytes)?;
-        let user = head[2..18].split(|b| *b == 0).next().unwrap_or(&[]);
-        let slot = match (user == USER, u16_at(head, 18)) {
-            (true, KEYS) => &mut self.keys,
-            (true, NUMBERS) => &mut self.numbers,
-            (true, TEXTS) => &mut self.texts,
-            (true, WELL_KNOWN) => &mut self.well_known,
-            _ => return Some(next),
-        };
-        if bytes <= LARGEST && next <= input.bytes {
-            slot.resize(bytes as usize, 0);
-            (input.read_at(data, slot).ok()? == slot.len()).then_some(())?;
-        }
-        Some(next)
+/// From well-known text if present: files of newer point formats may have outdated keys beside it.
+fn crs(mut records: BTreeMap<u16, Vlr>) -> Option<Crs> {
+    // Numbers and texts that are missing are no reason to refuse the codes.
+    for record_id in [NUMBERS, TEXTS] {
+        let record = records.entry(record_id).or_default();
+        (record.user_id, record.record_id) = ("LASF_Projection".into(), record_id);
+        record.data.resize(LARGEST_KEYS, 0);
     }
+    let mut builder = las::Builder::from((1, 4));
+    builder.vlrs = records.into_values().collect();
+    let header = builder.into_header().ok()?;
+    let text = String::from_utf8_lossy(header.get_wkt_crs_bytes().unwrap_or_default());
+    match text.trim_matches(|c: char| c == '\0' || c.is_whitespace()) {
+        "" => geotiff(header.get_geotiff_crs().ok()??),
+        text => Some(well_known(text)),
+    }
+}
 
-    /// From well-known text if present: files of newer point formats may have outdated keys beside it.
-    fn crs(&self) -> Option<Crs> {
-        let text = String::from_utf8_lossy(&self.well_known);
-        let text = text.trim_matches(|c: char| c == '\0' || c.is_whitespace());
-        if text.is_empty() {
-            self.geotiff()
-        } else {
-            Some(well_known(text))
+fn geotiff(mut keys: GeoTiffCrs) -> Option<Crs> {
+    // 32767 stands for a system described by other keys.
+    let code = |key: Option<u16>| key.filter(|k| (1..32767).contains(k)).map(u32::from);
+    let projected = keys.get_projected_crs_geo_key_value();
+    let horizontal = code(projected.or(keys.get_geodetic_crs_geo_key_value()));
+    let vertical = code(keys.get_vertical_crs_geo_key_value());
+    let mut name = String::new();
+    keys.entries.retain(|entry| {
+        let citation = CITATIONS.contains(&entry.id);
+        if let (true, true, GeoTiffData::String(text)) = (citation, name.is_empty(), &entry.data) {
+            name = text.trim_end_matches(['|', '\0', ' ']).to_owned();
         }
+        !citation
+    });
+    keys.entries.sort_by_key(|entry| entry.id);
+    if name.is_empty() {
+        name = format!("{} keys without a name", keys.entries.len());
     }
-
-    fn geotiff(&self) -> Option<Crs> {
-        let word = |at: usize| Some(u16_at(self.keys.get(at..at + 2)?, 0));
-        let count = usize::from(word(6)?);
-        let mut found: Vec<(u16, String)> = Vec::new();
-        let mut name = String::new();
-        for entry in 1..=count {
-            let field = |n: usize| word(8 * entry + 2 * n);
-            let (Some(key), Some(place), Some(size), Some(value)) =
-                (field(0), field(1), field(2), field(3))
-            else {
-                break;
-            };
-            let (size, value) = (usize::from(size), usize::from(value));
-            let shown = match place {
-                0 => value.to_string(),
-                NUMBERS => {
-                    let bytes = self.numbers.get(8 * value..8 * (value + size));
-                    format!("{:?}", bytes.unwrap_or_default())
-                }
-                _ => {
-                    let text = self.texts.get(value..value + size).unwrap_or_default();
-                    let text = String::from_utf8_lossy(text);
-                    text.trim_end_matches(['|', '\0', ' ']).to_owned()
-                }
-            };
-            match CITATIONS.contains(&key) {
-                true if name.is_empty() => name = shown,
-                true => {}
-                false => found.push((key, shown)),
-            }
-        }
-        found.sort();
-        let code = |key: u16| {
-            let (_, value) = found.iter().find(|(k, _)| *k == key)?;
-            // 32767 stands for a system described by other keys.
-            value.parse().ok().filter(|code| (1..32767).contains(code))
-        };
-        let projected = found.iter().any(|(key, _)| *key == PROJECTED);
-        if name.is_empty() {
-            name = format!("{} keys without a name", found.len());
-        }
-        (!found.is_empty()).then(|| Crs {
-            horizontal: code(if projected { PROJECTED } else { GEOGRAPHIC }),
-            vertical: code(VERTICAL),
-            normal: format!("{found:?}"),
-            name,
-        })
-    }
+    (!keys.entries.is_empty()).then(|| Crs {
+        horizontal,
+        vertical,
+        normal: format!("{:?}", keys.entries),
+        name,
+    })
 }
 
 /// The system described by a well-known text, version 1 or 2.
@@ -217,16 +159,21 @@ impl Crs {
 mod tests {
     use super::*;
 
+    fn from(records: &[(u16, &[u8])]) -> Option<Crs> {
+        let record = |(record_id, data): &(u16, &[u8])| Vlr {
+            user_id: "LASF_Projection".into(),
+            record_id: *record_id,
+            data: data.to_vec(),
+            ..Vlr::default()
+        };
+        crs(records.iter().map(|r| (r.0, record(r))).collect())
+    }
+
     fn keys(entries: &[[u16; 4]], texts: &str) -> Crs {
         let head = [[1, 1, 0, entries.len() as u16]];
         let words = head.iter().chain(entries).flatten();
-        Records {
-            keys: words.flat_map(|w| w.to_le_bytes()).collect(),
-            texts: texts.into(),
-            ..Records::default()
-        }
-        .crs()
-        .unwrap()
+        let keys: Vec<u8> = words.flat_map(|w| w.to_le_bytes()).collect();
+        from(&[(34735, &keys), (TEXTS, texts.as_bytes())]).unwrap()
     }
 
     const UTM_17: &str = r#"PROJCS["NAD83 / UTM zone 17N", GEOGCS["NAD83", AUTHORITY["EPSG","4269"]],
@@ -276,17 +223,19 @@ mod tests {
         let user_defined = keys(&[[3072, 0, 1, 32767], [3073, 34737, 4, 0]], "own|");
         assert!(!user_defined.differs(&well_known(UTM_17)));
         assert_eq!(user_defined.to_string(), "\"own\"");
+        // A code is of use without the text and the numbers of other keys.
+        let lost = [
+            [3072, 0, 1, 26917],
+            [3073, TEXTS, 40, 9],
+            [2057, NUMBERS, 1, 3],
+        ];
+        assert_eq!(keys(&lost, "").to_string(), "EPSG:26917");
     }
 
     #[test]
     fn records_that_are_wrong_are_no_reference_system() {
-        let none = Records::default().crs();
-        assert!(none.is_none());
-        let cut = Records {
-            keys: vec![1, 0, 1, 0, 0, 0, 9, 0, 0, 4],
-            ..Records::default()
-        };
-        assert!(cut.crs().is_none());
+        assert!(from(&[]).is_none());
+        assert!(from(&[(34735, &[1, 0, 1, 0, 0, 0, 9, 0, 0, 4])]).is_none());
         assert_eq!(well_known(&"A[".repeat(5000)).horizontal, None);
         assert_eq!(well_known("]]]],\"").horizontal, None);
     }

@@ -1,27 +1,29 @@
 //! The public header block, read leniently: fields without influence on positions are not checked.
 
-use super::super::input::{Input, f64_at, u16_at, u32_at, u64_at};
+use super::super::input::Input;
 use crate::error::Result;
+use las::point::Format;
+use las::raw;
+use std::io::Read;
 
-/// Smallest header, that of LAS 1.0 to 1.2.
+/// Headers of LAS 1.0 to 1.2, of 1.3, which has the offset of waveforms, and of 1.4.
 const SMALLEST: usize = 227;
-
-/// Header of LAS 1.4.
+const WITH_WAVEFORMS: usize = 235;
 const LARGEST: usize = 375;
 
-/// Bytes of a record of each point format.
-const RECORD_BYTES: [u16; 11] = [20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67];
+/// Byte of the minor version.
+const MINOR: usize = 25;
 
 /// Valid scales and offsets. Values outside indicate damage, and would overflow.
 const SCALES: std::ops::RangeInclusive<f64> = 1e-15..=1e9;
 const LARGEST_OFFSET: f64 = 1e15;
 
-/// The fields of the header that are used.
+/// The header, and what follows from it.
 #[derive(Debug, Clone)]
 pub(super) struct Header {
-    pub(super) version: [u8; 2],
-    pub(super) compressed: bool,
-    pub(super) point_format: u8,
+    /// Without the fields that the file has no room for, and without the compression in the point format.
+    pub(super) raw: raw::Header,
+    pub(super) format: Format,
     pub(super) record_bytes: u16,
     /// Number of points given in the header.
     pub(super) claimed: u64,
@@ -29,14 +31,8 @@ pub(super) struct Header {
     pub(super) data: u64,
     /// Upper limit for the end of the points: the first extended record or waveform, or the end of the file.
     pub(super) data_end: u64,
-    /// Offset of the variable-length records.
-    pub(super) vlrs: u64,
-    /// Offset and number of the extended records.
-    pub(super) extended: Option<(u64, u32)>,
     pub(super) scale: [f64; 3],
     pub(super) offset: [f64; 3],
-    /// Smallest and largest coordinates given in the header; used for estimates only.
-    pub(super) bounds: [[f64; 3]; 2],
     pub(super) warnings: Vec<String>,
 }
 
@@ -46,93 +42,37 @@ impl Header {
     /// # Errors
     /// [`crate::Error::Input`] naming the field and its byte offset.
     pub(super) fn read(input: &Input) -> Result<Self> {
-        let head = input.head(LARGEST)?;
-        if head.len() < SMALLEST {
-            return Err(input.error(
-                "LAS header",
-                format!("the end of the file after {} bytes", head.len()),
-                format!("a header of at least {SMALLEST} bytes"),
-            ));
-        }
-        let version = [head[24], head[25]];
-        let mut warnings = Vec::new();
-        if version[0] != 1 {
-            return Err(input.error(
-                "version at byte 24",
-                format!("{}.{}", version[0], version[1]),
-                "1.0 to 1.4",
-            ));
-        }
-        if version[1] > 4 {
-            warnings.push(format!("LAS version 1.{} is read as 1.4", version[1]));
-        }
-        let header_bytes = usize::from(u16_at(&head, 94));
-        let full = version[1] >= 4 && header_bytes >= LARGEST && head.len() >= LARGEST;
+        let mut raw = raw(input)?;
+        let format = layout(input, &mut raw)?;
+        let data = raw.offset_to_point_data.into();
+        // The points end where other data are known to start. Waveforms in this file are an extended record
+        // too.
+        let extended = raw.evlr.map(|e| e.start_of_first_evlr).into_iter();
+        let other = extended.chain(raw.start_of_waveform_data_packet_record);
+        let data_end = other.filter(|start| (data + 1..input.bytes).contains(start));
         // Formats from 6 on leave the legacy count at zero; writers of lower formats fill in one of the two,
         // or both.
-        let count = if full { u64_at(&head, 247) } else { 0 };
-        let legacy_count = u64::from(u32_at(&head, 107));
+        let count = raw.large_file.map(|l| l.number_of_point_records);
+        let count = count.filter(|count| *count > 0);
         let mut header = Self {
-            version,
-            compressed: head[104] & 0x80 != 0,
-            point_format: head[104] & 0x3f,
-            record_bytes: u16_at(&head, 105),
-            claimed: if count > 0 { count } else { legacy_count },
-            data: u64::from(u32_at(&head, 96)),
-            data_end: input.bytes,
-            vlrs: header_bytes.max(SMALLEST) as u64,
-            extended: full.then(|| (u64_at(&head, 235), u32_at(&head, 243))),
-            scale: [131, 139, 147].map(|at| f64_at(&head, at)),
-            offset: [155, 163, 171].map(|at| f64_at(&head, at)),
-            bounds: [[187, 203, 219], [179, 195, 211]].map(|ends| ends.map(|at| f64_at(&head, at))),
-            warnings,
+            format,
+            record_bytes: raw.point_data_record_length,
+            claimed: count.unwrap_or(raw.number_of_point_records.into()),
+            data,
+            data_end: data_end.min().unwrap_or(input.bytes),
+            scale: [raw.x_scale_factor, raw.y_scale_factor, raw.z_scale_factor],
+            offset: [raw.x_offset, raw.y_offset, raw.z_offset],
+            warnings: Vec::new(),
+            raw,
         };
-        header.check_layout(input, head[104])?;
-        header.find_end(input, &head, header_bytes);
+        if header.raw.version.minor > 4 {
+            let warning = format!("LAS version {} is read as 1.4", header.raw.version);
+            header.warnings.push(warning);
+        }
         if header.claimed > 0 || header.data < header.data_end {
             header.check_transform(input)?;
         }
         Ok(header)
-    }
-
-    fn check_layout(&self, input: &Input, format_byte: u8) -> Result<()> {
-        let Some(&least) = RECORD_BYTES.get(usize::from(self.point_format)) else {
-            return Err(input.error(
-                "point format at byte 104",
-                format!("{} (byte {format_byte:#04x})", self.point_format),
-                "0 to 10",
-            ));
-        };
-        if self.record_bytes < least {
-            return Err(input.error(
-                "record length at byte 105",
-                self.record_bytes.to_string(),
-                format!("at least {least} for point format {}", self.point_format),
-            ));
-        }
-        if self.data < SMALLEST as u64 || self.data > input.bytes {
-            return Err(input.error(
-                "offset to point data at byte 96",
-                self.data.to_string(),
-                format!("{SMALLEST} to {}, the size of the file", input.bytes),
-            ));
-        }
-        Ok(())
-    }
-
-    /// Ends the points where other data are known to start.
-    fn find_end(&mut self, input: &Input, head: &[u8], header_bytes: usize) {
-        let extended = self.extended.filter(|(_, count)| *count > 0);
-        // Waveform packets in this file are an extended record too.
-        let has_waveforms = self.version[1] >= 3 && header_bytes >= 235 && head.len() >= 235;
-        let waveforms = has_waveforms.then(|| u64_at(head, 227));
-        self.data_end = extended
-            .map(|(start, _)| start)
-            .into_iter()
-            .chain(waveforms)
-            .filter(|start| (self.data + 1..input.bytes).contains(start))
-            .min()
-            .unwrap_or(input.bytes);
     }
 
     fn check_transform(&mut self, input: &Input) -> Result<()> {
@@ -160,4 +100,65 @@ impl Header {
         }
         Ok(())
     }
+}
+
+/// The header as it stands in the file.
+fn raw(input: &Input) -> Result<raw::Header> {
+    let mut head = input.head(LARGEST)?;
+    if head.len() < SMALLEST {
+        return Err(input.error(
+            "LAS header",
+            format!("the end of the file after {} bytes", head.len()),
+            format!("a header of at least {SMALLEST} bytes"),
+        ));
+    }
+    let minor = head[MINOR];
+    head[MINOR] = minor.min(4);
+    // Padding may be missing.
+    let mut raw = raw::Header::read_from((&head[..]).chain(std::io::repeat(0)))
+        .map_err(|e| input.error("LAS header", e.to_string(), "a header that can be read"))?;
+    raw.version.minor = minor;
+    if raw.version.major != 1 {
+        return Err(input.error("version at byte 24", raw.version.to_string(), "1.0 to 1.4"));
+    }
+    let room = head.len().min(raw.header_size.into());
+    raw.large_file = raw.large_file.filter(|_| room >= LARGEST);
+    raw.evlr = raw
+        .evlr
+        .filter(|e| room >= LARGEST && e.number_of_evlrs > 0);
+    let waveforms = raw.start_of_waveform_data_packet_record;
+    raw.start_of_waveform_data_packet_record = waveforms.filter(|_| room >= WITH_WAVEFORMS);
+    raw.header_size = raw.header_size.max(SMALLEST as u16);
+    Ok(raw)
+}
+
+/// Checks the layout of the points.
+fn layout(input: &Input, raw: &mut raw::Header) -> Result<Format> {
+    let byte = raw.point_data_record_format;
+    raw.point_data_record_format &= 0x3f;
+    let number = raw.point_data_record_format;
+    let Ok(mut format) = Format::new(number) else {
+        return Err(input.error(
+            "point format at byte 104",
+            format!("{number} (byte {byte:#04x})"),
+            "0 to 10",
+        ));
+    };
+    if raw.point_data_record_length < format.len() {
+        return Err(input.error(
+            "record length at byte 105",
+            raw.point_data_record_length.to_string(),
+            format!("at least {} for {format}", format.len()),
+        ));
+    }
+    let data = u64::from(raw.offset_to_point_data);
+    if data < SMALLEST as u64 || data > input.bytes {
+        return Err(input.error(
+            "offset to point data at byte 96",
+            data.to_string(),
+            format!("{SMALLEST} to {}, the size of the file", input.bytes),
+        ));
+    }
+    format.is_compressed = byte & 0x80 != 0;
+    Ok(format)
 }

@@ -4,14 +4,16 @@ use super::super::input::{Input, STREAM_BUFFER};
 use super::super::spool::{Sink, SourceWriter, sink_bytes};
 use super::chunks::{Decoder, LayerHead};
 use super::table::{self, Chunk, Table};
-use super::vlr::{self, Laszip, Layout};
+use super::vlr::{self, Laszip};
 use super::{Header, Record};
 use crate::error::Result;
+use laz::LazItemType;
 
 /// Memory of the decoder's models, without those of extra bytes.
 const MODELS: u64 = 1 << 20;
-/// Memory of the models of one extra byte: 256 symbols with their tables.
+/// Memory of the models of one extra byte: 256 symbols with their tables, in layers for each of four channels.
 const MODELS_PER_BYTE: u64 = 4 << 10;
+const MODELS_PER_BYTE_IN_LAYERS: u64 = 4 * MODELS_PER_BYTE;
 /// Chunks of whole points up to this size are read into memory first.
 const IN_MEMORY: u64 = 8 << 20;
 /// Most points for each byte of a file, and number of points that is always accepted. Scans take several
@@ -38,14 +40,14 @@ pub(super) fn read(
         laszip: &laszip,
         record: Record::of(header, writer.classes),
     };
-    let table = match laszip.layout {
-        Layout::Stream => None,
-        Layout::Chunks | Layout::Layers => table::read(input, header, &laszip, workspace)?,
+    let table = match laszip.stream {
+        true => None,
+        false => table::read(input, header, &laszip, workspace)?,
     };
-    let mut table = match (table, laszip.layout) {
-        (Some(table), _) => table,
-        (None, Layout::Layers) => table::walk(input, header, &laszip, workspace)?,
-        (None, Layout::Stream | Layout::Chunks) => {
+    let mut table = match table {
+        Some(table) => table,
+        None if header.format.is_extended => table::walk(input, header, &laszip, workspace)?,
+        None => {
             one_by_one(&decoder, writer)?;
             return Ok(warnings);
         }
@@ -70,28 +72,22 @@ fn plausible(input: &Input, points: u64) -> Result<()> {
 
 /// Memory of the models for all items.
 fn models(laszip: &Laszip) -> u64 {
-    let extra: u64 = match laszip.layout {
-        Layout::Layers => 0,
-        Layout::Stream | Layout::Chunks => laszip
-            .items
-            .iter()
-            .filter(|i| matches!(i.item_type(), laz::LazItemType::Byte(_)))
-            .map(|i| u64::from(i.size()))
-            .sum(),
-    };
-    MODELS + extra * MODELS_PER_BYTE
+    let extra = laszip.items.iter().map(|item| match item.item_type() {
+        LazItemType::Byte(bytes) => u64::from(bytes) * MODELS_PER_BYTE,
+        LazItemType::Byte14(bytes) => u64::from(bytes) * MODELS_PER_BYTE_IN_LAYERS,
+        _ => 0,
+    });
+    MODELS + extra.sum::<u64>()
 }
 
 fn in_parallel(decoder: &Decoder<'_>, chunks: &[Chunk], writer: &SourceWriter<'_>) -> Result<()> {
     let fixed = models(decoder.laszip) + sink_bytes::<i32>();
-    let layered = decoder.laszip.layout == Layout::Layers;
+    let layered = decoder.header.format.is_extended;
     let memory = |unit: usize| {
         let bytes = chunks[unit].bytes;
         fixed
-            + match layered {
-                // The decoder copies each layer once.
-                true => 2 * bytes,
-                false if bytes <= IN_MEMORY => bytes,
+            + match layered || bytes <= IN_MEMORY {
+                true => bytes,
                 false => STREAM_BUFFER as u64,
             }
     };
@@ -117,8 +113,8 @@ fn in_parallel(decoder: &Decoder<'_>, chunks: &[Chunk], writer: &SourceWriter<'_
 /// Decodes a file in which the offset of a chunk is only known after the previous one has been decoded.
 fn one_by_one(decoder: &Decoder<'_>, writer: &SourceWriter<'_>) -> Result<()> {
     let (input, header) = (decoder.input, decoder.header);
-    let (start, per_chunk) = match (decoder.laszip.layout, decoder.laszip.chunk_points) {
-        (Layout::Stream, _) => (header.data, u64::MAX),
+    let (start, per_chunk) = match (decoder.laszip.stream, decoder.laszip.chunk_points) {
+        (true, _) => (header.data, u64::MAX),
         (_, Some(points)) => (header.data + 8, points),
         (_, None) => {
             return Err(input.error(
@@ -152,7 +148,7 @@ fn limit(
     warnings: &mut Vec<String>,
 ) -> Result<()> {
     let claimed = header.claimed;
-    let layered = laszip.layout == Layout::Layers;
+    let layered = header.format.is_extended;
     if claimed == 0 && layered {
         // Each chunk has its own number of points.
         for chunk in &mut table.chunks {

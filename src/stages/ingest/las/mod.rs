@@ -65,7 +65,8 @@ impl PointFormat for Las {
 
 impl PointFile for Header {
     fn claims(&self, input: &Input) -> Claims {
-        let (format, least) = match self.compressed {
+        let raw = &self.raw;
+        let (format, least) = match self.format.is_compressed {
             true => (Format::LAZ, 1),
             false => (Format::LAS, self.record_bytes.into()),
         };
@@ -75,9 +76,12 @@ impl PointFile for Header {
         };
         Claims {
             classes: true,
-            version: Some(format!("{}.{}", self.version[0], self.version[1])),
-            point_format: Some(self.point_format),
-            bounds: Some(self.bounds),
+            version: Some(raw.version.to_string()),
+            point_format: Some(raw.point_data_record_format),
+            bounds: Some([
+                [raw.min_x, raw.min_y, raw.min_z],
+                [raw.max_x, raw.max_y, raw.max_z],
+            ]),
             ..Claims::new(input, format, native, self.claimed, least)
         }
     }
@@ -88,7 +92,7 @@ impl PointFile for Header {
 
     fn read(&self, input: &Input, target: &SourceWriter<'_>) -> Result<Vec<String>> {
         let mut warnings = self.warnings.clone();
-        warnings.extend(match self.compressed {
+        warnings.extend(match self.format.is_compressed {
             true => laz::read(input, self, target)?,
             false => plain::read(input, self, target)?,
         });
@@ -108,10 +112,10 @@ struct Record<'a> {
 
 impl<'a> Record<'a> {
     fn of(header: &Header, classes: &'a Classes) -> Self {
-        let (withheld, class) = match (header.point_format, header.version) {
-            (6.., _) => (0x04, (CLASS, 0xff)),
+        let (withheld, class) = match (header.format.is_extended, header.raw.version.minor) {
+            (true, _) => (0x04, (CLASS, 0xff)),
             // In LAS 1.0 the class is the whole byte.
-            (_, [1, 0]) => (0, (FLAGS, 0xff)),
+            (_, 0) => (0, (FLAGS, 0xff)),
             _ => (0x80, (FLAGS, 0x1f)),
         };
         let wanted = (*classes != Classes::All).then_some(classes);

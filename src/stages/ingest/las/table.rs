@@ -3,7 +3,7 @@
 use super::super::contain::contain;
 use super::super::input::{Input, u32_at, u64_at};
 use super::Header;
-use super::vlr::{Laszip, Layout};
+use super::vlr::Laszip;
 use crate::error::Result;
 use crate::workspace::Workspace;
 use crate::workspace::memory::Reservation;
@@ -123,7 +123,7 @@ pub(super) fn walk(
     laszip: &Laszip,
     workspace: &Workspace,
 ) -> Result<Table> {
-    debug_assert_eq!(laszip.layout, Layout::Layers);
+    debug_assert!(header.format.is_extended);
     let mut chunks: Vec<Chunk> = Vec::new();
     let mut at = header.data + 8;
     let mut points = 0;

@@ -1,28 +1,81 @@
-//! The laszip record, which describes the compression of the points.
+//! Variable-length records, and the laszip record, which describes the compression of the points.
 
-use super::super::input::{Input, u16_at, u32_at};
+use super::super::input::{Input, u16_at};
 use super::Header;
 use crate::error::Result;
-use laz::{LazItem, LazItemType, LazVlr};
+use las::raw;
+use laz::{LazItem, LazItemRecordBuilder, LazItemType, LazVlr};
 
-/// Bytes before the data of a variable-length record.
-const HEAD: usize = 54;
+/// Limit for the size of a record; larger ones are passed over.
+const LARGEST: u64 = 64 << 10;
 
-/// Organisation of the compressed points.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Layout {
-    /// One stream of all points.
-    Stream,
-    /// Chunks, each a stream of whole points.
-    Chunks,
-    /// Chunks with a separate layer for each field.
-    Layers,
+/// Consecutive variable-length records of a file, each with the offset of its data.
+pub(super) struct Records<'a> {
+    input: &'a Input,
+    /// Offset of the next record.
+    at: u64,
+    end: u64,
+    extended: bool,
+}
+
+impl<'a> Records<'a> {
+    /// The records between the header and the points.
+    pub(super) fn plain(input: &'a Input, header: &Header) -> Self {
+        Self {
+            input,
+            at: header.raw.header_size.into(),
+            end: header.data,
+            extended: false,
+        }
+    }
+
+    /// The extended records from `at` on.
+    pub(super) fn extended(input: &'a Input, at: u64) -> Self {
+        Self {
+            input,
+            at,
+            end: input.bytes,
+            extended: true,
+        }
+    }
+
+    fn read(&mut self) -> Result<Option<(u64, las::Vlr)>> {
+        let what = "variable-length record";
+        let (head, field) = if self.extended { (60, 8) } else { (54, 2) };
+        while let Some(data) = self.at.checked_add(head).filter(|data| *data <= self.end) {
+            let mut length = [0u8; 8];
+            let length_at = self.at + 20;
+            self.input
+                .read_exact_at(length_at, &mut length[..field], what)?;
+            let length = u64::from_le_bytes(length);
+            let at = std::mem::replace(&mut self.at, data.saturating_add(length));
+            if length <= LARGEST {
+                let mut record = vec![0u8; (head + length) as usize];
+                self.input.read_exact_at(at, &mut record, what)?;
+                let record = raw::Vlr::read_from(&record[..], self.extended).map_err(|e| {
+                    self.input
+                        .error(format!("{what} at byte {at}"), e.to_string(), "a record")
+                })?;
+                return Ok(Some((data, las::Vlr::new(record))));
+            }
+        }
+        Ok(None)
+    }
+}
+
+impl Iterator for Records<'_> {
+    type Item = Result<(u64, las::Vlr)>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        self.read().transpose()
+    }
 }
 
 /// The laszip record.
 #[derive(Debug, Clone)]
 pub(super) struct Laszip {
-    pub(super) layout: Layout,
+    /// True if all points are one stream; else they are in chunks.
+    pub(super) stream: bool,
     /// Points in each chunk except the last; `None` if every chunk has its own number.
     pub(super) chunk_points: Option<u64>,
     pub(super) items: Vec<LazItem>,
@@ -33,19 +86,11 @@ pub(super) struct Laszip {
 /// # Errors
 /// [`crate::Error::Input`] if there is none, or if it describes an unsupported compression.
 pub(super) fn read(input: &Input, header: &Header) -> Result<Laszip> {
-    let mut at = header.vlrs;
-    while at + HEAD as u64 <= header.data {
-        let mut head = [0u8; HEAD];
-        input.read_exact_at(at, &mut head, "variable-length record")?;
-        let bytes = usize::from(u16_at(&head, 20));
-        let data = at + HEAD as u64;
-        let user = head[2..18].split(|b| *b == 0).next().unwrap_or(&[]);
-        if user == LazVlr::USER_ID.as_bytes() && u16_at(&head, 18) == LazVlr::RECORD_ID {
-            let mut record = vec![0u8; bytes];
-            input.read_exact_at(data, &mut record, "laszip record")?;
-            return parse(input, header, data, &record);
+    for record in Records::plain(input, header) {
+        let (at, record) = record?;
+        if record.user_id == LazVlr::USER_ID && record.record_id == LazVlr::RECORD_ID {
+            return parse(input, header, at, &record.data);
         }
-        at = data + bytes as u64;
     }
     Err(input.error(
         "variable-length records",
@@ -58,7 +103,7 @@ fn parse(input: &Input, header: &Header, at: u64, record: &[u8]) -> Result<Laszi
     let wrong = |found: String, expected: String| {
         Err(input.error(format!("laszip record at byte {at}"), found, expected))
     };
-    let vlr = match LazVlr::read_from(record) {
+    let vlr = match LazVlr::from_buffer(record) {
         Ok(vlr) => vlr,
         Err(e) => return wrong(e.to_string(), "a record that can be decoded".into()),
     };
@@ -68,43 +113,37 @@ fn parse(input: &Input, header: &Header, at: u64, record: &[u8]) -> Result<Laszi
     }
     let items = vlr.items();
     let sum: u64 = items.iter().map(|i| u64::from(i.size())).sum();
-    let layered = header.point_format >= 6;
+    let layered = header.format.is_extended;
     let (versions, first) = match layered {
         true => (3..=4, LazItemType::Point14),
         false => (1..=2, LazItemType::Point10),
     };
     let fits = items.first().is_some_and(|i| i.item_type() == first)
         && items.iter().all(|i| {
-            i.size() > 0
-                && versions.contains(&i.version())
-                && fixed_size(i.item_type()).is_none_or(|s| s == i.size())
+            let standard = LazItemRecordBuilder::new().add_item(i.item_type()).build();
+            i.size() > 0 && versions.contains(&i.version()) && i.size() == standard[0].size()
         });
+    let format = header.raw.point_data_record_format;
     if !fits || sum != u64::from(header.record_bytes) {
         return wrong(
             format!("items of {sum} bytes: {}", names(items)),
             format!(
-                "items of point format {} that make up a record of {} bytes",
-                header.point_format, header.record_bytes
+                "items of point format {format} that make up a record of {} bytes",
+                header.record_bytes
             ),
         );
     }
-    let layout = match (u16_at(record, 0), layered) {
-        (1, false) => Layout::Stream,
-        (2, false) => Layout::Chunks,
-        (3, true) => Layout::Layers,
-        (other, _) => {
-            let format = header.point_format;
-            let found = format!("compressor {other} for point format {format}");
-            return wrong(
-                found,
-                "1 or 2 for point formats 0 to 5, 3 for 6 to 10".into(),
-            );
-        }
-    };
-    let variable = vlr.uses_variable_size_chunks() || u32_at(record, 12) == 0;
+    let compressor = u16_at(record, 0);
+    if !matches!((compressor, layered), (1 | 2, false) | (3, true)) {
+        return wrong(
+            format!("compressor {compressor} for point format {format}"),
+            "1 or 2 for point formats 0 to 5, 3 for 6 to 10".into(),
+        );
+    }
+    let counted = vlr.uses_variable_size_chunks();
     Ok(Laszip {
-        layout,
-        chunk_points: (!variable).then(|| u64::from(vlr.chunk_size())),
+        stream: compressor == 1,
+        chunk_points: (!counted).then(|| vlr.chunk_size().into()),
         items: items.clone(),
     })
 }
@@ -117,19 +156,7 @@ fn names(items: &[LazItem]) -> String {
     names.join(", ")
 }
 
-fn fixed_size(item: LazItemType) -> Option<u16> {
-    Some(match item {
-        LazItemType::Point10 => 20,
-        LazItemType::GpsTime => 8,
-        LazItemType::RGB12 | LazItemType::RGB14 => 6,
-        LazItemType::WavePacket13 | LazItemType::WavePacket14 => 29,
-        LazItemType::Point14 => 30,
-        LazItemType::RGBNIR14 => 8,
-        LazItemType::Byte(_) | LazItemType::Byte14(_) => return None,
-    })
-}
-
-/// Number of layers of an item in a chunk of [`Layout::Layers`].
+/// Number of layers of an item in a chunk of point formats 6 to 10.
 pub(super) fn layers(item: &LazItem) -> usize {
     match item.item_type() {
         LazItemType::Point14 => 9,
