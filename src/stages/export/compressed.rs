@@ -17,11 +17,12 @@ use std::ops::Range;
 use zstd::bulk::Compressor;
 use zstd::zstd_safe::compress_bound;
 
-/// Most bytes of the mesh in a frame: what a reader has to decompress to get at one record. Frames of 4 MiB
-/// make the file 0.1 % smaller.
+/// Most bytes of the mesh in a frame: what a reader has to decompress to get at one record. At this level the
+/// file is 7 % smaller than with frames of 1 MiB (docs/decisions.md).
 const PIECE: usize = 256 << 10;
 
-/// The level of compression; higher ones cost more time than they save bytes (docs/decisions.md).
+/// The level of compression: 1 saves a third of the time and makes the file a tenth larger, 6 is slower and no
+/// smaller (docs/decisions.md).
 const LEVEL: i32 = 3;
 
 /// Bytes of memory of a compressor for pieces at this level; a test asks the library.
