@@ -215,10 +215,10 @@ pub struct Repair {
 /// `outcrop reconstruct`
 #[derive(Debug, ClapArgs)]
 pub struct Reconstruct {
-    /// Files (LAS, LAZ, PLY, XYZ text) or folders of files; together they are one cloud
+    /// Files (LAS, LAZ, PLY, XYZ text; also as .gz and .zst) or folders of files; together they are one cloud
     #[arg(value_name = "INPUT", required = true)]
     pub inputs: Vec<PathBuf>,
-    /// The mesh to write (binary PLY)
+    /// The mesh to write (binary PLY); MESH.ply.zst is compressed
     #[arg(long, short, value_name = "MESH.ply")]
     pub output: PathBuf,
     #[command(flatten)]

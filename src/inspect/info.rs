@@ -74,6 +74,7 @@ pub fn info(inputs: &[PathBuf], classes: &Classes, workspace: &Workspace) -> Res
     let start = Instant::now();
     let observer = &workspace.observer;
     observer.begin("ingest", "points", 0);
+    let headers = Known::from_headers(inputs);
     let spool = ingest_classes(inputs, classes, workspace)?;
     observer.end();
     let input = spool.stats().clone();
@@ -93,6 +94,7 @@ pub fn info(inputs: &[PathBuf], classes: &Classes, workspace: &Workspace) -> Res
     let known = Known {
         read: input.kept,
         spool: spool_bytes,
+        decompressed: headers.map_or(0, |known| known.decompressed),
         points,
         double: Some(double),
         moved: None,

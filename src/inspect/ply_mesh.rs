@@ -1,7 +1,9 @@
 //! Streaming reader of triangle meshes in PLY files; see [`MeshStream`].
 
 use crate::error::{Error, Result};
-use outcrop_ply::{FileError, MeshStream, Part};
+use crate::workspace::Workspace;
+use crate::workspace::compressed::{Beginning, Content};
+use outcrop_ply::{FileError, Header, MeshStream, Part};
 use std::path::Path;
 
 pub use outcrop_ply::{NO_VERTEX, SLICE};
@@ -30,7 +32,11 @@ pub trait Sink {
 
 /// A PLY mesh with a checked header.
 #[derive(Debug)]
-pub struct PlyMesh(MeshStream);
+pub struct PlyMesh {
+    stream: MeshStream,
+    /// The file that the stream reads if the mesh is compressed; it is deleted at the end.
+    _content: Option<Content>,
+}
 
 /// True for a PLY file whose header has faces: a mesh and not a cloud. False for other files and for headers
 /// that cannot be read; their readers report the error.
@@ -38,7 +44,15 @@ pub struct PlyMesh(MeshStream);
 /// # Errors
 /// [`Error::Io`].
 pub fn holds_faces(path: &Path) -> Result<bool> {
-    MeshStream::holds_faces(path).map_err(converted)
+    let compressed = match Beginning::of(path, Header::LONGEST) {
+        Err(Error::Input { .. }) => return Ok(false),
+        beginning => beginning?,
+    };
+    let Some(beginning) = compressed else {
+        return MeshStream::holds_faces(path).map_err(converted);
+    };
+    let header = Header::read(&mut &beginning.bytes[..]);
+    Ok(header.is_ok_and(|header| header.holds_faces()))
 }
 
 impl PlyMesh {
@@ -47,25 +61,41 @@ impl PlyMesh {
     /// # Errors
     /// [`Error::Io`]; [`Error::Input`] if it is no PLY mesh, or has counts that do not fit its size.
     pub fn open(path: &Path) -> Result<Self> {
-        MeshStream::open(path).map(Self).map_err(converted)
+        Ok(Self {
+            stream: MeshStream::open(path).map_err(converted)?,
+            _content: None,
+        })
+    }
+
+    /// As [`PlyMesh::open`], also for a compressed file; its content is read from the scratch folder.
+    ///
+    /// # Errors
+    /// See [`PlyMesh::open`] and [`Content::of`].
+    pub fn open_any(path: &Path, workspace: &Workspace) -> Result<Self> {
+        let Some(content) = Content::of(path, workspace)? else {
+            return Self::open(path);
+        };
+        let stream = MeshStream::open_as(&content.path, path).map_err(converted)?;
+        let _content = Some(content);
+        Ok(Self { stream, _content })
     }
 
     /// Number of vertices; at most [`NO_VERTEX`], so that indices fit `u32`.
     #[must_use]
     pub fn vertices(&self) -> u64 {
-        self.0.vertices()
+        self.stream.vertices()
     }
 
     /// Number of faces, of any number of corners.
     #[must_use]
     pub fn faces(&self) -> u64 {
-        self.0.faces()
+        self.stream.faces()
     }
 
     /// True if all vertices come before the first face.
     #[must_use]
     pub fn vertices_first(&self) -> bool {
-        self.0.vertices_first()
+        self.stream.vertices_first()
     }
 
     /// Reads the whole mesh.
@@ -79,7 +109,7 @@ impl PlyMesh {
             Part::Triangles(triangles) => sink.triangles(triangles),
             Part::NonTriangle => sink.non_triangles(1),
         };
-        let read = self.0.read(|part| take(part).map_err(Failure));
+        let read = self.stream.read(|part| take(part).map_err(Failure));
         read.map_err(converted)
     }
 }

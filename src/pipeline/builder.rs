@@ -41,7 +41,7 @@ impl Builder {
         self
     }
 
-    /// Path of the mesh (binary PLY).
+    /// Path of the mesh (binary PLY; compressed if the name ends with `.zst`).
     #[must_use]
     pub fn output(mut self, path: impl Into<PathBuf>) -> Self {
         self.output = path.into();
@@ -143,6 +143,17 @@ impl Builder {
         }
         if self.output.as_os_str().is_empty() {
             return missing("--output", "the path of the mesh");
+        }
+        if self
+            .output
+            .extension()
+            .is_some_and(|e| e.eq_ignore_ascii_case("gz"))
+        {
+            return Err(Error::Parameter {
+                name: "--output",
+                found: self.output.display().to_string(),
+                expected: "a name that ends with .ply or .ply.zst".into(),
+            });
         }
         let budget = self.memory.unwrap_or_else(default_memory);
         let folder = || scratch_folder(&self.output, self.scratch.as_deref());

@@ -40,6 +40,8 @@ pub(crate) struct Known {
     pub read: u64,
     /// Bytes of the spool.
     pub spool: u64,
+    /// Bytes of the content of the largest compressed input that is still to be read.
+    pub decompressed: u64,
     /// Points that remain.
     pub points: u64,
     /// True if the mesh has coordinates in double precision; none if unknown.
@@ -55,6 +57,7 @@ impl Known {
         let mut known = Self {
             read: 0,
             spool: 0,
+            decompressed: 0,
             points: 0,
             double: None,
             moved: None,
@@ -65,6 +68,7 @@ impl Known {
             let points = probe.points_likely;
             known.read += points;
             known.spool += points * probe.spool_bytes_per_point;
+            known.decompressed = known.decompressed.max(probe.decompressed_bytes);
             probes.push(probe);
         }
         known.points = known.read;
@@ -78,7 +82,8 @@ impl Known {
         let (moved, triples, triangles) = self.surface(params);
         let stores = STORED * (1.0 + moved);
         // While points are read and sorted they are on disk twice.
-        let mut early = self.spool as f64 + STORED * points;
+        let early = self.spool as f64 + STORED * points;
+        let mut early = early.max((self.spool + self.decompressed) as f64);
         if params.thin.is_some() {
             early = early.max(self.spool as f64 + 2.0 * POSITION * self.read as f64);
         }
@@ -151,6 +156,7 @@ mod tests {
     const MILLION: Known = Known {
         read: 1_000_000,
         spool: 12_000_000,
+        decompressed: 0,
         points: 1_000_000,
         double: Some(false),
         moved: None,

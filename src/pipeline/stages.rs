@@ -96,6 +96,7 @@ impl<'a> Stages<'a> {
         self.known = Known {
             read: input.kept,
             spool: spool.bytes(),
+            decompressed: 0,
             // With thinning, the number of points that stay is unknown.
             points: if params.thin.is_some() { 0 } else { input.kept },
             double: Some(self.report.coordinates == CoordinateType::Double),

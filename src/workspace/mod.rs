@@ -2,6 +2,7 @@
 //!
 //! The workspace knows neither stages nor rows. Stages obtain memory, files and threads from it.
 
+pub mod compressed;
 mod disk;
 pub mod fault;
 pub mod file;

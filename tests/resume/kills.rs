@@ -49,6 +49,29 @@ fn killed_while_the_mesh_gets_its_name() {
 }
 
 #[test]
+fn killed_while_a_compressed_mesh_is_written() {
+    let case = Case::with_mesh("mesh.ply.zst", ROBUST);
+    let last = |kind: &str| case.events[kind];
+    let writes = (last("write") - 20..=last("write")).map(|n| format!("write:{n}"));
+    let records = (last("recorded") - 6..=last("recorded")).map(|n| format!("recorded:{n}"));
+    let names = ["rename:1", "renamed:1"].map(String::from);
+    for fault in writes.chain(records).chain(names) {
+        case.killed(&fault);
+        if case.scratch.exists() {
+            assert_eq!(case.go_on(&fault), "", "{fault}");
+        }
+    }
+    // Of a disk that is full nothing is left under the final name, and the run goes on when there is room.
+    let full = format!("full:{}", last("write") - 8);
+    case.clear();
+    let ended = case.attempt(&full, &["--threads", "2"]);
+    assert_eq!(ended.said.code, Some(2), "{ended:?}");
+    assert!(ended.said.err.contains("not enough space"), "{ended:?}");
+    assert!(!case.mesh.exists());
+    assert_eq!(case.go_on(&full), "");
+}
+
+#[test]
 fn killed_while_scratch_is_removed() {
     let case = Case::new(ROBUST);
     let events = case.events["delete"];

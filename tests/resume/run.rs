@@ -48,13 +48,18 @@ impl From<Output> for Ended {
 impl Case {
     /// A noisy terrain with outliers: every stage has work to do.
     pub fn new(options: &[&str]) -> Self {
+        Self::with_mesh("mesh.ply", options)
+    }
+
+    /// As [`Case::new`], with this name of the mesh.
+    pub fn with_mesh(name: &str, options: &[&str]) -> Self {
         let bench = Bench::new();
         let mut cloud = Cloud::new(Kind::Terrain).points(30_000).noise(0.6);
         cloud.outliers = 0.001;
         let input = bench.cloud("cloud.laz", &cloud);
-        let mesh = bench.path("mesh.ply");
+        let mesh = bench.path(name);
         let mut case = Self {
-            scratch: bench.path("mesh.ply.outcrop-scratch"),
+            scratch: bench.path(&format!("{name}.outcrop-scratch")),
             options: options.iter().map(ToString::to_string).collect(),
             expected: 0,
             counts: serde_json::Value::Null,

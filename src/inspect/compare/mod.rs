@@ -67,7 +67,13 @@ fn read_side(
     workspace: &Workspace,
 ) -> Result<Shape> {
     if path.is_file() && holds_faces(path)? {
-        mesh::read(PlyMesh::open(path)?, path, name, options, workspace)
+        mesh::read(
+            PlyMesh::open_any(path, workspace)?,
+            path,
+            name,
+            options,
+            workspace,
+        )
     } else {
         cloud::read(path, name, workspace)
     }

@@ -57,7 +57,7 @@ pub fn verify(mesh: &Path, workspace: &Workspace) -> Result<Verdict> {
 /// # Errors
 /// See [`verify`].
 pub fn verify_with(mesh: &Path, options: &Options, workspace: &Workspace) -> Result<Verdict> {
-    let mesh = PlyMesh::open(mesh)?;
+    let mesh = PlyMesh::open_any(mesh, workspace)?;
     let free = workspace.memory.available();
     let plan = Plan::new(mesh.vertices(), mesh.faces(), free, options.range);
     check(mesh, &plan, options, workspace)

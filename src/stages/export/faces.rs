@@ -24,15 +24,15 @@ pub struct Faces<'a> {
 }
 
 impl<'a> Faces<'a> {
-    /// Reads the triangles of the block whose ids are `ids`.
+    /// Reads the triangles of `block`, whose ids are `ids`.
     pub fn load(
         unit: &Unit<'_>,
+        block: usize,
         surface: &Surface<'_>,
         filled: &Inbox<FilledTriangle>,
         numbering: &'a Numbering,
         ids: Range<u32>,
     ) -> Result<Self> {
-        let block = unit.number();
         let (triangles, _) = surface.load(unit, block)?;
         let filled = filled.get(unit, block)?;
         let filled = filled.iter().map(|f| f.triangle);
@@ -52,11 +52,6 @@ impl<'a> Faces<'a> {
     pub fn bytes(&self) -> u64 {
         let triangles = bytes_of(&self.triangles) + bytes_of(&self.filled);
         triangles + bytes_of(&self.numbers) + bytes_of(&self.splits)
-    }
-
-    /// Number of triangles.
-    pub fn len(&self) -> usize {
-        self.own().len() + self.filled.len()
     }
 
     /// Triangles of the surface whose smallest vertex is in the block.

@@ -36,12 +36,18 @@ pub fn temporary(output: &Path) -> PathBuf {
     folder_of(output).join(name)
 }
 
-/// Number of the header among the parts of the mesh.
-const HEADER: u32 = u32::MAX;
+/// Number of the header among the parts of the mesh, and of the whole of a compressed one.
+pub const HEADER: u32 = u32::MAX;
+
+/// True if the name of a mesh asks for Zstandard.
+#[must_use]
+pub fn is_compressed(output: &Path) -> bool {
+    let extension = output.extension().unwrap_or_default();
+    extension.eq_ignore_ascii_case("zst")
+}
 
 impl<'a> MeshFile<'a> {
-    /// Writes the header of a mesh beside `output`, or reopens the file if an earlier attempt of the run
-    /// wrote it.
+    /// Creates the file of a mesh beside `output`, or reopens it if an earlier attempt of the run wrote it.
     ///
     /// # Errors
     /// [`Error::Io`]; [`Error::Disk`] if there is no room for the whole file.
@@ -71,9 +77,6 @@ impl<'a> MeshFile<'a> {
                 Err(e) => return Err(Error::io(&file.temporary, "open", e)),
             }
         }
-        workspace.once("header", |unit| {
-            file.write(unit, HEADER, &file.layout.header, 0)
-        })?;
         Ok(file)
     }
 
@@ -94,7 +97,13 @@ impl<'a> MeshFile<'a> {
             .create_new(true)
             .open(&self.temporary)
             .map_err(|e| Error::io(&self.output, "create a file beside it", e))?;
-        let room = fault::write().and_then(|()| file.set_len(bytes));
+        // The size of a compressed mesh is unknown.
+        let length = if is_compressed(&self.output) {
+            0
+        } else {
+            bytes
+        };
+        let room = fault::write().and_then(|()| file.set_len(length));
         room.map_err(|e| match failed_write(&self.output, 0, bytes, e) {
             Error::Io { source, .. } => Error::io(&self.output, "make room for the mesh", source),
             full => full,
@@ -106,16 +115,9 @@ impl<'a> MeshFile<'a> {
     /// Writes encoded `bytes` at `offset`, as part `part` of the mesh.
     ///
     /// # Errors
-    /// [`Error::Io`].
+    /// [`Error::Io`], [`Error::Disk`].
     pub fn write(&self, unit: &Unit<'_>, part: u32, bytes: &[u8], offset: u64) -> Result<()> {
-        let Some(file) = &self.file else {
-            let gone = std::io::ErrorKind::NotFound.into();
-            return Err(Error::io(&self.temporary, "open", gone));
-        };
-        unit.io.add_written(bytes.len() as u64);
-        fault::write()
-            .and_then(|()| file.write_all_at(bytes, offset))
-            .map_err(|e| failed_write(&self.output, bytes.len(), 0, e))?;
+        self.put(bytes, offset)?;
         let resumable = unit.is_resumable();
         let place = Place {
             offset,
@@ -125,6 +127,26 @@ impl<'a> MeshFile<'a> {
         };
         note(unit, part, place);
         Ok(())
+    }
+
+    /// Writes `bytes` at `offset`.
+    ///
+    /// # Errors
+    /// [`Error::Io`], [`Error::Disk`].
+    pub fn put(&self, bytes: &[u8], offset: u64) -> Result<()> {
+        let Some(file) = &self.file else {
+            let gone = std::io::ErrorKind::NotFound.into();
+            return Err(Error::io(&self.temporary, "open", gone));
+        };
+        self.workspace.io.add_written(bytes.len() as u64);
+        fault::write()
+            .and_then(|()| file.write_all_at(bytes, offset))
+            .map_err(|e| failed_write(&self.output, bytes.len(), 0, e))
+    }
+
+    /// The error of an `action` on the mesh that failed.
+    pub fn failed(&self, action: &str, error: std::io::Error) -> Error {
+        Error::io(&self.output, action, error)
     }
 
     /// Appends the encoded vertices to `bytes`.
@@ -174,7 +196,7 @@ impl Drop for MeshFile<'_> {
 }
 
 /// Notes a part of the mesh.
-fn note(unit: &Unit<'_>, section: u32, place: Place) {
+pub fn note(unit: &Unit<'_>, section: u32, place: Place) {
     unit.note(Put {
         file: OUTPUT.to_owned(),
         section,

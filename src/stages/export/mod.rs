@@ -1,15 +1,17 @@
-//! Writes the mesh file. Used points are renumbered and pinched vertices split. Slices are written in
-//! parallel at known offsets under a temporary name; then the file is renamed.
+//! Writes the mesh file. Used points are renumbered and pinched vertices split. Parts are written in
+//! parallel at known offsets under a temporary name, or compressed in parallel and written in order; then the
+//! file is renamed.
 //!
 //! A format is a module that implements `MeshFormat`, and an entry of the list here.
 
+mod compressed;
 mod faces;
 mod file;
 mod format;
 mod number;
 mod ply;
 
-pub(crate) use file::{folder_of, temporary};
+pub(crate) use file::{folder_of, is_compressed, temporary};
 pub use format::CoordinateType;
 
 use crate::error::{Error, Result};
@@ -21,18 +23,23 @@ use crate::stages::repair::{FilledTriangle, Repaired, Surface};
 use crate::workspace::memory::bytes_of;
 use crate::workspace::{Unit, Workspace};
 use faces::Faces;
-use file::MeshFile;
+use file::{HEADER, MeshFile};
 use format::{Mesh, MeshFormat};
 use number::Numbering;
 use serde::{Deserialize, Serialize};
+use std::ops::Range;
 use std::path::Path;
 
 /// All formats. The first is used if the extension is not known.
 const FORMATS: [&dyn MeshFormat; 1] = [&ply::Ply];
 
-/// The format for the extension of `output`.
+/// The format for the extension of `output`, or for that before the one of compression.
 fn format_of(output: &Path) -> &'static dyn MeshFormat {
-    let extension = output.extension().unwrap_or_default();
+    let name = match is_compressed(output) {
+        true => Path::new(output.file_stem().unwrap_or_default()),
+        false => output,
+    };
+    let extension = name.extension().unwrap_or_default();
     let is = |known: &&str| extension.eq_ignore_ascii_case(known);
     let mut named = FORMATS.into_iter();
     let named = named.find(|f| f.extensions().iter().any(is));
@@ -101,9 +108,10 @@ pub fn export(
         lattice,
         file: MeshFile::open(output, format_of(output), mesh, workspace)?,
     };
-    let bytes = |block| writer.bytes(workspace, block);
-    let work = |unit: &Unit<'_>| writer.block(unit).inspect(|_| unit.advance(1));
-    workspace.units("export: block", blocks.count(), bytes, work, |_, ()| Ok(()))?;
+    match is_compressed(output) {
+        true => compressed::write(&writer, workspace)?,
+        false => writer.write(workspace)?,
+    }
     writer.file.finish()?;
     writer.numbering.release(workspace)?;
     Ok(stats)
@@ -112,7 +120,8 @@ pub fn export(
 const NO_TRIANGLES: &str = "no three cells agree on one that belongs to a component large enough; \
     try a larger --radius, --smooth 1 for noisy scans, or a smaller --min-component";
 
-/// Writes the blocks of a mesh.
+/// Writes the parts of a mesh: for each block its vertices, its copies of vertices, and its triangles. In the
+/// file the parts of one kind follow each other.
 struct Writer<'a> {
     store: &'a PointStore,
     surface: Surface<'a>,
@@ -123,42 +132,92 @@ struct Writer<'a> {
     file: MeshFile<'a>,
 }
 
+/// Number of parts of a block.
+const KINDS: usize = 3;
+
 impl Writer<'_> {
-    /// Bytes for a block.
-    fn bytes(&self, workspace: &Workspace, block: usize) -> u64 {
+    /// Writes the file, every part at its offset.
+    fn write(&self, workspace: &Workspace) -> Result<()> {
+        let (file, count) = (&self.file, self.blocks.count());
+        workspace.once("header", |unit| {
+            file.write(unit, HEADER, &file.layout.header, 0)
+        })?;
+        let memory = |block| self.memory(workspace, block);
+        let work = |unit: &Unit<'_>| {
+            let mut bytes = Vec::new();
+            for kind in 0..KINDS {
+                let part = kind * count + unit.number();
+                self.encode(unit, part, &mut bytes)?;
+                file.write(unit, part as u32, &bytes, self.start(part))?;
+            }
+            unit.advance(1);
+            Ok(())
+        };
+        workspace.units("export: block", count, memory, work, |_, ()| Ok(()))
+    }
+
+    /// Bytes of memory for a part of a block.
+    fn memory(&self, workspace: &Workspace, block: usize) -> u64 {
         let records = self.surface.records(workspace, block) + self.filled.rows(block);
         60 * records as u64 + self.blocks.ids(block).len() as u64 * 60 + (1 << 20)
     }
 
-    /// Writes a block.
-    fn block(&self, unit: &Unit<'_>) -> Result<()> {
-        let (block, numbering, file) = (unit.number(), &self.numbering, &self.file);
-        let (vertices, triangles) = (file.layout.vertices, file.layout.triangles);
+    /// Offset in the uncompressed file at which a part begins: the end of the part before it.
+    fn start(&self, part: usize) -> u64 {
+        let (layout, numbering) = (&self.file.layout, &self.numbering);
+        let block = part % self.blocks.count();
+        match part / self.blocks.count() {
+            0 => {
+                let first = numbering.vertex(self.blocks.ids(block).start);
+                layout.vertices.offset(first.into())
+            }
+            1 => layout.vertices.offset(numbering.first_copy(block)),
+            2 => layout.triangles.offset(numbering.first_face(block)),
+            _ => layout.bytes,
+        }
+    }
+
+    /// Encodes a part.
+    fn encode(&self, unit: &Unit<'_>, part: usize, bytes: &mut Vec<u8>) -> Result<()> {
+        let (numbering, block) = (&self.numbering, part % self.blocks.count());
         let ids = self.blocks.ids(block);
+        bytes.clear();
+        bytes.reserve_exact((self.start(part + 1) - self.start(part)) as usize);
+        match part / self.blocks.count() {
+            0 => {
+                let used = ids.clone().filter(|v| numbering.used(*v));
+                self.vertices(unit, ids, used, bytes)
+            }
+            1 => {
+                let copies = numbering.copies.get(unit, block)?;
+                if copies.is_empty() {
+                    return Ok(());
+                }
+                self.vertices(unit, ids, copies.iter().map(|c| c.id), bytes)
+            }
+            _ => {
+                let faces = Faces::load(unit, block, &self.surface, &self.filled, numbering, ids)?;
+                let _held = unit.hold(faces.bytes() + bytes_of(bytes));
+                let mut batch = self.file.triangles(bytes);
+                faces.for_each(|t| batch.push(t));
+                batch.finish();
+                Ok(())
+            }
+        }
+    }
+
+    /// Encodes the positions of `chosen` points of the block with the ids `ids`.
+    fn vertices(
+        &self,
+        unit: &Unit<'_>,
+        ids: Range<u32>,
+        chosen: impl Iterator<Item = u32>,
+        bytes: &mut Vec<u8>,
+    ) -> Result<()> {
         let points = self.store.slice(ids.start as usize..ids.end as usize)?;
+        let _held = unit.hold(bytes_of(&points) + bytes_of(bytes));
         let at = |v: u32| self.lattice.position(points[(v - ids.start) as usize]);
-        let mut bytes = Vec::with_capacity(vertices.bytes as usize * ids.len());
-        let mut held = unit.hold(bytes_of(&points) + bytes_of(&bytes));
-        let used = ids.clone().filter(|v| numbering.used(*v));
-        file.encode_vertices(used.map(at), &mut bytes);
-        // Three parts for each block; the number only identifies a part.
-        let part = 3 * block as u32;
-        let first = numbering.vertex(ids.start).into();
-        file.write(unit, part, &bytes, vertices.offset(first))?;
-        bytes.clear();
-        let copies = numbering.copies.get(unit, block)?;
-        file.encode_vertices(copies.iter().map(|c| at(c.id)), &mut bytes);
-        let first = numbering.first_copy(block);
-        file.write(unit, part + 1, &bytes, vertices.offset(first))?;
-        drop(points);
-        bytes.clear();
-        let faces = Faces::load(unit, &self.surface, &self.filled, numbering, ids)?;
-        bytes.reserve_exact(faces.len() * triangles.bytes as usize);
-        let mut batch = file.triangles(&mut bytes);
-        faces.for_each(|t| batch.push(t));
-        batch.finish();
-        held.set(faces.bytes() + bytes_of(&bytes));
-        let first = numbering.first_face(block);
-        file.write(unit, part + 2, &bytes, triangles.offset(first))
+        self.file.encode_vertices(chosen.map(at), bytes);
+        Ok(())
     }
 }

@@ -6,11 +6,10 @@ use super::las::Las;
 use super::ply::Ply;
 use super::point_format::{Head, PointFile, PointFormat, Refusal, has_extension};
 use super::text::Text;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer};
 use std::path::Path;
-use std::sync::Arc;
 
 /// All formats, in the order in which they are tested. Text is last: its error explains why no format fits.
 pub(super) const FORMATS: [&dyn PointFormat; 3] = [&Las, &Ply, &Text];
@@ -19,7 +18,7 @@ pub(super) const FORMATS: [&dyn PointFormat; 3] = [&Las, &Ply, &Text];
 const HEAD: usize = 64 << 10;
 
 /// The same, for a file with a very long first line, or with many lines before the first point.
-const LONG_HEAD: usize = 1 << 20;
+pub(super) const LONG_HEAD: usize = 1 << 20;
 
 /// Names of all formats, for messages.
 pub(super) fn readable() -> String {
@@ -75,7 +74,12 @@ pub(super) fn is_points(path: &Path) -> Result<bool> {
     if FORMATS.into_iter().any(|f| f.has_signature() && named(f)) {
         return Ok(true);
     }
-    let (_, found) = find(&Input::open(path, Arc::default())?)?;
+    let input = match Input::open_head(path, LONG_HEAD) {
+        // A damaged archive of something else is skipped.
+        Err(Error::Input { .. }) => return Ok(FORMATS.into_iter().any(named)),
+        opened => opened?,
+    };
+    let (_, found) = find(&input)?;
     Ok(match found {
         Ok(format) => format.has_signature() || named(format),
         // A point cloud of an unsupported format must not be skipped silently.

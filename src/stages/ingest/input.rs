@@ -1,7 +1,9 @@
-//! An input file: positioned reads that are counted, with errors that give the position.
+//! An input file: positioned reads that are counted, with errors that give the position. Of a compressed file
+//! the content is read, and positions are those in it.
 
 use crate::error::{Error, Result};
-use crate::workspace::IoCounters;
+use crate::workspace::compressed::{Beginning, Content};
+use crate::workspace::{IoCounters, Workspace};
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::os::unix::fs::FileExt;
@@ -12,14 +14,76 @@ use std::sync::Arc;
 #[derive(Debug)]
 pub(super) struct Input {
     pub(super) path: PathBuf,
-    /// Size in bytes when it was opened.
+    /// Size in bytes of what is read.
     pub(super) bytes: u64,
-    file: File,
+    /// Size in bytes of the file when it was opened.
+    pub(super) size: u64,
+    source: Source,
     io: Arc<IoCounters>,
 }
 
+/// The bytes of an input.
+#[derive(Debug)]
+enum Source {
+    File(File),
+    /// Of a compressed file: its content.
+    Content(
+        File,
+        #[expect(dead_code, reason = "dropping it deletes the file")] Content,
+    ),
+    /// Of a compressed file of which only the header is wanted.
+    Memory(Vec<u8>),
+}
+
+impl Source {
+    fn read_at(&self, buffer: &mut [u8], offset: u64) -> std::io::Result<usize> {
+        match self {
+            Self::File(file) | Self::Content(file, _) => file.read_at(buffer, offset),
+            Self::Memory(bytes) => {
+                let start = bytes
+                    .len()
+                    .min(usize::try_from(offset).unwrap_or(usize::MAX));
+                (&bytes[start..]).read(buffer)
+            }
+        }
+    }
+}
+
 impl Input {
-    pub(super) fn open(path: &Path, io: Arc<IoCounters>) -> Result<Self> {
+    /// Opens a file to read all of it.
+    pub(super) fn open(path: &Path, workspace: &Workspace) -> Result<Self> {
+        let input = Self::of(path, workspace.io.clone())?;
+        let Some(content) = Content::of(path, workspace)? else {
+            return Ok(input);
+        };
+        let file = File::open(&content.path).map_err(|e| Error::io(&content.path, "open", e))?;
+        Ok(Self {
+            bytes: content.bytes,
+            source: Source::Content(file, content),
+            ..input
+        })
+    }
+
+    /// Opens a file of which only the first `most` bytes are read. The size of a compressed one is an
+    /// estimate.
+    pub(super) fn open_head(path: &Path, most: usize) -> Result<Self> {
+        let input = Self::of(path, Arc::default())?;
+        let Some(beginning) = Beginning::of(path, most)? else {
+            return Ok(input);
+        };
+        Ok(Self {
+            bytes: beginning.likely,
+            source: Source::Memory(beginning.bytes),
+            ..input
+        })
+    }
+
+    /// True if the file is compressed.
+    pub(super) fn is_compressed(&self) -> bool {
+        !matches!(self.source, Source::File(_))
+    }
+
+    fn of(path: &Path, io: Arc<IoCounters>) -> Result<Self> {
         let file = File::open(path).map_err(|e| Error::io(path, "open", e))?;
         let meta = file
             .metadata()
@@ -35,7 +99,8 @@ impl Input {
         Ok(Self {
             path: path.to_path_buf(),
             bytes: meta.len(),
-            file,
+            size: meta.len(),
+            source: Source::File(file),
             io,
         })
     }
@@ -54,7 +119,10 @@ impl Input {
     pub(super) fn read_at(&self, offset: u64, buffer: &mut [u8]) -> Result<usize> {
         let mut done = 0;
         while done < buffer.len() {
-            match self.file.read_at(&mut buffer[done..], offset + done as u64) {
+            match self
+                .source
+                .read_at(&mut buffer[done..], offset + done as u64)
+            {
                 Ok(0) => break,
                 Ok(n) => done += n,
                 Err(e) if e.kind() == std::io::ErrorKind::Interrupted => {}
@@ -132,7 +200,7 @@ impl Read for Range<'_> {
     fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
         let left = usize::try_from(self.end.saturating_sub(self.at)).unwrap_or(usize::MAX);
         let wanted = buffer.len().min(left);
-        let got = self.input.file.read_at(&mut buffer[..wanted], self.at)?;
+        let got = self.input.source.read_at(&mut buffer[..wanted], self.at)?;
         self.at += got as u64;
         self.input.io.add_read(got as u64);
         Ok(got)

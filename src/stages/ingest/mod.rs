@@ -5,7 +5,7 @@
 //! [`Spool::for_each`] streams the points as positions on it.
 //!
 //! Formats are detected by content: LAS 1.0 to 1.4 with point formats 0 to 10, LAZ (COPC included), PLY, and
-//! text with one point in a line. Each format is a module that implements `PointFormat`, and an entry of the
+//! text with one point in a line; any of them may be compressed with gzip or Zstandard. Each format is a module that implements `PointFormat`, and an entry of the
 //! list in `formats.rs`.
 
 mod belong;
@@ -38,14 +38,13 @@ pub use stream::READ_BUFFERS;
 
 use crate::error::Result;
 use crate::geom::lattice::Lattice;
-use crate::workspace::{IoCounters, Workspace};
+use crate::workspace::Workspace;
 use input::Input;
 use point_format::{Claims, PointFile};
 use serde::{Deserialize, Serialize};
 use source::{Native, Source};
 use spool::{Frame, SourceWriter};
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::path::PathBuf;
 
 /// Precision that suffices for writing the coordinates of the cloud.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize)]
@@ -108,7 +107,7 @@ fn read_all(
     let mut stats = IngestStats::default();
     for path in expand(inputs)? {
         workspace.check_cancel()?;
-        let opened = Opened::new(&path, workspace.io.clone())?;
+        let opened = Opened::new(Input::open(&path, workspace)?)?;
         let number = sources.len() as u32;
         let target = SourceWriter::new(workspace, name, section, number, classes)?;
         let mut warnings = opened.file.read(&opened.input, &target)?;
@@ -148,8 +147,7 @@ struct Opened {
 }
 
 impl Opened {
-    fn new(path: &Path, io: Arc<IoCounters>) -> Result<Self> {
-        let input = Input::open(path, io)?;
+    fn new(input: Input) -> Result<Self> {
         let file = formats::open(&input)?;
         let claims = file.claims(&input);
         Ok(Self {
@@ -172,7 +170,7 @@ impl IngestStats {
         self.files.push(FileStats {
             path: opened.input.path.clone(),
             format: opened.claims.format,
-            bytes: opened.input.bytes,
+            bytes: opened.input.size,
             claimed: opened.claims.points,
             points: stats.read,
             kept: stats.kept,

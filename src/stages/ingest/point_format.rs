@@ -6,6 +6,7 @@ use super::input::Input;
 use super::source::Native;
 use super::spool::SourceWriter;
 use crate::error::Result;
+use crate::workspace::compressed::plain_name;
 use std::path::{Path, PathBuf};
 
 /// An input format; [`FORMATS`](super::formats::FORMATS) lists all of them.
@@ -65,8 +66,9 @@ impl Head {
     }
 }
 
-/// True if a path has one of the extensions, in upper or lower case.
+/// True if a path has one of the extensions, in upper or lower case, before that of a compression.
 pub(super) fn has_extension(path: &Path, extensions: &[&str]) -> bool {
+    let path = plain_name(path);
     let extension = path.extension().and_then(|e| e.to_str());
     extension.is_some_and(|e| extensions.iter().any(|x| e.eq_ignore_ascii_case(x)))
 }

@@ -2,11 +2,12 @@
 
 use super::Opened;
 use super::format::Format;
+use super::formats::LONG_HEAD;
+use super::input::Input;
 use super::source::Native;
 use crate::error::Result;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 /// Values given in a file's header; none is verified.
 #[derive(Debug, Clone, Serialize)]
@@ -17,6 +18,8 @@ pub struct Probe {
     pub format: Format,
     /// Its size in bytes.
     pub bytes: u64,
+    /// Estimated bytes of its content if it is compressed, else 0.
+    pub decompressed_bytes: u64,
     /// Number of points given in the header; `None` for text.
     pub points_claimed: Option<u64>,
     /// The number of points, limited by the file size; an estimate for text.
@@ -40,14 +43,19 @@ pub struct Probe {
 /// # Errors
 /// [`crate::Error::Io`]; [`crate::Error::Input`] if it is not a readable point cloud.
 pub fn probe(path: &Path) -> Result<Probe> {
-    let Opened { input, claims, .. } = Opened::new(path, Arc::default())?;
+    let Opened { input, claims, .. } = Opened::new(Input::open_head(path, LONG_HEAD)?)?;
     let (scale, offset) = match claims.native {
         Native::Las { scale, offset } => (Some(scale), Some(offset)),
         Native::F32 | Native::F64 => (None, None),
     };
     Ok(Probe {
         format: claims.format,
-        bytes: input.bytes,
+        bytes: input.size,
+        decompressed_bytes: if input.is_compressed() {
+            input.bytes
+        } else {
+            0
+        },
         points_claimed: claims.points,
         points_likely: claims.likely_points,
         las_version: claims.version,

@@ -1,6 +1,6 @@
 //! The kinds of files: their makers, and files of other programs by kind.
 
-use super::{las, ply, text};
+use super::{compressed, las, ply, text};
 use crate::bench::Bench;
 use std::path::PathBuf;
 
@@ -183,6 +183,20 @@ pub const KINDS: &[(&str, Kind)] = &[
     ("nothing but comments", |b| {
         vec![b.write("a.txt", "# nothing\n\n//\n")]
     }),
+    (
+        "LAS, LAZ, PLY and text in gzip or Zstandard",
+        compressed::formats,
+    ),
+    (
+        "several members or frames, and frames that are skipped",
+        compressed::several,
+    ),
+    ("gzip that ends early", compressed::short_gzip),
+    ("Zstandard that ends early", compressed::short_zstd),
+    ("gzip or Zstandard with damaged data", compressed::damaged),
+    ("something else behind a frame", compressed::more),
+    ("nothing that is compressed", compressed::nothing),
+    ("compression in compression", compressed::twice),
     ("an empty file", |b| {
         ["a.las", "a.laz", "a.ply", "a.xyz", "a"]
             .map(|name| b.write(name, ""))

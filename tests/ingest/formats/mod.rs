@@ -1,5 +1,6 @@
 //! The outcomes in `docs/formats.md`, checked for each kind of file.
 
+mod compressed;
 mod kinds;
 mod las;
 mod ply;

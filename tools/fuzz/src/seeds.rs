@@ -3,6 +3,7 @@
 use crate::{folder, resume, scratch};
 use outcrop_cloudgen::{Cloud, Encoding, Format, Kind, LasOptions, PointFormat, Precision};
 use std::error::Error;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Errors are passed to the caller of the program.
@@ -198,7 +199,13 @@ fn texts(seeds: &Seeds) -> Result {
         "digits",
         format!("{digits} 1.{digits} -2e{digits}\n1 2 3\n"),
     )?;
-    seeds.put("text", "columns", format!("{}\n", "1 ".repeat(30_000)))
+    seeds.put("text", "columns", format!("{}\n", "1 ".repeat(30_000)))?;
+    let mut gzip = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+    gzip.write_all(TEXTS[0].as_bytes())?;
+    let gzip = gzip.finish()?;
+    seeds.put("text", "two.gz", [&gzip[..], &gzip[..]].concat())?;
+    let zstd = zstd::encode_all(TEXTS[0].as_bytes(), 3)?;
+    seeds.put("text", "two.zst", [&zstd[..], &zstd[..]].concat())
 }
 
 /// Files of several formats in one folder.

@@ -26,6 +26,13 @@ pub struct Element {
 }
 
 impl Header {
+    /// True for a mesh, false for a cloud.
+    #[must_use]
+    pub fn holds_faces(&self) -> bool {
+        let mut elements = self.elements.iter();
+        elements.any(|e| e.name == "face" && e.count > 0)
+    }
+
     /// The element with this name, and its index.
     ///
     /// # Errors

@@ -58,10 +58,7 @@ impl MeshStream {
             return Ok(false);
         }
         match source.header() {
-            Ok(header) => {
-                let mut elements = header.elements.iter();
-                Ok(elements.any(|e| e.name == "face" && e.count > 0))
-            }
+            Ok(header) => Ok(header.holds_faces()),
             Err(FileError::Content { .. }) => Ok(false),
             Err(other) => Err(other),
         }
@@ -72,7 +69,15 @@ impl MeshStream {
     /// # Errors
     /// [`FileError::Io`]; [`FileError::Content`] if it is no PLY mesh, or has counts that do not fit its size.
     pub fn open(path: &Path) -> Result<Self, FileError> {
-        let mut source = Source::open(path)?;
+        Self::open_as(path, path)
+    }
+
+    /// As [`MeshStream::open`]; errors name the file `shown`.
+    ///
+    /// # Errors
+    /// See [`MeshStream::open`].
+    pub fn open_as(path: &Path, shown: &Path) -> Result<Self, FileError> {
+        let mut source = Source::open(path)?.shown_as(shown);
         let header = source.header()?;
         let mesh = Self { header, source };
         mesh.check().map_err(|e| mesh.source.wrong(e))?;

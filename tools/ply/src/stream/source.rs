@@ -42,6 +42,12 @@ impl Source {
         })
     }
 
+    /// Errors name the file `path`.
+    pub(super) fn shown_as(self, path: &Path) -> Self {
+        let path = path.to_path_buf();
+        Self { path, ..self }
+    }
+
     /// Reads the header, at the begin of the file.
     pub(super) fn header(&mut self) -> Result<Header, FileError> {
         let header = Header::read(&mut self.peek(Header::LONGEST)?);

@@ -1,0 +1,327 @@
+//! Files compressed with gzip or Zstandard: their content in a scratch file, or its beginning in memory.
+
+#[cfg(test)]
+mod tests;
+
+use super::file::ScratchFile;
+use super::{Files, Workspace};
+use crate::error::{Error, Result};
+use flate2::bufread::MultiGzDecoder;
+use std::fs::File;
+use std::io::{BufReader, ErrorKind, Read};
+use std::os::unix::fs::FileExt;
+use std::path::{Path, PathBuf};
+use zstd::stream::read::Decoder;
+use zstd::zstd_safe::{DCtx, DParameter};
+
+/// Name of the scratch file; there is one at a time.
+const NAME: &str = "decompressed";
+
+/// Bytes of content that are decoded at a time.
+const CHUNK: usize = 1 << 20;
+
+/// Bytes of the file that are read at a time.
+const READ: usize = 128 << 10;
+
+/// Bytes of memory for decoding, besides the window: the buffers here, and those of the decoders.
+const BUFFERS: u64 = 2 << 20;
+
+/// Largest window for the beginning of a file, whose memory is touched only as far as it is decoded: that of
+/// the highest level of `zstd`.
+const WINDOW: u64 = 1 << 27;
+
+/// The base-two logarithm of the largest window that the decoder accepts: the budget decides.
+const LARGEST_WINDOW: u32 = 31;
+
+/// A compression that is recognised by the first bytes of a file.
+#[derive(Debug, Clone, Copy)]
+enum Compression {
+    Gzip,
+    Zstandard,
+}
+
+impl Compression {
+    fn of(file: &File) -> std::io::Result<Option<Self>> {
+        let head = &head_at(file, 0)?[..];
+        Ok(match head {
+            [0x1f, 0x8b, ..] => Some(Self::Gzip),
+            _ => window(head).map(|_| Self::Zstandard),
+        })
+    }
+}
+
+/// The name of a file without the extension of its compression.
+#[must_use]
+pub fn plain_name(path: &Path) -> PathBuf {
+    let extension = path.extension().unwrap_or_default();
+    match ["gz", "zst"]
+        .iter()
+        .any(|e| extension.eq_ignore_ascii_case(e))
+    {
+        true => path.with_extension(""),
+        false => path.to_path_buf(),
+    }
+}
+
+/// The content of a compressed file, in a scratch file that is deleted when this is dropped.
+#[derive(Debug)]
+pub struct Content {
+    /// The scratch file.
+    pub path: PathBuf,
+    /// Its size in bytes.
+    pub bytes: u64,
+    files: Files,
+}
+
+impl Content {
+    /// The content of the file `path`; none if it is not compressed.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if it is damaged; [`Error::Memory`] if it needs a window larger than the free part of
+    /// the budget; [`Error::Io`], [`Error::Disk`], [`Error::Cancelled`].
+    pub fn of(path: &Path, workspace: &Workspace) -> Result<Option<Self>> {
+        let Some((file, compression)) = opened(path)? else {
+            return Ok(None);
+        };
+        let mut held = workspace.promise("decompress", BUFFERS)?;
+        held.set_held(BUFFERS);
+        let scratch = workspace.files.open(NAME, false)?;
+        let mut content = Self {
+            path: PathBuf::new(),
+            bytes: 0,
+            files: workspace.files.clone(),
+        };
+        let window = |bytes: u64| {
+            held.at_least(bytes.saturating_add(BUFFERS))?;
+            held.set_held(held.bytes());
+            Ok(())
+        };
+        let read = decode(path, &file, compression, window, |bytes| {
+            workspace.check_cancel()?;
+            content.append(&scratch, bytes)?;
+            Ok(true)
+        })?;
+        workspace.io.add_read(read);
+        if content.bytes == 0 {
+            let expected = "compressed points or a compressed mesh";
+            return Err(Error::input(path, "content", "nothing", expected));
+        }
+        Ok(Some(content))
+    }
+
+    fn append(&mut self, scratch: &ScratchFile, bytes: &[u8]) -> Result<()> {
+        let place = scratch.append(self.files.worker(), bytes, 0)?;
+        self.path = scratch.path(place.segment);
+        self.bytes += bytes.len() as u64;
+        Ok(())
+    }
+}
+
+impl Drop for Content {
+    fn drop(&mut self) {
+        // If it cannot be deleted, it is when the folder is removed.
+        let _ = self.files.release(NAME);
+    }
+}
+
+/// The beginning of the content of a compressed file.
+#[derive(Debug)]
+pub struct Beginning {
+    /// The first bytes.
+    pub bytes: Vec<u8>,
+    /// An estimate of the size of the content; exact if `bytes` are all of it, larger than these if not.
+    pub likely: u64,
+}
+
+impl Beginning {
+    /// At least the first `least` bytes of the content of the file `path`, up to 1 MiB more, or all; none if
+    /// it is not compressed.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if it is damaged there, or needs a window of more than 128 MiB; [`Error::Io`].
+    pub fn of(path: &Path, least: usize) -> Result<Option<Self>> {
+        let Some((file, compression)) = opened(path)? else {
+            return Ok(None);
+        };
+        let window = |bytes| match bytes > WINDOW {
+            true => {
+                let found = format!("a window of {bytes} bytes");
+                let expected = format!("at most {WINDOW} to detect the format");
+                Err(Error::input(path, "Zstandard frame", found, expected))
+            }
+            false => Ok(()),
+        };
+        let mut bytes = Vec::new();
+        let read = decode(path, &file, compression, window, |chunk| {
+            bytes.extend_from_slice(chunk);
+            Ok(bytes.len() < least)
+        })?;
+        let all = file.metadata();
+        let all = all.map_err(|e| Error::io(path, "read the size of", e))?;
+        let now = bytes.len() as u64;
+        // If it is long enough there may be more, even where no byte of the file is left.
+        let share = all.len().max(read) as f64 / read.max(1) as f64;
+        let likely = match now < least as u64 {
+            true => now,
+            false => (now as f64 * share) as u64 + 1,
+        };
+        Ok(Some(Self { bytes, likely }))
+    }
+}
+
+/// A file and its compression; none if it is not compressed, or no regular file.
+fn opened(path: &Path) -> Result<Option<(File, Compression)>> {
+    let io = |action: &'static str| move |e| Error::io(path, action, e);
+    // Opening a pipe may block.
+    if !path.metadata().map_err(io("open"))?.is_file() {
+        return Ok(None);
+    }
+    let file = File::open(path).map_err(io("open"))?;
+    let found = Compression::of(&file).map_err(io("read"))?;
+    Ok(found.map(|compression| (file, compression)))
+}
+
+/// A file that is read from its start.
+struct Forward<'a> {
+    file: &'a File,
+    at: u64,
+}
+
+impl Read for Forward<'_> {
+    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+        let got = self.file.read_at(buffer, self.at)?;
+        self.at += got as u64;
+        Ok(got)
+    }
+}
+
+/// Offset in the file of the next byte.
+fn position(source: &BufReader<Forward<'_>>) -> u64 {
+    source.get_ref().at - source.buffer().len() as u64
+}
+
+/// Passes the content to `take` until that returns false; `allow` is asked before memory for a window is
+/// taken. Returns the bytes of the file that were read.
+fn decode(
+    path: &Path,
+    file: &File,
+    compression: Compression,
+    mut allow: impl FnMut(u64) -> Result<()>,
+    mut take: impl FnMut(&[u8]) -> Result<bool>,
+) -> Result<u64> {
+    let mut source = BufReader::with_capacity(READ, Forward { file, at: 0 });
+    let mut buffer = vec![0; CHUNK];
+    if let Compression::Gzip = compression {
+        let mut decoder = MultiGzDecoder::new(source);
+        pump(&mut decoder, &mut buffer, &mut take, |decoder, e| {
+            let place = format!("gzip data before byte {}", position(decoder.get_ref()));
+            damaged(path, place, "gzip data", e)
+        })?;
+        return Ok(position(decoder.get_ref()));
+    }
+    let mut context = DCtx::create();
+    // The parameter is in the range of all versions of the library.
+    let _ = context.set_parameter(DParameter::WindowLogMax(LARGEST_WINDOW));
+    loop {
+        let at = position(&source);
+        let head = head_at(file, at).map_err(|e| Error::io(path, "read", e))?;
+        if head.is_empty() {
+            return Ok(at);
+        }
+        let place = format!("Zstandard frame at byte {at}");
+        let Some(window) = window(&head) else {
+            let found = format!("\"{}\"", head[..head.len().min(4)].escape_ascii());
+            return Err(Error::input(
+                path,
+                place,
+                found,
+                "a frame, or the end of the file",
+            ));
+        };
+        allow(window)?;
+        let mut frame = Decoder::with_context(source, &mut context).single_frame();
+        let more = pump(&mut frame, &mut buffer, &mut take, |_, e| {
+            damaged(path, place.clone(), "a whole frame", e)
+        })?;
+        source = frame.finish();
+        if !more {
+            return Ok(position(&source));
+        }
+    }
+}
+
+/// Passes all that `decoder` gives to `take`; false if that returns false.
+fn pump<R: Read>(
+    decoder: &mut R,
+    buffer: &mut [u8],
+    take: &mut impl FnMut(&[u8]) -> Result<bool>,
+    failed: impl Fn(&R, std::io::Error) -> Error,
+) -> Result<bool> {
+    loop {
+        let mut filled = 0;
+        while filled < buffer.len() {
+            match decoder.read(&mut buffer[filled..]) {
+                Ok(0) => break,
+                Ok(n) => filled += n,
+                Err(e) if e.kind() == ErrorKind::Interrupted => {}
+                Err(e) => return Err(failed(decoder, e)),
+            }
+        }
+        if filled > 0 && !take(&buffer[..filled])? {
+            return Ok(false);
+        }
+        if filled < buffer.len() {
+            return Ok(true);
+        }
+    }
+}
+
+/// The error of a decoder.
+fn damaged(path: &Path, place: String, expected: &str, error: std::io::Error) -> Error {
+    if error.raw_os_error().is_some() {
+        return Error::io(path, "read", error);
+    }
+    let found = match error.kind() {
+        ErrorKind::UnexpectedEof => "the end of the file".to_owned(),
+        _ => format!("damaged data ({})", error.to_string().escape_debug()),
+    };
+    Error::input(path, place, found, expected)
+}
+
+/// Bytes of the longest head of a Zstandard frame.
+const HEAD: usize = 18;
+
+/// The first bytes from `offset` on, at most those of a head of a frame.
+fn head_at(file: &File, offset: u64) -> std::io::Result<Vec<u8>> {
+    let mut head = Vec::with_capacity(HEAD);
+    let from = Forward { file, at: offset };
+    from.take(HEAD as u64).read_to_end(&mut head)?;
+    Ok(head)
+}
+
+/// Bytes of the window of the Zstandard frame that begins with `head`, 0 for one that is skipped; none if it
+/// is no frame. (RFC 8878, section 3.1.1.1)
+fn window(head: &[u8]) -> Option<u64> {
+    let (magic, rest) = head.split_first_chunk()?;
+    match u32::from_le_bytes(*magic) {
+        0x184d_2a50..=0x184d_2a5f => return Some(0),
+        0xfd2f_b528 => {}
+        _ => return None,
+    }
+    // The decoder reports a head that ends early.
+    let byte = |at: usize| u64::from(rest.get(at).copied().unwrap_or(0));
+    let descriptor = byte(0) as usize;
+    if descriptor & 0x20 == 0 {
+        let base = 1u64 << (10 + (byte(1) >> 3));
+        return Some(base + base / 8 * (byte(1) & 7));
+    }
+    // The window is the whole content.
+    let start = 1 + [0, 1, 2, 4][descriptor & 3];
+    let field = |bytes| (0..bytes).fold(0, |sum, at| sum | byte(start + at) << (8 * at));
+    Some(match descriptor >> 6 {
+        0 => field(1),
+        1 => field(2) + 256,
+        2 => field(4),
+        _ => field(8),
+    })
+}
