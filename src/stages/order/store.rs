@@ -1,8 +1,9 @@
-//! The ordered store: positions by id in one file, in pages, with a tree of page boxes in memory.
+//! The ordered store: positions by id in one file, in pages, with their boxes and an R\*-tree in memory.
 
 use crate::error::Result;
 use crate::geom::Point;
 use crate::geom::aabb::Aabb;
+use crate::geom::boxes::BoxTree;
 use crate::spill::{Table, row};
 use crate::workspace::file::ScratchFile;
 use crate::workspace::memory::Reservation;
@@ -42,8 +43,9 @@ pub(super) const STEP: usize = 16;
 /// Points in a page, except in tests.
 pub const PAGE: usize = 256;
 
-/// Children of a node of the box tree.
-const FAN: usize = 8;
+/// Pages in a group, a box of the tree, for which this leaves 4 bytes a page. Consecutive pages are near on the
+/// curve, so groups are compact.
+const GROUP: usize = 32;
 
 /// An ordered store in the scratch folder: the name of its file and its size.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -164,7 +166,7 @@ impl StoredPoints {
         Aabb { min, max }
     }
 
-    /// Opens the store: reads its index and builds the tree of boxes.
+    /// Opens the store: reads its index and builds the R\*-tree.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`].
@@ -182,7 +184,7 @@ impl StoredPoints {
                 let found = format!("{} points in {pages} pages", file.records());
                 return Err(file.damaged(0, 0, found, format!("{} points", self.len)));
             }
-            // A tree of boxes has a seventh more of them than there are pages.
+            // A box, a checksum, and 4 bytes of the tree.
             held.at_least(pages * 32 + 4096)?;
             held.set_held(pages * 32 + 4096);
             files.read_index(&workspace.unit(), end, |row| {
@@ -202,21 +204,14 @@ impl StoredPoints {
                 first += pages.next_multiple_of(STEP).max(STEP);
             }
         }
-        let mut levels = vec![boxes];
-        while levels.last().is_some_and(|top| top.len() > FAN) {
-            let next = levels[levels.len() - 1]
-                .chunks(FAN)
-                .map(|boxes| boxes.iter().fold(Aabb::EMPTY, |a, b| a.union(*b)))
-                .collect();
-            levels.push(next);
-        }
         Ok(PointStore {
             file,
             parts,
             len: self.len,
             page,
             checks,
-            levels,
+            tree: BoxTree::of(boxes.chunks(GROUP).map(|pages| Aabb::around(pages).wide(0))),
+            boxes,
             _held: held,
         })
     }
@@ -241,7 +236,7 @@ struct Part {
     offset: u64,
 }
 
-/// Positions of all points by id; 12 bytes for each point on disk, 28/256 in memory.
+/// Positions of all points by id; 12 bytes for each point on disk, 32 for each page in memory.
 #[derive(Debug)]
 pub struct PointStore {
     file: Arc<ScratchFile>,
@@ -249,9 +244,10 @@ pub struct PointStore {
     len: usize,
     page: usize,
     checks: Vec<u32>,
-    /// `levels[0]` has a box for each page; each further level has one box for `FAN` boxes of the previous
-    /// level.
-    levels: Vec<Vec<Aabb>>,
+    /// The bounding box of each page.
+    boxes: Vec<Aabb>,
+    /// The bounding boxes of groups of [`GROUP`] pages.
+    tree: BoxTree<i64>,
     _held: Reservation,
 }
 
@@ -277,13 +273,13 @@ impl PointStore {
     /// Number of pages.
     #[must_use]
     pub fn pages(&self) -> usize {
-        self.levels[0].len()
+        self.boxes.len()
     }
 
     /// The bounding box of a page.
     #[must_use]
     pub fn page_box(&self, page: usize) -> &Aabb {
-        &self.levels[0][page]
+        &self.boxes[page]
     }
 
     /// Ids of the points of a page.
@@ -295,53 +291,33 @@ impl PointStore {
     /// The bounding box of all points.
     #[must_use]
     pub fn bounds(&self) -> Aabb {
-        self.levels.last().map_or(Aabb::EMPTY, |top| {
-            top.iter().fold(Aabb::EMPTY, |a, b| a.union(*b))
-        })
+        Aabb::around(&self.boxes)
     }
 
-    /// Number of levels of the box tree; level 0 is the pages.
-    #[must_use]
-    pub fn tree_levels(&self) -> usize {
-        self.levels.len()
-    }
-
-    /// The boxes of a level.
-    #[must_use]
-    pub fn tree_boxes(&self, level: usize) -> &[Aabb] {
-        &self.levels[level]
-    }
-
-    /// The children in `level - 1` of node `index` of `level`.
-    #[must_use]
-    pub fn tree_children(&self, level: usize, index: usize) -> Range<usize> {
-        index * FAN..((index + 1) * FAN).min(self.levels[level - 1].len())
-    }
-
-    /// Calls `each` with all pages whose box is within squared distance `d2` of `target`, ascending, until it
-    /// returns false.
-    pub fn pages_near(&self, target: &Aabb, d2: u64, each: &mut dyn FnMut(usize) -> bool) {
-        let top = self.levels.len() - 1;
-        let mut nodes = 0..self.levels[top].len();
-        nodes.all(|node| self.descend(top, node, target, d2, each));
-    }
-
-    fn descend(
-        &self,
-        level: usize,
-        node: usize,
-        target: &Aabb,
-        d2: u64,
-        each: &mut dyn FnMut(usize) -> bool,
-    ) -> bool {
-        if self.levels[level][node].distance2_box(target) > d2 {
-            return true;
+    /// Replaces `found` by the pages whose box is within `reach` of `target`, ascending; if there are more
+    /// than `most`, by some of them, and returns false.
+    pub fn pages_near(&self, target: &Aabb, reach: u64, most: usize, found: &mut Vec<u32>) -> bool {
+        found.clear();
+        let near = |page: &usize| self.boxes[*page].distance2_box(target) <= reach * reach;
+        for group in self.tree.meeting(target.wide(reach as i64)) {
+            found.extend(self.group(group).filter(near).map(|page| page as u32));
+            if found.len() > most {
+                return false;
+            }
         }
-        if level == 0 {
-            return each(node);
-        }
-        self.tree_children(level, node)
-            .all(|child| self.descend(level - 1, child, target, d2, each))
+        found.sort_unstable();
+        true
+    }
+
+    /// Groups of pages with the squared distance of their box from a point, the nearest first.
+    pub fn nearest_groups(&self, p: Point) -> impl Iterator<Item = (u64, Range<usize>)> {
+        let groups = self.tree.nearest(p.map(i64::from));
+        groups.map(|(distance2, group)| (distance2 as u64, self.group(group)))
+    }
+
+    /// The pages of a group.
+    fn group(&self, group: usize) -> Range<usize> {
+        group * GROUP..((group + 1) * GROUP).min(self.boxes.len())
     }
 
     /// Reads consecutive pages and appends their points to `points`.
