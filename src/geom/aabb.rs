@@ -24,6 +24,12 @@ impl Aabb {
         points.iter().fold(Self::EMPTY, |b, &p| b.with(p))
     }
 
+    /// The smallest box around `boxes`.
+    #[must_use]
+    pub fn around(boxes: &[Self]) -> Self {
+        boxes.iter().fold(Self::EMPTY, |all, b| all.union(*b))
+    }
+
     /// The smallest box that contains this box and `p`.
     #[must_use]
     pub fn with(self, p: Point) -> Self {
@@ -37,6 +43,13 @@ impl Aabb {
             min: std::array::from_fn(|i| self.min[i].min(other.min[i])),
             max: std::array::from_fn(|i| self.max[i].max(other.max[i])),
         }
+    }
+
+    /// The lowest and the highest corner of this box, extended by `by` on all sides.
+    #[must_use]
+    pub fn wide(&self, by: i64) -> [[i64; 3]; 2] {
+        let min = self.min.map(|at| i64::from(at) - by);
+        [min, self.max.map(|at| i64::from(at) + by)]
     }
 
     /// Length of the longest side, in steps; 0 for the empty box.

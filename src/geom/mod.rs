@@ -1,6 +1,7 @@
 //! Exact geometry on the integer lattice: points, boxes, curve keys, planes, predicates, cells.
 
 pub mod aabb;
+pub mod boxes;
 pub mod clip;
 pub mod hilbert;
 pub mod lattice;

@@ -1,5 +1,5 @@
-//! Triangles or points to which distances are measured: in curve order, in pages on disk, with a tree of
-//! boxes around the pages in memory.
+//! Triangles or points to which distances are measured: in curve order, in pages on disk, with an R\*-tree of
+//! the pages' boxes in memory.
 //!
 //! The size of a page depends only on the number of items. For more items pages grow, and not their number,
 //! so the tree stays small.
@@ -7,6 +7,7 @@
 use super::triangle;
 use super::vector::{Box3, V3, dot, sub};
 use crate::error::Result;
+use crate::geom::boxes::BoxTree;
 use crate::spill::{LocalTable, Row, Word};
 use crate::workspace::Workspace;
 use crate::workspace::memory::Reservation;
@@ -17,9 +18,6 @@ const LEAST: u64 = 64;
 
 /// Largest number of pages.
 const MOST_PAGES: u64 = 1 << 17;
-
-/// Children of a node of the tree.
-const FAN: usize = 8;
 
 /// Items that share a box within a page.
 const LEAF: usize = 8;
@@ -63,8 +61,9 @@ impl Item for [V3; 3] {
 #[derive(Debug)]
 pub(super) struct Pages<T: Row> {
     stored: LocalTable<T>,
-    /// `levels[0]` has a box for each page, each further level a box for `FAN` boxes of the level before.
-    levels: Vec<Vec<Box3>>,
+    /// The boxes around the pages.
+    tree: BoxTree<f64>,
+    bounds: Box3,
     page: usize,
     _held: Reservation,
 }
@@ -72,13 +71,12 @@ pub(super) struct Pages<T: Row> {
 impl<T: Item> Pages<T> {
     /// The box around all items.
     pub(super) fn bounds(&self) -> Box3 {
-        let top = self.levels.last().map_or(&[][..], Vec::as_slice);
-        top.iter().fold(Box3::EMPTY, |a, b| a.union(*b))
+        self.bounds
     }
 
     /// Number of pages.
     pub(super) fn count(&self) -> usize {
-        self.levels[0].len()
+        self.stored.count()
     }
 
     /// Bytes of a page in memory, with those for reading it.
@@ -111,43 +109,13 @@ impl<T: Item> Pages<T> {
 
     /// Updates `best`, a squared distance from `p`, if an item is nearer.
     pub(super) fn nearest(&self, p: V3, best: &mut Best<T>, cache: &mut Cache<T>) -> Result<()> {
-        let top = self.levels.len() - 1;
-        let mut stack = std::mem::take(&mut cache.stack);
-        stack.clear();
-        let roots = 0..self.levels[top].len();
-        self.push_children(&mut stack, top, roots, p, best.distance2);
-        while let Some((distance2, level, node)) = stack.pop() {
+        for (distance2, page) in self.tree.nearest(p) {
             if distance2 >= best.distance2 {
-                continue;
+                break;
             }
-            if level == 0 {
-                cache.page(self, node)?.look(p, best);
-            } else {
-                let children = node * FAN..((node + 1) * FAN).min(self.levels[level - 1].len());
-                self.push_children(&mut stack, level - 1, children, p, best.distance2);
-            }
+            cache.page(self, page)?.look(p, best);
         }
-        cache.stack = stack;
         Ok(())
-    }
-
-    /// Puts the nodes nearer than `limit` on the stack, the nearest on top.
-    fn push_children(
-        &self,
-        stack: &mut Vec<(f64, usize, usize)>,
-        level: usize,
-        nodes: std::ops::Range<usize>,
-        p: V3,
-        limit: f64,
-    ) {
-        let from = stack.len();
-        for node in nodes {
-            let distance2 = self.levels[level][node].distance2(p);
-            if distance2 < limit {
-                stack.push((distance2, level, node));
-            }
-        }
-        stack[from..].sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(b.2.cmp(&a.2)));
     }
 }
 
@@ -192,7 +160,6 @@ impl<T> Page<T> {
 pub(super) struct Cache<T> {
     pages: FxHashMap<usize, Page<T>>,
     most: usize,
-    stack: Vec<(f64, usize, usize)>,
 }
 
 impl<T> Cache<T> {
@@ -201,7 +168,6 @@ impl<T> Cache<T> {
         Self {
             pages: FxHashMap::default(),
             most: most.max(1),
-            stack: Vec::new(),
         }
     }
 
@@ -235,8 +201,8 @@ impl<T: Item> PageWriter<T> {
     pub(super) fn new(workspace: &Workspace, name: &str, count: u64) -> Result<Self> {
         let page = count.div_ceil(MOST_PAGES).max(LEAST) as usize;
         let pages = count.div_ceil(page as u64);
-        // For each page a box of the tree (an eighth more for the levels above) and a place in the file.
-        let index = pages * (2 * size_of::<Box3>() as u64) + (page * 2 * size_of::<T>()) as u64;
+        // The boxes are dropped before the tree grows to its size.
+        let index = pages * BoxTree::<f64>::BYTES + (page * 2 * size_of::<T>()) as u64;
         Ok(Self {
             held: workspace.reserve("compare: boxes", index + 4096)?,
             stored: LocalTable::create(workspace, name)?,
@@ -267,14 +233,12 @@ impl<T: Item> PageWriter<T> {
         if !self.pending.is_empty() {
             self.flush()?;
         }
-        let mut levels = vec![self.boxes];
-        while let Some(top) = levels.last().filter(|top| top.len() > FAN) {
-            let union = |boxes: &[Box3]| boxes.iter().fold(Box3::EMPTY, |a, b| a.union(*b));
-            levels.push(top.chunks(FAN).map(union).collect());
-        }
+        let bounds = self.boxes.iter().copied().fold(Box3::EMPTY, Box3::union);
+        let boxes = self.boxes.into_iter().map(|Box3 { min, max }| [min, max]);
         Ok(Pages {
             stored: self.stored,
-            levels,
+            tree: BoxTree::of(boxes),
+            bounds,
             page: self.page,
             _held: self.held,
         })

@@ -1,5 +1,7 @@
+use super::pages::{Best, Cache, Item, PageWriter};
 use super::triangle::distance2;
 use super::vector::{Box3, V3, add, dot, scale, sub};
+use crate::workspace::Workspace;
 use proptest::prelude::*;
 
 /// Minimum of a convex function on `0..=1`.
@@ -44,6 +46,32 @@ fn check(triangle: &[V3; 3], p: V3) {
     );
 }
 
+/// Compares the nearest of `items` in pages with the least of all distances, from points that follow each
+/// other as samples do.
+fn check_nearest<T: Item + std::fmt::Debug>(items: &[T], from: &[V3]) {
+    let workspace = Workspace::for_tests(1);
+    let mut writer = PageWriter::new(&workspace, "items", items.len() as u64).unwrap();
+    items.iter().for_each(|item| writer.push(*item).unwrap());
+    let pages = writer.finish().unwrap();
+    let mut cache = Cache::new(3);
+    let mut last: Option<T> = None;
+    for &p in from {
+        let mut best = Best {
+            distance2: last.map_or(f64::INFINITY, |item| item.distance2(p)),
+            item: last,
+        };
+        pages.nearest(p, &mut best, &mut cache).unwrap();
+        let least = (items.iter()).fold(f64::INFINITY, |least, item| least.min(item.distance2(p)));
+        // A triangle's distance may be rounded to less than that of its box.
+        assert!(
+            best.distance2 >= least && best.distance2 <= least * (1.0 + 1e-12) + 1e-24,
+            "{} {least}",
+            best.distance2
+        );
+        last = best.item;
+    }
+}
+
 fn lattice() -> impl Strategy<Value = V3> {
     prop::array::uniform3(-3i32..4).prop_map(|p| p.map(f64::from))
 }
@@ -56,6 +84,17 @@ proptest! {
         p in prop::array::uniform3(-2.0..2.0f64),
     ) {
         check(&triangle, p);
+    }
+
+    #[test]
+    fn the_nearest_in_pages_is_the_nearest_of_all(
+        corners in prop::collection::vec(prop::array::uniform3(-1.0..1.0f64), 1..900),
+        from in prop::collection::vec(prop::array::uniform3(-2.0..2.0f64), 1..20),
+    ) {
+        check_nearest(&corners, &from);
+        let triangle = |k: usize| [corners[k], corners[k / 2], corners[k / 3]];
+        let triangles: Vec<[V3; 3]> = (0..corners.len()).map(triangle).collect();
+        check_nearest(&triangles, &from);
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Writes a store of the same points at other positions, in any order.
 
-use super::store::{GROUP, PointStore, StoreFiles, StoredPoints};
+use super::files::{StoreFiles, WRITTEN};
+use super::store::{PointStore, StoredPoints};
 use crate::error::Result;
 use crate::geom::Point;
 use crate::workspace::{Unit, Workspace};
@@ -29,7 +30,7 @@ impl Rewriter {
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Disk`].
     pub fn put(&self, unit: &Unit<'_>, first: usize, points: &[Point]) -> Result<()> {
-        let groups = points.chunks(GROUP * self.files.page);
+        let groups = points.chunks(WRITTEN * self.files.page);
         let written: Result<Vec<_>> = groups.map(|group| self.files.write(unit, group)).collect();
         self.files.keep(unit, first / self.files.page, &written?)
     }

@@ -1,61 +1,26 @@
-//! The ordered store: positions by id in one file, in pages, with a tree of page boxes in memory.
+//! The ordered store: positions by id in one file, in pages, with their boxes and an R\*-tree in memory.
 
-use super::packed::{Packing, pack};
+use super::files::{STEP, StoreFiles, index_of};
+use super::packed::Packing;
 use crate::error::Result;
 use crate::geom::Point;
 use crate::geom::aabb::Aabb;
-use crate::spill::{Table, row};
+use crate::geom::boxes::BoxTree;
+use crate::workspace::Workspace;
 use crate::workspace::file::ScratchFile;
 use crate::workspace::mapped::Mapping;
 use crate::workspace::memory::Reservation;
-use crate::workspace::place::Place;
-use crate::workspace::{Unit, Workspace};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::Arc;
 
-row! {
-    /// Checksum, packing and bounding box of a page.
-    pub struct PageRow {
-        /// CRC-32 of the packed page.
-        crc: u32,
-        /// Bits left out of each coordinate.
-        shift: u32,
-        /// Lowest coordinates.
-        min: Point,
-        /// Highest coordinates.
-        max: Point,
-    }
-    unpacked
-}
-
-impl PageRow {
-    pub fn bounds(&self) -> Aabb {
-        let Self { min, max, .. } = *self;
-        Aabb { min, max }
-    }
-
-    fn packing(&self) -> Packing {
-        Packing::of(&self.bounds(), self.shift.min(31) as u8)
-    }
-}
-
-/// The pages of a store. Pages written together form a section; its number is that of its first page divided
-/// by [`STEP`].
-type Index = Table<PageRow>;
-
-/// The first page of every write has a number that is a multiple of this.
-pub(super) const STEP: usize = 16;
-
-/// Pages written at a time, a multiple of [`STEP`].
-pub(super) const GROUP: usize = 64;
-
 /// Points in a page, except in tests.
 pub const PAGE: usize = 256;
 
-/// Children of a node of the box tree.
-const FAN: usize = 8;
+/// Pages in a group, a box of the tree, for which this leaves 4 bytes a page. Consecutive pages are near on the
+/// curve, so groups are compact.
+const GROUP: usize = 32;
 
 /// An ordered store in the scratch folder: the name of its file and its size.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -65,123 +30,6 @@ pub struct StoredPoints {
     pub(super) page: usize,
     /// The bounding box of all points.
     pub(super) bounds: [Point; 2],
-}
-
-/// The table of pages of the store `name`.
-fn index_of(name: &str) -> Index {
-    Index::new(&format!("{name}.index"), 0)
-}
-
-/// Pages that were written together, and their place in the file.
-pub(super) type Written = (Vec<PageRow>, Place);
-
-/// The file and the index of a store that is written.
-#[derive(Debug)]
-pub(super) struct StoreFiles {
-    pub file: Arc<ScratchFile>,
-    pub index: Index,
-    pub page: usize,
-}
-
-impl StoreFiles {
-    pub fn open(workspace: &Workspace, name: &str, page: usize) -> Result<Self> {
-        Ok(Self {
-            file: workspace.files.open(name, true)?,
-            index: index_of(name),
-            page: page.max(1),
-        })
-    }
-
-    /// Writes up to a group of pages to the segment of the current thread.
-    pub fn write(&self, workspace: &Workspace, points: &[Point]) -> Result<Written> {
-        let mut bytes = Vec::new();
-        let page = |page: &[Point]| {
-            let before = bytes.len();
-            let (Aabb { min, max }, shift) = pack(page, &mut bytes);
-            PageRow {
-                crc: crc32fast::hash(&bytes[before..]),
-                shift: shift.into(),
-                min,
-                max,
-            }
-        };
-        let pages = points.chunks(self.page).map(page).collect();
-        let worker = workspace.files.worker();
-        Ok((pages, self.file.append(worker, &bytes, points.len())?))
-    }
-
-    /// The last point of the whole groups before page `end`, of which those from page `first` on were
-    /// recorded together.
-    pub fn last_before(&self, unit: &Unit<'_>, first: usize, end: usize) -> Result<Option<Point>> {
-        let mut rows = Vec::new();
-        self.index.get_into(unit, first / STEP, &mut rows)?;
-        let group = end.saturating_sub(GROUP);
-        let group_rows = rows.get(group.saturating_sub(first)..end.saturating_sub(first));
-        let Some((last, others)) = group_rows.and_then(<[_]>::split_last) else {
-            return Ok(None);
-        };
-        let (place, packing) = (self.file.section(group / STEP), last.packing());
-        let before: usize = (others.iter())
-            .map(|row| row.packing().bytes(self.page))
-            .sum();
-        let mut bytes = vec![0; packing.bytes(self.page)];
-        self.file
-            .read(place.segment, place.offset + before as u64, &mut bytes)?;
-        let mut columns = [0, 1, 2].map(|_| vec![0; self.page]);
-        packing.unpack(&bytes, columns.each_mut().map(Vec::as_mut_slice));
-        Ok(Some(columns.map(|column| column[self.page - 1])))
-    }
-
-    /// Records in the index pages that were written, the first with number `first`.
-    pub fn keep(&self, unit: &Unit<'_>, first: usize, written: &[Written]) -> Result<()> {
-        let mut rows = Vec::new();
-        for (pages, place) in written {
-            let part = (first + rows.len()) / STEP;
-            self.file.put(unit, part as u32, *place)?;
-            rows.extend_from_slice(pages);
-        }
-        self.index.put(unit, first / STEP, &rows)
-    }
-
-    /// The store of `len` points with all pages written.
-    pub fn stored(&self, len: usize, bounds: Aabb) -> StoredPoints {
-        StoredPoints {
-            name: self.file.name.clone(),
-            len,
-            page: self.page,
-            bounds: [bounds.min, bounds.max],
-        }
-    }
-
-    /// Calls `each` with all pages up to `end`.
-    pub fn read_index(
-        &self,
-        unit: &Unit<'_>,
-        end: usize,
-        each: impl FnMut(&PageRow),
-    ) -> Result<()> {
-        let (mut at, mut rows, mut each) = (0, Vec::new(), each);
-        while at < end {
-            self.index.get_into(unit, at / STEP, &mut rows)?;
-            if rows.is_empty() {
-                let expected = self.index.total(unit)?.to_string();
-                return Err(self.file.damaged(0, 0, format!("{at} pages"), expected));
-            }
-            rows.iter().for_each(&mut each);
-            at += rows.len().next_multiple_of(STEP);
-        }
-        Ok(())
-    }
-
-    /// The bounding box of all pages up to `end`.
-    pub fn bounds(&self, unit: &Unit<'_>, end: usize) -> Result<Aabb> {
-        let mut bounds = Aabb::EMPTY;
-        // Points that an earlier attempt deleted are not read any more.
-        if !self.file.is_gone() {
-            self.read_index(unit, end, |row| bounds = bounds.union(row.bounds()))?;
-        }
-        Ok(bounds)
-    }
 }
 
 impl StoredPoints {
@@ -204,7 +52,7 @@ impl StoredPoints {
         Aabb { min, max }
     }
 
-    /// Opens the store: reads its index and builds the tree of boxes.
+    /// Opens the store: reads its index and builds the R\*-tree.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`].
@@ -223,7 +71,7 @@ impl StoredPoints {
                 let found = format!("{} points in {pages} pages", file.records());
                 return Err(file.damaged(0, 0, found, format!("{} points", self.len)));
             }
-            // A tree of boxes has a seventh more of them than there are pages.
+            // A box, a checksum, a shift, and 4 bytes of the tree.
             held.at_least(pages * 33 + 4096)?;
             held.set_held(pages * 33 + 4096);
             files.read_index(&workspace.unit(), end, |row| {
@@ -243,14 +91,6 @@ impl StoredPoints {
                 first += pages.next_multiple_of(STEP).max(STEP);
             }
         }
-        let mut levels = vec![boxes];
-        while levels.last().is_some_and(|top| top.len() > FAN) {
-            let next = levels[levels.len() - 1]
-                .chunks(FAN)
-                .map(|boxes| boxes.iter().fold(Aabb::EMPTY, |a, b| a.union(*b)))
-                .collect();
-            levels.push(next);
-        }
         let mapped = if file.is_gone() { None } else { file.map() };
         Ok(PointStore {
             mapped,
@@ -260,7 +100,8 @@ impl StoredPoints {
             page,
             checks,
             shifts,
-            levels,
+            tree: BoxTree::of(boxes.chunks(GROUP).map(|pages| Aabb::around(pages).wide(0))),
+            boxes,
             _held: held,
         })
     }
@@ -285,7 +126,7 @@ struct Part {
     offset: u64,
 }
 
-/// Positions of all points by id, in packed pages on disk; 29/256 bytes for each point in memory.
+/// Positions of all points by id, in packed pages on disk; 33 bytes for each page in memory.
 #[derive(Debug)]
 pub struct PointStore {
     file: Arc<ScratchFile>,
@@ -296,9 +137,10 @@ pub struct PointStore {
     checks: Vec<u32>,
     /// Bits left out of each coordinate, for each page.
     shifts: Vec<u8>,
-    /// `levels[0]` has a box for each page; each further level has one box for `FAN` boxes of the previous
-    /// level.
-    levels: Vec<Vec<Aabb>>,
+    /// The bounding box of each page.
+    boxes: Vec<Aabb>,
+    /// The bounding boxes of groups of [`GROUP`] pages.
+    tree: BoxTree<i64>,
     /// The segments that are mapped, by number, and their reservation.
     mapped: Option<(HashMap<u32, Mapping>, Reservation)>,
     _held: Reservation,
@@ -326,13 +168,13 @@ impl PointStore {
     /// Number of pages.
     #[must_use]
     pub fn pages(&self) -> usize {
-        self.levels[0].len()
+        self.boxes.len()
     }
 
     /// The bounding box of a page.
     #[must_use]
     pub fn page_box(&self, page: usize) -> &Aabb {
-        &self.levels[0][page]
+        &self.boxes[page]
     }
 
     /// Ids of the points of a page.
@@ -344,57 +186,37 @@ impl PointStore {
     /// The bounding box of all points.
     #[must_use]
     pub fn bounds(&self) -> Aabb {
-        self.levels.last().map_or(Aabb::EMPTY, |top| {
-            top.iter().fold(Aabb::EMPTY, |a, b| a.union(*b))
-        })
+        Aabb::around(&self.boxes)
     }
 
-    /// Number of levels of the box tree; level 0 is the pages.
-    #[must_use]
-    pub fn tree_levels(&self) -> usize {
-        self.levels.len()
-    }
-
-    /// The boxes of a level.
-    #[must_use]
-    pub fn tree_boxes(&self, level: usize) -> &[Aabb] {
-        &self.levels[level]
-    }
-
-    /// The children in `level - 1` of node `index` of `level`.
-    #[must_use]
-    pub fn tree_children(&self, level: usize, index: usize) -> Range<usize> {
-        index * FAN..((index + 1) * FAN).min(self.levels[level - 1].len())
-    }
-
-    /// Calls `each` with all pages whose box is within squared distance `d2` of `target`, ascending, until it
-    /// returns false.
-    pub fn pages_near(&self, target: &Aabb, d2: u64, each: &mut dyn FnMut(usize) -> bool) {
-        let top = self.levels.len() - 1;
-        let mut nodes = 0..self.levels[top].len();
-        nodes.all(|node| self.descend(top, node, target, d2, each));
-    }
-
-    fn descend(
-        &self,
-        level: usize,
-        node: usize,
-        target: &Aabb,
-        d2: u64,
-        each: &mut dyn FnMut(usize) -> bool,
-    ) -> bool {
-        if self.levels[level][node].distance2_box(target) > d2 {
-            return true;
+    /// Replaces `found` by the pages whose box is within `reach` of `target`, ascending; if there are more
+    /// than `most`, by some of them, and returns false.
+    pub fn pages_near(&self, target: &Aabb, reach: u64, most: usize, found: &mut Vec<u32>) -> bool {
+        found.clear();
+        let near = |page: &usize| self.boxes[*page].distance2_box(target) <= reach * reach;
+        for group in self.tree.meeting(target.wide(reach as i64)) {
+            found.extend(self.group(group).filter(near).map(|page| page as u32));
+            if found.len() > most {
+                return false;
+            }
         }
-        if level == 0 {
-            return each(node);
-        }
-        self.tree_children(level, node)
-            .all(|child| self.descend(level - 1, child, target, d2, each))
+        found.sort_unstable();
+        true
+    }
+
+    /// Groups of pages with the squared distance of their box from a point, the nearest first.
+    pub fn nearest_groups(&self, p: Point) -> impl Iterator<Item = (u64, Range<usize>)> {
+        let groups = self.tree.nearest(p.map(i64::from));
+        groups.map(|(distance2, group)| (distance2 as u64, self.group(group)))
+    }
+
+    /// The pages of a group.
+    fn group(&self, group: usize) -> Range<usize> {
+        group * GROUP..((group + 1) * GROUP).min(self.boxes.len())
     }
 
     fn packing(&self, page: usize) -> Packing {
-        Packing::of(&self.levels[0][page], self.shifts[page])
+        Packing::of(&self.boxes[page], self.shifts[page])
     }
 
     /// Calls `each` with the layout and the packed bytes of consecutive pages, in order.

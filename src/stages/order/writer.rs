@@ -1,6 +1,7 @@
 //! Writes the ordered store: in id order, or, with `rewrite`, in any order.
 
-use super::store::{GROUP, STEP, StoreFiles, StoredPoints, Written};
+use super::files::{STEP, StoreFiles, WRITTEN, Written};
+use super::store::StoredPoints;
 use crate::error::Result;
 use crate::geom::Point;
 use crate::geom::aabb::Aabb;
@@ -44,7 +45,7 @@ impl<'w> StoreWriter<'w> {
         // The end of the points may have cut the last group short; it is written again.
         let (mut recorded, mut pages) = (0, 0);
         loop {
-            let more = files.index.rows(workspace, pages / STEP)? / GROUP * GROUP;
+            let more = files.index.rows(workspace, pages / STEP)? / WRITTEN * WRITTEN;
             if more == 0 {
                 break;
             }
@@ -105,11 +106,11 @@ impl<'w> StoreWriter<'w> {
     /// [`crate::Error::Io`].
     pub fn push(&mut self, mut points: &[Point]) -> Result<()> {
         while !points.is_empty() {
-            let room = GROUP * self.files.page - self.pending.len();
+            let room = WRITTEN * self.files.page - self.pending.len();
             let (now, later) = points.split_at(room.min(points.len()));
             self.pending.extend_from_slice(now);
             points = later;
-            if self.pending.len() == GROUP * self.files.page {
+            if self.pending.len() == WRITTEN * self.files.page {
                 self.flush()?;
             }
         }
@@ -125,7 +126,7 @@ impl<'w> StoreWriter<'w> {
         items: &[T],
         point: impl Fn(&T) -> Point + Sync,
     ) -> Result<()> {
-        let group = GROUP * self.files.page;
+        let group = WRITTEN * self.files.page;
         let (first, rest) = items.split_at(((group - self.pending.len()) % group).min(items.len()));
         let (groups, last) = rest.split_at(rest.len() / group * group);
         self.push(&first.iter().map(&point).collect::<Vec<_>>())?;

@@ -129,7 +129,7 @@ fn lonely(around: &mut ReachablePages<'_>, page: usize, reach: u64) -> u64 {
     factors.find(few).unwrap_or(1)
 }
 
-/// The pages that any page of a tile can reach, if they are not too many; then the box tree need not be
+/// The pages that any page of a tile can reach, if they are not too many; then the tree of boxes need not be
 /// searched for each page.
 struct ReachablePages<'a> {
     store: &'a PointStore,
@@ -155,13 +155,12 @@ impl<'a> ReachablePages<'a> {
             found: Vec::new(),
         };
         let most = MOST_AROUND * size;
-        let square = around.reach.pow(2);
-        store.pages_near(&all, square, &mut |page| {
-            let Aabb { min, max } = *store.page_box(page);
-            around.boxes.push(min, max, page as u32);
-            around.boxes.len() <= most
-        });
-        if around.boxes.len() > most {
+        if store.pages_near(&all, around.reach, most, &mut around.found) {
+            for &page in &around.found {
+                let Aabb { min, max } = *store.page_box(page as usize);
+                around.boxes.push(min, max, page);
+            }
+        } else {
             around.reach = 0;
         }
         around
@@ -177,12 +176,7 @@ impl<'a> ReachablePages<'a> {
             let count = near_boxes(self.level, &self.boxes, limit, &mut self.found);
             return (&self.found[..count], count <= most);
         }
-        let found = &mut self.found;
-        found.clear();
-        self.store.pages_near(bounds, reach * reach, &mut |page| {
-            found.push(page as u32);
-            found.len() <= most
-        });
-        (&*found, found.len() <= most)
+        let all = (self.store).pages_near(bounds, reach, most, &mut self.found);
+        (&self.found, all)
     }
 }

@@ -236,4 +236,27 @@ proptest! {
             prop_assert!(asked || known > 0);
         }
     }
+
+    #[test]
+    fn pages_near_a_page_are_those_whose_box_is(
+        cloud in clouds(),
+        page in prop::sample::select(vec![1usize, 3, 16]),
+        far in 0u32..33,
+        most in 0usize..200,
+    ) {
+        let (_workspace, store, _) = ordered(&cloud, page);
+        let mut found = Vec::new();
+        for target in (0..store.pages()).step_by(11).map(|page| store.page_box(page)) {
+            let reach = (1u64 << far) / 3;
+            let near = |page: &u32| {
+                store.page_box(*page as usize).distance2_box(target) <= reach * reach
+            };
+            let expected: Vec<_> = (0..store.pages() as u32).filter(near).collect();
+            let all = store.pages_near(target, reach, most, &mut found);
+            prop_assert_eq!(all, expected.len() <= most);
+            if all {
+                prop_assert_eq!(&found, &expected);
+            }
+        }
+    }
 }

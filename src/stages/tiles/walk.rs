@@ -11,6 +11,8 @@ use crate::workspace::memory::bytes_of;
 use rustc_hash::FxHashMap;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
+use std::iter::Peekable;
+use std::ops::Range;
 
 /// Pages kept in memory by a [`PageCache`].
 const CACHED_PAGES: usize = 1024;
@@ -77,17 +79,22 @@ impl PageCache {
 /// Neighbours in the first batch; each following batch is twice as large.
 const BATCH: usize = 32;
 
-/// A node of the box tree that has not been opened: its squared distance, level and index.
-type Node = Reverse<(u64, usize, usize)>;
+/// A page that has not been opened: its squared distance and number.
+type Page = Reverse<(u64, usize)>;
+
+/// Groups of pages with their squared distance, the nearest first.
+type Groups<'a> = Box<dyn Iterator<Item = (u64, Range<usize>)> + 'a>;
 
 /// Best-first search from one point, a batch of neighbours at a time.
-#[derive(Debug)]
 pub struct Walk<'a> {
     store: &'a PointStore,
     cache: &'a mut PageCache,
     id: u32,
     point: Point,
-    nodes: BinaryHeap<Node>,
+    /// The groups of pages that have not been opened.
+    groups: Peekable<Groups<'a>>,
+    /// The pages of opened groups.
+    pages: BinaryHeap<Page>,
     /// The neighbours to return next, with squared distance and id, farthest first.
     ready: Vec<(u64, u32, Point)>,
     /// The other points of opened pages, unordered.
@@ -101,21 +108,18 @@ impl<'a> Walk<'a> {
     /// Starts at point `id` at the position `point`.
     #[must_use]
     pub fn new(store: &'a PointStore, cache: &'a mut PageCache, id: u32, point: Point) -> Self {
-        let level = store.tree_levels() - 1;
-        let count = store.tree_boxes(level).len();
-        let mut walk = Self {
+        Self {
             store,
             cache,
             id,
             point,
-            nodes: BinaryHeap::new(),
+            groups: (Box::new(store.nearest_groups(point)) as Groups<'a>).peekable(),
+            pages: BinaryHeap::new(),
             ready: Vec::new(),
             later: Vec::new(),
             places: Vec::new(),
             batch: BATCH,
-        };
-        (0..count).for_each(|index| walk.wait(level, index));
-        walk
+        }
     }
 
     /// The next neighbour in the order of (distance, id); `None` if there are no more.
@@ -165,19 +169,26 @@ impl<'a> Walk<'a> {
         let mut limit = within2;
         self.take_later(limit, wanted);
         limit = self.narrow(limit);
-        while let Some(&Reverse((distance, level, index))) = self.nodes.peek() {
-            if distance > limit {
-                break;
-            }
-            self.nodes.pop();
-            if !wanted.may_be_in(&self.store.tree_boxes(level)[index]) {
+        let (store, point) = (self.store, self.point);
+        let may = |page: &usize| wanted.may_be_in(store.page_box(*page));
+        loop {
+            let nearest = self.pages.peek().map_or(u64::MAX, |page| page.0.0);
+            let nearer = |group: &(u64, _)| group.0 <= limit.min(nearest);
+            if let Some((_, group)) = self.groups.next_if(nearer) {
+                let distance2 = |page| (store.page_box(page).distance2(point), page);
+                let pages = group.filter(may).map(distance2);
+                self.pages.extend(pages.map(Reverse));
                 continue;
             }
-            if level > 0 {
-                let children = self.store.tree_children(level, index);
-                children.for_each(|child| self.wait(level - 1, child));
-            } else {
-                self.open(index, limit, wanted)?;
+            if nearest > limit {
+                break;
+            }
+            let Some(Reverse((_, page))) = self.pages.pop() else {
+                break;
+            };
+            // Less may be wanted than when the group was opened.
+            if may(&page) {
+                self.open(page, limit, wanted)?;
                 if self.ready.len() >= 2 * self.batch {
                     limit = self.narrow(limit);
                 }
@@ -185,8 +196,8 @@ impl<'a> Walk<'a> {
         }
         self.narrow(limit);
         self.ready.sort_unstable_by_key(|p| Reverse((p.0, p.1)));
-        let nodes = self.nodes.capacity() * size_of::<Node>();
-        let bytes = nodes as u64 + bytes_of(&self.ready) + bytes_of(&self.later);
+        let pages = self.pages.capacity() * size_of::<Page>();
+        let bytes = pages as u64 + bytes_of(&self.ready) + bytes_of(&self.later);
         self.cache.walk = self.cache.walk.max(bytes);
         self.batch *= 2;
         Ok(())
@@ -239,10 +250,5 @@ impl<'a> Walk<'a> {
             }
         }
         Ok(())
-    }
-
-    fn wait(&mut self, level: usize, index: usize) {
-        let distance = self.store.tree_boxes(level)[index].distance2(self.point);
-        self.nodes.push(Reverse((distance, level, index)));
     }
 }
