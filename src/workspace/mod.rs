@@ -12,6 +12,7 @@ mod keeper;
 pub mod limits;
 pub mod memory;
 pub mod open;
+mod pipe;
 pub mod place;
 pub mod progress;
 mod recover;
