@@ -28,13 +28,15 @@ pub fn run(command: Command) -> Result<bool> {
     }
 }
 
-fn observer(quiet: bool) -> Arc<dyn Observer> {
+/// The receiver of the progress, and the flag that signals raise.
+fn watched(quiet: bool) -> (Arc<dyn Observer>, Cancel) {
     if quiet {
-        Arc::new(Silent)
+        (Arc::new(Silent), stop::watch(None))
     } else if std::io::stderr().is_terminal() {
-        Arc::new(Bars::default())
+        let bars = Arc::new(Bars::default());
+        (bars.clone(), stop::watch(Some(bars)))
     } else {
-        Arc::new(Warnings)
+        (Arc::new(Warnings), stop::watch(None))
     }
 }
 
@@ -49,13 +51,8 @@ fn memory(limits: &Limits) -> u64 {
 fn workspace(limits: &Limits, beside: &Path) -> Result<Workspace> {
     let memory = MemoryPool::new(memory(limits))?;
     let scratch = limits.scratch.as_deref().unwrap_or(beside);
-    let workspace = Workspace::new(
-        scratch,
-        memory,
-        threads(limits),
-        observer(limits.quiet),
-        stop::on_signal(),
-    )?;
+    let (observer, cancel) = watched(limits.quiet);
+    let workspace = Workspace::new(scratch, memory, threads(limits), observer, cancel)?;
     workspace.set_storage(limits.storing.storage());
     Ok(workspace)
 }
@@ -114,8 +111,8 @@ fn resume(args: &Resume) -> Result<bool> {
 }
 
 fn run_reconstruction(builder: Builder, ends: &Ends, quiet: bool) -> Result<bool> {
-    let cancel = stop::on_signal();
-    let mut builder = builder.observer(observer(quiet)).cancel(cancel.clone());
+    let (observer, cancel) = watched(quiet);
+    let mut builder = builder.observer(observer).cancel(cancel);
     if let Some(limit) = ends.time_limit {
         builder = builder.time_limit(limit);
     }
@@ -136,7 +133,7 @@ fn run_reconstruction(builder: Builder, ends: &Ends, quiet: bool) -> Result<bool
             .open(path);
         opened.map_err(|e| Error::io(path, "write the report", e))?;
     }
-    stop::watch(&run, &cancel);
+    stop::can_end(&run);
     let outcome = run.run();
     match (&outcome, &ends.report) {
         (Ok(report), Some(path)) => write_report(path, report)?,
@@ -230,14 +227,15 @@ fn demo(args: &Demo) -> Result<bool> {
         .write(&cloud, format)
         .map_err(|e| generator_error(&cloud, &e))?;
     let mesh = folder.join("bumpy.ply");
+    let (observer, cancel) = watched(args.limits.quiet);
     let report = Reconstruction::builder()
         .input(&cloud)
         .output(&mesh)
         .threads(threads(&args.limits))
         .memory(memory(&args.limits))
-        .observer(observer(args.limits.quiet))
+        .observer(observer)
         .start(Start::Restart)
-        .cancel(stop::on_signal())
+        .cancel(cancel)
         .build()?
         .run()?;
     let path = folder.join("report.json");

@@ -5,12 +5,14 @@ use crate::workspace::{limits, lock};
 use indicatif::{HumanCount, ProgressBar, ProgressState, ProgressStyle};
 use std::fmt::Write;
 use std::sync::Mutex;
-use std::time::Duration;
+use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Draws a progress bar for the current stage on standard error.
+/// A progress bar for the current stage on standard error. Only [`Bars::draw`] draws it, so that workers never
+/// wait for the terminal.
 #[derive(Default)]
 pub struct Bars {
     current: Mutex<Option<ProgressBar>>,
+    done: AtomicU64,
 }
 
 const KNOWN: &str =
@@ -31,9 +33,10 @@ fn style(template: &str) -> ProgressStyle {
 }
 
 impl Bars {
-    fn with(&self, work: impl FnOnce(&ProgressBar)) {
+    /// Draws the bar, if there is one.
+    pub fn draw(&self) {
         if let Some(bar) = &*lock(&self.current) {
-            work(bar);
+            bar.set_position(self.done.load(Ordering::Relaxed));
         }
     }
 }
@@ -46,23 +49,27 @@ impl Observer for Bars {
             ProgressBar::new_spinner().with_style(style(UNKNOWN))
         };
         let bar = bar.with_prefix(name).with_message(unit);
-        bar.enable_steady_tick(Duration::from_millis(200));
+        self.done.store(0, Ordering::Relaxed);
         *lock(&self.current) = Some(bar);
     }
 
     fn advance(&self, count: u64) {
-        self.with(|bar| bar.inc(count));
+        self.done.fetch_add(count, Ordering::Relaxed);
     }
 
     fn end(&self) {
-        self.with(|bar| {
+        self.draw();
+        if let Some(bar) = lock(&self.current).take() {
             bar.set_style(style(DONE));
             bar.finish();
-        });
+        }
     }
 
     fn warn(&self, message: &str) {
-        self.with(|bar| bar.suspend(|| eprintln!("outcrop: warning: {message}")));
+        match &*lock(&self.current) {
+            Some(bar) => bar.suspend(|| Warnings.warn(message)),
+            None => Warnings.warn(message),
+        }
     }
 }
 

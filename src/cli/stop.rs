@@ -1,12 +1,15 @@
-//! Stopping: signals, time limits, and the messages about them.
+//! The thread that waits for signals, the end of a run and the next drawing of the progress; messages about
+//! stopping.
 
+use super::progress::Bars;
 use crate::pipeline::Reconstruction;
 use crate::workspace::progress::Cancel;
 use crate::workspace::{Folder, fault, lock};
+use crossbeam_channel::{Receiver, after, never, select, tick, unbounded};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicI32, Ordering};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 /// Exit code of a run that reached its time limit.
@@ -16,8 +19,8 @@ pub const TIME_IS_UP: u8 = 75;
 /// time after that.
 const PATIENCE: Duration = Duration::from_millis(1500);
 
-/// Interval at which the flag is checked.
-const LOOK: Duration = Duration::from_millis(50);
+/// Time between two drawings of the progress.
+const DRAW: Duration = Duration::from_millis(200);
 
 /// The signal that stops the program; 0 if none.
 static SIGNAL: AtomicI32 = AtomicI32::new(0);
@@ -34,40 +37,59 @@ pub fn code(expired: bool) -> u8 {
     }
 }
 
-/// A flag that signals raise; a second signal ends the program at once.
-pub fn on_signal() -> Cancel {
+/// Starts the thread, which draws the progress; returns a flag that signals raise. A second signal ends the
+/// program at once. If a run does not stop soon after its flag is raised, the program ends as well.
+pub fn watch(bars: Option<Arc<Bars>>) -> Cancel {
     let cancel = Cancel::new();
-    let raised = cancel.clone();
-    // Without a handler a signal ends the program; the run can be resumed in this case too.
-    if let Ok(mut signals) = Signals::new([SIGINT, SIGTERM, SIGHUP]) {
-        std::thread::spawn(move || {
-            for signal in signals.forever() {
-                if raised.is_cancelled() {
-                    std::process::exit(128 + signal);
-                }
-                SIGNAL.store(signal, Ordering::Relaxed);
-                raised.cancel();
+    let (signals, flag) = (signals(), cancel.clone());
+    std::thread::spawn(move || {
+        let (raised, mut late) = (flag.raised(), never());
+        let draw = bars.as_ref().map_or_else(never, |_| tick(DRAW));
+        loop {
+            select! {
+                recv(signals) -> signal => match signal {
+                    Ok(signal) if flag.is_cancelled() => std::process::exit(128 + signal),
+                    Ok(signal) => {
+                        SIGNAL.store(signal, Ordering::Relaxed);
+                        flag.cancel();
+                    }
+                    Err(_) => return,
+                },
+                recv(raised) -> _ => late = after(PATIENCE),
+                recv(late) -> _ => end(&flag),
+                recv(draw) -> _ => bars.iter().for_each(|bars| bars.draw()),
             }
-        });
-    }
+        }
+    });
     cancel
 }
 
-/// Ends the program if the run does not stop soon after its flag is raised.
-pub fn watch(run: &Reconstruction, cancel: &Cancel) {
+/// Receives the signals that stop a run.
+fn signals() -> Receiver<i32> {
+    // Without a handler a signal ends the program; the run can be resumed in this case too.
+    let Ok(mut signals) = Signals::new([SIGINT, SIGTERM, SIGHUP]) else {
+        return never();
+    };
+    let (sender, receiver) = unbounded();
+    std::thread::spawn(move || signals.forever().try_for_each(|s| sender.send(s)));
+    receiver
+}
+
+/// Notes that a run begins which the program may end at any time.
+pub fn can_end(run: &Reconstruction) {
     *lock(&FOLDER) = Some(run.scratch_folder().to_path_buf());
-    let cancel = cancel.clone();
-    std::thread::spawn(move || {
-        while !cancel.is_cancelled() {
-            std::thread::sleep(LOOK);
-        }
-        std::thread::sleep(PATIENCE);
-        if let Err(error) = cancel.check() {
-            eprintln!("outcrop: {error}{}", hint());
-        }
-        fault::finish();
-        std::process::exit(code(cancel.is_expired()).into());
-    });
+}
+
+/// Ends the program if its work can be resumed.
+fn end(cancel: &Cancel) {
+    if lock(&FOLDER).is_none() {
+        return;
+    }
+    if let Err(error) = cancel.check() {
+        eprintln!("outcrop: {error}{}", hint());
+    }
+    fault::finish();
+    std::process::exit(code(cancel.is_expired()).into());
 }
 
 /// A line about resuming the run, if that is possible.

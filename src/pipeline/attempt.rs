@@ -6,8 +6,8 @@ use crate::error::{Error, Result};
 use crate::stages::export;
 use crate::workspace::progress::Cancel;
 use crate::workspace::{Folder, Found, Workspace, fault};
+use crossbeam_channel::{RecvTimeoutError, Sender, bounded};
 use std::path::Path;
-use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::time::Duration;
 
 /// Raises a flag when the time is up, unless it is dropped before.
@@ -21,7 +21,7 @@ fn margin(limit: Duration) -> Duration {
 
 impl Alarm {
     pub fn set(limit: Duration, cancel: Cancel) -> Self {
-        let (sender, receiver) = channel();
+        let (sender, receiver) = bounded(0);
         let wait = limit.saturating_sub(margin(limit));
         std::thread::spawn(move || {
             if receiver.recv_timeout(wait) == Err(RecvTimeoutError::Timeout) {

@@ -3,6 +3,7 @@
 //! A row is a struct of 32-bit words, compared lexicographically; its fields are known only to the
 //! stage that writes it. Every part of a file carries a CRC-32 that is checked when it is read.
 
+mod beside;
 mod compress;
 mod local;
 mod pack;

@@ -126,6 +126,7 @@ pub(super) fn merge<R: Row>(
 }
 
 /// Writes a run.
+#[derive(Debug)]
 pub(super) struct RunWriter<R: Row> {
     file: Arc<ScratchFile>,
     worker: usize,

@@ -1,4 +1,8 @@
-//! The external sorter: sorted runs on disk, merged with a bounded fan-in.
+//! The external sorter: sorted runs on disk, merged with a bounded fan-in. If there is more than one run, one
+//! half of the memory is written by a thread of its own while the other half is filled and sorted. Whoever
+//! adds rows waits for that thread, which waits for the disk only.
+
+mod state;
 
 use super::runs::{FILE_BUFFER, FRAME, Run, RunWriter, merge};
 use super::{Row, sort};
@@ -8,6 +12,7 @@ use crate::workspace::steps::Step;
 use crate::workspace::{Files, Workspace, lock};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
+use state::State;
 use std::collections::BTreeMap;
 use std::marker::PhantomData;
 use std::sync::{Mutex, MutexGuard};
@@ -24,42 +29,13 @@ pub struct Sorter<R: Row> {
     files: Files,
 }
 
-#[derive(Debug)]
-struct State<R: Row> {
-    buffer: Vec<R>,
-    runs: Vec<Run<R>>,
-    made: usize,
-    /// Largest number of rows that were in the buffer; memory beyond them was never touched.
-    touched: usize,
-    /// The reservation to which the usage of the buffer is reported.
-    held: Option<Reservation>,
-}
-
-impl<R: Row> State<R> {
-    fn new() -> Self {
-        Self {
-            buffer: Vec::new(),
-            runs: Vec::new(),
-            made: 0,
-            touched: 0,
-            held: None,
-        }
-    }
-
-    fn report_usage(&mut self, bytes: u64) {
-        if let Some(held) = &mut self.held {
-            held.set_held(bytes);
-        }
-    }
-}
-
 impl<R: Row> Sorter<R> {
     /// A sorter whose buffers take at most `buffer` bytes, which the caller has reserved.
     #[must_use]
     pub fn new(workspace: &Workspace, name: &str, buffer: u64) -> Self {
         let capacity = (buffer as usize / size_of::<R>()).max(2);
         Self {
-            state: Mutex::new(State::new()),
+            state: Mutex::new(State::new(capacity)),
             capacity,
             name: name.to_owned(),
             files: workspace.files.clone(),
@@ -97,51 +73,28 @@ impl<R: Row> Sorter<R> {
     pub fn push(&self, mut records: &[R]) -> Result<()> {
         let mut state = self.state();
         while !records.is_empty() {
-            let room = self.capacity - state.buffer.len();
-            let (now, later) = records.split_at(room.min(records.len()));
-            let wanted = state.buffer.len() + now.len();
-            if wanted > state.buffer.capacity() {
-                // Doubles the buffer, within the reservation.
-                let target = wanted.max(2 * state.buffer.len()).min(self.capacity);
-                let more = target - state.buffer.len();
-                // The old buffer and its copy.
-                let both = 2 * size_of_val(state.buffer.as_slice()) as u64;
-                state.buffer.reserve_exact(more);
-                state.report_usage(both);
-            }
-            state.buffer.extend_from_slice(now);
-            if state.buffer.len() > state.touched {
-                state.touched = state.buffer.len();
-                let taken = size_of_val(state.buffer.as_slice()) as u64;
-                state.report_usage(taken);
-            }
-            records = later;
-            if state.buffer.len() == self.capacity {
-                self.spill(&mut state)?;
+            records = state.add(records);
+            if state.buffer.len() == state.capacity {
+                self.spill(&mut state, false)?;
+                state.divide();
             }
         }
-        Ok(())
-    }
-
-    fn spill(&self, state: &mut State<R>) -> Result<()> {
-        let run = self.write_run(state, false)?;
-        state.runs.push(run);
         Ok(())
     }
 
     /// Sorts the rows in the buffer and writes them as a run.
-    fn write_run(&self, state: &mut State<R>, kept: bool) -> Result<Run<R>> {
+    fn spill(&self, state: &mut State<R>, kept: bool) -> Result<()> {
         self.files.pool().install(|| sort::sort(&mut state.buffer));
-        let mut writer = self.run_writer(&mut state.made, kept)?;
-        for frame in state.buffer.chunks(FRAME) {
-            writer.frame(frame)?;
-        }
-        state.buffer.clear();
-        writer.finish()
+        let writer = self.run_writer(&mut state.made, kept)?;
+        state.write(writer)
+    }
+
+    fn run_name(&self, number: usize) -> String {
+        format!("{}.run{number}", self.name)
     }
 
     fn run_writer(&self, made: &mut usize, kept: bool) -> Result<RunWriter<R>> {
-        let name = format!("{}.run{made}", self.name);
+        let name = self.run_name(*made);
         *made += 1;
         RunWriter::new(&self.files, &name, kept)
     }
@@ -177,7 +130,13 @@ impl<R: Row> Sorter<R> {
             }
         }
         // A full buffer would be written by [`Sorter::push`], as a run that does not survive the attempt.
-        let most = (self.capacity - 1).min(MOST_IN_RUN) as u64;
+        let most = |capacity: usize| (capacity - 1).min(MOST_IN_RUN) as u64;
+        if left.values().sum::<u64>() > most(self.capacity) {
+            self.state().divide();
+        }
+        let most = most(self.state().capacity);
+        // The last run, which may not be written yet.
+        let mut beside: Option<(usize, Vec<u32>)> = None;
         while !left.is_empty() {
             let (mut numbers, mut records) = (Vec::new(), 0);
             for (&number, &more) in &left {
@@ -187,18 +146,43 @@ impl<R: Row> Sorter<R> {
                 numbers.push(number);
                 records += more;
             }
-            push(&numbers)?;
+            let pushed = push(&numbers);
             left.retain(|part, _| !numbers.contains(part));
             let mut state = self.state();
-            if left.is_empty() && state.runs.is_empty() && !kept {
-                break;
+            if left.is_empty() && state.runs.is_empty() && beside.is_none() && !kept {
+                return pushed.map(|()| all);
             }
-            let number = state.made as u64;
-            let run = self.write_run(&mut state, true)?;
-            step.finish(number, &(run.name(), numbers), |unit| run.put(unit))?;
-            state.runs.push(run);
+            let number = state.made;
+            match pushed {
+                Ok(()) => self.spill(&mut state, true)?,
+                Err(_) => state.settle()?,
+            }
+            if let Some((number, numbers)) = beside.replace((number, numbers)) {
+                self.record(&state, &step, number, &numbers)?;
+            }
+            pushed?;
         }
+        let mut state = self.state();
+        state.settle()?;
+        beside.map_or(Ok(()), |(number, numbers)| {
+            self.record(&state, &step, number, &numbers)
+        })?;
         Ok(all)
+    }
+
+    /// Records the run with this number and `note`, if it is written, as a finished unit.
+    fn record(
+        &self,
+        state: &State<R>,
+        step: &Step<'_>,
+        number: usize,
+        note: &impl Serialize,
+    ) -> Result<()> {
+        let name = self.run_name(number);
+        let written = state.runs.iter().rfind(|run| run.name() == name);
+        written.map_or(Ok(()), |run| {
+            step.finish(number as u64, &(name, note), |unit| run.put(unit))
+        })
     }
 
     /// True if all rows are on disk.
@@ -231,11 +215,10 @@ impl<R: Row> Sorter<R> {
     /// [`crate::Error::Io`], [`crate::Error::Disk`].
     pub(crate) fn close_run<T: Serialize>(&self, step: &Step<'_>, note: &T) -> Result<()> {
         let mut state = self.state();
-        let number = state.made as u64;
-        let run = self.write_run(&mut state, true)?;
-        step.finish(number, &(run.name(), note), |unit| run.put(unit))?;
-        state.runs.push(run);
-        Ok(())
+        let number = state.made;
+        self.spill(&mut state, true)?;
+        state.settle()?;
+        self.record(&state, step, number, note)
     }
 
     /// Number of rows in the buffer.
@@ -251,8 +234,9 @@ impl<R: Row> Sorter<R> {
     pub fn finish(self, workspace: &Workspace) -> Result<Sorted<R>> {
         let mut state = {
             let mut guard = self.state();
-            std::mem::replace(&mut *guard, State::new())
+            std::mem::replace(&mut *guard, State::new(self.capacity))
         };
+        state.settle()?;
         if state.runs.is_empty() {
             self.files.pool().install(|| sort::sort(&mut state.buffer));
             return Ok(Sorted {
@@ -263,7 +247,8 @@ impl<R: Row> Sorter<R> {
             });
         }
         if !state.buffer.is_empty() {
-            self.spill(&mut state)?;
+            self.spill(&mut state, false)?;
+            state.settle()?;
         }
         state.buffer = Vec::new();
         state.report_usage(0);
@@ -307,8 +292,9 @@ impl<R: Row> Sorter<R> {
     /// See [`Sorter::finish`].
     pub fn finish_on_disk(self, workspace: &Workspace) -> Result<SortedRuns<R>> {
         let mut state = self.state();
+        state.settle()?;
         if state.runs.is_empty() {
-            self.spill(&mut state)?;
+            self.spill(&mut state, false)?;
         }
         drop(state);
         Ok(self.finish(workspace)?.runs())

@@ -4,7 +4,7 @@
 //! Its numbered sections are contiguous parts of segments.
 
 use super::fault;
-use super::keeper::Leaving;
+use super::keeper::{Kept, Leaving};
 use super::mapped::{Io, Mapping};
 use super::memory::{MemoryPool, Reservation};
 use super::open::{failed_write, open_existing, options};
@@ -18,7 +18,7 @@ use std::fs::File;
 use std::os::unix::fs::FileExt;
 use std::path::PathBuf;
 use std::str::FromStr;
-use std::sync::atomic::{AtomicBool, AtomicI32, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicI32, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, OnceLock};
 
 /// Bytes of memory for a section.
@@ -101,14 +101,11 @@ impl Shared {
 /// A part of a scratch file that one thread writes.
 #[derive(Debug)]
 struct Segment {
-    name: Arc<str>,
-    path: PathBuf,
+    kept: Arc<Kept>,
     /// The handle; closed segments are opened again by their readers.
     file: Mutex<Option<Arc<File>>>,
     /// End of the bytes allocated so far.
     end: AtomicU64,
-    /// Set by writing, reset by syncing.
-    dirty: Arc<AtomicBool>,
 }
 
 impl Segment {
@@ -162,13 +159,11 @@ impl ScratchFile {
         if let Some((_, segment)) = segments.iter().find(|(n, _)| *n == number) {
             return segment.clone();
         }
-        let name = format!("{}.{number}", self.name);
+        let path = self.shared.folder.join(format!("{}.{number}", self.name));
         let segment = Arc::new(Segment {
-            path: self.shared.folder.join(&name),
-            name: name.into(),
+            kept: Arc::new(Kept::new(path)),
             file: Mutex::new(None),
             end: AtomicU64::new(0),
-            dirty: Arc::default(),
         });
         segments.push((number, segment.clone()));
         segment
@@ -185,7 +180,7 @@ impl ScratchFile {
     /// Path of a segment.
     #[must_use]
     pub fn path(&self, segment: u32) -> PathBuf {
-        self.segment(segment).path.clone()
+        self.segment(segment).kept.path.clone()
     }
 
     /// Deletes the file; a later attempt does not need it any more.
@@ -193,13 +188,10 @@ impl ScratchFile {
         if self.gone {
             return Ok(());
         }
-        let leaving = self.segments().into_iter().map(|segment| Leaving {
-            name: segment.name.clone(),
-            path: segment.path.clone(),
-            bytes: segment.end(),
-        });
+        let segments = self.segments().into_iter();
+        let leaving = segments.map(|s| Leaving(s.kept.clone(), s.end()));
         match &self.shared.run {
-            Some(run) if self.kept => run.delete(&self.name, leaving.collect()),
+            Some(run) if self.kept => run.delete(&self.name, leaving),
             _ => {
                 leaving.for_each(|file| file.delete(&self.shared.io));
                 Ok(())
@@ -310,13 +302,10 @@ impl ScratchFile {
         self.shared.io.grow_scratch(length);
         fault::write()
             .and_then(|()| file.write_all_at(bytes, place.offset))
-            .map_err(|e| failed_write(&segment.path, bytes.len(), self.shared.more(), e))?;
+            .map_err(|e| failed_write(&segment.kept.path, bytes.len(), self.shared.more(), e))?;
         self.shared.io.add_written(length);
-        if let Some(run) = &self.shared.run
-            && self.kept
-            && !segment.dirty.swap(true, Ordering::Relaxed)
-        {
-            run.keeper.sync_later(&segment.name, &file, &segment.dirty);
+        if let (Some(run), true) = (&self.shared.run, self.kept) {
+            run.keeper.sync_later(&segment.kept);
         }
         Ok(place)
     }
@@ -327,12 +316,11 @@ impl ScratchFile {
         if let Some(file) = &*handle {
             return Ok(file.clone());
         }
-        let file = options().create_new(true).open(&segment.path);
-        let file = Arc::new(file.map_err(|e| Error::io(&segment.path, "create", e))?);
+        let path = &segment.kept.path;
+        let file = options().create_new(true).open(path);
+        let file = Arc::new(file.map_err(|e| Error::io(path, "create", e))?);
         *handle = Some(file.clone());
-        if let (Some(run), true) = (&self.shared.run, self.kept) {
-            run.keeper.made(&segment.name);
-        }
+        segment.kept.made();
         Ok(file)
     }
 
@@ -354,7 +342,7 @@ impl ScratchFile {
                 let found = "the end of the file".to_owned();
                 self.damaged(segment, offset, found, format!("{wanted} bytes"))
             }
-            _ => Error::io(&of.path, format!("read {wanted} bytes"), e),
+            _ => Error::io(&of.kept.path, format!("read {wanted} bytes"), e),
         })?;
         self.shared.io.add_read(wanted as u64);
         Ok(())
@@ -417,7 +405,7 @@ impl ScratchFile {
         if let Some(file) = &*handle {
             return Ok(file.clone());
         }
-        let file = Arc::new(open_existing(&segment.path)?);
+        let file = Arc::new(open_existing(&segment.kept.path)?);
         *handle = Some(file.clone());
         Ok(file)
     }

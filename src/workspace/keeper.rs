@@ -5,115 +5,164 @@
 //! this one, so a loss of power costs at most a few seconds of work.
 
 use super::fault::{self, Event};
+use super::open::open_existing;
 use super::{IoCounters, lock};
-use std::collections::HashSet;
+use crossbeam_channel::{Receiver, Sender, TryRecvError, after, select, unbounded};
 use std::fs::File;
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::atomic::{AtomicU8, Ordering};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 /// Time between two rounds of syncing, if no file waits to be deleted. A file that waits triggers a round at
 /// once, since the run may need its space.
 const ROUND: Duration = Duration::from_secs(5);
 
-/// A file to delete, and its size.
+/// Bit of a file's state: the file has unsynced data, and the keeper knows it.
+const DIRTY: u8 = 1;
+/// Bit of a file's state: some of its data may have been synced, by this attempt or an earlier one.
+const SYNCED: u8 = 2;
+/// Bit of a file's state: nobody reads the file any more.
+const UNNEEDED: u8 = 4;
+
+/// A file, and how much of it would survive a loss of power.
 #[derive(Debug)]
-pub struct Leaving {
-    /// Name of the file.
-    pub name: Arc<str>,
-    /// Path of the file.
+pub struct Kept {
+    /// Its path.
     pub path: PathBuf,
-    /// Scratch bytes that its deletion frees.
-    pub bytes: u64,
+    state: AtomicU8,
 }
+
+impl Kept {
+    /// A file of an earlier attempt, or one that does not exist yet.
+    pub fn new(path: PathBuf) -> Self {
+        let state = AtomicU8::new(SYNCED);
+        Self { path, state }
+    }
+
+    /// Notes that this attempt made the file.
+    pub fn made(&self) {
+        self.state.store(0, Ordering::Release);
+    }
+
+    fn add(&self, bit: u8) -> u8 {
+        self.state.fetch_or(bit, Ordering::AcqRel)
+    }
+
+    /// Syncs the data, unless nobody needs them.
+    fn sync(&self) {
+        // Of this and `Keeper::delete`, one sees what the other did: a file is deleted at once or synced.
+        if self.add(SYNCED) & UNNEEDED == 0 {
+            self.state.fetch_and(!DIRTY, Ordering::AcqRel);
+            // Unsynced data are found by their checksums when the run is resumed.
+            let _ = open_existing(&self.path).and_then(|file| file.sync_data());
+        }
+    }
+}
+
+/// A file to delete, and the scratch bytes that its deletion frees.
+#[derive(Debug)]
+pub struct Leaving(pub Arc<Kept>, pub u64);
 
 impl Leaving {
     /// Deletes the file at once.
     pub fn delete(&self, io: &IoCounters) {
         fault::point(Event::Delete);
         // A scratch file that cannot be deleted is deleted with its folder.
-        let _ = std::fs::remove_file(&self.path);
-        io.shrink_scratch(self.bytes);
+        let _ = std::fs::remove_file(&self.0.path);
+        io.shrink_scratch(self.1);
     }
 }
 
-/// A file with unsynced data.
 #[derive(Debug)]
-struct Dirty {
-    name: Arc<str>,
-    file: Arc<File>,
-    flag: Arc<AtomicBool>,
+enum Message {
+    /// A journal that is synced in every round.
+    Journal(Arc<File>),
+    /// A file has unsynced data.
+    Dirty(Arc<Kept>),
+    /// Files to delete after a round.
+    Leaving(Vec<Leaving>),
 }
 
-#[derive(Debug, Default)]
-struct State {
-    journals: Vec<Arc<File>>,
-    dirty: Vec<Dirty>,
-    /// Files of this attempt without any synced data.
-    fresh: HashSet<Arc<str>>,
-    leaving: Vec<Leaving>,
-    stop: bool,
-}
-
-#[derive(Debug, Default)]
-struct Table {
-    state: Mutex<State>,
-    wake: Condvar,
-}
-
-/// The thread and its queue.
-#[derive(Debug)]
-pub struct Keeper {
-    table: Arc<Table>,
+/// The thread's end of the channel, and what it knows.
+struct Rounds {
+    messages: Receiver<Message>,
+    folder: File,
     io: Arc<IoCounters>,
+    deleting: Arc<Mutex<()>>,
+    journals: Vec<Arc<File>>,
+    dirty: Vec<Arc<Kept>>,
+    leaving: Vec<Leaving>,
 }
 
-impl Table {
-    fn state(&self) -> MutexGuard<'_, State> {
-        lock(&self.state)
+/// The run is over.
+struct Over;
+
+impl Rounds {
+    fn take(&mut self, message: Message) {
+        match message {
+            Message::Journal(file) => self.journals.push(file),
+            Message::Dirty(file) => self.dirty.push(file),
+            Message::Leaving(files) => self.leaving.extend(files),
+        }
     }
 
-    /// Waits for the next round or for a file to delete; false if the thread has to stop.
-    fn wait(&self, round: Duration) -> bool {
-        let idle = |state: &mut State| !state.stop && state.leaving.is_empty();
-        let waited = self.wake.wait_timeout_while(self.state(), round, idle);
-        !waited.unwrap_or_else(PoisonError::into_inner).0.stop
+    /// Takes all messages that are there.
+    fn take_all(&mut self) -> Result<(), Over> {
+        loop {
+            match self.messages.try_recv() {
+                Ok(message) => self.take(message),
+                Err(TryRecvError::Empty) => return Ok(()),
+                Err(TryRecvError::Disconnected) => return Err(Over),
+            }
+        }
     }
 
-    fn round(&self, folder: &File, io: &IoCounters) {
-        let (dirty, leaving, journals) = {
-            let mut state = self.state();
-            let dirty = std::mem::take(&mut state.dirty);
-            for file in &dirty {
-                state.fresh.remove(&file.name);
+    fn run(mut self, time: Duration) -> Result<(), Over> {
+        loop {
+            let due = after(time);
+            while self.leaving.is_empty() {
+                select! {
+                    recv(self.messages) -> message => self.take(message.map_err(|_| Over)?),
+                    recv(due) -> _ => break,
+                }
             }
-            let leaving = std::mem::take(&mut state.leaving);
-            (dirty, leaving, state.journals.clone())
-        };
-        for Dirty { file, flag, .. } in dirty {
-            if self.state().stop {
-                return;
-            }
-            flag.store(false, Ordering::Relaxed);
-            // Unsynced data are found by their checksums when the run is resumed.
-            let _ = file.sync_data();
+            self.round()?;
+        }
+    }
+
+    fn round(&mut self) -> Result<(), Over> {
+        self.take_all()?;
+        let leaving = std::mem::take(&mut self.leaving);
+        for file in std::mem::take(&mut self.dirty) {
+            // The end of the run does not wait for more than one sync, and nobody waits for that.
+            self.take_all()?;
+            file.sync();
         }
         // Syncs the names of new files.
-        let _ = folder.sync_all();
-        for journal in journals {
+        let _ = self.folder.sync_all();
+        for journal in &self.journals {
             let _ = journal.sync_data();
         }
         fault::point(Event::Synced);
+        let deleting = self.deleting.clone();
         for file in leaving {
-            // After the run the folder may belong to another run.
-            let state = self.state();
-            if state.stop {
-                return;
-            }
-            file.delete(io);
+            let _deleting = lock(&deleting);
+            self.take_all()?;
+            file.delete(&self.io);
         }
+        Ok(())
     }
+}
+
+/// Sends messages to the thread; dropping it ends the thread.
+#[derive(Debug)]
+pub struct Keeper {
+    /// Not bounded, since nobody must wait: one message for each unsynced, leaving or journal file.
+    messages: Option<Sender<Message>>,
+    io: Arc<IoCounters>,
+    /// Locked while the thread deletes a file.
+    deleting: Arc<Mutex<()>>,
 }
 
 impl Keeper {
@@ -131,66 +180,60 @@ impl Keeper {
         folder: File,
         io: Arc<IoCounters>,
     ) -> std::io::Result<Self> {
-        let table = Arc::new(Table::default());
-        table.state().journals.push(journal);
-        let (shared, counters) = (table.clone(), io.clone());
-        let work = move || {
-            while shared.wait(time) {
-                shared.round(&folder, &counters);
-            }
+        let (sender, messages) = unbounded();
+        let deleting: Arc<Mutex<()>> = Arc::default();
+        let rounds = Rounds {
+            messages,
+            folder,
+            io: io.clone(),
+            deleting: deleting.clone(),
+            journals: vec![journal],
+            dirty: Vec::new(),
+            leaving: Vec::new(),
         };
         let thread = std::thread::Builder::new().name("outcrop-keeper".into());
-        thread.spawn(work)?;
-        Ok(Self { table, io })
+        thread.spawn(move || rounds.run(time))?;
+        Ok(Self {
+            messages: Some(sender),
+            io,
+            deleting,
+        })
+    }
+
+    fn send(&self, message: Message) {
+        // The thread is there until the sender is dropped.
+        let _ = self.messages.as_ref().map(|thread| thread.send(message));
     }
 
     /// Notes a journal that is synced in every round.
     pub fn journal(&self, file: Arc<File>) {
-        self.table.state().journals.push(file);
+        self.send(Message::Journal(file));
     }
 
-    /// Notes a new file.
-    pub fn made(&self, name: &Arc<str>) {
-        self.table.state().fresh.insert(name.clone());
-    }
-
-    /// Notes a file that was written to.
-    pub fn sync_later(&self, name: &Arc<str>, file: &Arc<File>, flag: &Arc<AtomicBool>) {
-        self.table.state().dirty.push(Dirty {
-            name: name.clone(),
-            file: file.clone(),
-            flag: flag.clone(),
-        });
-    }
-
-    /// Notes files to delete; the journal already records their deletion. A file that was never synced would
-    /// not survive a loss of power anyway, so it is deleted at once.
-    pub fn delete(&self, files: Vec<Leaving>) {
-        let mut now = Vec::new();
-        let mut state = self.table.state();
-        for file in files {
-            // It will not be read, so it needs no sync.
-            state.dirty.retain(|dirty| dirty.name != file.name);
-            if state.fresh.remove(&file.name) {
-                now.push(file);
-            } else {
-                state.leaving.push(file);
-            }
+    /// Notes that a file was written to.
+    pub fn sync_later(&self, file: &Arc<Kept>) {
+        if file.add(DIRTY) & DIRTY == 0 {
+            self.send(Message::Dirty(file.clone()));
         }
-        let waits = !state.leaving.is_empty();
-        drop(state);
-        if waits {
-            self.table.wake.notify_all();
+    }
+
+    /// Deletes files; the journal already records their deletion. A file that was never synced would not
+    /// survive a loss of power anyway, so it is deleted at once, which frees its space even during a sync.
+    pub fn delete(&self, files: impl Iterator<Item = Leaving>) {
+        let synced = |file: &Leaving| file.0.add(UNNEEDED) & SYNCED != 0;
+        let (leaving, fresh): (Vec<_>, Vec<_>) = files.partition(synced);
+        if !leaving.is_empty() {
+            self.send(Message::Leaving(leaving));
         }
-        now.iter().for_each(|file| file.delete(&self.io));
+        fresh.iter().for_each(|file| file.delete(&self.io));
     }
 }
 
 impl Drop for Keeper {
     fn drop(&mut self) {
-        // The end of the run does not wait for a sync under way.
-        self.table.state().stop = true;
-        self.table.wake.notify_all();
+        // After the run the folder may belong to another run: nothing is deleted then.
+        self.messages = None;
+        drop(lock(&self.deleting));
     }
 }
 
@@ -198,26 +241,69 @@ impl Drop for Keeper {
 mod tests {
     use super::*;
 
+    fn keeper(folder: &std::path::Path, round: Duration) -> (Keeper, Arc<IoCounters>) {
+        let (io, journal) = (Arc::new(IoCounters::default()), folder.join("journal"));
+        let (journal, folder) = (File::create(journal).unwrap(), File::open(folder).unwrap());
+        let keeper = Keeper::every(round, Arc::new(journal), folder, io.clone());
+        (keeper.unwrap(), io)
+    }
+
+    fn file(folder: &std::path::Path) -> Arc<Kept> {
+        let path = folder.join("file");
+        File::create(&path).unwrap();
+        Arc::new(Kept::new(path))
+    }
+
+    fn wait_until(mut there: impl FnMut() -> bool) {
+        while !there() {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+
+    const NEVER: Duration = Duration::from_secs(1 << 20);
+
     #[test]
     fn a_file_that_may_have_been_synced_goes_without_waiting_for_a_round() {
         let folder = tempfile::tempdir().unwrap();
-        let file = |name: &str| {
-            let path = folder.path().join(name);
-            (File::create(&path).unwrap(), path)
-        };
-        let never = Duration::from_secs(1 << 20);
-        let (journal, (_, path)) = (file("journal").0, file("left"));
-        let io = Arc::new(IoCounters::default());
+        let (keeper, io) = keeper(folder.path(), NEVER);
+        let file = file(folder.path());
         io.grow_scratch(7);
-        let opened = File::open(folder.path()).unwrap();
-        let keeper = Keeper::every(never, Arc::new(journal), opened, io.clone()).unwrap();
-        keeper.delete(vec![Leaving {
-            name: "left".into(),
-            path: path.clone(),
-            bytes: 7,
-        }]);
-        while path.exists() || io.scratch() > 0 {
-            std::thread::sleep(Duration::from_millis(1));
+        keeper.delete([Leaving(file.clone(), 7)].into_iter());
+        wait_until(|| !file.path.exists() && io.scratch() == 0);
+    }
+
+    #[test]
+    fn a_file_is_deleted_at_once_until_it_was_synced() {
+        for synced in [false, true] {
+            let folder = tempfile::tempdir().unwrap();
+            let round = Duration::from_millis(if synced { 1 } else { 1 << 40 });
+            let (keeper, _) = keeper(folder.path(), round);
+            let file = file(folder.path());
+            file.made();
+            keeper.sync_later(&file);
+            keeper.sync_later(&file);
+            if synced {
+                wait_until(|| file.state.load(Ordering::Acquire) == SYNCED);
+            }
+            let deleting = lock(&keeper.deleting);
+            keeper.delete([Leaving(file.clone(), 0)].into_iter());
+            assert_eq!(file.path.exists(), synced);
+            drop(deleting);
+            wait_until(|| !file.path.exists());
+        }
+    }
+
+    #[test]
+    fn nothing_is_deleted_after_the_run() {
+        for _ in 0..200 {
+            let folder = tempfile::tempdir().unwrap();
+            let (keeper, _) = keeper(folder.path(), NEVER);
+            let file = file(folder.path());
+            keeper.delete([Leaving(file.clone(), 0)].into_iter());
+            drop(keeper);
+            File::create(&file.path).unwrap();
+            std::thread::sleep(Duration::from_micros(200));
+            assert!(file.path.exists());
         }
     }
 }

@@ -15,6 +15,7 @@ pub mod limits;
 pub mod mapped;
 pub mod memory;
 pub mod open;
+mod pipe;
 pub mod place;
 pub mod progress;
 mod recover;

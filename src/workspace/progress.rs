@@ -1,6 +1,7 @@
 //! Progress reports of a run, and the flag that stops it.
 
 use crate::error::{Error, Result};
+use crossbeam_channel::{Receiver, Sender, bounded};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
 
@@ -29,12 +30,24 @@ pub struct Silent;
 impl Observer for Silent {}
 
 /// A flag that makes a run stop at its next unit of work.
-#[derive(Debug, Clone, Default)]
-pub struct Cancel(Arc<AtomicU8>);
+#[derive(Debug, Clone)]
+pub struct Cancel {
+    flag: Arc<AtomicU8>,
+    raised: (Sender<()>, Receiver<()>),
+}
 
 /// Values of the flag.
 const STOP: u8 = 1;
 const TIME: u8 = 2;
+
+impl Default for Cancel {
+    fn default() -> Self {
+        Self {
+            flag: Arc::default(),
+            raised: bounded(1),
+        }
+    }
+}
 
 impl Cancel {
     /// A flag that is not raised.
@@ -45,32 +58,39 @@ impl Cancel {
 
     /// Cancels the run.
     pub fn cancel(&self) {
-        self.0.store(STOP, Ordering::Relaxed);
+        self.flag.store(STOP, Ordering::Relaxed);
+        let _ = self.raised.0.try_send(());
     }
 
     /// Stops the run because its time is up.
     pub fn expire(&self) {
-        let _ = self
-            .0
-            .compare_exchange(0, TIME, Ordering::Relaxed, Ordering::Relaxed);
+        let (set, get) = (Ordering::Relaxed, Ordering::Relaxed);
+        if self.flag.compare_exchange(0, TIME, set, get).is_ok() {
+            let _ = self.raised.0.try_send(());
+        }
+    }
+
+    /// Receives a message when the flag is raised, for one thread that waits for it.
+    pub(crate) fn raised(&self) -> Receiver<()> {
+        self.raised.1.clone()
     }
 
     /// True if the run is cancelled or its time is up.
     #[must_use]
     pub fn is_cancelled(&self) -> bool {
-        self.0.load(Ordering::Relaxed) != 0
+        self.flag.load(Ordering::Relaxed) != 0
     }
 
     /// True if the time of the run is up.
     #[must_use]
     pub fn is_expired(&self) -> bool {
-        self.0.load(Ordering::Relaxed) == TIME
+        self.flag.load(Ordering::Relaxed) == TIME
     }
 
     /// # Errors
     /// [`Error::Cancelled`] or [`Error::TimeLimit`] if the run has to stop.
     pub fn check(&self) -> Result<()> {
-        match self.0.load(Ordering::Relaxed) {
+        match self.flag.load(Ordering::Relaxed) {
             0 => Ok(()),
             TIME => Err(Error::TimeLimit),
             _ => Err(Error::Cancelled),

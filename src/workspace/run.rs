@@ -204,7 +204,7 @@ impl ResumableRun {
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Disk`].
-    pub fn delete(&self, name: &str, leaving: Vec<Leaving>) -> Result<()> {
+    pub fn delete(&self, name: &str, leaving: impl Iterator<Item = Leaving>) -> Result<()> {
         self.journal.append(Record::Deleted(name.to_owned()))?;
         self.keeper.delete(leaving);
         Ok(())

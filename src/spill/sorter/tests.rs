@@ -203,3 +203,56 @@ fn a_run_that_was_damaged_is_made_again() {
         }
     }
 }
+
+#[test]
+fn an_error_of_the_writer_reaches_the_caller() {
+    let folder = tempfile::tempdir().unwrap();
+    let all: Vec<[u32; 2]> = parts().iter().flat_map(|p| part(p.0)).collect();
+    for (number, threads) in [(0, 1), (1, 1), (1, 2), (2, 2), (3, 1)] {
+        let blocked = format!("s.run{number}.{threads}");
+        let fails = |outcome: Result<()>| match outcome {
+            Err(Error::Io { path, .. }) => assert!(path.ends_with(&blocked), "{path:?}"),
+            other => panic!("{other:?}"),
+        };
+        let workspace = Workspace::for_tests(threads);
+        std::fs::write(workspace.path(&blocked), b"").unwrap();
+        let sorter = Sorter::<[u32; 2]>::new(&workspace, "s", 20_000);
+        let pushed = all.chunks(100).try_for_each(|rows| sorter.push(rows));
+        fails(pushed.and_then(|()| sorter.finish(&workspace).map(drop)));
+        // From other threads, in a run that can be resumed.
+        let path = folder.path().join(format!("run{number}{threads}"));
+        let workspace = attempt(&path);
+        std::fs::write(workspace.path(&format!("s.run{number}.2")), b"").unwrap();
+        let sorter = Sorter::<[u32; 2]>::new(&workspace, "s", 20_000);
+        let taken = sorter.take_parts(&workspace, &parts(), false, |numbers| {
+            numbers.iter().try_for_each(|n| {
+                std::thread::scope(|scope| scope.spawn(|| sorter.push(&part(*n))).join().unwrap())
+            })
+        });
+        assert!(matches!(taken, Err(Error::Io { .. })), "{taken:?}");
+    }
+}
+
+#[test]
+fn two_halves_are_held_and_no_more() {
+    let workspace = Workspace::for_tests(2);
+    let pool = &workspace.memory;
+    let before = pool.peak_held();
+    let reserved = workspace.promise("sorted", 1 << 16).unwrap();
+    let sorter = Sorter::<[u32; 2]>::new(&workspace, "m", 1 << 16).reporting(reserved);
+    for n in 0..100_000u32 {
+        sorter.push(&[[n % 100, n]]).unwrap();
+        let rows = sorter.state().buffer.capacity();
+        assert!(
+            rows * 8 <= if n < 1 << 13 { 1 << 16 } else { 1 << 15 },
+            "{n}: {rows}"
+        );
+    }
+    assert_eq!(pool.take_held(), before + (1 << 16));
+    assert_eq!(
+        sorter.state().runs.len(),
+        1 + (100_000 - (1 << 13)) / (1 << 12) - 1
+    );
+    let rows = collect(sorter.finish(&workspace).unwrap());
+    assert!(rows.len() == 100_000 && rows.is_sorted());
+}

@@ -17,7 +17,6 @@ use crate::geom::{Point, hilbert};
 use crate::spill::{Sorted, Sorter, row};
 use crate::stages::ingest::{READ_BUFFERS, Spool};
 use crate::workspace::Workspace;
-use rayon::prelude::*;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -241,9 +240,6 @@ pub fn order(
     orderer.finish(workspace, page)
 }
 
-/// The limits of a part of the keys; `None` at the two ends.
-type Part = (Option<CurveKey>, Option<CurveKey>);
-
 /// The successor of a key.
 fn next(mut key: CurveKey) -> CurveKey {
     for word in key.key.iter_mut().rev() {
@@ -256,7 +252,8 @@ fn next(mut key: CurveKey) -> CurveKey {
     key
 }
 
-/// Merges the sorted runs on disk part by part, one thread for each part, in `memory` bytes.
+/// Merges the sorted runs on disk part by part, one thread for each part, in `memory` bytes; the calling
+/// thread writes them.
 fn merge(
     mut sorted: Sorted<CurveKey>,
     memory: u64,
@@ -268,28 +265,23 @@ fn merge(
     let cuts = sorted.cuts(PART).into_iter().map(Some);
     let cuts = cuts.filter(|cut| *cut > start);
     let ends: Vec<_> = [start].into_iter().chain(cuts).chain([None]).collect();
-    let parts: Vec<Part> = ends.windows(2).map(|w| (w[0], w[1])).collect();
-    // A part reads up to one extra frame of each run, and its list grows by doubling.
+    // A part reads up to one extra frame of each run, and its list grows by doubling. One list more is written.
     let (list, merging) = ((PART * size_of::<CurveKey>()) as u64, sorted.merge_bytes());
     let threads = (memory / (3 * list + 4 * merging)).clamp(1, workspace.threads as u64) as usize;
-    sorted.report_usage(threads as u64 * (list + merging));
-    let one = |&(from, to): &Part| {
+    sorted.report_usage(threads as u64 * (list + merging) + list);
+    let one = |part: usize| {
         workspace.check_cancel()?;
-        let mut keys = Vec::with_capacity(PART);
-        sorted.for_range(from, to, |key| {
-            if keys.last() != Some(&key) {
-                keys.push(key);
+        let (mut points, mut last) = (Vec::with_capacity(PART), None);
+        sorted.for_range(ends[part], ends[part + 1], |key| {
+            if last.replace(key) != Some(key) {
+                points.push(key.point());
             }
             Ok(())
         })?;
-        Ok(keys)
+        Ok(points)
     };
-    for wave in parts.chunks(threads) {
-        let merged: Result<Vec<Vec<CurveKey>>> =
-            workspace.install(|| wave.par_iter().with_max_len(1).map(one).collect());
-        for keys in merged? {
-            writer.append(&keys, CurveKey::point)?;
-        }
-    }
-    Ok(())
+    workspace.pipe(threads, ends.len() - 1, one, |points: Vec<Point>| {
+        workspace.observer.advance(points.len() as u64);
+        writer.push(&points)
+    })
 }

@@ -105,16 +105,16 @@ impl<'w> StoreWriter<'w> {
     /// # Errors
     /// [`crate::Error::Io`].
     pub fn push(&mut self, mut points: &[Point]) -> Result<()> {
-        while !points.is_empty() {
-            let room = WRITTEN * self.files.page - self.pending.len();
-            let (now, later) = points.split_at(room.min(points.len()));
+        let (group, mut written) = (WRITTEN * self.files.page, Vec::new());
+        while self.pending.len() + points.len() >= group {
+            let (now, later) = points.split_at(group - self.pending.len());
             self.pending.extend_from_slice(now);
             points = later;
-            if self.pending.len() == WRITTEN * self.files.page {
-                self.flush()?;
-            }
+            written.push(self.files.write(self.workspace, &self.pending)?);
+            self.pending.clear();
         }
-        Ok(())
+        self.pending.extend_from_slice(points);
+        self.note(&written, written.len() * group)
     }
 
     /// Appends the points of `items`, in id order, on all threads.
@@ -140,15 +140,14 @@ impl<'w> StoreWriter<'w> {
             };
             groups.par_chunks(group).map(write).collect()
         });
-        self.note(&written?)?;
-        self.len += groups.len();
+        self.note(&written?, groups.len())?;
         let others = first.len() + last.len();
         workspace.observer.advance(others as u64);
         self.push(&last.iter().map(&point).collect::<Vec<_>>())
     }
 
-    /// Records groups that were written.
-    fn note(&mut self, groups: &[Written]) -> Result<()> {
+    /// Records groups of `points` points that were written.
+    fn note(&mut self, groups: &[Written], points: usize) -> Result<()> {
         if groups.is_empty() {
             return Ok(());
         }
@@ -158,6 +157,7 @@ impl<'w> StoreWriter<'w> {
         for row in groups.iter().flat_map(|group| &group.0) {
             self.bounds = self.bounds.union(row.bounds());
         }
+        self.len += points;
         Ok(())
     }
 
@@ -165,8 +165,7 @@ impl<'w> StoreWriter<'w> {
     fn flush(&mut self) -> Result<()> {
         if !self.pending.is_empty() {
             let group = self.files.write(self.workspace, &self.pending)?;
-            self.note(&[group])?;
-            self.len += self.pending.len();
+            self.note(&[group], self.pending.len())?;
             self.pending.clear();
         }
         Ok(())
