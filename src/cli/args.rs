@@ -82,7 +82,7 @@ pub struct Storing {
     /// buffers), or auto (mapped on local disks if they take at most a quarter of the budget)
     #[arg(long, value_name = "auto|map|read", default_value = "auto")]
     pub io: Io,
-    /// Compression of scratch files with Zstandard: none, a level from 1 to 19, or auto (level 1 if many
+    /// Compression of scratch files with Zstandard: none, a level from 1 to 3, or auto (level 1 if many
     /// gigabytes go to a slow disk or to a network)
     #[arg(long, value_name = "auto|none|LEVEL", default_value = "auto")]
     pub scratch_compression: Compression,

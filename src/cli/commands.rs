@@ -53,7 +53,7 @@ fn workspace(limits: &Limits, beside: &Path) -> Result<Workspace> {
     let scratch = limits.scratch.as_deref().unwrap_or(beside);
     let (observer, cancel) = watched(limits.quiet);
     let workspace = Workspace::new(scratch, memory, threads(limits), observer, cancel)?;
-    workspace.set_storage(limits.storing.storage());
+    workspace.set_storage(limits.storing.storage())?;
     Ok(workspace)
 }
 

@@ -71,9 +71,10 @@ impl Reconstruction {
             self.observer.clone(),
             self.cancel.clone(),
         );
-        if let Ok(workspace) = &workspace {
-            workspace.set_storage(self.storage);
-        }
+        let workspace = workspace.and_then(|workspace| {
+            workspace.set_storage(self.storage)?;
+            Ok(workspace)
+        });
         if workspace.is_err() && !self.is_unfinished() {
             Folder::remove(&self.folder, false);
         }

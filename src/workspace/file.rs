@@ -46,6 +46,10 @@ pub struct Shared {
     pub level: AtomicI32,
 }
 
+/// Bytes that a thread takes to compress a section: tables of Zstandard, up to 2.5 MiB at level 3, and the
+/// compressed copy.
+pub(super) const COMPRESSING: u64 = 4 << 20;
+
 /// The level before it is known whether compression pays.
 pub(super) const UNDECIDED: i32 = -1;
 
@@ -66,7 +70,7 @@ pub enum Compression {
     Auto,
     /// None.
     None,
-    /// At a level of Zstandard, 1 to 19.
+    /// At a level of Zstandard, 1 to 3: higher ones take several MiB for each thread to save little.
     Level(i32),
 }
 
@@ -77,10 +81,8 @@ impl FromStr for Compression {
         match (text, text.parse()) {
             ("auto", _) => Ok(Self::Auto),
             ("none", _) => Ok(Self::None),
-            (_, Ok(level @ 1..=19)) => Ok(Self::Level(level)),
-            _ => Err(format!(
-                "{text:?} is not auto, none or a level from 1 to 19"
-            )),
+            (_, Ok(level @ 1..=3)) => Ok(Self::Level(level)),
+            _ => Err(format!("{text:?} is not auto, none or a level from 1 to 3")),
         }
     }
 }

@@ -25,8 +25,8 @@ pub fn resident() -> u64 {
     status("VmRSS:").unwrap_or(0)
 }
 
-/// Resident pages of mapped files now, in bytes (`RssFile`): the program's code and its libraries,
-/// since no other file is mapped.
+/// Resident pages of mapped files now, in bytes (`RssFile`): the program's code and its libraries, and points
+/// while they are mapped.
 #[must_use]
 pub fn resident_file() -> u64 {
     status("RssFile:").unwrap_or(0)

@@ -126,6 +126,8 @@ pub struct Workspace {
     shared: Arc<Shared>,
     /// The scratch files.
     pub files: Files,
+    /// Memory for the compression of rows.
+    compressing: Mutex<Option<Reservation>>,
     numbers: AtomicU64,
     parts: Mutex<Vec<(&'static str, f64)>>,
     pool: Arc<rayon::ThreadPool>,
@@ -200,6 +202,7 @@ impl Workspace {
             io,
             files: Files::new(shared.clone(), pool.clone()),
             shared,
+            compressing: Mutex::default(),
             numbers: AtomicU64::new(0),
             parts: Mutex::default(),
             pool,
@@ -244,12 +247,24 @@ impl Workspace {
 
     /// Sets how files are read and written; to be called before the first file is. Automatic compression is
     /// decided where the disk need is known, see [`Workspace::expect_scratch`].
-    pub fn set_storage(&self, storage: Storage) {
+    ///
+    /// # Errors
+    /// [`Error::Memory`] if there is no room for compression.
+    pub fn set_storage(&self, storage: Storage) -> Result<()> {
         // The first setting holds.
         let _ = self.shared.storage.set(storage);
-        if let Compression::Level(level) = storage.compression {
-            self.shared.level.store(level, Ordering::Relaxed);
+        match storage.compression {
+            Compression::Level(level) => self.compress_rows(level),
+            Compression::Auto | Compression::None => Ok(()),
         }
+    }
+
+    /// Compresses rows from now on.
+    fn compress_rows(&self, level: i32) -> Result<()> {
+        let bytes = self.threads as u64 * file::COMPRESSING;
+        *lock(&self.compressing) = Some(self.memory.promise("compression", bytes)?);
+        self.shared.level.store(level, Ordering::Relaxed);
+        Ok(())
     }
 
     /// Path of `name` in the scratch folder.
@@ -275,8 +290,11 @@ impl Workspace {
         self.shared.expected.store(bytes, Ordering::Relaxed);
         let auto = self.shared.storage().compression == Compression::Auto;
         if auto && self.shared.level.load(Ordering::Relaxed) == file::UNDECIDED {
-            let level = disk::compression_pays(&self.folder, bytes, self.threads);
-            self.shared.level.store(level.into(), Ordering::Relaxed);
+            self.shared.level.store(0, Ordering::Relaxed);
+            if disk::compression_pays(&self.folder, bytes, self.threads) {
+                // Without room for it, rows are not compressed.
+                let _ = self.compress_rows(1);
+            }
         }
     }
 

@@ -3,7 +3,9 @@
 
 use crate::util::{self, Bench};
 use outcrop::params::Params;
+use outcrop::workspace::mapped::Io;
 use outcrop::workspace::memory::MINIMUM_BUDGET;
+use outcrop::workspace::{Compression, Storage};
 use outcrop_cloudgen::{Cloud, Format, Kind, LasOptions};
 use std::path::{Path, PathBuf};
 
@@ -15,6 +17,7 @@ struct Way {
     memory: u64,
     tile: Option<u32>,
     page: Option<usize>,
+    storage: Storage,
 }
 
 impl Way {
@@ -25,7 +28,13 @@ impl Way {
             memory: 512 << 20,
             tile: None,
             page: None,
+            storage: Storage::default(),
         }
+    }
+
+    fn storage(self, io: Io, compression: Compression) -> Self {
+        let storage = Storage { io, compression };
+        Self { storage, ..self }
     }
 
     fn threads(self, threads: usize) -> Self {
@@ -61,7 +70,8 @@ impl Way {
         let mesh = bench.path("mesh.ply");
         let mut builder = util::builder(&self.inputs, &mesh, params)
             .threads(self.threads)
-            .memory(self.memory);
+            .memory(self.memory)
+            .storage(self.storage);
         if let Some(points) = self.tile {
             builder = builder.tile_points(points);
         }
@@ -103,6 +113,8 @@ fn settings(base: &Way) -> Vec<Way> {
             .page(16)
             .threads(1)
             .memory(MINIMUM_BUDGET),
+        base.clone().storage(Io::Read, Compression::Level(1)),
+        (base.clone().memory(MINIMUM_BUDGET)).storage(Io::Map, Compression::Level(3)),
     ]
 }
 
