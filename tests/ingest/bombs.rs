@@ -60,3 +60,31 @@ fn rows_of_a_grid_take_few_bytes_and_are_read() {
         assert_eq!(bench.read(&[path]).unwrap().points(), 1_000_000);
     }
 }
+
+#[test]
+fn keys_that_all_name_the_same_numbers_take_no_memory() {
+    let bench = Bench::new();
+    let path = bench.path("keys.las");
+    let keys = std::iter::repeat_n([2057u16, 34736, 8190, 0], 8190);
+    let words = std::iter::once([1, 1, 0, 8190]).chain(keys).flatten();
+    let mut builder = las::Builder::from((1, 4));
+    for (record_id, data) in [
+        (34735, words.flat_map(u16::to_le_bytes).collect()),
+        (34736, vec![0xff; 65_520]),
+    ] {
+        builder.vlrs.push(las::Vlr {
+            user_id: "LASF_Projection".into(),
+            record_id,
+            description: String::new(),
+            data,
+        });
+    }
+    let header = builder.into_header().unwrap();
+    let mut writer = las::Writer::from_path(&path, header).unwrap();
+    writer.write_point(las::Point::default()).unwrap();
+    writer.close().unwrap();
+    let begin = std::time::Instant::now();
+    assert_eq!(bench.read(&[path]).unwrap().points(), 1);
+    // With a copy of the numbers for each key it takes 10 s, and gigabytes.
+    assert!(begin.elapsed().as_secs() < 2, "{:?}", begin.elapsed());
+}
