@@ -1,7 +1,9 @@
 //! An R\*-tree of boxes: those that meet a box, and the nearest to a point.
 
 use rstar::primitives::{GeomWithData, Rectangle};
-use rstar::{AABB, RStarInsertionStrategy, RTree, RTreeNum, RTreeParams};
+use rstar::{
+    AABB, RStarInsertionStrategy, RTree, RTreeNum, RTreeObject, RTreeParams, SelectionFunction,
+};
 
 /// A box and its number.
 type Entry<S> = GeomWithData<Rectangle<[S; 3]>, u32>;
@@ -23,6 +25,19 @@ impl RTreeParams for Wide {
 #[derive(Debug)]
 pub struct BoxTree<S: RTreeNum>(RTree<Entry<S>, Wide>);
 
+/// Selects boxes by their corners.
+struct That<F>(F);
+
+impl<S: RTreeNum, F: Fn([S; 3], [S; 3]) -> bool> SelectionFunction<Entry<S>> for That<F> {
+    fn should_unpack_parent(&self, around: &AABB<[S; 3]>) -> bool {
+        self.0(around.lower(), around.upper())
+    }
+
+    fn should_unpack_leaf(&self, entry: &Entry<S>) -> bool {
+        self.should_unpack_parent(&entry.envelope())
+    }
+}
+
 impl<S: RTreeNum> BoxTree<S> {
     /// Bytes for each box, also while the tree is built: a node takes 72 with coordinates of 8, there is at
     /// most one inner node for two boxes, and the allocator adds to each.
@@ -41,6 +56,13 @@ impl<S: RTreeNum> BoxTree<S> {
     pub fn meeting(&self, [min, max]: [[S; 3]; 2]) -> impl Iterator<Item = usize> {
         let wanted = AABB::from_corners(min, max);
         let entries = self.0.locate_in_envelope_intersecting(wanted);
+        entries.map(|entry| entry.data as usize)
+    }
+
+    /// The boxes whose corners are `wanted`, in any order. It must be true of a box around a wanted box; it
+    /// may become false between two steps.
+    pub fn that(&self, wanted: impl Fn([S; 3], [S; 3]) -> bool) -> impl Iterator<Item = usize> {
+        let entries = self.0.locate_with_selection_function(That(wanted));
         entries.map(|entry| entry.data as usize)
     }
 
@@ -110,8 +132,13 @@ mod tests {
                 prop_assert!(found.is_sorted_by_key(|(distance2, _)| *distance2));
                 let mut all: Vec<_> = found.iter().map(|(d, k)| (*k, *d as u64)).collect();
                 all.sort_unstable();
-                let expected = boxes.iter().map(|b| b.distance2(p)).enumerate();
-                prop_assert_eq!(all, expected.collect::<Vec<_>>());
+                let expected: Vec<_> = boxes.iter().map(|b| b.distance2(p)).enumerate().collect();
+                prop_assert_eq!(&all, &expected);
+                let low = |min: [i64; 3], _: [i64; 3]| min[0] <= i64::from(p[0]);
+                let mut some: Vec<_> = tree.that(low).collect();
+                some.sort_unstable();
+                let low = |k: &usize| boxes[*k].min[0] <= p[0];
+                prop_assert_eq!(some, (0..boxes.len()).filter(low).collect::<Vec<_>>());
             }
         }
     }

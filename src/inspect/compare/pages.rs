@@ -12,6 +12,7 @@ use crate::spill::{LocalTable, Row, Word};
 use crate::workspace::Workspace;
 use crate::workspace::memory::Reservation;
 use rustc_hash::FxHashMap;
+use std::cell::Cell;
 
 /// Least number of items per page.
 const LEAST: u64 = 64;
@@ -109,11 +110,16 @@ impl<T: Item> Pages<T> {
 
     /// Updates `best`, a squared distance from `p`, if an item is nearer.
     pub(super) fn nearest(&self, p: V3, best: &mut Best<T>, cache: &mut Cache<T>) -> Result<()> {
-        for (distance2, page) in self.tree.nearest(p) {
-            if distance2 >= best.distance2 {
-                break;
-            }
+        if best.item.is_none()
+            && let Some((_, page)) = self.tree.nearest(p).next()
+        {
             cache.page(self, page)?.look(p, best);
+        }
+        let limit = Cell::new(best.distance2);
+        let nearer = |min, max| Box3 { min, max }.distance2(p) < limit.get();
+        for page in self.tree.that(nearer) {
+            cache.page(self, page)?.look(p, best);
+            limit.set(best.distance2);
         }
         Ok(())
     }
