@@ -39,6 +39,9 @@ pub(super) struct Reach {
 /// All pages of a tile of `size` pages whose pages `own` are queried, and the reaches of the latter. Reaches
 /// are shorter than usual where the halo would be too large for the tile, as around scattered outliers.
 pub(super) fn halo(store: &PointStore, own: &[usize], size: usize) -> (Vec<usize>, Vec<Reach>) {
+    if own.is_empty() {
+        return (Vec::new(), Vec::new());
+    }
     let most = size * (1 + MOST_HALO) + MOST_NEAR;
     let mut around = ReachablePages::of(store, own, size);
     let mut shrink = 1;
