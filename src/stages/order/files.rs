@@ -1,7 +1,6 @@
 //! The files of an ordered store that is written: packed pages, and their index.
 
 use super::packed::{Packing, pack};
-use super::store::StoredPoints;
 use crate::error::Result;
 use crate::geom::Point;
 use crate::geom::aabb::Aabb;
@@ -9,6 +8,7 @@ use crate::spill::{Table, row};
 use crate::workspace::file::ScratchFile;
 use crate::workspace::place::Place;
 use crate::workspace::{Unit, Workspace};
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 row! {
@@ -46,6 +46,16 @@ pub(super) const STEP: usize = 16;
 
 /// Pages written at a time, a multiple of [`STEP`].
 pub(super) const WRITTEN: usize = 64;
+
+/// An ordered store in the scratch folder: the name of its file and its size.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct StoredPoints {
+    pub(super) name: String,
+    pub(super) len: usize,
+    pub(super) page: usize,
+    /// The bounding box of all points.
+    pub(super) bounds: [Point; 2],
+}
 
 /// The table of pages of the store `name`.
 pub(super) fn index_of(name: &str) -> Index {

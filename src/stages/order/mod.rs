@@ -7,8 +7,9 @@ mod rewrite;
 mod store;
 mod writer;
 
+pub use files::StoredPoints;
 pub use rewrite::Rewriter;
-pub use store::{PAGE, PointStore, StoredPoints};
+pub use store::{PAGE, PointStore};
 pub use writer::{Position, StoreWriter};
 
 use crate::error::{Error, Result};

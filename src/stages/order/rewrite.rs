@@ -1,7 +1,7 @@
 //! Writes a store of the same points at other positions, in any order.
 
-use super::files::{StoreFiles, WRITTEN};
-use super::store::{PointStore, StoredPoints};
+use super::files::{StoreFiles, StoredPoints, WRITTEN};
+use super::store::PointStore;
 use crate::error::Result;
 use crate::geom::Point;
 use crate::workspace::{Unit, Workspace};

@@ -1,6 +1,6 @@
 //! The ordered store: positions by id in one file, in pages, with their boxes and an R\*-tree in memory.
 
-use super::files::{STEP, StoreFiles, index_of};
+use super::files::{STEP, StoreFiles, StoredPoints, index_of};
 use super::packed::Packing;
 use crate::error::Result;
 use crate::geom::Point;
@@ -10,7 +10,6 @@ use crate::workspace::Workspace;
 use crate::workspace::file::ScratchFile;
 use crate::workspace::mapped::Mapping;
 use crate::workspace::memory::Reservation;
-use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::Arc;
@@ -21,16 +20,6 @@ pub const PAGE: usize = 256;
 /// Pages in a group, a box of the tree, for which this leaves 4 bytes a page. Consecutive pages are near on the
 /// curve, so groups are compact.
 const GROUP: usize = 32;
-
-/// An ordered store in the scratch folder: the name of its file and its size.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct StoredPoints {
-    pub(super) name: String,
-    pub(super) len: usize,
-    pub(super) page: usize,
-    /// The bounding box of all points.
-    pub(super) bounds: [Point; 2],
-}
 
 impl StoredPoints {
     /// Number of points.

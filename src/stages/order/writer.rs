@@ -1,7 +1,6 @@
 //! Writes the ordered store: in id order, or, with `rewrite`, in any order.
 
-use super::files::{STEP, StoreFiles, WRITTEN, Written};
-use super::store::StoredPoints;
+use super::files::{STEP, StoreFiles, StoredPoints, WRITTEN, Written};
 use crate::error::Result;
 use crate::geom::Point;
 use crate::geom::aabb::Aabb;
