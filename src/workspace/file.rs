@@ -42,7 +42,7 @@ pub struct Shared {
     pub memory: MemoryPool,
     /// How files are read and written.
     pub storage: OnceLock<Storage>,
-    /// The level at which rows are compressed; 0: they are not, as long as it is [`UNDECIDED`].
+    /// The level at which rows are compressed; 0: they are not, as long as it is `UNDECIDED`.
     pub level: AtomicI32,
 }
 
