@@ -127,6 +127,17 @@ pub enum Error {
         /// The reason.
         why: String,
     },
+    /// Something else has to be done before.
+    #[error("{path}: {what}; try again later", path = path.display())]
+    NotYet {
+        /// The folder of the run.
+        path: PathBuf,
+        /// The missing part.
+        what: String,
+    },
+    /// The rest of the run's units are for tasks.
+    #[error("the next units of work are for tasks")]
+    Shared,
     /// The time limit is reached.
     #[error("stopped: the time limit is reached")]
     TimeLimit,
@@ -144,6 +155,7 @@ impl Error {
             | Error::Memory { .. }
             | Error::Disk { .. }
             | Error::Corrupt { .. }
+            | Error::Shared
             | Error::TimeLimit
             | Error::Cancelled => true,
             Error::Input { .. }
@@ -154,6 +166,7 @@ impl Error {
             | Error::Locked { .. }
             | Error::Unfinished { .. }
             | Error::Mismatch { .. }
+            | Error::NotYet { .. }
             | Error::NotResumable { .. } => false,
         }
     }

@@ -6,6 +6,7 @@ mod checks;
 mod clock;
 mod disk;
 mod manifest;
+mod shared;
 mod stages;
 mod start;
 
@@ -20,6 +21,7 @@ pub use builder::Builder;
 use checks::{not_an_input, writable};
 pub(crate) use clock::Clock;
 pub(crate) use disk::Known;
+pub use shared::{Advanced, MOST_SHARDS, Status, Totals, Worked, status};
 use stages::Stages;
 pub use start::Start;
 use std::path::{Path, PathBuf};

@@ -126,7 +126,19 @@ fn options(text: &str) -> BTreeSet<String> {
 
 /// The options of each command, from its help.
 fn of_commands() -> BTreeMap<&'static str, BTreeSet<String>> {
-    let commands = ["reconstruct", "resume", "info", "verify", "compare", "demo"];
+    let commands = [
+        "reconstruct",
+        "resume",
+        "info",
+        "verify",
+        "compare",
+        "demo",
+        "plan",
+        "work",
+        "advance",
+        "status",
+        "submit",
+    ];
     let help = |command: &'static str| {
         let mut outcrop = Command::new(env!("CARGO_BIN_EXE_outcrop"));
         let output = outcrop.args([command, "--help"]).output().expect("it runs");
@@ -216,6 +228,8 @@ fn options_exist() {
         let code = document.lines().filter(|(_, _, code)| *code);
         for (number, line, _) in code {
             let line = line.split('#').next().unwrap_or_default();
+            // Options of another program follow.
+            let line = line.split(" -- ").next().unwrap_or_default();
             let mut words = line.split_whitespace();
             if words.next() != Some("outcrop") {
                 continue;

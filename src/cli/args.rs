@@ -2,59 +2,13 @@
 
 use crate::method::METHOD;
 use crate::params::{MaxWidth, Method, Params, Radius, Smoothing};
-use crate::pipeline::Start;
+use crate::pipeline::{Builder, Reconstruction, Start};
 use crate::stages::ingest::Classes;
 use crate::workspace::mapped::Io;
 use crate::workspace::{Compression, Storage};
-use clap::{Args as ClapArgs, Parser, Subcommand};
+use clap::Args as ClapArgs;
 use std::path::PathBuf;
 use std::time::Duration;
-
-/// Turns point clouds of any size into clean triangle meshes within a memory budget.
-#[derive(Debug, Parser)]
-#[command(version, about, long_about = LONG_ABOUT, max_term_width = 100, after_help = EXAMPLES)]
-pub struct Args {
-    #[command(subcommand)]
-    pub command: Command,
-}
-
-const LONG_ABOUT: &str = "Turns point clouds of any size into clean triangle meshes, inside the \
-memory you give it.
-
-The mesh interpolates the points: its vertices are points of the cloud. Every edge has at most two \
-triangles, every vertex is a disk or a half-disk, and triangles run consistently. The same cloud \
-and parameters give the same file, byte for byte, whatever memory, threads and order of inputs.";
-
-const EXAMPLES: &str = "Examples:
-  outcrop reconstruct scan.laz -o mesh.ply
-  outcrop reconstruct tiles/ -o town.ply --memory 4GiB --report town.json
-  outcrop reconstruct noisy.las -o smooth.ply --smooth 1
-  outcrop reconstruct scan.laz -o mesh.ply --resume --time-limit 7h30m
-  outcrop resume mesh.ply.outcrop-scratch
-  outcrop info scan.laz
-  outcrop verify mesh.ply && echo manifold
-  outcrop compare mesh.ply scan.laz
-  outcrop demo
-
-Exit codes: 0 fine, 1 the answer is no (verify), 2 error. A run that was stopped can be resumed: 75 its \
-time limit was reached, 130 Ctrl-C, 143 SIGTERM, 129 SIGHUP.";
-
-/// The commands.
-#[derive(Debug, Subcommand)]
-pub enum Command {
-    /// Make a mesh from points
-    Reconstruct(Box<Reconstruct>),
-    /// Continue a run that was stopped, killed, or ran out of disk
-    Resume(Resume),
-    /// Describe a cloud and estimate what a run needs
-    Info(Info),
-    /// Check that a mesh is a manifold (exit code 0 if it is, 1 if not)
-    Verify(Verify),
-    /// Measure the distance between two meshes or clouds
-    Compare(Compare),
-    /// Generate a cloud, reconstruct it and verify the mesh
-    Demo(Demo),
-}
 
 /// Resources of a run.
 #[derive(Debug, ClapArgs)]
@@ -212,9 +166,9 @@ pub struct Repair {
     pub no_repair: bool,
 }
 
-/// `outcrop reconstruct`
+/// The points, the mesh, and what decides it.
 #[derive(Debug, ClapArgs)]
-pub struct Reconstruct {
+pub struct Job {
     /// Files (LAS, LAZ, PLY, XYZ text; also as .gz and .zst) or folders of files; together they are one cloud
     #[arg(value_name = "INPUT", required = true)]
     pub inputs: Vec<PathBuf>,
@@ -229,18 +183,25 @@ pub struct Reconstruct {
     pub surface: Surface,
     #[command(flatten)]
     pub repair: Repair,
-    #[command(flatten, next_help_heading = "Limits")]
-    pub limits: Limits,
-    #[command(flatten)]
-    pub again: Again,
-    #[command(flatten)]
-    pub ends: Ends,
     /// Points per tile; does not change the result
     #[arg(long, value_name = "N", hide = true)]
     pub tile_points: Option<u32>,
     /// Points per block, for tests; changes the result
     #[arg(long, value_name = "N", hide = true, default_value_t = METHOD.curve.block)]
     pub block_points: u32,
+}
+
+/// `outcrop reconstruct`
+#[derive(Debug, ClapArgs)]
+pub struct Reconstruct {
+    #[command(flatten)]
+    pub job: Job,
+    #[command(flatten, next_help_heading = "Limits")]
+    pub limits: Limits,
+    #[command(flatten)]
+    pub again: Again,
+    #[command(flatten)]
+    pub ends: Ends,
 }
 
 /// Treatment of an unfinished run.
@@ -365,7 +326,16 @@ pub struct Demo {
     pub limits: Limits,
 }
 
-impl Reconstruct {
+impl Job {
+    /// The builder of the reconstruction.
+    pub fn builder(&self) -> Builder {
+        let builder = Reconstruction::builder()
+            .output(&self.output)
+            .params(self.params())
+            .tile_points(self.tile_points.unwrap_or(self.block_points));
+        self.inputs.iter().fold(builder, Builder::input)
+    }
+
     /// The parameters of the reconstruction.
     pub fn params(&self) -> Params {
         let usual = match self.surface.method {
@@ -394,7 +364,7 @@ impl Reconstruct {
     }
 }
 
-fn size(text: &str) -> Result<u64, String> {
+pub fn size(text: &str) -> Result<u64, String> {
     let size: bytesize::ByteSize = text
         .parse()
         .map_err(|_| format!("{text:?} is not a size like 512MiB, 4GiB or 2000000000"))?;
@@ -420,12 +390,6 @@ fn count(text: &str) -> Result<u64, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn flags_are_well_formed() {
-        use clap::CommandFactory;
-        Args::command().debug_assert();
-    }
 
     #[test]
     fn the_default_factor_is_what_the_library_says() {

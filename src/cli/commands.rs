@@ -1,18 +1,16 @@
 //! The commands.
 
-use super::args::{Command, Compare, Demo, Ends, Info, Limits, Reconstruct, Resume, Verify};
-use super::progress::{Bars, Warnings};
-use super::{stop, style};
+use super::args::{Compare, Demo, Ends, Info, Limits, Reconstruct, Resume, Verify};
+use super::command::Command;
+use super::output::{print, show, summary, write_report};
+use super::{shared, stop, style};
 use crate::error::{Error, Result};
 use crate::inspect::{compare, info, verify};
 use crate::pipeline::{Builder, Reconstruction, Start, default_memory, default_threads};
-use crate::report::Report;
 use crate::workspace::Workspace;
 use crate::workspace::memory::MemoryPool;
-use crate::workspace::progress::{Cancel, Observer, Silent};
-use serde::Serialize;
-use std::fmt::Display;
-use std::io::{IsTerminal, Write};
+use crate::workspace::progress::{Cancel, Silent};
+use std::io::IsTerminal;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -25,18 +23,11 @@ pub fn run(command: Command) -> Result<bool> {
         Command::Verify(args) => check(&args),
         Command::Compare(args) => measure(&args),
         Command::Demo(args) => demo(&args),
-    }
-}
-
-/// The receiver of the progress, and the flag that signals raise.
-fn watched(quiet: bool) -> (Arc<dyn Observer>, Cancel) {
-    if quiet {
-        (Arc::new(Silent), stop::watch(None))
-    } else if std::io::stderr().is_terminal() {
-        let bars = Arc::new(Bars::default());
-        (bars.clone(), stop::watch(Some(bars)))
-    } else {
-        (Arc::new(Warnings), stop::watch(None))
+        Command::Plan(args) => shared::plan(&args),
+        Command::Work(args) => shared::work(&args),
+        Command::Advance(args) => shared::advance(&args),
+        Command::Status(args) => shared::status(&args),
+        Command::Submit(args) => shared::submit(&args),
     }
 }
 
@@ -51,47 +42,20 @@ fn memory(limits: &Limits) -> u64 {
 fn workspace(limits: &Limits, beside: &Path) -> Result<Workspace> {
     let memory = MemoryPool::new(memory(limits))?;
     let scratch = limits.scratch.as_deref().unwrap_or(beside);
-    let (observer, cancel) = watched(limits.quiet);
+    let (observer, cancel) = stop::watched(limits.quiet);
     let workspace = Workspace::new(scratch, memory, threads(limits), observer, cancel)?;
     workspace.set_storage(limits.storing.storage())?;
     Ok(workspace)
 }
 
-fn print(text: &str) -> Result<()> {
-    let mut out = std::io::stdout().lock();
-    writeln!(out, "{text}").map_err(|e| Error::io("standard output", "write", e))
-}
-
-fn json<T: Serialize>(value: &T) -> Result<String> {
-    serde_json::to_string_pretty(value)
-        .map_err(|e| Error::io("standard output", "write JSON", e.into()))
-}
-
-/// Prints a value as JSON or as text.
-fn show<T: Serialize + Display>(value: &T, as_json: bool) -> Result<()> {
-    print(&if as_json {
-        json(value)?
-    } else {
-        value.to_string()
-    })
-}
-
-fn write_report(path: &Path, report: &Report) -> Result<()> {
-    std::fs::write(path, json(report)? + "\n").map_err(|e| Error::io(path, "write the report", e))
-}
-
 fn reconstruct(args: &Reconstruct) -> Result<bool> {
-    let mut builder = Reconstruction::builder()
-        .output(&args.output)
-        .params(args.params())
+    let mut builder = args
+        .job
+        .builder()
         .threads(threads(&args.limits))
         .memory(memory(&args.limits))
         .storage(args.limits.storing.storage())
-        .tile_points(args.tile_points.unwrap_or(args.block_points))
         .start(args.again.start());
-    for input in &args.inputs {
-        builder = builder.input(input);
-    }
     if let Some(scratch) = &args.limits.scratch {
         builder = builder.scratch(scratch);
     }
@@ -111,7 +75,7 @@ fn resume(args: &Resume) -> Result<bool> {
 }
 
 fn run_reconstruction(builder: Builder, ends: &Ends, quiet: bool) -> Result<bool> {
-    let (observer, cancel) = watched(quiet);
+    let (observer, cancel) = stop::watched(quiet);
     let mut builder = builder.observer(observer).cancel(cancel);
     if let Some(limit) = ends.time_limit {
         builder = builder.time_limit(limit);
@@ -146,43 +110,6 @@ fn run_reconstruction(builder: Builder, ends: &Ends, quiet: bool) -> Result<bool
         print(&summary(&report, run.output()))?;
     }
     Ok(true)
-}
-
-fn summary(report: &Report, output: &Path) -> String {
-    let mesh = &report.mesh;
-    format!(
-        "{}: {} triangles, {} vertices from {} points; {}, {} boundary edges\n\
-         {} in all, at most {} of memory and {} of scratch",
-        output.display(),
-        style::grouped(mesh.triangles),
-        style::grouped(mesh.vertices),
-        style::grouped(report.points),
-        style::counted(
-            report.repair.components_found - report.repair.components_removed,
-            "component"
-        ),
-        style::grouped(mesh.boundary_edges),
-        style::seconds(report.seconds),
-        style::bytes(report.peak_resident_bytes),
-        style::bytes(report.peak_scratch_bytes),
-    ) + &left_out(report)
-}
-
-/// A line about the points left out by options, if there are any.
-fn left_out(report: &Report) -> String {
-    let reasons: Vec<String> = [
-        (report.input.dropped_by_class, "of other classes"),
-        (report.thin.dropped, "by thinning"),
-        (report.outliers.dropped, "outliers"),
-    ]
-    .iter()
-    .filter(|(count, _)| *count > 0)
-    .map(|(count, why)| format!("{} {why}", style::grouped(*count)))
-    .collect();
-    if reasons.is_empty() {
-        return String::new();
-    }
-    format!("\npoints left out: {}", reasons.join(", "))
 }
 
 fn info(args: &Info) -> Result<bool> {
@@ -227,7 +154,7 @@ fn demo(args: &Demo) -> Result<bool> {
         .write(&cloud, format)
         .map_err(|e| generator_error(&cloud, &e))?;
     let mesh = folder.join("bumpy.ply");
-    let (observer, cancel) = watched(args.limits.quiet);
+    let (observer, cancel) = stop::watched(args.limits.quiet);
     let report = Reconstruction::builder()
         .input(&cloud)
         .output(&mesh)

@@ -1,8 +1,11 @@
 //! The command line: arguments, messages, exit codes. The only code that prints.
 
 mod args;
+mod command;
 mod commands;
+mod output;
 mod progress;
+mod shared;
 mod stop;
 mod style;
 
@@ -30,7 +33,7 @@ pub fn main() -> ExitCode {
             return ExitCode::from(FAILED);
         }
     }
-    let args = args::Args::parse();
+    let args = command::Args::parse();
     match commands::run(args.command) {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::from(NO),
@@ -43,6 +46,7 @@ pub fn main() -> ExitCode {
             ExitCode::from(match error {
                 Error::Cancelled => stop::code(false),
                 Error::TimeLimit => stop::code(true),
+                Error::NotYet { .. } => stop::TIME_IS_UP,
                 _ => FAILED,
             })
         }

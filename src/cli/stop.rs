@@ -1,18 +1,19 @@
 //! The thread that waits for signals, the end of a run and the next drawing of the progress; messages about
 //! stopping.
 
-use super::progress::Bars;
+use super::progress::{Bars, Warnings};
 use crate::pipeline::Reconstruction;
-use crate::workspace::progress::Cancel;
+use crate::workspace::progress::{Cancel, Observer, Silent};
 use crate::workspace::{Folder, fault, lock};
 use crossbeam_channel::{Receiver, after, never, select, tick, unbounded};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
+use std::io::IsTerminal;
 use std::sync::atomic::{AtomicI32, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-/// Exit code of a run that reached its time limit.
+/// Exit code of a run that reached its time limit, and of a command that is to be tried again later.
 pub const TIME_IS_UP: u8 = 75;
 
 /// Time that a run has to stop by itself. Its finished work is on disk, so the program can be ended at any
@@ -34,6 +35,18 @@ pub fn code(expired: bool) -> u8 {
         0 if expired => TIME_IS_UP,
         0 => 130,
         signal => 128 + signal as u8,
+    }
+}
+
+/// The receiver of the progress, and the flag that signals raise.
+pub fn watched(quiet: bool) -> (Arc<dyn Observer>, Cancel) {
+    if quiet {
+        (Arc::new(Silent), watch(None))
+    } else if std::io::stderr().is_terminal() {
+        let bars = Arc::new(Bars::default());
+        (bars.clone(), watch(Some(bars)))
+    } else {
+        (Arc::new(Warnings), watch(None))
     }
 }
 
@@ -103,7 +116,7 @@ pub fn hint() -> String {
 }
 
 /// A path quoted for a shell.
-fn quoted(path: &std::path::Path) -> String {
+pub fn quoted(path: &std::path::Path) -> String {
     let text = path.display().to_string();
     let plain = |c: char| c.is_alphanumeric() || "/._-+,@%".contains(c);
     if text.chars().all(plain) {

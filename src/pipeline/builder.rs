@@ -125,6 +125,12 @@ impl Builder {
         self
     }
 
+    /// The scratch folder of the run.
+    pub(super) fn folder(mut self, folder: PathBuf) -> Self {
+        self.folder = Some(folder);
+        self
+    }
+
     /// Checks everything that can be checked in advance.
     ///
     /// # Errors
@@ -194,7 +200,8 @@ pub(super) fn unfinished(folder: &Path) -> Result<Builder> {
         }
     };
     let manifest = Manifest::from_bytes(folder, &found.manifest)?;
-    let mut builder = manifest.settings().start(Start::Resume);
-    builder.folder = Some(folder.to_path_buf());
-    Ok(builder)
+    Ok(manifest
+        .settings()
+        .start(Start::Resume)
+        .folder(folder.to_path_buf()))
 }

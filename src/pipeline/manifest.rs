@@ -14,7 +14,7 @@ use std::os::unix::fs::{FileExt, MetadataExt};
 use std::path::{Path, PathBuf};
 
 /// The format of scratch folders that this program writes and reads.
-const FORMAT: u32 = 4;
+const FORMAT: u32 = 5;
 
 /// Bytes of each sample of an input.
 const SAMPLE: u64 = 64 << 10;
@@ -134,6 +134,11 @@ impl Manifest {
                 .map(|p| Identity::of(p))
                 .collect::<Result<_>>()?,
         })
+    }
+
+    /// Path of the mesh.
+    pub fn output(&self) -> PathBuf {
+        self.output.path()
     }
 
     pub fn to_bytes(&self) -> Result<Vec<u8>> {

@@ -13,7 +13,7 @@ use crate::stages::cells::{CellTriples, DiskRadius, TileRanges, Widen, cells};
 use crate::stages::export::{CoordinateType, export};
 use crate::stages::ingest::{self, Spool, ingest_classes};
 use crate::stages::located::Places;
-use crate::stages::order::{Orderer, PointStore, StoredPoints, order};
+use crate::stages::order::{Orderer, PointStore, StoredPoints, order, sample_sort};
 use crate::stages::outliers::{OutlierOptions, drop_outliers};
 use crate::stages::repair::{RepairOptions, Repaired, repair};
 use crate::stages::smooth::{Relaxed, Relaxing, relax, smooth};
@@ -45,7 +45,11 @@ pub(super) struct Stages<'a> {
 impl<'a> Stages<'a> {
     /// Begins with the estimate of disk space from the headers of the inputs.
     pub fn begin(job: &'a Reconstruction, workspace: &'a Workspace) -> Result<Self> {
-        let headers = Known::from_headers(&job.inputs);
+        // A task leaves the check of disk space to the process that began its generation.
+        let headers = match workspace.is_task() {
+            true => None,
+            false => Known::from_headers(&job.inputs),
+        };
         let first = headers.map(|known| known.estimate(&job.params));
         let stages = Self {
             job,
@@ -70,6 +74,9 @@ impl<'a> Stages<'a> {
 
     /// Ends the run if the disk is too small for the following stages.
     fn check_room(&mut self) -> Result<()> {
+        if self.workspace.is_task() {
+            return Ok(());
+        }
         let estimate = self.known.estimate(&self.job.params);
         self.report.estimated_scratch_bytes = estimate.scratch;
         self.report.estimated_output_bytes = estimate.output;
@@ -136,9 +143,12 @@ impl<'a> Stages<'a> {
             self.report.thin = left_out.thin;
             store
         } else {
-            let (store, folded) = self.clock.stage("order", "points", points, || {
-                order(spool, lattice, page, workspace)
-            })?;
+            let (store, folded) =
+                self.clock
+                    .stage("order", "points", points, || match workspace.is_shared() {
+                        true => sample_sort(spool, lattice, page, workspace),
+                        false => order(spool, lattice, page, workspace),
+                    })?;
             self.report.duplicates_folded = folded;
             store
         };

@@ -1,7 +1,7 @@
 //! Fault injection for tests: the environment variable `OUTCROP_FAULT` is read once.
 //!
 //! `KIND:N` kills the program at the `N`th event of a kind, or makes that event fail; `count:FILE` writes the
-//! number of events of each kind. See `CONTRIBUTING.md`.
+//! number of events of each kind; `freeze:publish` stops it before it publishes a finished journal. See `CONTRIBUTING.md`.
 
 use std::io;
 use std::sync::OnceLock;
@@ -27,15 +27,30 @@ pub enum Event {
     Renamed,
     /// Before a file is deleted.
     Delete,
+    /// Before a finished journal is published.
+    Publish,
+    /// After a finished journal was published.
+    Published,
 }
 
-const NAMES: [&str; 8] = [
-    "write", "record", "torn", "recorded", "synced", "rename", "renamed", "delete",
+const NAMES: [&str; 10] = [
+    "write",
+    "record",
+    "torn",
+    "recorded",
+    "synced",
+    "rename",
+    "renamed",
+    "delete",
+    "publish",
+    "published",
 ];
 
 #[derive(Debug)]
 enum Plan {
     Kill(usize, u64),
+    /// Stop, as by SIGSTOP, before a finished journal is published.
+    Freeze,
     Fail(rustix::io::Errno, u64),
     Count(std::path::PathBuf),
 }
@@ -46,6 +61,9 @@ static SEEN: [AtomicU64; NAMES.len()] = [const { AtomicU64::new(0) }; NAMES.len(
 fn read() -> Option<Plan> {
     let text = std::env::var("OUTCROP_FAULT").ok()?;
     let (kind, rest) = text.split_once(':')?;
+    if text == "freeze:publish" {
+        return Some(Plan::Freeze);
+    }
     if kind == "count" {
         return Some(Plan::Count(rest.into()));
     }
@@ -83,6 +101,10 @@ fn die() -> ! {
 pub fn point(event: Event) {
     if dies(event) {
         die();
+    }
+    if event == Event::Publish && matches!(plan(), Some(Plan::Freeze)) {
+        let (own, stop) = (rustix::process::getpid(), rustix::process::Signal::STOP);
+        let _ = rustix::process::kill_process(own, stop);
     }
 }
 

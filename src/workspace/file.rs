@@ -323,6 +323,9 @@ impl ScratchFile {
         let file = Arc::new(file.map_err(|e| Error::io(path, "create", e))?);
         *handle = Some(file.clone());
         segment.kept.made();
+        if let (Some(run), true) = (&self.shared.run, self.kept) {
+            run.made(path);
+        }
         Ok(file)
     }
 

@@ -9,7 +9,7 @@ use super::memory::MemoryPool;
 use super::open::{failed_write, open_existing, options};
 use super::progress::{Cancel, Observer};
 use super::recover::{Whereabouts, recover};
-use super::run::ResumableRun;
+use super::run::{ResumableRun, Role};
 use crate::error::{Error, Result};
 use std::collections::HashSet;
 use std::fs::File;
@@ -63,12 +63,12 @@ fn not_resumable(path: &Path, why: &str) -> Error {
 }
 
 /// A manifest with its checksum.
-fn sealed(manifest: &[u8]) -> Vec<u8> {
+pub(super) fn sealed(manifest: &[u8]) -> Vec<u8> {
     let seal = format!("\n{:08x}\n", crc32fast::hash(manifest));
     [manifest, seal.as_bytes()].concat()
 }
 
-fn unsealed(bytes: &[u8]) -> Option<Vec<u8>> {
+pub(super) fn unsealed(bytes: &[u8]) -> Option<Vec<u8>> {
     let (manifest, _) = bytes.split_at_checked(bytes.len().checked_sub(10)?)?;
     (sealed(manifest) == bytes).then(|| manifest.to_vec())
 }
@@ -86,6 +86,10 @@ impl Folder {
         let names = listing(path)?;
         if names.is_empty() {
             return Ok(Found::Nothing);
+        }
+        if is_shared(path) {
+            let why = "tasks share the run here; `outcrop submit` goes on with it";
+            return Err(not_resumable(path, why));
         }
         if !names.iter().any(|name| is_ours(name)) {
             return Err(not_resumable(path, "it is not a scratch folder of outcrop"));
@@ -108,7 +112,7 @@ impl Folder {
 
     fn read(mut self) -> Result<Found> {
         let mut in_journal = None;
-        let _ = journal::read(&self.path, None, |entry| {
+        let _ = journal::read(&self.path.join(journal::NAME), None, |entry| {
             if let Record::Manifest(bytes) = entry.record {
                 in_journal = Some(bytes.clone());
             }
@@ -283,9 +287,13 @@ impl Folder {
         let keeper = File::open(&self.path)
             .and_then(|folder| Keeper::start(journal.file(), folder, io.clone()))
             .map_err(|e| Error::io(&self.path, "start a thread for", e))?;
-        let history = (history, held);
         Ok(ResumableRun::new(
-            self.path, first, threads, journal, keeper, history, self.lock,
+            self.path,
+            Role::Alone(self.lock),
+            (first, threads),
+            (journal, path),
+            keeper,
+            (history, held),
         ))
     }
 
@@ -309,7 +317,7 @@ impl Folder {
         let mut journals = std::iter::once(None).chain(workers);
         journals.any(|worker| {
             let mut found = false;
-            let _ = journal::read(path, worker, |entry| {
+            let _ = journal::read(&journal::path_of(path, worker), worker, |entry| {
                 found |= matches!(entry.record, Record::Unit { .. });
                 !found
             });
@@ -335,14 +343,16 @@ fn read_history(path: &Path, until: u64) -> Result<(History, Ends)> {
         }
         valid
     };
-    let program = journal::read(path, None, |entry| add(entry, until))?.unwrap_or_default();
+    let program = journal::read(&path.join(journal::NAME), None, |entry| add(entry, until))?
+        .unwrap_or_default();
     // A worker cannot have seen more records than there are.
     let until = until.min(2 * program.1 + 1);
     let mut ends = Vec::new();
     for worker in workers(path)? {
         let unit = |entry: &journal::Entry<'_>| matches!(entry.record, Record::Unit { .. });
         let each = |entry: &journal::Entry<'_>| unit(entry) && add(entry, until);
-        ends.push((worker, journal::read(path, Some(worker), each)?));
+        let journal = journal::path_of(path, Some(worker));
+        ends.push((worker, journal::read(&journal, Some(worker), each)?));
     }
     let workers = ends;
     Ok((history, Ends { program, workers }))
@@ -363,8 +373,16 @@ fn is_ours(name: &str) -> bool {
     OURS.contains(&name) || journal::worker(name).is_some()
 }
 
+/// The folder with the generations of a run that tasks share.
+pub(super) const GENERATIONS: &str = "generations";
+
+/// True if `path` is the folder of a run that tasks share.
+pub(super) fn is_shared(path: &Path) -> bool {
+    path.join(GENERATIONS).is_dir()
+}
+
 /// False if there is nothing at `path`; an error unless it is a private folder of this user.
-fn is_private(path: &Path) -> Result<bool> {
+pub(super) fn is_private(path: &Path) -> Result<bool> {
     let meta = match path.symlink_metadata() {
         Ok(meta) => meta,
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(false),

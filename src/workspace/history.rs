@@ -1,6 +1,6 @@
 //! The finished work of earlier attempts according to the journals, and the part of it that survives damage.
 
-use super::journal::{Entry, PayloadPlace, Record};
+use super::journal::{Entry, OpenStep, PayloadPlace, Record, Sharing, Took};
 use super::place::Place;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -19,6 +19,14 @@ pub struct History {
     begun: Vec<(String, u64)>,
     /// Larger than the numbers of all workers.
     next_worker: u32,
+    /// How tasks share the run.
+    pub sharing: Option<Sharing>,
+    /// The steps that are open for tasks.
+    pub open: Vec<OpenStep>,
+    /// The resources that processes took.
+    pub took: Vec<Took>,
+    /// True if the run is finished.
+    pub finished: bool,
 }
 
 #[derive(Debug, Default)]
@@ -99,7 +107,11 @@ impl History {
     pub fn add(&mut self, entry: &Entry<'_>) {
         let at = entry.at;
         match entry.record {
-            Record::Manifest(_) => {}
+            Record::Manifest(_) | Record::Task(_) => {}
+            Record::Shared(sharing) => self.sharing = Some(sharing.clone()),
+            Record::Open(steps) => self.open.clone_from(steps),
+            Record::Took(took) => self.took.push(*took),
+            Record::Finished => self.finished = true,
             Record::Attempt(next) => self.next_worker = self.next_worker.max(*next),
             Record::Begin(stage) => self.begun.push((stage.clone(), at)),
             Record::Deleted(name) => {

@@ -72,6 +72,68 @@ pub enum Record {
     },
     /// A file is not needed any more.
     Deleted(String),
+    /// Tasks share the run.
+    Shared(Sharing),
+    /// The units of these steps that are not finished are for tasks; the last record of a generation.
+    Open(Vec<OpenStep>),
+    /// The journal is that of a task.
+    Task(Task),
+    /// A task, or the program between two generations, is finished.
+    Took(Took),
+    /// The run is finished.
+    Finished,
+}
+
+/// How tasks share a run.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Sharing {
+    /// A number that tells the run from others.
+    pub run: u64,
+    /// Number of shards of the units of a generation.
+    pub shards: u32,
+    /// Most threads of a process.
+    pub threads: u32,
+    /// Bytes of memory of a process, unless it is told otherwise.
+    pub memory: u64,
+    /// Checksum of the program; all processes must run the same one.
+    pub program: u32,
+}
+
+/// A step with units that are not finished.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct OpenStep {
+    /// Name of the step.
+    pub step: String,
+    /// Number of its units, all of which are open.
+    pub units: u64,
+}
+
+/// The work of a task.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Task {
+    /// Number of the run.
+    pub run: u64,
+    /// Number of the generation whose units it does.
+    pub generation: u64,
+    /// Number of its shard.
+    pub shard: u32,
+}
+
+/// The resources that a process took.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct Took {
+    /// The shard; none for the program between two generations.
+    pub shard: Option<u32>,
+    /// Seconds.
+    pub seconds: f64,
+    /// Seconds of processor time.
+    pub cpu_seconds: f64,
+    /// Peak of the resident memory in bytes.
+    pub resident: u64,
+    /// Bytes read.
+    pub read: u64,
+    /// Bytes written.
+    pub written: u64,
 }
 
 /// The place of a payload: the worker whose journal has it (`None`: the program's), offset and length.
@@ -147,6 +209,11 @@ impl Journal {
         }
     }
 
+    /// Path of the file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
     /// The file, for syncing.
     pub fn file(&self) -> Arc<File> {
         self.file.clone()
@@ -174,33 +241,43 @@ impl Journal {
     }
 }
 
-/// Reads a payload of a journal in `folder`.
+/// Path of the journal of a worker in `folder` (`None`: the program's).
+pub fn path_of(folder: &Path, worker: Option<u32>) -> PathBuf {
+    folder.join(worker.map_or(NAME.to_owned(), of_worker))
+}
+
+/// Opens a journal to read payloads.
 ///
 /// # Errors
 /// [`Error::Io`].
-pub fn payload(folder: &Path, (worker, offset, bytes): PayloadPlace) -> Result<Vec<u8>> {
-    let path = folder.join(worker.map_or(NAME.to_owned(), of_worker));
+pub fn open(path: &Path) -> Result<File> {
+    open_existing(path).map_err(|e| Error::io(path, "open", e))
+}
+
+/// Reads a payload of the journal `path`, which is open as `file`.
+///
+/// # Errors
+/// [`Error::Io`].
+pub fn payload(path: &Path, file: &File, offset: u64, bytes: usize) -> Result<Vec<u8>> {
     let mut payload = vec![0; bytes];
-    open_existing(&path)
-        .and_then(|file| file.read_exact_at(&mut payload, offset))
-        .map_err(|e| Error::io(&path, format!("read {bytes} bytes"), e))?;
+    file.read_exact_at(&mut payload, offset)
+        .map_err(|e| Error::io(path, format!("read {bytes} bytes"), e))?;
     Ok(payload)
 }
 
-/// Calls `each` with the whole records of the journal of `worker` (`None`: the program's) in `folder`, until
-/// it returns false. Returns the end of the last record for which it returned true, and their number; `None`
-/// if the file is no journal.
+/// Calls `each` with the whole records of the journal `path` of `worker` (`None`: the program's), until it
+/// returns false. Returns the end of the last record for which it returned true, and their number; `None` if
+/// the file is no journal.
 ///
 /// # Errors
 /// [`Error::Io`].
 pub fn read(
-    folder: &Path,
+    path: &Path,
     worker: Option<u32>,
     mut each: impl FnMut(&Entry<'_>) -> bool,
 ) -> Result<Option<(u64, u64)>> {
-    let path = folder.join(worker.map_or(NAME.to_owned(), of_worker));
-    let io = |e| Error::io(&path, "read", e);
-    let Ok(file) = open_existing(&path) else {
+    let io = |e| Error::io(path, "read", e);
+    let Ok(file) = open_existing(path) else {
         return Ok(None);
     };
     let length = file.metadata().map_err(io)?.len();
@@ -304,7 +381,7 @@ mod tests {
         let whole = std::fs::read(&path).unwrap();
         let read_back = || {
             let mut found = Vec::new();
-            let end = read(folder.path(), None, |entry| {
+            let end = read(&path, None, |entry| {
                 found.push(entry.record.clone());
                 true
             });
@@ -349,10 +426,11 @@ mod tests {
             found.push(entry.payload);
             true
         };
-        assert!(read(folder.path(), Some(4), each).unwrap().is_some());
-        for (unit, place) in (0..).zip(found) {
+        let path = path_of(folder.path(), Some(4));
+        assert!(read(&path, Some(4), each).unwrap().is_some());
+        for (unit, (_, offset, bytes)) in (0..).zip(found) {
             assert_eq!(
-                payload(folder.path(), place).unwrap(),
+                payload(&path, &open(&path).unwrap(), offset, bytes).unwrap(),
                 vec![unit; 200 * unit as usize]
             );
         }

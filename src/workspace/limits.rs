@@ -32,6 +32,13 @@ pub fn resident_file() -> u64 {
     status("RssFile:").unwrap_or(0)
 }
 
+/// Processor time of this process so far, in seconds.
+#[must_use]
+pub fn cpu_seconds() -> f64 {
+    let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
+    time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9
+}
+
 /// Bytes free for this user on the file system that holds `path` (or its nearest existing parent).
 #[must_use]
 pub fn disk_free(path: &Path) -> Option<u64> {

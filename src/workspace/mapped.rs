@@ -1,17 +1,19 @@
 //! Files mapped into memory.
 
-use memmap2::{Advice, Mmap};
+use memmap2::{Advice, Mmap, MmapOptions};
 use std::fs::File;
+use std::ops::Deref;
 use std::path::Path;
 use std::str::FromStr;
 
-/// The way in which points in scratch files are read. It changes no result.
+/// The way in which points are read, from scratch files and inputs. It changes no result.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Io {
-    /// Mapped on local disks where the budget has ample room, else read.
+    /// Mapped on local disks where the budget has ample room, else read; inputs are read.
     #[default]
     Auto,
-    /// Mapped wherever the system allows it and the budget has room.
+    /// Mapped wherever the system allows it and the budget has room; inputs, too. Whoever cuts an input
+    /// meanwhile ends the run by SIGBUS.
     Map,
     /// Read into buffers.
     Read,
@@ -94,6 +96,48 @@ impl Mapping {
     }
 }
 
+/// A part of an input file: mapped, or a copy.
+#[derive(Debug)]
+pub enum Window {
+    /// Mapped, all of it in memory.
+    Mapped(Mmap),
+    /// A copy.
+    Copied(Vec<u8>),
+}
+
+impl Window {
+    /// Maps a part of the file, and brings it into memory; `None` if that cannot be done, or if the file ends
+    /// before it.
+    #[must_use]
+    pub fn of(file: &File, offset: u64, bytes: usize) -> Option<Self> {
+        let end = offset.checked_add(bytes as u64)?;
+        if bytes == 0 || file.metadata().ok()?.len() < end {
+            return None;
+        }
+        #[expect(
+            unsafe_code,
+            reason = "no mapping of a file can be proved to be constant"
+        )]
+        // SAFETY: the bytes are only read, and decoded with bounds. A program that writes to an input at the
+        // same time changes what is read, as it does without a mapping. Whoever cuts it between the next line
+        // and the end of its use ends the run by SIGBUS.
+        let map = unsafe { MmapOptions::new().offset(offset).len(bytes).map(file) }.ok()?;
+        map.advise(Advice::PopulateRead).ok()?;
+        Some(Self::Mapped(map))
+    }
+}
+
+impl Deref for Window {
+    type Target = [u8];
+
+    fn deref(&self) -> &[u8] {
+        match self {
+            Self::Mapped(map) => map,
+            Self::Copied(bytes) => bytes,
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -110,6 +154,22 @@ mod tests {
         assert_eq!(map.get(69_999, 3), None);
         assert_eq!(map.get(u64::MAX, 1), None);
         assert_eq!(map.get(5, usize::MAX), None);
+    }
+
+    #[test]
+    fn a_window_has_the_bytes_of_its_part_and_none_if_the_file_ends_before() {
+        let mut file = tempfile::tempfile().unwrap();
+        let bytes: Vec<u8> = (0..70_001u32).map(|n| (n % 251) as u8).collect();
+        file.write_all(&bytes).unwrap();
+        for (offset, count) in [(0, 70_001), (4095, 2), (4096, 4096), (69_990, 11)] {
+            let window = Window::of(&file, offset as u64, count).unwrap();
+            assert_eq!(window[..], bytes[offset..offset + count]);
+        }
+        assert!(Window::of(&file, 69_990, 12).is_none());
+        assert!(Window::of(&file, u64::MAX, 2).is_none());
+        assert!(Window::of(&file, 0, 0).is_none());
+        file.set_len(69_999).unwrap();
+        assert!(Window::of(&file, 69_990, 11).is_none());
     }
 
     #[test]

@@ -8,8 +8,9 @@ pub mod fault;
 pub mod file;
 mod files;
 mod folder;
+pub mod generations;
 mod history;
-mod journal;
+pub mod journal;
 mod keeper;
 pub mod limits;
 pub mod mapped;
@@ -32,6 +33,7 @@ pub use unit::Unit;
 
 use crate::error::{Error, Result};
 use file::Shared;
+use generations::{Opened, Resources};
 use memory::{MemoryPool, Reservation};
 use progress::{Cancel, Observer};
 use std::path::{Path, PathBuf};
@@ -245,6 +247,35 @@ impl Workspace {
         ))
     }
 
+    /// Takes part in a run that tasks share; `begin` begins its part.
+    ///
+    /// # Errors
+    /// Errors of `begin`, [`Error::Io`].
+    pub fn shared(
+        folder: &Path,
+        memory: MemoryPool,
+        threads: usize,
+        observer: Arc<dyn Observer>,
+        cancel: Cancel,
+        begin: impl FnOnce(&Resources<'_>) -> Result<Opened>,
+    ) -> Result<Result<Self, Opened>> {
+        let threads = threads.max(1);
+        let io: Arc<IoCounters> = Arc::default();
+        let resources = Resources {
+            threads,
+            memory: &memory,
+            io: &io,
+        };
+        let run = match begin(&resources)? {
+            Opened::Run(run) => *run,
+            nothing => return Ok(Err(nothing)),
+        };
+        let pool = pool(threads, folder)?;
+        let path = folder.to_path_buf();
+        let run = Some(run);
+        Ok(Ok(Self::of(path, io, run, memory, pool, observer, cancel)))
+    }
+
     /// Sets how files are read and written; to be called before the first file is. Automatic compression is
     /// decided where the disk need is known, see [`Workspace::expect_scratch`].
     ///
@@ -257,6 +288,12 @@ impl Workspace {
             Compression::Level(level) => self.compress_rows(level),
             Compression::Auto | Compression::None => Ok(()),
         }
+    }
+
+    /// True if inputs are mapped.
+    #[must_use]
+    pub fn maps_inputs(&self) -> bool {
+        self.shared.storage().io == mapped::Io::Map
     }
 
     /// Compresses rows from now on.

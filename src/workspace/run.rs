@@ -4,7 +4,7 @@
 //! journals is skipped. A step is identified by its name and the names of the steps around it.
 
 use super::history::History;
-use super::journal::{self, Journal, Record};
+use super::journal::{self, Journal, OpenStep, Record};
 use super::keeper::{Keeper, Leaving};
 use super::lock;
 use super::memory::Reservation;
@@ -12,15 +12,31 @@ use super::place::{Place, Put};
 use crate::error::Result;
 use std::collections::{BTreeSet, HashSet};
 use std::fs::File;
+use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::{Mutex, OnceLock};
+
+/// The part of the work that this process does.
+#[derive(Debug)]
+pub enum Role {
+    /// All work; the folder is locked meanwhile.
+    Alone(File),
+    /// The work between the units that tasks do.
+    Between,
+    /// Units of steps that are open.
+    Task(Vec<(String, Range<u64>)>),
+}
 
 /// The state of a run that can be resumed.
 #[derive(Debug)]
 pub struct ResumableRun {
     folder: PathBuf,
-    /// The journal of the thread that runs the program.
+    role: Role,
+    /// The journal of the thread that runs the program; if tasks share the run, that of all threads.
     journal: Journal,
+    /// The journal with the results of earlier attempts that have no worker, and its handle.
+    past: PathBuf,
+    opened: OnceLock<File>,
     /// The journals of the workers of this attempt, begun when they finish their first units.
     workers: Vec<OnceLock<Journal>>,
     /// The number of the first worker of this attempt among those of all attempts.
@@ -31,8 +47,13 @@ pub struct ResumableRun {
     history: History,
     /// The open steps of the program, outermost first; the first is the program itself.
     scopes: Mutex<Vec<Scope>>,
-    /// Locked as long as the run is at work.
-    _lock: File,
+    /// Steps that were found open for tasks.
+    open: Mutex<Vec<OpenStep>>,
+    /// If tasks share the run: the segments that this process made, other files that it wrote to, and the
+    /// segments of others that are to be deleted.
+    made: Mutex<HashSet<PathBuf>>,
+    touched: Mutex<HashSet<PathBuf>>,
+    leaving: Mutex<Vec<Leaving>>,
     _held: Reservation,
 }
 
@@ -44,28 +65,106 @@ struct Scope {
 }
 
 impl ResumableRun {
-    /// A run in a locked folder, on `threads` threads whose numbers begin with `first`.
+    /// A run on `threads` threads whose numbers begin with `first`; `past` is the journal with the results of
+    /// earlier attempts.
     #[must_use]
     pub fn new(
         folder: PathBuf,
-        first: u32,
-        threads: usize,
-        journal: Journal,
+        role: Role,
+        (first, threads): (u32, usize),
+        (journal, past): (Journal, PathBuf),
         keeper: Keeper,
         (history, held): (History, Reservation),
-        lock: File,
     ) -> Self {
         Self {
             folder,
+            role,
             journal,
+            past,
+            opened: OnceLock::new(),
             workers: (0..threads).map(|_| OnceLock::new()).collect(),
             first,
             keeper,
             history,
             scopes: Mutex::new(vec![Scope::default()]),
-            _lock: lock,
+            open: Mutex::default(),
+            made: Mutex::default(),
+            touched: Mutex::default(),
+            leaving: Mutex::default(),
             _held: held,
         }
+    }
+
+    /// True if tasks share the run.
+    #[must_use]
+    pub fn is_shared(&self) -> bool {
+        !matches!(self.role, Role::Alone(_))
+    }
+
+    /// True if this process is a task.
+    #[must_use]
+    pub fn is_task(&self) -> bool {
+        matches!(self.role, Role::Task(_))
+    }
+
+    /// If `step` is for tasks: the units of it that this process does. None of the `left` of its `units` units
+    /// is finished then.
+    #[must_use]
+    pub fn shared_units(&self, step: &str, units: u64, left: &[usize]) -> Option<Range<u64>> {
+        match &self.role {
+            Role::Between if !left.is_empty() => {
+                let step = step.to_owned();
+                lock(&self.open).push(OpenStep { step, units });
+                Some(0..0)
+            }
+            Role::Task(parts) if !left.is_empty() => {
+                let part = parts.iter().find(|(name, _)| name == step);
+                Some(part.map_or(0..0, |(_, units)| units.clone()))
+            }
+            _ => None,
+        }
+    }
+
+    /// The steps that were found open for tasks.
+    pub fn take_open(&self) -> Vec<OpenStep> {
+        std::mem::take(&mut *lock(&self.open))
+    }
+
+    /// The segments of other processes that are to be deleted.
+    pub fn take_leaving(&self) -> Vec<Leaving> {
+        std::mem::take(&mut *lock(&self.leaving))
+    }
+
+    /// The journal of this process.
+    #[must_use]
+    pub fn journal(&self) -> &Journal {
+        &self.journal
+    }
+
+    /// Notes that this process made a segment that others may read.
+    pub fn made(&self, path: &std::path::Path) {
+        if self.is_shared() {
+            lock(&self.made).insert(path.to_path_buf());
+        }
+    }
+
+    /// Notes a file, not a segment, that this process has written to.
+    pub fn touched(&self, path: &std::path::Path) {
+        if self.is_shared() {
+            lock(&self.touched).insert(path.to_path_buf());
+        }
+    }
+
+    /// The files that are not segments to which this process has written.
+    #[must_use]
+    pub fn files_touched(&self) -> Vec<PathBuf> {
+        lock(&self.touched).iter().cloned().collect()
+    }
+
+    /// The segments that this process made.
+    #[must_use]
+    pub fn segments_made(&self) -> Vec<PathBuf> {
+        lock(&self.made).iter().cloned().collect()
     }
 
     /// The number of the first worker of this attempt among those of all attempts.
@@ -88,7 +187,7 @@ impl ResumableRun {
         assert!(new, "two steps of {:?} have the name {name:?}", scope.path);
         let path = format!("{}/{name}", scope.path);
         drop(scopes);
-        if depth == 1 && !self.history.began(&path) {
+        if depth == 1 && !self.is_task() && !self.history.began(&path) {
             self.journal.append(Record::Begin(path.clone()))?;
         }
         Ok(path)
@@ -119,7 +218,20 @@ impl ResumableRun {
     /// [`crate::Error::Io`].
     pub fn payload(&self, step: &str, unit: u64) -> Result<Option<Vec<u8>>> {
         match self.history.payload(step, unit) {
-            Some(at) => journal::payload(&self.folder, at).map(Some),
+            Some((None, offset, bytes)) => {
+                let file = match self.opened.get() {
+                    Some(file) => file,
+                    None => {
+                        let file = journal::open(&self.past)?;
+                        self.opened.get_or_init(|| file)
+                    }
+                };
+                journal::payload(&self.past, file, offset, bytes).map(Some)
+            }
+            Some((worker, offset, bytes)) => {
+                let path = journal::path_of(&self.folder, worker);
+                journal::payload(&path, &journal::open(&path)?, offset, bytes).map(Some)
+            }
             None => Ok(None),
         }
     }
@@ -144,8 +256,8 @@ impl ResumableRun {
             payload,
         };
         match self.workers.get(worker) {
-            Some(journal) => self.of_worker(worker, journal)?.append(record),
-            None => self.journal.append(record),
+            Some(journal) if !self.is_shared() => self.of_worker(worker, journal)?.append(record),
+            _ => self.journal.append(record),
         }
     }
 
@@ -200,12 +312,20 @@ impl ResumableRun {
         records.try_for_each(|record| self.journal.append(record))
     }
 
-    /// Deletes the segments `leaving` of the file `name`.
+    /// Deletes the segments `leaving` of the file `name`. If tasks share the run, those of other processes are
+    /// kept until the others know.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Disk`].
     pub fn delete(&self, name: &str, leaving: impl Iterator<Item = Leaving>) -> Result<()> {
         self.journal.append(Record::Deleted(name.to_owned()))?;
+        if self.is_shared() {
+            let mut made = lock(&self.made);
+            let (own, others): (Vec<_>, Vec<_>) = leaving.partition(|l| made.remove(&l.0.path));
+            lock(&self.leaving).extend(others);
+            self.keeper.delete(own.into_iter());
+            return Ok(());
+        }
         self.keeper.delete(leaving);
         Ok(())
     }

@@ -9,6 +9,7 @@ use crate::error::{Error, Result};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::collections::BTreeSet;
+use std::path::Path;
 use std::sync::Mutex;
 
 /// The name of a step that consists of units, and the name under which their memory is reserved.
@@ -133,13 +134,15 @@ impl Workspace {
             });
         };
         let step = run.begin(&step)?;
-        let mut left: Vec<usize> = Vec::new();
         let mut finished = run.finished(&step).into_iter().peekable();
-        for unit in 0..count {
-            if finished.next_if_eq(&(unit as u64)).is_none() {
-                left.push(unit);
-                continue;
-            }
+        let (done, mut left): (Vec<usize>, Vec<usize>) =
+            (0..count).partition(|unit| finished.next_if_eq(&(*unit as u64)).is_some());
+        let shared = run.shared_units(&step, count as u64, &left);
+        if let Some(own) = &shared {
+            left.retain(|unit| own.contains(&(*unit as u64)));
+        }
+        // Whoever does some units of a step does not need the results of the others.
+        for unit in done.into_iter().filter(|_| shared.is_none()) {
             let payload = run.payload(&step, unit as u64)?.unwrap_or_default();
             let (items, value) = self.restored(&payload)?;
             self.observer.advance(items);
@@ -161,6 +164,9 @@ impl Workspace {
             hand_on(number, value)?;
             Ok(usage)
         })?;
+        if shared.is_some() {
+            return Err(Error::Shared);
+        }
         run.end(&step, count as u64, std::mem::take(&mut *lock(&files)))
     }
 
@@ -189,6 +195,32 @@ impl Workspace {
     #[must_use]
     pub fn is_resumable(&self) -> bool {
         self.shared.run.is_some()
+    }
+
+    /// True if tasks share the run.
+    #[must_use]
+    pub fn is_shared(&self) -> bool {
+        self.run().is_some_and(ResumableRun::is_shared)
+    }
+
+    /// Notes a file that this process has written to, and that others read.
+    pub fn touched(&self, path: &Path) {
+        if let Some(run) = self.run() {
+            run.touched(path);
+        }
+    }
+
+    /// If tasks share the run: a number that no other process of it has.
+    #[must_use]
+    pub fn shared_number(&self) -> Option<u32> {
+        let run = self.run().filter(|run| run.is_shared());
+        run.map(ResumableRun::first)
+    }
+
+    /// True if this process is a task, which does some units of a run.
+    #[must_use]
+    pub fn is_task(&self) -> bool {
+        self.run().is_some_and(ResumableRun::is_task)
     }
 }
 

@@ -1,19 +1,11 @@
-//! A compressed mesh: the bytes of the plain file in frames of the Zstandard seekable format. Threads compress
-//! parts, another writes them in their order.
-//!
-//! A part may begin when the writer has given out its number, and the writer gives out a further number for
-//! each part that is written. So numbers ascend, no more parts are in memory than were reserved, and whoever
-//! has a number has all memory that it needs: nobody waits for a part that cannot go on.
+//! A compressed mesh: the bytes of the plain file in frames of the Zstandard seekable format. All threads
+//! compress parts, and the calling thread writes them in their order.
 
 use super::file::{HEADER, MeshFile, note};
 use super::{KINDS, Writer};
 use crate::error::Result;
-use crate::workspace::memory::bytes_of;
 use crate::workspace::place::Place;
 use crate::workspace::{Unit, Workspace};
-use crossbeam_channel::{Receiver, Sender, bounded};
-use std::collections::BTreeMap;
-use std::ops::Range;
 use zstd::bulk::Compressor;
 use zstd::zstd_safe::compress_bound;
 
@@ -41,9 +33,6 @@ struct Frame {
     bytes: Vec<u8>,
 }
 
-/// A part with its number.
-type Packed = (usize, Result<Vec<Frame>>);
-
 /// Writes the file.
 pub(super) fn write(writer: &Writer<'_>, workspace: &Workspace) -> Result<()> {
     workspace.once("compress", |unit| {
@@ -59,50 +48,42 @@ fn write_all(writer: &Writer<'_>, workspace: &Workspace) -> Result<Place> {
     let count = KINDS * blocks;
     let sizes = (0..count).map(|part| writer.start(part + 1) - writer.start(part));
     let most = compress_bound(sizes.max().unwrap_or(0) as usize) as u64;
-    let ahead = workspace.memory.available() / 4 / most;
-    let ahead = ahead.clamp(1, 2 * workspace.threads as u64);
+    let memory = |block| writer.memory(workspace, block) + COMPRESSOR + most;
+    let part = (0..blocks).map(memory).max().unwrap_or(0);
     // The header is a frame, and each part may end with a short one.
     let entries = 1 + count + (bytes / PIECE as u64) as usize;
-    let table = (entries * ENTRY + 64) as u64;
-    let _held = workspace.reserve("export: frames", ahead * most + table)?;
-    let memory = |block| writer.memory(workspace, block) + COMPRESSOR + most;
-    let largest = (0..blocks).map(memory).max().unwrap_or(0);
+    let table = (entries * ENTRY + 64) as u64 + most;
+    let room = workspace.memory.available().saturating_sub(table);
+    let threads = (room / part.max(1)).clamp(1, workspace.threads as u64);
+    let _held = workspace.reserve("export: frames", threads * part + table)?;
 
-    let (allow, allowed) = bounded(ahead as usize);
-    let (hand_on, arriving) = bounded(ahead as usize);
     let mut out = Appender {
         file: &writer.file,
         end: 0,
         crc: crc32fast::Hasher::new(),
-        table: Vec::with_capacity(table as usize),
+        table: Vec::with_capacity(entries * ENTRY + 64),
     };
-    std::thread::scope(|scope| {
-        let written = scope.spawn(move || {
-            out.append_in_order(0..count, &allow, &arriving)?;
-            out.finish()
-        });
-        let work = |unit: &Unit<'_>| {
-            // If there is no number, or nobody to take the part, the writer failed.
-            let Ok(part) = allowed.recv() else {
-                return Ok(());
-            };
-            unit.give_back(largest - memory(part % blocks));
-            let _ = hand_on.send((part, pack_part(writer, unit, part)));
-            unit.advance(u64::from(part / blocks == KINDS - 1));
-            Ok(())
-        };
-        let outcome = workspace.for_each_unit("export: block", count, |_| largest, work);
-        drop(hand_on);
-        let written = written.join();
-        outcome.and(written.unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
-    })
+    let header = pack(&writer.file.layout.header).map_err(|e| writer.file.failed("compress", e))?;
+    out.append(&header)?;
+    let make = |part| {
+        workspace.check_cancel()?;
+        pack_part(writer, &workspace.unit(), part)
+    };
+    let mut written = 0;
+    workspace.pipe(threads as usize, count, make, |frames| {
+        written += 1;
+        workspace
+            .observer
+            .advance(u64::from(written > (KINDS - 1) * blocks));
+        out.append(&frames)
+    })?;
+    out.finish()
 }
 
 /// Encodes and compresses a part.
 fn pack_part(writer: &Writer<'_>, unit: &Unit<'_>, part: usize) -> Result<Vec<Frame>> {
     let mut bytes = Vec::new();
     writer.encode(unit, part, &mut bytes)?;
-    let _held = unit.hold(bytes_of(&bytes) + COMPRESSOR);
     pack(&bytes).map_err(|e| writer.file.failed("compress", e))
 }
 
@@ -131,30 +112,6 @@ struct Appender<'a> {
 }
 
 impl Appender<'_> {
-    /// Writes the header, and the parts `numbers` in their order; gives out the numbers.
-    fn append_in_order(
-        &mut self,
-        mut numbers: Range<usize>,
-        allow: &Sender<usize>,
-        arriving: &Receiver<Packed>,
-    ) -> Result<()> {
-        let (mut next, mut waiting) = (numbers.start, BTreeMap::new());
-        // The channel has room for all numbers that are given out and not written.
-        let first = numbers.by_ref().take(allow.capacity().unwrap_or(1));
-        first.for_each(|part| _ = allow.send(part));
-        let header = pack(&self.file.layout.header).map_err(|e| self.file.failed("compress", e))?;
-        self.append(&header)?;
-        for (part, frames) in arriving {
-            waiting.insert(part, frames?);
-            while let Some(frames) = waiting.remove(&next) {
-                self.append(&frames)?;
-                next += 1;
-                numbers.next().map(|part| allow.send(part));
-            }
-        }
-        Ok(())
-    }
-
     fn append(&mut self, frames: &[Frame]) -> Result<()> {
         for Frame { bytes, content } in frames {
             self.put(bytes)?;

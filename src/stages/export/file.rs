@@ -7,6 +7,8 @@ use crate::workspace::open::{failed_write, open_existing, options};
 use crate::workspace::place::{Place, Put};
 use crate::workspace::{OUTPUT, RENAMED, Unit, Workspace, limits};
 use std::fs::File;
+use std::io::ErrorKind::NotFound;
+use std::ops::Range;
 use std::os::unix::fs::{FileExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 
@@ -34,6 +36,32 @@ pub fn temporary(output: &Path) -> PathBuf {
     name.push(output.file_name().unwrap_or_default());
     name.push(".outcrop-part");
     folder_of(output).join(name)
+}
+
+/// The temporary name of a mesh if tasks share the run: each attempt at the mesh has a number.
+#[must_use]
+pub fn temporary_of(output: &Path, number: u32) -> PathBuf {
+    let mut path = temporary(output).into_os_string();
+    path.push(format!(".{number}"));
+    path.into()
+}
+
+/// Bytes at the beginning or the end of a part that share a page with other parts, and their offset.
+pub type Edge = (u64, Vec<u8>);
+
+/// Bytes of a page. Two machines must not write to one page of a file.
+const PAGE: u64 = 4096;
+
+/// The whole pages of a part, and the edges that share pages with others.
+fn pages(bytes: &[u8], offset: u64) -> (Range<usize>, [Range<usize>; 2]) {
+    let end = offset + bytes.len() as u64;
+    let (first, last) = (offset.next_multiple_of(PAGE), end / PAGE * PAGE);
+    if first >= last {
+        return (0..0, [0..bytes.len(), 0..0]);
+    }
+    let whole = (first - offset) as usize..(last - offset) as usize;
+    let edges = [0..whole.start, whole.end..bytes.len()];
+    (whole, edges)
 }
 
 /// Number of the header among the parts of the mesh, and of the whole of a compressed one.
@@ -67,13 +95,29 @@ impl<'a> MeshFile<'a> {
             workspace,
         };
         let known = workspace.places(OUTPUT);
-        if known.is_empty() {
+        let mut new = known.is_empty();
+        if let Some(own) = workspace.shared_number() {
+            new = false;
+            let make = |_: &Unit<'_>| {
+                new = true;
+                Ok(own)
+            };
+            let number = workspace.once("file", make)?;
+            file.temporary = temporary_of(output, number);
+        }
+        if new {
             file.begin()?;
         } else {
             // All parts were verified, in the temporary or in the final file.
             match open_existing(&file.temporary) {
                 Ok(found) => file.file = Some(found),
-                Err(e) if e.kind() == std::io::ErrorKind::NotFound => {}
+                Err(e) if e.kind() == NotFound => {
+                    // Another process may have given it its name; what is written again are the same bytes.
+                    let size = output.metadata().map_or(0, |meta| meta.len());
+                    if workspace.is_shared() && size == file.layout.bytes {
+                        file.file = open_existing(output).ok();
+                    }
+                }
                 Err(e) => return Err(Error::io(&file.temporary, "open", e)),
             }
         }
@@ -108,15 +152,31 @@ impl<'a> MeshFile<'a> {
             Error::Io { source, .. } => Error::io(&self.output, "make room for the mesh", source),
             full => full,
         })?;
+        self.workspace.touched(&self.temporary);
         self.file = Some(file);
         Ok(())
     }
 
-    /// Writes encoded `bytes` at `offset`, as part `part` of the mesh.
+    /// Writes encoded `bytes` at `offset`, as part `part` of the mesh. A task only writes whole pages; the
+    /// edges are returned.
     ///
     /// # Errors
     /// [`Error::Io`], [`Error::Disk`].
-    pub fn write(&self, unit: &Unit<'_>, part: u32, bytes: &[u8], offset: u64) -> Result<()> {
+    pub fn write(
+        &self,
+        unit: &Unit<'_>,
+        part: u32,
+        bytes: &[u8],
+        offset: u64,
+    ) -> Result<Vec<Edge>> {
+        if unit.is_task() {
+            let (whole, edges) = pages(bytes, offset);
+            self.put(&bytes[whole.clone()], offset + whole.start as u64)?;
+            unit.touched(&self.temporary);
+            let edges = edges.into_iter().filter(|edge| !edge.is_empty());
+            let edges = edges.map(|edge| (offset + edge.start as u64, bytes[edge].to_vec()));
+            return Ok(edges.collect());
+        }
         self.put(bytes, offset)?;
         let resumable = unit.is_resumable();
         let place = Place {
@@ -126,7 +186,16 @@ impl<'a> MeshFile<'a> {
             ..Place::default()
         };
         note(unit, part, place);
-        Ok(())
+        Ok(Vec::new())
+    }
+
+    /// Writes the edges of parts.
+    ///
+    /// # Errors
+    /// [`Error::Io`], [`Error::Disk`].
+    pub fn write_edges(&self, edges: &[Edge]) -> Result<()> {
+        let mut edges = edges.iter();
+        edges.try_for_each(|(offset, bytes)| self.put(bytes, *offset))
     }
 
     /// Writes `bytes` at `offset`.
@@ -135,7 +204,7 @@ impl<'a> MeshFile<'a> {
     /// [`Error::Io`], [`Error::Disk`].
     pub fn put(&self, bytes: &[u8], offset: u64) -> Result<()> {
         let Some(file) = &self.file else {
-            let gone = std::io::ErrorKind::NotFound.into();
+            let gone = NotFound.into();
             return Err(Error::io(&self.temporary, "open", gone));
         };
         self.workspace.io.add_written(bytes.len() as u64);
@@ -176,8 +245,13 @@ impl<'a> MeshFile<'a> {
                 Ok(())
             })?;
             fault::point(Event::Rename);
-            std::fs::rename(&self.temporary, &self.output)
-                .map_err(|e| Error::io(&self.output, "rename the finished file to it", e))?;
+            match std::fs::rename(&self.temporary, &self.output) {
+                // Another process may have done it.
+                Err(e) if e.kind() == NotFound && self.workspace.is_shared() => {}
+                done => {
+                    done.map_err(|e| Error::io(&self.output, "rename the finished file to it", e))?
+                }
+            }
             fault::point(Event::Renamed);
         }
         let folder = folder_of(&self.output);
@@ -239,5 +313,30 @@ pub(crate) fn folder_of(path: &Path) -> &Path {
     match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn whole_pages_and_edges_are_all_of_a_part_and_edges_are_short() {
+        for (offset, length) in [
+            (0, 4096),
+            (1, 4095),
+            (5, 0),
+            (100, 9000),
+            (4096, 3),
+            (4000, 200),
+        ] {
+            let bytes = vec![0; length];
+            let (whole, [head, tail]) = pages(&bytes, offset);
+            assert_eq!(whole.len() + head.len() + tail.len(), length);
+            let start = offset + whole.start as u64;
+            assert!(whole.is_empty() || start.is_multiple_of(PAGE));
+            assert!(whole.len().is_multiple_of(PAGE as usize));
+            assert!(head.len() < 2 * PAGE as usize && tail.len() < PAGE as usize);
+        }
     }
 }

@@ -11,7 +11,7 @@ mod format;
 mod number;
 mod ply;
 
-pub(crate) use file::{folder_of, is_compressed, temporary};
+pub(crate) use file::{folder_of, is_compressed, temporary, temporary_of};
 pub use format::CoordinateType;
 
 use crate::error::{Error, Result};
@@ -23,7 +23,7 @@ use crate::stages::repair::{FilledTriangle, Repaired, Surface};
 use crate::workspace::memory::bytes_of;
 use crate::workspace::{Unit, Workspace};
 use faces::Faces;
-use file::{HEADER, MeshFile};
+use file::{Edge, HEADER, MeshFile};
 use format::{Mesh, MeshFormat};
 use number::Numbering;
 use serde::{Deserialize, Serialize};
@@ -144,16 +144,17 @@ impl Writer<'_> {
         })?;
         let memory = |block| self.memory(workspace, block);
         let work = |unit: &Unit<'_>| {
-            let mut bytes = Vec::new();
+            let (mut bytes, mut edges) = (Vec::new(), Vec::new());
             for kind in 0..KINDS {
                 let part = kind * count + unit.number();
                 self.encode(unit, part, &mut bytes)?;
-                file.write(unit, part as u32, &bytes, self.start(part))?;
+                edges.extend(file.write(unit, part as u32, &bytes, self.start(part))?);
             }
             unit.advance(1);
-            Ok(())
+            Ok(edges)
         };
-        workspace.units("export: block", count, memory, work, |_, ()| Ok(()))
+        let each = |_, edges: Vec<Edge>| file.write_edges(&edges);
+        workspace.units("export: block", count, memory, work, each)
     }
 
     /// Bytes of memory for a part of a block.

@@ -3,6 +3,7 @@
 
 use crate::error::{Error, Result};
 use crate::workspace::compressed::{Beginning, Content};
+use crate::workspace::mapped::Window;
 use crate::workspace::{IoCounters, Workspace};
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
@@ -20,6 +21,8 @@ pub(super) struct Input {
     pub(super) size: u64,
     source: Source,
     io: Arc<IoCounters>,
+    /// True if parts of the file are mapped.
+    maps: bool,
 }
 
 /// The bytes of an input.
@@ -52,7 +55,11 @@ impl Source {
 impl Input {
     /// Opens a file to read all of it.
     pub(super) fn open(path: &Path, workspace: &Workspace) -> Result<Self> {
-        let input = Self::of(path, workspace.io.clone())?;
+        let maps = workspace.maps_inputs();
+        let input = Self {
+            maps,
+            ..Self::of(path, workspace.io.clone())?
+        };
         let Some(content) = Content::of(path, workspace)? else {
             return Ok(input);
         };
@@ -102,6 +109,7 @@ impl Input {
             size: meta.len(),
             source: Source::File(file),
             io,
+            maps: false,
         })
     }
 
@@ -147,6 +155,19 @@ impl Input {
             format!("the end of the file after {} bytes", offset + got as u64),
             format!("{} more bytes", buffer.len() - got),
         ))
+    }
+
+    /// The part of `bytes` bytes from `offset`, mapped if the run maps inputs; if the file ends before that, an error names `what`.
+    pub(super) fn window(&self, offset: u64, bytes: usize, what: &str) -> Result<Window> {
+        if let (true, Source::File(file) | Source::Content(file, _)) = (self.maps, &self.source)
+            && let Some(window) = Window::of(file, offset, bytes)
+        {
+            self.io.add_read(bytes as u64);
+            return Ok(window);
+        }
+        let mut copy = vec![0; bytes];
+        self.read_exact_at(offset, &mut copy, what)?;
+        Ok(Window::Copied(copy))
     }
 
     /// The first bytes of the file, at most `most`.

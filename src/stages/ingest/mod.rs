@@ -36,7 +36,7 @@ pub use probe::{Probe, probe};
 pub use stats::{FileStats, IngestStats};
 pub use stream::READ_BUFFERS;
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::geom::lattice::Lattice;
 use crate::workspace::Workspace;
 use input::Input;
@@ -105,12 +105,20 @@ fn read_all(
     let mut sources = Vec::new();
     let mut systems = Vec::new();
     let mut stats = IngestStats::default();
+    let mut shared = false;
     for path in expand(inputs)? {
         workspace.check_cancel()?;
         let opened = Opened::new(Input::open(&path, workspace)?)?;
         let number = sources.len() as u32;
         let target = SourceWriter::new(workspace, name, section, number, classes)?;
-        let mut warnings = opened.file.read(&opened.input, &target)?;
+        let mut warnings = match opened.file.read(&opened.input, &target) {
+            // Tasks read all files at the same time.
+            Err(Error::Shared) => {
+                shared = true;
+                Vec::new()
+            }
+            other => other?,
+        };
         if *classes != Classes::All && !opened.claims.classes {
             warnings.push("its points have no class, all of them are kept".to_owned());
         }
@@ -127,6 +135,9 @@ fn read_all(
         let (next, more) = target.end();
         section = next;
         frames.extend(more);
+    }
+    if shared {
+        return Err(Error::Shared);
     }
     stats
         .warnings

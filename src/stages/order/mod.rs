@@ -4,11 +4,13 @@
 mod files;
 mod packed;
 mod rewrite;
+mod sample;
 mod store;
 mod writer;
 
 pub use files::StoredPoints;
 pub use rewrite::Rewriter;
+pub use sample::sample_sort;
 pub use store::{PAGE, PointStore};
 pub use writer::{Position, StoreWriter};
 

@@ -1,4 +1,4 @@
-//! Writes a store of the same points at other positions, in any order.
+//! Writes a store in any order: of points that are sorted elsewhere, or of the same points at other positions.
 
 use super::files::{StoreFiles, StoredPoints, WRITTEN};
 use super::store::PointStore;
@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::geom::Point;
 use crate::workspace::{Unit, Workspace};
 
-/// Writes a store of the same length as another one; several threads may write ranges of pages.
+/// Writes a store of known length; several threads may write ranges of pages.
 #[derive(Debug)]
 pub struct Rewriter {
     files: StoreFiles,
@@ -19,9 +19,17 @@ impl Rewriter {
     /// # Errors
     /// [`crate::Error::Memory`].
     pub fn of(store: &PointStore, workspace: &Workspace, name: &str) -> Result<Self> {
+        Self::new(name, store.len(), store.page_size(), workspace)
+    }
+
+    /// The scratch file `name` for `len` points in pages of `page`.
+    ///
+    /// # Errors
+    /// [`crate::Error::Memory`].
+    pub fn new(name: &str, len: usize, page: usize, workspace: &Workspace) -> Result<Self> {
         Ok(Self {
-            files: StoreFiles::open(workspace, name, store.page_size())?,
-            len: store.len(),
+            files: StoreFiles::open(workspace, name, page)?,
+            len,
         })
     }
 

@@ -80,7 +80,7 @@ impl StoredPoints {
                 first += pages.next_multiple_of(STEP).max(STEP);
             }
         }
-        let mapped = if file.is_gone() { None } else { file.map() };
+        let mapped = file.map();
         Ok(PointStore {
             mapped,
             file,

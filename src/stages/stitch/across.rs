@@ -61,7 +61,10 @@ impl<'a> Across<'a> {
             let found = insert(insertion, block as usize, unit)?;
             unit.advance(1);
             self.finished(block);
-            self.go_on(unit)?;
+            // A task has no blocks but its own.
+            if !unit.is_task() {
+                self.go_on(unit)?;
+            }
             Ok(found)
         };
         let bytes = |unit: usize| block_bytes(insertion, order[unit] as usize);

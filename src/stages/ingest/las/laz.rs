@@ -96,10 +96,8 @@ fn in_parallel(decoder: &Decoder<'_>, chunks: &[Chunk], writer: &SourceWriter<'_
         if layered {
             decoder.layers(chunk, sink)?;
         } else if chunk.bytes <= IN_MEMORY {
-            let mut bytes = vec![0u8; chunk.bytes as usize];
-            decoder
-                .input
-                .read_exact_at(chunk.at, &mut bytes, "LAZ chunk")?;
+            let size = chunk.bytes as usize;
+            let bytes = decoder.input.window(chunk.at, size, "LAZ chunk")?;
             decoder.stream(&bytes[..], chunk.at, chunk.points, sink)?;
         } else {
             let source = decoder.input.stream(chunk.at, chunk.at + chunk.bytes);

@@ -27,9 +27,9 @@ pub(super) fn read(
         |unit, sink: &mut Sink<'_, i32>| {
             let first = unit as u64 * rows;
             let rows = rows.min(points - first);
-            let mut slab = vec![0u8; (rows * record_bytes) as usize];
             let what = format!("records {first} to {}", first + rows - 1);
-            input.read_exact_at(header.data + first * record_bytes, &mut slab, &what)?;
+            let (start, bytes) = (header.data + first * record_bytes, rows * record_bytes);
+            let slab = input.window(start, bytes as usize, &what)?;
             for bytes in slab.chunks_exact(header.record_bytes.into()) {
                 record.take(bytes, sink)?;
             }

@@ -87,9 +87,8 @@ fn fixed<T: FromScalar>(
     let work = |unit: usize, sink: &mut Sink<'_, T>| {
         let first = unit as u64 * rows;
         let rows = rows.min(count - first);
-        let mut slab = vec![0u8; (rows * bytes) as usize];
         let what = format!("vertices {first} to {}", first + rows - 1);
-        input.read_exact_at(start + first * bytes, &mut slab, &what)?;
+        let slab = input.window(start + first * bytes, (rows * bytes) as usize, &what)?;
         for record in slab.chunks_exact(bytes as usize) {
             sink.push(places.map(|(at, kind)| T::from_double(real(kind, &record[at..], big))))?;
         }

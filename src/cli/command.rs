@@ -1,0 +1,74 @@
+//! The commands and their help.
+
+use super::args::{Compare, Demo, Info, Reconstruct, Resume, Verify};
+use super::shared::{Advance, Plan, Status, Submit, Work};
+use clap::{Parser, Subcommand};
+
+/// Turns point clouds of any size into clean triangle meshes within a memory budget.
+#[derive(Debug, Parser)]
+#[command(version, about, long_about = LONG_ABOUT, max_term_width = 100, after_help = EXAMPLES)]
+pub struct Args {
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+const LONG_ABOUT: &str = "Turns point clouds of any size into clean triangle meshes, inside the \
+memory you give it.
+
+The mesh interpolates the points: its vertices are points of the cloud. Every edge has at most two \
+triangles, every vertex is a disk or a half-disk, and triangles run consistently. The same cloud \
+and parameters give the same file, byte for byte, whatever memory, threads and order of inputs.";
+
+const EXAMPLES: &str = "Examples:
+  outcrop reconstruct scan.laz -o mesh.ply
+  outcrop reconstruct tiles/ -o town.ply --memory 4GiB --report town.json
+  outcrop reconstruct noisy.las -o smooth.ply --smooth 1
+  outcrop reconstruct scan.laz -o mesh.ply --resume --time-limit 7h30m
+  outcrop resume mesh.ply.outcrop-scratch
+  outcrop info scan.laz
+  outcrop verify mesh.ply && echo manifold
+  outcrop compare mesh.ply scan.laz
+  outcrop demo
+  outcrop plan tiles/ -o town.ply --shards 200 --task-memory 4GiB --task-threads 8
+  outcrop submit town.ply.outcrop-scratch --engine slurm -- --partition=long
+
+Exit codes: 0 fine, 1 the answer is no (verify), 2 error. A run that was stopped can be resumed: 75 its \
+time limit was reached (of work, advance: try again later), 130 Ctrl-C, 143 SIGTERM, 129 SIGHUP.";
+
+/// The commands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Make a mesh from points
+    Reconstruct(Box<Reconstruct>),
+    /// Continue a run that was stopped, killed, or ran out of disk
+    Resume(Resume),
+    /// Describe a cloud and estimate what a run needs
+    Info(Info),
+    /// Check that a mesh is a manifold (exit code 0 if it is, 1 if not)
+    Verify(Verify),
+    /// Measure the distance between two meshes or clouds
+    Compare(Compare),
+    /// Generate a cloud, reconstruct it and verify the mesh
+    Demo(Demo),
+    /// Plan a run for many tasks, on a cluster or on this machine; makes its folder
+    Plan(Box<Plan>),
+    /// Do the units of one shard of a planned run
+    Work(Work),
+    /// Do what lies between two generations of tasks of a planned run
+    Advance(Advance),
+    /// Tell how far a planned run is, and which command goes on
+    Status(Status),
+    /// Run the tasks of a planned run, by Slurm or as processes on this machine
+    Submit(Submit),
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn flags_are_well_formed() {
+        use clap::CommandFactory;
+        Args::command().debug_assert();
+    }
+}

@@ -1,0 +1,69 @@
+//! Output of the commands: text, JSON, reports.
+
+use super::style;
+use crate::error::{Error, Result};
+use crate::report::Report;
+use serde::Serialize;
+use std::fmt::Display;
+use std::io::Write;
+use std::path::Path;
+
+pub fn print(text: &str) -> Result<()> {
+    let mut out = std::io::stdout().lock();
+    writeln!(out, "{text}").map_err(|e| Error::io("standard output", "write", e))
+}
+
+pub fn json<T: Serialize>(value: &T) -> Result<String> {
+    serde_json::to_string_pretty(value)
+        .map_err(|e| Error::io("standard output", "write JSON", e.into()))
+}
+
+/// Prints a value as JSON or as text.
+pub fn show<T: Serialize + Display>(value: &T, as_json: bool) -> Result<()> {
+    print(&if as_json {
+        json(value)?
+    } else {
+        value.to_string()
+    })
+}
+
+pub fn write_report(path: &Path, report: &Report) -> Result<()> {
+    std::fs::write(path, json(report)? + "\n").map_err(|e| Error::io(path, "write the report", e))
+}
+
+pub fn summary(report: &Report, output: &Path) -> String {
+    let mesh = &report.mesh;
+    format!(
+        "{}: {} triangles, {} vertices from {} points; {}, {} boundary edges\n\
+         {} in all, at most {} of memory and {} of scratch",
+        output.display(),
+        style::grouped(mesh.triangles),
+        style::grouped(mesh.vertices),
+        style::grouped(report.points),
+        style::counted(
+            report.repair.components_found - report.repair.components_removed,
+            "component"
+        ),
+        style::grouped(mesh.boundary_edges),
+        style::seconds(report.seconds),
+        style::bytes(report.peak_resident_bytes),
+        style::bytes(report.peak_scratch_bytes),
+    ) + &left_out(report)
+}
+
+/// A line about the points left out by options, if there are any.
+fn left_out(report: &Report) -> String {
+    let reasons: Vec<String> = [
+        (report.input.dropped_by_class, "of other classes"),
+        (report.thin.dropped, "by thinning"),
+        (report.outliers.dropped, "outliers"),
+    ]
+    .iter()
+    .filter(|(count, _)| *count > 0)
+    .map(|(count, why)| format!("{} {why}", style::grouped(*count)))
+    .collect();
+    if reasons.is_empty() {
+        return String::new();
+    }
+    format!("\npoints left out: {}", reasons.join(", "))
+}

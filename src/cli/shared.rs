@@ -1,0 +1,376 @@
+//! The commands for runs that tasks share: plan, work, advance, status, submit.
+
+mod shard;
+mod submit;
+
+pub use submit::submit;
+
+use super::args::{Job, Storing, size};
+use super::output::{json, print, show, summary, write_report};
+use super::{stop, style};
+use crate::error::{Error, Result};
+use crate::pipeline::{self, Advanced, Reconstruction, Totals, Worked};
+use clap::{Args as ClapArgs, ValueEnum};
+use serde::{Deserialize, Serialize};
+use std::fmt::{Display, Formatter};
+use std::path::PathBuf;
+
+/// `outcrop plan`
+#[derive(Debug, ClapArgs)]
+#[command(after_help = PLAN)]
+pub struct Plan {
+    #[command(flatten)]
+    pub job: Job,
+    /// Folder in which the folder of the run is made; all tasks must see it under the same path
+    /// [default: beside the output]
+    #[arg(long, value_name = "DIR")]
+    pub scratch: Option<PathBuf>,
+    /// Number of parts into which each step is divided, at most 1000; several for each task that can run at
+    /// the same time
+    #[arg(long, value_name = "N", default_value_t = 16)]
+    pub shards: u32,
+    /// Memory of each task, e.g. 2GiB; of a batch job give 5 % less than it has
+    #[arg(long, value_name = "SIZE", value_parser = size, default_value = "2GiB")]
+    pub task_memory: u64,
+    /// Threads of each task
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub task_threads: u16,
+}
+
+const PLAN: &str = "The run alternates between two commands:
+
+  outcrop advance FOLDER            one process; opens the next step for tasks
+  outcrop work FOLDER --shard K     one for each shard 0, 1 ...; in any order, on any machine
+
+`outcrop submit FOLDER` runs them all. A task that is lost, killed or done twice does no harm.";
+
+/// `outcrop work`
+#[derive(Debug, ClapArgs)]
+#[command(after_help = WORK)]
+pub struct Work {
+    /// The folder of the run
+    #[arg(value_name = "FOLDER")]
+    pub folder: PathBuf,
+    /// The generation to work for; nothing is done if it is over [default: the newest]
+    #[arg(long, value_name = "N")]
+    pub generation: Option<u64>,
+    /// The shard, from 0, also as 17/200 [default: the index of the array job]
+    #[arg(long, value_name = "K[/N]")]
+    pub shard: Option<shard::Wanted>,
+    /// A file with the number of a shard in each line; the index selects the line
+    #[arg(long, value_name = "FILE")]
+    pub shards_file: Option<PathBuf>,
+    #[command(flatten)]
+    pub process: Process,
+}
+
+const WORK: &str = "The index is taken from SLURM_ARRAY_TASK_ID, JOB_COMPLETION_INDEX (Kubernetes),
+AWS_BATCH_JOB_ARRAY_INDEX or BATCH_TASK_INDEX (Google).
+
+Exit codes: 0 done, also if there is nothing to do any more; 2 it cannot be done; 75 try again later.";
+
+/// Resources of a process.
+#[derive(Debug, ClapArgs)]
+pub struct Process {
+    /// Memory budget [default: as planned]
+    #[arg(long, value_name = "SIZE", value_parser = size)]
+    pub memory: Option<u64>,
+    /// Worker threads, at most as many as planned [default: as planned]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub threads: Option<u16>,
+    #[command(flatten)]
+    pub storing: Storing,
+    /// Show no progress, even on a terminal
+    #[arg(long, short)]
+    pub quiet: bool,
+}
+
+/// `outcrop advance`
+#[derive(Debug, ClapArgs)]
+#[command(after_help = ADVANCE)]
+pub struct Advance {
+    /// The folder of the run
+    #[arg(value_name = "FOLDER")]
+    pub folder: PathBuf,
+    #[command(flatten)]
+    pub process: Process,
+    /// Write a report as JSON when the mesh is finished
+    #[arg(long, value_name = "FILE.json")]
+    pub report: Option<PathBuf>,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+const ADVANCE: &str =
+    "Exit codes: 0 the next step is open, or the mesh is finished; 2 it cannot be done;
+75 shards are missing.";
+
+/// `outcrop status`
+#[derive(Debug, ClapArgs)]
+pub struct Status {
+    /// The folder of the run
+    #[arg(value_name = "FOLDER")]
+    pub folder: PathBuf,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
+    /// Print only the numbers of the shards that are not finished, one in each line
+    #[arg(long, conflicts_with = "json")]
+    pub missing: bool,
+}
+
+/// `outcrop submit`
+#[derive(Debug, ClapArgs)]
+#[command(after_help = SUBMIT)]
+pub struct Submit {
+    /// The folder of the run
+    #[arg(value_name = "FOLDER")]
+    pub folder: PathBuf,
+    /// Who runs the tasks
+    #[arg(long, value_enum, default_value_t = Engine::Local)]
+    pub engine: Engine,
+    /// Tasks at the same time, with the local engine [default: as many as the processors have threads for]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub workers: Option<u16>,
+    /// Only show what would be run
+    #[arg(long)]
+    pub dry_run: bool,
+    /// With Slurm: wait here for each step, where jobs may not submit jobs
+    #[arg(long)]
+    pub foreground: bool,
+    /// In a job: advance the run before the next jobs are submitted
+    #[arg(long, hide = true)]
+    pub inside: bool,
+    /// Write a report as JSON when the mesh is finished
+    #[arg(long, value_name = "FILE.json")]
+    pub report: Option<PathBuf>,
+    /// Options for sbatch, like --partition=long
+    #[arg(last = true, value_name = "SITE FLAGS")]
+    pub site: Vec<String>,
+}
+
+const SUBMIT: &str =
+    "It may be interrupted, and run again at any time; it goes on where the run is.";
+
+/// Who runs tasks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Engine {
+    /// Processes on this machine
+    Local,
+    /// Array jobs of Slurm
+    Slurm,
+}
+
+/// Plans a run.
+pub fn plan(args: &Plan) -> Result<bool> {
+    let mut builder = args
+        .job
+        .builder()
+        .threads(args.task_threads.into())
+        .memory(args.task_memory);
+    if let Some(scratch) = &args.scratch {
+        builder = builder.scratch(scratch);
+    }
+    let run = builder.build()?;
+    let folder = run.plan(args.shards)?;
+    print(&format!(
+        "planned in {}; go on with: outcrop submit {}",
+        folder.display(),
+        stop::quoted(folder)
+    ))?;
+    Ok(true)
+}
+
+fn opened(folder: &std::path::Path, process: &Process) -> Result<Reconstruction> {
+    let (observer, cancel) = stop::watched(process.quiet);
+    let mut builder = Reconstruction::shared(folder)?
+        .observer(observer)
+        .cancel(cancel)
+        .storage(process.storing.storage());
+    if let Some(memory) = process.memory {
+        builder = builder.memory(memory);
+    }
+    if let Some(threads) = process.threads {
+        builder = builder.threads(threads.into());
+    }
+    let run = builder.build()?;
+    stop::can_end(&run);
+    Ok(run)
+}
+
+/// Does the units of a shard.
+pub fn work(args: &Work) -> Result<bool> {
+    let shard = shard::chosen(args)?;
+    if let Some(count) = shard.count {
+        let planned = pipeline::status(&args.folder)?.shards;
+        if planned != count {
+            return Err(Error::Parameter {
+                name: "--shard",
+                found: format!("a shard of {count}"),
+                expected: format!("one of the {planned} that were planned"),
+            });
+        }
+    }
+    let run = opened(&args.folder, &args.process)?;
+    match run.work(args.generation, shard.number)? {
+        Worked::Done | Worked::Superseded => Ok(true),
+        Worked::TooEarly => Err(Error::NotYet {
+            path: args.folder.clone(),
+            what: format!(
+                "generation {} has not begun",
+                args.generation.unwrap_or_default()
+            ),
+        }),
+    }
+}
+
+/// The state after the work between two generations.
+#[derive(Debug, Serialize, Deserialize)]
+pub struct After {
+    /// True if the mesh is finished.
+    pub finished: bool,
+    /// The newest generation, unless the mesh is finished.
+    pub generation: Option<u64>,
+    /// Its shards that are not finished.
+    pub missing: Vec<u32>,
+    /// The resources that finished processes took; none if another process finished the mesh.
+    pub totals: Option<Totals>,
+}
+
+impl Display for After {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        match self.generation {
+            Some(generation) => write!(
+                f,
+                "generation {generation} is open: {} to do",
+                style::counted(self.missing.len() as u64, "shard")
+            )?,
+            None => write!(f, "the mesh is finished")?,
+        }
+        match &self.totals {
+            Some(totals) => write!(f, "; so far {totals}"),
+            None => Ok(()),
+        }
+    }
+}
+
+impl Display for Totals {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        write!(
+            f,
+            "{} of processor time in tasks, {} between them; at most {} resident",
+            style::seconds(self.task_cpu_seconds),
+            style::seconds(self.serial_cpu_seconds),
+            style::bytes(self.task_resident_bytes.max(self.serial_resident_bytes)),
+        )
+    }
+}
+
+/// Does the work between two generations.
+pub fn advance(args: &Advance) -> Result<bool> {
+    let run = opened(&args.folder, &args.process)?;
+    let mut after = After {
+        finished: true,
+        generation: None,
+        missing: Vec::new(),
+        totals: None,
+    };
+    match run.advance()? {
+        Advanced::Finished(Some(finished)) => {
+            let (report, totals) = *finished;
+            after.totals = Some(totals);
+            if let Some(path) = &args.report {
+                write_report(path, &report)?;
+            }
+            if !args.json {
+                print(&summary(&report, run.output()))?;
+            }
+        }
+        Advanced::Finished(None) => {}
+        Advanced::Open(_) | Advanced::Superseded => {
+            // Another process may have finished it meanwhile.
+            if let Ok(status) = pipeline::status(&args.folder) {
+                after = After {
+                    finished: false,
+                    generation: Some(status.generation),
+                    missing: status.missing(),
+                    totals: Some(status.totals),
+                };
+            }
+        }
+        Advanced::Missing(generation, shards) => {
+            return Err(Error::NotYet {
+                path: args.folder.clone(),
+                what: format!("of generation {generation} {} missing", list(&shards)),
+            });
+        }
+    }
+    match args.json {
+        true => print(&json(&after)?)?,
+        false => print(&after.to_string())?,
+    }
+    Ok(true)
+}
+
+/// Shards as text.
+fn list(shards: &[u32]) -> String {
+    match shards {
+        [one] => format!("shard {one} is"),
+        shards if shards.len() <= 8 => format!(
+            "shards {} are",
+            shards
+                .iter()
+                .map(u32::to_string)
+                .collect::<Vec<_>>()
+                .join(", ")
+        ),
+        shards => format!("{} shards are", shards.len()),
+    }
+}
+
+/// Shows the state of a run.
+pub fn status(args: &Status) -> Result<bool> {
+    let status = pipeline::status(&args.folder)?;
+    if args.missing {
+        let lines = status.missing().into_iter().map(|shard| shard.to_string());
+        let lines: Vec<String> = lines.collect();
+        if !lines.is_empty() {
+            print(&lines.join("\n"))?;
+        }
+        return Ok(true);
+    }
+    show(&status, args.json)?;
+    Ok(true)
+}
+
+impl Display for pipeline::Status {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        let folder = stop::quoted(&self.folder);
+        writeln!(f, "mesh          {}", self.output.display())?;
+        let steps = match &self.steps[..] {
+            [] => "not begun".to_owned(),
+            [one] => one.trim_start_matches('/').to_owned(),
+            [first, ..] => format!(
+                "{} and {} more",
+                first.trim_start_matches('/'),
+                self.steps.len() - 1
+            ),
+        };
+        writeln!(f, "generation    {}: {steps}", self.generation)?;
+        let open = self.done.len() + self.missing().len();
+        writeln!(
+            f,
+            "shards        {} of {open} done, {} begun (running or lost), {} not begun; {} of work",
+            self.done.len(),
+            self.begun.len(),
+            self.new.len(),
+            style::counted(self.units, "unit"),
+        )?;
+        writeln!(f, "so far        {}", self.totals)?;
+        match self.can_advance {
+            true => write!(f, "go on with    outcrop advance {folder}"),
+            false => write!(f, "go on with    outcrop submit {folder}"),
+        }
+    }
+}

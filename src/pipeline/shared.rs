@@ -1,0 +1,420 @@
+//! A run that tasks share, perhaps on several machines: its plan, the work of a task, and the work between
+//! two generations of tasks. [`crate::workspace::generations`] has the files.
+
+use super::checks::{not_an_input, writable};
+use super::manifest::Manifest;
+use super::{Builder, Reconstruction};
+use crate::error::{Error, Result};
+use crate::report::Report;
+use crate::stages::export;
+use crate::workspace::generations::{Generation, Opened, Resources, Shard, SharedFolder};
+use crate::workspace::journal::{OpenStep, Sharing, Took};
+use crate::workspace::{Workspace, limits};
+use serde::{Deserialize, Serialize};
+use std::hash::{BuildHasher, Hasher};
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// Largest number of shards: array jobs of Slurm end here by default.
+pub const MOST_SHARDS: u32 = 1000;
+
+/// The result of a task.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Worked {
+    /// Its work is finished.
+    Done,
+    /// There was nothing to do: another attempt was faster, or its generation is over.
+    Superseded,
+    /// Its generation has not begun.
+    TooEarly,
+}
+
+/// The result of the work between two generations.
+#[derive(Debug)]
+pub enum Advanced {
+    /// The units of this generation are open for tasks.
+    Open(u64),
+    /// These shards of this generation are missing.
+    Missing(u64, Vec<u32>),
+    /// Another process was faster.
+    Superseded,
+    /// The mesh is finished; the report is missing if it was finished before.
+    Finished(Option<Box<(Report, Totals)>>),
+}
+
+/// The state of a run that tasks share.
+#[derive(Debug, Clone, Serialize)]
+pub struct Status {
+    /// The folder of the run.
+    pub folder: PathBuf,
+    /// The mesh.
+    pub output: PathBuf,
+    /// Number of the generation.
+    pub generation: u64,
+    /// The steps whose units are open in it.
+    pub steps: Vec<String>,
+    /// Number of shards.
+    pub shards: u32,
+    /// Most threads of a task.
+    pub task_threads: u32,
+    /// Memory of a task in bytes, as planned.
+    pub task_memory: u64,
+    /// Number of open units.
+    pub units: u64,
+    /// Numbers of finished shards.
+    pub done: Vec<u32>,
+    /// Shards that were begun and are not finished, with their numbers of attempts: running or lost.
+    pub begun: Vec<(u32, u32)>,
+    /// Shards that nobody began.
+    pub new: Vec<u32>,
+    /// True if all shards are finished, so the next generation can be made.
+    pub can_advance: bool,
+    /// True if the mesh is finished.
+    pub finished: bool,
+    /// The resources that finished processes took.
+    pub totals: Totals,
+}
+
+/// The resources that finished processes took.
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
+pub struct Totals {
+    /// Processor time of tasks.
+    pub task_cpu_seconds: f64,
+    /// Processor time of the work between generations.
+    pub serial_cpu_seconds: f64,
+    /// Wall-clock seconds of the work between generations.
+    pub serial_seconds: f64,
+    /// Largest peak of the resident memory of a task, in bytes.
+    pub task_resident_bytes: u64,
+    /// Largest peak of the resident memory between generations, in bytes.
+    pub serial_resident_bytes: u64,
+    /// Bytes that all processes read.
+    pub bytes_read: u64,
+    /// Bytes that all processes wrote.
+    pub bytes_written: u64,
+}
+
+impl Totals {
+    fn of(all: &[Took]) -> Self {
+        let mut totals = Self::default();
+        for took in all {
+            let (cpu, resident) = match took.shard {
+                Some(_) => (
+                    &mut totals.task_cpu_seconds,
+                    &mut totals.task_resident_bytes,
+                ),
+                None => {
+                    totals.serial_seconds += took.seconds;
+                    (
+                        &mut totals.serial_cpu_seconds,
+                        &mut totals.serial_resident_bytes,
+                    )
+                }
+            };
+            *cpu += took.cpu_seconds;
+            *resident = took.resident.max(*resident);
+            totals.bytes_read += took.read;
+            totals.bytes_written += took.written;
+        }
+        totals
+    }
+}
+
+impl Status {
+    /// The shards that are not finished.
+    #[must_use]
+    pub fn missing(&self) -> Vec<u32> {
+        let begun = self.begun.iter().map(|(shard, _)| *shard);
+        let mut all: Vec<u32> = begun.chain(self.new.iter().copied()).collect();
+        all.sort_unstable();
+        all
+    }
+}
+
+/// Checksum of this program, with its version.
+fn program() -> Result<u32> {
+    let path = Path::new("/proc/self/exe");
+    let io = |e| Error::io(path, "read", e);
+    let mut file = std::fs::File::open(path).map_err(io)?;
+    let mut crc = crc32fast::Hasher::new();
+    let mut buffer = vec![0; 1 << 20];
+    loop {
+        match file.read(&mut buffer).map_err(io)? {
+            0 => break,
+            n => crc.update(&buffer[..n]),
+        }
+    }
+    crc.update(env!("CARGO_PKG_VERSION").as_bytes());
+    Ok(crc.finalize())
+}
+
+impl Reconstruction {
+    /// Plans a run that tasks share in `shards` shards. The threads and the memory of this run are those of
+    /// each task. Returns its folder.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`]; [`Error::NotResumable`] if the folder exists; [`Error::Io`].
+    pub fn plan(&self, shards: u32) -> Result<&Path> {
+        if shards == 0 || shards > MOST_SHARDS {
+            return Err(Error::Parameter {
+                name: "--shards",
+                found: shards.to_string(),
+                expected: format!("1 to {MOST_SHARDS}"),
+            });
+        }
+        writable(&self.output)?;
+        not_an_input(&self.output, &self.inputs)?;
+        let manifest = Manifest::of(self)?.to_bytes()?;
+        let random = std::hash::RandomState::new().build_hasher().finish();
+        let sharing = Sharing {
+            run: random,
+            shards,
+            threads: self.threads as u32,
+            memory: self.memory.budget(),
+            program: program()?,
+        };
+        SharedFolder::create(&self.folder, manifest, sharing)?;
+        Ok(&self.folder)
+    }
+
+    /// The builder of a run that tasks share, with the threads and memory of its plan. These, observer and
+    /// flag can be changed.
+    ///
+    /// # Errors
+    /// [`Error::NotResumable`], [`Error::Io`], [`Error::Corrupt`].
+    pub fn shared(folder: impl AsRef<Path>) -> Result<Builder> {
+        let folder = SharedFolder::open(folder.as_ref())?;
+        let manifest = Manifest::from_bytes(&folder.path, &folder.manifest)?;
+        let plan = folder.sharing()?;
+        let builder = manifest.settings().folder(folder.path);
+        Ok(builder.threads(plan.threads as usize).memory(plan.memory))
+    }
+
+    /// Does the units of a shard of a generation, by default the newest.
+    ///
+    /// # Errors
+    /// Any [`Error`].
+    pub fn work(&self, generation: Option<u64>, shard: u32) -> Result<Worked> {
+        let begin = Instant::now();
+        let folder = SharedFolder::open(&self.folder)?;
+        let newest = folder.newest()?;
+        let number = generation.unwrap_or(newest);
+        if number < newest {
+            return Ok(Worked::Superseded);
+        }
+        if number > newest && !folder.has_begun(number) {
+            return Ok(Worked::TooEarly);
+        }
+        let outcome = self.try_work(&folder, number, shard, begin);
+        // Whatever fails after a generation is over is no error.
+        match outcome {
+            Err(_) if is_over(&folder, number) => Ok(Worked::Superseded),
+            outcome => outcome,
+        }
+    }
+
+    fn try_work(
+        &self,
+        folder: &SharedFolder,
+        number: u64,
+        shard: u32,
+        begin: Instant,
+    ) -> Result<Worked> {
+        let now = self.generation(folder, number)?;
+        if shard >= now.sharing.shards {
+            return Err(Error::Parameter {
+                name: "--shard",
+                found: shard.to_string(),
+                expected: format!("0 to {}", now.sharing.shards - 1),
+            });
+        }
+        let opened = self.open_shared(|resources| folder.begin_task(now, shard, resources))?;
+        let Ok(workspace) = opened else {
+            return Ok(Worked::Done);
+        };
+        let outcome = match self.reconstruct(&workspace) {
+            Err(Error::Shared) => {
+                let took = took(&workspace, Some(shard), begin);
+                folder.end_task(&workspace, (number, shard), took)
+            }
+            Err(e) => Err(e),
+            // A task ends with its units, which are not finished in this generation.
+            Ok(_) => Ok(false),
+        };
+        if !matches!(outcome, Ok(true)) {
+            folder.withdraw(&workspace);
+        }
+        Ok(match outcome? {
+            true => Worked::Done,
+            false => Worked::Superseded,
+        })
+    }
+
+    /// Does the work between the newest generation and the next, if all its shards are finished.
+    ///
+    /// # Errors
+    /// Any [`Error`].
+    pub fn advance(&self) -> Result<Advanced> {
+        let begin = Instant::now();
+        let folder = SharedFolder::open(&self.folder)?;
+        let number = folder.newest()?;
+        match self.try_advance(&folder, number, begin) {
+            Err(_) if is_over(&folder, number) => Ok(Advanced::Superseded),
+            outcome => outcome,
+        }
+    }
+
+    fn try_advance(&self, folder: &SharedFolder, number: u64, begin: Instant) -> Result<Advanced> {
+        let now = self.generation(folder, number)?;
+        writable(&self.output)?;
+        let was = Manifest::from_bytes(&self.folder, &folder.manifest)?;
+        was.check(&Manifest::of(self)?, &self.folder)?;
+        let opened = self.open_shared(|resources| folder.begin_next(now, resources))?;
+        let workspace = match opened {
+            Ok(workspace) => workspace,
+            Err(Opened::Missing(shards)) => return Ok(Advanced::Missing(number, shards)),
+            Err(_) => {
+                folder.remove();
+                return Ok(Advanced::Finished(None));
+            }
+        };
+        let outcome = self.reconstruct(&workspace);
+        let next = number + 1;
+        let finished = outcome.is_ok();
+        let published = match &outcome {
+            Ok(_) | Err(Error::Shared) => {
+                let took = took(&workspace, None, begin);
+                folder.end_next(&workspace, next, took, finished)
+            }
+            Err(_) => Ok(false),
+        };
+        if !matches!(published, Ok(true)) {
+            folder.withdraw(&workspace);
+            if let Some(number) = workspace.shared_number() {
+                let _ = std::fs::remove_file(export::temporary_of(&self.output, number));
+            }
+        }
+        match (outcome, published?) {
+            (Ok(report), true) => {
+                let totals = Totals::of(&folder.read(next)?.took);
+                self.remove_unfinished();
+                folder.remove();
+                Ok(Advanced::Finished(Some(Box::new((report, totals)))))
+            }
+            (Err(Error::Shared), true) => Ok(Advanced::Open(next)),
+            (Ok(_) | Err(Error::Shared), false) => Ok(Advanced::Superseded),
+            (Err(e), _) => Err(e),
+        }
+    }
+
+    /// Deletes meshes that killed attempts left unfinished.
+    fn remove_unfinished(&self) {
+        let name = export::temporary(&self.output).into_os_string();
+        let Some(name) = Path::new(&name).file_name().and_then(|name| name.to_str()) else {
+            return;
+        };
+        let beside = std::fs::read_dir(export::folder_of(&self.output)).into_iter();
+        for entry in beside.flatten().flatten() {
+            let number = entry
+                .file_name()
+                .to_str()
+                .and_then(|n| n.strip_prefix(name)?.strip_prefix('.')?.parse::<u32>().ok());
+            if number.is_some() {
+                let _ = std::fs::remove_file(entry.path());
+            }
+        }
+    }
+
+    /// The state of the run; an error if it was planned by another program.
+    fn generation(&self, folder: &SharedFolder, number: u64) -> Result<Generation> {
+        let now = folder.read(number)?;
+        let (was, is) = (now.sharing.program, program()?);
+        if was != is {
+            return Err(Error::Mismatch {
+                path: self.folder.clone(),
+                what: "the program".into(),
+                was: format!("{was:08x}"),
+                now: format!("{is:08x}"),
+            });
+        }
+        Ok(now)
+    }
+
+    fn open_shared(
+        &self,
+        begin: impl FnOnce(&Resources<'_>) -> Result<Opened>,
+    ) -> Result<Result<Workspace, Opened>> {
+        let opened = Workspace::shared(
+            &self.folder,
+            self.memory.clone(),
+            self.threads,
+            self.observer.clone(),
+            self.cancel.clone(),
+            begin,
+        )?;
+        if let Ok(workspace) = &opened {
+            workspace.set_storage(self.storage)?;
+        }
+        Ok(opened)
+    }
+}
+
+/// True if a newer generation began, or the run is finished.
+fn is_over(folder: &SharedFolder, number: u64) -> bool {
+    folder.newest().map_or(true, |newest| newest > number)
+}
+
+fn took(workspace: &Workspace, shard: Option<u32>, begin: Instant) -> Took {
+    Took {
+        shard,
+        seconds: begin.elapsed().as_secs_f64(),
+        cpu_seconds: limits::cpu_seconds(),
+        resident: limits::peak_resident(),
+        read: workspace.io.read(),
+        written: workspace.io.written(),
+    }
+}
+
+/// The state of the run in a folder.
+///
+/// # Errors
+/// [`Error::NotResumable`], [`Error::Io`], [`Error::Corrupt`].
+pub fn status(path: &Path) -> Result<Status> {
+    let folder = SharedFolder::open(path)?;
+    let manifest = Manifest::from_bytes(path, &folder.manifest)?;
+    let now = folder.read(folder.newest()?)?;
+    let shards = folder.shards(&now)?;
+    let of = |wanted: Shard| {
+        let all = (0..)
+            .zip(&shards)
+            .filter(move |(_, state)| **state == wanted);
+        all.map(|(shard, _)| shard).collect::<Vec<u32>>()
+    };
+    let begun = (0..).zip(&shards).filter_map(|(shard, state)| match state {
+        Shard::Begun(attempts) => Some((shard, *attempts)),
+        _ => None,
+    });
+    let mut status = Status {
+        folder: path.to_path_buf(),
+        output: manifest.output(),
+        generation: now.number,
+        steps: now
+            .open
+            .iter()
+            .map(|OpenStep { step, .. }| step.clone())
+            .collect(),
+        shards: now.sharing.shards,
+        task_threads: now.sharing.threads,
+        task_memory: now.sharing.memory,
+        units: now.units(),
+        done: of(Shard::Done),
+        begun: begun.collect(),
+        new: of(Shard::New),
+        can_advance: false,
+        finished: now.finished,
+        totals: Totals::of(&now.took),
+    };
+    status.can_advance = !status.finished && status.missing().is_empty();
+    Ok(status)
+}

@@ -1,0 +1,230 @@
+//! The beginning of an attempt: at a shard, or at the work between two generations.
+
+use super::{Generation, Opened, Resources, SharedFolder, TRIES};
+use crate::error::{Error, Result};
+use crate::workspace::journal::{self, Entry, Journal, Record, Task};
+use crate::workspace::keeper::Keeper;
+use crate::workspace::open::open_existing;
+use crate::workspace::run::{ResumableRun, Role};
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs::File;
+use std::io::ErrorKind;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+impl SharedFolder {
+    /// Begins an attempt at a shard of a generation.
+    ///
+    /// # Errors
+    /// [`Error::Io`], [`Error::Corrupt`], [`Error::Memory`].
+    pub fn begin_task(
+        &self,
+        generation: Generation,
+        shard: u32,
+        resources: &Resources<'_>,
+    ) -> Result<Opened> {
+        let number = generation.number;
+        if generation.range(shard).is_empty() || self.done(number, shard).exists() {
+            return Ok(Opened::Done);
+        }
+        let folder = self.tasks(number);
+        match std::fs::create_dir(&folder) {
+            Err(e) if e.kind() != ErrorKind::AlreadyExists => {
+                return Err(Error::io(&folder, "make the folder", e));
+            }
+            _ => {}
+        }
+        let path = |attempt: u32| folder.join(format!("{shard}.{attempt}"));
+        let (attempt, path, journal) = self.claim(path)?;
+        let task = Task {
+            run: generation.sharing.run,
+            generation: number,
+            shard,
+        };
+        journal.append(Record::Task(task))?;
+        let first = generation.first_segment(shard, attempt);
+        let role = Role::Task(generation.parts(shard));
+        let past = self.generation(number);
+        let run = self.run(role, first, generation, (journal, path, past), resources)?;
+        Ok(Opened::Run(Box::new(run)))
+    }
+
+    /// A new journal, the first of these paths that does not exist.
+    fn claim(&self, path: impl Fn(u32) -> PathBuf) -> Result<(u32, PathBuf, Journal)> {
+        for attempt in 0..TRIES {
+            let path = path(attempt);
+            match Journal::create(&path) {
+                Ok(journal) => return Ok((attempt, path, journal)),
+                Err(Error::Io { source, .. }) if source.kind() == ErrorKind::AlreadyExists => {}
+                Err(e) => return Err(e),
+            }
+        }
+        Err(Error::NotResumable {
+            path: self.path.clone(),
+            why: format!("{TRIES} attempts at the same work failed; look at their messages"),
+        })
+    }
+
+    fn run(
+        &self,
+        role: Role,
+        first: Option<u32>,
+        generation: Generation,
+        (journal, path, past): (Journal, PathBuf, PathBuf),
+        resources: &Resources<'_>,
+    ) -> Result<ResumableRun> {
+        let Resources {
+            threads,
+            memory,
+            io,
+        } = *resources;
+        let limit = generation.sharing.threads as usize;
+        if threads > limit {
+            return Err(Error::Parameter {
+                name: "--threads",
+                found: threads.to_string(),
+                expected: format!("at most {limit}, as planned with --task-threads"),
+            });
+        }
+        let first = first.ok_or_else(|| Error::NotResumable {
+            path: self.path.clone(),
+            why: "it had too many attempts".into(),
+        })?;
+        let held = memory.reserve("history", generation.history.bytes())?;
+        let keeper = File::open(&self.path)
+            .and_then(|folder| Keeper::start(journal.file(), folder, io.clone()))
+            .map_err(|e| Error::io(&path, "start a thread for", e))?;
+        Ok(ResumableRun::new(
+            self.path.clone(),
+            role,
+            (first, threads),
+            (journal, past),
+            keeper,
+            (generation.history, held),
+        ))
+    }
+
+    /// Begins an attempt at the work between `generation` and the next: takes over what the tasks did.
+    ///
+    /// # Errors
+    /// [`Error::Io`], [`Error::Disk`], [`Error::Corrupt`], [`Error::Memory`].
+    pub fn begin_next(&self, generation: Generation, resources: &Resources<'_>) -> Result<Opened> {
+        if generation.finished {
+            return Ok(Opened::Done);
+        }
+        let (mut missing, mut done) = (Vec::new(), Vec::new());
+        for shard in 0..generation.sharing.shards {
+            let parts = generation.parts(shard);
+            if !parts.is_empty() {
+                match self.task_records(&generation, shard, &parts)? {
+                    Some(path) => done.push(path),
+                    None => missing.push(shard),
+                }
+            }
+        }
+        if !missing.is_empty() {
+            return Ok(Opened::Missing(missing));
+        }
+        let number = generation.number + 1;
+        let (attempt, path, _) = self.claim(|attempt| self.attempt(number, attempt))?;
+        let first = generation.first_segment(generation.sharing.shards, attempt);
+        let next = generation.first_segment(generation.sharing.shards + 1, 0);
+        let journal = self.copy(&generation, &path)?;
+        for done in done {
+            append(&journal, &done)?;
+        }
+        journal.append(Record::Attempt(next.unwrap_or(u32::MAX)))?;
+        let state = self.read_journal(number, &path)?;
+        let past = path.clone();
+        let run = self.run(
+            Role::Between,
+            first,
+            state,
+            (journal, path, past),
+            resources,
+        )?;
+        Ok(Opened::Run(Box::new(run)))
+    }
+
+    /// Copies the journal of a generation to `path`, to continue it there.
+    fn copy(&self, generation: &Generation, path: &Path) -> Result<Journal> {
+        let from = self.generation(generation.number);
+        std::fs::copy(&from, path).map_err(|e| Error::io(path, "copy a journal to", e))?;
+        let (bytes, records) = generation.end;
+        Journal::go_on(path, bytes, records)
+    }
+
+    /// The journal of the finished task of a shard; none if there is none. It must have all units of the shard,
+    /// and the segments must have all bytes that it names.
+    fn task_records(
+        &self,
+        generation: &Generation,
+        shard: u32,
+        parts: &[(String, Range<u64>)],
+    ) -> Result<Option<PathBuf>> {
+        let path = self.done(generation.number, shard);
+        let expected = Task {
+            run: generation.sharing.run,
+            generation: generation.number,
+            shard,
+        };
+        let (mut known, mut ended) = (false, false);
+        let mut units: BTreeSet<(String, u64)> = BTreeSet::new();
+        let mut ends = BTreeMap::new();
+        let found = journal::read(&path, None, |entry: &Entry<'_>| {
+            match entry.record {
+                Record::Task(task) => known = *task == expected,
+                Record::Unit {
+                    step, unit, puts, ..
+                } => {
+                    units.insert((step.clone(), *unit));
+                    for put in puts.iter().filter(|put| put.place.bytes > 0) {
+                        let name = format!("{}.{}", put.file, put.place.segment);
+                        let end = ends.entry(name).or_insert(0);
+                        *end = (*end).max(put.place.end().unwrap_or(u64::MAX));
+                    }
+                }
+                Record::Took(_) => ended = true,
+                _ => {}
+            }
+            true
+        })?;
+        if found.is_none() {
+            return Ok(None);
+        }
+        let mut wanted = parts
+            .iter()
+            .flat_map(|(step, range)| range.clone().map(|unit| (step.clone(), unit)));
+        let whole = |(name, end): (&String, &u64)| {
+            // Opening a file asks the server for its size; looking at it may not.
+            let file = open_existing(&self.path.join(name)).and_then(|file| file.metadata());
+            !name.contains('/') && file.is_ok_and(|meta| meta.len() >= *end)
+        };
+        let good = known && ended && wanted.all(|unit| units.contains(&unit));
+        if good && ends.iter().all(whole) {
+            return Ok(Some(path));
+        }
+        Err(self.damaged(&path, 0, "not all units of the shard"))
+    }
+}
+
+/// Appends the records of a task's journal.
+fn append(journal: &Journal, path: &Path) -> Result<()> {
+    let (mut outcome, file) = (Ok(()), journal::open(path)?);
+    journal::read(path, None, |entry| {
+        let mut record = entry.record.clone();
+        outcome = match &mut record {
+            Record::Task(_) => return true,
+            Record::Unit { payload, .. } => {
+                let (_, offset, bytes) = entry.payload;
+                journal::payload(path, &file, offset, bytes).map(|bytes| *payload = bytes)
+            }
+            _ => Ok(()),
+        };
+        if outcome.is_ok() {
+            outcome = journal.append(record);
+        }
+        outcome.is_ok()
+    })?;
+    outcome
+}

@@ -1,0 +1,150 @@
+//! The end of an attempt: its journal gets the name that others look for.
+
+use super::{SharedFolder, Took};
+use crate::error::{Error, Result};
+use crate::workspace::Workspace;
+use crate::workspace::fault::{self, Event};
+use crate::workspace::folder::data;
+use crate::workspace::journal::{OpenStep, Record};
+use crate::workspace::open::open_existing;
+use crate::workspace::run::ResumableRun;
+use std::fs::File;
+use std::io::ErrorKind;
+use std::os::unix::fs::MetadataExt;
+use std::path::{Path, PathBuf};
+
+impl SharedFolder {
+    /// Deletes the segments of an attempt that failed, or that came too late. Its journal stays, so that it
+    /// is counted.
+    pub fn withdraw(&self, workspace: &Workspace) {
+        for path in workspace.segments_made() {
+            let _ = std::fs::remove_file(path);
+        }
+    }
+
+    /// Publishes the work of a task; false if another attempt was faster, or its generation is over.
+    ///
+    /// # Errors
+    /// [`Error::Io`], [`Error::Disk`].
+    pub fn end_task(&self, workspace: &Workspace, task: (u64, u32), took: Took) -> Result<bool> {
+        let path = workspace.seal(&[Record::Took(took)])?;
+        let done = self.done(task.0, task.1);
+        match link(&path, &done) {
+            // The generation is over, and its folder is gone.
+            Err(Error::Io { source, .. }) if source.kind() == ErrorKind::NotFound => Ok(false),
+            other => other,
+        }
+    }
+
+    /// Publishes the next generation; false if another process was faster. What nobody needs any more is then
+    /// deleted.
+    ///
+    /// # Errors
+    /// [`Error::Io`], [`Error::Disk`].
+    pub fn end_next(
+        &self,
+        workspace: &Workspace,
+        number: u64,
+        took: Took,
+        finished: bool,
+    ) -> Result<bool> {
+        let end = match finished {
+            true => Record::Finished,
+            false => Record::Open(workspace.take_open()),
+        };
+        let path = workspace.seal(&[Record::Took(took), end])?;
+        if !link(&path, &self.generation(number))? {
+            return Ok(false);
+        }
+        let _ = std::fs::remove_file(&path);
+        if !finished {
+            // What others have been told of must stay; what is not deleted now does no harm.
+            let _ = self.clean(number);
+        }
+        Ok(true)
+    }
+
+    /// Deletes what no process of generation `number` needs. Names of generations stay, so that a process
+    /// that was late cannot take one.
+    fn clean(&self, number: u64) -> Result<()> {
+        let now = self.read(number)?;
+        let needed = now.history.segments();
+        let over = |name: &String| {
+            let segment = name
+                .rsplit_once('.')
+                .and_then(|(_, n)| n.parse::<u32>().ok());
+            segment.is_some_and(|segment| segment < now.history.next_worker())
+        };
+        let files = data(&self.path)?.into_iter();
+        for name in files.filter(|name| over(name) && !needed.contains(name)) {
+            let _ = std::fs::remove_file(self.path.join(name));
+        }
+        for old in (0..number).rev() {
+            let _ = std::fs::remove_dir_all(self.tasks(old));
+            let path = self.generation(old);
+            // All before the first empty one are empty.
+            if path.metadata().map_or(true, |meta| meta.len() == 0) {
+                break;
+            }
+            if old + 1 < number {
+                let _ = File::create(&path);
+            }
+        }
+        Ok(())
+    }
+
+    /// Removes the folder.
+    pub fn remove(&self) {
+        let _ = std::fs::remove_dir_all(&self.path);
+    }
+}
+
+pub(super) fn sync(path: &Path) -> Result<()> {
+    match open_existing(path).and_then(|file| file.sync_all()) {
+        Err(e) if e.kind() != ErrorKind::NotFound => Err(Error::io(path, "sync", e)),
+        _ => Ok(()),
+    }
+}
+
+/// Gives a file a second name; false if it exists.
+pub(super) fn link(from: &Path, to: &Path) -> Result<bool> {
+    fault::point(Event::Publish);
+    match std::fs::hard_link(from, to) {
+        Ok(()) => {
+            fault::point(Event::Published);
+            Ok(true)
+        }
+        // The reply of a server may have been lost after it made the link.
+        Err(_) if from.metadata().is_ok_and(|meta| meta.nlink() == 2) => Ok(true),
+        Err(e) if e.kind() == ErrorKind::AlreadyExists => Ok(false),
+        Err(e) => Err(Error::io(to, "link a finished journal to", e)),
+    }
+}
+
+impl Workspace {
+    /// Segments that this process made, of a run that tasks share.
+    fn segments_made(&self) -> Vec<PathBuf> {
+        self.run()
+            .map_or_else(Vec::new, ResumableRun::segments_made)
+    }
+
+    fn take_open(&self) -> Vec<OpenStep> {
+        self.run().map_or_else(Vec::new, ResumableRun::take_open)
+    }
+
+    /// Ends the journal of this process with `records` and syncs all that it wrote; returns its path.
+    fn seal(&self, records: &[Record]) -> Result<PathBuf> {
+        let Some(run) = self.run() else {
+            return Ok(PathBuf::new());
+        };
+        for path in run.segments_made().iter().chain(&run.files_touched()) {
+            sync(path)?;
+        }
+        let journal = run.journal();
+        for record in records {
+            journal.append(record.clone())?;
+        }
+        sync(journal.path())?;
+        Ok(journal.path().to_path_buf())
+    }
+}
