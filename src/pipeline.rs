@@ -21,7 +21,7 @@ pub use builder::Builder;
 use checks::{not_an_input, writable};
 pub(crate) use clock::Clock;
 pub(crate) use disk::Known;
-pub use shared::{Advanced, MOST_SHARDS, Status, Totals, Worked, status};
+pub use shared::{Advanced, Begun, MOST_SHARDS, Status, TaskState, Totals, Worked, status};
 use stages::Stages;
 pub use start::Start;
 use std::path::{Path, PathBuf};

@@ -1,12 +1,14 @@
 //! The commands for runs that tasks share: plan, work, advance, status, submit.
 
 mod shard;
+mod status;
 mod submit;
 
+pub use status::status;
 pub use submit::submit;
 
 use super::args::{Job, Storing, size};
-use super::output::{json, print, show, summary, write_report};
+use super::output::{json, print, summary, write_report};
 use super::{stop, style};
 use crate::error::{Error, Result};
 use crate::pipeline::{self, Advanced, Reconstruction, Totals, Worked};
@@ -35,6 +37,11 @@ pub struct Plan {
     /// Threads of each task
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub task_threads: u16,
+    /// Submit the tasks at once, as `outcrop submit` does; SITE FLAGS are for it
+    #[arg(long, value_name = "ENGINE", value_enum)]
+    pub submit: Option<Engine>,
+    #[command(flatten)]
+    pub how: How,
 }
 
 const PLAN: &str = "The run alternates between two commands:
@@ -130,22 +137,33 @@ pub struct Submit {
     /// Who runs the tasks
     #[arg(long, value_enum, default_value_t = Engine::Local)]
     pub engine: Engine,
-    /// Tasks at the same time, with the local engine [default: as many as the processors have threads for]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
-    pub workers: Option<u16>,
     /// Only show what would be run
     #[arg(long)]
     pub dry_run: bool,
-    /// With Slurm: wait here for each step, where jobs may not submit jobs
-    #[arg(long)]
-    pub foreground: bool,
     /// In a job: advance the run before the next jobs are submitted
     #[arg(long, hide = true)]
     pub inside: bool,
+    #[command(flatten)]
+    pub how: How,
+}
+
+/// How tasks are run.
+#[derive(Debug, Clone, ClapArgs)]
+pub struct How {
+    /// Tasks at the same time, as processes [default: as many as there are processors, or tasks in the
+    /// allocation]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub workers: Option<u16>,
+    /// With Slurm: wait here for each step, where jobs may not submit jobs
+    #[arg(long)]
+    pub foreground: bool,
+    /// With Slurm, inside sbatch or salloc: run tasks by srun, so that no step waits in a queue
+    #[arg(long, conflicts_with = "foreground")]
+    pub within_allocation: bool,
     /// Write a report as JSON when the mesh is finished
     #[arg(long, value_name = "FILE.json")]
     pub report: Option<PathBuf>,
-    /// Options for sbatch, like --partition=long
+    /// Options for sbatch or srun, like --partition=long
     #[arg(last = true, value_name = "SITE FLAGS")]
     pub site: Vec<String>,
 }
@@ -173,11 +191,35 @@ pub fn plan(args: &Plan) -> Result<bool> {
         builder = builder.scratch(scratch);
     }
     let run = builder.build()?;
-    let folder = run.plan(args.shards)?;
+    let unused = [
+        ("--workers", args.how.workers.is_some()),
+        ("--foreground", args.how.foreground),
+        ("--within-allocation", args.how.within_allocation),
+        ("--report", args.how.report.is_some()),
+        ("SITE FLAGS", !args.how.site.is_empty()),
+    ];
+    if let (None, Some((name, _))) = (args.submit, unused.iter().find(|(_, given)| *given)) {
+        return Err(Error::Parameter {
+            name,
+            found: "a plan that is not submitted".into(),
+            expected: "--submit with it".into(),
+        });
+    }
+    let folder = run.plan(args.shards)?.to_path_buf();
+    if let Some(engine) = args.submit {
+        print(&format!("planned in {}", folder.display()))?;
+        return submit(&Submit {
+            folder,
+            engine,
+            dry_run: false,
+            inside: false,
+            how: args.how.clone(),
+        });
+    }
     print(&format!(
         "planned in {}; go on with: outcrop submit {}",
         folder.display(),
-        stop::quoted(folder)
+        stop::quoted(&folder)
     ))?;
     Ok(true)
 }
@@ -236,6 +278,8 @@ pub struct After {
     pub missing: Vec<u32>,
     /// The resources that finished processes took; none if another process finished the mesh.
     pub totals: Option<Totals>,
+    /// Warnings of the finished run, one line each.
+    pub warnings: Vec<String>,
 }
 
 impl Display for After {
@@ -248,10 +292,11 @@ impl Display for After {
             )?,
             None => write!(f, "the mesh is finished")?,
         }
-        match &self.totals {
-            Some(totals) => write!(f, "; so far {totals}"),
-            None => Ok(()),
+        if let Some(totals) = &self.totals {
+            write!(f, "; so far {totals}")?;
         }
+        let mut warnings = self.warnings.iter();
+        warnings.try_for_each(|warning| write!(f, "\nwarning: {warning}"))
     }
 }
 
@@ -275,11 +320,15 @@ pub fn advance(args: &Advance) -> Result<bool> {
         generation: None,
         missing: Vec::new(),
         totals: None,
+        warnings: Vec::new(),
     };
     match run.advance()? {
         Advanced::Finished(Some(finished)) => {
             let (report, totals) = *finished;
             after.totals = Some(totals);
+            if args.json {
+                after.warnings.clone_from(&report.warnings);
+            }
             if let Some(path) = &args.report {
                 write_report(path, &report)?;
             }
@@ -296,6 +345,7 @@ pub fn advance(args: &Advance) -> Result<bool> {
                     generation: Some(status.generation),
                     missing: status.missing(),
                     totals: Some(status.totals),
+                    warnings: Vec::new(),
                 };
             }
         }
@@ -326,51 +376,5 @@ fn list(shards: &[u32]) -> String {
                 .join(", ")
         ),
         shards => format!("{} shards are", shards.len()),
-    }
-}
-
-/// Shows the state of a run.
-pub fn status(args: &Status) -> Result<bool> {
-    let status = pipeline::status(&args.folder)?;
-    if args.missing {
-        let lines = status.missing().into_iter().map(|shard| shard.to_string());
-        let lines: Vec<String> = lines.collect();
-        if !lines.is_empty() {
-            print(&lines.join("\n"))?;
-        }
-        return Ok(true);
-    }
-    show(&status, args.json)?;
-    Ok(true)
-}
-
-impl Display for pipeline::Status {
-    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
-        let folder = stop::quoted(&self.folder);
-        writeln!(f, "mesh          {}", self.output.display())?;
-        let steps = match &self.steps[..] {
-            [] => "not begun".to_owned(),
-            [one] => one.trim_start_matches('/').to_owned(),
-            [first, ..] => format!(
-                "{} and {} more",
-                first.trim_start_matches('/'),
-                self.steps.len() - 1
-            ),
-        };
-        writeln!(f, "generation    {}: {steps}", self.generation)?;
-        let open = self.done.len() + self.missing().len();
-        writeln!(
-            f,
-            "shards        {} of {open} done, {} begun (running or lost), {} not begun; {} of work",
-            self.done.len(),
-            self.begun.len(),
-            self.new.len(),
-            style::counted(self.units, "unit"),
-        )?;
-        writeln!(f, "so far        {}", self.totals)?;
-        match self.can_advance {
-            true => write!(f, "go on with    outcrop advance {folder}"),
-            false => write!(f, "go on with    outcrop submit {folder}"),
-        }
     }
 }

@@ -7,14 +7,17 @@ use super::{Builder, Reconstruction};
 use crate::error::{Error, Result};
 use crate::report::Report;
 use crate::stages::export;
-use crate::workspace::generations::{Generation, Opened, Resources, Shard, SharedFolder};
-use crate::workspace::journal::{OpenStep, Sharing, Took};
+use crate::workspace::generations::{Generation, Opened, Resources, SharedFolder};
+use crate::workspace::journal::{Sharing, Took};
 use crate::workspace::{Workspace, limits};
-use serde::{Deserialize, Serialize};
 use std::hash::{BuildHasher, Hasher};
 use std::io::Read;
-use std::path::{Path, PathBuf};
-use std::time::Instant;
+use std::path::Path;
+use std::time::{Instant, SystemTime};
+
+mod status;
+
+pub use status::{Begun, Status, TaskState, Totals, status};
 
 /// Largest number of shards: array jobs of Slurm end here by default.
 pub const MOST_SHARDS: u32 = 1000;
@@ -41,95 +44,6 @@ pub enum Advanced {
     Superseded,
     /// The mesh is finished; the report is missing if it was finished before.
     Finished(Option<Box<(Report, Totals)>>),
-}
-
-/// The state of a run that tasks share.
-#[derive(Debug, Clone, Serialize)]
-pub struct Status {
-    /// The folder of the run.
-    pub folder: PathBuf,
-    /// The mesh.
-    pub output: PathBuf,
-    /// Number of the generation.
-    pub generation: u64,
-    /// The steps whose units are open in it.
-    pub steps: Vec<String>,
-    /// Number of shards.
-    pub shards: u32,
-    /// Most threads of a task.
-    pub task_threads: u32,
-    /// Memory of a task in bytes, as planned.
-    pub task_memory: u64,
-    /// Number of open units.
-    pub units: u64,
-    /// Numbers of finished shards.
-    pub done: Vec<u32>,
-    /// Shards that were begun and are not finished, with their numbers of attempts: running or lost.
-    pub begun: Vec<(u32, u32)>,
-    /// Shards that nobody began.
-    pub new: Vec<u32>,
-    /// True if all shards are finished, so the next generation can be made.
-    pub can_advance: bool,
-    /// True if the mesh is finished.
-    pub finished: bool,
-    /// The resources that finished processes took.
-    pub totals: Totals,
-}
-
-/// The resources that finished processes took.
-#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
-pub struct Totals {
-    /// Processor time of tasks.
-    pub task_cpu_seconds: f64,
-    /// Processor time of the work between generations.
-    pub serial_cpu_seconds: f64,
-    /// Wall-clock seconds of the work between generations.
-    pub serial_seconds: f64,
-    /// Largest peak of the resident memory of a task, in bytes.
-    pub task_resident_bytes: u64,
-    /// Largest peak of the resident memory between generations, in bytes.
-    pub serial_resident_bytes: u64,
-    /// Bytes that all processes read.
-    pub bytes_read: u64,
-    /// Bytes that all processes wrote.
-    pub bytes_written: u64,
-}
-
-impl Totals {
-    fn of(all: &[Took]) -> Self {
-        let mut totals = Self::default();
-        for took in all {
-            let (cpu, resident) = match took.shard {
-                Some(_) => (
-                    &mut totals.task_cpu_seconds,
-                    &mut totals.task_resident_bytes,
-                ),
-                None => {
-                    totals.serial_seconds += took.seconds;
-                    (
-                        &mut totals.serial_cpu_seconds,
-                        &mut totals.serial_resident_bytes,
-                    )
-                }
-            };
-            *cpu += took.cpu_seconds;
-            *resident = took.resident.max(*resident);
-            totals.bytes_read += took.read;
-            totals.bytes_written += took.written;
-        }
-        totals
-    }
-}
-
-impl Status {
-    /// The shards that are not finished.
-    #[must_use]
-    pub fn missing(&self) -> Vec<u32> {
-        let begun = self.begun.iter().map(|(shard, _)| *shard);
-        let mut all: Vec<u32> = begun.chain(self.new.iter().copied()).collect();
-        all.sort_unstable();
-        all
-    }
 }
 
 /// Checksum of this program, with its version.
@@ -238,7 +152,10 @@ impl Reconstruction {
                 let took = took(&workspace, Some(shard), begin);
                 folder.end_task(&workspace, (number, shard), took)
             }
-            Err(e) => Err(e),
+            Err(e) => {
+                workspace.note_failure(&e);
+                Err(e)
+            }
             // A task ends with its units, which are not finished in this generation.
             Ok(_) => Ok(false),
         };
@@ -287,7 +204,10 @@ impl Reconstruction {
                 let took = took(&workspace, None, begin);
                 folder.end_next(&workspace, next, took, finished)
             }
-            Err(_) => Ok(false),
+            Err(e) => {
+                workspace.note_failure(e);
+                Ok(false)
+            }
         };
         if !matches!(published, Ok(true)) {
             folder.withdraw(&workspace);
@@ -373,48 +293,9 @@ fn took(workspace: &Workspace, shard: Option<u32>, begin: Instant) -> Took {
         resident: limits::peak_resident(),
         read: workspace.io.read(),
         written: workspace.io.written(),
+        points: workspace.noted_points(),
+        ended: SystemTime::now()
+            .duration_since(SystemTime::UNIX_EPOCH)
+            .map_or(0, |since| since.as_secs()),
     }
-}
-
-/// The state of the run in a folder.
-///
-/// # Errors
-/// [`Error::NotResumable`], [`Error::Io`], [`Error::Corrupt`].
-pub fn status(path: &Path) -> Result<Status> {
-    let folder = SharedFolder::open(path)?;
-    let manifest = Manifest::from_bytes(path, &folder.manifest)?;
-    let now = folder.read(folder.newest()?)?;
-    let shards = folder.shards(&now)?;
-    let of = |wanted: Shard| {
-        let all = (0..)
-            .zip(&shards)
-            .filter(move |(_, state)| **state == wanted);
-        all.map(|(shard, _)| shard).collect::<Vec<u32>>()
-    };
-    let begun = (0..).zip(&shards).filter_map(|(shard, state)| match state {
-        Shard::Begun(attempts) => Some((shard, *attempts)),
-        _ => None,
-    });
-    let mut status = Status {
-        folder: path.to_path_buf(),
-        output: manifest.output(),
-        generation: now.number,
-        steps: now
-            .open
-            .iter()
-            .map(|OpenStep { step, .. }| step.clone())
-            .collect(),
-        shards: now.sharing.shards,
-        task_threads: now.sharing.threads,
-        task_memory: now.sharing.memory,
-        units: now.units(),
-        done: of(Shard::Done),
-        begun: begun.collect(),
-        new: of(Shard::New),
-        can_advance: false,
-        finished: now.finished,
-        totals: Totals::of(&now.took),
-    };
-    status.can_advance = !status.finished && status.missing().is_empty();
-    Ok(status)
 }

@@ -84,7 +84,10 @@ impl<'a> Stages<'a> {
     }
 
     fn warn(&mut self, warning: String) {
-        self.job.observer.warn(&warning);
+        // Of a run that tasks share, the process that finishes it has them in its report.
+        if !self.workspace.is_task() {
+            self.job.observer.warn(&warning);
+        }
         self.report.warnings.push(warning);
     }
 
@@ -109,6 +112,7 @@ impl<'a> Stages<'a> {
             double: Some(self.report.coordinates == CoordinateType::Double),
             moved: None,
         };
+        workspace.note_points(input.kept);
         self.report.input = input;
         self.check_room()?;
         let moves = params.smooth + params.relax > 0;
@@ -156,6 +160,7 @@ impl<'a> Stages<'a> {
         self.warn_of_input(lattice);
         enough(&store)?;
         self.known.points = store.len() as u64;
+        workspace.note_points(self.known.points);
         self.check_room()?;
         Ok(store)
     }

@@ -27,6 +27,9 @@ use std::sync::Arc;
 
 mod attempt;
 mod publish;
+mod state;
+
+pub use state::{Attempts, Shard};
 
 const TASKS: &str = "tasks";
 const MANIFEST: &str = "manifest";
@@ -62,19 +65,6 @@ pub struct Generation {
     /// Bytes and records of its journal.
     end: (u64, u64),
     history: History,
-}
-
-/// The state of a shard.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Shard {
-    /// It has no units in this generation.
-    Empty,
-    /// No task began it.
-    New,
-    /// This number of attempts began; none is finished.
-    Begun(u32),
-    /// It is finished.
-    Done,
 }
 
 /// The run of a process, or the reason why there is nothing to do.
@@ -305,39 +295,5 @@ impl SharedFolder {
             found: found.into(),
             expected: "a journal whose records match their checksums".into(),
         }
-    }
-
-    /// The state of all shards of a generation.
-    ///
-    /// # Errors
-    /// [`Error::Io`].
-    pub fn shards(&self, generation: &Generation) -> Result<Vec<Shard>> {
-        let count = generation.sharing.shards;
-        let state = |shard| match generation.range(shard).is_empty() {
-            true => Shard::Empty,
-            false => Shard::New,
-        };
-        let mut shards: Vec<Shard> = (0..count).map(state).collect();
-        let folder = self.tasks(generation.number);
-        let names = match std::fs::read_dir(&folder) {
-            Ok(names) => names,
-            Err(e) if e.kind() == ErrorKind::NotFound => return Ok(shards),
-            Err(e) => return Err(Error::io(&folder, "list", e)),
-        };
-        for name in names.filter_map(|name| name.ok()?.file_name().into_string().ok()) {
-            let Some((Ok(shard), end)) = name.split_once('.').map(|(n, e)| (n.parse(), e)) else {
-                continue;
-            };
-            let shard: usize = shard;
-            let Some(state) = shards.get_mut(shard) else {
-                continue;
-            };
-            *state = match (*state, end) {
-                (_, "done") | (Shard::Done, _) => Shard::Done,
-                (Shard::Begun(n), _) => Shard::Begun(n + 1),
-                _ => Shard::Begun(1),
-            };
-        }
-        Ok(shards)
     }
 }

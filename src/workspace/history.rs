@@ -107,7 +107,7 @@ impl History {
     pub fn add(&mut self, entry: &Entry<'_>) {
         let at = entry.at;
         match entry.record {
-            Record::Manifest(_) | Record::Task(_) => {}
+            Record::Manifest(_) | Record::Task(_) | Record::Failed(_) => {}
             Record::Shared(sharing) => self.sharing = Some(sharing.clone()),
             Record::Open(steps) => self.open.clone_from(steps),
             Record::Took(took) => self.took.push(*took),

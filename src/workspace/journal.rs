@@ -82,6 +82,8 @@ pub enum Record {
     Took(Took),
     /// The run is finished.
     Finished,
+    /// A process that shares the run failed, for this reason; the last record of its journal.
+    Failed(String),
 }
 
 /// How tasks share a run.
@@ -134,6 +136,10 @@ pub struct Took {
     pub read: u64,
     /// Bytes written.
     pub written: u64,
+    /// Points of the cloud, as far as they are known; of the program between two generations.
+    pub points: u64,
+    /// Seconds since the beginning of 1970 at its end.
+    pub ended: u64,
 }
 
 /// The place of a payload: the worker whose journal has it (`None`: the program's), offset and length.

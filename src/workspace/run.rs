@@ -14,6 +14,7 @@ use std::collections::{BTreeSet, HashSet};
 use std::fs::File;
 use std::ops::Range;
 use std::path::PathBuf;
+use std::sync::atomic::AtomicU64;
 use std::sync::{Mutex, OnceLock};
 
 /// The part of the work that this process does.
@@ -54,6 +55,8 @@ pub struct ResumableRun {
     made: Mutex<HashSet<PathBuf>>,
     touched: Mutex<HashSet<PathBuf>>,
     leaving: Mutex<Vec<Leaving>>,
+    /// Points of the cloud, as far as they are known.
+    pub points: AtomicU64,
     _held: Reservation,
 }
 
@@ -91,6 +94,7 @@ impl ResumableRun {
             made: Mutex::default(),
             touched: Mutex::default(),
             leaving: Mutex::default(),
+            points: AtomicU64::new(0),
             _held: held,
         }
     }

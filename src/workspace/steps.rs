@@ -11,6 +11,7 @@ use serde::de::DeserializeOwned;
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Mutex;
+use std::sync::atomic::Ordering;
 
 /// The name of a step that consists of units, and the name under which their memory is reserved.
 #[derive(Debug)]
@@ -215,6 +216,20 @@ impl Workspace {
     pub fn shared_number(&self) -> Option<u32> {
         let run = self.run().filter(|run| run.is_shared());
         run.map(ResumableRun::first)
+    }
+
+    /// Notes the number of points, for those who ask for the state of a run that tasks share.
+    pub fn note_points(&self, points: u64) {
+        if let Some(run) = self.run() {
+            run.points.store(points, Ordering::Relaxed);
+        }
+    }
+
+    /// The number of points that was noted last.
+    #[must_use]
+    pub fn noted_points(&self) -> u64 {
+        self.run()
+            .map_or(0, |run| run.points.load(Ordering::Relaxed))
     }
 
     /// True if this process is a task, which does some units of a run.

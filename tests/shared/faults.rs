@@ -212,7 +212,7 @@ fn what_a_slow_folder_does_not_show_yet_is_waited_for() {
 }
 
 #[test]
-fn damage_is_found_before_it_is_believed() {
+fn a_damaged_result_is_not_believed_and_made_again() {
     let case = Case::new(&[]);
     case.plan(SHARDS);
     case.advance_to("cells");
@@ -222,22 +222,25 @@ fn damage_is_found_before_it_is_believed() {
         let file = std::fs::File::options().write(true).open(&path).unwrap();
         file.set_len(path.metadata().unwrap().len() - 1).unwrap();
     };
-    let generation = case.status().generation();
-    let done = format!("tasks/{generation:06}/1.done");
+    let done = format!("tasks/{:06}/1.done", case.status().generation());
     cut(&done);
-    let said = case.say("advance", &[]);
-    assert_eq!(said.code, Some(2), "{said:?}");
-    assert!(said.err.contains("1.done"), "{said:?}");
-    // Without it the shard is done again.
-    std::fs::remove_file(case.scratch.join(&done)).unwrap();
-    case.work(1);
+    let refused = |shard: u64| {
+        let said = case.say("advance", &[]);
+        let expected = format!("shard {shard} is missing");
+        assert!(
+            said.code == Some(75) && said.err.contains(&expected),
+            "{said:?}"
+        );
+        assert_eq!(case.status().missing(), [shard]);
+        case.work(shard);
+    };
+    refused(1);
     let segments = util::listing(&case.scratch)
         .into_iter()
         .filter(|name| name.starts_with("cells"));
     let newest =
         segments.max_by_key(|name| name.rsplit_once('.').unwrap().1.parse::<u32>().unwrap());
     cut(&newest.unwrap());
-    let said = case.say("advance", &[]);
-    assert_eq!(said.code, Some(2), "{said:?}");
-    assert!(said.err.contains(".done"), "{said:?}");
+    refused(2);
+    case.finish();
 }

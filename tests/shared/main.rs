@@ -9,3 +9,4 @@ mod deploy;
 mod faults;
 mod refusals;
 mod run;
+mod status;

@@ -37,7 +37,8 @@ impl Status {
     }
 
     pub fn missing(&self) -> Vec<u64> {
-        let begun = self.0["begun"].as_array().unwrap().iter().map(|b| &b[0]);
+        let begun = self.0["begun"].as_array().unwrap().iter();
+        let begun = begun.map(|begun| &begun["shard"]);
         let new = self.0["new"].as_array().unwrap().iter();
         begun.chain(new).map(|n| n.as_u64().unwrap()).collect()
     }

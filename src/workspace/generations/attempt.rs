@@ -155,7 +155,7 @@ impl SharedFolder {
     }
 
     /// The journal of the finished task of a shard; none if there is none. It must have all units of the shard,
-    /// and the segments must have all bytes that it names.
+    /// and the segments must have all bytes that it names; otherwise it is removed, and the shard is done again.
     fn task_records(
         &self,
         generation: &Generation,
@@ -189,7 +189,7 @@ impl SharedFolder {
             }
             true
         })?;
-        if found.is_none() {
+        if found.is_none() && !path.exists() {
             return Ok(None);
         }
         let mut wanted = parts
@@ -204,7 +204,8 @@ impl SharedFolder {
         if good && ends.iter().all(whole) {
             return Ok(Some(path));
         }
-        Err(self.damaged(&path, 0, "not all units of the shard"))
+        std::fs::remove_file(&path).map_err(|e| Error::io(&path, "remove the damaged", e))?;
+        Ok(None)
     }
 }
 

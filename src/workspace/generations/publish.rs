@@ -128,6 +128,14 @@ impl Workspace {
             .map_or_else(Vec::new, ResumableRun::segments_made)
     }
 
+    /// Notes in the journal of this process why it failed, for those who ask for the state of the run.
+    pub fn note_failure(&self, error: &Error) {
+        if let Some(run) = self.run() {
+            // It may be the disk that is full.
+            let _ = run.journal().append(Record::Failed(error.to_string()));
+        }
+    }
+
     fn take_open(&self) -> Vec<OpenStep> {
         self.run().map_or_else(Vec::new, ResumableRun::take_open)
     }

@@ -1,0 +1,156 @@
+//! The state of shards, as far as their files tell.
+
+use super::{Generation, SharedFolder};
+use crate::error::{Error, Result};
+use crate::workspace::journal::{self, Record};
+use std::io::ErrorKind;
+use std::path::Path;
+use std::time::SystemTime;
+
+/// The state of a shard.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Shard {
+    /// It has no units in this generation.
+    Empty,
+    /// No task began it.
+    New,
+    /// These attempts began; none is finished.
+    Begun(Attempts),
+    /// It is finished.
+    Done,
+}
+
+/// Attempts at a piece of work, none of which is finished.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Attempts {
+    /// Their number.
+    pub count: u32,
+    /// The time when one of them last wrote to its journal.
+    pub written: Option<SystemTime>,
+    /// Number of the last one that told why it failed, and its reason.
+    pub failed: Option<(u32, String)>,
+}
+
+impl Attempts {
+    /// Adds the attempt with this journal.
+    fn add(&mut self, attempt: u32, path: &Path) {
+        self.count += 1;
+        let written = path.metadata().and_then(|meta| meta.modified()).ok();
+        self.written = self.written.max(written);
+        if self.failed.as_ref().is_none_or(|(last, _)| *last < attempt)
+            && let Some(why) = reason(path)
+        {
+            self.failed = Some((attempt, why));
+        }
+    }
+
+    /// True if no attempt can be at work: all of them told that they failed, or the last one did.
+    #[must_use]
+    pub fn all_failed(&self) -> bool {
+        self.failed
+            .as_ref()
+            .is_some_and(|(last, _)| last + 1 >= self.count)
+    }
+}
+
+/// The reason why an attempt failed, if its journal tells.
+fn reason(path: &Path) -> Option<String> {
+    let mut why = None;
+    // A journal that cannot be read tells nothing.
+    let _ = journal::read(path, None, |entry| {
+        if let Record::Failed(text) = entry.record {
+            why = Some(text.clone());
+        }
+        true
+    });
+    why
+}
+
+impl SharedFolder {
+    /// The state of all shards of a generation.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn shards(&self, generation: &Generation) -> Result<Vec<Shard>> {
+        let count = generation.sharing.shards;
+        let state = |shard| match generation.range(shard).is_empty() {
+            true => Shard::Empty,
+            false => Shard::New,
+        };
+        let mut shards: Vec<Shard> = (0..count).map(state).collect();
+        let folder = self.tasks(generation.number);
+        let names = match std::fs::read_dir(&folder) {
+            Ok(names) => names,
+            Err(e) if e.kind() == ErrorKind::NotFound => return Ok(shards),
+            Err(e) => return Err(Error::io(&folder, "list", e)),
+        };
+        let mut names: Vec<String> = names
+            .filter_map(|name| name.ok()?.file_name().into_string().ok())
+            .collect();
+        // Finished shards first, so that journals of their other attempts are not read.
+        names.sort_by_key(|name| !name.ends_with(".done"));
+        for name in names {
+            let Some((Ok(shard), end)) = name.split_once('.').map(|(n, e)| (n.parse(), e)) else {
+                continue;
+            };
+            let shard: usize = shard;
+            let Some(state) = shards.get_mut(shard) else {
+                continue;
+            };
+            let path = folder.join(&name);
+            match (&mut *state, end.parse()) {
+                (Shard::Done, _) => {}
+                (_, Err(_)) if end == "done" => *state = Shard::Done,
+                (Shard::Begun(attempts), Ok(attempt)) => attempts.add(attempt, &path),
+                (_, Ok(attempt)) => {
+                    let mut attempts = Attempts::default();
+                    attempts.add(attempt, &path);
+                    *state = Shard::Begun(attempts);
+                }
+                _ => {}
+            }
+        }
+        Ok(shards)
+    }
+
+    /// The attempts to make the generation after this one.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn advances(&self, generation: &Generation) -> Result<Attempts> {
+        let next = generation.number + 1;
+        let folder = self.path.join(super::GENERATIONS);
+        let names = std::fs::read_dir(&folder).map_err(|e| Error::io(&folder, "list", e))?;
+        let prefix = format!("{next:06}.");
+        let mut attempts = Attempts::default();
+        for name in names.filter_map(|name| name.ok()?.file_name().into_string().ok()) {
+            if let Some(Ok(attempt)) = name.strip_prefix(&prefix).map(str::parse) {
+                attempts.add(attempt, &folder.join(&name));
+            }
+        }
+        Ok(attempts)
+    }
+
+    /// Seconds of wall-clock time of each finished task of a generation.
+    #[must_use]
+    pub fn seconds(&self, generation: &Generation, done: &[u32]) -> Vec<f64> {
+        let of = |shard: &u32| {
+            let mut seconds = None;
+            journal::read(&self.done(generation.number, *shard), None, |entry| {
+                if let Record::Took(took) = entry.record {
+                    seconds = Some(took.seconds);
+                }
+                true
+            })
+            .ok()?;
+            seconds
+        };
+        done.iter().filter_map(of).collect()
+    }
+
+    /// The time when a generation began.
+    #[must_use]
+    pub fn begun(&self, number: u64) -> Option<SystemTime> {
+        self.generation(number).metadata().ok()?.modified().ok()
+    }
+}
