@@ -175,6 +175,10 @@ impl Reconstruction {
     pub fn advance(&self) -> Result<Advanced> {
         let begin = Instant::now();
         let folder = SharedFolder::open(&self.folder)?;
+        if folder.is_left_over() {
+            folder.remove();
+            return Ok(Advanced::Finished(None));
+        }
         let number = folder.newest()?;
         match self.try_advance(&folder, number, begin) {
             Err(_) if is_over(&folder, number) => Ok(Advanced::Superseded),
@@ -219,6 +223,7 @@ impl Reconstruction {
             (Ok(report), true) => {
                 let totals = Totals::of(&folder.read(next)?.took);
                 self.remove_unfinished();
+                drop(workspace);
                 folder.remove();
                 Ok(Advanced::Finished(Some(Box::new((report, totals)))))
             }

@@ -1,7 +1,8 @@
 //! Fault injection for tests: the environment variable `OUTCROP_FAULT` is read once.
 //!
 //! `KIND:N` kills the program at the `N`th event of a kind, or makes that event fail; `count:FILE` writes the
-//! number of events of each kind; `freeze:publish` stops it before it publishes a finished journal. See `CONTRIBUTING.md`.
+//! number of events of each kind; `freeze:publish` stops it before it publishes a finished journal, and
+//! `hold:N` makes it take N MiB there. See `CONTRIBUTING.md`.
 
 use std::io;
 use std::sync::OnceLock;
@@ -51,6 +52,8 @@ enum Plan {
     Kill(usize, u64),
     /// Stop, as by SIGSTOP, before a finished journal is published.
     Freeze,
+    /// Have this number of MiB resident for some seconds before a finished journal is published.
+    Hold(u64),
     Fail(rustix::io::Errno, u64),
     Count(std::path::PathBuf),
 }
@@ -70,6 +73,7 @@ fn read() -> Option<Plan> {
     let number = rest.parse().ok()?;
     match kind {
         "full" => Some(Plan::Fail(rustix::io::Errno::NOSPC, number)),
+        "hold" => Some(Plan::Hold(number)),
         "eio" => Some(Plan::Fail(rustix::io::Errno::IO, number)),
         _ => NAMES
             .iter()
@@ -102,10 +106,25 @@ pub fn point(event: Event) {
     if dies(event) {
         die();
     }
-    if event == Event::Publish && matches!(plan(), Some(Plan::Freeze)) {
-        let (own, stop) = (rustix::process::getpid(), rustix::process::Signal::STOP);
-        let _ = rustix::process::kill_process(own, stop);
+    if event != Event::Publish {
+        return;
     }
+    match plan() {
+        Some(Plan::Freeze) => {
+            let (own, stop) = (rustix::process::getpid(), rustix::process::Signal::STOP);
+            let _ = rustix::process::kill_process(own, stop);
+        }
+        Some(Plan::Hold(mebibytes)) => hold(mebibytes << 20),
+        _ => {}
+    }
+}
+
+/// Has this number of bytes resident in all, long enough for a scheduler that polls to see it.
+fn hold(bytes: u64) {
+    let more = bytes.saturating_sub(super::limits::resident());
+    let held = vec![1u8; more as usize];
+    std::thread::sleep(std::time::Duration::from_secs(3));
+    std::hint::black_box(&held);
 }
 
 /// An event before a write: the write may fail, or the program may end.

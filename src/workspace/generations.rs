@@ -193,7 +193,10 @@ impl SharedFolder {
             file.read_exact_at(&mut bytes, 0)?;
             Ok(bytes)
         });
-        let bytes = bytes.map_err(|e| Error::io(&file, "read", e))?;
+        let bytes = bytes.map_err(|e| match e.kind() {
+            ErrorKind::NotFound => not("its run is finished, it may be removed"),
+            _ => Error::io(&file, "read", e),
+        })?;
         let manifest = unsealed(&bytes)
             .ok_or_else(|| not("its manifest is damaged; remove it and plan again"))?;
         Ok(Self {

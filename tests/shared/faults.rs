@@ -211,6 +211,31 @@ fn what_a_slow_folder_does_not_show_yet_is_waited_for() {
     case.finish();
 }
 
+/// A folder that was not removed as a whole, for example because a file in it was open on a network.
+#[test]
+fn what_is_left_of_a_finished_run_is_removed() {
+    let case = Case::new(&[]);
+    case.plan(SHARDS);
+    let generations = util::listing(&case.scratch.join("generations"));
+    for name in generations {
+        std::fs::remove_file(case.scratch.join("generations").join(name)).unwrap();
+    }
+    let said = case.say("advance", &[]);
+    assert!(
+        said.code == Some(0) && said.out.contains("finished"),
+        "{said:?}"
+    );
+    assert!(!case.scratch.exists());
+    std::fs::create_dir_all(case.scratch.join("generations")).unwrap();
+    let mode = std::os::unix::fs::PermissionsExt::from_mode(0o700);
+    std::fs::set_permissions(&case.scratch, mode).unwrap();
+    let said = case.say("status", &[]);
+    assert!(
+        said.code == Some(2) && said.err.contains("may be removed"),
+        "{said:?}"
+    );
+}
+
 #[test]
 fn a_damaged_result_is_not_believed_and_made_again() {
     let case = Case::new(&[]);

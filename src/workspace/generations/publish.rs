@@ -1,6 +1,6 @@
 //! The end of an attempt: its journal gets the name that others look for.
 
-use super::{SharedFolder, Took};
+use super::{GENERATIONS, MANIFEST, SharedFolder, Took};
 use crate::error::{Error, Result};
 use crate::workspace::Workspace;
 use crate::workspace::fault::{self, Event};
@@ -12,6 +12,11 @@ use std::fs::File;
 use std::io::ErrorKind;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// Most rounds of removing a folder, and the time between them.
+const REMOVALS: u32 = 20;
+const REMOVAL_PAUSE: Duration = Duration::from_millis(100);
 
 impl SharedFolder {
     /// Deletes the segments of an attempt that failed, or that came too late. Its journal stays, so that it
@@ -93,9 +98,46 @@ impl SharedFolder {
         Ok(())
     }
 
-    /// Removes the folder.
+    /// Removes the folder of a finished run. What tells that this is its folder goes last, so that whoever
+    /// is killed meanwhile can begin again.
     pub fn remove(&self) {
-        let _ = std::fs::remove_dir_all(&self.path);
+        for _ in 0..REMOVALS {
+            let last = [GENERATIONS, MANIFEST];
+            remove_inside(&self.path, |name| !last.contains(&name));
+            remove_inside(&self.path.join(GENERATIONS), |_| true);
+            // A network file system keeps a file under another name as long as it is open here.
+            if self.is_left_over() {
+                let _ = std::fs::remove_file(self.path.join(MANIFEST));
+                let _ = std::fs::remove_dir(self.path.join(GENERATIONS));
+                if std::fs::remove_dir(&self.path).is_ok() {
+                    return;
+                }
+            }
+            if !self.path.exists() {
+                return;
+            }
+            std::thread::sleep(REMOVAL_PAUSE);
+        }
+    }
+
+    /// True if no generation is left: the folder is being removed, or its removal was interrupted.
+    #[must_use]
+    pub fn is_left_over(&self) -> bool {
+        let generations = std::fs::read_dir(self.path.join(GENERATIONS));
+        generations.is_ok_and(|mut names| names.next().is_none())
+    }
+}
+
+/// Deletes what is in a folder as far as it can be deleted, if `which` is true for its name.
+fn remove_inside(folder: &Path, which: impl Fn(&str) -> bool) {
+    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        if entry.file_name().to_str().is_none_or(&which) {
+            let path = entry.path();
+            let _ = match entry.file_type().is_ok_and(|kind| kind.is_dir()) {
+                true => std::fs::remove_dir_all(&path),
+                false => std::fs::remove_file(&path),
+            };
+        }
     }
 }
 

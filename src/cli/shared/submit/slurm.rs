@@ -1,11 +1,11 @@
 //! Jobs of Slurm: an array of tasks, and a job after it that advances the run and submits the next ones.
 
 use super::super::Submit;
-use super::{advance, advance_command, mebibytes, program, state};
+use super::{TRIES, advance, advance_command, mebibytes, program, state};
 use crate::cli::output::print;
 use crate::cli::{stop, style};
 use crate::error::{Error, Result};
-use crate::pipeline::Status;
+use crate::pipeline::{Status, TaskState};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
@@ -85,7 +85,7 @@ impl<'a> Slurm<'a> {
                 print(&format!("# {}\n{text}", self.folder.join(name).display()))?;
             }
             let first = match status.can_advance {
-                true => self.sbatch(&[], ADVANCE, None),
+                true => self.sbatch(&advance_options(&status), ADVANCE, None),
                 false => self.sbatch(&tasks(&status), WORK, Some(status.generation)),
             };
             print(&format!("# first\n{first:?}"))?;
@@ -110,7 +110,8 @@ impl<'a> Slurm<'a> {
                 state(&self.folder)?
             }
             (false, true) => {
-                let id = self.submitted(&mut self.sbatch(&[], ADVANCE, None))?;
+                let id =
+                    self.submitted(&mut self.sbatch(&advance_options(&status), ADVANCE, None))?;
                 print(&format!(
                     "submitted job {id}; see: outcrop status {}",
                     stop::quoted(&self.folder)
@@ -137,7 +138,13 @@ impl<'a> Slurm<'a> {
         loop {
             let wait = "--wait".to_owned();
             let (mut command, advances) = match status.can_advance {
-                true => (self.sbatch(&[wait], ADVANCE, None), true),
+                true => {
+                    let options = advance_options(&status).into_iter().chain([wait]);
+                    (
+                        self.sbatch(&options.collect::<Vec<_>>(), ADVANCE, None),
+                        true,
+                    )
+                }
                 false => {
                     let mut options = tasks(&status);
                     options.push(wait);
@@ -147,13 +154,18 @@ impl<'a> Slurm<'a> {
             let shown = format!("{command:?}");
             let ended = command.stdout(Stdio::null()).status();
             let ended = ended.map_err(|e| Error::io(&shown, "run", e))?;
-            // Tasks that failed are found missing, and run again.
+            // Tasks that failed are found missing, and run again. An advance is so if it was killed.
             if advances && !ended.success() {
-                let why = std::io::Error::other(format!(
-                    "the job failed; see {}/logs",
-                    self.folder.display()
-                ));
-                return Err(Error::io(&self.folder, "advance", why));
+                let again = state(&self.folder)?.advance;
+                let killed =
+                    again.is_some_and(|a| a.state != TaskState::Failed && a.attempts < TRIES);
+                if !killed {
+                    let why = std::io::Error::other(format!(
+                        "the job failed; see {}/logs",
+                        self.folder.display()
+                    ));
+                    return Err(Error::io(&self.folder, "advance", why));
+                }
             }
             if advances && !self.folder.exists() {
                 print("the mesh is finished")?;
@@ -188,6 +200,15 @@ impl<'a> Slurm<'a> {
         let id = text.trim().split(';').next().unwrap_or_default();
         Ok(id.to_owned())
     }
+}
+
+/// The options for a job that advances: more memory if an earlier one did not end.
+fn advance_options(status: &Status) -> Vec<String> {
+    let tries = status.advance.as_ref().map(|advance| advance.attempts);
+    tries
+        .map(|tries| format!("--mem={}M", mebibytes(status, tries)))
+        .into_iter()
+        .collect()
 }
 
 /// The options for an array of the missing shards.
