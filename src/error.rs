@@ -135,6 +135,12 @@ pub enum Error {
         /// The missing part.
         what: String,
     },
+    /// A task found that the work of others is damaged.
+    #[error("{source}; `outcrop advance` finds what is damaged and has it made again")]
+    Damaged {
+        /// What was found.
+        source: Box<Error>,
+    },
     /// The rest of the run's units are for tasks.
     #[error("the next units of work are for tasks")]
     Shared,
@@ -167,6 +173,7 @@ impl Error {
             | Error::Unfinished { .. }
             | Error::Mismatch { .. }
             | Error::NotYet { .. }
+            | Error::Damaged { .. }
             | Error::NotResumable { .. } => false,
         }
     }

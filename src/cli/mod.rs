@@ -18,7 +18,11 @@ const NO: u8 = 1;
 /// Exit code for errors.
 const FAILED: u8 = 2;
 
-/// Runs the command line. Exit codes: 0 success, 1 negative answer, 2 error, 75 time limit, 128 + signal.
+/// Exit code of a task, or of `advance`, that found the work of others damaged.
+const DAMAGED: u8 = 65;
+
+/// Runs the command line. Exit codes: 0 success, 1 negative answer, 2 error, 65 damaged work of tasks,
+/// 75 time limit, 128 + signal.
 #[must_use]
 pub fn main() -> ExitCode {
     #[cfg(feature = "ablation")]
@@ -47,6 +51,7 @@ pub fn main() -> ExitCode {
                 Error::Cancelled => stop::code(false),
                 Error::TimeLimit => stop::code(true),
                 Error::NotYet { .. } => stop::TIME_IS_UP,
+                Error::Damaged { .. } => DAMAGED,
                 _ => FAILED,
             })
         }

@@ -100,6 +100,10 @@ impl Reconstruction {
     pub fn shared(folder: impl AsRef<Path>) -> Result<Builder> {
         let folder = SharedFolder::open(folder.as_ref())?;
         let manifest = Manifest::from_bytes(&folder.path, &folder.manifest)?;
+        if folder.is_left_over() {
+            // There is nothing to do but to remove it.
+            return Ok(manifest.settings().folder(folder.path).threads(1));
+        }
         let plan = folder.sharing()?;
         let builder = manifest.settings().folder(folder.path);
         Ok(builder.threads(plan.threads as usize).memory(plan.memory))
@@ -152,10 +156,7 @@ impl Reconstruction {
                 let took = took(&workspace, Some(shard), begin);
                 folder.end_task(&workspace, (number, shard), took)
             }
-            Err(e) => {
-                workspace.note_failure(&e);
-                Err(e)
-            }
+            Err(e) => Err(workspace.note_failure(e)),
             // A task ends with its units, which are not finished in this generation.
             Ok(_) => Ok(false),
         };
@@ -187,11 +188,18 @@ impl Reconstruction {
     }
 
     fn try_advance(&self, folder: &SharedFolder, number: u64, begin: Instant) -> Result<Advanced> {
-        let now = self.generation(folder, number)?;
+        let mut now = self.generation(folder, number)?;
         writable(&self.output)?;
         let was = Manifest::from_bytes(&self.folder, &folder.manifest)?;
         was.check(&Manifest::of(self)?, &self.folder)?;
-        let opened = self.open_shared(|resources| folder.begin_next(now, resources))?;
+        let damaged = folder.is_damaged(&now)?;
+        let opened = self.open_shared(|resources| {
+            let watched = (&*self.observer, &self.cancel);
+            if damaged && let Some(run) = folder.begin_repair(&mut now, resources, watched)? {
+                return Ok(run);
+            }
+            folder.begin_next(now, resources)
+        })?;
         let workspace = match opened {
             Ok(workspace) => workspace,
             Err(Opened::Missing(shards)) => return Ok(Advanced::Missing(number, shards)),
@@ -200,7 +208,10 @@ impl Reconstruction {
                 return Ok(Advanced::Finished(None));
             }
         };
-        let outcome = self.reconstruct(&workspace);
+        let outcome = match self.reconstruct(&workspace) {
+            Err(e) if !matches!(e, Error::Shared) => Err(workspace.note_failure(e)),
+            outcome => outcome,
+        };
         let next = number + 1;
         let finished = outcome.is_ok();
         let published = match &outcome {
@@ -208,10 +219,7 @@ impl Reconstruction {
                 let took = took(&workspace, None, begin);
                 folder.end_next(&workspace, next, took, finished)
             }
-            Err(e) => {
-                workspace.note_failure(e);
-                Ok(false)
-            }
+            Err(_) => Ok(false),
         };
         if !matches!(published, Ok(true)) {
             folder.withdraw(&workspace);

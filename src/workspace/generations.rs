@@ -26,6 +26,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 mod attempt;
+mod damage;
 mod publish;
 mod state;
 
@@ -114,6 +115,15 @@ impl Generation {
             first += units;
         }
         parts
+    }
+
+    /// True if a shard has units that are not finished. Others are finished if work is made again that was
+    /// damaged.
+    #[must_use]
+    pub fn is_left(&self, shard: u32) -> bool {
+        let parts = self.parts(shard).into_iter();
+        let mut units = parts.flat_map(|(step, units)| units.map(move |unit| (step.clone(), unit)));
+        units.any(|(step, unit)| self.history.payload(&step, unit).is_none())
     }
 
     /// Numbers that one process takes for its segments: one a thread, and one for all others.

@@ -188,6 +188,12 @@ impl History {
         sections as u64 * SECTION + units as u64 * UNIT
     }
 
+    /// The number of finished units.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.steps.iter().map(|step| step.units.len()).sum()
+    }
+
     /// A number that is larger than those of all workers of earlier attempts.
     #[must_use]
     pub fn next_worker(&self) -> u32 {

@@ -82,8 +82,17 @@ pub enum Record {
     Took(Took),
     /// The run is finished.
     Finished,
-    /// A process that shares the run failed, for this reason; the last record of its journal.
-    Failed(String),
+    /// A process that shares the run failed; the last record of its journal.
+    Failed(Failure),
+}
+
+/// The reason why a process failed.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Failure {
+    /// Its message.
+    pub why: String,
+    /// True if the work of others is damaged.
+    pub damage: bool,
 }
 
 /// How tasks share a run.

@@ -211,6 +211,72 @@ fn what_a_slow_folder_does_not_show_yet_is_waited_for() {
     case.finish();
 }
 
+/// Flips a bit in the middle of each segment of a file.
+fn damage(case: &Case, file: &str) {
+    let segments = util::listing(&case.scratch).into_iter();
+    let of_file = |name: &String| name.rsplit_once('.').is_some_and(|(stem, _)| stem == file);
+    let mut count = 0;
+    for name in segments.filter(of_file) {
+        let path = case.scratch.join(name);
+        let mut bytes = std::fs::read(&path).unwrap();
+        if let Some(middle) = bytes.len().checked_div(2).filter(|middle| *middle > 0) {
+            bytes[middle] ^= 16;
+            std::fs::write(&path, bytes).unwrap();
+            count += 1;
+        }
+    }
+    assert!(count > 0, "there is no {file}");
+}
+
+/// The work of tasks is damaged after it was taken over; what it was made from is there, or is gone.
+#[test]
+fn damaged_work_is_made_again() {
+    for (before, file) in [
+        ("triples", "cells.own"),
+        ("stitch/orient", "triples.own"),
+        ("relax", "points"),
+        ("repair", "points"),
+    ] {
+        let case = Case::new(&[]);
+        case.plan(SHARDS);
+        case.advance_to(before);
+        case.work(0);
+        damage(&case, file);
+        let tasks = ["1", "2"].map(|shard| case.say("work", &["--shard", shard]));
+        let found = tasks.iter().find(|said| said.code == Some(65));
+        let found = found.unwrap_or_else(|| panic!("{before}: {tasks:?}"));
+        assert!(found.err.contains("outcrop advance"), "{found:?}");
+        assert_eq!(case.say("status", &["--missing"]).out, "");
+        let text = case.say("status", &[]).out;
+        assert!(text.contains("go on with    outcrop advance"), "{text}");
+        let said = case.say("submit", &["--workers", "2"]);
+        assert_eq!(said.code, Some(0), "{file}: {said:?}");
+        case.check();
+    }
+}
+
+#[test]
+fn damage_that_is_gone_again_is_no_damage() {
+    let case = Case::new(&[]);
+    case.plan(SHARDS);
+    case.advance_to("triples");
+    let hidden = case.bench.path("hidden");
+    let segments = util::listing(&case.scratch).into_iter();
+    let name = segments.filter(|name| name.starts_with("cells.own.")).max();
+    let path = case.scratch.join(name.unwrap());
+    std::fs::rename(&path, &hidden).unwrap();
+    let codes: Vec<_> = (0..3)
+        .map(|shard: u64| case.say("work", &["--shard", &shard.to_string()]).code)
+        .collect();
+    assert!(codes.contains(&Some(65)), "{codes:?}");
+    std::fs::rename(&hidden, &path).unwrap();
+    let said = case.say("advance", &[]);
+    assert_eq!(said.code, Some(75), "{said:?}");
+    let text = case.say("status", &[]).out;
+    assert!(text.contains("all files were whole"), "{text}");
+    case.finish();
+}
+
 /// A folder that was not removed as a whole, for example because a file in it was open on a network.
 #[test]
 fn what_is_left_of_a_finished_run_is_removed() {

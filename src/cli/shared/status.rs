@@ -17,7 +17,12 @@ const EARLY: f64 = 5.0;
 pub fn status(args: &Status) -> Result<bool> {
     let status = pipeline::status(&args.folder)?;
     if args.missing {
-        let lines = status.missing().into_iter().map(|shard| shard.to_string());
+        // While damaged work is not open again, tasks cannot finish.
+        let missing = match status.damaged {
+            true => Vec::new(),
+            false => status.missing(),
+        };
+        let lines = missing.into_iter().map(|shard| shard.to_string());
         let lines: Vec<String> = lines.collect();
         if !lines.is_empty() {
             print(&lines.join("\n"))?;

@@ -3,7 +3,7 @@
 mod local;
 mod slurm;
 
-use super::super::stop;
+use super::super::{DAMAGED, stop};
 use super::{After, Engine, Submit};
 use crate::error::{Error, Result};
 use crate::pipeline::{self, Status};
@@ -57,15 +57,19 @@ fn state(folder: &Path) -> Result<Status> {
     }
 }
 
-/// Runs a command whose answer is JSON.
-fn advance(command: &mut Command) -> Result<After> {
+/// Runs the command that advances the run, whose answer is JSON; none if it has to be tried again.
+fn advance(command: &mut Command) -> Result<Option<After>> {
     let shown = format!("{command:?}");
     let failed = |e| Error::io(&shown, "run", e);
     let output = command.stderr(Stdio::inherit()).output().map_err(failed)?;
-    if !output.status.success() {
-        return Err(failed(std::io::Error::other(output.status.to_string())));
+    match output.status.code() {
+        Some(0) => serde_json::from_slice(&output.stdout)
+            .map(Some)
+            .map_err(|e| failed(e.into())),
+        // Shards turned out to be missing, or damaged.
+        Some(code) if [stop::TIME_IS_UP, DAMAGED].map(i32::from).contains(&code) => Ok(None),
+        _ => Err(failed(std::io::Error::other(output.status.to_string()))),
     }
-    serde_json::from_slice(&output.stdout).map_err(|e| failed(e.into()))
 }
 
 /// The command that advances the run, with an answer in JSON.

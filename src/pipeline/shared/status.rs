@@ -58,7 +58,9 @@ pub struct Status {
     pub new: Vec<u32>,
     /// The attempts at the work between this generation and the next.
     pub advance: Option<Begun>,
-    /// True if all shards are finished, so the next generation can be made.
+    /// True if a process found the work of others damaged; `advance` then finds out what of it is.
+    pub damaged: bool,
+    /// True if the next generation can be made: all shards are finished, or damaged work is to be made again.
     pub can_advance: bool,
     /// True if the mesh is finished.
     pub finished: bool,
@@ -162,7 +164,10 @@ impl Begun {
             attempts: attempts.count,
             state,
             silent_seconds: silent.as_secs(),
-            why: attempts.failed.as_ref().map(|(_, why)| why.clone()),
+            why: attempts
+                .failed
+                .as_ref()
+                .map(|(_, failure)| failure.why.clone()),
         }
     }
 }
@@ -242,6 +247,7 @@ pub fn status(path: &Path) -> Result<Status> {
         begun: Vec::new(),
         new: Vec::new(),
         advance: None,
+        damaged: folder.is_damaged(&generation)?,
         can_advance: false,
         finished: generation.finished,
         points: None,
@@ -262,7 +268,7 @@ pub fn status(path: &Path) -> Result<Status> {
     }
     let advances = folder.advances(&generation)?;
     status.advance = (advances.count > 0).then(|| Begun::of(None, &advances, now));
-    status.can_advance = !status.finished && status.missing().is_empty();
+    status.can_advance = !status.finished && (status.damaged || status.missing().is_empty());
     add_times(&mut status, &folder, &generation, now);
     Ok(status)
 }

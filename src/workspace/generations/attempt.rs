@@ -24,7 +24,7 @@ impl SharedFolder {
         resources: &Resources<'_>,
     ) -> Result<Opened> {
         let number = generation.number;
-        if generation.range(shard).is_empty() || self.done(number, shard).exists() {
+        if !generation.is_left(shard) || self.done(number, shard).exists() {
             return Ok(Opened::Done);
         }
         let folder = self.tasks(number);
@@ -50,7 +50,7 @@ impl SharedFolder {
     }
 
     /// A new journal, the first of these paths that does not exist.
-    fn claim(&self, path: impl Fn(u32) -> PathBuf) -> Result<(u32, PathBuf, Journal)> {
+    pub(super) fn claim(&self, path: impl Fn(u32) -> PathBuf) -> Result<(u32, PathBuf, Journal)> {
         for attempt in 0..TRIES {
             let path = path(attempt);
             match Journal::create(&path) {
@@ -65,7 +65,7 @@ impl SharedFolder {
         })
     }
 
-    fn run(
+    pub(super) fn run(
         &self,
         role: Role,
         first: Option<u32>,
@@ -112,38 +112,51 @@ impl SharedFolder {
         if generation.finished {
             return Ok(Opened::Done);
         }
-        let (mut missing, mut done) = (Vec::new(), Vec::new());
-        for shard in 0..generation.sharing.shards {
-            let parts = generation.parts(shard);
-            if !parts.is_empty() {
-                match self.task_records(&generation, shard, &parts)? {
-                    Some(path) => done.push(path),
-                    None => missing.push(shard),
-                }
-            }
-        }
+        let (done, missing) = self.finished_tasks(&generation)?;
         if !missing.is_empty() {
             return Ok(Opened::Missing(missing));
         }
         let number = generation.number + 1;
         let (attempt, path, _) = self.claim(|attempt| self.attempt(number, attempt))?;
-        let first = generation.first_segment(generation.sharing.shards, attempt);
-        let next = generation.first_segment(generation.sharing.shards + 1, 0);
         let journal = self.copy(&generation, &path)?;
         for done in done {
-            append(&journal, &done)?;
+            append(&journal, &done, of_task)?;
         }
+        self.go_on(&generation, attempt, (journal, path), resources)
+    }
+
+    /// The run of a process that makes the generation after this one, whose journal was begun.
+    pub(super) fn go_on(
+        &self,
+        generation: &Generation,
+        attempt: u32,
+        (journal, path): (Journal, PathBuf),
+        resources: &Resources<'_>,
+    ) -> Result<Opened> {
+        let first = generation.first_segment(generation.sharing.shards, attempt);
+        let next = generation.first_segment(generation.sharing.shards + 1, 0);
         journal.append(Record::Attempt(next.unwrap_or(u32::MAX)))?;
-        let state = self.read_journal(number, &path)?;
-        let past = path.clone();
-        let run = self.run(
-            Role::Between,
-            first,
-            state,
-            (journal, path, past),
-            resources,
-        )?;
+        let state = self.read_journal(generation.number + 1, &path)?;
+        let journal = (journal, path.clone(), path);
+        let run = self.run(Role::Between, first, state, journal, resources)?;
         Ok(Opened::Run(Box::new(run)))
+    }
+
+    /// The journals of the finished tasks of a generation, and the shards without one.
+    pub(super) fn finished_tasks(
+        &self,
+        generation: &Generation,
+    ) -> Result<(Vec<PathBuf>, Vec<u32>)> {
+        let (mut done, mut missing) = (Vec::new(), Vec::new());
+        for shard in 0..generation.sharing.shards {
+            if generation.is_left(shard) {
+                match self.task_records(generation, shard, &generation.parts(shard))? {
+                    Some(path) => done.push(path),
+                    None => missing.push(shard),
+                }
+            }
+        }
+        Ok((done, missing))
     }
 
     /// Copies the journal of a generation to `path`, to continue it there.
@@ -194,7 +207,8 @@ impl SharedFolder {
         }
         let mut wanted = parts
             .iter()
-            .flat_map(|(step, range)| range.clone().map(|unit| (step.clone(), unit)));
+            .flat_map(|(step, range)| range.clone().map(|unit| (step.clone(), unit)))
+            .filter(|(step, unit)| generation.history.payload(step, *unit).is_none());
         let whole = |(name, end): (&String, &u64)| {
             // Opening a file asks the server for its size; looking at it may not.
             let file = open_existing(&self.path.join(name)).and_then(|file| file.metadata());
@@ -209,23 +223,32 @@ impl SharedFolder {
     }
 }
 
-/// Appends the records of a task's journal.
-fn append(journal: &Journal, path: &Path) -> Result<()> {
+/// True for the records of a task that stay.
+pub(super) fn of_task(entry: &Entry<'_>) -> bool {
+    !matches!(entry.record, Record::Task(_))
+}
+
+/// Appends those records of the journal `path` for which `which` is true.
+pub(super) fn append(
+    journal: &Journal,
+    path: &Path,
+    which: impl Fn(&Entry<'_>) -> bool,
+) -> Result<()> {
     let (mut outcome, file) = (Ok(()), journal::open(path)?);
     journal::read(path, None, |entry| {
-        let mut record = entry.record.clone();
-        outcome = match &mut record {
-            Record::Task(_) => return true,
-            Record::Unit { payload, .. } => {
-                let (_, offset, bytes) = entry.payload;
-                journal::payload(path, &file, offset, bytes).map(|bytes| *payload = bytes)
-            }
-            _ => Ok(()),
-        };
-        if outcome.is_ok() {
-            outcome = journal.append(record);
+        if which(entry) {
+            outcome = append_one(journal, path, &file, entry);
         }
         outcome.is_ok()
     })?;
     outcome
+}
+
+fn append_one(journal: &Journal, path: &Path, file: &File, entry: &Entry<'_>) -> Result<()> {
+    let mut record = entry.record.clone();
+    if let Record::Unit { payload, .. } = &mut record {
+        let (_, offset, bytes) = entry.payload;
+        *payload = journal::payload(path, file, offset, bytes)?;
+    }
+    journal.append(record)
 }

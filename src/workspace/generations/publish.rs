@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use crate::workspace::Workspace;
 use crate::workspace::fault::{self, Event};
 use crate::workspace::folder::data;
-use crate::workspace::journal::{OpenStep, Record};
+use crate::workspace::journal::{Failure, OpenStep, Record};
 use crate::workspace::open::open_existing;
 use crate::workspace::run::ResumableRun;
 use std::fs::File;
@@ -170,11 +170,32 @@ impl Workspace {
             .map_or_else(Vec::new, ResumableRun::segments_made)
     }
 
-    /// Notes in the journal of this process why it failed, for those who ask for the state of the run.
-    pub fn note_failure(&self, error: &Error) {
-        if let Some(run) = self.run() {
-            // It may be the disk that is full.
-            let _ = run.journal().append(Record::Failed(error.to_string()));
+    /// Notes in the journal of this process why it failed, for those who ask for the state of the run. An
+    /// error that tells of damaged scratch files becomes [`Error::Damaged`].
+    #[must_use]
+    pub fn note_failure(&self, error: Error) -> Error {
+        let Some(run) = self.run() else { return error };
+        let damage = match &error {
+            Error::Corrupt { path, .. } => path.starts_with(&self.folder),
+            Error::Io { path, source, .. } => {
+                let lost = matches!(
+                    source.kind(),
+                    ErrorKind::NotFound | ErrorKind::UnexpectedEof
+                );
+                lost && path.starts_with(&self.folder)
+            }
+            _ => false,
+        };
+        let why = error.to_string();
+        // It may be the disk that is full.
+        let _ = run
+            .journal()
+            .append(Record::Failed(Failure { why, damage }));
+        match damage {
+            true => Error::Damaged {
+                source: Box::new(error),
+            },
+            false => error,
         }
     }
 

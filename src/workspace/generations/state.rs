@@ -2,9 +2,9 @@
 
 use super::{Generation, SharedFolder};
 use crate::error::{Error, Result};
-use crate::workspace::journal::{self, Record};
+use crate::workspace::journal::{self, Failure, Record};
 use std::io::ErrorKind;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 /// The state of a shard.
@@ -28,7 +28,7 @@ pub struct Attempts {
     /// The time when one of them last wrote to its journal.
     pub written: Option<SystemTime>,
     /// Number of the last one that told why it failed, and its reason.
-    pub failed: Option<(u32, String)>,
+    pub failed: Option<(u32, Failure)>,
 }
 
 impl Attempts {
@@ -44,6 +44,14 @@ impl Attempts {
         }
     }
 
+    /// True if the last one failed because the work of others is damaged.
+    #[must_use]
+    pub fn found_damage(&self) -> bool {
+        self.failed
+            .as_ref()
+            .is_some_and(|(_, failure)| failure.damage)
+    }
+
     /// True if no attempt can be at work: all of them told that they failed, or the last one did.
     #[must_use]
     pub fn all_failed(&self) -> bool {
@@ -54,12 +62,12 @@ impl Attempts {
 }
 
 /// The reason why an attempt failed, if its journal tells.
-fn reason(path: &Path) -> Option<String> {
+fn reason(path: &Path) -> Option<Failure> {
     let mut why = None;
     // A journal that cannot be read tells nothing.
     let _ = journal::read(path, None, |entry| {
-        if let Record::Failed(text) = entry.record {
-            why = Some(text.clone());
+        if let Record::Failed(failure) = entry.record {
+            why = Some(failure.clone());
         }
         true
     });
@@ -73,9 +81,9 @@ impl SharedFolder {
     /// [`Error::Io`].
     pub fn shards(&self, generation: &Generation) -> Result<Vec<Shard>> {
         let count = generation.sharing.shards;
-        let state = |shard| match generation.range(shard).is_empty() {
-            true => Shard::Empty,
-            false => Shard::New,
+        let state = |shard| match generation.is_left(shard) {
+            true => Shard::New,
+            false => Shard::Empty,
         };
         let mut shards: Vec<Shard> = (0..count).map(state).collect();
         let folder = self.tasks(generation.number);
@@ -129,6 +137,39 @@ impl SharedFolder {
             }
         }
         Ok(attempts)
+    }
+
+    /// The journals of processes that found damage.
+    pub(super) fn failed(&self, generation: &Generation) -> Result<Vec<PathBuf>> {
+        let mut paths = Vec::new();
+        for (shard, state) in self.shards(generation)?.into_iter().enumerate() {
+            if let Shard::Begun(Attempts {
+                failed: Some((attempt, failure)),
+                ..
+            }) = state
+                && failure.damage
+            {
+                let name = format!("{shard}.{attempt}");
+                paths.push(self.tasks(generation.number).join(name));
+            }
+        }
+        if let Some((attempt, failure)) = self.advances(generation)?.failed
+            && failure.damage
+        {
+            paths.push(self.attempt(generation.number + 1, attempt));
+        }
+        Ok(paths)
+    }
+
+    /// True if a process of this generation found the work of others damaged.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn is_damaged(&self, generation: &Generation) -> Result<bool> {
+        let shards = self.shards(generation)?;
+        let task =
+            |shard: &Shard| matches!(shard, Shard::Begun(attempts) if attempts.found_damage());
+        Ok(shards.iter().any(task) || self.advances(generation)?.found_damage())
     }
 
     /// Seconds of wall-clock time of each finished task of a generation.

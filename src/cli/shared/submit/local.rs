@@ -2,6 +2,7 @@
 
 use super::super::Submit;
 use super::{TRIES, advance, advance_command, mebibytes, program, state};
+use crate::cli::DAMAGED;
 use crate::cli::output::print;
 use crate::error::{Error, Result};
 use crate::pipeline::{self, Status, default_threads};
@@ -87,10 +88,11 @@ impl<'a> Local<'a> {
             if !status.can_advance {
                 self.work_all(&status)?;
             }
-            let after = advance(&mut self.advance())?;
-            print(&after.to_string())?;
-            if after.finished {
-                return Ok(true);
+            if let Some(after) = advance(&mut self.advance())? {
+                print(&after.to_string())?;
+                if after.finished {
+                    return Ok(true);
+                }
             }
         }
     }
@@ -110,6 +112,8 @@ impl<'a> Local<'a> {
                 let before = lock(&tries).get(&shard).copied().unwrap_or_default();
                 let (problem, lost) = match self.work(status, shard, before).status() {
                     Ok(status) if status.success() => continue,
+                    // The next advance makes it good.
+                    Ok(status) if status.code() == Some(DAMAGED.into()) => continue,
                     Ok(status) => {
                         let problem = std::io::Error::other(format!("shard {shard}: {status}"));
                         (problem, status.code() != Some(2))

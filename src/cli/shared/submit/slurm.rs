@@ -1,7 +1,7 @@
 //! Jobs of Slurm: an array of tasks, and a job after it that advances the run and submits the next ones.
 
 use super::super::Submit;
-use super::{TRIES, advance, advance_command, mebibytes, program, state};
+use super::{advance, advance_command, mebibytes, program, state};
 use crate::cli::output::print;
 use crate::cli::{stop, style};
 use crate::error::{Error, Result};
@@ -103,9 +103,11 @@ impl<'a> Slurm<'a> {
         let status = match (self.args.inside, status.can_advance) {
             (true, true) => {
                 let after = advance(&mut advance_command(&self.program, self.args, &self.folder))?;
-                print(&after.to_string())?;
-                if after.finished {
-                    return Ok(true);
+                if let Some(after) = after {
+                    print(&after.to_string())?;
+                    if after.finished {
+                        return Ok(true);
+                    }
                 }
                 state(&self.folder)?
             }
@@ -156,10 +158,9 @@ impl<'a> Slurm<'a> {
             let ended = ended.map_err(|e| Error::io(&shown, "run", e))?;
             // Tasks that failed are found missing, and run again. An advance is so if it was killed.
             if advances && !ended.success() {
-                let again = state(&self.folder)?.advance;
-                let killed =
-                    again.is_some_and(|a| a.state != TaskState::Failed && a.attempts < TRIES);
-                if !killed {
+                let now = state(&self.folder)?;
+                let failed = now.advance.is_none_or(|a| a.state == TaskState::Failed);
+                if failed && now.can_advance && !now.damaged {
                     let why = std::io::Error::other(format!(
                         "the job failed; see {}/logs",
                         self.folder.display()
