@@ -21,7 +21,9 @@ pub use builder::Builder;
 use checks::{not_an_input, writable};
 pub(crate) use clock::Clock;
 pub(crate) use disk::Known;
-pub use shared::{Advanced, Begun, MOST_SHARDS, Status, TaskState, Totals, Worked, status};
+pub use shared::{
+    Advanced, Begun, MOST_SHARDS, Status, TaskState, Totals, Worked, planned_shards, status,
+};
 use stages::Stages;
 pub use start::Start;
 use std::path::{Path, PathBuf};

@@ -245,7 +245,7 @@ fn opened(folder: &std::path::Path, process: &Process) -> Result<Reconstruction>
 pub fn work(args: &Work) -> Result<bool> {
     let shard = shard::chosen(args)?;
     if let Some(count) = shard.count {
-        let planned = pipeline::status(&args.folder)?.shards;
+        let planned = pipeline::planned_shards(&args.folder)?;
         if planned != count {
             return Err(Error::Parameter {
                 name: "--shard",

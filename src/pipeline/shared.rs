@@ -63,6 +63,14 @@ fn program() -> Result<u32> {
     Ok(crc.finalize())
 }
 
+/// The number of shards that were planned for the run in a folder.
+///
+/// # Errors
+/// [`Error::NotResumable`], [`Error::Io`], [`Error::Corrupt`].
+pub fn planned_shards(folder: &Path) -> Result<u32> {
+    Ok(SharedFolder::open(folder)?.sharing()?.shards)
+}
+
 impl Reconstruction {
     /// Plans a run that tasks share in `shards` shards. The threads and the memory of this run are those of
     /// each task. Returns its folder.
