@@ -30,7 +30,11 @@ fn files_that_lie_or_end_early_are_refused_with_the_place() {
     assert!(spool.stats().warnings[0].contains("40 records after"));
     for (name, text, says) in [
         ("a.pts", "5\n1 2 3\n4 5 6\n", "count line: found 5 points"),
-        ("a.e57", "ASTM-E57 and more", "found E57, which is not read"),
+        (
+            "a.obj",
+            "v 1 2 3\nv 4 5 6\n",
+            "found OBJ, which is not read",
+        ),
         ("b.las", "1 2 3\n4 5 6\n", "no signature \"LASF\""),
         ("c.xyz", "\u{0}\u{1}", "binary data"),
         (

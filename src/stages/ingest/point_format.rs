@@ -92,6 +92,11 @@ pub(super) trait PointFile {
         None
     }
 
+    /// The positions of the scanners, in the unit of the points; all of them when the points were read.
+    fn scanners(&self) -> Vec<[f64; 3]> {
+        Vec::new()
+    }
+
     /// Reads all points, in units of at most a few MiB; returns warnings.
     ///
     /// # Errors

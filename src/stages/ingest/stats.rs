@@ -15,6 +15,8 @@ pub struct IngestStats {
     pub dropped_non_finite: u64,
     /// Points left out because they are flagged as withheld.
     pub withheld: u64,
+    /// Records of scans that the scanner marked as no point, since nothing came back.
+    pub invalid: u64,
     /// Points left out because their class is not wanted.
     pub dropped_by_class: u64,
     /// The counts of each file, in the order given.
@@ -48,12 +50,16 @@ pub struct FileStats {
     pub dropped_non_finite: u64,
     /// Points left out because they are flagged as withheld.
     pub withheld: u64,
+    /// Records of scans that the scanner marked as no point, since nothing came back.
+    pub invalid: u64,
     /// Points left out because their class is not wanted.
     pub dropped_by_class: u64,
     /// Lowest coordinates of the kept points, in the file's unit; `None` without points.
     pub min: Option<[f64; 3]>,
     /// Highest coordinates of the kept points, in the file's unit; `None` without points.
     pub max: Option<[f64; 3]>,
+    /// The positions of the scanners given in the file, in its unit.
+    pub scanners: Vec<[f64; 3]>,
 }
 
 /// Exact statistics of one source, in its native form; merging is commutative.
@@ -63,6 +69,8 @@ pub(super) struct SourceStats {
     pub(super) kept: u64,
     pub(super) dropped: u64,
     pub(super) withheld: u64,
+    /// Records that the scanner marked as no point.
+    pub(super) invalid: u64,
     /// Points left out because of their class.
     pub(super) unwanted: u64,
     pub(super) min: [f64; 3],
@@ -82,6 +90,7 @@ impl Default for SourceStats {
             kept: 0,
             dropped: 0,
             withheld: 0,
+            invalid: 0,
             unwanted: 0,
             min: [f64::INFINITY; 3],
             max: [f64::NEG_INFINITY; 3],
@@ -98,6 +107,7 @@ impl SourceStats {
         self.kept += other.kept;
         self.dropped += other.dropped;
         self.withheld += other.withheld;
+        self.invalid += other.invalid;
         self.unwanted += other.unwanted;
         for axis in 0..3 {
             self.min[axis] = self.min[axis].min(other.min[axis]);

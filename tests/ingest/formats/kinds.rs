@@ -1,6 +1,6 @@
 //! The kinds of files: their makers, and files of other programs by kind.
 
-use super::{compressed, las, ply, text};
+use super::{compressed, e57, las, pcd, ply, ptx, text};
 use crate::bench::Bench;
 use std::path::PathBuf;
 
@@ -84,6 +84,28 @@ pub const KINDS: &[(&str, Kind)] = &[
         "LAZ that claims more points than its size allows",
         las::bomb,
     ),
+    ("E57 with one scan or several, and poses", e57::scans),
+    (
+        "E57 with coordinates of every type, and spherical ones",
+        e57::types,
+    ),
+    ("directions of an E57 scan without a point", e57::states),
+    ("E57 of which all points are the same", e57::same),
+    ("E57 without scans, or scans without points", e57::none),
+    ("E57 that ends early", e57::cut),
+    ("an E57 header that ends early", e57::short),
+    ("another version, size of pages, or length", e57::headers),
+    ("a page with a wrong checksum", e57::pages),
+    ("an E57 description that is damaged", e57::descriptions),
+    ("E57 records without coordinates", e57::no_coordinates),
+    ("a pose that is none", e57::no_rotation),
+    (
+        "E57 that claims more points than there is room for",
+        e57::bombs,
+    ),
+    ("two E57 scans with the same points", e57::shared),
+    ("an E57 section that is damaged", e57::sections),
+    ("E57 packets that are damaged", e57::packets),
     ("text, little-endian and big-endian", ply::bodies),
     (
         "coordinates that are `float`, `double` or whole numbers",
@@ -132,6 +154,57 @@ pub const KINDS: &[(&str, Kind)] = &[
         let text = ply::text("1", "1 2 3\n");
         vec![b.write("a.ply", format!("\u{feff}{text}"))]
     }),
+    ("PCD as text, binary, and compressed", pcd::bodies),
+    ("PCD with coordinates of every type", pcd::types),
+    ("padding between the fields of PCD", pcd::padded),
+    (
+        "PCD headers of other versions, or with less in them",
+        pcd::headers,
+    ),
+    ("PCD with coordinates that are not finite", pcd::not_finite),
+    ("PCD as text, with tabs or commas", pcd::separators),
+    ("PCD as text, with more lines than points", |b| {
+        vec![pcd::header(b, "POINTS 2", "POINTS 1")]
+    }),
+    ("PCD as text that ends early", |b| pcd::cut(b, "ascii")),
+    ("a line of PCD that is no point", |b| {
+        vec![
+            pcd::header(b, "2 3 1", "2 3 one"),
+            pcd::header(b, "e+06 1\n", "e+06\n"),
+        ]
+    }),
+    ("binary PCD that ends early", |b| pcd::cut(b, "binary")),
+    ("compressed PCD that ends early", |b| {
+        pcd::cut(b, "binary_compressed")
+    }),
+    ("compressed PCD with damaged data", pcd::damaged),
+    (
+        "compressed PCD whose size is not that of its points",
+        pcd::other_sizes,
+    ),
+    (
+        "compressed PCD that claims more than there can be",
+        pcd::bombs,
+    ),
+    ("PCD without a field z", pcd::no_z),
+    (
+        "two fields x in PCD, or one with several values",
+        pcd::twice,
+    ),
+    ("a word in a PCD header that it does not have", pcd::unknown),
+    (
+        "a PCD header without end, or of more than 1 MiB",
+        pcd::endless,
+    ),
+    ("PTX with one scan or several", ptx::scans),
+    (
+        "directions without a point, and scans without any",
+        ptx::empty,
+    ),
+    ("PTX that ends early", ptx::cut),
+    ("the header of a later scan that is none", ptx::no_header),
+    ("a matrix for points in columns", ptx::columns),
+    ("a line of PTX that is no point", ptx::bad_line),
     (
         "spaces, tabs, commas or semicolons between numbers",
         text::separators,
@@ -201,14 +274,6 @@ pub const KINDS: &[(&str, Kind)] = &[
         ["a.las", "a.laz", "a.ply", "a.xyz", "a"]
             .map(|name| b.write(name, ""))
             .into()
-    }),
-    ("E57", |b| vec![b.write("a.e57", "ASTM-E57 and more")]),
-    ("PCD", |b| {
-        vec![b.write("a.pcd", "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z\n")]
-    }),
-    ("PTX", |b| {
-        let head = "1\n1\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n";
-        vec![b.write("a.ptx", head.to_owned() + "1 2 3 0.5\n")]
     }),
     ("OBJ", |b| {
         vec![b.write("a.obj", "v 1 2 3\nv 4 5 6\nv 7 8 9\nf 1 2 3\n")]
@@ -412,8 +477,25 @@ pub const ZOO: &[(&str, &[&str])] = &[
     ("UTF-16", &["generated/utf16.xyz"]),
     ("an empty file", &["generated/empty_file.las"]),
     (
-        "E57",
+        "E57 with one scan or several, and poses",
         &["e57/bunnyFloat.e57", "generated/two_scans_pose.e57"],
     ),
-    ("PTX", &["generated/two_scans.ptx"]),
+    ("E57 that ends early", &["generated/trunc60.e57"]),
+    (
+        "a page with a wrong checksum",
+        &["generated/badcrc.e57", "e57/corrupt_crc.e57"],
+    ),
+    (
+        "PCD as text, with tabs or commas",
+        &["pdal/utm17_tab.pcd", "pdal/utm17_comma.pcd"],
+    ),
+    (
+        "PTX with one scan or several",
+        &["pdal/multiple-and-transform.ptx", "pdal/1.2-with-color.ptx"],
+    ),
+    (
+        "directions without a point, and scans without any",
+        &["generated/two_scans.ptx", "pdal/complex-transform.ptx"],
+    ),
+    ("PTX that ends early", &["generated/trunc.ptx"]),
 ];

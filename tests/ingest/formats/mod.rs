@@ -1,9 +1,12 @@
 //! The outcomes in `docs/formats.md`, checked for each kind of file.
 
 mod compressed;
+pub mod e57;
 mod kinds;
 mod las;
+pub mod pcd;
 mod ply;
+pub mod ptx;
 mod text;
 
 use crate::bench::Bench;

@@ -87,7 +87,7 @@ fn geotiff(mut keys: GeoTiffCrs) -> Option<Crs> {
 }
 
 /// The system described by a well-known text, version 1 or 2.
-fn well_known(text: &str) -> Crs {
+pub(in super::super) fn well_known(text: &str) -> Crs {
     let mut crs = Crs {
         horizontal: None,
         vertical: None,

@@ -9,6 +9,7 @@ mod plain;
 mod table;
 mod vlr;
 
+pub(super) use crs::well_known;
 use header::Header;
 
 /// Byte of a record with the withheld flag, in all point formats.
