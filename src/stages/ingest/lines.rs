@@ -34,7 +34,7 @@ impl Lines {
         let skip = match bytes.iter().position(|b| is_end(*b)) {
             _ if before == 0 => 0,
             Some(end) => end + 1,
-            None if full => return Err(too_long(input, start)),
+            None if full => return Err(too_long(input, start, LONGEST_LINE)),
             None => got,
         };
         // A line that starts exactly at the end of the slab belongs to the next one.
@@ -64,7 +64,7 @@ impl Lines {
                 return Ok(());
             }
             if (bytes.len() - begun) as u64 > LONGEST_LINE {
-                return Err(too_long(input, at + begun as u64));
+                return Err(too_long(input, at + begun as u64, LONGEST_LINE));
             }
         }
     }
@@ -81,11 +81,11 @@ impl Lines {
 }
 
 /// The error of a line that does not end.
-pub(super) fn too_long(input: &Input, at: u64) -> crate::Error {
+pub(super) fn too_long(input: &Input, at: u64, most: u64) -> crate::Error {
     input.error(
         format!("line around byte {at}"),
         "no line end",
-        format!("lines of at most {LONGEST_LINE} bytes"),
+        format!("lines of at most {most} bytes"),
     )
 }
 

@@ -223,11 +223,16 @@ pub fn patched(bench: &Bench, name: &str, scan: Scan, edits: &[(usize, &[u8])]) 
     for (at, new) in edits {
         bytes[*at..*at + new.len()].copy_from_slice(new);
     }
+    seal(&mut bytes);
+    bench.write(name, bytes)
+}
+
+/// Corrects the checksums.
+pub fn seal(bytes: &mut [u8]) {
     for page in bytes.chunks_exact_mut(1024) {
         let sum = crc32c::crc32c(&page[..1020]).to_be_bytes();
         page[1020..].copy_from_slice(&sum);
     }
-    bench.write(name, bytes)
 }
 
 pub fn headers(bench: &Bench) -> Vec<PathBuf> {

@@ -161,7 +161,7 @@ impl Parser<'_> {
                     return Err(self.wrong("one more", expected));
                 }
             }
-            ["data3D", "vectorChild", "points", "prototype", ..] => {
+            ["data3D", "vectorChild", "points", "prototype", _, _, ..] => {
                 let expected = "numbers that are not nested";
                 return Err(self.wrong("a part of a record that has parts", expected));
             }

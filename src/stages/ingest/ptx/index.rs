@@ -13,6 +13,9 @@ use std::io::{BufRead, BufReader};
 /// Most bytes of lines in a unit; no line is longer.
 pub(super) const UNIT: u64 = 2 << 20;
 
+/// Most bytes of a line of a header.
+const LONGEST_ROW: u64 = 4096;
+
 /// Most scans in a file.
 const MOST_SCANS: usize = 1 << 16;
 
@@ -122,13 +125,19 @@ impl<'a> Reader<'a> {
             let end = buffer[from..].iter().position(|b| lines::is_end(*b));
             let to = end.map_or(buffer.len(), |end| from + end);
             if let Some(line) = &mut keep {
-                line.extend_from_slice(&buffer[from..to]);
+                let most = to.min(from + LONGEST_ROW as usize);
+                line.extend_from_slice(&buffer[from..most]);
             }
             self.source.consume(to);
             self.at += to as u64;
             let Some(start) = start else { continue };
-            if self.at - start > LONGEST_LINE {
-                return Err(lines::too_long(self.input, start));
+            let most = if keep.is_some() {
+                LONGEST_ROW
+            } else {
+                LONGEST_LINE
+            };
+            if self.at - start > most {
+                return Err(lines::too_long(self.input, start, most));
             }
             if end.is_some() {
                 return Ok(Some((start, self.at)));
