@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::method::METHOD;
-use crate::stages::ingest::Classes;
+use crate::stages::ingest::{Attributes, Classes};
 pub use crate::stages::smooth::Smoothing;
 use crate::stages::spacing::{Limits, Width};
 pub use crate::stages::surface::evidence::Division;
@@ -107,6 +107,10 @@ impl std::fmt::Display for MaxWidth {
 pub struct Params {
     /// Classes of the points that are read.
     pub classes: Classes,
+    /// Columns of the points that the mesh keeps, such as colours.
+    pub attributes: Attributes,
+    /// Colours with 16 bits instead of 8.
+    pub wide_colors: bool,
     /// Keep at most one point in each cube of this side, in the input's unit.
     pub thin: Option<f64>,
     /// Drop points whose spacing is more than this factor times that of the points around them.
@@ -159,6 +163,8 @@ impl Default for Params {
     fn default() -> Self {
         Self {
             classes: Classes::All,
+            attributes: Attributes::None,
+            wide_colors: false,
             thin: None,
             drop_outliers: None,
             method: Method::Robust,

@@ -3,7 +3,7 @@
 use crate::method::METHOD;
 use crate::params::{MaxWidth, Method, Params, Radius, Smoothing};
 use crate::pipeline::{Builder, Reconstruction, Start};
-use crate::stages::ingest::Classes;
+use crate::stages::ingest::{Attributes, Classes};
 use crate::workspace::mapped::Io;
 use crate::workspace::{Compression, Storage};
 use clap::Args as ClapArgs;
@@ -66,6 +66,19 @@ pub struct Points {
     /// Read only points of these classes (LAS, LAZ), e.g. 2,6 for ground and buildings
     #[arg(long, value_name = "CLASSES", value_delimiter = ',')]
     pub keep_classes: Vec<u8>,
+}
+
+/// Columns that the mesh keeps.
+#[derive(Debug, ClapArgs)]
+#[command(next_help_heading = "Attributes")]
+pub struct Columns {
+    /// Keep the points' own values at the vertices: auto (colours, intensity and classification, unless they are
+    /// the same everywhere), none, or a list of columns by name like color,intensity,gps_time
+    #[arg(long, value_name = "auto|none|LIST", default_value = "none")]
+    pub attributes: Attributes,
+    /// Write colours with 16 bits instead of 8
+    #[arg(long)]
+    pub wide_colors: bool,
 }
 
 /// Selection of points by position.
@@ -179,6 +192,8 @@ pub struct Job {
     pub points: Points,
     #[command(flatten)]
     pub filters: Filters,
+    #[command(flatten)]
+    pub columns: Columns,
     #[command(flatten)]
     pub surface: Surface,
     #[command(flatten)]
@@ -344,6 +359,8 @@ impl Job {
         };
         Params {
             classes: self.points.classes(),
+            attributes: self.columns.attributes.clone(),
+            wide_colors: self.columns.wide_colors,
             thin: self.filters.thin,
             drop_outliers: self.filters.drop_outliers,
             neighbors: self.surface.neighbors,

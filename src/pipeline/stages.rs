@@ -8,10 +8,11 @@ use crate::geom::lattice::Lattice;
 use crate::method::METHOD;
 use crate::params::Method;
 use crate::report::{LatticeReport, Report};
+use crate::stages::attributes::{StoredColumns, attributes};
 use crate::stages::blocks::Blocks;
 use crate::stages::cells::{CellTriples, DiskRadius, TileRanges, Widen, cells};
 use crate::stages::export::{CoordinateType, ExportOptions, export};
-use crate::stages::ingest::{self, Spool, ingest_classes};
+use crate::stages::ingest::{self, Carried, Selection, Spool, ingest_selected};
 use crate::stages::located::Places;
 use crate::stages::order::{Orderer, PointStore, StoredPoints, order, sample_sort};
 use crate::stages::outliers::{OutlierOptions, drop_outliers};
@@ -39,6 +40,7 @@ pub(super) struct Stages<'a> {
     clock: Clock<'a>,
     begin: Instant,
     known: Known,
+    carried: Carried,
     report: Report,
 }
 
@@ -57,6 +59,7 @@ impl<'a> Stages<'a> {
             clock: Clock::new(workspace),
             begin: Instant::now(),
             known: headers.unwrap_or_default(),
+            carried: Carried::default(),
             report: Report {
                 version: env!("CARGO_PKG_VERSION"),
                 parameters: job.params.clone(),
@@ -95,9 +98,15 @@ impl<'a> Stages<'a> {
     pub fn ingest(&mut self) -> Result<(Spool, Lattice)> {
         let (job, workspace) = (self.job, self.workspace);
         let params = &job.params;
+        let selection = Selection {
+            classes: params.classes.clone(),
+            attributes: params.attributes.clone(),
+        };
         let spool = self.clock.stage("ingest", "points", 0, || {
-            ingest_classes(&job.inputs, &params.classes, workspace)
+            ingest_selected(&job.inputs, &selection, workspace)
         })?;
+        self.carried = spool.carried(&params.attributes, params.wide_colors);
+        self.report.attributes = self.carried.attributes.clone();
         let input = spool.stats().clone();
         self.report.coordinates = match spool.source_precision() {
             ingest::CoordinateType::F32 => CoordinateType::Float,
@@ -156,7 +165,9 @@ impl<'a> Stages<'a> {
             self.report.duplicates_folded = folded;
             store
         };
-        spool.release(workspace)?;
+        if self.carried.columns.is_empty() {
+            spool.release(workspace)?;
+        }
         self.warn_of_input(lattice);
         enough(&store)?;
         self.known.points = store.len() as u64;
@@ -169,7 +180,8 @@ impl<'a> Stages<'a> {
     fn warn_of_input(&mut self, lattice: &Lattice) {
         let input = &self.report.input;
         let (kept, left_out) = (input.kept, input.dropped_non_finite);
-        for warning in input.warnings.clone() {
+        let warnings = [input.warnings.clone(), self.carried.warnings.clone()];
+        for warning in warnings.concat() {
             self.warn(warning);
         }
         if left_out > 0 {
@@ -206,6 +218,26 @@ impl<'a> Stages<'a> {
         self.report.outliers = stats;
         self.report.points = store.len() as u64;
         Ok(store)
+    }
+
+    /// The columns of the points that remain, if the mesh keeps any.
+    pub fn attributes(
+        &mut self,
+        spool: &Spool,
+        lattice: &Lattice,
+        store: &StoredPoints,
+    ) -> Result<Option<StoredColumns>> {
+        if self.carried.columns.is_empty() {
+            return Ok(None);
+        }
+        let (workspace, blocks, carried) = (self.workspace, self.blocks(), &self.carried);
+        let columns = self
+            .clock
+            .stage("attributes", "points", spool.points(), || {
+                attributes(spool, lattice, carried, store, blocks, workspace)
+            })?;
+        spool.release(workspace)?;
+        Ok(Some(columns))
     }
 
     /// The radius of the disks; a percentage refers to the points before smoothing.
@@ -378,6 +410,7 @@ impl<'a> Stages<'a> {
     pub fn export(
         &mut self,
         store: &PointStore,
+        columns: Option<&StoredColumns>,
         repaired: &Repaired,
         lattice: &Lattice,
     ) -> Result<()> {
@@ -387,12 +420,13 @@ impl<'a> Stages<'a> {
             coordinates: self.report.coordinates,
             comments: Vec::new(),
             origin: None,
+            columns,
         };
         let items = 2 * blocks.count() as u64;
         self.report.mesh = self.clock.stage("export", "blocks", items, || {
             export(store, repaired, blocks, lattice, options, workspace)
         })?;
-        Ok(())
+        columns.map_or(Ok(()), |columns| columns.release(workspace))
     }
 
     /// The report of the run.

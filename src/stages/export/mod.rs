@@ -17,14 +17,16 @@ pub use format::CoordinateType;
 use crate::error::{Error, Result};
 use crate::geom::lattice::Lattice;
 use crate::spill::Inbox;
+use crate::stages::attributes::StoredColumns;
 use crate::stages::blocks::Blocks;
+use crate::stages::ingest::Column;
 use crate::stages::order::PointStore;
 use crate::stages::repair::{FilledTriangle, Repaired, Surface};
 use crate::workspace::memory::bytes_of;
 use crate::workspace::{Unit, Workspace};
 use faces::Faces;
 use file::{Edge, HEADER, MeshFile};
-use format::{Mesh, MeshFormat};
+use format::{Mesh, MeshFormat, VertexColumn};
 use number::Numbering;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
@@ -85,6 +87,8 @@ pub struct ExportOptions<'a> {
     pub comments: Vec<String>,
     /// The position of the cloud that is the origin of the mesh, if it is not that of the cloud.
     pub origin: Option<[f64; 3]>,
+    /// Columns of the points.
+    pub columns: Option<&'a StoredColumns>,
 }
 
 /// Writes the mesh.
@@ -105,7 +109,13 @@ pub fn export(
         coordinates,
         comments,
         origin,
+        columns,
     } = options;
+    let of_points = columns.map(StoredColumns::columns).unwrap_or_default();
+    let vertex_column = |c: &Column| VertexColumn {
+        name: c.name.clone(),
+        scalar: c.scalar,
+    };
     let surface = repaired.surface.open(workspace)?;
     let filled = repaired.filled.open(workspace, blocks.count())?;
     let numbering = number::number(&repaired.numbering, &filled, blocks, workspace)?;
@@ -119,12 +129,13 @@ pub fn export(
         vertices: stats.vertices,
         triangles: stats.triangles,
         coordinates,
-        columns: Vec::new(),
+        columns: of_points.iter().map(vertex_column).collect(),
         comments,
         origin,
     };
     let writer = Writer {
         store,
+        columns,
         surface,
         filled,
         numbering,
@@ -148,6 +159,7 @@ const NO_TRIANGLES: &str = "no three cells agree on one that belongs to a compon
 /// file the parts of one kind follow each other.
 struct Writer<'a> {
     store: &'a PointStore,
+    columns: Option<&'a StoredColumns>,
     surface: Surface<'a>,
     filled: Inbox<FilledTriangle>,
     numbering: Numbering,
@@ -184,7 +196,9 @@ impl Writer<'_> {
     /// Bytes of memory for a part of a block.
     fn memory(&self, workspace: &Workspace, block: usize) -> u64 {
         let records = self.surface.records(workspace, block) + self.filled.rows(block);
-        60 * records as u64 + self.blocks.ids(block).len() as u64 * 60 + (1 << 20)
+        let ids = self.blocks.ids(block).len();
+        let values = self.columns.map_or(0, |columns| columns.bytes(ids));
+        60 * records as u64 + ids as u64 * 60 + values + (1 << 20)
     }
 
     /// Offset in the uncompressed file at which a part begins: the end of the part before it.
@@ -236,13 +250,19 @@ impl Writer<'_> {
         &self,
         unit: &Unit<'_>,
         ids: Range<u32>,
-        chosen: impl Iterator<Item = u32>,
+        chosen: impl Iterator<Item = u32> + Clone,
         bytes: &mut Vec<u8>,
     ) -> Result<()> {
         let points = self.store.slice(ids.start as usize..ids.end as usize)?;
-        let _held = unit.hold(bytes_of(&points) + bytes_of(bytes));
         let at = |v: u32| self.lattice.position(points[(v - ids.start) as usize]);
-        self.file.encode_vertices(chosen.map(at), &[], bytes);
+        let mut values = Vec::new();
+        if let Some(columns) = self.columns {
+            let of_block = columns.open(unit, ids.clone())?;
+            let _held = unit.hold(of_block.bytes());
+            chosen.clone().for_each(|v| of_block.put(v, &mut values));
+        }
+        let _held = unit.hold(bytes_of(&points) + bytes_of(&values) + bytes_of(bytes));
+        self.file.encode_vertices(chosen.map(at), &values, bytes);
         Ok(())
     }
 }

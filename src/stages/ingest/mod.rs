@@ -9,6 +9,7 @@
 //! list in `formats.rs`.
 
 mod belong;
+mod carry;
 mod classes;
 mod columns;
 mod contain;
@@ -30,18 +31,19 @@ mod stats;
 mod stream;
 mod text;
 
+pub use carry::{Attribute, Carried};
 pub use classes::Classes;
 pub use columns::{Attributes, Column};
 pub use expand::expand;
 pub use format::Format;
 pub use probe::{Probe, probe};
 pub use stats::{FileStats, IngestStats};
-pub use stream::READ_BUFFERS;
+pub use stream::{READ_BUFFERS, VALUE_BUFFERS};
 
 use crate::error::{Error, Result};
 use crate::geom::lattice::Lattice;
 use crate::workspace::Workspace;
-use columns::Wanted;
+use columns::{Wanted, row_bytes};
 use input::Input;
 use point_format::{Claims, PointFile};
 use serde::{Deserialize, Serialize};
@@ -64,7 +66,8 @@ pub enum CoordinateType {
 pub struct Spool {
     name: String,
     frames: Vec<Frame>,
-    /// The frames of values, in the same order, of sources with wanted columns.
+    /// The frames of values, if columns are wanted: one for each of `frames`, without points for sources that have
+    /// none of the columns.
     values: Vec<Frame>,
     sources: Vec<Source>,
     stats: IngestStats,
@@ -174,6 +177,10 @@ fn read_all(
         section = next;
         frames.extend(more);
         values.extend(more_values.frames);
+        if selection.attributes != Attributes::None {
+            // Frames without values.
+            values.resize(frames.len(), Frame::default());
+        }
         let source = Source {
             native: opened.claims.native,
             stats: read,
@@ -253,18 +260,22 @@ impl Spool {
         &self.stats
     }
 
-    /// Deletes the scratch file.
+    /// Deletes the scratch files.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Disk`].
     pub fn release(&self, workspace: &Workspace) -> Result<()> {
+        if self.has_values() {
+            workspace.files.release(&values_of(&self.name))?;
+        }
         workspace.files.release(&self.name)
     }
 
     /// Approximate bytes of the points in the spool.
     #[must_use]
     pub fn bytes(&self) -> u64 {
-        let bytes = |source: &Source| source.stats.kept * source.native.point_bytes() as u64;
+        let point = |source: &Source| source.native.point_bytes() + row_bytes(&source.columns);
+        let bytes = |source: &Source| source.stats.kept * point(source) as u64;
         self.sources.iter().map(bytes).sum()
     }
 

@@ -61,7 +61,7 @@ impl Coordinate for i32 {
 }
 
 /// A frame of the spool.
-#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 pub(super) struct Frame {
     /// The segment of the file.
     pub(super) segment: u32,
