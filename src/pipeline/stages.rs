@@ -50,7 +50,7 @@ impl<'a> Stages<'a> {
         // A task leaves the check of disk space to the process that began its generation.
         let headers = match workspace.is_task() {
             true => None,
-            false => Known::from_headers(&job.inputs),
+            false => Known::from_headers(&job.inputs, &job.params.attributes),
         };
         let first = headers.map(|known| known.estimate(&job.params));
         let stages = Self {
@@ -118,6 +118,7 @@ impl<'a> Stages<'a> {
             decompressed: 0,
             // With thinning, the number of points that stay is unknown.
             points: if params.thin.is_some() { 0 } else { input.kept },
+            values: self.carried.bytes() as u64,
             double: Some(self.report.coordinates == CoordinateType::Double),
             moved: None,
         };

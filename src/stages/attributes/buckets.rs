@@ -101,12 +101,16 @@ impl<'a> Buckets<'a> {
         };
         let bytes = |bucket: usize| {
             let rows = inbox.rows(bucket) * size_of::<R>();
-            let largest = self.of(bucket).map(|s| self.sections[s + 1] - self.sections[s]);
+            let largest = self
+                .of(bucket)
+                .map(|s| self.sections[s + 1] - self.sections[s]);
             let ids = largest.max().unwrap_or(0) as usize;
             // The rows, half of them while they are sorted, and the packed ones.
             (rows * 5 / 2 + ids * (24 + 12 * words)) as u64 + (1 << 20)
         };
-        workspace.units("attributes: merge", self.count(), bytes, work, |_, ()| Ok(()))?;
+        workspace.units("attributes: merge", self.count(), bytes, work, |_, ()| {
+            Ok(())
+        })?;
         Ok(table)
     }
 }

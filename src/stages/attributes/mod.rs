@@ -17,7 +17,7 @@ use crate::stages::order::{Grouped, MOST_GROUPS, StoredPoints, cuts};
 use crate::workspace::memory::bytes_of;
 use crate::workspace::{Unit, Workspace};
 use buckets::Buckets;
-use rows::{Row1, Row2, Row6, Row16, Word};
+use rows::{Row1, Row2, Row6, Row12, Word};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
@@ -104,7 +104,7 @@ impl Values<'_> {
     pub fn put(&self, id: u32, bytes: &mut Vec<u8>) {
         let words = self.columns.words;
         let at = (id - self.first) as usize * words;
-        let mut row = [0; 64];
+        let mut row = [0; 48];
         for (to, word) in row.chunks_exact_mut(4).zip(&self.rows[at..at + words]) {
             to.copy_from_slice(&word.to_be_bytes());
         }
@@ -128,13 +128,14 @@ pub fn attributes(
         spool,
         lattice,
         carried,
+        rows: ROWS,
         workspace,
     };
     match carried.bytes().div_ceil(4) {
         0 | 1 => job.run::<Row1>(store, blocks),
         2 => job.run::<Row2>(store, blocks),
         3..=6 => job.run::<Row6>(store, blocks),
-        _ => job.run::<Row16>(store, blocks),
+        _ => job.run::<Row12>(store, blocks),
     }
 }
 
@@ -143,15 +144,21 @@ struct Job<'a> {
     spool: &'a Spool,
     lattice: &'a Lattice,
     carried: &'a Carried,
+    /// Bytes of memory for the rows of a unit.
+    rows: u64,
     workspace: &'a Workspace,
 }
 
 impl Job<'_> {
     fn run<R: Row>(&self, store: &StoredPoints, blocks: Blocks) -> Result<StoredColumns> {
         let workspace = self.workspace;
-        let size = (ROWS / (COPIES * size_of::<R>() as u64)).max(self.spool.points() / MOST_GROUPS);
+        let size = self.rows / (COPIES * size_of::<R>() as u64);
+        let size = size.max(self.spool.points() / MOST_GROUPS);
         let source = Grouped::new(self.spool, self.lattice, size, workspace);
-        let cuts = cuts(source.samples("attributes: samples")?, source.count().max(1));
+        let cuts = cuts(
+            source.samples("attributes: samples")?,
+            source.count().max(1),
+        );
         let sent = Shuffle::<R>::new("attributes.sent");
         self.send(&source, &cuts, &sent)?;
         let store = store.open(workspace)?;
@@ -182,7 +189,12 @@ impl Job<'_> {
             let mut rows: Vec<R> = Vec::with_capacity(source.points(group) as usize);
             let take = |points: &[_], values: &[u8]| {
                 let values = values.chunks_exact(row_bytes);
-                rows.extend(points.iter().zip(values).map(|(p, v)| rows::row::<R>(*p, v)));
+                rows.extend(
+                    points
+                        .iter()
+                        .zip(values)
+                        .map(|(p, v)| rows::row::<R>(*p, v)),
+                );
                 Ok(())
             };
             let frames = source.frames(group);
@@ -195,11 +207,12 @@ impl Job<'_> {
             unit.advance(source.points(group));
             sent.send(unit, group, rows)
         };
-        let bytes = |group: usize| {
-            VALUE_BUFFERS + source.points(group) * COPIES * size_of::<R>() as u64
-        };
+        let bytes =
+            |group: usize| VALUE_BUFFERS + source.points(group) * COPIES * size_of::<R>() as u64;
         self.workspace
-            .units("attributes: send", source.count(), bytes, work, |_, ()| Ok(()))
+            .units("attributes: send", source.count(), bytes, work, |_, ()| {
+                Ok(())
+            })
     }
 }
 

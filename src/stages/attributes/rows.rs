@@ -25,8 +25,8 @@ valued!(Row1, 1, Above);
 valued!(Row2, 2, Above Above);
 valued!(Row6, 6, Above Above Above Above Above Above);
 valued!(
-    Row16, 16,
-    Above Above Above Above Above Above Above Above Above Above Above Above Above Above Above Above
+    Row12, 12,
+    Above Above Above Above Above Above Above Above Above Above Above Above
 );
 
 row! {

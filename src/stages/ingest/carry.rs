@@ -252,8 +252,17 @@ impl Spool {
         for name in names {
             self.carry(name, palette, wide, &mut carried);
         }
-        let narrow = |s: &Source| COLORS.map(|n| place(s, n)).iter().flatten().any(|p| p.2 == Scalar::U16);
-        if palette.of_8_bits && carried.columns.iter().any(|c| is_color(&c.name)) && used(sources).any(narrow) {
+        let narrow = |s: &Source| {
+            COLORS
+                .map(|n| place(s, n))
+                .iter()
+                .flatten()
+                .any(|p| p.2 == Scalar::U16)
+        };
+        if palette.of_8_bits
+            && carried.columns.iter().any(|c| is_color(&c.name))
+            && used(sources).any(narrow)
+        {
             let note = "colours use 8 of their 16 bits: they are taken as numbers from 0 to 255";
             carried.warnings.push(note.into());
         }
@@ -286,9 +295,8 @@ impl Spool {
         if files_without > 0 {
             let filled = if scalar.is_integer() { "0" } else { "NaN" };
             let all = used(sources).count();
-            let note = format!(
-                "{files_without} of {all} files have no {name}; their points get {filled}"
-            );
+            let note =
+                format!("{files_without} of {all} files have no {name}; their points get {filled}");
             carried.warnings.push(note);
         }
         let Span { min, max } = span(sources, name);

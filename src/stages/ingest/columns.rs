@@ -30,7 +30,7 @@ const ALIASES: [(&str, &str); 12] = [
 ];
 
 /// Most bytes of all wanted columns of a point.
-pub(super) const MOST_BYTES: usize = 64;
+pub(super) const MOST_BYTES: usize = 48;
 
 /// A column of a file.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -76,9 +76,7 @@ impl Attributes {
     pub(super) fn wants(&self, name: &str) -> bool {
         match self {
             Self::None => false,
-            Self::Auto => {
-                COLORS.contains(&name) || name == INTENSITY || name == CLASSIFICATION
-            }
+            Self::Auto => COLORS.contains(&name) || name == INTENSITY || name == CLASSIFICATION,
             Self::List(names) => names.iter().any(|n| n == name),
         }
     }
@@ -269,7 +267,7 @@ mod tests {
             .map(|n| Column::new(&n.to_string(), Scalar::F64))
             .collect();
         let list = |n: usize| Attributes::List((0..n).map(|n| n.to_string()).collect());
-        assert_eq!(Wanted::of(&list(8), &columns).unwrap().bytes(), 64);
-        assert!(Wanted::of(&list(9), &columns).is_err());
+        assert_eq!(Wanted::of(&list(6), &columns).unwrap().bytes(), 48);
+        assert!(Wanted::of(&list(7), &columns).is_err());
     }
 }

@@ -241,6 +241,7 @@ impl IngestStats {
             path: opened.input.path.clone(),
             format: opened.claims.format,
             bytes: opened.input.size,
+            columns: opened.file.columns().into_iter().map(|c| c.name).collect(),
             claimed: opened.claims.points,
             points: stats.read,
             kept: stats.kept,

@@ -1,7 +1,7 @@
 //! Reads the header of a file only.
 
 use super::Opened;
-use super::columns::Column;
+use super::columns::{Attributes, Column};
 use super::format::Format;
 use super::formats::LONG_HEAD;
 use super::input::Input;
@@ -41,12 +41,26 @@ pub struct Probe {
     pub spool_bytes_per_point: u64,
 }
 
+impl Probe {
+    /// Bytes of the wanted columns of a point.
+    #[must_use]
+    pub fn value_bytes(&self, attributes: &Attributes) -> u64 {
+        let wanted = attributes.of(&self.columns);
+        let bytes = wanted.iter().map(|n| self.columns[*n].scalar.bytes());
+        bytes.sum::<usize>() as u64
+    }
+}
+
 /// Reads the header of a file.
 ///
 /// # Errors
 /// [`crate::Error::Io`]; [`crate::Error::Input`] if it is not a readable point cloud.
 pub fn probe(path: &Path) -> Result<Probe> {
-    let Opened { input, claims, file } = Opened::new(Input::open_head(path, LONG_HEAD)?)?;
+    let Opened {
+        input,
+        claims,
+        file,
+    } = Opened::new(Input::open_head(path, LONG_HEAD)?)?;
     let (scale, offset) = match claims.native {
         Native::Las { scale, offset } => (Some(scale), Some(offset)),
         Native::F32 | Native::F64 => (None, None),

@@ -97,7 +97,11 @@ impl Scalar {
             Self::I32 => bytes.extend_from_slice(&(value as i32).to_le_bytes()),
             Self::U32 => bytes.extend_from_slice(&(value as u32).to_le_bytes()),
             Self::F32 => {
-                let value = if value.is_nan() { f32::NAN } else { value as f32 };
+                let value = if value.is_nan() {
+                    f32::NAN
+                } else {
+                    value as f32
+                };
                 bytes.extend_from_slice(&value.to_le_bytes());
             }
             Self::F64 => {

@@ -81,7 +81,12 @@ fn all(header: &Header) -> Vec<Field> {
     let format = header.format;
     let base: Layer = |selection| selection;
     let class: Layer = Layers::decompress_classification;
-    let mut fields = vec![Field::plain(INTENSITY, U16, 12, Layers::decompress_intensity)];
+    let mut fields = vec![Field::plain(
+        INTENSITY,
+        U16,
+        12,
+        Layers::decompress_intensity,
+    )];
     let after = if format.is_extended {
         fields.extend([
             Field::bits("return_number", 14, 0, 0x0f, base),
@@ -94,7 +99,11 @@ fn all(header: &Header) -> Vec<Field> {
         22
     } else {
         // In LAS 1.0 the class is the whole byte.
-        let classes = if header.raw.version.minor == 0 { 0xff } else { 0x1f };
+        let classes = if header.raw.version.minor == 0 {
+            0xff
+        } else {
+            0x1f
+        };
         fields.extend([
             Field::bits("return_number", 14, 0, 0x07, base),
             Field::bits("number_of_returns", 14, 3, 0x07, base),
@@ -107,7 +116,12 @@ fn all(header: &Header) -> Vec<Field> {
     };
     let mut at = after;
     if format.has_gps_time {
-        fields.push(Field::plain("gps_time", F64, at, Layers::decompress_gps_time));
+        fields.push(Field::plain(
+            "gps_time",
+            F64,
+            at,
+            Layers::decompress_gps_time,
+        ));
         at += 8;
     }
     if format.has_color {
@@ -117,7 +131,12 @@ fn all(header: &Header) -> Vec<Field> {
         }
     }
     if format.has_nir {
-        fields.push(Field::plain("near_infrared", U16, at, Layers::decompress_nir));
+        fields.push(Field::plain(
+            "near_infrared",
+            U16,
+            at,
+            Layers::decompress_nir,
+        ));
     }
     fields
 }

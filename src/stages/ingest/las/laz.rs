@@ -3,9 +3,9 @@
 use super::super::input::{Input, STREAM_BUFFER};
 use super::super::spool::{Sink, SourceWriter, sink_bytes};
 use super::chunks::{Decoder, LayerHead};
+use super::fields::Fields;
 use super::table::{self, Chunk, Table};
 use super::vlr::{self, Laszip};
-use super::fields::Fields;
 use super::{Header, Record};
 use crate::error::Result;
 use laz::LazItemType;
