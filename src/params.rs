@@ -145,6 +145,8 @@ pub struct Params {
     pub max_fill: MaxWidth,
     /// Remove bridges and small components, fill holes (paper, section 3.6).
     pub repair: bool,
+    /// Vertices have normals, in formats that hold them.
+    pub normals: bool,
     /// Points per block, the unit of insertion; changes the result.
     #[serde(skip)]
     pub block: u32,
@@ -180,6 +182,7 @@ impl Default for Params {
             max_edge: MaxWidth::Spacings(METHOD.admissibility.edge),
             max_fill: MaxWidth::Spacings(METHOD.filling.width),
             repair: true,
+            normals: false,
             block: METHOD.curve.block,
             division: Division::default(),
         }

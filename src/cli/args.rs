@@ -185,9 +185,12 @@ pub struct Job {
     /// Files (LAS, LAZ, PLY, XYZ text; also as .gz and .zst) or folders of files; together they are one cloud
     #[arg(value_name = "INPUT", required = true)]
     pub inputs: Vec<PathBuf>,
-    /// The mesh to write (binary PLY); MESH.ply.zst is compressed
+    /// The mesh to write: .ply, .obj, .stl or .glb (all but OBJ binary), compressed with .zst behind it
     #[arg(long, short, value_name = "MESH.ply")]
     pub output: PathBuf,
+    /// Write a normal for each vertex (PLY, OBJ, GLB)
+    #[arg(long)]
+    pub normals: bool,
     #[command(flatten)]
     pub points: Points,
     #[command(flatten)]
@@ -375,6 +378,7 @@ impl Job {
             max_hole_edges: self.repair.max_hole_edges,
             min_component: self.repair.min_component.or(usual.min_component),
             repair: !self.repair.no_repair,
+            normals: self.normals,
             block: self.block_points,
             ..usual
         }

@@ -1,7 +1,8 @@
 //! The stages of a run: each with its parameters, its part of the report, and the check of disk space for the
 //! following stages.
 
-use super::checks::{disk_radius, enough, not_a_line, room};
+use super::checks::{all_are_kept, disk_radius, enough, not_a_line, room};
+use super::disk::Text;
 use super::{Clock, Known, Reconstruction};
 use crate::error::Result;
 use crate::geom::lattice::Lattice;
@@ -11,7 +12,7 @@ use crate::report::{LatticeReport, Report};
 use crate::stages::attributes::{StoredColumns, attributes};
 use crate::stages::blocks::Blocks;
 use crate::stages::cells::{CellTriples, DiskRadius, TileRanges, Widen, cells};
-use crate::stages::export::{CoordinateType, ExportOptions, export};
+use crate::stages::export::{CoordinateType, ExportOptions, decimals, export};
 use crate::stages::ingest::{self, Carried, Selection, Spool, ingest_selected};
 use crate::stages::located::Places;
 use crate::stages::order::{Orderer, PointStore, StoredPoints, order, sample_sort};
@@ -52,7 +53,10 @@ impl<'a> Stages<'a> {
             true => None,
             false => Known::from_headers(&job.inputs, &job.params.attributes),
         };
-        let first = headers.map(|known| known.estimate(&job.params));
+        let first = headers.map(|known| known.estimate(&job.params, &job.output));
+        if let Some(known) = headers.filter(|_| all_are_kept(&job.params)) {
+            known.fits(&job.params, &job.output)?;
+        }
         let stages = Self {
             job,
             workspace,
@@ -80,7 +84,11 @@ impl<'a> Stages<'a> {
         if self.workspace.is_task() {
             return Ok(());
         }
-        let estimate = self.known.estimate(&self.job.params);
+        let (params, output) = (&self.job.params, &self.job.output);
+        if params.drop_outliers.is_none() {
+            self.known.fits(params, output)?;
+        }
+        let estimate = self.known.estimate(params, output);
         self.report.estimated_scratch_bytes = estimate.scratch;
         self.report.estimated_output_bytes = estimate.output;
         room(&self.job.folder, &self.job.output, estimate, self.workspace)
@@ -121,6 +129,7 @@ impl<'a> Stages<'a> {
             values: self.carried.bytes() as u64,
             double: Some(self.report.coordinates == CoordinateType::Double),
             moved: None,
+            text: None,
         };
         workspace.note_points(input.kept);
         self.report.input = input;
@@ -172,6 +181,11 @@ impl<'a> Stages<'a> {
         self.warn_of_input(lattice);
         enough(&store)?;
         self.known.points = store.len() as u64;
+        let bounds = store.bounds();
+        self.known.text = Some(Text {
+            decimals: decimals(lattice),
+            bounds: [bounds.min, bounds.max].map(|corner| lattice.position(corner)),
+        });
         workspace.note_points(self.known.points);
         self.check_room()?;
         Ok(store)
@@ -422,6 +436,7 @@ impl<'a> Stages<'a> {
             comments: Vec::new(),
             origin: None,
             columns,
+            normals: job.params.normals,
         };
         let items = 2 * blocks.count() as u64;
         self.report.mesh = self.clock.stage("export", "blocks", items, || {

@@ -20,13 +20,13 @@ fn rows(bench: &Bench, spool: &Spool, carried: &Carried) -> Vec<(Point, Vec<f64>
     let mut all = Vec::new();
     let take = |points: &[Point], values: &[u8]| {
         for (point, row) in points.iter().zip(values.chunks(carried.bytes())) {
-            let mut bytes = Vec::new();
-            Carried::unordered(&carried.columns, row, &mut bytes);
             let mut at = 0;
             let values = carried.columns.iter().map(|column| {
-                let value = outcrop_ply::real(column.scalar, &bytes[at..], false);
-                at += column.scalar.bytes();
-                value
+                let mut bytes = Vec::new();
+                let own = &row[at..at + column.scalar.bytes()];
+                Carried::unordered(column, own, &mut bytes);
+                at += own.len();
+                outcrop_ply::real(column.scalar, &bytes, false)
             });
             all.push((*point, values.collect()));
         }

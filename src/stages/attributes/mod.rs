@@ -100,15 +100,22 @@ impl Values<'_> {
         bytes_of(&self.rows)
     }
 
-    /// Appends the little-endian values of an id to `bytes`.
-    pub fn put(&self, id: u32, bytes: &mut Vec<u8>) {
+    /// Appends the little-endian values of an id to `bytes`, in the columns that are `held`.
+    pub fn put(&self, id: u32, held: &[bool], bytes: &mut Vec<u8>) {
         let words = self.columns.words;
         let at = (id - self.first) as usize * words;
         let mut row = [0; 48];
         for (to, word) in row.chunks_exact_mut(4).zip(&self.rows[at..at + words]) {
             to.copy_from_slice(&word.to_be_bytes());
         }
-        Carried::unordered(&self.columns.columns, &row, bytes);
+        let mut at = 0;
+        for (column, held) in self.columns.columns.iter().zip(held) {
+            let own = &row[at..at + column.scalar.bytes()];
+            if *held {
+                Carried::unordered(column, own, bytes);
+            }
+            at += own.len();
+        }
     }
 }
 

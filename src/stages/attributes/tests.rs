@@ -72,7 +72,7 @@ fn check<R: Row>(points: u32, side: u32, block: u32, page: usize, keep_all: bool
         let places = opened.slice(ids.start as usize..ids.end as usize).unwrap();
         for (id, place) in ids.zip(places) {
             let mut bytes = Vec::new();
-            values.put(id, &mut bytes);
+            values.put(id, &[true; 3], &mut bytes);
             let place: [u32; 3] = std::array::from_fn(|a| place[a] as u32 + base[a]);
             let [a, b, c] = least[&place];
             let want = [&[a as u8][..], &(b as i16).to_le_bytes(), &c.to_le_bytes()].concat();

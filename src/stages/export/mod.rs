@@ -4,62 +4,40 @@
 //!
 //! A format is a module that implements `MeshFormat`, and an entry of the list here.
 
+mod bounds;
 mod compressed;
+mod corners;
 mod faces;
 mod file;
 mod format;
+mod formats;
+mod glb;
+mod normals;
 mod number;
+mod obj;
 mod ply;
+mod stl;
+mod write;
 
-pub(crate) use file::{folder_of, is_compressed, temporary, temporary_of};
+pub(crate) use file::{folder_of, temporary, temporary_of};
 pub use format::CoordinateType;
+pub(crate) use format::{Mesh, normal_columns};
+pub(crate) use formats::{check_name, check_size, format_of, mesh_bytes};
+pub(crate) use obj::decimals;
 
 use crate::error::{Error, Result};
 use crate::geom::lattice::Lattice;
-use crate::spill::Inbox;
 use crate::stages::attributes::StoredColumns;
 use crate::stages::blocks::Blocks;
 use crate::stages::ingest::Column;
 use crate::stages::order::PointStore;
-use crate::stages::repair::{FilledTriangle, Repaired, Surface};
-use crate::workspace::memory::bytes_of;
-use crate::workspace::{Unit, Workspace};
-use faces::Faces;
-use file::{Edge, HEADER, MeshFile};
-use format::{Mesh, MeshFormat, VertexColumn};
-use number::Numbering;
+use crate::stages::repair::Repaired;
+use crate::workspace::Workspace;
+use file::{MeshFile, is_compressed};
+use format::VertexColumn;
 use serde::{Deserialize, Serialize};
-use std::ops::Range;
 use std::path::Path;
-
-/// All formats. The first is used if the extension is not known.
-const FORMATS: [&dyn MeshFormat; 1] = [&ply::Ply];
-
-/// The format for the extension of `output`, or for that before the one of compression.
-fn format_of(output: &Path) -> &'static dyn MeshFormat {
-    let name = match is_compressed(output) {
-        true => Path::new(output.file_stem().unwrap_or_default()),
-        false => output,
-    };
-    let extension = name.extension().unwrap_or_default();
-    let is = |known: &&str| extension.eq_ignore_ascii_case(known);
-    let mut named = FORMATS.into_iter();
-    let named = named.find(|f| f.extensions().iter().any(is));
-    named.unwrap_or(FORMATS[0])
-}
-
-/// Bytes of a mesh file in the first format.
-pub(crate) fn mesh_bytes(vertices: u64, triangles: u64, coordinates: CoordinateType) -> u64 {
-    let mesh = Mesh {
-        vertices,
-        triangles,
-        coordinates,
-        columns: Vec::new(),
-        comments: Vec::new(),
-        origin: None,
-    };
-    FORMATS[0].layout(&mesh).bytes
-}
+use write::Writer;
 
 /// Counts of the finished mesh.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize, PartialEq, Eq)]
@@ -87,6 +65,8 @@ pub struct ExportOptions<'a> {
     pub comments: Vec<String>,
     /// The position of the cloud that is the origin of the mesh, if it is not that of the cloud.
     pub origin: Option<[f64; 3]>,
+    /// Vertices have normals, in formats that hold them.
+    pub normals: bool,
     /// Columns of the points.
     pub columns: Option<&'a StoredColumns>,
 }
@@ -94,8 +74,8 @@ pub struct ExportOptions<'a> {
 /// Writes the mesh.
 ///
 /// # Errors
-/// [`Error::Io`], [`Error::Disk`], [`Error::NoTriangles`], [`Error::Corrupt`], [`Error::Memory`],
-/// [`Error::Cancelled`].
+/// [`Error::Io`], [`Error::Disk`], [`Error::NoTriangles`], [`Error::TooLarge`], [`Error::Corrupt`],
+/// [`Error::Memory`], [`Error::Cancelled`].
 pub fn export(
     store: &PointStore,
     repaired: &Repaired,
@@ -109,13 +89,10 @@ pub fn export(
         coordinates,
         comments,
         origin,
+        normals,
         columns,
     } = options;
-    let of_points = columns.map(StoredColumns::columns).unwrap_or_default();
-    let vertex_column = |c: &Column| VertexColumn {
-        name: c.name.clone(),
-        scalar: c.scalar,
-    };
+    let format = format_of(output)?;
     let surface = repaired.surface.open(workspace)?;
     let filled = repaired.filled.open(workspace, blocks.count())?;
     let numbering = number::number(&repaired.numbering, &filled, blocks, workspace)?;
@@ -125,23 +102,44 @@ pub fn export(
             why: NO_TRIANGLES.into(),
         });
     }
-    let mesh = Mesh {
+    let mut mesh = Mesh {
         vertices: stats.vertices,
         triangles: stats.triangles,
         coordinates,
-        columns: of_points.iter().map(vertex_column).collect(),
+        columns: normal_columns()
+            .filter(|_| normals)
+            .chain(of_points(columns).map(vertex_column))
+            .collect(),
         comments,
         origin,
+        bounds: None,
+        decimals: decimals(lattice),
     };
+    // Columns that the format does not hold are not made.
+    mesh.columns = mesh
+        .columns
+        .iter()
+        .filter(|c| format.holds(&mesh, c))
+        .cloned()
+        .collect();
+    if format.wants_bounds() {
+        let bounds = bounds::bounds(store, &numbering, workspace)?;
+        mesh.bounds = Some(bounds.map(|corner| lattice.position(corner)));
+    }
+    check_size(output, &mesh, false)?;
+    let held = |c: &Column| mesh.columns.iter().any(|held| held.name == c.name);
+    let columns = columns.map(|columns| (columns, of_points(Some(columns)).map(held).collect()));
     let writer = Writer {
         store,
         columns,
         surface,
         filled,
+        pinches: &repaired.numbering.pinches,
+        normals: mesh.normals().is_some(),
         numbering,
         blocks,
         lattice,
-        file: MeshFile::open(output, format_of(output), mesh, workspace)?,
+        file: MeshFile::open(output, format, mesh, workspace)?,
     };
     match is_compressed(output) {
         true => compressed::write(&writer, workspace)?,
@@ -152,117 +150,17 @@ pub fn export(
     Ok(stats)
 }
 
+/// The columns of points.
+fn of_points(columns: Option<&StoredColumns>) -> impl Iterator<Item = &Column> {
+    columns.into_iter().flat_map(StoredColumns::columns)
+}
+
+fn vertex_column(column: &Column) -> VertexColumn {
+    VertexColumn {
+        name: column.name.clone(),
+        scalar: column.scalar,
+    }
+}
+
 const NO_TRIANGLES: &str = "no three cells agree on one that belongs to a component large enough; \
     try a larger --radius, --smooth 1 for noisy scans, or a smaller --min-component";
-
-/// Writes the parts of a mesh: for each block its vertices, its copies of vertices, and its triangles. In the
-/// file the parts of one kind follow each other.
-struct Writer<'a> {
-    store: &'a PointStore,
-    columns: Option<&'a StoredColumns>,
-    surface: Surface<'a>,
-    filled: Inbox<FilledTriangle>,
-    numbering: Numbering,
-    blocks: Blocks,
-    lattice: &'a Lattice,
-    file: MeshFile<'a>,
-}
-
-/// Number of parts of a block.
-const KINDS: usize = 3;
-
-impl Writer<'_> {
-    /// Writes the file, every part at its offset.
-    fn write(&self, workspace: &Workspace) -> Result<()> {
-        let (file, count) = (&self.file, self.blocks.count());
-        workspace.once("header", |unit| {
-            file.write(unit, HEADER, &file.layout.header, 0)
-        })?;
-        let memory = |block| self.memory(workspace, block);
-        let work = |unit: &Unit<'_>| {
-            let (mut bytes, mut edges) = (Vec::new(), Vec::new());
-            for kind in 0..KINDS {
-                let part = kind * count + unit.number();
-                self.encode(unit, part, &mut bytes)?;
-                edges.extend(file.write(unit, part as u32, &bytes, self.start(part))?);
-            }
-            unit.advance(1);
-            Ok(edges)
-        };
-        let each = |_, edges: Vec<Edge>| file.write_edges(&edges);
-        workspace.units("export: block", count, memory, work, each)
-    }
-
-    /// Bytes of memory for a part of a block.
-    fn memory(&self, workspace: &Workspace, block: usize) -> u64 {
-        let records = self.surface.records(workspace, block) + self.filled.rows(block);
-        let ids = self.blocks.ids(block).len();
-        let values = self.columns.map_or(0, |columns| columns.bytes(ids));
-        60 * records as u64 + ids as u64 * 60 + values + (1 << 20)
-    }
-
-    /// Offset in the uncompressed file at which a part begins: the end of the part before it.
-    fn start(&self, part: usize) -> u64 {
-        let (layout, numbering) = (&self.file.layout, &self.numbering);
-        let block = part % self.blocks.count();
-        match part / self.blocks.count() {
-            0 => {
-                let first = numbering.vertex(self.blocks.ids(block).start);
-                layout.vertices.offset(first.into())
-            }
-            1 => layout.vertices.offset(numbering.first_copy(block)),
-            2 => layout.triangles.offset(numbering.first_face(block)),
-            _ => layout.bytes,
-        }
-    }
-
-    /// Encodes a part.
-    fn encode(&self, unit: &Unit<'_>, part: usize, bytes: &mut Vec<u8>) -> Result<()> {
-        let (numbering, block) = (&self.numbering, part % self.blocks.count());
-        let ids = self.blocks.ids(block);
-        bytes.clear();
-        bytes.reserve_exact((self.start(part + 1) - self.start(part)) as usize);
-        match part / self.blocks.count() {
-            0 => {
-                let used = ids.clone().filter(|v| numbering.used(*v));
-                self.vertices(unit, ids, used, bytes)
-            }
-            1 => {
-                let copies = numbering.copies.get(unit, block)?;
-                if copies.is_empty() {
-                    return Ok(());
-                }
-                self.vertices(unit, ids, copies.iter().map(|c| c.id), bytes)
-            }
-            _ => {
-                let faces = Faces::load(unit, block, &self.surface, &self.filled, numbering, ids)?;
-                let _held = unit.hold(faces.bytes() + bytes_of(bytes));
-                let mut batch = self.file.triangles(bytes);
-                faces.for_each(|t| batch.push(t));
-                batch.finish();
-                Ok(())
-            }
-        }
-    }
-
-    /// Encodes the positions of `chosen` points of the block with the ids `ids`.
-    fn vertices(
-        &self,
-        unit: &Unit<'_>,
-        ids: Range<u32>,
-        chosen: impl Iterator<Item = u32> + Clone,
-        bytes: &mut Vec<u8>,
-    ) -> Result<()> {
-        let points = self.store.slice(ids.start as usize..ids.end as usize)?;
-        let at = |v: u32| self.lattice.position(points[(v - ids.start) as usize]);
-        let mut values = Vec::new();
-        if let Some(columns) = self.columns {
-            let of_block = columns.open(unit, ids.clone())?;
-            let _held = unit.hold(of_block.bytes());
-            chosen.clone().for_each(|v| of_block.put(v, &mut values));
-        }
-        let _held = unit.hold(bytes_of(&points) + bytes_of(&values) + bytes_of(bytes));
-        self.file.encode_vertices(chosen.map(at), &values, bytes);
-        Ok(())
-    }
-}

@@ -94,15 +94,11 @@ impl Carried {
         }
     }
 
-    /// Appends the little-endian values of a row.
-    pub fn unordered(columns: &[Column], mut row: &[u8], values: &mut Vec<u8>) {
-        for column in columns {
-            let (own, rest) = row.split_at(column.scalar.bytes());
-            let start = values.len();
-            values.extend(own.iter().rev());
-            flip(column.scalar, &mut values[start..], false);
-            row = rest;
-        }
+    /// Appends the little-endian value of a column, whose bytes in a row are `own`.
+    pub fn unordered(column: &Column, own: &[u8], values: &mut Vec<u8>) {
+        let start = values.len();
+        values.extend(own.iter().rev());
+        flip(column.scalar, &mut values[start..], false);
     }
 }
 
@@ -335,10 +331,10 @@ mod tests {
             f64::INFINITY,
         ];
         for scalar in SCALARS {
-            let column = [Column {
+            let column = Column {
                 name: "x".into(),
                 scalar,
-            }];
+            };
             let mut last: Option<(f64, Vec<u8>)> = None;
             for value in values {
                 let (mut row, mut plain, mut back) = (Vec::new(), Vec::new(), Vec::new());
