@@ -10,10 +10,13 @@
 //! (`workspace/keeper.rs`), within a moment.
 
 use crate::error::Result;
+use crate::geom::aabb::Aabb;
+use crate::geom::lattice::Lattice;
 use crate::params::{Method, Params};
 use crate::report::DiskEstimate;
 use crate::stages::export::{self, CoordinateType, Mesh};
-use crate::stages::ingest::{self, Attributes, Probe};
+use crate::stages::ingest::{self, Attributes, Probe, Spool};
+use crate::stages::order::StoredPoints;
 use std::path::{Path, PathBuf};
 
 /// Bytes of a position that is not packed: in sorted runs, and in the spool if its source has integers or
@@ -67,6 +70,25 @@ pub(crate) struct Text {
     pub bounds: [[f64; 3]; 2],
 }
 
+impl Text {
+    /// The coordinates of ordered points. Without smoothing the vertices are points of the cloud, and need no
+    /// finer lattice than they have.
+    pub fn of(
+        spool: &Spool,
+        lattice: &Lattice,
+        params: &Params,
+        points: &StoredPoints,
+    ) -> Result<Self> {
+        let own = spool.choose_lattice(0)?;
+        let finer = params.smooth > 0 || !own.exact;
+        let Aabb { min, max } = points.bounds();
+        Ok(Self {
+            decimals: export::decimals(if finer { lattice } else { &own }),
+            bounds: [min, max].map(|corner| lattice.position(corner)),
+        })
+    }
+}
+
 /// Decimals assumed as long as they are unknown.
 const DECIMALS: usize = 3;
 
@@ -107,6 +129,21 @@ impl Known {
     pub fn fits(&self, params: &Params, output: &Path) -> Result<()> {
         let coordinates = CoordinateType::Float;
         export::check_size(output, &self.mesh(params, coordinates), true)
+    }
+
+    /// Warnings about what the format of `output` leaves out.
+    pub fn left_out(
+        &self,
+        params: &Params,
+        coordinates: CoordinateType,
+        output: &Path,
+    ) -> Result<Vec<String>> {
+        let bounds = self.text.map(|text| text.bounds).unwrap_or_default();
+        let largest = bounds
+            .as_flattened()
+            .iter()
+            .fold(0.0, |m: f64, x| m.max(x.abs()));
+        export::left_out(output, &self.mesh(params, coordinates), largest)
     }
 
     /// The mesh that is expected.

@@ -12,7 +12,7 @@ use crate::report::{LatticeReport, Report};
 use crate::stages::attributes::{StoredColumns, attributes};
 use crate::stages::blocks::Blocks;
 use crate::stages::cells::{CellTriples, DiskRadius, TileRanges, Widen, cells};
-use crate::stages::export::{CoordinateType, ExportOptions, decimals, export};
+use crate::stages::export::{CoordinateType, ExportOptions, export};
 use crate::stages::ingest::{self, Carried, Selection, Spool, ingest_selected};
 use crate::stages::located::Places;
 use crate::stages::order::{Orderer, PointStore, StoredPoints, order, sample_sort};
@@ -175,17 +175,18 @@ impl<'a> Stages<'a> {
             self.report.duplicates_folded = folded;
             store
         };
+        let text = Text::of(spool, lattice, &job.params, &store)?;
         if self.carried.columns.is_empty() {
             spool.release(workspace)?;
         }
         self.warn_of_input(lattice);
         enough(&store)?;
         self.known.points = store.len() as u64;
-        let bounds = store.bounds();
-        self.known.text = Some(Text {
-            decimals: decimals(lattice),
-            bounds: [bounds.min, bounds.max].map(|corner| lattice.position(corner)),
-        });
+        self.known.text = Some(text);
+        let coordinates = self.report.coordinates;
+        for warning in self.known.left_out(&job.params, coordinates, &job.output)? {
+            self.warn(warning);
+        }
         workspace.note_points(self.known.points);
         self.check_room()?;
         Ok(store)
@@ -437,6 +438,7 @@ impl<'a> Stages<'a> {
             origin: None,
             columns,
             normals: job.params.normals,
+            decimals: self.known.text.map_or(0, |text| text.decimals),
         };
         let items = 2 * blocks.count() as u64;
         self.report.mesh = self.clock.stage("export", "blocks", items, || {

@@ -1,7 +1,7 @@
 //! The list of mesh formats, and what is asked of a format before there is a mesh.
 
 use super::file::is_compressed;
-use super::format::{Mesh, MeshFormat};
+use super::format::{CoordinateType, Mesh, MeshFormat};
 use super::{glb, obj, ply, stl};
 use crate::error::{Error, Result};
 use std::path::Path;
@@ -73,6 +73,30 @@ pub(crate) fn check_size(output: &Path, mesh: &Mesh, estimated: bool) -> Result<
             false => exceeded.found.to_string(),
         },
     })
+}
+
+/// Warnings about what the format of `output` leaves out of a mesh whose coordinates are up to `largest`.
+pub(crate) fn left_out(output: &Path, mesh: &Mesh, largest: f64) -> Result<Vec<String>> {
+    let format = format_of(output)?;
+    let mut warnings = Vec::new();
+    let lost = mesh.columns.iter().filter(|c| !format.holds(mesh, c));
+    let lost: Vec<&str> = lost.map(|column| &*column.name).collect();
+    if !lost.is_empty() {
+        let (name, lost) = (format.name(), lost.join(", "));
+        warnings.push(format!(
+            "{name} has no {lost} for vertices: left out; .ply has"
+        ));
+    }
+    if mesh.coordinates == CoordinateType::Double && !format.holds_doubles() {
+        let largest = (largest as f32).min(f32::MAX / 2.0);
+        warnings.push(format!(
+            "{} has 32-bit floats only: coordinates of this cloud are rounded to steps of up to {}; \
+             .ply, .obj and .glb keep them, or give --origin auto",
+            format.name(),
+            largest.next_up() - largest,
+        ));
+    }
+    Ok(warnings)
 }
 
 #[cfg(test)]

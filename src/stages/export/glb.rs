@@ -160,15 +160,15 @@ fn shift(mesh: &Mesh) -> [f64; 3] {
     // The power of two below it: that of its exponent alone.
     let unit = f64::from_bits(part.to_bits() & !((1 << 52) - 1)).max(f64::MIN_POSITIVE);
     [0, 1, 2].map(|k| {
-        let middle = low[k] + sides[k] / 2.0;
+        let middle = low[k] / 2.0 + high[k] / 2.0;
         let rounded = (middle / unit).round() * unit;
         if rounded.is_finite() { rounded } else { middle }
     })
 }
 
-/// A position as it is in the file.
+/// A position as it is in the file. JSON has no infinite numbers.
 fn local(position: [f64; 3], shift: [f64; 3]) -> [f32; 3] {
-    [0, 1, 2].map(|k| (position[k] - shift[k]) as f32)
+    [0, 1, 2].map(|k| ((position[k] - shift[k]) as f32).clamp(f32::MIN, f32::MAX))
 }
 
 /// The content of the chunk of JSON.
@@ -235,4 +235,105 @@ fn document(mesh: &Mesh, record: &Record) -> Value {
         ],
         "buffers": [{ "byteLength": vertices + indices }],
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stages::export::format::normal_columns;
+
+    fn mesh(scalar: Scalar) -> Mesh {
+        let colours = ["red", "green", "blue"].map(|name| VertexColumn {
+            name: name.into(),
+            scalar,
+        });
+        Mesh {
+            vertices: 1,
+            triangles: 1,
+            columns: colours.into_iter().chain(normal_columns()).collect(),
+            comments: vec!["EPSG:25832 \"x\"\n".into()],
+            coordinates: CoordinateType::Double,
+            bounds: Some([[500_000.25, 0.0, -3.0], [500_100.25, 40.0, 3.0]]),
+            origin: Some([1e6, 0.0, 0.0]),
+            ..Mesh::default()
+        }
+    }
+
+    /// The document of a file that starts with this header.
+    fn json_of(header: &[u8]) -> Value {
+        serde_json::from_slice(&header[20..header.len() - 8]).unwrap()
+    }
+
+    #[test]
+    fn colours_normals_and_comments_are_there() {
+        for (scalar, red, size, component) in [
+            (Scalar::U8, vec![7], 4, BYTE),
+            (Scalar::U16, vec![7, 1], 8, SHORT),
+        ] {
+            let mesh = mesh(scalar);
+            let layout = Glb.layout(&mesh);
+            assert_eq!(layout.vertices.bytes, 24 + size);
+            assert!(layout.vertices.at.is_multiple_of(4));
+            let document = json_of(&layout.header);
+            assert_eq!(document["asset"]["extras"]["comments"][0], mesh.comments[0]);
+            let attributes = &document["meshes"][0]["primitives"][0]["attributes"];
+            let accessor =
+                |name: &str| &document["accessors"][attributes[name].as_u64().unwrap() as usize];
+            assert_eq!(accessor("NORMAL")["byteOffset"], 12);
+            assert_eq!(accessor("COLOR_0")["byteOffset"], 24);
+            assert_eq!(accessor("COLOR_0")["componentType"], component);
+            // Rounded to four units: a sixteenth of the size is 6.25.
+            let translation = &document["nodes"][1]["translation"];
+            assert_eq!(*translation, json!([1_500_052.0, 20.0, 0.0]));
+
+            let mut values = [red, vec![0; 2 * scalar.bytes()]].concat();
+            values.extend([0f32, 0.0, 1.0].iter().flat_map(|x| x.to_le_bytes()));
+            let mut bytes = Vec::new();
+            Glb.put_vertices(&mesh, &[[500_000.25, 40.0, 3.0]], &values, &mut bytes);
+            let floats = [-51.75f32, 20.0, 3.0, 0.0, 0.0, 1.0];
+            let floats = floats.map(f32::to_le_bytes);
+            assert_eq!(&bytes[..24], floats.as_flattened());
+            assert_eq!(bytes[24..24 + scalar.bytes()], values[..scalar.bytes()]);
+            assert!(
+                bytes[bytes.len() - scalar.bytes()..]
+                    .iter()
+                    .all(|b| *b == 255)
+            );
+            assert_eq!(bytes.len() as u64, layout.vertices.bytes);
+        }
+    }
+
+    #[test]
+    fn four_gibibytes_are_the_limit() {
+        let mesh = |triangles| Mesh {
+            vertices: 1000,
+            triangles,
+            ..Mesh::default()
+        };
+        let most = u64::from(u32::MAX);
+        // The length of the JSON grows with the counts.
+        let fixed = Glb.layout(&mesh(357_000_000)).bytes - 357_000_000 * 12;
+        let triangles = (most - fixed) / 12;
+        assert_eq!(Glb.exceeded(&mesh(triangles)), None);
+        let exceeded = Glb.exceeded(&mesh(triangles + 1)).unwrap();
+        assert_eq!((exceeded.unit, exceeded.most), ("bytes", most));
+        assert!(exceeded.found > most && exceeded.found < most + 13);
+    }
+
+    #[test]
+    fn a_translation_of_any_bounds_is_a_number() {
+        for bounds in [
+            [[0.0; 3]; 2],
+            [[5e-324; 3], [1e-320; 3]],
+            [[-1e308; 3], [1e308; 3]],
+            [[1e300, 1.0, 2.0], [1e300, 1.0, 2.0]],
+        ] {
+            let mesh = Mesh {
+                coordinates: CoordinateType::Double,
+                bounds: Some(bounds),
+                ..Mesh::default()
+            };
+            assert!(shift(&mesh).iter().all(|x| x.is_finite()), "{bounds:?}");
+        }
+    }
 }

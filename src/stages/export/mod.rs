@@ -22,7 +22,7 @@ mod write;
 pub(crate) use file::{folder_of, temporary, temporary_of};
 pub use format::CoordinateType;
 pub(crate) use format::{Mesh, normal_columns};
-pub(crate) use formats::{check_name, check_size, format_of, mesh_bytes};
+pub(crate) use formats::{check_name, check_size, left_out, mesh_bytes};
 pub(crate) use obj::decimals;
 
 use crate::error::{Error, Result};
@@ -35,6 +35,7 @@ use crate::stages::repair::Repaired;
 use crate::workspace::Workspace;
 use file::{MeshFile, is_compressed};
 use format::VertexColumn;
+use formats::format_of;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use write::Writer;
@@ -69,6 +70,24 @@ pub struct ExportOptions<'a> {
     pub normals: bool,
     /// Columns of the points.
     pub columns: Option<&'a StoredColumns>,
+    /// Decimals of coordinates as text, see [`decimals`].
+    pub decimals: usize,
+}
+
+impl<'a> ExportOptions<'a> {
+    /// A mesh without comments, origin and normals.
+    #[must_use]
+    pub fn new(output: &'a Path, coordinates: CoordinateType) -> Self {
+        Self {
+            output,
+            coordinates,
+            comments: Vec::new(),
+            origin: None,
+            normals: false,
+            decimals: 3,
+            columns: None,
+        }
+    }
 }
 
 /// Writes the mesh.
@@ -91,6 +110,7 @@ pub fn export(
         origin,
         normals,
         columns,
+        decimals,
     } = options;
     let format = format_of(output)?;
     let surface = repaired.surface.open(workspace)?;
@@ -113,7 +133,7 @@ pub fn export(
         comments,
         origin,
         bounds: None,
-        decimals: decimals(lattice),
+        decimals,
     };
     // Columns that the format does not hold are not made.
     mesh.columns = mesh

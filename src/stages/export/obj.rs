@@ -69,15 +69,17 @@ impl MeshFormat for Obj {
                 put(bytes, *x, width, decimals);
             }
             if let Some((places, scalar)) = colours {
-                places.map(|at| put(bytes, share(values, at, scalar), COLOUR - 1, 6));
+                for at in places {
+                    put(bytes, share(values, at, scalar), COLOUR - 1, 6);
+                }
             }
             bytes.push(b'\n');
             if let Some(places) = normals {
                 bytes.extend_from_slice(b"vn");
-                places.map(|at| {
+                for at in places {
                     let x = f32::from_le_bytes(four(values, at));
                     put(bytes, x.into(), NORMAL - 1, 6);
-                });
+                }
                 bytes.push(b'\n');
             }
         }
@@ -192,4 +194,104 @@ pub fn decimals(lattice: &Lattice) -> usize {
     };
     let found = (first.saturating_sub(1)..=first + 3).find(exact);
     found.unwrap_or(first + 2)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stages::export::format::normal_columns;
+
+    fn lattice(step: f64, offset: [f64; 3]) -> Lattice {
+        Lattice {
+            step,
+            offset,
+            base: [0; 3],
+            exact: true,
+        }
+    }
+
+    #[test]
+    fn decimals_keep_the_step() {
+        for (step, offset, expected) in [
+            (0.01, 0.0, 2),
+            (0.001, 500_000.0, 3),
+            (0.001, 5_400_000.1234, 4),
+            (0.01, 1.0 / 3.0, 4),
+            (1.0, 0.0, 0),
+            (0.5, 0.0, 1),
+            (0.25, 0.0, 2),
+            (2f64.powi(-20), 0.0, 9),
+            (10.0, 0.0, 0),
+            (0.0254, 0.0, 4),
+            (1e-300, 0.0, 300),
+        ] {
+            let found = decimals(&lattice(step, [0.0, offset, 0.0]));
+            assert_eq!(found, expected, "step {step}, offset {offset}");
+        }
+    }
+
+    /// A mesh of two vertices with normals, and colours of this type.
+    fn mesh(scalar: Scalar) -> Mesh {
+        let colours = ["red", "green", "blue"].map(|name| VertexColumn {
+            name: name.into(),
+            scalar,
+        });
+        Mesh {
+            vertices: 12,
+            triangles: 1,
+            columns: normal_columns().chain(colours).collect(),
+            comments: vec!["a\nb".into()],
+            bounds: Some([[-0.001, 0.0, 5.0], [9.996, 1e6, 5.0]]),
+            decimals: 2,
+            ..Mesh::default()
+        }
+    }
+
+    #[test]
+    fn lines_have_one_width_whatever_is_in_them() {
+        let mut bytes = Vec::new();
+        let mesh_8 = mesh(Scalar::U8);
+        let mut values = Vec::new();
+        for (normal, colour) in [
+            ([0.0f32, -1.0, 0.5], [0, 127, 255]),
+            ([1.0, 0.0, -0.5], [1, 2, 3]),
+        ] {
+            values.extend(normal.iter().flat_map(|x| x.to_le_bytes()));
+            values.extend_from_slice(&colour);
+        }
+        let positions = [[-0.001, 0.0, 5.0], [9.996, 999_999.994, 5.0]];
+        Obj.put_vertices(&mesh_8, &positions, &values, &mut bytes);
+        Obj.put_triangles(&mesh_8, &[[0, 9, 11]], &[], &mut bytes);
+        let lines = "v -0.00       0.00 5.00 0.000000 0.498040 1.000000\n\
+                     vn  0.000000 -1.000000  0.500000\n\
+                     v 10.00  999999.99 5.00 0.003922 0.007844 0.011765\n\
+                     vn  1.000000  0.000000 -0.500000\n\
+                     f   1//1 10//10 12//12\n";
+        assert_eq!(String::from_utf8(bytes).unwrap(), lines);
+        let layout = Obj.layout(&mesh_8);
+        let record = lines.find("v 10").unwrap() as u64;
+        assert_eq!(layout.vertices.bytes, record);
+        assert_eq!(layout.triangles.bytes, lines.len() as u64 - 2 * record);
+        let header = format!("# {MADE_BY}\n# a b\n");
+        assert_eq!(layout.header, header.into_bytes());
+    }
+
+    /// Readers compute the byte by rounding or by cutting off.
+    #[test]
+    fn colours_can_be_read_back() {
+        for value in 0..=u8::MAX {
+            let read = share(&[value], 0, Scalar::U8) * 255.0;
+            assert!(
+                read as u8 == value && read.round() as u8 == value,
+                "{value}"
+            );
+        }
+        for value in 0..=u16::MAX {
+            let read = share(&value.to_le_bytes(), 0, Scalar::U16) * 65535.0;
+            assert!(
+                read as u16 == value && read.round() as u16 == value,
+                "{value}"
+            );
+        }
+    }
 }

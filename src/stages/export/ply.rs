@@ -113,7 +113,7 @@ mod tests {
         }
         Ply.put_vertices(&mesh, &positions, &values, &mut bytes);
         assert_eq!(bytes.len() as u64, layout.vertices.offset(3));
-        Ply.put_triangles(&mesh, &[[2, 0, 1]], &mut bytes);
+        Ply.put_triangles(&mesh, &[[2, 0, 1]], &[], &mut bytes);
         assert_eq!(bytes.len() as u64, layout.bytes);
 
         let read = outcrop_ply::Mesh::read(&bytes[..], layout.bytes).unwrap();

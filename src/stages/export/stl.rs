@@ -83,3 +83,31 @@ fn normal([a, b, c]: &Positions) -> [f64; 3] {
         [0.0; 3]
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn counts_have_32_bits() {
+        let mesh = |triangles| Mesh {
+            triangles,
+            ..Mesh::default()
+        };
+        let most = u64::from(u32::MAX);
+        assert_eq!(Stl.exceeded(&mesh(most)), None);
+        assert_eq!(Stl.exceeded(&mesh(most + 1)).unwrap().found, most + 1);
+        assert_eq!(Stl.layout(&mesh(most)).header[80..], [255; 4]);
+        assert_eq!(Stl.layout(&mesh(most)).bytes, 84 + 50 * most);
+    }
+
+    #[test]
+    fn a_triangle_without_area_has_no_normal() {
+        let flat = [[0.0; 3], [1.0, 1.0, 1.0], [2.0, 2.0, 2.0]];
+        assert_eq!(normal(&flat), [0.0; 3]);
+        assert_eq!(
+            normal(&[[0.0; 3], [0.0, 5.0, 0.0], [0.0, 0.0, 2.0]]),
+            [1.0, 0.0, 0.0]
+        );
+    }
+}

@@ -121,6 +121,7 @@ impl Writer<'_> {
             0 => {
                 let used: Vec<u32> = ids.clone().filter(|v| numbering.used(*v)).collect();
                 let normals = normals(unit)?.map(|normals| {
+                    let _held = unit.hold(normals.bytes());
                     let own = |v: &u32| normals.points[(v - ids.start) as usize];
                     used.iter().map(own).collect::<Vec<_>>()
                 });
