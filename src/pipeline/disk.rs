@@ -15,7 +15,7 @@ use crate::geom::lattice::Lattice;
 use crate::params::{Method, Params};
 use crate::report::DiskEstimate;
 use crate::stages::export::{self, CoordinateType, Mesh};
-use crate::stages::ingest::{self, Attributes, Probe, Spool};
+use crate::stages::ingest::{self, Attributes, Column, Probe, Spool};
 use crate::stages::order::StoredPoints;
 use std::path::{Path, PathBuf};
 
@@ -131,10 +131,11 @@ impl Known {
         export::check_size(output, &self.mesh(params, coordinates), true)
     }
 
-    /// Warnings about what the format of `output` leaves out.
+    /// Warnings about what the format of `output` leaves out, of points with these columns.
     pub fn left_out(
         &self,
         params: &Params,
+        columns: &[Column],
         coordinates: CoordinateType,
         output: &Path,
     ) -> Result<Vec<String>> {
@@ -143,7 +144,9 @@ impl Known {
             .as_flattened()
             .iter()
             .fold(0.0, |m: f64, x| m.max(x.abs()));
-        export::left_out(output, &self.mesh(params, coordinates), largest)
+        let mut mesh = self.mesh(params, coordinates);
+        mesh.columns.extend(columns.iter().map(Into::into));
+        export::left_out(output, &mesh, largest)
     }
 
     /// The mesh that is expected.

@@ -184,7 +184,11 @@ impl<'a> Stages<'a> {
         self.known.points = store.len() as u64;
         self.known.text = Some(text);
         let coordinates = self.report.coordinates;
-        for warning in self.known.left_out(&job.params, coordinates, &job.output)? {
+        let columns = &self.carried.columns;
+        let warnings = self
+            .known
+            .left_out(&job.params, columns, coordinates, &job.output)?;
+        for warning in warnings {
             self.warn(warning);
         }
         workspace.note_points(self.known.points);

@@ -128,7 +128,7 @@ pub fn export(
         coordinates,
         columns: normal_columns()
             .filter(|_| normals)
-            .chain(of_points(columns).map(vertex_column))
+            .chain(of_points(columns).map(VertexColumn::from))
             .collect(),
         comments,
         origin,
@@ -173,13 +173,6 @@ pub fn export(
 /// The columns of points.
 fn of_points(columns: Option<&StoredColumns>) -> impl Iterator<Item = &Column> {
     columns.into_iter().flat_map(StoredColumns::columns)
-}
-
-fn vertex_column(column: &Column) -> VertexColumn {
-    VertexColumn {
-        name: column.name.clone(),
-        scalar: column.scalar,
-    }
 }
 
 const NO_TRIANGLES: &str = "no three cells agree on one that belongs to a component large enough; \
