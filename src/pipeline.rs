@@ -6,6 +6,7 @@ mod checks;
 mod clock;
 mod disk;
 mod manifest;
+mod origin;
 mod shared;
 mod stages;
 mod start;
