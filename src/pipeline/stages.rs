@@ -10,7 +10,7 @@ use crate::params::Method;
 use crate::report::{LatticeReport, Report};
 use crate::stages::blocks::Blocks;
 use crate::stages::cells::{CellTriples, DiskRadius, TileRanges, Widen, cells};
-use crate::stages::export::{CoordinateType, export};
+use crate::stages::export::{CoordinateType, ExportOptions, export};
 use crate::stages::ingest::{self, Spool, ingest_classes};
 use crate::stages::located::Places;
 use crate::stages::order::{Orderer, PointStore, StoredPoints, order, sample_sort};
@@ -382,18 +382,15 @@ impl<'a> Stages<'a> {
         lattice: &Lattice,
     ) -> Result<()> {
         let (job, workspace, blocks) = (self.job, self.workspace, self.blocks());
-        let coordinates = self.report.coordinates;
+        let options = ExportOptions {
+            output: &job.output,
+            coordinates: self.report.coordinates,
+            comments: Vec::new(),
+            origin: None,
+        };
         let items = 2 * blocks.count() as u64;
         self.report.mesh = self.clock.stage("export", "blocks", items, || {
-            export(
-                store,
-                repaired,
-                blocks,
-                lattice,
-                coordinates,
-                &job.output,
-                workspace,
-            )
+            export(store, repaired, blocks, lattice, options, workspace)
         })?;
         Ok(())
     }

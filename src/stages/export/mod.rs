@@ -52,6 +52,9 @@ pub(crate) fn mesh_bytes(vertices: u64, triangles: u64, coordinates: CoordinateT
         vertices,
         triangles,
         coordinates,
+        columns: Vec::new(),
+        comments: Vec::new(),
+        origin: None,
     };
     FORMATS[0].layout(&mesh).bytes
 }
@@ -71,7 +74,20 @@ pub struct MeshStats {
     pub boundary_edges: u64,
 }
 
-/// Writes the mesh to `output`.
+/// Properties of a mesh file.
+#[derive(Debug)]
+pub struct ExportOptions<'a> {
+    /// Path of the mesh; its extension selects the format.
+    pub output: &'a Path,
+    /// Type of the coordinates, in formats that have both.
+    pub coordinates: CoordinateType,
+    /// Comments for the header.
+    pub comments: Vec<String>,
+    /// The position of the cloud that is the origin of the mesh, if it is not that of the cloud.
+    pub origin: Option<[f64; 3]>,
+}
+
+/// Writes the mesh.
 ///
 /// # Errors
 /// [`Error::Io`], [`Error::Disk`], [`Error::NoTriangles`], [`Error::Corrupt`], [`Error::Memory`],
@@ -81,10 +97,15 @@ pub fn export(
     repaired: &Repaired,
     blocks: Blocks,
     lattice: &Lattice,
-    coordinates: CoordinateType,
-    output: &Path,
+    options: ExportOptions<'_>,
     workspace: &Workspace,
 ) -> Result<MeshStats> {
+    let ExportOptions {
+        output,
+        coordinates,
+        comments,
+        origin,
+    } = options;
     let surface = repaired.surface.open(workspace)?;
     let filled = repaired.filled.open(workspace, blocks.count())?;
     let numbering = number::number(&repaired.numbering, &filled, blocks, workspace)?;
@@ -98,6 +119,9 @@ pub fn export(
         vertices: stats.vertices,
         triangles: stats.triangles,
         coordinates,
+        columns: Vec::new(),
+        comments,
+        origin,
     };
     let writer = Writer {
         store,
@@ -218,7 +242,7 @@ impl Writer<'_> {
         let points = self.store.slice(ids.start as usize..ids.end as usize)?;
         let _held = unit.hold(bytes_of(&points) + bytes_of(bytes));
         let at = |v: u32| self.lattice.position(points[(v - ids.start) as usize]);
-        self.file.encode_vertices(chosen.map(at), bytes);
+        self.file.encode_vertices(chosen.map(at), &[], bytes);
         Ok(())
     }
 }
