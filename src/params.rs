@@ -123,7 +123,9 @@ impl std::str::FromStr for Origin {
             "auto" => Ok(Self::Auto),
             "none" => Ok(Self::None),
             numbers => {
-                let parsed = numbers.split(',').map(|number| number.trim().parse::<f64>());
+                let parsed = numbers
+                    .split(',')
+                    .map(|number| number.trim().parse::<f64>());
                 let parsed: Vec<f64> = parsed.collect::<Result<_, _>>().map_err(|_| wrong())?;
                 let at: [f64; 3] = parsed.try_into().map_err(|_| wrong())?;
                 match at.iter().all(|c| c.is_finite()) {

@@ -1,6 +1,7 @@
 //! The driver: the stages in the order of the data flow.
 
 mod attempt;
+mod beside;
 mod builder;
 mod checks;
 mod clock;

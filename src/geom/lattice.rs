@@ -83,12 +83,14 @@ mod tests {
 
     #[test]
     fn products_are_rounded_once() {
-        // Exactly between two floats in f64, but not before it was rounded.
-        let (a, b) = (f64::from((1 << 24) + 1), 1.0 + f64::EPSILON);
-        assert_eq!((a * b) as f32, 16_777_216.0);
-        assert_eq!(single_product(a, b), 16_777_218.0);
-        assert_eq!(single_product(-a, b), -16_777_218.0);
-        assert_eq!(single_product(a, 1.0), 16_777_216.0);
+        // In f64 both products are exactly between two floats, in truth they are beside it.
+        let (between, next) = (16_777_217.0, 16_777_219.0);
+        let (above, below) = (between / 3.0, next / 3.0);
+        assert_eq!((3.0 * above, 3.0 * below), (between, next));
+        assert_eq!(single_product(3.0, above), 16_777_218.0);
+        assert_eq!(single_product(-3.0, above), -16_777_218.0);
+        assert_eq!(single_product(3.0, below), 16_777_218.0);
+        assert_eq!(single_product(between, 1.0), 16_777_216.0);
         assert_eq!(single_product(3.0, 0.1), 0.3);
         assert_eq!(single_product(0.0, 0.01), 0.0);
         assert_eq!(single_product(1e300, 1e300), f32::INFINITY);

@@ -6,8 +6,8 @@ use crate::geom::aabb::Aabb;
 use crate::geom::lattice::{COORDINATE_LIMIT, Lattice, Shift};
 use crate::stages::ingest::{self, CoordinateType};
 
-/// An automatic origin is a multiple of one of these: the largest that is not above the extent of the cloud and
-/// is a whole number of steps. Larger ones would make local coordinates larger than they need to be.
+/// Units of automatic origins, if they are whole numbers of steps. Adjacent clouds are likely to have the same
+/// multiple of a large unit.
 const UNITS: [f64; 13] = [
     1e3, 1e2, 1e1, 1.0, 1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9,
 ];
@@ -24,34 +24,44 @@ pub(super) struct Steps<'a> {
 }
 
 impl Steps<'_> {
-    /// The shift of a cloud with these bounds to a round position below it; none if that is where the origin
-    /// is.
+    /// The shift of a cloud with these bounds to a round position below it: a multiple of the largest unit with
+    /// which single precision suffices, else of the largest that is not above the extent of the cloud. None if
+    /// the origin is there already.
     pub fn automatic(&self, bounds: Aabb) -> Option<Shift> {
         let [min, max] = [bounds.min, bounds.max].map(|corner| self.lattice.position(corner));
         let extent = (0..3).map(|a| max[a] - min[a]).fold(0.0, f64::max);
-        let unit = self.unit(extent);
-        let shift = self.shift(min.map(|c| (c / unit).floor() * unit))?;
+        let below = |unit: f64| self.shift(min.map(|c| (c / unit).floor() * unit));
+        let units = self.units();
+        let single = units.iter().find_map(|unit| {
+            below(*unit).filter(|shift| self.precision(shift, bounds) == CoordinateType::F32)
+        });
+        let suited = || {
+            let suited = units.iter().find(|unit| **unit <= extent);
+            below(*suited.or(units.last())?)
+        };
+        let shift = single.or_else(suited)?;
         (shift.origin != [0.0; 3]).then_some(shift)
     }
 
-    /// The unit of an automatic origin.
-    fn unit(&self, extent: f64) -> f64 {
+    /// The units of automatic origins, descending: round decimals, then round numbers of steps.
+    fn units(&self) -> Vec<f64> {
         let step = self.coarse;
         let whole = |unit: &f64| {
             let steps = unit / step;
             steps >= 1.0 && (steps - steps.round()).abs() <= 1e-9 * steps
         };
-        let found = UNITS.into_iter().find(|unit| *unit <= extent && whole(unit));
-        found.unwrap_or_else(|| {
-            // No decimal is a whole number of steps: a round number of them.
-            let binary = step.to_bits() & ((1 << 52) - 1) == 0;
-            let (factor, most) = (if binary { 2.0 } else { 10.0 }, extent.min(UNITS[0]));
-            let mut unit = step;
-            while unit * factor <= most {
-                unit *= factor;
-            }
-            unit
-        })
+        let mut units: Vec<f64> = UNITS.into_iter().filter(whole).collect();
+        // Below them round numbers of steps, in the system of the step.
+        let binary = step.to_bits() & ((1 << 52) - 1) == 0;
+        let factor = if binary { 2.0 } else { 10.0 };
+        let most = units.last().copied().unwrap_or(UNITS[0]);
+        let powers = std::iter::successors(Some(step), |unit| Some(unit * factor));
+        let powers: Vec<f64> = powers.take_while(|unit| *unit < most).collect();
+        units.extend(powers.into_iter().rev());
+        if units.is_empty() {
+            units.push(step);
+        }
+        units
     }
 
     /// The shift to the lattice position nearest to the given one; none if it is too far away.
@@ -85,7 +95,10 @@ impl Steps<'_> {
         self.shift(to).ok_or_else(|| Error::Parameter {
             name: "--origin",
             found: format!("{},{},{}", to[0], to[1], to[2]),
-            expected: format!("a position within 2^52 steps of {} of the cloud", self.coarse),
+            expected: format!(
+                "a position within 2^52 steps of {} of the cloud",
+                self.coarse
+            ),
         })
     }
 
@@ -140,18 +153,43 @@ mod tests {
     #[test]
     fn automatic_origins_are_round() {
         let feet = lattice(0.01, [0.0; 3], [63_601_234, 84_801_234, 40_612]);
-        assert_eq!(automatic(&feet, [500_000, 400_000, 60_000]), [636_000.0, 848_000.0, 0.0]);
-        // A statue: thousands of units would take the precision away.
-        assert_eq!(automatic(&feet, [250, 200, 300]), [636_012.0, 848_012.0, 406.0]);
+        assert_eq!(
+            automatic(&feet, [500_000, 400_000, 60_000]),
+            [636_000.0, 848_000.0, 0.0]
+        );
+        // A statue: thousands would take the precision away.
+        let fine = lattice(1e-5, [0.0; 3], [63_605_234_000, 84_801_234_000, 40_612_000]);
+        assert_eq!(
+            automatic(&fine, [250_000, 200_000, 300_000]),
+            [636_050.0, 848_010.0, 400.0]
+        );
+        // Wider than what single precision can hold.
+        assert_eq!(
+            automatic(&feet, [50_000_000; 3]),
+            [636_000.0, 848_000.0, 0.0]
+        );
         // An offset between the steps stays in the origin.
-        let odd = lattice(0.01, [600_000.005, 0.25, 0.0], [3_601_234, 84_801_234, -612]);
-        assert_eq!(automatic(&odd, [500_000, 400_000, 60_000]), [636_000.005, 848_000.0, -1000.0]);
-        // 1000 is not a multiple of the step, 300 is a round number of steps.
+        let odd = lattice(
+            0.01,
+            [600_000.002, 0.25, 0.0],
+            [3_601_234, 84_801_234, -612],
+        );
+        assert_eq!(
+            automatic(&odd, [500_000, 400_000, 60_000]),
+            [636_000.002, 848_000.0, -1000.0]
+        );
+        // 1000 is not a multiple of the step, 300 is.
         let threes = lattice(0.003, [0.0; 3], [212_004_113, 1, 1]);
         assert_eq!(automatic(&threes, [500_000; 3])[0], 636_000.0);
         let binary = lattice(2f64.powi(-10), [0.0; 3], [651_277_000, 868_352_001, 5]);
-        assert_eq!(automatic(&binary, [5_000_000; 3]), [636_000.0, 848_000.0, 0.0]);
-        assert_eq!(automatic(&binary, [300; 3])[0], 636_012.5);
+        assert_eq!(
+            automatic(&binary, [5_000_000; 3]),
+            [636_000.0, 848_000.0, 0.0]
+        );
+        let tiny = lattice(2f64.powi(-30), [0.0; 3], [682_911_875_000_000, 7, 5]);
+        let at = automatic(&tiny, [300; 3]);
+        assert_eq!(at[0].fract() * 1024.0 % 1.0, 0.0);
+        assert!((636_011.0..636_012.0).contains(&at[0]));
     }
 
     #[test]

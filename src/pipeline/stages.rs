@@ -1,12 +1,14 @@
 //! The stages of a run: each with its parameters, its part of the report, and the check of disk space for the
 //! following stages.
 
+use super::beside;
 use super::checks::{disk_radius, enough, not_a_line, room};
+use super::origin::Steps;
 use super::{Clock, Known, Reconstruction};
 use crate::error::Result;
-use crate::geom::lattice::Lattice;
+use crate::geom::lattice::{Lattice, Shift};
 use crate::method::METHOD;
-use crate::params::Method;
+use crate::params::{Method, Origin};
 use crate::report::{LatticeReport, Report};
 use crate::stages::blocks::Blocks;
 use crate::stages::cells::{CellTriples, DiskRadius, TileRanges, Widen, cells};
@@ -22,6 +24,7 @@ use crate::stages::stitch::{StitchOptions, Stitched, stitch};
 use crate::stages::thin::{Grid, LeftOut, thin};
 use crate::stages::triples::{Triples, triples};
 use crate::workspace::{Workspace, limits};
+use outcrop_ply::Place;
 use std::time::Instant;
 
 /// The positions that decide which points are connected, if they are not those of the mesh, and the local
@@ -40,6 +43,16 @@ pub(super) struct Stages<'a> {
     begin: Instant,
     known: Known,
     report: Report,
+    /// Step of the lattice before it was refined.
+    coarse: f64,
+}
+
+/// The type of coordinates in the mesh.
+fn written(precision: ingest::CoordinateType) -> CoordinateType {
+    match precision {
+        ingest::CoordinateType::F32 => CoordinateType::Float,
+        ingest::CoordinateType::F64 => CoordinateType::Double,
+    }
 }
 
 impl<'a> Stages<'a> {
@@ -57,6 +70,7 @@ impl<'a> Stages<'a> {
             clock: Clock::new(workspace),
             begin: Instant::now(),
             known: headers.unwrap_or_default(),
+            coarse: 0.0,
             report: Report {
                 version: env!("CARGO_PKG_VERSION"),
                 parameters: job.params.clone(),
@@ -99,10 +113,7 @@ impl<'a> Stages<'a> {
             ingest_classes(&job.inputs, &params.classes, workspace)
         })?;
         let input = spool.stats().clone();
-        self.report.coordinates = match spool.source_precision() {
-            ingest::CoordinateType::F32 => CoordinateType::Float,
-            ingest::CoordinateType::F64 => CoordinateType::Double,
-        };
+        self.report.coordinates = written(spool.source_precision());
         self.known = Known {
             read: input.kept,
             spool: spool.bytes(),
@@ -117,11 +128,28 @@ impl<'a> Stages<'a> {
         self.check_room()?;
         let moves = params.smooth + params.relax > 0;
         let lattice = spool.choose_lattice(if moves { METHOD.smoothing.halvings } else { 0 })?;
+        self.coarse = spool.choose_lattice(0)?.step;
+        self.check_origin(&lattice)?;
         self.report.lattice = LatticeReport {
             step: lattice.step,
             exact: lattice.exact,
         };
         Ok((spool, lattice))
+    }
+
+    /// Checks a given origin, and says if it is rounded.
+    fn check_origin(&mut self, lattice: &Lattice) -> Result<()> {
+        let Origin::At(to) = self.job.params.origin else {
+            return Ok(());
+        };
+        let coarse = self.coarse;
+        let [x, y, z] = Steps { lattice, coarse }.given(to)?.origin;
+        if [x, y, z] != to {
+            self.warn(format!(
+                "--origin: {x},{y},{z} is used, the nearest position on the lattice of steps of {coarse}"
+            ));
+        }
+        Ok(())
     }
 
     /// Sorts the points along the curve, thinned if requested; duplicates become one point.
@@ -374,6 +402,30 @@ impl<'a> Stages<'a> {
         Ok(repaired)
     }
 
+    /// The origin of the mesh's coordinates, if it is not that of the cloud, and their type.
+    fn shift(&mut self, store: &PointStore, lattice: &Lattice) -> Result<Option<Shift>> {
+        let coarse = self.coarse;
+        let steps = Steps { lattice, coarse };
+        let doubles = self.report.coordinates == CoordinateType::Double;
+        let shift = match self.job.params.origin {
+            Origin::Auto if doubles => steps.automatic(store.bounds()),
+            Origin::Auto | Origin::None => None,
+            Origin::At(to) => Some(steps.given(to)?),
+        };
+        if let Some(shift) = &shift {
+            self.report.coordinates = written(steps.precision(shift, store.bounds()));
+            self.report.origin = Some(shift.origin);
+        }
+        Ok(shift)
+    }
+
+    /// The comments of the mesh.
+    fn comments(&self) -> Vec<String> {
+        let step = (self.job.params.smooth == 0).then_some(self.coarse);
+        let place = self.report.origin.map(|origin| Place::new(origin, step));
+        place.map_or_else(Vec::new, |place| place.comments())
+    }
+
     /// Writes the mesh.
     pub fn export(
         &mut self,
@@ -382,17 +434,18 @@ impl<'a> Stages<'a> {
         lattice: &Lattice,
     ) -> Result<()> {
         let (job, workspace, blocks) = (self.job, self.workspace, self.blocks());
+        let shift = self.shift(store, lattice)?;
         let options = ExportOptions {
             output: &job.output,
             coordinates: self.report.coordinates,
-            comments: Vec::new(),
-            origin: None,
+            comments: self.comments(),
+            origin: shift,
         };
         let items = 2 * blocks.count() as u64;
         self.report.mesh = self.clock.stage("export", "blocks", items, || {
             export(store, repaired, blocks, lattice, options, workspace)
         })?;
-        Ok(())
+        beside::write(&job.output, &self.report)
     }
 
     /// The report of the run.

@@ -15,7 +15,8 @@ pub(crate) use file::{folder_of, is_compressed, temporary, temporary_of};
 pub use format::CoordinateType;
 
 use crate::error::{Error, Result};
-use crate::geom::lattice::Lattice;
+use crate::geom::Point;
+use crate::geom::lattice::{Lattice, Shift};
 use crate::spill::Inbox;
 use crate::stages::blocks::Blocks;
 use crate::stages::order::PointStore;
@@ -83,8 +84,8 @@ pub struct ExportOptions<'a> {
     pub coordinates: CoordinateType,
     /// Comments for the header.
     pub comments: Vec<String>,
-    /// The position of the cloud that is the origin of the mesh, if it is not that of the cloud.
-    pub origin: Option<[f64; 3]>,
+    /// The origin of the coordinates in the mesh, if it is not that of the cloud.
+    pub origin: Option<Shift>,
 }
 
 /// Writes the mesh.
@@ -104,7 +105,7 @@ pub fn export(
         output,
         coordinates,
         comments,
-        origin,
+        origin: shift,
     } = options;
     let surface = repaired.surface.open(workspace)?;
     let filled = repaired.filled.open(workspace, blocks.count())?;
@@ -121,7 +122,7 @@ pub fn export(
         coordinates,
         columns: Vec::new(),
         comments,
-        origin,
+        origin: shift.map(|shift| shift.origin),
     };
     let writer = Writer {
         store,
@@ -130,6 +131,8 @@ pub fn export(
         numbering,
         blocks,
         lattice,
+        shift,
+        written: coordinates,
         file: MeshFile::open(output, format_of(output), mesh, workspace)?,
     };
     match is_compressed(output) {
@@ -153,6 +156,9 @@ struct Writer<'a> {
     numbering: Numbering,
     blocks: Blocks,
     lattice: &'a Lattice,
+    shift: Option<Shift>,
+    /// Type of the coordinates in the file.
+    written: CoordinateType,
     file: MeshFile<'a>,
 }
 
@@ -241,8 +247,19 @@ impl Writer<'_> {
     ) -> Result<()> {
         let points = self.store.slice(ids.start as usize..ids.end as usize)?;
         let _held = unit.hold(bytes_of(&points) + bytes_of(bytes));
-        let at = |v: u32| self.lattice.position(points[(v - ids.start) as usize]);
+        let at = |v: u32| self.coordinates(points[(v - ids.start) as usize]);
         self.file.encode_vertices(chosen.map(at), &[], bytes);
         Ok(())
+    }
+
+    /// The coordinates that are written for a position.
+    fn coordinates(&self, point: Point) -> [f64; 3] {
+        match (&self.shift, self.written) {
+            (None, _) => self.lattice.position(point),
+            (Some(shift), CoordinateType::Double) => self.lattice.shifted(point, shift),
+            (Some(shift), CoordinateType::Float) => {
+                self.lattice.shifted_single(point, shift).map(f64::from)
+            }
+        }
     }
 }

@@ -103,12 +103,26 @@ mod tests {
 
     #[test]
     fn comments_that_are_no_place_are_text() {
-        let lines = |lines: &[&str]| read(&lines.iter().map(ToString::to_string).collect::<Vec<_>>());
-        for odd in ["offsetz", "offsetz nan", "offsetz inf", "offsetz 1 2", "offsetz far", "gridstep 0"] {
+        let lines =
+            |lines: &[&str]| read(&lines.iter().map(ToString::to_string).collect::<Vec<_>>());
+        for odd in [
+            "offsetz",
+            "offsetz nan",
+            "offsetz inf",
+            "offsetz 1 2",
+            "offsetz far",
+            "gridstep 0",
+        ] {
             let place = lines(&["offsetx 1", "offsety 2", odd]);
             assert_eq!((place.origin(), place.step), (None, None), "{odd}");
         }
-        let place = lines(&["offsety 2", "epsg 2994", "offsetx 1", "offsetz 3", "gridstep -1"]);
+        let place = lines(&[
+            "offsety 2",
+            "epsg 2994",
+            "offsetx 1",
+            "offsetz 3",
+            "gridstep -1",
+        ]);
         assert_eq!((place.origin(), place.step), (Some([1.0, 2.0, 3.0]), None));
     }
 
@@ -120,7 +134,10 @@ mod tests {
         assert_eq!(place.position(local, single), [2234.56, 1000.1, 1007.0]);
         // Not near a multiple, for its precision: it was moved.
         let moved = [0.015, 0.25 / 3.0, 7.001];
-        assert_eq!(place.position(moved, [Scalar::F64; 3]), moved.map(|c| c + 1000.0));
+        assert_eq!(
+            place.position(moved, [Scalar::F64; 3]),
+            moved.map(|c| c + 1000.0)
+        );
         assert_eq!(Place::default().position(moved, single), moved);
     }
 }
