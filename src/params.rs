@@ -176,6 +176,8 @@ pub struct Params {
     pub max_fill: MaxWidth,
     /// Remove bridges and small components, fill holes (paper, section 3.6).
     pub repair: bool,
+    /// Take coordinates as they are if files give different reference systems, which is an error otherwise.
+    pub ignore_crs: bool,
     /// Origin of the coordinates in the mesh file.
     pub origin: Origin,
     /// Points per block, the unit of insertion; changes the result.
@@ -211,6 +213,7 @@ impl Default for Params {
             max_edge: MaxWidth::Spacings(METHOD.admissibility.edge),
             max_fill: MaxWidth::Spacings(METHOD.filling.width),
             repair: true,
+            ignore_crs: false,
             origin: Origin::None,
             block: METHOD.curve.block,
             division: Division::default(),

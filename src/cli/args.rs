@@ -180,6 +180,9 @@ pub struct Coordinates {
         allow_hyphen_values = true
     )]
     pub origin: Origin,
+    /// Take coordinates as they are if files give different reference systems; the mesh then names none
+    #[arg(long)]
+    pub ignore_crs: bool,
 }
 
 /// The points, the mesh, and what decides it.
@@ -377,6 +380,7 @@ impl Job {
             min_component: self.repair.min_component.or(usual.min_component),
             repair: !self.repair.no_repair,
             origin: self.coordinates.origin,
+            ignore_crs: self.coordinates.ignore_crs,
             block: self.block_points,
             ..usual
         }

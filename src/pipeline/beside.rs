@@ -1,4 +1,5 @@
-//! The files beside the mesh: `MESH.origin.json` with the origin of its coordinates.
+//! The files beside the mesh: `MESH.origin.json` with the origin of its coordinates, and `MESH.prj` with the
+//! well-known text of their reference system.
 //!
 //! They are written when the mesh has its name, each under a temporary name first; a resumed run writes them
 //! again.
@@ -6,6 +7,7 @@
 use crate::error::{Error, Result};
 use crate::report::Report;
 use crate::stages::export::{folder_of, is_compressed};
+use crate::stages::ingest::{self, Crs};
 use serde::Serialize;
 use std::ffi::OsString;
 use std::io::ErrorKind::NotFound;
@@ -29,6 +31,7 @@ struct OriginFile {
     cloudcompare_global_shift: [f64; 3],
     /// A line for `global_shift_list.txt`, from which CloudCompare offers shifts.
     cloudcompare_global_shift_list: String,
+    crs: Option<Crs>,
 }
 
 /// Path of the file beside a mesh: its name with another extension, after that of a compression is removed.
@@ -43,8 +46,26 @@ pub(super) fn path_beside(output: &Path, extension: &str) -> PathBuf {
     path.into()
 }
 
-/// Writes the files beside the mesh; one of an earlier mesh that is not true any more is deleted.
-pub(super) fn write(output: &Path, report: &Report) -> Result<()> {
+/// Writes the files beside the mesh; an origin of an earlier mesh that is not true any more is deleted.
+pub(super) fn write(output: &Path, inputs: &[PathBuf], report: &Report) -> Result<()> {
+    write_origin(output, report)?;
+    let wkt = report.input.crs.as_ref().and_then(|crs| crs.wkt.as_ref());
+    let Some(wkt) = wkt else {
+        return Ok(());
+    };
+    let path = path_beside(output, "prj");
+    // That of an input stays as it is.
+    let of_input = ingest::expand(inputs)?.iter().any(|input| {
+        let other = ingest::prj_of(input).canonicalize();
+        other.is_ok_and(|other| path.canonicalize().is_ok_and(|path| path == other))
+    });
+    match of_input {
+        true => Ok(()),
+        false => put(&path, format!("{wkt}\n").as_bytes()),
+    }
+}
+
+fn write_origin(output: &Path, report: &Report) -> Result<()> {
     let path = path_beside(output, "origin.json");
     let Some(origin) = report.origin else {
         return match is_ours(&path) {
@@ -61,6 +82,7 @@ pub(super) fn write(output: &Path, report: &Report) -> Result<()> {
         mesh: name.into_owned(),
         origin,
         cloudcompare_global_shift: shift,
+        crs: report.input.crs.clone(),
     };
     let json = serde_json::to_string_pretty(&content);
     let json = json.map_err(|e| Error::io(&path, "write JSON", e.into()))?;
@@ -132,16 +154,16 @@ mod tests {
             origin,
             ..Report::default()
         };
-        write(&output, &with(Some([635_000.0, 0.0, -0.5]))).unwrap();
+        write(&output, &[], &with(Some([635_000.0, 0.0, -0.5]))).unwrap();
         let json: serde_json::Value =
             serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
         assert_eq!(json["origin"], serde_json::json!([635_000.0, 0.0, -0.5]));
         let line = "mesh.ply; -635000; 0; 0.5; 1;";
         assert_eq!(json["cloudcompare_global_shift_list"], line);
-        write(&output, &with(None)).unwrap();
+        write(&output, &[], &with(None)).unwrap();
         assert!(!path.exists());
         std::fs::write(&path, "{\"made_by\": \"hand\"}").unwrap();
-        write(&output, &with(None)).unwrap();
+        write(&output, &[], &with(None)).unwrap();
         assert!(path.exists());
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
     }

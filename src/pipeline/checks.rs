@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::geom::lattice::Lattice;
-use crate::params::Radius;
+use crate::params::{Params, Radius};
 use crate::report::DiskEstimate;
 use crate::stages::cells::{CellStats, DiskRadius};
 use crate::stages::export::folder_of;
@@ -80,6 +80,14 @@ pub(super) fn not_an_input(output: &Path, inputs: &[PathBuf]) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// Checks that the inputs do not have different reference systems, as far as their headers tell.
+pub(super) fn one_system(params: &Params, inputs: &[PathBuf]) -> Result<()> {
+    match params.ignore_crs {
+        true => Ok(()),
+        false => ingest::check_systems(inputs),
+    }
 }
 
 pub(super) fn enough(store: &StoredPoints) -> Result<()> {

@@ -1,7 +1,7 @@
 //! A run that tasks share, perhaps on several machines: its plan, the work of a task, and the work between
 //! two generations of tasks. [`crate::workspace::generations`] has the files.
 
-use super::checks::{not_an_input, writable};
+use super::checks::{not_an_input, one_system, writable};
 use super::manifest::Manifest;
 use super::{Builder, Reconstruction};
 use crate::error::{Error, Result};
@@ -87,6 +87,7 @@ impl Reconstruction {
         }
         writable(&self.output)?;
         not_an_input(&self.output, &self.inputs)?;
+        one_system(&self.params, &self.inputs)?;
         let manifest = Manifest::of(self)?.to_bytes()?;
         let random = std::hash::RandomState::new().build_hasher().finish();
         let sharing = Sharing {

@@ -113,6 +113,9 @@ impl<'a> Stages<'a> {
             ingest_classes(&job.inputs, &params.classes, workspace)
         })?;
         let input = spool.stats().clone();
+        if let Some(mixed) = input.mixed.as_ref().filter(|_| !params.ignore_crs) {
+            return Err(mixed.refused());
+        }
         self.report.coordinates = written(spool.source_precision());
         self.known = Known {
             read: input.kept,
@@ -423,7 +426,12 @@ impl<'a> Stages<'a> {
     fn comments(&self) -> Vec<String> {
         let step = (self.job.params.smooth == 0).then_some(self.coarse);
         let place = self.report.origin.map(|origin| Place::new(origin, step));
-        place.map_or_else(Vec::new, |place| place.comments())
+        let mut comments = place.map_or_else(Vec::new, |place| place.comments());
+        if let Some(crs) = &self.report.input.crs {
+            comments.extend(crs.horizontal.map(|code| format!("epsg {code}")));
+            comments.push(format!("crs {}", crs.line()));
+        }
+        comments
     }
 
     /// Writes the mesh.
@@ -445,7 +453,7 @@ impl<'a> Stages<'a> {
         self.report.mesh = self.clock.stage("export", "blocks", items, || {
             export(store, repaired, blocks, lattice, options, workspace)
         })?;
-        beside::write(&job.output, &self.report)
+        beside::write(&job.output, &job.inputs, &self.report)
     }
 
     /// The report of the run.
