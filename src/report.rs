@@ -58,6 +58,9 @@ pub struct Report {
     pub mesh: MeshStats,
     /// Type of the coordinates in the file.
     pub coordinates: CoordinateType,
+    /// The position of the cloud that is the origin of the mesh's coordinates; none if that is the same as the
+    /// cloud's.
+    pub origin: Option<[f64; 3]>,
     /// Peak resident memory of the process in bytes.
     pub peak_resident_bytes: u64,
     /// Mapped files in resident memory, in bytes: the program's code and its libraries.

@@ -1,7 +1,7 @@
 //! Command-line arguments.
 
 use crate::method::METHOD;
-use crate::params::{MaxWidth, Method, Params, Radius, Smoothing};
+use crate::params::{MaxWidth, Method, Origin, Params, Radius, Smoothing};
 use crate::pipeline::{Builder, Reconstruction, Start};
 use crate::stages::ingest::{Attributes, Classes};
 use crate::workspace::mapped::Io;
@@ -179,6 +179,25 @@ pub struct Repair {
     pub no_repair: bool,
 }
 
+/// Coordinates of the mesh.
+#[derive(Debug, ClapArgs)]
+#[command(next_help_heading = "Coordinates")]
+pub struct Coordinates {
+    /// Origin of the mesh's coordinates, for programs that round them to single precision: auto (a round
+    /// position below the cloud, if single precision does not suffice), none (that of the cloud), or a position
+    /// like 635000,848000,0; it is written into the mesh and MESH.origin.json
+    #[arg(
+        long,
+        value_name = "auto|none|X,Y,Z",
+        default_value = "none",
+        allow_hyphen_values = true
+    )]
+    pub origin: Origin,
+    /// Take coordinates as they are if files give different reference systems; the mesh then names none
+    #[arg(long)]
+    pub ignore_crs: bool,
+}
+
 /// The points, the mesh, and what decides it.
 #[derive(Debug, ClapArgs)]
 pub struct Job {
@@ -201,6 +220,8 @@ pub struct Job {
     pub surface: Surface,
     #[command(flatten)]
     pub repair: Repair,
+    #[command(flatten)]
+    pub coordinates: Coordinates,
     /// Points per tile; does not change the result
     #[arg(long, value_name = "N", hide = true)]
     pub tile_points: Option<u32>,
@@ -379,6 +400,8 @@ impl Job {
             min_component: self.repair.min_component.or(usual.min_component),
             repair: !self.repair.no_repair,
             normals: self.normals,
+            origin: self.coordinates.origin,
+            ignore_crs: self.coordinates.ignore_crs,
             block: self.block_points,
             ..usual
         }

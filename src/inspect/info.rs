@@ -200,7 +200,12 @@ impl fmt::Display for Info {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for file in &self.input.files {
             let path = file.path.display();
-            writeln!(f, "{path}: {}, {} points", file.format, file.points)?;
+            write!(f, "{path}: {}, {} points", file.format, file.points)?;
+            // If it is not that of all.
+            if let (None, Some(crs)) = (&self.input.crs, &file.crs) {
+                write!(f, ", {} ({})", crs.line(), crs.source)?;
+            }
+            writeln!(f)?;
         }
         let three = |p: &[f64; 3]| format!("{} {} {}", p[0], p[1], p[2]);
         let spread =
@@ -211,6 +216,11 @@ impl fmt::Display for Info {
             "{} duplicates, {} not finite, {} withheld, {} of other classes",
             self.duplicates, input.dropped_non_finite, input.withheld, input.dropped_by_class
         );
+        let system = match &input.crs {
+            Some(crs) => format!("{} ({})", crs.line(), crs.source),
+            None if input.files.iter().any(|file| file.crs.is_some()) => "different ones".into(),
+            None => "not given".into(),
+        };
         let rounding = if self.lattice_exact {
             "exact"
         } else {
@@ -223,6 +233,7 @@ impl fmt::Display for Info {
             ),
             ("left out", left_out),
             ("columns", self.columns()),
+            ("system", system),
             ("lowest", three(&self.min)),
             ("highest", three(&self.max)),
             (

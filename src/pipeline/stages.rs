@@ -1,13 +1,15 @@
 //! The stages of a run: each with its parameters, its part of the report, and the check of disk space for the
 //! following stages.
 
+use super::beside;
 use super::checks::{all_are_kept, disk_radius, enough, not_a_line, room};
 use super::disk::Text;
+use super::origin::Steps;
 use super::{Clock, Known, Reconstruction};
 use crate::error::Result;
-use crate::geom::lattice::Lattice;
+use crate::geom::lattice::{Lattice, Shift};
 use crate::method::METHOD;
-use crate::params::Method;
+use crate::params::{Method, Origin};
 use crate::report::{LatticeReport, Report};
 use crate::stages::attributes::{StoredColumns, attributes};
 use crate::stages::blocks::Blocks;
@@ -24,6 +26,7 @@ use crate::stages::stitch::{StitchOptions, Stitched, stitch};
 use crate::stages::thin::{Grid, LeftOut, thin};
 use crate::stages::triples::{Triples, triples};
 use crate::workspace::{Workspace, limits};
+use outcrop_ply::Place;
 use std::time::Instant;
 
 /// The positions that decide which points are connected, if they are not those of the mesh, and the local
@@ -43,6 +46,16 @@ pub(super) struct Stages<'a> {
     known: Known,
     carried: Carried,
     report: Report,
+    /// Step of the lattice before it was refined.
+    coarse: f64,
+}
+
+/// The type of coordinates in the mesh.
+fn written(precision: ingest::CoordinateType) -> CoordinateType {
+    match precision {
+        ingest::CoordinateType::F32 => CoordinateType::Float,
+        ingest::CoordinateType::F64 => CoordinateType::Double,
+    }
 }
 
 impl<'a> Stages<'a> {
@@ -64,6 +77,7 @@ impl<'a> Stages<'a> {
             begin: Instant::now(),
             known: headers.unwrap_or_default(),
             carried: Carried::default(),
+            coarse: 0.0,
             report: Report {
                 version: env!("CARGO_PKG_VERSION"),
                 parameters: job.params.clone(),
@@ -116,10 +130,10 @@ impl<'a> Stages<'a> {
         self.carried = spool.carried(&params.attributes, params.wide_colors);
         self.report.attributes = self.carried.attributes.clone();
         let input = spool.stats().clone();
-        self.report.coordinates = match spool.source_precision() {
-            ingest::CoordinateType::F32 => CoordinateType::Float,
-            ingest::CoordinateType::F64 => CoordinateType::Double,
-        };
+        if let Some(mixed) = input.mixed.as_ref().filter(|_| !params.ignore_crs) {
+            return Err(mixed.refused());
+        }
+        self.report.coordinates = written(spool.source_precision());
         self.known = Known {
             read: input.kept,
             spool: spool.bytes(),
@@ -136,11 +150,28 @@ impl<'a> Stages<'a> {
         self.check_room()?;
         let moves = params.smooth + params.relax > 0;
         let lattice = spool.choose_lattice(if moves { METHOD.smoothing.halvings } else { 0 })?;
+        self.coarse = spool.choose_lattice(0)?.step;
+        self.check_origin(&lattice)?;
         self.report.lattice = LatticeReport {
             step: lattice.step,
             exact: lattice.exact,
         };
         Ok((spool, lattice))
+    }
+
+    /// Checks a given origin, and says if it is rounded.
+    fn check_origin(&mut self, lattice: &Lattice) -> Result<()> {
+        let Origin::At(to) = self.job.params.origin else {
+            return Ok(());
+        };
+        let coarse = self.coarse;
+        let [x, y, z] = Steps { lattice, coarse }.given(to)?.origin;
+        if [x, y, z] != to {
+            self.warn(format!(
+                "--origin: {x},{y},{z} is used, the nearest position on the lattice of steps of {coarse}"
+            ));
+        }
+        Ok(())
     }
 
     /// Sorts the points along the curve, thinned if requested; duplicates become one point.
@@ -426,6 +457,35 @@ impl<'a> Stages<'a> {
         Ok(repaired)
     }
 
+    /// The origin of the mesh's coordinates, if it is not that of the cloud, and their type.
+    fn shift(&mut self, store: &PointStore, lattice: &Lattice) -> Result<Option<Shift>> {
+        let coarse = self.coarse;
+        let steps = Steps { lattice, coarse };
+        let doubles = self.report.coordinates == CoordinateType::Double;
+        let shift = match self.job.params.origin {
+            Origin::Auto if doubles => steps.automatic(store.bounds()),
+            Origin::Auto | Origin::None => None,
+            Origin::At(to) => Some(steps.given(to)?),
+        };
+        if let Some(shift) = &shift {
+            self.report.coordinates = written(steps.precision(shift, store.bounds()));
+            self.report.origin = Some(shift.origin);
+        }
+        Ok(shift)
+    }
+
+    /// The comments of the mesh.
+    fn comments(&self) -> Vec<String> {
+        let step = (self.job.params.smooth == 0).then_some(self.coarse);
+        let place = self.report.origin.map(|origin| Place::new(origin, step));
+        let mut comments = place.map_or_else(Vec::new, |place| place.comments());
+        if let Some(crs) = &self.report.input.crs {
+            comments.extend(crs.horizontal.map(|code| format!("epsg {code}")));
+            comments.push(format!("crs {}", crs.line()));
+        }
+        comments
+    }
+
     /// Writes the mesh.
     pub fn export(
         &mut self,
@@ -435,11 +495,12 @@ impl<'a> Stages<'a> {
         lattice: &Lattice,
     ) -> Result<()> {
         let (job, workspace, blocks) = (self.job, self.workspace, self.blocks());
+        let shift = self.shift(store, lattice)?;
         let options = ExportOptions {
             output: &job.output,
             coordinates: self.report.coordinates,
-            comments: Vec::new(),
-            origin: None,
+            comments: self.comments(),
+            origin: shift,
             columns,
             normals: job.params.normals,
             decimals: self.known.text.map_or(0, |text| text.decimals),
@@ -448,7 +509,8 @@ impl<'a> Stages<'a> {
         self.report.mesh = self.clock.stage("export", "blocks", items, || {
             export(store, repaired, blocks, lattice, options, workspace)
         })?;
-        columns.map_or(Ok(()), |columns| columns.release(workspace))
+        columns.map_or(Ok(()), |columns| columns.release(workspace))?;
+        beside::write(&job.output, &job.inputs, &self.report)
     }
 
     /// The report of the run.

@@ -6,6 +6,7 @@
 
 mod bounds;
 mod compressed;
+mod coordinates;
 mod corners;
 mod faces;
 mod file;
@@ -19,21 +20,22 @@ mod ply;
 mod stl;
 mod write;
 
-pub(crate) use file::{folder_of, temporary, temporary_of};
+pub(crate) use file::{folder_of, is_compressed, temporary, temporary_of};
 pub use format::CoordinateType;
 pub(crate) use format::{Mesh, normal_columns};
 pub(crate) use formats::{check_name, check_size, left_out, mesh_bytes};
 pub(crate) use obj::decimals;
 
 use crate::error::{Error, Result};
-use crate::geom::lattice::Lattice;
+use crate::geom::lattice::{Lattice, Shift};
 use crate::stages::attributes::StoredColumns;
 use crate::stages::blocks::Blocks;
 use crate::stages::ingest::Column;
 use crate::stages::order::PointStore;
 use crate::stages::repair::Repaired;
 use crate::workspace::Workspace;
-use file::{MeshFile, is_compressed};
+use coordinates::Coordinates;
+use file::MeshFile;
 use format::VertexColumn;
 use formats::format_of;
 use serde::{Deserialize, Serialize};
@@ -64,8 +66,8 @@ pub struct ExportOptions<'a> {
     pub coordinates: CoordinateType,
     /// Comments for the header.
     pub comments: Vec<String>,
-    /// The position of the cloud that is the origin of the mesh, if it is not that of the cloud.
-    pub origin: Option<[f64; 3]>,
+    /// The origin of the coordinates in the mesh, if it is not that of the cloud.
+    pub origin: Option<Shift>,
     /// Vertices have normals, in formats that hold them.
     pub normals: bool,
     /// Columns of the points.
@@ -107,12 +109,17 @@ pub fn export(
         output,
         coordinates,
         comments,
-        origin,
+        origin: shift,
         normals,
         columns,
         decimals,
     } = options;
     let format = format_of(output)?;
+    let in_file = Coordinates {
+        lattice,
+        shift,
+        written: coordinates,
+    };
     let surface = repaired.surface.open(workspace)?;
     let filled = repaired.filled.open(workspace, blocks.count())?;
     let numbering = number::number(&repaired.numbering, &filled, blocks, workspace)?;
@@ -131,7 +138,7 @@ pub fn export(
             .chain(of_points(columns).map(VertexColumn::from))
             .collect(),
         comments,
-        origin,
+        origin: shift.map(|shift| shift.origin),
         bounds: None,
         decimals,
     };
@@ -144,7 +151,7 @@ pub fn export(
         .collect();
     if format.wants_bounds() {
         let bounds = bounds::bounds(store, &numbering, workspace)?;
-        mesh.bounds = Some(bounds.map(|corner| lattice.position(corner)));
+        mesh.bounds = Some(bounds.map(|corner| in_file.of(corner)));
     }
     check_size(output, &mesh, false)?;
     let held = |c: &Column| mesh.columns.iter().any(|held| held.name == c.name);
@@ -158,7 +165,7 @@ pub fn export(
         normals: mesh.normals().is_some(),
         numbering,
         blocks,
-        lattice,
+        coordinates: in_file,
         file: MeshFile::open(output, format, mesh, workspace)?,
     };
     match is_compressed(output) {

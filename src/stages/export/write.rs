@@ -1,13 +1,12 @@
 //! Encodes the parts of a mesh, and writes them at their offsets.
 
+use super::coordinates::Coordinates;
 use super::corners::Corners;
 use super::faces::Faces;
 use super::file::{Edge, HEADER, MeshFile};
 use super::normals::{Normals, Sources};
 use super::number::Numbering;
 use crate::error::Result;
-use crate::geom::Point;
-use crate::geom::lattice::Lattice;
 use crate::spill::{Id, Inbox, Table};
 use crate::stages::attributes::StoredColumns;
 use crate::stages::blocks::Blocks;
@@ -36,8 +35,8 @@ pub struct Writer<'a> {
     pub numbering: Numbering,
     /// Division into blocks.
     pub blocks: Blocks,
-    /// Map from the store's positions to those of the mesh.
-    pub lattice: &'a Lattice,
+    /// The coordinates in the file.
+    pub coordinates: Coordinates<'a>,
     /// The file.
     pub file: MeshFile<'a>,
 }
@@ -162,7 +161,7 @@ impl Writer<'_> {
         let values = self.values(unit, ids.clone(), chosen, normals.as_deref())?;
         let lists = bytes_of(&points) + bytes_of(&values) + 4 * chosen.len() as u64;
         let _held = unit.hold(lists + bytes_of(bytes));
-        let at = |v: &u32| self.position(points[(v - ids.start) as usize]);
+        let at = |v: &u32| self.coordinates.of(points[(v - ids.start) as usize]);
         self.file
             .encode_vertices(chosen.iter().map(at), &values, bytes);
         Ok(())
@@ -214,13 +213,8 @@ impl Writer<'_> {
         let corners = Corners::load(self.store, ids, faces.ids())?;
         let _corners = unit.hold(corners.bytes());
         let mut batch = self.file.placed_triangles(bytes);
-        faces.for_each(|t, ids| batch.push((t, ids.map(|v| self.position(corners.at(v))))));
+        faces.for_each(|t, ids| batch.push((t, ids.map(|v| self.coordinates.of(corners.at(v))))));
         batch.finish();
         Ok(())
-    }
-
-    /// The position of a point in the mesh.
-    fn position(&self, point: Point) -> [f64; 3] {
-        self.lattice.position(point)
     }
 }

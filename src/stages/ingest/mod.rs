@@ -31,9 +31,11 @@ mod stats;
 mod stream;
 mod text;
 
+pub use belong::Mixed;
 pub use carry::{Attribute, Carried};
 pub use classes::Classes;
 pub use columns::{Attributes, Column};
+pub use crs::{Crs, CrsSource, prj_of};
 pub use expand::expand;
 pub use format::Format;
 pub use probe::{Probe, probe};
@@ -152,7 +154,6 @@ fn read_all(
     let classes = &selection.classes;
     let (mut section, mut frames, mut values) = (0, Vec::new(), Vec::new());
     let mut sources = Vec::new();
-    let mut systems = Vec::new();
     let mut stats = IngestStats::default();
     let mut shared = false;
     for path in paths {
@@ -190,16 +191,15 @@ fn read_all(
         };
         let shown = |w: String| format!("{}: {w}", path.display());
         stats.warnings.extend(warnings.into_iter().map(shown));
-        stats.add(&opened, &source);
-        systems.push(opened.file.crs(&opened.input));
+        let (crs, unusable) = opened.crs();
+        stats.warnings.extend(unusable);
+        stats.add(&opened, &source, crs);
         sources.push(source);
     }
     if shared {
         return Err(Error::Shared);
     }
-    stats
-        .warnings
-        .extend(belong::warnings(&stats.files, &systems));
+    stats.compare();
     Ok(Spool {
         name: name.to_owned(),
         frames,
@@ -226,10 +226,61 @@ impl Opened {
             claims,
         })
     }
+
+    /// The reference system that the file gives, or else a `.prj` file beside it; a warning about that.
+    fn crs(&self) -> (Option<Crs>, Option<String>) {
+        match self.file.crs(&self.input) {
+            Some(crs) => (Some(crs), None),
+            None => crs::beside(&self.input),
+        }
+    }
+}
+
+/// Checks that the headers of all files give one reference system. Files that cannot be read are passed over:
+/// their error comes when they are read.
+///
+/// # Errors
+/// [`Error::Input`] with two files whose systems are different.
+pub fn check_systems(inputs: &[PathBuf]) -> Result<()> {
+    let mut systems = Vec::new();
+    for path in expand(inputs)? {
+        let opened = Input::open_head(&path, formats::LONG_HEAD).and_then(Opened::new);
+        let crs = opened.ok().and_then(|opened| opened.crs().0);
+        // Their texts may be long, and many files usually have the same.
+        if let Some(crs) = crs
+            && !systems.iter().any(|(_, known)| *known == crs)
+        {
+            systems.push((path, crs));
+        }
+    }
+    let each = systems
+        .iter()
+        .map(|(path, crs)| (path.as_path(), Some(crs)));
+    match belong::common(each) {
+        Ok(_) => Ok(()),
+        Err(mixed) => Err(mixed.refused()),
+    }
 }
 
 impl IngestStats {
-    fn add(&mut self, opened: &Opened, source: &Source) {
+    /// Compares the files with each other.
+    fn compare(&mut self) {
+        let files = &self.files;
+        let systems = files.iter().map(|f| (f.path.as_path(), f.crs.as_ref()));
+        let warning = match belong::common(systems) {
+            Ok(crs) => {
+                self.crs = crs;
+                self.crs
+                    .as_ref()
+                    .and_then(|crs| belong::without(files, crs))
+            }
+            Err(mixed) => Some(self.mixed.insert(mixed).warning()),
+        };
+        let places = belong::warnings(files);
+        self.warnings.extend(warning.into_iter().chain(places));
+    }
+
+    fn add(&mut self, opened: &Opened, source: &Source, crs: Option<Crs>) {
         let stats = &source.stats;
         self.read += stats.read;
         self.kept += stats.kept;
@@ -250,6 +301,7 @@ impl IngestStats {
             dropped_by_class: stats.unwanted,
             min: bounds.map(|b| b[0]),
             max: bounds.map(|b| b[1]),
+            crs,
         });
     }
 }

@@ -1,5 +1,7 @@
 //! Statistics of the input: counts and extents of each file and in total.
 
+use super::belong::Mixed;
+use super::crs::Crs;
 use super::format::Format;
 use serde::{Deserialize, Serialize, Serializer};
 use std::path::{Path, PathBuf};
@@ -17,6 +19,11 @@ pub struct IngestStats {
     pub withheld: u64,
     /// Points left out because their class is not wanted.
     pub dropped_by_class: u64,
+    /// The reference system; none if no file gives one, or if files give different ones.
+    pub crs: Option<Crs>,
+    /// Two files that give different ones.
+    #[serde(skip)]
+    pub mixed: Option<Mixed>,
     /// The counts of each file, in the order given.
     pub files: Vec<FileStats>,
     /// Warnings for the user, one line each.
@@ -56,6 +63,8 @@ pub struct FileStats {
     pub min: Option<[f64; 3]>,
     /// Highest coordinates of the kept points, in the file's unit; `None` without points.
     pub max: Option<[f64; 3]>,
+    /// The reference system that it gives, or a `.prj` file beside it.
+    pub crs: Option<Crs>,
 }
 
 /// Exact statistics of one source, in its native form; merging is commutative.

@@ -12,6 +12,8 @@ mod vlr;
 
 use header::Header;
 
+pub(super) use crs::well_known;
+
 /// Byte of a record with the withheld flag, in all point formats.
 const FLAGS: usize = 15;
 
