@@ -1,9 +1,9 @@
 //! Command-line arguments.
 
 use crate::method::METHOD;
-use crate::params::{MaxWidth, Method, Params, Radius, Smoothing};
+use crate::params::{MaxWidth, Method, Origin, Params, Radius, Smoothing};
 use crate::pipeline::{Builder, Reconstruction, Start};
-use crate::stages::ingest::Classes;
+use crate::stages::ingest::{Attributes, Classes};
 use crate::workspace::mapped::Io;
 use crate::workspace::{Compression, Storage};
 use clap::Args as ClapArgs;
@@ -66,6 +66,19 @@ pub struct Points {
     /// Read only points of these classes (LAS, LAZ), e.g. 2,6 for ground and buildings
     #[arg(long, value_name = "CLASSES", value_delimiter = ',')]
     pub keep_classes: Vec<u8>,
+}
+
+/// Columns that the mesh keeps.
+#[derive(Debug, ClapArgs)]
+#[command(next_help_heading = "Attributes")]
+pub struct Columns {
+    /// Keep the points' own values at the vertices: auto (colours, intensity and classification, unless they are
+    /// the same everywhere), none, or a list of columns by name like color,intensity,gps_time
+    #[arg(long, value_name = "auto|none|LIST", default_value = "none")]
+    pub attributes: Attributes,
+    /// Write colours with 16 bits instead of 8
+    #[arg(long)]
+    pub wide_colors: bool,
 }
 
 /// Selection of points by position.
@@ -166,23 +179,49 @@ pub struct Repair {
     pub no_repair: bool,
 }
 
+/// Coordinates of the mesh.
+#[derive(Debug, ClapArgs)]
+#[command(next_help_heading = "Coordinates")]
+pub struct Coordinates {
+    /// Origin of the mesh's coordinates, for programs that round them to single precision: auto (a round
+    /// position below the cloud, if single precision does not suffice), none (that of the cloud), or a position
+    /// like 635000,848000,0; it is written into the mesh and MESH.origin.json
+    #[arg(
+        long,
+        value_name = "auto|none|X,Y,Z",
+        default_value = "none",
+        allow_hyphen_values = true
+    )]
+    pub origin: Origin,
+    /// Take coordinates as they are if files give different reference systems; the mesh then names none
+    #[arg(long)]
+    pub ignore_crs: bool,
+}
+
 /// The points, the mesh, and what decides it.
 #[derive(Debug, ClapArgs)]
 pub struct Job {
     /// Files (LAS, LAZ, E57, PLY, PCD, PTX, XYZ text; also as .gz and .zst) or folders of files; together they are one cloud
     #[arg(value_name = "INPUT", required = true)]
     pub inputs: Vec<PathBuf>,
-    /// The mesh to write (binary PLY); MESH.ply.zst is compressed
+    /// The mesh to write: .ply, .obj, .stl or .glb (all but OBJ binary), compressed with .zst behind it
     #[arg(long, short, value_name = "MESH.ply")]
     pub output: PathBuf,
+    /// Write a normal for each vertex (PLY, OBJ, GLB)
+    #[arg(long)]
+    pub normals: bool,
     #[command(flatten)]
     pub points: Points,
     #[command(flatten)]
     pub filters: Filters,
     #[command(flatten)]
+    pub columns: Columns,
+    #[command(flatten)]
     pub surface: Surface,
     #[command(flatten)]
     pub repair: Repair,
+    #[command(flatten)]
+    pub coordinates: Coordinates,
     /// Points per tile; does not change the result
     #[arg(long, value_name = "N", hide = true)]
     pub tile_points: Option<u32>,
@@ -344,6 +383,8 @@ impl Job {
         };
         Params {
             classes: self.points.classes(),
+            attributes: self.columns.attributes.clone(),
+            wide_colors: self.columns.wide_colors,
             thin: self.filters.thin,
             drop_outliers: self.filters.drop_outliers,
             neighbors: self.surface.neighbors,
@@ -358,6 +399,9 @@ impl Job {
             max_hole_edges: self.repair.max_hole_edges,
             min_component: self.repair.min_component.or(usual.min_component),
             repair: !self.repair.no_repair,
+            normals: self.normals,
+            origin: self.coordinates.origin,
+            ignore_crs: self.coordinates.ignore_crs,
             block: self.block_points,
             ..usual
         }

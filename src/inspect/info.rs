@@ -6,7 +6,7 @@ use crate::method::METHOD;
 use crate::params::Params;
 use crate::pipeline::Known;
 use crate::stages::cells::{CellMaker, DiskRadius, Widen};
-use crate::stages::ingest::{Classes, CoordinateType, IngestStats, ingest_classes};
+use crate::stages::ingest::{Attributes, Classes, CoordinateType, IngestStats, ingest_classes};
 use crate::stages::order::{PAGE, PointStore, order};
 use crate::stages::tiles::Tile;
 use crate::stages::tiles::near::Search;
@@ -14,7 +14,7 @@ use crate::workspace::Workspace;
 use crate::workspace::memory::MINIMUM_BUDGET;
 use serde::Serialize;
 use std::fmt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// Number of sampled sequences of points, and of points in each.
@@ -74,7 +74,7 @@ pub fn info(inputs: &[PathBuf], classes: &Classes, workspace: &Workspace) -> Res
     let start = Instant::now();
     let observer = &workspace.observer;
     observer.begin("ingest", "points", 0);
-    let headers = Known::from_headers(inputs);
+    let headers = Known::from_headers(inputs, &Attributes::None);
     let spool = ingest_classes(inputs, classes, workspace)?;
     observer.end();
     let input = spool.stats().clone();
@@ -96,10 +96,12 @@ pub fn info(inputs: &[PathBuf], classes: &Classes, workspace: &Workspace) -> Res
         spool: spool_bytes,
         decompressed: headers.map_or(0, |known| known.decompressed),
         points,
+        values: 0,
         double: Some(double),
         moved: None,
+        text: None,
     };
-    let disk = known.estimate(&Params::default());
+    let disk = known.estimate(&Params::default(), Path::new("mesh.ply"));
     Ok(Info {
         duplicates,
         points,
@@ -199,11 +201,32 @@ fn shown(scanners: &[[f64; 3]]) -> Option<String> {
     Some(format!("{count}: {}{more}", some.join("; ")))
 }
 
+impl Info {
+    /// The columns of all files, for `--attributes`.
+    fn columns(&self) -> String {
+        let mut names: Vec<&str> = Vec::new();
+        for name in self.input.files.iter().flat_map(|file| &file.columns) {
+            if !names.contains(&name.as_str()) {
+                names.push(name);
+            }
+        }
+        match names.is_empty() {
+            true => "none".to_owned(),
+            false => names.join(", "),
+        }
+    }
+}
+
 impl fmt::Display for Info {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for file in &self.input.files {
             let path = file.path.display();
-            writeln!(f, "{path}: {}, {} points", file.format, file.points)?;
+            write!(f, "{path}: {}, {} points", file.format, file.points)?;
+            // If it is not that of all.
+            if let (None, Some(crs)) = (&self.input.crs, &file.crs) {
+                write!(f, ", {} ({})", crs.line(), crs.source)?;
+            }
+            writeln!(f)?;
             if let Some(shown) = shown(&file.scanners) {
                 writeln!(f, "  {shown}")?;
             }
@@ -221,6 +244,11 @@ impl fmt::Display for Info {
             input.invalid,
             input.dropped_by_class
         );
+        let system = match &input.crs {
+            Some(crs) => format!("{} ({})", crs.line(), crs.source),
+            None if input.files.iter().any(|file| file.crs.is_some()) => "different ones".into(),
+            None => "not given".into(),
+        };
         let rounding = if self.lattice_exact {
             "exact"
         } else {
@@ -232,6 +260,8 @@ impl fmt::Display for Info {
                 format!("{} distinct of {} read", self.points, input.read),
             ),
             ("left out", left_out),
+            ("columns", self.columns()),
+            ("system", system),
             ("lowest", three(&self.min)),
             ("highest", three(&self.max)),
             (

@@ -1,6 +1,6 @@
 //! The mesh file while it is being written: slices at known offsets, under a temporary name.
 
-use super::format::{Layout, Mesh, MeshFormat};
+use super::format::{Layout, Mesh, MeshFormat, Positions};
 use crate::error::{Error, Result};
 use crate::workspace::fault::{self, Event};
 use crate::workspace::open::{failed_write, open_existing, options};
@@ -218,9 +218,19 @@ impl<'a> MeshFile<'a> {
         Error::io(&self.output, action, error)
     }
 
-    /// Appends the encoded vertices to `bytes`.
-    pub fn encode_vertices(&self, positions: impl Iterator<Item = [f64; 3]>, bytes: &mut Vec<u8>) {
-        let put = |batch: &[[f64; 3]]| self.format.put_vertices(&self.mesh, batch, bytes);
+    /// Appends the encoded vertices to `bytes`; `values` has the values that each has in all columns.
+    pub fn encode_vertices(
+        &self,
+        positions: impl Iterator<Item = [f64; 3]>,
+        mut values: &[u8],
+        bytes: &mut Vec<u8>,
+    ) {
+        let each = self.mesh.value_bytes();
+        let put = |batch: &[[f64; 3]]| {
+            let own;
+            (own, values) = values.split_at(batch.len() * each);
+            self.format.put_vertices(&self.mesh, batch, own, bytes);
+        };
         let mut batch = Batch::new(put);
         positions.for_each(|p| batch.push(p));
         batch.finish();
@@ -228,7 +238,31 @@ impl<'a> MeshFile<'a> {
 
     /// A batch of triangles that are encoded to the end of `bytes`.
     pub fn triangles(&self, bytes: &mut Vec<u8>) -> Batch<[u32; 3], impl FnMut(&[[u32; 3]])> {
-        Batch::new(|batch: &[[u32; 3]]| self.format.put_triangles(&self.mesh, batch, bytes))
+        Batch::new(|batch: &[[u32; 3]]| {
+            self.format.put_triangles(&self.mesh, batch, &[], bytes);
+        })
+    }
+
+    /// A batch of triangles with their positions that are encoded to the end of `bytes`.
+    pub fn placed_triangles(
+        &self,
+        bytes: &mut Vec<u8>,
+    ) -> Batch<([u32; 3], Positions), impl FnMut(&[([u32; 3], Positions)])> {
+        Batch::new(|batch: &[([u32; 3], Positions)]| {
+            let (triangles, positions): (Vec<_>, Vec<_>) = batch.iter().copied().unzip();
+            self.format
+                .put_triangles(&self.mesh, &triangles, &positions, bytes);
+        })
+    }
+
+    /// True if triangles are written with the positions of their corners.
+    pub fn wants_positions(&self) -> bool {
+        self.format.wants_positions()
+    }
+
+    /// Bytes of the values that a vertex has in all columns.
+    pub fn value_bytes(&self) -> usize {
+        self.mesh.value_bytes()
     }
 
     /// Flushes the file to disk and renames it to its final name.

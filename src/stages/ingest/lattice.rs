@@ -234,6 +234,8 @@ mod tests {
                         ..SourceStats::default()
                     },
                     text: false,
+                    columns: Vec::new(),
+                    spans: Vec::new(),
                 };
                 let found = choose(&[source], &IngestStats::default(), 3);
                 if let Ok(lattice) = found {

@@ -1,5 +1,6 @@
 //! The interface of input formats: detection and reading.
 
+use super::columns::Column;
 use super::crs::Crs;
 use super::format::Format;
 use super::input::Input;
@@ -94,6 +95,11 @@ pub(super) trait PointFile {
 
     /// The positions of the scanners, in the unit of the points; all of them when the points were read.
     fn scanners(&self) -> Vec<[f64; 3]> {
+        Vec::new()
+    }
+
+    /// The columns of the file. A [`SourceWriter`] says which are wanted, by their numbers in this list.
+    fn columns(&self) -> Vec<Column> {
         Vec::new()
     }
 

@@ -1,5 +1,7 @@
 //! Statistics of the input: counts and extents of each file and in total.
 
+use super::belong::Mixed;
+use super::crs::Crs;
 use super::format::Format;
 use serde::{Deserialize, Serialize, Serializer};
 use std::path::{Path, PathBuf};
@@ -19,6 +21,11 @@ pub struct IngestStats {
     pub invalid: u64,
     /// Points left out because their class is not wanted.
     pub dropped_by_class: u64,
+    /// The reference system; none if no file gives one, or if files give different ones.
+    pub crs: Option<Crs>,
+    /// Two files that give different ones.
+    #[serde(skip)]
+    pub mixed: Option<Mixed>,
     /// The counts of each file, in the order given.
     pub files: Vec<FileStats>,
     /// Warnings for the user, one line each.
@@ -40,6 +47,8 @@ pub struct FileStats {
     pub format: Format,
     /// Its size in bytes.
     pub bytes: u64,
+    /// Names of its columns beside the coordinates.
+    pub columns: Vec<String>,
     /// Number of points given in the header; `None` for text.
     pub claimed: Option<u64>,
     /// Points in the file.
@@ -60,6 +69,8 @@ pub struct FileStats {
     pub max: Option<[f64; 3]>,
     /// The positions of the scanners given in the file, in its unit.
     pub scanners: Vec<[f64; 3]>,
+    /// The reference system that it gives, or a `.prj` file beside it.
+    pub crs: Option<Crs>,
 }
 
 /// Exact statistics of one source, in its native form; merging is commutative.

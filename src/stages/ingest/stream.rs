@@ -1,9 +1,11 @@
 //! Streams the spool as lattice positions.
 
 use super::Spool;
+use super::carry::Carried;
+use super::columns::{MOST_BYTES, row_bytes};
 use super::map::SourceMap;
 use super::source::Source;
-use super::spool::{FRAME, FrameBuffer, read_frame};
+use super::spool::{FRAME, FrameBuffer, read_frame, read_values, values_of};
 use crate::error::{Error, Result};
 use crate::geom::Point;
 use crate::geom::lattice::{COORDINATE_LIMIT, Lattice};
@@ -13,6 +15,9 @@ use std::sync::Mutex;
 
 /// Bytes of the buffers of one thread that streams a [`Spool`].
 pub const READ_BUFFERS: u64 = (FRAME * (24 + 24 + 12)) as u64;
+
+/// Bytes of the buffers of one thread that streams the values of a [`Spool`] as well.
+pub const VALUE_BUFFERS: u64 = READ_BUFFERS + (FRAME * 2 * MOST_BYTES) as u64;
 
 /// The buffers of one thread.
 #[derive(Default)]
@@ -113,6 +118,50 @@ impl Spool {
         });
         let failed = lock(&failed).take();
         failed.map_or(Ok(()), Err)
+    }
+
+    /// Streams the points of some `frames` with their rows of the columns `carried`, on the calling thread, with
+    /// buffers of [`VALUE_BUFFERS`] bytes. A row has [`Carried::bytes`] bytes.
+    ///
+    /// # Errors
+    /// See [`Spool::for_each`].
+    pub fn for_values(
+        &self,
+        workspace: &Workspace,
+        lattice: &Lattice,
+        frames: &[u32],
+        carried: &Carried,
+        mut each: impl FnMut(&[Point], &[u8]) -> Result<()>,
+    ) -> Result<()> {
+        let maps = self.maps(lattice)?;
+        let file = workspace.files.open(&self.name, true)?;
+        let values = workspace.files.open(&values_of(&self.name), true)?;
+        let mut buffers = Buffers::default();
+        let (mut words, mut rows) = (Vec::new(), Vec::new());
+        for &frame in frames {
+            workspace.check_cancel()?;
+            self.read(&file, frame, &maps, lattice, &mut buffers)?;
+            let (source, points) = (buffers.frame.source, buffers.points.len());
+            let each_bytes = row_bytes(&self.sources[source].columns);
+            words.clear();
+            let at = self.values.get(frame as usize).copied().unwrap_or_default();
+            if each_bytes > 0 {
+                let of = read_values(&values, &self.sources, at, &mut words)?;
+                if of != source || at.points as usize != points {
+                    let found = format!("values of {} points of source {of}", at.points);
+                    let expected = format!("of {points} points of source {source}");
+                    return Err(values.damaged(at.segment, at.offset, found, expected));
+                }
+            }
+            let bytes: &[u8] = bytemuck::cast_slice(&words);
+            rows.clear();
+            for point in 0..points {
+                let own = &bytes[point * each_bytes..(point + 1) * each_bytes];
+                carried.put(source, own, &mut rows);
+            }
+            each(&buffers.points, &rows)?;
+        }
+        Ok(())
     }
 
     /// The maps of all sources to `lattice`; `None` for sources without kept points, which had no influence
