@@ -176,6 +176,8 @@ pub struct Params {
     pub max_fill: MaxWidth,
     /// Remove bridges and small components, fill holes (paper, section 3.6).
     pub repair: bool,
+    /// Keep points far from all others, even if the lattice of the positions is coarser for them.
+    pub keep_far: bool,
     /// Take coordinates as they are if files give different reference systems, which is an error otherwise.
     pub ignore_crs: bool,
     /// Origin of the coordinates in the mesh file.
@@ -213,6 +215,7 @@ impl Default for Params {
             max_edge: MaxWidth::Spacings(METHOD.admissibility.edge),
             max_fill: MaxWidth::Spacings(METHOD.filling.width),
             repair: true,
+            keep_far: false,
             ignore_crs: false,
             origin: Origin::None,
             block: METHOD.curve.block,

@@ -180,6 +180,9 @@ pub struct Coordinates {
         allow_hyphen_values = true
     )]
     pub origin: Origin,
+    /// Keep points so far from all others that coordinates have to be rounded for them; else they are left out
+    #[arg(long)]
+    pub keep_far: bool,
     /// Take coordinates as they are if files give different reference systems; the mesh then names none
     #[arg(long)]
     pub ignore_crs: bool,
@@ -380,6 +383,7 @@ impl Job {
             min_component: self.repair.min_component.or(usual.min_component),
             repair: !self.repair.no_repair,
             origin: self.coordinates.origin,
+            keep_far: self.coordinates.keep_far,
             ignore_crs: self.coordinates.ignore_crs,
             block: self.block_points,
             ..usual

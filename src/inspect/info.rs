@@ -75,7 +75,8 @@ pub fn info(inputs: &[PathBuf], classes: &Classes, workspace: &Workspace) -> Res
     let observer = &workspace.observer;
     observer.begin("ingest", "points", 0);
     let headers = Known::from_headers(inputs);
-    let spool = ingest_classes(inputs, classes, workspace)?;
+    let mut spool = ingest_classes(inputs, classes, workspace)?;
+    spool.drop_far(workspace)?;
     observer.end();
     let input = spool.stats().clone();
     let lattice = spool.choose_lattice(0)?;
@@ -195,8 +196,12 @@ impl fmt::Display for Info {
         let mib = |bytes: u64| format!("{} MiB", bytes.div_ceil(1 << 20));
         let input = &self.input;
         let left_out = format!(
-            "{} duplicates, {} not finite, {} withheld, {} of other classes",
-            self.duplicates, input.dropped_non_finite, input.withheld, input.dropped_by_class
+            "{} duplicates, {} not finite, {} withheld, {} of other classes, {} far away",
+            self.duplicates,
+            input.dropped_non_finite,
+            input.withheld,
+            input.dropped_by_class,
+            input.dropped_far
         );
         let system = match &input.crs {
             Some(crs) => format!("{} ({})", crs.line(), crs.source),

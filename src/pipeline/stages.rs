@@ -110,7 +110,11 @@ impl<'a> Stages<'a> {
         let (job, workspace) = (self.job, self.workspace);
         let params = &job.params;
         let spool = self.clock.stage("ingest", "points", 0, || {
-            ingest_classes(&job.inputs, &params.classes, workspace)
+            let mut spool = ingest_classes(&job.inputs, &params.classes, workspace)?;
+            if !params.keep_far {
+                spool.drop_far(workspace)?;
+            }
+            Ok(spool)
         })?;
         let input = spool.stats().clone();
         if let Some(mixed) = input.mixed.as_ref().filter(|_| !params.ignore_crs) {
@@ -206,6 +210,13 @@ impl<'a> Stages<'a> {
         if left_out > 0 {
             self.warn(format!(
                 "{left_out} points left out: a coordinate is NaN or infinite"
+            ));
+        }
+        let far = (self.report.input.dropped_far, self.report.input.far_example);
+        if let (count, Some([x, y, z])) = far {
+            self.warn(format!(
+                "{count} points left out, far from all others (one at {x} {y} {z}): with --keep-far they \
+                 are kept, and all are rounded to coarser steps"
             ));
         }
         let folded = self.report.duplicates_folded;

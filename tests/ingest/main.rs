@@ -5,6 +5,7 @@ mod bench;
 mod bombs;
 mod classes;
 mod damage;
+mod far;
 mod formats;
 mod lattices;
 mod numbers;

@@ -13,6 +13,7 @@ mod classes;
 mod contain;
 mod crs;
 mod expand;
+mod far;
 mod format;
 mod formats;
 mod input;
@@ -127,6 +128,7 @@ fn read_all(
             native: opened.claims.native,
             stats: target.stats(),
             text: opened.claims.text,
+            cut: false,
         };
         let shown = |w: String| format!("{}: {w}", path.display());
         stats.warnings.extend(warnings.into_iter().map(shown));
@@ -239,6 +241,7 @@ impl IngestStats {
             dropped_non_finite: stats.dropped,
             withheld: stats.withheld,
             dropped_by_class: stats.unwanted,
+            dropped_far: 0,
             min: bounds.map(|b| b[0]),
             max: bounds.map(|b| b[1]),
             crs,

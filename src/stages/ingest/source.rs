@@ -33,6 +33,8 @@ pub(super) struct Source {
     pub(super) stats: SourceStats,
     /// True if the numbers come from text, so that a fixed number of decimals gives a lattice.
     pub(super) text: bool,
+    /// True if points outside the box of `stats` are left out.
+    pub(super) cut: bool,
 }
 
 impl Source {

@@ -5,7 +5,8 @@
 //! frames are numbered in the order of units.
 
 use super::classes::Classes;
-use super::source::Source;
+use super::far::{Middle, middle};
+use super::source::{Native, Source};
 use super::stats::SourceStats;
 use crate::error::Result;
 use crate::workspace::file::ScratchFile;
@@ -24,6 +25,8 @@ const HEADER: usize = 16;
 
 /// A coordinate as a file stores it.
 pub(super) trait Coordinate: bytemuck::Pod + PartialEq + Into<f64> {
+    /// True for floating-point numbers.
+    const FLOATING: bool = true;
     /// False for infinity and NaN.
     fn is_finite(self) -> bool {
         let value: f64 = self.into();
@@ -48,6 +51,8 @@ impl Coordinate for f32 {}
 impl Coordinate for f64 {}
 
 impl Coordinate for i32 {
+    const FLOATING: bool = false;
+
     fn is_finite(self) -> bool {
         true
     }
@@ -65,6 +70,10 @@ pub(super) struct Frame {
     pub(super) offset: u64,
     /// Number of points.
     pub(super) points: u32,
+    /// Number of these that are far from all others and left out.
+    pub(super) far: u32,
+    /// The middle of floating-point values.
+    pub(super) middle: Option<Middle>,
 }
 
 /// The result of a unit: its counts and its frames.
@@ -227,10 +236,8 @@ impl<T: Coordinate> Sink<'_, T> {
         self.stats.kept += self.points.len() as u64;
         for point in &self.points {
             for (axis, coordinate) in point.iter().enumerate() {
-                let value = (*coordinate).into();
-                self.stats.min[axis] = self.stats.min[axis].min(value);
-                self.stats.max[axis] = self.stats.max[axis].max(value);
-                self.stats.exponent = self.stats.exponent.min(coordinate.exponent());
+                let exponent = coordinate.exponent();
+                self.stats.reach(axis, (*coordinate).into(), exponent);
             }
         }
         self.bytes.truncate(HEADER);
@@ -241,6 +248,7 @@ impl<T: Coordinate> Sink<'_, T> {
         let crc = frame_crc(&self.bytes[..12], &self.bytes[HEADER..]);
         self.bytes[12..HEADER].copy_from_slice(&crc.to_ne_bytes());
         let points = self.points.len();
+        let middle = T::FLOATING.then(|| middle(&self.points));
         self.points.clear();
         let file = &self.target.file;
         let place = file.append(self.unit.worker(), &self.bytes, points)?;
@@ -249,6 +257,8 @@ impl<T: Coordinate> Sink<'_, T> {
             segment: place.segment,
             offset: place.offset,
             points: points as u32,
+            far: 0,
+            middle,
         });
         if self.frames.len() == 1 {
             self.whole = place;
@@ -293,6 +303,15 @@ impl FrameBuffer {
     pub(super) fn points<T: Coordinate>(&self) -> &[[T; 3]] {
         let all: &[T] = bytemuck::cast_slice(&self.words);
         &bytemuck::cast_slice(&all[..self.points * 3])[..self.points]
+    }
+
+    /// The coordinates of a point, as in its file.
+    pub(super) fn native(&self, native: Native, point: usize) -> [f64; 3] {
+        match native {
+            Native::Las { .. } => self.points::<i32>()[point].map(f64::from),
+            Native::F32 => self.points::<f32>()[point].map(f64::from),
+            Native::F64 => self.points::<f64>()[point],
+        }
     }
 }
 

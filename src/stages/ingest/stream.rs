@@ -1,6 +1,7 @@
 //! Streams the spool as lattice positions.
 
 use super::Spool;
+use super::far::is_near;
 use super::map::SourceMap;
 use super::source::Source;
 use super::spool::{FRAME, FrameBuffer, read_frame};
@@ -30,7 +31,7 @@ impl Spool {
     #[must_use]
     pub fn frames(&self) -> Vec<(u32, u64)> {
         let frames = (0..).zip(&self.frames);
-        frames.map(|(n, frame)| (n, frame.points.into())).collect()
+        frames.map(|(n, frame)| (n, frame.near().into())).collect()
     }
 
     /// Streams all points as positions on `lattice`, in chunks, with buffers of [`READ_BUFFERS`] bytes.
@@ -144,12 +145,26 @@ impl Spool {
         let at = self.frames[frame as usize];
         read_frame(file, &self.sources, at, &mut buffers.frame)?;
         let Buffers { frame, wide, .. } = buffers;
+        let source = &self.sources[frame.source];
+        if at.near() == 0 {
+            buffers.points.clear();
+            return Ok(());
+        }
         let Some(map) = &maps[frame.source] else {
             let found = format!("points of source {}", frame.source);
             let expected = "none of it were kept".into();
             return Err(file.damaged(at.segment, at.offset, found, expected));
         };
-        map.apply(self.sources[frame.source].native, frame, lattice.base, wide);
+        map.apply(source.native, frame, lattice.base, wide);
+        if source.cut {
+            let mut point = 0..;
+            let near = |_: &[i64; 3]| {
+                point
+                    .next()
+                    .is_some_and(|p| is_near(source, frame.native(source.native, p)))
+            };
+            wide.retain(near);
+        }
         buffers.points.clear();
         buffers
             .points
