@@ -3,6 +3,7 @@
 mod bad_input;
 mod cli;
 mod compressed;
+mod coordinates;
 mod determinism;
 mod filters;
 mod library;
