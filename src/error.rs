@@ -39,6 +39,20 @@ pub enum Error {
         /// Description of the cloud.
         found: String,
     },
+    /// A mesh exceeds a limit of its format.
+    #[error("{path}: {format} holds at most {most} {unit}, this mesh has {found}; write .ply or .obj, or a smaller mesh (--thin, --split)", path = path.display())]
+    TooLarge {
+        /// Path of the mesh.
+        path: PathBuf,
+        /// Name of the format.
+        format: &'static str,
+        /// `bytes` or `triangles`.
+        unit: &'static str,
+        /// The limit.
+        most: u64,
+        /// The number that the mesh has; with `about` if it is estimated.
+        found: String,
+    },
     /// The cells gave no triangle.
     #[error("the cloud yields no triangle: {why}")]
     NoTriangles {
@@ -167,6 +181,7 @@ impl Error {
             Error::Input { .. }
             | Error::Degenerate { .. }
             | Error::NoTriangles { .. }
+            | Error::TooLarge { .. }
             | Error::Parameter { .. }
             | Error::TooManyPoints { .. }
             | Error::Locked { .. }

@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::method::METHOD;
-use crate::stages::ingest::Classes;
+use crate::stages::ingest::{Attributes, Classes};
 pub use crate::stages::smooth::Smoothing;
 use crate::stages::spacing::{Limits, Width};
 pub use crate::stages::surface::evidence::Division;
@@ -142,6 +142,10 @@ impl std::str::FromStr for Origin {
 pub struct Params {
     /// Classes of the points that are read.
     pub classes: Classes,
+    /// Columns of the points that the mesh keeps, such as colours.
+    pub attributes: Attributes,
+    /// Colours with 16 bits instead of 8.
+    pub wide_colors: bool,
     /// Keep at most one point in each cube of this side, in the input's unit.
     pub thin: Option<f64>,
     /// Drop points whose spacing is more than this factor times that of the points around them.
@@ -178,6 +182,8 @@ pub struct Params {
     pub repair: bool,
     /// Keep points far from all others, even if the lattice of the positions is coarser for them.
     pub keep_far: bool,
+    /// Vertices have normals, in formats that hold them.
+    pub normals: bool,
     /// Take coordinates as they are if files give different reference systems, which is an error otherwise.
     pub ignore_crs: bool,
     /// Origin of the coordinates in the mesh file.
@@ -200,6 +206,8 @@ impl Default for Params {
     fn default() -> Self {
         Self {
             classes: Classes::All,
+            attributes: Attributes::None,
+            wide_colors: false,
             thin: None,
             drop_outliers: None,
             method: Method::Robust,
@@ -216,6 +224,7 @@ impl Default for Params {
             max_fill: MaxWidth::Spacings(METHOD.filling.width),
             repair: true,
             keep_far: false,
+            normals: false,
             ignore_crs: false,
             origin: Origin::None,
             block: METHOD.curve.block,

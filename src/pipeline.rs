@@ -112,6 +112,7 @@ impl Reconstruction {
         let (spool, lattice) = stages.ingest()?;
         let points = stages.order(&spool, &lattice)?;
         let points = stages.without_outliers(points)?;
+        let columns = stages.attributes(&spool, &lattice, &points)?;
         let radius = stages.radius(&points, &lattice);
         let points = stages.smooth(points)?;
         let store = points.open(workspace)?;
@@ -122,7 +123,7 @@ impl Reconstruction {
         let triples = stages.triples(&seen)?;
         let stitched = stages.stitch(places, &triples)?;
         let repaired = stages.repair(places, &stitched)?;
-        stages.export(&store, &repaired, &lattice)?;
+        stages.export(&store, columns.as_ref(), &repaired, &lattice)?;
         Ok(stages.report())
     }
 }

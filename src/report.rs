@@ -3,7 +3,7 @@
 use crate::params::Params;
 pub use crate::stages::cells::CellStats;
 pub use crate::stages::export::{CoordinateType, MeshStats};
-pub use crate::stages::ingest::IngestStats;
+pub use crate::stages::ingest::{Attribute, IngestStats};
 pub use crate::stages::outliers::OutlierStats;
 pub use crate::stages::repair::RepairStats;
 pub use crate::stages::smooth::RelaxStats;
@@ -26,6 +26,8 @@ pub struct Report {
     pub threads: usize,
     /// Points and files read.
     pub input: IngestStats,
+    /// Columns that the mesh keeps.
+    pub attributes: Vec<Attribute>,
     /// Points with the position of another one, dropped.
     pub duplicates_folded: u64,
     /// Thinning, if requested.

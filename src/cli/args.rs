@@ -3,7 +3,7 @@
 use crate::method::METHOD;
 use crate::params::{MaxWidth, Method, Origin, Params, Radius, Smoothing};
 use crate::pipeline::{Builder, Reconstruction, Start};
-use crate::stages::ingest::Classes;
+use crate::stages::ingest::{Attributes, Classes};
 use crate::workspace::mapped::Io;
 use crate::workspace::{Compression, Storage};
 use clap::Args as ClapArgs;
@@ -66,6 +66,19 @@ pub struct Points {
     /// Read only points of these classes (LAS, LAZ), e.g. 2,6 for ground and buildings
     #[arg(long, value_name = "CLASSES", value_delimiter = ',')]
     pub keep_classes: Vec<u8>,
+}
+
+/// Columns that the mesh keeps.
+#[derive(Debug, ClapArgs)]
+#[command(next_help_heading = "Attributes")]
+pub struct Columns {
+    /// Keep the points' own values at the vertices: auto (colours, intensity and classification, unless they are
+    /// the same everywhere), none, or a list of columns by name like color,intensity,gps_time
+    #[arg(long, value_name = "auto|none|LIST", default_value = "none")]
+    pub attributes: Attributes,
+    /// Write colours with 16 bits instead of 8
+    #[arg(long)]
+    pub wide_colors: bool,
 }
 
 /// Selection of points by position.
@@ -194,13 +207,18 @@ pub struct Job {
     /// Files (LAS, LAZ, PLY, XYZ text; also as .gz and .zst) or folders of files; together they are one cloud
     #[arg(value_name = "INPUT", required = true)]
     pub inputs: Vec<PathBuf>,
-    /// The mesh to write (binary PLY); MESH.ply.zst is compressed
+    /// The mesh to write: .ply, .obj, .stl or .glb (all but OBJ binary), compressed with .zst behind it
     #[arg(long, short, value_name = "MESH.ply")]
     pub output: PathBuf,
+    /// Write a normal for each vertex (PLY, OBJ, GLB)
+    #[arg(long)]
+    pub normals: bool,
     #[command(flatten)]
     pub points: Points,
     #[command(flatten)]
     pub filters: Filters,
+    #[command(flatten)]
+    pub columns: Columns,
     #[command(flatten)]
     pub surface: Surface,
     #[command(flatten)]
@@ -368,6 +386,8 @@ impl Job {
         };
         Params {
             classes: self.points.classes(),
+            attributes: self.columns.attributes.clone(),
+            wide_colors: self.columns.wide_colors,
             thin: self.filters.thin,
             drop_outliers: self.filters.drop_outliers,
             neighbors: self.surface.neighbors,
@@ -382,6 +402,7 @@ impl Job {
             max_hole_edges: self.repair.max_hole_edges,
             min_component: self.repair.min_component.or(usual.min_component),
             repair: !self.repair.no_repair,
+            normals: self.normals,
             origin: self.coordinates.origin,
             keep_far: self.coordinates.keep_far,
             ignore_crs: self.coordinates.ignore_crs,

@@ -6,7 +6,7 @@ use crate::method::METHOD;
 use crate::params::Params;
 use crate::pipeline::Known;
 use crate::stages::cells::{CellMaker, DiskRadius, Widen};
-use crate::stages::ingest::{Classes, CoordinateType, IngestStats, ingest_classes};
+use crate::stages::ingest::{Attributes, Classes, CoordinateType, IngestStats, ingest_classes};
 use crate::stages::order::{PAGE, PointStore, order};
 use crate::stages::tiles::Tile;
 use crate::stages::tiles::near::Search;
@@ -14,7 +14,7 @@ use crate::workspace::Workspace;
 use crate::workspace::memory::MINIMUM_BUDGET;
 use serde::Serialize;
 use std::fmt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// Number of sampled sequences of points, and of points in each.
@@ -74,7 +74,7 @@ pub fn info(inputs: &[PathBuf], classes: &Classes, workspace: &Workspace) -> Res
     let start = Instant::now();
     let observer = &workspace.observer;
     observer.begin("ingest", "points", 0);
-    let headers = Known::from_headers(inputs);
+    let headers = Known::from_headers(inputs, &Attributes::None);
     let mut spool = ingest_classes(inputs, classes, workspace)?;
     spool.drop_far(workspace)?;
     observer.end();
@@ -97,10 +97,12 @@ pub fn info(inputs: &[PathBuf], classes: &Classes, workspace: &Workspace) -> Res
         spool: spool_bytes,
         decompressed: headers.map_or(0, |known| known.decompressed),
         points,
+        values: 0,
         double: Some(double),
         moved: None,
+        text: None,
     };
-    let disk = known.estimate(&Params::default());
+    let disk = known.estimate(&Params::default(), Path::new("mesh.ply"));
     Ok(Info {
         duplicates,
         points,
@@ -179,6 +181,22 @@ fn percentiles(mut lengths: Vec<f64>, step: f64) -> Percentiles {
     }
 }
 
+impl Info {
+    /// The columns of all files, for `--attributes`.
+    fn columns(&self) -> String {
+        let mut names: Vec<&str> = Vec::new();
+        for name in self.input.files.iter().flat_map(|file| &file.columns) {
+            if !names.contains(&name.as_str()) {
+                names.push(name);
+            }
+        }
+        match names.is_empty() {
+            true => "none".to_owned(),
+            false => names.join(", "),
+        }
+    }
+}
+
 impl fmt::Display for Info {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for file in &self.input.files {
@@ -219,6 +237,7 @@ impl fmt::Display for Info {
                 format!("{} distinct of {} read", self.points, input.read),
             ),
             ("left out", left_out),
+            ("columns", self.columns()),
             ("system", system),
             ("lowest", three(&self.min)),
             ("highest", three(&self.max)),

@@ -6,7 +6,7 @@ use crate::params::{Params, Radius};
 use crate::report::DiskEstimate;
 use crate::stages::cells::{CellStats, DiskRadius};
 use crate::stages::export::folder_of;
-use crate::stages::ingest;
+use crate::stages::ingest::{self, Classes};
 use crate::stages::order::StoredPoints;
 use crate::workspace::{Workspace, limits};
 use std::os::unix::fs::MetadataExt;
@@ -26,6 +26,12 @@ pub(super) fn disk_radius(radius: Radius, store: &StoredPoints, lattice: &Lattic
             DiskRadius::Steps((percent / 100.0 * diagonal).min(LARGEST_RADIUS))
         }
     }
+}
+
+/// True if no option leaves out points.
+pub(super) fn all_are_kept(params: &Params) -> bool {
+    let filters = [params.thin, params.drop_outliers];
+    params.classes == Classes::All && filters.iter().all(Option::is_none)
 }
 
 /// Checks that a file can be created in the output's folder.

@@ -1,19 +1,21 @@
 //! The stages of a run: each with its parameters, its part of the report, and the check of disk space for the
 //! following stages.
 
-use super::beside;
-use super::checks::{disk_radius, enough, not_a_line, room};
-use super::origin::Steps;
+mod export;
+
+use super::checks::{all_are_kept, disk_radius, enough, not_a_line, room};
+use super::disk::Text;
 use super::{Clock, Known, Reconstruction};
 use crate::error::Result;
-use crate::geom::lattice::{Lattice, Shift};
+use crate::geom::lattice::Lattice;
 use crate::method::METHOD;
-use crate::params::{Method, Origin};
+use crate::params::Method;
 use crate::report::{LatticeReport, Report};
+use crate::stages::attributes::{StoredColumns, attributes};
 use crate::stages::blocks::Blocks;
 use crate::stages::cells::{CellTriples, DiskRadius, TileRanges, Widen, cells};
-use crate::stages::export::{CoordinateType, ExportOptions, export};
-use crate::stages::ingest::{self, Spool, ingest_classes};
+use crate::stages::export::CoordinateType;
+use crate::stages::ingest::{Carried, Selection, Spool, ingest_selected};
 use crate::stages::located::Places;
 use crate::stages::order::{Orderer, PointStore, StoredPoints, order, sample_sort};
 use crate::stages::outliers::{OutlierOptions, drop_outliers};
@@ -24,7 +26,7 @@ use crate::stages::stitch::{StitchOptions, Stitched, stitch};
 use crate::stages::thin::{Grid, LeftOut, thin};
 use crate::stages::triples::{Triples, triples};
 use crate::workspace::{Workspace, limits};
-use outcrop_ply::Place;
+use export::written;
 use std::time::Instant;
 
 /// The positions that decide which points are connected, if they are not those of the mesh, and the local
@@ -42,17 +44,10 @@ pub(super) struct Stages<'a> {
     clock: Clock<'a>,
     begin: Instant,
     known: Known,
+    carried: Carried,
     report: Report,
     /// Step of the lattice before it was refined.
     coarse: f64,
-}
-
-/// The type of coordinates in the mesh.
-fn written(precision: ingest::CoordinateType) -> CoordinateType {
-    match precision {
-        ingest::CoordinateType::F32 => CoordinateType::Float,
-        ingest::CoordinateType::F64 => CoordinateType::Double,
-    }
 }
 
 impl<'a> Stages<'a> {
@@ -61,15 +56,19 @@ impl<'a> Stages<'a> {
         // A task leaves the check of disk space to the process that began its generation.
         let headers = match workspace.is_task() {
             true => None,
-            false => Known::from_headers(&job.inputs),
+            false => Known::from_headers(&job.inputs, &job.params.attributes),
         };
-        let first = headers.map(|known| known.estimate(&job.params));
+        let first = headers.map(|known| known.estimate(&job.params, &job.output));
+        if let Some(known) = headers.filter(|_| all_are_kept(&job.params)) {
+            known.fits(&job.params, &job.output)?;
+        }
         let stages = Self {
             job,
             workspace,
             clock: Clock::new(workspace),
             begin: Instant::now(),
             known: headers.unwrap_or_default(),
+            carried: Carried::default(),
             coarse: 0.0,
             report: Report {
                 version: env!("CARGO_PKG_VERSION"),
@@ -91,7 +90,11 @@ impl<'a> Stages<'a> {
         if self.workspace.is_task() {
             return Ok(());
         }
-        let estimate = self.known.estimate(&self.job.params);
+        let (params, output) = (&self.job.params, &self.job.output);
+        if params.drop_outliers.is_none() {
+            self.known.fits(params, output)?;
+        }
+        let estimate = self.known.estimate(params, output);
         self.report.estimated_scratch_bytes = estimate.scratch;
         self.report.estimated_output_bytes = estimate.output;
         room(&self.job.folder, &self.job.output, estimate, self.workspace)
@@ -109,13 +112,19 @@ impl<'a> Stages<'a> {
     pub fn ingest(&mut self) -> Result<(Spool, Lattice)> {
         let (job, workspace) = (self.job, self.workspace);
         let params = &job.params;
+        let selection = Selection {
+            classes: params.classes.clone(),
+            attributes: params.attributes.clone(),
+        };
         let spool = self.clock.stage("ingest", "points", 0, || {
-            let mut spool = ingest_classes(&job.inputs, &params.classes, workspace)?;
+            let mut spool = ingest_selected(&job.inputs, &selection, workspace)?;
             if !params.keep_far {
                 spool.drop_far(workspace)?;
             }
             Ok(spool)
         })?;
+        self.carried = spool.carried(&params.attributes, params.wide_colors);
+        self.report.attributes = self.carried.attributes.clone();
         let input = spool.stats().clone();
         if let Some(mixed) = input.mixed.as_ref().filter(|_| !params.ignore_crs) {
             return Err(mixed.refused());
@@ -127,8 +136,10 @@ impl<'a> Stages<'a> {
             decompressed: 0,
             // With thinning, the number of points that stay is unknown.
             points: if params.thin.is_some() { 0 } else { input.kept },
+            values: self.carried.bytes() as u64,
             double: Some(self.report.coordinates == CoordinateType::Double),
             moved: None,
+            text: None,
         };
         workspace.note_points(input.kept);
         self.report.input = input;
@@ -142,21 +153,6 @@ impl<'a> Stages<'a> {
             exact: lattice.exact,
         };
         Ok((spool, lattice))
-    }
-
-    /// Checks a given origin, and says if it is rounded.
-    fn check_origin(&mut self, lattice: &Lattice) -> Result<()> {
-        let Origin::At(to) = self.job.params.origin else {
-            return Ok(());
-        };
-        let coarse = self.coarse;
-        let [x, y, z] = Steps { lattice, coarse }.given(to)?.origin;
-        if [x, y, z] != to {
-            self.warn(format!(
-                "--origin: {x},{y},{z} is used, the nearest position on the lattice of steps of {coarse}"
-            ));
-        }
-        Ok(())
     }
 
     /// Sorts the points along the curve, thinned if requested; duplicates become one point.
@@ -191,10 +187,22 @@ impl<'a> Stages<'a> {
             self.report.duplicates_folded = folded;
             store
         };
-        spool.release(workspace)?;
+        let text = Text::of(spool, lattice, &job.params, &store)?;
+        if self.carried.columns.is_empty() {
+            spool.release(workspace)?;
+        }
         self.warn_of_input(lattice);
         enough(&store)?;
         self.known.points = store.len() as u64;
+        self.known.text = Some(text);
+        let coordinates = self.report.coordinates;
+        let columns = &self.carried.columns;
+        let warnings = self
+            .known
+            .left_out(&job.params, columns, coordinates, &job.output)?;
+        for warning in warnings {
+            self.warn(warning);
+        }
         workspace.note_points(self.known.points);
         self.check_room()?;
         Ok(store)
@@ -204,7 +212,8 @@ impl<'a> Stages<'a> {
     fn warn_of_input(&mut self, lattice: &Lattice) {
         let input = &self.report.input;
         let (kept, left_out) = (input.kept, input.dropped_non_finite);
-        for warning in input.warnings.clone() {
+        let warnings = [input.warnings.clone(), self.carried.warnings.clone()];
+        for warning in warnings.concat() {
             self.warn(warning);
         }
         if left_out > 0 {
@@ -248,6 +257,26 @@ impl<'a> Stages<'a> {
         self.report.outliers = stats;
         self.report.points = store.len() as u64;
         Ok(store)
+    }
+
+    /// The columns of the points that remain, if the mesh keeps any.
+    pub fn attributes(
+        &mut self,
+        spool: &Spool,
+        lattice: &Lattice,
+        store: &StoredPoints,
+    ) -> Result<Option<StoredColumns>> {
+        if self.carried.columns.is_empty() {
+            return Ok(None);
+        }
+        let (workspace, blocks, carried) = (self.workspace, self.blocks(), &self.carried);
+        let columns = self
+            .clock
+            .stage("attributes", "points", spool.points(), || {
+                attributes(spool, lattice, carried, store, blocks, workspace)
+            })?;
+        spool.release(workspace)?;
+        Ok(Some(columns))
     }
 
     /// The radius of the disks; a percentage refers to the points before smoothing.
@@ -414,57 +443,6 @@ impl<'a> Stages<'a> {
         self.report.holes_left = stats.holes_found - stats.holes_filled;
         self.report.repair = stats;
         Ok(repaired)
-    }
-
-    /// The origin of the mesh's coordinates, if it is not that of the cloud, and their type.
-    fn shift(&mut self, store: &PointStore, lattice: &Lattice) -> Result<Option<Shift>> {
-        let coarse = self.coarse;
-        let steps = Steps { lattice, coarse };
-        let doubles = self.report.coordinates == CoordinateType::Double;
-        let shift = match self.job.params.origin {
-            Origin::Auto if doubles => steps.automatic(store.bounds()),
-            Origin::Auto | Origin::None => None,
-            Origin::At(to) => Some(steps.given(to)?),
-        };
-        if let Some(shift) = &shift {
-            self.report.coordinates = written(steps.precision(shift, store.bounds()));
-            self.report.origin = Some(shift.origin);
-        }
-        Ok(shift)
-    }
-
-    /// The comments of the mesh.
-    fn comments(&self) -> Vec<String> {
-        let step = (self.job.params.smooth == 0).then_some(self.coarse);
-        let place = self.report.origin.map(|origin| Place::new(origin, step));
-        let mut comments = place.map_or_else(Vec::new, |place| place.comments());
-        if let Some(crs) = &self.report.input.crs {
-            comments.extend(crs.horizontal.map(|code| format!("epsg {code}")));
-            comments.push(format!("crs {}", crs.line()));
-        }
-        comments
-    }
-
-    /// Writes the mesh.
-    pub fn export(
-        &mut self,
-        store: &PointStore,
-        repaired: &Repaired,
-        lattice: &Lattice,
-    ) -> Result<()> {
-        let (job, workspace, blocks) = (self.job, self.workspace, self.blocks());
-        let shift = self.shift(store, lattice)?;
-        let options = ExportOptions {
-            output: &job.output,
-            coordinates: self.report.coordinates,
-            comments: self.comments(),
-            origin: shift,
-        };
-        let items = 2 * blocks.count() as u64;
-        self.report.mesh = self.clock.stage("export", "blocks", items, || {
-            export(store, repaired, blocks, lattice, options, workspace)
-        })?;
-        beside::write(&job.output, &job.inputs, &self.report)
     }
 
     /// The report of the run.

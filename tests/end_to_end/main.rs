@@ -1,5 +1,6 @@
 //! Whole runs, through the library and through the program. One test binary, to link only once.
 
+mod attributes;
 mod bad_input;
 mod cli;
 mod compressed;
@@ -9,6 +10,7 @@ mod filters;
 mod library;
 mod odd;
 mod outdoor;
+mod outputs;
 mod report;
 mod scans;
 mod stop;

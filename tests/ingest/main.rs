@@ -4,6 +4,7 @@ mod belong;
 mod bench;
 mod bombs;
 mod classes;
+mod columns;
 mod damage;
 mod far;
 mod formats;

@@ -2,7 +2,7 @@
 //! compress parts, and the calling thread writes them in their order.
 
 use super::file::{HEADER, MeshFile, note};
-use super::{KINDS, Writer};
+use super::write::{KINDS, Writer};
 use crate::error::Result;
 use crate::workspace::place::Place;
 use crate::workspace::{Unit, Workspace};

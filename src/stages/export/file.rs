@@ -1,6 +1,6 @@
 //! The mesh file while it is being written: slices at known offsets, under a temporary name.
 
-use super::format::{Layout, Mesh, MeshFormat};
+use super::format::{Layout, Mesh, MeshFormat, Positions};
 use crate::error::{Error, Result};
 use crate::workspace::fault::{self, Event};
 use crate::workspace::open::{failed_write, open_existing, options};
@@ -238,7 +238,31 @@ impl<'a> MeshFile<'a> {
 
     /// A batch of triangles that are encoded to the end of `bytes`.
     pub fn triangles(&self, bytes: &mut Vec<u8>) -> Batch<[u32; 3], impl FnMut(&[[u32; 3]])> {
-        Batch::new(|batch: &[[u32; 3]]| self.format.put_triangles(&self.mesh, batch, bytes))
+        Batch::new(|batch: &[[u32; 3]]| {
+            self.format.put_triangles(&self.mesh, batch, &[], bytes);
+        })
+    }
+
+    /// A batch of triangles with their positions that are encoded to the end of `bytes`.
+    pub fn placed_triangles(
+        &self,
+        bytes: &mut Vec<u8>,
+    ) -> Batch<([u32; 3], Positions), impl FnMut(&[([u32; 3], Positions)])> {
+        Batch::new(|batch: &[([u32; 3], Positions)]| {
+            let (triangles, positions): (Vec<_>, Vec<_>) = batch.iter().copied().unzip();
+            self.format
+                .put_triangles(&self.mesh, &triangles, &positions, bytes);
+        })
+    }
+
+    /// True if triangles are written with the positions of their corners.
+    pub fn wants_positions(&self) -> bool {
+        self.format.wants_positions()
+    }
+
+    /// Bytes of the values that a vertex has in all columns.
+    pub fn value_bytes(&self) -> usize {
+        self.mesh.value_bytes()
     }
 
     /// Flushes the file to disk and renames it to its final name.

@@ -184,6 +184,7 @@ mod tests {
             path: name.into(),
             format: Format::LAS,
             bytes: 0,
+            columns: Vec::new(),
             claimed: None,
             points: kept,
             kept,

@@ -270,6 +270,8 @@ mod tests {
                     },
                     text: false,
                     cut: false,
+                    columns: Vec::new(),
+                    spans: Vec::new(),
                 };
                 let found = choose(&[source], &IngestStats::default(), 3);
                 if let Ok(lattice) = found {

@@ -9,7 +9,9 @@
 //! list in `formats.rs`.
 
 mod belong;
+mod carry;
 mod classes;
+mod columns;
 mod contain;
 mod crs;
 mod expand;
@@ -31,22 +33,25 @@ mod stream;
 mod text;
 
 pub use belong::Mixed;
+pub use carry::{Attribute, Carried};
 pub use classes::Classes;
+pub use columns::{Attributes, Column};
 pub use crs::{Crs, CrsSource, prj_of};
 pub use expand::expand;
 pub use format::Format;
 pub use probe::{Probe, probe};
 pub use stats::{FileStats, IngestStats};
-pub use stream::READ_BUFFERS;
+pub use stream::{READ_BUFFERS, VALUE_BUFFERS};
 
 use crate::error::{Error, Result};
 use crate::geom::lattice::Lattice;
 use crate::workspace::Workspace;
+use columns::{Wanted, row_bytes};
 use input::Input;
 use point_format::{Claims, PointFile};
 use serde::{Deserialize, Serialize};
 use source::{Native, Source};
-use spool::{Frame, SourceWriter};
+use spool::{Frame, SourceWriter, values_of};
 use std::path::PathBuf;
 
 /// Precision that suffices for writing the coordinates of the cloud.
@@ -64,8 +69,20 @@ pub enum CoordinateType {
 pub struct Spool {
     name: String,
     frames: Vec<Frame>,
+    /// The frames of values, if columns are wanted: one for each of `frames`, without points for sources that have
+    /// none of the columns.
+    values: Vec<Frame>,
     sources: Vec<Source>,
     stats: IngestStats,
+}
+
+/// The part of the inputs that is read.
+#[derive(Debug, Clone, Default)]
+pub struct Selection {
+    /// Classes of the points.
+    pub classes: Classes,
+    /// Columns of the points.
+    pub attributes: Attributes,
 }
 
 /// Decodes all inputs, which may be files and folders, into a spool.
@@ -77,7 +94,7 @@ pub struct Spool {
 /// [`crate::Error::Input`] for a file that is not what it claims to be; [`crate::Error::Io`],
 /// [`crate::Error::Disk`], [`crate::Error::Memory`], [`crate::Error::Cancelled`].
 pub fn ingest(inputs: &[PathBuf], workspace: &Workspace) -> Result<Spool> {
-    ingest_classes(inputs, &Classes::All, workspace)
+    ingest_selected(inputs, &Selection::default(), workspace)
 }
 
 /// As [`ingest`], but reads only points of the wanted classes.
@@ -89,30 +106,63 @@ pub fn ingest_classes(
     classes: &Classes,
     workspace: &Workspace,
 ) -> Result<Spool> {
+    let selection = Selection {
+        classes: classes.clone(),
+        ..Selection::default()
+    };
+    ingest_selected(inputs, &selection, workspace)
+}
+
+/// As [`ingest`], but reads only what is selected.
+///
+/// # Errors
+/// See [`ingest`]; [`crate::Error::Parameter`] for columns that no file has.
+pub fn ingest_selected(
+    inputs: &[PathBuf],
+    selection: &Selection,
+    workspace: &Workspace,
+) -> Result<Spool> {
+    let paths = expand(inputs)?;
+    check_columns(&paths, &selection.attributes)?;
     let name = format!("ingest-{}.spool", workspace.number());
-    let spool = read_all(inputs, classes, &name, workspace);
+    let spool = read_all(&paths, selection, &name, workspace);
     if spool.is_err() && !workspace.is_resumable() {
         workspace.files.release(&name)?;
+        workspace.files.release(&values_of(&name))?;
     }
     spool
 }
 
+/// Refuses columns that are in none of the files.
+fn check_columns(paths: &[PathBuf], attributes: &Attributes) -> Result<()> {
+    if !matches!(attributes, Attributes::List(_)) {
+        return Ok(());
+    }
+    let mut present = Vec::new();
+    for path in paths {
+        present.extend(probe(path)?.columns);
+    }
+    attributes.check(&present)
+}
+
 /// Decodes all inputs into the spool `name`.
 fn read_all(
-    inputs: &[PathBuf],
-    classes: &Classes,
+    paths: &[PathBuf],
+    selection: &Selection,
     name: &str,
     workspace: &Workspace,
 ) -> Result<Spool> {
-    let (mut section, mut frames) = (0, Vec::new());
+    let classes = &selection.classes;
+    let (mut section, mut frames, mut values) = (0, Vec::new(), Vec::new());
     let mut sources = Vec::new();
     let mut stats = IngestStats::default();
     let mut shared = false;
-    for path in expand(inputs)? {
+    for path in paths {
         workspace.check_cancel()?;
-        let opened = Opened::new(Input::open(&path, workspace)?)?;
+        let opened = Opened::new(Input::open(path, workspace)?)?;
         let number = sources.len() as u32;
-        let target = SourceWriter::new(workspace, name, section, number, classes)?;
+        let wanted = Wanted::of(&selection.attributes, &opened.file.columns())?;
+        let target = SourceWriter::new(workspace, name, section, number, classes, &wanted)?;
         let mut warnings = match opened.file.read(&opened.input, &target) {
             // Tasks read all files at the same time.
             Err(Error::Shared) => {
@@ -124,11 +174,22 @@ fn read_all(
         if *classes != Classes::All && !opened.claims.classes {
             warnings.push("its points have no class, all of them are kept".to_owned());
         }
+        let read = target.stats();
+        let (next, more, more_values) = target.end();
+        section = next;
+        frames.extend(more);
+        values.extend(more_values.frames);
+        if selection.attributes != Attributes::None {
+            // Frames without values.
+            values.resize(frames.len(), Frame::default());
+        }
         let source = Source {
             native: opened.claims.native,
-            stats: target.stats(),
+            stats: read,
             text: opened.claims.text,
             cut: false,
+            columns: wanted.columns,
+            spans: more_values.spans,
         };
         let shown = |w: String| format!("{}: {w}", path.display());
         stats.warnings.extend(warnings.into_iter().map(shown));
@@ -136,9 +197,6 @@ fn read_all(
         stats.warnings.extend(unusable);
         stats.add(&opened, &source, crs);
         sources.push(source);
-        let (next, more) = target.end();
-        section = next;
-        frames.extend(more);
     }
     if shared {
         return Err(Error::Shared);
@@ -147,6 +205,7 @@ fn read_all(
     Ok(Spool {
         name: name.to_owned(),
         frames,
+        values,
         sources,
         stats,
     })
@@ -235,6 +294,7 @@ impl IngestStats {
             path: opened.input.path.clone(),
             format: opened.claims.format,
             bytes: opened.input.size,
+            columns: opened.file.columns().into_iter().map(|c| c.name).collect(),
             claimed: opened.claims.points,
             points: stats.read,
             kept: stats.kept,
@@ -256,18 +316,22 @@ impl Spool {
         &self.stats
     }
 
-    /// Deletes the scratch file.
+    /// Deletes the scratch files.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Disk`].
     pub fn release(&self, workspace: &Workspace) -> Result<()> {
+        if self.has_values() {
+            workspace.files.release(&values_of(&self.name))?;
+        }
         workspace.files.release(&self.name)
     }
 
     /// Approximate bytes of the points in the spool.
     #[must_use]
     pub fn bytes(&self) -> u64 {
-        let bytes = |source: &Source| source.stats.kept * source.native.point_bytes() as u64;
+        let point = |source: &Source| source.native.point_bytes() + row_bytes(&source.columns);
+        let bytes = |source: &Source| source.stats.kept * point(source) as u64;
         self.sources.iter().map(bytes).sum()
     }
 

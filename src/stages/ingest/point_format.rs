@@ -1,5 +1,6 @@
 //! The interface of input formats: detection and reading.
 
+use super::columns::Column;
 use super::crs::Crs;
 use super::format::Format;
 use super::input::Input;
@@ -90,6 +91,11 @@ pub(super) trait PointFile {
     /// The reference system given in the file.
     fn crs(&self, _input: &Input) -> Option<Crs> {
         None
+    }
+
+    /// The columns of the file. A [`SourceWriter`] says which are wanted, by their numbers in this list.
+    fn columns(&self) -> Vec<Column> {
+        Vec::new()
     }
 
     /// Reads all points, in units of at most a few MiB; returns warnings.

@@ -51,6 +51,8 @@ pub struct FileStats {
     pub format: Format,
     /// Its size in bytes.
     pub bytes: u64,
+    /// Names of its columns beside the coordinates.
+    pub columns: Vec<String>,
     /// Number of points given in the header; `None` for text.
     pub claimed: Option<u64>,
     /// Points in the file.

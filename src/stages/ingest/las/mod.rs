@@ -2,6 +2,7 @@
 
 mod chunks;
 mod crs;
+mod fields;
 mod gps;
 mod header;
 mod laz;
@@ -20,6 +21,7 @@ const FLAGS: usize = 15;
 const CLASS: usize = 16;
 
 use super::classes::Classes;
+use super::columns::Column;
 use super::crs::Crs;
 use super::format::Format;
 use super::input::Input;
@@ -27,6 +29,7 @@ use super::point_format::{Claims, Head, PointFile, PointFormat, Refusal};
 use super::source::Native;
 use super::spool::{Sink, SourceWriter};
 use crate::error::Result;
+use fields::Fields;
 
 impl Format {
     /// ASPRS LAS.
@@ -92,6 +95,10 @@ impl PointFile for Header {
         crs::read(input, self)
     }
 
+    fn columns(&self) -> Vec<Column> {
+        fields::columns(self)
+    }
+
     fn read(&self, input: &Input, target: &SourceWriter<'_>) -> Result<Vec<String>> {
         let mut warnings = self.warnings.clone();
         warnings.extend(match self.format.is_compressed {
@@ -102,7 +109,7 @@ impl PointFile for Header {
     }
 }
 
-/// The position of the withheld flag and of the class in a record, and the wanted classes.
+/// The position of the withheld flag and of the class in a record, and the wanted classes and fields.
 #[derive(Debug, Clone, Copy)]
 struct Record<'a> {
     withheld: u8,
@@ -110,10 +117,11 @@ struct Record<'a> {
     class: (usize, u8),
     /// `None` if all classes are wanted.
     wanted: Option<&'a Classes>,
+    fields: &'a Fields,
 }
 
 impl<'a> Record<'a> {
-    fn of(header: &Header, classes: &'a Classes) -> Self {
+    fn of(header: &Header, classes: &'a Classes, fields: &'a Fields) -> Self {
         let (withheld, class) = match (header.format.is_extended, header.raw.version.minor) {
             (true, _) => (0x04, (CLASS, 0xff)),
             // In LAS 1.0 the class is the whole byte.
@@ -125,6 +133,7 @@ impl<'a> Record<'a> {
             withheld,
             class,
             wanted,
+            fields,
         }
     }
 
@@ -137,7 +146,8 @@ impl<'a> Record<'a> {
         } else if self.wanted.is_some_and(|c| !c.wants(record[byte] & bits)) {
             sink.leave_out();
         } else {
-            return sink.push(position(record));
+            let values = |values: &mut Vec<u8>| self.fields.put(record, values);
+            return sink.push_with(position(record), values);
         }
         Ok(())
     }
