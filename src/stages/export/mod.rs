@@ -35,7 +35,7 @@ use file::{MeshFile, is_compressed};
 use formats::format_of;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
-use write::Writer;
+use write::{Frame, Writer};
 
 /// Counts of the finished mesh.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize, PartialEq, Eq)]
@@ -132,9 +132,10 @@ pub fn export(
         .filter(|c| format.holds(&mesh, c))
         .cloned()
         .collect();
+    let frame = Frame { lattice };
     if format.wants_bounds() {
         let bounds = bounds::bounds(store, &numbering, workspace)?;
-        mesh.bounds = Some(bounds.map(|corner| lattice.position(corner)));
+        mesh.bounds = Some(bounds.map(|corner| frame.position(corner)));
     }
     check_size(output, &mesh, false)?;
     let writer = Writer {
@@ -145,7 +146,7 @@ pub fn export(
         normals: mesh.normals().is_some(),
         numbering,
         blocks,
-        lattice,
+        frame,
         file: MeshFile::open(output, format, mesh, workspace)?,
     };
     match is_compressed(output) {

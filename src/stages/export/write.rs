@@ -33,8 +33,8 @@ pub struct Writer<'a> {
     pub numbering: Numbering,
     /// Division into blocks.
     pub blocks: Blocks,
-    /// Map from the store's positions to those of the mesh.
-    pub lattice: &'a Lattice,
+    /// The map from the store's positions to those of the mesh.
+    pub frame: Frame<'a>,
     /// The file.
     pub file: MeshFile<'a>,
 }
@@ -156,7 +156,7 @@ impl Writer<'_> {
         let values = normals.as_deref().map_or_else(Vec::new, values);
         let lists = bytes_of(&points) + bytes_of(&values) + 4 * chosen.len() as u64;
         let _held = unit.hold(lists + bytes_of(bytes));
-        let at = |v: &u32| self.position(points[(v - ids.start) as usize]);
+        let at = |v: &u32| self.frame.position(points[(v - ids.start) as usize]);
         self.file
             .encode_vertices(chosen.iter().map(at), &values, bytes);
         Ok(())
@@ -184,13 +184,22 @@ impl Writer<'_> {
         let corners = Corners::load(self.store, ids, faces.ids())?;
         let _corners = unit.hold(corners.bytes());
         let mut batch = self.file.placed_triangles(bytes);
-        faces.for_each(|t, ids| batch.push((t, ids.map(|v| self.position(corners.at(v))))));
+        faces.for_each(|t, ids| batch.push((t, ids.map(|v| self.frame.position(corners.at(v))))));
         batch.finish();
         Ok(())
     }
+}
 
-    /// The position of a point in the mesh.
-    fn position(&self, point: Point) -> [f64; 3] {
+/// The map from positions on the lattice to those in the mesh.
+#[derive(Debug, Clone, Copy)]
+pub struct Frame<'a> {
+    /// The lattice.
+    pub lattice: &'a Lattice,
+}
+
+impl Frame<'_> {
+    /// The position of a point in the mesh; it ascends with the point.
+    pub fn position(&self, point: Point) -> [f64; 3] {
         self.lattice.position(point)
     }
 }
