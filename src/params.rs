@@ -180,6 +180,8 @@ pub struct Params {
     pub max_fill: MaxWidth,
     /// Remove bridges and small components, fill holes (paper, section 3.6).
     pub repair: bool,
+    /// Keep points far from all others, even if the lattice of the positions is coarser for them.
+    pub keep_far: bool,
     /// Vertices have normals, in formats that hold them.
     pub normals: bool,
     /// Take coordinates as they are if files give different reference systems, which is an error otherwise.
@@ -221,6 +223,7 @@ impl Default for Params {
             max_edge: MaxWidth::Spacings(METHOD.admissibility.edge),
             max_fill: MaxWidth::Spacings(METHOD.filling.width),
             repair: true,
+            keep_far: false,
             normals: false,
             ignore_crs: false,
             origin: Origin::None,

@@ -193,6 +193,9 @@ pub struct Coordinates {
         allow_hyphen_values = true
     )]
     pub origin: Origin,
+    /// Keep points so far from all others that coordinates have to be rounded for them; else they are left out
+    #[arg(long)]
+    pub keep_far: bool,
     /// Take coordinates as they are if files give different reference systems; the mesh then names none
     #[arg(long)]
     pub ignore_crs: bool,
@@ -401,6 +404,7 @@ impl Job {
             repair: !self.repair.no_repair,
             normals: self.normals,
             origin: self.coordinates.origin,
+            keep_far: self.coordinates.keep_far,
             ignore_crs: self.coordinates.ignore_crs,
             block: self.block_points,
             ..usual

@@ -6,6 +6,7 @@ mod bombs;
 mod classes;
 mod columns;
 mod damage;
+mod far;
 mod formats;
 mod lattices;
 mod numbers;

@@ -16,6 +16,7 @@ mod contain;
 mod crs;
 mod e57;
 mod expand;
+mod far;
 mod format;
 mod formats;
 mod input;
@@ -191,6 +192,7 @@ fn read_all(
             native: opened.claims.native,
             stats: read,
             text: opened.claims.text,
+            cut: false,
             columns: wanted.columns,
             spans: more_values.spans,
         };
@@ -306,6 +308,7 @@ impl IngestStats {
             withheld: stats.withheld,
             invalid: stats.invalid,
             dropped_by_class: stats.unwanted,
+            dropped_far: 0,
             min: bounds.map(|b| b[0]),
             max: bounds.map(|b| b[1]),
             scanners: opened.file.scanners(),
