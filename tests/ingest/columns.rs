@@ -14,7 +14,7 @@ fn selection(list: &str) -> Selection {
 }
 
 /// The points with their values as numbers, sorted.
-fn rows(bench: &Bench, spool: &Spool, carried: &Carried) -> Vec<(Point, Vec<f64>)> {
+pub fn rows(bench: &Bench, spool: &Spool, carried: &Carried) -> Vec<(Point, Vec<f64>)> {
     let lattice = spool.choose_lattice(0).unwrap();
     let frames: Vec<u32> = spool.frames().into_iter().map(|f| f.0).collect();
     let mut all = Vec::new();
@@ -39,7 +39,8 @@ fn rows(bench: &Bench, spool: &Spool, carried: &Carried) -> Vec<(Point, Vec<f64>
     all
 }
 
-fn read(bench: &Bench, paths: &[PathBuf], list: &str, wide: bool) -> (Spool, Carried) {
+/// Reads files with the columns of a list.
+pub fn read(bench: &Bench, paths: &[PathBuf], list: &str, wide: bool) -> (Spool, Carried) {
     let selection = selection(list);
     let spool = ingest_selected(paths, &selection, &bench.workspace).unwrap();
     let carried = spool.carried(&selection.attributes, wide);

@@ -292,12 +292,6 @@ pub(super) struct Sink<'a, T: Coordinate> {
 }
 
 impl<T: Coordinate> Sink<'_, T> {
-    /// Adds a point of a source of which no column is wanted, unless a coordinate is not finite.
-    #[inline]
-    pub(super) fn push(&mut self, point: [T; 3]) -> Result<()> {
-        self.push_with(point, |_| {})
-    }
-
     /// Adds a point, unless a coordinate is not finite. `values` appends the values of the wanted columns, in
     /// their order and in little-endian bytes; it is called only if columns are wanted.
     #[inline]

@@ -6,6 +6,7 @@ mod read;
 mod scan;
 mod xml;
 
+use super::columns::Column;
 use super::crs::Crs;
 use super::format::Format;
 use super::input::{Input, u32_at, u64_at};
@@ -14,8 +15,9 @@ use super::point_format::{Claims, Head, PointFile, PointFormat, Refusal};
 use super::source::Native;
 use super::spool::SourceWriter;
 use crate::error::Result;
+use outcrop_ply::Scalar;
 use pages::PAGE;
-use scan::{Kind, Name, Pose, Scan};
+use scan::{Field, Kind, Name, Pose, Scan};
 use xml::Description;
 
 impl Format {
@@ -80,6 +82,7 @@ struct Scans {
     /// Those with points.
     filled: Vec<Scan>,
     native: Native,
+    columns: Vec<Column>,
     system: String,
 }
 
@@ -89,6 +92,7 @@ impl Scans {
         filled.retain(|scan| scan.points > 0);
         Self {
             native: native(&filled),
+            columns: columns(&filled),
             filled,
             system: description.system,
         }
@@ -143,6 +147,20 @@ fn native(scans: &[Scan]) -> Native {
     }
 }
 
+/// The columns of all scans; of another type than in the first scan, they become doubles.
+fn columns(scans: &[Scan]) -> Vec<Column> {
+    let mut all: Vec<Column> = Vec::new();
+    let found = scans.iter().flat_map(|scan| &scan.fields);
+    for column in found.filter_map(Field::column) {
+        match all.iter_mut().find(|other| other.name == column.name) {
+            Some(same) if same.scalar != column.scalar => same.scalar = Scalar::F64,
+            Some(_) => {}
+            None => all.push(column),
+        }
+    }
+    all
+}
+
 impl PointFile for Scans {
     fn claims(&self, input: &Input) -> Claims {
         let bits = self.filled.iter().map(Scan::bits).min().unwrap_or(1);
@@ -156,6 +174,10 @@ impl PointFile for Scans {
     fn crs(&self, _: &Input) -> Option<Crs> {
         let text = self.system.trim();
         text.contains('[').then(|| well_known(text))
+    }
+
+    fn columns(&self) -> Vec<Column> {
+        self.columns.clone()
     }
 
     fn scanners(&self) -> Vec<[f64; 3]> {

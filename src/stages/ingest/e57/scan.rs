@@ -1,5 +1,8 @@
 //! A scan of an E57 file, as its description says: the parts of a record, and the pose.
 
+use super::super::columns::Column;
+use outcrop_ply::Scalar;
+
 /// The part of a record.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Name {
@@ -57,11 +60,76 @@ impl Kind {
     }
 }
 
+/// Types of whole numbers, smaller ones first.
+const WHOLE: [(Scalar, i64, i64); 6] = [
+    (Scalar::U8, 0, u8::MAX as i64),
+    (Scalar::I8, i8::MIN as i64, i8::MAX as i64),
+    (Scalar::U16, 0, u16::MAX as i64),
+    (Scalar::I16, i16::MIN as i64, i16::MAX as i64),
+    (Scalar::U32, 0, u32::MAX as i64),
+    (Scalar::I32, i32::MIN as i64, i32::MAX as i64),
+];
+
+impl Kind {
+    /// The type of a column of such numbers.
+    pub(super) fn scalar(self) -> Scalar {
+        match self {
+            Self::Single => Scalar::F32,
+            Self::Integer {
+                lowest,
+                highest,
+                scale: 1.0,
+                offset: 0.0,
+            } => {
+                let holds = |(_, min, max): &&(Scalar, i64, i64)| *min <= lowest && highest <= *max;
+                let found = WHOLE.iter().find(holds);
+                found.map_or(Scalar::F64, |(scalar, ..)| *scalar)
+            }
+            _ => Scalar::F64,
+        }
+    }
+}
+
 /// A part of a record.
 #[derive(Debug, Clone)]
 pub(super) struct Field {
     pub(super) name: Name,
     pub(super) kind: Kind,
+}
+
+/// The parts of the standard that have other names as columns.
+const COLUMNS: [(&str, &str); 8] = [
+    ("colorRed", "red"),
+    ("colorGreen", "green"),
+    ("colorBlue", "blue"),
+    ("rowIndex", "row"),
+    ("columnIndex", "column"),
+    ("returnIndex", "return_index"),
+    ("returnCount", "return_count"),
+    ("timeStamp", "time_stamp"),
+];
+
+/// The parts that tell if others are valid, and these.
+const STATES: [(&str, &[&str]); 3] = [
+    ("isIntensityInvalid", &["intensity"]),
+    ("isColorInvalid", &["red", "green", "blue"]),
+    ("isTimeStampInvalid", &["time_stamp"]),
+];
+
+impl Field {
+    /// The column of which this has the values; none for coordinates and states.
+    pub(super) fn column(&self) -> Option<Column> {
+        let Name::Other(name) = &self.name else {
+            return None;
+        };
+        if STATES.iter().any(|(state, _)| *state == &**name) {
+            return None;
+        }
+        let usual = COLUMNS.iter().find(|(standard, _)| *standard == &**name);
+        // Names of extensions have a prefix and a colon.
+        let name = usual.map_or_else(|| name.replace(':', "_"), |(_, usual)| (*usual).to_owned());
+        Some(Column::new(&name, self.kind.scalar()))
+    }
 }
 
 /// The place of a scanner.
@@ -156,6 +224,12 @@ impl Scan {
     /// The number of the field with this name.
     pub(super) fn field(&self, name: &Name) -> Option<usize> {
         self.fields.iter().position(|field| field.name == *name)
+    }
+
+    /// The number of the field that tells if a column is valid.
+    pub(super) fn state(&self, column: &str) -> Option<usize> {
+        let state = STATES.iter().find(|(_, columns)| columns.contains(&column));
+        state.and_then(|(state, _)| self.field(&Name::of(state)))
     }
 
     /// The numbers of three fields.

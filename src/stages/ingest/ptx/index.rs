@@ -1,5 +1,6 @@
 //! The places of scans and of units of lines in a PTX file. Only the number of lines tells where a scan ends.
 
+use super::super::columns::Wanted;
 use super::super::input::{Input, Range, STREAM_BUFFER};
 use super::super::lines::{self, LONGEST_LINE};
 use super::super::spool::{Sink, SourceWriter};
@@ -59,7 +60,13 @@ impl Index {
     }
 
     /// Passes the points of a unit on.
-    pub(super) fn take(&self, input: &Input, unit: usize, sink: &mut Sink<'_, f64>) -> Result<()> {
+    pub(super) fn take(
+        &self,
+        input: &Input,
+        unit: usize,
+        wanted: &Wanted,
+        sink: &mut Sink<'_, f64>,
+    ) -> Result<()> {
         let UnitOfLines { start, end, scan } = self.units[unit];
         let scan = &self.scans[scan as usize];
         let bytes = input.window(start, (end - start) as usize, "lines")?;
@@ -67,7 +74,7 @@ impl Index {
         for line in bytes.split(|b| lines::is_end(*b)) {
             let text = line.trim_ascii();
             if !text.is_empty()
-                && let Err(found) = scan.take(text, sink)?
+                && let Err(found) = scan.take(text, wanted, sink)?
             {
                 let place = format!("line {}", lines::number_of(input, at)?);
                 let expected = "three coordinates, perhaps with an intensity and a colour";
