@@ -11,6 +11,8 @@ mod formats;
 mod lattices;
 mod numbers;
 mod ply_headers;
+mod scan_columns;
+mod scans;
 
 use bench::{Bench, based, cloud, ply, positions, write_las};
 use outcrop::Error;

@@ -154,6 +154,11 @@ impl<'a> SourceWriter<'a> {
         }
     }
 
+    /// The name of a step of this source.
+    pub(super) fn step(&self, name: &str) -> String {
+        format!("{name} of source {}", self.source)
+    }
+
     /// Reads units of the source on all threads, as [`Workspace::units`]; `work` fills a sink for each.
     pub(super) fn units<T: Coordinate>(
         &self,
@@ -162,7 +167,7 @@ impl<'a> SourceWriter<'a> {
         bytes: impl Fn(usize) -> u64 + Sync,
         work: impl Fn(usize, &mut Sink<'_, T>) -> Result<()> + Sync,
     ) -> Result<()> {
-        let step = format!("{name} of source {}", self.source);
+        let step = self.step(name);
         let first = self.next.fetch_add(count as u32, Ordering::Relaxed);
         let one = |unit: &Unit<'_>| {
             let mut sink = self.sink(unit);
@@ -287,12 +292,6 @@ pub(super) struct Sink<'a, T: Coordinate> {
 }
 
 impl<T: Coordinate> Sink<'_, T> {
-    /// Adds a point of a source of which no column is wanted, unless a coordinate is not finite.
-    #[inline]
-    pub(super) fn push(&mut self, point: [T; 3]) -> Result<()> {
-        self.push_with(point, |_| {})
-    }
-
     /// Adds a point, unless a coordinate is not finite. `values` appends the values of the wanted columns, in
     /// their order and in little-endian bytes; it is called only if columns are wanted.
     #[inline]
@@ -325,6 +324,13 @@ impl<T: Coordinate> Sink<'_, T> {
     pub(super) fn withhold(&mut self) {
         self.stats.read += 1;
         self.stats.withheld += 1;
+    }
+
+    /// Counts a record that the scanner marked as no point.
+    #[inline]
+    pub(super) fn invalid(&mut self) {
+        self.stats.read += 1;
+        self.stats.invalid += 1;
     }
 
     /// Counts a point whose class is not wanted.

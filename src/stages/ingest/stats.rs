@@ -19,6 +19,8 @@ pub struct IngestStats {
     pub dropped_non_finite: u64,
     /// Points left out because they are flagged as withheld.
     pub withheld: u64,
+    /// Records of scans that the scanner marked as no point, since nothing came back.
+    pub invalid: u64,
     /// Points left out because their class is not wanted.
     pub dropped_by_class: u64,
     /// Points left out because they are far from all others, and the lattice is finer without them.
@@ -63,6 +65,8 @@ pub struct FileStats {
     pub dropped_non_finite: u64,
     /// Points left out because they are flagged as withheld.
     pub withheld: u64,
+    /// Records of scans that the scanner marked as no point, since nothing came back.
+    pub invalid: u64,
     /// Points left out because their class is not wanted.
     pub dropped_by_class: u64,
     /// Points left out because they are far from all others.
@@ -71,6 +75,8 @@ pub struct FileStats {
     pub min: Option<[f64; 3]>,
     /// Highest coordinates of the kept points, in the file's unit; `None` without points.
     pub max: Option<[f64; 3]>,
+    /// The positions of the scanners given in the file, in its unit.
+    pub scanners: Vec<[f64; 3]>,
     /// The reference system that it gives, or a `.prj` file beside it.
     pub crs: Option<Crs>,
 }
@@ -82,6 +88,8 @@ pub(super) struct SourceStats {
     pub(super) kept: u64,
     pub(super) dropped: u64,
     pub(super) withheld: u64,
+    /// Records that the scanner marked as no point.
+    pub(super) invalid: u64,
     /// Points left out because of their class.
     pub(super) unwanted: u64,
     pub(super) min: [f64; 3],
@@ -101,6 +109,7 @@ impl Default for SourceStats {
             kept: 0,
             dropped: 0,
             withheld: 0,
+            invalid: 0,
             unwanted: 0,
             min: [f64::INFINITY; 3],
             max: [f64::NEG_INFINITY; 3],
@@ -155,6 +164,7 @@ impl SourceStats {
         self.kept += other.kept;
         self.dropped += other.dropped;
         self.withheld += other.withheld;
+        self.invalid += other.invalid;
         self.unwanted += other.unwanted;
         for axis in 0..3 {
             self.min[axis] = self.min[axis].min(other.min[axis]);
