@@ -48,6 +48,8 @@ pub(super) struct Stages<'a> {
     report: Report,
     /// Step of the lattice before it was refined.
     coarse: f64,
+    /// Well-known text of the reference system.
+    wkt: Option<String>,
 }
 
 impl<'a> Stages<'a> {
@@ -70,6 +72,7 @@ impl<'a> Stages<'a> {
             known: headers.unwrap_or_default(),
             carried: Carried::default(),
             coarse: 0.0,
+            wkt: None,
             report: Report {
                 version: env!("CARGO_PKG_VERSION"),
                 parameters: job.params.clone(),
@@ -129,6 +132,7 @@ impl<'a> Stages<'a> {
         if let Some(mixed) = input.mixed.as_ref().filter(|_| !params.ignore_crs) {
             return Err(mixed.refused());
         }
+        self.wkt = spool.wkt().map(str::to_owned);
         self.report.coordinates = written(spool.source_precision());
         self.known = Known {
             read: input.kept,

@@ -46,6 +46,9 @@ fn killed_while_far_points_are_searched() {
         let fault = format!("recorded:{number}");
         case.killed(&fault);
         assert!(said(&case.go_on(&fault)), "{fault}");
+        let text = std::fs::read_to_string(case.bench.path("mesh.prj")).unwrap();
+        assert_eq!(text.trim_end(), "LOCAL_CS[\"site\"]");
+        std::fs::remove_file(case.bench.path("mesh.prj")).unwrap();
     }
     // What a file beside an input says is in the mesh.
     case.killed("recorded:20");

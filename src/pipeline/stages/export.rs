@@ -90,6 +90,6 @@ impl Stages<'_> {
             export(store, repaired, blocks, lattice, options, workspace)
         })?;
         columns.map_or(Ok(()), |columns| columns.release(workspace))?;
-        beside::write(&job.output, &job.inputs, &self.report)
+        beside::write(&job.output, &job.inputs, &self.report, self.wkt.as_deref())
     }
 }

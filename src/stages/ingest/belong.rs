@@ -55,25 +55,44 @@ impl Mixed {
     }
 }
 
-/// The reference system of several files; two files if theirs are different.
-pub(super) fn common<'a>(
-    systems: impl Iterator<Item = (&'a Path, Option<&'a Crs>)>,
-) -> Result<Option<Crs>, Mixed> {
-    let mut distinct: Vec<(&Path, &Crs)> = Vec::new();
-    for (path, crs) in systems {
-        let Some(crs) = crs else { continue };
-        if let Some((first, system)) = distinct.iter().find(|(_, known)| known.differs(crs)) {
-            return Err(Mixed {
-                first: (first.to_path_buf(), system.to_string()),
+/// The reference systems of several files: one of each kind that may be the same as the others, so that few
+/// texts are in memory.
+#[derive(Debug, Default)]
+pub(super) struct Systems {
+    known: Vec<(PathBuf, Crs)>,
+    mixed: Option<Mixed>,
+}
+
+impl Systems {
+    /// Takes the system of a file.
+    pub(super) fn add(&mut self, path: &Path, crs: Crs) {
+        if self.mixed.is_some() {
+            return;
+        }
+        if let Some((first, system)) = self.known.iter().find(|(_, known)| known.differs(&crs)) {
+            self.mixed = Some(Mixed {
+                first: (first.clone(), system.to_string()),
                 other: (path.to_path_buf(), crs.to_string()),
             });
+            return;
         }
-        if !distinct.iter().any(|(_, known)| *known == crs) {
-            distinct.push((path, crs));
+        match self.known.iter_mut().find(|(_, known)| known.is_like(&crs)) {
+            Some((_, known)) if crs.rank() < known.rank() => *known = crs,
+            Some(_) => {}
+            None => self.known.push((path.to_path_buf(), crs)),
         }
     }
-    let best = distinct.iter().map(|(_, crs)| *crs);
-    Ok(best.min_by_key(|crs| crs.rank()).cloned())
+
+    /// The system that tells most; two files if theirs are different.
+    pub(super) fn common(self) -> Result<Option<Crs>, Mixed> {
+        match self.mixed {
+            Some(mixed) => Err(mixed),
+            None => {
+                let known = self.known.into_iter().map(|(_, crs)| crs);
+                Ok(known.min_by_key(Crs::rank))
+            }
+        }
+    }
 }
 
 /// A warning if some files have no reference system, and others have this one.

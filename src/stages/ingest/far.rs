@@ -28,7 +28,7 @@ const REACH: f64 = 16.0;
 const BITS: u32 = 16;
 
 /// Bytes of the counts and of the buffers.
-const MEMORY: u64 = (6 * 8 << BITS) + (1 << 20);
+const MEMORY: u64 = ((6 * 8) << BITS) + (1 << 20);
 
 /// Of each frame every point with a multiple of this as its number is a sample.
 const SAMPLE: usize = 64;

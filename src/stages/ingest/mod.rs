@@ -51,6 +51,7 @@ pub use stream::{READ_BUFFERS, VALUE_BUFFERS};
 use crate::error::{Error, Result};
 use crate::geom::lattice::Lattice;
 use crate::workspace::Workspace;
+use belong::Systems;
 use columns::{Wanted, row_bytes};
 use input::Input;
 use point_format::{Claims, PointFile};
@@ -79,6 +80,8 @@ pub struct Spool {
     values: Vec<Frame>,
     sources: Vec<Source>,
     stats: IngestStats,
+    /// The well-known text of the reference system, at most 1 MiB.
+    wkt: Option<String>,
 }
 
 /// The part of the inputs that is read.
@@ -161,6 +164,7 @@ fn read_all(
     let (mut section, mut frames, mut values) = (0, Vec::new(), Vec::new());
     let mut sources = Vec::new();
     let mut stats = IngestStats::default();
+    let mut systems = Systems::default();
     let mut shared = false;
     for path in paths {
         workspace.check_cancel()?;
@@ -200,19 +204,23 @@ fn read_all(
         stats.warnings.extend(warnings.into_iter().map(shown));
         let (crs, unusable) = opened.crs();
         stats.warnings.extend(unusable);
-        stats.add(&opened, &source, crs);
+        stats.add(&opened, &source, crs.as_ref().map(Crs::without_texts));
+        if let Some(crs) = crs {
+            systems.add(path, crs);
+        }
         sources.push(source);
     }
     if shared {
         return Err(Error::Shared);
     }
-    stats.compare();
+    let wkt = stats.compare(systems);
     Ok(Spool {
         name: name.to_owned(),
         frames,
         values,
         sources,
         stats,
+        wkt,
     })
 }
 
@@ -249,42 +257,35 @@ impl Opened {
 /// # Errors
 /// [`Error::Input`] with two files whose systems are different.
 pub fn check_systems(inputs: &[PathBuf]) -> Result<()> {
-    let mut systems = Vec::new();
+    let mut systems = Systems::default();
     for path in expand(inputs)? {
         let opened = Input::open_head(&path, formats::LONG_HEAD).and_then(Opened::new);
-        let crs = opened.ok().and_then(|opened| opened.crs().0);
-        // Their texts may be long, and many files usually have the same.
-        if let Some(crs) = crs
-            && !systems.iter().any(|(_, known)| *known == crs)
-        {
-            systems.push((path, crs));
+        if let Some(crs) = opened.ok().and_then(|opened| opened.crs().0) {
+            systems.add(&path, crs);
         }
     }
-    let each = systems
-        .iter()
-        .map(|(path, crs)| (path.as_path(), Some(crs)));
-    match belong::common(each) {
+    match systems.common() {
         Ok(_) => Ok(()),
         Err(mixed) => Err(mixed.refused()),
     }
 }
 
 impl IngestStats {
-    /// Compares the files with each other.
-    fn compare(&mut self) {
-        let files = &self.files;
-        let systems = files.iter().map(|f| (f.path.as_path(), f.crs.as_ref()));
-        let warning = match belong::common(systems) {
+    /// Compares the files with each other; returns the well-known text of the system of all.
+    fn compare(&mut self, systems: Systems) -> Option<String> {
+        let (mut wkt, files) = (None, &self.files);
+        let warning = match systems.common() {
             Ok(crs) => {
-                self.crs = crs;
-                self.crs
-                    .as_ref()
-                    .and_then(|crs| belong::without(files, crs))
+                let crs = crs.as_ref();
+                wkt = crs.and_then(|crs| crs.wkt.clone());
+                self.crs = crs.map(Crs::without_texts);
+                crs.and_then(|crs| belong::without(files, crs))
             }
             Err(mixed) => Some(self.mixed.insert(mixed).warning()),
         };
         let places = belong::warnings(files);
         self.warnings.extend(warning.into_iter().chain(places));
+        wkt
     }
 
     fn add(&mut self, opened: &Opened, source: &Source, crs: Option<Crs>) {
@@ -322,6 +323,12 @@ impl Spool {
     #[must_use]
     pub fn stats(&self) -> &IngestStats {
         &self.stats
+    }
+
+    /// The well-known text of the reference system, if it was given by one; at most 1 MiB.
+    #[must_use]
+    pub fn wkt(&self) -> Option<&str> {
+        self.wkt.as_deref()
     }
 
     /// Deletes the scratch files.
