@@ -39,6 +39,18 @@ pub enum Error {
         /// Description of the cloud.
         found: String,
     },
+    /// No point of the cloud is in the region of interest.
+    #[error(
+        "no point is in {region}, nor within {margin} around it; the cloud lies between {bounds}"
+    )]
+    Outside {
+        /// The region.
+        region: String,
+        /// Width of the margin around it.
+        margin: f64,
+        /// The lowest and highest coordinates of the cloud.
+        bounds: String,
+    },
     /// The cells gave no triangle.
     #[error("the cloud yields no triangle: {why}")]
     NoTriangles {
@@ -166,6 +178,7 @@ impl Error {
             | Error::Cancelled => true,
             Error::Input { .. }
             | Error::Degenerate { .. }
+            | Error::Outside { .. }
             | Error::NoTriangles { .. }
             | Error::Parameter { .. }
             | Error::TooManyPoints { .. }

@@ -1,8 +1,9 @@
 //! The parameters of a reconstruction, with their ranges.
 
 use crate::error::{Error, Result};
+pub use crate::geom::region::{NoRegion, Region};
 use crate::method::METHOD;
-use crate::stages::ingest::Classes;
+use crate::stages::ingest::{Classes, Crop, Selection};
 pub use crate::stages::smooth::Smoothing;
 use crate::stages::spacing::{Limits, Width};
 pub use crate::stages::surface::evidence::Division;
@@ -107,6 +108,11 @@ impl std::fmt::Display for MaxWidth {
 pub struct Params {
     /// Classes of the points that are read.
     pub classes: Classes,
+    /// The mesh inside this region only.
+    pub crop: Option<Region>,
+    /// Width of the margin around the region within which points are read as well, in the input's unit.
+    /// `None`: a tenth of the shorter side of the box around the region.
+    pub crop_margin: Option<f64>,
     /// Keep at most one point in each cube of this side, in the input's unit.
     pub thin: Option<f64>,
     /// Drop points whose spacing is more than this factor times that of the points around them.
@@ -152,6 +158,10 @@ pub struct Params {
 /// A factor for [`Params::drop_outliers`] that suits most clouds.
 pub const OUTLIER_FACTOR: f64 = 5.0;
 
+/// The margin around a region, as a share of the shorter side of the box around it. The local spacing of the
+/// points, which decides how wide it must be, is not known before they are read (docs/decisions.md).
+const MARGIN: f64 = 0.1;
+
 /// Largest number of neighbours.
 pub const MAX_NEIGHBORS: usize = 255;
 
@@ -159,6 +169,8 @@ impl Default for Params {
     fn default() -> Self {
         Self {
             classes: Classes::All,
+            crop: None,
+            crop_margin: None,
             thin: None,
             drop_outliers: None,
             method: Method::Robust,
@@ -194,6 +206,23 @@ impl Params {
             max_fill: MaxWidth::None,
             min_component: Some(10),
             ..Self::default()
+        }
+    }
+
+    /// The points that are read.
+    #[must_use]
+    pub fn selection(&self) -> Selection {
+        let crop = |region: &Region| {
+            let [min, max] = region.bounds();
+            let shorter = (max[0] - min[0]).min(max[1] - min[1]);
+            Crop {
+                region: region.clone(),
+                margin: self.crop_margin.unwrap_or(shorter * MARGIN),
+            }
+        };
+        Selection {
+            classes: self.classes.clone(),
+            crop: self.crop.as_ref().map(crop),
         }
     }
 
@@ -242,6 +271,14 @@ impl Params {
                 expected: expected.into(),
             })
         };
+        if let Some(Err(why)) = self.crop.as_ref().map(Region::check) {
+            return error("--crop", why.found, &why.expected);
+        }
+        if let Some(margin) = self.crop_margin
+            && !(margin >= 0.0 && margin.is_finite())
+        {
+            return error("--crop-margin", margin.to_string(), "a length, or 0");
+        }
         if let Some(side) = self.thin
             && !(side > 0.0 && side.is_finite())
         {

@@ -119,7 +119,8 @@ impl Reconstruction {
         let triples = stages.triples(&seen)?;
         let stitched = stages.stitch(places, &triples)?;
         let repaired = stages.repair(places, &stitched)?;
-        stages.export(&store, &repaired, &lattice)?;
+        let pieces = stages.cut(&store, &repaired, &lattice)?;
+        stages.export(&store, &repaired, pieces.as_ref(), &lattice)?;
         Ok(stages.report())
     }
 }

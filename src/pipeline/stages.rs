@@ -10,8 +10,9 @@ use crate::params::Method;
 use crate::report::{LatticeReport, Report};
 use crate::stages::blocks::Blocks;
 use crate::stages::cells::{CellTriples, DiskRadius, TileRanges, Widen, cells};
-use crate::stages::export::{CoordinateType, export};
-use crate::stages::ingest::{self, Spool, ingest_classes};
+use crate::stages::cut::{CutOptions, StoredPieces, cut};
+use crate::stages::export::{CoordinateType, export, export_cut};
+use crate::stages::ingest::{self, Spool, ingest_selected};
 use crate::stages::located::Places;
 use crate::stages::order::{Orderer, PointStore, StoredPoints, order, sample_sort};
 use crate::stages::outliers::{OutlierOptions, drop_outliers};
@@ -96,7 +97,7 @@ impl<'a> Stages<'a> {
         let (job, workspace) = (self.job, self.workspace);
         let params = &job.params;
         let spool = self.clock.stage("ingest", "points", 0, || {
-            ingest_classes(&job.inputs, &params.classes, workspace)
+            ingest_selected(&job.inputs, &params.selection(), workspace)
         })?;
         let input = spool.stats().clone();
         self.report.coordinates = match spool.source_precision() {
@@ -374,27 +375,61 @@ impl<'a> Stages<'a> {
         Ok(repaired)
     }
 
+    /// Cuts the surface, if requested.
+    pub fn cut(
+        &mut self,
+        store: &PointStore,
+        repaired: &Repaired,
+        lattice: &Lattice,
+    ) -> Result<Option<StoredPieces>> {
+        let (params, workspace, blocks) = (&self.job.params, self.workspace, self.blocks());
+        let options = CutOptions {
+            region: params.crop.as_ref(),
+            side: None,
+        };
+        if options.region.is_none() && options.side.is_none() {
+            return Ok(None);
+        }
+        workspace.trim();
+        let items = 2 * blocks.count() as u64;
+        let (pieces, stats) = self.clock.stage("cut", "blocks", items, || {
+            cut(store, repaired, blocks, lattice, options, workspace)
+        })?;
+        repaired.release(workspace)?;
+        self.report.cut = stats;
+        Ok(Some(pieces))
+    }
+
     /// Writes the mesh.
     pub fn export(
         &mut self,
         store: &PointStore,
         repaired: &Repaired,
+        pieces: Option<&StoredPieces>,
         lattice: &Lattice,
     ) -> Result<()> {
         let (job, workspace, blocks) = (self.job, self.workspace, self.blocks());
         let coordinates = self.report.coordinates;
-        let items = 2 * blocks.count() as u64;
-        self.report.mesh = self.clock.stage("export", "blocks", items, || {
-            export(
-                store,
-                repaired,
-                blocks,
-                lattice,
-                coordinates,
-                &job.output,
-                workspace,
-            )
-        })?;
+        let items = match pieces {
+            Some(pieces) => pieces.count() as u64,
+            None => 2 * blocks.count() as u64,
+        };
+        self.report.mesh = self
+            .clock
+            .stage("export", "blocks", items, || match pieces {
+                Some(pieces) => {
+                    export_cut(store, pieces, lattice, coordinates, &job.output, workspace)
+                }
+                None => export(
+                    store,
+                    repaired,
+                    blocks,
+                    lattice,
+                    coordinates,
+                    &job.output,
+                    workspace,
+                ),
+            })?;
         Ok(())
     }
 

@@ -32,6 +32,8 @@ pub mod stitch;
 
 pub mod repair;
 
+pub mod cut;
+
 pub mod export;
 
 pub mod blocks;

@@ -2,7 +2,8 @@
 //! compress parts, and the calling thread writes them in their order.
 
 use super::file::{HEADER, MeshFile, note};
-use super::{KINDS, Writer};
+use super::parts::Parts;
+use super::writer::{KINDS, Writer};
 use crate::error::Result;
 use crate::workspace::place::Place;
 use crate::workspace::{Unit, Workspace};
@@ -34,7 +35,7 @@ struct Frame {
 }
 
 /// Writes the file.
-pub(super) fn write(writer: &Writer<'_>, workspace: &Workspace) -> Result<()> {
+pub(super) fn write<P: Parts>(writer: &Writer<'_, P>, workspace: &Workspace) -> Result<()> {
     workspace.once("compress", |unit| {
         let whole = write_all(writer, workspace)?;
         note(unit, HEADER, whole);
@@ -43,8 +44,8 @@ pub(super) fn write(writer: &Writer<'_>, workspace: &Workspace) -> Result<()> {
 }
 
 /// Writes the file; returns its place.
-fn write_all(writer: &Writer<'_>, workspace: &Workspace) -> Result<Place> {
-    let (bytes, blocks) = (writer.file.layout.bytes, writer.blocks.count());
+fn write_all<P: Parts>(writer: &Writer<'_, P>, workspace: &Workspace) -> Result<Place> {
+    let (bytes, blocks) = (writer.file.layout.bytes, writer.parts.count());
     let count = KINDS * blocks;
     let sizes = (0..count).map(|part| writer.start(part + 1) - writer.start(part));
     let most = compress_bound(sizes.max().unwrap_or(0) as usize) as u64;
@@ -81,7 +82,7 @@ fn write_all(writer: &Writer<'_>, workspace: &Workspace) -> Result<Place> {
 }
 
 /// Encodes and compresses a part.
-fn pack_part(writer: &Writer<'_>, unit: &Unit<'_>, part: usize) -> Result<Vec<Frame>> {
+fn pack_part<P: Parts>(writer: &Writer<'_, P>, unit: &Unit<'_>, part: usize) -> Result<Vec<Frame>> {
     let mut bytes = Vec::new();
     writer.encode(unit, part, &mut bytes)?;
     pack(&bytes).map_err(|e| writer.file.failed("compress", e))

@@ -9,26 +9,26 @@ mod faces;
 mod file;
 mod format;
 mod number;
+mod parts;
 mod ply;
+mod writer;
 
 pub(crate) use file::{folder_of, is_compressed, temporary, temporary_of};
 pub use format::CoordinateType;
 
 use crate::error::{Error, Result};
 use crate::geom::lattice::Lattice;
-use crate::spill::Inbox;
 use crate::stages::blocks::Blocks;
+use crate::stages::cut::StoredPieces;
 use crate::stages::order::PointStore;
-use crate::stages::repair::{FilledTriangle, Repaired, Surface};
-use crate::workspace::memory::bytes_of;
-use crate::workspace::{Unit, Workspace};
-use faces::Faces;
-use file::{Edge, HEADER, MeshFile};
+use crate::stages::repair::Repaired;
+use crate::workspace::Workspace;
+use file::MeshFile;
 use format::{Mesh, MeshFormat};
-use number::Numbering;
+use parts::{OfTile, Parts, Whole};
 use serde::{Deserialize, Serialize};
-use std::ops::Range;
 use std::path::Path;
+use writer::Writer;
 
 /// All formats. The first is used if the extension is not known.
 const FORMATS: [&dyn MeshFormat; 1] = [&ply::Ply];
@@ -88,12 +88,57 @@ pub fn export(
     let surface = repaired.surface.open(workspace)?;
     let filled = repaired.filled.open(workspace, blocks.count())?;
     let numbering = number::number(&repaired.numbering, &filled, blocks, workspace)?;
-    let stats = numbering.stats;
+    let parts = Whole {
+        surface,
+        filled,
+        numbering,
+        blocks,
+    };
+    let stats = parts.stats();
     if stats.triangles == 0 {
         return Err(Error::NoTriangles {
             why: NO_TRIANGLES.into(),
         });
     }
+    let parts = write(store, parts, lattice, coordinates, output, workspace)?;
+    parts.numbering.release(workspace)?;
+    Ok(stats)
+}
+
+/// Writes a mesh that was cut to `output`: that of the only square.
+///
+/// # Errors
+/// See [`export`].
+pub fn export_cut(
+    store: &PointStore,
+    stored: &StoredPieces,
+    lattice: &Lattice,
+    coordinates: CoordinateType,
+    output: &Path,
+    workspace: &Workspace,
+) -> Result<MeshStats> {
+    let pieces = &stored.open(workspace)?;
+    let [tile] = pieces.tiles() else {
+        return Err(Error::NoTriangles {
+            why: NO_TRIANGLES.into(),
+        });
+    };
+    let parts = OfTile { pieces, tile };
+    write(store, parts, lattice, coordinates, output, workspace)?;
+    stored.release(workspace)?;
+    Ok(parts.stats())
+}
+
+/// Writes the file of a mesh; returns its parts.
+fn write<P: Parts>(
+    store: &PointStore,
+    parts: P,
+    lattice: &Lattice,
+    coordinates: CoordinateType,
+    output: &Path,
+    workspace: &Workspace,
+) -> Result<P> {
+    let stats = parts.stats();
     let mesh = Mesh {
         vertices: stats.vertices,
         triangles: stats.triangles,
@@ -101,11 +146,8 @@ pub fn export(
     };
     let writer = Writer {
         store,
-        surface,
-        filled,
-        numbering,
-        blocks,
         lattice,
+        parts,
         file: MeshFile::open(output, format_of(output), mesh, workspace)?,
     };
     match is_compressed(output) {
@@ -113,112 +155,8 @@ pub fn export(
         false => writer.write(workspace)?,
     }
     writer.file.finish()?;
-    writer.numbering.release(workspace)?;
-    Ok(stats)
+    Ok(writer.parts)
 }
 
 const NO_TRIANGLES: &str = "no three cells agree on one that belongs to a component large enough; \
     try a larger --radius, --smooth 1 for noisy scans, or a smaller --min-component";
-
-/// Writes the parts of a mesh: for each block its vertices, its copies of vertices, and its triangles. In the
-/// file the parts of one kind follow each other.
-struct Writer<'a> {
-    store: &'a PointStore,
-    surface: Surface<'a>,
-    filled: Inbox<FilledTriangle>,
-    numbering: Numbering,
-    blocks: Blocks,
-    lattice: &'a Lattice,
-    file: MeshFile<'a>,
-}
-
-/// Number of parts of a block.
-const KINDS: usize = 3;
-
-impl Writer<'_> {
-    /// Writes the file, every part at its offset.
-    fn write(&self, workspace: &Workspace) -> Result<()> {
-        let (file, count) = (&self.file, self.blocks.count());
-        workspace.once("header", |unit| {
-            file.write(unit, HEADER, &file.layout.header, 0)
-        })?;
-        let memory = |block| self.memory(workspace, block);
-        let work = |unit: &Unit<'_>| {
-            let (mut bytes, mut edges) = (Vec::new(), Vec::new());
-            for kind in 0..KINDS {
-                let part = kind * count + unit.number();
-                self.encode(unit, part, &mut bytes)?;
-                edges.extend(file.write(unit, part as u32, &bytes, self.start(part))?);
-            }
-            unit.advance(1);
-            Ok(edges)
-        };
-        let each = |_, edges: Vec<Edge>| file.write_edges(&edges);
-        workspace.units("export: block", count, memory, work, each)
-    }
-
-    /// Bytes of memory for a part of a block.
-    fn memory(&self, workspace: &Workspace, block: usize) -> u64 {
-        let records = self.surface.records(workspace, block) + self.filled.rows(block);
-        60 * records as u64 + self.blocks.ids(block).len() as u64 * 60 + (1 << 20)
-    }
-
-    /// Offset in the uncompressed file at which a part begins: the end of the part before it.
-    fn start(&self, part: usize) -> u64 {
-        let (layout, numbering) = (&self.file.layout, &self.numbering);
-        let block = part % self.blocks.count();
-        match part / self.blocks.count() {
-            0 => {
-                let first = numbering.vertex(self.blocks.ids(block).start);
-                layout.vertices.offset(first.into())
-            }
-            1 => layout.vertices.offset(numbering.first_copy(block)),
-            2 => layout.triangles.offset(numbering.first_face(block)),
-            _ => layout.bytes,
-        }
-    }
-
-    /// Encodes a part.
-    fn encode(&self, unit: &Unit<'_>, part: usize, bytes: &mut Vec<u8>) -> Result<()> {
-        let (numbering, block) = (&self.numbering, part % self.blocks.count());
-        let ids = self.blocks.ids(block);
-        bytes.clear();
-        bytes.reserve_exact((self.start(part + 1) - self.start(part)) as usize);
-        match part / self.blocks.count() {
-            0 => {
-                let used = ids.clone().filter(|v| numbering.used(*v));
-                self.vertices(unit, ids, used, bytes)
-            }
-            1 => {
-                let copies = numbering.copies.get(unit, block)?;
-                if copies.is_empty() {
-                    return Ok(());
-                }
-                self.vertices(unit, ids, copies.iter().map(|c| c.id), bytes)
-            }
-            _ => {
-                let faces = Faces::load(unit, block, &self.surface, &self.filled, numbering, ids)?;
-                let _held = unit.hold(faces.bytes() + bytes_of(bytes));
-                let mut batch = self.file.triangles(bytes);
-                faces.for_each(|t| batch.push(t));
-                batch.finish();
-                Ok(())
-            }
-        }
-    }
-
-    /// Encodes the positions of `chosen` points of the block with the ids `ids`.
-    fn vertices(
-        &self,
-        unit: &Unit<'_>,
-        ids: Range<u32>,
-        chosen: impl Iterator<Item = u32>,
-        bytes: &mut Vec<u8>,
-    ) -> Result<()> {
-        let points = self.store.slice(ids.start as usize..ids.end as usize)?;
-        let _held = unit.hold(bytes_of(&points) + bytes_of(bytes));
-        let at = |v: u32| self.lattice.position(points[(v - ids.start) as usize]);
-        self.file.encode_vertices(chosen.map(at), bytes);
-        Ok(())
-    }
-}

@@ -138,6 +138,7 @@ mod tests {
             dropped_non_finite: 0,
             withheld: 0,
             dropped_by_class: 0,
+            dropped_by_crop: 0,
             min: (kept > 0).then_some(min),
             max: (kept > 0).then_some(max),
         }

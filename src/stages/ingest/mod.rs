@@ -11,6 +11,7 @@
 mod belong;
 mod classes;
 mod contain;
+mod crop;
 mod crs;
 mod expand;
 mod format;
@@ -30,6 +31,7 @@ mod stream;
 mod text;
 
 pub use classes::Classes;
+pub use crop::Crop;
 pub use expand::expand;
 pub use format::Format;
 pub use probe::{Probe, probe};
@@ -39,6 +41,7 @@ pub use stream::READ_BUFFERS;
 use crate::error::{Error, Result};
 use crate::geom::lattice::Lattice;
 use crate::workspace::Workspace;
+use crop::Wanted;
 use input::Input;
 use point_format::{Claims, PointFile};
 use serde::{Deserialize, Serialize};
@@ -54,6 +57,15 @@ pub enum CoordinateType {
     F32,
     /// Double precision.
     F64,
+}
+
+/// The points that are read.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Selection {
+    /// Those of these classes.
+    pub classes: Classes,
+    /// Those in this region; `None` for all.
+    pub crop: Option<Crop>,
 }
 
 /// All points of the inputs in one scratch file.
@@ -74,20 +86,20 @@ pub struct Spool {
 /// [`crate::Error::Input`] for a file that is not what it claims to be; [`crate::Error::Io`],
 /// [`crate::Error::Disk`], [`crate::Error::Memory`], [`crate::Error::Cancelled`].
 pub fn ingest(inputs: &[PathBuf], workspace: &Workspace) -> Result<Spool> {
-    ingest_classes(inputs, &Classes::All, workspace)
+    ingest_selected(inputs, &Selection::default(), workspace)
 }
 
-/// As [`ingest`], but reads only points of the wanted classes.
+/// As [`ingest`], but reads only selected points.
 ///
 /// # Errors
 /// See [`ingest`].
-pub fn ingest_classes(
+pub fn ingest_selected(
     inputs: &[PathBuf],
-    classes: &Classes,
+    selection: &Selection,
     workspace: &Workspace,
 ) -> Result<Spool> {
     let name = format!("ingest-{}.spool", workspace.number());
-    let spool = read_all(inputs, classes, &name, workspace);
+    let spool = read_all(inputs, selection, &name, workspace);
     if spool.is_err() && !workspace.is_resumable() {
         workspace.files.release(&name)?;
     }
@@ -97,10 +109,13 @@ pub fn ingest_classes(
 /// Decodes all inputs into the spool `name`.
 fn read_all(
     inputs: &[PathBuf],
-    classes: &Classes,
+    selection: &Selection,
     name: &str,
     workspace: &Workspace,
 ) -> Result<Spool> {
+    let Selection { classes, crop } = selection;
+    let wanted = crop.as_ref().map(|crop| Wanted::of(crop, workspace));
+    let wanted = wanted.transpose()?;
     let (mut section, mut frames) = (0, Vec::new());
     let mut sources = Vec::new();
     let mut systems = Vec::new();
@@ -110,7 +125,8 @@ fn read_all(
         workspace.check_cancel()?;
         let opened = Opened::new(Input::open(&path, workspace)?)?;
         let number = sources.len() as u32;
-        let target = SourceWriter::new(workspace, name, section, number, classes)?;
+        let target = SourceWriter::new(workspace, name, section, number, classes)?
+            .within(wanted.as_ref(), opened.claims.native);
         let mut warnings = match opened.file.read(&opened.input, &target) {
             // Tasks read all files at the same time.
             Err(Error::Shared) => {
@@ -138,6 +154,9 @@ fn read_all(
     }
     if shared {
         return Err(Error::Shared);
+    }
+    if let Some(crop) = crop.as_ref().filter(|_| stats.kept == 0) {
+        crop.check_met(&sources)?;
     }
     stats
         .warnings
@@ -177,6 +196,7 @@ impl IngestStats {
         self.dropped_non_finite += stats.dropped;
         self.withheld += stats.withheld;
         self.dropped_by_class += stats.unwanted;
+        self.dropped_by_crop += stats.outside;
         let bounds = source.bounds();
         self.files.push(FileStats {
             path: opened.input.path.clone(),
@@ -188,6 +208,7 @@ impl IngestStats {
             dropped_non_finite: stats.dropped,
             withheld: stats.withheld,
             dropped_by_class: stats.unwanted,
+            dropped_by_crop: stats.outside,
             min: bounds.map(|b| b[0]),
             max: bounds.map(|b| b[1]),
         });

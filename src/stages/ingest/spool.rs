@@ -5,7 +5,8 @@
 //! frames are numbered in the order of units.
 
 use super::classes::Classes;
-use super::source::Source;
+use super::crop::Wanted;
+use super::source::{Native, Source};
 use super::stats::SourceStats;
 use crate::error::Result;
 use crate::workspace::file::ScratchFile;
@@ -77,6 +78,8 @@ pub(super) struct SourceWriter<'a> {
     source: u32,
     /// The classes to keep, if points have a class.
     pub(super) classes: &'a Classes,
+    /// The positions to keep, and the type of the source's coordinates.
+    wanted: Option<(&'a Wanted<'a>, Native)>,
     /// The section of the next unit.
     next: AtomicU32,
     stats: Mutex<SourceStats>,
@@ -98,10 +101,17 @@ impl<'a> SourceWriter<'a> {
             file: workspace.files.open(name, true)?,
             source,
             classes,
+            wanted: None,
             next: first.into(),
             stats: Mutex::default(),
             frames: Mutex::default(),
         })
+    }
+
+    /// The same, for points at wanted positions only; coordinates are of type `native`.
+    pub(super) fn within(self, wanted: Option<&'a Wanted<'a>>, native: Native) -> Self {
+        let wanted = wanted.map(|wanted| (wanted, native));
+        Self { wanted, ..self }
     }
 
     /// A buffer for one unit; its points are counted when it is finished.
@@ -195,6 +205,13 @@ impl<T: Coordinate> Sink<'_, T> {
         if !point.iter().all(|c| c.is_finite()) {
             self.stats.dropped += 1;
             return Ok(());
+        }
+        if let Some((wanted, native)) = &self.target.wanted {
+            let position = native.position(point.map(Into::into));
+            if !wanted.takes(position) {
+                self.stats.leave_outside(position);
+                return Ok(());
+            }
         }
         self.points.push(point);
         if self.points.len() == FRAME {

@@ -17,6 +17,8 @@ pub struct IngestStats {
     pub withheld: u64,
     /// Points left out because their class is not wanted.
     pub dropped_by_class: u64,
+    /// Points left out because they are not in the region, nor within the margin around it.
+    pub dropped_by_crop: u64,
     /// The counts of each file, in the order given.
     pub files: Vec<FileStats>,
     /// Warnings for the user, one line each.
@@ -50,6 +52,8 @@ pub struct FileStats {
     pub withheld: u64,
     /// Points left out because their class is not wanted.
     pub dropped_by_class: u64,
+    /// Points left out because they are not in the region, nor within the margin around it.
+    pub dropped_by_crop: u64,
     /// Lowest coordinates of the kept points, in the file's unit; `None` without points.
     pub min: Option<[f64; 3]>,
     /// Highest coordinates of the kept points, in the file's unit; `None` without points.
@@ -65,6 +69,10 @@ pub(super) struct SourceStats {
     pub(super) withheld: u64,
     /// Points left out because of their class.
     pub(super) unwanted: u64,
+    /// Points left out because of their position.
+    pub(super) outside: u64,
+    /// Lowest and highest coordinates of these, in the input's unit.
+    pub(super) beyond: [[f64; 3]; 2],
     pub(super) min: [f64; 3],
     pub(super) max: [f64; 3],
     /// All coordinates are multiples of 2 to the power of this; `i32::MAX` if all are zero.
@@ -83,6 +91,8 @@ impl Default for SourceStats {
             dropped: 0,
             withheld: 0,
             unwanted: 0,
+            outside: 0,
+            beyond: [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]],
             min: [f64::INFINITY; 3],
             max: [f64::NEG_INFINITY; 3],
             exponent: i32::MAX,
@@ -99,6 +109,9 @@ impl SourceStats {
         self.dropped += other.dropped;
         self.withheld += other.withheld;
         self.unwanted += other.unwanted;
+        self.outside += other.outside;
+        self.reach(other.beyond[0]);
+        self.reach(other.beyond[1]);
         for axis in 0..3 {
             self.min[axis] = self.min[axis].min(other.min[axis]);
             self.max[axis] = self.max[axis].max(other.max[axis]);
@@ -106,5 +119,19 @@ impl SourceStats {
         self.exponent = self.exponent.min(other.exponent);
         self.decimals = self.decimals.max(other.decimals);
         self.claimed = self.claimed.saturating_add(other.claimed);
+    }
+
+    /// Counts a point that is left out because of its position.
+    pub(super) fn leave_outside(&mut self, position: [f64; 3]) {
+        self.outside += 1;
+        self.reach(position);
+    }
+
+    fn reach(&mut self, position: [f64; 3]) {
+        let [low, high] = &mut self.beyond;
+        for axis in 0..3 {
+            low[axis] = low[axis].min(position[axis]);
+            high[axis] = high[axis].max(position[axis]);
+        }
     }
 }

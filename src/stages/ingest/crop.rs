@@ -1,0 +1,74 @@
+//! Selection of points by position: those in a region or within a margin around it.
+
+use super::source::{Native, Source};
+use super::stats::SourceStats;
+use crate::error::{Error, Result};
+use crate::geom::region::{Area, Region};
+use crate::workspace::Workspace;
+use crate::workspace::memory::Reservation;
+
+/// A region, and the margin around it within which points are read as well.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Crop {
+    /// The region.
+    pub region: Region,
+    /// Width of the margin, in the input's unit.
+    pub margin: f64,
+}
+
+impl Crop {
+    /// To be called if no point was kept.
+    ///
+    /// # Errors
+    /// [`Error::Outside`] if some were left out because of their position.
+    pub(super) fn check_met(&self, sources: &[Source]) -> Result<()> {
+        let mut all = SourceStats::default();
+        sources.iter().for_each(|source| all.merge(&source.stats));
+        if all.outside == 0 {
+            return Ok(());
+        }
+        let shown = |[x, y, z]: [f64; 3]| format!("{x},{y},{z}");
+        Err(Error::Outside {
+            region: self.region.to_string(),
+            margin: self.margin,
+            bounds: all.beyond.map(shown).join(" and "),
+        })
+    }
+}
+
+/// A crop prepared for tests of points.
+#[derive(Debug)]
+pub(super) struct Wanted<'a> {
+    area: Area<'a>,
+    margin: f64,
+    _held: Reservation,
+}
+
+impl<'a> Wanted<'a> {
+    pub(super) fn of(crop: &'a Crop, workspace: &Workspace) -> Result<Self> {
+        Ok(Self {
+            _held: workspace.reserve("crop: outline", crop.region.area_bytes())?,
+            area: crop.region.area(),
+            margin: crop.margin,
+        })
+    }
+
+    /// True if a point is read.
+    #[inline]
+    pub(super) fn takes(&self, position: [f64; 3]) -> bool {
+        self.area.is_near(position, self.margin)
+    }
+}
+
+impl Native {
+    /// The position of a point, in the input's unit.
+    #[inline]
+    pub(super) fn position(&self, point: [f64; 3]) -> [f64; 3] {
+        match self {
+            Self::Las { scale, offset } => {
+                std::array::from_fn(|axis| point[axis] * scale[axis] + offset[axis])
+            }
+            Self::F32 | Self::F64 => point,
+        }
+    }
+}
