@@ -11,7 +11,7 @@ use crate::report::{LatticeReport, Report};
 use crate::stages::blocks::Blocks;
 use crate::stages::cells::{CellTriples, DiskRadius, TileRanges, Widen, cells};
 use crate::stages::cut::{CutOptions, StoredPieces, cut};
-use crate::stages::export::{CoordinateType, export, export_cut};
+use crate::stages::export::{CoordinateType, ExportOptions, export, export_cut};
 use crate::stages::ingest::{self, Spool, ingest_selected};
 use crate::stages::located::Places;
 use crate::stages::order::{Orderer, PointStore, StoredPoints, order, sample_sort};
@@ -409,27 +409,21 @@ impl<'a> Stages<'a> {
         lattice: &Lattice,
     ) -> Result<()> {
         let (job, workspace, blocks) = (self.job, self.workspace, self.blocks());
-        let coordinates = self.report.coordinates;
+        let options = ExportOptions {
+            output: &job.output,
+            coordinates: self.report.coordinates,
+            comments: Vec::new(),
+            origin: None,
+        };
         let items = match pieces {
             Some(pieces) => pieces.count() as u64,
             None => 2 * blocks.count() as u64,
         };
-        self.report.mesh = self
-            .clock
-            .stage("export", "blocks", items, || match pieces {
-                Some(pieces) => {
-                    export_cut(store, pieces, lattice, coordinates, &job.output, workspace)
-                }
-                None => export(
-                    store,
-                    repaired,
-                    blocks,
-                    lattice,
-                    coordinates,
-                    &job.output,
-                    workspace,
-                ),
-            })?;
+        let write = || match pieces {
+            Some(pieces) => export_cut(store, pieces, lattice, options, workspace),
+            None => export(store, repaired, blocks, lattice, options, workspace),
+        };
+        self.report.mesh = self.clock.stage("export", "blocks", items, write)?;
         Ok(())
     }
 

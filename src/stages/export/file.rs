@@ -218,9 +218,19 @@ impl<'a> MeshFile<'a> {
         Error::io(&self.output, action, error)
     }
 
-    /// Appends the encoded vertices to `bytes`.
-    pub fn encode_vertices(&self, positions: impl Iterator<Item = [f64; 3]>, bytes: &mut Vec<u8>) {
-        let put = |batch: &[[f64; 3]]| self.format.put_vertices(&self.mesh, batch, bytes);
+    /// Appends the encoded vertices to `bytes`; `values` has the values that each has in all columns.
+    pub fn encode_vertices(
+        &self,
+        positions: impl Iterator<Item = [f64; 3]>,
+        mut values: &[u8],
+        bytes: &mut Vec<u8>,
+    ) {
+        let each = self.mesh.value_bytes();
+        let put = |batch: &[[f64; 3]]| {
+            let own;
+            (own, values) = values.split_at(batch.len() * each);
+            self.format.put_vertices(&self.mesh, batch, own, bytes);
+        };
         let mut batch = Batch::new(put);
         positions.for_each(|p| batch.push(p));
         batch.finish();

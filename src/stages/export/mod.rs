@@ -52,6 +52,9 @@ pub(crate) fn mesh_bytes(vertices: u64, triangles: u64, coordinates: CoordinateT
         vertices,
         triangles,
         coordinates,
+        columns: Vec::new(),
+        comments: Vec::new(),
+        origin: None,
     };
     FORMATS[0].layout(&mesh).bytes
 }
@@ -71,7 +74,20 @@ pub struct MeshStats {
     pub boundary_edges: u64,
 }
 
-/// Writes the mesh to `output`.
+/// Properties of a mesh file.
+#[derive(Debug)]
+pub struct ExportOptions<'a> {
+    /// Path of the mesh; its extension selects the format.
+    pub output: &'a Path,
+    /// Type of the coordinates, in formats that have both.
+    pub coordinates: CoordinateType,
+    /// Comments for the header.
+    pub comments: Vec<String>,
+    /// The position of the cloud that is the origin of the mesh, if it is not that of the cloud.
+    pub origin: Option<[f64; 3]>,
+}
+
+/// Writes the mesh.
 ///
 /// # Errors
 /// [`Error::Io`], [`Error::Disk`], [`Error::NoTriangles`], [`Error::Corrupt`], [`Error::Memory`],
@@ -81,8 +97,7 @@ pub fn export(
     repaired: &Repaired,
     blocks: Blocks,
     lattice: &Lattice,
-    coordinates: CoordinateType,
-    output: &Path,
+    options: ExportOptions<'_>,
     workspace: &Workspace,
 ) -> Result<MeshStats> {
     let surface = repaired.surface.open(workspace)?;
@@ -100,12 +115,12 @@ pub fn export(
             why: NO_TRIANGLES.into(),
         });
     }
-    let parts = write(store, parts, lattice, coordinates, output, workspace)?;
+    let parts = write(store, parts, lattice, options, workspace)?;
     parts.numbering.release(workspace)?;
     Ok(stats)
 }
 
-/// Writes a mesh that was cut to `output`: that of the only square.
+/// Writes a mesh that was cut: that of the only square.
 ///
 /// # Errors
 /// See [`export`].
@@ -113,8 +128,7 @@ pub fn export_cut(
     store: &PointStore,
     stored: &StoredPieces,
     lattice: &Lattice,
-    coordinates: CoordinateType,
-    output: &Path,
+    options: ExportOptions<'_>,
     workspace: &Workspace,
 ) -> Result<MeshStats> {
     let pieces = &stored.open(workspace)?;
@@ -124,7 +138,7 @@ pub fn export_cut(
         });
     };
     let parts = OfTile { pieces, tile };
-    write(store, parts, lattice, coordinates, output, workspace)?;
+    write(store, parts, lattice, options, workspace)?;
     stored.release(workspace)?;
     Ok(parts.stats())
 }
@@ -134,15 +148,23 @@ fn write<P: Parts>(
     store: &PointStore,
     parts: P,
     lattice: &Lattice,
-    coordinates: CoordinateType,
-    output: &Path,
+    options: ExportOptions<'_>,
     workspace: &Workspace,
 ) -> Result<P> {
+    let ExportOptions {
+        output,
+        coordinates,
+        comments,
+        origin,
+    } = options;
     let stats = parts.stats();
     let mesh = Mesh {
         vertices: stats.vertices,
         triangles: stats.triangles,
         coordinates,
+        columns: Vec::new(),
+        comments,
+        origin,
     };
     let writer = Writer {
         store,

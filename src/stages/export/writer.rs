@@ -103,7 +103,7 @@ impl<P: Parts> Writer<'_, P> {
             self.lattice.position(points[n])
         };
         self.file
-            .encode_vertices(ids.iter().enumerate().map(at), bytes);
+            .encode_vertices(ids.iter().enumerate().map(at), &[], bytes);
         Ok(())
     }
 }

@@ -12,9 +12,10 @@ pub(crate) fn write(path: &Path, points: &[[f64; 3]]) -> Result<()> {
         let mut file = BufWriter::with_capacity(1 << 20, File::create(path)?);
         let layout = Layout {
             encoding: Encoding::Little,
-            comment: None,
+            comments: &[],
             vertices: points.len() as u64,
             coordinates: Scalar::F64,
+            columns: &[],
             triangles: None,
         };
         file.write_all(layout.header().as_bytes())?;

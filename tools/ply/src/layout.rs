@@ -2,17 +2,19 @@
 
 use crate::types::{Encoding, Scalar};
 
-/// A file with vertices x, y and z, and possibly triangles.
+/// A file with vertices x, y and z, possibly with more columns, and possibly triangles.
 #[derive(Debug, Clone, Copy)]
 pub struct Layout<'a> {
     /// Encoding of numbers.
     pub encoding: Encoding,
-    /// A comment, on one line.
-    pub comment: Option<&'a str>,
+    /// Comments. Control characters in them, such as ends of lines, become spaces.
+    pub comments: &'a [&'a str],
     /// Number of vertices.
     pub vertices: u64,
     /// Type of the coordinates.
     pub coordinates: Scalar,
+    /// Names and types of the properties that vertices have after x, y and z.
+    pub columns: &'a [(&'a str, Scalar)],
     /// Number of triangles and type of their corners, unless the file is a cloud.
     pub triangles: Option<(u64, Scalar)>,
 }
@@ -35,17 +37,23 @@ impl Layout<'_> {
     #[must_use]
     pub fn header(&self) -> String {
         let scalar = self.coordinates.name();
-        let comment = self.comment.map(|c| format!("comment {c}\n"));
+        let comments = self.comments.iter().map(|comment| {
+            let line = comment.replace(char::is_control, " ");
+            format!("comment {line}\n")
+        });
+        let columns = self.columns.iter();
+        let columns = columns.map(|(name, scalar)| format!("property {} {name}\n", scalar.name()));
         let faces = self.triangles.map(|(count, corner)| {
             let corner = corner.name();
             format!("element face {count}\nproperty list uchar {corner} vertex_indices\n")
         });
         format!(
             "ply\nformat {} 1.0\n{}element vertex {}\n\
-             property {scalar} x\nproperty {scalar} y\nproperty {scalar} z\n{}end_header\n",
+             property {scalar} x\nproperty {scalar} y\nproperty {scalar} z\n{}{}end_header\n",
             self.encoding.name(),
-            comment.unwrap_or_default(),
+            comments.collect::<String>(),
             self.vertices,
+            columns.collect::<String>(),
             faces.unwrap_or_default(),
         )
     }

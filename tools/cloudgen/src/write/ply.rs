@@ -38,12 +38,13 @@ impl PlySink {
                 Encoding::BigEndian => outcrop_ply::Encoding::Big,
                 Encoding::Ascii => outcrop_ply::Encoding::Ascii,
             },
-            comment: Some("outcrop-cloudgen"),
+            comments: &["outcrop-cloudgen"],
             vertices: count,
             coordinates: match precision {
                 Precision::Single => Scalar::F32,
                 Precision::Double => Scalar::F64,
             },
+            columns: &[],
             triangles: None,
         };
         let written = sink.file.write_all(layout.header().as_bytes());

@@ -19,9 +19,10 @@ pub(crate) fn write_reference(mesh: &Tessellation, path: &Path) -> Result<()> {
 fn body(mesh: &Tessellation, mut file: impl Write) -> io::Result<()> {
     let layout = Layout {
         encoding: Encoding::Little,
-        comment: Some("outcrop-cloudgen reference"),
+        comments: &["outcrop-cloudgen reference"],
         vertices: mesh.vertices.len() as u64,
         coordinates: Scalar::F64,
+        columns: &[],
         triangles: Some((mesh.triangles.len() as u64, Scalar::U32)),
     };
     file.write_all(layout.header().as_bytes())?;
