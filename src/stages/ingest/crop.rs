@@ -1,7 +1,6 @@
 //! Selection of points by position: those in a region or within a margin around it.
 
 use super::source::{Native, Source};
-use super::stats::SourceStats;
 use crate::error::{Error, Result};
 use crate::geom::region::{Area, Region};
 use crate::workspace::Workspace;
@@ -22,16 +21,21 @@ impl Crop {
     /// # Errors
     /// [`Error::Outside`] if some were left out because of their position.
     pub(super) fn check_met(&self, sources: &[Source]) -> Result<()> {
-        let mut all = SourceStats::default();
-        sources.iter().for_each(|source| all.merge(&source.stats));
-        if all.outside == 0 {
+        let mut boxes = sources.iter().filter_map(Source::whole_bounds);
+        let Some(mut all) = boxes.next() else {
             return Ok(());
+        };
+        for [low, high] in boxes {
+            for axis in 0..3 {
+                all[0][axis] = all[0][axis].min(low[axis]);
+                all[1][axis] = all[1][axis].max(high[axis]);
+            }
         }
         let shown = |[x, y, z]: [f64; 3]| format!("{x},{y},{z}");
         Err(Error::Outside {
             region: self.region.to_string(),
             margin: self.margin,
-            bounds: all.beyond.map(shown).join(" and "),
+            bounds: all.map(shown).join(" and "),
         })
     }
 }

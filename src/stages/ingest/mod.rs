@@ -260,14 +260,14 @@ impl Spool {
     /// The precision in which coordinates are to be written.
     #[must_use]
     pub fn source_precision(&self) -> CoordinateType {
-        let kept = || self.sources.iter().filter(|s| s.stats.kept > 0);
+        let kept = || self.sources.iter().filter(|s| s.stats.any());
         if kept().all(|s| s.native == Native::F32) {
             return CoordinateType::F32;
         }
         let Ok(lattice) = self.choose_lattice(0) else {
             return CoordinateType::F64;
         };
-        let bounds = kept().filter_map(Source::bounds);
+        let bounds = kept().filter_map(Source::whole_bounds);
         let largest = bounds
             .flat_map(|b| b.into_iter().flatten())
             .fold(0.0, |m: f64, c| m.max(c.abs()));

@@ -62,12 +62,18 @@ impl Source {
         }
     }
 
-    /// Lowest and highest coordinates in the input's unit; `None` without points.
+    /// Lowest and highest coordinates of the kept points in the input's unit; `None` without points.
     pub(super) fn bounds(&self) -> Option<[[f64; 3]; 2]> {
-        if self.stats.kept == 0 {
-            return None;
-        }
-        let (mut min, mut max) = (self.stats.min, self.stats.max);
+        (self.stats.kept > 0).then(|| self.in_unit(self.stats.own))
+    }
+
+    /// The same of all points with a place on the lattice.
+    pub(super) fn whole_bounds(&self) -> Option<[[f64; 3]; 2]> {
+        let whole = [self.stats.min, self.stats.max];
+        self.stats.any().then(|| self.in_unit(whole))
+    }
+
+    fn in_unit(&self, [mut min, mut max]: [[f64; 3]; 2]) -> [[f64; 3]; 2] {
         if let Native::Las { scale, offset } = self.native {
             for axis in 0..3 {
                 let ends = [min[axis], max[axis]].map(|i| i * scale[axis] + offset[axis]);
@@ -75,6 +81,6 @@ impl Source {
                 max[axis] = ends[0].max(ends[1]);
             }
         }
-        Some([min, max])
+        [min, max]
     }
 }

@@ -209,7 +209,8 @@ impl<T: Coordinate> Sink<'_, T> {
         if let Some((wanted, native)) = &self.target.wanted {
             let position = native.position(point.map(Into::into));
             if !wanted.takes(position) {
-                self.stats.leave_outside(position);
+                self.stats.outside += 1;
+                self.stats.reach(point);
                 return Ok(());
             }
         }
@@ -242,14 +243,10 @@ impl<T: Coordinate> Sink<'_, T> {
             return Ok(());
         }
         self.stats.kept += self.points.len() as u64;
-        for point in &self.points {
-            for (axis, coordinate) in point.iter().enumerate() {
-                let value = (*coordinate).into();
-                self.stats.min[axis] = self.stats.min[axis].min(value);
-                self.stats.max[axis] = self.stats.max[axis].max(value);
-                self.stats.exponent = self.stats.exponent.min(coordinate.exponent());
-            }
-        }
+        let mut own = SourceStats::default();
+        self.points.iter().for_each(|point| own.reach(*point));
+        own.own = [own.min, own.max];
+        self.stats.merge(&own);
         self.bytes.truncate(HEADER);
         let words = [MAGIC, self.target.source, self.points.len() as u32, 0];
         self.bytes[..HEADER].copy_from_slice(bytemuck::bytes_of(&words));

@@ -1,6 +1,7 @@
 //! Statistics of the input: counts and extents of each file and in total.
 
 use super::format::Format;
+use super::spool::Coordinate;
 use serde::{Deserialize, Serialize, Serializer};
 use std::path::{Path, PathBuf};
 
@@ -71,10 +72,12 @@ pub(super) struct SourceStats {
     pub(super) unwanted: u64,
     /// Points left out because of their position.
     pub(super) outside: u64,
-    /// Lowest and highest coordinates of these, in the input's unit.
-    pub(super) beyond: [[f64; 3]; 2],
+    /// Lowest coordinates, also of points left out because of their position.
     pub(super) min: [f64; 3],
+    /// Highest coordinates, likewise.
     pub(super) max: [f64; 3],
+    /// Lowest and highest coordinates of the kept points.
+    pub(super) own: [[f64; 3]; 2],
     /// All coordinates are multiples of 2 to the power of this; `i32::MAX` if all are zero.
     pub(super) exponent: i32,
     /// Largest number of decimals in text, or [`NOT_FIXED`](super::number::NOT_FIXED).
@@ -82,6 +85,9 @@ pub(super) struct SourceStats {
     /// Sum of the point counts given in count lines of a text file.
     pub(super) claimed: u64,
 }
+
+/// The extent of no point.
+const NOWHERE: [[f64; 3]; 2] = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
 
 impl Default for SourceStats {
     fn default() -> Self {
@@ -92,9 +98,9 @@ impl Default for SourceStats {
             withheld: 0,
             unwanted: 0,
             outside: 0,
-            beyond: [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]],
             min: [f64::INFINITY; 3],
             max: [f64::NEG_INFINITY; 3],
+            own: NOWHERE,
             exponent: i32::MAX,
             decimals: 0,
             claimed: 0,
@@ -110,28 +116,31 @@ impl SourceStats {
         self.withheld += other.withheld;
         self.unwanted += other.unwanted;
         self.outside += other.outside;
-        self.reach(other.beyond[0]);
-        self.reach(other.beyond[1]);
         for axis in 0..3 {
             self.min[axis] = self.min[axis].min(other.min[axis]);
             self.max[axis] = self.max[axis].max(other.max[axis]);
+            self.own[0][axis] = self.own[0][axis].min(other.own[0][axis]);
+            self.own[1][axis] = self.own[1][axis].max(other.own[1][axis]);
         }
         self.exponent = self.exponent.min(other.exponent);
         self.decimals = self.decimals.max(other.decimals);
         self.claimed = self.claimed.saturating_add(other.claimed);
     }
 
-    /// Counts a point that is left out because of its position.
-    pub(super) fn leave_outside(&mut self, position: [f64; 3]) {
-        self.outside += 1;
-        self.reach(position);
+    /// Extends the range of coordinates by a point.
+    #[inline]
+    pub(super) fn reach<T: Coordinate>(&mut self, point: [T; 3]) {
+        for (axis, coordinate) in point.into_iter().enumerate() {
+            let value = coordinate.into();
+            self.min[axis] = self.min[axis].min(value);
+            self.max[axis] = self.max[axis].max(value);
+            self.exponent = self.exponent.min(coordinate.exponent());
+        }
     }
 
-    fn reach(&mut self, position: [f64; 3]) {
-        let [low, high] = &mut self.beyond;
-        for axis in 0..3 {
-            low[axis] = low[axis].min(position[axis]);
-            high[axis] = high[axis].max(position[axis]);
-        }
+    /// True if a point has a place on the lattice, even if it is left out because of its position: so the
+    /// lattice of a part of a cloud is that of the whole.
+    pub(super) fn any(&self) -> bool {
+        self.kept + self.outside > 0
     }
 }

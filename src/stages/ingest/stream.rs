@@ -119,7 +119,7 @@ impl Spool {
     /// on the lattice and may not fit it.
     fn maps(&self, lattice: &Lattice) -> Result<Vec<Option<SourceMap>>> {
         let map = |source: &Source| {
-            if source.stats.kept == 0 {
+            if !source.stats.any() {
                 return Ok(None);
             }
             let map = SourceMap::new(source, lattice.step, lattice.offset);
