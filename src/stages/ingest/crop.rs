@@ -2,6 +2,7 @@
 
 use super::source::{Native, Source};
 use crate::error::{Error, Result};
+use crate::geom::boxes::BoxTree;
 use crate::geom::region::{Area, Region};
 use crate::workspace::Workspace;
 use crate::workspace::memory::Reservation;
@@ -55,6 +56,21 @@ impl<'a> Wanted<'a> {
             area: crop.region.area(),
             margin: crop.margin,
         })
+    }
+
+    /// False only if no point of a box is wanted.
+    pub(super) fn may_meet(&self, bounds: [[f64; 3]; 2]) -> bool {
+        self.area.may_meet(bounds, self.margin)
+    }
+
+    /// Those of `boxes` that may have a wanted point, found by a tree of them.
+    pub(super) fn meeting(&self, boxes: &[[[f64; 3]; 2]]) -> Vec<usize> {
+        let tree = BoxTree::of(boxes.iter().copied());
+        let [min, max] = self.area.region().bounds();
+        let low = [min[0] - self.margin, min[1] - self.margin, f64::MIN];
+        let high = [max[0] + self.margin, max[1] + self.margin, f64::MAX];
+        let near = tree.meeting([low, high]);
+        near.filter(|n| self.may_meet(boxes[*n])).collect()
     }
 
     /// True if a point is read.

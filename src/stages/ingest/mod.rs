@@ -127,13 +127,20 @@ fn read_all(
         let number = sources.len() as u32;
         let target = SourceWriter::new(workspace, name, section, number, classes)?
             .within(wanted.as_ref(), opened.claims.native);
-        let mut warnings = match opened.file.read(&opened.input, &target) {
-            // Tasks read all files at the same time.
-            Err(Error::Shared) => {
-                shared = true;
-                Vec::new()
+        let outside =
+            |wanted: &Wanted<'_>| opened.file.lies_outside(&opened.input, wanted, workspace);
+        let mut warnings = if let Some(bounds) = wanted.as_ref().and_then(outside) {
+            target.skip(opened.claims.likely_points, bounds);
+            Vec::new()
+        } else {
+            match opened.file.read(&opened.input, &target) {
+                // Tasks read all files at the same time.
+                Err(Error::Shared) => {
+                    shared = true;
+                    Vec::new()
+                }
+                other => other?,
             }
-            other => other?,
         };
         if *classes != Classes::All && !opened.claims.classes {
             warnings.push("its points have no class, all of them are kept".to_owned());
@@ -197,6 +204,7 @@ impl IngestStats {
         self.withheld += stats.withheld;
         self.dropped_by_class += stats.unwanted;
         self.dropped_by_crop += stats.outside;
+        self.skipped_by_crop += stats.skipped;
         let bounds = source.bounds();
         self.files.push(FileStats {
             path: opened.input.path.clone(),
@@ -209,6 +217,7 @@ impl IngestStats {
             withheld: stats.withheld,
             dropped_by_class: stats.unwanted,
             dropped_by_crop: stats.outside,
+            skipped_by_crop: stats.skipped,
             min: bounds.map(|b| b[0]),
             max: bounds.map(|b| b[1]),
         });

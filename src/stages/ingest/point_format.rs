@@ -1,11 +1,13 @@
 //! The interface of input formats: detection and reading.
 
+use super::crop::Wanted;
 use super::crs::Crs;
 use super::format::Format;
 use super::input::Input;
 use super::source::Native;
 use super::spool::SourceWriter;
 use crate::error::Result;
+use crate::workspace::Workspace;
 use crate::workspace::compressed::plain_name;
 use std::path::{Path, PathBuf};
 
@@ -89,6 +91,17 @@ pub(super) trait PointFile {
 
     /// The reference system given in the file.
     fn crs(&self, _input: &Input) -> Option<Crs> {
+        None
+    }
+
+    /// The lowest and highest coordinates in the spool's type, if it is certain from the header and a few points
+    /// that none of its points is wanted.
+    fn lies_outside(
+        &self,
+        _input: &Input,
+        _wanted: &Wanted<'_>,
+        _workspace: &Workspace,
+    ) -> Option<[[f64; 3]; 2]> {
         None
     }
 

@@ -114,6 +114,19 @@ impl<'a> SourceWriter<'a> {
         Self { wanted, ..self }
     }
 
+    /// The wanted positions, if not all are.
+    pub(super) fn region(&self) -> Option<&'a Wanted<'a>> {
+        self.wanted.map(|(wanted, _)| wanted)
+    }
+
+    /// Counts points that are not read because of their position; their coordinates are between these ends.
+    pub(super) fn skip(&self, points: u64, [low, high]: [[f64; 3]; 2]) {
+        let mut stats = lock(&self.stats);
+        stats.skipped += points;
+        stats.reach(low);
+        stats.reach(high);
+    }
+
     /// A buffer for one unit; its points are counted when it is finished.
     pub(super) fn sink<'u, T: Coordinate>(&'u self, unit: &'u Unit<'u>) -> Sink<'u, T> {
         let mut bytes = Vec::with_capacity(HEADER + FRAME * size_of::<[T; 3]>());

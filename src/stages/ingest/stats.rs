@@ -20,6 +20,8 @@ pub struct IngestStats {
     pub dropped_by_class: u64,
     /// Points left out because they are not in the region, nor within the margin around it.
     pub dropped_by_crop: u64,
+    /// Points not read because their files or chunks lie outside, by header or chunk table.
+    pub skipped_by_crop: u64,
     /// The counts of each file, in the order given.
     pub files: Vec<FileStats>,
     /// Warnings for the user, one line each.
@@ -55,6 +57,8 @@ pub struct FileStats {
     pub dropped_by_class: u64,
     /// Points left out because they are not in the region, nor within the margin around it.
     pub dropped_by_crop: u64,
+    /// Points not read because they are in chunks that lie outside, or the whole file does.
+    pub skipped_by_crop: u64,
     /// Lowest coordinates of the kept points, in the file's unit; `None` without points.
     pub min: Option<[f64; 3]>,
     /// Highest coordinates of the kept points, in the file's unit; `None` without points.
@@ -72,6 +76,8 @@ pub(super) struct SourceStats {
     pub(super) unwanted: u64,
     /// Points left out because of their position.
     pub(super) outside: u64,
+    /// Points not decoded because of their position, by the header or the chunk table.
+    pub(super) skipped: u64,
     /// Lowest coordinates, also of points left out because of their position.
     pub(super) min: [f64; 3],
     /// Highest coordinates, likewise.
@@ -98,6 +104,7 @@ impl Default for SourceStats {
             withheld: 0,
             unwanted: 0,
             outside: 0,
+            skipped: 0,
             min: [f64::INFINITY; 3],
             max: [f64::NEG_INFINITY; 3],
             own: NOWHERE,
@@ -116,6 +123,7 @@ impl SourceStats {
         self.withheld += other.withheld;
         self.unwanted += other.unwanted;
         self.outside += other.outside;
+        self.skipped += other.skipped;
         for axis in 0..3 {
             self.min[axis] = self.min[axis].min(other.min[axis]);
             self.max[axis] = self.max[axis].max(other.max[axis]);
@@ -141,6 +149,6 @@ impl SourceStats {
     /// True if a point has a place on the lattice, even if it is left out because of its position: so the
     /// lattice of a part of a cloud is that of the whole.
     pub(super) fn any(&self) -> bool {
-        self.kept + self.outside > 0
+        self.kept + self.outside + self.skipped > 0
     }
 }

@@ -5,7 +5,7 @@ use super::super::spool::{Sink, SourceWriter, sink_bytes};
 use super::chunks::{Decoder, LayerHead};
 use super::table::{self, Chunk, Table};
 use super::vlr::{self, Laszip};
-use super::{Header, Record};
+use super::{Header, Record, skip};
 use crate::error::Result;
 use laz::LazItemType;
 
@@ -53,6 +53,7 @@ pub(super) fn read(
         }
     };
     limit(input, header, &laszip, &mut table, &mut warnings)?;
+    warnings.extend(skip::outside(input, header, &mut table.chunks, writer)?);
     in_parallel(&decoder, &table.chunks, writer)?;
     Ok(warnings)
 }

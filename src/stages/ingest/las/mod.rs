@@ -1,11 +1,13 @@
 //! LAS 1.0 to 1.4 and LAZ.
 
 mod chunks;
+mod copc;
 mod crs;
 mod gps;
 mod header;
 mod laz;
 mod plain;
+mod skip;
 mod table;
 mod vlr;
 
@@ -18,6 +20,7 @@ const FLAGS: usize = 15;
 const CLASS: usize = 16;
 
 use super::classes::Classes;
+use super::crop::Wanted;
 use super::crs::Crs;
 use super::format::Format;
 use super::input::Input;
@@ -25,6 +28,7 @@ use super::point_format::{Claims, Head, PointFile, PointFormat, Refusal};
 use super::source::Native;
 use super::spool::{Sink, SourceWriter};
 use crate::error::Result;
+use crate::workspace::Workspace;
 
 impl Format {
     /// ASPRS LAS.
@@ -84,6 +88,17 @@ impl PointFile for Header {
             ]),
             ..Claims::new(input, format, native, self.claimed, least)
         }
+    }
+
+    fn lies_outside(
+        &self,
+        input: &Input,
+        wanted: &Wanted<'_>,
+        workspace: &Workspace,
+    ) -> Option<[[f64; 3]; 2]> {
+        // What is damaged is reported when the file is read.
+        let outside = Header::lies_outside(self, input, wanted, workspace).unwrap_or(false);
+        self.native_bounds().filter(|_| outside)
     }
 
     fn crs(&self, input: &Input) -> Option<Crs> {
