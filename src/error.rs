@@ -51,6 +51,20 @@ pub enum Error {
         /// The lowest and highest coordinates of the cloud.
         bounds: String,
     },
+    /// A mesh exceeds a limit of its format.
+    #[error("{path}: {format} holds at most {most} {unit}, this mesh has {found}; write .ply or .obj, or a smaller mesh (--thin, --split)", path = path.display())]
+    TooLarge {
+        /// Path of the mesh.
+        path: PathBuf,
+        /// Name of the format.
+        format: &'static str,
+        /// `bytes` or `triangles`.
+        unit: &'static str,
+        /// The limit.
+        most: u64,
+        /// The number that the mesh has; with `about` if it is estimated.
+        found: String,
+    },
     /// The cells gave no triangle.
     #[error("the cloud yields no triangle: {why}")]
     NoTriangles {
@@ -180,6 +194,7 @@ impl Error {
             | Error::Degenerate { .. }
             | Error::Outside { .. }
             | Error::NoTriangles { .. }
+            | Error::TooLarge { .. }
             | Error::Parameter { .. }
             | Error::TooManyPoints { .. }
             | Error::Locked { .. }

@@ -14,7 +14,7 @@
 //! # std::fs::write(&cloud, points.collect::<String>())?;
 //! let report = Reconstruction::builder()
 //!     .input(cloud) // LAS, LAZ, PLY or text, or a folder of them
-//!     .output(mesh) // binary PLY
+//!     .output(mesh) // PLY, OBJ, STL or GLB
 //!     .params(Params { neighbors: 20, ..Params::default() })
 //!     .memory(256 << 20) // the ceiling, in bytes
 //!     .build()?
@@ -74,7 +74,7 @@ pub mod stages;
 pub mod workspace;
 
 pub use error::{Error, Result};
-pub use params::{Division, MaxWidth, Method, Params, Radius, Smoothing};
+pub use params::{Division, MaxWidth, Method, Params, Radius, Region, Smoothing};
 pub use pipeline::{Builder, Reconstruction, Start, default_memory, default_threads};
 pub use report::{DiskEstimate, Report};
 pub use stages::ingest::Classes;

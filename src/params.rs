@@ -111,8 +111,10 @@ pub struct Params {
     /// The mesh inside this region only.
     pub crop: Option<Region>,
     /// Width of the margin around the region within which points are read as well, in the input's unit.
-    /// `None`: a tenth of the shorter side of the box around the region.
+    /// `None`: a twentieth of the shorter side of the box around the region.
     pub crop_margin: Option<f64>,
+    /// One mesh for each square of this side in x and y, in the input's unit, instead of one for all.
+    pub split: Option<f64>,
     /// Keep at most one point in each cube of this side, in the input's unit.
     pub thin: Option<f64>,
     /// Drop points whose spacing is more than this factor times that of the points around them.
@@ -147,6 +149,8 @@ pub struct Params {
     pub max_fill: MaxWidth,
     /// Remove bridges and small components, fill holes (paper, section 3.6).
     pub repair: bool,
+    /// Vertices have normals, in formats that hold them.
+    pub normals: bool,
     /// Points per block, the unit of insertion; changes the result.
     #[serde(skip)]
     pub block: u32,
@@ -160,7 +164,7 @@ pub const OUTLIER_FACTOR: f64 = 5.0;
 
 /// The margin around a region, as a share of the shorter side of the box around it. The local spacing of the
 /// points, which decides how wide it must be, is not known before they are read (docs/decisions.md).
-const MARGIN: f64 = 0.1;
+const MARGIN: f64 = 0.05;
 
 /// Largest number of neighbours.
 pub const MAX_NEIGHBORS: usize = 255;
@@ -171,6 +175,7 @@ impl Default for Params {
             classes: Classes::All,
             crop: None,
             crop_margin: None,
+            split: None,
             thin: None,
             drop_outliers: None,
             method: Method::Robust,
@@ -186,6 +191,7 @@ impl Default for Params {
             max_edge: MaxWidth::Spacings(METHOD.admissibility.edge),
             max_fill: MaxWidth::Spacings(METHOD.filling.width),
             repair: true,
+            normals: false,
             block: METHOD.curve.block,
             division: Division::default(),
         }
@@ -278,6 +284,11 @@ impl Params {
             && !(margin >= 0.0 && margin.is_finite())
         {
             return error("--crop-margin", margin.to_string(), "a length, or 0");
+        }
+        if let Some(side) = self.split
+            && !(side > 0.0 && side.is_finite())
+        {
+            return error("--split", side.to_string(), "a positive length");
         }
         if let Some(side) = self.thin
             && !(side > 0.0 && side.is_finite())

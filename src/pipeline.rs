@@ -93,7 +93,7 @@ impl Reconstruction {
     /// run can be resumed, see [`Reconstruction::is_unfinished`].
     pub fn run(&self) -> Result<Report> {
         writable(&self.output)?;
-        not_an_input(&self.output, &self.inputs)?;
+        not_an_input(&self.output, self.params.split.is_some(), &self.inputs)?;
         let _alarm = self
             .time_limit
             .map(|limit| Alarm::set(limit, self.cancel.clone()));

@@ -6,7 +6,7 @@ mod reference;
 use outcrop::inspect::ply_mesh::{PlyMesh, Sink};
 use outcrop::stages::blocks::Blocks;
 use outcrop::stages::cells::{CountedTriple, SentTriple};
-use outcrop::stages::export::{CoordinateType, export};
+use outcrop::stages::export::{CoordinateType, ExportOptions, export};
 use outcrop::stages::located::Places;
 use outcrop::stages::order::{Orderer, PointStore, StoreWriter};
 use outcrop::stages::repair::{RepairOptions, repair};
@@ -135,10 +135,9 @@ fn pipeline(
         exact: true,
     };
     let folder = tempfile::tempdir().unwrap();
-    let (path, double) = (folder.path().join("mesh.ply"), CoordinateType::Double);
-    export(
-        &store, &repaired, blocks, &lattice, double, &path, workspace,
-    )?;
+    let path = folder.path().join("mesh.ply");
+    let to = ExportOptions::new(&path, CoordinateType::Double);
+    export(&store, &repaired, blocks, &lattice, to, workspace)?;
     let mut faces = Faces::default();
     PlyMesh::open(&path)?.read(&mut faces)?;
     let counts = [

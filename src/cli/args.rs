@@ -77,7 +77,7 @@ pub struct Points {
     )]
     pub crop: Option<Region>,
     /// Width of the margin around the region within which points are read as well, in the cloud's unit
-    /// [default: a tenth of the region's shorter side]
+    /// [default: a twentieth of the region's shorter side]
     #[arg(long, value_name = "LENGTH", requires = "crop")]
     pub crop_margin: Option<f64>,
 }
@@ -196,9 +196,16 @@ pub struct Job {
     /// Files (LAS, LAZ, PLY, XYZ text; also as .gz and .zst) or folders of files; together they are one cloud
     #[arg(value_name = "INPUT", required = true)]
     pub inputs: Vec<PathBuf>,
-    /// The mesh to write (binary PLY); MESH.ply.zst is compressed
+    /// The mesh to write: .ply, .obj, .stl or .glb (all but OBJ binary), compressed with .zst behind it
     #[arg(long, short, value_name = "MESH.ply")]
     pub output: PathBuf,
+    /// Write a normal for each vertex (PLY, OBJ, GLB)
+    #[arg(long)]
+    pub normals: bool,
+    /// Write one mesh for each square with this side in x and y, in the cloud's unit: MESH_X_Y.ply, and
+    /// MESH.index.json with a list of them
+    #[arg(long, value_name = "LENGTH")]
+    pub split: Option<f64>,
     #[command(flatten)]
     pub points: Points,
     #[command(flatten)]
@@ -371,6 +378,7 @@ impl Job {
             classes: selected.classes,
             crop: selected.crop,
             crop_margin: selected.crop_margin,
+            split: self.split,
             thin: self.filters.thin,
             drop_outliers: self.filters.drop_outliers,
             neighbors: self.surface.neighbors,
@@ -385,6 +393,7 @@ impl Job {
             max_hole_edges: self.repair.max_hole_edges,
             min_component: self.repair.min_component.or(usual.min_component),
             repair: !self.repair.no_repair,
+            normals: self.normals,
             block: self.block_points,
             ..usual
         }

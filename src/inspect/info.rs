@@ -14,7 +14,7 @@ use crate::workspace::Workspace;
 use crate::workspace::memory::MINIMUM_BUDGET;
 use serde::Serialize;
 use std::fmt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// Number of sampled sequences of points, and of points in each.
@@ -98,8 +98,9 @@ pub fn info(inputs: &[PathBuf], params: &Params, workspace: &Workspace) -> Resul
         points,
         double: Some(double),
         moved: None,
+        text: None,
     };
-    let disk = known.estimate(&Params::default());
+    let disk = known.estimate(&Params::default(), Path::new("mesh.ply"));
     Ok(Info {
         duplicates,
         points,

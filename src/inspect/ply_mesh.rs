@@ -55,6 +55,23 @@ pub fn holds_faces(path: &Path) -> Result<bool> {
     Ok(header.is_ok_and(|header| header.holds_faces()))
 }
 
+/// Extensions of meshes that the program writes and does not read.
+const NOT_READ: [&str; 3] = ["obj", "stl", "glb"];
+
+/// A clearer error for a mesh in a format that the program writes and does not read.
+pub fn clearer(path: &Path, error: Error) -> Error {
+    let name = path.to_string_lossy().to_ascii_lowercase();
+    let name = name.strip_suffix(".zst").unwrap_or(&name);
+    let extension = name.rsplit_once('.').map_or("", |(_, extension)| extension);
+    match error {
+        Error::Input { .. } if NOT_READ.contains(&extension) => {
+            let found = extension.to_ascii_uppercase();
+            Error::input(path, "format", found, "PLY: of meshes only PLY is read")
+        }
+        other => other,
+    }
+}
+
 impl PlyMesh {
     /// Opens a file and reads its header.
     ///
@@ -73,9 +90,10 @@ impl PlyMesh {
     /// See [`PlyMesh::open`] and [`Content::of`].
     pub fn open_any(path: &Path, workspace: &Workspace) -> Result<Self> {
         let Some(content) = Content::of(path, workspace)? else {
-            return Self::open(path);
+            return Self::open(path).map_err(|e| clearer(path, e));
         };
-        let stream = MeshStream::open_as(&content.path, path).map_err(converted)?;
+        let stream = MeshStream::open_as(&content.path, path);
+        let stream = stream.map_err(|e| clearer(path, converted(e)))?;
         let _content = Some(content);
         Ok(Self { stream, _content })
     }

@@ -5,6 +5,7 @@ use super::start::{Start, scratch_folder};
 use super::{Reconstruction, default_memory, default_threads};
 use crate::error::{Error, Result};
 use crate::params::Params;
+use crate::stages::export::check_name;
 use crate::stages::order::PAGE;
 use crate::workspace::memory::MemoryPool;
 use crate::workspace::progress::{Cancel, Observer, Silent};
@@ -41,7 +42,8 @@ impl Builder {
         self
     }
 
-    /// Path of the mesh (binary PLY; compressed if the name ends with `.zst`).
+    /// Path of the mesh. Its extension selects the format: `.ply`, `.obj`, `.stl` or `.glb`; with `.zst`
+    /// behind it the mesh is compressed.
     #[must_use]
     pub fn output(mut self, path: impl Into<PathBuf>) -> Self {
         self.output = path.into();
@@ -150,17 +152,7 @@ impl Builder {
         if self.output.as_os_str().is_empty() {
             return missing("--output", "the path of the mesh");
         }
-        if self
-            .output
-            .extension()
-            .is_some_and(|e| e.eq_ignore_ascii_case("gz"))
-        {
-            return Err(Error::Parameter {
-                name: "--output",
-                found: self.output.display().to_string(),
-                expected: "a name that ends with .ply or .ply.zst".into(),
-            });
-        }
+        check_name(&self.output)?;
         let budget = self.memory.unwrap_or_else(default_memory);
         let folder = || scratch_folder(&self.output, self.scratch.as_deref());
         Ok(Reconstruction {

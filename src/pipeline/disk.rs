@@ -9,11 +9,15 @@
 //! Unneeded files are not counted. They are deleted as soon as the deletion is synced
 //! (`workspace/keeper.rs`), within a moment.
 
+use crate::error::Result;
+use crate::geom::aabb::Aabb;
+use crate::geom::lattice::Lattice;
 use crate::params::{Method, Params};
 use crate::report::DiskEstimate;
-use crate::stages::export::{self, CoordinateType};
-use crate::stages::ingest::{self, Probe};
-use std::path::PathBuf;
+use crate::stages::export::{self, CoordinateType, Mesh};
+use crate::stages::ingest::{self, Probe, Spool};
+use crate::stages::order::StoredPoints;
+use std::path::{Path, PathBuf};
 
 /// Bytes of a position that is not packed: in sorted runs, and in the spool if its source has integers or
 /// `f32`.
@@ -48,7 +52,40 @@ pub(crate) struct Known {
     pub double: Option<bool>,
     /// True if points moved in relaxing; none if unknown.
     pub moved: Option<bool>,
+    /// The coordinates in a mesh that is text, once they are known.
+    pub text: Option<Text>,
 }
+
+/// Coordinates as text.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Text {
+    /// Number of decimals.
+    pub decimals: usize,
+    /// Lowest and highest coordinates.
+    pub bounds: [[f64; 3]; 2],
+}
+
+impl Text {
+    /// The coordinates of ordered points. Without smoothing the vertices are points of the cloud, and need no
+    /// finer lattice than they have.
+    pub fn of(
+        spool: &Spool,
+        lattice: &Lattice,
+        params: &Params,
+        points: &StoredPoints,
+    ) -> Result<Self> {
+        let own = spool.choose_lattice(0)?;
+        let finer = params.smooth > 0 || !own.exact;
+        let Aabb { min, max } = points.bounds();
+        Ok(Self {
+            decimals: export::decimals(if finer { lattice } else { &own }),
+            bounds: [min, max].map(|corner| lattice.position(corner)),
+        })
+    }
+}
+
+/// Decimals assumed as long as they are unknown.
+const DECIMALS: usize = 3;
 
 impl Known {
     /// The properties in the headers of the inputs. They may be wrong, but cannot exceed the sizes of the
@@ -61,6 +98,7 @@ impl Known {
             points: 0,
             double: None,
             moved: None,
+            text: None,
         };
         let mut probes = Vec::new();
         for path in ingest::expand(inputs).ok()? {
@@ -76,10 +114,50 @@ impl Known {
         Some(known)
     }
 
-    /// The estimated space of a run with these parameters.
-    pub fn estimate(&self, params: &Params) -> DiskEstimate {
+    /// Checks that the mesh of the points does not exceed a limit of the format of `output`.
+    ///
+    /// # Errors
+    /// [`crate::Error::TooLarge`].
+    pub fn fits(&self, params: &Params, output: &Path) -> Result<()> {
+        let coordinates = CoordinateType::Float;
+        export::check_size(output, &self.mesh(params, coordinates), true)
+    }
+
+    /// Warnings about what the format of `output` leaves out.
+    pub fn left_out(
+        &self,
+        params: &Params,
+        coordinates: CoordinateType,
+        output: &Path,
+    ) -> Result<Vec<String>> {
+        let bounds = self.text.map(|text| text.bounds).unwrap_or_default();
+        let largest = bounds
+            .as_flattened()
+            .iter()
+            .fold(0.0, |m: f64, x| m.max(x.abs()));
+        export::left_out(output, &self.mesh(params, coordinates), largest)
+    }
+
+    /// The mesh that is expected.
+    fn mesh(&self, params: &Params, coordinates: CoordinateType) -> Mesh {
+        let (_, _, triangles) = self.surface(params);
+        Mesh {
+            vertices: self.points,
+            triangles: (triangles * self.points as f64) as u64,
+            coordinates,
+            columns: export::normal_columns()
+                .filter(|_| params.normals)
+                .collect(),
+            bounds: self.text.map(|text| text.bounds),
+            decimals: self.text.map_or(DECIMALS, |text| text.decimals),
+            ..Mesh::default()
+        }
+    }
+
+    /// The estimated space of a run with these parameters, whose mesh is `output`.
+    pub fn estimate(&self, params: &Params, output: &Path) -> DiskEstimate {
         let points = self.points as f64;
-        let (moved, triples, triangles) = self.surface(params);
+        let (moved, triples, _) = self.surface(params);
         let stores = STORED * (1.0 + moved);
         // While points are read and sorted they are on disk twice.
         let early = self.spool as f64 + STORED * points;
@@ -95,10 +173,7 @@ impl Known {
         }
         let late = (stores + TRIPLE * triples) * points;
         let small = |bytes: f64| bytes + SMALL.0 * points + SMALL.1;
-        let mesh = |coordinates| {
-            let triangles = (triangles * points) as u64;
-            export::mesh_bytes(self.points, triangles, coordinates) as f64
-        };
+        let mesh = |coordinates| export::mesh_bytes(output, &self.mesh(params, coordinates)) as f64;
         let output = match self.double {
             Some(false) => mesh(CoordinateType::Float),
             Some(true) => mesh(CoordinateType::Double),
@@ -160,18 +235,20 @@ mod tests {
         points: 1_000_000,
         double: Some(false),
         moved: None,
+        text: None,
     };
 
     #[test]
     fn more_is_known_later() {
         let params = Params::default();
-        let first = MILLION.estimate(&params);
+        let output = Path::new("mesh.ply");
+        let first = MILLION.estimate(&params, output);
         let moved = |moved| {
             Known {
                 moved: Some(moved),
                 ..MILLION
             }
-            .estimate(&params)
+            .estimate(&params, output)
         };
         assert!(moved(false).scratch < first.scratch && first.scratch < moved(true).scratch);
         assert!(first.together >= first.scratch.max(first.output));
@@ -179,7 +256,7 @@ mod tests {
             double: Some(true),
             ..MILLION
         }
-        .estimate(&params);
+        .estimate(&params, output);
         // "double" is one letter longer than "float", three times.
         assert_eq!(double.output - first.output, 12_000_003);
     }

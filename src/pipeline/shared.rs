@@ -1,9 +1,9 @@
 //! A run that tasks share, perhaps on several machines: its plan, the work of a task, and the work between
 //! two generations of tasks. [`crate::workspace::generations`] has the files.
 
-use super::checks::{not_an_input, writable};
+use super::checks::{all_are_kept, not_an_input, writable};
 use super::manifest::Manifest;
-use super::{Builder, Reconstruction};
+use super::{Builder, Known, Reconstruction};
 use crate::error::{Error, Result};
 use crate::report::Report;
 use crate::stages::export;
@@ -86,7 +86,11 @@ impl Reconstruction {
             });
         }
         writable(&self.output)?;
-        not_an_input(&self.output, &self.inputs)?;
+        not_an_input(&self.output, self.params.split.is_some(), &self.inputs)?;
+        let headers = Known::from_headers(&self.inputs);
+        if let Some(known) = headers.filter(|_| all_are_kept(&self.params)) {
+            known.fits(&self.params, &self.output)?;
+        }
         let manifest = Manifest::of(self)?.to_bytes()?;
         let random = std::hash::RandomState::new().build_hasher().finish();
         let sharing = Sharing {
@@ -255,6 +259,9 @@ impl Reconstruction {
         let Some(name) = Path::new(&name).file_name().and_then(|name| name.to_str()) else {
             return;
         };
+        if self.params.split.is_some() {
+            export::remove_unfinished(&self.output);
+        }
         let beside = std::fs::read_dir(export::folder_of(&self.output)).into_iter();
         for entry in beside.flatten().flatten() {
             let number = entry

@@ -1,7 +1,8 @@
 //! The stages of a run: each with its parameters, its part of the report, and the check of disk space for the
 //! following stages.
 
-use super::checks::{disk_radius, enough, not_a_line, room};
+use super::checks::{all_are_kept, disk_radius, enough, not_a_line, room};
+use super::disk::Text;
 use super::{Clock, Known, Reconstruction};
 use crate::error::Result;
 use crate::geom::lattice::Lattice;
@@ -11,7 +12,9 @@ use crate::report::{LatticeReport, Report};
 use crate::stages::blocks::Blocks;
 use crate::stages::cells::{CellTriples, DiskRadius, TileRanges, Widen, cells};
 use crate::stages::cut::{CutOptions, StoredPieces, cut};
-use crate::stages::export::{CoordinateType, ExportOptions, export, export_cut};
+use crate::stages::export::{
+    CoordinateType, ExportOptions, SplitOptions, export, export_cut, export_split,
+};
 use crate::stages::ingest::{self, Spool, ingest_selected};
 use crate::stages::located::Places;
 use crate::stages::order::{Orderer, PointStore, StoredPoints, order, sample_sort};
@@ -51,7 +54,10 @@ impl<'a> Stages<'a> {
             true => None,
             false => Known::from_headers(&job.inputs),
         };
-        let first = headers.map(|known| known.estimate(&job.params));
+        let first = headers.map(|known| known.estimate(&job.params, &job.output));
+        if let Some(known) = headers.filter(|_| all_are_kept(&job.params)) {
+            known.fits(&job.params, &job.output)?;
+        }
         let stages = Self {
             job,
             workspace,
@@ -78,7 +84,11 @@ impl<'a> Stages<'a> {
         if self.workspace.is_task() {
             return Ok(());
         }
-        let estimate = self.known.estimate(&self.job.params);
+        let (params, output) = (&self.job.params, &self.job.output);
+        if params.drop_outliers.is_none() {
+            self.known.fits(params, output)?;
+        }
+        let estimate = self.known.estimate(params, output);
         self.report.estimated_scratch_bytes = estimate.scratch;
         self.report.estimated_output_bytes = estimate.output;
         room(&self.job.folder, &self.job.output, estimate, self.workspace)
@@ -112,6 +122,7 @@ impl<'a> Stages<'a> {
             points: if params.thin.is_some() { 0 } else { input.kept },
             double: Some(self.report.coordinates == CoordinateType::Double),
             moved: None,
+            text: None,
         };
         workspace.note_points(input.kept);
         self.report.input = input;
@@ -157,10 +168,16 @@ impl<'a> Stages<'a> {
             self.report.duplicates_folded = folded;
             store
         };
+        let text = Text::of(spool, lattice, &job.params, &store)?;
         spool.release(workspace)?;
         self.warn_of_input(lattice);
         enough(&store)?;
         self.known.points = store.len() as u64;
+        self.known.text = Some(text);
+        let coordinates = self.report.coordinates;
+        for warning in self.known.left_out(&job.params, coordinates, &job.output)? {
+            self.warn(warning);
+        }
         workspace.note_points(self.known.points);
         self.check_room()?;
         Ok(store)
@@ -385,7 +402,8 @@ impl<'a> Stages<'a> {
         let (params, workspace, blocks) = (&self.job.params, self.workspace, self.blocks());
         let options = CutOptions {
             region: params.crop.as_ref(),
-            side: None,
+            side: params.split,
+            normals: params.normals,
         };
         if options.region.is_none() && options.side.is_none() {
             return Ok(None);
@@ -414,13 +432,21 @@ impl<'a> Stages<'a> {
             coordinates: self.report.coordinates,
             comments: Vec::new(),
             origin: None,
+            normals: job.params.normals,
+            decimals: self.known.text.map_or(0, |text| text.decimals),
         };
         let items = match pieces {
             Some(pieces) => pieces.count() as u64,
             None => 2 * blocks.count() as u64,
         };
         let write = || match pieces {
-            Some(pieces) => export_cut(store, pieces, lattice, options, workspace),
+            Some(pieces) => match job.params.split {
+                Some(side) => {
+                    let split = SplitOptions { side };
+                    export_split(store, pieces, lattice, split, options, workspace)
+                }
+                None => export_cut(store, pieces, lattice, options, workspace),
+            },
             None => export(store, repaired, blocks, lattice, options, workspace),
         };
         self.report.mesh = self.clock.stage("export", "blocks", items, write)?;

@@ -8,6 +8,7 @@ mod filters;
 mod library;
 mod odd;
 mod outdoor;
+mod outputs;
 mod report;
 mod scans;
 mod stop;

@@ -17,6 +17,7 @@ const KEYS: &[&str] = &[
     "/parameters/max_hole_edges",
     "/parameters/min_component",
     "/parameters/repair",
+    "/parameters/normals",
     "/memory_budget",
     "/threads",
     "/input/read",

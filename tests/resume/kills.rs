@@ -72,6 +72,30 @@ fn killed_while_a_compressed_mesh_is_written() {
 }
 
 #[test]
+fn killed_while_a_mesh_in_another_format_is_written() {
+    for (name, options) in [
+        ("mesh.obj", &["--normals"][..]),
+        ("mesh.stl", ROBUST),
+        ("mesh.glb", &["--normals"]),
+    ] {
+        let case = Case::with_mesh(name, options);
+        let last = |kind: &str| case.events[kind];
+        let records = (last("recorded") - 9..=last("recorded")).map(|n| format!("recorded:{n}"));
+        let writes = (last("write") - 24..=last("write")).step_by(4);
+        let writes = writes.map(|n| format!("write:{n}"));
+        let mut kills = 0;
+        for fault in records.chain(writes).chain(["rename:1".to_owned()]) {
+            case.killed(&fault);
+            if case.scratch.exists() {
+                assert_eq!(case.go_on(&fault), "", "{name}, {fault}");
+                kills += 1;
+            }
+        }
+        assert!(kills > 10, "{name}: {kills}");
+    }
+}
+
+#[test]
 fn killed_while_scratch_is_removed() {
     let case = Case::new(ROBUST);
     let events = case.events["delete"];

@@ -69,6 +69,36 @@ fn a_compressed_mesh_is_the_same() {
 }
 
 #[test]
+fn meshes_in_other_formats_are_the_same() {
+    let case = Case::new(&[]);
+    let input = case.input.display().to_string();
+    let parts = ["--block-points", "4096", "--tile-points", "1500"];
+    for (name, options) in [
+        ("obj", &["--normals"][..]),
+        ("stl", &[]),
+        ("glb", &["--normals"]),
+    ] {
+        let one = case.bench.path(&format!("one.{name}"));
+        let many = case.bench.path(&format!("many.{name}"));
+        let (whole, mesh) = (one.display().to_string(), many.display().to_string());
+        let run = |first: &[&str]| {
+            let said = util::run(first.iter().chain(&parts).chain(options));
+            assert_eq!(said.code, Some(0), "{said:?}");
+        };
+        run(&["reconstruct", &input, "-o", &whole]);
+        run(&["plan", &input, "-o", &mesh, "--shards", "3"]);
+        let said = util::run([
+            "submit",
+            &format!("{mesh}.outcrop-scratch"),
+            "--workers",
+            "2",
+        ]);
+        assert_eq!(said.code, Some(0), "{said:?}");
+        assert!(util::hash(&one) == util::hash(&many), "{name}");
+    }
+}
+
+#[test]
 fn tasks_have_other_threads_and_memory_than_planned() {
     let case = Case::new(&[]);
     case.plan(&["--shards", "4", "--task-threads", "3"]);

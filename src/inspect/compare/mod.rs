@@ -34,7 +34,7 @@ pub use figures::{Comparison, Distances, Figures};
 pub use shape::{Kind, Side};
 
 use crate::error::{Error, Result};
-use crate::inspect::ply_mesh::{PlyMesh, holds_faces};
+use crate::inspect::ply_mesh::{PlyMesh, clearer, holds_faces};
 use crate::workspace::Workspace;
 use figures::Sums;
 use samples::Numbers;
@@ -75,7 +75,7 @@ fn read_side(
             workspace,
         )
     } else {
-        cloud::read(path, name, workspace)
+        cloud::read(path, name, workspace).map_err(|e| clearer(path, e))
     }
 }
 

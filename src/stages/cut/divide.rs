@@ -1,14 +1,15 @@
 //! The triangles of a block, divided into squares, with the numbers of the block's vertices in each.
 
 use super::grid::Square;
-use super::{FarCorner, Source};
+use super::{FarCorner, Normal, Source};
 use crate::error::Result;
 use crate::geom::Point;
+use crate::geom::triangle::{add, direction, normal};
 use crate::spill::row;
 use crate::stages::blocks::Blocks;
 use crate::stages::located::Located;
 use crate::stages::repair::OrientedTriangle;
-use crate::stages::surface::star::{Link, sorted};
+use crate::stages::surface::star::{Link, Star, sorted};
 use crate::workspace::Unit;
 use crate::workspace::memory::bytes_of;
 use std::ops::Range;
@@ -53,6 +54,8 @@ pub struct Divide {
     vertices: Vec<u32>,
     /// Ids of its copies.
     copies: Vec<u32>,
+    /// Normals of vertices and copies, if wanted.
+    normals: [Vec<Normal>; 2],
 }
 
 impl Divided {
@@ -67,6 +70,8 @@ impl Divided {
         let vertices = triangles.iter().flatten().copied();
         let points = Located::load(source.store, source.blocks, block, vertices)?;
         let _held = unit.hold(bytes_of(&triangles) + bytes_of(&filled) + points.bytes());
+        let whole = source.normals.then(|| Fans::of(ids.clone(), &triangles));
+        let _fans = unit.hold(whole.as_ref().map_or(0, Fans::bytes));
         let outside = source.leave_out(&mut triangles, &points, ids.clone());
         let mut squares: Vec<(Square, u32)> = Vec::new();
         if let Some(grid) = &source.grid {
@@ -91,13 +96,19 @@ impl Divided {
         for square in squares.chunk_by(|a, b| a.0 == b.0) {
             let triangles = start..start + square.len();
             start = triangles.end;
-            divided.number(square[0].0, triangles, &points);
+            divided.number(square[0].0, triangles, &points, whole.as_ref());
         }
         Ok(divided)
     }
 
     /// Numbers the vertices of a square.
-    fn number(&mut self, square: Square, range: Range<usize>, points: &Located) {
+    fn number(
+        &mut self,
+        square: Square,
+        range: Range<usize>,
+        points: &Located,
+        whole: Option<&Fans>,
+    ) {
         let own = |v: &u32| self.ids.contains(v);
         let triangles = &self.triangles[range.clone()];
         let mut corners: Vec<(u32, u32)> = Vec::with_capacity(3 * triangles.len());
@@ -109,6 +120,7 @@ impl Divided {
         let numbers = &mut self.numbers[range.clone()];
         let (mut link, mut higher) = (Link::default(), Vec::new());
         let (mut vertices, mut copies, mut boundary_edges) = (Vec::new(), Vec::new(), 0);
+        let mut normals = [Vec::new(), Vec::new()];
         let mut bounds = [[i32::MAX; 3], [i32::MIN; 3]];
         for star in corners.chunk_by(|a, b| a.0 == b.0) {
             let v = star[0].0;
@@ -127,6 +139,14 @@ impl Divided {
             let edges = higher.chunk_by(|a, b| a == b);
             boundary_edges += edges.filter(|edge| edge.len() == 1).count() as u32;
             higher.clear();
+            if let Some(whole) = whole {
+                let first = |group| (0..star.len()).find(|n| link.group(*n) == group);
+                let firsts = (0..link.groups()).filter_map(first);
+                for (group, n) in firsts.enumerate() {
+                    let t = triangles[star[n].1 as usize];
+                    normals[group.min(1)].push(whole.normal(v, t, points));
+                }
+            }
             copies.extend((1..link.groups()).map(|_| v));
             vertices.push(v);
             let p = points.at(v);
@@ -146,12 +166,16 @@ impl Divided {
             triangles: range,
             vertices,
             copies,
+            normals,
         });
     }
 
     /// Allocated bytes.
     pub fn bytes(&self) -> u64 {
-        let lists = |s: &Divide| bytes_of(&s.vertices) + bytes_of(&s.copies);
+        let lists = |s: &Divide| {
+            let normals: u64 = s.normals.iter().map(bytes_of).sum();
+            bytes_of(&s.vertices) + bytes_of(&s.copies) + normals
+        };
         let squares: u64 = self.squares.iter().map(lists).sum();
         squares + bytes_of(&self.squares) + bytes_of(&self.triangles) + bytes_of(&self.numbers)
     }
@@ -210,9 +234,53 @@ impl Divide {
         &self.vertices
     }
 
+    /// Normals of the vertices, then of the copies; none if they are not wanted.
+    pub fn normals(&self) -> Vec<Normal> {
+        self.normals.concat()
+    }
+
     /// Ids of its copies of pinched vertices in the block.
     pub fn copies(&self) -> &[u32] {
         &self.copies
+    }
+}
+
+/// The triangles around the vertices of a block, before any are left out.
+struct Fans {
+    triangles: Vec<OrientedTriangle>,
+    star: Star,
+}
+
+impl Fans {
+    fn of(ids: Range<u32>, triangles: &[OrientedTriangle]) -> Self {
+        Self {
+            star: Star::of(ids, triangles),
+            triangles: triangles.to_vec(),
+        }
+    }
+
+    fn bytes(&self) -> u64 {
+        bytes_of(&self.triangles) + self.star.bytes()
+    }
+
+    /// The normal of the fan around a vertex that has a triangle: the sum of those of its triangles, weighed by
+    /// their areas.
+    fn normal(&self, v: u32, triangle: OrientedTriangle, points: &Located) -> Normal {
+        let star = self.star.at(v).iter().map(|n| self.triangles[*n as usize]);
+        let mut link = Link::default();
+        link.set(v, star.clone());
+        let own = star.clone().position(|t| t == triangle);
+        let own = own.map(|own| link.group(own));
+        let mut sum = [0; 3];
+        for (n, t) in star.enumerate() {
+            if Some(link.group(n)) == own {
+                let [a, b, c] = points.corners(t);
+                add(&mut sum, normal(a, b, c));
+            }
+        }
+        Normal {
+            direction: direction(&sum),
+        }
     }
 }
 

@@ -47,8 +47,19 @@ row! {
     pub struct Face {
         /// Numbers in the triangle's orientation.
         corners: [u32; 3],
+        /// Ids of the same vertices.
+        ids: [u32; 3],
     }
-    packed Above Left Left
+    packed Above Left Left Above Left Left
+}
+
+row! {
+    /// The normal of a vertex of a piece.
+    pub struct Normal {
+        /// Its direction in the whole surface, so that there is no seam.
+        direction: [f32; 3],
+    }
+    unpacked
 }
 
 /// The part of the surface that is written, and its division.
@@ -58,6 +69,8 @@ pub struct CutOptions<'a> {
     pub region: Option<&'a Region>,
     /// Side of the squares, in the input's unit; `None` for one square with everything.
     pub side: Option<f64>,
+    /// Vertices have normals.
+    pub normals: bool,
 }
 
 /// Counts of this stage.
@@ -78,6 +91,7 @@ struct Source<'a> {
     lattice: &'a Lattice,
     area: Option<Area<'a>>,
     grid: Option<Grid>,
+    normals: bool,
     _held: Reservation,
 }
 
@@ -85,7 +99,8 @@ impl Source<'_> {
     /// Bytes of memory for a block.
     fn memory(&self, workspace: &Workspace, block: usize) -> u64 {
         let records = self.surface.records(workspace, block) + self.filled.rows(block);
-        260 * records as u64 + self.blocks.ids(block).len() as u64 * 60 + (1 << 20)
+        let each = if self.normals { 320 } else { 260 };
+        each * records as u64 + self.blocks.ids(block).len() as u64 * 60 + (1 << 20)
     }
 }
 
@@ -102,7 +117,11 @@ pub fn cut(
     options: CutOptions<'_>,
     workspace: &Workspace,
 ) -> Result<(StoredPieces, CutStats)> {
-    let CutOptions { region, side } = options;
+    let CutOptions {
+        region,
+        side,
+        normals,
+    } = options;
     let outline = region.map_or(0, Region::area_bytes);
     let source = Source {
         store,
@@ -113,6 +132,7 @@ pub fn cut(
         _held: workspace.reserve("crop: outline", outline)?,
         area: region.map(Region::area),
         grid: side.map(|side| Grid::new(lattice, side)),
+        normals,
     };
     let far = Shuffle::new("cut.far");
     let count = blocks.count();

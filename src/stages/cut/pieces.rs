@@ -2,7 +2,7 @@
 
 use super::divide::{Divided, Part};
 use super::grid::Square;
-use super::{Face, FarCorner};
+use super::{Face, FarCorner, Normal};
 use crate::error::{Error, Result};
 use crate::geom::Point;
 use crate::spill::{Id, Table, release};
@@ -61,9 +61,10 @@ pub struct StoredPieces {
     vertices: Table<Id>,
     copies: Table<Id>,
     faces: Table<Face>,
+    normals: Table<Normal>,
 }
 
-release!(StoredPieces: parts, vertices, copies, faces);
+release!(StoredPieces: parts, vertices, copies, faces, normals);
 
 /// Bytes of memory for a piece.
 const PIECE: u64 = (size_of::<Piece>() + size_of::<Tile>()) as u64;
@@ -76,6 +77,7 @@ impl StoredPieces {
             vertices: Table::new("cut.vertices", pieces),
             copies: Table::new("cut.copies", pieces),
             faces: Table::new("cut.faces", pieces),
+            normals: Table::new("cut.normals", pieces),
         }
     }
 
@@ -167,6 +169,12 @@ impl Pieces {
         &self.tiles
     }
 
+    /// Number of pieces.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.pieces.len()
+    }
+
     /// First numbers of a piece's vertices, copies and triangles in the file of its square.
     #[must_use]
     pub fn firsts(&self, piece: usize) -> [u64; 3] {
@@ -196,6 +204,14 @@ impl Pieces {
     /// [`Error::Io`], [`Error::Corrupt`].
     pub fn faces(&self, unit: &Unit<'_>, piece: usize) -> Result<Vec<Face>> {
         self.stored.faces.get(unit, piece)
+    }
+
+    /// The normals of a piece's vertices, then of its copies, if they are wanted.
+    ///
+    /// # Errors
+    /// [`Error::Io`], [`Error::Corrupt`].
+    pub fn normals(&self, unit: &Unit<'_>, piece: usize) -> Result<Vec<Normal>> {
+        self.stored.normals.get(unit, piece)
     }
 
     fn find(&self, square: Square, block: u32) -> Option<usize> {
@@ -229,7 +245,7 @@ impl Pieces {
                     let found = own.or_else(sent).and_then(|n| number(v, n));
                     *to = found.ok_or_else(|| missing(unit, t, v))?;
                 }
-                faces.push(Face { corners });
+                faces.push(Face { corners, ids: t });
             }
             let Some(piece) = self.find(square, block) else {
                 continue;
@@ -240,6 +256,10 @@ impl Pieces {
                 .put(unit, piece, &rows(part.vertices()))?;
             self.stored.copies.put(unit, piece, &rows(part.copies()))?;
             self.stored.faces.put(unit, piece, &faces)?;
+            let normals = part.normals();
+            if !normals.is_empty() {
+                self.stored.normals.put(unit, piece, &normals)?;
+            }
         }
         Ok(())
     }

@@ -1,9 +1,9 @@
 //! A compressed mesh: the bytes of the plain file in frames of the Zstandard seekable format. All threads
 //! compress parts, and the calling thread writes them in their order.
 
-use super::file::{HEADER, MeshFile, note};
+use super::file::{HEADER, MeshFile};
 use super::parts::Parts;
-use super::writer::{KINDS, Writer};
+use super::write::{KINDS, Writer};
 use crate::error::Result;
 use crate::workspace::place::Place;
 use crate::workspace::{Unit, Workspace};
@@ -34,13 +34,15 @@ struct Frame {
     bytes: Vec<u8>,
 }
 
-/// Writes the file.
-pub(super) fn write<P: Parts>(writer: &Writer<'_, P>, workspace: &Workspace) -> Result<()> {
-    workspace.once("compress", |unit| {
-        let whole = write_all(writer, workspace)?;
-        note(unit, HEADER, whole);
-        Ok(())
-    })
+/// Writes the file, as one unit.
+pub(super) fn write<P: Parts>(
+    writer: &Writer<'_, P>,
+    unit: &Unit<'_>,
+    workspace: &Workspace,
+) -> Result<()> {
+    let whole = write_all(writer, workspace)?;
+    writer.file.note(unit, HEADER, whole);
+    Ok(())
 }
 
 /// Writes the file; returns its place.

@@ -60,8 +60,13 @@ impl<'a> Faces<'a> {
         &self.triangles[first..]
     }
 
-    /// Passes all triangles to `put`, ascending by sorted ids.
-    pub fn for_each(&self, mut put: impl FnMut([u32; 3])) {
+    /// All triangles by their ids, those that fill holes last.
+    pub fn ids(&self) -> impl Iterator<Item = &[u32; 3]> + Clone {
+        self.own().iter().chain(&self.filled)
+    }
+
+    /// Passes all triangles to `put`, ascending by sorted ids: the numbers of their corners, and the ids.
+    pub fn for_each(&self, mut put: impl FnMut([u32; 3], [u32; 3])) {
         let mut filled = self.filled.iter().copied().peekable();
         let mut splits = &self.splits[..];
         // The smallest vertex of the next triangle that needs a lookup of copies or of another block.
@@ -69,16 +74,16 @@ impl<'a> Faces<'a> {
         for &t in self.own() {
             if t[0] >= special {
                 while let Some(f) = filled.next_if(|f| sorted(*f) < sorted(t)) {
-                    put(self.special(f, &mut splits));
+                    put(self.special(f, &mut splits), f);
                 }
-                put(self.special(t, &mut splits));
+                put(self.special(t, &mut splits), t);
                 let next_filled = filled.peek().map_or(u32::MAX, |f| f[0]);
                 special = next_filled.min(splits.first().map_or(u32::MAX, |s| s.triangle[0]));
             } else {
-                put(t.map(|v| self.number(v)));
+                put(t.map(|v| self.number(v)), t);
             }
         }
-        filled.for_each(|f| put(self.special(f, &mut splits)));
+        filled.for_each(|f| put(self.special(f, &mut splits), f));
     }
 
     #[inline]

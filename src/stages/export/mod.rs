@@ -4,17 +4,30 @@
 //!
 //! A format is a module that implements `MeshFormat`, and an entry of the list here.
 
+mod bounds;
 mod compressed;
+mod corners;
 mod faces;
 mod file;
 mod format;
+mod formats;
+mod glb;
+mod normals;
 mod number;
+mod obj;
 mod parts;
 mod ply;
-mod writer;
+mod split;
+mod stl;
+mod write;
 
-pub(crate) use file::{folder_of, is_compressed, temporary, temporary_of};
+pub(crate) use file::{folder_of, temporary, temporary_of};
 pub use format::CoordinateType;
+pub(crate) use format::{Mesh, normal_columns};
+pub(crate) use formats::{check_name, check_size, left_out, mesh_bytes};
+pub(crate) use obj::decimals;
+pub use split::{SplitOptions, export_split};
+pub(crate) use split::{is_square_of, remove_unfinished};
 
 use crate::error::{Error, Result};
 use crate::geom::lattice::Lattice;
@@ -23,41 +36,13 @@ use crate::stages::cut::StoredPieces;
 use crate::stages::order::PointStore;
 use crate::stages::repair::Repaired;
 use crate::workspace::Workspace;
-use file::MeshFile;
-use format::{Mesh, MeshFormat};
+use file::{MeshFile, is_compressed};
+use format::MeshFormat;
+use formats::format_of;
 use parts::{OfTile, Parts, Whole};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
-use writer::Writer;
-
-/// All formats. The first is used if the extension is not known.
-const FORMATS: [&dyn MeshFormat; 1] = [&ply::Ply];
-
-/// The format for the extension of `output`, or for that before the one of compression.
-fn format_of(output: &Path) -> &'static dyn MeshFormat {
-    let name = match is_compressed(output) {
-        true => Path::new(output.file_stem().unwrap_or_default()),
-        false => output,
-    };
-    let extension = name.extension().unwrap_or_default();
-    let is = |known: &&str| extension.eq_ignore_ascii_case(known);
-    let mut named = FORMATS.into_iter();
-    let named = named.find(|f| f.extensions().iter().any(is));
-    named.unwrap_or(FORMATS[0])
-}
-
-/// Bytes of a mesh file in the first format.
-pub(crate) fn mesh_bytes(vertices: u64, triangles: u64, coordinates: CoordinateType) -> u64 {
-    let mesh = Mesh {
-        vertices,
-        triangles,
-        coordinates,
-        columns: Vec::new(),
-        comments: Vec::new(),
-        origin: None,
-    };
-    FORMATS[0].layout(&mesh).bytes
-}
+use write::Writer;
 
 /// Counts of the finished mesh.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize, PartialEq, Eq)]
@@ -85,13 +70,32 @@ pub struct ExportOptions<'a> {
     pub comments: Vec<String>,
     /// The position of the cloud that is the origin of the mesh, if it is not that of the cloud.
     pub origin: Option<[f64; 3]>,
+    /// Vertices have normals, in formats that hold them.
+    pub normals: bool,
+    /// Decimals of coordinates as text, see [`decimals`].
+    pub decimals: usize,
+}
+
+impl<'a> ExportOptions<'a> {
+    /// A mesh without comments, origin and normals.
+    #[must_use]
+    pub fn new(output: &'a Path, coordinates: CoordinateType) -> Self {
+        Self {
+            output,
+            coordinates,
+            comments: Vec::new(),
+            origin: None,
+            normals: false,
+            decimals: 3,
+        }
+    }
 }
 
 /// Writes the mesh.
 ///
 /// # Errors
-/// [`Error::Io`], [`Error::Disk`], [`Error::NoTriangles`], [`Error::Corrupt`], [`Error::Memory`],
-/// [`Error::Cancelled`].
+/// [`Error::Io`], [`Error::Disk`], [`Error::NoTriangles`], [`Error::TooLarge`], [`Error::Corrupt`],
+/// [`Error::Memory`], [`Error::Cancelled`].
 pub fn export(
     store: &PointStore,
     repaired: &Repaired,
@@ -104,8 +108,10 @@ pub fn export(
     let filled = repaired.filled.open(workspace, blocks.count())?;
     let numbering = number::number(&repaired.numbering, &filled, blocks, workspace)?;
     let parts = Whole {
+        store,
         surface,
         filled,
+        pinches: &repaired.numbering.pinches,
         numbering,
         blocks,
     };
@@ -115,12 +121,17 @@ pub fn export(
             why: NO_TRIANGLES.into(),
         });
     }
-    let parts = write(store, parts, lattice, options, workspace)?;
+    let (format, mut mesh) = options.mesh(&stats)?;
+    if format.wants_bounds() {
+        let bounds = bounds::bounds(store, &parts.numbering, workspace)?;
+        mesh.bounds = Some(bounds.map(|corner| lattice.position(corner)));
+    }
+    let parts = write(store, parts, lattice, mesh, &options, workspace)?;
     parts.numbering.release(workspace)?;
     Ok(stats)
 }
 
-/// Writes a mesh that was cut: that of the only square.
+/// Writes a mesh that was cut, but not divided: that of the only square.
 ///
 /// # Errors
 /// See [`export`].
@@ -138,9 +149,36 @@ pub fn export_cut(
         });
     };
     let parts = OfTile { pieces, tile };
-    write(store, parts, lattice, options, workspace)?;
+    let (_, mut mesh) = options.mesh(&parts.stats())?;
+    mesh.bounds = Some(tile.bounds.map(|corner| lattice.position(corner)));
+    write(store, parts, lattice, mesh, &options, workspace)?;
     stored.release(workspace)?;
     Ok(parts.stats())
+}
+
+impl ExportOptions<'_> {
+    /// The format, and what is known of a mesh with these counts.
+    fn mesh(&self, stats: &MeshStats) -> Result<(&'static dyn MeshFormat, Mesh)> {
+        let format = format_of(self.output)?;
+        let mut mesh = Mesh {
+            vertices: stats.vertices,
+            triangles: stats.triangles,
+            coordinates: self.coordinates,
+            columns: normal_columns().filter(|_| self.normals).collect(),
+            comments: self.comments.clone(),
+            origin: self.origin,
+            bounds: None,
+            decimals: self.decimals,
+        };
+        // Columns that the format does not hold are not made.
+        mesh.columns = mesh
+            .columns
+            .iter()
+            .filter(|c| format.holds(&mesh, c))
+            .cloned()
+            .collect();
+        Ok((format, mesh))
+    }
 }
 
 /// Writes the file of a mesh; returns its parts.
@@ -148,32 +186,23 @@ fn write<P: Parts>(
     store: &PointStore,
     parts: P,
     lattice: &Lattice,
-    options: ExportOptions<'_>,
+    mesh: Mesh,
+    options: &ExportOptions<'_>,
     workspace: &Workspace,
 ) -> Result<P> {
-    let ExportOptions {
-        output,
-        coordinates,
-        comments,
-        origin,
-    } = options;
-    let stats = parts.stats();
-    let mesh = Mesh {
-        vertices: stats.vertices,
-        triangles: stats.triangles,
-        coordinates,
-        columns: Vec::new(),
-        comments,
-        origin,
-    };
+    let output = options.output;
+    check_size(output, &mesh, false)?;
     let writer = Writer {
         store,
-        lattice,
         parts,
-        file: MeshFile::open(output, format_of(output), mesh, workspace)?,
+        normals: mesh.normals().is_some(),
+        lattice,
+        file: MeshFile::open(output, format_of(output)?, mesh, workspace)?,
     };
     match is_compressed(output) {
-        true => compressed::write(&writer, workspace)?,
+        true => workspace.once("compress", |unit| {
+            compressed::write(&writer, unit, workspace)
+        })?,
         false => writer.write(workspace)?,
     }
     writer.file.finish()?;

@@ -176,7 +176,7 @@ fn split(
 }
 
 /// Copies the pinched vertices of a block; returns the copies, and the corners that use them.
-fn split_block(
+pub fn split_block(
     pinches: &[Id],
     triangles: &[[u32; 3]],
     blocks: Blocks,

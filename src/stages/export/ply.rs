@@ -1,14 +1,26 @@
 //! Binary little-endian PLY.
 
-use super::format::{CoordinateType, Layout, MADE_BY, Mesh, MeshFormat, Records};
+use super::format::{CoordinateType, Layout, MADE_BY, Mesh, MeshFormat, Positions, VertexColumn};
 use outcrop_ply::{Encoding, Scalar, TRIANGLE, put_triangle};
 
 /// Binary little-endian PLY.
 pub struct Ply;
 
 impl MeshFormat for Ply {
+    fn name(&self) -> &'static str {
+        "PLY"
+    }
+
     fn extensions(&self) -> &'static [&'static str] {
         &["ply"]
+    }
+
+    fn holds_doubles(&self) -> bool {
+        true
+    }
+
+    fn holds(&self, _: &Mesh, _: &VertexColumn) -> bool {
+        true
     }
 
     fn layout(&self, mesh: &Mesh) -> Layout {
@@ -33,21 +45,9 @@ impl MeshFormat for Ply {
             columns: &columns.map(|c| (&*c.name, c.scalar)).collect::<Vec<_>>(),
             triangles: Some((mesh.triangles, index)),
         };
+        let vertex = 3 * coordinates.bytes() + mesh.value_bytes();
         let header = layout.header().into_bytes();
-        let vertices = Records {
-            at: header.len() as u64,
-            bytes: (3 * coordinates.bytes() + mesh.value_bytes()) as u64,
-        };
-        let triangles = Records {
-            at: vertices.offset(mesh.vertices),
-            bytes: TRIANGLE as u64,
-        };
-        Layout {
-            header,
-            vertices,
-            triangles,
-            bytes: triangles.offset(mesh.triangles),
-        }
+        Layout::of(header, mesh, vertex as u64, TRIANGLE as u64)
     }
 
     fn put_vertices(
@@ -72,7 +72,13 @@ impl MeshFormat for Ply {
         }
     }
 
-    fn put_triangles(&self, _: &Mesh, triangles: &[[u32; 3]], bytes: &mut Vec<u8>) {
+    fn put_triangles(
+        &self,
+        _: &Mesh,
+        triangles: &[[u32; 3]],
+        _: &[Positions],
+        bytes: &mut Vec<u8>,
+    ) {
         triangles.iter().for_each(|t| put_triangle(*t, bytes));
     }
 }
@@ -95,7 +101,7 @@ mod tests {
             coordinates: CoordinateType::Double,
             columns: vec![column("red", Scalar::U8), column("height", Scalar::F32)],
             comments: vec!["crs\nend_header".into()],
-            origin: None,
+            ..Mesh::default()
         };
         let layout = Ply.layout(&mesh);
         let mut bytes = layout.header.clone();
@@ -107,7 +113,7 @@ mod tests {
         }
         Ply.put_vertices(&mesh, &positions, &values, &mut bytes);
         assert_eq!(bytes.len() as u64, layout.vertices.offset(3));
-        Ply.put_triangles(&mesh, &[[2, 0, 1]], &mut bytes);
+        Ply.put_triangles(&mesh, &[[2, 0, 1]], &[], &mut bytes);
         assert_eq!(bytes.len() as u64, layout.bytes);
 
         let read = outcrop_ply::Mesh::read(&bytes[..], layout.bytes).unwrap();

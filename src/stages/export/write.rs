@@ -1,0 +1,167 @@
+//! Encodes the parts of a mesh, and writes them at their offsets.
+
+use super::corners::Corners;
+use super::file::{Edge, HEADER, MeshFile};
+use super::parts::Parts;
+use crate::error::Result;
+use crate::geom::Point;
+use crate::geom::lattice::Lattice;
+use crate::stages::order::PointStore;
+use crate::workspace::memory::bytes_of;
+use crate::workspace::{Unit, Workspace};
+
+/// Writes the parts of a mesh: of each its vertices, its copies of vertices, and its triangles. In the file the
+/// slices of one kind follow each other.
+pub struct Writer<'a, P> {
+    /// Positions.
+    pub store: &'a PointStore,
+    /// The parts.
+    pub parts: P,
+    /// Normals are among the columns, as the first.
+    pub normals: bool,
+    /// Map from the store's positions to those of the mesh.
+    pub lattice: &'a Lattice,
+    /// The file.
+    pub file: MeshFile<'a>,
+}
+
+/// Number of slices of a part.
+pub const KINDS: usize = 3;
+
+impl<P: Parts> Writer<'_, P> {
+    /// Writes the file, every slice at its offset.
+    pub fn write(&self, workspace: &Workspace) -> Result<()> {
+        let file = &self.file;
+        workspace.once("header", |unit| self.write_header(unit).map(drop))?;
+        let memory = |part| self.memory(workspace, part);
+        let work = |unit: &Unit<'_>| {
+            let edges = self.write_part(unit, unit.number())?;
+            unit.advance(1);
+            Ok(edges)
+        };
+        let each = |_, edges: Vec<Edge>| file.write_edges(&edges);
+        workspace.units("export: block", self.parts.count(), memory, work, each)
+    }
+
+    /// Writes the header.
+    pub fn write_header(&self, unit: &Unit<'_>) -> Result<Vec<Edge>> {
+        self.file.write(unit, HEADER, &self.file.layout.header, 0)
+    }
+
+    /// Writes the slices of a part; returns the edges that a task leaves.
+    pub fn write_part(&self, unit: &Unit<'_>, part: usize) -> Result<Vec<Edge>> {
+        let (mut bytes, mut edges) = (Vec::new(), Vec::new());
+        for kind in 0..KINDS {
+            let slice = kind * self.parts.count() + part;
+            self.encode(unit, slice, &mut bytes)?;
+            let start = self.start(slice);
+            edges.extend(self.file.write(unit, slice as u32, &bytes, start)?);
+        }
+        Ok(edges)
+    }
+
+    /// Bytes of memory for a part.
+    pub fn memory(&self, workspace: &Workspace, part: usize) -> u64 {
+        let [points, records] = self.parts.sizes(workspace, part);
+        let layout = &self.file.layout;
+        let of_triangles = (47 + layout.triangles.bytes) * records;
+        let of_points = (36 + layout.vertices.bytes + self.file.value_bytes() as u64) * points;
+        let mut bytes = of_triangles + of_points + (1 << 20);
+        if self.file.wants_positions() {
+            bytes += Corners::estimate(points, records);
+        }
+        if self.normals {
+            bytes += P::normals_estimate(points, records);
+        }
+        bytes
+    }
+
+    /// Offset in the uncompressed file at which a slice begins: the end of the slice before it.
+    pub fn start(&self, slice: usize) -> u64 {
+        let (layout, count) = (&self.file.layout, self.parts.count());
+        let first = |kind: usize| self.parts.firsts(slice % count)[kind];
+        match slice / count {
+            0 => layout.vertices.offset(first(0)),
+            1 => layout.vertices.offset(first(1)),
+            2 => layout.triangles.offset(first(2)),
+            _ => layout.bytes,
+        }
+    }
+
+    /// Encodes a slice.
+    pub fn encode(&self, unit: &Unit<'_>, slice: usize, bytes: &mut Vec<u8>) -> Result<()> {
+        let (kind, part) = (slice / self.parts.count(), slice % self.parts.count());
+        bytes.clear();
+        let size = (self.start(slice + 1) - self.start(slice)) as usize;
+        if size == 0 {
+            return Ok(());
+        }
+        bytes.reserve_exact(size);
+        if kind == 2 {
+            return self.triangles(unit, part, bytes);
+        }
+        let ids = self.parts.vertices(unit, part, kind == 1)?;
+        let normals = self
+            .normals
+            .then(|| self.parts.normals(unit, part, kind == 1, &ids));
+        self.vertices(unit, &ids, normals.transpose()?, bytes)
+    }
+
+    /// Encodes the points with ascending `ids`, with the normals of each, if any.
+    fn vertices(
+        &self,
+        unit: &Unit<'_>,
+        ids: &[u32],
+        normals: Option<Vec<[f32; 3]>>,
+        bytes: &mut Vec<u8>,
+    ) -> Result<()> {
+        let [Some(first), Some(last)] = [ids.first(), ids.last()] else {
+            return Ok(());
+        };
+        let range = *first as usize..*last as usize + 1;
+        let mut points: Vec<Point> = Vec::with_capacity(ids.len());
+        // Where many points of a range are wanted, it is read at once.
+        if range.len() / 4 <= ids.len() {
+            let all = self.store.slice(range)?;
+            points.extend(ids.iter().map(|id| all[(id - first) as usize]));
+        } else {
+            self.store.fetch(ids, &mut points)?;
+        }
+        let values = normals.as_deref().map_or_else(Vec::new, values);
+        let lists = bytes_of(&points) + bytes_of(&values) + 4 * ids.len() as u64;
+        let _held = unit.hold(lists + bytes_of(bytes));
+        let at = |p: &Point| self.position(*p);
+        self.file
+            .encode_vertices(points.iter().map(at), &values, bytes);
+        Ok(())
+    }
+
+    /// Encodes the triangles of a part.
+    fn triangles(&self, unit: &Unit<'_>, part: usize, bytes: &mut Vec<u8>) -> Result<()> {
+        let faces = self.parts.faces(unit, part)?;
+        let _held = unit.hold(faces.bytes() + bytes_of(bytes));
+        if !self.file.wants_positions() {
+            let mut batch = self.file.triangles(bytes);
+            faces.for_each(|t, _| batch.push(t));
+            batch.finish();
+            return Ok(());
+        }
+        let corners = faces.corners(self.store)?;
+        let _corners = unit.hold(corners.bytes());
+        let mut batch = self.file.placed_triangles(bytes);
+        faces.for_each(|t, ids| batch.push((t, ids.map(|v| self.position(corners.at(v))))));
+        batch.finish();
+        Ok(())
+    }
+
+    /// The position of a point in the mesh.
+    fn position(&self, point: Point) -> [f64; 3] {
+        self.lattice.position(point)
+    }
+}
+
+/// The bytes of normals.
+fn values(normals: &[[f32; 3]]) -> Vec<u8> {
+    let words = normals.as_flattened().iter();
+    words.flat_map(|x| x.to_le_bytes()).collect()
+}
