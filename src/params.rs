@@ -3,7 +3,7 @@
 use crate::error::{Error, Result};
 pub use crate::geom::region::{NoRegion, Region};
 use crate::method::METHOD;
-use crate::stages::ingest::{Classes, Crop, Selection};
+use crate::stages::ingest::{Classes, Crop, IngestStats, Selection};
 pub use crate::stages::smooth::Smoothing;
 use crate::stages::spacing::{Limits, Width};
 pub use crate::stages::surface::evidence::Division;
@@ -166,6 +166,9 @@ pub const OUTLIER_FACTOR: f64 = 5.0;
 /// points, which decides how wide it must be, is not known before they are read (docs/decisions.md).
 const MARGIN: f64 = 0.05;
 
+/// A margin of so many spacings is wide enough: at the cut no more triangles differ than elsewhere.
+const SPACINGS: f64 = 16.0;
+
 /// Largest number of neighbours.
 pub const MAX_NEIGHBORS: usize = 255;
 
@@ -230,6 +233,32 @@ impl Params {
             classes: self.classes.clone(),
             crop: self.crop.as_ref().map(crop),
         }
+    }
+
+    /// A warning if the default margin around the region is narrow for the density of the points read.
+    pub(crate) fn narrow_margin(&self, input: &IngestStats) -> Option<String> {
+        let margin = self.selection().crop?.margin;
+        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        for file in &input.files {
+            let (Some(min), Some(max)) = (file.min, file.max) else {
+                continue;
+            };
+            for axis in 0..2 {
+                low[axis] = low[axis].min(min[axis]);
+                high[axis] = high[axis].max(max[axis]);
+            }
+        }
+        let area = (high[0] - low[0]) * (high[1] - low[1]);
+        let spacing = (area / input.kept.max(1) as f64).sqrt();
+        let narrow = self.crop_margin.is_none() && margin < SPACINGS * spacing;
+        narrow.then(|| {
+            format!(
+                "the margin around the region is {margin}, {:.0} times the mean spacing of the points: at the cut \
+                 the mesh may differ from that of the whole cloud; --crop-margin {:.3} is wide enough",
+                margin / spacing,
+                SPACINGS * spacing
+            )
+        })
     }
 
     /// True if points off the surface are dropped.

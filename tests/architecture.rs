@@ -23,7 +23,7 @@ const MAY_USE: &[(&str, &str)] = &[
     ("method", ""),
     (
         "params",
-        "method stages/ingest stages/smooth stages/spacing stages/surface",
+        "geom method stages/ingest stages/smooth stages/spacing stages/surface",
     ),
     ("pipeline", "geom method params report stages/* workspace"),
     ("report", "params stages/*"),
@@ -34,8 +34,12 @@ const MAY_USE: &[(&str, &str)] = &[
         "kernels stages/blocks stages/order stages/spacing stages/tiles",
     ),
     (
+        "stages/cut",
+        "stages/blocks stages/located stages/order stages/repair stages/surface",
+    ),
+    (
         "stages/export",
-        "stages/blocks stages/order stages/repair stages/surface",
+        "stages/blocks stages/cut stages/order stages/repair stages/surface",
     ),
     ("stages/ingest", ""),
     (

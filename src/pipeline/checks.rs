@@ -31,7 +31,8 @@ pub(super) fn disk_radius(radius: Radius, store: &StoredPoints, lattice: &Lattic
 /// True if no option leaves out points.
 pub(super) fn all_are_kept(params: &Params) -> bool {
     let filters = [params.thin, params.drop_outliers];
-    params.classes == Classes::All && filters.iter().all(Option::is_none)
+    let whole = params.crop.is_none() && params.split.is_none();
+    whole && params.classes == Classes::All && filters.iter().all(Option::is_none)
 }
 
 /// Checks that a file can be created in the output's folder.

@@ -50,7 +50,8 @@ impl<'a> Stages<'a> {
     /// Begins with the estimate of disk space from the headers of the inputs.
     pub fn begin(job: &'a Reconstruction, workspace: &'a Workspace) -> Result<Self> {
         // A task leaves the check of disk space to the process that began its generation.
-        let headers = match workspace.is_task() {
+        // With a region, headers do not tell how many points there will be.
+        let headers = match workspace.is_task() || job.params.crop.is_some() {
             true => None,
             false => Known::from_headers(&job.inputs),
         };
@@ -125,7 +126,9 @@ impl<'a> Stages<'a> {
             text: None,
         };
         workspace.note_points(input.kept);
+        let narrow = params.narrow_margin(&input);
         self.report.input = input;
+        narrow.into_iter().for_each(|warning| self.warn(warning));
         self.check_room()?;
         let moves = params.smooth + params.relax > 0;
         let lattice = spool.choose_lattice(if moves { METHOD.smoothing.halvings } else { 0 })?;
