@@ -42,7 +42,7 @@ use formats::format_of;
 use parts::{OfTile, Parts, Whole};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
-use write::Writer;
+use write::{Frame, Writer};
 
 /// Counts of the finished mesh.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize, PartialEq, Eq)]
@@ -124,7 +124,8 @@ pub fn export(
     let (format, mut mesh) = options.mesh(&stats)?;
     if format.wants_bounds() {
         let bounds = bounds::bounds(store, &parts.numbering, workspace)?;
-        mesh.bounds = Some(bounds.map(|corner| lattice.position(corner)));
+        let frame = Frame { lattice };
+        mesh.bounds = Some(bounds.map(|corner| frame.position(corner)));
     }
     let parts = write(store, parts, lattice, mesh, &options, workspace)?;
     parts.numbering.release(workspace)?;
@@ -150,7 +151,8 @@ pub fn export_cut(
     };
     let parts = OfTile { pieces, tile };
     let (_, mut mesh) = options.mesh(&parts.stats())?;
-    mesh.bounds = Some(tile.bounds.map(|corner| lattice.position(corner)));
+    let frame = Frame { lattice };
+    mesh.bounds = Some(tile.bounds.map(|corner| frame.position(corner)));
     write(store, parts, lattice, mesh, &options, workspace)?;
     stored.release(workspace)?;
     Ok(parts.stats())
@@ -196,7 +198,7 @@ fn write<P: Parts>(
         store,
         parts,
         normals: mesh.normals().is_some(),
-        lattice,
+        frame: Frame { lattice },
         file: MeshFile::open(output, format_of(output)?, mesh, workspace)?,
     };
     match is_compressed(output) {

@@ -6,7 +6,7 @@
 use super::file::{MeshFile, folder_of, is_compressed, temporary, temporary_of};
 use super::formats::{check_size, format_of};
 use super::parts::{OfTile, Parts};
-use super::write::Writer;
+use super::write::{Frame, Writer};
 use super::{ExportOptions, MeshStats, NO_TRIANGLES, compressed};
 use crate::error::{Error, Result};
 use crate::geom::lattice::Lattice;
@@ -150,6 +150,12 @@ pub fn export_split(
 }
 
 impl Split<'_> {
+    fn frame(&self) -> Frame<'_> {
+        Frame {
+            lattice: self.lattice,
+        }
+    }
+
     fn path(&self, tile: &Tile) -> PathBuf {
         square_path(self.options.output, &name_of(tile.square))
     }
@@ -201,7 +207,7 @@ impl Split<'_> {
 
     fn mesh(&self, tile: &Tile) -> Result<(&'static dyn super::MeshFormat, super::Mesh)> {
         let (format, mut mesh) = self.options.mesh(&self.parts(tile))?;
-        mesh.bounds = Some(tile.bounds.map(|corner| self.lattice.position(corner)));
+        mesh.bounds = Some(tile.bounds.map(|corner| self.frame().position(corner)));
         Ok((format, mesh))
     }
 
@@ -218,7 +224,7 @@ impl Split<'_> {
                 tile,
             },
             normals: mesh.normals().is_some(),
-            lattice: self.lattice,
+            frame: self.frame(),
             file: MeshFile::one_of_several(&path, temporary, name, format, mesh, self.workspace)?,
         })
     }

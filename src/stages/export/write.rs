@@ -19,8 +19,8 @@ pub struct Writer<'a, P> {
     pub parts: P,
     /// Normals are among the columns, as the first.
     pub normals: bool,
-    /// Map from the store's positions to those of the mesh.
-    pub lattice: &'a Lattice,
+    /// The map from the store's positions to those of the mesh.
+    pub frame: Frame<'a>,
     /// The file.
     pub file: MeshFile<'a>,
 }
@@ -130,7 +130,7 @@ impl<P: Parts> Writer<'_, P> {
         let values = normals.as_deref().map_or_else(Vec::new, values);
         let lists = bytes_of(&points) + bytes_of(&values) + 4 * ids.len() as u64;
         let _held = unit.hold(lists + bytes_of(bytes));
-        let at = |p: &Point| self.position(*p);
+        let at = |p: &Point| self.frame.position(*p);
         self.file
             .encode_vertices(points.iter().map(at), &values, bytes);
         Ok(())
@@ -149,13 +149,22 @@ impl<P: Parts> Writer<'_, P> {
         let corners = faces.corners(self.store)?;
         let _corners = unit.hold(corners.bytes());
         let mut batch = self.file.placed_triangles(bytes);
-        faces.for_each(|t, ids| batch.push((t, ids.map(|v| self.position(corners.at(v))))));
+        faces.for_each(|t, ids| batch.push((t, ids.map(|v| self.frame.position(corners.at(v))))));
         batch.finish();
         Ok(())
     }
+}
 
-    /// The position of a point in the mesh.
-    fn position(&self, point: Point) -> [f64; 3] {
+/// The map from positions on the lattice to those in the mesh.
+#[derive(Debug, Clone, Copy)]
+pub struct Frame<'a> {
+    /// The lattice.
+    pub lattice: &'a Lattice,
+}
+
+impl Frame<'_> {
+    /// The position of a point in the mesh; it ascends with the point.
+    pub fn position(&self, point: Point) -> [f64; 3] {
         self.lattice.position(point)
     }
 }
