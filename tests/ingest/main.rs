@@ -9,6 +9,7 @@ mod formats;
 mod lattices;
 mod numbers;
 mod ply_headers;
+mod regions;
 
 use bench::{Bench, based, cloud, ply, positions, write_las};
 use outcrop::Error;

@@ -26,7 +26,8 @@ pub fn read(extension: &str, bytes: &[u8]) {
 pub fn check(spool: &Spool) {
     let workspace = &Bench::get().workspace;
     let stats = spool.stats();
-    let left_out = stats.dropped_non_finite + stats.withheld + stats.dropped_by_class + stats.dropped_by_crop;
+    let left_out =
+        stats.dropped_non_finite + stats.withheld + stats.dropped_by_class + stats.dropped_by_crop;
     assert_eq!(stats.read, stats.kept + left_out);
     for warning in &stats.warnings {
         assert!(!warning.contains('\n'), "{warning:?} is more than one line");

@@ -1,9 +1,9 @@
 //! Several files as one cloud.
 
 use crate::{Bench, check_error, cloud};
-use outcrop::{Classes, Error, Params, Region};
 use outcrop::inspect::info::info;
 use outcrop::stages::ingest::{expand, ingest_selected, probe};
+use outcrop::{Classes, Error, Params, Region};
 
 /// Separator between two files.
 pub const BETWEEN: &[u8] = b"\n=====\n";
