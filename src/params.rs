@@ -3,7 +3,7 @@
 use crate::error::{Error, Result};
 pub use crate::geom::region::{NoRegion, Region};
 use crate::method::METHOD;
-use crate::stages::ingest::{Classes, Crop, IngestStats, Selection};
+use crate::stages::ingest::{Attributes, Classes, Crop, IngestStats, Selection};
 pub use crate::stages::smooth::Smoothing;
 use crate::stages::spacing::{Limits, Width};
 pub use crate::stages::surface::evidence::Division;
@@ -103,6 +103,41 @@ impl std::fmt::Display for MaxWidth {
     }
 }
 
+/// The origin of the coordinates in the mesh file.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Origin {
+    /// That of the input's coordinates.
+    None,
+    /// A round position below the cloud, where single precision does not suffice without it.
+    Auto,
+    /// The lattice position nearest to this one, in the input's coordinates.
+    At([f64; 3]),
+}
+
+impl std::str::FromStr for Origin {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = || format!("{text:?} is not auto, none, or three numbers like 635000,848000,0");
+        match text.trim() {
+            "auto" => Ok(Self::Auto),
+            "none" => Ok(Self::None),
+            numbers => {
+                let parsed = numbers
+                    .split(',')
+                    .map(|number| number.trim().parse::<f64>());
+                let parsed: Vec<f64> = parsed.collect::<Result<_, _>>().map_err(|_| wrong())?;
+                let at: [f64; 3] = parsed.try_into().map_err(|_| wrong())?;
+                match at.iter().all(|c| c.is_finite()) {
+                    true => Ok(Self::At(at)),
+                    false => Err(wrong()),
+                }
+            }
+        }
+    }
+}
+
 /// All parameters that decide the mesh. Equal parameters and equal points give the same bytes.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Params {
@@ -115,6 +150,10 @@ pub struct Params {
     pub crop_margin: Option<f64>,
     /// One mesh for each square of this side in x and y, in the input's unit, instead of one for all.
     pub split: Option<f64>,
+    /// Columns of the points that the mesh keeps, such as colours.
+    pub attributes: Attributes,
+    /// Colours with 16 bits instead of 8.
+    pub wide_colors: bool,
     /// Keep at most one point in each cube of this side, in the input's unit.
     pub thin: Option<f64>,
     /// Drop points whose spacing is more than this factor times that of the points around them.
@@ -149,8 +188,14 @@ pub struct Params {
     pub max_fill: MaxWidth,
     /// Remove bridges and small components, fill holes (paper, section 3.6).
     pub repair: bool,
+    /// Keep points far from all others, even if the lattice of the positions is coarser for them.
+    pub keep_far: bool,
     /// Vertices have normals, in formats that hold them.
     pub normals: bool,
+    /// Take coordinates as they are if files give different reference systems, which is an error otherwise.
+    pub ignore_crs: bool,
+    /// Origin of the coordinates in the mesh file.
+    pub origin: Origin,
     /// Points per block, the unit of insertion; changes the result.
     #[serde(skip)]
     pub block: u32,
@@ -179,6 +224,8 @@ impl Default for Params {
             crop: None,
             crop_margin: None,
             split: None,
+            attributes: Attributes::None,
+            wide_colors: false,
             thin: None,
             drop_outliers: None,
             method: Method::Robust,
@@ -194,7 +241,10 @@ impl Default for Params {
             max_edge: MaxWidth::Spacings(METHOD.admissibility.edge),
             max_fill: MaxWidth::Spacings(METHOD.filling.width),
             repair: true,
+            keep_far: false,
             normals: false,
+            ignore_crs: false,
+            origin: Origin::None,
             block: METHOD.curve.block,
             division: Division::default(),
         }
@@ -232,6 +282,7 @@ impl Params {
         Selection {
             classes: self.classes.clone(),
             crop: self.crop.as_ref().map(crop),
+            attributes: self.attributes.clone(),
         }
     }
 
@@ -346,6 +397,11 @@ impl Params {
             {
                 return error(name, x.to_string(), "a positive number");
             }
+        }
+        if let Origin::At(at) = self.origin
+            && !at.iter().all(|c| c.is_finite())
+        {
+            return error("--origin", format!("{at:?}"), "finite coordinates");
         }
         if self.smooth > 100 {
             return error("--smooth", self.smooth.to_string(), "0 to 100");

@@ -28,6 +28,10 @@ const MAY_USE: &[(&str, &str)] = &[
     ("pipeline", "geom method params report stages/* workspace"),
     ("report", "params stages/*"),
     ("spill", "workspace"),
+    (
+        "stages/attributes",
+        "stages/blocks stages/ingest stages/order",
+    ),
     ("stages/blocks", ""),
     (
         "stages/cells",
@@ -39,7 +43,7 @@ const MAY_USE: &[(&str, &str)] = &[
     ),
     (
         "stages/export",
-        "stages/blocks stages/cut stages/order stages/repair stages/surface",
+        "stages/attributes stages/blocks stages/cut stages/ingest stages/order stages/repair stages/surface",
     ),
     ("stages/ingest", ""),
     (

@@ -1,9 +1,9 @@
 //! Command-line arguments.
 
 use crate::method::METHOD;
-use crate::params::{MaxWidth, Method, NoRegion, Params, Radius, Region, Smoothing};
+use crate::params::{MaxWidth, Method, NoRegion, Origin, Params, Radius, Region, Smoothing};
 use crate::pipeline::{Builder, Reconstruction, Start};
-use crate::stages::ingest::Classes;
+use crate::stages::ingest::{Attributes, Classes};
 use crate::workspace::mapped::Io;
 use crate::workspace::{Compression, Storage};
 use clap::Args as ClapArgs;
@@ -80,6 +80,19 @@ pub struct Points {
     /// [default: a twentieth of the region's shorter side]
     #[arg(long, value_name = "LENGTH", requires = "crop")]
     pub crop_margin: Option<f64>,
+}
+
+/// Columns that the mesh keeps.
+#[derive(Debug, ClapArgs)]
+#[command(next_help_heading = "Attributes")]
+pub struct Columns {
+    /// Keep the points' own values at the vertices: auto (colours, intensity and classification, unless they are
+    /// the same everywhere), none, or a list of columns by name like color,intensity,gps_time
+    #[arg(long, value_name = "auto|none|LIST", default_value = "none")]
+    pub attributes: Attributes,
+    /// Write colours with 16 bits instead of 8
+    #[arg(long)]
+    pub wide_colors: bool,
 }
 
 /// Selection of points by position.
@@ -190,10 +203,32 @@ pub struct Repair {
     pub no_repair: bool,
 }
 
+/// Coordinates of the mesh.
+#[derive(Debug, ClapArgs)]
+#[command(next_help_heading = "Coordinates")]
+pub struct Coordinates {
+    /// Origin of the mesh's coordinates, for programs that round them to single precision: auto (a round
+    /// position below the cloud, if single precision does not suffice), none (that of the cloud), or a position
+    /// like 635000,848000,0; it is written into the mesh and MESH.origin.json
+    #[arg(
+        long,
+        value_name = "auto|none|X,Y,Z",
+        default_value = "none",
+        allow_hyphen_values = true
+    )]
+    pub origin: Origin,
+    /// Keep points so far from all others that coordinates have to be rounded for them; else they are left out
+    #[arg(long)]
+    pub keep_far: bool,
+    /// Take coordinates as they are if files give different reference systems; the mesh then names none
+    #[arg(long)]
+    pub ignore_crs: bool,
+}
+
 /// The points, the mesh, and what decides it.
 #[derive(Debug, ClapArgs)]
 pub struct Job {
-    /// Files (LAS, LAZ, PLY, XYZ text; also as .gz and .zst) or folders of files; together they are one cloud
+    /// Files (LAS, LAZ, E57, PLY, PCD, PTX, XYZ text; also as .gz and .zst) or folders of files; together they are one cloud
     #[arg(value_name = "INPUT", required = true)]
     pub inputs: Vec<PathBuf>,
     /// The mesh to write: .ply, .obj, .stl or .glb (all but OBJ binary), compressed with .zst behind it
@@ -211,9 +246,13 @@ pub struct Job {
     #[command(flatten)]
     pub filters: Filters,
     #[command(flatten)]
+    pub columns: Columns,
+    #[command(flatten)]
     pub surface: Surface,
     #[command(flatten)]
     pub repair: Repair,
+    #[command(flatten)]
+    pub coordinates: Coordinates,
     /// Points per tile; does not change the result
     #[arg(long, value_name = "N", hide = true)]
     pub tile_points: Option<u32>,
@@ -325,7 +364,7 @@ pub struct Verify {
 /// `outcrop compare`
 #[derive(Debug, ClapArgs)]
 pub struct Compare {
-    /// A mesh (PLY with faces) or a cloud (LAS, LAZ, PLY, XYZ text, or a folder of them)
+    /// A mesh (PLY with faces) or a cloud (LAS, LAZ, E57, PLY, PCD, PTX, XYZ text, or a folder of them)
     #[arg(value_name = "A")]
     pub a: PathBuf,
     /// The mesh or cloud to compare it with
@@ -379,6 +418,8 @@ impl Job {
             crop: selected.crop,
             crop_margin: selected.crop_margin,
             split: self.split,
+            attributes: self.columns.attributes.clone(),
+            wide_colors: self.columns.wide_colors,
             thin: self.filters.thin,
             drop_outliers: self.filters.drop_outliers,
             neighbors: self.surface.neighbors,
@@ -394,6 +435,9 @@ impl Job {
             min_component: self.repair.min_component.or(usual.min_component),
             repair: !self.repair.no_repair,
             normals: self.normals,
+            origin: self.coordinates.origin,
+            keep_far: self.coordinates.keep_far,
+            ignore_crs: self.coordinates.ignore_crs,
             block: self.block_points,
             ..usual
         }

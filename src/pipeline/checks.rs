@@ -108,6 +108,14 @@ pub(super) fn not_an_input(output: &Path, split: bool, inputs: &[PathBuf]) -> Re
     Ok(())
 }
 
+/// Checks that the inputs do not have different reference systems, as far as their headers tell.
+pub(super) fn one_system(params: &Params, inputs: &[PathBuf]) -> Result<()> {
+    match params.ignore_crs {
+        true => Ok(()),
+        false => ingest::check_systems(inputs),
+    }
+}
+
 pub(super) fn enough(store: &StoredPoints) -> Result<()> {
     if store.len() >= 3 {
         return Ok(());

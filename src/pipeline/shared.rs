@@ -1,7 +1,7 @@
 //! A run that tasks share, perhaps on several machines: its plan, the work of a task, and the work between
 //! two generations of tasks. [`crate::workspace::generations`] has the files.
 
-use super::checks::{all_are_kept, not_an_input, writable};
+use super::checks::{all_are_kept, not_an_input, one_system, writable};
 use super::manifest::Manifest;
 use super::{Builder, Known, Reconstruction};
 use crate::error::{Error, Result};
@@ -87,7 +87,8 @@ impl Reconstruction {
         }
         writable(&self.output)?;
         not_an_input(&self.output, self.params.split.is_some(), &self.inputs)?;
-        let headers = Known::from_headers(&self.inputs);
+        one_system(&self.params, &self.inputs)?;
+        let headers = Known::from_headers(&self.inputs, &self.params.attributes);
         if let Some(known) = headers.filter(|_| all_are_kept(&self.params)) {
             known.fits(&self.params, &self.output)?;
         }

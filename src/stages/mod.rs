@@ -21,6 +21,8 @@ pub mod thin;
 
 pub mod outliers;
 
+pub mod attributes;
+
 pub mod smooth;
 pub mod spacing;
 

@@ -1,8 +1,10 @@
 //! Whole runs, through the library and through the program. One test binary, to link only once.
 
+mod attributes;
 mod bad_input;
 mod cli;
 mod compressed;
+mod coordinates;
 mod determinism;
 mod filters;
 mod library;

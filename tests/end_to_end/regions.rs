@@ -30,12 +30,9 @@ fn read(path: &Path) -> Mesh {
     Mesh::read(&bytes[..], bytes.len() as u64).unwrap()
 }
 
-/// A wavy terrain with noise: open boundaries, pinched vertices, many blocks.
-fn terrain(bench: &Bench) -> PathBuf {
-    bench.cloud(
-        "cloud.laz",
-        &Cloud::new(Kind::Terrain).points(20_000).noise(0.6),
-    )
+/// Points all through a box: open boundaries, pinched vertices, many blocks.
+fn volume(bench: &Bench) -> PathBuf {
+    bench.cloud("cloud.laz", &Cloud::new(Kind::Volume).points(12_000))
 }
 
 fn params() -> Params {
@@ -84,7 +81,7 @@ fn check(path: &Path, report: &Report) {
 #[test]
 fn with_a_margin_around_everything_a_crop_is_what_is_inside_of_the_whole_mesh() {
     let bench = Bench::new();
-    let (input, whole) = (terrain(&bench), bench.path("whole.ply"));
+    let (input, whole) = (volume(&bench), bench.path("whole.ply"));
     util::reconstruct(&input, &whole, &params());
     let whole = read(&whole);
     let around = bounds(&whole);
@@ -137,7 +134,7 @@ fn with_a_margin_around_everything_a_crop_is_what_is_inside_of_the_whole_mesh() 
         let report = util::reconstruct(&input, &output, &cropped);
         let mesh = read(&output);
         assert!(
-            mesh.triangles.len() > 1000 && report.mesh.pinched_copies > 0,
+            mesh.triangles.len() > 300 && report.mesh.pinched_copies > 0,
             "{text}"
         );
         assert!(triangles(&mesh) == triangles(&expected), "{text}");
@@ -151,8 +148,8 @@ fn with_a_margin_around_everything_a_crop_is_what_is_inside_of_the_whole_mesh() 
 #[test]
 fn a_crop_is_the_same_for_any_threads_memory_tiles_pages_and_inputs() {
     let bench = Bench::new();
-    let input = terrain(&bench);
-    let cloud = Cloud::new(Kind::Terrain).points(20_000).noise(0.6);
+    let input = volume(&bench);
+    let cloud = Cloud::new(Kind::Volume).points(12_000);
     let plain = bench.cloud("cloud.las", &cloud);
     let output = bench.path("crop.ply");
     let first = util::reconstruct(&input, &output, &params());
@@ -165,7 +162,7 @@ fn a_crop_is_the_same_for_any_threads_memory_tiles_pages_and_inputs() {
     };
     let report = util::reconstruct(&input, &output, &cropped);
     let input_stats = &report.input;
-    assert!(input_stats.kept < 9000 && input_stats.kept > 2000);
+    assert!(input_stats.kept < 9000 && input_stats.kept > 1500);
     assert_eq!(
         input_stats.kept + input_stats.dropped_by_crop,
         input_stats.read
@@ -248,6 +245,11 @@ fn a_region_without_points_or_triangles_is_an_error_that_tells_where_they_are() 
     );
 }
 
+/// A position of an index, rounded as in the meshes, which have single precision.
+fn single(position: &serde_json::Value) -> [f64; 3] {
+    [0, 1, 2].map(|axis| f64::from(position[axis].as_f64().unwrap() as f32))
+}
+
 /// The meshes of an index, with their squares.
 fn meshes(index: &Path) -> Vec<([i64; 2], PathBuf, serde_json::Value)> {
     let json: serde_json::Value = serde_json::from_slice(&std::fs::read(index).unwrap()).unwrap();
@@ -262,7 +264,7 @@ fn meshes(index: &Path) -> Vec<([i64; 2], PathBuf, serde_json::Value)> {
 #[test]
 fn squares_together_are_the_whole_mesh_and_each_is_clean() {
     let bench = Bench::new();
-    let (input, whole) = (terrain(&bench), bench.path("whole.ply"));
+    let (input, whole) = (volume(&bench), bench.path("whole.ply"));
     util::reconstruct(&input, &whole, &params());
     let whole = read(&whole);
     let around = bounds(&whole);
@@ -305,8 +307,8 @@ fn squares_together_are_the_whole_mesh_and_each_is_clean() {
             assert_eq!(entry["triangles"], mesh.triangles.len());
             assert_eq!(entry["boundary_edges"], boundary_edges(&mesh));
             let [min, max] = bounds(&mesh);
-            assert_eq!(entry["min"], serde_json::json!(min));
-            assert_eq!(entry["max"], serde_json::json!(max));
+            assert_eq!(single(&entry["min"]), min);
+            assert_eq!(single(&entry["max"]), max);
             boundary += boundary_edges(&mesh);
             vertices += mesh.vertices.len() as u64;
             all.extend(triangles(&mesh));
@@ -322,20 +324,9 @@ fn squares_together_are_the_whole_mesh_and_each_is_clean() {
 #[test]
 fn one_square_around_everything_has_the_bytes_of_the_whole_mesh() {
     let bench = Bench::new();
-    // All coordinates are positive, so there is one square.
-    let wave = |x: u32, y: u32| (f64::from(x) / 7.0).sin() * (f64::from(y) / 5.0).cos() * 4.0;
-    let noise = |n: u32| f64::from(n.wrapping_mul(2_654_435_761) >> 20) / 2500.0;
-    let point = |n: u32| {
-        let (x, y) = (n % 110, n / 110);
-        let z = 50.0 + wave(x, y) + noise(n);
-        [
-            f64::from(x) + 1.0 + noise(n + 9),
-            f64::from(y) + 1.0 + noise(n + 7),
-            z,
-        ]
-    };
-    let points: Vec<_> = (0..12_000).map(point).collect();
-    let input = bench.points("cloud.xyz", &points);
+    // Coordinates along x and y are positive, so there is one square.
+    let cloud = Cloud::new(Kind::Outdoor).points(20_000);
+    let input = bench.cloud("cloud.las", &cloud);
     for (name, normals) in [
         ("a.ply", false),
         ("b.ply", true),
@@ -374,7 +365,7 @@ fn one_square_around_everything_has_the_bytes_of_the_whole_mesh() {
 #[test]
 fn squares_are_the_same_for_any_threads_memory_tiles_and_pages_and_in_a_crop() {
     let bench = Bench::new();
-    let input = terrain(&bench);
+    let input = volume(&bench);
     let bytes = |folder: &Path| -> Vec<(String, u64)> {
         let names = util::listing(folder).into_iter();
         names

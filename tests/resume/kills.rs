@@ -38,6 +38,24 @@ fn killed_anywhere_filters_go_on() {
 }
 
 #[test]
+fn killed_while_far_points_are_searched() {
+    let case = Case::with_far_point();
+    assert_eq!(case.counts["input"]["dropped_far"], 1);
+    let said = |said: &str| said.contains("1 points left out, far from all others");
+    for number in 1..30 {
+        let fault = format!("recorded:{number}");
+        case.killed(&fault);
+        assert!(said(&case.go_on(&fault)), "{fault}");
+    }
+    // What a file beside an input says is in the mesh.
+    case.killed("recorded:20");
+    case.bench.write("far.prj", "LOCAL_CS[\"another site\"]");
+    let ended = case.attempt("", &["--resume"]);
+    assert_eq!(ended.said.code, Some(2));
+    assert!(ended.said.err.contains("far.prj was"), "{ended:?}");
+}
+
+#[test]
 fn killed_while_the_mesh_gets_its_name() {
     let case = Case::new(ROBUST);
     for fault in ["rename:1", "renamed:1"] {
@@ -99,7 +117,14 @@ fn killed_while_a_mesh_in_another_format_is_written() {
 #[test]
 fn killed_while_a_divided_mesh_is_written() {
     for name in ["mesh.ply", "mesh.ply.zst"] {
-        let crop = ["--crop", "-300,-300,250,300", "--split", "150"];
+        let crop = [
+            "--crop",
+            "-300,-300,250,300",
+            "--crop-margin",
+            "70",
+            "--split",
+            "150",
+        ];
         let case = Case::with_mesh(name, &crop);
         let last = |kind: &str| case.events[kind];
         assert!(last("rename") > 8, "{}", last("rename"));

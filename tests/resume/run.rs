@@ -14,7 +14,7 @@ const PARTS: [&str; 4] = ["--block-points", "4096", "--tile-points", "1500"];
 /// Options that cover different stages.
 pub const ROBUST: &[&str] = &[];
 pub const PAPER: &[&str] = &["--method", "paper", "--smooth", "1", "--relax", "1"];
-pub const FILTERS: &[&str] = &["--thin", "6", "--drop-outliers"];
+pub const FILTERS: &[&str] = &["--thin", "6", "--drop-outliers", "--origin", "-3,0.5,7"];
 
 /// A cloud, options, and the mesh of an undisturbed run.
 pub struct Case {
@@ -25,7 +25,7 @@ pub struct Case {
     options: Vec<String>,
     expected: u64,
     /// The counts of the report.
-    counts: serde_json::Value,
+    pub counts: serde_json::Value,
     /// Number of events of each kind in an undisturbed run.
     pub events: HashMap<String, u64>,
 }
@@ -54,7 +54,21 @@ impl Case {
 
     /// As [`Case::new`], with this name of the mesh.
     pub fn with_mesh(name: &str, options: &[&str]) -> Self {
+        Self::of(Bench::new(), name, options)
+    }
+
+    /// As [`Case::new`], with a point so far away that the lattice is chosen without it, and a reference system.
+    pub fn with_far_point() -> Self {
         let bench = Bench::new();
+        let far = bench
+            .write("far.xyz", "1.5 -7e30 2\n")
+            .display()
+            .to_string();
+        bench.write("far.prj", "LOCAL_CS[\"site\"]");
+        Self::of(bench, "mesh.ply", &[&far, "--origin", "auto"])
+    }
+
+    fn of(bench: Bench, name: &str, options: &[&str]) -> Self {
         let mut cloud = Cloud::new(Kind::Terrain).points(30_000).noise(0.6);
         cloud.outliers = 0.001;
         let input = bench.cloud("cloud.laz", &cloud);

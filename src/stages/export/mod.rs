@@ -6,6 +6,7 @@
 
 mod bounds;
 mod compressed;
+mod coordinates;
 mod corners;
 mod faces;
 mod file;
@@ -21,7 +22,7 @@ mod split;
 mod stl;
 mod write;
 
-pub(crate) use file::{folder_of, temporary, temporary_of};
+pub(crate) use file::{folder_of, is_compressed, temporary, temporary_of};
 pub use format::CoordinateType;
 pub(crate) use format::{Mesh, normal_columns};
 pub(crate) use formats::{check_name, check_size, left_out, mesh_bytes};
@@ -30,19 +31,22 @@ pub use split::{SplitOptions, export_split};
 pub(crate) use split::{is_square_of, remove_unfinished};
 
 use crate::error::{Error, Result};
-use crate::geom::lattice::Lattice;
+use crate::geom::lattice::{Lattice, Shift};
+use crate::stages::attributes::StoredColumns;
 use crate::stages::blocks::Blocks;
 use crate::stages::cut::StoredPieces;
+use crate::stages::ingest::Column;
 use crate::stages::order::PointStore;
 use crate::stages::repair::Repaired;
 use crate::workspace::Workspace;
-use file::{MeshFile, is_compressed};
-use format::MeshFormat;
+use coordinates::Coordinates;
+use file::MeshFile;
+use format::{MeshFormat, VertexColumn};
 use formats::format_of;
 use parts::{OfTile, Parts, Whole};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
-use write::{Frame, Writer};
+use write::Writer;
 
 /// Counts of the finished mesh.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize, PartialEq, Eq)]
@@ -68,10 +72,12 @@ pub struct ExportOptions<'a> {
     pub coordinates: CoordinateType,
     /// Comments for the header.
     pub comments: Vec<String>,
-    /// The position of the cloud that is the origin of the mesh, if it is not that of the cloud.
-    pub origin: Option<[f64; 3]>,
+    /// The origin of the coordinates in the mesh, if it is not that of the cloud.
+    pub origin: Option<Shift>,
     /// Vertices have normals, in formats that hold them.
     pub normals: bool,
+    /// Columns of the points.
+    pub columns: Option<&'a StoredColumns>,
     /// Decimals of coordinates as text, see [`decimals`].
     pub decimals: usize,
 }
@@ -87,6 +93,7 @@ impl<'a> ExportOptions<'a> {
             origin: None,
             normals: false,
             decimals: 3,
+            columns: None,
         }
     }
 }
@@ -124,8 +131,8 @@ pub fn export(
     let (format, mut mesh) = options.mesh(&stats)?;
     if format.wants_bounds() {
         let bounds = bounds::bounds(store, &parts.numbering, workspace)?;
-        let frame = Frame { lattice };
-        mesh.bounds = Some(bounds.map(|corner| frame.position(corner)));
+        let in_file = options.in_file(lattice);
+        mesh.bounds = Some(bounds.map(|corner| in_file.of(corner)));
     }
     let parts = write(store, parts, lattice, mesh, &options, workspace)?;
     parts.numbering.release(workspace)?;
@@ -151,8 +158,8 @@ pub fn export_cut(
     };
     let parts = OfTile { pieces, tile };
     let (_, mut mesh) = options.mesh(&parts.stats())?;
-    let frame = Frame { lattice };
-    mesh.bounds = Some(tile.bounds.map(|corner| frame.position(corner)));
+    let in_file = options.in_file(lattice);
+    mesh.bounds = Some(tile.bounds.map(|corner| in_file.of(corner)));
     write(store, parts, lattice, mesh, &options, workspace)?;
     stored.release(workspace)?;
     Ok(parts.stats())
@@ -166,9 +173,12 @@ impl ExportOptions<'_> {
             vertices: stats.vertices,
             triangles: stats.triangles,
             coordinates: self.coordinates,
-            columns: normal_columns().filter(|_| self.normals).collect(),
+            columns: normal_columns()
+                .filter(|_| self.normals)
+                .chain(of_points(self.columns).map(VertexColumn::from))
+                .collect(),
             comments: self.comments.clone(),
-            origin: self.origin,
+            origin: self.origin.map(|shift| shift.origin),
             bounds: None,
             decimals: self.decimals,
         };
@@ -181,6 +191,27 @@ impl ExportOptions<'_> {
             .collect();
         Ok((format, mesh))
     }
+
+    /// The coordinates in the file.
+    fn in_file<'l>(&self, lattice: &'l Lattice) -> Coordinates<'l> {
+        Coordinates {
+            lattice,
+            shift: self.origin,
+            written: self.coordinates,
+        }
+    }
+
+    /// The columns of the points, and true for each of them that the file holds.
+    fn held(&self, mesh: &Mesh) -> Option<(&StoredColumns, Vec<bool>)> {
+        let held = |c: &Column| mesh.columns.iter().any(|held| held.name == c.name);
+        let held = of_points(self.columns).map(held).collect();
+        self.columns.map(|columns| (columns, held))
+    }
+}
+
+/// The columns of points.
+fn of_points(columns: Option<&StoredColumns>) -> impl Iterator<Item = &Column> {
+    columns.into_iter().flat_map(StoredColumns::columns)
 }
 
 /// Writes the file of a mesh; returns its parts.
@@ -197,8 +228,9 @@ fn write<P: Parts>(
     let writer = Writer {
         store,
         parts,
+        columns: options.held(&mesh),
         normals: mesh.normals().is_some(),
-        frame: Frame { lattice },
+        coordinates: options.in_file(lattice),
         file: MeshFile::open(output, format_of(output)?, mesh, workspace)?,
     };
     match is_compressed(output) {

@@ -6,7 +6,7 @@
 use super::file::{MeshFile, folder_of, is_compressed, temporary, temporary_of};
 use super::formats::{check_size, format_of};
 use super::parts::{OfTile, Parts};
-use super::write::{Frame, Writer};
+use super::write::Writer;
 use super::{ExportOptions, MeshStats, NO_TRIANGLES, compressed};
 use crate::error::{Error, Result};
 use crate::geom::lattice::Lattice;
@@ -150,12 +150,6 @@ pub fn export_split(
 }
 
 impl Split<'_> {
-    fn frame(&self) -> Frame<'_> {
-        Frame {
-            lattice: self.lattice,
-        }
-    }
-
     fn path(&self, tile: &Tile) -> PathBuf {
         square_path(self.options.output, &name_of(tile.square))
     }
@@ -207,7 +201,10 @@ impl Split<'_> {
 
     fn mesh(&self, tile: &Tile) -> Result<(&'static dyn super::MeshFormat, super::Mesh)> {
         let (format, mut mesh) = self.options.mesh(&self.parts(tile))?;
-        mesh.bounds = Some(tile.bounds.map(|corner| self.frame().position(corner)));
+        mesh.bounds = Some(
+            tile.bounds
+                .map(|corner| self.options.in_file(self.lattice).of(corner)),
+        );
         Ok((format, mesh))
     }
 
@@ -223,8 +220,9 @@ impl Split<'_> {
                 pieces: self.pieces,
                 tile,
             },
+            columns: self.options.held(&mesh),
             normals: mesh.normals().is_some(),
-            frame: self.frame(),
+            coordinates: self.options.in_file(self.lattice),
             file: MeshFile::one_of_several(&path, temporary, name, format, mesh, self.workspace)?,
         })
     }
@@ -268,7 +266,9 @@ impl Split<'_> {
             };
             // With positions for triangles, and normals.
             let [points, records] = parts.sizes(workspace, n - tile.pieces.start);
-            160 * points + 200 * records + (1 << 20)
+            let columns = self.options.columns;
+            let values = columns.map_or(0, |columns| columns.bytes(points as usize));
+            160 * points + 200 * records + values + (1 << 20)
         };
         let work = |unit: &Unit<'_>| piece(unit, unit.number());
         workspace.units("export: piece", count, memory, work, |_, ()| Ok(()))

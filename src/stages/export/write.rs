@@ -1,11 +1,12 @@
 //! Encodes the parts of a mesh, and writes them at their offsets.
 
+use super::coordinates::Coordinates;
 use super::corners::Corners;
 use super::file::{Edge, HEADER, MeshFile};
 use super::parts::Parts;
 use crate::error::Result;
 use crate::geom::Point;
-use crate::geom::lattice::Lattice;
+use crate::stages::attributes::StoredColumns;
 use crate::stages::order::PointStore;
 use crate::workspace::memory::bytes_of;
 use crate::workspace::{Unit, Workspace};
@@ -17,10 +18,12 @@ pub struct Writer<'a, P> {
     pub store: &'a PointStore,
     /// The parts.
     pub parts: P,
+    /// Columns of the points, and true for each of them that the file holds; behind the normals.
+    pub columns: Option<(&'a StoredColumns, Vec<bool>)>,
     /// Normals are among the columns, as the first.
     pub normals: bool,
-    /// The map from the store's positions to those of the mesh.
-    pub frame: Frame<'a>,
+    /// The coordinates in the file.
+    pub coordinates: Coordinates<'a>,
     /// The file.
     pub file: MeshFile<'a>,
 }
@@ -69,6 +72,9 @@ impl<P: Parts> Writer<'_, P> {
         let mut bytes = of_triangles + of_points + (1 << 20);
         if self.file.wants_positions() {
             bytes += Corners::estimate(points, records);
+        }
+        if let Some((columns, _)) = &self.columns {
+            bytes += columns.bytes(points as usize);
         }
         if self.normals {
             bytes += P::normals_estimate(points, records);
@@ -127,13 +133,42 @@ impl<P: Parts> Writer<'_, P> {
         } else {
             self.store.fetch(ids, &mut points)?;
         }
-        let values = normals.as_deref().map_or_else(Vec::new, values);
+        let values = self.values(unit, ids, normals.as_deref())?;
         let lists = bytes_of(&points) + bytes_of(&values) + 4 * ids.len() as u64;
         let _held = unit.hold(lists + bytes_of(bytes));
-        let at = |p: &Point| self.frame.position(*p);
+        let at = |p: &Point| self.coordinates.of(*p);
         self.file
             .encode_vertices(points.iter().map(at), &values, bytes);
         Ok(())
+    }
+
+    /// The values of points with ascending `ids`: their normals, if any, and their columns.
+    fn values(
+        &self,
+        unit: &Unit<'_>,
+        ids: &[u32],
+        normals: Option<&[[f32; 3]]>,
+    ) -> Result<Vec<u8>> {
+        let [Some(first), Some(last)] = [ids.first(), ids.last()] else {
+            return Ok(Vec::new());
+        };
+        let columns = self.columns.as_ref();
+        let opened = columns.map(|(columns, held)| {
+            let values = columns.open(unit, *first..*last + 1)?;
+            Ok((values, held))
+        });
+        let opened = opened.transpose()?;
+        let _held = unit.hold(opened.as_ref().map_or(0, |(values, _)| values.bytes()));
+        let mut bytes = Vec::with_capacity(ids.len() * self.file.value_bytes());
+        for (number, id) in ids.iter().enumerate() {
+            if let Some(normals) = normals {
+                bytes.extend(normals[number].iter().flat_map(|x| x.to_le_bytes()));
+            }
+            if let Some((values, held)) = &opened {
+                values.put(*id, held, &mut bytes);
+            }
+        }
+        Ok(bytes)
     }
 
     /// Encodes the triangles of a part.
@@ -149,28 +184,8 @@ impl<P: Parts> Writer<'_, P> {
         let corners = faces.corners(self.store)?;
         let _corners = unit.hold(corners.bytes());
         let mut batch = self.file.placed_triangles(bytes);
-        faces.for_each(|t, ids| batch.push((t, ids.map(|v| self.frame.position(corners.at(v))))));
+        faces.for_each(|t, ids| batch.push((t, ids.map(|v| self.coordinates.of(corners.at(v))))));
         batch.finish();
         Ok(())
     }
-}
-
-/// The map from positions on the lattice to those in the mesh.
-#[derive(Debug, Clone, Copy)]
-pub struct Frame<'a> {
-    /// The lattice.
-    pub lattice: &'a Lattice,
-}
-
-impl Frame<'_> {
-    /// The position of a point in the mesh; it ascends with the point.
-    pub fn position(&self, point: Point) -> [f64; 3] {
-        self.lattice.position(point)
-    }
-}
-
-/// The bytes of normals.
-fn values(normals: &[[f32; 3]]) -> Vec<u8> {
-    let words = normals.as_flattened().iter();
-    words.flat_map(|x| x.to_le_bytes()).collect()
 }

@@ -43,13 +43,13 @@ impl Crop {
 
 /// A crop prepared for tests of points.
 #[derive(Debug)]
-pub(super) struct Wanted<'a> {
+pub(super) struct Nearby<'a> {
     area: Area<'a>,
     margin: f64,
     _held: Reservation,
 }
 
-impl<'a> Wanted<'a> {
+impl<'a> Nearby<'a> {
     pub(super) fn of(crop: &'a Crop, workspace: &Workspace) -> Result<Self> {
         Ok(Self {
             _held: workspace.reserve("crop: outline", crop.region.area_bytes())?,

@@ -1,6 +1,9 @@
 //! Statistics of the input: counts and extents of each file and in total.
 
+use super::belong::Mixed;
+use super::crs::Crs;
 use super::format::Format;
+use super::source::Native;
 use super::spool::Coordinate;
 use serde::{Deserialize, Serialize, Serializer};
 use std::path::{Path, PathBuf};
@@ -16,12 +19,23 @@ pub struct IngestStats {
     pub dropped_non_finite: u64,
     /// Points left out because they are flagged as withheld.
     pub withheld: u64,
+    /// Records of scans that the scanner marked as no point, since nothing came back.
+    pub invalid: u64,
     /// Points left out because their class is not wanted.
     pub dropped_by_class: u64,
     /// Points left out because they are not in the region, nor within the margin around it.
     pub dropped_by_crop: u64,
     /// Points not read because their files or chunks lie outside, by header or chunk table.
     pub skipped_by_crop: u64,
+    /// Points left out because they are far from all others, and the lattice is finer without them.
+    pub dropped_far: u64,
+    /// One of these.
+    pub far_example: Option<[f64; 3]>,
+    /// The reference system; none if no file gives one, or if files give different ones.
+    pub crs: Option<Crs>,
+    /// Two files that give different ones.
+    #[serde(skip)]
+    pub mixed: Option<Mixed>,
     /// The counts of each file, in the order given.
     pub files: Vec<FileStats>,
     /// Warnings for the user, one line each.
@@ -43,6 +57,8 @@ pub struct FileStats {
     pub format: Format,
     /// Its size in bytes.
     pub bytes: u64,
+    /// Names of its columns beside the coordinates.
+    pub columns: Vec<String>,
     /// Number of points given in the header; `None` for text.
     pub claimed: Option<u64>,
     /// Points in the file.
@@ -53,16 +69,24 @@ pub struct FileStats {
     pub dropped_non_finite: u64,
     /// Points left out because they are flagged as withheld.
     pub withheld: u64,
+    /// Records of scans that the scanner marked as no point, since nothing came back.
+    pub invalid: u64,
     /// Points left out because their class is not wanted.
     pub dropped_by_class: u64,
     /// Points left out because they are not in the region, nor within the margin around it.
     pub dropped_by_crop: u64,
     /// Points not read because they are in chunks that lie outside, or the whole file does.
     pub skipped_by_crop: u64,
+    /// Points left out because they are far from all others.
+    pub dropped_far: u64,
     /// Lowest coordinates of the kept points, in the file's unit; `None` without points.
     pub min: Option<[f64; 3]>,
     /// Highest coordinates of the kept points, in the file's unit; `None` without points.
     pub max: Option<[f64; 3]>,
+    /// The positions of the scanners given in the file, in its unit.
+    pub scanners: Vec<[f64; 3]>,
+    /// The reference system that it gives, or a `.prj` file beside it.
+    pub crs: Option<Crs>,
 }
 
 /// Exact statistics of one source, in its native form; merging is commutative.
@@ -72,6 +96,8 @@ pub(super) struct SourceStats {
     pub(super) kept: u64,
     pub(super) dropped: u64,
     pub(super) withheld: u64,
+    /// Records that the scanner marked as no point.
+    pub(super) invalid: u64,
     /// Points left out because of their class.
     pub(super) unwanted: u64,
     /// Points left out because of their position.
@@ -102,6 +128,7 @@ impl Default for SourceStats {
             kept: 0,
             dropped: 0,
             withheld: 0,
+            invalid: 0,
             unwanted: 0,
             outside: 0,
             skipped: 0,
@@ -116,11 +143,54 @@ impl Default for SourceStats {
 }
 
 impl SourceStats {
+    /// The same counts without points.
+    pub(super) fn emptied(&self) -> Self {
+        let Self {
+            min,
+            max,
+            own,
+            exponent,
+            kept,
+            ..
+        } = Self::default();
+        Self {
+            min,
+            max,
+            own,
+            exponent,
+            kept,
+            ..*self
+        }
+    }
+
+    /// Takes a kept point with these native coordinates.
+    pub(super) fn take(&mut self, point: [f64; 3], native: Native) {
+        self.kept += 1;
+        for (axis, value) in point.into_iter().enumerate() {
+            let exponent = match native {
+                Native::Las { .. } => 0,
+                Native::F32 | Native::F64 => value.exponent(),
+            };
+            self.reach(axis, value, exponent);
+            self.own[0][axis] = self.own[0][axis].min(value);
+            self.own[1][axis] = self.own[1][axis].max(value);
+        }
+    }
+
+    /// Extends the range of an axis by a coordinate that is a multiple of two to the power of `exponent`.
+    #[inline]
+    pub(super) fn reach(&mut self, axis: usize, value: f64, exponent: i32) {
+        self.min[axis] = self.min[axis].min(value);
+        self.max[axis] = self.max[axis].max(value);
+        self.exponent = self.exponent.min(exponent);
+    }
+
     pub(super) fn merge(&mut self, other: &Self) {
         self.read += other.read;
         self.kept += other.kept;
         self.dropped += other.dropped;
         self.withheld += other.withheld;
+        self.invalid += other.invalid;
         self.unwanted += other.unwanted;
         self.outside += other.outside;
         self.skipped += other.skipped;
@@ -137,12 +207,9 @@ impl SourceStats {
 
     /// Extends the range of coordinates by a point.
     #[inline]
-    pub(super) fn reach<T: Coordinate>(&mut self, point: [T; 3]) {
+    pub(super) fn reach_point<T: Coordinate>(&mut self, point: [T; 3]) {
         for (axis, coordinate) in point.into_iter().enumerate() {
-            let value = coordinate.into();
-            self.min[axis] = self.min[axis].min(value);
-            self.max[axis] = self.max[axis].max(value);
-            self.exponent = self.exponent.min(coordinate.exponent());
+            self.reach(axis, coordinate.into(), coordinate.exponent());
         }
     }
 

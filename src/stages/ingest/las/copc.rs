@@ -4,7 +4,7 @@
 //! The chunk table says what chunks there are; the hierarchy only adds boxes to some of them. So a hierarchy
 //! that is damaged, or that lacks nodes, can make more to be decoded, and never less points to be found.
 
-use super::super::crop::Wanted;
+use super::super::crop::Nearby;
 use super::super::input::{Input, u32_at, u64_at};
 use super::Header;
 use super::table::Chunk;
@@ -143,7 +143,7 @@ impl Hierarchy {
         &self,
         chunks: &[Chunk],
         slack: f64,
-        wanted: &Wanted<'_>,
+        wanted: &Nearby<'_>,
     ) -> Vec<(bool, Option<[[f64; 3]; 2]>)> {
         let wide = |[low, high]: [[f64; 3]; 2]| [low.map(|c| c - slack), high.map(|c| c + slack)];
         let boxes: Vec<_> = self.nodes.iter().map(|node| wide(node.bounds)).collect();

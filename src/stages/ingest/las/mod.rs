@@ -3,6 +3,7 @@
 mod chunks;
 mod copc;
 mod crs;
+mod fields;
 mod gps;
 mod header;
 mod laz;
@@ -13,6 +14,8 @@ mod vlr;
 
 use header::Header;
 
+pub(super) use crs::well_known;
+
 /// Byte of a record with the withheld flag, in all point formats.
 const FLAGS: usize = 15;
 
@@ -20,7 +23,8 @@ const FLAGS: usize = 15;
 const CLASS: usize = 16;
 
 use super::classes::Classes;
-use super::crop::Wanted;
+use super::columns::Column;
+use super::crop::Nearby;
 use super::crs::Crs;
 use super::format::Format;
 use super::input::Input;
@@ -29,6 +33,7 @@ use super::source::Native;
 use super::spool::{Sink, SourceWriter};
 use crate::error::Result;
 use crate::workspace::Workspace;
+use fields::Fields;
 
 impl Format {
     /// ASPRS LAS.
@@ -93,7 +98,7 @@ impl PointFile for Header {
     fn lies_outside(
         &self,
         input: &Input,
-        wanted: &Wanted<'_>,
+        wanted: &Nearby<'_>,
         workspace: &Workspace,
     ) -> Option<[[f64; 3]; 2]> {
         // What is damaged is reported when the file is read.
@@ -103,6 +108,10 @@ impl PointFile for Header {
 
     fn crs(&self, input: &Input) -> Option<Crs> {
         crs::read(input, self)
+    }
+
+    fn columns(&self) -> Vec<Column> {
+        fields::columns(self)
     }
 
     fn read(&self, input: &Input, target: &SourceWriter<'_>) -> Result<Vec<String>> {
@@ -115,7 +124,7 @@ impl PointFile for Header {
     }
 }
 
-/// The position of the withheld flag and of the class in a record, and the wanted classes.
+/// The position of the withheld flag and of the class in a record, and the wanted classes and fields.
 #[derive(Debug, Clone, Copy)]
 struct Record<'a> {
     withheld: u8,
@@ -123,10 +132,11 @@ struct Record<'a> {
     class: (usize, u8),
     /// `None` if all classes are wanted.
     wanted: Option<&'a Classes>,
+    fields: &'a Fields,
 }
 
 impl<'a> Record<'a> {
-    fn of(header: &Header, classes: &'a Classes) -> Self {
+    fn of(header: &Header, classes: &'a Classes, fields: &'a Fields) -> Self {
         let (withheld, class) = match (header.format.is_extended, header.raw.version.minor) {
             (true, _) => (0x04, (CLASS, 0xff)),
             // In LAS 1.0 the class is the whole byte.
@@ -138,6 +148,7 @@ impl<'a> Record<'a> {
             withheld,
             class,
             wanted,
+            fields,
         }
     }
 
@@ -150,7 +161,8 @@ impl<'a> Record<'a> {
         } else if self.wanted.is_some_and(|c| !c.wants(record[byte] & bits)) {
             sink.leave_out();
         } else {
-            return sink.push(position(record));
+            let values = |values: &mut Vec<u8>| self.fields.put(record, values);
+            return sink.push_with(position(record), values);
         }
         Ok(())
     }

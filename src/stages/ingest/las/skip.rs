@@ -3,7 +3,7 @@
 //! Headers can be wrong. The box in a header, and the cubes of COPC, are believed only if a sample of the points
 //! agrees: those at the beginning of chunks, which are not compressed, or records at equal distances.
 
-use super::super::crop::Wanted;
+use super::super::crop::Nearby;
 use super::super::input::Input;
 use super::super::spool::SourceWriter;
 use super::copc::Hierarchy;
@@ -69,7 +69,7 @@ impl Header {
     pub(super) fn lies_outside(
         &self,
         input: &Input,
-        wanted: &Wanted<'_>,
+        wanted: &Nearby<'_>,
         workspace: &Workspace,
     ) -> Result<bool> {
         let outside = |bounds: &[[f64; 3]; 2]| !wanted.may_meet(*bounds);
