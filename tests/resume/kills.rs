@@ -116,6 +116,39 @@ fn killed_while_a_mesh_in_another_format_is_written() {
     }
 }
 
+/// Some squares have their names when others are still unfinished.
+#[test]
+fn killed_while_a_divided_mesh_is_written() {
+    for name in ["mesh.ply", "mesh.ply.zst"] {
+        let crop = [
+            "--crop",
+            "-300,-300,250,300",
+            "--crop-margin",
+            "70",
+            "--split",
+            "150",
+        ];
+        let case = Case::with_mesh(name, &crop);
+        let last = |kind: &str| case.events[kind];
+        assert!(last("rename") > 8, "{}", last("rename"));
+        let records = (last("recorded") - 30..=last("recorded")).step_by(3);
+        let records = records.map(|n| format!("recorded:{n}"));
+        let writes = (last("write") - 60..=last("write")).step_by(7);
+        let writes = writes.map(|n| format!("write:{n}"));
+        let names =
+            [1, 2, 5, last("rename")].map(|n| [format!("rename:{n}"), format!("renamed:{n}")]);
+        let mut kills = 0;
+        for fault in records.chain(writes).chain(names.into_iter().flatten()) {
+            case.killed(&fault);
+            if case.scratch.exists() {
+                assert_eq!(case.go_on(&fault), "", "{name}, {fault}");
+                kills += 1;
+            }
+        }
+        assert!(kills > 15, "{name}: {kills}");
+    }
+}
+
 #[test]
 fn killed_while_scratch_is_removed() {
     let case = Case::new(ROBUST);

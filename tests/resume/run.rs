@@ -3,6 +3,7 @@
 use crate::util::{self, Bench, Said};
 use outcrop_cloudgen::{Cloud, Kind};
 use std::collections::HashMap;
+use std::hash::{Hash, Hasher};
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
 use std::process::Output;
@@ -87,7 +88,7 @@ impl Case {
         let report = case.bench.path("report.json").display().to_string();
         let ended = case.attempt(&fault, &["--threads", "2", "--report", &report]);
         assert_eq!(ended.said.code, Some(0), "{ended:?}");
-        case.expected = util::hash(&case.mesh);
+        case.expected = case.meshes();
         case.counts = case.report();
         let counts = std::fs::read_to_string(counts).unwrap();
         let lines = counts.lines().filter_map(|line| line.split_once(' '));
@@ -136,7 +137,26 @@ impl Case {
     /// Removes all files of runs.
     pub fn clear(&self) {
         let _ = std::fs::remove_dir_all(&self.scratch);
-        let _ = std::fs::remove_file(&self.mesh);
+        for path in self.outputs() {
+            let _ = std::fs::remove_file(path);
+        }
+    }
+
+    /// Paths of everything that the run wrote, in the order of names.
+    pub fn outputs(&self) -> Vec<PathBuf> {
+        let names = util::listing(self.bench.folder()).into_iter();
+        let mine = names.filter(|name| name.starts_with("mesh") && !name.contains("scratch"));
+        mine.map(|name| self.bench.path(&name)).collect()
+    }
+
+    /// A hash of all meshes and their names.
+    fn meshes(&self) -> u64 {
+        let mut hasher = std::collections::hash_map::DefaultHasher::new();
+        for path in self.outputs() {
+            path.hash(&mut hasher);
+            util::hash(&path).hash(&mut hasher);
+        }
+        hasher.finish()
     }
 
     /// Makes a run that is killed at this event, with other threads and memory than later attempts.
@@ -162,10 +182,7 @@ impl Case {
     /// Checks that the run succeeded and left only the mesh.
     pub fn check(&self, said: &Said, what: &str) {
         assert_eq!(said.code, Some(0), "{what}: {said:?}");
-        assert!(
-            util::hash(&self.mesh) == self.expected,
-            "{what}: another mesh"
-        );
+        assert!(self.meshes() == self.expected, "{what}: another mesh");
         let left = util::listing(self.bench.folder());
         let strange = |name: &&String| name.contains("outcrop");
         assert_eq!(left.iter().find(strange), None, "{what}");

@@ -13,17 +13,22 @@ mod carry;
 mod classes;
 mod columns;
 mod contain;
+mod coordinate;
+mod crop;
 mod crs;
 mod e57;
 mod expand;
 mod far;
 mod format;
 mod formats;
+mod frames;
 mod input;
 mod las;
 mod lattice;
 mod lines;
 mod map;
+mod middle;
+mod native;
 mod number;
 mod pcd;
 mod ply;
@@ -41,6 +46,7 @@ pub use belong::Mixed;
 pub use carry::{Attribute, Carried};
 pub use classes::Classes;
 pub use columns::{Attributes, Column};
+pub use crop::Crop;
 pub use crs::{Crs, CrsSource, prj_of};
 pub use expand::expand;
 pub use format::Format;
@@ -53,11 +59,14 @@ use crate::geom::lattice::Lattice;
 use crate::workspace::Workspace;
 use belong::Systems;
 use columns::{Wanted, row_bytes};
+use crop::Nearby;
+use frames::{Frame, values_of};
 use input::Input;
+use native::Native;
 use point_format::{Claims, PointFile};
 use serde::{Deserialize, Serialize};
-use source::{Native, Source};
-use spool::{Frame, SourceWriter, values_of};
+use source::Source;
+use spool::SourceWriter;
 use std::path::PathBuf;
 
 /// Precision that suffices for writing the coordinates of the cloud.
@@ -68,6 +77,17 @@ pub enum CoordinateType {
     F32,
     /// Double precision.
     F64,
+}
+
+/// The points that are read.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Selection {
+    /// Those of these classes.
+    pub classes: Classes,
+    /// Those in this region; `None` for all.
+    pub crop: Option<Crop>,
+    /// Columns of the points.
+    pub attributes: Attributes,
 }
 
 /// All points of the inputs in one scratch file.
@@ -82,15 +102,6 @@ pub struct Spool {
     stats: IngestStats,
     /// The well-known text of the reference system, at most 1 MiB.
     wkt: Option<String>,
-}
-
-/// The part of the inputs that is read.
-#[derive(Debug, Clone, Default)]
-pub struct Selection {
-    /// Classes of the points.
-    pub classes: Classes,
-    /// Columns of the points.
-    pub attributes: Attributes,
 }
 
 /// Decodes all inputs, which may be files and folders, into a spool.
@@ -161,6 +172,9 @@ fn read_all(
     workspace: &Workspace,
 ) -> Result<Spool> {
     let classes = &selection.classes;
+    let crop = selection.crop.as_ref();
+    let nearby = crop.map(|crop| Nearby::of(crop, workspace));
+    let nearby = nearby.transpose()?;
     let (mut section, mut frames, mut values) = (0, Vec::new(), Vec::new());
     let mut sources = Vec::new();
     let mut stats = IngestStats::default();
@@ -171,14 +185,22 @@ fn read_all(
         let opened = Opened::new(Input::open(path, workspace)?)?;
         let number = sources.len() as u32;
         let wanted = Wanted::of(&selection.attributes, &opened.file.columns())?;
-        let target = SourceWriter::new(workspace, name, section, number, classes, &wanted)?;
-        let mut warnings = match opened.file.read(&opened.input, &target) {
-            // Tasks read all files at the same time.
-            Err(Error::Shared) => {
-                shared = true;
-                Vec::new()
+        let target = SourceWriter::new(workspace, name, section, number, classes, &wanted)?
+            .within(nearby.as_ref(), opened.claims.native);
+        let outside =
+            |nearby: &Nearby<'_>| opened.file.lies_outside(&opened.input, nearby, workspace);
+        let mut warnings = if let Some(bounds) = nearby.as_ref().and_then(outside) {
+            target.skip(opened.claims.likely_points, bounds);
+            Vec::new()
+        } else {
+            match opened.file.read(&opened.input, &target) {
+                // Tasks read all files at the same time.
+                Err(Error::Shared) => {
+                    shared = true;
+                    Vec::new()
+                }
+                other => other?,
             }
-            other => other?,
         };
         if *classes != Classes::All && !opened.claims.classes {
             warnings.push("its points have no class, all of them are kept".to_owned());
@@ -212,6 +234,9 @@ fn read_all(
     }
     if shared {
         return Err(Error::Shared);
+    }
+    if let Some(crop) = crop.filter(|_| stats.kept == 0) {
+        crop.check_met(&sources)?;
     }
     let wkt = stats.compare(systems);
     Ok(Spool {
@@ -296,6 +321,8 @@ impl IngestStats {
         self.withheld += stats.withheld;
         self.invalid += stats.invalid;
         self.dropped_by_class += stats.unwanted;
+        self.dropped_by_crop += stats.outside;
+        self.skipped_by_crop += stats.skipped;
         let bounds = source.bounds();
         self.files.push(FileStats {
             path: opened.input.path.clone(),
@@ -309,6 +336,8 @@ impl IngestStats {
             withheld: stats.withheld,
             invalid: stats.invalid,
             dropped_by_class: stats.unwanted,
+            dropped_by_crop: stats.outside,
+            skipped_by_crop: stats.skipped,
             dropped_far: 0,
             min: bounds.map(|b| b[0]),
             max: bounds.map(|b| b[1]),
@@ -373,14 +402,14 @@ impl Spool {
     /// The precision in which coordinates are to be written.
     #[must_use]
     pub fn source_precision(&self) -> CoordinateType {
-        let kept = || self.sources.iter().filter(|s| s.stats.kept > 0);
+        let kept = || self.sources.iter().filter(|s| s.stats.any());
         if kept().all(|s| s.native == Native::F32) {
             return CoordinateType::F32;
         }
         let Ok(lattice) = self.choose_lattice(0) else {
             return CoordinateType::F64;
         };
-        let bounds = kept().filter_map(Source::bounds);
+        let bounds = kept().filter_map(Source::whole_bounds);
         let largest = bounds
             .flat_map(|b| b.into_iter().flatten())
             .fold(0.0, |m: f64, c| m.max(c.abs()));
