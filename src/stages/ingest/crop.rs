@@ -1,11 +1,12 @@
 //! Selection of points by position: those in a region or within a margin around it.
 
 use super::source::{Native, Source};
+use super::spool::SourceWriter;
 use crate::error::{Error, Result};
 use crate::geom::boxes::BoxTree;
 use crate::geom::region::{Area, Region};
-use crate::workspace::Workspace;
 use crate::workspace::memory::Reservation;
+use crate::workspace::{Workspace, lock};
 
 /// A region, and the margin around it within which points are read as well.
 #[derive(Debug, Clone, PartialEq)]
@@ -77,6 +78,27 @@ impl<'a> Nearby<'a> {
     #[inline]
     pub(super) fn takes(&self, position: [f64; 3]) -> bool {
         self.area.is_near(position, self.margin)
+    }
+}
+
+impl<'a> SourceWriter<'a> {
+    /// The same, for points at wanted positions only; coordinates are of type `native`.
+    pub(super) fn within(mut self, nearby: Option<&'a Nearby<'a>>, native: Native) -> Self {
+        self.nearby = nearby.map(|nearby| (nearby, native));
+        self
+    }
+
+    /// The wanted positions, if not all are.
+    pub(super) fn region(&self) -> Option<&'a Nearby<'a>> {
+        self.nearby.map(|(nearby, _)| nearby)
+    }
+
+    /// Counts points that are not read because of their position; their coordinates are between these ends.
+    pub(super) fn skip(&self, points: u64, [low, high]: [[f64; 3]; 2]) {
+        let mut stats = lock(&self.stats);
+        stats.skipped += points;
+        stats.reach_point(low);
+        stats.reach_point(high);
     }
 }
 

@@ -106,12 +106,12 @@ pub(super) struct SourceWriter<'a> {
     /// The classes to keep, if points have a class.
     pub(super) classes: &'a Classes,
     /// The positions to keep, and the type of the source's coordinates.
-    nearby: Option<(&'a Nearby<'a>, Native)>,
+    pub(super) nearby: Option<(&'a Nearby<'a>, Native)>,
     /// The columns to read.
     pub(super) wanted: &'a Wanted,
     /// The section of the next unit.
     next: AtomicU32,
-    stats: Mutex<SourceStats>,
+    pub(super) stats: Mutex<SourceStats>,
     /// The frames by section.
     frames: Mutex<BTreeMap<u32, (Vec<Frame>, Values)>>,
 }
@@ -139,25 +139,6 @@ impl<'a> SourceWriter<'a> {
             stats: Mutex::default(),
             frames: Mutex::default(),
         })
-    }
-
-    /// The same, for points at wanted positions only; coordinates are of type `native`.
-    pub(super) fn within(self, nearby: Option<&'a Nearby<'a>>, native: Native) -> Self {
-        let nearby = nearby.map(|nearby| (nearby, native));
-        Self { nearby, ..self }
-    }
-
-    /// The wanted positions, if not all are.
-    pub(super) fn region(&self) -> Option<&'a Nearby<'a>> {
-        self.nearby.map(|(nearby, _)| nearby)
-    }
-
-    /// Counts points that are not read because of their position; their coordinates are between these ends.
-    pub(super) fn skip(&self, points: u64, [low, high]: [[f64; 3]; 2]) {
-        let mut stats = lock(&self.stats);
-        stats.skipped += points;
-        stats.reach_point(low);
-        stats.reach_point(high);
     }
 
     /// A buffer for one unit; its points are counted when it is finished.
