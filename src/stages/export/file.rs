@@ -13,6 +13,9 @@ use std::ops::Range;
 use std::os::unix::fs::{FileExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 
+/// A triangle with the positions of its corners.
+pub type Placed = ([u32; 3], Positions);
+
 /// Records encoded at a time.
 const BATCH: usize = 1024;
 
@@ -283,8 +286,8 @@ impl<'a> MeshFile<'a> {
     pub fn placed_triangles(
         &self,
         bytes: &mut Vec<u8>,
-    ) -> Batch<([u32; 3], Positions), impl FnMut(&[([u32; 3], Positions)])> {
-        Batch::new(|batch: &[([u32; 3], Positions)]| {
+    ) -> Batch<Placed, impl FnMut(&[Placed])> {
+        Batch::new(|batch: &[Placed]| {
             let (triangles, positions): (Vec<_>, Vec<_>) = batch.iter().copied().unzip();
             self.format
                 .put_triangles(&self.mesh, &triangles, &positions, bytes);
