@@ -12,6 +12,7 @@ fn within(region: &str, margin: f64) -> Selection {
     Selection {
         classes: Classes::All,
         crop: Some(Crop { region, margin }),
+        ..Selection::default()
     }
 }
 
