@@ -1,8 +1,9 @@
 //! The parameters of a reconstruction, with their ranges.
 
 use crate::error::{Error, Result};
+pub use crate::geom::region::{NoRegion, Region};
 use crate::method::METHOD;
-use crate::stages::ingest::Classes;
+use crate::stages::ingest::{Attributes, Classes, Crop, IngestStats, Selection};
 pub use crate::stages::smooth::Smoothing;
 use crate::stages::spacing::{Limits, Width};
 pub use crate::stages::surface::evidence::Division;
@@ -102,11 +103,57 @@ impl std::fmt::Display for MaxWidth {
     }
 }
 
+/// The origin of the coordinates in the mesh file.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Origin {
+    /// That of the input's coordinates.
+    None,
+    /// A round position below the cloud, where single precision does not suffice without it.
+    Auto,
+    /// The lattice position nearest to this one, in the input's coordinates.
+    At([f64; 3]),
+}
+
+impl std::str::FromStr for Origin {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = || format!("{text:?} is not auto, none, or three numbers like 635000,848000,0");
+        match text.trim() {
+            "auto" => Ok(Self::Auto),
+            "none" => Ok(Self::None),
+            numbers => {
+                let parsed = numbers
+                    .split(',')
+                    .map(|number| number.trim().parse::<f64>());
+                let parsed: Vec<f64> = parsed.collect::<Result<_, _>>().map_err(|_| wrong())?;
+                let at: [f64; 3] = parsed.try_into().map_err(|_| wrong())?;
+                match at.iter().all(|c| c.is_finite()) {
+                    true => Ok(Self::At(at)),
+                    false => Err(wrong()),
+                }
+            }
+        }
+    }
+}
+
 /// All parameters that decide the mesh. Equal parameters and equal points give the same bytes.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Params {
     /// Classes of the points that are read.
     pub classes: Classes,
+    /// The mesh inside this region only.
+    pub crop: Option<Region>,
+    /// Width of the margin around the region within which points are read as well, in the input's unit.
+    /// `None`: a twentieth of the shorter side of the box around the region.
+    pub crop_margin: Option<f64>,
+    /// One mesh for each square of this side in x and y, in the input's unit, instead of one for all.
+    pub split: Option<f64>,
+    /// Columns of the points that the mesh keeps, such as colours.
+    pub attributes: Attributes,
+    /// Colours with 16 bits instead of 8.
+    pub wide_colors: bool,
     /// Keep at most one point in each cube of this side, in the input's unit.
     pub thin: Option<f64>,
     /// Drop points whose spacing is more than this factor times that of the points around them.
@@ -141,8 +188,14 @@ pub struct Params {
     pub max_fill: MaxWidth,
     /// Remove bridges and small components, fill holes (paper, section 3.6).
     pub repair: bool,
+    /// Keep points far from all others, even if the lattice of the positions is coarser for them.
+    pub keep_far: bool,
     /// Vertices have normals, in formats that hold them.
     pub normals: bool,
+    /// Take coordinates as they are if files give different reference systems, which is an error otherwise.
+    pub ignore_crs: bool,
+    /// Origin of the coordinates in the mesh file.
+    pub origin: Origin,
     /// Points per block, the unit of insertion; changes the result.
     #[serde(skip)]
     pub block: u32,
@@ -154,6 +207,13 @@ pub struct Params {
 /// A factor for [`Params::drop_outliers`] that suits most clouds.
 pub const OUTLIER_FACTOR: f64 = 5.0;
 
+/// The margin around a region, as a share of the shorter side of the box around it. The local spacing of the
+/// points, which decides how wide it must be, is not known before they are read (docs/decisions.md).
+const MARGIN: f64 = 0.05;
+
+/// A margin of so many spacings is wide enough: at the cut no more triangles differ than elsewhere.
+const SPACINGS: f64 = 16.0;
+
 /// Largest number of neighbours.
 pub const MAX_NEIGHBORS: usize = 255;
 
@@ -161,6 +221,11 @@ impl Default for Params {
     fn default() -> Self {
         Self {
             classes: Classes::All,
+            crop: None,
+            crop_margin: None,
+            split: None,
+            attributes: Attributes::None,
+            wide_colors: false,
             thin: None,
             drop_outliers: None,
             method: Method::Robust,
@@ -176,7 +241,10 @@ impl Default for Params {
             max_edge: MaxWidth::Spacings(METHOD.admissibility.edge),
             max_fill: MaxWidth::Spacings(METHOD.filling.width),
             repair: true,
+            keep_far: false,
             normals: false,
+            ignore_crs: false,
+            origin: Origin::None,
             block: METHOD.curve.block,
             division: Division::default(),
         }
@@ -198,6 +266,50 @@ impl Params {
             min_component: Some(10),
             ..Self::default()
         }
+    }
+
+    /// The points that are read.
+    #[must_use]
+    pub fn selection(&self) -> Selection {
+        let crop = |region: &Region| {
+            let [min, max] = region.bounds();
+            let shorter = (max[0] - min[0]).min(max[1] - min[1]);
+            Crop {
+                region: region.clone(),
+                margin: self.crop_margin.unwrap_or(shorter * MARGIN),
+            }
+        };
+        Selection {
+            classes: self.classes.clone(),
+            crop: self.crop.as_ref().map(crop),
+            attributes: self.attributes.clone(),
+        }
+    }
+
+    /// A warning if the default margin around the region is narrow for the density of the points read.
+    pub(crate) fn narrow_margin(&self, input: &IngestStats) -> Option<String> {
+        let margin = self.selection().crop?.margin;
+        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        for file in &input.files {
+            let (Some(min), Some(max)) = (file.min, file.max) else {
+                continue;
+            };
+            for axis in 0..2 {
+                low[axis] = low[axis].min(min[axis]);
+                high[axis] = high[axis].max(max[axis]);
+            }
+        }
+        let area = (high[0] - low[0]) * (high[1] - low[1]);
+        let spacing = (area / input.kept.max(1) as f64).sqrt();
+        let narrow = self.crop_margin.is_none() && margin < SPACINGS * spacing;
+        narrow.then(|| {
+            format!(
+                "the margin around the region is {margin}, {:.0} times the mean spacing of the points: at the cut \
+                 the mesh may differ from that of the whole cloud; --crop-margin {:.3} is wide enough",
+                margin / spacing,
+                SPACINGS * spacing
+            )
+        })
     }
 
     /// True if points off the surface are dropped.
@@ -245,6 +357,19 @@ impl Params {
                 expected: expected.into(),
             })
         };
+        if let Some(Err(why)) = self.crop.as_ref().map(Region::check) {
+            return error("--crop", why.found, &why.expected);
+        }
+        if let Some(margin) = self.crop_margin
+            && !(margin >= 0.0 && margin.is_finite())
+        {
+            return error("--crop-margin", margin.to_string(), "a length, or 0");
+        }
+        if let Some(side) = self.split
+            && !(side > 0.0 && side.is_finite())
+        {
+            return error("--split", side.to_string(), "a positive length");
+        }
         if let Some(side) = self.thin
             && !(side > 0.0 && side.is_finite())
         {
@@ -272,6 +397,11 @@ impl Params {
             {
                 return error(name, x.to_string(), "a positive number");
             }
+        }
+        if let Origin::At(at) = self.origin
+            && !at.iter().all(|c| c.is_finite())
+        {
+            return error("--origin", format!("{at:?}"), "finite coordinates");
         }
         if self.smooth > 100 {
             return error("--smooth", self.smooth.to_string(), "0 to 100");

@@ -1,11 +1,13 @@
 //! The driver: the stages in the order of the data flow.
 
 mod attempt;
+mod beside;
 mod builder;
 mod checks;
 mod clock;
 mod disk;
 mod manifest;
+mod origin;
 mod shared;
 mod stages;
 mod start;
@@ -18,7 +20,7 @@ use crate::workspace::progress::{Cancel, Observer};
 use crate::workspace::{Storage, Workspace, limits};
 use attempt::Alarm;
 pub use builder::Builder;
-use checks::{not_an_input, writable};
+use checks::{not_an_input, one_system, writable};
 pub(crate) use clock::Clock;
 pub(crate) use disk::Known;
 pub use shared::{
@@ -93,7 +95,8 @@ impl Reconstruction {
     /// run can be resumed, see [`Reconstruction::is_unfinished`].
     pub fn run(&self) -> Result<Report> {
         writable(&self.output)?;
-        not_an_input(&self.output, &self.inputs)?;
+        not_an_input(&self.output, self.params.split.is_some(), &self.inputs)?;
+        one_system(&self.params, &self.inputs)?;
         let _alarm = self
             .time_limit
             .map(|limit| Alarm::set(limit, self.cancel.clone()));
@@ -109,6 +112,7 @@ impl Reconstruction {
         let (spool, lattice) = stages.ingest()?;
         let points = stages.order(&spool, &lattice)?;
         let points = stages.without_outliers(points)?;
+        let columns = stages.attributes(&spool, &lattice, &points)?;
         let radius = stages.radius(&points, &lattice);
         let points = stages.smooth(points)?;
         let store = points.open(workspace)?;
@@ -119,7 +123,14 @@ impl Reconstruction {
         let triples = stages.triples(&seen)?;
         let stitched = stages.stitch(places, &triples)?;
         let repaired = stages.repair(places, &stitched)?;
-        stages.export(&store, &repaired, &lattice)?;
+        let pieces = stages.cut(&store, &repaired, &lattice)?;
+        stages.export(
+            &store,
+            columns.as_ref(),
+            &repaired,
+            pieces.as_ref(),
+            &lattice,
+        )?;
         Ok(stages.report())
     }
 }

@@ -2,8 +2,9 @@
 
 use crate::params::Params;
 pub use crate::stages::cells::CellStats;
+pub use crate::stages::cut::CutStats;
 pub use crate::stages::export::{CoordinateType, MeshStats};
-pub use crate::stages::ingest::IngestStats;
+pub use crate::stages::ingest::{Attribute, IngestStats};
 pub use crate::stages::outliers::OutlierStats;
 pub use crate::stages::repair::RepairStats;
 pub use crate::stages::smooth::RelaxStats;
@@ -26,6 +27,8 @@ pub struct Report {
     pub threads: usize,
     /// Points and files read.
     pub input: IngestStats,
+    /// Columns that the mesh keeps.
+    pub attributes: Vec<Attribute>,
     /// Points with the position of another one, dropped.
     pub duplicates_folded: u64,
     /// Thinning, if requested.
@@ -52,10 +55,15 @@ pub struct Report {
     pub repair: RepairStats,
     /// Holes left open: too long, outlines of the surface, or without a clean triangulation.
     pub holes_left: u64,
+    /// The cut, if the mesh was cropped or divided.
+    pub cut: CutStats,
     /// The mesh.
     pub mesh: MeshStats,
     /// Type of the coordinates in the file.
     pub coordinates: CoordinateType,
+    /// The position of the cloud that is the origin of the mesh's coordinates; none if that is the same as the
+    /// cloud's.
+    pub origin: Option<[f64; 3]>,
     /// Peak resident memory of the process in bytes.
     pub peak_resident_bytes: u64,
     /// Mapped files in resident memory, in bytes: the program's code and its libraries.

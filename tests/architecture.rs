@@ -23,19 +23,27 @@ const MAY_USE: &[(&str, &str)] = &[
     ("method", ""),
     (
         "params",
-        "method stages/ingest stages/smooth stages/spacing stages/surface",
+        "geom method stages/ingest stages/smooth stages/spacing stages/surface",
     ),
     ("pipeline", "geom method params report stages/* workspace"),
     ("report", "params stages/*"),
     ("spill", "workspace"),
+    (
+        "stages/attributes",
+        "stages/blocks stages/ingest stages/order",
+    ),
     ("stages/blocks", ""),
     (
         "stages/cells",
         "kernels stages/blocks stages/order stages/spacing stages/tiles",
     ),
     (
+        "stages/cut",
+        "stages/blocks stages/located stages/order stages/repair stages/surface",
+    ),
+    (
         "stages/export",
-        "stages/blocks stages/order stages/repair stages/surface",
+        "stages/attributes stages/blocks stages/cut stages/ingest stages/order stages/repair stages/surface",
     ),
     ("stages/ingest", ""),
     (

@@ -1,12 +1,13 @@
 //! Command-line arguments.
 
 use crate::method::METHOD;
-use crate::params::{MaxWidth, Method, Params, Radius, Smoothing};
+use crate::params::{MaxWidth, Method, NoRegion, Origin, Params, Radius, Region, Smoothing};
 use crate::pipeline::{Builder, Reconstruction, Start};
-use crate::stages::ingest::Classes;
+use crate::stages::ingest::{Attributes, Classes};
 use crate::workspace::mapped::Io;
 use crate::workspace::{Compression, Storage};
 use clap::Args as ClapArgs;
+use std::io::Read;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -51,7 +52,7 @@ impl Storing {
     }
 }
 
-/// Selection of points by class.
+/// Selection of points by class and region.
 #[derive(Debug, ClapArgs)]
 #[command(next_help_heading = "Points")]
 pub struct Points {
@@ -66,6 +67,32 @@ pub struct Points {
     /// Read only points of these classes (LAS, LAZ), e.g. 2,6 for ground and buildings
     #[arg(long, value_name = "CLASSES", value_delimiter = ',')]
     pub keep_classes: Vec<u8>,
+    /// Only the part inside a region: a box, or polygons in x and y in a file (WKT or GeoJSON). The mesh
+    /// inside is that of the whole cloud, up to the cut
+    #[arg(
+        long,
+        value_name = "MINX,MINY,MAXX,MAXY|FILE",
+        value_parser = region,
+        allow_hyphen_values = true
+    )]
+    pub crop: Option<Region>,
+    /// Width of the margin around the region within which points are read as well, in the cloud's unit
+    /// [default: a twentieth of the region's shorter side]
+    #[arg(long, value_name = "LENGTH", requires = "crop")]
+    pub crop_margin: Option<f64>,
+}
+
+/// Columns that the mesh keeps.
+#[derive(Debug, ClapArgs)]
+#[command(next_help_heading = "Attributes")]
+pub struct Columns {
+    /// Keep the points' own values at the vertices: auto (colours, intensity and classification, unless they are
+    /// the same everywhere), none, or a list of columns by name like color,intensity,gps_time
+    #[arg(long, value_name = "auto|none|LIST", default_value = "none")]
+    pub attributes: Attributes,
+    /// Write colours with 16 bits instead of 8
+    #[arg(long)]
+    pub wide_colors: bool,
 }
 
 /// Selection of points by position.
@@ -90,6 +117,16 @@ pub struct Filters {
 const OUTLIER_FACTOR_TEXT: &str = "5";
 
 impl Points {
+    /// The parameters that select points.
+    pub fn params(&self) -> Params {
+        Params {
+            classes: self.classes(),
+            crop: self.crop.clone(),
+            crop_margin: self.crop_margin,
+            ..Params::default()
+        }
+    }
+
     /// The selected classes.
     pub fn classes(&self) -> Classes {
         let sorted = |classes: &[u8]| {
@@ -166,10 +203,32 @@ pub struct Repair {
     pub no_repair: bool,
 }
 
+/// Coordinates of the mesh.
+#[derive(Debug, ClapArgs)]
+#[command(next_help_heading = "Coordinates")]
+pub struct Coordinates {
+    /// Origin of the mesh's coordinates, for programs that round them to single precision: auto (a round
+    /// position below the cloud, if single precision does not suffice), none (that of the cloud), or a position
+    /// like 635000,848000,0; it is written into the mesh and MESH.origin.json
+    #[arg(
+        long,
+        value_name = "auto|none|X,Y,Z",
+        default_value = "none",
+        allow_hyphen_values = true
+    )]
+    pub origin: Origin,
+    /// Keep points so far from all others that coordinates have to be rounded for them; else they are left out
+    #[arg(long)]
+    pub keep_far: bool,
+    /// Take coordinates as they are if files give different reference systems; the mesh then names none
+    #[arg(long)]
+    pub ignore_crs: bool,
+}
+
 /// The points, the mesh, and what decides it.
 #[derive(Debug, ClapArgs)]
 pub struct Job {
-    /// Files (LAS, LAZ, PLY, XYZ text; also as .gz and .zst) or folders of files; together they are one cloud
+    /// Files (LAS, LAZ, E57, PLY, PCD, PTX, XYZ text; also as .gz and .zst) or folders of files; together they are one cloud
     #[arg(value_name = "INPUT", required = true)]
     pub inputs: Vec<PathBuf>,
     /// The mesh to write: .ply, .obj, .stl or .glb (all but OBJ binary), compressed with .zst behind it
@@ -178,14 +237,22 @@ pub struct Job {
     /// Write a normal for each vertex (PLY, OBJ, GLB)
     #[arg(long)]
     pub normals: bool,
+    /// Write one mesh for each square with this side in x and y, in the cloud's unit: MESH_X_Y.ply, and
+    /// MESH.index.json with a list of them
+    #[arg(long, value_name = "LENGTH")]
+    pub split: Option<f64>,
     #[command(flatten)]
     pub points: Points,
     #[command(flatten)]
     pub filters: Filters,
     #[command(flatten)]
+    pub columns: Columns,
+    #[command(flatten)]
     pub surface: Surface,
     #[command(flatten)]
     pub repair: Repair,
+    #[command(flatten)]
+    pub coordinates: Coordinates,
     /// Points per tile; does not change the result
     #[arg(long, value_name = "N", hide = true)]
     pub tile_points: Option<u32>,
@@ -297,7 +364,7 @@ pub struct Verify {
 /// `outcrop compare`
 #[derive(Debug, ClapArgs)]
 pub struct Compare {
-    /// A mesh (PLY with faces) or a cloud (LAS, LAZ, PLY, XYZ text, or a folder of them)
+    /// A mesh (PLY with faces) or a cloud (LAS, LAZ, E57, PLY, PCD, PTX, XYZ text, or a folder of them)
     #[arg(value_name = "A")]
     pub a: PathBuf,
     /// The mesh or cloud to compare it with
@@ -341,12 +408,18 @@ impl Job {
 
     /// The parameters of the reconstruction.
     pub fn params(&self) -> Params {
+        let selected = self.points.params();
         let usual = match self.surface.method {
             Method::Robust => Params::default(),
             Method::Paper => Params::paper(),
         };
         Params {
-            classes: self.points.classes(),
+            classes: selected.classes,
+            crop: selected.crop,
+            crop_margin: selected.crop_margin,
+            split: self.split,
+            attributes: self.columns.attributes.clone(),
+            wide_colors: self.columns.wide_colors,
             thin: self.filters.thin,
             drop_outliers: self.filters.drop_outliers,
             neighbors: self.surface.neighbors,
@@ -362,6 +435,9 @@ impl Job {
             min_component: self.repair.min_component.or(usual.min_component),
             repair: !self.repair.no_repair,
             normals: self.normals,
+            origin: self.coordinates.origin,
+            keep_far: self.coordinates.keep_far,
+            ignore_crs: self.coordinates.ignore_crs,
             block: self.block_points,
             ..usual
         }
@@ -373,6 +449,22 @@ pub fn size(text: &str) -> Result<u64, String> {
         .parse()
         .map_err(|_| format!("{text:?} is not a size like 512MiB, 4GiB or 2000000000"))?;
     Ok(size.as_u64())
+}
+
+/// A region: numbers, or the name of a file.
+fn region(text: &str) -> Result<Region, String> {
+    if Region::is_numbers(text) {
+        return text.parse().map_err(|e: NoRegion| e.to_string());
+    }
+    // A point cloud given by mistake must not be read as a whole.
+    let limit = Region::LONGEST as u64 + 1;
+    let read = std::fs::File::open(text).and_then(|file| {
+        let mut content = Vec::new();
+        file.take(limit).read_to_end(&mut content).map(|_| content)
+    });
+    let content = read.map_err(|e| format!("neither numbers nor a file that can be read ({e})"))?;
+    let content = String::from_utf8_lossy(&content);
+    content.parse().map_err(|e: NoRegion| e.to_string())
 }
 
 fn time(text: &str) -> Result<Duration, String> {

@@ -31,4 +31,68 @@ impl Lattice {
             (i64::from(p[axis]) + self.base[axis]) as f64 * self.step + self.offset[axis]
         })
     }
+
+    /// The coordinates of a lattice position from a shifted origin, to the nearest `f64`.
+    #[must_use]
+    pub fn shifted(&self, p: Point, shift: &Shift) -> [f64; 3] {
+        // Integers below 2^53 are exact, so the product is the only rounding.
+        self.steps_from(p, shift)
+            .map(|steps| steps as f64 * self.step)
+    }
+
+    /// The coordinates of a lattice position from a shifted origin, to the nearest `f32`.
+    #[must_use]
+    pub fn shifted_single(&self, p: Point, shift: &Shift) -> [f32; 3] {
+        self.steps_from(p, shift)
+            .map(|steps| single_product(steps as f64, self.step))
+    }
+
+    /// Steps from a shifted origin to a lattice position.
+    fn steps_from(&self, p: Point, shift: &Shift) -> [i64; 3] {
+        std::array::from_fn(|axis| i64::from(p[axis]) + self.base[axis] - shift.steps[axis])
+    }
+}
+
+/// A shift of the origin by a whole number of steps along each axis.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Shift {
+    /// Steps from the offset of the lattice to the new origin; fewer than 2^52 from any position.
+    pub steps: [i64; 3],
+    /// The new origin in the input's coordinates.
+    pub origin: [f64; 3],
+}
+
+/// The `f32` nearest to the exact product. Rounding the `f64` product again would round twice.
+fn single_product(a: f64, b: f64) -> f32 {
+    let product = a * b;
+    let rest = a.mul_add(b, -product);
+    // If anything was cut off, an odd last bit keeps the second rounding on the right side: rounding to odd.
+    let is_even = product.to_bits() & 1 == 0;
+    let odd = match rest {
+        0.0 => product,
+        _ if !is_even || !product.is_finite() => product,
+        rest if rest > 0.0 => product.next_up(),
+        _ => product.next_down(),
+    };
+    odd as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn products_are_rounded_once() {
+        // In f64 both products are exactly between two floats, in truth they are beside it.
+        let (between, next) = (16_777_217.0, 16_777_219.0);
+        let (above, below) = (between / 3.0, next / 3.0);
+        assert_eq!((3.0 * above, 3.0 * below), (between, next));
+        assert_eq!(single_product(3.0, above), 16_777_218.0);
+        assert_eq!(single_product(-3.0, above), -16_777_218.0);
+        assert_eq!(single_product(3.0, below), 16_777_218.0);
+        assert_eq!(single_product(between, 1.0), 16_777_216.0);
+        assert_eq!(single_product(3.0, 0.1), 0.3);
+        assert_eq!(single_product(0.0, 0.01), 0.0);
+        assert_eq!(single_product(1e300, 1e300), f32::INFINITY);
+    }
 }

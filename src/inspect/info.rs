@@ -6,7 +6,7 @@ use crate::method::METHOD;
 use crate::params::Params;
 use crate::pipeline::Known;
 use crate::stages::cells::{CellMaker, DiskRadius, Widen};
-use crate::stages::ingest::{Classes, CoordinateType, IngestStats, ingest_classes};
+use crate::stages::ingest::{Attributes, CoordinateType, IngestStats, ingest_selected};
 use crate::stages::order::{PAGE, PointStore, order};
 use crate::stages::tiles::Tile;
 use crate::stages::tiles::near::Search;
@@ -66,16 +66,17 @@ pub struct Info {
     pub seconds: f64,
 }
 
-/// Reads the whole cloud (or the points of the given classes) once, and samples it.
+/// Reads the cloud once, as far as it is selected by `params`, and samples it.
 ///
 /// # Errors
 /// As for a reconstruction, but a cloud that is too small for a surface is no error.
-pub fn info(inputs: &[PathBuf], classes: &Classes, workspace: &Workspace) -> Result<Info> {
+pub fn info(inputs: &[PathBuf], params: &Params, workspace: &Workspace) -> Result<Info> {
     let start = Instant::now();
     let observer = &workspace.observer;
     observer.begin("ingest", "points", 0);
-    let headers = Known::from_headers(inputs);
-    let spool = ingest_classes(inputs, classes, workspace)?;
+    let headers = Known::from_headers(inputs, &Attributes::None);
+    let mut spool = ingest_selected(inputs, &params.selection(), workspace)?;
+    spool.drop_far(workspace)?;
     observer.end();
     let input = spool.stats().clone();
     let lattice = spool.choose_lattice(0)?;
@@ -96,6 +97,7 @@ pub fn info(inputs: &[PathBuf], classes: &Classes, workspace: &Workspace) -> Res
         spool: spool_bytes,
         decompressed: headers.map_or(0, |known| known.decompressed),
         points,
+        values: 0,
         double: Some(double),
         moved: None,
         text: None,
@@ -179,11 +181,56 @@ fn percentiles(mut lengths: Vec<f64>, step: f64) -> Percentiles {
     }
 }
 
+/// Most positions of scanners in the text; the report has all.
+const MOST_SCANNERS: usize = 8;
+
+/// The number of scanners and their positions; none without any.
+fn shown(scanners: &[[f64; 3]]) -> Option<String> {
+    let position = |[x, y, z]: &[f64; 3]| format!("{x} {y} {z}");
+    let some = scanners.iter().take(MOST_SCANNERS).map(position);
+    let some: Vec<String> = some.collect();
+    let more = if scanners.len() > some.len() {
+        "; …"
+    } else {
+        ""
+    };
+    let count = match scanners.len() {
+        0 => return None,
+        1 => "1 scanner position".to_owned(),
+        many => format!("{many} scanner positions"),
+    };
+    Some(format!("{count}: {}{more}", some.join("; ")))
+}
+
+impl Info {
+    /// The columns of all files, for `--attributes`.
+    fn columns(&self) -> String {
+        let mut names: Vec<&str> = Vec::new();
+        for name in self.input.files.iter().flat_map(|file| &file.columns) {
+            if !names.contains(&name.as_str()) {
+                names.push(name);
+            }
+        }
+        match names.is_empty() {
+            true => "none".to_owned(),
+            false => names.join(", "),
+        }
+    }
+}
+
 impl fmt::Display for Info {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for file in &self.input.files {
             let path = file.path.display();
-            writeln!(f, "{path}: {}, {} points", file.format, file.points)?;
+            write!(f, "{path}: {}, {} points", file.format, file.points)?;
+            // If it is not that of all.
+            if let (None, Some(crs)) = (&self.input.crs, &file.crs) {
+                write!(f, ", {} ({})", crs.line(), crs.source)?;
+            }
+            writeln!(f)?;
+            if let Some(shown) = shown(&file.scanners) {
+                writeln!(f, "  {shown}")?;
+            }
         }
         let three = |p: &[f64; 3]| format!("{} {} {}", p[0], p[1], p[2]);
         let spread =
@@ -191,9 +238,21 @@ impl fmt::Display for Info {
         let mib = |bytes: u64| format!("{} MiB", bytes.div_ceil(1 << 20));
         let input = &self.input;
         let left_out = format!(
-            "{} duplicates, {} not finite, {} withheld, {} of other classes",
-            self.duplicates, input.dropped_non_finite, input.withheld, input.dropped_by_class
+            "{} duplicates, {} not finite, {} withheld, {} invalid, {} of other classes, {} far away, {} outside \
+             the region",
+            self.duplicates,
+            input.dropped_non_finite,
+            input.withheld,
+            input.invalid,
+            input.dropped_by_class,
+            input.dropped_far,
+            input.dropped_by_crop
         );
+        let system = match &input.crs {
+            Some(crs) => format!("{} ({})", crs.line(), crs.source),
+            None if input.files.iter().any(|file| file.crs.is_some()) => "different ones".into(),
+            None => "not given".into(),
+        };
         let rounding = if self.lattice_exact {
             "exact"
         } else {
@@ -205,6 +264,8 @@ impl fmt::Display for Info {
                 format!("{} distinct of {} read", self.points, input.read),
             ),
             ("left out", left_out),
+            ("columns", self.columns()),
+            ("system", system),
             ("lowest", three(&self.min)),
             ("highest", three(&self.max)),
             (

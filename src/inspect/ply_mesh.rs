@@ -116,6 +116,37 @@ impl PlyMesh {
         self.stream.vertices_first()
     }
 
+    /// The position of the cloud that is the origin of the mesh's coordinates, if its header gives one.
+    #[must_use]
+    pub fn origin(&self) -> Option<[f64; 3]> {
+        self.stream.place().origin()
+    }
+
+    /// The map of positions in the file to the coordinates of the cloud.
+    pub fn place(&self) -> impl Fn([f64; 3]) -> [f64; 3] + use<> {
+        let (place, types) = (self.stream.place(), self.stream.types());
+        move |position| match types {
+            Some(types) => place.position(position, types),
+            None => position,
+        }
+    }
+
+    /// As [`PlyMesh::read`], with the coordinates of the cloud instead of those from the mesh's origin.
+    ///
+    /// # Errors
+    /// See [`PlyMesh::read`].
+    pub fn read_in_place(self, sink: &mut impl Sink) -> Result<()> {
+        if self.origin().is_none() {
+            return self.read(sink);
+        }
+        let (place, positions) = (self.place(), Vec::with_capacity(SLICE));
+        self.read(&mut InPlace {
+            sink,
+            place,
+            positions,
+        })
+    }
+
     /// Reads the whole mesh.
     ///
     /// # Errors
@@ -129,6 +160,30 @@ impl PlyMesh {
         };
         let read = self.stream.read(|part| take(part).map_err(Failure));
         read.map_err(converted)
+    }
+}
+
+/// Passes on positions with the coordinates of the cloud.
+struct InPlace<'a, S, P> {
+    sink: &'a mut S,
+    place: P,
+    positions: Vec<[f64; 3]>,
+}
+
+impl<S: Sink, P: Fn([f64; 3]) -> [f64; 3]> Sink for InPlace<'_, S, P> {
+    fn vertices(&mut self, positions: &[[f64; 3]]) -> Result<()> {
+        self.positions.clear();
+        self.positions
+            .extend(positions.iter().map(|p| (self.place)(*p)));
+        self.sink.vertices(&self.positions)
+    }
+
+    fn triangles(&mut self, triangles: &[[u32; 3]]) -> Result<()> {
+        self.sink.triangles(triangles)
+    }
+
+    fn non_triangles(&mut self, count: u64) -> Result<()> {
+        self.sink.non_triangles(count)
     }
 }
 

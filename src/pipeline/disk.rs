@@ -15,7 +15,7 @@ use crate::geom::lattice::Lattice;
 use crate::params::{Method, Params};
 use crate::report::DiskEstimate;
 use crate::stages::export::{self, CoordinateType, Mesh};
-use crate::stages::ingest::{self, Probe, Spool};
+use crate::stages::ingest::{self, Attributes, Column, Probe, Spool};
 use crate::stages::order::StoredPoints;
 use std::path::{Path, PathBuf};
 
@@ -26,6 +26,9 @@ const POSITION: f64 = 12.0;
 /// Bytes of a position in an ordered store. Measured: 4 to 8 for scans, 8.4 to 9.4 for coordinates of full
 /// precision, fewer the more points there are.
 const STORED: f64 = 8.5;
+
+/// Bytes of the key of a position, packed, beside values on their way.
+const SENT: f64 = 6.0;
 
 /// Scratch bytes per triple at the peak: two copies, packed. Measured: 7.4 where nearly all are triangles,
 /// 8.5 where most are candidates.
@@ -48,6 +51,8 @@ pub(crate) struct Known {
     pub decompressed: u64,
     /// Points that remain.
     pub points: u64,
+    /// Bytes of the values that a point keeps.
+    pub values: u64,
     /// True if the mesh has coordinates in double precision; none if unknown.
     pub double: Option<bool>,
     /// True if points moved in relaxing; none if unknown.
@@ -90,12 +95,13 @@ const DECIMALS: usize = 3;
 impl Known {
     /// The properties in the headers of the inputs. They may be wrong, but cannot exceed the sizes of the
     /// files.
-    pub fn from_headers(inputs: &[PathBuf]) -> Option<Self> {
+    pub fn from_headers(inputs: &[PathBuf], attributes: &Attributes) -> Option<Self> {
         let mut known = Self {
             read: 0,
             spool: 0,
             decompressed: 0,
             points: 0,
+            values: 0,
             double: None,
             moved: None,
             text: None,
@@ -105,7 +111,9 @@ impl Known {
             let probe = ingest::probe(&path).ok()?;
             let points = probe.points_likely;
             known.read += points;
-            known.spool += points * probe.spool_bytes_per_point;
+            let values = probe.value_bytes(attributes);
+            known.values = known.values.max(values);
+            known.spool += points * (probe.spool_bytes_per_point + values);
             known.decompressed = known.decompressed.max(probe.decompressed_bytes);
             probes.push(probe);
         }
@@ -123,10 +131,11 @@ impl Known {
         export::check_size(output, &self.mesh(params, coordinates), true)
     }
 
-    /// Warnings about what the format of `output` leaves out.
+    /// Warnings about what the format of `output` leaves out, of points with these columns.
     pub fn left_out(
         &self,
         params: &Params,
+        columns: &[Column],
         coordinates: CoordinateType,
         output: &Path,
     ) -> Result<Vec<String>> {
@@ -135,7 +144,9 @@ impl Known {
             .as_flattened()
             .iter()
             .fold(0.0, |m: f64, x| m.max(x.abs()));
-        export::left_out(output, &self.mesh(params, coordinates), largest)
+        let mut mesh = self.mesh(params, coordinates);
+        mesh.columns.extend(columns.iter().map(Into::into));
+        export::left_out(output, &mesh, largest)
     }
 
     /// The mesh that is expected.
@@ -162,6 +173,12 @@ impl Known {
         // While points are read and sorted they are on disk twice.
         let early = self.spool as f64 + STORED * points;
         let mut early = early.max((self.spool + self.decompressed) as f64);
+        let (read, values) = (self.read as f64, self.values as f64);
+        if self.values > 0 {
+            // The spool stays until the values are in the order of ids.
+            early = early.max(self.spool as f64 + POSITION * read);
+            early = early.max(self.spool as f64 + STORED * points + (SENT + values) * read);
+        }
         if params.thin.is_some() {
             early = early.max(self.spool as f64 + 2.0 * POSITION * self.read as f64);
         }
@@ -171,16 +188,19 @@ impl Known {
         if params.relax > 1 {
             early = early.max(STORED * (1.0 + 2.0 * moved) * points);
         }
-        let late = (stores + TRIPLE * triples) * points;
+        let late = (stores + values + TRIPLE * triples) * points;
         let small = |bytes: f64| bytes + SMALL.0 * points + SMALL.1;
-        let mesh = |coordinates| export::mesh_bytes(output, &self.mesh(params, coordinates)) as f64;
+        let mesh = |coordinates| {
+            let bytes = export::mesh_bytes(output, &self.mesh(params, coordinates));
+            bytes as f64 + values * points
+        };
         let output = match self.double {
             Some(false) => mesh(CoordinateType::Float),
             Some(true) => mesh(CoordinateType::Double),
             None => (mesh(CoordinateType::Float) + mesh(CoordinateType::Double)) / 2.0,
         };
         let scratch = small(early.max(late));
-        let export = small((stores + EXPORT) * points) + output;
+        let export = small((stores + values + EXPORT) * points) + output;
         DiskEstimate {
             scratch: scratch as u64,
             output: output as u64,
@@ -233,6 +253,7 @@ mod tests {
         spool: 12_000_000,
         decompressed: 0,
         points: 1_000_000,
+        values: 0,
         double: Some(false),
         moved: None,
         text: None,
@@ -268,9 +289,9 @@ mod tests {
         let header = "ply\nformat binary_little_endian 1.0\nelement vertex 1000000000000\n\
             property float x\nproperty float y\nproperty float z\nend_header\n";
         std::fs::write(&path, [header.as_bytes(), &[0; 1200]].concat()).unwrap();
-        let known = Known::from_headers(&[path]);
+        let known = Known::from_headers(&[path], &Attributes::None);
         assert!(known.is_none_or(|known| known.points < 200), "{known:?}");
-        assert!(Known::from_headers(&[folder.path().join("nothing")]).is_none());
+        assert!(Known::from_headers(&[folder.path().join("nothing")], &Attributes::None).is_none());
     }
 
     /// An uncompressed LAS 1.2 file of 100 points with steps of 1 cm.
@@ -303,7 +324,9 @@ mod tests {
         let text = file("text.xyz", b"1.25 2.5 3\n4 5.5 6\n");
         let double = |paths: &[&PathBuf]| {
             let paths: Vec<PathBuf> = paths.iter().map(|path| (*path).clone()).collect();
-            Known::from_headers(&paths).unwrap().double
+            Known::from_headers(&paths, &Attributes::None)
+                .unwrap()
+                .double
         };
         assert_eq!(double(&[&near]), Some(false));
         assert_eq!(double(&[&far]), Some(true));

@@ -14,7 +14,7 @@ use std::os::unix::fs::{FileExt, MetadataExt};
 use std::path::{Path, PathBuf};
 
 /// The format of scratch folders that this program writes and reads.
-const FORMAT: u32 = 6;
+const FORMAT: u32 = 7;
 
 /// Bytes of each sample of an input.
 const SAMPLE: u64 = 64 << 10;
@@ -114,7 +114,13 @@ pub(super) struct Manifest {
 impl Manifest {
     /// Makes the manifest of a run; samples every input.
     pub fn of(job: &Reconstruction) -> Result<Self> {
-        let files = ingest::expand(&job.inputs)?;
+        let mut files = ingest::expand(&job.inputs)?;
+        // What they say is in the mesh.
+        let beside = files.iter().map(|file| ingest::prj_of(file));
+        let mut beside: Vec<PathBuf> = beside.filter(|path| path.is_file()).collect();
+        beside.sort();
+        beside.dedup();
+        files.extend(beside);
         Ok(Self {
             format: FORMAT,
             version: env!("CARGO_PKG_VERSION").into(),

@@ -1,7 +1,7 @@
 //! A run that tasks share, perhaps on several machines: its plan, the work of a task, and the work between
 //! two generations of tasks. [`crate::workspace::generations`] has the files.
 
-use super::checks::{all_are_kept, not_an_input, writable};
+use super::checks::{all_are_kept, not_an_input, one_system, writable};
 use super::manifest::Manifest;
 use super::{Builder, Known, Reconstruction};
 use crate::error::{Error, Result};
@@ -86,8 +86,9 @@ impl Reconstruction {
             });
         }
         writable(&self.output)?;
-        not_an_input(&self.output, &self.inputs)?;
-        let headers = Known::from_headers(&self.inputs);
+        not_an_input(&self.output, self.params.split.is_some(), &self.inputs)?;
+        one_system(&self.params, &self.inputs)?;
+        let headers = Known::from_headers(&self.inputs, &self.params.attributes);
         if let Some(known) = headers.filter(|_| all_are_kept(&self.params)) {
             known.fits(&self.params, &self.output)?;
         }
@@ -259,6 +260,9 @@ impl Reconstruction {
         let Some(name) = Path::new(&name).file_name().and_then(|name| name.to_str()) else {
             return;
         };
+        if self.params.split.is_some() {
+            export::remove_unfinished(&self.output);
+        }
         let beside = std::fs::read_dir(export::folder_of(&self.output)).into_iter();
         for entry in beside.flatten().flatten() {
             let number = entry

@@ -1,6 +1,8 @@
 //! The stages of a run: each with its parameters, its part of the report, and the check of disk space for the
 //! following stages.
 
+mod export;
+
 use super::checks::{all_are_kept, disk_radius, enough, not_a_line, room};
 use super::disk::Text;
 use super::{Clock, Known, Reconstruction};
@@ -9,10 +11,12 @@ use crate::geom::lattice::Lattice;
 use crate::method::METHOD;
 use crate::params::Method;
 use crate::report::{LatticeReport, Report};
+use crate::stages::attributes::{StoredColumns, attributes};
 use crate::stages::blocks::Blocks;
 use crate::stages::cells::{CellTriples, DiskRadius, TileRanges, Widen, cells};
-use crate::stages::export::{CoordinateType, ExportOptions, export};
-use crate::stages::ingest::{self, Spool, ingest_classes};
+use crate::stages::cut::{CutOptions, StoredPieces, cut};
+use crate::stages::export::CoordinateType;
+use crate::stages::ingest::{Carried, Spool, ingest_selected};
 use crate::stages::located::Places;
 use crate::stages::order::{Orderer, PointStore, StoredPoints, order, sample_sort};
 use crate::stages::outliers::{OutlierOptions, drop_outliers};
@@ -23,6 +27,7 @@ use crate::stages::stitch::{StitchOptions, Stitched, stitch};
 use crate::stages::thin::{Grid, LeftOut, thin};
 use crate::stages::triples::{Triples, triples};
 use crate::workspace::{Workspace, limits};
+use export::written;
 use std::time::Instant;
 
 /// The positions that decide which points are connected, if they are not those of the mesh, and the local
@@ -40,16 +45,22 @@ pub(super) struct Stages<'a> {
     clock: Clock<'a>,
     begin: Instant,
     known: Known,
+    carried: Carried,
     report: Report,
+    /// Step of the lattice before it was refined.
+    coarse: f64,
+    /// Well-known text of the reference system.
+    wkt: Option<String>,
 }
 
 impl<'a> Stages<'a> {
     /// Begins with the estimate of disk space from the headers of the inputs.
     pub fn begin(job: &'a Reconstruction, workspace: &'a Workspace) -> Result<Self> {
         // A task leaves the check of disk space to the process that began its generation.
-        let headers = match workspace.is_task() {
+        // With a region, headers do not tell how many points there will be.
+        let headers = match workspace.is_task() || job.params.crop.is_some() {
             true => None,
-            false => Known::from_headers(&job.inputs),
+            false => Known::from_headers(&job.inputs, &job.params.attributes),
         };
         let first = headers.map(|known| known.estimate(&job.params, &job.output));
         if let Some(known) = headers.filter(|_| all_are_kept(&job.params)) {
@@ -61,6 +72,9 @@ impl<'a> Stages<'a> {
             clock: Clock::new(workspace),
             begin: Instant::now(),
             known: headers.unwrap_or_default(),
+            carried: Carried::default(),
+            coarse: 0.0,
+            wkt: None,
             report: Report {
                 version: env!("CARGO_PKG_VERSION"),
                 parameters: job.params.clone(),
@@ -103,29 +117,42 @@ impl<'a> Stages<'a> {
     pub fn ingest(&mut self) -> Result<(Spool, Lattice)> {
         let (job, workspace) = (self.job, self.workspace);
         let params = &job.params;
+        let selection = params.selection();
         let spool = self.clock.stage("ingest", "points", 0, || {
-            ingest_classes(&job.inputs, &params.classes, workspace)
+            let mut spool = ingest_selected(&job.inputs, &selection, workspace)?;
+            if !params.keep_far {
+                spool.drop_far(workspace)?;
+            }
+            Ok(spool)
         })?;
+        self.carried = spool.carried(&params.attributes, params.wide_colors);
+        self.report.attributes = self.carried.attributes.clone();
         let input = spool.stats().clone();
-        self.report.coordinates = match spool.source_precision() {
-            ingest::CoordinateType::F32 => CoordinateType::Float,
-            ingest::CoordinateType::F64 => CoordinateType::Double,
-        };
+        if let Some(mixed) = input.mixed.as_ref().filter(|_| !params.ignore_crs) {
+            return Err(mixed.refused());
+        }
+        self.wkt = spool.wkt().map(str::to_owned);
+        self.report.coordinates = written(spool.source_precision());
         self.known = Known {
             read: input.kept,
             spool: spool.bytes(),
             decompressed: 0,
             // With thinning, the number of points that stay is unknown.
             points: if params.thin.is_some() { 0 } else { input.kept },
+            values: self.carried.bytes() as u64,
             double: Some(self.report.coordinates == CoordinateType::Double),
             moved: None,
             text: None,
         };
         workspace.note_points(input.kept);
+        let narrow = params.narrow_margin(&input);
         self.report.input = input;
+        narrow.into_iter().for_each(|warning| self.warn(warning));
         self.check_room()?;
         let moves = params.smooth + params.relax > 0;
         let lattice = spool.choose_lattice(if moves { METHOD.smoothing.halvings } else { 0 })?;
+        self.coarse = spool.choose_lattice(0)?.step;
+        self.check_origin(&lattice)?;
         self.report.lattice = LatticeReport {
             step: lattice.step,
             exact: lattice.exact,
@@ -166,13 +193,19 @@ impl<'a> Stages<'a> {
             store
         };
         let text = Text::of(spool, lattice, &job.params, &store)?;
-        spool.release(workspace)?;
+        if self.carried.columns.is_empty() {
+            spool.release(workspace)?;
+        }
         self.warn_of_input(lattice);
         enough(&store)?;
         self.known.points = store.len() as u64;
         self.known.text = Some(text);
         let coordinates = self.report.coordinates;
-        for warning in self.known.left_out(&job.params, coordinates, &job.output)? {
+        let columns = &self.carried.columns;
+        let warnings = self
+            .known
+            .left_out(&job.params, columns, coordinates, &job.output)?;
+        for warning in warnings {
             self.warn(warning);
         }
         workspace.note_points(self.known.points);
@@ -184,12 +217,20 @@ impl<'a> Stages<'a> {
     fn warn_of_input(&mut self, lattice: &Lattice) {
         let input = &self.report.input;
         let (kept, left_out) = (input.kept, input.dropped_non_finite);
-        for warning in input.warnings.clone() {
+        let warnings = [input.warnings.clone(), self.carried.warnings.clone()];
+        for warning in warnings.concat() {
             self.warn(warning);
         }
         if left_out > 0 {
             self.warn(format!(
                 "{left_out} points left out: a coordinate is NaN or infinite"
+            ));
+        }
+        let far = (self.report.input.dropped_far, self.report.input.far_example);
+        if let (count, Some([x, y, z])) = far {
+            self.warn(format!(
+                "{count} points left out, far from all others (one at {x} {y} {z}): with --keep-far they \
+                 are kept, and all are rounded to coarser steps"
             ));
         }
         let folded = self.report.duplicates_folded;
@@ -221,6 +262,26 @@ impl<'a> Stages<'a> {
         self.report.outliers = stats;
         self.report.points = store.len() as u64;
         Ok(store)
+    }
+
+    /// The columns of the points that remain, if the mesh keeps any.
+    pub fn attributes(
+        &mut self,
+        spool: &Spool,
+        lattice: &Lattice,
+        store: &StoredPoints,
+    ) -> Result<Option<StoredColumns>> {
+        if self.carried.columns.is_empty() {
+            return Ok(None);
+        }
+        let (workspace, blocks, carried) = (self.workspace, self.blocks(), &self.carried);
+        let columns = self
+            .clock
+            .stage("attributes", "points", spool.points(), || {
+                attributes(spool, lattice, carried, store, blocks, workspace)
+            })?;
+        spool.release(workspace)?;
+        Ok(Some(columns))
     }
 
     /// The radius of the disks; a percentage refers to the points before smoothing.
@@ -389,27 +450,30 @@ impl<'a> Stages<'a> {
         Ok(repaired)
     }
 
-    /// Writes the mesh.
-    pub fn export(
+    /// Cuts the surface, if requested.
+    pub fn cut(
         &mut self,
         store: &PointStore,
         repaired: &Repaired,
         lattice: &Lattice,
-    ) -> Result<()> {
-        let (job, workspace, blocks) = (self.job, self.workspace, self.blocks());
-        let options = ExportOptions {
-            output: &job.output,
-            coordinates: self.report.coordinates,
-            comments: Vec::new(),
-            origin: None,
-            normals: job.params.normals,
-            decimals: self.known.text.map_or(0, |text| text.decimals),
+    ) -> Result<Option<StoredPieces>> {
+        let (params, workspace, blocks) = (&self.job.params, self.workspace, self.blocks());
+        let options = CutOptions {
+            region: params.crop.as_ref(),
+            side: params.split,
+            normals: params.normals,
         };
+        if options.region.is_none() && options.side.is_none() {
+            return Ok(None);
+        }
+        workspace.trim();
         let items = 2 * blocks.count() as u64;
-        self.report.mesh = self.clock.stage("export", "blocks", items, || {
-            export(store, repaired, blocks, lattice, options, workspace)
+        let (pieces, stats) = self.clock.stage("cut", "blocks", items, || {
+            cut(store, repaired, blocks, lattice, options, workspace)
         })?;
-        Ok(())
+        repaired.release(workspace)?;
+        self.report.cut = stats;
+        Ok(Some(pieces))
     }
 
     /// The report of the run.

@@ -5,7 +5,7 @@
 
 use super::Row;
 use super::table::{append_packed, read_rows};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::workspace::file::ScratchFile;
 use crate::workspace::memory::{Reservation, bytes_of};
 use crate::workspace::place::Place;
@@ -212,6 +212,13 @@ impl<R: Row> Inbox<R> {
         Ok(rows)
     }
 
+    /// An error if rows that a receiver needs were not sent.
+    #[must_use]
+    pub fn missing(&self, receiver: usize, expected: &str) -> Error {
+        let found = format!("{} rows for {receiver}", self.rows(receiver));
+        self.file.damaged(0, 0, found, expected.to_owned())
+    }
+
     /// Number of rows for which there is room in memory: all, unless the index is damaged.
     fn fitting(&self, receiver: usize) -> usize {
         let bytes: usize = self.of(receiver).iter().map(|(_, place)| place.bytes).sum();
@@ -222,7 +229,6 @@ impl<R: Row> Inbox<R> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::error::Error;
 
     #[test]
     fn delivers_sorted_to_each_receiver() {

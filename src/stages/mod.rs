@@ -21,6 +21,8 @@ pub mod thin;
 
 pub mod outliers;
 
+pub mod attributes;
+
 pub mod smooth;
 pub mod spacing;
 
@@ -31,6 +33,8 @@ pub mod triples;
 pub mod stitch;
 
 pub mod repair;
+
+pub mod cut;
 
 pub mod export;
 

@@ -1,14 +1,17 @@
 //! Whole runs, through the library and through the program. One test binary, to link only once.
 
+mod attributes;
 mod bad_input;
 mod cli;
 mod compressed;
+mod coordinates;
 mod determinism;
 mod filters;
 mod library;
 mod odd;
 mod outdoor;
 mod outputs;
+mod regions;
 mod report;
 mod scans;
 mod stop;

@@ -4,11 +4,16 @@ mod belong;
 mod bench;
 mod bombs;
 mod classes;
+mod columns;
 mod damage;
+mod far;
 mod formats;
 mod lattices;
 mod numbers;
 mod ply_headers;
+mod regions;
+mod scan_columns;
+mod scans;
 
 use bench::{Bench, based, cloud, ply, positions, write_las};
 use outcrop::Error;

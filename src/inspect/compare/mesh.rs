@@ -44,12 +44,12 @@ pub(super) fn read(
     if small {
         let _held = workspace.reserve("compare: vertices", bytes)?;
         let mut direct = Direct::new(reading)?;
-        mesh.read(&mut direct)?;
+        mesh.read_in_place(&mut direct)?;
         observer.end();
         direct.finish()
     } else {
         let mut joined = Joined::new(reading)?;
-        mesh.read(&mut joined)?;
+        mesh.read_in_place(&mut joined)?;
         observer.end();
         joined.finish()
     }

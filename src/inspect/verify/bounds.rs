@@ -1,6 +1,6 @@
 //! The box around a mesh.
 
-/// Smallest box around all vertices with finite coordinates, in the units of the file.
+/// Smallest box around all vertices with finite coordinates, in the coordinates of the cloud.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Bounds {
     /// Lowest coordinates.

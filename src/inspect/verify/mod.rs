@@ -65,7 +65,18 @@ pub fn verify_with(mesh: &Path, options: &Options, workspace: &Workspace) -> Res
 
 fn check(mesh: PlyMesh, plan: &Plan, options: &Options, workspace: &Workspace) -> Result<Verdict> {
     let _held = plan.reserve(workspace)?;
+    let (origin, place) = (mesh.origin(), mesh.place());
     let intake = intake::read(mesh, plan, workspace)?;
     let verdict = workspace.install(|| sweep::run(intake, plan, workspace))?;
+    // Areas are judged by the coordinates in the file, which are exact.
+    let bounds = verdict.bounds.map(|Bounds { min, max }| Bounds {
+        min: place(min),
+        max: place(max),
+    });
+    let verdict = Verdict {
+        bounds,
+        origin,
+        ..verdict
+    };
     Ok(verdict.judged(options))
 }

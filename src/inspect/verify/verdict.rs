@@ -54,8 +54,11 @@ pub struct Verdict {
     /// Handles, summed over all components, each boundary loop taken as filled by a disk. Absent
     /// without triangles, and if the mesh is not an oriented manifold.
     pub genus: Option<u64>,
-    /// Box around the finite vertices; absent if there is none.
+    /// Box around the finite vertices, in the coordinates of the cloud; absent if there is none.
     pub bounds: Option<Bounds>,
+    /// The position of the cloud that is the origin of the coordinates in the file; absent if the header gives
+    /// none.
+    pub origin: Option<[f64; 3]>,
 }
 
 impl Verdict {
@@ -140,6 +143,12 @@ impl fmt::Display for Verdict {
                 self.unreferenced_vertices,
             );
             writeln!(f, "{name:<40}{count:>14}")?;
+        }
+        if let Some([x, y, z]) = self.origin {
+            writeln!(
+                f,
+                "origin  {x} {y} {z}  (the box is in the cloud's coordinates)"
+            )?;
         }
         match self.bounds {
             Some(Bounds { min, max }) => {

@@ -1,5 +1,6 @@
 //! The interface of mesh formats.
 
+use crate::stages::ingest::Column;
 use outcrop_ply::Scalar;
 
 /// Type of the coordinates in the file.
@@ -151,6 +152,15 @@ pub fn normal_columns() -> impl Iterator<Item = VertexColumn> {
         name: name.to_owned(),
         scalar: Scalar::F32,
     })
+}
+
+impl From<&Column> for VertexColumn {
+    fn from(column: &Column) -> Self {
+        Self {
+            name: column.name.clone(),
+            scalar: column.scalar,
+        }
+    }
 }
 
 /// A column of the vertices, such as `red`.

@@ -2,6 +2,8 @@
 
 use super::crs::Crs;
 use super::stats::FileStats;
+use crate::error::Error;
+use std::path::{Path, PathBuf};
 
 /// A warning is given if one file's point spacing and box are both this many times those of another: it may
 /// be in another unit. A small piece of a survey has a small box but no smaller spacing.
@@ -13,26 +15,95 @@ const FEWEST: u64 = 100;
 /// A warning is given if a gap between files exceeds this many times the extent of the largest file.
 const FARTHER: f64 = 100.0;
 
-/// At most one warning about reference systems, and one about sizes or places.
-pub(super) fn warnings(files: &[FileStats], systems: &[Option<Crs>]) -> Vec<String> {
+/// At most one warning, about sizes or places.
+pub(super) fn warnings(files: &[FileStats]) -> Vec<String> {
     let boxes: Vec<Extent<'_>> = files.iter().filter_map(Extent::of).collect();
     let places = far_apart(&boxes).or_else(|| unlike_sizes(&boxes));
-    let systems = unlike_systems(files, systems);
-    systems.into_iter().chain(places).collect()
+    places.into_iter().collect()
 }
 
-/// A warning with the first file that has a reference system, and the first file with a different one.
-fn unlike_systems(files: &[FileStats], systems: &[Option<Crs>]) -> Option<String> {
-    let mut known = files
-        .iter()
-        .zip(systems)
-        .filter_map(|(f, s)| Some((f, s.as_ref()?)));
-    let (first, system) = known.next()?;
-    let (other, another) = known.find(|(_, s)| s.differs(system))?;
+/// Two files with different reference systems.
+#[derive(Debug, Clone)]
+pub struct Mixed {
+    /// A file, and its system.
+    first: (PathBuf, String),
+    /// Another file, and its system.
+    other: (PathBuf, String),
+}
+
+impl Mixed {
+    /// The error for a cloud that must have one system.
+    #[must_use]
+    pub fn refused(&self) -> Error {
+        let ((first, system), (other, another)) = (&self.first, &self.other);
+        let expected = format!(
+            "{system}, that of {}; --ignore-crs takes coordinates as they are",
+            first.display()
+        );
+        Error::input(other, "reference system", another, expected)
+    }
+
+    /// The warning for a cloud that may have several.
+    pub(super) fn warning(&self) -> String {
+        let ((first, system), (other, another)) = (&self.first, &self.other);
+        format!(
+            "{}: its reference system is {another}, that of {} is {system}; coordinates are taken as they \
+             are, in no system",
+            other.display(),
+            first.display()
+        )
+    }
+}
+
+/// The reference systems of several files: one of each kind that may be the same as the others, so that few
+/// texts are in memory.
+#[derive(Debug, Default)]
+pub(super) struct Systems {
+    known: Vec<(PathBuf, Crs)>,
+    mixed: Option<Mixed>,
+}
+
+impl Systems {
+    /// Takes the system of a file.
+    pub(super) fn add(&mut self, path: &Path, crs: Crs) {
+        if self.mixed.is_some() {
+            return;
+        }
+        if let Some((first, system)) = self.known.iter().find(|(_, known)| known.differs(&crs)) {
+            self.mixed = Some(Mixed {
+                first: (first.clone(), system.to_string()),
+                other: (path.to_path_buf(), crs.to_string()),
+            });
+            return;
+        }
+        match self.known.iter_mut().find(|(_, known)| known.is_like(&crs)) {
+            Some((_, known)) if crs.rank() < known.rank() => *known = crs,
+            Some(_) => {}
+            None => self.known.push((path.to_path_buf(), crs)),
+        }
+    }
+
+    /// The system that tells most; two files if theirs are different.
+    pub(super) fn common(self) -> Result<Option<Crs>, Mixed> {
+        match self.mixed {
+            Some(mixed) => Err(mixed),
+            None => {
+                let known = self.known.into_iter().map(|(_, crs)| crs);
+                Ok(known.min_by_key(Crs::rank))
+            }
+        }
+    }
+}
+
+/// A warning if some files have no reference system, and others have this one.
+pub(super) fn without(files: &[FileStats], crs: &Crs) -> Option<String> {
+    let mut without = files.iter().filter(|file| file.crs.is_none());
+    let first = without.next()?;
+    let count = 1 + without.count();
+    let all = files.len();
     Some(format!(
-        "{}: its reference system is {another}, that of {} is {system}; coordinates are taken as they \
-         are, is that meant?",
-        other.path.display(),
+        "{}: it gives no reference system, as {count} of {all} files; that of the others, {crs}, is taken for \
+         all",
         first.path.display()
     ))
 }
@@ -132,19 +203,26 @@ mod tests {
             path: name.into(),
             format: Format::LAS,
             bytes: 0,
+            columns: Vec::new(),
             claimed: None,
             points: kept,
             kept,
             dropped_non_finite: 0,
             withheld: 0,
+            invalid: 0,
             dropped_by_class: 0,
+            dropped_by_crop: 0,
+            skipped_by_crop: 0,
+            dropped_far: 0,
             min: (kept > 0).then_some(min),
             max: (kept > 0).then_some(max),
+            scanners: Vec::new(),
+            crs: None,
         }
     }
 
     fn said(files: &[FileStats]) -> Vec<String> {
-        warnings(files, &vec![None; files.len()])
+        warnings(files)
     }
 
     /// A square of side `side` with a corner at `x`, `y` and points `spacing` apart.

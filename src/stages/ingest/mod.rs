@@ -4,46 +4,69 @@
 //! precision, and exact statistics of each file. [`Spool::choose_lattice`] then finds a common lattice, and
 //! [`Spool::for_each`] streams the points as positions on it.
 //!
-//! Formats are detected by content: LAS 1.0 to 1.4 with point formats 0 to 10, LAZ (COPC included), PLY, and
-//! text with one point in a line; any of them may be compressed with gzip or Zstandard. Each format is a module that implements `PointFormat`, and an entry of the
-//! list in `formats.rs`.
+//! Formats are detected by content: LAS 1.0 to 1.4 with point formats 0 to 10, LAZ (COPC included), E57,
+//! PLY, PCD, PTX, and text with one point in a line; any of them may be compressed with gzip or Zstandard. Each format
+//! is a module that implements `PointFormat`, and an entry of the list in `formats.rs`.
 
 mod belong;
+mod carry;
 mod classes;
+mod columns;
 mod contain;
+mod coordinate;
+mod crop;
 mod crs;
+mod e57;
 mod expand;
+mod far;
 mod format;
 mod formats;
+mod frames;
 mod input;
 mod las;
 mod lattice;
+mod lines;
 mod map;
+mod middle;
+mod native;
 mod number;
+mod pcd;
 mod ply;
 mod point_format;
 mod probe;
+mod ptx;
+mod scalar;
 mod source;
 mod spool;
 mod stats;
 mod stream;
 mod text;
 
+pub use belong::Mixed;
+pub use carry::{Attribute, Carried};
 pub use classes::Classes;
+pub use columns::{Attributes, Column};
+pub use crop::Crop;
+pub use crs::{Crs, CrsSource, prj_of};
 pub use expand::expand;
 pub use format::Format;
 pub use probe::{Probe, probe};
 pub use stats::{FileStats, IngestStats};
-pub use stream::READ_BUFFERS;
+pub use stream::{READ_BUFFERS, VALUE_BUFFERS};
 
 use crate::error::{Error, Result};
 use crate::geom::lattice::Lattice;
 use crate::workspace::Workspace;
+use belong::Systems;
+use columns::{Wanted, row_bytes};
+use crop::Nearby;
+use frames::{Frame, values_of};
 use input::Input;
+use native::Native;
 use point_format::{Claims, PointFile};
 use serde::{Deserialize, Serialize};
-use source::{Native, Source};
-use spool::{Frame, SourceWriter};
+use source::Source;
+use spool::SourceWriter;
 use std::path::PathBuf;
 
 /// Precision that suffices for writing the coordinates of the cloud.
@@ -56,13 +79,29 @@ pub enum CoordinateType {
     F64,
 }
 
+/// The points that are read.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Selection {
+    /// Those of these classes.
+    pub classes: Classes,
+    /// Those in this region; `None` for all.
+    pub crop: Option<Crop>,
+    /// Columns of the points.
+    pub attributes: Attributes,
+}
+
 /// All points of the inputs in one scratch file.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Spool {
     name: String,
     frames: Vec<Frame>,
+    /// The frames of values, if columns are wanted: one for each of `frames`, without points for sources that have
+    /// none of the columns.
+    values: Vec<Frame>,
     sources: Vec<Source>,
     stats: IngestStats,
+    /// The well-known text of the reference system, at most 1 MiB.
+    wkt: Option<String>,
 }
 
 /// Decodes all inputs, which may be files and folders, into a spool.
@@ -74,7 +113,7 @@ pub struct Spool {
 /// [`crate::Error::Input`] for a file that is not what it claims to be; [`crate::Error::Io`],
 /// [`crate::Error::Disk`], [`crate::Error::Memory`], [`crate::Error::Cancelled`].
 pub fn ingest(inputs: &[PathBuf], workspace: &Workspace) -> Result<Spool> {
-    ingest_classes(inputs, &Classes::All, workspace)
+    ingest_selected(inputs, &Selection::default(), workspace)
 }
 
 /// As [`ingest`], but reads only points of the wanted classes.
@@ -86,67 +125,127 @@ pub fn ingest_classes(
     classes: &Classes,
     workspace: &Workspace,
 ) -> Result<Spool> {
+    let selection = Selection {
+        classes: classes.clone(),
+        ..Selection::default()
+    };
+    ingest_selected(inputs, &selection, workspace)
+}
+
+/// As [`ingest`], but reads only what is selected.
+///
+/// # Errors
+/// See [`ingest`]; [`crate::Error::Parameter`] for columns that no file has.
+pub fn ingest_selected(
+    inputs: &[PathBuf],
+    selection: &Selection,
+    workspace: &Workspace,
+) -> Result<Spool> {
+    let paths = expand(inputs)?;
+    check_columns(&paths, &selection.attributes)?;
     let name = format!("ingest-{}.spool", workspace.number());
-    let spool = read_all(inputs, classes, &name, workspace);
+    let spool = read_all(&paths, selection, &name, workspace);
     if spool.is_err() && !workspace.is_resumable() {
         workspace.files.release(&name)?;
+        workspace.files.release(&values_of(&name))?;
     }
     spool
 }
 
+/// Refuses columns that are in none of the files.
+fn check_columns(paths: &[PathBuf], attributes: &Attributes) -> Result<()> {
+    if !matches!(attributes, Attributes::List(_)) {
+        return Ok(());
+    }
+    let mut present = Vec::new();
+    for path in paths {
+        present.extend(probe(path)?.columns);
+    }
+    attributes.check(&present)
+}
+
 /// Decodes all inputs into the spool `name`.
 fn read_all(
-    inputs: &[PathBuf],
-    classes: &Classes,
+    paths: &[PathBuf],
+    selection: &Selection,
     name: &str,
     workspace: &Workspace,
 ) -> Result<Spool> {
-    let (mut section, mut frames) = (0, Vec::new());
+    let classes = &selection.classes;
+    let crop = selection.crop.as_ref();
+    let nearby = crop.map(|crop| Nearby::of(crop, workspace));
+    let nearby = nearby.transpose()?;
+    let (mut section, mut frames, mut values) = (0, Vec::new(), Vec::new());
     let mut sources = Vec::new();
-    let mut systems = Vec::new();
     let mut stats = IngestStats::default();
+    let mut systems = Systems::default();
     let mut shared = false;
-    for path in expand(inputs)? {
+    for path in paths {
         workspace.check_cancel()?;
-        let opened = Opened::new(Input::open(&path, workspace)?)?;
+        let opened = Opened::new(Input::open(path, workspace)?)?;
         let number = sources.len() as u32;
-        let target = SourceWriter::new(workspace, name, section, number, classes)?;
-        let mut warnings = match opened.file.read(&opened.input, &target) {
-            // Tasks read all files at the same time.
-            Err(Error::Shared) => {
-                shared = true;
-                Vec::new()
+        let wanted = Wanted::of(&selection.attributes, &opened.file.columns())?;
+        let target = SourceWriter::new(workspace, name, section, number, classes, &wanted)?
+            .within(nearby.as_ref(), opened.claims.native);
+        let outside =
+            |nearby: &Nearby<'_>| opened.file.lies_outside(&opened.input, nearby, workspace);
+        let mut warnings = if let Some(bounds) = nearby.as_ref().and_then(outside) {
+            target.skip(opened.claims.likely_points, bounds);
+            Vec::new()
+        } else {
+            match opened.file.read(&opened.input, &target) {
+                // Tasks read all files at the same time.
+                Err(Error::Shared) => {
+                    shared = true;
+                    Vec::new()
+                }
+                other => other?,
             }
-            other => other?,
         };
         if *classes != Classes::All && !opened.claims.classes {
             warnings.push("its points have no class, all of them are kept".to_owned());
         }
+        let read = target.stats();
+        let (next, more, more_values) = target.end();
+        section = next;
+        frames.extend(more);
+        values.extend(more_values.frames);
+        if selection.attributes != Attributes::None {
+            // Frames without values.
+            values.resize(frames.len(), Frame::default());
+        }
         let source = Source {
             native: opened.claims.native,
-            stats: target.stats(),
+            stats: read,
             text: opened.claims.text,
+            cut: false,
+            columns: wanted.columns,
+            spans: more_values.spans,
         };
         let shown = |w: String| format!("{}: {w}", path.display());
         stats.warnings.extend(warnings.into_iter().map(shown));
-        stats.add(&opened, &source);
-        systems.push(opened.file.crs(&opened.input));
+        let (crs, unusable) = opened.crs();
+        stats.warnings.extend(unusable);
+        stats.add(&opened, &source, crs.as_ref().map(Crs::without_texts));
+        if let Some(crs) = crs {
+            systems.add(path, crs);
+        }
         sources.push(source);
-        let (next, more) = target.end();
-        section = next;
-        frames.extend(more);
     }
     if shared {
         return Err(Error::Shared);
     }
-    stats
-        .warnings
-        .extend(belong::warnings(&stats.files, &systems));
+    if let Some(crop) = crop.filter(|_| stats.kept == 0) {
+        crop.check_met(&sources)?;
+    }
+    let wkt = stats.compare(systems);
     Ok(Spool {
         name: name.to_owned(),
         frames,
+        values,
         sources,
         stats,
+        wkt,
     })
 }
 
@@ -167,29 +266,83 @@ impl Opened {
             claims,
         })
     }
+
+    /// The reference system that the file gives, or else a `.prj` file beside it; a warning about that.
+    fn crs(&self) -> (Option<Crs>, Option<String>) {
+        match self.file.crs(&self.input) {
+            Some(crs) => (Some(crs), None),
+            None => crs::beside(&self.input),
+        }
+    }
+}
+
+/// Checks that the headers of all files give one reference system. Files that cannot be read are passed over:
+/// their error comes when they are read.
+///
+/// # Errors
+/// [`Error::Input`] with two files whose systems are different.
+pub fn check_systems(inputs: &[PathBuf]) -> Result<()> {
+    let mut systems = Systems::default();
+    for path in expand(inputs)? {
+        let opened = Input::open_head(&path, formats::LONG_HEAD).and_then(Opened::new);
+        if let Some(crs) = opened.ok().and_then(|opened| opened.crs().0) {
+            systems.add(&path, crs);
+        }
+    }
+    match systems.common() {
+        Ok(_) => Ok(()),
+        Err(mixed) => Err(mixed.refused()),
+    }
 }
 
 impl IngestStats {
-    fn add(&mut self, opened: &Opened, source: &Source) {
+    /// Compares the files with each other; returns the well-known text of the system of all.
+    fn compare(&mut self, systems: Systems) -> Option<String> {
+        let (mut wkt, files) = (None, &self.files);
+        let warning = match systems.common() {
+            Ok(crs) => {
+                let crs = crs.as_ref();
+                wkt = crs.and_then(|crs| crs.wkt.clone());
+                self.crs = crs.map(Crs::without_texts);
+                crs.and_then(|crs| belong::without(files, crs))
+            }
+            Err(mixed) => Some(self.mixed.insert(mixed).warning()),
+        };
+        let places = belong::warnings(files);
+        self.warnings.extend(warning.into_iter().chain(places));
+        wkt
+    }
+
+    fn add(&mut self, opened: &Opened, source: &Source, crs: Option<Crs>) {
         let stats = &source.stats;
         self.read += stats.read;
         self.kept += stats.kept;
         self.dropped_non_finite += stats.dropped;
         self.withheld += stats.withheld;
+        self.invalid += stats.invalid;
         self.dropped_by_class += stats.unwanted;
+        self.dropped_by_crop += stats.outside;
+        self.skipped_by_crop += stats.skipped;
         let bounds = source.bounds();
         self.files.push(FileStats {
             path: opened.input.path.clone(),
             format: opened.claims.format,
             bytes: opened.input.size,
+            columns: opened.file.columns().into_iter().map(|c| c.name).collect(),
             claimed: opened.claims.points,
             points: stats.read,
             kept: stats.kept,
             dropped_non_finite: stats.dropped,
             withheld: stats.withheld,
+            invalid: stats.invalid,
             dropped_by_class: stats.unwanted,
+            dropped_by_crop: stats.outside,
+            skipped_by_crop: stats.skipped,
+            dropped_far: 0,
             min: bounds.map(|b| b[0]),
             max: bounds.map(|b| b[1]),
+            scanners: opened.file.scanners(),
+            crs,
         });
     }
 }
@@ -201,18 +354,28 @@ impl Spool {
         &self.stats
     }
 
-    /// Deletes the scratch file.
+    /// The well-known text of the reference system, if it was given by one; at most 1 MiB.
+    #[must_use]
+    pub fn wkt(&self) -> Option<&str> {
+        self.wkt.as_deref()
+    }
+
+    /// Deletes the scratch files.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Disk`].
     pub fn release(&self, workspace: &Workspace) -> Result<()> {
+        if self.has_values() {
+            workspace.files.release(&values_of(&self.name))?;
+        }
         workspace.files.release(&self.name)
     }
 
     /// Approximate bytes of the points in the spool.
     #[must_use]
     pub fn bytes(&self) -> u64 {
-        let bytes = |source: &Source| source.stats.kept * source.native.point_bytes() as u64;
+        let point = |source: &Source| source.native.point_bytes() + row_bytes(&source.columns);
+        let bytes = |source: &Source| source.stats.kept * point(source) as u64;
         self.sources.iter().map(bytes).sum()
     }
 
@@ -239,14 +402,14 @@ impl Spool {
     /// The precision in which coordinates are to be written.
     #[must_use]
     pub fn source_precision(&self) -> CoordinateType {
-        let kept = || self.sources.iter().filter(|s| s.stats.kept > 0);
+        let kept = || self.sources.iter().filter(|s| s.stats.any());
         if kept().all(|s| s.native == Native::F32) {
             return CoordinateType::F32;
         }
         let Ok(lattice) = self.choose_lattice(0) else {
             return CoordinateType::F64;
         };
-        let bounds = kept().filter_map(Source::bounds);
+        let bounds = kept().filter_map(Source::whole_bounds);
         let largest = bounds
             .flat_map(|b| b.into_iter().flatten())
             .fold(0.0, |m: f64, c| m.max(c.abs()));

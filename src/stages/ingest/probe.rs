@@ -1,10 +1,11 @@
 //! Reads the header of a file only.
 
 use super::Opened;
+use super::columns::{Attributes, Column};
 use super::format::Format;
 use super::formats::LONG_HEAD;
 use super::input::Input;
-use super::source::Native;
+use super::native::Native;
 use crate::error::Result;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -34,8 +35,20 @@ pub struct Probe {
     pub offset: Option<[f64; 3]>,
     /// Smallest and largest coordinates given in the header of LAS and LAZ.
     pub bounds: Option<[[f64; 3]; 2]>,
+    /// Columns of its points beside the coordinates.
+    pub columns: Vec<Column>,
     /// Bytes of a point in the scratch folder.
     pub spool_bytes_per_point: u64,
+}
+
+impl Probe {
+    /// Bytes of the wanted columns of a point.
+    #[must_use]
+    pub fn value_bytes(&self, attributes: &Attributes) -> u64 {
+        let wanted = attributes.of(&self.columns);
+        let bytes = wanted.iter().map(|n| self.columns[*n].scalar.bytes());
+        bytes.sum::<usize>() as u64
+    }
 }
 
 /// Reads the header of a file.
@@ -43,7 +56,11 @@ pub struct Probe {
 /// # Errors
 /// [`crate::Error::Io`]; [`crate::Error::Input`] if it is not a readable point cloud.
 pub fn probe(path: &Path) -> Result<Probe> {
-    let Opened { input, claims, .. } = Opened::new(Input::open_head(path, LONG_HEAD)?)?;
+    let Opened {
+        input,
+        claims,
+        file,
+    } = Opened::new(Input::open_head(path, LONG_HEAD)?)?;
     let (scale, offset) = match claims.native {
         Native::Las { scale, offset } => (Some(scale), Some(offset)),
         Native::F32 | Native::F64 => (None, None),
@@ -63,6 +80,7 @@ pub fn probe(path: &Path) -> Result<Probe> {
         scale,
         offset,
         bounds: claims.bounds,
+        columns: file.columns(),
         spool_bytes_per_point: claims.native.point_bytes() as u64,
         path: input.path,
     })

@@ -1,87 +1,50 @@
-//! The spool: all points in their native form, in checksummed frames of one scratch file.
-//!
-//! A frame is `magic, source, points, CRC-32` (four `u32`), followed by the coordinates. The CRC also covers
-//! the other header words. A unit of work writes its frames one after another, as one section of the file;
-//! frames are numbered in the order of units.
+//! The writer of the spool: all points in their native form, in frames of one scratch file.
 
 use super::classes::Classes;
-use super::source::Source;
+use super::columns::{Span, Wanted};
+use super::coordinate::Coordinate;
+use super::crop::Nearby;
+use super::frames::{FRAME, Frame, FrameWriter, HEADER, values_of};
+use super::middle::middle;
+use super::native::Native;
 use super::stats::SourceStats;
 use crate::error::Result;
 use crate::workspace::file::ScratchFile;
-use crate::workspace::place::Place;
 use crate::workspace::{Unit, Workspace, lock};
+use outcrop_ply::real;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Mutex};
 
-/// Most points in a frame.
-pub(super) const FRAME: usize = 1 << 14;
-
-const MAGIC: u32 = 0x4c50_534f;
-const HEADER: usize = 16;
-
-/// A coordinate as a file stores it.
-pub(super) trait Coordinate: bytemuck::Pod + PartialEq + Into<f64> {
-    /// False for infinity and NaN.
-    fn is_finite(self) -> bool {
-        let value: f64 = self.into();
-        value.is_finite()
-    }
-    /// The highest power of two of which the value is a multiple; `i32::MAX` for zero.
-    fn exponent(self) -> i32 {
-        let value: f64 = self.into();
-        let bits = value.to_bits();
-        let power = (bits >> 52 & 0x7ff) as i32;
-        let fraction = bits & ((1 << 52) - 1);
-        match (power, fraction) {
-            (0, 0) => i32::MAX,
-            (0, _) => -1074 + fraction.trailing_zeros() as i32,
-            _ => power - 1075 + (fraction | 1 << 52).trailing_zeros() as i32,
-        }
-    }
+/// The values of one source or of a part of it: their frames, and the span of each column.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+pub(super) struct Values {
+    pub(super) frames: Vec<Frame>,
+    pub(super) spans: Vec<Span>,
 }
 
-impl Coordinate for f32 {}
-
-impl Coordinate for f64 {}
-
-impl Coordinate for i32 {
-    fn is_finite(self) -> bool {
-        true
-    }
-    fn exponent(self) -> i32 {
-        0
-    }
-}
-
-/// A frame of the spool.
-#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
-pub(super) struct Frame {
-    /// The segment of the file.
-    pub(super) segment: u32,
-    /// Offset in the segment.
-    pub(super) offset: u64,
-    /// Number of points.
-    pub(super) points: u32,
-}
-
-/// The result of a unit: its counts and its frames.
-pub(super) type Taken = (SourceStats, Vec<Frame>);
+/// The result of a unit: its counts, its frames, and its values.
+pub(super) type Taken = (SourceStats, Vec<Frame>, Values);
 
 /// Receives the points of one source, from several threads.
 pub(super) struct SourceWriter<'a> {
     pub(super) workspace: &'a Workspace,
     file: Arc<ScratchFile>,
+    /// The file of values, if columns are wanted.
+    values: Option<Arc<ScratchFile>>,
     source: u32,
     /// The classes to keep, if points have a class.
     pub(super) classes: &'a Classes,
+    /// The positions to keep, and the type of the source's coordinates.
+    nearby: Option<(&'a Nearby<'a>, Native)>,
+    /// The columns to read.
+    pub(super) wanted: &'a Wanted,
     /// The section of the next unit.
     next: AtomicU32,
     stats: Mutex<SourceStats>,
     /// The frames by section.
-    frames: Mutex<BTreeMap<u32, Vec<Frame>>>,
+    frames: Mutex<BTreeMap<u32, (Vec<Frame>, Values)>>,
 }
 
 impl<'a> SourceWriter<'a> {
@@ -92,33 +55,62 @@ impl<'a> SourceWriter<'a> {
         first: u32,
         source: u32,
         classes: &'a Classes,
+        wanted: &'a Wanted,
     ) -> Result<Self> {
+        let values = (!wanted.is_empty()).then(|| workspace.files.open(&values_of(name), true));
         Ok(Self {
             workspace,
             file: workspace.files.open(name, true)?,
+            values: values.transpose()?,
             source,
             classes,
+            nearby: None,
+            wanted,
             next: first.into(),
             stats: Mutex::default(),
             frames: Mutex::default(),
         })
     }
 
+    /// The same, for points at wanted positions only; coordinates are of type `native`.
+    pub(super) fn within(self, nearby: Option<&'a Nearby<'a>>, native: Native) -> Self {
+        let nearby = nearby.map(|nearby| (nearby, native));
+        Self { nearby, ..self }
+    }
+
+    /// The wanted positions, if not all are.
+    pub(super) fn region(&self) -> Option<&'a Nearby<'a>> {
+        self.nearby.map(|(nearby, _)| nearby)
+    }
+
+    /// Counts points that are not read because of their position; their coordinates are between these ends.
+    pub(super) fn skip(&self, points: u64, [low, high]: [[f64; 3]; 2]) {
+        let mut stats = lock(&self.stats);
+        stats.skipped += points;
+        stats.reach_point(low);
+        stats.reach_point(high);
+    }
+
     /// A buffer for one unit; its points are counted when it is finished.
     pub(super) fn sink<'u, T: Coordinate>(&'u self, unit: &'u Unit<'u>) -> Sink<'u, T> {
-        let mut bytes = Vec::with_capacity(HEADER + FRAME * size_of::<[T; 3]>());
-        bytes.resize(HEADER, 0);
+        let values = self.values.as_ref().map(|file| {
+            let frames = FrameWriter::new(file, FRAME * self.wanted.bytes());
+            (frames, vec![Span::default(); self.wanted.columns.len()])
+        });
         Sink {
             target: self,
             unit,
-            bytes,
+            frames: FrameWriter::new(&self.file, FRAME * size_of::<[T; 3]>()),
             points: Vec::with_capacity(FRAME),
+            values,
             stats: SourceStats::default(),
             reported: 0,
-            frames: Vec::new(),
-            whole: Place::default(),
-            crc: crc32fast::Hasher::new(),
         }
+    }
+
+    /// The name of a step of this source.
+    pub(super) fn step(&self, name: &str) -> String {
+        format!("{name} of source {}", self.source)
     }
 
     /// Reads units of the source on all threads, as [`Workspace::units`]; `work` fills a sink for each.
@@ -129,18 +121,20 @@ impl<'a> SourceWriter<'a> {
         bytes: impl Fn(usize) -> u64 + Sync,
         work: impl Fn(usize, &mut Sink<'_, T>) -> Result<()> + Sync,
     ) -> Result<()> {
-        let step = format!("{name} of source {}", self.source);
+        let step = self.step(name);
         let first = self.next.fetch_add(count as u32, Ordering::Relaxed);
         let one = |unit: &Unit<'_>| {
             let mut sink = self.sink(unit);
             work(unit.number(), &mut sink)?;
             sink.finish(first + unit.number() as u32)
         };
-        let each = |unit: usize, (stats, frames): Taken| {
+        let each = |unit: usize, (stats, frames, values): Taken| {
             lock(&self.stats).merge(&stats);
-            lock(&self.frames).insert(first + unit as u32, frames);
+            lock(&self.frames).insert(first + unit as u32, (frames, values));
             Ok(())
         };
+        let rows = 2 * (HEADER + FRAME * self.wanted.bytes()) as u64;
+        let bytes = |unit| bytes(unit) + if self.wanted.is_empty() { 0 } else { rows };
         self.workspace.units((step, name), count, bytes, one, each)
     }
 
@@ -159,11 +153,18 @@ impl<'a> SourceWriter<'a> {
         *lock(&self.stats)
     }
 
-    /// The section after those of the source, and all frames in the order of units.
-    pub(super) fn end(self) -> (u32, Vec<Frame>) {
-        let frames = std::mem::take(&mut *lock(&self.frames));
-        let frames = frames.into_values().flatten().collect();
-        (self.next.into_inner(), frames)
+    /// The section after those of the source, and all frames and values in the order of units.
+    pub(super) fn end(self) -> (u32, Vec<Frame>, Values) {
+        let mut all = (Vec::new(), Values::default());
+        all.1.spans = vec![Span::default(); self.wanted.columns.len()];
+        for (frames, values) in std::mem::take(&mut *lock(&self.frames)).into_values() {
+            all.0.extend(frames);
+            all.1.frames.extend(values.frames);
+            for (span, more) in all.1.spans.iter_mut().zip(&values.spans) {
+                span.merge(more);
+            }
+        }
+        (self.next.into_inner(), all.0, all.1)
     }
 }
 
@@ -176,27 +177,45 @@ pub(super) const fn sink_bytes<T>() -> u64 {
 pub(super) struct Sink<'a, T: Coordinate> {
     target: &'a SourceWriter<'a>,
     unit: &'a Unit<'a>,
-    bytes: Vec<u8>,
+    frames: FrameWriter<'a>,
     points: Vec<[T; 3]>,
+    /// The values of the points, and the span of each column, if columns are wanted.
+    values: Option<(FrameWriter<'a>, Vec<Span>)>,
     /// Statistics so far; extents and kept points are added when a frame is full.
     pub(super) stats: SourceStats,
     reported: u64,
-    frames: Vec<Frame>,
-    /// The place of all frames.
-    whole: Place,
-    crc: crc32fast::Hasher,
 }
 
 impl<T: Coordinate> Sink<'_, T> {
-    /// Adds a point, unless a coordinate is not finite.
+    /// Adds a point, unless a coordinate is not finite. `values` appends the values of the wanted columns, in
+    /// their order and in little-endian bytes; it is called only if columns are wanted.
     #[inline]
-    pub(super) fn push(&mut self, point: [T; 3]) -> Result<()> {
+    pub(super) fn push_with(
+        &mut self,
+        point: [T; 3],
+        values: impl FnOnce(&mut Vec<u8>),
+    ) -> Result<()> {
         self.stats.read += 1;
         if !point.iter().all(|c| c.is_finite()) {
             self.stats.dropped += 1;
             return Ok(());
         }
+        if let Some((nearby, native)) = &self.target.nearby {
+            let position = native.position(point.map(Into::into));
+            if !nearby.takes(position) {
+                self.stats.outside += 1;
+                self.stats.reach_point(point);
+                return Ok(());
+            }
+        }
         self.points.push(point);
+        if let Some((frames, _)) = &mut self.values {
+            values(&mut frames.bytes);
+            debug_assert_eq!(
+                frames.bytes.len() - HEADER,
+                self.points.len() * self.target.wanted.bytes()
+            );
+        }
         if self.points.len() == FRAME {
             self.flush()?;
         }
@@ -208,6 +227,13 @@ impl<T: Coordinate> Sink<'_, T> {
     pub(super) fn withhold(&mut self) {
         self.stats.read += 1;
         self.stats.withheld += 1;
+    }
+
+    /// Counts a record that the scanner marked as no point.
+    #[inline]
+    pub(super) fn invalid(&mut self) {
+        self.stats.read += 1;
+        self.stats.invalid += 1;
     }
 
     /// Counts a point whose class is not wanted.
@@ -225,108 +251,41 @@ impl<T: Coordinate> Sink<'_, T> {
             return Ok(());
         }
         self.stats.kept += self.points.len() as u64;
-        for point in &self.points {
-            for (axis, coordinate) in point.iter().enumerate() {
-                let value = (*coordinate).into();
-                self.stats.min[axis] = self.stats.min[axis].min(value);
-                self.stats.max[axis] = self.stats.max[axis].max(value);
-                self.stats.exponent = self.stats.exponent.min(coordinate.exponent());
-            }
-        }
-        self.bytes.truncate(HEADER);
-        let words = [MAGIC, self.target.source, self.points.len() as u32, 0];
-        self.bytes[..HEADER].copy_from_slice(bytemuck::bytes_of(&words));
-        self.bytes
-            .extend_from_slice(bytemuck::cast_slice(&self.points));
-        let crc = frame_crc(&self.bytes[..12], &self.bytes[HEADER..]);
-        self.bytes[12..HEADER].copy_from_slice(&crc.to_ne_bytes());
-        let points = self.points.len();
+        let mut own = SourceStats::default();
+        self.points.iter().for_each(|point| own.reach_point(*point));
+        own.own = [own.min, own.max];
+        self.stats.merge(&own);
+        let (source, points) = (self.target.source, self.points.len());
+        let coordinates = bytemuck::cast_slice(&self.points);
+        self.frames.bytes.extend_from_slice(coordinates);
+        let middle = T::FLOATING.then(|| middle(&self.points));
         self.points.clear();
-        let file = &self.target.file;
-        let place = file.append(self.unit.worker(), &self.bytes, points)?;
-        self.crc.update(&self.bytes);
-        self.frames.push(Frame {
-            segment: place.segment,
-            offset: place.offset,
-            points: points as u32,
-        });
-        if self.frames.len() == 1 {
-            self.whole = place;
-        } else {
-            self.whole.bytes += place.bytes;
-            self.whole.records += points;
+        self.frames.write(self.unit, source, points)?;
+        if let Some(frame) = self.frames.frames.last_mut() {
+            frame.middle = middle;
+        }
+        if let Some((frames, spans)) = &mut self.values {
+            let mut at = HEADER;
+            for _ in 0..points {
+                for (span, column) in spans.iter_mut().zip(&self.target.wanted.columns) {
+                    span.add(real(column.scalar, &frames.bytes[at..], false));
+                    at += column.scalar.bytes();
+                }
+            }
+            frames.write(self.unit, source, points)?;
         }
         Ok(())
     }
 
-    /// Writes the remaining points, and ends the section; returns the counts and the frames.
+    /// Writes the remaining points, and ends the section.
     fn finish(mut self, section: u32) -> Result<Taken> {
         self.flush()?;
-        if !self.frames.is_empty() {
-            self.whole.crc = self.crc.finalize();
-            self.target.file.put(self.unit, section, self.whole)?;
+        let frames = self.frames.finish(self.unit, section)?;
+        let mut values = Values::default();
+        if let Some((writer, spans)) = self.values {
+            let frames = writer.finish(self.unit, section)?;
+            values = Values { frames, spans };
         }
-        Ok((self.stats, self.frames))
+        Ok((self.stats, frames, values))
     }
-}
-
-fn frame_crc(head: &[u8], body: &[u8]) -> u32 {
-    let mut hasher = crc32fast::Hasher::new();
-    hasher.update(head);
-    hasher.update(body);
-    hasher.finalize()
-}
-
-/// Buffer for reading one frame.
-#[derive(Debug, Default)]
-pub(super) struct FrameBuffer {
-    /// Number of the source.
-    pub(super) source: usize,
-    /// Number of points.
-    pub(super) points: usize,
-    /// Coordinates, in `u64` words so that every coordinate type is aligned.
-    words: Vec<u64>,
-}
-
-impl FrameBuffer {
-    /// The points, which must have coordinates of type `T`.
-    pub(super) fn points<T: Coordinate>(&self) -> &[[T; 3]] {
-        let all: &[T] = bytemuck::cast_slice(&self.words);
-        &bytemuck::cast_slice(&all[..self.points * 3])[..self.points]
-    }
-}
-
-/// Reads a frame of the spool `file`.
-pub(super) fn read_frame(
-    file: &ScratchFile,
-    sources: &[Source],
-    at: Frame,
-    frame: &mut FrameBuffer,
-) -> Result<()> {
-    let (segment, offset) = (at.segment, at.offset);
-    let mut words = [0u32; 4];
-    file.read(segment, offset, bytemuck::bytes_of_mut(&mut words))?;
-    let [magic, source, points, crc] = words;
-    let (source, points) = (source as usize, points as usize);
-    let fits =
-        magic == MAGIC && source < sources.len() && points <= FRAME && points == at.points as usize;
-    if !fits {
-        let (points, sources) = (at.points, sources.len());
-        let found = format!("frame header {words:08x?}");
-        let expected = format!("a frame of {points} points of one of {sources} sources");
-        return Err(file.damaged(segment, offset, found, expected));
-    }
-    let bytes = points * sources[source].native.point_bytes();
-    frame.words.clear();
-    frame.words.resize(bytes.div_ceil(8), 0);
-    let body = &mut bytemuck::cast_slice_mut::<u64, u8>(&mut frame.words)[..bytes];
-    file.read(segment, offset + HEADER as u64, body)?;
-    let found = frame_crc(&bytemuck::bytes_of(&words)[..12], body);
-    if found != crc {
-        let checksum = |crc: u32| format!("checksum {crc:08x}");
-        return Err(file.damaged(segment, offset, checksum(found), checksum(crc)));
-    }
-    frame.source = source;
-    frame.points = points;
-    Ok(())
 }

@@ -1,6 +1,10 @@
 //! Statistics of the input: counts and extents of each file and in total.
 
+use super::belong::Mixed;
+use super::coordinate::Coordinate;
+use super::crs::Crs;
 use super::format::Format;
+use super::native::Native;
 use serde::{Deserialize, Serialize, Serializer};
 use std::path::{Path, PathBuf};
 
@@ -15,8 +19,23 @@ pub struct IngestStats {
     pub dropped_non_finite: u64,
     /// Points left out because they are flagged as withheld.
     pub withheld: u64,
+    /// Records of scans that the scanner marked as no point, since nothing came back.
+    pub invalid: u64,
     /// Points left out because their class is not wanted.
     pub dropped_by_class: u64,
+    /// Points left out because they are not in the region, nor within the margin around it.
+    pub dropped_by_crop: u64,
+    /// Points not read because their files or chunks lie outside, by header or chunk table.
+    pub skipped_by_crop: u64,
+    /// Points left out because they are far from all others, and the lattice is finer without them.
+    pub dropped_far: u64,
+    /// One of these.
+    pub far_example: Option<[f64; 3]>,
+    /// The reference system; none if no file gives one, or if files give different ones.
+    pub crs: Option<Crs>,
+    /// Two files that give different ones.
+    #[serde(skip)]
+    pub mixed: Option<Mixed>,
     /// The counts of each file, in the order given.
     pub files: Vec<FileStats>,
     /// Warnings for the user, one line each.
@@ -38,6 +57,8 @@ pub struct FileStats {
     pub format: Format,
     /// Its size in bytes.
     pub bytes: u64,
+    /// Names of its columns beside the coordinates.
+    pub columns: Vec<String>,
     /// Number of points given in the header; `None` for text.
     pub claimed: Option<u64>,
     /// Points in the file.
@@ -48,12 +69,24 @@ pub struct FileStats {
     pub dropped_non_finite: u64,
     /// Points left out because they are flagged as withheld.
     pub withheld: u64,
+    /// Records of scans that the scanner marked as no point, since nothing came back.
+    pub invalid: u64,
     /// Points left out because their class is not wanted.
     pub dropped_by_class: u64,
+    /// Points left out because they are not in the region, nor within the margin around it.
+    pub dropped_by_crop: u64,
+    /// Points not read because they are in chunks that lie outside, or the whole file does.
+    pub skipped_by_crop: u64,
+    /// Points left out because they are far from all others.
+    pub dropped_far: u64,
     /// Lowest coordinates of the kept points, in the file's unit; `None` without points.
     pub min: Option<[f64; 3]>,
     /// Highest coordinates of the kept points, in the file's unit; `None` without points.
     pub max: Option<[f64; 3]>,
+    /// The positions of the scanners given in the file, in its unit.
+    pub scanners: Vec<[f64; 3]>,
+    /// The reference system that it gives, or a `.prj` file beside it.
+    pub crs: Option<Crs>,
 }
 
 /// Exact statistics of one source, in its native form; merging is commutative.
@@ -63,10 +96,20 @@ pub(super) struct SourceStats {
     pub(super) kept: u64,
     pub(super) dropped: u64,
     pub(super) withheld: u64,
+    /// Records that the scanner marked as no point.
+    pub(super) invalid: u64,
     /// Points left out because of their class.
     pub(super) unwanted: u64,
+    /// Points left out because of their position.
+    pub(super) outside: u64,
+    /// Points not decoded because of their position, by the header or the chunk table.
+    pub(super) skipped: u64,
+    /// Lowest coordinates, also of points left out because of their position.
     pub(super) min: [f64; 3],
+    /// Highest coordinates, likewise.
     pub(super) max: [f64; 3],
+    /// Lowest and highest coordinates of the kept points.
+    pub(super) own: [[f64; 3]; 2],
     /// All coordinates are multiples of 2 to the power of this; `i32::MAX` if all are zero.
     pub(super) exponent: i32,
     /// Largest number of decimals in text, or [`NOT_FIXED`](super::number::NOT_FIXED).
@@ -75,6 +118,9 @@ pub(super) struct SourceStats {
     pub(super) claimed: u64,
 }
 
+/// The extent of no point.
+const NOWHERE: [[f64; 3]; 2] = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
+
 impl Default for SourceStats {
     fn default() -> Self {
         Self {
@@ -82,9 +128,13 @@ impl Default for SourceStats {
             kept: 0,
             dropped: 0,
             withheld: 0,
+            invalid: 0,
             unwanted: 0,
+            outside: 0,
+            skipped: 0,
             min: [f64::INFINITY; 3],
             max: [f64::NEG_INFINITY; 3],
+            own: NOWHERE,
             exponent: i32::MAX,
             decimals: 0,
             claimed: 0,
@@ -93,18 +143,79 @@ impl Default for SourceStats {
 }
 
 impl SourceStats {
+    /// The same counts without points.
+    pub(super) fn emptied(&self) -> Self {
+        let Self {
+            min,
+            max,
+            own,
+            exponent,
+            kept,
+            ..
+        } = Self::default();
+        Self {
+            min,
+            max,
+            own,
+            exponent,
+            kept,
+            ..*self
+        }
+    }
+
+    /// Takes a kept point with these native coordinates.
+    pub(super) fn take(&mut self, point: [f64; 3], native: Native) {
+        self.kept += 1;
+        for (axis, value) in point.into_iter().enumerate() {
+            let exponent = match native {
+                Native::Las { .. } => 0,
+                Native::F32 | Native::F64 => value.exponent(),
+            };
+            self.reach(axis, value, exponent);
+            self.own[0][axis] = self.own[0][axis].min(value);
+            self.own[1][axis] = self.own[1][axis].max(value);
+        }
+    }
+
+    /// Extends the range of an axis by a coordinate that is a multiple of two to the power of `exponent`.
+    #[inline]
+    pub(super) fn reach(&mut self, axis: usize, value: f64, exponent: i32) {
+        self.min[axis] = self.min[axis].min(value);
+        self.max[axis] = self.max[axis].max(value);
+        self.exponent = self.exponent.min(exponent);
+    }
+
     pub(super) fn merge(&mut self, other: &Self) {
         self.read += other.read;
         self.kept += other.kept;
         self.dropped += other.dropped;
         self.withheld += other.withheld;
+        self.invalid += other.invalid;
         self.unwanted += other.unwanted;
+        self.outside += other.outside;
+        self.skipped += other.skipped;
         for axis in 0..3 {
             self.min[axis] = self.min[axis].min(other.min[axis]);
             self.max[axis] = self.max[axis].max(other.max[axis]);
+            self.own[0][axis] = self.own[0][axis].min(other.own[0][axis]);
+            self.own[1][axis] = self.own[1][axis].max(other.own[1][axis]);
         }
         self.exponent = self.exponent.min(other.exponent);
         self.decimals = self.decimals.max(other.decimals);
         self.claimed = self.claimed.saturating_add(other.claimed);
+    }
+
+    /// Extends the range of coordinates by a point.
+    #[inline]
+    pub(super) fn reach_point<T: Coordinate>(&mut self, point: [T; 3]) {
+        for (axis, coordinate) in point.into_iter().enumerate() {
+            self.reach(axis, coordinate.into(), coordinate.exponent());
+        }
+    }
+
+    /// True if a point has a place on the lattice, even if it is left out because of its position: so the
+    /// lattice of a part of a cloud is that of the whole.
+    pub(super) fn any(&self) -> bool {
+        self.kept + self.outside + self.skipped > 0
     }
 }

@@ -10,7 +10,7 @@ mod writer;
 
 pub use files::StoredPoints;
 pub use rewrite::Rewriter;
-pub use sample::sample_sort;
+pub use sample::{Grouped, MOST_GROUPS, cuts, sample_sort};
 pub use store::{PAGE, PointStore};
 pub use writer::{Position, StoreWriter};
 
@@ -236,8 +236,9 @@ pub fn order(
         spool.par_for_frames(workspace, threads, lattice, frames, push)
     })?;
     drop(held);
-    // After an interruption, points that were only in memory have to be read again.
-    if orderer.is_sorted() || !workspace.is_resumable() {
+    // After an interruption, points that were only in memory have to be read again; with values all are.
+    let again = spool.has_values() || workspace.is_resumable() && !orderer.is_sorted();
+    if !again {
         spool.release(workspace)?;
     }
     orderer.finish(workspace, page)

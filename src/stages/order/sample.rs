@@ -19,7 +19,7 @@ use std::sync::Mutex;
 const GROUP: u64 = 1 << 20;
 
 /// Most units that read, and most buckets: each of either has an entry of 40 bytes for each of the other.
-const MOST: u64 = 1024;
+pub const MOST_GROUPS: u64 = 1024;
 
 /// Keys in the sample of a unit. Buckets differ in size by about a tenth.
 const SAMPLES: usize = 256;
@@ -63,7 +63,8 @@ fn groups(frames: Vec<(u32, u64)>, size: u64) -> Vec<Group> {
 }
 
 /// The keys at which `buckets` buckets of about equal size begin, without the first.
-fn cuts(mut samples: Vec<hilbert::Key>, buckets: usize) -> Vec<hilbert::Key> {
+#[must_use]
+pub fn cuts(mut samples: Vec<hilbert::Key>, buckets: usize) -> Vec<hilbert::Key> {
     samples.sort_unstable();
     let cut = |bucket: usize| samples.get(bucket * samples.len() / buckets).copied();
     let mut cuts: Vec<_> = (1..buckets).filter_map(cut).collect();
@@ -71,15 +72,43 @@ fn cuts(mut samples: Vec<hilbert::Key>, buckets: usize) -> Vec<hilbert::Key> {
     cuts
 }
 
-/// The spool on the lattice.
-struct Source<'a> {
+/// The spool on the lattice, in groups.
+pub struct Grouped<'a> {
     spool: &'a Spool,
     lattice: &'a Lattice,
     groups: Vec<Group>,
     workspace: &'a Workspace,
 }
 
-impl Source<'_> {
+impl<'a> Grouped<'a> {
+    /// Groups of about `size` points.
+    #[must_use]
+    pub fn new(
+        spool: &'a Spool,
+        lattice: &'a Lattice,
+        size: u64,
+        workspace: &'a Workspace,
+    ) -> Self {
+        Self {
+            spool,
+            lattice,
+            groups: groups(spool.frames(), size),
+            workspace,
+        }
+    }
+
+    /// Number of groups.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.groups.len()
+    }
+
+    /// The frames of a group.
+    #[must_use]
+    pub fn frames(&self, group: usize) -> &[u32] {
+        &self.groups[group].0
+    }
+
     /// Reads a group; `each` takes some of its points at a time.
     fn read(&self, group: usize, each: impl FnMut(&[Point]) + Send) -> Result<()> {
         let each = Mutex::new(each);
@@ -92,12 +121,17 @@ impl Source<'_> {
             .par_for_frames(self.workspace, 1, self.lattice, frames, take)
     }
 
-    fn points(&self, group: usize) -> u64 {
+    /// Number of points of a group.
+    #[must_use]
+    pub fn points(&self, group: usize) -> u64 {
         self.groups[group].1
     }
 
-    /// A sample of the keys of all points.
-    fn samples(&self) -> Result<Vec<hilbert::Key>> {
+    /// A sample of the keys of all points, taken in the step `name`.
+    ///
+    /// # Errors
+    /// [`Error::Io`], [`Error::Corrupt`], [`Error::Memory`], [`Error::Cancelled`].
+    pub fn samples(&self, name: &'static str) -> Result<Vec<hilbert::Key>> {
         let mut all = Vec::new();
         let work = |unit: &Unit<'_>| {
             let each = (self.points(unit.number()) as usize / SAMPLES).max(1);
@@ -111,7 +145,7 @@ impl Source<'_> {
             Ok(samples)
         };
         let bytes = |_| READ_BUFFERS + (64 << 10);
-        let (name, count) = ("order: samples", self.groups.len());
+        let count = self.groups.len();
         self.workspace
             .units(name, count, bytes, work, |_, more: Vec<_>| {
                 all.extend(more);
@@ -253,7 +287,7 @@ pub fn sample_sort(
     page: usize,
     workspace: &Workspace,
 ) -> Result<(StoredPoints, u64)> {
-    let size = GROUP.max(spool.points() / MOST);
+    let size = GROUP.max(spool.points() / MOST_GROUPS);
     sort_in_groups(spool, lattice, page, size, workspace)
 }
 
@@ -264,14 +298,9 @@ fn sort_in_groups(
     size: u64,
     workspace: &Workspace,
 ) -> Result<(StoredPoints, u64)> {
-    let source = Source {
-        spool,
-        lattice,
-        groups: groups(spool.frames(), size),
-        workspace,
-    };
+    let source = Grouped::new(spool, lattice, size, workspace);
     let buckets = source.groups.len().max(1);
-    let cuts = cuts(source.samples()?, buckets);
+    let cuts = cuts(source.samples("order: samples")?, buckets);
     let sent = Shuffle::new("order.sent");
     source.send(&cuts, &sent)?;
     let page = page.max(1);

@@ -83,7 +83,9 @@ pub fn thin(
         spool.par_for_frames(workspace, threads, lattice, frames, take)
     })?;
     drop(frames);
-    spool.release(workspace)?;
+    if !spool.has_values() {
+        spool.release(workspace)?;
+    }
     Ok(Thinned {
         sorted: sorter.finish_on_disk(workspace)?,
         grid,

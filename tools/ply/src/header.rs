@@ -1,6 +1,7 @@
 //! The header of a file.
 
 use crate::error::{Error, Result};
+use crate::place::Place;
 use crate::types::{Encoding, Property, Scalar};
 
 /// The header of a PLY file.
@@ -12,6 +13,8 @@ pub struct Header {
     pub elements: Vec<Element>,
     /// Bytes of the header: the offset of the elements.
     pub bytes: u64,
+    /// The place of the coordinates, if comments give one.
+    pub place: Place,
 }
 
 /// An element: entries that all have the same properties.

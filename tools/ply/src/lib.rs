@@ -11,6 +11,7 @@ mod layout;
 mod mesh;
 mod numbers;
 mod parse;
+mod place;
 mod stream;
 mod types;
 
@@ -19,5 +20,6 @@ pub use header::{Element, Header};
 pub use layout::{Layout, TRIANGLE, put_triangle};
 pub use mesh::Mesh;
 pub use numbers::{Numbers, real};
+pub use place::Place;
 pub use stream::{MeshStream, NO_VERTEX, Part, SLICE};
 pub use types::{Encoding, Property, Scalar};

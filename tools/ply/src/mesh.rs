@@ -3,6 +3,7 @@
 use crate::error::{Error, Result};
 use crate::header::{Element, Header};
 use crate::numbers::Numbers;
+use crate::types::{Property, Scalar};
 use std::io::BufRead;
 
 /// A mesh, or a cloud if there are no triangles.
@@ -10,6 +11,8 @@ use std::io::BufRead;
 pub struct Mesh {
     /// Positions of the vertices.
     pub vertices: Vec<[f64; 3]>,
+    /// Colours of the vertices, from 0 to 255; empty if the file has none.
+    pub colors: Vec<[u8; 3]>,
     /// Corners of the triangles, as indices of vertices; polygons become fans.
     pub triangles: Vec<[u32; 3]>,
 }
@@ -39,8 +42,7 @@ impl Mesh {
             let least = element.least_bytes(header.encoding).max(1);
             let room = element.count.min(bytes / least + 1) as usize;
             if Some(at) == vertex {
-                mesh.vertices.reserve_exact(room);
-                read_vertices(&mut numbers, element, &mut mesh.vertices)?;
+                read_vertices(&mut numbers, element, room, &mut mesh)?;
             } else if Some(at) == face {
                 mesh.triangles.reserve_exact(room);
                 read_faces(&mut numbers, element, vertices, &mut mesh.triangles)?;
@@ -63,14 +65,58 @@ fn wrong(element: &Element, row: u64, found: String) -> Error {
 fn read_vertices(
     numbers: &mut Numbers<impl BufRead>,
     element: &Element,
-    out: &mut Vec<[f64; 3]>,
+    room: usize,
+    mesh: &mut Mesh,
 ) -> Result<()> {
     let coordinates = element.coordinates()?;
+    let colors = colors(element);
+    mesh.vertices.reserve_exact(room);
+    if !colors.is_empty() {
+        mesh.colors.reserve_exact(room);
+    }
+    let mut values = Vec::new();
     for row in 0..element.count {
-        let point = numbers.point(element, &coordinates);
-        out.push(point.map_err(|found| wrong(element, row, found))?);
+        let point = numbers.point_with(element, &coordinates, &colors, &mut values);
+        mesh.vertices
+            .push(point.map_err(|found| wrong(element, row, found))?);
+        if let [r, g, b] = values[..] {
+            let scalar = colors[0].1;
+            mesh.colors.push([r, g, b].map(|c| byte(scalar, c)));
+        }
     }
     Ok(())
+}
+
+/// Index and type of the properties red, green and blue; empty unless all are there in this order, of one type.
+fn colors(element: &Element) -> Vec<(usize, Scalar)> {
+    let place = |name: &str| {
+        let mut numbers = element.properties.iter().enumerate();
+        numbers.find_map(|(at, (own, property))| match property {
+            Property::One(scalar) if own == name => Some((at, *scalar)),
+            _ => None,
+        })
+    };
+    let found: Vec<_> = ["red", "green", "blue"]
+        .iter()
+        .filter_map(|name| place(name))
+        .collect();
+    let ascend = found
+        .windows(2)
+        .all(|w| w[0].0 < w[1].0 && w[0].1 == w[1].1);
+    if found.len() == 3 && ascend {
+        found
+    } else {
+        Vec::new()
+    }
+}
+
+/// A colour as a number from 0 to 255: integers of more than 8 bits are those of 16, floats go from 0 to 1.
+fn byte(scalar: Scalar, value: f64) -> u8 {
+    match scalar {
+        Scalar::U8 | Scalar::I8 => value as u8,
+        Scalar::F32 | Scalar::F64 => (value * 255.0).round() as u8,
+        _ => (value / 256.0) as u8,
+    }
 }
 
 fn read_faces(
@@ -161,6 +207,33 @@ mod tests {
                 assert!(parse(&bytes[..end]).is_err(), "cut at {end}");
             }
         }
+    }
+
+    #[test]
+    fn colours_are_read_from_all_types() {
+        for (scalar, values) in [
+            ("uchar", "255 128 0"),
+            ("ushort", "65535 32896 0"),
+            ("float", "1 0.502 0"),
+        ] {
+            let color = |name| format!("property {scalar} {name}\n");
+            let text = format!(
+                "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n\
+                 property float z\n{}{}property int more\n{}end_header\n1 2 3 {}\n",
+                color("red"),
+                color("green"),
+                color("blue"),
+                values
+                    .rsplit_once(' ')
+                    .map_or(String::new(), |(a, b)| format!("{a} 7 {b}")),
+            );
+            let mesh = parse(text.as_bytes()).unwrap();
+            assert_eq!(
+                (mesh.vertices[0], mesh.colors[0]),
+                ([1.0, 2.0, 3.0], [255, 128, 0])
+            );
+        }
+        assert!(parse(format!("ply\nformat ascii 1.0\n{HEADER}").as_bytes()).is_err());
     }
 
     #[test]

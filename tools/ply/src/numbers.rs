@@ -88,11 +88,31 @@ impl<R: BufRead> Numbers<R> {
         element: &Element,
         coordinates: &[(usize, Scalar); 3],
     ) -> Result<[f64; 3], String> {
+        self.point_with(element, coordinates, &[], &mut Vec::new())
+    }
+
+    /// As [`Numbers::point`]; replaces `others` by the values of the properties `columns`, given by their indices
+    /// and types, ascending.
+    ///
+    /// # Errors
+    /// The content found instead of the entry.
+    pub fn point_with(
+        &mut self,
+        element: &Element,
+        coordinates: &[(usize, Scalar); 3],
+        columns: &[(usize, Scalar)],
+        others: &mut Vec<f64>,
+    ) -> Result<[f64; 3], String> {
         let mut point = [0.0; 3];
+        others.clear();
         for (at, (_, property)) in element.properties.iter().enumerate() {
-            match coordinates.iter().position(|c| c.0 == at) {
-                Some(axis) => point[axis] = self.next(coordinates[axis].1)?,
-                None => self.skip(*property)?,
+            let axis = coordinates.iter().position(|c| c.0 == at);
+            if let Some(axis) = axis {
+                point[axis] = self.next(coordinates[axis].1)?;
+            } else if let Some((_, scalar)) = columns.iter().find(|c| c.0 == at) {
+                others.push(self.next(*scalar)?);
+            } else {
+                self.skip(*property)?;
             }
         }
         Ok(point)

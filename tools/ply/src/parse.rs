@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::header::{Element, Header};
+use crate::place::Place;
 use crate::types::{Encoding, Property, Scalar};
 use std::io::BufRead;
 
@@ -29,6 +30,7 @@ impl Header {
             encoding: Encoding::Ascii,
             elements: Vec::new(),
             bytes: 0,
+            place: Place::default(),
         };
         let mut encoding = None;
         loop {
@@ -53,7 +55,11 @@ impl Header {
     fn take(&mut self, text: &str, encoding: &mut Option<Encoding>) -> Result<(), &'static str> {
         let words: Vec<&str> = text.split_ascii_whitespace().collect();
         match words[..] {
-            [] | ["ply" | "comment" | "obj_info", ..] => Ok(()),
+            ["comment", ref words @ ..] => {
+                self.place.take(words);
+                Ok(())
+            }
+            [] | ["ply" | "obj_info", ..] => Ok(()),
             ["format", name, ..] => {
                 let found = Encoding::parse(name).ok_or("ascii or binary_…_endian")?;
                 *encoding = Some(found);

@@ -30,7 +30,8 @@ impl Encoding {
 }
 
 /// Type of a number.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
 #[allow(missing_docs)]
 pub enum Scalar {
     I8,
@@ -81,6 +82,32 @@ impl Scalar {
             Self::I16 | Self::U16 => 2,
             Self::I32 | Self::U32 | Self::F32 => 4,
             Self::F64 => 8,
+        }
+    }
+
+    /// Appends a number in little-endian order. Integers are truncated, and limited to the range of the type; NaN
+    /// is zero for integers, and one and the same NaN for floats.
+    #[inline]
+    pub fn put(self, value: f64, bytes: &mut Vec<u8>) {
+        match self {
+            Self::I8 => bytes.extend_from_slice(&(value as i8).to_le_bytes()),
+            Self::U8 => bytes.push(value as u8),
+            Self::I16 => bytes.extend_from_slice(&(value as i16).to_le_bytes()),
+            Self::U16 => bytes.extend_from_slice(&(value as u16).to_le_bytes()),
+            Self::I32 => bytes.extend_from_slice(&(value as i32).to_le_bytes()),
+            Self::U32 => bytes.extend_from_slice(&(value as u32).to_le_bytes()),
+            Self::F32 => {
+                let value = if value.is_nan() {
+                    f32::NAN
+                } else {
+                    value as f32
+                };
+                bytes.extend_from_slice(&value.to_le_bytes());
+            }
+            Self::F64 => {
+                let value = if value.is_nan() { f64::NAN } else { value };
+                bytes.extend_from_slice(&value.to_le_bytes());
+            }
         }
     }
 

@@ -79,6 +79,10 @@ struct Args {
     #[arg(long)]
     wire: bool,
 
+    /// Draw vertices in their own colours, if the file has any: triangles in the mean of their corners
+    #[arg(long)]
+    colors: bool,
+
     /// Leave out back faces, e.g. to look into a room
     #[arg(long)]
     cull: bool,
@@ -146,7 +150,10 @@ fn check(args: &Args) -> Result<()> {
 
 fn run(args: &Args) -> Result<()> {
     check(args)?;
-    let mesh = scene::read(&args.input)?;
+    let mut mesh = scene::read(&args.input)?;
+    if !args.colors {
+        mesh.colors.clear();
+    }
     let factor = args.supersample;
     let framing = Framing {
         size: [args.width * factor, args.height * factor],

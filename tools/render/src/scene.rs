@@ -13,6 +13,8 @@ pub(crate) struct Scene {
     /// Vertices relative to `origin`.
     pub positions: Vec<Vec3>,
     pub triangles: Vec<[u32; 3]>,
+    /// Colours of the vertices; empty if there are none.
+    pub colors: Vec<[u8; 3]>,
     /// Centre of the bounding box; subtracted so that coordinates are small.
     pub origin: Vec3,
 }
@@ -30,6 +32,7 @@ fn centred(mesh: Mesh) -> Scene {
     let mut scene = Scene {
         positions: mesh.vertices,
         triangles: mesh.triangles,
+        colors: mesh.colors,
         origin: [0.0; 3],
     };
     let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
@@ -59,7 +62,7 @@ mod tests {
         let vertices = vec![[0.0, 0.0, 0.5], [2.0, 4.0, 0.5], [f64::NAN, 9.0, 9.0]];
         let scene = centred(Mesh {
             vertices,
-            triangles: Vec::new(),
+            ..Mesh::default()
         });
         assert_eq!(scene.origin, [1.0, 2.0, 0.5]);
         assert_eq!(scene.positions[1], [1.0, 2.0, 0.0]);

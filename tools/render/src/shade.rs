@@ -8,7 +8,7 @@ use crate::vec3::{Vec3, cross, dot, normalize, sub};
 type Colour = [f64; 3];
 
 const BACKGROUND: Colour = [255.0, 255.0, 255.0];
-/// Triangles seen from the side of their counter-clockwise winding.
+/// Triangles seen from the side of their counter-clockwise winding, without colours of their own.
 const FRONT: Colour = [236.0, 224.0, 206.0];
 /// Triangles seen from behind.
 const BACK: Colour = [92.0, 132.0, 232.0];
@@ -63,7 +63,26 @@ impl<'a> Shader<'a> {
         let head = dot(normal, self.light).max(0.0);
         let sky = 0.5 + 0.5 * normal[2];
         let brightness = 0.16 + 0.64 * head + 0.20 * sky;
-        (if facing { FRONT } else { BACK }).map(|c| c * brightness)
+        let color = match facing {
+            true => self
+                .own(&self.mesh.triangles[number as usize])
+                .unwrap_or(FRONT),
+            false => BACK,
+        };
+        color.map(|c| c * brightness)
+    }
+
+    /// The mean of the colours of some vertices, if the file has any.
+    fn own(&self, vertices: &[u32]) -> Option<Colour> {
+        if self.mesh.colors.is_empty() {
+            return None;
+        }
+        let mut sum = [0.0; 3];
+        for v in vertices {
+            let color = self.mesh.colors[*v as usize];
+            sum = std::array::from_fn(|k| sum[k] + f64::from(color[k]));
+        }
+        Some(sum.map(|c| c / vertices.len() as f64))
     }
 
     fn point(&self, raster: &Raster, pixel: usize) -> Colour {
@@ -78,6 +97,9 @@ impl<'a> Shader<'a> {
         let step = (place as usize).min(RAMP.len() - 2);
         let blend = place - step as f64;
         let shade = self.eye_dome(raster, pixel);
+        if let Some(color) = self.own(&[raster.item[pixel]]) {
+            return color.map(|c| c * shade);
+        }
         std::array::from_fn(|k| shade * (RAMP[step][k] * (1.0 - blend) + RAMP[step + 1][k] * blend))
     }
 

@@ -76,10 +76,11 @@ impl Decoder<'_> {
         let wanted = DecompressionSelection::base()
             .decompress_z()
             .decompress_flags();
-        decoder.set_selection(match self.record.wanted {
+        let wanted = match self.record.wanted {
             Some(_) => wanted.decompress_classification(),
             None => wanted,
-        });
+        };
+        decoder.set_selection(self.record.fields.layers(wanted));
         self.points(&mut decoder, chunk.at, chunk.points, sink)
     }
 

@@ -1,8 +1,8 @@
-//! The reference system given in a file, as far as needed to compare two of them.
+//! The reference system given in a file, as far as needed to name it and to compare two of them.
 //!
-//! Coordinates are read unchanged; the records only serve for a warning. So errors in them are ignored.
+//! Coordinates are read unchanged, so errors in the records are ignored.
 
-use super::super::crs::Crs;
+use super::super::crs::{Crs, CrsSource, LONGEST};
 use super::super::input::Input;
 use super::Header;
 use super::vlr::Records;
@@ -81,16 +81,20 @@ fn geotiff(mut keys: GeoTiffCrs) -> Option<Crs> {
     (!keys.entries.is_empty()).then(|| Crs {
         horizontal,
         vertical,
+        source: CrsSource::GeotiffKeys,
+        wkt: None,
         normal: format!("{:?}", keys.entries),
         name,
     })
 }
 
 /// The system described by a well-known text, version 1 or 2.
-fn well_known(text: &str) -> Crs {
+pub(in crate::stages::ingest) fn well_known(text: &str) -> Crs {
     let mut crs = Crs {
         horizontal: None,
         vertical: None,
+        source: CrsSource::WellKnownText,
+        wkt: (text.len() <= LONGEST).then(|| text.to_owned()),
         normal: String::with_capacity(text.len()),
         name: String::new(),
     };

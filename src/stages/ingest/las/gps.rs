@@ -1,8 +1,6 @@
-//! Skips compressed GPS times (laszip item 7, version 2).
+//! Decodes compressed GPS times (laszip item 7, version 2).
 //!
-//! In chunks of whole points, times and positions share one stream, so times must be decoded to be skipped;
-//! their values are not used. The decoder of the `laz` crate is recursive, and damaged data can make it
-//! overflow the stack.
+//! The decoder of the `laz` crate is recursive, and damaged data can make it overflow the stack.
 
 use laz::decoders::ArithmeticDecoder;
 use laz::decompressors::{IntegerDecompressor, IntegerDecompressorBuilder};
@@ -30,6 +28,8 @@ pub(super) struct GpsTimes {
     integers: IntegerDecompressor,
     last: usize,
     next: usize,
+    /// The bits of the last time of each sequence, as an integer.
+    times: [i64; 4],
     differences: [i32; 4],
     extremes: [u32; 4],
 }
@@ -45,6 +45,7 @@ impl Default for GpsTimes {
                 .build_initialized(),
             last: 0,
             next: 0,
+            times: [0; 4],
             differences: [0; 4],
             extremes: [0; 4],
         }
@@ -63,14 +64,21 @@ impl GpsTimes {
 
     /// A time stored in full starts a new sequence.
     fn whole<R: Read>(&mut self, decoder: &mut ArithmeticDecoder<R>) -> std::io::Result<()> {
-        // The predicted value does not affect how many bytes are consumed.
-        self.integers.decompress(decoder, 0, 8)?;
-        decoder.read_int()?;
+        let prediction = (self.times[self.last] >> 32) as i32;
+        let upper = self.integers.decompress(decoder, prediction, 8)?;
+        let lower = decoder.read_int()?;
         self.next = (self.next + 1) & 3;
         self.last = self.next;
+        self.times[self.last] = i64::from(upper) << 32 | i64::from(lower);
         self.differences[self.last] = 0;
         self.extremes[self.last] = 0;
         Ok(())
+    }
+
+    /// Adds a difference to the last time of the sequence.
+    fn add(&mut self, difference: i32) {
+        let time = &mut self.times[self.last];
+        *time = time.wrapping_add(difference.into());
     }
 
     /// Decodes one symbol and its data; true if it was a switch to another sequence.
@@ -79,7 +87,9 @@ impl GpsTimes {
             match decoder.decode_symbol(&mut self.first_difference)? {
                 0 => {}
                 1 => {
-                    self.differences[self.last] = self.integers.decompress(decoder, 0, 0)?;
+                    let difference = self.integers.decompress(decoder, 0, 0)?;
+                    self.differences[self.last] = difference;
+                    self.add(difference);
                     self.extremes[self.last] = 0;
                 }
                 2 => self.whole(decoder)?,
@@ -109,6 +119,7 @@ impl GpsTimes {
         };
         let prediction = multiple.wrapping_mul(self.differences[self.last]);
         let difference = self.integers.decompress(decoder, prediction, context)?;
+        self.add(difference);
         match context {
             1 => self.extremes[self.last] = 0,
             4 | 6 | 7 => self.extreme(difference),
@@ -124,16 +135,20 @@ impl<R: Read> FieldDecompressor<R> for GpsTimes {
     }
 
     fn decompress_first(&mut self, source: &mut R, first: &mut [u8]) -> std::io::Result<()> {
-        source.read_exact(first)
+        source.read_exact(first)?;
+        let bytes = first.iter().rev();
+        self.times[0] = bytes.fold(0, |time, byte| time << 8 | i64::from(*byte));
+        Ok(())
     }
 
     fn decompress_with(
         &mut self,
         decoder: &mut ArithmeticDecoder<R>,
-        _time: &mut [u8],
+        time: &mut [u8],
     ) -> std::io::Result<()> {
         for _ in 0..MOST_SWITCHES {
             if !self.step(decoder)? {
+                time.copy_from_slice(&self.times[self.last].to_le_bytes());
                 return Ok(());
             }
         }

@@ -3,9 +3,10 @@
 use super::super::input::{Input, STREAM_BUFFER};
 use super::super::spool::{Sink, SourceWriter, sink_bytes};
 use super::chunks::{Decoder, LayerHead};
+use super::fields::Fields;
 use super::table::{self, Chunk, Table};
 use super::vlr::{self, Laszip};
-use super::{Header, Record};
+use super::{Header, Record, skip};
 use crate::error::Result;
 use laz::LazItemType;
 
@@ -34,11 +35,12 @@ pub(super) fn read(
         return Ok(warnings);
     }
     plausible(input, header.claimed)?;
+    let fields = Fields::of(header, writer.wanted);
     let decoder = Decoder {
         input,
         header,
         laszip: &laszip,
-        record: Record::of(header, writer.classes),
+        record: Record::of(header, writer.classes, &fields),
     };
     let table = match laszip.stream {
         true => None,
@@ -53,6 +55,7 @@ pub(super) fn read(
         }
     };
     limit(input, header, &laszip, &mut table, &mut warnings)?;
+    warnings.extend(skip::outside(input, header, &mut table.chunks, writer)?);
     in_parallel(&decoder, &table.chunks, writer)?;
     Ok(warnings)
 }

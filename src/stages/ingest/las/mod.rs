@@ -1,15 +1,20 @@
 //! LAS 1.0 to 1.4 and LAZ.
 
 mod chunks;
+mod copc;
 mod crs;
+mod fields;
 mod gps;
 mod header;
 mod laz;
 mod plain;
+mod skip;
 mod table;
 mod vlr;
 
 use header::Header;
+
+pub(super) use crs::well_known;
 
 /// Byte of a record with the withheld flag, in all point formats.
 const FLAGS: usize = 15;
@@ -18,13 +23,17 @@ const FLAGS: usize = 15;
 const CLASS: usize = 16;
 
 use super::classes::Classes;
+use super::columns::Column;
+use super::crop::Nearby;
 use super::crs::Crs;
 use super::format::Format;
 use super::input::Input;
+use super::native::Native;
 use super::point_format::{Claims, Head, PointFile, PointFormat, Refusal};
-use super::source::Native;
 use super::spool::{Sink, SourceWriter};
 use crate::error::Result;
+use crate::workspace::Workspace;
+use fields::Fields;
 
 impl Format {
     /// ASPRS LAS.
@@ -86,8 +95,23 @@ impl PointFile for Header {
         }
     }
 
+    fn lies_outside(
+        &self,
+        input: &Input,
+        wanted: &Nearby<'_>,
+        workspace: &Workspace,
+    ) -> Option<[[f64; 3]; 2]> {
+        // What is damaged is reported when the file is read.
+        let outside = Header::lies_outside(self, input, wanted, workspace).unwrap_or(false);
+        self.native_bounds().filter(|_| outside)
+    }
+
     fn crs(&self, input: &Input) -> Option<Crs> {
         crs::read(input, self)
+    }
+
+    fn columns(&self) -> Vec<Column> {
+        fields::columns(self)
     }
 
     fn read(&self, input: &Input, target: &SourceWriter<'_>) -> Result<Vec<String>> {
@@ -100,7 +124,7 @@ impl PointFile for Header {
     }
 }
 
-/// The position of the withheld flag and of the class in a record, and the wanted classes.
+/// The position of the withheld flag and of the class in a record, and the wanted classes and fields.
 #[derive(Debug, Clone, Copy)]
 struct Record<'a> {
     withheld: u8,
@@ -108,10 +132,11 @@ struct Record<'a> {
     class: (usize, u8),
     /// `None` if all classes are wanted.
     wanted: Option<&'a Classes>,
+    fields: &'a Fields,
 }
 
 impl<'a> Record<'a> {
-    fn of(header: &Header, classes: &'a Classes) -> Self {
+    fn of(header: &Header, classes: &'a Classes, fields: &'a Fields) -> Self {
         let (withheld, class) = match (header.format.is_extended, header.raw.version.minor) {
             (true, _) => (0x04, (CLASS, 0xff)),
             // In LAS 1.0 the class is the whole byte.
@@ -123,6 +148,7 @@ impl<'a> Record<'a> {
             withheld,
             class,
             wanted,
+            fields,
         }
     }
 
@@ -135,7 +161,8 @@ impl<'a> Record<'a> {
         } else if self.wanted.is_some_and(|c| !c.wants(record[byte] & bits)) {
             sink.leave_out();
         } else {
-            return sink.push(position(record));
+            let values = |values: &mut Vec<u8>| self.fields.put(record, values);
+            return sink.push_with(position(record), values);
         }
         Ok(())
     }

@@ -2,6 +2,7 @@
 
 use super::super::input::Input;
 use super::super::spool::{Sink, SourceWriter, sink_bytes};
+use super::fields::Fields;
 use super::{Header, Record};
 use crate::error::Result;
 
@@ -18,7 +19,8 @@ pub(super) fn read(
     let points = count(input, header, &mut warnings)?;
     let rows = (SLAB / record_bytes).max(1);
     let units = usize::try_from(points.div_ceil(rows)).unwrap_or(usize::MAX);
-    let record = Record::of(header, writer.classes);
+    let fields = Fields::of(header, writer.wanted);
+    let record = Record::of(header, writer.classes, &fields);
     let memory = rows * record_bytes + sink_bytes::<i32>();
     writer.units(
         "LAS records",

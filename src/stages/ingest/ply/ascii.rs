@@ -2,10 +2,11 @@
 
 use super::super::input::{Input, Range, STREAM_BUFFER};
 use super::super::number;
+use super::super::scalar::FromScalar;
 use super::super::spool::{Sink, SourceWriter, sink_bytes};
-use super::{Cloud, FromScalar, Vertex, position};
+use super::{Cloud, Vertex, position};
 use crate::error::{Error, Result};
-use outcrop_ply::Property;
+use outcrop_ply::{Property, Scalar};
 use std::io::{BufRead, BufReader};
 
 /// Longest accepted line, in bytes.
@@ -44,10 +45,17 @@ fn vertices<T: FromScalar>(
             lines.next(&element.name, number, element.count)?;
         }
     }
+    let columns = vertex.wanted(writer.wanted);
+    let mut others = vec![f64::NAN; columns.len()];
     for number in 0..vertex.element.count {
         lines.next("vertex", number, vertex.element.count)?;
-        let point = lines.point(vertex, number, &mut sink.stats.decimals)?;
-        sink.push(point)?;
+        let decimals = &mut sink.stats.decimals;
+        let point = lines.point(vertex, number, decimals, &columns, &mut others)?;
+        sink.push_with(point, |values| {
+            for (value, (_, scalar)) in others.iter().zip(&columns) {
+                scalar.put(*value, values);
+            }
+        })?;
     }
     Ok(())
 }
@@ -99,13 +107,17 @@ impl Lines<'_> {
         }
     }
 
+    /// The point in the line, with the values of `columns` in `others`: NaN for what is no number.
     fn point<T: FromScalar>(
         &self,
         vertex: &Vertex,
         number: u64,
         decimals: &mut u32,
+        columns: &[(usize, Scalar)],
+        others: &mut [f64],
     ) -> Result<[T; 3]> {
         let mut point = [T::from_double(0.0); 3];
+        others.fill(f64::NAN);
         let mut words = self
             .line
             .split(u8::is_ascii_whitespace)
@@ -133,6 +145,9 @@ impl Lines<'_> {
                 };
                 point[axis] = value;
                 found += 1;
+            } else if let Some(at) = columns.iter().position(|c| c.0 == column) {
+                let mut none = 0;
+                others[at] = number::parse(word, false, &mut none).unwrap_or(f64::NAN);
             }
         }
         if found == 3 {

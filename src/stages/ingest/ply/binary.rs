@@ -1,8 +1,9 @@
 //! Binary PLY: slabs of records on all threads, or one record after another if vertices contain lists.
 
 use super::super::input::{Input, Range, STREAM_BUFFER};
+use super::super::scalar::FromScalar;
 use super::super::spool::{Sink, SourceWriter, sink_bytes};
-use super::{Cloud, FromScalar, Vertex, position};
+use super::{Cloud, Vertex, position};
 use crate::error::{Error, Result};
 use outcrop_ply::{Encoding, Numbers, real};
 use std::io::BufReader;
@@ -80,6 +81,10 @@ fn fixed<T: FromScalar>(
     let places = vertex
         .coordinates
         .map(|(number, kind)| (vertex.element.bytes_before(number).unwrap_or(0), kind));
+    let columns = vertex.wanted(writer.wanted).into_iter();
+    let columns: Vec<_> = columns
+        .map(|(number, kind)| (vertex.element.bytes_before(number).unwrap_or(0), kind))
+        .collect();
     let rows = (SLAB / bytes).max(1);
     let units = usize::try_from(count.div_ceil(rows)).unwrap_or(usize::MAX);
     let memory = rows * bytes + sink_bytes::<T>();
@@ -90,7 +95,12 @@ fn fixed<T: FromScalar>(
         let what = format!("vertices {first} to {}", first + rows - 1);
         let slab = input.window(start + first * bytes, (rows * bytes) as usize, &what)?;
         for record in slab.chunks_exact(bytes as usize) {
-            sink.push(places.map(|(at, kind)| T::from_double(real(kind, &record[at..], big))))?;
+            let point = places.map(|(at, kind)| T::from_double(real(kind, &record[at..], big)));
+            sink.push_with(point, |values| {
+                for (at, kind) in &columns {
+                    kind.put(real(*kind, &record[*at..], big), values);
+                }
+            })?;
         }
         Ok(())
     };
@@ -106,14 +116,20 @@ fn one_by_one<T: FromScalar>(
 ) -> Result<()> {
     let count = vertex.element.count;
     let memory = sink_bytes::<T>() + STREAM_BUFFER as u64;
+    let columns = vertex.wanted(writer.wanted);
     writer.whole("PLY vertices", memory, |sink: &mut Sink<'_, T>| {
         let mut records = Records::new(input, encoding, start);
+        let mut others = Vec::with_capacity(columns.len());
         for number in 0..count {
             let point = records
                 .numbers
-                .point(&vertex.element, &vertex.coordinates)
+                .point_with(&vertex.element, &vertex.coordinates, &columns, &mut others)
                 .map_err(|e| records.error("vertex", number, count, e))?;
-            sink.push(point.map(T::from_double))?;
+            sink.push_with(point.map(T::from_double), |values| {
+                for (value, (_, scalar)) in others.iter().zip(&columns) {
+                    scalar.put(*value, values);
+                }
+            })?;
         }
         Ok(())
     })

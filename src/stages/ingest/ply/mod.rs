@@ -3,14 +3,14 @@
 mod ascii;
 mod binary;
 
+use super::columns::{Column, Wanted};
 use super::format::Format;
 use super::input::{Input, Range};
-use super::number;
+use super::native::Native;
 use super::point_format::{Claims, Head, PointFile, PointFormat, Refusal};
-use super::source::Native;
 use super::spool::SourceWriter;
 use crate::error::{Error, Result};
-use outcrop_ply::{Element, Encoding, Header, Scalar};
+use outcrop_ply::{Element, Encoding, Header, Property, Scalar};
 use std::io::BufReader;
 
 impl Format {
@@ -125,6 +125,25 @@ impl Cloud {
     }
 }
 
+impl Vertex {
+    /// Index and type of the properties that are columns: all numbers but the coordinates.
+    fn columns(&self) -> Vec<(usize, Scalar)> {
+        let numbers = self.element.properties.iter().enumerate();
+        let numbers = numbers.filter_map(|(at, (_, property))| match property {
+            Property::One(scalar) => Some((at, *scalar)),
+            Property::List { .. } => None,
+        });
+        let is_other = |(at, _): &(usize, Scalar)| self.coordinates.iter().all(|c| c.0 != *at);
+        numbers.filter(is_other).collect()
+    }
+
+    /// Index and type of the properties that are wanted columns, ascending.
+    fn wanted(&self, wanted: &Wanted) -> Vec<(usize, Scalar)> {
+        let columns = self.columns();
+        wanted.numbers.iter().map(|n| columns[*n]).collect()
+    }
+}
+
 impl PointFile for Cloud {
     fn claims(&self, input: &Input) -> Claims {
         let format = match self.encoding {
@@ -139,6 +158,17 @@ impl PointFile for Cloud {
             text: self.encoding == Encoding::Ascii,
             ..Claims::new(input, format, self.native(), points, least)
         }
+    }
+
+    fn columns(&self) -> Vec<Column> {
+        let Some(vertex) = &self.vertex else {
+            return Vec::new();
+        };
+        let name = |at: usize| &vertex.element.properties[at].0;
+        let columns = vertex.columns().into_iter();
+        columns
+            .map(|(at, scalar)| Column::new(name(at), scalar))
+            .collect()
     }
 
     fn read(&self, input: &Input, target: &SourceWriter<'_>) -> Result<Vec<String>> {
@@ -159,33 +189,4 @@ impl PointFile for Cloud {
 /// Offset in the file of the next byte.
 fn position(source: &BufReader<Range<'_>>) -> u64 {
     source.get_ref().at - source.buffer().len() as u64
-}
-
-/// A coordinate that can be converted from any scalar.
-trait FromScalar: super::spool::Coordinate {
-    fn from_double(value: f64) -> Self;
-    /// Parses a number in text; see [`number::parse`].
-    fn parse(word: &[u8], decimals: &mut u32) -> Option<Self>;
-}
-
-impl FromScalar for f32 {
-    fn from_double(value: f64) -> Self {
-        value as f32
-    }
-    fn parse(word: &[u8], decimals: &mut u32) -> Option<Self> {
-        // Parsed directly as single precision, since rounding twice may differ.
-        match std::str::from_utf8(word).ok()?.parse() {
-            Ok(value) => Some(value),
-            Err(_) => number::parse(word, false, decimals).map(|v| v as f32),
-        }
-    }
-}
-
-impl FromScalar for f64 {
-    fn from_double(value: f64) -> Self {
-        value
-    }
-    fn parse(word: &[u8], decimals: &mut u32) -> Option<Self> {
-        number::parse(word, false, decimals)
-    }
 }

@@ -9,6 +9,7 @@ mod values;
 
 use crate::error::{Error, FileError, Result};
 use crate::header::{Element, Header};
+use crate::place::Place;
 use crate::types::{Encoding, Scalar};
 use source::Source;
 use std::path::Path;
@@ -101,6 +102,19 @@ impl MeshStream {
     pub fn vertices_first(&self) -> bool {
         let mut names = self.header.elements.iter().map(|e| &*e.name);
         names.find(|n| ["vertex", "face"].contains(n)) == Some("vertex")
+    }
+
+    /// The place of the coordinates, if the header gives one. Positions are passed on as they are in the file.
+    #[must_use]
+    pub fn place(&self) -> Place {
+        self.header.place
+    }
+
+    /// Types of the properties x, y and z.
+    #[must_use]
+    pub fn types(&self) -> Option<[Scalar; 3]> {
+        let (_, vertex) = self.header.element("vertex").ok()??;
+        Some(vertex.coordinates().ok()?.map(|(_, scalar)| scalar))
     }
 
     fn count(&self, name: &str) -> u64 {

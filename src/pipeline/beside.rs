@@ -1,0 +1,174 @@
+//! The files beside the mesh: `MESH.origin.json` with the origin of its coordinates, and `MESH.prj` with the
+//! well-known text of their reference system.
+//!
+//! They are written when the mesh has its name, each under a temporary name first; a resumed run writes them
+//! again.
+
+use crate::error::{Error, Result};
+use crate::report::Report;
+use crate::stages::export::{folder_of, is_compressed};
+use crate::stages::ingest::{self, Crs};
+use serde::Serialize;
+use std::ffi::OsString;
+use std::io::ErrorKind::NotFound;
+use std::io::{Read, Write};
+use std::path::{Path, PathBuf};
+
+/// The beginning of every file with an origin, by which one of an earlier mesh is known.
+const MADE_BY: &str = "outcrop ";
+
+/// Most bytes of such a file.
+const LONGEST: u64 = 4 << 20;
+
+/// The content of `MESH.origin.json`.
+#[derive(Serialize)]
+struct OriginFile {
+    made_by: String,
+    mesh: String,
+    /// Coordinates of the mesh plus these are those of the cloud; Metashape calls this the shift.
+    origin: [f64; 3],
+    /// The same as CloudCompare counts it: coordinates of the cloud plus these are those of the mesh.
+    cloudcompare_global_shift: [f64; 3],
+    /// A line for `global_shift_list.txt`, from which CloudCompare offers shifts.
+    cloudcompare_global_shift_list: String,
+    crs: Option<Crs>,
+}
+
+/// Path of the file beside a mesh: its name with another extension, after that of a compression is removed.
+pub(super) fn path_beside(output: &Path, extension: &str) -> PathBuf {
+    let plain = match is_compressed(output) {
+        true => output.with_extension(""),
+        false => output.to_path_buf(),
+    };
+    let mut path = plain.with_extension("").into_os_string();
+    path.push(".");
+    path.push(extension);
+    path.into()
+}
+
+/// Writes the files beside the mesh; an origin of an earlier mesh that is not true any more is deleted.
+pub(super) fn write(
+    output: &Path,
+    inputs: &[PathBuf],
+    report: &Report,
+    wkt: Option<&str>,
+) -> Result<()> {
+    write_origin(output, report)?;
+    let Some(wkt) = wkt else {
+        return Ok(());
+    };
+    let path = path_beside(output, "prj");
+    // That of an input stays as it is.
+    let of_input = ingest::expand(inputs)?.iter().any(|input| {
+        let other = ingest::prj_of(input).canonicalize();
+        other.is_ok_and(|other| path.canonicalize().is_ok_and(|path| path == other))
+    });
+    match of_input {
+        true => Ok(()),
+        false => put(&path, format!("{wkt}\n").as_bytes()),
+    }
+}
+
+fn write_origin(output: &Path, report: &Report) -> Result<()> {
+    let path = path_beside(output, "origin.json");
+    let Some(origin) = report.origin else {
+        return match is_ours(&path) {
+            true => std::fs::remove_file(&path).map_err(|e| Error::io(&path, "delete", e)),
+            false => Ok(()),
+        };
+    };
+    let name = output.file_name().unwrap_or_default().to_string_lossy();
+    let shift = origin.map(|c| 0.0 - c);
+    let [x, y, z] = shift;
+    let content = OriginFile {
+        made_by: format!("{MADE_BY}{}", report.version),
+        cloudcompare_global_shift_list: format!("{}; {x}; {y}; {z}; 1;", name.replace(';', " ")),
+        mesh: name.into_owned(),
+        origin,
+        cloudcompare_global_shift: shift,
+        crs: report.input.crs.clone(),
+    };
+    let json = serde_json::to_string_pretty(&content);
+    let json = json.map_err(|e| Error::io(&path, "write JSON", e.into()))?;
+    put(&path, (json + "\n").as_bytes())
+}
+
+/// True if a file with an origin was written by this program, for an earlier mesh of the name.
+fn is_ours(path: &Path) -> bool {
+    let Ok(file) = std::fs::File::open(path) else {
+        return false;
+    };
+    let mut bytes = Vec::new();
+    if file.take(LONGEST).read_to_end(&mut bytes).is_err() {
+        return false;
+    }
+    let value: Result<serde_json::Value, _> = serde_json::from_slice(&bytes);
+    value.is_ok_and(|value| {
+        value["made_by"]
+            .as_str()
+            .is_some_and(|by| by.starts_with(MADE_BY))
+    })
+}
+
+/// Writes a file under a temporary name, then renames it.
+fn put(path: &Path, bytes: &[u8]) -> Result<()> {
+    let mut name = OsString::from(".");
+    name.push(path.file_name().unwrap_or_default());
+    name.push(".outcrop-part");
+    let temporary = folder_of(path).join(name);
+    let write = || {
+        match std::fs::remove_file(&temporary) {
+            Err(e) if e.kind() != NotFound => return Err(e),
+            _ => {}
+        }
+        let mut file = std::fs::File::create_new(&temporary)?;
+        file.write_all(bytes)?;
+        file.sync_all()?;
+        std::fs::rename(&temporary, path)
+    };
+    write().map_err(|e| {
+        let _ = std::fs::remove_file(&temporary);
+        Error::io(path, "write", e)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_lie_beside_the_mesh() {
+        for (output, beside) in [
+            ("mesh.ply", "mesh.prj"),
+            ("a/mesh.ply.zst", "a/mesh.prj"),
+            ("a.b/site.1.PLY", "a.b/site.1.prj"),
+            ("a.b/mesh", "a.b/mesh.prj"),
+        ] {
+            assert_eq!(path_beside(Path::new(output), "prj"), Path::new(beside));
+        }
+    }
+
+    #[test]
+    fn the_origin_of_an_earlier_mesh_is_deleted_and_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let output = folder.path().join("mesh.ply");
+        let path = folder.path().join("mesh.origin.json");
+        let with = |origin| Report {
+            version: "1",
+            origin,
+            ..Report::default()
+        };
+        write(&output, &[], &with(Some([635_000.0, 0.0, -0.5])), None).unwrap();
+        let json: serde_json::Value =
+            serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
+        assert_eq!(json["origin"], serde_json::json!([635_000.0, 0.0, -0.5]));
+        let line = "mesh.ply; -635000; 0; 0.5; 1;";
+        assert_eq!(json["cloudcompare_global_shift_list"], line);
+        write(&output, &[], &with(None), None).unwrap();
+        assert!(!path.exists());
+        std::fs::write(&path, "{\"made_by\": \"hand\"}").unwrap();
+        write(&output, &[], &with(None), None).unwrap();
+        assert!(path.exists());
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+}

@@ -1,0 +1,227 @@
+//! Columns of the points by id, such as colours (not in the paper).
+//!
+//! The ordered store is there already. Units read parts of the spool again, with values, and send each point's row
+//! to a bucket: a range of ids, cut at a sample of all points. Units of buckets sort the rows and go through them
+//! beside the store. Of several rows at one position the smallest counts, so the order of inputs does not matter;
+//! rows at positions that are not in the store belong to points that were left out.
+
+mod buckets;
+mod rows;
+
+use crate::error::Result;
+use crate::geom::lattice::Lattice;
+use crate::spill::{Row, Shuffle, Table, release};
+use crate::stages::blocks::Blocks;
+use crate::stages::ingest::{Carried, Column, Spool, VALUE_BUFFERS};
+use crate::stages::order::{Grouped, MOST_GROUPS, StoredPoints, cuts};
+use crate::workspace::memory::bytes_of;
+use crate::workspace::{Unit, Workspace};
+use buckets::Buckets;
+use rows::{Row1, Row2, Row6, Row12, Word};
+use serde::{Deserialize, Serialize};
+use std::ops::Range;
+
+/// Bytes of memory for the rows of a unit that reads, and about those of a bucket: a third of the smallest budget.
+const ROWS: u64 = 64 << 20;
+
+/// Copies of its rows that a unit that reads has in memory: the rows, and the rows packed twice.
+const COPIES: u64 = 3;
+
+/// The columns of all points by id.
+#[derive(Debug, Serialize, Deserialize)]
+pub struct StoredColumns {
+    columns: Vec<Column>,
+    /// Words of the values of a point.
+    words: usize,
+    /// Sections: the values of consecutive ids, word by word.
+    table: Table<Word>,
+    /// The first id of each section.
+    starts: Vec<u32>,
+}
+
+release!(StoredColumns: table);
+
+impl StoredColumns {
+    /// The columns, in the order of the values.
+    #[must_use]
+    pub fn columns(&self) -> &[Column] {
+        &self.columns
+    }
+
+    /// Bytes of memory for the values of `ids` ids while they are read.
+    #[must_use]
+    pub fn bytes(&self, ids: usize) -> u64 {
+        (ids * self.words * 4 * 3) as u64
+    }
+
+    /// The values of all ids of a block.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+    pub fn open(&self, unit: &Unit<'_>, ids: Range<u32>) -> Result<Values<'_>> {
+        let mut rows = vec![0; ids.len() * self.words];
+        let first = self.starts.partition_point(|start| *start < ids.start);
+        let mut at = 0;
+        let mut section = Vec::new();
+        for number in first..self.starts.len() {
+            if self.starts[number] >= ids.end {
+                break;
+            }
+            self.table.get_into(unit, number, &mut section)?;
+            let count = section.len() / self.words;
+            let end = ((at + count) * self.words).min(rows.len());
+            let rows = &mut rows[at * self.words..end];
+            for (word, column) in section.chunks_exact(count.max(1)).enumerate() {
+                let places = rows[word..].iter_mut().step_by(self.words);
+                places.zip(column).for_each(|(to, from)| *to = from.word);
+            }
+            at = end / self.words;
+        }
+        Ok(Values {
+            columns: self,
+            first: ids.start,
+            rows,
+        })
+    }
+}
+
+/// The values of the ids of a block.
+#[derive(Debug)]
+pub struct Values<'a> {
+    columns: &'a StoredColumns,
+    first: u32,
+    rows: Vec<u32>,
+}
+
+impl Values<'_> {
+    /// Allocated bytes.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        bytes_of(&self.rows)
+    }
+
+    /// Appends the little-endian values of an id to `bytes`, in the columns that are `held`.
+    pub fn put(&self, id: u32, held: &[bool], bytes: &mut Vec<u8>) {
+        let words = self.columns.words;
+        let at = (id - self.first) as usize * words;
+        let mut row = [0; 48];
+        for (to, word) in row.chunks_exact_mut(4).zip(&self.rows[at..at + words]) {
+            to.copy_from_slice(&word.to_be_bytes());
+        }
+        let mut at = 0;
+        for (column, held) in self.columns.columns.iter().zip(held) {
+            let own = &row[at..at + column.scalar.bytes()];
+            if *held {
+                Carried::unordered(column, own, bytes);
+            }
+            at += own.len();
+        }
+    }
+}
+
+/// Puts the columns `carried` of a spool in the order of the ids of `store`.
+///
+/// # Errors
+/// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`], [`crate::Error::Cancelled`].
+pub fn attributes(
+    spool: &Spool,
+    lattice: &Lattice,
+    carried: &Carried,
+    store: &StoredPoints,
+    blocks: Blocks,
+    workspace: &Workspace,
+) -> Result<StoredColumns> {
+    let job = Job {
+        spool,
+        lattice,
+        carried,
+        rows: ROWS,
+        workspace,
+    };
+    match carried.bytes().div_ceil(4) {
+        0 | 1 => job.run::<Row1>(store, blocks),
+        2 => job.run::<Row2>(store, blocks),
+        3..=6 => job.run::<Row6>(store, blocks),
+        _ => job.run::<Row12>(store, blocks),
+    }
+}
+
+/// The input of the stage.
+struct Job<'a> {
+    spool: &'a Spool,
+    lattice: &'a Lattice,
+    carried: &'a Carried,
+    /// Bytes of memory for the rows of a unit.
+    rows: u64,
+    workspace: &'a Workspace,
+}
+
+impl Job<'_> {
+    fn run<R: Row>(&self, store: &StoredPoints, blocks: Blocks) -> Result<StoredColumns> {
+        let workspace = self.workspace;
+        let size = self.rows / (COPIES * size_of::<R>() as u64);
+        let size = size.max(self.spool.points() / MOST_GROUPS);
+        let source = Grouped::new(self.spool, self.lattice, size, workspace);
+        let cuts = cuts(
+            source.samples("attributes: samples")?,
+            source.count().max(1),
+        );
+        let sent = Shuffle::<R>::new("attributes.sent");
+        self.send(&source, &cuts, &sent)?;
+        let store = store.open(workspace)?;
+        let buckets = Buckets::new(&store, &cuts, blocks, workspace)?;
+        let inbox = sent.open(workspace, buckets.count())?;
+        let words = self.carried.bytes().div_ceil(4);
+        let table = buckets.merge(&inbox, words, workspace)?;
+        drop(inbox);
+        sent.release(workspace)?;
+        Ok(StoredColumns {
+            columns: self.carried.columns.clone(),
+            words,
+            table,
+            starts: buckets.sections(),
+        })
+    }
+
+    /// Sends the rows of all points to their buckets. Of rows of a unit at one position only the smallest is sent.
+    fn send<R: Row>(
+        &self,
+        source: &Grouped<'_>,
+        cuts: &[[u32; 3]],
+        sent: &Shuffle<R>,
+    ) -> Result<()> {
+        let row_bytes = self.carried.bytes();
+        let work = |unit: &Unit<'_>| {
+            let group = unit.number();
+            let mut rows: Vec<R> = Vec::with_capacity(source.points(group) as usize);
+            let take = |points: &[_], values: &[u8]| {
+                let values = values.chunks_exact(row_bytes);
+                rows.extend(
+                    points
+                        .iter()
+                        .zip(values)
+                        .map(|(p, v)| rows::row::<R>(*p, v)),
+                );
+                Ok(())
+            };
+            let frames = source.frames(group);
+            self.spool
+                .for_values(self.workspace, self.lattice, frames, self.carried, take)?;
+            let _held = unit.hold(bytes_of(&rows) + VALUE_BUFFERS);
+            rows.sort_unstable_by(R::compare);
+            rows.dedup_by(|b, a| rows::key(a) == rows::key(b));
+            rows::send_to(&mut rows, cuts);
+            unit.advance(source.points(group));
+            sent.send(unit, group, rows)
+        };
+        let bytes =
+            |group: usize| VALUE_BUFFERS + source.points(group) * COPIES * size_of::<R>() as u64;
+        self.workspace
+            .units("attributes: send", source.count(), bytes, work, |_, ()| {
+                Ok(())
+            })
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,400 @@
+//! The columns that the mesh keeps, and the values of the spool in their types.
+//!
+//! The columns of all files become one list. Its rows are bytes that compare like the values, column by column,
+//! so that the smallest of several rows does not depend on who read them.
+
+use super::Spool;
+use super::columns::{Attributes, COLORS, Column, Span, row_bytes};
+use super::source::Source;
+use outcrop_ply::{Scalar, real};
+use serde::{Deserialize, Serialize};
+
+/// All types, smaller ones first.
+const SCALARS: [Scalar; 8] = [
+    Scalar::U8,
+    Scalar::I8,
+    Scalar::U16,
+    Scalar::I16,
+    Scalar::U32,
+    Scalar::I32,
+    Scalar::F32,
+    Scalar::F64,
+];
+
+/// A column of the mesh, for the report.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Attribute {
+    /// Its name.
+    pub name: String,
+    /// Type of its values in the mesh.
+    #[serde(rename = "type")]
+    pub scalar: Scalar,
+    /// Smallest and largest value in the inputs.
+    pub range: [f64; 2],
+    /// Input files without it.
+    pub files_without: u64,
+}
+
+/// Change of a value on its way to the mesh.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Change {
+    /// None but of the type.
+    None,
+    /// A colour of 8 bits in 16: times 257.
+    Wider,
+    /// A colour of 16 bits in 8: its upper half. Right for writers that multiply by 256 and by 257.
+    Upper,
+    /// A colour from 0 to 1: times this.
+    Unit(f64),
+}
+
+/// The values of one column in the rows of one source.
+#[derive(Debug, Clone, Copy)]
+struct Step {
+    /// Byte in the row, and type; `None` if the source lacks the column.
+    from: Option<(usize, Scalar)>,
+    change: Change,
+    to: Scalar,
+}
+
+/// The columns of the mesh, and the way from the rows of each source.
+#[derive(Debug, Clone, Default)]
+pub struct Carried {
+    /// The columns, in the order of the mesh.
+    pub columns: Vec<Column>,
+    /// The columns for the report.
+    pub attributes: Vec<Attribute>,
+    /// Warnings and notes, one line each.
+    pub warnings: Vec<String>,
+    /// For each source, the steps of all columns.
+    steps: Vec<Vec<Step>>,
+}
+
+impl Carried {
+    /// Bytes of the values of a point.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        row_bytes(&self.columns)
+    }
+
+    /// Appends the row of a point of source `source`, whose values in the spool are `values`.
+    pub(super) fn put(&self, source: usize, values: &[u8], row: &mut Vec<u8>) {
+        for step in &self.steps[source] {
+            let value = match step.from {
+                Some((at, scalar)) => real(scalar, &values[at..], false),
+                None => f64::NAN,
+            };
+            let value = match step.change {
+                Change::None => value,
+                Change::Wider => value * 257.0,
+                Change::Upper => (value / 256.0).floor(),
+                Change::Unit(most) => (value * most).round(),
+            };
+            put_ordered(step.to, value, row);
+        }
+    }
+
+    /// Appends the little-endian value of a column, whose bytes in a row are `own`.
+    pub fn unordered(column: &Column, own: &[u8], values: &mut Vec<u8>) {
+        let start = values.len();
+        values.extend(own.iter().rev());
+        flip(column.scalar, &mut values[start..], false);
+    }
+}
+
+/// Appends a value in bytes that compare like values.
+fn put_ordered(scalar: Scalar, value: f64, row: &mut Vec<u8>) {
+    let start = row.len();
+    scalar.put(value, row);
+    flip(scalar, &mut row[start..], true);
+    row[start..].reverse();
+}
+
+/// Turns little-endian values into unsigned integers of the same order, or back.
+fn flip(scalar: Scalar, bytes: &mut [u8], forth: bool) {
+    let Some(top) = bytes.last_mut() else {
+        return;
+    };
+    let sign = *top >> 7 == 1;
+    match scalar {
+        Scalar::U8 | Scalar::U16 | Scalar::U32 => {}
+        Scalar::I8 | Scalar::I16 | Scalar::I32 => *top ^= 0x80,
+        // Of negative floats the larger has the smaller bits.
+        Scalar::F32 | Scalar::F64 if sign == forth => bytes.iter_mut().for_each(|b| *b = !*b),
+        Scalar::F32 | Scalar::F64 => *top ^= 0x80,
+    }
+}
+
+/// The smallest type that has all values of both.
+fn common(a: Scalar, b: Scalar) -> Scalar {
+    let bits = |s: Scalar| match s {
+        Scalar::F32 => 24,
+        Scalar::F64 => 53,
+        _ => 8 * s.bytes(),
+    };
+    let signed = |s: Scalar| matches!(s, Scalar::I8 | Scalar::I16 | Scalar::I32);
+    let holds = |t: Scalar, s: Scalar| match (t.is_integer(), s.is_integer()) {
+        _ if t == s => true,
+        (true, true) if signed(t) => bits(t) > bits(s) || signed(s) && bits(t) >= bits(s),
+        (true, true) => !signed(s) && bits(t) >= bits(s),
+        (true, false) => false,
+        (false, _) => bits(t) >= bits(s),
+    };
+    let both = |t: &Scalar| holds(*t, a) && holds(*t, b);
+    SCALARS.into_iter().find(both).unwrap_or(Scalar::F64)
+}
+
+fn is_color(name: &str) -> bool {
+    COLORS.contains(&name)
+}
+
+/// Number, byte and type of a column in the rows of a source.
+fn place(source: &Source, name: &str) -> Option<(usize, usize, Scalar)> {
+    let number = source.columns.iter().position(|c| c.name == name)?;
+    let at = row_bytes(&source.columns[..number]);
+    Some((number, at, source.columns[number].scalar))
+}
+
+/// The sources with kept points.
+fn used(sources: &[Source]) -> impl Iterator<Item = &Source> {
+    sources.iter().filter(|s| s.stats.kept > 0)
+}
+
+/// The span of a column over all sources.
+fn span(sources: &[Source], name: &str) -> Span {
+    let mut all = Span::default();
+    for source in used(sources) {
+        if let Some((number, ..)) = place(source, name) {
+            all.merge(&source.spans[number]);
+        }
+    }
+    all
+}
+
+/// How the files store colours.
+#[derive(Debug, Clone, Copy)]
+struct Palette {
+    /// True if integers of more than 8 bits use only 8.
+    of_8_bits: bool,
+    /// True if floats go from 0 to 1, else they are as integers of 8 bits.
+    to_one: bool,
+}
+
+impl Palette {
+    fn of(sources: &[Source]) -> Self {
+        let mut most = [0.0; 2];
+        for (source, name) in used(sources).flat_map(|s| COLORS.map(|name| (s, name))) {
+            if let Some((number, _, scalar)) = place(source, name) {
+                let most = &mut most[usize::from(scalar.is_integer())];
+                *most = f64::max(*most, source.spans[number].max);
+            }
+        }
+        Self {
+            of_8_bits: most[1] <= 255.0,
+            to_one: most[0] <= 1.0,
+        }
+    }
+
+    /// The change of a colour of the type `from`.
+    fn change(self, from: Scalar, wide: bool) -> Change {
+        let eight = match from {
+            Scalar::U8 | Scalar::I8 => true,
+            _ if from.is_integer() => self.of_8_bits,
+            _ if self.to_one => return Change::Unit(if wide { 65535.0 } else { 255.0 }),
+            _ => true,
+        };
+        match (eight, wide) {
+            (true, true) => Change::Wider,
+            (false, false) => Change::Upper,
+            (true, false) | (false, true) => Change::None,
+        }
+    }
+}
+
+impl Spool {
+    /// True if values of columns were read.
+    #[must_use]
+    pub fn has_values(&self) -> bool {
+        used(&self.sources).any(|s| !s.columns.is_empty())
+    }
+
+    /// The columns of the mesh: those wanted that some file has, colours with 8 bits or, if `wide`, 16.
+    #[must_use]
+    pub fn carried(&self, attributes: &Attributes, wide: bool) -> Carried {
+        let sources = &self.sources;
+        let mut names = attributes.names();
+        names.retain(|name| used(sources).any(|s| place(s, name).is_some()));
+        let mut carried = Carried::default();
+        if *attributes == Attributes::Auto {
+            let constant = |name: &str| {
+                let span = span(sources, name);
+                span.min >= span.max
+            };
+            let gray = COLORS.iter().all(|name| constant(name));
+            let (dull, kept) = names.into_iter().partition(|name| match is_color(name) {
+                true => gray,
+                false => constant(name),
+            });
+            names = kept;
+            let dull: Vec<&str> = dull;
+            if !dull.is_empty() {
+                let list = dull.join(", ");
+                let note = format!("the same at all points, so not kept: {list}");
+                carried.warnings.push(note);
+            }
+        }
+        let palette = Palette::of(sources);
+        carried.steps = vec![Vec::new(); sources.len()];
+        for name in names {
+            self.carry(name, palette, wide, &mut carried);
+        }
+        let narrow = |s: &Source| {
+            COLORS
+                .map(|n| place(s, n))
+                .iter()
+                .flatten()
+                .any(|p| p.2 == Scalar::U16)
+        };
+        if palette.of_8_bits
+            && carried.columns.iter().any(|c| is_color(&c.name))
+            && used(sources).any(narrow)
+        {
+            let note = "colours use 8 of their 16 bits: they are taken as numbers from 0 to 255";
+            carried.warnings.push(note.into());
+        }
+        carried
+    }
+
+    /// Adds the column `name`.
+    fn carry(&self, name: &str, palette: Palette, wide: bool, carried: &mut Carried) {
+        let sources = &self.sources;
+        let scalars = used(sources).filter_map(|s| Some(place(s, name)?.2));
+        let scalar = match (is_color(name), wide) {
+            (true, true) => Scalar::U16,
+            (true, false) => Scalar::U8,
+            _ => scalars.reduce(common).unwrap_or(Scalar::U8),
+        };
+        for (source, steps) in sources.iter().zip(&mut carried.steps) {
+            let from = place(source, name).map(|(_, at, scalar)| (at, scalar));
+            let change = match from {
+                Some((_, from)) if is_color(name) => palette.change(from, wide),
+                _ => Change::None,
+            };
+            steps.push(Step {
+                from,
+                change,
+                to: scalar,
+            });
+        }
+        let lacking = |s: &&Source| place(s, name).is_none();
+        let files_without = used(sources).filter(lacking).count() as u64;
+        if files_without > 0 {
+            let filled = if scalar.is_integer() { "0" } else { "NaN" };
+            let all = used(sources).count();
+            let note =
+                format!("{files_without} of {all} files have no {name}; their points get {filled}");
+            carried.warnings.push(note);
+        }
+        let Span { min, max } = span(sources, name);
+        carried.attributes.push(Attribute {
+            name: name.to_owned(),
+            scalar,
+            range: [min, max].map(|x| if x.is_finite() { x } else { 0.0 }),
+            files_without,
+        });
+        carried.columns.push(Column {
+            name: name.to_owned(),
+            scalar,
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bytes_compare_like_values_and_come_back() {
+        let values = [
+            f64::NEG_INFINITY,
+            -1e9,
+            -70000.0,
+            -300.0,
+            -1.5,
+            -1.0,
+            0.0,
+            1e-9,
+            1.0,
+            200.0,
+            40000.0,
+            3e9,
+            f64::INFINITY,
+        ];
+        for scalar in SCALARS {
+            let column = Column {
+                name: "x".into(),
+                scalar,
+            };
+            let mut last: Option<(f64, Vec<u8>)> = None;
+            for value in values {
+                let (mut row, mut plain, mut back) = (Vec::new(), Vec::new(), Vec::new());
+                put_ordered(scalar, value, &mut row);
+                scalar.put(value, &mut plain);
+                Carried::unordered(&column, &row, &mut back);
+                assert_eq!(plain, back, "{scalar:?} {value}");
+                let stored = real(scalar, &plain, false);
+                if let Some((before, bytes)) = &last {
+                    let order = before.partial_cmp(&stored).unwrap();
+                    assert_eq!(bytes.cmp(&row), order, "{scalar:?} {before} {stored}");
+                }
+                last = Some((stored, row));
+            }
+        }
+    }
+
+    #[test]
+    fn a_common_type_has_all_values() {
+        use Scalar::*;
+        for (a, b, want) in [
+            (U8, U8, U8),
+            (U8, U16, U16),
+            (U8, I8, I16),
+            (U16, I8, I32),
+            (U32, I8, F64),
+            (F32, U16, F32),
+            (F32, I32, F64),
+            (F64, U8, F64),
+        ] {
+            assert_eq!((common(a, b), common(b, a)), (want, want), "{a:?} {b:?}");
+        }
+    }
+
+    #[test]
+    fn colours_of_all_kinds_become_the_same() {
+        for (from, of_8_bits, value) in [
+            (Scalar::U8, false, 200.0),
+            (Scalar::U16, true, 200.0),
+            (Scalar::U16, false, 200.0 * 256.0),
+            (Scalar::U16, false, 200.0 * 257.0),
+            (Scalar::F32, false, 200.0 / 255.0),
+        ] {
+            let palette = Palette {
+                of_8_bits,
+                to_one: true,
+            };
+            let step = Step {
+                from: Some((0, from)),
+                change: palette.change(from, false),
+                to: Scalar::U8,
+            };
+            let carried = Carried {
+                steps: vec![vec![step]],
+                ..Carried::default()
+            };
+            let (mut values, mut row) = (Vec::new(), Vec::new());
+            from.put(value, &mut values);
+            carried.put(0, &values, &mut row);
+            assert_eq!(row, [200], "{from:?} {value}");
+        }
+    }
+}

@@ -1,0 +1,273 @@
+//! Columns of input files: values that points have beside their positions, such as colours.
+
+use crate::error::{Error, Result};
+use outcrop_ply::Scalar;
+use serde::{Deserialize, Serialize};
+
+/// The colour of a point.
+pub(super) const COLORS: [&str; 3] = ["red", "green", "blue"];
+
+/// The strength of the echo.
+pub(super) const INTENSITY: &str = "intensity";
+
+/// The class of a point, as in LAS.
+pub(super) const CLASSIFICATION: &str = "classification";
+
+/// Other names of columns, in lower case.
+const ALIASES: [(&str, &str); 12] = [
+    ("r", "red"),
+    ("g", "green"),
+    ("b", "blue"),
+    ("diffuse_red", "red"),
+    ("diffuse_green", "green"),
+    ("diffuse_blue", "blue"),
+    ("class", CLASSIFICATION),
+    ("reflectance", INTENSITY),
+    ("gpstime", "gps_time"),
+    ("pointsourceid", "point_source"),
+    ("point_source_id", "point_source"),
+    ("returnnumber", "return_number"),
+];
+
+/// Most bytes of all wanted columns of a point.
+pub(super) const MOST_BYTES: usize = 48;
+
+/// A column of a file.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Column {
+    /// Its name, in lower case.
+    pub name: String,
+    /// Type of its values.
+    pub scalar: Scalar,
+}
+
+impl Column {
+    /// The column that a file calls `name`.
+    pub(super) fn new(name: &str, scalar: Scalar) -> Self {
+        let name = usual_name(name);
+        Self { name, scalar }
+    }
+}
+
+/// The name by which a column is known in all formats: in lower case, without the prefix that CloudCompare
+/// writes.
+pub(super) fn usual_name(name: &str) -> String {
+    let name = name.trim().to_ascii_lowercase();
+    let name = name.strip_prefix("scalar_").unwrap_or(&name);
+    let alias = ALIASES.iter().find(|(alias, _)| *alias == name);
+    alias.map_or(name, |(_, usual)| usual).to_owned()
+}
+
+/// Columns that the mesh keeps.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Attributes {
+    /// None.
+    #[default]
+    None,
+    /// Colours, intensity and classification, each if it is not the same at all points.
+    Auto,
+    /// The columns with these names.
+    List(Vec<String>),
+}
+
+impl Attributes {
+    /// True for the column `name`.
+    pub(super) fn wants(&self, name: &str) -> bool {
+        match self {
+            Self::None => false,
+            Self::Auto => COLORS.contains(&name) || name == INTENSITY || name == CLASSIFICATION,
+            Self::List(names) => names.iter().any(|n| n == name),
+        }
+    }
+
+    /// Numbers of the wanted columns among those of a file. Of columns with the same name the first counts.
+    pub(super) fn of(&self, columns: &[Column]) -> Vec<usize> {
+        let first = |at: usize| columns[..at].iter().all(|c| c.name != columns[at].name);
+        let wanted = |at: &usize| self.wants(&columns[*at].name) && first(*at);
+        (0..columns.len()).filter(wanted).collect()
+    }
+
+    /// The names in the order of the mesh.
+    pub(super) fn names(&self) -> Vec<&str> {
+        match self {
+            Self::None => Vec::new(),
+            Self::Auto => [&COLORS[..], &[INTENSITY, CLASSIFICATION]].concat(),
+            Self::List(names) => names.iter().map(String::as_str).collect(),
+        }
+    }
+
+    /// # Errors
+    /// [`Error::Parameter`] if a listed column is in none of the files, whose columns are `present`.
+    pub(super) fn check(&self, present: &[Column]) -> Result<()> {
+        let Self::List(names) = self else {
+            return Ok(());
+        };
+        let missing = |name: &&String| present.iter().all(|c| c.name != **name);
+        let Some(name) = names.iter().find(missing) else {
+            return Ok(());
+        };
+        let mut known: Vec<&str> = present.iter().map(|c| &*c.name).collect();
+        known.sort_unstable();
+        known.dedup();
+        let expected = match known.is_empty() {
+            true => "none: the points have no columns".to_owned(),
+            false => format!("columns of the points: {}", known.join(", ")),
+        };
+        Err(Error::Parameter {
+            name: "--attributes",
+            found: name.escape_debug().to_string(),
+            expected,
+        })
+    }
+}
+
+impl std::str::FromStr for Attributes {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text.trim() {
+            "none" => return Ok(Self::None),
+            "auto" => return Ok(Self::Auto),
+            _ => {}
+        }
+        let mut names: Vec<String> = Vec::new();
+        for word in text.split(',') {
+            let word = word.trim();
+            if word.is_empty() {
+                return Err(format!(
+                    "{text:?} is not auto, none, or a list of columns like color,intensity"
+                ));
+            }
+            let color = ["color", "colour", "colors", "colours", "rgb"];
+            let more = match color.contains(&&*word.to_ascii_lowercase()) {
+                true => COLORS.map(str::to_owned).to_vec(),
+                false => vec![usual_name(word)],
+            };
+            for name in more {
+                if !names.contains(&name) {
+                    names.push(name);
+                }
+            }
+        }
+        Ok(Self::List(names))
+    }
+}
+
+/// The wanted columns of one file, as its reader sees them.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Wanted {
+    /// Numbers of the columns in the file's list, ascending.
+    pub(super) numbers: Vec<usize>,
+    /// The columns.
+    pub(super) columns: Vec<Column>,
+}
+
+impl Wanted {
+    /// Of a file with these columns.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] if they take more than [`MOST_BYTES`].
+    pub(super) fn of(attributes: &Attributes, columns: &[Column]) -> Result<Self> {
+        let numbers = attributes.of(columns);
+        let columns: Vec<Column> = numbers.iter().map(|n| columns[*n].clone()).collect();
+        let bytes = row_bytes(&columns);
+        if bytes > MOST_BYTES {
+            return Err(Error::Parameter {
+                name: "--attributes",
+                found: format!("columns of {bytes} bytes for each point"),
+                expected: format!("at most {MOST_BYTES}"),
+            });
+        }
+        Ok(Self { numbers, columns })
+    }
+
+    /// True if no column is wanted.
+    pub(super) fn is_empty(&self) -> bool {
+        self.columns.is_empty()
+    }
+
+    /// Bytes of the values of a point.
+    pub(super) fn bytes(&self) -> usize {
+        row_bytes(&self.columns)
+    }
+}
+
+/// Bytes of the values of a point.
+pub(super) fn row_bytes(columns: &[Column]) -> usize {
+    columns.iter().map(|c| c.scalar.bytes()).sum()
+}
+
+/// Smallest and largest value of a column; merging is commutative.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub(super) struct Span {
+    pub(super) min: f64,
+    pub(super) max: f64,
+}
+
+impl Default for Span {
+    fn default() -> Self {
+        Self {
+            min: f64::INFINITY,
+            max: f64::NEG_INFINITY,
+        }
+    }
+}
+
+impl Span {
+    /// Widens the span; NaN has no effect.
+    #[inline]
+    pub(super) fn add(&mut self, value: f64) {
+        self.min = self.min.min(value);
+        self.max = self.max.max(value);
+    }
+
+    pub(super) fn merge(&mut self, other: &Self) {
+        self.min = self.min.min(other.min);
+        self.max = self.max.max(other.max);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lists_are_parsed() {
+        let list = |names: &[&str]| {
+            Ok(Attributes::List(
+                names.iter().map(|n| (*n).to_owned()).collect(),
+            ))
+        };
+        assert_eq!("none".parse(), Ok(Attributes::None));
+        assert_eq!(" auto".parse(), Ok(Attributes::Auto));
+        assert_eq!(
+            "Colour, class,red".parse(),
+            list(&["red", "green", "blue", "classification"])
+        );
+        assert_eq!("scalar_Intensity".parse(), list(&["intensity"]));
+        for wrong in ["", ",", "color,,intensity"] {
+            assert!(wrong.parse::<Attributes>().is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn of_two_columns_of_a_name_the_first_counts() {
+        let columns = ["red", "x2", "Red", "intensity"].map(|n| Column::new(n, Scalar::U8));
+        assert_eq!(Attributes::Auto.of(&columns), [0, 3]);
+        let wanted = Attributes::List(vec!["x2".into(), "y2".into()]);
+        assert_eq!(wanted.of(&columns), [1]);
+        assert!(wanted.check(&columns).is_err());
+        assert!(Attributes::Auto.check(&[]).is_ok());
+    }
+
+    #[test]
+    fn rows_are_not_wider_than_allowed() {
+        let columns: Vec<Column> = (0..9)
+            .map(|n| Column::new(&n.to_string(), Scalar::F64))
+            .collect();
+        let list = |n: usize| Attributes::List((0..n).map(|n| n.to_string()).collect());
+        assert_eq!(Wanted::of(&list(6), &columns).unwrap().bytes(), 48);
+        assert!(Wanted::of(&list(7), &columns).is_err());
+    }
+}
