@@ -31,7 +31,7 @@ pub(super) fn check(polygons: &[Polygon]) -> Result<(), NoRegion> {
         return Ok(());
     }
     Err(NoRegion::new(
-        match polygons.is_empty() {
+        match polygons.iter().all(|polygon| polygon.is_empty()) {
             true => "no polygon".to_owned(),
             false => "polygons without an area".to_owned(),
         },

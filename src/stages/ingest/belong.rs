@@ -1,10 +1,7 @@
-//! Warnings about files that may not belong together: different reference systems, units or places.
+//! Warnings about files that may not belong together: different units or places.
 
 use super::crs::Crs;
 use super::stats::FileStats;
-use crate::error::Error;
-use std::path::{Path, PathBuf};
-
 /// A warning is given if one file's point spacing and box are both this many times those of another: it may
 /// be in another unit. A small piece of a survey has a small box but no smaller spacing.
 const LARGER: f64 = 100.0;
@@ -20,79 +17,6 @@ pub(super) fn warnings(files: &[FileStats]) -> Vec<String> {
     let boxes: Vec<Extent<'_>> = files.iter().filter_map(Extent::of).collect();
     let places = far_apart(&boxes).or_else(|| unlike_sizes(&boxes));
     places.into_iter().collect()
-}
-
-/// Two files with different reference systems.
-#[derive(Debug, Clone)]
-pub struct Mixed {
-    /// A file, and its system.
-    first: (PathBuf, String),
-    /// Another file, and its system.
-    other: (PathBuf, String),
-}
-
-impl Mixed {
-    /// The error for a cloud that must have one system.
-    #[must_use]
-    pub fn refused(&self) -> Error {
-        let ((first, system), (other, another)) = (&self.first, &self.other);
-        let expected = format!(
-            "{system}, that of {}; --ignore-crs takes coordinates as they are",
-            first.display()
-        );
-        Error::input(other, "reference system", another, expected)
-    }
-
-    /// The warning for a cloud that may have several.
-    pub(super) fn warning(&self) -> String {
-        let ((first, system), (other, another)) = (&self.first, &self.other);
-        format!(
-            "{}: its reference system is {another}, that of {} is {system}; coordinates are taken as they \
-             are, in no system",
-            other.display(),
-            first.display()
-        )
-    }
-}
-
-/// The reference systems of several files: one of each kind that may be the same as the others, so that few
-/// texts are in memory.
-#[derive(Debug, Default)]
-pub(super) struct Systems {
-    known: Vec<(PathBuf, Crs)>,
-    mixed: Option<Mixed>,
-}
-
-impl Systems {
-    /// Takes the system of a file.
-    pub(super) fn add(&mut self, path: &Path, crs: Crs) {
-        if self.mixed.is_some() {
-            return;
-        }
-        if let Some((first, system)) = self.known.iter().find(|(_, known)| known.differs(&crs)) {
-            self.mixed = Some(Mixed {
-                first: (first.clone(), system.to_string()),
-                other: (path.to_path_buf(), crs.to_string()),
-            });
-            return;
-        }
-        match self.known.iter_mut().find(|(_, known)| known.is_like(&crs)) {
-            Some((_, known)) if crs.rank() < known.rank() => *known = crs,
-            Some(_) => {}
-            None => self.known.push((path.to_path_buf(), crs)),
-        }
-    }
-
-    /// The system that tells most; two files if theirs are different.
-    pub(super) fn common(self) -> Result<Option<Crs>, Mixed> {
-        match self.mixed {
-            Some(mixed) => Err(mixed),
-            None => {
-                let known = self.known.into_iter().map(|(_, crs)| crs);
-                Ok(known.min_by_key(Crs::rank))
-            }
-        }
-    }
 }
 
 /// A warning if some files have no reference system, and others have this one.

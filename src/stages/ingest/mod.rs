@@ -40,9 +40,9 @@ mod source;
 mod spool;
 mod stats;
 mod stream;
+mod systems;
 mod text;
 
-pub use belong::Mixed;
 pub use carry::{Attribute, Carried};
 pub use classes::Classes;
 pub use columns::{Attributes, Column};
@@ -53,11 +53,11 @@ pub use format::Format;
 pub use probe::{Probe, probe};
 pub use stats::{FileStats, IngestStats};
 pub use stream::{READ_BUFFERS, VALUE_BUFFERS};
+pub use systems::Mixed;
 
 use crate::error::{Error, Result};
 use crate::geom::lattice::Lattice;
 use crate::workspace::Workspace;
-use belong::Systems;
 use columns::{Wanted, row_bytes};
 use crop::Nearby;
 use frames::{Frame, values_of};
@@ -68,6 +68,7 @@ use serde::{Deserialize, Serialize};
 use source::Source;
 use spool::SourceWriter;
 use std::path::PathBuf;
+use systems::Systems;
 
 /// Precision that suffices for writing the coordinates of the cloud.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize)]

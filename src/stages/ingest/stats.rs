@@ -1,10 +1,10 @@
 //! Statistics of the input: counts and extents of each file and in total.
 
-use super::belong::Mixed;
 use super::coordinate::Coordinate;
 use super::crs::Crs;
 use super::format::Format;
 use super::native::Native;
+use super::systems::Mixed;
 use serde::{Deserialize, Serialize, Serializer};
 use std::path::{Path, PathBuf};
 
