@@ -280,11 +280,8 @@ impl<'a> MeshFile<'a> {
     }
 
     /// A batch of triangles with their positions that are encoded to the end of `bytes`.
-    pub fn placed_triangles(
-        &self,
-        bytes: &mut Vec<u8>,
-    ) -> Batch<([u32; 3], Positions), impl FnMut(&[([u32; 3], Positions)])> {
-        Batch::new(|batch: &[([u32; 3], Positions)]| {
+    pub fn placed_triangles(&self, bytes: &mut Vec<u8>) -> Batch<Placed, impl FnMut(&[Placed])> {
+        Batch::new(|batch: &[Placed]| {
             let (triangles, positions): (Vec<_>, Vec<_>) = batch.iter().copied().unzip();
             self.format
                 .put_triangles(&self.mesh, &triangles, &positions, bytes);
@@ -338,6 +335,9 @@ impl Drop for MeshFile<'_> {
         }
     }
 }
+
+/// A triangle with the positions of its corners.
+type Placed = ([u32; 3], Positions);
 
 /// Collects records and passes them on in batches.
 pub struct Batch<T, F: FnMut(&[T])> {
