@@ -127,7 +127,7 @@ fn with_a_margin_around_everything_a_crop_is_what_is_inside_of_the_whole_mesh() 
         let expected = Mesh {
             vertices: whole.vertices.clone(),
             triangles: kept.collect(),
-            colors: Vec::new(),
+            ..Mesh::default()
         };
         let output = bench.path("crop.ply");
         let cropped = Params {

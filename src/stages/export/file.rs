@@ -13,6 +13,9 @@ use std::ops::Range;
 use std::os::unix::fs::{FileExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 
+/// A triangle with the positions of its corners.
+pub type Placed = ([u32; 3], Positions);
+
 /// Records encoded at a time.
 const BATCH: usize = 1024;
 
@@ -280,7 +283,10 @@ impl<'a> MeshFile<'a> {
     }
 
     /// A batch of triangles with their positions that are encoded to the end of `bytes`.
-    pub fn placed_triangles(&self, bytes: &mut Vec<u8>) -> Batch<Placed, impl FnMut(&[Placed])> {
+    pub fn placed_triangles(
+        &self,
+        bytes: &mut Vec<u8>,
+    ) -> Batch<Placed, impl FnMut(&[Placed])> {
         Batch::new(|batch: &[Placed]| {
             let (triangles, positions): (Vec<_>, Vec<_>) = batch.iter().copied().unzip();
             self.format
@@ -335,9 +341,6 @@ impl Drop for MeshFile<'_> {
         }
     }
 }
-
-/// A triangle with the positions of its corners.
-type Placed = ([u32; 3], Positions);
 
 /// Collects records and passes them on in batches.
 pub struct Batch<T, F: FnMut(&[T])> {

@@ -161,7 +161,6 @@ pub fn export_cut(
     let in_file = options.in_file(lattice);
     mesh.bounds = Some(tile.bounds.map(|corner| in_file.of(corner)));
     write(store, parts, lattice, mesh, &options, workspace)?;
-    stored.release(workspace)?;
     Ok(parts.stats())
 }
 

@@ -145,7 +145,6 @@ pub fn export_split(
         split_up.write()?;
     }
     split_up.finish(split.side)?;
-    stored.release(workspace)?;
     Ok(stats)
 }
 
