@@ -283,10 +283,7 @@ impl<'a> MeshFile<'a> {
     }
 
     /// A batch of triangles with their positions that are encoded to the end of `bytes`.
-    pub fn placed_triangles(
-        &self,
-        bytes: &mut Vec<u8>,
-    ) -> Batch<Placed, impl FnMut(&[Placed])> {
+    pub fn placed_triangles(&self, bytes: &mut Vec<u8>) -> Batch<Placed, impl FnMut(&[Placed])> {
         Batch::new(|batch: &[Placed]| {
             let (triangles, positions): (Vec<_>, Vec<_>) = batch.iter().copied().unzip();
             self.format
