@@ -96,7 +96,9 @@ impl<'a> Stages<'a> {
             return Ok(());
         }
         let (params, output) = (&self.job.params, &self.job.output);
-        if params.drop_outliers.is_none() {
+        // What these leave out, and how much a square has, is not known yet.
+        let whole = params.crop.is_none() && params.split.is_none();
+        if whole && params.drop_outliers.is_none() {
             self.known.fits(params, output)?;
         }
         let estimate = self.known.estimate(params, output);
