@@ -246,7 +246,7 @@ fn reference_systems_are_carried_and_not_mixed() {
     assert!(report.warnings[0].contains("b.xyz: it gives no reference system, as 1 of 2 files"));
     let (_, text) = header(&output);
     assert!(
-        text.contains("\ncomment epsg 32617\ncomment crs EPSG:32617 UTM zone\n"),
+        text.contains("\ncomment epsg 32617\ncomment crs EPSG:32617\n"),
         "{text}"
     );
     let beside = std::fs::read_to_string(output.with_extension("prj")).unwrap();

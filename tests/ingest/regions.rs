@@ -51,10 +51,11 @@ fn check(bench: &Bench, inputs: &[PathBuf], region: &str, margin: f64) -> Spool 
         some.choose_lattice(3).unwrap(),
         all.choose_lattice(3).unwrap(),
     );
-    assert_eq!(
-        (ours.step, ours.offset, ours.base),
-        (whole.step, whole.offset, whole.base)
-    );
+    assert_eq!((ours.step, ours.offset), (whole.step, whole.offset));
+    // The box in a header may be looser by a step of the file, which is eight of the lattice.
+    for (ours, whole) in ours.base.iter().zip(whole.base) {
+        assert!((whole - 8..=whole).contains(ours), "{ours} {whole}");
+    }
     assert_eq!(some.source_precision(), all.source_precision());
     some
 }

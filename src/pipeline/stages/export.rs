@@ -64,7 +64,7 @@ impl Stages<'_> {
         let mut comments = place.map_or_else(Vec::new, |place| place.comments());
         if let Some(crs) = &self.report.input.crs {
             comments.extend(crs.horizontal.map(|code| format!("epsg {code}")));
-            comments.push(format!("crs {}", crs.line()));
+            comments.push(format!("crs {}", crs.label()));
         }
         comments
     }

@@ -105,6 +105,12 @@ impl Crs {
         }
     }
 
+    /// The codes, or without codes the name, on one line: names of one system differ from file to file.
+    #[must_use]
+    pub fn label(&self) -> String {
+        self.codes().unwrap_or_else(|| self.line())
+    }
+
     /// Codes and name on one line, at most 250 characters.
     #[must_use]
     pub fn line(&self) -> String {
