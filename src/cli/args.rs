@@ -201,7 +201,7 @@ pub struct Coordinates {
 /// The points, the mesh, and what decides it.
 #[derive(Debug, ClapArgs)]
 pub struct Job {
-    /// Files (LAS, LAZ, PLY, XYZ text; also as .gz and .zst) or folders of files; together they are one cloud
+    /// Files (LAS, LAZ, E57, PLY, PCD, PTX, XYZ text; also as .gz and .zst) or folders of files; together they are one cloud
     #[arg(value_name = "INPUT", required = true)]
     pub inputs: Vec<PathBuf>,
     /// The mesh to write: .ply, .obj, .stl or .glb (all but OBJ binary), compressed with .zst behind it
@@ -333,7 +333,7 @@ pub struct Verify {
 /// `outcrop compare`
 #[derive(Debug, ClapArgs)]
 pub struct Compare {
-    /// A mesh (PLY with faces) or a cloud (LAS, LAZ, PLY, XYZ text, or a folder of them)
+    /// A mesh (PLY with faces) or a cloud (LAS, LAZ, E57, PLY, PCD, PTX, XYZ text, or a folder of them)
     #[arg(value_name = "A")]
     pub a: PathBuf,
     /// The mesh or cloud to compare it with

@@ -180,6 +180,27 @@ fn percentiles(mut lengths: Vec<f64>, step: f64) -> Percentiles {
     }
 }
 
+/// Most positions of scanners in the text; the report has all.
+const MOST_SCANNERS: usize = 8;
+
+/// The number of scanners and their positions; none without any.
+fn shown(scanners: &[[f64; 3]]) -> Option<String> {
+    let position = |[x, y, z]: &[f64; 3]| format!("{x} {y} {z}");
+    let some = scanners.iter().take(MOST_SCANNERS).map(position);
+    let some: Vec<String> = some.collect();
+    let more = if scanners.len() > some.len() {
+        "; …"
+    } else {
+        ""
+    };
+    let count = match scanners.len() {
+        0 => return None,
+        1 => "1 scanner position".to_owned(),
+        many => format!("{many} scanner positions"),
+    };
+    Some(format!("{count}: {}{more}", some.join("; ")))
+}
+
 impl Info {
     /// The columns of all files, for `--attributes`.
     fn columns(&self) -> String {
@@ -206,6 +227,9 @@ impl fmt::Display for Info {
                 write!(f, ", {} ({})", crs.line(), crs.source)?;
             }
             writeln!(f)?;
+            if let Some(shown) = shown(&file.scanners) {
+                writeln!(f, "  {shown}")?;
+            }
         }
         let three = |p: &[f64; 3]| format!("{} {} {}", p[0], p[1], p[2]);
         let spread =
@@ -213,8 +237,12 @@ impl fmt::Display for Info {
         let mib = |bytes: u64| format!("{} MiB", bytes.div_ceil(1 << 20));
         let input = &self.input;
         let left_out = format!(
-            "{} duplicates, {} not finite, {} withheld, {} of other classes",
-            self.duplicates, input.dropped_non_finite, input.withheld, input.dropped_by_class
+            "{} duplicates, {} not finite, {} withheld, {} invalid, {} of other classes",
+            self.duplicates,
+            input.dropped_non_finite,
+            input.withheld,
+            input.invalid,
+            input.dropped_by_class
         );
         let system = match &input.crs {
             Some(crs) => format!("{} ({})", crs.line(), crs.source),

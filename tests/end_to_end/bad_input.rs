@@ -222,11 +222,11 @@ fn unknown_formats() {
     );
     refuses(
         &bench.write("scan.e57", b"ASTM-E57\x01\0\0\0\0\0\0\0".repeat(9)),
-        &["scan.e57", "E57"],
+        &["scan.e57", "length at byte 16"],
     );
     refuses(
         &bench.write("cloud.pcd", "# .PCD v.7\nVERSION .7\n"),
-        &["cloud.pcd", "PCD"],
+        &["cloud.pcd", "PCD header", "a line DATA"],
     );
     let fine = good(&bench, "cloud.ply");
     let bad = bench.write("bad.las", "LASF and no more");

@@ -129,6 +129,27 @@ fn info_tells_what_is_there() {
 }
 
 #[test]
+fn info_tells_where_the_scanners_were() {
+    let bench = Bench::new();
+    let head = "2\n2\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n1 2.5 -3 1\n";
+    let scan = format!("{head}1 2 3 0.5\n4 5 6 0.5\n0 0 0 0.5\n7 8 0 0.5\n");
+    let input = bench.write("two.ptx", scan.clone() + &scan.replace("2.5 -3", "9 9"));
+    let said = util::run(["info".as_ref(), input.as_os_str()]);
+    assert_eq!((said.code, said.err.as_str()), (Some(0), ""), "{said:?}");
+    for part in ["2 scanner positions: 1 2.5 -3; 1 9 9", "2 invalid"] {
+        assert!(said.out.contains(part), "{said:?}");
+    }
+    let said = util::run(["info".as_ref(), "--json".as_ref(), input.as_os_str()]);
+    let json: Value = serde_json::from_str(&said.out).unwrap();
+    let places = serde_json::json!([[1.0, 2.5, -3.0], [1.0, 9.0, 9.0]]);
+    assert_eq!(json["input"]["files"][0]["scanners"], places);
+    assert_eq!(
+        (&json["input"]["invalid"], &json["input"]["kept"]),
+        (&2.into(), &6.into())
+    );
+}
+
+#[test]
 fn the_estimate_of_the_minimum_is_accepted() {
     let bench = Bench::new();
     let input = bench.cloud("cloud.laz", &Cloud::new(Kind::Torus).points(5000));

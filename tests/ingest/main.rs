@@ -10,6 +10,7 @@ mod formats;
 mod lattices;
 mod numbers;
 mod ply_headers;
+mod scans;
 
 use bench::{Bench, based, cloud, ply, positions, write_las};
 use outcrop::Error;

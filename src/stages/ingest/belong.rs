@@ -190,9 +190,11 @@ mod tests {
             kept,
             dropped_non_finite: 0,
             withheld: 0,
+            invalid: 0,
             dropped_by_class: 0,
             min: (kept > 0).then_some(min),
             max: (kept > 0).then_some(max),
+            scanners: Vec::new(),
             crs: None,
         }
     }

@@ -1,10 +1,13 @@
 //! The list of input formats, and the detection of a file's format.
 
+use super::e57::E57;
 use super::format::Format;
 use super::input::Input;
 use super::las::Las;
+use super::pcd::Pcd;
 use super::ply::Ply;
 use super::point_format::{Head, PointFile, PointFormat, Refusal, has_extension};
+use super::ptx::Ptx;
 use super::text::Text;
 use crate::error::{Error, Result};
 use serde::de::Error as _;
@@ -12,7 +15,7 @@ use serde::{Deserialize, Deserializer};
 use std::path::Path;
 
 /// All formats, in the order in which they are tested. Text is last: its error explains why no format fits.
-pub(super) const FORMATS: [&dyn PointFormat; 3] = [&Las, &Ply, &Text];
+pub(super) const FORMATS: [&dyn PointFormat; 6] = [&Las, &E57, &Ply, &Pcd, &Ptx, &Text];
 
 /// Bytes at the start of a file that are used for detection.
 const HEAD: usize = 64 << 10;

@@ -49,6 +49,7 @@ fn no_points(stats: &IngestStats) -> Error {
             "with coordinates that are no numbers",
         ),
         (stats.withheld, "withheld"),
+        (stats.invalid, "that the scanner marked as invalid"),
         (stats.dropped_by_class, "of classes that are not wanted"),
     ];
     let counted = reasons.iter().filter(|(count, _)| *count > 0);

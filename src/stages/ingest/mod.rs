@@ -4,9 +4,9 @@
 //! precision, and exact statistics of each file. [`Spool::choose_lattice`] then finds a common lattice, and
 //! [`Spool::for_each`] streams the points as positions on it.
 //!
-//! Formats are detected by content: LAS 1.0 to 1.4 with point formats 0 to 10, LAZ (COPC included), PLY, and
-//! text with one point in a line; any of them may be compressed with gzip or Zstandard. Each format is a module that implements `PointFormat`, and an entry of the
-//! list in `formats.rs`.
+//! Formats are detected by content: LAS 1.0 to 1.4 with point formats 0 to 10, LAZ (COPC included), E57,
+//! PLY, PCD, PTX, and text with one point in a line; any of them may be compressed with gzip or Zstandard. Each format
+//! is a module that implements `PointFormat`, and an entry of the list in `formats.rs`.
 
 mod belong;
 mod carry;
@@ -14,17 +14,22 @@ mod classes;
 mod columns;
 mod contain;
 mod crs;
+mod e57;
 mod expand;
 mod format;
 mod formats;
 mod input;
 mod las;
 mod lattice;
+mod lines;
 mod map;
 mod number;
+mod pcd;
 mod ply;
 mod point_format;
 mod probe;
+mod ptx;
+mod scalar;
 mod source;
 mod spool;
 mod stats;
@@ -286,6 +291,7 @@ impl IngestStats {
         self.kept += stats.kept;
         self.dropped_non_finite += stats.dropped;
         self.withheld += stats.withheld;
+        self.invalid += stats.invalid;
         self.dropped_by_class += stats.unwanted;
         let bounds = source.bounds();
         self.files.push(FileStats {
@@ -298,9 +304,11 @@ impl IngestStats {
             kept: stats.kept,
             dropped_non_finite: stats.dropped,
             withheld: stats.withheld,
+            invalid: stats.invalid,
             dropped_by_class: stats.unwanted,
             min: bounds.map(|b| b[0]),
             max: bounds.map(|b| b[1]),
+            scanners: opened.file.scanners(),
             crs,
         });
     }

@@ -93,6 +93,11 @@ pub(super) trait PointFile {
         None
     }
 
+    /// The positions of the scanners, in the unit of the points; all of them when the points were read.
+    fn scanners(&self) -> Vec<[f64; 3]> {
+        Vec::new()
+    }
+
     /// The columns of the file. A [`SourceWriter`] says which are wanted, by their numbers in this list.
     fn columns(&self) -> Vec<Column> {
         Vec::new()

@@ -145,6 +145,11 @@ impl<'a> SourceWriter<'a> {
         }
     }
 
+    /// The name of a step of this source.
+    pub(super) fn step(&self, name: &str) -> String {
+        format!("{name} of source {}", self.source)
+    }
+
     /// Reads units of the source on all threads, as [`Workspace::units`]; `work` fills a sink for each.
     pub(super) fn units<T: Coordinate>(
         &self,
@@ -153,7 +158,7 @@ impl<'a> SourceWriter<'a> {
         bytes: impl Fn(usize) -> u64 + Sync,
         work: impl Fn(usize, &mut Sink<'_, T>) -> Result<()> + Sync,
     ) -> Result<()> {
-        let step = format!("{name} of source {}", self.source);
+        let step = self.step(name);
         let first = self.next.fetch_add(count as u32, Ordering::Relaxed);
         let one = |unit: &Unit<'_>| {
             let mut sink = self.sink(unit);
@@ -315,6 +320,13 @@ impl<T: Coordinate> Sink<'_, T> {
     pub(super) fn withhold(&mut self) {
         self.stats.read += 1;
         self.stats.withheld += 1;
+    }
+
+    /// Counts a record that the scanner marked as no point.
+    #[inline]
+    pub(super) fn invalid(&mut self) {
+        self.stats.read += 1;
+        self.stats.invalid += 1;
     }
 
     /// Counts a point whose class is not wanted.

@@ -17,6 +17,8 @@ pub struct IngestStats {
     pub dropped_non_finite: u64,
     /// Points left out because they are flagged as withheld.
     pub withheld: u64,
+    /// Records of scans that the scanner marked as no point, since nothing came back.
+    pub invalid: u64,
     /// Points left out because their class is not wanted.
     pub dropped_by_class: u64,
     /// The reference system; none if no file gives one, or if files give different ones.
@@ -57,12 +59,16 @@ pub struct FileStats {
     pub dropped_non_finite: u64,
     /// Points left out because they are flagged as withheld.
     pub withheld: u64,
+    /// Records of scans that the scanner marked as no point, since nothing came back.
+    pub invalid: u64,
     /// Points left out because their class is not wanted.
     pub dropped_by_class: u64,
     /// Lowest coordinates of the kept points, in the file's unit; `None` without points.
     pub min: Option<[f64; 3]>,
     /// Highest coordinates of the kept points, in the file's unit; `None` without points.
     pub max: Option<[f64; 3]>,
+    /// The positions of the scanners given in the file, in its unit.
+    pub scanners: Vec<[f64; 3]>,
     /// The reference system that it gives, or a `.prj` file beside it.
     pub crs: Option<Crs>,
 }
@@ -74,6 +80,8 @@ pub(super) struct SourceStats {
     pub(super) kept: u64,
     pub(super) dropped: u64,
     pub(super) withheld: u64,
+    /// Records that the scanner marked as no point.
+    pub(super) invalid: u64,
     /// Points left out because of their class.
     pub(super) unwanted: u64,
     pub(super) min: [f64; 3],
@@ -93,6 +101,7 @@ impl Default for SourceStats {
             kept: 0,
             dropped: 0,
             withheld: 0,
+            invalid: 0,
             unwanted: 0,
             min: [f64::INFINITY; 3],
             max: [f64::NEG_INFINITY; 3],
@@ -109,6 +118,7 @@ impl SourceStats {
         self.kept += other.kept;
         self.dropped += other.dropped;
         self.withheld += other.withheld;
+        self.invalid += other.invalid;
         self.unwanted += other.unwanted;
         for axis in 0..3 {
             self.min[axis] = self.min[axis].min(other.min[axis]);

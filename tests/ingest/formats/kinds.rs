@@ -1,6 +1,6 @@
-//! The kinds of files: their makers, and files of other programs by kind.
+//! The kinds of files and their makers.
 
-use super::{compressed, las, ply, text};
+use super::{compressed, e57, las, pcd, ply, ptx, text};
 use crate::bench::Bench;
 use std::path::PathBuf;
 
@@ -84,6 +84,28 @@ pub const KINDS: &[(&str, Kind)] = &[
         "LAZ that claims more points than its size allows",
         las::bomb,
     ),
+    ("E57 with one scan or several, and poses", e57::scans),
+    (
+        "E57 with coordinates of every type, and spherical ones",
+        e57::types,
+    ),
+    ("directions of an E57 scan without a point", e57::states),
+    ("E57 of which all points are the same", e57::same),
+    ("E57 without scans, or scans without points", e57::none),
+    ("E57 that ends early", e57::cut),
+    ("an E57 header that ends early", e57::short),
+    ("another version, size of pages, or length", e57::headers),
+    ("a page with a wrong checksum", e57::pages),
+    ("an E57 description that is damaged", e57::descriptions),
+    ("E57 records without coordinates", e57::no_coordinates),
+    ("a pose that is none", e57::no_rotation),
+    (
+        "E57 that claims more points than there is room for",
+        e57::bombs,
+    ),
+    ("two E57 scans with the same points", e57::shared),
+    ("an E57 section that is damaged", e57::sections),
+    ("E57 packets that are damaged", e57::packets),
     ("text, little-endian and big-endian", ply::bodies),
     (
         "coordinates that are `float`, `double` or whole numbers",
@@ -132,6 +154,57 @@ pub const KINDS: &[(&str, Kind)] = &[
         let text = ply::text("1", "1 2 3\n");
         vec![b.write("a.ply", format!("\u{feff}{text}"))]
     }),
+    ("PCD as text, binary, and compressed", pcd::bodies),
+    ("PCD with coordinates of every type", pcd::types),
+    ("padding between the fields of PCD", pcd::padded),
+    (
+        "PCD headers of other versions, or with less in them",
+        pcd::headers,
+    ),
+    ("PCD with coordinates that are not finite", pcd::not_finite),
+    ("PCD as text, with tabs or commas", pcd::separators),
+    ("PCD as text, with more lines than points", |b| {
+        vec![pcd::header(b, "POINTS 2", "POINTS 1")]
+    }),
+    ("PCD as text that ends early", |b| pcd::cut(b, "ascii")),
+    ("a line of PCD that is no point", |b| {
+        vec![
+            pcd::header(b, "2 3 1", "2 3 one"),
+            pcd::header(b, "e+06 1\n", "e+06\n"),
+        ]
+    }),
+    ("binary PCD that ends early", |b| pcd::cut(b, "binary")),
+    ("compressed PCD that ends early", |b| {
+        pcd::cut(b, "binary_compressed")
+    }),
+    ("compressed PCD with damaged data", pcd::damaged),
+    (
+        "compressed PCD whose size is not that of its points",
+        pcd::other_sizes,
+    ),
+    (
+        "compressed PCD that claims more than there can be",
+        pcd::bombs,
+    ),
+    ("PCD without a field z", pcd::no_z),
+    (
+        "two fields x in PCD, or one with several values",
+        pcd::twice,
+    ),
+    ("a word in a PCD header that it does not have", pcd::unknown),
+    (
+        "a PCD header without end, or of more than 1 MiB",
+        pcd::endless,
+    ),
+    ("PTX with one scan or several", ptx::scans),
+    (
+        "directions without a point, and scans without any",
+        ptx::empty,
+    ),
+    ("PTX that ends early", ptx::cut),
+    ("the header of a later scan that is none", ptx::no_header),
+    ("a matrix for points in columns", ptx::columns),
+    ("a line of PTX that is no point", ptx::bad_line),
     (
         "spaces, tabs, commas or semicolons between numbers",
         text::separators,
@@ -202,14 +275,6 @@ pub const KINDS: &[(&str, Kind)] = &[
             .map(|name| b.write(name, ""))
             .into()
     }),
-    ("E57", |b| vec![b.write("a.e57", "ASTM-E57 and more")]),
-    ("PCD", |b| {
-        vec![b.write("a.pcd", "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z\n")]
-    }),
-    ("PTX", |b| {
-        let head = "1\n1\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n";
-        vec![b.write("a.ptx", head.to_owned() + "1 2 3 0.5\n")]
-    }),
     ("OBJ", |b| {
         vec![b.write("a.obj", "v 1 2 3\nv 4 5 6\nv 7 8 9\nf 1 2 3\n")]
     }),
@@ -217,203 +282,4 @@ pub const KINDS: &[(&str, Kind)] = &[
         vec![b.write("a.stl", "solid a\nfacet normal 0 0 1\n")]
     }),
     ("what is no regular file", |_| vec!["/dev/null".into()]),
-];
-
-/// Files of other programs by kind.
-pub const ZOO: &[(&str, &[&str])] = &[
-    (
-        "LAS 1.2, point formats 0 to 3",
-        &["generated/pf0.las", "generated/pf3.las"],
-    ),
-    (
-        "LAS 1.3, point formats 0 to 5",
-        &["generated/pf4.las", "generated/pf5.las"],
-    ),
-    (
-        "LAS 1.4, point formats 0 to 10",
-        &[
-            "generated/pf6.las",
-            "generated/pf8.las",
-            "generated/pf10.las",
-            "generated/v1.4_pf1.las",
-        ],
-    ),
-    (
-        "LAS 1.0, point formats 0 and 1",
-        &["generated/v1.0_pf1.las"],
-    ),
-    (
-        "LAS 1.1, point formats 0 and 1",
-        &["generated/v1.1_pf1.las"],
-    ),
-    (
-        "LAZ 1.0 to 1.3, point formats 0 to 5",
-        &["generated/pf1.laz", "laz-rs/point-time-color.laz"],
-    ),
-    (
-        "LAZ 1.4, point formats 0 to 10",
-        &[
-            "generated/pf6.laz",
-            "generated/pf9.laz",
-            "generated/pf10.laz",
-        ],
-    ),
-    ("COPC", &["laspy/simple.copc.laz"]),
-    (
-        "extra bytes, described or not",
-        &[
-            "generated/extra_bytes.laz",
-            "generated/reclen_long_undeclared.las",
-            "laz-rs/extra-bytes.laz",
-        ],
-    ),
-    (
-        "a name that says LAS for LAZ, or the other way round",
-        &["generated/las_named.laz", "generated/laz_named.las"],
-    ),
-    (
-        "a box in the header that is wrong",
-        &[
-            "generated/bbox_zero.las",
-            "generated/bbox_nan.las",
-            "generated/bbox_inverted.las",
-        ],
-    ),
-    (
-        "bytes after the points",
-        &["generated/trailing_garbage.las"],
-    ),
-    (
-        "no points",
-        &[
-            "generated/empty.las",
-            "generated/empty.laz",
-            "generated/empty14.laz",
-        ],
-    ),
-    ("version 1.5", &["generated/v1.5_future.las"]),
-    (
-        "a count of 0 in the header, and points",
-        &["generated/count_zero.las"],
-    ),
-    (
-        "a count in the header that is too small",
-        &["generated/count_too_small.las"],
-    ),
-    ("a negative scale", &["generated/scale_neg.las"]),
-    ("point format 42", &["generated/bad_pointformat42.las"]),
-    (
-        "a record length below that of the point format",
-        &["generated/reclen_zero.las", "generated/reclen_short.las"],
-    ),
-    (
-        "a scale that is 0 or not a number",
-        &["generated/scale_zero.las", "generated/scale_nan.las"],
-    ),
-    ("an offset that is infinite", &["generated/offset_inf.las"]),
-    (
-        "points that start outside the file",
-        &[
-            "generated/dataoffset_past_eof.las",
-            "generated/dataoffset_in_header.las",
-        ],
-    ),
-    (
-        "a count in the header that is too large",
-        &["generated/count_too_big.las", "generated/count_4e9.las"],
-    ),
-    (
-        "LAS that ends early",
-        &["generated/trunc60.las", "generated/trunc99.las"],
-    ),
-    ("LAZ that ends early", &["generated/trunc60.laz"]),
-    (
-        "a header that ends early",
-        &["generated/trunc_header.las", "generated/magic_only.las"],
-    ),
-    (
-        "a name that says LAS, and other content",
-        &["generated/random.las", "generated/text_named.las"],
-    ),
-    (
-        "text, little-endian and big-endian",
-        &[
-            "generated/ascii.ply",
-            "generated/le_f32.ply",
-            "generated/be_f32.ply",
-        ],
-    ),
-    (
-        "coordinates that are `float`, `double` or whole numbers",
-        &["generated/le_f64.ply", "generated/int_coords.ply"],
-    ),
-    (
-        "lists among the properties, and elements before the vertices",
-        &[
-            "generated/list_before_vertex.ply",
-            "generated/with_faces_normals.ply",
-        ],
-    ),
-    (
-        "headers whose lines end with LF, CR LF or CR",
-        &["generated/ascii_crlf.ply", "generated/bin_crlf_header.ply"],
-    ),
-    (
-        "coordinates that are not finite",
-        &["generated/nan_inf.ply", "generated/nan_ascii.ply"],
-    ),
-    ("no property z", &["generated/no_z.ply"]),
-    (
-        "a count that is negative or 2^64",
-        &["generated/count_neg.ply"],
-    ),
-    (
-        "a binary body that ends early, or a count that is too large",
-        &["generated/short_body.ply", "generated/count_4e9.ply"],
-    ),
-    (
-        "spaces, tabs, commas or semicolons between numbers",
-        &[
-            "generated/space.xyz",
-            "generated/tab.xyz",
-            "generated/comma.xyz",
-            "generated/semicolon.xyz",
-        ],
-    ),
-    (
-        "decimal commas, with spaces or semicolons",
-        &["generated/decimal_comma.xyz"],
-    ),
-    (
-        "a line of names, also with x, y and z in other places",
-        &["generated/header.xyz", "generated/slashheader.xyz"],
-    ),
-    (
-        "comments behind `#` or `//`, and blank lines",
-        &["generated/hash.xyz"],
-    ),
-    (
-        "PTS: lines that count the points after them",
-        &["generated/pts_count.pts"],
-    ),
-    (
-        "lines that end with LF, CR LF or CR, and a UTF-8 byte order mark",
-        &[
-            "generated/crlf.xyz",
-            "generated/cr_only.xyz",
-            "generated/bom.xyz",
-        ],
-    ),
-    (
-        "any name, if the content is such a list",
-        &["generated/xyz_named.ply"],
-    ),
-    ("a line that is no point", &["generated/ragged.xyz"]),
-    ("UTF-16", &["generated/utf16.xyz"]),
-    ("an empty file", &["generated/empty_file.las"]),
-    (
-        "E57",
-        &["e57/bunnyFloat.e57", "generated/two_scans_pose.e57"],
-    ),
-    ("PTX", &["generated/two_scans.ptx"]),
 ];

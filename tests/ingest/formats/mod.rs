@@ -1,15 +1,20 @@
 //! The outcomes in `docs/formats.md`, checked for each kind of file.
 
 mod compressed;
+pub mod e57;
 mod kinds;
 mod las;
+pub mod pcd;
 mod ply;
+pub mod ptx;
 mod text;
+mod zoo;
 
 use crate::bench::Bench;
-use kinds::{KINDS, Kind, ZOO};
+use kinds::{KINDS, Kind};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+use zoo::ZOO;
 
 const PAGE: &str = include_str!("../../../docs/formats.md");
 

@@ -9,8 +9,8 @@ use outcrop::stages::ingest::{expand, ingest_classes, probe};
 pub const BETWEEN: &[u8] = b"\n=====\n";
 
 /// The extensions of files, selected by their first byte.
-pub const EXTENSIONS: [&str; 10] = [
-    "las", "laz", "ply", "xyz", "txt", "csv", "pts", "asc", "bin", "dat",
+pub const EXTENSIONS: [&str; 13] = [
+    "las", "laz", "ply", "xyz", "txt", "csv", "pts", "asc", "bin", "dat", "e57", "pcd", "ptx",
 ];
 
 /// Largest number of points for which [`info`] is called.

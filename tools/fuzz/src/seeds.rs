@@ -1,5 +1,7 @@
 //! The initial files for fuzzing.
 
+mod scans;
+
 use crate::{folder, resume, scratch};
 use outcrop_cloudgen::{Cloud, Encoding, Format, Kind, LasOptions, PointFormat, Precision};
 use std::error::Error;
@@ -30,6 +32,9 @@ pub fn write(folder: &Path) -> Result {
     las_files(&seeds)?;
     clouds(&seeds)?;
     ply_files(&seeds)?;
+    scans::pcd_files(&seeds)?;
+    scans::ptx_files(&seeds)?;
+    scans::e57_files(&seeds)?;
     texts(&seeds)?;
     folders(&seeds)?;
     meshes(&seeds)?;
@@ -170,7 +175,7 @@ fn ply_files(seeds: &Seeds) -> Result {
 }
 
 /// Lists of points as programs write them, and text that only resembles one.
-const TEXTS: [&str; 16] = [
+const TEXTS: [&str; 13] = [
     "1.5 2 -3.25\n4 5 6\n",
     "1.5\t2\t-3.25\r\n4\t5\t6",
     "1.5,2,-3.25\r4,5,6\r",
@@ -182,11 +187,8 @@ const TEXTS: [&str; 16] = [
     "2\n1.5 2 -3.25 -100 1 2 3\n4 5 6 -100 1 2 3\n1\n1 2 3\n",
     "\"z\",\"x\",\"y\"\n-3.25,1.5,2\n6,4,5\n",
     "1.#QNAN -1.#IND inf\n1 2 3\n",
-    "# .PCD v.7\nVERSION .7\nFIELDS x y z\n",
-    "1\n1\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n0 0 0 0.5\n",
     "v 1 2 3\nvn 4 5 6\nf 1 2 3\n",
     "solid a\nfacet normal 0 0 1\n",
-    "ASTM-E57 and more",
 ];
 
 fn texts(seeds: &Seeds) -> Result {
@@ -216,12 +218,16 @@ fn folders(seeds: &Seeds) -> Result {
     let las = read("las", "1.2-0-60.las")?;
     let laz = read("laz", "1.4-6-60.laz")?;
     let ply = read("ply", "7-le32.ply")?;
+    let e57 = read("e57", "1-false.e57")?;
+    let pcd = read("pcd", "packed.pcd")?;
+    let ptx = read("ptx", "two.ptx")?;
     let text = TEXTS[0].as_bytes().to_vec();
     for (number, files) in [
         vec![(0, &las), (1, &laz)],
         vec![(0, &las), (2, &ply), (3, &text)],
         vec![(8, &laz), (9, &text), (2, &text)],
         vec![(5, &text), (6, &text), (0, &text)],
+        vec![(10, &e57), (11, &pcd), (12, &ptx)],
     ]
     .into_iter()
     .enumerate()

@@ -9,7 +9,7 @@ use std::path::PathBuf;
 /// `holdout split`
 #[derive(Debug, Args)]
 pub(crate) struct Split {
-    /// The scan: LAS, LAZ, PLY, text, E57, PCD, or a folder of what outcrop reads
+    /// The scan: what outcrop reads, a file or a folder
     #[arg(value_name = "SCAN")]
     scan: PathBuf,
     /// Seed of the choice of points

@@ -2,8 +2,9 @@
 
 use super::super::input::{Input, Range, STREAM_BUFFER};
 use super::super::number;
+use super::super::scalar::FromScalar;
 use super::super::spool::{Sink, SourceWriter, sink_bytes};
-use super::{Cloud, FromScalar, Vertex, position};
+use super::{Cloud, Vertex, position};
 use crate::error::{Error, Result};
 use outcrop_ply::{Property, Scalar};
 use std::io::{BufRead, BufReader};

@@ -1,8 +1,9 @@
 //! Binary PLY: slabs of records on all threads, or one record after another if vertices contain lists.
 
 use super::super::input::{Input, Range, STREAM_BUFFER};
+use super::super::scalar::FromScalar;
 use super::super::spool::{Sink, SourceWriter, sink_bytes};
-use super::{Cloud, FromScalar, Vertex, position};
+use super::{Cloud, Vertex, position};
 use crate::error::{Error, Result};
 use outcrop_ply::{Encoding, Numbers, real};
 use std::io::BufReader;

@@ -6,7 +6,6 @@ mod binary;
 use super::columns::{Column, Wanted};
 use super::format::Format;
 use super::input::{Input, Range};
-use super::number;
 use super::point_format::{Claims, Head, PointFile, PointFormat, Refusal};
 use super::source::Native;
 use super::spool::SourceWriter;
@@ -190,33 +189,4 @@ impl PointFile for Cloud {
 /// Offset in the file of the next byte.
 fn position(source: &BufReader<Range<'_>>) -> u64 {
     source.get_ref().at - source.buffer().len() as u64
-}
-
-/// A coordinate that can be converted from any scalar.
-trait FromScalar: super::spool::Coordinate {
-    fn from_double(value: f64) -> Self;
-    /// Parses a number in text; see [`number::parse`].
-    fn parse(word: &[u8], decimals: &mut u32) -> Option<Self>;
-}
-
-impl FromScalar for f32 {
-    fn from_double(value: f64) -> Self {
-        value as f32
-    }
-    fn parse(word: &[u8], decimals: &mut u32) -> Option<Self> {
-        // Parsed directly as single precision, since rounding twice may differ.
-        match std::str::from_utf8(word).ok()?.parse() {
-            Ok(value) => Some(value),
-            Err(_) => number::parse(word, false, decimals).map(|v| v as f32),
-        }
-    }
-}
-
-impl FromScalar for f64 {
-    fn from_double(value: f64) -> Self {
-        value
-    }
-    fn parse(word: &[u8], decimals: &mut u32) -> Option<Self> {
-        number::parse(word, false, decimals)
-    }
 }

@@ -2,16 +2,15 @@
 
 mod dialect;
 mod foreign;
-mod lines;
 
 use super::format::Format;
 use super::input::Input;
+use super::lines::{self, LONGEST_LINE, Lines, SLAB};
 use super::point_format::{Claims, Head, PointFile, PointFormat, Refusal};
 use super::source::Native;
 use super::spool::{Sink, SourceWriter, sink_bytes};
 use crate::error::Result;
 use dialect::{Dialect, Row};
-use lines::{LONGEST_LINE, Lines, SLAB};
 
 impl Format {
     /// Lines of numbers: XYZ, TXT, CSV, PTS.

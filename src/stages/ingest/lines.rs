@@ -1,6 +1,6 @@
 //! The lines that start in a slab of a file.
 
-use super::super::input::Input;
+use super::input::Input;
 use crate::error::Result;
 
 /// Bytes of a slab.
@@ -10,7 +10,8 @@ pub(super) const LONGEST_LINE: u64 = 1 << 20;
 /// Bytes read at a time to find the end of a slab's last line.
 const STEP: usize = 4 << 10;
 
-fn is_end(byte: u8) -> bool {
+/// True for the bytes that end a line.
+pub(super) fn is_end(byte: u8) -> bool {
     matches!(byte, b'\n' | b'\r')
 }
 
@@ -33,7 +34,7 @@ impl Lines {
         let skip = match bytes.iter().position(|b| is_end(*b)) {
             _ if before == 0 => 0,
             Some(end) => end + 1,
-            None if full => return Err(Self::too_long(input, start)),
+            None if full => return Err(too_long(input, start, LONGEST_LINE)),
             None => got,
         };
         // A line that starts exactly at the end of the slab belongs to the next one.
@@ -63,17 +64,9 @@ impl Lines {
                 return Ok(());
             }
             if (bytes.len() - begun) as u64 > LONGEST_LINE {
-                return Err(Self::too_long(input, at + begun as u64));
+                return Err(too_long(input, at + begun as u64, LONGEST_LINE));
             }
         }
-    }
-
-    fn too_long(input: &Input, at: u64) -> crate::Error {
-        input.error(
-            format!("line around byte {at}"),
-            "no line end",
-            format!("lines of at most {LONGEST_LINE} bytes"),
-        )
     }
 
     /// The lines, each with its offset in the file.
@@ -85,6 +78,15 @@ impl Lines {
             (start, line)
         })
     }
+}
+
+/// The error of a line that does not end.
+pub(super) fn too_long(input: &Input, at: u64, most: u64) -> crate::Error {
+    input.error(
+        format!("line around byte {at}"),
+        "no line end",
+        format!("lines of at most {most} bytes"),
+    )
 }
 
 /// Number, from 1, of the line that starts at `at`.

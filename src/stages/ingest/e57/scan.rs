@@ -1,0 +1,176 @@
+//! A scan of an E57 file, as its description says: the parts of a record, and the pose.
+
+/// The part of a record.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Name {
+    /// A Cartesian coordinate.
+    Cartesian(usize),
+    CartesianState,
+    /// Range, azimuth and elevation.
+    Spherical(usize),
+    SphericalState,
+    /// Anything else.
+    Other(Box<str>),
+}
+
+impl Name {
+    pub(super) fn of(name: &str) -> Self {
+        match name {
+            "cartesianX" => Self::Cartesian(0),
+            "cartesianY" => Self::Cartesian(1),
+            "cartesianZ" => Self::Cartesian(2),
+            "cartesianInvalidState" => Self::CartesianState,
+            "sphericalRange" => Self::Spherical(0),
+            "sphericalAzimuth" => Self::Spherical(1),
+            "sphericalElevation" => Self::Spherical(2),
+            "sphericalInvalidState" => Self::SphericalState,
+            other => Self::Other(other.into()),
+        }
+    }
+}
+
+/// Type of a number.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Kind {
+    Single,
+    Double,
+    /// Whole numbers of a range, as their difference to the lowest, in as few bits as possible. The number is
+    /// `i * scale + offset`.
+    Integer {
+        lowest: i64,
+        highest: i64,
+        scale: f64,
+        offset: f64,
+    },
+}
+
+impl Kind {
+    /// Bits of a number; none if there is only one.
+    pub(super) fn bits(self) -> u32 {
+        match self {
+            Self::Single => 32,
+            Self::Double => 64,
+            Self::Integer {
+                lowest, highest, ..
+            } => u64::BITS - highest.wrapping_sub(lowest).cast_unsigned().leading_zeros(),
+        }
+    }
+}
+
+/// A part of a record.
+#[derive(Debug, Clone)]
+pub(super) struct Field {
+    pub(super) name: Name,
+    pub(super) kind: Kind,
+}
+
+/// The place of a scanner.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Pose {
+    /// Quaternion: w, x, y, z.
+    pub(super) rotation: [f64; 4],
+    pub(super) translation: [f64; 3],
+}
+
+impl Default for Pose {
+    fn default() -> Self {
+        Self {
+            rotation: [1.0, 0.0, 0.0, 0.0],
+            translation: [0.0; 3],
+        }
+    }
+}
+
+impl Pose {
+    /// The rows of a matrix, and a translation; none if the rotation is none.
+    pub(super) fn motion(&self) -> Option<Motion> {
+        let [w, x, y, z] = self.rotation;
+        let norm2 = w * w + x * x + y * y + z * z;
+        if !norm2.is_normal() || !self.translation.iter().all(|t| t.is_finite()) {
+            return None;
+        }
+        // A unit quaternion, but for the rounding of its text.
+        let norm = match (norm2 - 1.0).abs() < 1e-14 {
+            true => 1.0,
+            false => norm2.sqrt(),
+        };
+        let [w, x, y, z] = [w, x, y, z].map(|part| part / norm);
+        Some(Motion {
+            rows: [
+                [
+                    w * w + x * x - y * y - z * z,
+                    2.0 * (x * y - w * z),
+                    2.0 * (x * z + w * y),
+                ],
+                [
+                    2.0 * (x * y + w * z),
+                    w * w + y * y - x * x - z * z,
+                    2.0 * (y * z - w * x),
+                ],
+                [
+                    2.0 * (x * z - w * y),
+                    2.0 * (y * z + w * x),
+                    w * w + z * z - x * x - y * y,
+                ],
+            ],
+            translation: self.translation,
+        })
+    }
+}
+
+/// A rotation and a translation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Motion {
+    rows: [[f64; 3]; 3],
+    translation: [f64; 3],
+}
+
+impl Motion {
+    /// True if every point stays where it is.
+    pub(super) fn rests(&self) -> bool {
+        self.rows == [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+            && self.translation == [0.0; 3]
+    }
+
+    #[inline]
+    pub(super) fn apply(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
+        std::array::from_fn(|axis| {
+            let [a, b, c] = self.rows[axis];
+            a * x + b * y + c * z + self.translation[axis]
+        })
+    }
+}
+
+/// A scan.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Scan {
+    /// Number of records.
+    pub(super) points: u64,
+    /// Offset in the file of its section.
+    pub(super) section: u64,
+    pub(super) pose: Option<Pose>,
+    pub(super) fields: Vec<Field>,
+}
+
+impl Scan {
+    /// The number of the field with this name.
+    pub(super) fn field(&self, name: &Name) -> Option<usize> {
+        self.fields.iter().position(|field| field.name == *name)
+    }
+
+    /// The numbers of three fields.
+    pub(super) fn three(&self, name: impl Fn(usize) -> Name) -> Option<[usize; 3]> {
+        let [a, b, c] = [0, 1, 2].map(|number| self.field(&name(number)));
+        Some([a?, b?, c?])
+    }
+
+    /// Bits of a record.
+    pub(super) fn bits(&self) -> u64 {
+        self.fields.iter().map(|f| u64::from(f.kind.bits())).sum()
+    }
+
+    /// The motion of the points; none if the rotation is none.
+    pub(super) fn motion(&self) -> Option<Motion> {
+        self.pose.unwrap_or_default().motion()
+    }
+}
