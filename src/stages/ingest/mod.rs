@@ -29,6 +29,7 @@ mod ply;
 mod point_format;
 mod probe;
 mod ptx;
+mod ranks;
 mod scalar;
 mod source;
 mod spool;
@@ -87,6 +88,8 @@ pub struct Selection {
     pub classes: Classes,
     /// Columns of the points.
     pub attributes: Attributes,
+    /// True if the scanners of the points are read, from files that give their positions.
+    pub scanners: bool,
 }
 
 /// Decodes all inputs, which may be files and folders, into a spool.
@@ -165,7 +168,8 @@ fn read_all(
         workspace.check_cancel()?;
         let opened = Opened::new(Input::open(path, workspace)?)?;
         let number = sources.len() as u32;
-        let wanted = Wanted::of(&selection.attributes, &opened.file.columns())?;
+        let scanners = selection.scanners && !opened.file.scanners().is_empty();
+        let wanted = Wanted::of(&selection.attributes, &opened.file.columns(), scanners)?;
         let target = SourceWriter::new(workspace, name, section, number, classes, &wanted)?;
         let mut warnings = match opened.file.read(&opened.input, &target) {
             // Tasks read all files at the same time.
@@ -183,7 +187,7 @@ fn read_all(
         section = next;
         frames.extend(more);
         values.extend(more_values.frames);
-        if selection.attributes != Attributes::None {
+        if selection.attributes != Attributes::None || selection.scanners {
             // Frames without values.
             values.resize(frames.len(), Frame::default());
         }
