@@ -180,8 +180,12 @@ pub struct Params {
     pub max_fill: MaxWidth,
     /// Remove bridges and small components, fill holes (paper, section 3.6).
     pub repair: bool,
+    /// Keep points far from all others, even if the lattice of the positions is coarser for them.
+    pub keep_far: bool,
     /// Vertices have normals, in formats that hold them.
     pub normals: bool,
+    /// Do not use the positions of scanners that files give: what a scanner saw is out otherwise (robust).
+    pub ignore_scanners: bool,
     /// Take coordinates as they are if files give different reference systems, which is an error otherwise.
     pub ignore_crs: bool,
     /// Origin of the coordinates in the mesh file.
@@ -221,7 +225,9 @@ impl Default for Params {
             max_edge: MaxWidth::Spacings(METHOD.admissibility.edge),
             max_fill: MaxWidth::Spacings(METHOD.filling.width),
             repair: true,
+            keep_far: false,
             normals: false,
+            ignore_scanners: false,
             ignore_crs: false,
             origin: Origin::None,
             block: METHOD.curve.block,
@@ -251,6 +257,12 @@ impl Params {
     #[must_use]
     pub fn off_surface(&self) -> bool {
         self.method == Method::Robust && !self.keep_all
+    }
+
+    /// True if the positions of scanners decide which side is out.
+    #[must_use]
+    pub fn scanners(&self) -> bool {
+        self.method == Method::Robust && !self.ignore_scanners
     }
 
     /// The limits of length on a lattice with this step.

@@ -156,6 +156,9 @@ pub struct Surface {
     /// [default: 8x; with --method paper none]
     #[arg(long, value_name = "LENGTH|Nx|none")]
     pub max_edge: Option<MaxWidth>,
+    /// Do not use the positions of scanners in E57 and PTX files, by which the side that the scanner saw is out
+    #[arg(long)]
+    pub ignore_scanners: bool,
 }
 
 /// Post-processing.
@@ -193,6 +196,9 @@ pub struct Coordinates {
         allow_hyphen_values = true
     )]
     pub origin: Origin,
+    /// Keep points so far from all others that coordinates have to be rounded for them; else they are left out
+    #[arg(long)]
+    pub keep_far: bool,
     /// Take coordinates as they are if files give different reference systems; the mesh then names none
     #[arg(long)]
     pub ignore_crs: bool,
@@ -401,7 +407,9 @@ impl Job {
             repair: !self.repair.no_repair,
             normals: self.normals,
             origin: self.coordinates.origin,
+            keep_far: self.coordinates.keep_far,
             ignore_crs: self.coordinates.ignore_crs,
+            ignore_scanners: self.surface.ignore_scanners,
             block: self.block_points,
             ..usual
         }

@@ -55,6 +55,7 @@ pub fn summary(report: &Report, output: &Path) -> String {
 fn left_out(report: &Report) -> String {
     let reasons: Vec<String> = [
         (report.input.dropped_by_class, "of other classes"),
+        (report.input.dropped_far, "far from all others"),
         (report.thin.dropped, "by thinning"),
         (report.outliers.dropped, "outliers"),
     ]

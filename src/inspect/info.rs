@@ -74,8 +74,9 @@ pub fn info(inputs: &[PathBuf], classes: &Classes, workspace: &Workspace) -> Res
     let start = Instant::now();
     let observer = &workspace.observer;
     observer.begin("ingest", "points", 0);
-    let headers = Known::from_headers(inputs, &Attributes::None);
-    let spool = ingest_classes(inputs, classes, workspace)?;
+    let headers = Known::from_headers(inputs, &Attributes::None, true);
+    let mut spool = ingest_classes(inputs, classes, workspace)?;
+    spool.drop_far(workspace)?;
     observer.end();
     let input = spool.stats().clone();
     let lattice = spool.choose_lattice(0)?;
@@ -237,12 +238,13 @@ impl fmt::Display for Info {
         let mib = |bytes: u64| format!("{} MiB", bytes.div_ceil(1 << 20));
         let input = &self.input;
         let left_out = format!(
-            "{} duplicates, {} not finite, {} withheld, {} invalid, {} of other classes",
+            "{} duplicates, {} not finite, {} withheld, {} invalid, {} of other classes, {} far away",
             self.duplicates,
             input.dropped_non_finite,
             input.withheld,
             input.invalid,
-            input.dropped_by_class
+            input.dropped_by_class,
+            input.dropped_far
         );
         let system = match &input.crs {
             Some(crs) => format!("{} ({})", crs.line(), crs.source),

@@ -1,21 +1,21 @@
 //! The stages of a run: each with its parameters, its part of the report, and the check of disk space for the
 //! following stages.
 
-use super::beside;
+mod export;
+mod values;
+
 use super::checks::{all_are_kept, disk_radius, enough, not_a_line, room};
-use super::disk::Text;
-use super::origin::Steps;
+use super::disk::{SCANNER, Text};
 use super::{Clock, Known, Reconstruction};
 use crate::error::Result;
-use crate::geom::lattice::{Lattice, Shift};
+use crate::geom::lattice::Lattice;
 use crate::method::METHOD;
-use crate::params::{Method, Origin};
+use crate::params::Method;
 use crate::report::{LatticeReport, Report};
-use crate::stages::attributes::{StoredColumns, attributes};
 use crate::stages::blocks::Blocks;
 use crate::stages::cells::{CellTriples, DiskRadius, TileRanges, Widen, cells};
-use crate::stages::export::{CoordinateType, ExportOptions, export};
-use crate::stages::ingest::{self, Carried, Selection, Spool, ingest_selected};
+use crate::stages::export::CoordinateType;
+use crate::stages::ingest::{Carried, Selection, Spool, ingest_selected};
 use crate::stages::located::Places;
 use crate::stages::order::{Orderer, PointStore, StoredPoints, order, sample_sort};
 use crate::stages::outliers::{OutlierOptions, drop_outliers};
@@ -26,7 +26,8 @@ use crate::stages::stitch::{StitchOptions, Stitched, stitch};
 use crate::stages::thin::{Grid, LeftOut, thin};
 use crate::stages::triples::{Triples, triples};
 use crate::workspace::{Workspace, limits};
-use outcrop_ply::Place;
+use export::written;
+use values::Values;
 use std::time::Instant;
 
 /// The positions that decide which points are connected, if they are not those of the mesh, and the local
@@ -50,21 +51,15 @@ pub(super) struct Stages<'a> {
     coarse: f64,
 }
 
-/// The type of coordinates in the mesh.
-fn written(precision: ingest::CoordinateType) -> CoordinateType {
-    match precision {
-        ingest::CoordinateType::F32 => CoordinateType::Float,
-        ingest::CoordinateType::F64 => CoordinateType::Double,
-    }
-}
-
 impl<'a> Stages<'a> {
     /// Begins with the estimate of disk space from the headers of the inputs.
     pub fn begin(job: &'a Reconstruction, workspace: &'a Workspace) -> Result<Self> {
         // A task leaves the check of disk space to the process that began its generation.
         let headers = match workspace.is_task() {
             true => None,
-            false => Known::from_headers(&job.inputs, &job.params.attributes),
+            false => {
+                Known::from_headers(&job.inputs, &job.params.attributes, job.params.scanners())
+            },
         };
         let first = headers.map(|known| known.estimate(&job.params, &job.output));
         if let Some(known) = headers.filter(|_| all_are_kept(&job.params)) {
@@ -123,24 +118,37 @@ impl<'a> Stages<'a> {
         let selection = Selection {
             classes: params.classes.clone(),
             attributes: params.attributes.clone(),
+            scanners: params.scanners(),
         };
         let spool = self.clock.stage("ingest", "points", 0, || {
-            ingest_selected(&job.inputs, &selection, workspace)
+            let mut spool = ingest_selected(&job.inputs, &selection, workspace)?;
+            if !params.keep_far {
+                spool.drop_far(workspace)?;
+            }
+            Ok(spool)
         })?;
         self.carried = spool.carried(&params.attributes, params.wide_colors);
+        if params.scanners() {
+            self.carried = spool.with_scanners(std::mem::take(&mut self.carried));
+        }
         self.report.attributes = self.carried.attributes.clone();
         let input = spool.stats().clone();
         if let Some(mixed) = input.mixed.as_ref().filter(|_| !params.ignore_crs) {
             return Err(mixed.refused());
         }
         self.report.coordinates = written(spool.source_precision());
+        let scanner = match self.carried.has_scanners() {
+            true => SCANNER,
+            false => 0,
+        };
         self.known = Known {
             read: input.kept,
             spool: spool.bytes(),
             decompressed: 0,
             // With thinning, the number of points that stay is unknown.
             points: if params.thin.is_some() { 0 } else { input.kept },
-            values: self.carried.bytes() as u64,
+            values: self.carried.bytes() as u64 - scanner,
+            scanner,
             double: Some(self.report.coordinates == CoordinateType::Double),
             moved: None,
             text: None,
@@ -157,21 +165,6 @@ impl<'a> Stages<'a> {
             exact: lattice.exact,
         };
         Ok((spool, lattice))
-    }
-
-    /// Checks a given origin, and says if it is rounded.
-    fn check_origin(&mut self, lattice: &Lattice) -> Result<()> {
-        let Origin::At(to) = self.job.params.origin else {
-            return Ok(());
-        };
-        let coarse = self.coarse;
-        let [x, y, z] = Steps { lattice, coarse }.given(to)?.origin;
-        if [x, y, z] != to {
-            self.warn(format!(
-                "--origin: {x},{y},{z} is used, the nearest position on the lattice of steps of {coarse}"
-            ));
-        }
-        Ok(())
     }
 
     /// Sorts the points along the curve, thinned if requested; duplicates become one point.
@@ -207,7 +200,7 @@ impl<'a> Stages<'a> {
             store
         };
         let text = Text::of(spool, lattice, &job.params, &store)?;
-        if self.carried.columns.is_empty() {
+        if self.carried.is_empty() {
             spool.release(workspace)?;
         }
         self.warn_of_input(lattice);
@@ -240,6 +233,13 @@ impl<'a> Stages<'a> {
                 "{left_out} points left out: a coordinate is NaN or infinite"
             ));
         }
+        let far = (self.report.input.dropped_far, self.report.input.far_example);
+        if let (count, Some([x, y, z])) = far {
+            self.warn(format!(
+                "{count} points left out, far from all others (one at {x} {y} {z}): with --keep-far they \
+                 are kept, and all are rounded to coarser steps"
+            ));
+        }
         let folded = self.report.duplicates_folded;
         if !lattice.exact && folded > kept / 100 {
             self.warn(format!(
@@ -269,26 +269,6 @@ impl<'a> Stages<'a> {
         self.report.outliers = stats;
         self.report.points = store.len() as u64;
         Ok(store)
-    }
-
-    /// The columns of the points that remain, if the mesh keeps any.
-    pub fn attributes(
-        &mut self,
-        spool: &Spool,
-        lattice: &Lattice,
-        store: &StoredPoints,
-    ) -> Result<Option<StoredColumns>> {
-        if self.carried.columns.is_empty() {
-            return Ok(None);
-        }
-        let (workspace, blocks, carried) = (self.workspace, self.blocks(), &self.carried);
-        let columns = self
-            .clock
-            .stage("attributes", "points", spool.points(), || {
-                attributes(spool, lattice, carried, store, blocks, workspace)
-            })?;
-        spool.release(workspace)?;
-        Ok(Some(columns))
     }
 
     /// The radius of the disks; a percentage refers to the points before smoothing.
@@ -369,6 +349,7 @@ impl<'a> Stages<'a> {
         &self,
         store: &'p PointStore,
         shape: &'p Shape,
+        values: &'p Values,
         lattice: &Lattice,
     ) -> Places<'p> {
         let params = &self.job.params;
@@ -377,6 +358,7 @@ impl<'a> Stages<'a> {
         Places {
             shape: shape.store.as_ref().unwrap_or(store),
             file: store,
+            scanners: values.scanners(),
             density: robust.map(|spacings| Density {
                 spacings,
                 neighbors: params.neighbors,
@@ -455,62 +437,6 @@ impl<'a> Stages<'a> {
         self.report.holes_left = stats.holes_found - stats.holes_filled;
         self.report.repair = stats;
         Ok(repaired)
-    }
-
-    /// The origin of the mesh's coordinates, if it is not that of the cloud, and their type.
-    fn shift(&mut self, store: &PointStore, lattice: &Lattice) -> Result<Option<Shift>> {
-        let coarse = self.coarse;
-        let steps = Steps { lattice, coarse };
-        let doubles = self.report.coordinates == CoordinateType::Double;
-        let shift = match self.job.params.origin {
-            Origin::Auto if doubles => steps.automatic(store.bounds()),
-            Origin::Auto | Origin::None => None,
-            Origin::At(to) => Some(steps.given(to)?),
-        };
-        if let Some(shift) = &shift {
-            self.report.coordinates = written(steps.precision(shift, store.bounds()));
-            self.report.origin = Some(shift.origin);
-        }
-        Ok(shift)
-    }
-
-    /// The comments of the mesh.
-    fn comments(&self) -> Vec<String> {
-        let step = (self.job.params.smooth == 0).then_some(self.coarse);
-        let place = self.report.origin.map(|origin| Place::new(origin, step));
-        let mut comments = place.map_or_else(Vec::new, |place| place.comments());
-        if let Some(crs) = &self.report.input.crs {
-            comments.extend(crs.horizontal.map(|code| format!("epsg {code}")));
-            comments.push(format!("crs {}", crs.line()));
-        }
-        comments
-    }
-
-    /// Writes the mesh.
-    pub fn export(
-        &mut self,
-        store: &PointStore,
-        columns: Option<&StoredColumns>,
-        repaired: &Repaired,
-        lattice: &Lattice,
-    ) -> Result<()> {
-        let (job, workspace, blocks) = (self.job, self.workspace, self.blocks());
-        let shift = self.shift(store, lattice)?;
-        let options = ExportOptions {
-            output: &job.output,
-            coordinates: self.report.coordinates,
-            comments: self.comments(),
-            origin: shift,
-            columns,
-            normals: job.params.normals,
-            decimals: self.known.text.map_or(0, |text| text.decimals),
-        };
-        let items = 2 * blocks.count() as u64;
-        self.report.mesh = self.clock.stage("export", "blocks", items, || {
-            export(store, repaired, blocks, lattice, options, workspace)
-        })?;
-        columns.map_or(Ok(()), |columns| columns.release(workspace))?;
-        beside::write(&job.output, &job.inputs, &self.report)
     }
 
     /// The report of the run.

@@ -4,6 +4,7 @@ mod attributes;
 mod bad_input;
 mod cli;
 mod compressed;
+mod coordinates;
 mod determinism;
 mod filters;
 mod library;

@@ -1,6 +1,7 @@
 //! Warnings about files that do not belong together.
 
 use crate::bench::{Bench, cloud, write_las};
+use outcrop::stages::ingest::{CrsSource, check_systems};
 use std::path::{Path, PathBuf};
 
 /// A file with these records of its reference system.
@@ -72,7 +73,23 @@ fn files_of_two_reference_systems_are_told_apart() {
     let plain = bench.write("a.xyz", "1 2 0\n3 4 0\n");
     let mut fine = vec![utm.clone(), plain];
     fine.extend_from_slice(&same);
-    assert_eq!(warnings(&fine), [""; 0]);
+    let said = warnings(&fine);
+    assert_eq!(said.len(), 1, "{said:?}");
+    assert!(
+        said[0].ends_with(
+            "it gives no reference system, as 2 of 6 files; that of the others, EPSG:26917, is \
+             taken for all"
+        ),
+        "{said:?}"
+    );
+    // The one that tells most, in any order of the files.
+    for paths in [fine.clone(), fine.iter().rev().cloned().collect()] {
+        let stats = bench.read(&paths).unwrap().stats().clone();
+        let crs = stats.crs.unwrap();
+        assert_eq!((crs.name.as_str(), crs.horizontal), ("a", Some(26917)));
+        assert!(crs.wkt.unwrap().starts_with("PROJCS[\"a\""));
+        assert_eq!(check_systems(&paths).map_err(|e| e.to_string()), Ok(()));
+    }
     for other in other {
         let mut files = fine.clone();
         files.push(other.clone());
@@ -86,6 +103,60 @@ fn files_of_two_reference_systems_are_told_apart() {
             said.len() == 1 && said[0].starts_with(&expected),
             "{said:?}"
         );
+        let stats = bench.read(&files).unwrap().stats().clone();
+        assert_eq!(stats.crs, None);
+        let refused = format!(
+            "{}: reference system: found EPSG:32617, expected EPSG:26917, that of {}; --ignore-crs \
+             takes coordinates as they are",
+            other.display(),
+            utm.display()
+        );
+        assert_eq!(stats.mixed.unwrap().refused().to_string(), refused);
+        assert_eq!(check_systems(&files).unwrap_err().to_string(), refused);
+    }
+}
+
+#[test]
+fn a_file_beside_may_give_the_system() {
+    let bench = Bench::new();
+    let cloud = bench.write("a.xyz", "1 2 0\n3 4 0\n");
+    let las = bench.path("b.laz");
+    with_records(&las, &keys(26917), false);
+    let text = |code| String::from_utf8(text(code).swap_remove(0).1).unwrap();
+    bench.write("a.prj", text(26917).trim_end_matches('\0'));
+    // What a file says itself counts more.
+    bench.write("b.prj", text(32617).trim_end_matches('\0'));
+    let stats = bench
+        .read(&[cloud.clone(), las.clone()])
+        .unwrap()
+        .stats()
+        .clone();
+    assert_eq!(stats.warnings, [""; 0]);
+    let sources: Vec<_> = stats
+        .files
+        .iter()
+        .map(|f| f.crs.as_ref().unwrap().source)
+        .collect();
+    assert_eq!(sources, [CrsSource::Prj, CrsSource::GeotiffKeys]);
+    assert_eq!(stats.crs.unwrap().source, CrsSource::Prj);
+    bench.write("a.prj", text(32617));
+    assert!(check_systems(&[cloud.clone(), las]).is_err());
+    for (content, why) in [
+        ("Projection UTM".to_owned(), "it is no well-known text"),
+        (
+            format!("A[\"{}\"]", "b".repeat(1 << 20)),
+            "it is longer than 1 MiB",
+        ),
+    ] {
+        bench.write("a.prj", content);
+        let stats = bench
+            .read(std::slice::from_ref(&cloud))
+            .unwrap()
+            .stats()
+            .clone();
+        let said = format!("a.prj: {why}, no reference system is taken from it");
+        assert!(stats.warnings[0].ends_with(&said), "{:?}", stats.warnings);
+        assert_eq!(stats.crs, None);
     }
 }
 

@@ -6,10 +6,12 @@ mod bombs;
 mod classes;
 mod columns;
 mod damage;
+mod far;
 mod formats;
 mod lattices;
 mod numbers;
 mod ply_headers;
+mod scan_columns;
 mod scans;
 
 use bench::{Bench, based, cloud, ply, positions, write_las};

@@ -27,6 +27,7 @@ fn reads_every_kind_of_pcd() {
             assert_eq!(positions(&bench, &spool, &lattice), based(&whole));
             assert_eq!(spool.source_precision(), CoordinateType::F32);
             assert_eq!(probe(&path).unwrap().points_claimed, Some(3000));
+            assert_eq!(spool.stats().files[0].scanners, [[1.0, 2.0, 3.0]]);
         }
     }
 }
@@ -272,5 +273,9 @@ fn reference_systems_of_e57_are_compared() {
     assert_eq!(warnings.len(), 1);
     assert!(warnings[0].contains("EPSG:32618") && warnings[0].contains("EPSG:32617"));
     let spool = bench.read(&[a, file("c.e57", "none known")]).unwrap();
-    assert!(spool.stats().warnings.is_empty());
+    let warnings = &spool.stats().warnings;
+    assert!(
+        warnings[0].contains("c.e57: it gives no reference system"),
+        "{warnings:?}"
+    );
 }

@@ -1,7 +1,7 @@
 use super::*;
 use crate::geom::Point;
 use crate::stages::ingest::{Selection, ingest_selected};
-use crate::stages::order::{Orderer, order};
+use crate::stages::order::{Rewriter, order};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
@@ -47,10 +47,10 @@ fn check<R: Row>(points: u32, side: u32, block: u32, page: usize, keep_all: bool
     let all = all.open(&workspace).unwrap();
     let kept = |p: &Point| keep_all || p.iter().sum::<i32>() % 2 == 0;
     let ids = all.slice(0..all.len()).unwrap();
-    let orderer = Orderer::new(&workspace).unwrap();
     let some: Vec<Point> = ids.into_iter().filter(kept).collect();
-    orderer.push(&workspace, &some).unwrap();
-    let store = orderer.finish(&workspace, page).unwrap().0;
+    let writer = Rewriter::new("kept", some.len(), page, &workspace).unwrap();
+    writer.put(&workspace.unit(), 0, &some).unwrap();
+    let store = writer.finish(&workspace).unwrap();
     let blocks = Blocks::new(store.len(), block);
     let job = Job {
         spool: &spool,

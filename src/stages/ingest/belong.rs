@@ -192,6 +192,7 @@ mod tests {
             withheld: 0,
             invalid: 0,
             dropped_by_class: 0,
+            dropped_far: 0,
             min: (kept > 0).then_some(min),
             max: (kept > 0).then_some(max),
             scanners: Vec::new(),

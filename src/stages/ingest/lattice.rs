@@ -42,6 +42,36 @@ pub(super) fn choose(sources: &[Source], stats: &IngestStats, refine: u32) -> Re
     Ok(chosen)
 }
 
+/// The finest step that a cloud asks for.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct ExactStep {
+    pub(super) step: f64,
+    /// True if a lattice with this step holds the cloud.
+    pub(super) fits: bool,
+    /// True without floating-point sources.
+    pub(super) grids_only: bool,
+}
+
+/// The step with which all points are on the lattice, or are rounded invisibly; `None` without points.
+pub(super) fn exact_step(sources: &[Source]) -> Option<ExactStep> {
+    let sources: Vec<&Source> = sources.iter().filter(|s| s.stats.kept > 0).collect();
+    let offset = common_offset(&sources);
+    let floats = sources.iter().filter(|s| s.grid(0).is_none());
+    let exponent = floats.clone().map(|s| s.stats.exponent).min();
+    let grid = finest_grid_step(&sources, offset).map(|(step, _)| step);
+    let step = match (grid, exponent) {
+        (Some(step), Some(exponent)) => step.min(pow2(exponent.max(-1000))),
+        (Some(step), None) => step,
+        (None, Some(_)) => float_step(&sources),
+        (None, None) => return None,
+    };
+    Some(ExactStep {
+        step,
+        fits: place(&sources, step.max(f64::MIN_POSITIVE), offset).is_some(),
+        grids_only: exponent.is_none(),
+    })
+}
+
 fn no_points(stats: &IngestStats) -> Error {
     let reasons = [
         (
@@ -97,9 +127,21 @@ fn common_offset(sources: &[&Source]) -> [f64; 3] {
     })
 }
 
-/// The step for sources on grids (LAS, decimals): the greatest common divisor of all scales, refined to
-/// include all offsets, if it fits; else the finest that fits. `None` without such sources.
+/// The step for sources on grids (LAS, decimals): the finest, if it fits; else the finest that fits. `None`
+/// without such sources.
 fn grid_step(sources: &[&Source], offset: [f64; 3]) -> Option<f64> {
+    let (fine, step) = finest_grid_step(sources, offset)?;
+    let factors = (0..).flat_map(|k| [1.0, 2.0, 5.0].map(|f: f64| f * 10f64.powi(k)));
+    let coarser = factors.take(60).map(|factor| nice(step * factor));
+    std::iter::once(fine)
+        .chain(coarser)
+        .find(|step| place(sources, *step, offset).is_some())
+        .or(Some(step))
+}
+
+/// The finest step for sources on grids: the greatest common divisor of all scales, refined to include all
+/// offsets; and that before it is refined. `None` without such sources.
+fn finest_grid_step(sources: &[&Source], offset: [f64; 3]) -> Option<(f64, f64)> {
     let grids: Vec<Vec<(f64, f64)>> = (0..3)
         .map(|axis| sources.iter().filter_map(|s| s.grid(axis)).collect())
         .collect();
@@ -116,13 +158,7 @@ fn grid_step(sources: &[&Source], offset: [f64; 3]) -> Option<f64> {
     });
     let parts = common.and_then(|step| offset_parts(step, shifts));
     // Ten parts are not exact, but a tenth of a step keeps rounding errors invisible.
-    let fine = divided(step, parts.unwrap_or(10));
-    let factors = (0..).flat_map(|k| [1.0, 2.0, 5.0].map(|f: f64| f * 10f64.powi(k)));
-    let coarser = factors.take(60).map(|factor| nice(step * factor));
-    std::iter::once(fine)
-        .chain(coarser)
-        .find(|step| place(sources, *step, offset).is_some())
-        .or(Some(step))
+    Some((divided(step, parts.unwrap_or(10)), step))
 }
 
 /// `step / parts`, corrected to the decimal number it stands for.
@@ -234,6 +270,7 @@ mod tests {
                         ..SourceStats::default()
                     },
                     text: false,
+                    cut: false,
                     columns: Vec::new(),
                     spans: Vec::new(),
                 };

@@ -16,6 +16,7 @@ mod contain;
 mod crs;
 mod e57;
 mod expand;
+mod far;
 mod format;
 mod formats;
 mod input;
@@ -51,8 +52,9 @@ pub use stream::{READ_BUFFERS, VALUE_BUFFERS};
 use crate::error::{Error, Result};
 use crate::geom::lattice::Lattice;
 use crate::workspace::Workspace;
-use columns::{Wanted, row_bytes};
+use columns::{SCANNER, Wanted, row_bytes};
 use input::Input;
+use outcrop_ply::Scalar;
 use point_format::{Claims, PointFile};
 use serde::{Deserialize, Serialize};
 use source::{Native, Source};
@@ -168,7 +170,7 @@ fn read_all(
         workspace.check_cancel()?;
         let opened = Opened::new(Input::open(path, workspace)?)?;
         let number = sources.len() as u32;
-        let scanners = selection.scanners && !opened.file.scanners().is_empty();
+        let scanners = selection.scanners && opened.has_scanners();
         let wanted = Wanted::of(&selection.attributes, &opened.file.columns(), scanners)?;
         let target = SourceWriter::new(workspace, name, section, number, classes, &wanted)?;
         let mut warnings = match opened.file.read(&opened.input, &target) {
@@ -195,6 +197,7 @@ fn read_all(
             native: opened.claims.native,
             stats: read,
             text: opened.claims.text,
+            cut: false,
             columns: wanted.columns,
             spans: more_values.spans,
         };
@@ -234,6 +237,13 @@ impl Opened {
             file,
             claims,
         })
+    }
+
+    /// True if the file tells where the scanners were, and which of them saw a point.
+    fn has_scanners(&self) -> bool {
+        let columns = self.file.columns();
+        let scanner = columns.iter().find(|c| c.name == SCANNER);
+        scanner.is_some_and(|c| c.scalar == Scalar::U16) && !self.file.scanners().is_empty()
     }
 
     /// The reference system that the file gives, or else a `.prj` file beside it; a warning about that.
@@ -310,6 +320,7 @@ impl IngestStats {
             withheld: stats.withheld,
             invalid: stats.invalid,
             dropped_by_class: stats.unwanted,
+            dropped_far: 0,
             min: bounds.map(|b| b[0]),
             max: bounds.map(|b| b[1]),
             scanners: opened.file.scanners(),

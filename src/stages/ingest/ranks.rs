@@ -1,6 +1,6 @@
 //! The scanners of all files, in one order that does not depend on the order of files.
 
-use super::columns::NO_SCANNER;
+use super::columns::{NO_SCANNER, SCANNER};
 use super::source::Source;
 use super::stats::IngestStats;
 
@@ -22,9 +22,10 @@ impl Ranks {
     pub(super) fn of(sources: &[Source], stats: &IngestStats) -> Self {
         let files = sources.iter().zip(&stats.files);
         // Zero has one sign.
-        let of_file = files.map(|(source, file)| match source.stats.kept {
-            0 => Vec::new(),
-            _ => file.scanners.iter().map(|p| p.map(|x| x + 0.0)).collect(),
+        let read = |source: &Source| source.columns.iter().any(|c| c.name == SCANNER);
+        let of_file = files.map(|(source, file)| match source.stats.kept > 0 && read(source) {
+            false => Vec::new(),
+            true => file.scanners.iter().map(|p| p.map(|x| x + 0.0)).collect(),
         });
         Self::of_files(&of_file.collect::<Vec<_>>())
     }

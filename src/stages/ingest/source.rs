@@ -34,6 +34,8 @@ pub(super) struct Source {
     pub(super) stats: SourceStats,
     /// True if the numbers come from text, so that a fixed number of decimals gives a lattice.
     pub(super) text: bool,
+    /// True if points outside the box of `stats` are left out.
+    pub(super) cut: bool,
     /// The columns whose values are in the spool, and their spans.
     pub(super) columns: Vec<Column>,
     pub(super) spans: Vec<Span>,

@@ -8,7 +8,8 @@
 
 use super::classes::Classes;
 use super::columns::{Span, Wanted, row_bytes};
-use super::source::Source;
+use super::far::{Middle, middle};
+use super::source::{Native, Source};
 use super::stats::SourceStats;
 use crate::error::Result;
 use crate::workspace::file::ScratchFile;
@@ -28,6 +29,8 @@ const HEADER: usize = 16;
 
 /// A coordinate as a file stores it.
 pub(super) trait Coordinate: bytemuck::Pod + PartialEq + Into<f64> {
+    /// True for floating-point numbers.
+    const FLOATING: bool = true;
     /// False for infinity and NaN.
     fn is_finite(self) -> bool {
         let value: f64 = self.into();
@@ -52,6 +55,8 @@ impl Coordinate for f32 {}
 impl Coordinate for f64 {}
 
 impl Coordinate for i32 {
+    const FLOATING: bool = false;
+
     fn is_finite(self) -> bool {
         true
     }
@@ -69,6 +74,10 @@ pub(super) struct Frame {
     pub(super) offset: u64,
     /// Number of points.
     pub(super) points: u32,
+    /// Number of these that are far from all others and left out.
+    pub(super) far: u32,
+    /// The middle of floating-point values.
+    pub(super) middle: Option<Middle>,
 }
 
 /// The values of one source or of a part of it: their frames, and the span of each column.
@@ -247,6 +256,7 @@ impl<'a> FrameWriter<'a> {
             segment: place.segment,
             offset: place.offset,
             points: points as u32,
+            ..Frame::default()
         });
         if self.frames.len() == 1 {
             self.whole = place;
@@ -282,12 +292,6 @@ pub(super) struct Sink<'a, T: Coordinate> {
 }
 
 impl<T: Coordinate> Sink<'_, T> {
-    /// Adds a point of a source of which no column is wanted, unless a coordinate is not finite.
-    #[inline]
-    pub(super) fn push(&mut self, point: [T; 3]) -> Result<()> {
-        self.push_with(point, |_| {})
-    }
-
     /// Adds a point, unless a coordinate is not finite. `values` appends the values of the wanted columns, in
     /// their order and in little-endian bytes; it is called only if columns are wanted.
     #[inline]
@@ -346,17 +350,19 @@ impl<T: Coordinate> Sink<'_, T> {
         self.stats.kept += self.points.len() as u64;
         for point in &self.points {
             for (axis, coordinate) in point.iter().enumerate() {
-                let value = (*coordinate).into();
-                self.stats.min[axis] = self.stats.min[axis].min(value);
-                self.stats.max[axis] = self.stats.max[axis].max(value);
-                self.stats.exponent = self.stats.exponent.min(coordinate.exponent());
+                let exponent = coordinate.exponent();
+                self.stats.reach(axis, (*coordinate).into(), exponent);
             }
         }
         let (source, points) = (self.target.source, self.points.len());
         let coordinates = bytemuck::cast_slice(&self.points);
         self.frames.bytes.extend_from_slice(coordinates);
+        let middle = T::FLOATING.then(|| middle(&self.points));
         self.points.clear();
         self.frames.write(self.unit, source, points)?;
+        if let Some(frame) = self.frames.frames.last_mut() {
+            frame.middle = middle;
+        }
         if let Some((frames, spans)) = &mut self.values {
             let mut at = HEADER;
             for _ in 0..points {
@@ -406,6 +412,15 @@ impl FrameBuffer {
     pub(super) fn points<T: Coordinate>(&self) -> &[[T; 3]] {
         let all: &[T] = bytemuck::cast_slice(&self.words);
         &bytemuck::cast_slice(&all[..self.points * 3])[..self.points]
+    }
+
+    /// The coordinates of a point, as in its file.
+    pub(super) fn native(&self, native: Native, point: usize) -> [f64; 3] {
+        match native {
+            Native::Las { .. } => self.points::<i32>()[point].map(f64::from),
+            Native::F32 => self.points::<f32>()[point].map(f64::from),
+            Native::F64 => self.points::<f64>()[point],
+        }
     }
 }
 

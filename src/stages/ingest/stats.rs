@@ -3,6 +3,8 @@
 use super::belong::Mixed;
 use super::crs::Crs;
 use super::format::Format;
+use super::source::Native;
+use super::spool::Coordinate;
 use serde::{Deserialize, Serialize, Serializer};
 use std::path::{Path, PathBuf};
 
@@ -21,6 +23,10 @@ pub struct IngestStats {
     pub invalid: u64,
     /// Points left out because their class is not wanted.
     pub dropped_by_class: u64,
+    /// Points left out because they are far from all others, and the lattice is finer without them.
+    pub dropped_far: u64,
+    /// One of these.
+    pub far_example: Option<[f64; 3]>,
     /// The reference system; none if no file gives one, or if files give different ones.
     pub crs: Option<Crs>,
     /// Two files that give different ones.
@@ -63,6 +69,8 @@ pub struct FileStats {
     pub invalid: u64,
     /// Points left out because their class is not wanted.
     pub dropped_by_class: u64,
+    /// Points left out because they are far from all others.
+    pub dropped_far: u64,
     /// Lowest coordinates of the kept points, in the file's unit; `None` without points.
     pub min: Option<[f64; 3]>,
     /// Highest coordinates of the kept points, in the file's unit; `None` without points.
@@ -113,6 +121,44 @@ impl Default for SourceStats {
 }
 
 impl SourceStats {
+    /// The same counts without points.
+    pub(super) fn emptied(&self) -> Self {
+        let Self {
+            min,
+            max,
+            exponent,
+            kept,
+            ..
+        } = Self::default();
+        Self {
+            min,
+            max,
+            exponent,
+            kept,
+            ..*self
+        }
+    }
+
+    /// Takes a kept point with these native coordinates.
+    pub(super) fn take(&mut self, point: [f64; 3], native: Native) {
+        self.kept += 1;
+        for (axis, value) in point.into_iter().enumerate() {
+            let exponent = match native {
+                Native::Las { .. } => 0,
+                Native::F32 | Native::F64 => value.exponent(),
+            };
+            self.reach(axis, value, exponent);
+        }
+    }
+
+    /// Extends the range of an axis by a coordinate that is a multiple of two to the power of `exponent`.
+    #[inline]
+    pub(super) fn reach(&mut self, axis: usize, value: f64, exponent: i32) {
+        self.min[axis] = self.min[axis].min(value);
+        self.max[axis] = self.max[axis].max(value);
+        self.exponent = self.exponent.min(exponent);
+    }
+
     pub(super) fn merge(&mut self, other: &Self) {
         self.read += other.read;
         self.kept += other.kept;

@@ -3,6 +3,7 @@
 use super::Spool;
 use super::carry::Carried;
 use super::columns::{MOST_ROW, row_bytes};
+use super::far::is_near;
 use super::map::SourceMap;
 use super::source::Source;
 use super::spool::{FRAME, FrameBuffer, read_frame, read_values, values_of};
@@ -14,7 +15,7 @@ use crate::workspace::{Workspace, lock};
 use std::sync::Mutex;
 
 /// Bytes of the buffers of one thread that streams a [`Spool`].
-pub const READ_BUFFERS: u64 = (FRAME * (24 + 24 + 12)) as u64;
+pub const READ_BUFFERS: u64 = (FRAME * (24 + 24 + 12 + 4)) as u64;
 
 /// Bytes of the buffers of one thread that streams the values of a [`Spool`] as well.
 pub const VALUE_BUFFERS: u64 = READ_BUFFERS + (FRAME * 2 * MOST_ROW) as u64;
@@ -25,6 +26,8 @@ struct Buffers {
     frame: FrameBuffer,
     wide: Vec<[i64; 3]>,
     points: Vec<Point>,
+    /// Numbers of the points in the frame, if some of its source are far and left out.
+    near: Option<Vec<u32>>,
 }
 
 /// The remaining frames; empty after a thread has failed.
@@ -35,7 +38,7 @@ impl Spool {
     #[must_use]
     pub fn frames(&self) -> Vec<(u32, u64)> {
         let frames = (0..).zip(&self.frames);
-        frames.map(|(n, frame)| (n, frame.points.into())).collect()
+        frames.map(|(n, frame)| (n, frame.near().into())).collect()
     }
 
     /// Streams all points as positions on `lattice`, in chunks, with buffers of [`READ_BUFFERS`] bytes.
@@ -141,7 +144,7 @@ impl Spool {
         for &frame in frames {
             workspace.check_cancel()?;
             self.read(&file, frame, &maps, lattice, &mut buffers)?;
-            let (source, points) = (buffers.frame.source, buffers.points.len());
+            let (source, points) = (buffers.frame.source, buffers.frame.points);
             let each_bytes = row_bytes(&self.sources[source].columns);
             words.clear();
             let at = self.values.get(frame as usize).copied().unwrap_or_default();
@@ -155,9 +158,13 @@ impl Spool {
             }
             let bytes: &[u8] = bytemuck::cast_slice(&words);
             rows.clear();
-            for point in 0..points {
+            let mut put = |point: usize| {
                 let own = &bytes[point * each_bytes..(point + 1) * each_bytes];
                 carried.put(source, own, &mut rows);
+            };
+            match &buffers.near {
+                Some(near) => near.iter().for_each(|point| put(*point as usize)),
+                None => (0..points).for_each(put),
             }
             each(&buffers.points, &rows)?;
         }
@@ -192,13 +199,31 @@ impl Spool {
     ) -> Result<()> {
         let at = self.frames[frame as usize];
         read_frame(file, &self.sources, at, &mut buffers.frame)?;
-        let Buffers { frame, wide, .. } = buffers;
+        let Buffers {
+            frame, wide, near, ..
+        } = buffers;
+        let source = &self.sources[frame.source];
+        if at.near() == 0 {
+            *near = Some(Vec::new());
+            buffers.points.clear();
+            return Ok(());
+        }
         let Some(map) = &maps[frame.source] else {
             let found = format!("points of source {}", frame.source);
             let expected = "none of it were kept".into();
             return Err(file.damaged(at.segment, at.offset, found, expected));
         };
-        map.apply(self.sources[frame.source].native, frame, lattice.base, wide);
+        map.apply(source.native, frame, lattice.base, wide);
+        *near = source.cut.then(|| {
+            let native = |point: &u32| frame.native(source.native, *point as usize);
+            let all = 0..frame.points as u32;
+            let near: Vec<u32> = all.filter(|p| is_near(source, native(p))).collect();
+            for (to, from) in near.iter().enumerate() {
+                wide[to] = wide[*from as usize];
+            }
+            wide.truncate(near.len());
+            near
+        });
         buffers.points.clear();
         buffers
             .points

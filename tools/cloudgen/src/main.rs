@@ -143,7 +143,7 @@ struct Args {
     #[arg(long, value_name = "N")]
     split: Option<u32>,
 
-    /// LAS point format, 0 or 6
+    /// LAS point format: 0 or 6, or with colours that depend on the position 2 or 7
     #[arg(long, value_name = "N", default_value = "0", value_parser = parse_point_format)]
     point_format: PointFormat,
 
@@ -218,8 +218,10 @@ fn parse_triple(text: &str) -> Result<Triple, String> {
 fn parse_point_format(text: &str) -> Result<PointFormat, String> {
     match text {
         "0" => Ok(PointFormat::Legacy),
+        "2" => Ok(PointFormat::Colored),
         "6" => Ok(PointFormat::Extended),
-        _ => Err("expected 0 or 6".to_owned()),
+        "7" => Ok(PointFormat::ExtendedColored),
+        _ => Err("expected 0, 2, 6 or 7".to_owned()),
     }
 }
 

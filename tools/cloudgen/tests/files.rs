@@ -22,7 +22,16 @@ fn las_and_laz_round_trip() {
         .noise(0.1)
         .offset(offset);
     let generator = cloud.generator().unwrap();
-    for point_format in [PointFormat::Legacy, PointFormat::Extended] {
+    for point_format in [
+        PointFormat::Legacy,
+        PointFormat::Colored,
+        PointFormat::Extended,
+        PointFormat::ExtendedColored,
+    ] {
+        let colored = matches!(
+            point_format,
+            PointFormat::Colored | PointFormat::ExtendedColored
+        );
         let options = LasOptions {
             point_format,
             scale: None,
@@ -42,6 +51,9 @@ fn las_and_laz_round_trip() {
             for (point, exact) in read.points().zip(generator.iter()) {
                 let point = point.unwrap();
                 assert_eq!((point.return_number, point.number_of_returns), (1, 1));
+                let red = 32768.0 + 32767.0 * libm::sin(exact[0] * 0.06);
+                let wanted = colored.then_some(red as u16);
+                assert_eq!(point.color.map(|color| color.red), wanted);
                 for (read, exact) in [point.x, point.y, point.z].into_iter().zip(exact) {
                     assert!((read - exact).abs() < 0.000_501, "{name} {index}");
                 }

@@ -6,6 +6,7 @@ mod read;
 mod scan;
 mod xml;
 
+use super::columns::{Column, NO_SCANNER, SCANNER};
 use super::crs::Crs;
 use super::format::Format;
 use super::input::{Input, u32_at, u64_at};
@@ -14,8 +15,9 @@ use super::point_format::{Claims, Head, PointFile, PointFormat, Refusal};
 use super::source::Native;
 use super::spool::SourceWriter;
 use crate::error::Result;
+use outcrop_ply::Scalar;
 use pages::PAGE;
-use scan::{Kind, Name, Pose, Scan};
+use scan::{Field, Kind, Name, Scan};
 use xml::Description;
 
 impl Format {
@@ -80,6 +82,7 @@ struct Scans {
     /// Those with points.
     filled: Vec<Scan>,
     native: Native,
+    columns: Vec<Column>,
     system: String,
 }
 
@@ -87,8 +90,13 @@ impl Scans {
     fn of(description: Description) -> Self {
         let mut filled = description.scans;
         filled.retain(|scan| scan.points > 0);
+        let known = filled.iter_mut().filter(|scan| scan.scanner().is_some());
+        for (number, scan) in (0..NO_SCANNER).zip(known) {
+            scan.number = Some(number);
+        }
         Self {
             native: native(&filled),
+            columns: columns(&filled),
             filled,
             system: description.system,
         }
@@ -143,6 +151,23 @@ fn native(scans: &[Scan]) -> Native {
     }
 }
 
+/// The columns of all scans; of another type than in the first scan, they become doubles.
+fn columns(scans: &[Scan]) -> Vec<Column> {
+    let mut all: Vec<Column> = Vec::new();
+    let found = scans.iter().flat_map(|scan| &scan.fields);
+    for column in found.filter_map(Field::column) {
+        match all.iter_mut().find(|other| other.name == column.name) {
+            Some(same) if same.scalar != column.scalar => same.scalar = Scalar::F64,
+            Some(_) => {}
+            None => all.push(column),
+        }
+    }
+    if scans.iter().any(|scan| scan.number.is_some()) {
+        all.push(Column::new(SCANNER, Scalar::U16));
+    }
+    all
+}
+
 impl PointFile for Scans {
     fn claims(&self, input: &Input) -> Claims {
         let bits = self.filled.iter().map(Scan::bits).min().unwrap_or(1);
@@ -158,9 +183,12 @@ impl PointFile for Scans {
         text.contains('[').then(|| well_known(text))
     }
 
+    fn columns(&self) -> Vec<Column> {
+        self.columns.clone()
+    }
+
     fn scanners(&self) -> Vec<[f64; 3]> {
-        let poses = self.filled.iter().filter_map(|scan| scan.pose);
-        poses.map(|Pose { translation, .. }| translation).collect()
+        self.filled.iter().filter_map(Scan::scanner).collect()
     }
 
     fn read(&self, input: &Input, target: &SourceWriter<'_>) -> Result<Vec<String>> {

@@ -103,6 +103,15 @@ impl Stream {
     }
 }
 
+/// A part of the records that is decoded.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Decoded {
+    /// Number of the part.
+    pub(super) field: usize,
+    /// Whole numbers stay whole.
+    pub(super) unscaled: bool,
+}
+
 /// The records of a scan, from the first to the last.
 pub(super) struct Records<'a> {
     input: &'a Input,
@@ -153,17 +162,11 @@ impl<'a> Records<'a> {
         })
     }
 
-    /// Decodes some records, at most [`BLOCK`]: for each of `columns` the numbers of a part, unscaled if so
-    /// asked. Returns their number, which is 0 at the end.
+    /// Decodes some records, at most [`BLOCK`]: the numbers of each of `parts`. Returns how many, 0 at the end.
     ///
     /// # Errors
     /// [`crate::Error::Input`] if the file is damaged; [`crate::Error::Io`].
-    pub(super) fn next(
-        &mut self,
-        columns: &[usize],
-        unscaled: bool,
-        out: &mut [Vec<f64>],
-    ) -> Result<usize> {
+    pub(super) fn next(&mut self, parts: &[Decoded], out: &mut [Vec<f64>]) -> Result<usize> {
         let most = BLOCK.min(usize::try_from(self.left).unwrap_or(BLOCK));
         if most == 0 {
             return Ok(0);
@@ -175,9 +178,9 @@ impl<'a> Records<'a> {
                 count => break count,
             }
         };
-        for (column, out) in columns.iter().zip(out) {
+        for (part, out) in parts.iter().zip(out) {
             out.resize(count, 0.0);
-            self.streams[*column].numbers_into(unscaled, out);
+            self.streams[part.field].numbers_into(part.unscaled, out);
         }
         for stream in &mut self.streams {
             stream.done += count * stream.bits as usize;

@@ -1,10 +1,12 @@
 //! The points of an E57 file: a unit for each scan.
 
+use super::super::columns::{Column, SCANNER, Wanted};
 use super::super::input::Input;
 use super::super::spool::{Coordinate, Sink, SourceWriter, sink_bytes};
-use super::packets::{self, BLOCK, Records};
-use super::scan::{Motion, Name, Scan};
+use super::packets::{self, BLOCK, Decoded, Records};
+use super::scan::{Field, Motion, Name, Scan};
 use crate::error::Result;
+use outcrop_ply::Scalar;
 
 /// Most points of which every record takes no bits, since all are the same.
 const FEW: u64 = 1 << 23;
@@ -16,12 +18,28 @@ struct Plan {
     cartesian_state: Option<usize>,
     spherical: Option<[usize; 3]>,
     spherical_state: Option<usize>,
-    /// The parts of the records that are read; the others are numbers of these.
-    columns: Vec<usize>,
+    /// The values of wanted columns.
+    values: Vec<Value>,
+    /// The parts of the records that are read; all other fields are numbers of these.
+    parts: Vec<Decoded>,
+}
+
+/// The values of a column.
+struct Value {
+    /// Number of its part, and of the one that tells if it is valid; none if the scan lacks the column.
+    from: Option<(usize, Option<usize>)>,
+    /// The value of points without one.
+    otherwise: f64,
+    scalar: Scalar,
 }
 
 impl Plan {
-    fn of(input: &Input, number: usize, scan: &Scan) -> Result<Self> {
+    fn of(
+        input: &Input,
+        (number, scan): (usize, &Scan),
+        unscaled: bool,
+        wanted: &Wanted,
+    ) -> Result<Self> {
         let wrong = |found: String, expected: &str| {
             input.error(
                 format!("scan {} of those with points", number + 1),
@@ -33,10 +51,10 @@ impl Plan {
             let found = format!("the pose {:?}", scan.pose.unwrap_or_default());
             wrong(found, "a rotation that is not zero, and finite numbers")
         })?;
-        let mut columns = Vec::new();
+        let mut parts = Vec::new();
         let mut take = |field: usize| {
-            columns.push(field);
-            columns.len() - 1
+            parts.push(Decoded { field, unscaled });
+            parts.len() - 1
         };
         let cartesian = scan.three(Name::Cartesian).map(|f| f.map(&mut take));
         let spherical = scan.three(Name::Spherical).map(|f| f.map(&mut take));
@@ -45,13 +63,34 @@ impl Plan {
                             sphericalAzimuth and sphericalElevation";
             return Err(wrong("records without coordinates".into(), expected));
         }
+        let cartesian_state = scan.field(&Name::CartesianState).map(&mut take);
+        let spherical_state = scan.field(&Name::SphericalState).map(&mut take);
+        let mut take = |field: usize| {
+            let unscaled = false;
+            parts.push(Decoded { field, unscaled });
+            parts.len() - 1
+        };
+        let value = |column: &Column| {
+            let is = |field: &Field| field.column().is_some_and(|c| c.name == column.name);
+            let field = scan.fields.iter().position(is);
+            let state = scan.state(&column.name);
+            Value {
+                from: field.map(|field| (take(field), state.map(&mut take))),
+                otherwise: match column.name == SCANNER {
+                    true => f64::from(scan.scanner_number()),
+                    false => f64::NAN,
+                },
+                scalar: column.scalar,
+            }
+        };
         Ok(Self {
             motion,
             cartesian,
-            cartesian_state: scan.field(&Name::CartesianState).map(&mut take),
+            cartesian_state,
             spherical,
-            spherical_state: scan.field(&Name::SphericalState).map(&mut take),
-            columns,
+            spherical_state,
+            values: wanted.columns.iter().map(value).collect(),
+            parts,
         })
     }
 
@@ -80,8 +119,24 @@ impl Plan {
             false => self.motion.apply(point),
         };
         match convert(point) {
-            Ok(point) => sink.push(point).map(Ok),
+            Ok(point) => {
+                let push = sink.push_with(point, |out| self.put(values, record, out));
+                push.map(Ok)
+            }
             Err(found) => Ok(Err(found)),
+        }
+    }
+}
+
+impl Plan {
+    /// Appends the values of the wanted columns of a record.
+    #[inline]
+    fn put(&self, values: &[Vec<f64>], record: usize, out: &mut Vec<u8>) {
+        for column in &self.values {
+            let valid = |state: &usize| values[*state][record] == 0.0;
+            let from = column.from.filter(|(_, state)| state.iter().all(valid));
+            let value = from.map_or(column.otherwise, |(part, _)| values[part][record]);
+            column.scalar.put(value, out);
         }
     }
 }
@@ -116,18 +171,19 @@ pub(super) fn scans<T: Coordinate>(
 ) -> Result<()> {
     let ends = ends(input, scans)?;
     let memory = |unit: usize| {
-        // The parts that may be read: six coordinates and two states.
-        let numbers = 8 * BLOCK * size_of::<f64>();
+        // The parts that may be read: six coordinates and two states, and columns, each with a state.
+        let parts = 8 + 2 * writer.wanted.columns.len();
+        let numbers = parts * BLOCK * size_of::<f64>();
         packets::memory(&scans[unit]) + numbers as u64 + sink_bytes::<T>()
     };
     let work = |unit: usize, sink: &mut Sink<'_, T>| {
         let scan = &scans[unit];
-        let plan = Plan::of(input, unit, scan)?;
+        let plan = Plan::of(input, (unit, scan), unscaled, writer.wanted)?;
         let mut records = Records::new(input, scan, ends[unit])?;
-        let mut values = vec![Vec::with_capacity(BLOCK); plan.columns.len()];
+        let mut values = vec![Vec::with_capacity(BLOCK); plan.parts.len()];
         let mut done = 0;
         loop {
-            let count = records.next(&plan.columns, unscaled, &mut values)?;
+            let count = records.next(&plan.parts, &mut values)?;
             if count == 0 {
                 return Ok(());
             }

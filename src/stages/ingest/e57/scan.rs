@@ -1,5 +1,8 @@
 //! A scan of an E57 file, as its description says: the parts of a record, and the pose.
 
+use super::super::columns::{Column, NO_SCANNER, SCANNER};
+use outcrop_ply::Scalar;
+
 /// The part of a record.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Name {
@@ -57,11 +60,77 @@ impl Kind {
     }
 }
 
+/// Types of whole numbers, smaller ones first.
+const WHOLE: [(Scalar, i64, i64); 6] = [
+    (Scalar::U8, 0, u8::MAX as i64),
+    (Scalar::I8, i8::MIN as i64, i8::MAX as i64),
+    (Scalar::U16, 0, u16::MAX as i64),
+    (Scalar::I16, i16::MIN as i64, i16::MAX as i64),
+    (Scalar::U32, 0, u32::MAX as i64),
+    (Scalar::I32, i32::MIN as i64, i32::MAX as i64),
+];
+
+impl Kind {
+    /// The type of a column of such numbers.
+    pub(super) fn scalar(self) -> Scalar {
+        match self {
+            Self::Single => Scalar::F32,
+            Self::Integer {
+                lowest,
+                highest,
+                scale: 1.0,
+                offset: 0.0,
+            } => {
+                let holds = |(_, min, max): &&(Scalar, i64, i64)| *min <= lowest && highest <= *max;
+                let found = WHOLE.iter().find(holds);
+                found.map_or(Scalar::F64, |(scalar, ..)| *scalar)
+            }
+            _ => Scalar::F64,
+        }
+    }
+}
+
 /// A part of a record.
 #[derive(Debug, Clone)]
 pub(super) struct Field {
     pub(super) name: Name,
     pub(super) kind: Kind,
+}
+
+/// The parts of the standard that have other names as columns.
+const COLUMNS: [(&str, &str); 8] = [
+    ("colorRed", "red"),
+    ("colorGreen", "green"),
+    ("colorBlue", "blue"),
+    ("rowIndex", "row"),
+    ("columnIndex", "column"),
+    ("returnIndex", "return_index"),
+    ("returnCount", "return_count"),
+    ("timeStamp", "time_stamp"),
+];
+
+/// The parts that tell if others are valid, and these.
+const STATES: [(&str, &[&str]); 3] = [
+    ("isIntensityInvalid", &["intensity"]),
+    ("isColorInvalid", &["red", "green", "blue"]),
+    ("isTimeStampInvalid", &["time_stamp"]),
+];
+
+impl Field {
+    /// The column of which this has the values; none for coordinates and states, and for what would have the name
+    /// of the column of scanners.
+    pub(super) fn column(&self) -> Option<Column> {
+        let Name::Other(name) = &self.name else {
+            return None;
+        };
+        if STATES.iter().any(|(state, _)| *state == &**name) {
+            return None;
+        }
+        let usual = COLUMNS.iter().find(|(standard, _)| *standard == &**name);
+        // Names of extensions have a prefix and a colon.
+        let name = usual.map_or_else(|| name.replace(':', "_"), |(_, usual)| (*usual).to_owned());
+        Some(Column::new(&name, self.kind.scalar())).filter(|column| column.name != SCANNER)
+    }
 }
 
 /// The place of a scanner.
@@ -128,8 +197,12 @@ pub(super) struct Motion {
 impl Motion {
     /// True if every point stays where it is.
     pub(super) fn rests(&self) -> bool {
-        self.rows == [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
-            && self.translation == [0.0; 3]
+        !self.turns() && self.translation == [0.0; 3]
+    }
+
+    /// True if it is not only a translation.
+    fn turns(&self) -> bool {
+        self.rows != [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
     }
 
     #[inline]
@@ -150,12 +223,20 @@ pub(super) struct Scan {
     pub(super) section: u64,
     pub(super) pose: Option<Pose>,
     pub(super) fields: Vec<Field>,
+    /// Its number among the scans with a scanner.
+    pub(super) number: Option<u16>,
 }
 
 impl Scan {
     /// The number of the field with this name.
     pub(super) fn field(&self, name: &Name) -> Option<usize> {
         self.fields.iter().position(|field| field.name == *name)
+    }
+
+    /// The number of the field that tells if a column is valid.
+    pub(super) fn state(&self, column: &str) -> Option<usize> {
+        let state = STATES.iter().find(|(_, columns)| columns.contains(&column));
+        state.and_then(|(state, _)| self.field(&Name::of(state)))
     }
 
     /// The numbers of three fields.
@@ -167,6 +248,21 @@ impl Scan {
     /// Bits of a record.
     pub(super) fn bits(&self) -> u64 {
         self.fields.iter().map(|f| u64::from(f.kind.bits())).sum()
+    }
+
+    /// The position of the scanner, the origin of the scan, if its records are in a grid or are directions, or it
+    /// was turned. Else its translation may be that of the origin of coordinates.
+    pub(super) fn scanner(&self) -> Option<[f64; 3]> {
+        let motion = self.motion()?;
+        let grid = ["rowIndex", "columnIndex"].map(Name::of);
+        let is_in_grid = grid.iter().any(|index| self.field(index).is_some());
+        let is_scan = is_in_grid || self.three(Name::Spherical).is_some() || motion.turns();
+        is_scan.then_some(motion.translation)
+    }
+
+    /// The value of the column of scanners.
+    pub(super) fn scanner_number(&self) -> u16 {
+        self.number.unwrap_or(NO_SCANNER)
     }
 
     /// The motion of the points; none if the rotation is none.

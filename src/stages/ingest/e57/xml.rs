@@ -1,5 +1,6 @@
 //! The description in an E57 file, which is XML: its scans and its reference system.
 
+use super::super::contain::contain;
 use super::super::input::Input;
 use super::pages::{PAGE, Pages, Part};
 use super::scan::{Field, Kind, Name, Scan};
@@ -62,7 +63,11 @@ impl Description {
             text: String::new(),
             found: Self::default(),
         };
-        parser.parse(Reader::from_reader(source))?;
+        let parsed = contain(|| parser.parse(Reader::from_reader(source)));
+        parsed.unwrap_or_else(|found| {
+            let place = format!("description at byte {at}");
+            Err(input.error(place, found, "well-formed XML"))
+        })?;
         Ok(parser.found)
     }
 }

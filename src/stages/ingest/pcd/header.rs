@@ -41,6 +41,28 @@ impl Number {
         }
     }
 
+    /// Puts the number that a word stands for into the first bytes, as a binary file has it; what is no number
+    /// becomes NaN, or 0 if there is none.
+    pub(super) fn put(self, word: &[u8], bytes: &mut [u8]) {
+        let text = std::str::from_utf8(word).unwrap_or_default();
+        let word = match self {
+            Self::Scalar(Scalar::F32) => {
+                let single: u32 = text.parse().unwrap_or(f32::NAN).to_bits();
+                u64::from(single)
+            }
+            Self::Scalar(Scalar::F64) => text.parse().unwrap_or(f64::NAN).to_bits(),
+            _ => match (text.parse::<i64>(), text.parse::<f64>()) {
+                (Ok(whole), _) => whole.cast_unsigned(),
+                // Beyond the range of i64, or with a point.
+                (_, Ok(real)) if real >= 0.0 => real as u64,
+                (_, Ok(real)) => (real as i64).cast_unsigned(),
+                _ => 0,
+            },
+        };
+        let length = self.bytes() as usize;
+        bytes[..length].copy_from_slice(&word.to_le_bytes()[..length]);
+    }
+
     /// The number in the first bytes; the caller has checked the length.
     #[inline]
     pub(super) fn value(self, bytes: &[u8]) -> f64 {
@@ -100,6 +122,8 @@ pub(super) struct Header {
     /// Number of points.
     pub(super) points: u64,
     pub(super) body: Body,
+    /// Position of the sensor, if it is not the default.
+    pub(super) sensor: Option<[f64; 3]>,
     /// Offset of the first byte after the header.
     pub(super) data: u64,
 }
@@ -157,6 +181,7 @@ struct Lines {
     width: Option<Line>,
     height: Option<Line>,
     points: Option<Line>,
+    viewpoint: Line,
 }
 
 impl Lines {
@@ -169,7 +194,8 @@ impl Lines {
             "WIDTH" => self.width = Some(line),
             "HEIGHT" => self.height = Some(line),
             "POINTS" => self.points = Some(line),
-            // Comments, VERSION, VIEWPOINT.
+            "VIEWPOINT" => self.viewpoint = line,
+            // Comments, VERSION.
             _ => {}
         }
     }
@@ -191,6 +217,7 @@ impl Lines {
         Ok(Header {
             axes: [x?, y?, z?],
             points: self.points(input)?,
+            sensor: self.sensor(),
             fields,
             body,
             data: at,
@@ -239,6 +266,18 @@ impl Lines {
             })
         };
         names.iter().enumerate().map(field).collect()
+    }
+
+    /// The position in `VIEWPOINT`; a line that cannot be understood is as none, for it moves no point.
+    fn sensor(&self) -> Option<[f64; 3]> {
+        let numbers = self.viewpoint.1.iter().map(|word| word.parse().ok());
+        let numbers: Vec<f64> = numbers.collect::<Option<_>>()?;
+        let [x, y, z, ..] = numbers[..] else {
+            return None;
+        };
+        let finite = numbers.iter().all(|number| number.is_finite());
+        let default = numbers == [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
+        (finite && !default).then_some([x, y, z])
     }
 
     /// The number of points: that of `POINTS`, else the product of `WIDTH` and `HEIGHT`.

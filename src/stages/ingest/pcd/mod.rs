@@ -2,8 +2,10 @@
 
 mod header;
 mod lzf;
+mod parts;
 mod read;
 
+use super::columns::Column;
 use super::format::Format;
 use super::input::Input;
 use super::point_format::{Claims, Head, PointFile, PointFormat, Refusal};
@@ -90,6 +92,15 @@ impl PointFile for Header {
             likely_points: self.points.min(content / record.max(1)),
             ..Claims::new(input, format, self.native(), self.points, 1)
         }
+    }
+
+    fn scanners(&self) -> Vec<[f64; 3]> {
+        self.sensor.into_iter().collect()
+    }
+
+    fn columns(&self) -> Vec<Column> {
+        let parts = parts::parts(self).into_iter();
+        parts.map(|part| part.column).collect()
     }
 
     fn read(&self, input: &Input, target: &SourceWriter<'_>) -> Result<Vec<String>> {

@@ -1,5 +1,6 @@
 //! The points of PCD files: lines, records, or fields one after another.
 
+use super::super::columns::Wanted;
 use super::super::input::{Input, u32_at};
 use super::super::lines::{self, LONGEST_LINE, Lines, SLAB as LINES};
 use super::super::number;
@@ -7,7 +8,9 @@ use super::super::scalar::FromScalar;
 use super::super::spool::{Sink, SourceWriter, sink_bytes};
 use super::header::{Field, Header, Number};
 use super::lzf::{self, Stream};
+use super::parts::parts;
 use crate::error::Result;
+use outcrop_ply::Scalar;
 
 /// Bytes of records read at a time.
 const SLAB: u64 = 2 << 20;
@@ -18,17 +21,67 @@ const BLOCK: usize = 4096;
 /// Bytes before compressed data: two sizes.
 const SIZES: u64 = 8;
 
-/// The values of a point in a record: place and type of x, y and z.
-#[derive(Debug, Clone, Copy)]
-struct Record([(usize, Number); 3]);
+/// The values of a point in a record.
+struct Record {
+    /// Place and type of x, y and z.
+    coordinates: [(usize, Number); 3],
+    /// Place and type of the values of wanted columns, and their type in the spool.
+    values: Vec<(usize, Number, Scalar)>,
+}
 
 impl Record {
+    /// A record in which `place` tells the first byte of a field.
+    fn of(header: &Header, wanted: &Wanted, place: impl Fn(usize) -> usize) -> Self {
+        let parts = parts(header);
+        let value = |number: &usize| {
+            let part = &parts[*number];
+            let at = place(part.field) + part.at;
+            (at, part.number, part.column.scalar)
+        };
+        Self {
+            coordinates: header
+                .axes
+                .map(|axis| (place(axis), header.fields[axis].number)),
+            values: wanted.numbers.iter().map(value).collect(),
+        }
+    }
+
+    /// A record of some fields, one after another.
+    fn packed(header: &Header, wanted: &Wanted, fields: &[usize]) -> Self {
+        Self::of(header, wanted, |field| {
+            let before = fields.iter().take_while(|other| **other != field);
+            let bytes = before.map(|other| header.fields[*other].number.bytes());
+            bytes.sum::<u64>() as usize
+        })
+    }
+
     /// Passes a point on.
     #[inline]
     fn take<T: FromScalar>(&self, record: &[u8], sink: &mut Sink<'_, T>) -> Result<()> {
         let coordinate = |(at, number): (usize, Number)| number.value(&record[at..]);
-        sink.push(self.0.map(|place| T::from_double(coordinate(place))))
+        let point = self
+            .coordinates
+            .map(|place| T::from_double(coordinate(place)));
+        sink.push_with(point, |values| self.put(record, values))
     }
+
+    /// Appends the values of the wanted columns.
+    #[inline]
+    fn put(&self, record: &[u8], values: &mut Vec<u8>) {
+        for (at, number, scalar) in &self.values {
+            scalar.put(number.value(&record[*at..]), values);
+        }
+    }
+}
+
+/// The fields that are read, in the order of the file.
+fn fields(header: &Header, wanted: &Wanted) -> Vec<usize> {
+    let parts = parts(header);
+    let others = wanted.numbers.iter().map(|number| parts[*number].field);
+    let mut fields: Vec<usize> = others.chain(header.axes).collect();
+    fields.sort_unstable();
+    fields.dedup();
+    fields
 }
 
 /// Reads one record after another.
@@ -53,11 +106,8 @@ pub(super) fn binary<T: FromScalar>(
     if count == 0 {
         return Ok(());
     }
-    let place = |axis: usize| {
-        let at = header.before(axis, Field::bytes) as usize;
-        (at, header.fields[axis].number)
-    };
-    let record = Record(header.axes.map(place));
+    let place = |field: usize| header.before(field, Field::bytes) as usize;
+    let record = Record::of(header, writer.wanted, place);
     let rows = (SLAB / bytes).max(1);
     let units = usize::try_from(count.div_ceil(rows)).unwrap_or(usize::MAX);
     let memory = rows * bytes + sink_bytes::<T>();
@@ -84,15 +134,18 @@ pub(super) fn text(
     let slabs = input.bytes.saturating_sub(header.data).div_ceil(LINES);
     let slabs = usize::try_from(slabs).unwrap_or(usize::MAX);
     let memory = LINES + LONGEST_LINE + sink_bytes::<f64>();
-    let columns = header.axes.map(|axis| header.before(axis, |f| f.count));
-    let all = header.before(header.fields.len(), |f| f.count);
+    let line = Line::of(header, writer.wanted);
     let work = |unit: usize, sink: &mut Sink<'_, f64>| {
         let lines = Lines::read(input, header.data, header.data + unit as u64 * LINES)?;
-        for (at, line) in lines.iter() {
-            match point(line, columns, &mut sink.stats.decimals) {
-                Some(Ok(point)) => sink.push(point)?,
+        let mut record = vec![0; line.bytes];
+        for (at, text) in lines.iter() {
+            match line.point(text, &mut record, &mut sink.stats.decimals) {
+                Some(Ok(point)) => {
+                    sink.push_with(point, |values| line.record.put(&record, values))?;
+                }
                 Some(Err(found)) => {
                     let place = format!("line {}", lines::number_of(input, at)?);
+                    let all = header.before(header.fields.len(), |f| f.count);
                     return Err(input.error(place, found, format!("{all} numbers")));
                 }
                 None => {}
@@ -114,35 +167,78 @@ pub(super) fn text(
     Ok(more.then_some(warning).into_iter().collect())
 }
 
-/// The point in a line; none if the line is blank, and the words found if they are no point.
-fn point(
-    line: &[u8],
-    columns: [u64; 3],
-    decimals: &mut u32,
-) -> Option<std::result::Result<[f64; 3], String>> {
-    let line = line.trim_ascii();
-    if line.is_empty() {
-        return None;
+/// What is read of a line.
+struct Line {
+    /// Columns of x, y and z.
+    axes: [u64; 3],
+    /// The other fields: column, type, and place in a record of them.
+    others: Vec<(u64, Number, usize)>,
+    record: Record,
+    /// Bytes of the record.
+    bytes: usize,
+    /// The last column that is read.
+    last: u64,
+}
+
+impl Line {
+    fn of(header: &Header, wanted: &Wanted) -> Self {
+        let column = |field: usize| header.before(field, |f| f.count);
+        let mut fields = fields(header, wanted);
+        // Coordinates keep their decimals.
+        fields.retain(|field| !header.axes.contains(field));
+        let record = Record::packed(header, wanted, &fields);
+        let (mut others, mut bytes) = (Vec::new(), 0);
+        for field in fields {
+            let number = header.fields[field].number;
+            others.push((column(field), number, bytes));
+            bytes += number.bytes() as usize;
+        }
+        let axes = header.axes.map(column);
+        let last = axes.into_iter().chain(others.iter().map(|other| other.0));
+        Self {
+            last: last.max().unwrap_or(0),
+            axes,
+            others,
+            record,
+            bytes,
+        }
     }
-    let separates = |b: &u8| b.is_ascii_whitespace() || matches!(b, b',' | b';');
-    let words = line.split(separates).filter(|word| !word.is_empty());
-    let last = columns.into_iter().max().unwrap_or(0);
-    let (mut point, mut found) = ([0.0; 3], 0);
-    for (column, word) in (0..=last).zip(words) {
-        let Some(axis) = columns.iter().position(|c| *c == column) else {
-            continue;
-        };
-        let Some(value) = number::parse(word, false, decimals) else {
-            break;
-        };
-        point[axis] = value;
-        found += 1;
+
+    /// The point in a line, with its other values in `record`; none if the line is blank, and its begin if it is
+    /// no point.
+    fn point(
+        &self,
+        line: &[u8],
+        record: &mut [u8],
+        decimals: &mut u32,
+    ) -> Option<std::result::Result<[f64; 3], String>> {
+        let line = line.trim_ascii();
+        if line.is_empty() {
+            return None;
+        }
+        let separates = |b: &u8| b.is_ascii_whitespace() || matches!(b, b',' | b';');
+        let words = line.split(separates).filter(|word| !word.is_empty());
+        let (mut point, mut found) = ([0.0; 3], 0);
+        for (_, number, at) in &self.others {
+            number.put(b"nan", &mut record[*at..]);
+        }
+        for (column, word) in (0..=self.last).zip(words) {
+            if let Some(axis) = self.axes.iter().position(|c| *c == column) {
+                let Some(value) = number::parse(word, false, decimals) else {
+                    break;
+                };
+                point[axis] = value;
+                found += 1;
+            } else if let Some((_, number, at)) = self.others.iter().find(|o| o.0 == column) {
+                number.put(word, &mut record[*at..]);
+            }
+        }
+        let shown = &line[..line.len().min(60)];
+        Some(match found == 3 {
+            true => Ok(point),
+            false => Err(format!("\"{}\"", shown.escape_ascii())),
+        })
     }
-    let shown = &line[..line.len().min(60)];
-    Some(match found == 3 {
-        true => Ok(point),
-        false => Err(format!("\"{}\"", shown.escape_ascii())),
-    })
 }
 
 /// Reads fields one after another, each from a stream of its own that begins at the field.
@@ -165,17 +261,17 @@ pub(super) fn compressed<T: FromScalar>(
         }
     };
     let start = header.data + SIZES;
-    let mut order = header.axes;
-    order.sort_unstable();
-    let buffers = order.map(|f| header.fields[f].number.bytes() as usize * BLOCK);
-    let all: usize = buffers.iter().sum();
-    let memory = 4 * lzf::MEMORY + 2 * all as u64 + sink_bytes::<T>();
+    let order = fields(header, writer.wanted);
+    let record = Record::packed(header, writer.wanted, &order);
+    let bytes: u64 = order.iter().map(|f| header.fields[*f].number.bytes()).sum();
+    let streams = order.len() as u64 + 1;
+    let memory = streams * lzf::MEMORY + (bytes + 8) * BLOCK as u64 + sink_bytes::<T>();
     writer.whole("PCD fields", memory, |sink: &mut Sink<'_, T>| {
         let cancel = || writer.workspace.check_cancel();
         let mut stream = Stream::new(input, start, start + packed);
         let mut at = 0;
         let mut columns = Vec::with_capacity(order.len());
-        for field in order {
+        for &field in &order {
             let bytes = |f: &Field| match padding || !f.is_padding() {
                 true => f.bytes(),
                 false => 0,
@@ -185,19 +281,14 @@ pub(super) fn compressed<T: FromScalar>(
             at = begin;
             columns.push((stream.fork(), header.fields[field].number));
         }
-        let places = header.axes.map(|axis| {
-            let before = order.iter().take_while(|field| **field != axis);
-            let at: u64 = before.map(|f| header.fields[*f].number.bytes()).sum();
-            (at as usize, header.fields[axis].number)
-        });
-        together(&mut columns, Record(places), points, sink)
+        together(&mut columns, &record, points, sink)
     })
 }
 
 /// Puts the values of the columns together to records of points.
 fn together<T: FromScalar>(
     columns: &mut [(Stream<'_>, Number)],
-    record: Record,
+    record: &Record,
     points: u64,
     sink: &mut Sink<'_, T>,
 ) -> Result<()> {

@@ -1,5 +1,6 @@
 //! The places of scans and of units of lines in a PTX file. Only the number of lines tells where a scan ends.
 
+use super::super::columns::{NO_SCANNER, Wanted};
 use super::super::input::{Input, Range, STREAM_BUFFER};
 use super::super::lines::{self, LONGEST_LINE};
 use super::super::spool::{Sink, SourceWriter};
@@ -59,7 +60,13 @@ impl Index {
     }
 
     /// Passes the points of a unit on.
-    pub(super) fn take(&self, input: &Input, unit: usize, sink: &mut Sink<'_, f64>) -> Result<()> {
+    pub(super) fn take(
+        &self,
+        input: &Input,
+        unit: usize,
+        wanted: &Wanted,
+        sink: &mut Sink<'_, f64>,
+    ) -> Result<()> {
         let UnitOfLines { start, end, scan } = self.units[unit];
         let scan = &self.scans[scan as usize];
         let bytes = input.window(start, (end - start) as usize, "lines")?;
@@ -67,7 +74,7 @@ impl Index {
         for line in bytes.split(|b| lines::is_end(*b)) {
             let text = line.trim_ascii();
             if !text.is_empty()
-                && let Err(found) = scan.take(text, sink)?
+                && let Err(found) = scan.take(text, wanted, sink)?
             {
                 let place = format!("line {}", lines::number_of(input, at)?);
                 let expected = "three coordinates, perhaps with an intensity and a colour";
@@ -86,6 +93,8 @@ struct Reader<'a> {
     source: BufReader<Range<'a>>,
     /// Offset of the next byte.
     at: u64,
+    /// Scans with points so far.
+    filled: u16,
     index: Index,
     /// For the index, which grows.
     held: Reservation,
@@ -99,6 +108,7 @@ impl<'a> Reader<'a> {
             workspace,
             source: input.stream(0, input.bytes),
             at: 0,
+            filled: 0,
             index: Index {
                 scans: Vec::new(),
                 units: Vec::new(),
@@ -164,7 +174,11 @@ impl<'a> Reader<'a> {
             return Ok(false);
         }
         let header: Vec<&[u8]> = header.iter().map(Vec::as_slice).collect();
-        let scan = Scan::of(self.input, begin, &header)?;
+        let mut scan = Scan::of(self.input, begin, &header)?;
+        scan.number = self.filled;
+        if scan.points > 0 {
+            self.filled = self.filled.saturating_add(1).min(NO_SCANNER);
+        }
         let number = self.index.scans.len();
         if number == MOST_SCANS {
             let place = format!("scan {}", number + 1);

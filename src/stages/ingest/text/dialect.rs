@@ -1,6 +1,8 @@
 //! The layout of points in a text file, inferred from its first lines.
 
+use super::super::columns::{COLORS, Column, INTENSITY, Wanted};
 use super::super::number;
+use outcrop_ply::Scalar;
 
 /// Number of data lines used to infer the layout.
 const SAMPLE: usize = 50;
@@ -36,6 +38,8 @@ pub(super) struct Dialect {
     pub(super) start: u64,
     /// True if lines with a single integer give the number of following points, as in PTS.
     pub(super) counted: bool,
+    /// The other columns that have a name, ascending, and their places.
+    pub(super) others: Vec<(usize, Column)>,
 }
 
 /// The content of a line.
@@ -73,6 +77,18 @@ impl Dialect {
             };
         }
         Row::Point(point)
+    }
+
+    /// Appends the values of the wanted columns of a line; a word that is no number is NaN, or 0 if the type has
+    /// none.
+    pub(super) fn values(&self, line: &[u8], wanted: &Wanted, values: &mut Vec<u8>) {
+        let mut words = self.tokens(line.trim_ascii()).enumerate();
+        for number in &wanted.numbers {
+            let (place, column) = &self.others[*number];
+            let word = words.find(|(at, _)| at == place);
+            let value = word.and_then(|(_, w)| number::parse(w, self.decimal_comma, &mut 0));
+            column.scalar.put(value.unwrap_or(f64::NAN), values);
+        }
     }
 
     fn tokens<'a>(&self, line: &'a [u8]) -> impl Iterator<Item = &'a [u8]> {
@@ -157,8 +173,12 @@ pub(super) fn guess(head: &[u8], whole: bool) -> Result<Dialect, String> {
             columns: [0, 1, 2],
             start: mark as u64,
             counted: count(first).is_some(),
+            others: Vec::new(),
         };
         if explains(&dialect, &lines) {
+            if dialect.counted {
+                dialect.others = dialect.counted_columns(&lines);
+            }
             return Ok(dialect);
         }
         // The first line may contain column names.
@@ -167,6 +187,8 @@ pub(super) fn guess(head: &[u8], whole: bool) -> Result<Dialect, String> {
             dialect.columns = named_columns(first).unwrap_or([0, 1, 2]);
             dialect.counted = false;
             if explains(&dialect, &lines[1..]) {
+                let (_, _, second) = lines[1];
+                dialect.others = dialect.named_others(first, second);
                 return Ok(dialect);
             }
         }
@@ -175,6 +197,34 @@ pub(super) fn guess(head: &[u8], whole: bool) -> Result<Dialect, String> {
         "text that is no list of points, \"{}\"",
         shown(first)
     ))
+}
+
+impl Dialect {
+    /// The columns of PTS: an intensity, a colour, or both.
+    fn counted_columns(&self, lines: &[(usize, usize, &[u8])]) -> Vec<(usize, Column)> {
+        let mut widths = lines.iter().map(|(_, _, line)| self.tokens(line).count());
+        let width = widths.find(|width| *width >= 3).unwrap_or(3);
+        let intensity = matches!(width, 4 | 7).then(|| Column::new(INTENSITY, Scalar::F32));
+        let color = COLORS.map(|name| Column::new(name, Scalar::U8));
+        let color = color.into_iter().filter(|_| matches!(width, 6 | 7));
+        (3..).zip(intensity.into_iter().chain(color)).collect()
+    }
+
+    /// The columns with names but the coordinates, if a line has as many words as there are names.
+    fn named_others(&self, header: &[u8], line: &[u8]) -> Vec<(usize, Column)> {
+        let names: Vec<&[u8]> = words(header).collect();
+        if names.len() != self.tokens(line).count() {
+            return Vec::new();
+        }
+        let column = |name: &[u8]| {
+            let name = String::from_utf8_lossy(name);
+            Column::new(&name, Scalar::F64)
+        };
+        let columns = names.into_iter().map(column).enumerate();
+        let others =
+            columns.filter(|(at, column)| !self.columns.contains(at) && !column.name.is_empty());
+        others.collect()
+    }
 }
 
 /// True if the first data line is a point. Errors in later lines are reported when they are read.

@@ -3,6 +3,7 @@
 mod dialect;
 mod foreign;
 
+use super::columns::{Column, Wanted};
 use super::format::Format;
 use super::input::Input;
 use super::lines::{self, LONGEST_LINE, Lines, SLAB};
@@ -74,6 +75,13 @@ impl PointFile for Dialect {
         }
     }
 
+    fn columns(&self) -> Vec<Column> {
+        self.others
+            .iter()
+            .map(|(_, column)| column.clone())
+            .collect()
+    }
+
     fn read(&self, input: &Input, target: &SourceWriter<'_>) -> Result<Vec<String>> {
         let slabs = input.bytes.saturating_sub(self.start).div_ceil(SLAB);
         let memory = SLAB + LONGEST_LINE + sink_bytes::<f64>();
@@ -81,7 +89,7 @@ impl PointFile for Dialect {
             let start = self.start + unit as u64 * SLAB;
             let lines = Lines::read(input, self.start, start)?;
             for (at, line) in lines.iter() {
-                take(input, self, at, line, sink)?;
+                take(input, self, target.wanted, (at, line), sink)?;
             }
             Ok(())
         };
@@ -102,13 +110,15 @@ impl PointFile for Dialect {
 fn take(
     input: &Input,
     dialect: &Dialect,
-    at: u64,
-    line: &[u8],
+    wanted: &Wanted,
+    (at, line): (u64, &[u8]),
     sink: &mut Sink<'_, f64>,
 ) -> Result<()> {
     match dialect.row(line, &mut sink.stats.decimals) {
         Row::Blank => {}
-        Row::Point(point) => sink.push(point)?,
+        Row::Point(point) => {
+            sink.push_with(point, |values| dialect.values(line, wanted, values))?;
+        }
         Row::Count(count) => {
             sink.stats.claimed = sink.stats.claimed.saturating_add(count);
         }

@@ -10,8 +10,12 @@ pub enum PointFormat {
     /// Format 0 in LAS 1.2, at most 2^32 - 1 points.
     #[default]
     Legacy,
+    /// Format 2 in LAS 1.2, with colours of 16 bits and intensities that depend on the position.
+    Colored,
     /// Format 6 in LAS 1.4.
     Extended,
+    /// Format 7 in LAS 1.4, with the same colours and intensities.
+    ExtendedColored,
 }
 
 /// Settings of LAS and LAZ files.

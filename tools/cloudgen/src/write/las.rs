@@ -41,13 +41,16 @@ pub(super) fn header(
     }
     let (number, version) = match options.point_format {
         PointFormat::Legacy => (0, Version::new(1, 2)),
+        PointFormat::Colored => (2, Version::new(1, 2)),
         PointFormat::Extended => (6, Version::new(1, 4)),
+        PointFormat::ExtendedColored => (7, Version::new(1, 4)),
     };
-    if options.point_format == PointFormat::Legacy && count > u64::from(u32::MAX) {
+    let old = !matches!(number, 6..);
+    if old && count > u64::from(u32::MAX) {
         return Err(Error::parameter(
             "points",
             count,
-            "below 2^32 for point format 0",
+            "below 2^32 for point formats 0 and 2",
         ));
     }
     let mut point_format = RecordFormat::new(number).map_err(|e| Error::las(path, e))?;
@@ -157,7 +160,7 @@ impl LasSink {
         })
     }
 
-    /// A record with one return and no attributes.
+    /// A record with one return and, if the format has them, colours that depend on the position.
     fn encode(&self, point: &[f64; 3], bytes: &mut Vec<u8>) -> las::Result<()> {
         let record = self.record_format.len() as usize;
         let start = bytes.len();
@@ -173,6 +176,21 @@ impl LasSink {
         } else {
             0x09
         };
+        if self.record_format.has_color {
+            let at = start
+                + if self.record_format.is_extended {
+                    30
+                } else {
+                    20
+                };
+            for (k, c) in point.iter().enumerate() {
+                // A wave of about a hundred units for each axis.
+                let value = (32768.0 + 32767.0 * libm::sin(c * 0.06)) as u16;
+                bytes[at + 2 * k..at + 2 * k + 2].copy_from_slice(&value.to_le_bytes());
+            }
+            let intensity = (point.iter().sum::<f64>() as i64 & 0x7ff) as u16;
+            bytes[start + 12..start + 14].copy_from_slice(&intensity.to_le_bytes());
+        }
         Ok(())
     }
 

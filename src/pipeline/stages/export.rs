@@ -1,0 +1,95 @@
+//! The last stage: the mesh file, the origin of its coordinates, and what is beside it.
+
+use super::super::beside;
+use super::super::origin::Steps;
+use super::Stages;
+use crate::error::Result;
+use crate::geom::lattice::{Lattice, Shift};
+use crate::params::Origin;
+use crate::stages::attributes::StoredColumns;
+use crate::stages::export::{CoordinateType, ExportOptions, export};
+use crate::stages::ingest;
+use crate::stages::order::PointStore;
+use crate::stages::repair::Repaired;
+use outcrop_ply::Place;
+
+/// The type of coordinates in the mesh.
+pub(super) fn written(precision: ingest::CoordinateType) -> CoordinateType {
+    match precision {
+        ingest::CoordinateType::F32 => CoordinateType::Float,
+        ingest::CoordinateType::F64 => CoordinateType::Double,
+    }
+}
+
+impl Stages<'_> {
+    /// Checks a given origin, and says if it is rounded.
+    pub(super) fn check_origin(&mut self, lattice: &Lattice) -> Result<()> {
+        let Origin::At(to) = self.job.params.origin else {
+            return Ok(());
+        };
+        let coarse = self.coarse;
+        let [x, y, z] = Steps { lattice, coarse }.given(to)?.origin;
+        if [x, y, z] != to {
+            self.warn(format!(
+                "--origin: {x},{y},{z} is used, the nearest position on the lattice of steps of {coarse}"
+            ));
+        }
+        Ok(())
+    }
+
+    /// The origin of the mesh's coordinates, if it is not that of the cloud, and their type.
+    fn shift(&mut self, store: &PointStore, lattice: &Lattice) -> Result<Option<Shift>> {
+        let coarse = self.coarse;
+        let steps = Steps { lattice, coarse };
+        let doubles = self.report.coordinates == CoordinateType::Double;
+        let shift = match self.job.params.origin {
+            Origin::Auto if doubles => steps.automatic(store.bounds()),
+            Origin::Auto | Origin::None => None,
+            Origin::At(to) => Some(steps.given(to)?),
+        };
+        if let Some(shift) = &shift {
+            self.report.coordinates = written(steps.precision(shift, store.bounds()));
+            self.report.origin = Some(shift.origin);
+        }
+        Ok(shift)
+    }
+
+    /// The comments of the mesh.
+    fn comments(&self) -> Vec<String> {
+        let step = (self.job.params.smooth == 0).then_some(self.coarse);
+        let place = self.report.origin.map(|origin| Place::new(origin, step));
+        let mut comments = place.map_or_else(Vec::new, |place| place.comments());
+        if let Some(crs) = &self.report.input.crs {
+            comments.extend(crs.horizontal.map(|code| format!("epsg {code}")));
+            comments.push(format!("crs {}", crs.line()));
+        }
+        comments
+    }
+
+    /// Writes the mesh.
+    pub fn export(
+        &mut self,
+        store: &PointStore,
+        columns: Option<&StoredColumns>,
+        repaired: &Repaired,
+        lattice: &Lattice,
+    ) -> Result<()> {
+        let (job, workspace, blocks) = (self.job, self.workspace, self.blocks());
+        let shift = self.shift(store, lattice)?;
+        let options = ExportOptions {
+            output: &job.output,
+            coordinates: self.report.coordinates,
+            comments: self.comments(),
+            origin: shift,
+            columns,
+            normals: job.params.normals,
+            decimals: self.known.text.map_or(0, |text| text.decimals),
+        };
+        let items = 2 * blocks.count() as u64;
+        self.report.mesh = self.clock.stage("export", "blocks", items, || {
+            export(store, repaired, blocks, lattice, options, workspace)
+        })?;
+        columns.map_or(Ok(()), |columns| columns.release(workspace))?;
+        beside::write(&job.output, &job.inputs, &self.report)
+    }
+}
