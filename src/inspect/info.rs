@@ -98,6 +98,7 @@ pub fn info(inputs: &[PathBuf], classes: &Classes, workspace: &Workspace) -> Res
         decompressed: headers.map_or(0, |known| known.decompressed),
         points,
         values: 0,
+        scanner: headers.map_or(0, |headers| headers.scanner),
         double: Some(double),
         moved: None,
         text: None,

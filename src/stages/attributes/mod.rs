@@ -183,7 +183,7 @@ impl StoredScanners {
 }
 
 /// The values of the points by id.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, Serialize, Deserialize)]
 pub struct StoredAttributes {
     /// The columns of the mesh, if there are any.
     pub columns: Option<StoredColumns>,
