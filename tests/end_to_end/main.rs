@@ -12,6 +12,7 @@ mod odd;
 mod outdoor;
 mod outputs;
 mod report;
+mod scanners;
 mod scans;
 mod stop;
 mod topology;
