@@ -348,7 +348,11 @@ fn some_scanners(random: &mut Random, count: usize) -> (Vec<u32>, Vec<Option<[i6
     let numbers = (0..count).map(|id| {
         if id % run == 0 {
             let seen = random.integer(0, 10) < share;
-            number = if seen { random.integer(1, all + 2) as u32 } else { 0 };
+            number = if seen {
+                random.integer(1, all + 2) as u32
+            } else {
+                0
+            };
         }
         number
     });

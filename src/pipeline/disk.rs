@@ -310,7 +310,10 @@ mod tests {
         std::fs::write(&path, [header.as_bytes(), &[0; 1200]].concat()).unwrap();
         let known = Known::from_headers(&[path], &Attributes::None, true);
         assert!(known.is_none_or(|known| known.points < 200), "{known:?}");
-        assert!(Known::from_headers(&[folder.path().join("nothing")], &Attributes::None, true).is_none());
+        assert!(
+            Known::from_headers(&[folder.path().join("nothing")], &Attributes::None, true)
+                .is_none()
+        );
     }
 
     /// An uncompressed LAS 1.2 file of 100 points with steps of 1 cm.

@@ -27,8 +27,8 @@ use crate::stages::thin::{Grid, LeftOut, thin};
 use crate::stages::triples::{Triples, triples};
 use crate::workspace::{Workspace, limits};
 use export::written;
-use values::Values;
 use std::time::Instant;
+use values::Values;
 
 /// The positions that decide which points are connected, if they are not those of the mesh, and the local
 /// spacings.
@@ -59,7 +59,7 @@ impl<'a> Stages<'a> {
             true => None,
             false => {
                 Known::from_headers(&job.inputs, &job.params.attributes, job.params.scanners())
-            },
+            }
         };
         let first = headers.map(|known| known.estimate(&job.params, &job.output));
         if let Some(known) = headers.filter(|_| all_are_kept(&job.params)) {

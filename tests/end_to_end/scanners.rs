@@ -1,9 +1,9 @@
 //! What a scanner saw is the outer side of the mesh.
 
 use crate::util::{self, Bench};
+use outcrop::Report;
 use outcrop::inspect::ply_mesh::{PlyMesh, Sink};
 use outcrop::params::Params;
-use outcrop::Report;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
@@ -100,7 +100,11 @@ fn scan(scanner: [f64; 3], points: &[[f64; 3]]) -> String {
 }
 
 fn run(inputs: &[PathBuf], mesh: &Path, params: &Params) -> Report {
-    util::builder(inputs, mesh, params).build().unwrap().run().unwrap()
+    util::builder(inputs, mesh, params)
+        .build()
+        .unwrap()
+        .run()
+        .unwrap()
 }
 
 #[test]
@@ -129,7 +133,10 @@ fn rooms_face_the_scanners_that_saw_them() {
         for (place, expected) in places {
             let found = facing(&mesh, place, 2.5);
             let name = input.display();
-            assert!((found - expected).abs() < 0.01, "{name}: {found} face {place:?}");
+            assert!(
+                (found - expected).abs() < 0.01,
+                "{name}: {found} face {place:?}"
+            );
         }
     }
     // Closed bodies face outwards without scanners.

@@ -228,7 +228,14 @@ pub fn reconstruct_seen(
         density,
     );
     let (triples, off_surface) = cells::triples(&relaxed.shape, settings, diagonal, density);
-    let mut mesh = connect(&relaxed.shape, points, &triples, density, &scanners, settings);
+    let mut mesh = connect(
+        &relaxed.shape,
+        points,
+        &triples,
+        density,
+        &scanners,
+        settings,
+    );
     mesh.counts.off_surface = off_surface;
     (mesh.counts.rounds, mesh.counts.moved) = (relaxed.rounds, relaxed.moved);
     (mesh.counts.curved, mesh.counts.clean) = (relaxed.curved, relaxed.clean);

@@ -73,9 +73,8 @@ impl<'a> Buckets<'a> {
         workspace: &Workspace,
     ) -> Result<[Option<(Table<Word>, usize)>; 2]> {
         let words = parts[0] + parts[1];
-        let table = |name, words| {
-            (words > 0).then(|| (Table::new(name, self.sections.len() - 1), words))
-        };
+        let table =
+            |name, words| (words > 0).then(|| (Table::new(name, self.sections.len() - 1), words));
         let tables = [
             table("attributes.scanners", parts[0]),
             table("attributes", parts[1]),

@@ -23,10 +23,12 @@ impl Ranks {
         let files = sources.iter().zip(&stats.files);
         // Zero has one sign.
         let read = |source: &Source| source.columns.iter().any(|c| c.name == SCANNER);
-        let of_file = files.map(|(source, file)| match source.stats.kept > 0 && read(source) {
-            false => Vec::new(),
-            true => file.scanners.iter().map(|p| p.map(|x| x + 0.0)).collect(),
-        });
+        let of_file = files.map(
+            |(source, file)| match source.stats.kept > 0 && read(source) {
+                false => Vec::new(),
+                true => file.scanners.iter().map(|p| p.map(|x| x + 0.0)).collect(),
+            },
+        );
         Self::of_files(&of_file.collect::<Vec<_>>())
     }
 

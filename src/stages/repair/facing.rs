@@ -259,7 +259,10 @@ mod tests {
     #[test]
     fn what_the_scanner_saw_is_out() {
         let floor = [[0, 0, 5], [9, 0, 5], [0, 9, 5]];
-        for (toward, wrong) in [(Some([0.6, 0.0, 0.8]), false), (Some([0.6, 0.0, -0.8]), true)] {
+        for (toward, wrong) in [
+            (Some([0.6, 0.0, 0.8]), false),
+            (Some([0.6, 0.0, -0.8]), true),
+        ] {
             for flip in [false, true] {
                 let mut sums = Sums::default();
                 sums.open();
