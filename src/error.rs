@@ -39,6 +39,18 @@ pub enum Error {
         /// Description of the cloud.
         found: String,
     },
+    /// No point of the cloud is in the region of interest.
+    #[error(
+        "no point is in {region}, nor within {margin} around it; the cloud lies between {bounds}"
+    )]
+    Outside {
+        /// The region.
+        region: String,
+        /// Width of the margin around it.
+        margin: f64,
+        /// The lowest and highest coordinates of the cloud.
+        bounds: String,
+    },
     /// A mesh exceeds a limit of its format.
     #[error("{path}: {format} holds at most {most} {unit}, this mesh has {found}; write .ply or .obj, or a smaller mesh (--thin, --split)", path = path.display())]
     TooLarge {
@@ -180,6 +192,7 @@ impl Error {
             | Error::Cancelled => true,
             Error::Input { .. }
             | Error::Degenerate { .. }
+            | Error::Outside { .. }
             | Error::NoTriangles { .. }
             | Error::TooLarge { .. }
             | Error::Parameter { .. }

@@ -74,7 +74,7 @@ pub mod stages;
 pub mod workspace;
 
 pub use error::{Error, Result};
-pub use params::{Division, MaxWidth, Method, Origin, Params, Radius, Smoothing};
+pub use params::{Division, MaxWidth, Method, Origin, Params, Radius, Region, Smoothing};
 pub use pipeline::{Builder, Reconstruction, Start, default_memory, default_threads};
 pub use report::{DiskEstimate, Report};
 pub use stages::ingest::Classes;

@@ -1,8 +1,9 @@
 //! The parameters of a reconstruction, with their ranges.
 
 use crate::error::{Error, Result};
+pub use crate::geom::region::{NoRegion, Region};
 use crate::method::METHOD;
-use crate::stages::ingest::{Attributes, Classes};
+use crate::stages::ingest::{Attributes, Classes, Crop, IngestStats, Selection};
 pub use crate::stages::smooth::Smoothing;
 use crate::stages::spacing::{Limits, Width};
 pub use crate::stages::surface::evidence::Division;
@@ -142,6 +143,13 @@ impl std::str::FromStr for Origin {
 pub struct Params {
     /// Classes of the points that are read.
     pub classes: Classes,
+    /// The mesh inside this region only.
+    pub crop: Option<Region>,
+    /// Width of the margin around the region within which points are read as well, in the input's unit.
+    /// `None`: a twentieth of the shorter side of the box around the region.
+    pub crop_margin: Option<f64>,
+    /// One mesh for each square of this side in x and y, in the input's unit, instead of one for all.
+    pub split: Option<f64>,
     /// Columns of the points that the mesh keeps, such as colours.
     pub attributes: Attributes,
     /// Colours with 16 bits instead of 8.
@@ -201,6 +209,13 @@ pub struct Params {
 /// A factor for [`Params::drop_outliers`] that suits most clouds.
 pub const OUTLIER_FACTOR: f64 = 5.0;
 
+/// The margin around a region, as a share of the shorter side of the box around it. The local spacing of the
+/// points, which decides how wide it must be, is not known before they are read (docs/decisions.md).
+const MARGIN: f64 = 0.05;
+
+/// A margin of so many spacings is wide enough: at the cut no more triangles differ than elsewhere.
+const SPACINGS: f64 = 16.0;
+
 /// Largest number of neighbours.
 pub const MAX_NEIGHBORS: usize = 255;
 
@@ -208,6 +223,9 @@ impl Default for Params {
     fn default() -> Self {
         Self {
             classes: Classes::All,
+            crop: None,
+            crop_margin: None,
+            split: None,
             attributes: Attributes::None,
             wide_colors: false,
             thin: None,
@@ -251,6 +269,51 @@ impl Params {
             min_component: Some(10),
             ..Self::default()
         }
+    }
+
+    /// The points that are read.
+    #[must_use]
+    pub fn selection(&self) -> Selection {
+        let crop = |region: &Region| {
+            let [min, max] = region.bounds();
+            let shorter = (max[0] - min[0]).min(max[1] - min[1]);
+            Crop {
+                region: region.clone(),
+                margin: self.crop_margin.unwrap_or(shorter * MARGIN),
+            }
+        };
+        Selection {
+            classes: self.classes.clone(),
+            crop: self.crop.as_ref().map(crop),
+            attributes: self.attributes.clone(),
+            scanners: self.scanners(),
+        }
+    }
+
+    /// A warning if the default margin around the region is narrow for the density of the points read.
+    pub(crate) fn narrow_margin(&self, input: &IngestStats) -> Option<String> {
+        let margin = self.selection().crop?.margin;
+        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        for file in &input.files {
+            let (Some(min), Some(max)) = (file.min, file.max) else {
+                continue;
+            };
+            for axis in 0..2 {
+                low[axis] = low[axis].min(min[axis]);
+                high[axis] = high[axis].max(max[axis]);
+            }
+        }
+        let area = (high[0] - low[0]) * (high[1] - low[1]);
+        let spacing = (area / input.kept.max(1) as f64).sqrt();
+        let narrow = self.crop_margin.is_none() && margin < SPACINGS * spacing;
+        narrow.then(|| {
+            format!(
+                "the margin around the region is {margin}, {:.0} times the mean spacing of the points: at the cut \
+                 the mesh may differ from that of the whole cloud; --crop-margin {:.3} is wide enough",
+                margin / spacing,
+                SPACINGS * spacing
+            )
+        })
     }
 
     /// True if points off the surface are dropped.
@@ -304,6 +367,19 @@ impl Params {
                 expected: expected.into(),
             })
         };
+        if let Some(Err(why)) = self.crop.as_ref().map(Region::check) {
+            return error("--crop", why.found, &why.expected);
+        }
+        if let Some(margin) = self.crop_margin
+            && !(margin >= 0.0 && margin.is_finite())
+        {
+            return error("--crop-margin", margin.to_string(), "a length, or 0");
+        }
+        if let Some(side) = self.split
+            && !(side > 0.0 && side.is_finite())
+        {
+            return error("--split", side.to_string(), "a positive length");
+        }
         if let Some(side) = self.thin
             && !(side > 0.0 && side.is_finite())
         {

@@ -95,7 +95,7 @@ impl Reconstruction {
     /// run can be resumed, see [`Reconstruction::is_unfinished`].
     pub fn run(&self) -> Result<Report> {
         writable(&self.output)?;
-        not_an_input(&self.output, &self.inputs)?;
+        not_an_input(&self.output, self.params.split.is_some(), &self.inputs)?;
         one_system(&self.params, &self.inputs)?;
         let _alarm = self
             .time_limit
@@ -124,7 +124,14 @@ impl Reconstruction {
         let stitched = stages.stitch(places, &triples)?;
         let repaired = stages.repair(places, &stitched)?;
         values.release_scanners(workspace)?;
-        stages.export(&store, values.columns(), &repaired, &lattice)?;
+        let pieces = stages.cut(&store, &repaired, &lattice)?;
+        stages.export(
+            &store,
+            values.columns(),
+            &repaired,
+            pieces.as_ref(),
+            &lattice,
+        )?;
         Ok(stages.report())
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::params::Params;
 pub use crate::stages::cells::CellStats;
+pub use crate::stages::cut::CutStats;
 pub use crate::stages::export::{CoordinateType, MeshStats};
 pub use crate::stages::ingest::{Attribute, IngestStats};
 pub use crate::stages::outliers::OutlierStats;
@@ -56,6 +57,8 @@ pub struct Report {
     pub repair: RepairStats,
     /// Holes left open: too long, outlines of the surface, or without a clean triangulation.
     pub holes_left: u64,
+    /// The cut, if the mesh was cropped or divided.
+    pub cut: CutStats,
     /// The mesh.
     pub mesh: MeshStats,
     /// Type of the coordinates in the file.

@@ -23,7 +23,7 @@ const MAY_USE: &[(&str, &str)] = &[
     ("method", ""),
     (
         "params",
-        "method stages/ingest stages/smooth stages/spacing stages/surface",
+        "geom method stages/ingest stages/smooth stages/spacing stages/surface",
     ),
     ("pipeline", "geom method params report stages/* workspace"),
     ("report", "params stages/*"),
@@ -38,8 +38,12 @@ const MAY_USE: &[(&str, &str)] = &[
         "kernels stages/blocks stages/order stages/spacing stages/tiles",
     ),
     (
+        "stages/cut",
+        "stages/blocks stages/located stages/order stages/repair stages/surface",
+    ),
+    (
         "stages/export",
-        "stages/attributes stages/blocks stages/ingest stages/order stages/repair stages/surface",
+        "stages/attributes stages/blocks stages/cut stages/ingest stages/order stages/repair stages/surface",
     ),
     ("stages/ingest", ""),
     (

@@ -1,12 +1,13 @@
 //! Command-line arguments.
 
 use crate::method::METHOD;
-use crate::params::{MaxWidth, Method, Origin, Params, Radius, Smoothing};
+use crate::params::{MaxWidth, Method, NoRegion, Origin, Params, Radius, Region, Smoothing};
 use crate::pipeline::{Builder, Reconstruction, Start};
 use crate::stages::ingest::{Attributes, Classes};
 use crate::workspace::mapped::Io;
 use crate::workspace::{Compression, Storage};
 use clap::Args as ClapArgs;
+use std::io::Read;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -51,7 +52,7 @@ impl Storing {
     }
 }
 
-/// Selection of points by class.
+/// Selection of points by class and region.
 #[derive(Debug, ClapArgs)]
 #[command(next_help_heading = "Points")]
 pub struct Points {
@@ -66,6 +67,19 @@ pub struct Points {
     /// Read only points of these classes (LAS, LAZ), e.g. 2,6 for ground and buildings
     #[arg(long, value_name = "CLASSES", value_delimiter = ',')]
     pub keep_classes: Vec<u8>,
+    /// Only the part inside a region: a box, or polygons in x and y in a file (WKT or GeoJSON). The mesh
+    /// inside is that of the whole cloud, up to the cut
+    #[arg(
+        long,
+        value_name = "MINX,MINY,MAXX,MAXY|FILE",
+        value_parser = region,
+        allow_hyphen_values = true
+    )]
+    pub crop: Option<Region>,
+    /// Width of the margin around the region within which points are read as well, in the cloud's unit
+    /// [default: a twentieth of the region's shorter side]
+    #[arg(long, value_name = "LENGTH", requires = "crop")]
+    pub crop_margin: Option<f64>,
 }
 
 /// Columns that the mesh keeps.
@@ -103,6 +117,16 @@ pub struct Filters {
 const OUTLIER_FACTOR_TEXT: &str = "5";
 
 impl Points {
+    /// The parameters that select points.
+    pub fn params(&self) -> Params {
+        Params {
+            classes: self.classes(),
+            crop: self.crop.clone(),
+            crop_margin: self.crop_margin,
+            ..Params::default()
+        }
+    }
+
     /// The selected classes.
     pub fn classes(&self) -> Classes {
         let sorted = |classes: &[u8]| {
@@ -216,6 +240,10 @@ pub struct Job {
     /// Write a normal for each vertex (PLY, OBJ, GLB)
     #[arg(long)]
     pub normals: bool,
+    /// Write one mesh for each square with this side in x and y, in the cloud's unit: MESH_X_Y.ply, and
+    /// MESH.index.json with a list of them
+    #[arg(long, value_name = "LENGTH")]
+    pub split: Option<f64>,
     #[command(flatten)]
     pub points: Points,
     #[command(flatten)]
@@ -383,12 +411,16 @@ impl Job {
 
     /// The parameters of the reconstruction.
     pub fn params(&self) -> Params {
+        let selected = self.points.params();
         let usual = match self.surface.method {
             Method::Robust => Params::default(),
             Method::Paper => Params::paper(),
         };
         Params {
-            classes: self.points.classes(),
+            classes: selected.classes,
+            crop: selected.crop,
+            crop_margin: selected.crop_margin,
+            split: self.split,
             attributes: self.columns.attributes.clone(),
             wide_colors: self.columns.wide_colors,
             thin: self.filters.thin,
@@ -421,6 +453,22 @@ pub fn size(text: &str) -> Result<u64, String> {
         .parse()
         .map_err(|_| format!("{text:?} is not a size like 512MiB, 4GiB or 2000000000"))?;
     Ok(size.as_u64())
+}
+
+/// A region: numbers, or the name of a file.
+fn region(text: &str) -> Result<Region, String> {
+    if Region::is_numbers(text) {
+        return text.parse().map_err(|e: NoRegion| e.to_string());
+    }
+    // A point cloud given by mistake must not be read as a whole.
+    let limit = Region::LONGEST as u64 + 1;
+    let read = std::fs::File::open(text).and_then(|file| {
+        let mut content = Vec::new();
+        file.take(limit).read_to_end(&mut content).map(|_| content)
+    });
+    let content = read.map_err(|e| format!("neither numbers nor a file that can be read ({e})"))?;
+    let content = String::from_utf8_lossy(&content);
+    content.parse().map_err(|e: NoRegion| e.to_string())
 }
 
 fn time(text: &str) -> Result<Duration, String> {

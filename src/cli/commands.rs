@@ -114,7 +114,7 @@ fn run_reconstruction(builder: Builder, ends: &Ends, quiet: bool) -> Result<bool
 
 fn info(args: &Info) -> Result<bool> {
     let workspace = workspace(&args.limits, &std::env::temp_dir())?;
-    let info = info::info(&args.inputs, &args.points.classes(), &workspace)?;
+    let info = info::info(&args.inputs, &args.points.params(), &workspace)?;
     show(&info, args.json)?;
     Ok(true)
 }

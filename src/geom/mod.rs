@@ -7,6 +7,7 @@ pub mod hilbert;
 pub mod lattice;
 pub mod plane;
 pub mod predicate;
+pub mod region;
 pub(crate) mod round;
 pub mod triangle;
 

@@ -33,6 +33,17 @@ pub fn length(v: [i128; 3]) -> f64 {
     v.iter().map(|x| *x as f64 * *x as f64).sum::<f64>().sqrt()
 }
 
+/// The direction of a vector, by operations that every machine rounds alike; up for a vector without length.
+#[must_use]
+pub fn direction(sum: &[i128; 3]) -> [f32; 3] {
+    let [x, y, z] = sum.map(|x| x as f64);
+    let length = (x * x + y * y + z * z).sqrt();
+    if length == 0.0 {
+        return [0.0, 0.0, 1.0];
+    }
+    [x, y, z].map(|x| (x / length) as f32)
+}
+
 /// Adds a vector to a sum.
 pub fn add(sum: &mut [i128; 3], part: [i128; 3]) {
     (0..3).for_each(|axis| sum[axis] += part[axis]);

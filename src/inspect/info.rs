@@ -6,7 +6,7 @@ use crate::method::METHOD;
 use crate::params::Params;
 use crate::pipeline::Known;
 use crate::stages::cells::{CellMaker, DiskRadius, Widen};
-use crate::stages::ingest::{Attributes, Classes, CoordinateType, IngestStats, ingest_classes};
+use crate::stages::ingest::{Attributes, CoordinateType, IngestStats, Selection, ingest_selected};
 use crate::stages::order::{PAGE, PointStore, order};
 use crate::stages::tiles::Tile;
 use crate::stages::tiles::near::Search;
@@ -66,16 +66,20 @@ pub struct Info {
     pub seconds: f64,
 }
 
-/// Reads the whole cloud (or the points of the given classes) once, and samples it.
+/// Reads the cloud once, as far as it is selected by `params`, and samples it.
 ///
 /// # Errors
 /// As for a reconstruction, but a cloud that is too small for a surface is no error.
-pub fn info(inputs: &[PathBuf], classes: &Classes, workspace: &Workspace) -> Result<Info> {
+pub fn info(inputs: &[PathBuf], params: &Params, workspace: &Workspace) -> Result<Info> {
     let start = Instant::now();
     let observer = &workspace.observer;
     observer.begin("ingest", "points", 0);
     let headers = Known::from_headers(inputs, &Attributes::None, true);
-    let mut spool = ingest_classes(inputs, classes, workspace)?;
+    let selection = Selection {
+        scanners: false,
+        ..params.selection()
+    };
+    let mut spool = ingest_selected(inputs, &selection, workspace)?;
     spool.drop_far(workspace)?;
     observer.end();
     let input = spool.stats().clone();
@@ -239,13 +243,15 @@ impl fmt::Display for Info {
         let mib = |bytes: u64| format!("{} MiB", bytes.div_ceil(1 << 20));
         let input = &self.input;
         let left_out = format!(
-            "{} duplicates, {} not finite, {} withheld, {} invalid, {} of other classes, {} far away",
+            "{} duplicates, {} not finite, {} withheld, {} invalid, {} of other classes, {} far away, {} outside \
+             the region",
             self.duplicates,
             input.dropped_non_finite,
             input.withheld,
             input.invalid,
             input.dropped_by_class,
-            input.dropped_far
+            input.dropped_far,
+            input.dropped_by_crop
         );
         let system = match &input.crs {
             Some(crs) => format!("{} ({})", crs.line(), crs.source),

@@ -123,7 +123,6 @@ impl PlyMesh {
     }
 
     /// The map of positions in the file to the coordinates of the cloud.
-    #[must_use]
     pub fn place(&self) -> impl Fn([f64; 3]) -> [f64; 3] + use<> {
         let (place, types) = (self.stream.place(), self.stream.types());
         move |position| match types {

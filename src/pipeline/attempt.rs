@@ -88,6 +88,9 @@ impl Reconstruction {
             workspace.remove(outcome.is_ok());
             // An unfinished mesh; if it cannot be deleted it does no harm.
             let _ = std::fs::remove_file(export::temporary(&self.output));
+            if self.params.split.is_some() {
+                export::remove_unfinished(&self.output);
+            }
         }
         // The workspace has the lock, which must outlive the files.
         drop(workspace);

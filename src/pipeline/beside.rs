@@ -47,9 +47,13 @@ pub(super) fn path_beside(output: &Path, extension: &str) -> PathBuf {
 }
 
 /// Writes the files beside the mesh; an origin of an earlier mesh that is not true any more is deleted.
-pub(super) fn write(output: &Path, inputs: &[PathBuf], report: &Report) -> Result<()> {
+pub(super) fn write(
+    output: &Path,
+    inputs: &[PathBuf],
+    report: &Report,
+    wkt: Option<&str>,
+) -> Result<()> {
     write_origin(output, report)?;
-    let wkt = report.input.crs.as_ref().and_then(|crs| crs.wkt.as_ref());
     let Some(wkt) = wkt else {
         return Ok(());
     };
@@ -154,16 +158,16 @@ mod tests {
             origin,
             ..Report::default()
         };
-        write(&output, &[], &with(Some([635_000.0, 0.0, -0.5]))).unwrap();
+        write(&output, &[], &with(Some([635_000.0, 0.0, -0.5])), None).unwrap();
         let json: serde_json::Value =
             serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
         assert_eq!(json["origin"], serde_json::json!([635_000.0, 0.0, -0.5]));
         let line = "mesh.ply; -635000; 0; 0.5; 1;";
         assert_eq!(json["cloudcompare_global_shift_list"], line);
-        write(&output, &[], &with(None)).unwrap();
+        write(&output, &[], &with(None), None).unwrap();
         assert!(!path.exists());
         std::fs::write(&path, "{\"made_by\": \"hand\"}").unwrap();
-        write(&output, &[], &with(None)).unwrap();
+        write(&output, &[], &with(None), None).unwrap();
         assert!(path.exists());
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
     }

@@ -5,7 +5,7 @@ use crate::geom::lattice::Lattice;
 use crate::params::{Params, Radius};
 use crate::report::DiskEstimate;
 use crate::stages::cells::{CellStats, DiskRadius};
-use crate::stages::export::folder_of;
+use crate::stages::export::{folder_of, is_square_of};
 use crate::stages::ingest::{self, Classes};
 use crate::stages::order::StoredPoints;
 use crate::workspace::{Workspace, limits};
@@ -31,7 +31,8 @@ pub(super) fn disk_radius(radius: Radius, store: &StoredPoints, lattice: &Lattic
 /// True if no option leaves out points.
 pub(super) fn all_are_kept(params: &Params) -> bool {
     let filters = [params.thin, params.drop_outliers];
-    params.classes == Classes::All && filters.iter().all(Option::is_none)
+    let whole = params.crop.is_none() && params.split.is_none();
+    whole && params.classes == Classes::All && filters.iter().all(Option::is_none)
 }
 
 /// Checks that a file can be created in the output's folder.
@@ -72,7 +73,26 @@ pub(super) fn room(
 }
 
 /// Checks that the output is not an input file.
-pub(super) fn not_an_input(output: &Path, inputs: &[PathBuf]) -> Result<()> {
+pub(super) fn not_an_input(output: &Path, split: bool, inputs: &[PathBuf]) -> Result<()> {
+    let absolute = |path: &Path| path.canonicalize().ok();
+    let folder = absolute(folder_of(output));
+    let several = folder.map(|folder| folder.join(output.file_name().unwrap_or_default()));
+    for input in ingest::expand(inputs)?.iter().filter(|_| split) {
+        let taken = |input: PathBuf| is_square_of(several.as_deref()?, &input).then_some(input);
+        if let Some(input) = absolute(input).and_then(taken) {
+            return Err(Error::Parameter {
+                name: "--output",
+                found: format!(
+                    "a name from which that of the input {} can be made",
+                    input.display()
+                ),
+                expected: "another name".into(),
+            });
+        }
+    }
+    if split {
+        return Ok(());
+    }
     let Ok(output) = output.canonicalize() else {
         return Ok(());
     };

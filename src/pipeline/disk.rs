@@ -12,7 +12,7 @@
 use crate::error::Result;
 use crate::geom::aabb::Aabb;
 use crate::geom::lattice::Lattice;
-use crate::params::{Method, Params};
+use crate::params::{Method, Origin, Params};
 use crate::report::DiskEstimate;
 use crate::stages::export::{self, CoordinateType, Mesh};
 use crate::stages::ingest::{self, Attributes, Column, Probe, Spool};
@@ -158,6 +158,11 @@ impl Known {
             .as_flattened()
             .iter()
             .fold(0.0, |m: f64, x| m.max(x.abs()));
+        // With an origin of its own a mesh is near it.
+        let coordinates = match params.origin {
+            Origin::None => coordinates,
+            _ => CoordinateType::Float,
+        };
         let mut mesh = self.mesh(params, coordinates);
         mesh.columns.extend(columns.iter().map(Into::into));
         export::left_out(output, &mesh, largest)

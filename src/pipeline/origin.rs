@@ -72,16 +72,15 @@ impl Steps<'_> {
             steps: [0; 3],
             origin: [0.0; 3],
         };
-        for axis in 0..3 {
+        for (axis, to) in to.into_iter().enumerate() {
             let offset = lattice.offset[axis];
-            let steps = ((to[axis] - offset) / self.coarse).round();
+            let steps = ((to - offset) / self.coarse).round();
             let far = steps * refined as f64 - lattice.base[axis] as f64;
-            // Also if it is not a number.
-            if !(far.abs() < FARTHEST - COORDINATE_LIMIT as f64) {
+            if far.is_nan() || far.abs() >= FARTHEST - COORDINATE_LIMIT as f64 {
                 return None;
             }
             shift.steps[axis] = (steps as i64).checked_mul(refined)?;
-            let noise = 1e-6 * self.coarse + 2.0 * f64::EPSILON * (to[axis].abs() + offset.abs());
+            let noise = 1e-6 * self.coarse + 2.0 * f64::EPSILON * (to.abs() + offset.abs());
             shift.origin[axis] = decimal(steps * self.coarse + offset, noise);
         }
         Some(shift)

@@ -86,7 +86,7 @@ impl Reconstruction {
             });
         }
         writable(&self.output)?;
-        not_an_input(&self.output, &self.inputs)?;
+        not_an_input(&self.output, self.params.split.is_some(), &self.inputs)?;
         one_system(&self.params, &self.inputs)?;
         let headers = Known::from_headers(
             &self.inputs,
@@ -264,6 +264,9 @@ impl Reconstruction {
         let Some(name) = Path::new(&name).file_name().and_then(|name| name.to_str()) else {
             return;
         };
+        if self.params.split.is_some() {
+            export::remove_unfinished(&self.output);
+        }
         let beside = std::fs::read_dir(export::folder_of(&self.output)).into_iter();
         for entry in beside.flatten().flatten() {
             let number = entry

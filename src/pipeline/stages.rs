@@ -14,8 +14,9 @@ use crate::params::Method;
 use crate::report::{LatticeReport, Report};
 use crate::stages::blocks::Blocks;
 use crate::stages::cells::{CellTriples, DiskRadius, TileRanges, Widen, cells};
+use crate::stages::cut::{CutOptions, StoredPieces, cut};
 use crate::stages::export::CoordinateType;
-use crate::stages::ingest::{Carried, Selection, Spool, ingest_selected};
+use crate::stages::ingest::{Carried, Spool, ingest_selected};
 use crate::stages::located::Places;
 use crate::stages::order::{Orderer, PointStore, StoredPoints, order, sample_sort};
 use crate::stages::outliers::{OutlierOptions, drop_outliers};
@@ -49,13 +50,16 @@ pub(super) struct Stages<'a> {
     report: Report,
     /// Step of the lattice before it was refined.
     coarse: f64,
+    /// Well-known text of the reference system.
+    wkt: Option<String>,
 }
 
 impl<'a> Stages<'a> {
     /// Begins with the estimate of disk space from the headers of the inputs.
     pub fn begin(job: &'a Reconstruction, workspace: &'a Workspace) -> Result<Self> {
         // A task leaves the check of disk space to the process that began its generation.
-        let headers = match workspace.is_task() {
+        // With a region, headers do not tell how many points there will be.
+        let headers = match workspace.is_task() || job.params.crop.is_some() {
             true => None,
             false => {
                 Known::from_headers(&job.inputs, &job.params.attributes, job.params.scanners())
@@ -73,6 +77,7 @@ impl<'a> Stages<'a> {
             known: headers.unwrap_or_default(),
             carried: Carried::default(),
             coarse: 0.0,
+            wkt: None,
             report: Report {
                 version: env!("CARGO_PKG_VERSION"),
                 parameters: job.params.clone(),
@@ -94,7 +99,9 @@ impl<'a> Stages<'a> {
             return Ok(());
         }
         let (params, output) = (&self.job.params, &self.job.output);
-        if params.drop_outliers.is_none() {
+        // What these leave out, and how much a square has, is not known yet.
+        let whole = params.crop.is_none() && params.split.is_none();
+        if whole && params.drop_outliers.is_none() {
             self.known.fits(params, output)?;
         }
         let estimate = self.known.estimate(params, output);
@@ -115,11 +122,7 @@ impl<'a> Stages<'a> {
     pub fn ingest(&mut self) -> Result<(Spool, Lattice)> {
         let (job, workspace) = (self.job, self.workspace);
         let params = &job.params;
-        let selection = Selection {
-            classes: params.classes.clone(),
-            attributes: params.attributes.clone(),
-            scanners: params.scanners(),
-        };
+        let selection = params.selection();
         let spool = self.clock.stage("ingest", "points", 0, || {
             let mut spool = ingest_selected(&job.inputs, &selection, workspace)?;
             if !params.keep_far {
@@ -136,6 +139,7 @@ impl<'a> Stages<'a> {
         if let Some(mixed) = input.mixed.as_ref().filter(|_| !params.ignore_crs) {
             return Err(mixed.refused());
         }
+        self.wkt = spool.wkt().map(str::to_owned);
         self.report.coordinates = written(spool.source_precision());
         let scanner = match self.carried.has_scanners() {
             true => SCANNER,
@@ -154,7 +158,9 @@ impl<'a> Stages<'a> {
             text: None,
         };
         workspace.note_points(input.kept);
+        let narrow = params.narrow_margin(&input);
         self.report.input = input;
+        narrow.into_iter().for_each(|warning| self.warn(warning));
         self.check_room()?;
         let moves = params.smooth + params.relax > 0;
         let lattice = spool.choose_lattice(if moves { METHOD.smoothing.halvings } else { 0 })?;
@@ -437,6 +443,32 @@ impl<'a> Stages<'a> {
         self.report.holes_left = stats.holes_found - stats.holes_filled;
         self.report.repair = stats;
         Ok(repaired)
+    }
+
+    /// Cuts the surface, if requested.
+    pub fn cut(
+        &mut self,
+        store: &PointStore,
+        repaired: &Repaired,
+        lattice: &Lattice,
+    ) -> Result<Option<StoredPieces>> {
+        let (params, workspace, blocks) = (&self.job.params, self.workspace, self.blocks());
+        let options = CutOptions {
+            region: params.crop.as_ref(),
+            side: params.split,
+            normals: params.normals,
+        };
+        if options.region.is_none() && options.side.is_none() {
+            return Ok(None);
+        }
+        workspace.trim();
+        let items = 2 * blocks.count() as u64;
+        let (pieces, stats) = self.clock.stage("cut", "blocks", items, || {
+            cut(store, repaired, blocks, lattice, options, workspace)
+        })?;
+        repaired.release(workspace)?;
+        self.report.cut = stats;
+        Ok(Some(pieces))
     }
 
     /// The report of the run.

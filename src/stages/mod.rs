@@ -34,6 +34,8 @@ pub mod stitch;
 
 pub mod repair;
 
+pub mod cut;
+
 pub mod export;
 
 pub mod blocks;

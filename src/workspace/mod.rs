@@ -28,7 +28,7 @@ mod units;
 pub use file::{Compression, Storage};
 pub use files::Files;
 pub use folder::{Folder, Found};
-pub use recover::{OUTPUT, RENAMED};
+pub use recover::{OUTPUT, RENAMED, output_of, square_path, temporary};
 pub use unit::Unit;
 
 use crate::error::{Error, Result};

@@ -17,6 +17,42 @@ const CHUNK: usize = 1 << 20;
 /// The name of the mesh file in the journal; it is not in the scratch folder.
 pub const OUTPUT: &str = "output";
 
+/// The name in the journal of the mesh of a square, of several that a run writes; `square` is part of the name of
+/// its file too.
+#[must_use]
+pub fn output_of(square: &str) -> String {
+    format!("{OUTPUT}:{square}")
+}
+
+/// The path of the mesh of a square, beside `output`: its name is added before the extension.
+#[must_use]
+pub fn square_path(output: &Path, square: &str) -> PathBuf {
+    let plain = super::compressed::plain_name(output);
+    let mut name = plain.file_stem().unwrap_or_default().to_os_string();
+    name.push(format!("_{square}"));
+    let compressed = output.extension().filter(|_| plain != output);
+    for extension in plain.extension().into_iter().chain(compressed) {
+        name.push(".");
+        name.push(extension);
+    }
+    output.with_file_name(name)
+}
+
+/// The temporary name of a mesh, in the same folder as the final one.
+#[must_use]
+pub fn temporary(output: &Path) -> PathBuf {
+    let mut name = std::ffi::OsString::from(".");
+    name.push(output.file_name().unwrap_or_default());
+    name.push(".outcrop-part");
+    output.with_file_name(name)
+}
+
+/// True for the name of a mesh in the journal.
+fn is_output(file: &str) -> bool {
+    let rest = file.strip_prefix(OUTPUT);
+    rest.is_some_and(|rest| rest.is_empty() || rest.starts_with(':'))
+}
+
 /// An empty part of the output which records that the mesh is complete and may be renamed.
 pub const RENAMED: u32 = u32::MAX - 1;
 
@@ -51,7 +87,7 @@ fn is_whole(file: &File, part: &Needed) -> bool {
 /// The name of the file on disk that has the part.
 fn segment(part: &Needed) -> String {
     match part.file.as_str() {
-        OUTPUT => OUTPUT.to_owned(),
+        file if is_output(file) => file.to_owned(),
         file => format!("{file}.{}", part.place.segment),
     }
 }
@@ -66,7 +102,7 @@ fn damaged(
     let mut by_file: BTreeMap<String, Vec<Needed>> = BTreeMap::new();
     for part in parts {
         // A name with a path in it was not written by this program. An empty part has no bytes to check.
-        if !part.file.contains('/') && (part.place.bytes > 0 || part.file == OUTPUT) {
+        if !part.file.contains('/') && (part.place.bytes > 0 || is_output(&part.file)) {
             by_file.entry(segment(&part)).or_default().push(part);
         }
     }
@@ -76,6 +112,9 @@ fn damaged(
     for (name, parts) in by_file {
         let paths = if name == OUTPUT {
             places.output.to_vec()
+        } else if let Some(square) = name.strip_prefix(OUTPUT).filter(|_| is_output(&name)) {
+            let path = square_path(&places.output[1], square.trim_start_matches(':'));
+            vec![temporary(&path), path]
         } else {
             vec![places.folder.join(&name)]
         };
@@ -92,7 +131,7 @@ fn damaged(
             let bad = bad.collect::<Result<Vec<_>>>()?;
             Ok(bad.into_iter().flatten().collect())
         };
-        let renamed = name == OUTPUT && parts.iter().any(|part| part.section == RENAMED);
+        let renamed = is_output(&name) && parts.iter().any(|part| part.section == RENAMED);
         let mut bad = check(&paths[0])?;
         // A file with the final name may be the output of another run.
         if !bad.is_empty() && renamed && check(&paths[1])?.is_empty() {

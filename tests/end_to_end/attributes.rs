@@ -148,7 +148,7 @@ fn bytes_do_not_depend_on_how_it_was_run() {
         std::fs::remove_file(&mesh).unwrap();
         hash
     };
-    let expected = hash(&[whole.clone()], 2, 1 << 30, 256);
+    let expected = hash(std::slice::from_ref(&whole), 2, 1 << 30, 256);
     assert_eq!(hash(&parts, 1, MINIMUM_BUDGET, 256), expected);
     assert_eq!(hash(&parts, 3, 1 << 30, 16), expected);
     // Stopped in a stage, and resumed.

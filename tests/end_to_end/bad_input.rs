@@ -222,7 +222,7 @@ fn unknown_formats() {
     );
     refuses(
         &bench.write("scan.e57", b"ASTM-E57\x01\0\0\0\0\0\0\0".repeat(9)),
-        &["scan.e57", "length at byte 16"],
+        &["scan.e57", "size of pages at byte 40"],
     );
     refuses(
         &bench.write("cloud.pcd", "# .PCD v.7\nVERSION .7\n"),

@@ -246,7 +246,7 @@ fn reference_systems_are_carried_and_not_mixed() {
     assert!(report.warnings[0].contains("b.xyz: it gives no reference system, as 1 of 2 files"));
     let (_, text) = header(&output);
     assert!(
-        text.contains("\ncomment epsg 32617\ncomment crs EPSG:32617 UTM zone\n"),
+        text.contains("\ncomment epsg 32617\ncomment crs EPSG:32617\n"),
         "{text}"
     );
     let beside = std::fs::read_to_string(output.with_extension("prj")).unwrap();
@@ -335,4 +335,37 @@ fn far_points_are_left_out_and_said() {
     let report = util::reconstruct(&cloud, &output, &keep);
     assert_eq!(report.input.dropped_far, 0);
     assert!(report.lattice.step > 0.001 && !report.lattice.exact);
+}
+
+#[test]
+fn values_stay_with_their_points_when_others_are_left_out() {
+    let bench = Bench::new();
+    let header = |count: usize| {
+        format!(
+            "ply\nformat ascii 1.0\nelement vertex {count}\nproperty double x\nproperty double y\n\
+             property double z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n"
+        )
+    };
+    let coloured = |(number, line): (usize, &String)| {
+        format!("{} {} {} 9\n", line.trim_end(), number % 256, number / 256)
+    };
+    let mut lines: Vec<String> = hills(0.35, 3).iter().enumerate().map(coloured).collect();
+    let write =
+        |name: &str, lines: &[String]| bench.write(name, header(lines.len()) + &lines.concat());
+    let params = Params {
+        attributes: outcrop::stages::ingest::Attributes::Auto,
+        ..Params::default()
+    };
+    let (near, alone) = (write("near.ply", &lines), bench.path("alone.ply"));
+    util::reconstruct(&near, &alone, &params);
+    lines.insert(17, "0.000 0.000 0.000 1 2 3\n".into());
+    let output = bench.path("mesh.ply");
+    let report = util::reconstruct(&write("far.ply", &lines), &output, &params);
+    assert_eq!(report.input.dropped_far, 1);
+    assert_eq!(util::hash(&output), util::hash(&alone));
+    assert!(header_text(&output).contains("property uchar red"));
+}
+
+fn header_text(path: &Path) -> String {
+    header(path).1
 }

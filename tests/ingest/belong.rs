@@ -84,10 +84,10 @@ fn files_of_two_reference_systems_are_told_apart() {
     );
     // The one that tells most, in any order of the files.
     for paths in [fine.clone(), fine.iter().rev().cloned().collect()] {
-        let stats = bench.read(&paths).unwrap().stats().clone();
-        let crs = stats.crs.unwrap();
+        let spool = bench.read(&paths).unwrap();
+        let crs = spool.stats().crs.clone().unwrap();
         assert_eq!((crs.name.as_str(), crs.horizontal), ("a", Some(26917)));
-        assert!(crs.wkt.unwrap().starts_with("PROJCS[\"a\""));
+        assert!(spool.wkt().unwrap().starts_with("PROJCS[\"a\""));
         assert_eq!(check_systems(&paths).map_err(|e| e.to_string()), Ok(()));
     }
     for other in other {
@@ -202,4 +202,27 @@ fn files_in_two_units_or_places_are_told_apart() {
         said[0].contains("elsewhere.las") && said[0].contains("beside.las"),
         "{said:?}"
     );
+}
+
+#[test]
+fn texts_of_different_kinds_are_not_compared() {
+    let bench = Bench::new();
+    let keys = bench.path("keys.laz");
+    // A system described by other keys, with a name only.
+    let words = [1u16, 1, 0, 2, 1024, 0, 1, 1, 3072, 0, 1, 32767];
+    with_records(
+        &keys,
+        &[(34735, words.map(u16::to_le_bytes).concat())],
+        false,
+    );
+    let files = ["PROJCS[\"a\"]", "PROJCRS[\"a\"]"].map(|text| {
+        let name = text[..7].trim_end_matches('[');
+        bench.write(&format!("{name}.prj"), text);
+        bench.write(&format!("{name}.xyz"), "1 2 0\n3 4 0\n")
+    });
+    let all = [vec![keys], files.to_vec()].concat();
+    assert_eq!(check_systems(&all).map_err(|e| e.to_string()), Ok(()));
+    assert_eq!(bench.read(&all).unwrap().wkt(), Some("PROJCRS[\"a\"]"));
+    bench.write("PROJCS.prj", "PROJCRS[\"b\"]");
+    assert!(check_systems(&all).is_err());
 }

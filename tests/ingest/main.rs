@@ -11,6 +11,7 @@ mod formats;
 mod lattices;
 mod numbers;
 mod ply_headers;
+mod regions;
 mod scan_columns;
 mod scans;
 

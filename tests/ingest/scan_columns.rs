@@ -6,7 +6,7 @@ use crate::formats::e57::{Scan, cartesian, scaled, write};
 use crate::formats::{pcd, ptx};
 use e57::{Record, RecordDataType, RecordName, RecordValue};
 use outcrop::stages::ingest::probe;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 fn names(path: &Path) -> Vec<String> {
     let columns = probe(path).unwrap().columns.into_iter();
@@ -14,8 +14,8 @@ fn names(path: &Path) -> Vec<String> {
 }
 
 /// The values of all points, in the order of their positions.
-fn values(bench: &Bench, path: &PathBuf, list: &str) -> Vec<Vec<f64>> {
-    let (spool, carried) = read(bench, &[path.clone()], list, false);
+fn values(bench: &Bench, path: &Path, list: &str) -> Vec<Vec<f64>> {
+    let (spool, carried) = read(bench, &[path.to_path_buf()], list, false);
     let found = rows(bench, &spool, &carried);
     spool.release(&bench.workspace).unwrap();
     found.into_iter().map(|(_, values)| values).collect()
@@ -30,7 +30,7 @@ fn pcd_file(body: &str, colors: &str, count: u32) -> Vec<u8> {
     .into_bytes();
     let mut columns: [Vec<u8>; 8] = Default::default();
     for i in 0..count {
-        let color = 0x00c8_6400 | i % 256;
+        let color = 0x00c8_6400 | (i % 256);
         let (intensity, label) = (i as f32 / 4.0, i as i16 - 50);
         if body == "ascii" {
             let color = match colors {

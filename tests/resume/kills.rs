@@ -38,6 +38,27 @@ fn killed_anywhere_filters_go_on() {
 }
 
 #[test]
+fn killed_while_far_points_are_searched() {
+    let case = Case::with_far_point();
+    assert_eq!(case.counts["input"]["dropped_far"], 1);
+    let said = |said: &str| said.contains("1 points left out, far from all others");
+    for number in 1..30 {
+        let fault = format!("recorded:{number}");
+        case.killed(&fault);
+        assert!(said(&case.go_on(&fault)), "{fault}");
+        let text = std::fs::read_to_string(case.bench.path("mesh.prj")).unwrap();
+        assert_eq!(text.trim_end(), "LOCAL_CS[\"site\"]");
+        std::fs::remove_file(case.bench.path("mesh.prj")).unwrap();
+    }
+    // What a file beside an input says is in the mesh.
+    case.killed("recorded:20");
+    case.bench.write("far.prj", "LOCAL_CS[\"another site\"]");
+    let ended = case.attempt("", &["--resume"]);
+    assert_eq!(ended.said.code, Some(2));
+    assert!(ended.said.err.contains("far.prj was"), "{ended:?}");
+}
+
+#[test]
 fn killed_while_the_mesh_gets_its_name() {
     let case = Case::new(ROBUST);
     for fault in ["rename:1", "renamed:1"] {
@@ -80,8 +101,8 @@ fn killed_while_a_mesh_in_another_format_is_written() {
     ] {
         let case = Case::with_mesh(name, options);
         let last = |kind: &str| case.events[kind];
-        let records = (last("recorded") - 9..=last("recorded")).map(|n| format!("recorded:{n}"));
-        let writes = (last("write") - 24..=last("write")).step_by(4);
+        let records = (last("recorded") - 4..=last("recorded")).map(|n| format!("recorded:{n}"));
+        let writes = (last("write") - 24..=last("write")).step_by(9);
         let writes = writes.map(|n| format!("write:{n}"));
         let mut kills = 0;
         for fault in records.chain(writes).chain(["rename:1".to_owned()]) {
@@ -91,7 +112,40 @@ fn killed_while_a_mesh_in_another_format_is_written() {
                 kills += 1;
             }
         }
-        assert!(kills > 10, "{name}: {kills}");
+        assert!(kills > 5, "{name}: {kills}");
+    }
+}
+
+/// Some squares have their names when others are still unfinished.
+#[test]
+fn killed_while_a_divided_mesh_is_written() {
+    for name in ["mesh.ply", "mesh.ply.zst"] {
+        let crop = [
+            "--crop",
+            "-300,-300,250,300",
+            "--crop-margin",
+            "70",
+            "--split",
+            "150",
+        ];
+        let case = Case::with_mesh(name, &crop);
+        let last = |kind: &str| case.events[kind];
+        assert!(last("rename") > 8, "{}", last("rename"));
+        let records = (last("recorded") - 30..=last("recorded")).step_by(3);
+        let records = records.map(|n| format!("recorded:{n}"));
+        let writes = (last("write") - 60..=last("write")).step_by(7);
+        let writes = writes.map(|n| format!("write:{n}"));
+        let names =
+            [1, 2, 5, last("rename")].map(|n| [format!("rename:{n}"), format!("renamed:{n}")]);
+        let mut kills = 0;
+        for fault in records.chain(writes).chain(names.into_iter().flatten()) {
+            case.killed(&fault);
+            if case.scratch.exists() {
+                assert_eq!(case.go_on(&fault), "", "{name}, {fault}");
+                kills += 1;
+            }
+        }
+        assert!(kills > 15, "{name}: {kills}");
     }
 }
 

@@ -3,6 +3,7 @@
 use crate::util::{self, Bench, Said};
 use outcrop_cloudgen::{Cloud, Kind};
 use std::collections::HashMap;
+use std::hash::{Hash, Hasher};
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
 use std::process::Output;
@@ -13,7 +14,7 @@ const PARTS: [&str; 4] = ["--block-points", "4096", "--tile-points", "1500"];
 /// Options that cover different stages.
 pub const ROBUST: &[&str] = &[];
 pub const PAPER: &[&str] = &["--method", "paper", "--smooth", "1", "--relax", "1"];
-pub const FILTERS: &[&str] = &["--thin", "6", "--drop-outliers"];
+pub const FILTERS: &[&str] = &["--thin", "6", "--drop-outliers", "--origin", "-3,0.5,7"];
 
 /// A cloud, options, and the mesh of an undisturbed run.
 pub struct Case {
@@ -24,7 +25,7 @@ pub struct Case {
     options: Vec<String>,
     expected: u64,
     /// The counts of the report.
-    counts: serde_json::Value,
+    pub counts: serde_json::Value,
     /// Number of events of each kind in an undisturbed run.
     pub events: HashMap<String, u64>,
 }
@@ -53,7 +54,21 @@ impl Case {
 
     /// As [`Case::new`], with this name of the mesh.
     pub fn with_mesh(name: &str, options: &[&str]) -> Self {
+        Self::of(Bench::new(), name, options)
+    }
+
+    /// As [`Case::new`], with a point so far away that the lattice is chosen without it, and a reference system.
+    pub fn with_far_point() -> Self {
         let bench = Bench::new();
+        let far = bench
+            .write("far.xyz", "1.5 -7e30 2\n")
+            .display()
+            .to_string();
+        bench.write("far.prj", "LOCAL_CS[\"site\"]");
+        Self::of(bench, "mesh.ply", &[&far, "--origin", "auto"])
+    }
+
+    fn of(bench: Bench, name: &str, options: &[&str]) -> Self {
         let mut cloud = Cloud::new(Kind::Terrain).points(30_000).noise(0.6);
         cloud.outliers = 0.001;
         let input = bench.cloud("cloud.laz", &cloud);
@@ -73,7 +88,7 @@ impl Case {
         let report = case.bench.path("report.json").display().to_string();
         let ended = case.attempt(&fault, &["--threads", "2", "--report", &report]);
         assert_eq!(ended.said.code, Some(0), "{ended:?}");
-        case.expected = util::hash(&case.mesh);
+        case.expected = case.meshes();
         case.counts = case.report();
         let counts = std::fs::read_to_string(counts).unwrap();
         let lines = counts.lines().filter_map(|line| line.split_once(' '));
@@ -122,7 +137,26 @@ impl Case {
     /// Removes all files of runs.
     pub fn clear(&self) {
         let _ = std::fs::remove_dir_all(&self.scratch);
-        let _ = std::fs::remove_file(&self.mesh);
+        for path in self.outputs() {
+            let _ = std::fs::remove_file(path);
+        }
+    }
+
+    /// Paths of everything that the run wrote, in the order of names.
+    pub fn outputs(&self) -> Vec<PathBuf> {
+        let names = util::listing(self.bench.folder()).into_iter();
+        let mine = names.filter(|name| name.starts_with("mesh") && !name.contains("scratch"));
+        mine.map(|name| self.bench.path(&name)).collect()
+    }
+
+    /// A hash of all meshes and their names.
+    fn meshes(&self) -> u64 {
+        let mut hasher = std::collections::hash_map::DefaultHasher::new();
+        for path in self.outputs() {
+            path.hash(&mut hasher);
+            util::hash(&path).hash(&mut hasher);
+        }
+        hasher.finish()
     }
 
     /// Makes a run that is killed at this event, with other threads and memory than later attempts.
@@ -148,10 +182,7 @@ impl Case {
     /// Checks that the run succeeded and left only the mesh.
     pub fn check(&self, said: &Said, what: &str) {
         assert_eq!(said.code, Some(0), "{what}: {said:?}");
-        assert!(
-            util::hash(&self.mesh) == self.expected,
-            "{what}: another mesh"
-        );
+        assert!(self.meshes() == self.expected, "{what}: another mesh");
         let left = util::listing(self.bench.folder());
         let strange = |name: &&String| name.contains("outcrop");
         assert_eq!(left.iter().find(strange), None, "{what}");

@@ -7,7 +7,10 @@ use crate::error::Result;
 use crate::geom::lattice::{Lattice, Shift};
 use crate::params::Origin;
 use crate::stages::attributes::StoredColumns;
-use crate::stages::export::{CoordinateType, ExportOptions, export};
+use crate::stages::cut::StoredPieces;
+use crate::stages::export::{
+    CoordinateType, ExportOptions, SplitOptions, export, export_cut, export_split,
+};
 use crate::stages::ingest;
 use crate::stages::order::PointStore;
 use crate::stages::repair::Repaired;
@@ -61,7 +64,7 @@ impl Stages<'_> {
         let mut comments = place.map_or_else(Vec::new, |place| place.comments());
         if let Some(crs) = &self.report.input.crs {
             comments.extend(crs.horizontal.map(|code| format!("epsg {code}")));
-            comments.push(format!("crs {}", crs.line()));
+            comments.push(format!("crs {}", crs.label()));
         }
         comments
     }
@@ -72,6 +75,7 @@ impl Stages<'_> {
         store: &PointStore,
         columns: Option<&StoredColumns>,
         repaired: &Repaired,
+        pieces: Option<&StoredPieces>,
         lattice: &Lattice,
     ) -> Result<()> {
         let (job, workspace, blocks) = (self.job, self.workspace, self.blocks());
@@ -85,11 +89,23 @@ impl Stages<'_> {
             normals: job.params.normals,
             decimals: self.known.text.map_or(0, |text| text.decimals),
         };
-        let items = 2 * blocks.count() as u64;
-        self.report.mesh = self.clock.stage("export", "blocks", items, || {
-            export(store, repaired, blocks, lattice, options, workspace)
-        })?;
+        let items = match pieces {
+            Some(pieces) => pieces.count() as u64,
+            None => 2 * blocks.count() as u64,
+        };
+        let write = || match pieces {
+            Some(pieces) => match job.params.split {
+                Some(side) => {
+                    let split = SplitOptions { side };
+                    export_split(store, pieces, lattice, split, options, workspace)
+                }
+                None => export_cut(store, pieces, lattice, options, workspace),
+            },
+            None => export(store, repaired, blocks, lattice, options, workspace),
+        };
+        self.report.mesh = self.clock.stage("export", "blocks", items, write)?;
+        pieces.map_or(Ok(()), |pieces| pieces.release(workspace))?;
         columns.map_or(Ok(()), |columns| columns.release(workspace))?;
-        beside::write(&job.output, &job.inputs, &self.report)
+        beside::write(&job.output, &job.inputs, &self.report, self.wkt.as_deref())
     }
 }

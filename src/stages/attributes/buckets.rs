@@ -10,6 +10,9 @@ use crate::workspace::memory::bytes_of;
 use crate::workspace::{Unit, Workspace};
 use std::ops::Range;
 
+/// A table of words by id, and the number of words of an id.
+pub type Part = (Table<Word>, usize);
+
 /// The buckets of an ordered store, and the sections of its columns.
 pub struct Buckets<'a> {
     store: &'a PointStore,
@@ -71,7 +74,7 @@ impl<'a> Buckets<'a> {
         inbox: &Inbox<R>,
         parts: [usize; 2],
         workspace: &Workspace,
-    ) -> Result<[Option<(Table<Word>, usize)>; 2]> {
+    ) -> Result<[Option<Part>; 2]> {
         let words = parts[0] + parts[1];
         let table =
             |name, words| (words > 0).then(|| (Table::new(name, self.sections.len() - 1), words));

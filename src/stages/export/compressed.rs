@@ -1,7 +1,8 @@
 //! A compressed mesh: the bytes of the plain file in frames of the Zstandard seekable format. All threads
 //! compress parts, and the calling thread writes them in their order.
 
-use super::file::{HEADER, MeshFile, note};
+use super::file::{HEADER, MeshFile};
+use super::parts::Parts;
 use super::write::{KINDS, Writer};
 use crate::error::Result;
 use crate::workspace::place::Place;
@@ -33,18 +34,20 @@ struct Frame {
     bytes: Vec<u8>,
 }
 
-/// Writes the file.
-pub(super) fn write(writer: &Writer<'_>, workspace: &Workspace) -> Result<()> {
-    workspace.once("compress", |unit| {
-        let whole = write_all(writer, workspace)?;
-        note(unit, HEADER, whole);
-        Ok(())
-    })
+/// Writes the file, as one unit.
+pub(super) fn write<P: Parts>(
+    writer: &Writer<'_, P>,
+    unit: &Unit<'_>,
+    workspace: &Workspace,
+) -> Result<()> {
+    let whole = write_all(writer, workspace)?;
+    writer.file.note(unit, HEADER, whole);
+    Ok(())
 }
 
 /// Writes the file; returns its place.
-fn write_all(writer: &Writer<'_>, workspace: &Workspace) -> Result<Place> {
-    let (bytes, blocks) = (writer.file.layout.bytes, writer.blocks.count());
+fn write_all<P: Parts>(writer: &Writer<'_, P>, workspace: &Workspace) -> Result<Place> {
+    let (bytes, blocks) = (writer.file.layout.bytes, writer.parts.count());
     let count = KINDS * blocks;
     let sizes = (0..count).map(|part| writer.start(part + 1) - writer.start(part));
     let most = compress_bound(sizes.max().unwrap_or(0) as usize) as u64;
@@ -81,7 +84,7 @@ fn write_all(writer: &Writer<'_>, workspace: &Workspace) -> Result<Place> {
 }
 
 /// Encodes and compresses a part.
-fn pack_part(writer: &Writer<'_>, unit: &Unit<'_>, part: usize) -> Result<Vec<Frame>> {
+fn pack_part<P: Parts>(writer: &Writer<'_, P>, unit: &Unit<'_>, part: usize) -> Result<Vec<Frame>> {
     let mut bytes = Vec::new();
     writer.encode(unit, part, &mut bytes)?;
     pack(&bytes).map_err(|e| writer.file.failed("compress", e))

@@ -5,12 +5,16 @@ use crate::error::{Error, Result};
 use crate::workspace::fault::{self, Event};
 use crate::workspace::open::{failed_write, open_existing, options};
 use crate::workspace::place::{Place, Put};
+pub use crate::workspace::temporary;
 use crate::workspace::{OUTPUT, RENAMED, Unit, Workspace, limits};
 use std::fs::File;
 use std::io::ErrorKind::NotFound;
 use std::ops::Range;
 use std::os::unix::fs::{FileExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
+
+/// A triangle with the positions of its corners.
+pub type Placed = ([u32; 3], Positions);
 
 /// Records encoded at a time.
 const BATCH: usize = 1024;
@@ -24,18 +28,13 @@ pub struct MeshFile<'a> {
     file: Option<File>,
     format: &'static dyn MeshFormat,
     mesh: Mesh,
+    /// Its name in the journal.
+    name: String,
+    /// True if dropping it deletes an unfinished file.
+    owned: bool,
     /// The offsets of its parts.
     pub layout: Layout,
     workspace: &'a Workspace,
-}
-
-/// The temporary name of a mesh, in the same folder as the final one.
-#[must_use]
-pub fn temporary(output: &Path) -> PathBuf {
-    let mut name = std::ffi::OsString::from(".");
-    name.push(output.file_name().unwrap_or_default());
-    name.push(".outcrop-part");
-    folder_of(output).join(name)
 }
 
 /// The temporary name of a mesh if tasks share the run: each attempt at the mesh has a number.
@@ -92,6 +91,8 @@ impl<'a> MeshFile<'a> {
             layout: format.layout(&mesh),
             format,
             mesh,
+            name: OUTPUT.to_owned(),
+            owned: true,
             workspace,
         };
         let known = workspace.places(OUTPUT);
@@ -122,6 +123,35 @@ impl<'a> MeshFile<'a> {
             }
         }
         Ok(file)
+    }
+
+    /// Opens the file of one of several meshes, or creates it; `name` is its name in the journal.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn one_of_several(
+        output: &Path,
+        temporary: PathBuf,
+        name: String,
+        format: &'static dyn MeshFormat,
+        mesh: Mesh,
+        workspace: &'a Workspace,
+    ) -> Result<Self> {
+        // Several threads may do this at the same time.
+        let file = options().mode(0o666).create(true).open(&temporary);
+        let file = file.map_err(|e| Error::io(output, "create a file beside it", e))?;
+        workspace.touched(&temporary);
+        Ok(Self {
+            output: output.to_path_buf(),
+            temporary,
+            file: Some(file),
+            layout: format.layout(&mesh),
+            format,
+            mesh,
+            name,
+            owned: false,
+            workspace,
+        })
     }
 
     fn begin(&mut self) -> Result<()> {
@@ -185,8 +215,17 @@ impl<'a> MeshFile<'a> {
             crc: if resumable { crc32fast::hash(bytes) } else { 0 },
             ..Place::default()
         };
-        note(unit, part, place);
+        self.note(unit, part, place);
         Ok(Vec::new())
+    }
+
+    /// Notes a part of the mesh.
+    pub fn note(&self, unit: &Unit<'_>, section: u32, place: Place) {
+        unit.note(Put {
+            file: self.name.clone(),
+            section,
+            place,
+        });
     }
 
     /// Writes the edges of parts.
@@ -244,11 +283,8 @@ impl<'a> MeshFile<'a> {
     }
 
     /// A batch of triangles with their positions that are encoded to the end of `bytes`.
-    pub fn placed_triangles(
-        &self,
-        bytes: &mut Vec<u8>,
-    ) -> Batch<([u32; 3], Positions), impl FnMut(&[([u32; 3], Positions)])> {
-        Batch::new(|batch: &[([u32; 3], Positions)]| {
+    pub fn placed_triangles(&self, bytes: &mut Vec<u8>) -> Batch<Placed, impl FnMut(&[Placed])> {
+        Batch::new(|batch: &[Placed]| {
             let (triangles, positions): (Vec<_>, Vec<_>) = batch.iter().copied().unzip();
             self.format
                 .put_triangles(&self.mesh, &triangles, &positions, bytes);
@@ -275,7 +311,7 @@ impl<'a> MeshFile<'a> {
                 .map_err(|e| Error::io(&self.output, "sync", e))?;
             let step = self.workspace.step("rename")?;
             step.finish(0, &(), |unit| {
-                note(unit, RENAMED, Place::default());
+                self.note(unit, RENAMED, Place::default());
                 Ok(())
             })?;
             fault::point(Event::Rename);
@@ -297,19 +333,10 @@ impl<'a> MeshFile<'a> {
 
 impl Drop for MeshFile<'_> {
     fn drop(&mut self) {
-        if self.file.is_some() && !self.workspace.is_resumable() {
+        if self.owned && self.file.is_some() && !self.workspace.is_resumable() {
             let _ = std::fs::remove_file(&self.temporary);
         }
     }
-}
-
-/// Notes a part of the mesh.
-pub fn note(unit: &Unit<'_>, section: u32, place: Place) {
-    unit.note(Put {
-        file: OUTPUT.to_owned(),
-        section,
-        place,
-    });
 }
 
 /// Collects records and passes them on in batches.

@@ -16,7 +16,9 @@ mod glb;
 mod normals;
 mod number;
 mod obj;
+mod parts;
 mod ply;
+mod split;
 mod stl;
 mod write;
 
@@ -25,19 +27,23 @@ pub use format::CoordinateType;
 pub(crate) use format::{Mesh, normal_columns};
 pub(crate) use formats::{check_name, check_size, left_out, mesh_bytes};
 pub(crate) use obj::decimals;
+pub use split::{SplitOptions, export_split};
+pub(crate) use split::{is_square_of, remove_unfinished};
 
 use crate::error::{Error, Result};
 use crate::geom::lattice::{Lattice, Shift};
 use crate::stages::attributes::StoredColumns;
 use crate::stages::blocks::Blocks;
+use crate::stages::cut::StoredPieces;
 use crate::stages::ingest::Column;
 use crate::stages::order::PointStore;
 use crate::stages::repair::Repaired;
 use crate::workspace::Workspace;
 use coordinates::Coordinates;
 use file::MeshFile;
-use format::VertexColumn;
+use format::{MeshFormat, VertexColumn};
 use formats::format_of;
+use parts::{OfTile, Parts, Whole};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use write::Writer;
@@ -105,81 +111,135 @@ pub fn export(
     options: ExportOptions<'_>,
     workspace: &Workspace,
 ) -> Result<MeshStats> {
-    let ExportOptions {
-        output,
-        coordinates,
-        comments,
-        origin: shift,
-        normals,
-        columns,
-        decimals,
-    } = options;
-    let format = format_of(output)?;
-    let in_file = Coordinates {
-        lattice,
-        shift,
-        written: coordinates,
-    };
     let surface = repaired.surface.open(workspace)?;
     let filled = repaired.filled.open(workspace, blocks.count())?;
     let numbering = number::number(&repaired.numbering, &filled, blocks, workspace)?;
-    let stats = numbering.stats;
+    let parts = Whole {
+        store,
+        surface,
+        filled,
+        pinches: &repaired.numbering.pinches,
+        numbering,
+        blocks,
+    };
+    let stats = parts.stats();
     if stats.triangles == 0 {
         return Err(Error::NoTriangles {
             why: NO_TRIANGLES.into(),
         });
     }
-    let mut mesh = Mesh {
-        vertices: stats.vertices,
-        triangles: stats.triangles,
-        coordinates,
-        columns: normal_columns()
-            .filter(|_| normals)
-            .chain(of_points(columns).map(VertexColumn::from))
-            .collect(),
-        comments,
-        origin: shift.map(|shift| shift.origin),
-        bounds: None,
-        decimals,
-    };
-    // Columns that the format does not hold are not made.
-    mesh.columns = mesh
-        .columns
-        .iter()
-        .filter(|c| format.holds(&mesh, c))
-        .cloned()
-        .collect();
+    let (format, mut mesh) = options.mesh(&stats)?;
     if format.wants_bounds() {
-        let bounds = bounds::bounds(store, &numbering, workspace)?;
+        let bounds = bounds::bounds(store, &parts.numbering, workspace)?;
+        let in_file = options.in_file(lattice);
         mesh.bounds = Some(bounds.map(|corner| in_file.of(corner)));
     }
-    check_size(output, &mesh, false)?;
-    let held = |c: &Column| mesh.columns.iter().any(|held| held.name == c.name);
-    let columns = columns.map(|columns| (columns, of_points(Some(columns)).map(held).collect()));
-    let writer = Writer {
-        store,
-        columns,
-        surface,
-        filled,
-        pinches: &repaired.numbering.pinches,
-        normals: mesh.normals().is_some(),
-        numbering,
-        blocks,
-        coordinates: in_file,
-        file: MeshFile::open(output, format, mesh, workspace)?,
-    };
-    match is_compressed(output) {
-        true => compressed::write(&writer, workspace)?,
-        false => writer.write(workspace)?,
-    }
-    writer.file.finish()?;
-    writer.numbering.release(workspace)?;
+    let parts = write(store, parts, lattice, mesh, &options, workspace)?;
+    parts.numbering.release(workspace)?;
     Ok(stats)
+}
+
+/// Writes a mesh that was cut, but not divided: that of the only square.
+///
+/// # Errors
+/// See [`export`].
+pub fn export_cut(
+    store: &PointStore,
+    stored: &StoredPieces,
+    lattice: &Lattice,
+    options: ExportOptions<'_>,
+    workspace: &Workspace,
+) -> Result<MeshStats> {
+    let pieces = &stored.open(workspace)?;
+    let [tile] = pieces.tiles() else {
+        return Err(Error::NoTriangles {
+            why: NO_TRIANGLES.into(),
+        });
+    };
+    let parts = OfTile { pieces, tile };
+    let (_, mut mesh) = options.mesh(&parts.stats())?;
+    let in_file = options.in_file(lattice);
+    mesh.bounds = Some(tile.bounds.map(|corner| in_file.of(corner)));
+    write(store, parts, lattice, mesh, &options, workspace)?;
+    Ok(parts.stats())
+}
+
+impl ExportOptions<'_> {
+    /// The format, and what is known of a mesh with these counts.
+    fn mesh(&self, stats: &MeshStats) -> Result<(&'static dyn MeshFormat, Mesh)> {
+        let format = format_of(self.output)?;
+        let mut mesh = Mesh {
+            vertices: stats.vertices,
+            triangles: stats.triangles,
+            coordinates: self.coordinates,
+            columns: normal_columns()
+                .filter(|_| self.normals)
+                .chain(of_points(self.columns).map(VertexColumn::from))
+                .collect(),
+            comments: self.comments.clone(),
+            origin: self.origin.map(|shift| shift.origin),
+            bounds: None,
+            decimals: self.decimals,
+        };
+        // Columns that the format does not hold are not made.
+        mesh.columns = mesh
+            .columns
+            .iter()
+            .filter(|c| format.holds(&mesh, c))
+            .cloned()
+            .collect();
+        Ok((format, mesh))
+    }
+
+    /// The coordinates in the file.
+    fn in_file<'l>(&self, lattice: &'l Lattice) -> Coordinates<'l> {
+        Coordinates {
+            lattice,
+            shift: self.origin,
+            written: self.coordinates,
+        }
+    }
+
+    /// The columns of the points, and true for each of them that the file holds.
+    fn held(&self, mesh: &Mesh) -> Option<(&StoredColumns, Vec<bool>)> {
+        let held = |c: &Column| mesh.columns.iter().any(|held| held.name == c.name);
+        let held = of_points(self.columns).map(held).collect();
+        self.columns.map(|columns| (columns, held))
+    }
 }
 
 /// The columns of points.
 fn of_points(columns: Option<&StoredColumns>) -> impl Iterator<Item = &Column> {
     columns.into_iter().flat_map(StoredColumns::columns)
+}
+
+/// Writes the file of a mesh; returns its parts.
+fn write<P: Parts>(
+    store: &PointStore,
+    parts: P,
+    lattice: &Lattice,
+    mesh: Mesh,
+    options: &ExportOptions<'_>,
+    workspace: &Workspace,
+) -> Result<P> {
+    let output = options.output;
+    check_size(output, &mesh, false)?;
+    let writer = Writer {
+        store,
+        parts,
+        columns: options.held(&mesh),
+        normals: mesh.normals().is_some(),
+        coordinates: options.in_file(lattice),
+        file: MeshFile::open(output, format_of(output)?, mesh, workspace)?,
+    };
+    match is_compressed(output) {
+        true => workspace.once("compress", |unit| {
+            compressed::write(&writer, unit, workspace)
+        })?,
+        false => writer.write(workspace)?,
+    }
+    writer.file.finish()?;
+    Ok(writer.parts)
 }
 
 const NO_TRIANGLES: &str = "no three cells agree on one that belongs to a component large enough; \

@@ -7,6 +7,7 @@ use super::corners::Corners;
 use super::number::{Split, split_block};
 use crate::error::Result;
 use crate::geom::Point;
+use crate::geom::triangle::direction as unit_vector;
 use crate::spill::{Id, Inbox, Table};
 use crate::stages::blocks::Blocks;
 use crate::stages::order::PointStore;
@@ -119,17 +120,6 @@ fn doubled_area([a, b, c]: [Point; 3]) -> [i64; 3] {
         let j = (i + 1) % 3;
         u[i] * v[j] - u[j] * v[i]
     })
-}
-
-/// The direction of a sum, by operations that every machine rounds alike; up where the triangles cancel each
-/// other.
-fn unit_vector(sum: &Sum) -> [f32; 3] {
-    let [x, y, z] = sum.map(|x| x as f64);
-    let length = (x * x + y * y + z * z).sqrt();
-    if length == 0.0 {
-        return [0.0, 0.0, 1.0];
-    }
-    [x, y, z].map(|x| (x / length) as f32)
 }
 
 #[cfg(test)]

@@ -2,74 +2,70 @@
 
 use super::coordinates::Coordinates;
 use super::corners::Corners;
-use super::faces::Faces;
 use super::file::{Edge, HEADER, MeshFile};
-use super::normals::{Normals, Sources};
-use super::number::Numbering;
+use super::parts::Parts;
 use crate::error::Result;
-use crate::spill::{Id, Inbox, Table};
+use crate::geom::Point;
 use crate::stages::attributes::StoredColumns;
-use crate::stages::blocks::Blocks;
 use crate::stages::order::PointStore;
-use crate::stages::repair::{FilledTriangle, Surface};
 use crate::workspace::memory::bytes_of;
 use crate::workspace::{Unit, Workspace};
-use std::ops::Range;
 
-/// Writes the parts of a mesh: for each block its vertices, its copies of vertices, and its triangles. In the
-/// file the parts of one kind follow each other.
-pub struct Writer<'a> {
+/// Writes the parts of a mesh: of each its vertices, its copies of vertices, and its triangles. In the file the
+/// slices of one kind follow each other.
+pub struct Writer<'a, P> {
     /// Positions.
     pub store: &'a PointStore,
+    /// The parts.
+    pub parts: P,
     /// Columns of the points, and true for each of them that the file holds; behind the normals.
     pub columns: Option<(&'a StoredColumns, Vec<bool>)>,
-    /// Triangles, except those that fill holes.
-    pub surface: Surface<'a>,
-    /// Triangles that fill holes.
-    pub filled: Inbox<FilledTriangle>,
-    /// Vertices that may have copies.
-    pub pinches: &'a Table<Id>,
     /// Normals are among the columns, as the first.
     pub normals: bool,
-    /// Numbers of vertices and triangles.
-    pub numbering: Numbering,
-    /// Division into blocks.
-    pub blocks: Blocks,
     /// The coordinates in the file.
     pub coordinates: Coordinates<'a>,
     /// The file.
     pub file: MeshFile<'a>,
 }
 
-/// Number of parts of a block.
+/// Number of slices of a part.
 pub const KINDS: usize = 3;
 
-impl Writer<'_> {
-    /// Writes the file, every part at its offset.
+impl<P: Parts> Writer<'_, P> {
+    /// Writes the file, every slice at its offset.
     pub fn write(&self, workspace: &Workspace) -> Result<()> {
-        let (file, count) = (&self.file, self.blocks.count());
-        workspace.once("header", |unit| {
-            file.write(unit, HEADER, &file.layout.header, 0)
-        })?;
-        let memory = |block| self.memory(workspace, block);
+        let file = &self.file;
+        workspace.once("header", |unit| self.write_header(unit).map(drop))?;
+        let memory = |part| self.memory(workspace, part);
         let work = |unit: &Unit<'_>| {
-            let (mut bytes, mut edges) = (Vec::new(), Vec::new());
-            for kind in 0..KINDS {
-                let part = kind * count + unit.number();
-                self.encode(unit, part, &mut bytes)?;
-                edges.extend(file.write(unit, part as u32, &bytes, self.start(part))?);
-            }
+            let edges = self.write_part(unit, unit.number())?;
             unit.advance(1);
             Ok(edges)
         };
         let each = |_, edges: Vec<Edge>| file.write_edges(&edges);
-        workspace.units("export: block", count, memory, work, each)
+        workspace.units("export: block", self.parts.count(), memory, work, each)
     }
 
-    /// Bytes of memory for a part of a block.
-    pub fn memory(&self, workspace: &Workspace, block: usize) -> u64 {
-        let records = self.surface.records(workspace, block) + self.filled.rows(block);
-        let (records, points) = (records as u64, self.blocks.ids(block).len() as u64);
+    /// Writes the header.
+    pub fn write_header(&self, unit: &Unit<'_>) -> Result<Vec<Edge>> {
+        self.file.write(unit, HEADER, &self.file.layout.header, 0)
+    }
+
+    /// Writes the slices of a part; returns the edges that a task leaves.
+    pub fn write_part(&self, unit: &Unit<'_>, part: usize) -> Result<Vec<Edge>> {
+        let (mut bytes, mut edges) = (Vec::new(), Vec::new());
+        for kind in 0..KINDS {
+            let slice = kind * self.parts.count() + part;
+            self.encode(unit, slice, &mut bytes)?;
+            let start = self.start(slice);
+            edges.extend(self.file.write(unit, slice as u32, &bytes, start)?);
+        }
+        Ok(edges)
+    }
+
+    /// Bytes of memory for a part.
+    pub fn memory(&self, workspace: &Workspace, part: usize) -> u64 {
+        let [points, records] = self.parts.sizes(workspace, part);
         let layout = &self.file.layout;
         let of_triangles = (47 + layout.triangles.bytes) * records;
         let of_points = (36 + layout.vertices.bytes + self.file.value_bytes() as u64) * points;
@@ -81,128 +77,103 @@ impl Writer<'_> {
             bytes += columns.bytes(points as usize);
         }
         if self.normals {
-            bytes += Normals::estimate(points, records);
+            bytes += P::normals_estimate(points, records);
         }
         bytes
     }
 
-    /// Offset in the uncompressed file at which a part begins: the end of the part before it.
-    pub fn start(&self, part: usize) -> u64 {
-        let (layout, numbering) = (&self.file.layout, &self.numbering);
-        let block = part % self.blocks.count();
-        match part / self.blocks.count() {
-            0 => {
-                let first = numbering.vertex(self.blocks.ids(block).start);
-                layout.vertices.offset(first.into())
-            }
-            1 => layout.vertices.offset(numbering.first_copy(block)),
-            2 => layout.triangles.offset(numbering.first_face(block)),
+    /// Offset in the uncompressed file at which a slice begins: the end of the slice before it.
+    pub fn start(&self, slice: usize) -> u64 {
+        let (layout, count) = (&self.file.layout, self.parts.count());
+        let first = |kind: usize| self.parts.firsts(slice % count)[kind];
+        match slice / count {
+            0 => layout.vertices.offset(first(0)),
+            1 => layout.vertices.offset(first(1)),
+            2 => layout.triangles.offset(first(2)),
             _ => layout.bytes,
         }
     }
 
-    /// Encodes a part.
-    pub fn encode(&self, unit: &Unit<'_>, part: usize, bytes: &mut Vec<u8>) -> Result<()> {
-        let (numbering, block) = (&self.numbering, part % self.blocks.count());
-        let ids = self.blocks.ids(block);
+    /// Encodes a slice.
+    pub fn encode(&self, unit: &Unit<'_>, slice: usize, bytes: &mut Vec<u8>) -> Result<()> {
+        let (kind, part) = (slice / self.parts.count(), slice % self.parts.count());
         bytes.clear();
-        let size = (self.start(part + 1) - self.start(part)) as usize;
+        let size = (self.start(slice + 1) - self.start(slice)) as usize;
         if size == 0 {
             return Ok(());
         }
         bytes.reserve_exact(size);
-        let normals = |unit| {
-            self.normals
-                .then(|| self.normals_of(unit, block))
-                .transpose()
-        };
-        match part / self.blocks.count() {
-            0 => {
-                let used: Vec<u32> = ids.clone().filter(|v| numbering.used(*v)).collect();
-                let normals = normals(unit)?.map(|normals| {
-                    let _held = unit.hold(normals.bytes());
-                    let own = |v: &u32| normals.points[(v - ids.start) as usize];
-                    used.iter().map(own).collect::<Vec<_>>()
-                });
-                self.vertices(unit, ids, &used, normals, bytes)
-            }
-            1 => {
-                let copies = numbering.copies.get(unit, block)?;
-                let copies: Vec<u32> = copies.iter().map(|c| c.id).collect();
-                let normals = normals(unit)?.map(|normals| normals.copies);
-                self.vertices(unit, ids, &copies, normals, bytes)
-            }
-            _ => self.triangles(unit, block, bytes),
+        if kind == 2 {
+            return self.triangles(unit, part, bytes);
         }
+        let ids = self.parts.vertices(unit, part, kind == 1)?;
+        let normals = self
+            .normals
+            .then(|| self.parts.normals(unit, part, kind == 1, &ids));
+        self.vertices(unit, &ids, normals.transpose()?, bytes)
     }
 
-    /// The normals of a block.
-    fn normals_of(&self, unit: &Unit<'_>, block: usize) -> Result<Normals> {
-        let sources = Sources {
-            store: self.store,
-            surface: &self.surface,
-            filled: &self.filled,
-            pinches: self.pinches,
-            blocks: self.blocks,
-        };
-        Normals::of(unit, &sources, block)
-    }
-
-    /// Encodes the `chosen` points of the block with the ids `ids`, with the normals of each, if any.
+    /// Encodes the points with ascending `ids`, with the normals of each, if any.
     fn vertices(
         &self,
         unit: &Unit<'_>,
-        ids: Range<u32>,
-        chosen: &[u32],
+        ids: &[u32],
         normals: Option<Vec<[f32; 3]>>,
         bytes: &mut Vec<u8>,
     ) -> Result<()> {
-        let points = self.store.slice(ids.start as usize..ids.end as usize)?;
-        let values = self.values(unit, ids.clone(), chosen, normals.as_deref())?;
-        let lists = bytes_of(&points) + bytes_of(&values) + 4 * chosen.len() as u64;
+        let [Some(first), Some(last)] = [ids.first(), ids.last()] else {
+            return Ok(());
+        };
+        let range = *first as usize..*last as usize + 1;
+        let mut points: Vec<Point> = Vec::with_capacity(ids.len());
+        // Where many points of a range are wanted, it is read at once.
+        if range.len() / 4 <= ids.len() {
+            let all = self.store.slice(range)?;
+            points.extend(ids.iter().map(|id| all[(id - first) as usize]));
+        } else {
+            self.store.fetch(ids, &mut points)?;
+        }
+        let values = self.values(unit, ids, normals.as_deref())?;
+        let lists = bytes_of(&points) + bytes_of(&values) + 4 * ids.len() as u64;
         let _held = unit.hold(lists + bytes_of(bytes));
-        let at = |v: &u32| self.coordinates.of(points[(v - ids.start) as usize]);
+        let at = |p: &Point| self.coordinates.of(*p);
         self.file
-            .encode_vertices(chosen.iter().map(at), &values, bytes);
+            .encode_vertices(points.iter().map(at), &values, bytes);
         Ok(())
     }
 
-    /// The values of the `chosen` points of the block with the ids `ids`: their normals, if any, and their columns.
+    /// The values of points with ascending `ids`: their normals, if any, and their columns.
     fn values(
         &self,
         unit: &Unit<'_>,
-        ids: Range<u32>,
-        chosen: &[u32],
+        ids: &[u32],
         normals: Option<&[[f32; 3]]>,
     ) -> Result<Vec<u8>> {
+        let [Some(first), Some(last)] = [ids.first(), ids.last()] else {
+            return Ok(Vec::new());
+        };
         let columns = self.columns.as_ref();
-        let of_block = columns.map(|(columns, held)| Ok((columns.open(unit, ids)?, held)));
-        let of_block = of_block.transpose()?;
-        let _held = unit.hold(of_block.as_ref().map_or(0, |(values, _)| values.bytes()));
-        let mut bytes = Vec::with_capacity(chosen.len() * self.file.value_bytes());
-        for (number, id) in chosen.iter().enumerate() {
+        let opened = columns.map(|(columns, held)| {
+            let values = columns.open(unit, *first..*last + 1)?;
+            Ok((values, held))
+        });
+        let opened = opened.transpose()?;
+        let _held = unit.hold(opened.as_ref().map_or(0, |(values, _)| values.bytes()));
+        let mut bytes = Vec::with_capacity(ids.len() * self.file.value_bytes());
+        for (number, id) in ids.iter().enumerate() {
             if let Some(normals) = normals {
                 bytes.extend(normals[number].iter().flat_map(|x| x.to_le_bytes()));
             }
-            if let Some((values, held)) = &of_block {
+            if let Some((values, held)) = &opened {
                 values.put(*id, held, &mut bytes);
             }
         }
         Ok(bytes)
     }
 
-    /// Encodes the triangles of a block.
-    fn triangles(&self, unit: &Unit<'_>, block: usize, bytes: &mut Vec<u8>) -> Result<()> {
-        let ids = self.blocks.ids(block);
-        let numbering = &self.numbering;
-        let faces = Faces::load(
-            unit,
-            block,
-            &self.surface,
-            &self.filled,
-            numbering,
-            ids.clone(),
-        )?;
+    /// Encodes the triangles of a part.
+    fn triangles(&self, unit: &Unit<'_>, part: usize, bytes: &mut Vec<u8>) -> Result<()> {
+        let faces = self.parts.faces(unit, part)?;
         let _held = unit.hold(faces.bytes() + bytes_of(bytes));
         if !self.file.wants_positions() {
             let mut batch = self.file.triangles(bytes);
@@ -210,7 +181,7 @@ impl Writer<'_> {
             batch.finish();
             return Ok(());
         }
-        let corners = Corners::load(self.store, ids, faces.ids())?;
+        let corners = faces.corners(self.store)?;
         let _corners = unit.hold(corners.bytes());
         let mut batch = self.file.placed_triangles(bytes);
         faces.for_each(|t, ids| batch.push((t, ids.map(|v| self.coordinates.of(corners.at(v))))));

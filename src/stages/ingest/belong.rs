@@ -1,10 +1,7 @@
-//! Warnings about files that may not belong together: different reference systems, units or places.
+//! Warnings about files that may not belong together: different units or places.
 
 use super::crs::Crs;
 use super::stats::FileStats;
-use crate::error::Error;
-use std::path::{Path, PathBuf};
-
 /// A warning is given if one file's point spacing and box are both this many times those of another: it may
 /// be in another unit. A small piece of a survey has a small box but no smaller spacing.
 const LARGER: f64 = 100.0;
@@ -20,60 +17,6 @@ pub(super) fn warnings(files: &[FileStats]) -> Vec<String> {
     let boxes: Vec<Extent<'_>> = files.iter().filter_map(Extent::of).collect();
     let places = far_apart(&boxes).or_else(|| unlike_sizes(&boxes));
     places.into_iter().collect()
-}
-
-/// Two files with different reference systems.
-#[derive(Debug, Clone)]
-pub struct Mixed {
-    /// A file, and its system.
-    first: (PathBuf, String),
-    /// Another file, and its system.
-    other: (PathBuf, String),
-}
-
-impl Mixed {
-    /// The error for a cloud that must have one system.
-    #[must_use]
-    pub fn refused(&self) -> Error {
-        let ((first, system), (other, another)) = (&self.first, &self.other);
-        let expected = format!(
-            "{system}, that of {}; --ignore-crs takes coordinates as they are",
-            first.display()
-        );
-        Error::input(other, "reference system", another, expected)
-    }
-
-    /// The warning for a cloud that may have several.
-    pub(super) fn warning(&self) -> String {
-        let ((first, system), (other, another)) = (&self.first, &self.other);
-        format!(
-            "{}: its reference system is {another}, that of {} is {system}; coordinates are taken as they \
-             are, in no system",
-            other.display(),
-            first.display()
-        )
-    }
-}
-
-/// The reference system of several files; two files if theirs are different.
-pub(super) fn common<'a>(
-    systems: impl Iterator<Item = (&'a Path, Option<&'a Crs>)>,
-) -> Result<Option<Crs>, Mixed> {
-    let mut distinct: Vec<(&Path, &Crs)> = Vec::new();
-    for (path, crs) in systems {
-        let Some(crs) = crs else { continue };
-        if let Some((first, system)) = distinct.iter().find(|(_, known)| known.differs(crs)) {
-            return Err(Mixed {
-                first: (first.to_path_buf(), system.to_string()),
-                other: (path.to_path_buf(), crs.to_string()),
-            });
-        }
-        if !distinct.iter().any(|(_, known)| *known == crs) {
-            distinct.push((path, crs));
-        }
-    }
-    let best = distinct.iter().map(|(_, crs)| *crs);
-    Ok(best.min_by_key(|crs| crs.rank()).cloned())
 }
 
 /// A warning if some files have no reference system, and others have this one.
@@ -192,6 +135,8 @@ mod tests {
             withheld: 0,
             invalid: 0,
             dropped_by_class: 0,
+            dropped_by_crop: 0,
+            skipped_by_crop: 0,
             dropped_far: 0,
             min: (kept > 0).then_some(min),
             max: (kept > 0).then_some(max),

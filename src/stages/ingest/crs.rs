@@ -48,7 +48,7 @@ pub struct Crs {
     pub source: CrsSource,
     /// The well-known text, if it was given by one; at most 1 MiB.
     #[serde(skip)]
-    pub wkt: Option<String>,
+    pub(super) wkt: Option<String>,
     /// The record without the parts that may differ between records of the same meaning.
     #[serde(skip)]
     pub(super) normal: String,
@@ -63,10 +63,33 @@ impl Crs {
                 a != b || heights.is_some_and(|(a, b)| a != b)
             }
             // Without codes, two texts of the same kind are compared.
-            (None, None) => {
-                self.normal.is_empty() == other.normal.is_empty() && self.normal != other.normal
-            }
+            (None, None) => self.kind() == other.kind() && self.normal != other.normal,
             _ => false,
+        }
+    }
+
+    /// The kind of the record: GeoTIFF keys, or the first word of a well-known text.
+    fn kind(&self) -> Option<&str> {
+        match self.source {
+            CrsSource::GeotiffKeys => None,
+            CrsSource::WellKnownText | CrsSource::Prj => self.normal.split(['[', '(']).next(),
+        }
+    }
+
+    /// True if it differs from the same systems as the other.
+    pub(super) fn is_like(&self, other: &Self) -> bool {
+        let codes = |crs: &Self| (crs.horizontal, crs.vertical);
+        let same = self.kind() == other.kind() && self.normal == other.normal;
+        codes(self) == codes(other) && (self.horizontal.is_some() || same)
+    }
+
+    /// The same without the texts, and with a name of bounded length.
+    pub(super) fn without_texts(&self) -> Self {
+        Self {
+            name: self.name.chars().take(LONGEST_NAME).collect(),
+            wkt: None,
+            normal: String::new(),
+            ..*self
         }
     }
 }
@@ -80,6 +103,12 @@ impl Crs {
             (Some(plane), None) => Some(format!("EPSG:{plane}")),
             _ => None,
         }
+    }
+
+    /// The codes, or without codes the name, on one line: names of one system differ from file to file.
+    #[must_use]
+    pub fn label(&self) -> String {
+        self.codes().unwrap_or_else(|| self.line())
     }
 
     /// Codes and name on one line, at most 250 characters.

@@ -5,9 +5,11 @@
 //! where samples of the frames prove that no point is far.
 
 use super::Spool;
+use super::frames::{Frame, FrameBuffer, read_frame};
 use super::lattice;
-use super::source::{Native, Source};
-use super::spool::{Coordinate, Frame, FrameBuffer, read_frame};
+use super::middle::{Middle, sure};
+use super::native::Native;
+use super::source::Source;
 use super::stats::SourceStats;
 use crate::error::Result;
 use crate::geom::lattice::COORDINATE_LIMIT;
@@ -28,10 +30,7 @@ const REACH: f64 = 16.0;
 const BITS: u32 = 16;
 
 /// Bytes of the counts and of the buffers.
-const MEMORY: u64 = (6 * 8 << BITS) + (1 << 20);
-
-/// Of each frame every point with a multiple of this as its number is a sample.
-const SAMPLE: usize = 64;
+const MEMORY: u64 = ((6 * 8) << BITS) + (1 << 20);
 
 /// The result of the passes.
 #[derive(Debug, Default, Serialize, Deserialize)]
@@ -46,29 +45,6 @@ struct Found {
 
 /// The closed interval of an axis in which points are near.
 type Window = [f64; 2];
-
-/// The middle of a frame along each axis: at least a quarter of its samples are at or below the first
-/// coordinate, and as many at or above the second.
-pub(super) type Middle = [[f64; 2]; 3];
-
-/// Number of samples that are at or below the middle of a frame with `points` points.
-fn sure(points: u64) -> u64 {
-    (points.div_ceil(SAMPLE as u64).max(1) - 1) / 4 + 1
-}
-
-/// The middle of a frame.
-pub(super) fn middle<T: Coordinate>(points: &[[T; 3]]) -> Middle {
-    std::array::from_fn(|axis| {
-        let mut sample: Vec<f64> = points
-            .iter()
-            .step_by(SAMPLE)
-            .map(|p| p[axis].into())
-            .collect();
-        sample.sort_unstable_by(f64::total_cmp);
-        let quarter = sure(points.len() as u64) as usize - 1;
-        [sample[quarter], sample[sample.len() - 1 - quarter]]
-    })
-}
 
 impl Spool {
     /// Leaves out points that are far from all others, if the lattice would be finer without them. They stay in

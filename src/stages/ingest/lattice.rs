@@ -11,8 +11,8 @@ const MOST_REFINEMENT: i64 = 1000;
 
 /// The lattice of the sources; see `Spool::choose_lattice`.
 pub(super) fn choose(sources: &[Source], stats: &IngestStats, refine: u32) -> Result<Lattice> {
-    let sources: Vec<&Source> = sources.iter().filter(|s| s.stats.kept > 0).collect();
-    if sources.is_empty() {
+    let sources: Vec<&Source> = sources.iter().filter(|s| s.stats.any()).collect();
+    if sources.iter().all(|s| s.stats.kept == 0) {
         return Err(no_points(stats));
     }
     let offset = common_offset(&sources);
@@ -250,7 +250,7 @@ fn pow2(exponent: i32) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::source::Native;
+    use super::super::native::Native;
     use super::super::stats::SourceStats;
     use super::*;
 

@@ -1,7 +1,8 @@
 //! Conversion of native coordinates to lattice positions, for each axis.
 
-use super::source::{Native, Source};
-use super::spool::FrameBuffer;
+use super::frames::FrameBuffer;
+use super::native::Native;
+use super::source::Source;
 
 /// Largest position before the base is subtracted; beyond it sums could overflow, so larger ones are
 /// rejected.

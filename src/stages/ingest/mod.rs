@@ -13,17 +13,22 @@ mod carry;
 mod classes;
 mod columns;
 mod contain;
+mod coordinate;
+mod crop;
 mod crs;
 mod e57;
 mod expand;
 mod far;
 mod format;
 mod formats;
+mod frames;
 mod input;
 mod las;
 mod lattice;
 mod lines;
 mod map;
+mod middle;
+mod native;
 mod number;
 mod pcd;
 mod ply;
@@ -36,30 +41,36 @@ mod source;
 mod spool;
 mod stats;
 mod stream;
+mod systems;
 mod text;
 
-pub use belong::Mixed;
 pub use carry::{Attribute, Carried};
 pub use classes::Classes;
 pub use columns::{Attributes, Column};
+pub use crop::Crop;
 pub use crs::{Crs, CrsSource, prj_of};
 pub use expand::expand;
 pub use format::Format;
 pub use probe::{Probe, probe};
 pub use stats::{FileStats, IngestStats};
 pub use stream::{READ_BUFFERS, VALUE_BUFFERS};
+pub use systems::Mixed;
 
 use crate::error::{Error, Result};
 use crate::geom::lattice::Lattice;
 use crate::workspace::Workspace;
 use columns::{SCANNER, Wanted, row_bytes};
+use crop::Nearby;
+use frames::{Frame, values_of};
 use input::Input;
+use native::Native;
 use outcrop_ply::Scalar;
 use point_format::{Claims, PointFile};
 use serde::{Deserialize, Serialize};
-use source::{Native, Source};
-use spool::{Frame, SourceWriter, values_of};
+use source::Source;
+use spool::SourceWriter;
 use std::path::PathBuf;
+use systems::Systems;
 
 /// Precision that suffices for writing the coordinates of the cloud.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize)]
@@ -69,6 +80,19 @@ pub enum CoordinateType {
     F32,
     /// Double precision.
     F64,
+}
+
+/// The points that are read.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Selection {
+    /// Those of these classes.
+    pub classes: Classes,
+    /// Those in this region; `None` for all.
+    pub crop: Option<Crop>,
+    /// Columns of the points.
+    pub attributes: Attributes,
+    /// True if the scanners of the points are read, from files that give their positions.
+    pub scanners: bool,
 }
 
 /// All points of the inputs in one scratch file.
@@ -81,17 +105,8 @@ pub struct Spool {
     values: Vec<Frame>,
     sources: Vec<Source>,
     stats: IngestStats,
-}
-
-/// The part of the inputs that is read.
-#[derive(Debug, Clone, Default)]
-pub struct Selection {
-    /// Classes of the points.
-    pub classes: Classes,
-    /// Columns of the points.
-    pub attributes: Attributes,
-    /// True if the scanners of the points are read, from files that give their positions.
-    pub scanners: bool,
+    /// The well-known text of the reference system, at most 1 MiB.
+    wkt: Option<String>,
 }
 
 /// Decodes all inputs, which may be files and folders, into a spool.
@@ -162,9 +177,13 @@ fn read_all(
     workspace: &Workspace,
 ) -> Result<Spool> {
     let classes = &selection.classes;
+    let crop = selection.crop.as_ref();
+    let nearby = crop.map(|crop| Nearby::of(crop, workspace));
+    let nearby = nearby.transpose()?;
     let (mut section, mut frames, mut values) = (0, Vec::new(), Vec::new());
     let mut sources = Vec::new();
     let mut stats = IngestStats::default();
+    let mut systems = Systems::default();
     let mut shared = false;
     for path in paths {
         workspace.check_cancel()?;
@@ -172,14 +191,22 @@ fn read_all(
         let number = sources.len() as u32;
         let scanners = selection.scanners && opened.has_scanners();
         let wanted = Wanted::of(&selection.attributes, &opened.file.columns(), scanners)?;
-        let target = SourceWriter::new(workspace, name, section, number, classes, &wanted)?;
-        let mut warnings = match opened.file.read(&opened.input, &target) {
-            // Tasks read all files at the same time.
-            Err(Error::Shared) => {
-                shared = true;
-                Vec::new()
+        let target = SourceWriter::new(workspace, name, section, number, classes, &wanted)?
+            .within(nearby.as_ref(), opened.claims.native);
+        let outside =
+            |nearby: &Nearby<'_>| opened.file.lies_outside(&opened.input, nearby, workspace);
+        let mut warnings = if let Some(bounds) = nearby.as_ref().and_then(outside) {
+            target.skip(opened.claims.likely_points, bounds);
+            Vec::new()
+        } else {
+            match opened.file.read(&opened.input, &target) {
+                // Tasks read all files at the same time.
+                Err(Error::Shared) => {
+                    shared = true;
+                    Vec::new()
+                }
+                other => other?,
             }
-            other => other?,
         };
         if *classes != Classes::All && !opened.claims.classes {
             warnings.push("its points have no class, all of them are kept".to_owned());
@@ -205,19 +232,26 @@ fn read_all(
         stats.warnings.extend(warnings.into_iter().map(shown));
         let (crs, unusable) = opened.crs();
         stats.warnings.extend(unusable);
-        stats.add(&opened, &source, crs);
+        stats.add(&opened, &source, crs.as_ref().map(Crs::without_texts));
+        if let Some(crs) = crs {
+            systems.add(path, crs);
+        }
         sources.push(source);
     }
     if shared {
         return Err(Error::Shared);
     }
-    stats.compare();
+    if let Some(crop) = crop.filter(|_| stats.kept == 0) {
+        crop.check_met(&sources)?;
+    }
+    let wkt = stats.compare(systems);
     Ok(Spool {
         name: name.to_owned(),
         frames,
         values,
         sources,
         stats,
+        wkt,
     })
 }
 
@@ -261,42 +295,35 @@ impl Opened {
 /// # Errors
 /// [`Error::Input`] with two files whose systems are different.
 pub fn check_systems(inputs: &[PathBuf]) -> Result<()> {
-    let mut systems = Vec::new();
+    let mut systems = Systems::default();
     for path in expand(inputs)? {
         let opened = Input::open_head(&path, formats::LONG_HEAD).and_then(Opened::new);
-        let crs = opened.ok().and_then(|opened| opened.crs().0);
-        // Their texts may be long, and many files usually have the same.
-        if let Some(crs) = crs
-            && !systems.iter().any(|(_, known)| *known == crs)
-        {
-            systems.push((path, crs));
+        if let Some(crs) = opened.ok().and_then(|opened| opened.crs().0) {
+            systems.add(&path, crs);
         }
     }
-    let each = systems
-        .iter()
-        .map(|(path, crs)| (path.as_path(), Some(crs)));
-    match belong::common(each) {
+    match systems.common() {
         Ok(_) => Ok(()),
         Err(mixed) => Err(mixed.refused()),
     }
 }
 
 impl IngestStats {
-    /// Compares the files with each other.
-    fn compare(&mut self) {
-        let files = &self.files;
-        let systems = files.iter().map(|f| (f.path.as_path(), f.crs.as_ref()));
-        let warning = match belong::common(systems) {
+    /// Compares the files with each other; returns the well-known text of the system of all.
+    fn compare(&mut self, systems: Systems) -> Option<String> {
+        let (mut wkt, files) = (None, &self.files);
+        let warning = match systems.common() {
             Ok(crs) => {
-                self.crs = crs;
-                self.crs
-                    .as_ref()
-                    .and_then(|crs| belong::without(files, crs))
+                let crs = crs.as_ref();
+                wkt = crs.and_then(|crs| crs.wkt.clone());
+                self.crs = crs.map(Crs::without_texts);
+                crs.and_then(|crs| belong::without(files, crs))
             }
             Err(mixed) => Some(self.mixed.insert(mixed).warning()),
         };
         let places = belong::warnings(files);
         self.warnings.extend(warning.into_iter().chain(places));
+        wkt
     }
 
     fn add(&mut self, opened: &Opened, source: &Source, crs: Option<Crs>) {
@@ -307,6 +334,8 @@ impl IngestStats {
         self.withheld += stats.withheld;
         self.invalid += stats.invalid;
         self.dropped_by_class += stats.unwanted;
+        self.dropped_by_crop += stats.outside;
+        self.skipped_by_crop += stats.skipped;
         let bounds = source.bounds();
         self.files.push(FileStats {
             path: opened.input.path.clone(),
@@ -320,6 +349,8 @@ impl IngestStats {
             withheld: stats.withheld,
             invalid: stats.invalid,
             dropped_by_class: stats.unwanted,
+            dropped_by_crop: stats.outside,
+            skipped_by_crop: stats.skipped,
             dropped_far: 0,
             min: bounds.map(|b| b[0]),
             max: bounds.map(|b| b[1]),
@@ -334,6 +365,12 @@ impl Spool {
     #[must_use]
     pub fn stats(&self) -> &IngestStats {
         &self.stats
+    }
+
+    /// The well-known text of the reference system, if it was given by one; at most 1 MiB.
+    #[must_use]
+    pub fn wkt(&self) -> Option<&str> {
+        self.wkt.as_deref()
     }
 
     /// Deletes the scratch files.
@@ -378,14 +415,14 @@ impl Spool {
     /// The precision in which coordinates are to be written.
     #[must_use]
     pub fn source_precision(&self) -> CoordinateType {
-        let kept = || self.sources.iter().filter(|s| s.stats.kept > 0);
+        let kept = || self.sources.iter().filter(|s| s.stats.any());
         if kept().all(|s| s.native == Native::F32) {
             return CoordinateType::F32;
         }
         let Ok(lattice) = self.choose_lattice(0) else {
             return CoordinateType::F64;
         };
-        let bounds = kept().filter_map(Source::bounds);
+        let bounds = kept().filter_map(Source::whole_bounds);
         let largest = bounds
             .flat_map(|b| b.into_iter().flatten())
             .fold(0.0, |m: f64, c| m.max(c.abs()));

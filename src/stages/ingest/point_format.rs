@@ -1,12 +1,14 @@
 //! The interface of input formats: detection and reading.
 
 use super::columns::Column;
+use super::crop::Nearby;
 use super::crs::Crs;
 use super::format::Format;
 use super::input::Input;
-use super::source::Native;
+use super::native::Native;
 use super::spool::SourceWriter;
 use crate::error::Result;
+use crate::workspace::Workspace;
 use crate::workspace::compressed::plain_name;
 use std::path::{Path, PathBuf};
 
@@ -102,6 +104,17 @@ pub(super) trait PointFile {
     /// The columns of the file. A [`SourceWriter`] says which are wanted, by their numbers in this list.
     fn columns(&self) -> Vec<Column> {
         Vec::new()
+    }
+
+    /// The lowest and highest coordinates in the spool's type, if it is certain from the header and a few points
+    /// that none of its points is wanted.
+    fn lies_outside(
+        &self,
+        _input: &Input,
+        _nearby: &Nearby<'_>,
+        _workspace: &Workspace,
+    ) -> Option<[[f64; 3]; 2]> {
+        None
     }
 
     /// Reads all points, in units of at most a few MiB; returns warnings.

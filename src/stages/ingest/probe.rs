@@ -5,7 +5,7 @@ use super::columns::{Attributes, Column};
 use super::format::Format;
 use super::formats::LONG_HEAD;
 use super::input::Input;
-use super::source::Native;
+use super::native::Native;
 use crate::error::Result;
 use serde::Serialize;
 use std::path::{Path, PathBuf};

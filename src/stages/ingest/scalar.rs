@@ -1,7 +1,7 @@
 //! Coordinates of formats that store single or double precision.
 
+use super::coordinate::Coordinate;
 use super::number;
-use super::spool::Coordinate;
 
 /// A floating-point coordinate, made of what a file stores.
 pub(super) trait FromScalar: Coordinate {

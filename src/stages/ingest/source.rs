@@ -1,31 +1,10 @@
 //! A source: the points of one input file in their native form.
 
 use super::columns::{Column, Span};
+use super::native::Native;
 use super::number::NOT_FIXED;
 use super::stats::SourceStats;
 use serde::{Deserialize, Serialize};
-
-/// The type of a source's coordinates in the spool.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub(super) enum Native {
-    /// Integers; the coordinate is `i * scale + offset`.
-    Las { scale: [f64; 3], offset: [f64; 3] },
-    /// Single precision.
-    F32,
-    /// Double precision.
-    F64,
-}
-
-impl Native {
-    /// Bytes of one point in the spool.
-    pub(super) fn point_bytes(&self) -> usize {
-        match self {
-            Self::Las { .. } => size_of::<[i32; 3]>(),
-            Self::F32 => size_of::<[f32; 3]>(),
-            Self::F64 => size_of::<[f64; 3]>(),
-        }
-    }
-}
 
 /// The points of one input file in the spool.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -68,12 +47,18 @@ impl Source {
         }
     }
 
-    /// Lowest and highest coordinates in the input's unit; `None` without points.
+    /// Lowest and highest coordinates of the kept points in the input's unit; `None` without points.
     pub(super) fn bounds(&self) -> Option<[[f64; 3]; 2]> {
-        if self.stats.kept == 0 {
-            return None;
-        }
-        let (mut min, mut max) = (self.stats.min, self.stats.max);
+        (self.stats.kept > 0).then(|| self.in_unit(self.stats.own))
+    }
+
+    /// The same of all points with a place on the lattice.
+    pub(super) fn whole_bounds(&self) -> Option<[[f64; 3]; 2]> {
+        let whole = [self.stats.min, self.stats.max];
+        self.stats.any().then(|| self.in_unit(whole))
+    }
+
+    fn in_unit(&self, [mut min, mut max]: [[f64; 3]; 2]) -> [[f64; 3]; 2] {
         if let Native::Las { scale, offset } = self.native {
             for axis in 0..3 {
                 let ends = [min[axis], max[axis]].map(|i| i * scale[axis] + offset[axis]);
@@ -81,6 +66,6 @@ impl Source {
                 max[axis] = ends[0].max(ends[1]);
             }
         }
-        Some([min, max])
+        [min, max]
     }
 }

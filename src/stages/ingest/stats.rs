@@ -1,10 +1,10 @@
 //! Statistics of the input: counts and extents of each file and in total.
 
-use super::belong::Mixed;
+use super::coordinate::Coordinate;
 use super::crs::Crs;
 use super::format::Format;
-use super::source::Native;
-use super::spool::Coordinate;
+use super::native::Native;
+use super::systems::Mixed;
 use serde::{Deserialize, Serialize, Serializer};
 use std::path::{Path, PathBuf};
 
@@ -23,6 +23,10 @@ pub struct IngestStats {
     pub invalid: u64,
     /// Points left out because their class is not wanted.
     pub dropped_by_class: u64,
+    /// Points left out because they are not in the region, nor within the margin around it.
+    pub dropped_by_crop: u64,
+    /// Points not read because their files or chunks lie outside, by header or chunk table.
+    pub skipped_by_crop: u64,
     /// Points left out because they are far from all others, and the lattice is finer without them.
     pub dropped_far: u64,
     /// One of these.
@@ -69,6 +73,10 @@ pub struct FileStats {
     pub invalid: u64,
     /// Points left out because their class is not wanted.
     pub dropped_by_class: u64,
+    /// Points left out because they are not in the region, nor within the margin around it.
+    pub dropped_by_crop: u64,
+    /// Points not read because they are in chunks that lie outside, or the whole file does.
+    pub skipped_by_crop: u64,
     /// Points left out because they are far from all others.
     pub dropped_far: u64,
     /// Lowest coordinates of the kept points, in the file's unit; `None` without points.
@@ -92,8 +100,16 @@ pub(super) struct SourceStats {
     pub(super) invalid: u64,
     /// Points left out because of their class.
     pub(super) unwanted: u64,
+    /// Points left out because of their position.
+    pub(super) outside: u64,
+    /// Points not decoded because of their position, by the header or the chunk table.
+    pub(super) skipped: u64,
+    /// Lowest coordinates, also of points left out because of their position.
     pub(super) min: [f64; 3],
+    /// Highest coordinates, likewise.
     pub(super) max: [f64; 3],
+    /// Lowest and highest coordinates of the kept points.
+    pub(super) own: [[f64; 3]; 2],
     /// All coordinates are multiples of 2 to the power of this; `i32::MAX` if all are zero.
     pub(super) exponent: i32,
     /// Largest number of decimals in text, or [`NOT_FIXED`](super::number::NOT_FIXED).
@@ -101,6 +117,9 @@ pub(super) struct SourceStats {
     /// Sum of the point counts given in count lines of a text file.
     pub(super) claimed: u64,
 }
+
+/// The extent of no point.
+const NOWHERE: [[f64; 3]; 2] = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
 
 impl Default for SourceStats {
     fn default() -> Self {
@@ -111,8 +130,11 @@ impl Default for SourceStats {
             withheld: 0,
             invalid: 0,
             unwanted: 0,
+            outside: 0,
+            skipped: 0,
             min: [f64::INFINITY; 3],
             max: [f64::NEG_INFINITY; 3],
+            own: NOWHERE,
             exponent: i32::MAX,
             decimals: 0,
             claimed: 0,
@@ -126,6 +148,7 @@ impl SourceStats {
         let Self {
             min,
             max,
+            own,
             exponent,
             kept,
             ..
@@ -133,6 +156,7 @@ impl SourceStats {
         Self {
             min,
             max,
+            own,
             exponent,
             kept,
             ..*self
@@ -148,6 +172,8 @@ impl SourceStats {
                 Native::F32 | Native::F64 => value.exponent(),
             };
             self.reach(axis, value, exponent);
+            self.own[0][axis] = self.own[0][axis].min(value);
+            self.own[1][axis] = self.own[1][axis].max(value);
         }
     }
 
@@ -166,12 +192,30 @@ impl SourceStats {
         self.withheld += other.withheld;
         self.invalid += other.invalid;
         self.unwanted += other.unwanted;
+        self.outside += other.outside;
+        self.skipped += other.skipped;
         for axis in 0..3 {
             self.min[axis] = self.min[axis].min(other.min[axis]);
             self.max[axis] = self.max[axis].max(other.max[axis]);
+            self.own[0][axis] = self.own[0][axis].min(other.own[0][axis]);
+            self.own[1][axis] = self.own[1][axis].max(other.own[1][axis]);
         }
         self.exponent = self.exponent.min(other.exponent);
         self.decimals = self.decimals.max(other.decimals);
         self.claimed = self.claimed.saturating_add(other.claimed);
+    }
+
+    /// Extends the range of coordinates by a point.
+    #[inline]
+    pub(super) fn reach_point<T: Coordinate>(&mut self, point: [T; 3]) {
+        for (axis, coordinate) in point.into_iter().enumerate() {
+            self.reach(axis, coordinate.into(), coordinate.exponent());
+        }
+    }
+
+    /// True if a point has a place on the lattice, even if it is left out because of its position: so the
+    /// lattice of a part of a cloud is that of the whole.
+    pub(super) fn any(&self) -> bool {
+        self.kept + self.outside + self.skipped > 0
     }
 }

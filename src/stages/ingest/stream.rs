@@ -4,9 +4,9 @@ use super::Spool;
 use super::carry::Carried;
 use super::columns::{MOST_ROW, row_bytes};
 use super::far::is_near;
+use super::frames::{FRAME, FrameBuffer, read_frame, read_values, values_of};
 use super::map::SourceMap;
 use super::source::Source;
-use super::spool::{FRAME, FrameBuffer, read_frame, read_values, values_of};
 use crate::error::{Error, Result};
 use crate::geom::Point;
 use crate::geom::lattice::{COORDINATE_LIMIT, Lattice};
@@ -175,7 +175,7 @@ impl Spool {
     /// on the lattice and may not fit it.
     fn maps(&self, lattice: &Lattice) -> Result<Vec<Option<SourceMap>>> {
         let map = |source: &Source| {
-            if source.stats.kept == 0 {
+            if !source.stats.any() {
                 return Ok(None);
             }
             let map = SourceMap::new(source, lattice.step, lattice.offset);

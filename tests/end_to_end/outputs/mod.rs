@@ -213,7 +213,7 @@ fn formats_with_normals_do_not_depend_on_threads_memory_and_parts() {
         }
         for (threads, memory, tile, page) in [(1, MINIMUM_BUDGET, 97, 7), (3, 4 << 30, 500, 64)] {
             let output = bench.path(&format!("again-{name}"));
-            let builder = util::builder(&[input.clone()], &output, &params)
+            let builder = util::builder(std::slice::from_ref(&input), &output, &params)
                 .threads(threads)
                 .memory(memory)
                 .tile_points(tile)

@@ -40,8 +40,11 @@ pub fn read_e57(bytes: &[u8]) {
 pub fn check(spool: &Spool) {
     let workspace = &Bench::get().workspace;
     let stats = spool.stats();
-    let left_out =
-        stats.dropped_non_finite + stats.withheld + stats.invalid + stats.dropped_by_class;
+    let left_out = stats.dropped_non_finite
+        + stats.withheld
+        + stats.invalid
+        + stats.dropped_by_class
+        + stats.dropped_by_crop;
     assert_eq!(stats.read, stats.kept + left_out);
     for warning in &stats.warnings {
         assert!(!warning.contains('\n'), "{warning:?} is more than one line");

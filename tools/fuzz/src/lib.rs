@@ -6,6 +6,7 @@
 pub mod cloud;
 pub mod folder;
 pub mod mesh;
+pub mod region;
 pub mod resume;
 pub mod scratch;
 pub mod seeds;

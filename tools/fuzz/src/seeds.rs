@@ -36,6 +36,9 @@ pub fn write(folder: &Path) -> Result {
     scans::ptx_files(&seeds)?;
     scans::e57_files(&seeds)?;
     texts(&seeds)?;
+    for (number, text) in REGIONS.iter().enumerate() {
+        seeds.put("region", &number.to_string(), text)?;
+    }
     folders(&seeds)?;
     meshes(&seeds)?;
     scratch_files(&seeds)?;
@@ -47,6 +50,15 @@ pub fn write(folder: &Path) -> Result {
     }
     Ok(())
 }
+
+/// Regions of every kind.
+const REGIONS: [&str; 5] = [
+    "0,0,10,20",
+    "-1,-2,-3,4,5,6.5e1",
+    "MULTIPOLYGON Z(((0 0 1,4 0 1,0 4 1,0 0 1),(1 1 1,2 1 1,1 2 1)),((9 9 1,8 9 1,9 8 1)))",
+    r#"{"type":"FeatureCollection","features":[{"type":"Feature","properties":{},"geometry":null}]}"#,
+    r#"{"type":"MultiPolygon","coordinates":[[[[0,0],[4,0],[0,4],[0,0]]]]}"#,
+];
 
 /// Damage: file, kind, three bytes of the place, value.
 const EDITS: [&[u8]; 5] = [

@@ -1,8 +1,9 @@
 //! The points of an E57 file: a unit for each scan.
 
 use super::super::columns::{Column, SCANNER, Wanted};
+use super::super::coordinate::Coordinate;
 use super::super::input::Input;
-use super::super::spool::{Coordinate, Sink, SourceWriter, sink_bytes};
+use super::super::spool::{Sink, SourceWriter, sink_bytes};
 use super::packets::{self, BLOCK, Decoded, Records};
 use super::scan::{Field, Motion, Name, Scan};
 use crate::error::Result;

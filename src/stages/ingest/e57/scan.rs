@@ -85,6 +85,8 @@ impl Kind {
                 let found = WHOLE.iter().find(holds);
                 found.map_or(Scalar::F64, |(scalar, ..)| *scalar)
             }
+            // Single precision tells all of them apart.
+            Self::Integer { offset: 0.0, .. } if self.bits() <= 24 => Scalar::F32,
             _ => Scalar::F64,
         }
     }

@@ -6,7 +6,7 @@ use super::chunks::{Decoder, LayerHead};
 use super::fields::Fields;
 use super::table::{self, Chunk, Table};
 use super::vlr::{self, Laszip};
-use super::{Header, Record};
+use super::{Header, Record, skip};
 use crate::error::Result;
 use laz::LazItemType;
 
@@ -55,6 +55,7 @@ pub(super) fn read(
         }
     };
     limit(input, header, &laszip, &mut table, &mut warnings)?;
+    warnings.extend(skip::outside(input, header, &mut table.chunks, writer)?);
     in_parallel(&decoder, &table.chunks, writer)?;
     Ok(warnings)
 }

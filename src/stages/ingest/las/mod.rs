@@ -1,12 +1,14 @@
 //! LAS 1.0 to 1.4 and LAZ.
 
 mod chunks;
+mod copc;
 mod crs;
 mod fields;
 mod gps;
 mod header;
 mod laz;
 mod plain;
+mod skip;
 mod table;
 mod vlr;
 
@@ -22,13 +24,15 @@ const CLASS: usize = 16;
 
 use super::classes::Classes;
 use super::columns::Column;
+use super::crop::Nearby;
 use super::crs::Crs;
 use super::format::Format;
 use super::input::Input;
+use super::native::Native;
 use super::point_format::{Claims, Head, PointFile, PointFormat, Refusal};
-use super::source::Native;
 use super::spool::{Sink, SourceWriter};
 use crate::error::Result;
+use crate::workspace::Workspace;
 use fields::Fields;
 
 impl Format {
@@ -89,6 +93,17 @@ impl PointFile for Header {
             ]),
             ..Claims::new(input, format, native, self.claimed, least)
         }
+    }
+
+    fn lies_outside(
+        &self,
+        input: &Input,
+        wanted: &Nearby<'_>,
+        workspace: &Workspace,
+    ) -> Option<[[f64; 3]; 2]> {
+        // What is damaged is reported when the file is read.
+        let outside = Header::lies_outside(self, input, wanted, workspace).unwrap_or(false);
+        self.native_bounds().filter(|_| outside)
     }
 
     fn crs(&self, input: &Input) -> Option<Crs> {

@@ -1,6 +1,6 @@
 //! The places of scans and of units of lines in a PTX file. Only the number of lines tells where a scan ends.
 
-use super::super::columns::{NO_SCANNER, Wanted};
+use super::super::columns::Wanted;
 use super::super::input::{Input, Range, STREAM_BUFFER};
 use super::super::lines::{self, LONGEST_LINE};
 use super::super::spool::{Sink, SourceWriter};
@@ -175,9 +175,10 @@ impl<'a> Reader<'a> {
         }
         let header: Vec<&[u8]> = header.iter().map(Vec::as_slice).collect();
         let mut scan = Scan::of(self.input, begin, &header)?;
+        // Beyond the largest number it is that of none.
         scan.number = self.filled;
         if scan.points > 0 {
-            self.filled = self.filled.saturating_add(1).min(NO_SCANNER);
+            self.filled = self.filled.saturating_add(1);
         }
         let number = self.index.scans.len();
         if number == MOST_SCANS {

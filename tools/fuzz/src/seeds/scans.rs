@@ -90,7 +90,7 @@ fn e57_scan(
     };
     let fields = names.map(field).into_iter().chain([state]).collect();
     let mut scan = writer.add_pointcloud("scan", fields)?;
-    scan.set_transform(posed.then(|| Transform {
+    scan.set_transform(posed.then_some(Transform {
         rotation: Quaternion {
             w: 0.5,
             x: 0.5,
