@@ -192,6 +192,8 @@ pub struct Params {
     pub keep_far: bool,
     /// Vertices have normals, in formats that hold them.
     pub normals: bool,
+    /// Do not use the positions of scanners that files give: what a scanner saw is out otherwise (robust).
+    pub ignore_scanners: bool,
     /// Take coordinates as they are if files give different reference systems, which is an error otherwise.
     pub ignore_crs: bool,
     /// Origin of the coordinates in the mesh file.
@@ -243,6 +245,7 @@ impl Default for Params {
             repair: true,
             keep_far: false,
             normals: false,
+            ignore_scanners: false,
             ignore_crs: false,
             origin: Origin::None,
             block: METHOD.curve.block,
@@ -283,6 +286,7 @@ impl Params {
             classes: self.classes.clone(),
             crop: self.crop.as_ref().map(crop),
             attributes: self.attributes.clone(),
+            scanners: self.scanners(),
         }
     }
 
@@ -316,6 +320,12 @@ impl Params {
     #[must_use]
     pub fn off_surface(&self) -> bool {
         self.method == Method::Robust && !self.keep_all
+    }
+
+    /// True if the positions of scanners decide which side is out.
+    #[must_use]
+    pub fn scanners(&self) -> bool {
+        self.method == Method::Robust && !self.ignore_scanners
     }
 
     /// The limits of length on a lattice with this step.

@@ -112,21 +112,22 @@ impl Reconstruction {
         let (spool, lattice) = stages.ingest()?;
         let points = stages.order(&spool, &lattice)?;
         let points = stages.without_outliers(points)?;
-        let columns = stages.attributes(&spool, &lattice, &points)?;
+        let values = stages.values(&spool, &lattice, &points)?;
         let radius = stages.radius(&points, &lattice);
         let points = stages.smooth(points)?;
         let store = points.open(workspace)?;
         let relaxed = stages.relax(&store)?;
         let shape = stages.open_shape(relaxed)?;
-        let places = stages.places(&store, &shape, &lattice);
+        let places = stages.places(&store, &shape, &values, &lattice);
         let seen = stages.cells(places, radius)?;
         let triples = stages.triples(&seen)?;
         let stitched = stages.stitch(places, &triples)?;
         let repaired = stages.repair(places, &stitched)?;
+        values.release_scanners(workspace)?;
         let pieces = stages.cut(&store, &repaired, &lattice)?;
         stages.export(
             &store,
-            columns.as_ref(),
+            values.columns(),
             &repaired,
             pieces.as_ref(),
             &lattice,

@@ -29,6 +29,8 @@ pub struct Report {
     pub input: IngestStats,
     /// Columns that the mesh keeps.
     pub attributes: Vec<Attribute>,
+    /// Positions of the scanners whose side is out, in the input's unit.
+    pub scanners: Vec<[f64; 3]>,
     /// Points with the position of another one, dropped.
     pub duplicates_folded: u64,
     /// Thinning, if requested.

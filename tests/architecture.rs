@@ -48,7 +48,7 @@ const MAY_USE: &[(&str, &str)] = &[
     ("stages/ingest", ""),
     (
         "stages/located",
-        "stages/blocks stages/cells stages/order stages/spacing",
+        "stages/blocks stages/cells stages/order stages/scanners stages/spacing",
     ),
     ("stages/order", "stages/ingest"),
     (
@@ -57,12 +57,13 @@ const MAY_USE: &[(&str, &str)] = &[
     ),
     (
         "stages/repair",
-        "stages/blocks stages/located stages/order stages/spacing stages/stitch stages/surface",
+        "stages/blocks stages/located stages/order stages/scanners stages/spacing stages/stitch stages/surface",
     ),
     (
         "stages/smooth",
         "kernels stages/cells stages/order stages/spacing stages/tiles",
     ),
+    ("stages/scanners", "stages/attributes"),
     ("stages/spacing", ""),
     (
         "stages/stitch",

@@ -4,12 +4,14 @@
 mod reference;
 
 use outcrop::inspect::ply_mesh::{PlyMesh, Sink};
+use outcrop::stages::attributes::StoredScanners;
 use outcrop::stages::blocks::Blocks;
 use outcrop::stages::cells::{CountedTriple, SentTriple};
 use outcrop::stages::export::{CoordinateType, ExportOptions, export};
 use outcrop::stages::located::Places;
 use outcrop::stages::order::{Orderer, PointStore, StoreWriter};
 use outcrop::stages::repair::{RepairOptions, repair};
+use outcrop::stages::scanners::Scanners;
 use outcrop::stages::stitch::{StitchOptions, stitch};
 use outcrop::stages::triples::Triples;
 use outcrop::workspace::Workspace;
@@ -99,6 +101,7 @@ fn pipeline(
     shape: &[Point],
     points: &[Point],
     all: &BTreeMap<[u32; 3], u32>,
+    scanners: Option<(&[u32], &[Option<[i64; 3]>])>,
     settings: &Settings,
 ) -> outcrop::Result<(Vec<[u32; 3]>, [u64; 7])> {
     let workspace = &workspace();
@@ -106,10 +109,18 @@ fn pipeline(
     let moved = (shape != points).then(|| shape_of(shape, workspace));
     let blocks = Blocks::new(store.len(), settings.block);
     let triples = tables(all, blocks, workspace);
+    let store_scanners = |(numbers, places)| {
+        let stored = StoredScanners::new(numbers, blocks, &workspace.unit()).unwrap();
+        (stored, places)
+    };
+    let stored = scanners.map(store_scanners);
     let places = Places {
         shape: moved.as_ref().unwrap_or(&store),
         file: &store,
         density: None,
+        scanners: stored
+            .as_ref()
+            .map(|(stored, places)| Scanners::new(stored, places)),
     };
     let division = Division {
         patch: settings.patch,
@@ -324,6 +335,30 @@ fn walled_triples(random: &mut Random, count: usize) -> (BTreeMap<[u32; 3], u32>
     (all, places)
 }
 
+/// For each point the number of its scanner, from 1, or 0; and the places of the scanners, one of which is too far
+/// to be real. They change from point to point, or not.
+fn some_scanners(random: &mut Random, count: usize) -> (Vec<u32>, Vec<Option<[i64; 3]>>) {
+    let all = random.integer(1, 5);
+    let mut place = || Some([0; 3].map(|_: i64| random.integer(-3000, 9000)));
+    let mut places: Vec<_> = (0..all).map(|_| place()).collect();
+    places.push(None);
+    let share = [10, 10, 7][random.integer(0, 3) as usize];
+    let run = [1, 200][random.integer(0, 2) as usize];
+    let mut number = 0;
+    let numbers = (0..count).map(|id| {
+        if id % run == 0 {
+            let seen = random.integer(0, 10) < share;
+            number = if seen {
+                random.integer(1, all + 2) as u32
+            } else {
+                0
+            };
+        }
+        number
+    });
+    (numbers.collect(), places)
+}
+
 /// Compares for many seeds; `shape` moves a point. Returns sums of the counts that must not stay 0.
 fn compare(
     seeds: std::ops::Range<u64>,
@@ -364,9 +399,16 @@ fn compare(
             outcrop::geom::triangle::normal(a, b, c) != [0; 3]
         });
         let settings = settings(seed);
-        let expected = connect(&shape, points.clone(), &all, None, &settings);
+        // Of every other cloud some or all points were seen by scanners.
+        let (numbers, places) = some_scanners(&mut random, points.len());
+        let seen = settings.robust && seed % 2 == 0;
+        let of = |number: &u32| places.get(number.checked_sub(1)? as usize).copied()?;
+        let scanners: Vec<_> = numbers.iter().map(of).collect();
+        let scanners = if seen { &scanners[..] } else { &[] };
+        let expected = connect(&shape, points.clone(), &all, None, scanners, &settings);
+        let seen = seen.then_some((&numbers[..], &places[..]));
         let what = format!("seed {seed}, {} points, {settings:?}", points.len());
-        match pipeline(&shape, &points, &all, &settings) {
+        match pipeline(&shape, &points, &all, seen, &settings) {
             Ok((triangles, counts)) => {
                 assert_eq!(counts, counted(&expected.counts), "{what}");
                 assert_eq!(triangles, expected.triangles, "{what}");

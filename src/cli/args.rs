@@ -180,6 +180,9 @@ pub struct Surface {
     /// [default: 8x; with --method paper none]
     #[arg(long, value_name = "LENGTH|Nx|none")]
     pub max_edge: Option<MaxWidth>,
+    /// Do not use the positions of scanners in E57 and PTX files, by which the side that the scanner saw is out
+    #[arg(long)]
+    pub ignore_scanners: bool,
 }
 
 /// Post-processing.
@@ -438,6 +441,7 @@ impl Job {
             origin: self.coordinates.origin,
             keep_far: self.coordinates.keep_far,
             ignore_crs: self.coordinates.ignore_crs,
+            ignore_scanners: self.surface.ignore_scanners,
             block: self.block_points,
             ..usual
         }

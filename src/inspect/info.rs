@@ -6,7 +6,7 @@ use crate::method::METHOD;
 use crate::params::Params;
 use crate::pipeline::Known;
 use crate::stages::cells::{CellMaker, DiskRadius, Widen};
-use crate::stages::ingest::{Attributes, CoordinateType, IngestStats, ingest_selected};
+use crate::stages::ingest::{Attributes, CoordinateType, IngestStats, Selection, ingest_selected};
 use crate::stages::order::{PAGE, PointStore, order};
 use crate::stages::tiles::Tile;
 use crate::stages::tiles::near::Search;
@@ -74,8 +74,12 @@ pub fn info(inputs: &[PathBuf], params: &Params, workspace: &Workspace) -> Resul
     let start = Instant::now();
     let observer = &workspace.observer;
     observer.begin("ingest", "points", 0);
-    let headers = Known::from_headers(inputs, &Attributes::None);
-    let mut spool = ingest_selected(inputs, &params.selection(), workspace)?;
+    let headers = Known::from_headers(inputs, &Attributes::None, true);
+    let selection = Selection {
+        scanners: false,
+        ..params.selection()
+    };
+    let mut spool = ingest_selected(inputs, &selection, workspace)?;
     spool.drop_far(workspace)?;
     observer.end();
     let input = spool.stats().clone();
@@ -98,6 +102,7 @@ pub fn info(inputs: &[PathBuf], params: &Params, workspace: &Workspace) -> Resul
         decompressed: headers.map_or(0, |known| known.decompressed),
         points,
         values: 0,
+        scanner: headers.map_or(0, |headers| headers.scanner),
         double: Some(double),
         moved: None,
         text: None,

@@ -37,6 +37,9 @@ const TRIPLE: f64 = 8.2;
 /// Scratch bytes per point while the mesh is written, beside the stores.
 const EXPORT: f64 = 7.3;
 
+/// Bytes of the number of a scanner.
+pub(crate) const SCANNER: u64 = 4;
+
 /// Checksums, boxes and other small data: bytes per point, and in all.
 const SMALL: (f64, f64) = (0.8, 4096.0);
 
@@ -53,6 +56,8 @@ pub(crate) struct Known {
     pub points: u64,
     /// Bytes of the values that a point keeps.
     pub values: u64,
+    /// Bytes of the number of its scanner, if that is carried.
+    pub scanner: u64,
     /// True if the mesh has coordinates in double precision; none if unknown.
     pub double: Option<bool>,
     /// True if points moved in relaxing; none if unknown.
@@ -95,13 +100,18 @@ const DECIMALS: usize = 3;
 impl Known {
     /// The properties in the headers of the inputs. They may be wrong, but cannot exceed the sizes of the
     /// files.
-    pub fn from_headers(inputs: &[PathBuf], attributes: &Attributes) -> Option<Self> {
+    pub fn from_headers(
+        inputs: &[PathBuf],
+        attributes: &Attributes,
+        scanners: bool,
+    ) -> Option<Self> {
         let mut known = Self {
             read: 0,
             spool: 0,
             decompressed: 0,
             points: 0,
             values: 0,
+            scanner: 0,
             double: None,
             moved: None,
             text: None,
@@ -113,7 +123,11 @@ impl Known {
             known.read += points;
             let values = probe.value_bytes(attributes);
             known.values = known.values.max(values);
-            known.spool += points * (probe.spool_bytes_per_point + values);
+            let scanner = if scanners { probe.scanner_bytes } else { 0 };
+            if scanner > 0 {
+                known.scanner = SCANNER;
+            }
+            known.spool += points * (probe.spool_bytes_per_point + values + scanner);
             known.decompressed = known.decompressed.max(probe.decompressed_bytes);
             probes.push(probe);
         }
@@ -179,10 +193,12 @@ impl Known {
         let early = self.spool as f64 + STORED * points;
         let mut early = early.max((self.spool + self.decompressed) as f64);
         let (read, values) = (self.read as f64, self.values as f64);
-        if self.values > 0 {
+        let scanner = self.scanner as f64;
+        if self.values + self.scanner > 0 {
             // The spool stays until the values are in the order of ids.
+            let sent = SENT + values + scanner;
             early = early.max(self.spool as f64 + POSITION * read);
-            early = early.max(self.spool as f64 + STORED * points + (SENT + values) * read);
+            early = early.max(self.spool as f64 + STORED * points + sent * read);
         }
         if params.thin.is_some() {
             early = early.max(self.spool as f64 + 2.0 * POSITION * self.read as f64);
@@ -193,7 +209,9 @@ impl Known {
         if params.relax > 1 {
             early = early.max(STORED * (1.0 + 2.0 * moved) * points);
         }
-        let late = (stores + values + TRIPLE * triples) * points;
+        // Points side by side have the same scanner, mostly.
+        let kept = values + scanner / 4.0;
+        let late = (stores + kept + TRIPLE * triples) * points;
         let small = |bytes: f64| bytes + SMALL.0 * points + SMALL.1;
         let mesh = |coordinates| {
             let bytes = export::mesh_bytes(output, &self.mesh(params, coordinates));
@@ -259,6 +277,7 @@ mod tests {
         decompressed: 0,
         points: 1_000_000,
         values: 0,
+        scanner: 0,
         double: Some(false),
         moved: None,
         text: None,
@@ -294,9 +313,12 @@ mod tests {
         let header = "ply\nformat binary_little_endian 1.0\nelement vertex 1000000000000\n\
             property float x\nproperty float y\nproperty float z\nend_header\n";
         std::fs::write(&path, [header.as_bytes(), &[0; 1200]].concat()).unwrap();
-        let known = Known::from_headers(&[path], &Attributes::None);
+        let known = Known::from_headers(&[path], &Attributes::None, true);
         assert!(known.is_none_or(|known| known.points < 200), "{known:?}");
-        assert!(Known::from_headers(&[folder.path().join("nothing")], &Attributes::None).is_none());
+        assert!(
+            Known::from_headers(&[folder.path().join("nothing")], &Attributes::None, true)
+                .is_none()
+        );
     }
 
     /// An uncompressed LAS 1.2 file of 100 points with steps of 1 cm.
@@ -329,7 +351,7 @@ mod tests {
         let text = file("text.xyz", b"1.25 2.5 3\n4 5.5 6\n");
         let double = |paths: &[&PathBuf]| {
             let paths: Vec<PathBuf> = paths.iter().map(|path| (*path).clone()).collect();
-            Known::from_headers(&paths, &Attributes::None)
+            Known::from_headers(&paths, &Attributes::None, true)
                 .unwrap()
                 .double
         };

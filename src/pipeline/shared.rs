@@ -88,7 +88,11 @@ impl Reconstruction {
         writable(&self.output)?;
         not_an_input(&self.output, self.params.split.is_some(), &self.inputs)?;
         one_system(&self.params, &self.inputs)?;
-        let headers = Known::from_headers(&self.inputs, &self.params.attributes);
+        let headers = Known::from_headers(
+            &self.inputs,
+            &self.params.attributes,
+            self.params.scanners(),
+        );
         if let Some(known) = headers.filter(|_| all_are_kept(&self.params)) {
             known.fits(&self.params, &self.output)?;
         }

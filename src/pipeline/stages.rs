@@ -2,16 +2,16 @@
 //! following stages.
 
 mod export;
+mod values;
 
 use super::checks::{all_are_kept, disk_radius, enough, not_a_line, room};
-use super::disk::Text;
+use super::disk::{SCANNER, Text};
 use super::{Clock, Known, Reconstruction};
 use crate::error::Result;
 use crate::geom::lattice::Lattice;
 use crate::method::METHOD;
 use crate::params::Method;
 use crate::report::{LatticeReport, Report};
-use crate::stages::attributes::{StoredColumns, attributes};
 use crate::stages::blocks::Blocks;
 use crate::stages::cells::{CellTriples, DiskRadius, TileRanges, Widen, cells};
 use crate::stages::cut::{CutOptions, StoredPieces, cut};
@@ -29,6 +29,7 @@ use crate::stages::triples::{Triples, triples};
 use crate::workspace::{Workspace, limits};
 use export::written;
 use std::time::Instant;
+use values::Values;
 
 /// The positions that decide which points are connected, if they are not those of the mesh, and the local
 /// spacings.
@@ -60,7 +61,9 @@ impl<'a> Stages<'a> {
         // With a region, headers do not tell how many points there will be.
         let headers = match workspace.is_task() || job.params.crop.is_some() {
             true => None,
-            false => Known::from_headers(&job.inputs, &job.params.attributes),
+            false => {
+                Known::from_headers(&job.inputs, &job.params.attributes, job.params.scanners())
+            }
         };
         let first = headers.map(|known| known.estimate(&job.params, &job.output));
         if let Some(known) = headers.filter(|_| all_are_kept(&job.params)) {
@@ -128,6 +131,9 @@ impl<'a> Stages<'a> {
             Ok(spool)
         })?;
         self.carried = spool.carried(&params.attributes, params.wide_colors);
+        if params.scanners() {
+            self.carried = spool.with_scanners(std::mem::take(&mut self.carried));
+        }
         self.report.attributes = self.carried.attributes.clone();
         let input = spool.stats().clone();
         if let Some(mixed) = input.mixed.as_ref().filter(|_| !params.ignore_crs) {
@@ -135,13 +141,18 @@ impl<'a> Stages<'a> {
         }
         self.wkt = spool.wkt().map(str::to_owned);
         self.report.coordinates = written(spool.source_precision());
+        let scanner = match self.carried.has_scanners() {
+            true => SCANNER,
+            false => 0,
+        };
         self.known = Known {
             read: input.kept,
             spool: spool.bytes(),
             decompressed: 0,
             // With thinning, the number of points that stay is unknown.
             points: if params.thin.is_some() { 0 } else { input.kept },
-            values: self.carried.bytes() as u64,
+            values: self.carried.bytes() as u64 - scanner,
+            scanner,
             double: Some(self.report.coordinates == CoordinateType::Double),
             moved: None,
             text: None,
@@ -195,7 +206,7 @@ impl<'a> Stages<'a> {
             store
         };
         let text = Text::of(spool, lattice, &job.params, &store)?;
-        if self.carried.columns.is_empty() {
+        if self.carried.is_empty() {
             spool.release(workspace)?;
         }
         self.warn_of_input(lattice);
@@ -264,26 +275,6 @@ impl<'a> Stages<'a> {
         self.report.outliers = stats;
         self.report.points = store.len() as u64;
         Ok(store)
-    }
-
-    /// The columns of the points that remain, if the mesh keeps any.
-    pub fn attributes(
-        &mut self,
-        spool: &Spool,
-        lattice: &Lattice,
-        store: &StoredPoints,
-    ) -> Result<Option<StoredColumns>> {
-        if self.carried.columns.is_empty() {
-            return Ok(None);
-        }
-        let (workspace, blocks, carried) = (self.workspace, self.blocks(), &self.carried);
-        let columns = self
-            .clock
-            .stage("attributes", "points", spool.points(), || {
-                attributes(spool, lattice, carried, store, blocks, workspace)
-            })?;
-        spool.release(workspace)?;
-        Ok(Some(columns))
     }
 
     /// The radius of the disks; a percentage refers to the points before smoothing.
@@ -364,6 +355,7 @@ impl<'a> Stages<'a> {
         &self,
         store: &'p PointStore,
         shape: &'p Shape,
+        values: &'p Values,
         lattice: &Lattice,
     ) -> Places<'p> {
         let params = &self.job.params;
@@ -372,6 +364,7 @@ impl<'a> Stages<'a> {
         Places {
             shape: shape.store.as_ref().unwrap_or(store),
             file: store,
+            scanners: values.scanners(),
             density: robust.map(|spacings| Density {
                 spacings,
                 neighbors: params.neighbors,

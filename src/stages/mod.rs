@@ -40,4 +40,5 @@ pub mod export;
 
 pub mod blocks;
 pub mod located;
+pub mod scanners;
 pub mod surface;

@@ -13,6 +13,7 @@ mod outdoor;
 mod outputs;
 mod regions;
 mod report;
+mod scanners;
 mod scans;
 mod stop;
 mod topology;

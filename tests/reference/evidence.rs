@@ -3,7 +3,7 @@
 use super::base::is_interior;
 use super::contract::Graph;
 use super::homes::{Homes, Side};
-use super::patches::{Block, cosine, highest, unit_normal, weight};
+use super::patches::{Block, Scanner, cosine, highest, unit_normal, weight};
 use super::surface::{Edge, Surface, Triangle, alike, edges};
 use super::{Settings, Weighing};
 use outcrop::geom::Point;
@@ -14,6 +14,8 @@ pub struct Known<'a> {
     /// The shape.
     pub points: &'a [Point],
     pub settings: &'a Settings,
+    /// The scanner of each point.
+    pub scanners: &'a [Option<Scanner>],
     /// The T3 that no vertex flags.
     pub kept: &'a BTreeSet<Triangle>,
     /// By block, the crossing T3 that touch it and are not flagged by its own vertices.
@@ -120,6 +122,7 @@ impl Weigher<'_> {
             crossing: self.known.seen[&g].clone(),
             candidates: self.known.candidates.iter().filter(here).copied().collect(),
             highest,
+            scanners: self.known.scanners,
             run: settings.patch,
         };
         for t in block.crossing.difference(self.known.kept) {

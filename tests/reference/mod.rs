@@ -32,6 +32,7 @@ pub mod weighing;
 
 use holes::Filling;
 use outcrop::geom::Point;
+use patches::Scanner;
 use spacing::Density;
 use std::collections::{BTreeMap, BTreeSet};
 use surface::{Component, Surface, Triangle};
@@ -198,7 +199,17 @@ pub struct Mesh {
 
 /// Reconstructs the surface of a cloud.
 pub fn reconstruct(points: &[Point], settings: &Settings) -> Mesh {
+    reconstruct_seen(points, |_| None, settings)
+}
+
+/// As [`reconstruct`], of points that scanners saw; `scanner` has that of a position.
+pub fn reconstruct_seen(
+    points: &[Point],
+    scanner: impl Fn(&Point) -> Option<Scanner>,
+    settings: &Settings,
+) -> Mesh {
     let mut points = cells::in_id_order(points);
+    let scanners: Vec<Option<Scanner>> = points.iter().map(scanner).collect();
     let diagonal = cells::diagonal(&points);
     for _ in 0..settings.smooth {
         let smooth = match settings.edges {
@@ -217,7 +228,14 @@ pub fn reconstruct(points: &[Point], settings: &Settings) -> Mesh {
         density,
     );
     let (triples, off_surface) = cells::triples(&relaxed.shape, settings, diagonal, density);
-    let mut mesh = connect(&relaxed.shape, points, &triples, density, settings);
+    let mut mesh = connect(
+        &relaxed.shape,
+        points,
+        &triples,
+        density,
+        &scanners,
+        settings,
+    );
     mesh.counts.off_surface = off_surface;
     (mesh.counts.rounds, mesh.counts.moved) = (relaxed.rounds, relaxed.moved);
     (mesh.counts.curved, mesh.counts.clean) = (relaxed.curved, relaxed.clean);
@@ -232,15 +250,16 @@ pub fn from_triples(
     triples: &BTreeMap<Triangle, u32>,
     settings: &Settings,
 ) -> Mesh {
-    connect(&points.clone(), points, triples, None, settings)
+    connect(&points.clone(), points, triples, None, &[], settings)
 }
 
-/// As [`from_triples`], with a shape and file positions.
+/// As [`from_triples`], with a shape and file positions, and the scanners of the points (robust).
 pub fn connect(
     shape: &[Point],
     file: Vec<Point>,
     triples: &BTreeMap<Triangle, u32>,
     density: Option<&Density>,
+    scanners: &[Option<Scanner>],
     settings: &Settings,
 ) -> Mesh {
     let mut counts = Counts {
@@ -264,7 +283,7 @@ pub fn connect(
     counts.flat_candidates = on_a_line.len() - counts.flat;
     let base = if settings.robust {
         let open = open.into_keys().copied().collect();
-        base::weighed(shape, &t3, &open, settings)
+        base::weighed(shape, &t3, &open, scanners, settings)
     } else {
         base::base(&t3, settings.block)
     };
@@ -281,7 +300,15 @@ pub fn connect(
     counts.rejected = inserted.rejected;
 
     let mut surface = inserted.surface;
-    let turned = repair_and_orient(shape, &file, density, &mut surface, settings, &mut counts);
+    let turned = repair_and_orient(
+        shape,
+        &file,
+        density,
+        scanners,
+        &mut surface,
+        settings,
+        &mut counts,
+    );
     let (vertices, triangles) = output::in_file_order(&surface, &turned, true);
     counts.copies = vertices.len() - surface.vertices().len();
     Mesh {
@@ -298,6 +325,7 @@ fn repair_and_orient(
     shape: &[Point],
     file: &[Point],
     density: Option<&Density>,
+    scanners: &[Option<Scanner>],
     surface: &mut Surface,
     settings: &Settings,
     counts: &mut Counts,
@@ -310,7 +338,7 @@ fn repair_and_orient(
         (counts.small_components, counts.small_triangles) =
             repair::remove_small_components(surface, settings.min_component);
     }
-    let components = repair::oriented(shape, surface);
+    let components = repair::oriented(shape, scanners, surface);
     let mut turned: Component = components
         .iter()
         .flatten()

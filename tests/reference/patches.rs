@@ -27,6 +27,24 @@ pub fn weight(cosine: f64) -> i64 {
     1 + (15.0 * cosine.max(0.0)).floor() as i64
 }
 
+/// The place of a scanner on the lattice.
+pub type Scanner = [i64; 3];
+
+/// The evidence that the run i → j → k of a triangle faces the scanner that saw its vertex `v`.
+pub fn facing(points: &[Point], scanners: &[Option<Scanner>], t: Triangle, v: u32) -> i64 {
+    let Some(Some(scanner)) = scanners.get(v as usize) else {
+        return 0;
+    };
+    let at = points[v as usize];
+    let way: [f64; 3] = std::array::from_fn(|axis| (scanner[axis] - i64::from(at[axis])) as f64);
+    let length = (way[0] * way[0] + way[1] * way[1] + way[2] * way[2]).sqrt();
+    if length == 0.0 {
+        return 0;
+    }
+    let (n, d) = (unit_normal(points, t), way.map(|x| x / length));
+    (16.0 * (n[0] * d[0] + n[1] * d[1] + n[2] * d[2])).trunc() as i64
+}
+
 /// Step 2: the points that are the highest of their columns.
 pub fn highest(points: &[Point]) -> BTreeSet<u32> {
     let least = |axis: usize| points.iter().map(|p| i64::from(p[axis])).min();
@@ -64,6 +82,8 @@ pub struct Block<'a> {
     pub candidates: BTreeSet<Triangle>,
     /// The highest points of columns.
     pub highest: &'a BTreeSet<u32>,
+    /// The scanner of each point.
+    pub scanners: &'a [Option<Scanner>],
     /// `P`.
     pub run: u32,
 }
@@ -101,7 +121,7 @@ impl Block<'_> {
         };
         let count = patches.of.values().map(|side| side.home + 1).max();
         (0..count.unwrap_or(0)).for_each(|_| _ = patches.graph.push());
-        self.add_evidence(&mut patches);
+        self.add_evidence(&mut patches, met);
         self.add_edges(&mut patches);
         self.add_outside(&mut patches);
         for &c in &self.candidates {
@@ -153,15 +173,21 @@ impl Block<'_> {
     }
 
     /// Step 2: evidence, and the numbers of triangles.
-    fn add_evidence(&self, patches: &mut Patches) {
+    fn add_evidence(&self, patches: &mut Patches, met: &mut Weighing) {
         for (&t, side) in &patches.of {
             let node = &mut patches.graph.nodes[side.home];
             node.triangles += 1;
             for v in t {
-                if self.highest.contains(&v) {
-                    let up = (16.0 * unit_normal(self.points, t)[2]).trunc() as i64;
-                    node.up += if side.turned { -up } else { up };
-                }
+                let known = self.scanners.get(v as usize).is_some_and(Option::is_some);
+                let up = match known {
+                    true if v % 64 == 0 => facing(self.points, self.scanners, t, v),
+                    false if self.highest.contains(&v) => {
+                        (16.0 * unit_normal(self.points, t)[2]).trunc() as i64
+                    }
+                    _ => 0,
+                };
+                met.faced += usize::from(known && up != 0);
+                node.up += if side.turned { -up } else { up };
             }
         }
     }

@@ -2,6 +2,7 @@
 
 use super::big::{Big, Big3, cross, determinant, dot, plus, vector};
 use super::insert::normal;
+use super::patches::{Scanner, facing};
 use super::surface::{Component, Edge, Surface, Triangle, edges};
 use outcrop::geom::Point;
 use std::collections::BTreeSet;
@@ -52,14 +53,26 @@ pub fn run([i, j, k]: Triangle, turned: bool) -> [u32; 3] {
     if turned { [i, k, j] } else { [i, j, k] }
 }
 
-/// All triangles as they run after every component is oriented by its volume or area.
-pub fn oriented(points: &[Point], surface: &Surface) -> Vec<Component> {
+/// All triangles as they run after every component is oriented: to the scanners that saw it, else by its volume or
+/// area.
+pub fn oriented(
+    points: &[Point],
+    scanners: &[Option<Scanner>],
+    surface: &Surface,
+) -> Vec<Component> {
     let mut components = surface.components().expect("the mesh is orientable");
     for component in &mut components {
         let open = component
             .keys()
             .any(|&t| edges(t).iter().any(|&e| surface.is_boundary(e)));
-        if faces_wrongly(points, component, open) {
+        let seen: i64 = component
+            .iter()
+            .map(|(&t, &turned)| {
+                let seen = facing(points, scanners, t, t[0]);
+                if turned { -seen } else { seen }
+            })
+            .sum();
+        if seen < 0 || seen == 0 && faces_wrongly(points, component, open) {
             component.values_mut().for_each(|turned| *turned = !*turned);
         }
     }

@@ -5,6 +5,8 @@
 pub struct Weighing {
     /// Step 1: joins of triangles that contradicted earlier ones.
     pub folded: usize,
+    /// Step 2: vertices of triangles that give evidence because a scanner saw them.
+    pub faced: usize,
     /// Step 3: pairs of patches that candidates voted on, and candidates with more than three triangles.
     pub votes: usize,
     pub crowded: usize,
@@ -42,9 +44,10 @@ impl Weighing {
     }
 
     /// All counts with their names.
-    pub fn all(&self) -> [(&'static str, usize); 16] {
+    pub fn all(&self) -> [(&'static str, usize); 17] {
         [
             ("folded", self.folded),
+            ("faced", self.faced),
             ("votes", self.votes),
             ("crowded", self.crowded),
             ("flagged elsewhere", self.flagged_elsewhere),
@@ -67,6 +70,7 @@ impl Weighing {
     pub fn add(&mut self, more: &Self) {
         let Self {
             folded,
+            faced,
             votes,
             crowded,
             flagged_elsewhere,
@@ -84,6 +88,7 @@ impl Weighing {
             cut_between,
         } = more;
         self.folded += folded;
+        self.faced += faced;
         self.votes += votes;
         self.crowded += crowded;
         self.flagged_elsewhere += flagged_elsewhere;

@@ -10,6 +10,9 @@ use crate::workspace::memory::bytes_of;
 use crate::workspace::{Unit, Workspace};
 use std::ops::Range;
 
+/// A table of words by id, and the number of words of an id.
+pub type Part = (Table<Word>, usize);
+
 /// The buckets of an ordered store, and the sections of its columns.
 pub struct Buckets<'a> {
     store: &'a PointStore,
@@ -64,14 +67,21 @@ impl<'a> Buckets<'a> {
         section(self.starts[bucket])..section(self.starts[bucket + 1])
     }
 
-    /// Puts the values that were sent in the order of ids.
+    /// Puts the values that were sent in the order of ids, so many words of each point into each of two tables;
+    /// a table of no words is not made.
     pub fn merge<R: Row>(
         &self,
         inbox: &Inbox<R>,
-        words: usize,
+        parts: [usize; 2],
         workspace: &Workspace,
-    ) -> Result<Table<Word>> {
-        let table = Table::new("attributes", self.sections.len() - 1);
+    ) -> Result<[Option<Part>; 2]> {
+        let words = parts[0] + parts[1];
+        let table =
+            |name, words| (words > 0).then(|| (Table::new(name, self.sections.len() - 1), words));
+        let tables = [
+            table("attributes.scanners", parts[0]),
+            table("attributes", parts[1]),
+        ];
         let work = |unit: &Unit<'_>| {
             let bucket = unit.number();
             let rows = inbox.get(unit, bucket)?;
@@ -95,7 +105,12 @@ impl<'a> Buckets<'a> {
                         column[word * count + number].word = *value;
                     }
                 }
-                table.put(unit, section, &column)?;
+                let mut rest = &column[..];
+                for (table, words) in tables.iter().flatten() {
+                    let own;
+                    (own, rest) = rest.split_at(words * count);
+                    table.put(unit, section, own)?;
+                }
             }
             Ok(())
         };
@@ -111,7 +126,7 @@ impl<'a> Buckets<'a> {
         workspace.units("attributes: merge", self.count(), bytes, work, |_, ()| {
             Ok(())
         })?;
-        Ok(table)
+        Ok(tables)
     }
 }
 

@@ -1,4 +1,4 @@
-//! Columns of the points by id, such as colours (not in the paper).
+//! Columns of the points by id, such as colours, and the scanners that saw them (not in the paper).
 //!
 //! The ordered store is there already. Units read parts of the spool again, with values, and send each point's row
 //! to a bucket: a range of ids, cut at a sample of all points. Units of buckets sort the rows and go through them
@@ -17,7 +17,7 @@ use crate::stages::order::{Grouped, MOST_GROUPS, StoredPoints, cuts};
 use crate::workspace::memory::bytes_of;
 use crate::workspace::{Unit, Workspace};
 use buckets::Buckets;
-use rows::{Row1, Row2, Row6, Row12, Word};
+use rows::{Row1, Row2, Row6, Row12, Row13, Word};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
@@ -27,11 +27,10 @@ const ROWS: u64 = 64 << 20;
 /// Copies of its rows that a unit that reads has in memory: the rows, and the rows packed twice.
 const COPIES: u64 = 3;
 
-/// The columns of all points by id.
+/// Words of all points by id.
 #[derive(Debug, Serialize, Deserialize)]
-pub struct StoredColumns {
-    columns: Vec<Column>,
-    /// Words of the values of a point.
+struct Words {
+    /// Words of a point.
     words: usize,
     /// Sections: the values of consecutive ids, word by word.
     table: Table<Word>,
@@ -39,26 +38,16 @@ pub struct StoredColumns {
     starts: Vec<u32>,
 }
 
-release!(StoredColumns: table);
+release!(Words: table);
 
-impl StoredColumns {
-    /// The columns, in the order of the values.
-    #[must_use]
-    pub fn columns(&self) -> &[Column] {
-        &self.columns
-    }
-
-    /// Bytes of memory for the values of `ids` ids while they are read.
-    #[must_use]
-    pub fn bytes(&self, ids: usize) -> u64 {
+impl Words {
+    /// Bytes of memory for `ids` ids while they are read.
+    fn bytes(&self, ids: usize) -> u64 {
         (ids * self.words * 4 * 3) as u64
     }
 
-    /// The values of all ids of a block.
-    ///
-    /// # Errors
-    /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
-    pub fn open(&self, unit: &Unit<'_>, ids: Range<u32>) -> Result<Values<'_>> {
+    /// The words of the ids of a block, id by id.
+    fn open(&self, unit: &Unit<'_>, ids: Range<u32>) -> Result<Vec<u32>> {
         let mut rows = vec![0; ids.len() * self.words];
         let first = self.starts.partition_point(|start| *start < ids.start);
         let mut at = 0;
@@ -77,10 +66,41 @@ impl StoredColumns {
             }
             at = end / self.words;
         }
+        Ok(rows)
+    }
+}
+
+/// The columns of all points by id.
+#[derive(Debug, Serialize, Deserialize)]
+pub struct StoredColumns {
+    columns: Vec<Column>,
+    words: Words,
+}
+
+release!(StoredColumns: words);
+
+impl StoredColumns {
+    /// The columns, in the order of the values.
+    #[must_use]
+    pub fn columns(&self) -> &[Column] {
+        &self.columns
+    }
+
+    /// Bytes of memory for the values of `ids` ids while they are read.
+    #[must_use]
+    pub fn bytes(&self, ids: usize) -> u64 {
+        self.words.bytes(ids)
+    }
+
+    /// The values of all ids of a block.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+    pub fn open(&self, unit: &Unit<'_>, ids: Range<u32>) -> Result<Values<'_>> {
         Ok(Values {
             columns: self,
             first: ids.start,
-            rows,
+            rows: self.words.open(unit, ids)?,
         })
     }
 }
@@ -102,7 +122,7 @@ impl Values<'_> {
 
     /// Appends the little-endian values of an id to `bytes`, in the columns that are `held`.
     pub fn put(&self, id: u32, held: &[bool], bytes: &mut Vec<u8>) {
-        let words = self.columns.words;
+        let words = self.columns.words.words;
         let at = (id - self.first) as usize * words;
         let mut row = [0; 48];
         for (to, word) in row.chunks_exact_mut(4).zip(&self.rows[at..at + words]) {
@@ -119,7 +139,59 @@ impl Values<'_> {
     }
 }
 
-/// Puts the columns `carried` of a spool in the order of the ids of `store`.
+/// The number of the scanner of each point by id, from 1; 0 if it is unknown.
+#[derive(Debug, Serialize, Deserialize)]
+pub struct StoredScanners {
+    words: Words,
+}
+
+release!(StoredScanners: words);
+
+impl StoredScanners {
+    /// Stores the numbers of all ids.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], [`crate::Error::Disk`].
+    pub fn new(numbers: &[u32], blocks: Blocks, unit: &Unit<'_>) -> Result<Self> {
+        let table = Table::new("attributes.scanners", blocks.count());
+        let ids = || (0..blocks.count()).map(|block| blocks.ids(block));
+        for (block, ids) in ids().enumerate() {
+            let own = &numbers[ids.start as usize..ids.end as usize];
+            table.put(unit, block, bytemuck::cast_slice(own))?;
+        }
+        let words = Words {
+            words: 1,
+            table,
+            starts: ids().map(|ids| ids.start).collect(),
+        };
+        Ok(Self { words })
+    }
+
+    /// Bytes of memory for the numbers of `ids` ids while they are read.
+    #[must_use]
+    pub fn bytes(&self, ids: usize) -> u64 {
+        self.words.bytes(ids)
+    }
+
+    /// The numbers of all ids of a block.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+    pub fn open(&self, unit: &Unit<'_>, ids: Range<u32>) -> Result<Vec<u32>> {
+        self.words.open(unit, ids)
+    }
+}
+
+/// The values of the points by id.
+#[derive(Debug, Default, Serialize, Deserialize)]
+pub struct StoredAttributes {
+    /// The columns of the mesh, if there are any.
+    pub columns: Option<StoredColumns>,
+    /// The scanners, if they are carried.
+    pub scanners: Option<StoredScanners>,
+}
+
+/// Puts the columns and scanners `carried` of a spool in the order of the ids of `store`.
 ///
 /// # Errors
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`], [`crate::Error::Cancelled`].
@@ -130,7 +202,7 @@ pub fn attributes(
     store: &StoredPoints,
     blocks: Blocks,
     workspace: &Workspace,
-) -> Result<StoredColumns> {
+) -> Result<StoredAttributes> {
     let job = Job {
         spool,
         lattice,
@@ -142,7 +214,8 @@ pub fn attributes(
         0 | 1 => job.run::<Row1>(store, blocks),
         2 => job.run::<Row2>(store, blocks),
         3..=6 => job.run::<Row6>(store, blocks),
-        _ => job.run::<Row12>(store, blocks),
+        7..=12 => job.run::<Row12>(store, blocks),
+        _ => job.run::<Row13>(store, blocks),
     }
 }
 
@@ -157,7 +230,7 @@ struct Job<'a> {
 }
 
 impl Job<'_> {
-    fn run<R: Row>(&self, store: &StoredPoints, blocks: Blocks) -> Result<StoredColumns> {
+    fn run<R: Row>(&self, store: &StoredPoints, blocks: Blocks) -> Result<StoredAttributes> {
         let workspace = self.workspace;
         let size = self.rows / (COPIES * size_of::<R>() as u64);
         let size = size.max(self.spool.points() / MOST_GROUPS);
@@ -172,14 +245,23 @@ impl Job<'_> {
         let buckets = Buckets::new(&store, &cuts, blocks, workspace)?;
         let inbox = sent.open(workspace, buckets.count())?;
         let words = self.carried.bytes().div_ceil(4);
-        let table = buckets.merge(&inbox, words, workspace)?;
+        let first = usize::from(self.carried.has_scanners());
+        let tables = buckets.merge(&inbox, [first, words - first], workspace)?;
         drop(inbox);
         sent.release(workspace)?;
-        Ok(StoredColumns {
-            columns: self.carried.columns.clone(),
-            words,
-            table,
-            starts: buckets.sections(),
+        let [scanners, columns] = tables.map(|table| {
+            table.map(|(table, words)| Words {
+                words,
+                table,
+                starts: buckets.sections(),
+            })
+        });
+        Ok(StoredAttributes {
+            columns: columns.map(|words| StoredColumns {
+                columns: self.carried.columns.clone(),
+                words,
+            }),
+            scanners: scanners.map(|words| StoredScanners { words }),
         })
     }
 

@@ -29,6 +29,11 @@ valued!(
     Above Above Above Above Above Above Above Above Above Above Above Above
 );
 
+valued!(
+    Row13, 13,
+    Above Above Above Above Above Above Above Above Above Above Above Above Above
+);
+
 row! {
     /// A word of the values of a point.
     pub struct Word {

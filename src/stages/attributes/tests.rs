@@ -60,7 +60,7 @@ fn check<R: Row>(points: u32, side: u32, block: u32, page: usize, keep_all: bool
         rows: 1,
         workspace: &workspace,
     };
-    let columns = job.run::<R>(&store, blocks).unwrap();
+    let columns = job.run::<R>(&store, blocks).unwrap().columns.unwrap();
     let opened = store.open(&workspace).unwrap();
     let base = least.keys().fold([u32::MAX; 3], |low, p| {
         std::array::from_fn(|a| low[a].min(p[a]))

@@ -1,10 +1,12 @@
 //! The columns that the mesh keeps, and the values of the spool in their types.
 //!
 //! The columns of all files become one list. Its rows are bytes that compare like the values, column by column,
-//! so that the smallest of several rows does not depend on who read them.
+//! so that the smallest of several rows does not depend on who read them. The number of the scanner, if it is
+//! carried, comes first: so the scanner of a position is the same whatever columns the mesh keeps.
 
 use super::Spool;
-use super::columns::{Attributes, COLORS, Column, Span, row_bytes};
+use super::columns::{Attributes, COLORS, Column, SCANNER, Span, row_bytes};
+use super::ranks::Ranks;
 use super::source::Source;
 use outcrop_ply::{Scalar, real};
 use serde::{Deserialize, Serialize};
@@ -46,6 +48,8 @@ enum Change {
     Upper,
     /// A colour from 0 to 1: times this.
     Unit(f64),
+    /// The number of a scanner in its file: that in the cloud.
+    Scanner,
 }
 
 /// The values of one column in the rows of one source.
@@ -68,17 +72,53 @@ pub struct Carried {
     pub warnings: Vec<String>,
     /// For each source, the steps of all columns.
     steps: Vec<Vec<Step>>,
+    ranks: Ranks,
+    /// For each source, the place of the number of the scanner; none if scanners are not carried.
+    scanners: Option<Vec<Option<(usize, Scalar)>>>,
 }
 
+/// Bytes of the number of a scanner in a row.
+const NUMBER: usize = size_of::<u32>();
+
 impl Carried {
+    /// True if nothing is carried.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.bytes() == 0
+    }
+
     /// Bytes of the values of a point.
     #[must_use]
     pub fn bytes(&self) -> usize {
-        row_bytes(&self.columns)
+        let number = if self.scanners.is_some() { NUMBER } else { 0 };
+        number + row_bytes(&self.columns)
+    }
+
+    /// True if rows begin with the number of the scanner, from 1, or 0: a word, highest byte first.
+    #[must_use]
+    pub fn has_scanners(&self) -> bool {
+        self.scanners.is_some()
+    }
+
+    /// The positions of the scanners in the order of their numbers, in the input's unit.
+    #[must_use]
+    pub fn scanners(&self) -> &[[f64; 3]] {
+        let carried = self.scanners.is_some();
+        if carried { &self.ranks.positions } else { &[] }
+    }
+
+    /// Leaves out the scanners.
+    pub fn drop_scanners(&mut self) {
+        self.scanners = None;
     }
 
     /// Appends the row of a point of source `source`, whose values in the spool are `values`.
     pub(super) fn put(&self, source: usize, values: &[u8], row: &mut Vec<u8>) {
+        let number = |value| self.ranks.number(source, value);
+        if let Some(scanners) = &self.scanners {
+            let scanner = scanners[source].map(|(at, scalar)| real(scalar, &values[at..], false));
+            row.extend(scanner.map_or(0, number).to_be_bytes());
+        }
         for step in &self.steps[source] {
             let value = match step.from {
                 Some((at, scalar)) => real(scalar, &values[at..], false),
@@ -89,6 +129,7 @@ impl Carried {
                 Change::Wider => value * 257.0,
                 Change::Upper => (value / 256.0).floor(),
                 Change::Unit(most) => (value * most).round(),
+                Change::Scanner => f64::from(number(value)),
             };
             put_ordered(step.to, value, row);
         }
@@ -224,7 +265,10 @@ impl Spool {
         let sources = &self.sources;
         let mut names = attributes.names();
         names.retain(|name| used(sources).any(|s| place(s, name).is_some()));
-        let mut carried = Carried::default();
+        let mut carried = Carried {
+            ranks: Ranks::of(sources, &self.stats),
+            ..Carried::default()
+        };
         if *attributes == Attributes::Auto {
             let constant = |name: &str| {
                 let span = span(sources, name);
@@ -265,6 +309,20 @@ impl Spool {
         carried
     }
 
+    /// The same, and the scanners of the points if they were read and a file gives any.
+    #[must_use]
+    pub fn with_scanners(&self, mut carried: Carried) -> Carried {
+        if !carried.ranks.positions.is_empty() {
+            let from = |(number, source): (usize, &Source)| {
+                let place = place(source, SCANNER).filter(|_| carried.ranks.has(number));
+                place.map(|(_, at, scalar)| (at, scalar))
+            };
+            let from = self.sources.iter().enumerate().map(from);
+            carried.scanners = Some(from.collect());
+        }
+        carried
+    }
+
     /// Adds the column `name`.
     fn carry(&self, name: &str, palette: Palette, wide: bool, carried: &mut Carried) {
         let sources = &self.sources;
@@ -274,10 +332,17 @@ impl Spool {
             (true, false) => Scalar::U8,
             _ => scalars.reduce(common).unwrap_or(Scalar::U8),
         };
-        for (source, steps) in sources.iter().zip(&mut carried.steps) {
+        let ranks = &carried.ranks;
+        let scanners = ranks.positions.len();
+        let scalar = match name == SCANNER && scanners > usize::from(u16::MAX) {
+            true => common(scalar, Scalar::U32),
+            false => scalar,
+        };
+        for (number, (source, steps)) in sources.iter().zip(&mut carried.steps).enumerate() {
             let from = place(source, name).map(|(_, at, scalar)| (at, scalar));
             let change = match from {
                 Some((_, from)) if is_color(name) => palette.change(from, wide),
+                Some(_) if name == SCANNER && ranks.has(number) => Change::Scanner,
                 _ => Change::None,
             };
             steps.push(Step {
@@ -295,7 +360,13 @@ impl Spool {
                 format!("{files_without} of {all} files have no {name}; their points get {filled}");
             carried.warnings.push(note);
         }
-        let Span { min, max } = span(sources, name);
+        let Span { min, max } = match name == SCANNER && scanners > 0 {
+            true => Span {
+                min: 0.0,
+                max: scanners as f64,
+            },
+            false => span(sources, name),
+        };
         carried.attributes.push(Attribute {
             name: name.to_owned(),
             scalar,

@@ -13,6 +13,13 @@ pub(super) const INTENSITY: &str = "intensity";
 /// The class of a point, as in LAS.
 pub(super) const CLASSIFICATION: &str = "classification";
 
+/// The scanner that saw a point, in files that give positions of scanners: its number in
+/// [`PointFile::scanners`](super::point_format::PointFile::scanners), or [`NO_SCANNER`].
+pub(super) const SCANNER: &str = "scanner";
+
+/// Of points whose scanner is unknown.
+pub(super) const NO_SCANNER: u16 = u16::MAX;
+
 /// Other names of columns, in lower case.
 const ALIASES: [(&str, &str); 12] = [
     ("r", "red"),
@@ -29,8 +36,11 @@ const ALIASES: [(&str, &str); 12] = [
     ("returnnumber", "return_number"),
 ];
 
-/// Most bytes of all wanted columns of a point.
+/// Most bytes of all columns of a point that are wanted for the mesh.
 pub(super) const MOST_BYTES: usize = 48;
+
+/// Most bytes of a point's row: these, and the number of its scanner.
+pub(super) const MOST_ROW: usize = MOST_BYTES + size_of::<u32>();
 
 /// A column of a file.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -164,14 +174,21 @@ pub(super) struct Wanted {
 }
 
 impl Wanted {
-    /// Of a file with these columns.
+    /// Of a file with these columns; also that of scanners if `scanners`.
     ///
     /// # Errors
-    /// [`Error::Parameter`] if they take more than [`MOST_BYTES`].
-    pub(super) fn of(attributes: &Attributes, columns: &[Column]) -> Result<Self> {
-        let numbers = attributes.of(columns);
-        let columns: Vec<Column> = numbers.iter().map(|n| columns[*n].clone()).collect();
-        let bytes = row_bytes(&columns);
+    /// [`Error::Parameter`] if those for the mesh take more than [`MOST_BYTES`].
+    pub(super) fn of(attributes: &Attributes, columns: &[Column], scanners: bool) -> Result<Self> {
+        let mut numbers = attributes.of(columns);
+        let bytes: usize = numbers.iter().map(|n| columns[*n].scalar.bytes()).sum();
+        if scanners
+            && let Some(scanner) = columns.iter().position(|c| c.name == SCANNER)
+            && !numbers.contains(&scanner)
+        {
+            numbers.push(scanner);
+            numbers.sort_unstable();
+        }
+        let columns = numbers.iter().map(|n| columns[*n].clone()).collect();
         if bytes > MOST_BYTES {
             return Err(Error::Parameter {
                 name: "--attributes",
@@ -267,7 +284,20 @@ mod tests {
             .map(|n| Column::new(&n.to_string(), Scalar::F64))
             .collect();
         let list = |n: usize| Attributes::List((0..n).map(|n| n.to_string()).collect());
-        assert_eq!(Wanted::of(&list(6), &columns).unwrap().bytes(), 48);
-        assert!(Wanted::of(&list(7), &columns).is_err());
+        assert_eq!(Wanted::of(&list(6), &columns, false).unwrap().bytes(), 48);
+        assert!(Wanted::of(&list(7), &columns, false).is_err());
+    }
+
+    #[test]
+    fn scanners_are_wanted_beside_others() {
+        let columns = ["intensity", SCANNER, "red"].map(|n| Column::new(n, Scalar::U16));
+        let numbers = |attributes: &Attributes, scanners| {
+            Wanted::of(attributes, &columns, scanners).unwrap().numbers
+        };
+        assert_eq!(numbers(&Attributes::None, true), [1]);
+        assert_eq!(numbers(&Attributes::Auto, true), [0, 1, 2]);
+        assert_eq!(numbers(&Attributes::Auto, false), [0, 2]);
+        let listed = Attributes::List(vec![SCANNER.into()]);
+        assert_eq!(numbers(&listed, true), numbers(&listed, false));
     }
 }

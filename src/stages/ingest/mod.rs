@@ -35,6 +35,7 @@ mod ply;
 mod point_format;
 mod probe;
 mod ptx;
+mod ranks;
 mod scalar;
 mod source;
 mod spool;
@@ -58,11 +59,12 @@ pub use systems::Mixed;
 use crate::error::{Error, Result};
 use crate::geom::lattice::Lattice;
 use crate::workspace::Workspace;
-use columns::{Wanted, row_bytes};
+use columns::{SCANNER, Wanted, row_bytes};
 use crop::Nearby;
 use frames::{Frame, values_of};
 use input::Input;
 use native::Native;
+use outcrop_ply::Scalar;
 use point_format::{Claims, PointFile};
 use serde::{Deserialize, Serialize};
 use source::Source;
@@ -89,6 +91,8 @@ pub struct Selection {
     pub crop: Option<Crop>,
     /// Columns of the points.
     pub attributes: Attributes,
+    /// True if the scanners of the points are read, from files that give their positions.
+    pub scanners: bool,
 }
 
 /// All points of the inputs in one scratch file.
@@ -185,7 +189,8 @@ fn read_all(
         workspace.check_cancel()?;
         let opened = Opened::new(Input::open(path, workspace)?)?;
         let number = sources.len() as u32;
-        let wanted = Wanted::of(&selection.attributes, &opened.file.columns())?;
+        let scanners = selection.scanners && opened.has_scanners();
+        let wanted = Wanted::of(&selection.attributes, &opened.file.columns(), scanners)?;
         let target = SourceWriter::new(workspace, name, section, number, classes, &wanted)?
             .within(nearby.as_ref(), opened.claims.native);
         let outside =
@@ -211,7 +216,7 @@ fn read_all(
         section = next;
         frames.extend(more);
         values.extend(more_values.frames);
-        if selection.attributes != Attributes::None {
+        if selection.attributes != Attributes::None || selection.scanners {
             // Frames without values.
             values.resize(frames.len(), Frame::default());
         }
@@ -266,6 +271,13 @@ impl Opened {
             file,
             claims,
         })
+    }
+
+    /// True if the file tells where the scanners were, and which of them saw a point.
+    fn has_scanners(&self) -> bool {
+        let columns = self.file.columns();
+        let scanner = columns.iter().find(|c| c.name == SCANNER);
+        scanner.is_some_and(|c| c.scalar == Scalar::U16) && !self.file.scanners().is_empty()
     }
 
     /// The reference system that the file gives, or else a `.prj` file beside it; a warning about that.

@@ -95,7 +95,8 @@ pub(super) trait PointFile {
         None
     }
 
-    /// The positions of the scanners, in the unit of the points; all of them when the points were read.
+    /// The positions of the scanners, in the unit of the points; all of them when the points were read. A file
+    /// that has any has a column [`SCANNER`](super::columns::SCANNER) of `u16`.
     fn scanners(&self) -> Vec<[f64; 3]> {
         Vec::new()
     }

@@ -37,6 +37,8 @@ pub struct Probe {
     pub bounds: Option<[[f64; 3]; 2]>,
     /// Columns of its points beside the coordinates.
     pub columns: Vec<Column>,
+    /// Bytes of the number of the scanner that saw a point, if the file gives positions of scanners.
+    pub scanner_bytes: u64,
     /// Bytes of a point in the scratch folder.
     pub spool_bytes_per_point: u64,
 }
@@ -56,11 +58,13 @@ impl Probe {
 /// # Errors
 /// [`crate::Error::Io`]; [`crate::Error::Input`] if it is not a readable point cloud.
 pub fn probe(path: &Path) -> Result<Probe> {
+    let opened = Opened::new(Input::open_head(path, LONG_HEAD)?)?;
+    let has_scanners = opened.has_scanners();
     let Opened {
         input,
         claims,
         file,
-    } = Opened::new(Input::open_head(path, LONG_HEAD)?)?;
+    } = opened;
     let (scale, offset) = match claims.native {
         Native::Las { scale, offset } => (Some(scale), Some(offset)),
         Native::F32 | Native::F64 => (None, None),
@@ -80,6 +84,10 @@ pub fn probe(path: &Path) -> Result<Probe> {
         scale,
         offset,
         bounds: claims.bounds,
+        scanner_bytes: match has_scanners {
+            true => size_of::<u16>() as u64,
+            false => 0,
+        },
         columns: file.columns(),
         spool_bytes_per_point: claims.native.point_bytes() as u64,
         path: input.path,

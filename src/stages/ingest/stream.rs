@@ -2,7 +2,7 @@
 
 use super::Spool;
 use super::carry::Carried;
-use super::columns::{MOST_BYTES, row_bytes};
+use super::columns::{MOST_ROW, row_bytes};
 use super::far::is_near;
 use super::frames::{FRAME, FrameBuffer, read_frame, read_values, values_of};
 use super::map::SourceMap;
@@ -18,7 +18,7 @@ use std::sync::Mutex;
 pub const READ_BUFFERS: u64 = (FRAME * (24 + 24 + 12 + 4)) as u64;
 
 /// Bytes of the buffers of one thread that streams the values of a [`Spool`] as well.
-pub const VALUE_BUFFERS: u64 = READ_BUFFERS + (FRAME * 2 * MOST_BYTES) as u64;
+pub const VALUE_BUFFERS: u64 = READ_BUFFERS + (FRAME * 2 * MOST_ROW) as u64;
 
 /// The buffers of one thread.
 #[derive(Default)]

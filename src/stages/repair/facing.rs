@@ -1,12 +1,15 @@
 //! The fate of a component: kept or removed, and its orientation.
 //!
-//! Sums over a component are exact integers, so they do not depend on the order of triangles.
+//! Sums over a component are exact integers, so they do not depend on the order of triangles. Where scanners saw
+//! the points, their side is out; else volume or area decide.
 
 use super::RepairStats;
 use crate::geom::Point;
 use crate::geom::triangle::small_normal;
 use crate::method::METHOD;
 use crate::spill::row;
+use crate::stages::surface::evidence::facing;
+use crate::stages::surface::parity::signed;
 use crate::stages::surface::star::Triangle;
 use serde::{Deserialize, Serialize};
 
@@ -24,6 +27,8 @@ pub struct Sums {
     area: u128,
     /// Sum of the positions of all corners.
     corners: [i128; 3],
+    /// Evidence that the triangles face the scanners that saw them.
+    seen: i64,
     /// The smallest triangle, and true if it is turned (does not run ascending).
     first: Option<(Triangle, bool)>,
 }
@@ -41,6 +46,8 @@ row! {
         corners: [[u32; 4]; 3],
         /// Number of triangles.
         triangles: [u32; 2],
+        /// Evidence that they face the scanners.
+        seen: [u32; 2],
         /// Bit 1: the smallest triangle is turned; bit 2: there is a triangle; bit 4: there is a boundary
         /// edge.
         flags: u32,
@@ -61,14 +68,37 @@ fn number(words: [u32; 4]) -> i128 {
         .cast_signed()
 }
 
+fn words64(number: u64) -> [u32; 2] {
+    [number as u32, (number >> 32) as u32]
+}
+
+fn number64(words: [u32; 2]) -> u64 {
+    let [low, high] = words.map(u64::from);
+    high << 32 | low
+}
+
 impl Sums {
-    /// Adds a triangle with corners at `corners`; `flip` if it is turned against its ascending ids.
-    pub fn add(&mut self, t: Triangle, [a, b, c]: [Point; 3], flip: bool) {
+    /// Adds a triangle with corners at `corners`; `flip` if it is turned against its ascending ids. `toward` is
+    /// the unit vector from its first corner to the scanner that saw it.
+    pub fn add(
+        &mut self,
+        t: Triangle,
+        [a, b, c]: [Point; 3],
+        flip: bool,
+        toward: Option<[f64; 3]>,
+    ) {
         self.see(t, flip);
         let mut n = small_normal(a, b, c);
         let length2 = n.iter().map(|x| (*x as f64) * (*x as f64)).sum::<f64>();
+        let length = length2.sqrt();
         self.triangles += 1;
-        self.area += u128::from((length2.sqrt() as i64).cast_unsigned());
+        self.area += u128::from((length as i64).cast_unsigned());
+        if let Some(toward) = toward
+            && length > 0.0
+        {
+            let unit = n.map(|x| x as f64 / length);
+            self.seen += signed(flip, facing(unit, toward));
+        }
         if flip {
             n = n.map(|x| -x);
         }
@@ -102,6 +132,7 @@ impl Sums {
         self.open |= other.open;
         self.volume6 += sign * other.volume6;
         self.area += other.area;
+        self.seen += signed(flip, other.seen);
         for axis in 0..3 {
             self.area_vector[axis] += sign * other.area_vector[axis];
             self.corners[axis] += other.corners[axis];
@@ -118,7 +149,8 @@ impl Sums {
             area: words(self.area.cast_signed()),
             area_vector: self.area_vector.map(words),
             corners: self.corners.map(words),
-            triangles: [self.triangles as u32, (self.triangles >> 32) as u32],
+            triangles: words64(self.triangles),
+            seen: words64(self.seen.cast_unsigned()),
             flags: flags | u32::from(turned),
             first,
         }
@@ -127,9 +159,9 @@ impl Sums {
     /// Converts from a row.
     #[must_use]
     pub fn of(row: &SumsRow) -> Self {
-        let [low, high] = row.triangles.map(u64::from);
         Self {
-            triangles: high << 32 | low,
+            triangles: number64(row.triangles),
+            seen: number64(row.seen).cast_signed(),
             open: row.flags & 4 != 0,
             volume6: number(row.volume6),
             area: number(row.area).cast_unsigned(),
@@ -142,7 +174,9 @@ impl Sums {
     /// True if the component must be turned. If nothing else decides, its smallest triangle is to run
     /// ascending.
     fn faces_wrong_way(&self) -> bool {
-        let wrong = if !self.open {
+        let wrong = if self.seen != 0 {
+            Some(self.seen < 0)
+        } else if !self.open {
             sign(self.volume6)
         } else {
             let v = self.area_vector.map(|x| x as f64);
@@ -221,12 +255,38 @@ pub fn judge(sums: &Sums, least: u64, stats: &mut RepairStats) -> Fate {
 mod tests {
     use super::*;
 
+    /// A floor that faces up, seen from a side of it.
+    #[test]
+    fn what_the_scanner_saw_is_out() {
+        let floor = [[0, 0, 5], [9, 0, 5], [0, 9, 5]];
+        for (toward, wrong) in [
+            (Some([0.6, 0.0, 0.8]), false),
+            (Some([0.6, 0.0, -0.8]), true),
+        ] {
+            for flip in [false, true] {
+                let mut sums = Sums::default();
+                sums.open();
+                sums.add([1, 2, 3], floor, flip, toward);
+                assert_eq!(sums.seen.abs(), 12);
+                assert_eq!(sums.faces_wrong_way(), wrong ^ flip);
+            }
+        }
+        // A scanner beside it says nothing.
+        let mut sums = Sums::default();
+        sums.open();
+        sums.add([1, 2, 3], floor, true, Some([1.0, 0.0, 0.0]));
+        assert_eq!((sums.seen, sums.faces_wrong_way()), (0, true));
+    }
+
     #[test]
     fn sums_as_rows() {
         let far = (1 << 30) - 1;
         let mut sums = Sums::default();
-        sums.add([3, 5, 9], [[0, far, 7], [far, 0, 0], [4, 2, far]], true);
-        sums.add([4, 5, 9], [[far, far, 0], [0, far, 9], [far, 5, 0]], false);
+        let corners = [[0, far, 7], [far, 0, 0], [4, 2, far]];
+        sums.add([3, 5, 9], corners, true, Some([0.0, 0.0, 1.0]));
+        let corners = [[far, far, 0], [0, far, 9], [far, 5, 0]];
+        sums.add([4, 5, 9], corners, false, Some([-0.8, 0.0, 0.6]));
+        assert!(sums.seen != 0);
         sums.open();
         assert_eq!(Sums::of(&sums.row()), sums);
         let empty = Sums::default();
@@ -234,6 +294,7 @@ mod tests {
         let mut both = sums;
         both.merge(&sums, true);
         assert_eq!((both.volume6, both.area_vector), (0, [0; 3]));
+        assert_eq!(both.seen, 0);
         assert_eq!((both.triangles, both.first), (4, sums.first));
     }
 }

@@ -16,6 +16,7 @@ use crate::geom::Point;
 use crate::spill::{Inbox, Shuffle, Table, release};
 use crate::stages::blocks::Blocks;
 use crate::stages::located::Places;
+use crate::stages::scanners::Seen;
 use crate::stages::stitch::Stitched;
 use crate::stages::surface::parity::constraint;
 use crate::stages::surface::rows::TriangleTo;
@@ -234,7 +235,9 @@ impl Build<'_> {
         let _held = unit.reserve("labels", label_bytes(labels as usize, count))?;
         let sets = join(unit, &seen, &globals, labels)?;
         let parts = Parts {
+            blocks: self.blocks,
             store: self.places.shape,
+            scanners: self.places.scanners,
             seen: &seen,
             sums: &self.sums,
             bridges: &bridges,
@@ -261,8 +264,9 @@ impl Build<'_> {
         let count = self.blocks.count();
         let around = Around::open(stitched, self.blocks, workspace)?;
         let bytes = |b: usize| {
-            let records = around.records(workspace, b);
-            230 * records as u64 + self.blocks.ids(b).len() as u64 * 30 + (1 << 20)
+            let (records, ids) = (around.records(workspace, b), self.blocks.ids(b).len());
+            let seen = self.places.scanners.map_or(0, |s| s.bytes(ids));
+            230 * records as u64 + ids as u64 * 30 + seen + (1 << 20)
         };
         let work = |unit: &Unit<'_>| {
             let done = self.block(unit, &around);
@@ -311,7 +315,11 @@ impl Build<'_> {
             rims[v / 32].bits |= 1 << (v % 32);
         }
         self.rims.put(unit, block, &rims)?;
-        let sums = self.sum(block, &shape, &triangles, &patch, &bridges);
+        let seen = self.places.scanners.map(|s| s.open(unit, ids.clone()));
+        let seen = seen.transpose()?;
+        let of_seen = unit.hold(seen.as_ref().map_or(0, Seen::bytes));
+        let sums = self.sum(block, &shape, seen.as_ref(), &triangles, &patch, &bridges);
+        drop((seen, of_seen));
         let (global, local) = sums.split_at(patch.global as usize);
         let global: Vec<SumsRow> = global.iter().map(Sums::row).collect();
         let more = unit.hold(bytes_of(&sums) + bytes_of(&global));
@@ -331,6 +339,7 @@ impl Build<'_> {
         &self,
         block: usize,
         points: &[Point],
+        seen: Option<&Seen<'_>>,
         triangles: &[Triangle],
         patch: &Patch,
         bridges: &[u32],
@@ -349,7 +358,8 @@ impl Build<'_> {
             }
             if ids.contains(&t[0]) && ids.contains(&t[2]) {
                 let corners = t.map(|v| points[(v - ids.start) as usize]);
-                sum.add(*t, corners, flip);
+                let toward = seen.and_then(|seen| seen.toward(t[0], corners[0]));
+                sum.add(*t, corners, flip, toward);
             }
         }
         sums

@@ -3,12 +3,13 @@
 
 use super::BaseStats;
 use crate::error::Result;
+use crate::method::METHOD;
 use crate::spill::{Id, Inbox, Shuffle, Table, release};
 use crate::stages::blocks::Blocks;
 use crate::stages::cells::{CountedTriple, SentTriple};
 use crate::stages::located::{Located, Places};
 use crate::stages::surface::columns;
-use crate::stages::surface::evidence::{Division, Evidence};
+use crate::stages::surface::evidence::{Division, Evidence, UP, Witness};
 use crate::stages::surface::orient::{BlockTriangles, Oriented, orient_inside};
 use crate::stages::surface::rows::TriangleTo;
 use crate::stages::surface::star::{Link, Star, Triangle, has, others};
@@ -72,7 +73,9 @@ pub(super) fn base(
     };
     let bytes = |block: usize| {
         let records = triples.own.expected_rows(workspace, block) + visiting.rows(block);
-        100 * records as u64 + (3 << 20)
+        let scanners = places.scanners.filter(|_| weigh);
+        let seen = scanners.map_or(0, |s| s.bytes(blocks.ids(block).len()));
+        100 * records as u64 + seen + (3 << 20)
     };
     let around = |unit: &Unit<'_>| look.block(unit);
     let name = "stitch.base";
@@ -218,12 +221,40 @@ impl Look<'_> {
         let load = || Located::load(self.places.shape, self.blocks, block, vertices);
         let places = located.map_or_else(load, Ok)?;
         let candidates: Vec<Triangle> = candidates.iter().map(|c| c.triple).collect();
+        let highest = bytemuck::cast_vec(highest.get(unit, block)?);
         Ok(Evidence {
             division: *division,
-            highest: bytemuck::cast_vec(highest.get(unit, block)?),
+            witnesses: self.witnesses(unit, &highest, &places)?,
             places,
             candidates,
         })
+    }
+
+    /// The vertices of the block at which it is known to which side the surface faces: one for a number of
+    /// points that faces the scanner that saw it; of the other points those that are the highest of columns.
+    fn witnesses(
+        &self,
+        unit: &Unit<'_>,
+        highest: &[u32],
+        places: &Located,
+    ) -> Result<Vec<Witness>> {
+        let up = |&vertex: &u32| Witness { vertex, toward: UP };
+        let Some(scanners) = self.places.scanners else {
+            return Ok(highest.iter().map(up).collect());
+        };
+        let ids = self.blocks.ids(unit.number());
+        let seen = scanners.open(unit, ids.clone())?;
+        let _held = unit.hold(scanners.bytes(ids.len()));
+        let sampled = |v: &u32| u64::from(*v) % METHOD.orientation.column == 0;
+        let facing = |vertex: u32| {
+            let toward = seen.toward(vertex, places.at(vertex))?;
+            Some(Witness { vertex, toward })
+        };
+        let unseen = highest.iter().filter(|v| !seen.has(**v));
+        let mut all: Vec<Witness> = unseen.map(up).collect();
+        all.extend(ids.filter(sampled).filter_map(facing));
+        all.sort_unstable_by_key(|w| w.vertex);
+        Ok(all)
     }
 
     /// The vertices of the triangles that are not interior to the block.

@@ -37,15 +37,33 @@ pub struct Evidence {
     pub candidates: Vec<Triangle>,
     /// Its division into patches and clusters.
     pub division: Division,
-    /// Vertices of the block that are the highest in their columns, ascending.
-    pub highest: Vec<u32>,
+    /// Vertices of the block at which it is known to which side the surface faces, ascending.
+    pub witnesses: Vec<Witness>,
+}
+
+/// A vertex at which it is known to which side the surface faces.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Witness {
+    /// Its id.
+    pub vertex: u32,
+    /// A unit vector to that side: up, or to the scanner that saw the point.
+    pub toward: [f64; 3],
+}
+
+/// Up.
+pub const UP: [f64; 3] = [0.0, 0.0, 1.0];
+
+/// The evidence that a triangle with this unit normal faces to a side.
+#[must_use]
+pub fn facing(unit_normal: [f64; 3], toward: [f64; 3]) -> i64 {
+    (dot(unit_normal, toward) * METHOD.orientation.flattest as f64) as i64
 }
 
 impl Evidence {
     /// Allocated bytes.
     #[must_use]
     pub fn bytes(&self) -> u64 {
-        self.places.bytes() + bytes_of(&self.candidates)
+        self.places.bytes() + bytes_of(&self.candidates) + bytes_of(&self.witnesses)
     }
 
     /// The normal of a triangle with ascending ids, rounded to `f64`, and its squared length.

@@ -20,7 +20,7 @@ pub fn constraint(word: u32) -> OrientationConstraint {
 
 /// A weight, negative if `flip`.
 #[inline]
-pub(super) fn signed(flip: bool, weight: i64) -> i64 {
+pub fn signed(flip: bool, weight: i64) -> i64 {
     if flip { -weight } else { weight }
 }
 

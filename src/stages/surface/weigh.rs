@@ -2,7 +2,7 @@
 //! decided without the rest of the cloud.
 
 use super::contract::{Graph, Limit};
-use super::evidence::{Evidence, cosine, weight};
+use super::evidence::{Evidence, cosine, facing, weight};
 use super::labels::{Connections, OrientedBlock, adjacent, number_labels};
 use super::parity::signed;
 use super::patches::Patches;
@@ -80,22 +80,27 @@ impl Weigher<'_> {
         self.graph.add(of_a, of_b, weight);
     }
 
-    /// Makes the patches nodes, with the evidence that they face up.
+    /// Makes the patches nodes, with the evidence that they face up, or to the scanners.
     fn add_patches(&mut self) {
         self.graph = Graph::new(self.patches.roots.len());
         for (node, (_, triangles)) in (0..).zip(&self.patches.roots) {
             self.graph.add_triangles(node, u64::from(*triangles));
         }
-        let mut highest = vec![false; self.ids.len()];
-        for v in &self.evidence.highest {
-            highest[(v - self.ids.start) as usize] = true;
+        let witnesses = &self.evidence.witnesses;
+        let mut known = vec![false; self.ids.len()];
+        for w in witnesses {
+            known[(w.vertex - self.ids.start) as usize] = true;
         }
         for (number, t) in (0..).zip(self.inner) {
-            let [a, b, c] = t.map(|v| i64::from(highest[(v - self.ids.start) as usize]));
-            let count = a + b + c;
-            if count > 0 {
-                let z = self.evidence.normal(*t)[2];
-                let up = count * (z * METHOD.orientation.flattest as f64) as i64;
+            let known = t.map(|v| known[(v - self.ids.start) as usize]);
+            if known.contains(&true) {
+                let normal = self.evidence.normal(*t);
+                let all = t.iter().zip(known).filter(|(_, known)| *known);
+                let evidence = all.map(|(v, _)| {
+                    let witness = witnesses.partition_point(|w| w.vertex < *v);
+                    facing(normal, witnesses[witness].toward)
+                });
+                let up = evidence.sum();
                 let (of, turned) = self.patch(number);
                 self.graph.add_up(of, signed(turned, up));
             }

@@ -6,7 +6,7 @@ mod read;
 mod scan;
 mod xml;
 
-use super::columns::Column;
+use super::columns::{Column, NO_SCANNER, SCANNER};
 use super::crs::Crs;
 use super::format::Format;
 use super::input::{Input, u32_at, u64_at};
@@ -17,7 +17,7 @@ use super::spool::SourceWriter;
 use crate::error::Result;
 use outcrop_ply::Scalar;
 use pages::PAGE;
-use scan::{Field, Kind, Name, Pose, Scan};
+use scan::{Field, Kind, Name, Scan};
 use xml::Description;
 
 impl Format {
@@ -90,6 +90,10 @@ impl Scans {
     fn of(description: Description) -> Self {
         let mut filled = description.scans;
         filled.retain(|scan| scan.points > 0);
+        let known = filled.iter_mut().filter(|scan| scan.scanner().is_some());
+        for (number, scan) in (0..NO_SCANNER).zip(known) {
+            scan.number = Some(number);
+        }
         Self {
             native: native(&filled),
             columns: columns(&filled),
@@ -158,6 +162,9 @@ fn columns(scans: &[Scan]) -> Vec<Column> {
             None => all.push(column),
         }
     }
+    if scans.iter().any(|scan| scan.number.is_some()) {
+        all.push(Column::new(SCANNER, Scalar::U16));
+    }
     all
 }
 
@@ -181,8 +188,7 @@ impl PointFile for Scans {
     }
 
     fn scanners(&self) -> Vec<[f64; 3]> {
-        let poses = self.filled.iter().filter_map(|scan| scan.pose);
-        poses.map(|Pose { translation, .. }| translation).collect()
+        self.filled.iter().filter_map(Scan::scanner).collect()
     }
 
     fn read(&self, input: &Input, target: &SourceWriter<'_>) -> Result<Vec<String>> {

@@ -1,6 +1,6 @@
 //! The points of an E57 file: a unit for each scan.
 
-use super::super::columns::{Column, Wanted};
+use super::super::columns::{Column, SCANNER, Wanted};
 use super::super::coordinate::Coordinate;
 use super::super::input::Input;
 use super::super::spool::{Sink, SourceWriter, sink_bytes};
@@ -29,6 +29,8 @@ struct Plan {
 struct Value {
     /// Number of its part, and of the one that tells if it is valid; none if the scan lacks the column.
     from: Option<(usize, Option<usize>)>,
+    /// The value of points without one.
+    otherwise: f64,
     scalar: Scalar,
 }
 
@@ -75,6 +77,10 @@ impl Plan {
             let state = scan.state(&column.name);
             Value {
                 from: field.map(|field| (take(field), state.map(&mut take))),
+                otherwise: match column.name == SCANNER {
+                    true => f64::from(scan.scanner_number()),
+                    false => f64::NAN,
+                },
                 scalar: column.scalar,
             }
         };
@@ -127,13 +133,11 @@ impl Plan {
     /// Appends the values of the wanted columns of a record.
     #[inline]
     fn put(&self, values: &[Vec<f64>], record: usize, out: &mut Vec<u8>) {
-        for Value { from, scalar } in &self.values {
+        for column in &self.values {
             let valid = |state: &usize| values[*state][record] == 0.0;
-            let value = from.filter(|(_, state)| state.iter().all(valid));
-            scalar.put(
-                value.map_or(f64::NAN, |(part, _)| values[part][record]),
-                out,
-            );
+            let from = column.from.filter(|(_, state)| state.iter().all(valid));
+            let value = from.map_or(column.otherwise, |(part, _)| values[part][record]);
+            column.scalar.put(value, out);
         }
     }
 }

@@ -1,6 +1,6 @@
 //! A scan of an E57 file, as its description says: the parts of a record, and the pose.
 
-use super::super::columns::Column;
+use super::super::columns::{Column, NO_SCANNER, SCANNER};
 use outcrop_ply::Scalar;
 
 /// The part of a record.
@@ -119,7 +119,8 @@ const STATES: [(&str, &[&str]); 3] = [
 ];
 
 impl Field {
-    /// The column of which this has the values; none for coordinates and states.
+    /// The column of which this has the values; none for coordinates and states, and for what would have the name
+    /// of the column of scanners.
     pub(super) fn column(&self) -> Option<Column> {
         let Name::Other(name) = &self.name else {
             return None;
@@ -130,7 +131,7 @@ impl Field {
         let usual = COLUMNS.iter().find(|(standard, _)| *standard == &**name);
         // Names of extensions have a prefix and a colon.
         let name = usual.map_or_else(|| name.replace(':', "_"), |(_, usual)| (*usual).to_owned());
-        Some(Column::new(&name, self.kind.scalar()))
+        Some(Column::new(&name, self.kind.scalar())).filter(|column| column.name != SCANNER)
     }
 }
 
@@ -198,8 +199,12 @@ pub(super) struct Motion {
 impl Motion {
     /// True if every point stays where it is.
     pub(super) fn rests(&self) -> bool {
-        self.rows == [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
-            && self.translation == [0.0; 3]
+        !self.turns() && self.translation == [0.0; 3]
+    }
+
+    /// True if it is not only a translation.
+    fn turns(&self) -> bool {
+        self.rows != [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
     }
 
     #[inline]
@@ -220,6 +225,8 @@ pub(super) struct Scan {
     pub(super) section: u64,
     pub(super) pose: Option<Pose>,
     pub(super) fields: Vec<Field>,
+    /// Its number among the scans with a scanner.
+    pub(super) number: Option<u16>,
 }
 
 impl Scan {
@@ -243,6 +250,21 @@ impl Scan {
     /// Bits of a record.
     pub(super) fn bits(&self) -> u64 {
         self.fields.iter().map(|f| u64::from(f.kind.bits())).sum()
+    }
+
+    /// The position of the scanner, the origin of the scan, if its records are in a grid or are directions, or it
+    /// was turned. Else its translation may be that of the origin of coordinates.
+    pub(super) fn scanner(&self) -> Option<[f64; 3]> {
+        let motion = self.motion()?;
+        let grid = ["rowIndex", "columnIndex"].map(Name::of);
+        let is_in_grid = grid.iter().any(|index| self.field(index).is_some());
+        let is_scan = is_in_grid || self.three(Name::Spherical).is_some() || motion.turns();
+        is_scan.then_some(motion.translation)
+    }
+
+    /// The value of the column of scanners.
+    pub(super) fn scanner_number(&self) -> u16 {
+        self.number.unwrap_or(NO_SCANNER)
     }
 
     /// The motion of the points; none if the rotation is none.

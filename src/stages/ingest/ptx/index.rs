@@ -93,6 +93,8 @@ struct Reader<'a> {
     source: BufReader<Range<'a>>,
     /// Offset of the next byte.
     at: u64,
+    /// Scans with points so far.
+    filled: u16,
     index: Index,
     /// For the index, which grows.
     held: Reservation,
@@ -106,6 +108,7 @@ impl<'a> Reader<'a> {
             workspace,
             source: input.stream(0, input.bytes),
             at: 0,
+            filled: 0,
             index: Index {
                 scans: Vec::new(),
                 units: Vec::new(),
@@ -171,7 +174,12 @@ impl<'a> Reader<'a> {
             return Ok(false);
         }
         let header: Vec<&[u8]> = header.iter().map(Vec::as_slice).collect();
-        let scan = Scan::of(self.input, begin, &header)?;
+        let mut scan = Scan::of(self.input, begin, &header)?;
+        // Beyond the largest number it is that of none.
+        scan.number = self.filled;
+        if scan.points > 0 {
+            self.filled = self.filled.saturating_add(1);
+        }
         let number = self.index.scans.len();
         if number == MOST_SCANS {
             let place = format!("scan {}", number + 1);

@@ -3,7 +3,7 @@
 mod index;
 mod scan;
 
-use super::columns::{COLORS, Column, INTENSITY, Wanted};
+use super::columns::{COLORS, Column, INTENSITY, SCANNER, Wanted};
 use super::format::Format;
 use super::input::Input;
 use super::lines;
@@ -100,7 +100,8 @@ impl PointFile for Scans {
     }
 }
 
-/// The columns of lines of so many words: an intensity behind the coordinates, and a colour behind that.
+/// The columns of lines of so many words: an intensity behind the coordinates, and a colour behind that; and the
+/// scanner.
 fn columns(words: usize) -> Vec<Column> {
     let color = COLORS.map(|name| Column::new(name, Scalar::U8));
     let all = [Column::new(INTENSITY, Scalar::F32)]
@@ -111,7 +112,8 @@ fn columns(words: usize) -> Vec<Column> {
         4..7 => 1,
         7.. => 4,
     };
-    all.take(count).collect()
+    let scanner = Column::new(SCANNER, Scalar::U16);
+    all.take(count).chain([scanner]).collect()
 }
 
 impl Scan {
@@ -150,6 +152,10 @@ impl Scan {
             let mut others = words(line).skip(3).take(4);
             let mut next = 0;
             for (number, column) in wanted.numbers.iter().zip(&wanted.columns) {
+                if column.name == SCANNER {
+                    values.extend(self.number.to_le_bytes());
+                    continue;
+                }
                 let word = others.nth(number - next);
                 next = number + 1;
                 let value = word.and_then(|w| number::parse(w, false, &mut 0));

@@ -56,6 +56,9 @@ fn numbers(line: &[u8]) -> Option<Vec<f64>> {
 pub(super) struct Scan {
     /// Lines after the header.
     pub(super) points: u64,
+    /// Its number among the scans with points; [`NO_SCANNER`](super::super::columns::NO_SCANNER) for too large
+    /// ones.
+    pub(super) number: u16,
     /// Position of the scanner, in the coordinates of the cloud.
     pub(super) scanner: [f64; 3],
     /// Images of the axes, and of the origin, in the coordinates of the cloud.
@@ -109,6 +112,7 @@ impl Scan {
         let [x, y, z, _] = rows[2];
         Ok(Self {
             points: columns.saturating_mul(lines),
+            number: 0,
             scanner: match unit && axes[3] == [0.0; 3] {
                 true => [x, y, z],
                 false => axes[3],

@@ -1,0 +1,154 @@
+//! Scanners: where they stood, and which of them saw each point (not in the paper). A scanner is on the outer side
+//! of every surface that it saw.
+
+use super::attributes::StoredScanners;
+use crate::error::Result;
+use crate::geom::Point;
+use crate::geom::aabb::Aabb;
+use crate::geom::lattice::Lattice;
+use crate::workspace::Unit;
+use crate::workspace::memory::bytes_of;
+use std::ops::Range;
+
+/// A position farther from the box around all points than this number of its diagonals is no scanner's.
+const MOST_DIAGONALS: i128 = 100;
+
+/// Largest absolute coordinate of a scanner, in steps: farther than any that counts.
+const FARTHEST: f64 = (1u64 << 40) as f64;
+
+/// The position of a scanner in lattice steps, rounded; none if it is too far from all points, in `bounds`, to be
+/// one. Such a position is rather the origin of coordinates.
+#[must_use]
+pub fn place(position: [f64; 3], lattice: &Lattice, bounds: Aabb) -> Option<[i64; 3]> {
+    let steps: [f64; 3] =
+        std::array::from_fn(|axis| (position[axis] - lattice.offset[axis]) / lattice.step);
+    let near = steps.iter().all(|x| x.abs() < FARTHEST);
+    // The base is less than 2^53.
+    let place: [i64; 3] =
+        std::array::from_fn(|axis| steps[axis].round() as i64 - lattice.base[axis]);
+    let (mut gap2, mut diagonal2) = (0, 0);
+    for (axis, x) in place.into_iter().enumerate() {
+        let ends = [bounds.min[axis], bounds.max[axis]].map(i64::from);
+        let gap = i128::from(x - x.clamp(ends[0], ends[1]));
+        let side = i128::from(ends[1] - ends[0]);
+        gap2 += gap * gap;
+        diagonal2 += side * side;
+    }
+    let near = near && gap2 <= MOST_DIAGONALS * MOST_DIAGONALS * diagonal2;
+    near.then_some(place)
+}
+
+/// The scanners of a cloud.
+#[derive(Debug, Clone, Copy)]
+pub struct Scanners<'a> {
+    stored: &'a StoredScanners,
+    places: &'a [Option<[i64; 3]>],
+}
+
+impl<'a> Scanners<'a> {
+    /// The scanners of the points, with their places in the order of their numbers.
+    #[must_use]
+    pub fn new(stored: &'a StoredScanners, places: &'a [Option<[i64; 3]>]) -> Self {
+        Self { stored, places }
+    }
+
+    /// Bytes of memory for those of `ids` points while they are read.
+    #[must_use]
+    pub fn bytes(&self, ids: usize) -> u64 {
+        self.stored.bytes(ids)
+    }
+
+    /// The scanners of the points of a block.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+    pub fn open(&self, unit: &Unit<'_>, ids: Range<u32>) -> Result<Seen<'a>> {
+        Ok(Seen {
+            first: ids.start,
+            numbers: self.stored.open(unit, ids)?,
+            places: self.places,
+        })
+    }
+}
+
+/// The scanners of the points of a block.
+#[derive(Debug)]
+pub struct Seen<'a> {
+    first: u32,
+    numbers: Vec<u32>,
+    places: &'a [Option<[i64; 3]>],
+}
+
+impl Seen<'_> {
+    /// Allocated bytes.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        bytes_of(&self.numbers)
+    }
+
+    /// The place of the scanner that saw a point of the block.
+    fn of(&self, id: u32) -> Option<[i64; 3]> {
+        let number = self.numbers.get((id - self.first) as usize)?;
+        let place = self.places.get(number.checked_sub(1)? as usize);
+        place.copied().flatten()
+    }
+
+    /// True if the scanner that saw a point of the block is known.
+    #[must_use]
+    pub fn has(&self, id: u32) -> bool {
+        self.of(id).is_some()
+    }
+
+    /// The unit vector from a point of the block, at `from`, to the scanner that saw it.
+    #[must_use]
+    pub fn toward(&self, id: u32, from: Point) -> Option<[f64; 3]> {
+        let to = self.of(id)?;
+        let v: [f64; 3] = std::array::from_fn(|axis| (to[axis] - i64::from(from[axis])) as f64);
+        let length = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
+        (length > 0.0).then(|| v.map(|x| x / length))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_origin_of_far_coordinates_is_no_scanner() {
+        let lattice = Lattice {
+            step: 0.5,
+            offset: [100.0, 0.0, 0.0],
+            base: [7, -3, 0],
+            exact: true,
+        };
+        let bounds = Aabb {
+            min: [0; 3],
+            max: [30, 40, 0],
+        };
+        let place = |position| place(position, &lattice, bounds);
+        assert_eq!(place([103.5, -1.5, 2.0]), Some([0, 0, 4]));
+        assert_eq!(place([100.26, 0.0, -1.0]), Some([-6, 3, -2]));
+        // A hundred diagonals of 50 steps.
+        assert_eq!(place([103.5, -1.5, 2500.0]), Some([0, 0, 5000]));
+        assert_eq!(place([103.5, -1.5, 2500.5]), None);
+        assert_eq!(place([1e300, 0.0, 0.0]), None);
+        assert_eq!(place([f64::NAN, 0.0, 0.0]), None);
+    }
+
+    #[test]
+    fn vectors_have_unit_length() {
+        let places = [Some([4, -3, 12]), None];
+        let seen = Seen {
+            first: 5,
+            numbers: vec![1, 2, 0, 3, 1],
+            places: &places,
+        };
+        let vector = [4.0 / 13.0, -3.0 / 13.0, 12.0 / 13.0];
+        assert_eq!(seen.toward(5, [0; 3]), Some(vector));
+        assert_eq!(seen.toward(9, [4, -3, 0]), Some([0.0, 0.0, 1.0]));
+        for unknown in [6, 7, 8] {
+            assert_eq!(seen.toward(unknown, [0; 3]), None);
+        }
+        assert_eq!(seen.toward(5, [4, -3, 12]), None);
+    }
+}
