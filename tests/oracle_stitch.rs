@@ -96,12 +96,15 @@ fn shape_of(shape: &[Point], workspace: &Workspace) -> PointStore {
     writer.finish().unwrap().open(workspace).unwrap()
 }
 
+/// The number of the scanner of each point, and the places of the scanners.
+type Seen<'a> = (&'a [u32], &'a [Option<[i64; 3]>]);
+
 /// The triangles, and the counts of [`counted`].
 fn pipeline(
     shape: &[Point],
     points: &[Point],
     all: &BTreeMap<[u32; 3], u32>,
-    scanners: Option<(&[u32], &[Option<[i64; 3]>])>,
+    scanners: Option<Seen<'_>>,
     settings: &Settings,
 ) -> outcrop::Result<(Vec<[u32; 3]>, [u64; 7])> {
     let workspace = &workspace();

@@ -92,7 +92,8 @@ fn every_field_of_every_point_format_is_kept() {
                 write_las(&path, (1, minor), format, grid, &points[..count], false);
                 let columns = probe(&path).unwrap().columns;
                 let names: Vec<&str> = columns.iter().map(|c| &*c.name).collect();
-                let (spool, carried) = read(&bench, &[path.clone()], &names.join(","), true);
+                let (spool, carried) =
+                    read(&bench, std::slice::from_ref(&path), &names.join(","), true);
                 assert!(
                     carried
                         .columns
@@ -181,7 +182,7 @@ fn properties_of_ply_are_columns_in_text_and_binary() {
         }
     }
     for file in files {
-        let (spool, carried) = read(&bench, &[file.clone()], "time,DEPTH,red", false);
+        let (spool, carried) = read(&bench, std::slice::from_ref(&file), "time,DEPTH,red", false);
         let found = rows(&bench, &spool, &carried);
         assert_eq!(found[0].1, [1e9 + 0.25, -5.0, 200.0], "{file:?}");
         assert!(found[1].1[0].is_nan(), "{file:?}");
@@ -240,7 +241,7 @@ fn what_no_file_has_is_refused_and_what_is_always_the_same_is_left_out() {
     let path = bench.path("cloud.las");
     write_las(&path, (1, 2), 2, (0.01, [0.0; 3]), &cloud(500, 3), false);
     let error = ingest_selected(
-        &[path.clone()],
+        std::slice::from_ref(&path),
         &selection("intensity,foo"),
         &bench.workspace,
     );

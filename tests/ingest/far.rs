@@ -74,7 +74,7 @@ fn what_fits_stays() {
     // Far, but the lattice can hold it.
     points.push([1 << 29, 0, 0]);
     write_las(&path, (1, 2), 0, GRID, &points, false);
-    let (spool, lattice, _) = near(&bench, &[path.clone()]);
+    let (spool, lattice, _) = near(&bench, std::slice::from_ref(&path));
     assert_eq!((spool.stats().dropped_far, lattice.exact), (0, true));
     // Too many to be strays: three of them are one in 1500.
     points.truncate(4500);

@@ -78,7 +78,7 @@ pub struct ExportOptions<'a> {
     pub normals: bool,
     /// Columns of the points.
     pub columns: Option<&'a StoredColumns>,
-    /// Decimals of coordinates as text, see [`decimals`].
+    /// Decimals of coordinates as text.
     pub decimals: usize,
 }
 
