@@ -390,6 +390,12 @@ impl Params {
         {
             return error("--drop-outliers", factor.to_string(), "1 or more");
         }
+        if let (true, Attributes::List(names)) = (self.normals, &self.attributes)
+            && let Some(name) = names.iter().find(|n| ["nx", "ny", "nz"].contains(&&***n))
+        {
+            let expected = "other columns: with --normals these are the mesh's own";
+            return error("--attributes", name.clone(), expected);
+        }
         if !(3..=MAX_NEIGHBORS).contains(&self.neighbors) {
             return error("--neighbors", self.neighbors.to_string(), "3 to 255");
         }

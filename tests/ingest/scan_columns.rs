@@ -108,7 +108,10 @@ fn lines_of_ptx_have_an_intensity_and_a_colour() {
     let line = |i: i32| format!("{i} 0 0 0.{i}25 {} 2 3", 10 * i);
     let lines: Vec<String> = (1..=4).map(line).collect();
     let path = bench.write("a.ptx", ptx::scan([2, 2], [0.0; 3], ptx::UNIT, &lines));
-    assert_eq!(names(&path), ["intensity", "red", "green", "blue"]);
+    assert_eq!(
+        names(&path),
+        ["intensity", "red", "green", "blue", "scanner"]
+    );
     let found = values(&bench, &path, "blue,red,intensity");
     assert_eq!(found[1], [3.0, 20.0, 0.225f32.into()]);
     assert_eq!(found.len(), 4);
@@ -130,7 +133,10 @@ fn text_has_the_columns_of_its_header_and_of_pts() {
     let bench = Bench::new();
     let pts = "2\n1 2 3 -1035.25 10 20 30\n4 5 6 7 40 50 60\n1\n7 8 9 0 0 0 0\n";
     let path = bench.write("a.pts", pts);
-    assert_eq!(names(&path), ["intensity", "red", "green", "blue"]);
+    assert_eq!(
+        names(&path),
+        ["intensity", "red", "green", "blue", "scanner"]
+    );
     let found = values(&bench, &path, "red,intensity");
     assert_eq!(found, [[10.0, -1035.25], [40.0, 7.0], [0.0, 0.0]]);
     let (spool, _) = read(&bench, &[path], "intensity", false);
@@ -190,7 +196,15 @@ fn e57_scan(from: u32, color: bool) -> Scan {
 fn parts_of_e57_records_are_columns() {
     let bench = Bench::new();
     let path = write(&bench, "a.e57", &[e57_scan(0, true), e57_scan(3000, false)]);
-    let all = ["intensity", "time_stamp", "row", "red", "green", "blue"];
+    let all = [
+        "intensity",
+        "time_stamp",
+        "row",
+        "red",
+        "green",
+        "blue",
+        "scanner",
+    ];
     assert_eq!(names(&path), all);
     let found = values(&bench, &path, "time_stamp,blue,red,intensity,row");
     assert_eq!(found.len(), 6000);
