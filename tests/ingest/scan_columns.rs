@@ -122,7 +122,7 @@ fn lines_of_ptx_have_an_intensity_and_a_colour() {
         .map(str::to_owned)
         .into();
     let path = bench.write("b.ptx", ptx::scan([1, 4], [0.0; 3], ptx::UNIT, &gray));
-    assert_eq!(names(&path), ["intensity"]);
+    assert_eq!(names(&path), ["intensity", "scanner"]);
     let found = values(&bench, &path, "intensity");
     assert_eq!((found.len(), found[0][0], found[2][0]), (3, 0.5, 0.25));
     assert!(found[1][0].is_nan());
@@ -133,10 +133,7 @@ fn text_has_the_columns_of_its_header_and_of_pts() {
     let bench = Bench::new();
     let pts = "2\n1 2 3 -1035.25 10 20 30\n4 5 6 7 40 50 60\n1\n7 8 9 0 0 0 0\n";
     let path = bench.write("a.pts", pts);
-    assert_eq!(
-        names(&path),
-        ["intensity", "red", "green", "blue", "scanner"]
-    );
+    assert_eq!(names(&path), ["intensity", "red", "green", "blue"]);
     let found = values(&bench, &path, "red,intensity");
     assert_eq!(found, [[10.0, -1035.25], [40.0, 7.0], [0.0, 0.0]]);
     let (spool, _) = read(&bench, &[path], "intensity", false);
