@@ -73,6 +73,9 @@ pub fn check(spool: &Spool) {
             Ok(())
         });
         streamed.expect("points that were just written");
-        assert_eq!((count, low), (spool.points(), [0; 3]), "{lattice:?}");
+        assert_eq!(count, spool.points(), "{lattice:?}");
+        // The lattice of a part is that of the whole, which may begin lower.
+        let whole = stats.dropped_by_crop + stats.skipped_by_crop == 0;
+        assert!(low == [0; 3] || !whole && low.iter().all(|c| *c >= 0));
     }
 }
