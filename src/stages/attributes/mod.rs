@@ -47,24 +47,23 @@ impl Words {
     }
 
     /// The words of the ids of a block, id by id.
-    fn open(&self, unit: &Unit<'_>, ids: Range<u32>) -> Result<Vec<u32>> {
-        let mut rows = vec![0; ids.len() * self.words];
-        let first = self.starts.partition_point(|start| *start < ids.start);
-        let mut at = 0;
+    fn open(&self, unit: &Unit<'_>, ids: impl IntoIterator<Item = u32>) -> Result<Vec<u32>> {
+        let mut rows = Vec::new();
         let mut section = Vec::new();
-        for number in first..self.starts.len() {
-            if self.starts[number] >= ids.end {
-                break;
+        // The ids of the section that is loaded.
+        let mut loaded = 0..0;
+        for id in ids {
+            if !loaded.contains(&id) {
+                let next = self.starts.partition_point(|start| *start <= id);
+                let end = self.starts.get(next).copied().unwrap_or(u32::MAX);
+                let number = next.saturating_sub(1);
+                self.table.get_into(unit, number, &mut section)?;
+                loaded = self.starts.get(number).copied().unwrap_or_default()..end;
             }
-            self.table.get_into(unit, number, &mut section)?;
             let count = section.len() / self.words;
-            let end = ((at + count) * self.words).min(rows.len());
-            let rows = &mut rows[at * self.words..end];
-            for (word, column) in section.chunks_exact(count.max(1)).enumerate() {
-                let places = rows[word..].iter_mut().step_by(self.words);
-                places.zip(column).for_each(|(to, from)| *to = from.word);
-            }
-            at = end / self.words;
+            let at = (id - loaded.start) as usize;
+            let word = |word: usize| section.get(word * count + at).filter(|_| at < count);
+            rows.extend((0..self.words).map(|w| word(w).map_or(0, |word| word.word)));
         }
         Ok(rows)
     }
@@ -92,24 +91,22 @@ impl StoredColumns {
         self.words.bytes(ids)
     }
 
-    /// The values of all ids of a block.
+    /// The values of ascending ids.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
-    pub fn open(&self, unit: &Unit<'_>, ids: Range<u32>) -> Result<Values<'_>> {
+    pub fn open(&self, unit: &Unit<'_>, ids: &[u32]) -> Result<Values<'_>> {
         Ok(Values {
             columns: self,
-            first: ids.start,
-            rows: self.words.open(unit, ids)?,
+            rows: self.words.open(unit, ids.iter().copied())?,
         })
     }
 }
 
-/// The values of the ids of a block.
+/// The values of some ids.
 #[derive(Debug)]
 pub struct Values<'a> {
     columns: &'a StoredColumns,
-    first: u32,
     rows: Vec<u32>,
 }
 
@@ -120,10 +117,10 @@ impl Values<'_> {
         bytes_of(&self.rows)
     }
 
-    /// Appends the little-endian values of an id to `bytes`, in the columns that are `held`.
-    pub fn put(&self, id: u32, held: &[bool], bytes: &mut Vec<u8>) {
+    /// Appends the little-endian values of the id with this number to `bytes`, in the columns that are `held`.
+    pub fn put(&self, number: usize, held: &[bool], bytes: &mut Vec<u8>) {
         let words = self.columns.words.words;
-        let at = (id - self.first) as usize * words;
+        let at = number * words;
         let mut row = [0; 48];
         for (to, word) in row.chunks_exact_mut(4).zip(&self.rows[at..at + words]) {
             to.copy_from_slice(&word.to_be_bytes());

@@ -67,12 +67,15 @@ fn check<R: Row>(points: u32, side: u32, block: u32, page: usize, keep_all: bool
     });
     let mut seen = 0;
     for block in 0..blocks.count() {
-        let ids = blocks.ids(block);
-        let values = columns.open(&workspace.unit(), ids.clone()).unwrap();
-        let places = opened.slice(ids.start as usize..ids.end as usize).unwrap();
-        for (id, place) in ids.zip(places) {
+        // From the second block on not all of them, and none at the begin of a section.
+        let few = block % 3;
+        let ids: Vec<u32> = blocks.ids(block).skip(few).step_by(1 + few).collect();
+        let values = columns.open(&workspace.unit(), &ids).unwrap();
+        let mut places = Vec::new();
+        opened.fetch(&ids, &mut places).unwrap();
+        for (number, place) in places.into_iter().enumerate() {
             let mut bytes = Vec::new();
-            values.put(id, &[true; 3], &mut bytes);
+            values.put(number, &[true; 3], &mut bytes);
             let place: [u32; 3] = std::array::from_fn(|a| place[a] as u32 + base[a]);
             let [a, b, c] = least[&place];
             let want = [&[a as u8][..], &(b as i16).to_le_bytes(), &c.to_le_bytes()].concat();
@@ -80,8 +83,8 @@ fn check<R: Row>(points: u32, side: u32, block: u32, page: usize, keep_all: bool
             seen += 1;
         }
     }
-    assert_eq!(seen, some.len());
-    assert!(keep_all || seen < least.len());
+    assert!(seen <= some.len() && 3 * seen >= some.len());
+    assert!(keep_all || some.len() < least.len() || least.len() < 3);
 }
 
 #[test]

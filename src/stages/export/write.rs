@@ -149,23 +149,20 @@ impl<P: Parts> Writer<'_, P> {
         ids: &[u32],
         normals: Option<&[[f32; 3]]>,
     ) -> Result<Vec<u8>> {
-        let [Some(first), Some(last)] = [ids.first(), ids.last()] else {
-            return Ok(Vec::new());
-        };
         let columns = self.columns.as_ref();
         let opened = columns.map(|(columns, held)| {
-            let values = columns.open(unit, *first..*last + 1)?;
+            let values = columns.open(unit, ids)?;
             Ok((values, held))
         });
         let opened = opened.transpose()?;
         let _held = unit.hold(opened.as_ref().map_or(0, |(values, _)| values.bytes()));
         let mut bytes = Vec::with_capacity(ids.len() * self.file.value_bytes());
-        for (number, id) in ids.iter().enumerate() {
+        for number in 0..ids.len() {
             if let Some(normals) = normals {
                 bytes.extend(normals[number].iter().flat_map(|x| x.to_le_bytes()));
             }
             if let Some((values, held)) = &opened {
-                values.put(*id, held, &mut bytes);
+                values.put(number, held, &mut bytes);
             }
         }
         Ok(bytes)
