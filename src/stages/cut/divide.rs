@@ -18,7 +18,7 @@ use std::ops::Range;
 const FAR: u32 = u32::MAX;
 
 row! {
-    /// What a square has in a block.
+    /// The part of a square in a block.
     pub struct Part {
         /// The square.
         square: Square,
@@ -180,7 +180,7 @@ impl Divided {
         squares + bytes_of(&self.squares) + bytes_of(&self.triangles) + bytes_of(&self.numbers)
     }
 
-    /// What each square has in the block, ascending by square.
+    /// The parts of all squares in the block, ascending by square.
     pub fn parts(&self) -> Vec<Part> {
         self.squares.iter().map(|square| square.part).collect()
     }

@@ -82,7 +82,7 @@ pub struct CutStats {
     pub squares: u64,
 }
 
-/// What the blocks read.
+/// The input of the blocks.
 struct Source<'a> {
     store: &'a PointStore,
     surface: Surface<'a>,

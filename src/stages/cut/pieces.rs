@@ -16,7 +16,7 @@ use std::ops::Range;
 /// Most squares: each is a file.
 const MOST_SQUARES: usize = 100_000;
 
-/// What a square has in a block.
+/// The part of a square in a block.
 #[derive(Debug, Clone)]
 struct Piece {
     part: Part,

@@ -22,7 +22,7 @@ const MOST_FIELDS: usize = u16::MAX as usize;
 /// Deepest nesting of which the names are kept.
 const DEEPEST: usize = 8;
 
-/// What a file says about itself.
+/// The description of a file.
 #[derive(Debug, Default)]
 pub(super) struct Description {
     pub(super) scans: Vec<Scan>,

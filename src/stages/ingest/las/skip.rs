@@ -1,4 +1,4 @@
-//! What of a file is not decoded because it is outside a region: chunks of COPC, and whole files.
+//! Parts of a file that are not decoded because they are outside a region: chunks of COPC, and whole files.
 //!
 //! Headers can be wrong. The box in a header, and the cubes of COPC, are believed only if a sample of the points
 //! agrees: those at the beginning of chunks, which are not compressed, or records at equal distances.

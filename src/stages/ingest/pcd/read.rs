@@ -167,7 +167,7 @@ pub(super) fn text(
     Ok(more.then_some(warning).into_iter().collect())
 }
 
-/// What is read of a line.
+/// The fields that are read of a line.
 struct Line {
     /// Columns of x, y and z.
     axes: [u64; 3],
