@@ -1,9 +1,11 @@
 //! A run that makes a tileset, and that can be resumed.
 
 use super::cells::MOST;
+use super::geo::Globe;
 use super::tileset::{self, About, beside};
 use crate::error::{Error, Result};
 use crate::pipeline::Start;
+use crate::stages::ingest;
 use crate::workspace::memory::MemoryPool;
 use crate::workspace::progress::{Cancel, Observer, Silent};
 use crate::workspace::{Folder, Found, Storage, Workspace, fault};
@@ -294,11 +296,26 @@ impl Tiles {
     }
 
     fn make(&self, workspace: &Workspace) -> Result<TilesReport> {
+        let (crs, warning) = ingest::of_prj(&ingest::prj_of(&self.mesh));
+        if let Some(warning) = warning {
+            workspace.observer.warn(&warning);
+        }
+        let code = crs.as_ref().and_then(|crs| crs.horizontal);
+        // What cannot be placed is refused before the work.
+        let globe = match self.options.geo {
+            true => Some(Globe::of(&self.mesh, code)?),
+            false => None,
+        };
         let source = self.mesh.file_name().unwrap_or_default();
-        let about = |_low, _high| {
+        let about = |origin: [f64; 3], high: [f64; 3]| {
+            let middle = std::array::from_fn(|axis| (origin[axis] + high[axis]) / 2.0);
+            let globe = globe.as_ref();
+            let matrix = globe.map(|globe| globe.matrix(&self.mesh, origin, middle));
             Ok(About {
                 source: source.to_string_lossy().into_owned(),
-                ..About::default()
+                epsg: code,
+                crs: crs.map(|crs| crs.wkt().map_or_else(|| crs.line(), str::to_owned)),
+                transform: matrix.transpose()?,
             })
         };
         super::make(&self.mesh, &self.folder, &self.options, about, workspace)

@@ -8,6 +8,7 @@
 mod cells;
 mod columns;
 mod distance;
+mod geo;
 mod glb;
 mod intake;
 mod job;

@@ -98,8 +98,8 @@ fn data(json: &Value, binary: &[u8], accessor: &Value) -> (Vec<u8>, usize) {
     }
     .unwrap();
     match packed["filter"].as_str() {
-        Some("EXPONENTIAL") => decode_filter_exp(&mut decoded, count, stride).unwrap(),
-        Some("OCTAHEDRAL") => decode_filter_oct(&mut decoded, count, stride).unwrap(),
+        Some("EXPONENTIAL") => decode_filter_exp(&mut decoded, count, stride, workspace).unwrap(),
+        Some("OCTAHEDRAL") => decode_filter_oct(&mut decoded, count, stride, workspace).unwrap(),
         _ => {}
     }
     (decoded, stride)
