@@ -61,6 +61,8 @@ pub mod geom;
 pub mod inspect;
 #[doc(hidden)]
 pub mod kernels;
+#[doc(hidden)]
+pub mod levels;
 mod method;
 pub mod params;
 #[doc(hidden)]

@@ -364,6 +364,30 @@ pub struct Verify {
     pub limits: Limits,
 }
 
+/// `outcrop tiles`
+#[derive(Debug, ClapArgs)]
+pub struct Tiles {
+    /// The mesh (PLY, also as .zst)
+    #[arg(value_name = "MESH")]
+    pub mesh: PathBuf,
+    /// The folder to write: tileset.json and tiles
+    #[arg(long, short, value_name = "DIR")]
+    pub output: PathBuf,
+    /// Place the tiles on the globe, by the reference system in MESH.prj
+    #[arg(long)]
+    pub geo: bool,
+    /// Most triangles of a leaf
+    #[arg(long, hide = true, default_value = "65536", value_parser = clap::value_parser!(u32).range(1..))]
+    pub most_triangles: u32,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
+    #[command(flatten)]
+    pub limits: Limits,
+    #[command(flatten)]
+    pub again: Again,
+}
+
 /// `outcrop compare`
 #[derive(Debug, ClapArgs)]
 pub struct Compare {

@@ -1,6 +1,6 @@
 //! The commands and their help.
 
-use super::args::{Compare, Demo, Info, Reconstruct, Resume, Verify};
+use super::args::{Compare, Demo, Info, Reconstruct, Resume, Tiles, Verify};
 use super::shared::{Advance, Plan, Status, Submit, Work};
 use super::view::View;
 use clap::{Parser, Subcommand};
@@ -29,6 +29,7 @@ const EXAMPLES: &str = "Examples:
   outcrop info scan.laz
   outcrop verify mesh.ply && echo manifold
   outcrop compare mesh.ply scan.laz
+  outcrop tiles mesh.ply -o town
   outcrop view mesh.ply
   outcrop demo
   outcrop plan tiles/ -o town.ply --shards 200 --task-memory 4GiB --task-threads 8
@@ -48,6 +49,8 @@ pub enum Command {
     Info(Info),
     /// Check that a mesh is a manifold (exit code 0 if it is, 1 if not)
     Verify(Verify),
+    /// Cut a mesh into levels of detail for 3D Tiles viewers
+    Tiles(Tiles),
     /// Measure the distance between two meshes or clouds
     Compare(Compare),
     /// Show a mesh of any size in the browser
