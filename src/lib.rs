@@ -73,6 +73,8 @@ pub mod spill;
 #[doc(hidden)]
 pub mod stages;
 #[doc(hidden)]
+pub mod view;
+#[doc(hidden)]
 pub mod workspace;
 
 pub use error::{Error, Result};

@@ -2,6 +2,7 @@
 
 use super::args::{Compare, Demo, Info, Reconstruct, Resume, Tiles, Verify};
 use super::shared::{Advance, Plan, Status, Submit, Work};
+use super::view::View;
 use clap::{Parser, Subcommand};
 
 /// Turns point clouds of any size into clean triangle meshes within a memory budget.
@@ -29,6 +30,7 @@ const EXAMPLES: &str = "Examples:
   outcrop verify mesh.ply && echo manifold
   outcrop compare mesh.ply scan.laz
   outcrop tiles mesh.ply -o town
+  outcrop view mesh.ply
   outcrop demo
   outcrop plan tiles/ -o town.ply --shards 200 --task-memory 4GiB --task-threads 8
   outcrop submit town.ply.outcrop-scratch --engine slurm -- --partition=long
@@ -51,6 +53,8 @@ pub enum Command {
     Tiles(Tiles),
     /// Measure the distance between two meshes or clouds
     Compare(Compare),
+    /// Show a mesh of any size in the browser
+    View(View),
     /// Generate a cloud, reconstruct it and verify the mesh
     Demo(Demo),
     /// Plan a run for many tasks, on a cluster or on this machine; makes its folder

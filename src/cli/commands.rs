@@ -3,7 +3,7 @@
 use super::args::{Compare, Demo, Ends, Info, Limits, Reconstruct, Resume, Tiles, Verify};
 use super::command::Command;
 use super::output::{print, show, summary, write_report};
-use super::{shared, stop, style};
+use super::{shared, stop, style, view};
 use crate::error::{Error, Result};
 use crate::inspect::{compare, info, verify};
 use crate::levels;
@@ -24,6 +24,7 @@ pub fn run(command: Command) -> Result<bool> {
         Command::Verify(args) => check(&args),
         Command::Compare(args) => measure(&args),
         Command::Tiles(args) => tiles(&args),
+        Command::View(args) => view::run(&args),
         Command::Demo(args) => demo(&args),
         Command::Plan(args) => shared::plan(&args),
         Command::Work(args) => shared::work(&args),

@@ -99,7 +99,10 @@ impl<'a> Grid<'a> {
 
     /// The cells of the box around a triangle.
     fn around(&self, triangle: usize, mut each: impl FnMut(usize)) {
-        let [a, b, c] = self.surface.corners(triangle).map(|corner| self.cell(corner));
+        let [a, b, c] = self
+            .surface
+            .corners(triangle)
+            .map(|corner| self.cell(corner));
         let low: [usize; 3] = std::array::from_fn(|k| a[k].min(b[k]).min(c[k]));
         let high: [usize; 3] = std::array::from_fn(|k| a[k].max(b[k]).max(c[k]));
         for z in low[2]..=high[2] {
@@ -121,7 +124,9 @@ impl<'a> Grid<'a> {
                 break;
             }
             self.ring(middle, ring, |cell| {
-                for &number in &self.triangles[self.starts[cell] as usize..self.starts[cell + 1] as usize] {
+                for &number in
+                    &self.triangles[self.starts[cell] as usize..self.starts[cell + 1] as usize]
+                {
                     best = best.min(distance2(&self.surface.corners(number as usize), p));
                 }
                 best <= enough
@@ -175,7 +180,11 @@ pub(super) fn measure(fine: Surface<'_>, coarse: Surface<'_>) -> f64 {
         return f64::INFINITY;
     }
     let mut kept = vec![false; fine.points.len()];
-    coarse.triangles.as_flattened().iter().for_each(|v| kept[*v as usize] = true);
+    coarse
+        .triangles
+        .as_flattened()
+        .iter()
+        .for_each(|v| kept[*v as usize] = true);
     let mut farthest = from_fine(fine, &Grid::new(coarse), &kept);
     let mut grid = None;
     for number in 0..coarse.triangles.len() {
@@ -212,7 +221,10 @@ fn from_fine(fine: Surface<'_>, coarse: &Grid<'_>, kept: &[bool]) -> f64 {
             let [a, b] = [triangle[a] as usize, triangle[b] as usize];
             if kept[a] != kept[b] {
                 let (p, q) = (fine.points[a], fine.points[b]);
-                let edge = (0..3).map(|k| (p[k] - q[k]) * (p[k] - q[k])).sum::<f64>().sqrt();
+                let edge = (0..3)
+                    .map(|k| (p[k] - q[k]) * (p[k] - q[k]))
+                    .sum::<f64>()
+                    .sqrt();
                 let gone = if kept[a] { b } else { a };
                 near[gone] = near[gone].min(edge as f32 * 1.000_001);
             }

@@ -265,7 +265,9 @@ impl Tiles {
             (Found::Run(folder) | Found::Damaged(folder), _) => folder.restart(bytes)?,
         };
         let memory = self.memory.unwrap_or_else(crate::pipeline::default_memory);
-        let threads = self.threads.unwrap_or_else(crate::pipeline::default_threads);
+        let threads = self
+            .threads
+            .unwrap_or_else(crate::pipeline::default_threads);
         let pool = MemoryPool::new(memory)?;
         let (observer, cancel) = (self.observer.clone(), self.cancel.clone());
         let workspace = Workspace::resumable(folder, pool, threads, observer, cancel)?;

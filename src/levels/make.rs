@@ -296,8 +296,12 @@ fn join(nodes: Vec<Node>) -> Node {
             }
         }
         let corners = node.triangles.iter();
-        all.triangles.extend(corners.map(|t| t.map(|corner| new[corner as usize])));
-        let seams = node.seams.iter().map(|ends| ends.map(|end| new[end as usize]));
+        all.triangles
+            .extend(corners.map(|t| t.map(|corner| new[corner as usize])));
+        let seams = node
+            .seams
+            .iter()
+            .map(|ends| ends.map(|end| new[end as usize]));
         all.seams.extend(seams.map(|[a, b]| [a.min(b), a.max(b)]));
     }
     all.seams.sort_unstable();
@@ -347,7 +351,10 @@ impl Points {
     /// ear that it was the tip of is gone, which moves the boundary.
     fn keeps_borders(&self, node: &Node, triangles: &[[u32; 3]]) -> bool {
         let mut lost = self.locked.clone();
-        triangles.as_flattened().iter().for_each(|v| lost[*v as usize] = false);
+        triangles
+            .as_flattened()
+            .iter()
+            .for_each(|v| lost[*v as usize] = false);
         if !lost.contains(&true) {
             return true;
         }

@@ -42,7 +42,12 @@ fn make(
 ) -> Result<TilesReport> {
     let intake = intake::read(path, workspace)?;
     if intake.triangles == 0 {
-        return Err(Error::input(path, "faces", "no triangle", "a mesh with triangles"));
+        return Err(Error::input(
+            path,
+            "faces",
+            "no triangle",
+            "a mesh with triangles",
+        ));
     }
     let cells = cells::divide(&intake, options.most_triangles, workspace)?;
     intake.sent.release(workspace)?;

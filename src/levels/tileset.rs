@@ -100,12 +100,7 @@ impl Maker<'_> {
     }
 
     /// Writes the folder. It has its name when all is in it; a tileset that had the name is then deleted.
-    pub fn write_folder(
-        &self,
-        folder: &Path,
-        about: &About,
-        workspace: &Workspace,
-    ) -> Result<u64> {
+    pub fn write_folder(&self, folder: &Path, about: &About, workspace: &Workspace) -> Result<u64> {
         let unfinished = beside(folder, "part");
         let failed = |path: &Path, action: &str| {
             let (path, action) = (path.to_path_buf(), action.to_owned());
@@ -132,7 +127,8 @@ impl Maker<'_> {
         let json = self.json(about).to_string();
         put(&unfinished.join(NAME), json.as_bytes())?;
         // All files at once: one by one would take long.
-        let synced = File::open(&unfinished).and_then(|folder| rustix::fs::syncfs(&folder).map_err(Into::into));
+        let synced = File::open(&unfinished)
+            .and_then(|folder| rustix::fs::syncfs(&folder).map_err(Into::into));
         synced.map_err(failed(&unfinished, "sync"))?;
         let old = beside(folder, "old");
         remove(&old)?;
@@ -159,9 +155,7 @@ pub(super) fn beside(folder: &Path, ending: &str) -> PathBuf {
 /// Removes what an earlier run left.
 pub(super) fn remove(folder: &Path) -> Result<()> {
     match std::fs::remove_dir_all(folder) {
-        Err(e) if e.kind() != std::io::ErrorKind::NotFound => {
-            Err(Error::io(folder, "delete", e))
-        }
+        Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::io(folder, "delete", e)),
         _ => Ok(()),
     }
 }
