@@ -240,6 +240,9 @@ pub struct Job {
     /// Write a normal for each vertex (PLY, OBJ, GLB)
     #[arg(long)]
     pub normals: bool,
+    /// Compress a .glb mesh, positions exactly (meshopt: EXT_meshopt_compression, which viewers read)
+    #[arg(long)]
+    pub compress_glb: bool,
     /// Write one mesh for each square with this side in x and y, in the cloud's unit: MESH_X_Y.ply, and
     /// MESH.index.json with a list of them
     #[arg(long, value_name = "LENGTH")]
@@ -462,6 +465,7 @@ impl Job {
             min_component: self.repair.min_component.or(usual.min_component),
             repair: !self.repair.no_repair,
             normals: self.normals,
+            compress_glb: self.compress_glb,
             origin: self.coordinates.origin,
             keep_far: self.coordinates.keep_far,
             ignore_crs: self.coordinates.ignore_crs,
