@@ -58,11 +58,14 @@ pub mod cli;
 pub mod error;
 #[doc(hidden)]
 pub mod geom;
+mod histogram;
 pub mod inspect;
 #[doc(hidden)]
 pub mod kernels;
 mod method;
+pub mod page;
 pub mod params;
+mod picture;
 #[doc(hidden)]
 pub mod pipeline;
 pub mod report;

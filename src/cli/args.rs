@@ -307,9 +307,10 @@ pub struct Ends {
     /// Stop before this time is over, e.g. 7h30m; the run can be resumed later
     #[arg(long, value_name = "TIME", value_parser = time)]
     pub time_limit: Option<Duration>,
-    /// Write a report as JSON
-    #[arg(long, value_name = "FILE.json")]
-    pub report: Option<PathBuf>,
+    /// Write a report: as a page with pictures and charts if its name ends in .html, else as JSON; may be given
+    /// several times
+    #[arg(long, value_name = "FILE.html|FILE.json")]
+    pub report: Vec<PathBuf>,
 }
 
 /// `outcrop resume`

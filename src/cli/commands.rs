@@ -2,7 +2,7 @@
 
 use super::args::{Compare, Demo, Ends, Info, Limits, Reconstruct, Resume, Verify};
 use super::command::Command;
-use super::output::{print, show, summary, write_report};
+use super::output::{is_page, print, show, summary, write_report};
 use super::{shared, stop, style};
 use crate::error::{Error, Result};
 use crate::inspect::{compare, info, verify};
@@ -11,7 +11,7 @@ use crate::workspace::Workspace;
 use crate::workspace::memory::MemoryPool;
 use crate::workspace::progress::{Cancel, Silent};
 use std::io::IsTerminal;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Runs a command; `false` for a negative answer.
@@ -80,36 +80,51 @@ fn run_reconstruction(builder: Builder, ends: &Ends, quiet: bool) -> Result<bool
     if let Some(limit) = ends.time_limit {
         builder = builder.time_limit(limit);
     }
-    let run = builder.build()?;
-    if ends.report.as_deref() == Some(run.output()) {
+    let page = ends.report.iter().any(|path| is_page(path));
+    let run = builder.pictures(page).build()?;
+    if let Some(path) = ends.report.iter().find(|path| **path == run.output()) {
         return Err(Error::Parameter {
             name: "--report",
-            found: run.output().display().to_string(),
+            found: path.display().to_string(),
             expected: "a file other than the mesh".into(),
         });
     }
-    let new_report = ends.report.as_ref().is_some_and(|path| !path.exists());
-    if let Some(path) = &ends.report {
-        // An unwritable report is an error before the work, not after it.
-        let opened = std::fs::File::options()
-            .append(true)
-            .create(true)
-            .open(path);
-        opened.map_err(|e| Error::io(path, "write the report", e))?;
-    }
+    let new_reports = new_reports(&ends.report)?;
     stop::can_end(&run);
     let outcome = run.run();
-    match (&outcome, &ends.report) {
-        (Ok(report), Some(path)) => write_report(path, report)?,
+    match &outcome {
+        Ok(report) => {
+            let mut paths = ends.report.iter();
+            paths.try_for_each(|path| write_report(path, report, run.output()))?;
+        }
         // No empty report of a failed run.
-        (Err(_), Some(path)) if new_report => drop(std::fs::remove_file(path)),
-        _ => {}
+        Err(_) => new_reports
+            .iter()
+            .for_each(|path| drop(std::fs::remove_file(path))),
     }
     let report = outcome?;
     if !quiet && std::io::stdout().is_terminal() {
         print(&summary(&report, run.output()))?;
     }
     Ok(true)
+}
+
+/// Makes sure that reports can be written, since later it would be an error after the work; returns those that did
+/// not exist.
+fn new_reports(paths: &[PathBuf]) -> Result<Vec<&Path>> {
+    let mut new = Vec::new();
+    for path in paths {
+        let exists = path.exists();
+        let opened = std::fs::File::options()
+            .append(true)
+            .create(true)
+            .open(path);
+        opened.map_err(|e| Error::io(path, "write the report", e))?;
+        if !exists {
+            new.push(path.as_path());
+        }
+    }
+    Ok(new)
 }
 
 fn info(args: &Info) -> Result<bool> {
@@ -166,7 +181,7 @@ fn demo(args: &Demo) -> Result<bool> {
         .build()?
         .run()?;
     let path = folder.join("report.json");
-    write_report(&path, &report)?;
+    write_report(&path, &report, &mesh)?;
     print(&summary(&report, &mesh))?;
     let memory = MemoryPool::new(memory(&args.limits))?;
     let threads = threads(&args.limits);

@@ -2,6 +2,7 @@
 
 use super::style;
 use crate::error::{Error, Result};
+use crate::page;
 use crate::report::Report;
 use serde::Serialize;
 use std::fmt::Display;
@@ -27,8 +28,21 @@ pub fn show<T: Serialize + Display>(value: &T, as_json: bool) -> Result<()> {
     })
 }
 
-pub fn write_report(path: &Path, report: &Report) -> Result<()> {
-    std::fs::write(path, json(report)? + "\n").map_err(|e| Error::io(path, "write the report", e))
+/// True if a report with this name is a page.
+pub fn is_page(path: &Path) -> bool {
+    let extension = path.extension().unwrap_or_default();
+    ["html", "htm"]
+        .iter()
+        .any(|page| extension.eq_ignore_ascii_case(page))
+}
+
+/// Writes the report of a run, whose mesh is `mesh`, as its name says.
+pub fn write_report(path: &Path, report: &Report, mesh: &Path) -> Result<()> {
+    let text = match is_page(path) {
+        true => page::report(report, mesh),
+        false => json(report)? + "\n",
+    };
+    std::fs::write(path, text).map_err(|e| Error::io(path, "write the report", e))
 }
 
 pub fn summary(report: &Report, output: &Path) -> String {
