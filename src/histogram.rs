@@ -99,20 +99,70 @@ impl Tally {
         self.max as f64
     }
 
+    /// The bins that have the values from the 0.1th to the 99.95th percentile.
+    fn usual(&self) -> Option<(usize, usize)> {
+        let total = self.total();
+        let few = (total / 1000, total / 2000);
+        let mut passed = 0;
+        let first = self.counts.iter().position(|count| {
+            passed += count;
+            passed > few.0
+        })?;
+        passed = 0;
+        let last = self.counts.iter().rposition(|count| {
+            passed += count;
+            passed > few.1
+        })?;
+        Some((first, last))
+    }
+
     /// The distribution; `unit` turns a value into what is shown, and ascends. Bins are joined until at most
-    /// `most` remain, or until each has a whole power of two.
+    /// `most` remain, or until each has a whole power of two. The first and the last take the few values beyond.
     #[must_use]
     pub fn histogram(&self, most: usize, unit: impl Fn(f64) -> f64) -> Option<Histogram> {
-        let first = self.counts.iter().position(|count| *count > 0)?;
-        let last = self.counts.iter().rposition(|count| *count > 0)?;
+        let (first, last) = self.usual()?;
         let fits = |joined: &usize| last / joined - first / joined < most;
         let joined = [1, 2, 4, 8].into_iter().find(fits).unwrap_or(8);
-        let bins = (first / joined..=last / joined).map(|number| Bin {
-            from: unit(low(number * joined)),
-            to: unit(low((number + 1) * joined)),
-            count: self.counts[number * joined..].iter().take(joined).sum(),
+        let ends = (first / joined..=last / joined + 1).map(|n| (n * joined).min(BINS));
+        Some(self.of_ends(&ends.collect::<Vec<_>>(), unit))
+    }
+
+    /// The distribution by powers of two.
+    #[must_use]
+    pub fn by_octave(&self) -> Option<Histogram> {
+        let first = self.counts.iter().position(|count| *count > 0)?;
+        let last = self.counts.iter().rposition(|count| *count > 0)?;
+        let all = [0, 1, 2, 4]
+            .into_iter()
+            .chain((1..=BINS / 8).map(|n| 8 * n));
+        let all: Vec<usize> = all.collect();
+        let from = all.partition_point(|end| *end <= first).saturating_sub(1);
+        let to = all.partition_point(|end| *end <= last).min(all.len() - 1);
+        Some(self.of_ends(&all[from..=to], |x| x))
+    }
+
+    fn of_ends(&self, ends: &[usize], unit: impl Fn(f64) -> f64) -> Histogram {
+        let last = ends.len().saturating_sub(2);
+        let value = |bin: usize| unit(low(bin));
+        let bins = ends.windows(2).enumerate().map(|(number, two)| {
+            let mut range = two[0]..two[1];
+            let mut bin = Bin {
+                from: value(range.start),
+                to: value(range.end),
+                count: 0,
+            };
+            if number == 0 {
+                range.start = 0;
+                bin.from = bin.from.min(unit(self.min as f64));
+            }
+            if number == last {
+                range.end = BINS;
+                bin.to = bin.to.max(unit(self.max as f64));
+            }
+            bin.count = self.counts[range].iter().sum();
+            bin
         });
-        Some(Histogram {
+        Histogram {
             count: self.total(),
             min: unit(self.min as f64),
             p5: unit(self.at(0.05)),
@@ -120,7 +170,7 @@ impl Tally {
             p95: unit(self.at(0.95)),
             max: unit(self.max as f64),
             bins: bins.collect(),
-        })
+        }
     }
 }
 
@@ -180,10 +230,22 @@ mod tests {
         let all = tally.histogram(1000, |x| x).unwrap();
         assert_eq!((all.count, all.min, all.max), (1000, 1.0, 1000.0));
         assert!((all.p50 - 500.0).abs() < 10.0 && (all.p95 - 950.0).abs() < 10.0);
+        let sizes = tally.by_octave().unwrap();
+        let ends: Vec<_> = sizes.bins.iter().map(|bin| (bin.from, bin.count)).collect();
+        assert_eq!(ends[..4], [(1.0, 1), (2.0, 2), (4.0, 4), (8.0, 8)]);
+        assert_eq!(sizes.bins.iter().map(|bin| bin.count).sum::<u64>(), 1000);
         let few = tally.histogram(12, f64::sqrt).unwrap();
         assert!(few.bins.len() <= 12);
         assert_eq!(few.bins.iter().map(|bin| bin.count).sum::<u64>(), 1000);
         assert!(few.bins.windows(2).all(|two| two[0].to == two[1].from));
         assert_eq!(Tally::default().histogram(10, |x| x), None);
+        assert_eq!(Tally::default().by_octave(), None);
+        let mut far = tally.clone();
+        far.add(u64::MAX);
+        far.add(0);
+        let far = far.histogram(20, |x| x).unwrap();
+        assert!(far.bins.len() <= 20 && far.bins[0].from == 0.0);
+        assert_eq!(far.bins.iter().map(|bin| bin.count).sum::<u64>(), 1002);
+        assert_eq!(far.bins[far.bins.len() - 1].to, u64::MAX as f64);
     }
 }

@@ -142,7 +142,7 @@ impl Canvas {
             .mark_point(at, size * FACTOR as f64, Mark::NonManifold);
     }
 
-    fn colour(&self, pixel: usize) -> Option<Colour> {
+    fn colour(&self, pixel: usize, scale: &impl Fn(f64) -> f64) -> Option<Colour> {
         let base = self.raster.value(pixel).map(|value| {
             let share = f64::from(value & 0xffff) / 65535.0;
             match value >> 16 {
@@ -150,7 +150,7 @@ impl Canvas {
                 kind::FRONT => FRONT.map(|c| c * share),
                 _ => {
                     let shade = self.light.eye_dome(&self.raster, pixel);
-                    ramp(share).map(|c| c * shade)
+                    ramp(scale(share)).map(|c| c * shade)
                 }
             }
         });
@@ -161,12 +161,13 @@ impl Canvas {
         }
     }
 
-    /// The picture; `unit` is the length of the unit of the positions.
+    /// The picture; `unit` is the length of the unit of the positions, and `scale` maps the shares of points to
+    /// those on the scale of colours.
     ///
     /// # Errors
     /// [`Error::Io`] if it cannot be encoded.
-    pub fn picture(&self, name: &str, unit: f64) -> Result<Picture> {
-        let image = picture::image(&self.raster, FACTOR, |pixel| self.colour(pixel));
+    pub fn picture(&self, name: &str, unit: f64, scale: impl Fn(f64) -> f64) -> Result<Picture> {
+        let image = picture::image(&self.raster, FACTOR, |pixel| self.colour(pixel, &scale));
         let scale = self.camera.scale / FACTOR as f64 / unit;
         encoded(name, scale, &image)
     }
@@ -177,10 +178,12 @@ fn level(share: f64) -> u32 {
     (share.clamp(0.0, 1.0) * 65535.0).round() as u32
 }
 
-/// A map from above that counts points in each pixel, and some of them once more.
+/// A map from above that counts points in cells of some pixels, and some of them once more.
 #[derive(Debug)]
 pub struct Map {
     camera: Camera,
+    /// Side of a cell in pixels.
+    cell: usize,
     all: Vec<AtomicU32>,
     some: Vec<AtomicU32>,
 }
@@ -191,16 +194,21 @@ pub fn map_bytes() -> u64 {
     20 * (SIZE[0] * SIZE[1]) as u64
 }
 
-/// Points for which a map has no room in a pixel are few: counts end here.
+/// Counts of a cell end here; there is no room for more in a picture.
 const MOST: u32 = u32::MAX / 2;
 
+/// Points that fill a map with cells of one pixel: some for each.
+const POINTS: u64 = (SIZE[0] * SIZE[1]) as u64 * 4;
+
 impl Map {
-    /// An empty map that is framed by some of the positions. [`map_bytes`] must be reserved.
+    /// An empty map for a number of points that is framed by some positions. [`map_bytes`] must be reserved.
     #[must_use]
-    pub fn new(positions: &[Vec3]) -> Self {
+    pub fn new(positions: &[Vec3], points: u64) -> Self {
         let zeros = || (0..SIZE[0] * SIZE[1]).map(|_| AtomicU32::new(0)).collect();
+        let fits = |cell: &usize| points * (cell * cell) as u64 >= POINTS;
         Self {
             camera: camera(TOP, positions, 1),
+            cell: [1, 2, 4].into_iter().find(fits).unwrap_or(8),
             all: zeros(),
             some: zeros(),
         }
@@ -214,24 +222,31 @@ impl Map {
         if !inside {
             return;
         }
-        let pixel = y as usize * SIZE[0] + x as usize;
-        if self.all[pixel].load(Ordering::Relaxed) < MOST {
-            self.all[pixel].fetch_add(1, Ordering::Relaxed);
-            self.some[pixel].fetch_add(special.into(), Ordering::Relaxed);
+        let at = y as usize / self.cell * SIZE[0] + x as usize / self.cell;
+        if self.all[at].load(Ordering::Relaxed) < MOST {
+            self.all[at].fetch_add(1, Ordering::Relaxed);
+            self.some[at].fetch_add(special.into(), Ordering::Relaxed);
         }
     }
 
     fn image(&self, colour: impl Fn(u32, u32) -> Colour) -> Vec<u8> {
-        let pixels = self.all.iter().zip(&self.some);
-        let pixels = pixels.flat_map(|(all, some)| {
-            let (all, some) = (all.load(Ordering::Relaxed), some.load(Ordering::Relaxed));
-            let [r, g, b] = match all {
-                0 => [0; 3],
-                _ => colour(all, some).map(|c| c.round() as u8),
-            };
-            [r, g, b, if all > 0 { 255 } else { 0 }]
-        });
-        pixels.collect()
+        let [width, height] = SIZE;
+        let mut image = Vec::with_capacity(4 * width * height);
+        for y in 0..height {
+            for x in 0..width {
+                let at = y / self.cell * width + x / self.cell;
+                let all = self.all[at].load(Ordering::Relaxed);
+                let some = self.some[at].load(Ordering::Relaxed);
+                match all {
+                    0 => image.extend([0; 4]),
+                    _ => {
+                        image.extend(colour(all, some).map(|c| c.round() as u8));
+                        image.push(255);
+                    }
+                }
+            }
+        }
+        image
     }
 
     /// The shares of special points: grey without any, orange where all are.
@@ -248,15 +263,18 @@ impl Map {
         encoded(name, self.camera.scale / unit, &image)
     }
 
-    /// The points in each pixel, on a logarithmic scale from one to the largest number, which is returned.
+    /// The points for each area, on a logarithmic scale; and the largest number of points for an area of one
+    /// square unit.
     ///
     /// # Errors
     /// [`Error::Io`] if it cannot be encoded.
-    pub fn density(&self, name: &str, unit: f64) -> Result<(Picture, u32)> {
+    pub fn density(&self, name: &str, unit: f64) -> Result<(Picture, f64)> {
         let counts = self.all.iter().map(|all| all.load(Ordering::Relaxed));
         let most = counts.max().unwrap_or(0);
         let whole = f64::from(most.max(2)).ln();
         let image = self.image(|all, _| ramp(f64::from(all).ln() / whole));
-        Ok((encoded(name, self.camera.scale / unit, &image)?, most))
+        let scale = self.camera.scale / unit;
+        let densest = f64::from(most) * (scale / self.cell as f64).powi(2);
+        Ok((encoded(name, scale, &image)?, densest))
     }
 }

@@ -343,6 +343,9 @@ pub struct Info {
     /// Print JSON
     #[arg(long)]
     pub json: bool,
+    /// Write a page with pictures
+    #[arg(long, value_name = "FILE.html")]
+    pub html: Option<PathBuf>,
     #[command(flatten)]
     pub points: Points,
     #[command(flatten, next_help_heading = "Limits")]
@@ -358,6 +361,9 @@ pub struct Verify {
     /// Print JSON
     #[arg(long)]
     pub json: bool,
+    /// Write a page with pictures
+    #[arg(long, value_name = "FILE.html")]
+    pub html: Option<PathBuf>,
     /// Accept vertices without a triangle
     #[arg(long)]
     pub allow_unreferenced: bool,
@@ -383,6 +389,9 @@ pub struct Compare {
     /// Print JSON
     #[arg(long)]
     pub json: bool,
+    /// Write a page with pictures
+    #[arg(long, value_name = "FILE.html")]
+    pub html: Option<PathBuf>,
     #[command(flatten)]
     pub limits: Limits,
 }

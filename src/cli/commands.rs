@@ -2,16 +2,17 @@
 
 use super::args::{Compare, Demo, Ends, Info, Limits, Reconstruct, Resume, Verify};
 use super::command::Command;
-use super::output::{is_page, print, show, summary, write_report};
+use super::output::{NewFile, is_page, print, report_text, show, summary, write_report};
 use super::{shared, stop, style};
 use crate::error::{Error, Result};
 use crate::inspect::{compare, info, verify};
+use crate::page;
 use crate::pipeline::{Builder, Reconstruction, Start, default_memory, default_threads};
 use crate::workspace::Workspace;
 use crate::workspace::memory::MemoryPool;
 use crate::workspace::progress::{Cancel, Silent};
 use std::io::IsTerminal;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 /// Runs a command; `false` for a negative answer.
@@ -89,47 +90,32 @@ fn run_reconstruction(builder: Builder, ends: &Ends, quiet: bool) -> Result<bool
             expected: "a file other than the mesh".into(),
         });
     }
-    let new_reports = new_reports(&ends.report)?;
+    let reports = ends.report.iter().map(|path| NewFile::open(path));
+    let reports = reports.collect::<Result<Vec<_>>>()?;
     stop::can_end(&run);
-    let outcome = run.run();
-    match &outcome {
-        Ok(report) => {
-            let mut paths = ends.report.iter();
-            paths.try_for_each(|path| write_report(path, report, run.output()))?;
-        }
-        // No empty report of a failed run.
-        Err(_) => new_reports
-            .iter()
-            .for_each(|path| drop(std::fs::remove_file(path))),
+    let report = run.run()?;
+    for file in reports {
+        let text = report_text(file.path(), &report, run.output())?;
+        file.write(&text)?;
     }
-    let report = outcome?;
     if !quiet && std::io::stdout().is_terminal() {
         print(&summary(&report, run.output()))?;
     }
     Ok(true)
 }
 
-/// Makes sure that reports can be written, since later it would be an error after the work; returns those that did
-/// not exist.
-fn new_reports(paths: &[PathBuf]) -> Result<Vec<&Path>> {
-    let mut new = Vec::new();
-    for path in paths {
-        let exists = path.exists();
-        let opened = std::fs::File::options()
-            .append(true)
-            .create(true)
-            .open(path);
-        opened.map_err(|e| Error::io(path, "write the report", e))?;
-        if !exists {
-            new.push(path.as_path());
-        }
-    }
-    Ok(new)
-}
-
 fn info(args: &Info) -> Result<bool> {
     let workspace = workspace(&args.limits, &std::env::temp_dir())?;
-    let info = info::info(&args.inputs, &args.points.params(), &workspace)?;
+    let params = args.points.params();
+    let info = match &args.html {
+        None => info::info(&args.inputs, &params, &workspace)?,
+        Some(path) => {
+            let page = NewFile::page(path)?;
+            let (info, drawn) = info::illustrated(&args.inputs, &params, &workspace)?;
+            page.write(&page::cloud(&args.inputs, &info, &drawn))?;
+            info
+        }
+    };
     show(&info, args.json)?;
     Ok(true)
 }
@@ -140,7 +126,15 @@ fn check(args: &Verify) -> Result<bool> {
         allow_unreferenced: args.allow_unreferenced,
         range: None,
     };
-    let verdict = verify::verify_with(&args.mesh, &options, &workspace)?;
+    let verdict = match &args.html {
+        None => verify::verify_with(&args.mesh, &options, &workspace)?,
+        Some(path) => {
+            let page = NewFile::page(path)?;
+            let (verdict, drawn) = verify::illustrated(&args.mesh, &options, &workspace)?;
+            page.write(&page::verdict(&args.mesh, &verdict, &drawn))?;
+            verdict
+        }
+    };
     show(&verdict, args.json)?;
     Ok(verdict.manifold)
 }
@@ -149,7 +143,16 @@ fn measure(args: &Compare) -> Result<bool> {
     let workspace = workspace(&args.limits, &std::env::temp_dir())?;
     let (samples, seed) = (args.samples, args.seed);
     let options = compare::Options { samples, seed };
-    let comparison = compare::compare(&args.a, &args.b, &options, &workspace)?;
+    let (a, b) = (&args.a, &args.b);
+    let comparison = match &args.html {
+        None => compare::compare(a, b, &options, &workspace)?,
+        Some(path) => {
+            let page = NewFile::page(path)?;
+            let (comparison, drawn) = compare::illustrated(a, b, &options, &workspace)?;
+            page.write(&page::comparison(&comparison, &drawn))?;
+            comparison
+        }
+    };
     show(&comparison, args.json)?;
     Ok(true)
 }

@@ -83,7 +83,7 @@ fn chart(
                     }
                 }
                 line.axis x1="0" x2=(WIDTH) y1=(floor) y2=(floor) {}
-                text x="0" y="10" { "most: " (most) }
+                text x="0" y="10" { "up to " (most) " in a bar" }
                 @for (at, text) in ticks {
                     text x=(num(at * WIDTH)) y=(num(HEIGHT - 5.0)) text-anchor=(anchor(*at)) { (text) }
                 }

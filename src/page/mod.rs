@@ -5,8 +5,14 @@
 
 mod advice;
 mod charts;
+mod cloud;
+mod comparison;
 mod report;
 mod sheet;
+mod verdict;
 mod words;
 
+pub use cloud::cloud;
+pub use comparison::comparison;
 pub use report::report;
+pub use verdict::verdict;

@@ -6,7 +6,7 @@ use super::sheet::{Sheet, advice as words_of, card, key, list, table, view};
 use super::words::{
     bytes, clean, count, counted, file_name, length, path, percent, position, seconds,
 };
-use crate::report::{Details, Picture, Report, Sample};
+use crate::report::{Details, IngestStats, Picture, Report, Sample};
 use maud::{Markup, html};
 use std::path::Path;
 
@@ -93,8 +93,8 @@ fn pictures(all: &[Picture]) -> Markup {
 }
 
 /// The box around all files.
-fn bounds(report: &Report) -> Option<[[f64; 3]; 2]> {
-    let files = report.input.files.iter();
+pub(super) fn bounds(input: &IngestStats) -> Option<[[f64; 3]; 2]> {
+    let files = input.files.iter();
     let boxes = files.filter_map(|file| Some([file.min?, file.max?]));
     boxes.reduce(|[a, b], [c, d]| {
         let each = |k: usize| [a[k].min(c[k]), b[k].max(d[k])];
@@ -102,10 +102,28 @@ fn bounds(report: &Report) -> Option<[[f64; 3]; 2]> {
     })
 }
 
+/// The table of the files.
+pub(super) fn files(input: &IngestStats) -> Markup {
+    let files = input.files.iter().take(FILES).map(|file| {
+        vec![
+            html! { (path(&file.path)) },
+            html! { (file.format.to_string()) },
+            html! { (bytes(file.bytes)) },
+            count(file.points),
+            count(file.kept),
+        ]
+    });
+    let more = input.files.len().saturating_sub(FILES) as u64;
+    html! {
+        (table(&["file", "format", "size", "points", "kept"], files))
+        @if more > 0 { p.note { "and " (counted(more, "more file")) ", in the JSON report" } }
+    }
+}
+
 fn input(report: &Report) -> Markup {
     let input = &report.input;
     let some = |n: u64| (n > 0).then(|| count(n));
-    let extent = bounds(report);
+    let extent = bounds(&report.input);
     let size = extent.map(|[low, high]| [0, 1, 2].map(|k| length(high[k] - low[k])).join(" × "));
     let all: u64 = input.files.iter().map(|file| file.bytes).sum();
     let spacing = report.details.as_ref().and_then(|d| d.spacings.as_ref());
@@ -134,11 +152,11 @@ fn input(report: &Report) -> Markup {
         ),
         (
             "lowest corner",
-            extent.map(|[low, _]| html! { (position(low)) }),
+            extent.map(|[low, _]| html! { (position(low, report.lattice.step)) }),
         ),
         (
             "highest corner",
-            extent.map(|[_, high]| html! { (position(high)) }),
+            extent.map(|[_, high]| html! { (position(high, report.lattice.step)) }),
         ),
         ("extent", size.map(|size| html! { (size) })),
         (
@@ -152,28 +170,15 @@ fn input(report: &Report) -> Markup {
         (
             "lattice",
             Some(html! {
-                "steps of " (report.lattice.step) @if report.lattice.exact { ", exact" } @else { ", rounded" }
+                "steps of " (length(report.lattice.step)) @if report.lattice.exact { ", exact" } @else { ", rounded" }
             }),
         ),
         ("scanners", some(report.scanners.len() as u64)),
     ];
-    let files = input.files.iter().take(FILES).map(|file| {
-        vec![
-            html! { (path(&file.path)) },
-            html! { (file.format.to_string()) },
-            html! { (bytes(file.bytes)) },
-            count(file.points),
-            count(file.kept),
-        ]
-    });
-    let more = input.files.len().saturating_sub(FILES) as u64;
     html! {
         div.two {
             div.panel { (list(&rows)) }
-            div.panel {
-                (table(&["file", "format", "size", "points", "kept"], files))
-                @if more > 0 { p.note { "and " (counted(more, "more file")) ", in the JSON report" } }
-            }
+            div.panel { (files(input)) }
         }
     }
 }
@@ -209,7 +214,9 @@ fn output(report: &Report, mesh: &Path) -> Markup {
         ),
         (
             "origin",
-            report.origin.map(|origin| html! { (position(origin)) }),
+            report
+                .origin
+                .map(|origin| html! { (position(origin, report.lattice.step)) }),
         ),
     ];
     let steps = [

@@ -31,9 +31,17 @@ pub fn length(x: f64) -> String {
     }
 }
 
-/// A position.
-pub fn position(p: [f64; 3]) -> String {
-    p.map(|x| x.to_string()).join("  ")
+/// A position, to a tenth of a step of the lattice on which it lies.
+pub fn position(p: [f64; 3], step: f64) -> String {
+    let decimals = match step {
+        step if step > 0.0 && step < 1.0 => (-step.log10().floor()) as usize + 1,
+        _ => 1,
+    };
+    let text = |x: f64| {
+        let text = format!("{x:.*}", decimals.min(12));
+        text.trim_end_matches('0').trim_end_matches('.').to_owned()
+    };
+    p.map(text).join("  ")
 }
 
 /// Bytes with a binary unit.
@@ -105,6 +113,9 @@ mod tests {
         assert_eq!(length(1e-9), "1.000e-9");
         assert_eq!(length(123_456_789.0), "1.235e8");
         assert_eq!(percent(1.0, 0.0), "–");
+        let p = [1.488_500_000_000_000_2, -2.0, 1e6];
+        assert_eq!(position(p, 0.0001), "1.4885  -2  1000000");
+        assert_eq!(position([0.5, 1.25, 3.0], 0.0), "0.5  1.2  3");
     }
 
     #[test]

@@ -21,6 +21,7 @@ use crate::workspace::memory::{bytes_of, table_bytes};
 use crate::workspace::{Unit, Workspace, lock};
 use border::{BorderEdge, Boundary};
 use outcrop_raster::{Vec3, View};
+use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 use serde::{Deserialize, Serialize};
 use source::{Part, Source};
@@ -180,10 +181,13 @@ impl Drawing<'_> {
                 canvases.iter().for_each(|canvas| canvas.edge(ends));
             })?;
         }
-        let named = views.iter().zip(&canvases);
-        let picture =
-            |((name, _), canvas): (&(&str, View), &Canvas)| canvas.picture(name, self.subject.step);
-        named.map(picture).collect()
+        let step = self.subject.step;
+        workspace.install(|| {
+            let named = views.par_iter().zip(&canvases);
+            named
+                .map(|((name, _), canvas)| canvas.picture(name, step, |share| share))
+                .collect()
+        })
     }
 
     fn each_part(&self, work: impl Fn(&Unit<'_>, &Part) -> Result<()> + Sync) -> Result<()> {
@@ -207,7 +211,8 @@ impl Drawing<'_> {
         held.set_held(BUFFER);
         let sorter: Sorter<BorderEdge> = Sorter::new(workspace, "draw.edges", BUFFER);
         let map_held = workspace.reserve("draw: map", map_bytes())?;
-        let map = matches!(self.source, Source::Whole { .. }).then(|| Map::new(self.frame));
+        let map = matches!(self.source, Source::Whole { .. })
+            .then(|| Map::new(self.frame, self.subject.store.len() as u64));
         let counts: Mutex<Counts> = Mutex::default();
         let components = Mutex::new(workspace.promise("draw: components", 0)?);
         self.each_part(|unit, part| {
@@ -252,11 +257,11 @@ impl Drawing<'_> {
             sides.merge(&boundary.lengths);
             sides.halve();
             drawn.many_loops = boundary.loops.is_none();
-            drawn.loops = boundary.loops.and_then(|loops| loops.histogram(1, |x| x));
+            drawn.loops = boundary.loops.and_then(|loops| loops.by_octave());
         }
         drawn.edges = sides.histogram(BARS, length);
         across.values().for_each(|size| inside.add(*size));
-        drawn.components = inside.histogram(1, |x| x);
+        drawn.components = inside.by_octave();
         drawn.spacings = self.subject.spacings.and_then(|(spacings, neighbors)| {
             let mut tally = Tally::default();
             for first in (0..self.subject.store.len()).step_by(METHOD.curve.patch) {
