@@ -28,6 +28,7 @@ pub use shared::{
 };
 use stages::Stages;
 pub use start::Start;
+pub(crate) use start::scratch_folder;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
@@ -47,6 +48,7 @@ pub struct Reconstruction {
     storage: Storage,
     start: Start,
     time_limit: Option<Duration>,
+    pictures: bool,
 }
 
 /// Half of the memory that machine and cgroup allow.
@@ -132,6 +134,7 @@ impl Reconstruction {
             pieces.as_ref(),
             &lattice,
         )?;
+        stages.draw(&store, &shape, &repaired, pieces.as_ref(), &lattice)?;
         Ok(stages.report())
     }
 }
