@@ -79,5 +79,6 @@ pub use pipeline::{Builder, Reconstruction, Start, default_memory, default_threa
 pub use report::{DiskEstimate, Report};
 pub use stages::ingest::Classes;
 pub use workspace::Workspace;
+pub use workspace::course::{Course, Planned, Position};
 pub use workspace::memory::MemoryPool;
 pub use workspace::progress::{Cancel, Observer, Silent};

@@ -5,6 +5,7 @@ mod beside;
 mod builder;
 mod checks;
 mod clock;
+mod course;
 mod disk;
 mod manifest;
 mod origin;

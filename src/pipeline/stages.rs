@@ -6,7 +6,7 @@ mod values;
 
 use super::checks::{all_are_kept, disk_radius, enough, not_a_line, room};
 use super::disk::{SCANNER, Text};
-use super::{Clock, Known, Reconstruction};
+use super::{Clock, Known, Reconstruction, course};
 use crate::error::Result;
 use crate::geom::lattice::Lattice;
 use crate::method::METHOD;
@@ -15,8 +15,8 @@ use crate::report::{LatticeReport, Report};
 use crate::stages::blocks::Blocks;
 use crate::stages::cells::{CellTriples, DiskRadius, TileRanges, Widen, cells};
 use crate::stages::cut::{CutOptions, StoredPieces, cut};
-use crate::stages::export::CoordinateType;
-use crate::stages::ingest::{Carried, Spool, ingest_selected};
+use crate::stages::export::{CoordinateType, is_compressed};
+use crate::stages::ingest::{Attributes, Carried, Spool, ingest_selected};
 use crate::stages::located::Places;
 use crate::stages::order::{Orderer, PointStore, StoredPoints, order, sample_sort};
 use crate::stages::outliers::{OutlierOptions, drop_outliers};
@@ -87,6 +87,11 @@ impl<'a> Stages<'a> {
                 ..Report::default()
             },
         };
+        stages.plan(
+            stages.known.read,
+            None,
+            job.params.attributes != Attributes::None,
+        );
         if let Some(estimate) = first {
             room(&job.folder, &job.output, estimate, workspace)?;
         }
@@ -108,6 +113,18 @@ impl<'a> Stages<'a> {
         self.report.estimated_scratch_bytes = estimate.scratch;
         self.report.estimated_output_bytes = estimate.output;
         room(&self.job.folder, &self.job.output, estimate, self.workspace)
+    }
+
+    /// Tells which stages are to come behind `after`, and how long they take for so many points.
+    fn plan(&self, points: u64, after: Option<&str>, valued: bool) {
+        let (job, workspace) = (self.job, self.workspace);
+        if workspace.is_shared() {
+            return;
+        }
+        let compressed = job.params.compress_glb || is_compressed(&job.output);
+        let stages = course::plan(&job.params, points, job.threads, valued, compressed);
+        let first = stages.iter().rposition(|stage| Some(stage.name) == after);
+        job.observer.plan(&stages[first.map_or(0, |at| at + 1)..]);
     }
 
     fn warn(&mut self, warning: String) {
@@ -158,6 +175,7 @@ impl<'a> Stages<'a> {
             text: None,
         };
         workspace.note_points(input.kept);
+        self.plan(input.kept, Some("ingest"), !self.carried.is_empty());
         let narrow = params.narrow_margin(&input);
         self.report.input = input;
         narrow.into_iter().for_each(|warning| self.warn(warning));
@@ -213,15 +231,19 @@ impl<'a> Stages<'a> {
         enough(&store)?;
         self.known.points = store.len() as u64;
         self.known.text = Some(text);
-        let coordinates = self.report.coordinates;
         let columns = &self.carried.columns;
+        let (shift, coordinates) = self.shift(store.bounds(), lattice)?;
+        let place = (coordinates, shift.map_or([0.0; 3], |shift| shift.origin));
         let warnings = self
             .known
-            .left_out(&job.params, columns, coordinates, &job.output)?;
+            .left_out(&job.params, columns, place, &job.output)?;
         for warning in warnings {
             self.warn(warning);
         }
         workspace.note_points(self.known.points);
+        if job.params.thin.is_some() {
+            self.plan(self.known.points, Some("order"), !self.carried.is_empty());
+        }
         self.check_room()?;
         Ok(store)
     }
