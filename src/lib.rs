@@ -58,11 +58,16 @@ pub mod cli;
 pub mod error;
 #[doc(hidden)]
 pub mod geom;
+mod histogram;
 pub mod inspect;
 #[doc(hidden)]
 pub mod kernels;
+#[doc(hidden)]
+pub mod levels;
 mod method;
+pub mod page;
 pub mod params;
+mod picture;
 #[doc(hidden)]
 pub mod pipeline;
 pub mod report;
@@ -70,6 +75,8 @@ pub mod report;
 pub mod spill;
 #[doc(hidden)]
 pub mod stages;
+#[doc(hidden)]
+pub mod view;
 #[doc(hidden)]
 pub mod workspace;
 
@@ -79,6 +86,6 @@ pub use pipeline::{Builder, Reconstruction, Start, default_memory, default_threa
 pub use report::{DiskEstimate, Report};
 pub use stages::ingest::Classes;
 pub use workspace::Workspace;
-pub use workspace::course::{Course, Planned, Position};
 pub use workspace::memory::MemoryPool;
+pub use workspace::outlook::{Outlook, Planned, Position};
 pub use workspace::progress::{Cancel, Observer, Silent};

@@ -5,10 +5,10 @@ mod beside;
 mod builder;
 mod checks;
 mod clock;
-mod course;
 mod disk;
 mod manifest;
 mod origin;
+mod outlook;
 mod shared;
 mod stages;
 mod start;
@@ -29,6 +29,7 @@ pub use shared::{
 };
 use stages::Stages;
 pub use start::Start;
+pub(crate) use start::scratch_folder;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
@@ -48,6 +49,7 @@ pub struct Reconstruction {
     storage: Storage,
     start: Start,
     time_limit: Option<Duration>,
+    pictures: bool,
 }
 
 /// Half of the memory that machine and cgroup allow.
@@ -133,6 +135,7 @@ impl Reconstruction {
             pieces.as_ref(),
             &lattice,
         )?;
+        stages.draw(&store, &shape, &repaired, pieces.as_ref(), &lattice)?;
         Ok(stages.report())
     }
 }

@@ -310,9 +310,10 @@ pub struct Ends {
     /// Stop before this time is over, e.g. 7h30m; the run can be resumed later
     #[arg(long, value_name = "TIME", value_parser = time)]
     pub time_limit: Option<Duration>,
-    /// Write a report as JSON
-    #[arg(long, value_name = "FILE.json")]
-    pub report: Option<PathBuf>,
+    /// Write a report: as a page with pictures and charts if its name ends in .html, else as JSON; may be given
+    /// several times
+    #[arg(long, value_name = "FILE.html|FILE.json")]
+    pub report: Vec<PathBuf>,
 }
 
 /// `outcrop resume`
@@ -345,6 +346,9 @@ pub struct Info {
     /// Print JSON
     #[arg(long)]
     pub json: bool,
+    /// Write a page with pictures
+    #[arg(long, value_name = "FILE.html")]
+    pub html: Option<PathBuf>,
     #[command(flatten)]
     pub points: Points,
     #[command(flatten, next_help_heading = "Limits")]
@@ -360,11 +364,38 @@ pub struct Verify {
     /// Print JSON
     #[arg(long)]
     pub json: bool,
+    /// Write a page with pictures
+    #[arg(long, value_name = "FILE.html")]
+    pub html: Option<PathBuf>,
     /// Accept vertices without a triangle
     #[arg(long)]
     pub allow_unreferenced: bool,
     #[command(flatten)]
     pub limits: Limits,
+}
+
+/// `outcrop tiles`
+#[derive(Debug, ClapArgs)]
+pub struct Tiles {
+    /// The mesh (PLY, also as .zst)
+    #[arg(value_name = "MESH")]
+    pub mesh: PathBuf,
+    /// The folder to write: tileset.json and tiles
+    #[arg(long, short, value_name = "DIR")]
+    pub output: PathBuf,
+    /// Place the tiles on the globe, by the reference system in MESH.prj
+    #[arg(long)]
+    pub geo: bool,
+    /// Most triangles of a leaf
+    #[arg(long, hide = true, default_value = "65536", value_parser = clap::value_parser!(u32).range(1..))]
+    pub most_triangles: u32,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
+    #[command(flatten)]
+    pub limits: Limits,
+    #[command(flatten)]
+    pub again: Again,
 }
 
 /// `outcrop compare`
@@ -385,6 +416,9 @@ pub struct Compare {
     /// Print JSON
     #[arg(long)]
     pub json: bool,
+    /// Write a page with pictures
+    #[arg(long, value_name = "FILE.html")]
+    pub html: Option<PathBuf>,
     #[command(flatten)]
     pub limits: Limits,
 }

@@ -8,6 +8,7 @@ mod progress;
 mod shared;
 mod stop;
 mod style;
+mod view;
 
 use crate::error::Error;
 use clap::Parser;

@@ -1,6 +1,6 @@
 //! Progress on a terminal: stage, rate, time left, memory, one line for each stage; and one for the whole run.
 
-use crate::workspace::course::{Course, Planned, Position};
+use crate::workspace::outlook::{Outlook, Planned, Position};
 use crate::workspace::progress::Observer;
 use crate::workspace::{limits, lock};
 use indicatif::{
@@ -23,7 +23,7 @@ pub struct Bars {
 
 /// The line of the whole run.
 struct Whole {
-    course: Course,
+    outlook: Outlook,
     began: Instant,
     /// None without a plan, and when the run is over.
     bar: Option<ProgressBar>,
@@ -32,7 +32,7 @@ struct Whole {
 impl Default for Whole {
     fn default() -> Self {
         Self {
-            course: Course::default(),
+            outlook: Outlook::default(),
             began: Instant::now(),
             bar: None,
         }
@@ -46,7 +46,7 @@ impl Whole {
 
     fn draw(&mut self, items: u64) {
         let now = self.now();
-        if let (Some(bar), Some(position)) = (&self.bar, self.course.position(items, now)) {
+        if let (Some(bar), Some(position)) = (&self.bar, self.outlook.position(items, now)) {
             bar.set_position(parts(&position));
             bar.set_message(left(&position));
         }
@@ -105,7 +105,7 @@ impl Bars {
 impl Observer for Bars {
     fn plan(&self, stages: &[Planned]) {
         let mut whole = lock(&self.whole);
-        whole.course.plan(stages);
+        whole.outlook.plan(stages);
         if whole.bar.is_none() && stages.iter().any(|stage| stage.seconds > 0.0) {
             let bar = ProgressBar::new(PARTS).with_style(style(WHOLE));
             whole.bar = Some(self.lines.add(bar.with_prefix("all")));
@@ -122,7 +122,7 @@ impl Observer for Bars {
         self.done.store(0, Ordering::Relaxed);
         let mut whole = lock(&self.whole);
         let now = whole.now();
-        whole.course.begin(name, total, now);
+        whole.outlook.begin(name, total, now);
         let bar = match &whole.bar {
             Some(below) => self.lines.insert_before(below, bar),
             None => self.lines.add(bar),
@@ -142,8 +142,8 @@ impl Observer for Bars {
         }
         let mut whole = lock(&self.whole);
         let now = whole.now();
-        whole.course.end(now);
-        if whole.course.is_over()
+        whole.outlook.end(now);
+        if whole.outlook.is_over()
             && let Some(bar) = whole.bar.take()
         {
             bar.finish_and_clear();

@@ -1,12 +1,13 @@
 //! The stages of a run: each with its parameters, its part of the report, and the check of disk space for the
 //! following stages.
 
+mod draw;
 mod export;
 mod values;
 
 use super::checks::{all_are_kept, disk_radius, enough, not_a_line, room};
 use super::disk::{SCANNER, Text};
-use super::{Clock, Known, Reconstruction, course};
+use super::{Clock, Known, Reconstruction, outlook};
 use crate::error::Result;
 use crate::geom::lattice::Lattice;
 use crate::method::METHOD;
@@ -26,7 +27,8 @@ use crate::stages::spacing::{Density, Spacings};
 use crate::stages::stitch::{StitchOptions, Stitched, stitch};
 use crate::stages::thin::{Grid, LeftOut, thin};
 use crate::stages::triples::{Triples, triples};
-use crate::workspace::{Workspace, limits};
+use crate::workspace::Workspace;
+use crate::workspace::course::Course;
 use export::written;
 use std::time::Instant;
 use values::Values;
@@ -52,6 +54,8 @@ pub(super) struct Stages<'a> {
     coarse: f64,
     /// Well-known text of the reference system.
     wkt: Option<String>,
+    /// The course of the attempt, if the report shows it.
+    course: Option<Course>,
 }
 
 impl<'a> Stages<'a> {
@@ -78,6 +82,8 @@ impl<'a> Stages<'a> {
             carried: Carried::default(),
             coarse: 0.0,
             wkt: None,
+            course: (job.pictures && !workspace.is_shared())
+                .then(|| Course::start(job.memory.clone(), workspace.io.clone())),
             report: Report {
                 version: env!("CARGO_PKG_VERSION"),
                 parameters: job.params.clone(),
@@ -122,7 +128,7 @@ impl<'a> Stages<'a> {
             return;
         }
         let compressed = job.params.compress_glb || is_compressed(&job.output);
-        let stages = course::plan(&job.params, points, job.threads, valued, compressed);
+        let stages = outlook::plan(&job.params, points, job.threads, valued, compressed);
         let first = stages.iter().rposition(|stage| Some(stage.name) == after);
         job.observer.plan(&stages[first.map_or(0, |at| at + 1)..]);
     }
@@ -491,22 +497,5 @@ impl<'a> Stages<'a> {
         repaired.release(workspace)?;
         self.report.cut = stats;
         Ok(Some(pieces))
-    }
-
-    /// The report of the run.
-    pub fn report(self) -> Report {
-        let memory = &self.job.memory;
-        Report {
-            peak_resident_bytes: limits::peak_resident(),
-            resident_file_bytes: limits::resident_file(),
-            peak_held_bytes: memory.peak_held(),
-            held_at_peak: memory.held_at_peak(),
-            peak_reserved_bytes: memory.peak(),
-            reserved_at_peak: memory.at_peak(),
-            peak_scratch_bytes: self.workspace.io.scratch_peak(),
-            seconds: self.begin.elapsed().as_secs_f64() + self.clock.earlier,
-            stages: self.clock.stages,
-            ..self.report
-        }
     }
 }

@@ -1,252 +1,138 @@
-//! The course of a whole run: how much of it is done, and how long the rest takes.
-//!
-//! What each stage takes on a usual machine is known beforehand. Stages that are finished, and the one that is
-//! under way, tell how much slower or faster this run is; the rest is expected to be so, too. Times are passed in,
-//! so that nothing here looks at a clock.
+//! The course of memory and disk over a run, for a report that shows it. A thread takes samples; their number is
+//! bounded, since neighbours are joined when there are too many.
 
-use std::time::Duration;
+use super::memory::MemoryPool;
+use super::{IoCounters, limits, lock};
+use crossbeam_channel::{RecvTimeoutError, Sender, bounded};
+use serde::Serialize;
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
 
-/// A stage that is to come, and the seconds that it takes on a usual machine.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Planned {
-    /// Name of the stage.
-    pub name: &'static str,
-    /// Expected seconds.
+/// Most samples.
+const MOST: usize = 512;
+
+/// Time between the first samples; it doubles whenever neighbours are joined.
+const FIRST: Duration = Duration::from_millis(25);
+
+/// Memory and disk at a time, in bytes; the largest values since the sample before.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct Sample {
+    /// Seconds since the attempt began.
     pub seconds: f64,
+    /// Resident memory of the process.
+    pub resident: u64,
+    /// Memory held as the program counts it.
+    pub held: u64,
+    /// Scratch files.
+    pub scratch: u64,
 }
 
-/// Share of the whole run that the expectation counts for, against what was measured.
-const TRUST: f64 = 0.1;
-
-/// The stage that is under way.
-#[derive(Debug, Clone, Copy)]
-struct Current {
-    /// Expected seconds.
-    expected: f64,
-    /// Items in all; 0 if that is unknown.
-    total: u64,
-    began: Duration,
-}
-
-/// The course of a run. Without a plan nothing is known.
-#[derive(Debug, Clone, Default)]
+/// Takes samples until it is dropped.
+#[derive(Debug)]
 pub struct Course {
-    /// Stages that did not begin, in their order.
-    coming: Vec<Planned>,
-    current: Option<Current>,
-    /// Expected seconds of the stages that are finished here.
-    done: f64,
-    /// Seconds that they took.
-    took: f64,
-    /// Expected seconds of stages that an earlier attempt finished.
-    earlier: f64,
-    /// Largest share that was told.
-    told: f64,
-}
-
-/// How far a run is.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Position {
-    /// Share of the whole run that is done, from 0 to 1; it never falls.
-    pub share: f64,
-    /// Expected time until the end.
-    pub left: Duration,
+    samples: Arc<Mutex<Vec<Sample>>>,
+    _running: Sender<()>,
 }
 
 impl Course {
-    /// Sets the stages that are to come, in their order. Those of the plan before that come before them were
-    /// finished by an earlier attempt.
-    pub fn plan(&mut self, stages: &[Planned]) {
-        let first = stages.first().map(|stage| stage.name);
-        let skipped = self.coming.iter();
-        let skipped = skipped.take_while(|stage| Some(stage.name) != first);
-        let skipped: f64 = skipped.map(|stage| stage.seconds).sum();
-        if self.coming.iter().any(|stage| Some(stage.name) == first) {
-            self.earlier += skipped;
-        }
-        self.coming = stages.to_vec();
-    }
-
-    /// Stage `name` begins, at time `now` since any fixed moment; it has `total` items (0: unknown). Stages before
-    /// it in the plan were finished by an earlier attempt.
-    pub fn begin(&mut self, name: &str, total: u64, now: Duration) {
-        let Some(at) = self.coming.iter().position(|stage| stage.name == name) else {
-            return;
-        };
-        let skipped = self.coming[..at].iter().map(|stage| stage.seconds);
-        self.earlier += skipped.sum::<f64>();
-        self.current = Some(Current {
-            expected: self.coming[at].seconds,
-            total,
-            began: now,
-        });
-        self.coming.drain(..=at);
-    }
-
-    /// The stage that is under way is finished.
-    pub fn end(&mut self, now: Duration) {
-        if let Some(stage) = self.current.take() {
-            self.done += stage.expected;
-            self.took += now.saturating_sub(stage.began).as_secs_f64();
-        }
-    }
-
-    /// True if no stage is under way and none is to come.
+    /// Starts to take samples. Without a thread for them there are none.
     #[must_use]
-    pub fn is_over(&self) -> bool {
-        self.current.is_none() && self.coming.is_empty()
-    }
-
-    /// Where the run is when `items` items of the current stage are done; none without a plan.
-    pub fn position(&mut self, items: u64, now: Duration) -> Option<Position> {
-        let coming: f64 = self.coming.iter().map(|stage| stage.seconds).sum();
-        let own = self.current.map_or(0.0, |stage| stage.expected);
-        let all = self.earlier + self.done + own + coming;
-        if all <= 0.0 || self.is_over() {
-            return None;
-        }
-        let took = self
-            .current
-            .map_or(0.0, |stage| now.saturating_sub(stage.began).as_secs_f64());
-        let share = self.current.map_or(0.0, |stage| match stage.total {
-            // It comes near the end, and never gets there.
-            0 => took / (took + stage.expected * self.pace(0.0, 0.0, all)).max(f64::MIN_POSITIVE),
-            total => (items as f64 / total as f64).min(1.0),
-        });
-        let pace = self.pace(own * share, took, all);
-        // Of the current stage its own speed counts, the more of it is done.
-        let by_plan = own * (1.0 - share) * pace;
-        let by_itself = if share > 0.0 {
-            took / share * (1.0 - share)
-        } else {
-            by_plan
+    pub fn start(memory: MemoryPool, io: Arc<IoCounters>) -> Self {
+        let (running, over) = bounded::<()>(0);
+        let samples: Arc<Mutex<Vec<Sample>>> = Arc::default();
+        let taken = samples.clone();
+        let begin = Instant::now();
+        let take = move || {
+            let mut pause = FIRST;
+            loop {
+                let mut samples = lock(&taken);
+                samples.push(Sample {
+                    seconds: begin.elapsed().as_secs_f64(),
+                    resident: limits::resident(),
+                    held: memory.held(),
+                    scratch: io.scratch(),
+                });
+                if join(&mut samples) {
+                    pause *= 2;
+                }
+                drop(samples);
+                if over.recv_timeout(pause) != Err(RecvTimeoutError::Timeout) {
+                    break;
+                }
+            }
         };
-        let rest = share * by_itself + (1.0 - share) * by_plan;
-        let reached = (self.earlier + self.done + own * share) / all;
-        self.told = self.told.max(reached.min(1.0));
-        Some(Position {
-            share: self.told,
-            left: Duration::try_from_secs_f64(rest + coming * pace).unwrap_or(Duration::MAX),
-        })
+        let thread = std::thread::Builder::new().name("outcrop-course".into());
+        let _ = thread.spawn(take);
+        Self {
+            samples,
+            _running: running,
+        }
     }
 
-    /// Seconds that a second of the plan takes, with so many expected and measured seconds of the current stage.
-    fn pace(&self, expected: f64, measured: f64, all: f64) -> f64 {
-        let trust = TRUST * all;
-        (self.took + measured + trust) / (self.done + expected + trust)
+    /// The samples so far.
+    #[must_use]
+    pub fn samples(&self) -> Vec<Sample> {
+        lock(&self.samples).clone()
     }
+}
+
+/// Joins neighbours if there are too many samples.
+fn join(samples: &mut Vec<Sample>) -> bool {
+    if samples.len() < MOST {
+        return false;
+    }
+    let joined = samples.chunks(2).map(|two| {
+        let most = |of: fn(&Sample) -> u64| two.iter().map(of).max().unwrap_or(0);
+        Sample {
+            seconds: two[two.len() - 1].seconds,
+            resident: most(|s| s.resident),
+            held: most(|s| s.held),
+            scratch: most(|s| s.scratch),
+        }
+    });
+    *samples = joined.collect();
+    true
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn seconds(seconds: f64) -> Duration {
-        Duration::from_secs_f64(seconds)
-    }
-
-    fn planned(stages: &[(&'static str, f64)]) -> Vec<Planned> {
-        let stages = stages.iter();
-        stages
-            .map(|(name, seconds)| Planned {
-                name,
-                seconds: *seconds,
-            })
-            .collect()
-    }
-
-    const STAGES: [(&str, f64); 4] = [
-        ("ingest", 10.0),
-        ("order", 10.0),
-        ("cells", 60.0),
-        ("export", 20.0),
-    ];
-
-    /// A run on a machine that takes `slower` times as long; each stage is seen at ten moments. Checks the time
-    /// left at the end of each stage, and that shares rise.
-    fn run(slower: f64, total: u64, close: f64) {
-        let mut course = Course::default();
-        assert_eq!(course.position(0, seconds(5.0)), None);
-        course.plan(&planned(&STAGES));
-        let (mut now, mut share) = (3.0, 0.0);
-        for (n, (name, expected)) in STAGES.into_iter().enumerate() {
-            course.begin(name, total, seconds(now));
-            for part in 0..10 {
-                let at = now + expected * slower * f64::from(part) / 10.0;
-                let seen = course
-                    .position(total * part as u64 / 10, seconds(at))
-                    .unwrap();
-                assert!(
-                    seen.share >= share && seen.share <= 1.0,
-                    "{seen:?} after {share}"
-                );
-                share = seen.share;
-            }
-            now += expected * slower;
-            course.end(seconds(now));
-            let rest: f64 = STAGES[n + 1..].iter().map(|stage| stage.1).sum();
-            let seen = course.position(0, seconds(now));
-            assert_eq!(seen.is_none(), rest == 0.0);
-            if let Some(seen) = seen {
-                share = seen.share;
-                assert!((seen.share - (1.0 - rest / 100.0)).abs() < 1e-9, "{seen:?}");
-                // What is measured counts more and more against the plan.
-                let measured = 100.0 - rest;
-                let pace = (measured * slower + 10.0) / (measured + 10.0);
-                assert!((seen.left.as_secs_f64() - rest * pace).abs() < 1e-6);
-                if n == 2 {
-                    let off = seen.left.as_secs_f64() / (rest * slower);
-                    assert!((off - 1.0).abs() < close, "{off}");
-                }
-            }
-        }
-        assert!(course.is_over());
-    }
-
     #[test]
-    fn the_time_left_follows_the_machine() {
-        run(1.0, 1000, 1e-9);
-        run(3.0, 1000, 0.08);
-        run(0.2, 1000, 0.5);
-        // Stages of unknown length.
-        run(1.0, 0, 1e-9);
-        run(7.0, 0, 0.1);
-    }
-
-    #[test]
-    fn within_a_stage_its_own_speed_counts() {
-        let mut course = Course::default();
-        course.plan(&planned(&[("cells", 100.0)]));
-        course.begin("cells", 200, seconds(0.0));
-        let left = |course: &mut Course, items, at| {
-            course
-                .position(items, seconds(at))
-                .unwrap()
-                .left
-                .as_secs_f64()
+    fn joined_samples_keep_peaks_and_times() {
+        let sample = |n: u64| Sample {
+            seconds: n as f64,
+            resident: n,
+            held: 1000 - n,
+            scratch: n % 7,
         };
-        assert!((left(&mut course, 0, 0.0) - 100.0).abs() < 1e-9);
-        // Twice as slow as planned.
-        let early = left(&mut course, 2, 2.0);
-        let late = left(&mut course, 180, 180.0);
-        assert!((100.0..150.0).contains(&early), "{early}");
-        assert!((late - 20.0).abs() < 1.0, "{late}");
+        let mut samples: Vec<Sample> = (0..MOST as u64 - 1).map(sample).collect();
+        assert!(!join(&mut samples));
+        samples.push(sample(MOST as u64 - 1));
+        assert!(join(&mut samples));
+        assert_eq!(samples.len(), MOST / 2);
+        assert_eq!((samples[0].held, samples[0].resident), (1000, 1));
+        assert_eq!(samples[MOST / 2 - 1].seconds, MOST as f64 - 1.0);
+        assert!(
+            samples
+                .windows(2)
+                .all(|two| two[0].seconds < two[1].seconds)
+        );
     }
 
     #[test]
-    fn stages_that_an_earlier_attempt_finished_are_done_and_tell_nothing() {
-        let mut course = Course::default();
-        course.plan(&planned(&STAGES));
-        course.begin("cells", 10, seconds(1.0));
-        let seen = course.position(0, seconds(1.0)).unwrap();
-        assert!((seen.share - 0.2).abs() < 1e-9);
-        assert!((seen.left.as_secs_f64() - 80.0).abs() < 1e-9);
-        // One that is not in the plan.
-        course.end(seconds(61.0));
-        course.begin("other", 5, seconds(61.0));
-        assert!((course.position(3, seconds(70.0)).unwrap().share - 0.8).abs() < 1e-9);
-        // A new plan, once more is known: the share does not fall.
-        course.plan(&planned(&[("cells", 500.0), ("export", 20.0)]));
-        assert!((course.position(0, seconds(70.0)).unwrap().share - 0.8).abs() < 1e-9);
+    fn samples_are_taken_until_the_end() {
+        let workspace = super::super::Workspace::for_tests(1);
+        let course = Course::start(workspace.memory.clone(), workspace.io.clone());
+        let _held = workspace.reserve("much", 50 << 20).unwrap();
+        let seen = || {
+            course
+                .samples()
+                .iter()
+                .any(|s| s.held >= 50 << 20 && s.resident > 0)
+        };
+        while !seen() {
+            std::thread::sleep(Duration::from_millis(1));
+        }
     }
 }

@@ -110,7 +110,6 @@ impl Stages<'_> {
             None => export(store, repaired, blocks, lattice, options, workspace),
         };
         self.report.mesh = self.clock.stage("export", "blocks", items, write)?;
-        pieces.map_or(Ok(()), |pieces| pieces.release(workspace))?;
         columns.map_or(Ok(()), |columns| columns.release(workspace))?;
         beside::write(&job.output, &job.inputs, &self.report, self.wkt.as_deref())
     }

@@ -171,9 +171,16 @@ fn rounding_is_told_by_the_distance_from_the_origin_of_the_mesh() {
         };
         let (_, report) = make(&bench, input, "mesh.stl", &params);
         let said = report.warnings.concat();
-        assert_eq!(said.contains("32-bit floats"), step.is_some(), "{origin}: {said}");
+        assert_eq!(
+            said.contains("32-bit floats"),
+            step.is_some(),
+            "{origin}: {said}"
+        );
         let step = step.map(|step| format!("steps of up to {step};"));
-        assert!(step.is_none_or(|step| said.contains(&step)), "{origin}: {said}");
+        assert!(
+            step.is_none_or(|step| said.contains(&step)),
+            "{origin}: {said}"
+        );
     }
 }
 
