@@ -3,11 +3,12 @@
 
 mod draw;
 mod export;
+mod plan;
 mod values;
 
 use super::checks::{all_are_kept, disk_radius, enough, not_a_line, room};
 use super::disk::{SCANNER, Text};
-use super::{Clock, Known, Reconstruction, outlook};
+use super::{Clock, Known, Reconstruction};
 use crate::error::Result;
 use crate::geom::lattice::Lattice;
 use crate::method::METHOD;
@@ -16,7 +17,7 @@ use crate::report::{LatticeReport, Report};
 use crate::stages::blocks::Blocks;
 use crate::stages::cells::{CellTriples, DiskRadius, TileRanges, Widen, cells};
 use crate::stages::cut::{CutOptions, StoredPieces, cut};
-use crate::stages::export::{CoordinateType, is_compressed};
+use crate::stages::export::CoordinateType;
 use crate::stages::ingest::{Attributes, Carried, Spool, ingest_selected};
 use crate::stages::located::Places;
 use crate::stages::order::{Orderer, PointStore, StoredPoints, order, sample_sort};
@@ -119,18 +120,6 @@ impl<'a> Stages<'a> {
         self.report.estimated_scratch_bytes = estimate.scratch;
         self.report.estimated_output_bytes = estimate.output;
         room(&self.job.folder, &self.job.output, estimate, self.workspace)
-    }
-
-    /// Tells which stages are to come behind `after`, and how long they take for so many points.
-    fn plan(&self, points: u64, after: Option<&str>, valued: bool) {
-        let (job, workspace) = (self.job, self.workspace);
-        if workspace.is_shared() {
-            return;
-        }
-        let compressed = job.params.compress_glb || is_compressed(&job.output);
-        let stages = outlook::plan(&job.params, points, job.threads, valued, compressed);
-        let first = stages.iter().rposition(|stage| Some(stage.name) == after);
-        job.observer.plan(&stages[first.map_or(0, |at| at + 1)..]);
     }
 
     fn warn(&mut self, warning: String) {
