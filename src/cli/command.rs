@@ -21,13 +21,13 @@ and parameters give the same file, byte for byte, whatever memory, threads and o
 
 const EXAMPLES: &str = "Examples:
   outcrop reconstruct scan.laz -o mesh.ply
-  outcrop reconstruct tiles/ -o town.ply --memory 4GiB --report town.json
+  outcrop reconstruct tiles/ -o town.ply --memory 4GiB --report town.html
   outcrop reconstruct noisy.las -o smooth.ply --smooth 1
   outcrop reconstruct scan.laz -o mesh.ply --resume --time-limit 7h30m
   outcrop resume mesh.ply.outcrop-scratch
   outcrop info scan.laz
   outcrop verify mesh.ply && echo manifold
-  outcrop compare mesh.ply scan.laz
+  outcrop compare mesh.ply scan.laz --html distances.html
   outcrop demo
   outcrop plan tiles/ -o town.ply --shards 200 --task-memory 4GiB --task-threads 8
   outcrop submit town.ply.outcrop-scratch --engine slurm -- --partition=long
