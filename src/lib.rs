@@ -63,6 +63,8 @@ mod histogram;
 pub mod inspect;
 #[doc(hidden)]
 pub mod kernels;
+#[doc(hidden)]
+pub mod levels;
 mod method;
 pub mod page;
 pub mod params;
@@ -74,6 +76,8 @@ pub mod report;
 pub mod spill;
 #[doc(hidden)]
 pub mod stages;
+#[doc(hidden)]
+pub mod view;
 #[doc(hidden)]
 pub mod workspace;
 

@@ -111,20 +111,18 @@ impl Canvas {
         }
     }
 
-    /// Where a position is in the picture, for [`Canvas::projected`].
+    /// The cell of a position, for [`Canvas::misses`].
     #[must_use]
     #[inline]
-    pub fn project(&self, p: Vec3) -> [f32; 3] {
-        self.camera.project(p).map(|x| x as f32)
+    pub fn cell(&self, p: Vec3) -> u32 {
+        Raster::cell(self.camera.project(p))
     }
 
-    /// Draws a triangle whose corners were projected; `corners` is asked only if it is seen.
+    /// True if a triangle whose corners have these cells is not seen for certain.
+    #[must_use]
     #[inline]
-    pub fn projected(&self, at: [[f32; 3]; 3], corners: impl FnOnce() -> [Vec3; 3]) {
-        if !self.raster.misses(&at) {
-            let at = at.map(|p| p.map(f64::from));
-            self.raster.triangle(at, || self.lit(corners()));
-        }
+    pub fn misses(cells: [u32; 3]) -> bool {
+        Raster::misses(cells)
     }
 
     /// The value of a triangle in the raster.

@@ -28,6 +28,7 @@ pub use shared::{
 };
 use stages::Stages;
 pub use start::Start;
+pub(crate) use start::scratch_folder;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;

@@ -11,7 +11,7 @@ use std::collections::{BTreeMap, BTreeSet};
 const MAY_USE: &[(&str, &str)] = &[
     (
         "cli",
-        "inspect method page params pipeline report stages/ingest workspace",
+        "inspect levels method page params pipeline report stages/ingest view workspace",
     ),
     ("error", ""),
     ("geom", "kernels method"),
@@ -22,6 +22,7 @@ const MAY_USE: &[(&str, &str)] = &[
          workspace",
     ),
     ("kernels", ""),
+    ("levels", "inspect pipeline spill stages/ingest workspace"),
     ("method", ""),
     (
         "params",
@@ -84,6 +85,7 @@ const MAY_USE: &[(&str, &str)] = &[
     ("stages/thin", "stages/ingest"),
     ("stages/tiles", "kernels stages/order"),
     ("stages/triples", "stages/blocks stages/cells"),
+    ("view", ""),
     ("workspace", ""),
 ];
 

@@ -1,13 +1,13 @@
 //! Command-line arguments.
 
+use super::parse::{count, region, size, time};
 use crate::method::METHOD;
-use crate::params::{MaxWidth, Method, NoRegion, Origin, Params, Radius, Region, Smoothing};
+use crate::params::{MaxWidth, Method, Origin, Params, Radius, Region, Smoothing};
 use crate::pipeline::{Builder, Reconstruction, Start};
 use crate::stages::ingest::{Attributes, Classes};
 use crate::workspace::mapped::Io;
 use crate::workspace::{Compression, Storage};
 use clap::Args as ClapArgs;
-use std::io::Read;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -240,6 +240,9 @@ pub struct Job {
     /// Write a normal for each vertex (PLY, OBJ, GLB)
     #[arg(long)]
     pub normals: bool,
+    /// Compress a .glb mesh, positions exactly (meshopt: EXT_meshopt_compression, which viewers read)
+    #[arg(long)]
+    pub compress_glb: bool,
     /// Write one mesh for each square with this side in x and y, in the cloud's unit: MESH_X_Y.ply, and
     /// MESH.index.json with a list of them
     #[arg(long, value_name = "LENGTH")]
@@ -371,6 +374,30 @@ pub struct Verify {
     pub limits: Limits,
 }
 
+/// `outcrop tiles`
+#[derive(Debug, ClapArgs)]
+pub struct Tiles {
+    /// The mesh (PLY, also as .zst)
+    #[arg(value_name = "MESH")]
+    pub mesh: PathBuf,
+    /// The folder to write: tileset.json and tiles
+    #[arg(long, short, value_name = "DIR")]
+    pub output: PathBuf,
+    /// Place the tiles on the globe, by the reference system in MESH.prj
+    #[arg(long)]
+    pub geo: bool,
+    /// Most triangles of a leaf
+    #[arg(long, hide = true, default_value = "65536", value_parser = clap::value_parser!(u32).range(1..))]
+    pub most_triangles: u32,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
+    #[command(flatten)]
+    pub limits: Limits,
+    #[command(flatten)]
+    pub again: Again,
+}
+
 /// `outcrop compare`
 #[derive(Debug, ClapArgs)]
 pub struct Compare {
@@ -448,6 +475,7 @@ impl Job {
             min_component: self.repair.min_component.or(usual.min_component),
             repair: !self.repair.no_repair,
             normals: self.normals,
+            compress_glb: self.compress_glb,
             origin: self.coordinates.origin,
             keep_far: self.coordinates.keep_far,
             ignore_crs: self.coordinates.ignore_crs,
@@ -455,45 +483,6 @@ impl Job {
             block: self.block_points,
             ..usual
         }
-    }
-}
-
-pub fn size(text: &str) -> Result<u64, String> {
-    let size: bytesize::ByteSize = text
-        .parse()
-        .map_err(|_| format!("{text:?} is not a size like 512MiB, 4GiB or 2000000000"))?;
-    Ok(size.as_u64())
-}
-
-/// A region: numbers, or the name of a file.
-fn region(text: &str) -> Result<Region, String> {
-    if Region::is_numbers(text) {
-        return text.parse().map_err(|e: NoRegion| e.to_string());
-    }
-    // A point cloud given by mistake must not be read as a whole.
-    let limit = Region::LONGEST as u64 + 1;
-    let read = std::fs::File::open(text).and_then(|file| {
-        let mut content = Vec::new();
-        file.take(limit).read_to_end(&mut content).map(|_| content)
-    });
-    let content = read.map_err(|e| format!("neither numbers nor a file that can be read ({e})"))?;
-    let content = String::from_utf8_lossy(&content);
-    content.parse().map_err(|e: NoRegion| e.to_string())
-}
-
-fn time(text: &str) -> Result<Duration, String> {
-    match humantime::parse_duration(text) {
-        Ok(time) if time > Duration::ZERO => Ok(time),
-        _ => Err(format!("{text:?} is not a time like 90s, 45m or 7h30m")),
-    }
-}
-
-fn count(text: &str) -> Result<u64, String> {
-    match text.parse::<f64>() {
-        Ok(x) if (1.0..=4e9).contains(&x) && x.fract() == 0.0 => Ok(x as u64),
-        _ => Err(format!(
-            "{text:?} is not a number of points like 200000 or 1e6"
-        )),
     }
 }
 
@@ -507,13 +496,5 @@ mod tests {
             OUTLIER_FACTOR_TEXT.parse(),
             Ok(crate::params::OUTLIER_FACTOR)
         );
-    }
-
-    #[test]
-    fn sizes_are_read() {
-        assert_eq!(size("512MiB"), Ok(512 << 20));
-        assert_eq!(size("2GiB"), Ok(2 << 30));
-        assert_eq!(size("1000"), Ok(1000));
-        assert!(size("lots").is_err());
     }
 }

@@ -1,7 +1,8 @@
 //! The commands and their help.
 
-use super::args::{Compare, Demo, Info, Reconstruct, Resume, Verify};
+use super::args::{Compare, Demo, Info, Reconstruct, Resume, Tiles, Verify};
 use super::shared::{Advance, Plan, Status, Submit, Work};
+use super::view::View;
 use clap::{Parser, Subcommand};
 
 /// Turns point clouds of any size into clean triangle meshes within a memory budget.
@@ -28,6 +29,8 @@ const EXAMPLES: &str = "Examples:
   outcrop info scan.laz
   outcrop verify mesh.ply && echo manifold
   outcrop compare mesh.ply scan.laz --html distances.html
+  outcrop tiles mesh.ply -o town
+  outcrop view mesh.ply
   outcrop demo
   outcrop plan tiles/ -o town.ply --shards 200 --task-memory 4GiB --task-threads 8
   outcrop submit town.ply.outcrop-scratch --engine slurm -- --partition=long
@@ -46,8 +49,12 @@ pub enum Command {
     Info(Info),
     /// Check that a mesh is a manifold (exit code 0 if it is, 1 if not)
     Verify(Verify),
+    /// Cut a mesh into levels of detail for 3D Tiles viewers
+    Tiles(Tiles),
     /// Measure the distance between two meshes or clouds
     Compare(Compare),
+    /// Show a mesh of any size in the browser
+    View(View),
     /// Generate a cloud, reconstruct it and verify the mesh
     Demo(Demo),
     /// Plan a run for many tasks, on a cluster or on this machine; makes its folder

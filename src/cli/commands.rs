@@ -1,11 +1,12 @@
 //! The commands.
 
-use super::args::{Compare, Demo, Ends, Info, Limits, Reconstruct, Resume, Verify};
+use super::args::{Compare, Demo, Ends, Info, Limits, Reconstruct, Resume, Tiles, Verify};
 use super::command::Command;
 use super::output::{NewFile, is_page, print, report_text, show, summary, write_report};
-use super::{shared, stop, style};
+use super::{shared, stop, style, view};
 use crate::error::{Error, Result};
 use crate::inspect::{compare, info, verify};
+use crate::levels;
 use crate::page;
 use crate::pipeline::{Builder, Reconstruction, Start, default_memory, default_threads};
 use crate::workspace::Workspace;
@@ -23,6 +24,8 @@ pub fn run(command: Command) -> Result<bool> {
         Command::Info(args) => info(&args),
         Command::Verify(args) => check(&args),
         Command::Compare(args) => measure(&args),
+        Command::Tiles(args) => tiles(&args),
+        Command::View(args) => view::run(&args),
         Command::Demo(args) => demo(&args),
         Command::Plan(args) => shared::plan(&args),
         Command::Work(args) => shared::work(&args),
@@ -154,6 +157,27 @@ fn measure(args: &Compare) -> Result<bool> {
         }
     };
     show(&comparison, args.json)?;
+    Ok(true)
+}
+
+fn tiles(args: &Tiles) -> Result<bool> {
+    let (observer, cancel) = stop::watched(args.limits.quiet);
+    let options = levels::Options {
+        geo: args.geo,
+        most_triangles: args.most_triangles,
+    };
+    let mut tiles = levels::Tiles::new(&args.mesh, &args.output)
+        .options(options)
+        .memory(memory(&args.limits))
+        .threads(threads(&args.limits))
+        .storage(args.limits.storing.storage())
+        .start(args.again.start())
+        .observer(observer)
+        .cancel(cancel);
+    if let Some(scratch) = &args.limits.scratch {
+        tiles = tiles.scratch(scratch);
+    }
+    show(&tiles.run()?, args.json)?;
     Ok(true)
 }
 

@@ -3,7 +3,7 @@
 use crate::error::{Error, Result};
 use crate::workspace::Workspace;
 use crate::workspace::compressed::{Beginning, Content};
-use outcrop_ply::{FileError, Header, MeshStream, Part};
+use outcrop_ply::{FileError, Header, MeshStream, Part, Scalar};
 use std::path::Path;
 
 pub use outcrop_ply::{NO_VERTEX, SLICE};
@@ -15,6 +15,14 @@ pub trait Sink {
     /// # Errors
     /// Any error; it ends the reading.
     fn vertices(&mut self, positions: &[[f64; 3]]) -> Result<()>;
+
+    /// Receives the values of the wanted columns of the vertices that came last, vertex by vertex.
+    ///
+    /// # Errors
+    /// Any error; it ends the reading.
+    fn values(&mut self, _values: &[f64]) -> Result<()> {
+        Ok(())
+    }
 
     /// Receives the corners of the next triangles, at most [`SLICE`]. Indices are as in the file, not checked
     /// against the number of vertices; those below 0 or above [`NO_VERTEX`] are reported as [`NO_VERTEX`].
@@ -122,6 +130,19 @@ impl PlyMesh {
         self.stream.place().origin()
     }
 
+    /// Index, name and type of each property of the vertices that is one number and no coordinate.
+    #[must_use]
+    pub fn columns(&self) -> Vec<(usize, &str, Scalar)> {
+        self.stream.columns()
+    }
+
+    /// Reads the values of these columns as well, given by index and type, ascending.
+    #[must_use]
+    pub fn wanting(self, columns: Vec<(usize, Scalar)>) -> Self {
+        let stream = self.stream.wanting(columns);
+        Self { stream, ..self }
+    }
+
     /// The map of positions in the file to the coordinates of the cloud.
     pub fn place(&self) -> impl Fn([f64; 3]) -> [f64; 3] + use<> {
         let (place, types) = (self.stream.place(), self.stream.types());
@@ -155,6 +176,7 @@ impl PlyMesh {
     pub fn read(self, sink: &mut impl Sink) -> Result<()> {
         let mut take = |part: Part<'_>| match part {
             Part::Vertices(positions) => sink.vertices(positions),
+            Part::Values(values) => sink.values(values),
             Part::Triangles(triangles) => sink.triangles(triangles),
             Part::NonTriangle => sink.non_triangles(1),
         };
@@ -176,6 +198,10 @@ impl<S: Sink, P: Fn([f64; 3]) -> [f64; 3]> Sink for InPlace<'_, S, P> {
         self.positions
             .extend(positions.iter().map(|p| (self.place)(*p)));
         self.sink.vertices(&self.positions)
+    }
+
+    fn values(&mut self, values: &[f64]) -> Result<()> {
+        self.sink.values(values)
     }
 
     fn triangles(&mut self, triangles: &[[u32; 3]]) -> Result<()> {

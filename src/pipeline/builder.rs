@@ -161,7 +161,7 @@ impl Builder {
         if self.output.as_os_str().is_empty() {
             return missing("--output", "the path of the mesh");
         }
-        check_name(&self.output)?;
+        check_name(&self.output, self.params.compress_glb)?;
         let budget = self.memory.unwrap_or_else(default_memory);
         let folder = || scratch_folder(&self.output, self.scratch.as_deref());
         Ok(Reconstruction {

@@ -34,6 +34,7 @@ pub use drawing::Illustration;
 use figures::DistanceRow;
 pub use figures::{Comparison, Distances, Figures};
 pub use shape::{Kind, Side};
+pub(crate) use triangle::distance2;
 
 use crate::error::{Error, Result};
 use crate::inspect::ply_mesh::{PlyMesh, clearer, holds_faces};

@@ -7,7 +7,7 @@ use super::vector::{V3, add, dot, scale, sub};
 const NEEDLE: f64 = 1e-4;
 
 /// Squared distance from `p` to the nearest point of a triangle, which may be a segment or a point.
-pub(super) fn distance2(triangle: &[V3; 3], p: V3) -> f64 {
+pub(crate) fn distance2(triangle: &[V3; 3], p: V3) -> f64 {
     let [a, b, c] = triangle.map(|corner| sub(corner, p));
     let (ab, ac) = (sub(b, a), sub(c, a));
     let base2 = dot(ab, ab);

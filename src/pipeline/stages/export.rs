@@ -88,6 +88,7 @@ impl Stages<'_> {
             columns,
             normals: job.params.normals,
             decimals: self.known.text.map_or(0, |text| text.decimals),
+            compress: job.params.compress_glb,
         };
         let items = match pieces {
             Some(pieces) => pieces.count() as u64,

@@ -276,21 +276,24 @@ impl Drawing<'_> {
     }
 }
 
-/// Draws the triangles of a part. Each vertex of the block is projected once.
+/// Draws the triangles of a part. Most triangles of a large mesh lie between the centres of pixels, which the cells
+/// of their corners tell.
 fn paint(unit: &Unit<'_>, part: &Part, canvases: &[Canvas]) {
     let first = part.ids.start;
-    let mut own: Vec<[f32; 3]> = Vec::with_capacity(part.at.own().len());
-    let _held = unit.hold(12 * part.at.own().len() as u64);
+    let mut own: Vec<u32> = Vec::with_capacity(part.at.own().len());
+    let _held = unit.hold(4 * part.at.own().len() as u64);
     for canvas in canvases {
-        let project = |p: &Point| canvas.project(position(*p));
+        let cell = |p: &Point| canvas.cell(position(*p));
         own.clear();
-        own.extend(part.at.own().iter().map(project));
+        own.extend(part.at.own().iter().map(cell));
         for t in &part.triangles {
-            let at = t.map(|v| match own.get(v.wrapping_sub(first) as usize) {
-                Some(at) => *at,
-                None => project(&part.at.at(v)),
+            let cells = t.map(|v| match own.get(v.wrapping_sub(first) as usize) {
+                Some(cell) => *cell,
+                None => cell(&part.at.at(v)),
             });
-            canvas.projected(at, || part.at.corners(*t).map(position));
+            if !Canvas::misses(cells) {
+                canvas.triangle(part.at.corners(*t).map(position));
+            }
         }
     }
 }

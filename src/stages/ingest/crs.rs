@@ -95,6 +95,12 @@ impl Crs {
 }
 
 impl Crs {
+    /// The well-known text, if it was given by one.
+    #[must_use]
+    pub fn wkt(&self) -> Option<&str> {
+        self.wkt.as_deref()
+    }
+
     /// The EPSG codes, as `EPSG:26917` or `EPSG:26917+5703`.
     #[must_use]
     pub fn codes(&self) -> Option<String> {
@@ -144,8 +150,12 @@ pub fn prj_of(input: &Path) -> PathBuf {
 
 /// The reference system in the `.prj` file beside an input, if there is one; a warning if it cannot be used.
 pub(super) fn beside(input: &Input) -> (Option<Crs>, Option<String>) {
-    let path = prj_of(&input.path);
-    let Ok(file) = File::open(&path) else {
+    of_prj(&prj_of(&input.path))
+}
+
+/// The reference system in a `.prj` file, if there is one; a warning if it cannot be used.
+pub fn of_prj(path: &Path) -> (Option<Crs>, Option<String>) {
+    let Ok(file) = File::open(path) else {
         return (None, None);
     };
     let not = |why: &str| {

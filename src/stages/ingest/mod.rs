@@ -48,7 +48,7 @@ pub use carry::{Attribute, Carried};
 pub use classes::Classes;
 pub use columns::{Attributes, Column};
 pub use crop::Crop;
-pub use crs::{Crs, CrsSource, prj_of};
+pub use crs::{Crs, CrsSource, of_prj, prj_of};
 pub use expand::expand;
 pub use format::Format;
 pub use probe::{Probe, probe};

@@ -109,20 +109,22 @@ impl Raster {
         first.min(size)..end.min(size)
     }
 
-    /// True if a triangle with these projected corners covers no centre of a pixel for certain: the quick answer for
-    /// most triangles of a large mesh.
+    /// The centres of pixels to the left of a projected position and above it, for [`Raster::misses`].
     #[must_use]
     #[inline]
-    pub fn misses(&self, [a, b, c]: &[[f32; 3]; 3]) -> bool {
-        let none = |k: usize, size: usize| {
-            let (low, high) = (a[k].min(b[k]).min(c[k]), a[k].max(b[k]).max(c[k]));
-            let from = (low - 0.5).max(0.0);
-            let below = from as u32;
-            let first = below.saturating_add(u32::from((below as f32) < from));
-            let end = (high + 0.5).max(0.0) as u32;
-            first >= end.min(size as u32)
-        };
-        none(0, self.width) || none(1, self.height)
+    pub fn cell([x, y, _]: Vec3) -> u32 {
+        // The casts saturate, and NaN gives zero.
+        let half = |x: f64| (x + 0.5).clamp(0.0, 65535.0) as u32;
+        half(x) << 16 | half(y)
+    }
+
+    /// True if a triangle whose corners have these cells covers no centre of a pixel for certain: the quick answer
+    /// for most triangles of a large mesh.
+    #[must_use]
+    #[inline]
+    pub fn misses([a, b, c]: [u32; 3]) -> bool {
+        let differ = (a ^ b) | (a ^ c);
+        differ >> 16 == 0 || differ & 0xffff == 0
     }
 
     /// Draws a triangle with projected corners; `value` is asked only if it is seen at the centre of a pixel,
@@ -390,19 +392,18 @@ mod tests {
         for _ in 0..20_000 {
             let middle = [2.4 * next() - 1.2, 2.4 * next() - 1.2];
             let size = 0.05 * next();
-            let mut corner = || {
-                let p = [middle[0] + size * next(), middle[1] + size * next(), 0.0];
-                camera.project(p).map(|x| x as f32)
-            };
+            let mut corner =
+                || camera.project([middle[0] + size * next(), middle[1] + size * next(), 0.0]);
             let at = [corner(), corner(), corner()];
             let raster = Raster::new(100, 100);
             let mut seen = false;
-            raster.triangle(at.map(|p| p.map(f64::from)), || {
+            raster.triangle(at, || {
                 seen = true;
                 1
             });
-            assert!(!(seen && raster.misses(&at)), "{at:?}");
-            missed += usize::from(raster.misses(&at));
+            let misses = Raster::misses(at.map(Raster::cell));
+            assert!(!(seen && misses), "{at:?}");
+            missed += usize::from(misses);
             drawn += usize::from(seen);
         }
         assert!(missed > 2000 && drawn > 2000, "{missed} {drawn}");
@@ -424,7 +425,7 @@ mod tests {
             let ends = [bad[k], bad[(k + 1) % 4]];
             raster.line(&camera, ends, Mark::Wire, 2.0);
             raster.point(camera.project(bad[k]), 3.0, 1);
-            let _ = raster.misses(&[[f32::NAN; 3], [f32::INFINITY; 3], [k as f32; 3]]);
+            let _ = Raster::cell(camera.project(bad[k]));
         }
     }
 }

@@ -8,22 +8,31 @@ use crate::numbers::{integer, real};
 use crate::types::Scalar;
 
 impl Source {
-    /// Decodes 1 to `most` vertices; none if they are text or have lists.
+    /// Decodes 1 to `most` vertices, and the values of `columns`; none if they are text or have lists.
     pub(super) fn fixed_vertices(
         &mut self,
         element: &Element,
-        axes: [(usize, Scalar); 3],
+        (axes, columns): ([(usize, Scalar); 3], &[(usize, Scalar)]),
         most: usize,
-        slice: &mut Vec<[f64; 3]>,
+        (slice, values): (&mut Vec<[f64; 3]>, &mut Vec<f64>),
     ) -> Result<(), FileError> {
         let (Some(big), Some(each)) = (self.big(), element.record_bytes()) else {
             return Ok(());
         };
-        let [x, y, z] = axes.map(|(at, s)| (element.bytes_before(at).unwrap_or(0), s));
+        let place = |(at, s)| (element.bytes_before(at).unwrap_or(0), s);
+        let [x, y, z] = axes.map(place);
+        let columns: Vec<_> = columns.iter().map(|column| place(*column)).collect();
         let now = (self.peek(each)?.len() / each).clamp(1, most);
         let entries = self.take(now * each, "a vertex")?.chunks_exact(each);
         let axis = |e: &[u8], (at, scalar): (usize, Scalar)| real(scalar, &e[at..], big);
-        slice.extend(entries.map(|e| [axis(e, x), axis(e, y), axis(e, z)]));
+        slice.extend(
+            entries
+                .clone()
+                .map(|e| [axis(e, x), axis(e, y), axis(e, z)]),
+        );
+        if !columns.is_empty() {
+            values.extend(entries.flat_map(|e| columns.iter().map(move |column| axis(e, *column))));
+        }
         Ok(())
     }
 

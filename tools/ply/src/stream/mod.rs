@@ -10,7 +10,7 @@ mod values;
 use crate::error::{Error, FileError, Result};
 use crate::header::{Element, Header};
 use crate::place::Place;
-use crate::types::{Encoding, Scalar};
+use crate::types::{Encoding, Property, Scalar};
 use source::Source;
 use std::path::Path;
 
@@ -25,6 +25,8 @@ pub const NO_VERTEX: u32 = u32::MAX;
 pub enum Part<'a> {
     /// The positions of the next vertices, at most [`SLICE`].
     Vertices(&'a [[f64; 3]]),
+    /// The values of the columns that are wanted, of the vertices that came last, vertex by vertex.
+    Values(&'a [f64]),
     /// The corners of the next triangles, at most [`SLICE`]. Indices are as in the file, not checked against
     /// the number of vertices; those below 0 or above [`NO_VERTEX`] are reported as [`NO_VERTEX`].
     Triangles(&'a [[u32; 3]]),
@@ -41,6 +43,8 @@ pub enum Part<'a> {
 pub struct MeshStream {
     header: Header,
     source: Source,
+    /// Indices and types of the vertices' properties that are wanted, ascending.
+    columns: Vec<(usize, Scalar)>,
 }
 
 fn index(value: i64) -> u32 {
@@ -80,7 +84,12 @@ impl MeshStream {
     pub fn open_as(path: &Path, shown: &Path) -> Result<Self, FileError> {
         let mut source = Source::open(path)?.shown_as(shown);
         let header = source.header()?;
-        let mesh = Self { header, source };
+        let columns = Vec::new();
+        let mesh = Self {
+            header,
+            source,
+            columns,
+        };
         mesh.check().map_err(|e| mesh.source.wrong(e))?;
         Ok(mesh)
     }
@@ -115,6 +124,28 @@ impl MeshStream {
     pub fn types(&self) -> Option<[Scalar; 3]> {
         let (_, vertex) = self.header.element("vertex").ok()??;
         Some(vertex.coordinates().ok()?.map(|(_, scalar)| scalar))
+    }
+
+    /// Index, name and type of each property of the vertices that is one number and no coordinate.
+    #[must_use]
+    pub fn columns(&self) -> Vec<(usize, &str, Scalar)> {
+        let Ok(Some((_, vertex))) = self.header.element("vertex") else {
+            return Vec::new();
+        };
+        let properties = vertex.properties.iter().enumerate();
+        let columns = properties.filter_map(|(at, (name, property))| match property {
+            Property::One(_) if ["x", "y", "z"].contains(&&**name) => None,
+            Property::One(scalar) => Some((at, &**name, *scalar)),
+            Property::List { .. } => None,
+        });
+        columns.collect()
+    }
+
+    /// Reads the values of these of the [`MeshStream::columns`] as well, given by index and type, ascending.
+    #[must_use]
+    pub fn wanting(mut self, columns: Vec<(usize, Scalar)>) -> Self {
+        self.columns = columns;
+        self
     }
 
     fn count(&self, name: &str) -> u64 {
@@ -168,7 +199,9 @@ impl MeshStream {
         for element in &self.header.elements {
             let source = &mut self.source;
             match Role::of(element).map_err(|e| source.wrong(e))? {
-                Role::Vertices(axes) => vertices(source, element, axes, &mut take)?,
+                Role::Vertices(axes) => {
+                    vertices(source, element, (axes, &self.columns), &mut take)?;
+                }
                 Role::Faces(list) => faces(source, element, list, &mut take)?,
                 Role::Other => skip(source, element)?,
             }
@@ -214,21 +247,25 @@ fn skip(source: &mut Source, element: &Element) -> Result<(), FileError> {
 fn vertices<E: From<FileError>>(
     source: &mut Source,
     element: &Element,
-    axes: [(usize, Scalar); 3],
+    (axes, columns): ([(usize, Scalar); 3], &[(usize, Scalar)]),
     take: &mut impl FnMut(Part<'_>) -> Result<(), E>,
 ) -> Result<(), E> {
-    let mut slice = Vec::with_capacity(SLICE);
+    let (mut slice, mut values) = (Vec::with_capacity(SLICE), Vec::new());
     let mut left = element.count;
     while left > 0 {
         let most = left.min(SLICE as u64) as usize;
         slice.clear();
-        source.fixed_vertices(element, axes, most, &mut slice)?;
+        values.clear();
+        source.fixed_vertices(element, (axes, columns), most, (&mut slice, &mut values))?;
         if slice.is_empty() {
             for _ in 0..most {
-                slice.push(source.vertex(element, axes)?);
+                slice.push(source.vertex(element, axes, columns, &mut values)?);
             }
         }
         take(Part::Vertices(&slice))?;
+        if !columns.is_empty() {
+            take(Part::Values(&values))?;
+        }
         left -= slice.len() as u64;
     }
     Ok(())

@@ -60,11 +60,13 @@ impl Source {
         self.skip_numbers(count, scalar, name, format_args!("property {name}"))
     }
 
-    /// Reads a vertex with these positions and types of the coordinates.
+    /// Reads a vertex with these positions and types of the coordinates; appends the values of `columns`.
     pub(super) fn vertex(
         &mut self,
         element: &Element,
         axes: [(usize, Scalar); 3],
+        columns: &[(usize, Scalar)],
+        values: &mut Vec<f64>,
     ) -> Result<[f64; 3], FileError> {
         let mut position = [0.0; 3];
         for (at, (name, property)) in element.properties.iter().enumerate() {
@@ -73,7 +75,12 @@ impl Source {
                 (Some(axis), Property::One(scalar)) => {
                     position[axis] = self.number(name, scalar, true)?;
                 }
-                (None, Property::One(scalar)) => drop(self.number(name, scalar, false)?),
+                (None, Property::One(scalar)) => {
+                    let value = self.number(name, scalar, false)?;
+                    if columns.iter().any(|column| column.0 == at) {
+                        values.push(value);
+                    }
+                }
                 (_, list) => self.skip_property(name, list)?,
             }
         }

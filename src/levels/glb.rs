@@ -1,0 +1,320 @@
+//! A tile as a GLB file, its buffer views compressed with `EXT_meshopt_compression`.
+
+use super::columns::Columns;
+use super::lattice::Lattice;
+use super::node::Node;
+use super::simplify::failed;
+use crate::error::Result;
+use meshoptimizer_rs::Workspace;
+use meshoptimizer_rs::codec::{
+    IndexEncoding, VertexEncoding, encode_index_buffer, encode_index_sequence, encode_vertex_buffer,
+};
+use outcrop_ply::Scalar;
+use serde_json::{Value, json};
+
+/// Component types of glTF.
+fn component(scalar: Scalar) -> u32 {
+    match scalar {
+        Scalar::I8 => 5120,
+        Scalar::U8 => 5121,
+        Scalar::I16 => 5122,
+        Scalar::U16 => 5123,
+        _ => 5126,
+    }
+}
+
+const UNSIGNED_SHORT: u32 = 5123;
+const UNSIGNED_INT: u32 = 5125;
+
+const EXTENSION: &str = "EXT_meshopt_compression";
+
+/// The grids of a tileset.
+#[derive(Debug, Clone)]
+pub(super) struct Grids<'a> {
+    pub lattice: &'a Lattice,
+    /// By depth: the number of low bits of positions that tiles at this depth or below cannot show, because one of
+    /// them is too large; it never grows with depth.
+    pub low_bits: &'a [u32],
+}
+
+impl Grids<'_> {
+    /// The number of low bits that a vertex does not show in a tile at `depth`: as many as in the largest tile with
+    /// which it is shown beside this one, so that they agree.
+    fn hidden(&self, depth: u32, vertex_depth: u8) -> u32 {
+        let most = (self.low_bits.len() - 1) as u32;
+        let depth = depth
+            .min(u32::from(vertex_depth).saturating_add(1))
+            .min(most);
+        self.low_bits[depth as usize]
+    }
+}
+
+/// Low bits of positions that a tile hides whose longest side is twice `half`: the rest must fit 24 bits with a sign.
+pub(super) fn low_bits(half: u32) -> u32 {
+    (0..32)
+        .find(|bits| (half >> bits) + 2 < 1 << 23)
+        .unwrap_or(31)
+}
+
+struct Writer<'a> {
+    bytes: Vec<u8>,
+    views: Vec<Value>,
+    accessors: Vec<Value>,
+    /// Bytes of all views when they are decoded.
+    decoded: usize,
+    workspace: &'a mut Workspace,
+}
+
+impl Writer<'_> {
+    /// Adds a buffer view of compressed data; returns its number.
+    fn view(
+        &mut self,
+        (compressed, mode, filter): (Vec<u8>, &str, Option<&str>),
+        (count, stride): (usize, usize),
+        target: u32,
+    ) -> usize {
+        self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
+        self.decoded = self.decoded.next_multiple_of(4);
+        let mut extension = json!({
+            "buffer": 0, "byteOffset": self.bytes.len(), "byteLength": compressed.len(),
+            "byteStride": stride, "count": count, "mode": mode,
+        });
+        if let Some(filter) = filter {
+            extension["filter"] = filter.into();
+        }
+        let mut view = json!({
+            "buffer": 1, "byteOffset": self.decoded, "byteLength": count * stride,
+            "target": target, "extensions": { EXTENSION: extension },
+        });
+        if mode == "ATTRIBUTES" {
+            view["byteStride"] = stride.into();
+        }
+        self.decoded += count * stride;
+        self.bytes.extend_from_slice(&compressed);
+        self.views.push(view);
+        self.views.len() - 1
+    }
+
+    /// Adds vertex data of `stride` bytes each; returns the number of the accessor.
+    fn attribute(
+        &mut self,
+        data: &[u8],
+        stride: usize,
+        filter: Option<&str>,
+        accessor: Value,
+    ) -> Result<usize> {
+        let count = data.len() / stride;
+        let encoding = VertexEncoding::new(0, 0).map_err(|e| failed("encode vertices", e))?;
+        let packed = encode_vertex_buffer(data, count, stride, encoding, self.workspace);
+        let packed = packed.map_err(|e| failed("encode vertices", e))?;
+        let view = self.view((packed, "ATTRIBUTES", filter), (count, stride), 34962);
+        let mut accessor = accessor;
+        accessor["bufferView"] = view.into();
+        accessor["count"] = count.into();
+        self.accessors.push(accessor);
+        Ok(self.accessors.len() - 1)
+    }
+
+    /// Adds indices, of triangles or lines.
+    fn indices(&mut self, indices: &[u32], vertices: usize, triangles: bool) -> Result<usize> {
+        let (encoding, workspace) = (IndexEncoding::DEFAULT, &mut *self.workspace);
+        let (packed, mode) = match triangles {
+            true => (
+                encode_index_buffer(indices, encoding, workspace),
+                "TRIANGLES",
+            ),
+            false => (
+                encode_index_sequence(indices, encoding, workspace),
+                "INDICES",
+            ),
+        };
+        let packed = packed.map_err(|e| failed("encode indices", e))?;
+        let (stride, component) = match vertices < 1 << 16 {
+            true => (2, UNSIGNED_SHORT),
+            false => (4, UNSIGNED_INT),
+        };
+        let view = self.view((packed, mode, None), (indices.len(), stride), 34963);
+        self.accessors.push(json!({
+            "bufferView": view, "componentType": component, "count": indices.len(), "type": "SCALAR",
+        }));
+        Ok(self.accessors.len() - 1)
+    }
+}
+
+/// The place of a tile: a whole number of the steps of the coarsest grid.
+fn place(node: &Node, grids: &Grids<'_>) -> [u32; 3] {
+    let bits = grids.low_bits.first().copied().unwrap_or(0);
+    node.bounds().middle().map(|x| x >> bits << bits)
+}
+
+/// A GLB file with a tile at this depth, and lines along `boundary`.
+pub(super) fn write(
+    node: &Node,
+    depth: u32,
+    boundary: &[[u32; 2]],
+    (grids, columns): (&Grids<'_>, &Columns),
+) -> Result<Vec<u8>> {
+    let mut workspace = Workspace::default();
+    let mut writer = Writer {
+        bytes: Vec::new(),
+        views: Vec::new(),
+        accessors: Vec::new(),
+        decoded: 0,
+        workspace: &mut workspace,
+    };
+    let place = place(node, grids);
+    let mut attributes = positions(&mut writer, node, depth, (grids, place))?;
+    let normals: Vec<u8> = node
+        .normals
+        .iter()
+        .flat_map(|[x, y]| [x.cast_unsigned(), y.cast_unsigned(), 127, 0])
+        .collect();
+    let accessor = json!({ "componentType": 5120, "normalized": true, "type": "VEC3" });
+    attributes["NORMAL"] = writer
+        .attribute(&normals, 4, Some("OCTAHEDRAL"), accessor)?
+        .into();
+    values(&mut writer, node, columns, &mut attributes)?;
+    let vertices = node.ids.len();
+    let indices = writer.indices(node.triangles.as_flattened(), vertices, true)?;
+    let mut primitives = vec![json!({
+        "attributes": attributes, "indices": indices, "mode": 4, "material": 0,
+    })];
+    if !boundary.is_empty() {
+        let indices = writer.indices(boundary.as_flattened(), vertices, false)?;
+        primitives.push(json!({
+            "attributes": attributes, "indices": indices, "mode": 1, "material": 0,
+        }));
+    }
+    let step = grids.lattice.step;
+    let [x, y, z] = place.map(|x| f64::from(x) * step);
+    let matrix = [
+        step,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        -step,
+        0.0,
+        0.0,
+        step,
+        0.0,
+        0.0,
+        x,
+        z,
+        0.0 - y,
+        1.0,
+    ];
+    writer
+        .bytes
+        .resize(writer.bytes.len().next_multiple_of(4), 0);
+    let json = json!({
+        "asset": { "version": "2.0", "generator": concat!("outcrop ", env!("CARGO_PKG_VERSION")) },
+        "extensionsUsed": [EXTENSION, "KHR_mesh_quantization"],
+        "extensionsRequired": [EXTENSION, "KHR_mesh_quantization"],
+        "scene": 0,
+        "scenes": [{ "nodes": [0] }],
+        "nodes": [{ "mesh": 0, "matrix": matrix }],
+        "meshes": [{ "primitives": primitives }],
+        "materials": [{
+            "doubleSided": true,
+            "pbrMetallicRoughness": { "metallicFactor": 0.0, "roughnessFactor": 1.0 },
+        }],
+        "buffers": [
+            { "byteLength": writer.bytes.len() },
+            { "byteLength": writer.decoded.max(1), "extensions": { EXTENSION: { "fallback": true } } },
+        ],
+        "bufferViews": writer.views,
+        "accessors": writer.accessors,
+    });
+    Ok(container(&json, &writer.bytes))
+}
+
+fn container(json: &Value, binary: &[u8]) -> Vec<u8> {
+    let mut json = json.to_string().into_bytes();
+    json.resize(json.len().next_multiple_of(4), b' ');
+    let length = (12 + 8 + json.len() + 8 + binary.len()) as u32;
+    let mut all = Vec::with_capacity(length as usize);
+    all.extend_from_slice(b"glTF");
+    all.extend_from_slice(&2u32.to_le_bytes());
+    all.extend_from_slice(&length.to_le_bytes());
+    for (kind, chunk) in [(b"JSON", &*json), (b"BIN\0", binary)] {
+        all.extend_from_slice(&(chunk.len() as u32).to_le_bytes());
+        all.extend_from_slice(kind);
+        all.extend_from_slice(chunk);
+    }
+    all
+}
+
+/// Positions as whole steps from the place, in the filter `EXPONENTIAL`, and the bits that this leaves out.
+fn positions(
+    writer: &mut Writer<'_>,
+    node: &Node,
+    depth: u32,
+    (grids, place): (&Grids<'_>, [u32; 3]),
+) -> Result<Value> {
+    let exponent = grids.hidden(depth, super::node::INNER);
+    let mut data = Vec::with_capacity(12 * node.points.len());
+    let mut low = Vec::with_capacity(8 * node.points.len());
+    let (mut min, mut max) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+    let mut any = false;
+    for (point, vertex_depth) in node.points.iter().zip(&node.depths) {
+        let hidden = grids.hidden(depth, *vertex_depth);
+        for axis in 0..3 {
+            let shown = point[axis] >> hidden << hidden;
+            let rest = point[axis] - shown;
+            any |= rest > 0;
+            low.extend_from_slice(&(rest as u16).to_le_bytes());
+            let steps = i64::from(shown) - i64::from(place[axis]);
+            let mantissa = (steps >> exponent) as i32;
+            let word = exponent << 24 | mantissa.cast_unsigned() & 0xff_ffff;
+            data.extend_from_slice(&word.to_le_bytes());
+            min[axis] = min[axis].min(steps as f64);
+            max[axis] = max[axis].max(steps as f64);
+        }
+        low.extend_from_slice(&[0, 0]);
+    }
+    let accessor = json!({ "componentType": 5126, "type": "VEC3", "min": min, "max": max });
+    let position = writer.attribute(&data, 12, Some("EXPONENTIAL"), accessor)?;
+    let mut attributes = json!({ "POSITION": position });
+    if any {
+        let accessor = json!({ "componentType": UNSIGNED_SHORT, "type": "VEC3" });
+        attributes["_LOW"] = writer.attribute(&low, 8, None, accessor)?.into();
+    }
+    Ok(attributes)
+}
+
+/// Colours and other values.
+fn values(
+    writer: &mut Writer<'_>,
+    node: &Node,
+    columns: &Columns,
+    attributes: &mut Value,
+) -> Result<()> {
+    let each = columns.words();
+    let column = |number: usize| node.values.iter().skip(number).step_by(each.max(1));
+    let mut number = 0;
+    if columns.has_colors() {
+        let data: Vec<u8> = column(0)
+            .flat_map(|word| {
+                let [r, g, b, _] = word.to_le_bytes();
+                [r, g, b, 0]
+            })
+            .collect();
+        let accessor = json!({ "componentType": 5121, "normalized": true, "type": "VEC3" });
+        attributes["COLOR_0"] = writer.attribute(&data, 4, None, accessor)?.into();
+        number = 1;
+    }
+    for (other, number) in columns.others().zip(number..) {
+        let scalar = other.attribute_type();
+        let bytes = scalar.bytes();
+        let mut data = Vec::with_capacity(4 * node.ids.len());
+        for word in column(number) {
+            data.extend_from_slice(&word.to_le_bytes()[..bytes]);
+            data.extend_from_slice(&[0; 4][bytes..]);
+        }
+        let accessor = json!({ "componentType": component(scalar), "type": "SCALAR" });
+        attributes[&*other.attribute] = writer.attribute(&data, 4, None, accessor)?.into();
+    }
+    Ok(())
+}

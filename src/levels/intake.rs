@@ -1,0 +1,270 @@
+//! Reading of the mesh: vertices into parts that can be read one by one, triangles to the blocks of their
+//! smallest vertices.
+
+use super::columns::Columns;
+use super::lattice::{Finder, LARGEST, Lattice};
+use super::rows::{BlockTriangle, LevelWord};
+use crate::error::{Error, Result};
+use crate::inspect::ply_mesh::{PlyMesh, Sink};
+use crate::spill::{Shuffle, Table};
+use crate::workspace::place::Place;
+use crate::workspace::{Unit, Workspace};
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// Vertices of a block, the receiver of triangles.
+pub(super) const BLOCK: usize = 1 << 16;
+
+/// Vertices of a part, which is read as a whole.
+pub(super) const PART: usize = 1 << 10;
+
+/// Triangles that are sorted by block at a time.
+const BATCH: usize = 1 << 18;
+
+/// A mesh that was read.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(super) struct Intake {
+    pub vertices: u64,
+    pub triangles: u64,
+    pub lattice: Lattice,
+    pub columns: Columns,
+    /// Places of the parts.
+    parts: Vec<Place>,
+    table: Table<LevelWord>,
+    pub sent: Shuffle<BlockTriangle>,
+}
+
+/// Words of a vertex: its position as three `f64`, and its values.
+fn words(columns: &Columns) -> usize {
+    6 + columns.stored()
+}
+
+/// Bytes of memory that reading takes.
+fn bytes(columns: &Columns, vertices: u64) -> u64 {
+    let block = 3 * 4 * (BLOCK * words(columns)) as u64;
+    let places = 2 * vertices.div_ceil(PART as u64) * size_of::<Place>() as u64;
+    block + places + 4 * (BATCH * size_of::<BlockTriangle>()) as u64 + (4 << 20)
+}
+
+/// Reads a mesh.
+pub(super) fn read(path: &Path, workspace: &Workspace) -> Result<Intake> {
+    workspace.once("read", |unit| {
+        let mesh = PlyMesh::open_any(path, workspace)?;
+        let columns = Columns::of(&mesh);
+        let _held = workspace.reserve("levels: reading", bytes(&columns, mesh.vertices()))?;
+        let total = mesh.vertices() + mesh.faces();
+        workspace
+            .observer
+            .begin("read mesh", "vertices and faces", total);
+        let mut reader = Reader::new(path, unit, &mesh, columns);
+        let mesh = mesh.wanting(reader.intake.columns.wanted());
+        mesh.read_in_place(&mut reader)?;
+        let intake = reader.finish()?;
+        workspace.observer.end();
+        Ok(intake)
+    })
+}
+
+struct Reader<'a> {
+    path: &'a Path,
+    unit: &'a Unit<'a>,
+    intake: Intake,
+    finder: Finder,
+    /// Positions whose values are to come.
+    positions: Vec<[f64; 3]>,
+    /// The parts of the current block.
+    block: Vec<Vec<LevelWord>>,
+    taken: u64,
+    batch: Vec<BlockTriangle>,
+    senders: usize,
+}
+
+impl<'a> Reader<'a> {
+    fn new(path: &'a Path, unit: &'a Unit<'a>, mesh: &PlyMesh, columns: Columns) -> Self {
+        let blocks = mesh.vertices().div_ceil(BLOCK as u64) as usize;
+        Self {
+            path,
+            unit,
+            intake: Intake {
+                vertices: mesh.vertices(),
+                triangles: 0,
+                lattice: Finder::default().finish(),
+                columns,
+                parts: Vec::new(),
+                table: Table::new("levels.vertices", blocks),
+                sent: Shuffle::new("levels.triangles"),
+            },
+            finder: Finder::default(),
+            positions: Vec::new(),
+            block: Vec::new(),
+            taken: 0,
+            batch: Vec::with_capacity(BATCH),
+            senders: 0,
+        }
+    }
+
+    fn store(&mut self, values: &[f64]) -> Result<()> {
+        let each = self.intake.columns.wanted().len();
+        let words = words(&self.intake.columns);
+        for number in 0..self.positions.len() {
+            let position = self.positions[number];
+            if !self.finder.see(position) {
+                let [x, y, z] = position;
+                let place = format!("vertex {}", self.taken);
+                let expected = format!("coordinates up to {LARGEST:e}");
+                let found = format!("a position {x} {y} {z}");
+                return Err(Error::input(self.path, place, found, expected));
+            }
+            if self.block.last().is_none_or(|p| p.len() == PART * words) {
+                if self.block.len() == BLOCK / PART {
+                    self.write()?;
+                }
+                self.block.push(Vec::with_capacity(PART * words));
+            }
+            let Some(part) = self.block.last_mut() else {
+                continue;
+            };
+            for x in position {
+                let bits = x.to_bits();
+                let halves = [bits as u32, (bits >> 32) as u32];
+                part.extend(halves.map(|word| LevelWord { word }));
+            }
+            let values = &values[number * each..][..each];
+            let columns = &mut self.intake.columns;
+            columns.store(values, |word| part.push(LevelWord { word }));
+            self.taken += 1;
+        }
+        self.unit.advance(self.positions.len() as u64);
+        self.positions.clear();
+        self.unit.check_cancel()
+    }
+
+    /// Writes the block.
+    fn write(&mut self) -> Result<()> {
+        let number = self.intake.parts.len() / (BLOCK / PART);
+        let places = self
+            .intake
+            .table
+            .put_parts(self.unit, number, &self.block)?;
+        self.intake.parts.extend(places);
+        self.block.clear();
+        Ok(())
+    }
+
+    fn send(&mut self) -> Result<()> {
+        let batch = std::mem::replace(&mut self.batch, Vec::with_capacity(BATCH));
+        self.intake.sent.send(self.unit, self.senders, batch)?;
+        self.senders += 1;
+        Ok(())
+    }
+
+    fn finish(mut self) -> Result<Intake> {
+        if !self.block.is_empty() {
+            self.write()?;
+        }
+        self.send()?;
+        self.intake.lattice = self.finder.finish();
+        Ok(self.intake)
+    }
+}
+
+impl Sink for Reader<'_> {
+    fn vertices(&mut self, positions: &[[f64; 3]]) -> Result<()> {
+        self.positions.extend_from_slice(positions);
+        match self.intake.columns.wanted().is_empty() {
+            true => self.store(&[]),
+            false => Ok(()),
+        }
+    }
+
+    fn values(&mut self, values: &[f64]) -> Result<()> {
+        self.store(values)
+    }
+
+    fn triangles(&mut self, triangles: &[[u32; 3]]) -> Result<()> {
+        for &[a, b, c] in triangles {
+            if u64::from(a.max(b).max(c)) >= self.intake.vertices {
+                let found = format!("a triangle {a} {b} {c}");
+                let expected = format!("vertices below {}", self.intake.vertices);
+                return Err(Error::input(self.path, "faces", found, expected));
+            }
+            let corners = match a.min(b).min(c) {
+                least if least == a => [a, b, c],
+                least if least == b => [b, c, a],
+                _ => [c, a, b],
+            };
+            let block = corners[0] / BLOCK as u32;
+            self.batch.push(BlockTriangle { block, corners });
+            if self.batch.len() == BATCH {
+                self.send()?;
+            }
+        }
+        self.intake.triangles += triangles.len() as u64;
+        self.unit.advance(triangles.len() as u64);
+        self.unit.check_cancel()
+    }
+
+    fn non_triangles(&mut self, count: u64) -> Result<()> {
+        let found = format!("{count} that are not triangles");
+        Err(Error::input(
+            self.path,
+            "faces",
+            found,
+            "triangles; split them first",
+        ))
+    }
+}
+
+/// A vertex as it was read.
+pub(super) struct Vertex<'a> {
+    /// Its place on the lattice.
+    pub point: [u32; 3],
+    /// Its other words.
+    pub stored: &'a [u32],
+}
+
+impl Intake {
+    /// Number of blocks.
+    pub fn blocks(&self) -> usize {
+        self.vertices.div_ceil(BLOCK as u64) as usize
+    }
+
+    /// Calls `each` with the vertices of these numbers, which ascend.
+    pub fn vertices(
+        &self,
+        unit: &Unit<'_>,
+        numbers: impl Iterator<Item = u32>,
+        mut each: impl FnMut(Vertex<'_>),
+    ) -> Result<()> {
+        let words = words(&self.columns);
+        let (mut part, mut at) = (Vec::new(), usize::MAX);
+        for number in numbers {
+            let (wanted, inside) = (number as usize / PART, number as usize % PART);
+            if wanted != at {
+                self.table.read(unit, self.parts[wanted], &mut part)?;
+                at = wanted;
+            }
+            let all: &[u32] = bytemuck::cast_slice(&part);
+            let vertex = &all[inside * words..][..words];
+            let position = std::array::from_fn(|axis| {
+                let half = |n| u64::from(vertex[2 * axis + n]);
+                f64::from_bits(half(0) | half(1) << 32)
+            });
+            each(Vertex {
+                point: self.lattice.index(position),
+                stored: &vertex[6..],
+            });
+        }
+        Ok(())
+    }
+
+    /// Bytes of a part in memory.
+    pub fn part_bytes(&self) -> u64 {
+        4 * (PART * words(&self.columns)) as u64
+    }
+
+    /// Deletes the vertices.
+    pub fn release(&self, workspace: &Workspace) -> Result<()> {
+        self.table.release(workspace)
+    }
+}

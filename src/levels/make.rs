@@ -1,0 +1,375 @@
+//! Makes the tiles: leaves from the cells, every other tile from its children.
+
+use super::cells::Cells;
+use super::distance::{self, measure};
+use super::glb::{self, Grids};
+use super::intake::Intake;
+use super::node::{Bounds, INNER, Node};
+use super::rows::LevelWord;
+use super::shared::{Shared, boundary, bytes};
+use super::simplify::{Manner, Simplifier, Surface, failed};
+use super::tree::TreeNode;
+use crate::error::Result;
+use crate::spill::Table;
+use crate::workspace::{Unit, Workspace};
+use rustc_hash::FxHashMap;
+use serde::{Deserialize, Serialize};
+
+/// Most bytes of the root.
+pub(super) const ROOT_BYTES: usize = 1_000_000;
+
+/// Fewest and most triangles for which a tile is simplified, if it can be: parts of the most that a cell has.
+const TARGETS: [f64; 2] = [0.25, 0.75];
+
+/// The part of the children's triangles that a tile has otherwise.
+const PART: usize = 4;
+
+/// Bytes of memory for each triangle of the children while a tile is made from them.
+const EACH: u64 = 420;
+
+/// A tile that was made.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+pub(super) struct Made {
+    pub triangles: u32,
+    /// Bytes of the GLB file.
+    pub bytes: u32,
+    /// Upper bound of the distance from the full mesh, in its unit.
+    pub error: f64,
+    /// Edges of the boundary of the mesh.
+    pub boundary: u64,
+}
+
+/// What the making of all tiles needs.
+pub(super) struct Maker<'a> {
+    pub intake: &'a Intake,
+    pub cells: &'a Cells,
+    pub nodes: Vec<TreeNode>,
+    pub bounds: Vec<Bounds>,
+    pub low_bits: Vec<u32>,
+    /// Most triangles of a cell.
+    pub most: u32,
+    pub simplifier: &'a dyn Simplifier,
+    /// The GLB files, as words, by tile.
+    pub files: Table<LevelWord>,
+    pub made: Vec<Made>,
+}
+
+/// The bounds of all nodes.
+pub(super) fn bounds(nodes: &[TreeNode], cells: &[Bounds]) -> Vec<Bounds> {
+    let mut all: Vec<Bounds> = Vec::with_capacity(nodes.len());
+    for (number, node) in nodes.iter().enumerate() {
+        let children = node.children.iter().map(|child| all[*child]);
+        let joined = children.fold(Bounds::EMPTY, Bounds::joined);
+        all.push(cells.get(number).map_or(joined, |own| own.joined(joined)));
+    }
+    all
+}
+
+/// By depth: the low bits that tiles there and below cannot show.
+pub(super) fn low_bits(nodes: &[TreeNode], bounds: &[Bounds]) -> Vec<u32> {
+    let mut all = vec![0; super::cells::DEEPEST as usize + 1];
+    for (node, bounds) in nodes.iter().zip(bounds) {
+        let bits = glb::low_bits(bounds.half());
+        let above = &mut all[..=node.depth as usize];
+        above.iter_mut().for_each(|most| *most = bits.max(*most));
+    }
+    all
+}
+
+impl Maker<'_> {
+    fn grids(&self) -> Grids<'_> {
+        Grids {
+            lattice: &self.intake.lattice,
+            low_bits: &self.low_bits,
+        }
+    }
+
+    /// The words of the nodes of a level.
+    fn stored(level: u32) -> Table<LevelWord> {
+        Table::new(&format!("levels.level {level}"), 0)
+    }
+
+    /// Makes all tiles. Without tiles above it, a large leaf gets one.
+    pub fn make(&mut self, shared: Shared<'_>, workspace: &Workspace) -> Result<()> {
+        self.leaves(&shared, workspace)?;
+        shared.release(workspace)?;
+        self.cells.table.release(workspace)?;
+        self.intake.release(workspace)?;
+        workspace.trim();
+        if let [leaf] = &*self.made {
+            if leaf.bytes as usize > ROOT_BYTES {
+                self.nodes.push(TreeNode {
+                    depth: 0,
+                    level: 1,
+                    children: vec![0],
+                });
+                self.bounds.push(self.bounds[0]);
+            }
+        }
+        let last = self.nodes.last().map_or(0, |root| root.level);
+        for level in 1..=last {
+            self.level(level, workspace)?;
+            for below in 0..level {
+                if self.last_use(below) == level {
+                    Self::stored(below).release(workspace)?;
+                }
+            }
+        }
+        Self::stored(last).release(workspace)
+    }
+
+    /// The highest level with a tile that has children of this one.
+    fn last_use(&self, level: u32) -> u32 {
+        let above = self.nodes.iter().filter(|node| {
+            let mut children = node.children.iter();
+            children.any(|child| self.nodes[*child].level == level)
+        });
+        above.map(|node| node.level).max().unwrap_or(0)
+    }
+
+    fn leaves(&mut self, shared: &Shared<'_>, workspace: &Workspace) -> Result<()> {
+        let list = &self.cells.cells;
+        let observer = &workspace.observer;
+        observer.begin("leaves", "triangles", self.intake.triangles);
+        let mut all = vec![Made::default(); list.len()];
+        let this = &*self;
+        let stored = Self::stored(0);
+        let work = |unit: &Unit<'_>| {
+            let cell = unit.number();
+            let (node, _) = shared.node(unit, cell)?;
+            let node = node.with_triangles(&ordered(&node)?);
+            let depth = list[cell].depth;
+            let mut made = Made {
+                triangles: node.triangles.len() as u32,
+                ..Made::default()
+            };
+            this.write(unit, (cell, depth), &node, &mut made)?;
+            stored.put(unit, cell, &node.to_words())?;
+            unit.advance(node.triangles.len() as u64);
+            Ok(made)
+        };
+        let bytes_of = |n: usize| bytes(this.intake, list[n].triangles);
+        workspace.units("leaves", list.len(), bytes_of, work, |cell, made| {
+            all[cell] = made;
+            Ok(())
+        })?;
+        observer.end();
+        self.made = all;
+        Ok(())
+    }
+
+    /// Puts the GLB file of a tile.
+    fn write(
+        &self,
+        unit: &Unit<'_>,
+        (number, depth): (usize, u32),
+        node: &Node,
+        made: &mut Made,
+    ) -> Result<()> {
+        let lines = boundary(node);
+        made.boundary = lines.len() as u64;
+        let file = glb::write(node, depth, &lines, (&self.grids(), &self.intake.columns))?;
+        made.bytes = file.len() as u32;
+        let words: Vec<LevelWord> = bytemuck::allocation::pod_collect_to_vec(&file);
+        self.files.put(unit, number, &words)
+    }
+
+    /// Makes the tiles of a level; all below are made.
+    fn level(&mut self, level: u32, workspace: &Workspace) -> Result<()> {
+        let numbers: Vec<usize> = (0..self.nodes.len())
+            .filter(|number| self.nodes[*number].level == level)
+            .collect();
+        let joined = |number: usize| {
+            let children = self.nodes[numbers[number]].children.iter();
+            children.map(|child| u64::from(self.made[*child].triangles))
+        };
+        let total = (0..numbers.len()).flat_map(joined).sum();
+        let observer = &workspace.observer;
+        observer.begin("level", "triangles", total);
+        let this = &*self;
+        let mut all = vec![Made::default(); numbers.len()];
+        let values = 12 * self.intake.columns.words() as u64;
+        let bytes_of = |n: usize| joined(n).sum::<u64>() * (EACH + values) + (2 << 20);
+        let work = |unit: &Unit<'_>| {
+            let made = this.inner(unit, numbers[unit.number()])?;
+            unit.advance(joined(unit.number()).sum());
+            Ok(made)
+        };
+        let name = (format!("level {level}"), "levels: tiles");
+        workspace.units(name, numbers.len(), bytes_of, work, |n, made| {
+            all[n] = made;
+            Ok(())
+        })?;
+        observer.end();
+        self.made.extend(all);
+        Ok(())
+    }
+
+    fn inner(&self, unit: &Unit<'_>, number: usize) -> Result<Made> {
+        let TreeNode {
+            depth,
+            level,
+            children,
+        } = &self.nodes[number];
+        let mut nodes = Vec::with_capacity(children.len());
+        for child in children {
+            let level = self.nodes[*child].level;
+            nodes.push(Node::of_words(&Self::stored(level).get(unit, *child)?));
+        }
+        let joined = join(nodes);
+        let is_root = number + 1 == self.nodes.len();
+        let count = joined.triangles.len();
+        let [least, most] = TARGETS.map(|part| (part * f64::from(self.most)) as usize);
+        let mut target = (count / PART).clamp(least, most).min(count / 2);
+        let mut manner = Manner::Careful;
+        let errors = children.iter().map(|child| self.made[*child].error);
+        let below = errors.fold(0.0, f64::max);
+        let points = Points::of(&joined, *depth);
+        loop {
+            let triangles = points.simplify(&joined, target, manner, self.simplifier)?;
+            let node = joined.with_triangles(&triangles);
+            let node = node.with_triangles(&ordered(&node)?);
+            let mut made = Made {
+                triangles: node.triangles.len() as u32,
+                ..Made::default()
+            };
+            self.write(unit, (number, *depth), &node, &mut made)?;
+            if is_root && made.bytes as usize > ROOT_BYTES && !triangles.is_empty() {
+                target = target.min(triangles.len()) * 2 / 3;
+                manner = match manner {
+                    Manner::Careful => Manner::Pruning,
+                    _ => Manner::Coarse,
+                };
+                continue;
+            }
+            let own = points.distance(&joined, &triangles);
+            made.error = below + self.error(own);
+            Self::stored(*level).put(unit, number, &node.to_words())?;
+            return Ok(made);
+        }
+    }
+
+    /// The error of a tile besides that of its children, from the measured distance in steps; at least half a step,
+    /// so that leaves are always better.
+    fn error(&self, distance: f64) -> f64 {
+        let hidden = match self.low_bits.first() {
+            None | Some(0) => 0.0,
+            Some(bits) => 3f64.sqrt() * f64::from(1u32 << bits),
+        };
+        // Distances were rounded, at most in the last digits.
+        (distance * (1.0 + 1e-9)).max(0.5) * self.intake.lattice.step
+            + hidden * self.intake.lattice.step
+    }
+}
+
+/// The triangles in an order that compresses well.
+fn ordered(node: &Node) -> Result<Vec<[u32; 3]>> {
+    let mut workspace = meshoptimizer_rs::Workspace::default();
+    let indices = node.triangles.as_flattened();
+    let ordered = meshoptimizer_rs::optimize_vertex_cache(indices, node.ids.len(), &mut workspace);
+    let ordered = ordered.map_err(|e| failed("order triangles", e))?;
+    Ok(ordered.as_chunks().0.to_vec())
+}
+
+/// The node that has the triangles of all these: vertices of several become one.
+fn join(nodes: Vec<Node>) -> Node {
+    let mut all = Node::default();
+    let mut shared: FxHashMap<u32, u32> = FxHashMap::default();
+    for node in nodes {
+        let each = node.value_words();
+        let mut new = Vec::with_capacity(node.ids.len());
+        for vertex in 0..node.ids.len() {
+            let (id, depth) = (node.ids[vertex], node.depths[vertex]);
+            let next = all.ids.len() as u32;
+            let index = match depth {
+                INNER => next,
+                _ => *shared.entry(id).or_insert(next),
+            };
+            new.push(index);
+            if index == next {
+                all.ids.push(id);
+                all.points.push(node.points[vertex]);
+                all.depths.push(depth);
+                all.normals.push(node.normals[vertex]);
+                let values = &node.values[vertex * each..][..each];
+                all.values.extend_from_slice(values);
+            }
+        }
+        let corners = node.triangles.iter();
+        all.triangles
+            .extend(corners.map(|t| t.map(|corner| new[corner as usize])));
+        let seams = node
+            .seams
+            .iter()
+            .map(|ends| ends.map(|end| new[end as usize]));
+        all.seams.extend(seams.map(|[a, b]| [a.min(b), a.max(b)]));
+    }
+    all.seams.sort_unstable();
+    all.seams.dedup();
+    all
+}
+
+/// Positions of a node from its middle, and which vertices are locked.
+struct Points {
+    points: Vec<[f64; 3]>,
+    locked: Vec<bool>,
+}
+
+impl Points {
+    fn of(node: &Node, depth: u32) -> Self {
+        let middle = node.bounds().middle();
+        let from = |p: &[u32; 3]| std::array::from_fn(|k| f64::from(p[k]) - f64::from(middle[k]));
+        let vertices = 0..node.ids.len();
+        Self {
+            points: node.points.iter().map(from).collect(),
+            locked: vertices.map(|v| node.is_locked(v, depth)).collect(),
+        }
+    }
+
+    fn simplify(
+        &self,
+        node: &Node,
+        target: usize,
+        manner: Manner,
+        simplifier: &dyn Simplifier,
+    ) -> Result<Vec<[u32; 3]>> {
+        let points: Vec<[f32; 3]> = self.points.iter().map(|p| p.map(|x| x as f32)).collect();
+        let surface = Surface {
+            points: &points,
+            triangles: &node.triangles,
+            locked: &self.locked,
+        };
+        let triangles = simplifier.simplify(surface, target, manner)?;
+        // Whatever the library does, tiles have no cracks.
+        Ok(match self.keeps_borders(node, &triangles) {
+            true => triangles,
+            false => node.triangles.clone(),
+        })
+    }
+
+    /// True if all locked vertices are corners of these triangles. One on the boundary of the mesh may be missing: the
+    /// ear that it was the tip of is gone, which moves the boundary.
+    fn keeps_borders(&self, node: &Node, triangles: &[[u32; 3]]) -> bool {
+        let mut lost = self.locked.clone();
+        triangles
+            .as_flattened()
+            .iter()
+            .for_each(|v| lost[*v as usize] = false);
+        if !lost.contains(&true) {
+            return true;
+        }
+        for end in boundary(node).into_iter().flatten() {
+            lost[end as usize] = false;
+        }
+        !lost.contains(&true)
+    }
+
+    /// The distance of these triangles from those of the node, in steps.
+    fn distance(&self, node: &Node, triangles: &[[u32; 3]]) -> f64 {
+        let surface = |triangles| distance::Surface {
+            points: &self.points,
+            triangles,
+        };
+        measure(surface(&node.triangles), surface(triangles))
+    }
+}

@@ -1,0 +1,97 @@
+//! Levels of detail: a mesh of any size as a tree of tiles, in bounded memory.
+//!
+//! The triangles are divided into the cells of an octree ([`cells`]), which are the leaves of the tree ([`tree`]).
+//! Every other tile is made from its children: they are joined, simplified ([`simplify`]) and measured against the
+//! joined surface ([`distance`]). A vertex that has triangles outside of the tile is not removed, so that tiles of
+//! any two levels meet without a crack. `docs/tiles.md` describes the files.
+
+mod cells;
+mod columns;
+mod distance;
+mod geo;
+mod glb;
+mod intake;
+mod job;
+mod lattice;
+mod make;
+mod node;
+mod rows;
+mod shared;
+mod simplify;
+mod tileset;
+mod tree;
+
+pub use job::{Options, Tiles, TilesReport};
+pub use simplify::{Manner, Quadrics, Simplifier, Surface};
+
+use crate::error::{Error, Result};
+use crate::spill::Table;
+use crate::workspace::Workspace;
+use make::Maker;
+use shared::Shared;
+use std::path::Path;
+use tileset::About;
+
+/// Makes the tileset `folder` of the mesh `path`.
+fn make(
+    path: &Path,
+    folder: &Path,
+    options: &Options,
+    about: impl FnOnce([f64; 3], [f64; 3]) -> Result<About>,
+    workspace: &Workspace,
+) -> Result<TilesReport> {
+    let intake = intake::read(path, workspace)?;
+    if intake.triangles == 0 {
+        return Err(Error::input(
+            path,
+            "faces",
+            "no triangle",
+            "a mesh with triangles",
+        ));
+    }
+    let cells = cells::divide(&intake, options.most_triangles, workspace)?;
+    intake.sent.release(workspace)?;
+    workspace.trim();
+    let observer = &workspace.observer;
+    observer.begin("share", "triangles", 2 * intake.triangles);
+    let shared = Shared::find(&intake, &cells, workspace)?;
+    observer.end();
+    let nodes = tree::build(&cells.cells);
+    let bounds = make::bounds(&nodes, &shared.bounds);
+    let low_bits = make::low_bits(&nodes, &bounds);
+    let mut maker = Maker {
+        intake: &intake,
+        cells: &cells,
+        nodes,
+        bounds,
+        low_bits,
+        most: options.most_triangles,
+        simplifier: &Quadrics,
+        files: Table::new("levels.tiles", 0),
+        made: Vec::new(),
+    };
+    workspace.trim();
+    maker.make(shared, workspace)?;
+    let step = intake.lattice.step;
+    let low = intake.lattice.origin();
+    let span = maker.bounds.last().map_or([0; 3], |root| root.max);
+    let high = std::array::from_fn(|axis| low[axis] + f64::from(span[axis]) * step);
+    let about = about(low, high)?;
+    let bytes = maker.write_folder(folder, &about, workspace)?;
+    let root = maker.made.last().cloned().unwrap_or_default();
+    let leaves = &maker.made[..cells.cells.len()];
+    Ok(TilesReport {
+        vertices: intake.vertices,
+        triangles: intake.triangles,
+        boundary_edges: leaves.iter().map(|leaf| leaf.boundary).sum(),
+        tiles: maker.made.len() as u64,
+        leaves: leaves.len() as u64,
+        levels: maker.nodes.last().map_or(0, |root| root.level) + 1,
+        bytes,
+        root_bytes: root.bytes.into(),
+        root_triangles: root.triangles.into(),
+        root_error: root.error,
+        step,
+        exact: intake.lattice.exact,
+    })
+}

@@ -1,0 +1,192 @@
+//! The same bytes for any memory and threads, and after a run was stopped or killed.
+
+use super::meshes::hills;
+use outcrop::levels::{Options, Tiles};
+use outcrop::{Cancel, Error, Observer, Start};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// All files below a folder, with their content.
+fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut all = BTreeMap::new();
+    let mut left = vec![folder.to_path_buf()];
+    while let Some(folder) = left.pop() {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            match path.is_dir() {
+                true => left.push(path),
+                false => drop(all.insert(path.clone(), std::fs::read(&path).unwrap())),
+            }
+        }
+    }
+    let relative = |path: PathBuf| path.strip_prefix(folder).unwrap().to_path_buf();
+    all.into_iter()
+        .map(|(path, bytes)| (relative(path), bytes))
+        .collect()
+}
+
+fn tiles(mesh: &Path, folder: &Path) -> Tiles {
+    let options = Options {
+        most_triangles: 300,
+        ..Options::default()
+    };
+    Tiles::new(mesh, folder)
+        .options(options)
+        .memory(192 << 20)
+        .threads(2)
+}
+
+fn equal(found: &Path, want: &BTreeMap<PathBuf, Vec<u8>>, what: &str) {
+    let found = files(found);
+    assert_eq!(
+        found.keys().collect::<Vec<_>>(),
+        want.keys().collect::<Vec<_>>(),
+        "{what}"
+    );
+    assert!(found == *want, "{what}");
+}
+
+#[test]
+fn memory_and_threads_change_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let mesh = folder.path().join("mesh.ply");
+    hills(80, true).write(&mesh);
+    let first = folder.path().join("first");
+    tiles(&mesh, &first).run().unwrap();
+    let want = files(&first);
+    for (threads, memory) in [(1, 192), (2, 1024), (5, 400)] {
+        let other = folder.path().join(format!("{threads}"));
+        tiles(&mesh, &other)
+            .threads(threads)
+            .memory(memory << 20)
+            .run()
+            .unwrap();
+        equal(&other, &want, &format!("{threads} threads"));
+    }
+    // A tileset is replaced by another one of the same name, and compressed meshes are read.
+    let packed = folder.path().join("mesh.ply.zst");
+    let bytes = zstd::encode_all(&*std::fs::read(&mesh).unwrap(), 1).unwrap();
+    std::fs::write(&packed, bytes).unwrap();
+    tiles(&packed, &first).run().unwrap();
+    let mut found = files(&first);
+    found.remove(Path::new("tileset.json"));
+    assert!(found.iter().all(|(path, bytes)| want[path] == *bytes));
+    assert_eq!(found.len() + 1, want.len());
+    let left = std::fs::read_dir(folder.path()).unwrap().count();
+    assert_eq!(left, 6, "something is left beside");
+}
+
+/// Stops a run after some progress.
+struct Stop {
+    left: AtomicU64,
+    cancel: Cancel,
+}
+
+impl Observer for Stop {
+    fn advance(&self, count: u64) {
+        let before = self.left.fetch_sub(
+            count.min(self.left.load(Ordering::Relaxed)),
+            Ordering::Relaxed,
+        );
+        if before <= count {
+            self.cancel.cancel();
+        }
+    }
+}
+
+#[test]
+fn a_stopped_run_goes_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let mesh = folder.path().join("mesh.ply");
+    hills(70, true).write(&mesh);
+    let first = folder.path().join("first");
+    tiles(&mesh, &first).run().unwrap();
+    let want = files(&first);
+    let output = folder.path().join("output");
+    let mut stops = 0;
+    for after in (1..).step_by(9000) {
+        let cancel = Cancel::new();
+        let observer = Arc::new(Stop {
+            left: AtomicU64::new(after),
+            cancel: cancel.clone(),
+        });
+        let run = tiles(&mesh, &output)
+            .start(Start::Resume)
+            .observer(observer)
+            .cancel(cancel);
+        match run.run() {
+            Ok(_) => break,
+            Err(Error::Cancelled) => stops += 1,
+            Err(other) => panic!("{other}"),
+        }
+        assert!(!output.exists());
+        if stops == 3 {
+            let refused = tiles(&mesh, &output).run().unwrap_err();
+            assert!(matches!(refused, Error::Unfinished { .. }), "{refused}");
+            let other = tiles(&mesh, &output)
+                .options(Options::default())
+                .start(Start::Resume);
+            assert!(matches!(other.run().unwrap_err(), Error::Mismatch { .. }));
+        }
+    }
+    assert!(stops > 3, "{stops}");
+    equal(&output, &want, "resumed");
+}
+
+#[test]
+fn a_killed_run_goes_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let mesh = folder.path().join("mesh.ply");
+    hills(70, true).write(&mesh);
+    let first = folder.path().join("first");
+    let program = |output: &Path, fault: &str| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_outcrop"));
+        command.arg("tiles").arg(&mesh).arg("-o").arg(output);
+        command.args([
+            "--quiet",
+            "--resume",
+            "--memory=192MiB",
+            "--threads=2",
+            "--most-triangles=300",
+        ]);
+        if !fault.is_empty() {
+            command.env("OUTCROP_FAULT", fault);
+        }
+        command.output().unwrap()
+    };
+    let events = folder.path().join("events");
+    let counted = program(&first, &format!("count:{}", events.display()));
+    assert!(
+        counted.status.success(),
+        "{}",
+        String::from_utf8_lossy(&counted.stderr)
+    );
+    let want = files(&first);
+    let counts = std::fs::read_to_string(&events).unwrap();
+    let count = |event: &str| -> u64 {
+        let line = counts.lines().find(|line| line.starts_with(event));
+        line.and_then(|line| line.split_whitespace().last()?.parse().ok())
+            .unwrap_or(0)
+    };
+    let mut killed = 0;
+    for event in ["record", "torn", "recorded", "write", "synced", "delete"] {
+        let all = count(event).max(1);
+        for part in 0..5 {
+            let at = 1 + (all - 1) * part / 4;
+            let output = folder.path().join(format!("{event} {at}"));
+            let stopped = program(&output, &format!("{event}:{at}"));
+            killed += u32::from(!stopped.status.success());
+            let resumed = program(&output, "");
+            let words = String::from_utf8_lossy(&resumed.stderr);
+            assert!(resumed.status.success(), "{event} {at}: {words}");
+            equal(&output, &want, &format!("{event} {at}"));
+            std::fs::remove_dir_all(&output).unwrap();
+        }
+    }
+    assert!(killed > 20, "{killed}: {counts}");
+    // Nothing is left beside.
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 3);
+}
