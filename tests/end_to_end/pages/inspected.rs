@@ -49,6 +49,8 @@ fn a_cloud_is_described() {
         .collect();
     assert_eq!(classes.len(), 1, "{:?}", page.table);
     let text = bench.cloud("land.xyz", &Cloud::new(Kind::Torus).points(3000));
+    let (page, _) = page_of("info", &bench, &[&text], 0);
+    assert!(page.pixels().iter().all(|picture| picture.filled() > 0.05));
     let (page, _) = page_of("info", &bench, &[&input, &text], 0);
     assert_eq!(page.heading, "2 files or folders");
 }
