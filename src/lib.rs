@@ -58,13 +58,16 @@ pub mod cli;
 pub mod error;
 #[doc(hidden)]
 pub mod geom;
+mod histogram;
 pub mod inspect;
 #[doc(hidden)]
 pub mod kernels;
 #[doc(hidden)]
 pub mod levels;
 mod method;
+pub mod page;
 pub mod params;
+mod picture;
 #[doc(hidden)]
 pub mod pipeline;
 pub mod report;

@@ -48,6 +48,7 @@ pub struct Reconstruction {
     storage: Storage,
     start: Start,
     time_limit: Option<Duration>,
+    pictures: bool,
 }
 
 /// Half of the memory that machine and cgroup allow.
@@ -133,6 +134,7 @@ impl Reconstruction {
             pieces.as_ref(),
             &lattice,
         )?;
+        stages.draw(&store, &shape, &repaired, pieces.as_ref(), &lattice)?;
         Ok(stages.report())
     }
 }

@@ -11,7 +11,7 @@ use std::collections::{BTreeMap, BTreeSet};
 const MAY_USE: &[(&str, &str)] = &[
     (
         "cli",
-        "inspect method params pipeline report stages/ingest view workspace",
+        "inspect levels method params pipeline report stages/ingest view workspace",
     ),
     ("error", ""),
     ("geom", "kernels method"),
@@ -20,6 +20,7 @@ const MAY_USE: &[(&str, &str)] = &[
         "geom method params pipeline spill stages/cells stages/ingest stages/order stages/tiles workspace",
     ),
     ("kernels", ""),
+    ("levels", "inspect pipeline spill stages/ingest workspace"),
     ("method", ""),
     (
         "params",

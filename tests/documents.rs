@@ -132,6 +132,7 @@ fn of_commands() -> BTreeMap<&'static str, BTreeSet<String>> {
         "info",
         "verify",
         "compare",
+        "tiles",
         "demo",
         "plan",
         "work",

@@ -240,6 +240,9 @@ pub struct Job {
     /// Write a normal for each vertex (PLY, OBJ, GLB)
     #[arg(long)]
     pub normals: bool,
+    /// Compress a .glb mesh, positions exactly (meshopt: EXT_meshopt_compression, which viewers read)
+    #[arg(long)]
+    pub compress_glb: bool,
     /// Write one mesh for each square with this side in x and y, in the cloud's unit: MESH_X_Y.ply, and
     /// MESH.index.json with a list of them
     #[arg(long, value_name = "LENGTH")]
@@ -307,9 +310,10 @@ pub struct Ends {
     /// Stop before this time is over, e.g. 7h30m; the run can be resumed later
     #[arg(long, value_name = "TIME", value_parser = time)]
     pub time_limit: Option<Duration>,
-    /// Write a report as JSON
-    #[arg(long, value_name = "FILE.json")]
-    pub report: Option<PathBuf>,
+    /// Write a report: as a page with pictures and charts if its name ends in .html, else as JSON; may be given
+    /// several times
+    #[arg(long, value_name = "FILE.html|FILE.json")]
+    pub report: Vec<PathBuf>,
 }
 
 /// `outcrop resume`
@@ -342,6 +346,9 @@ pub struct Info {
     /// Print JSON
     #[arg(long)]
     pub json: bool,
+    /// Write a page with pictures
+    #[arg(long, value_name = "FILE.html")]
+    pub html: Option<PathBuf>,
     #[command(flatten)]
     pub points: Points,
     #[command(flatten, next_help_heading = "Limits")]
@@ -357,6 +364,9 @@ pub struct Verify {
     /// Print JSON
     #[arg(long)]
     pub json: bool,
+    /// Write a page with pictures
+    #[arg(long, value_name = "FILE.html")]
+    pub html: Option<PathBuf>,
     /// Accept vertices without a triangle
     #[arg(long)]
     pub allow_unreferenced: bool,
@@ -406,6 +416,9 @@ pub struct Compare {
     /// Print JSON
     #[arg(long)]
     pub json: bool,
+    /// Write a page with pictures
+    #[arg(long, value_name = "FILE.html")]
+    pub html: Option<PathBuf>,
     #[command(flatten)]
     pub limits: Limits,
 }
@@ -462,6 +475,7 @@ impl Job {
             min_component: self.repair.min_component.or(usual.min_component),
             repair: !self.repair.no_repair,
             normals: self.normals,
+            compress_glb: self.compress_glb,
             origin: self.coordinates.origin,
             keep_far: self.coordinates.keep_far,
             ignore_crs: self.coordinates.ignore_crs,

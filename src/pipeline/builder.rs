@@ -32,6 +32,7 @@ pub struct Builder {
     /// The scratch folder, if an unfinished run is continued.
     folder: Option<PathBuf>,
     time_limit: Option<Duration>,
+    pictures: bool,
 }
 
 impl Builder {
@@ -127,6 +128,14 @@ impl Builder {
         self
     }
 
+    /// The report has pictures, distributions, and the course of memory and disk: [`Report::pictures`](crate::Report::pictures) and
+    /// [`Report::details`](crate::Report::details), for [`crate::page::report`].
+    #[must_use]
+    pub fn pictures(mut self, wanted: bool) -> Self {
+        self.pictures = wanted;
+        self
+    }
+
     /// The scratch folder of the run.
     pub(super) fn folder(mut self, folder: PathBuf) -> Self {
         self.folder = Some(folder);
@@ -152,7 +161,7 @@ impl Builder {
         if self.output.as_os_str().is_empty() {
             return missing("--output", "the path of the mesh");
         }
-        check_name(&self.output)?;
+        check_name(&self.output, self.params.compress_glb)?;
         let budget = self.memory.unwrap_or_else(default_memory);
         let folder = || scratch_folder(&self.output, self.scratch.as_deref());
         Ok(Reconstruction {
@@ -169,6 +178,7 @@ impl Builder {
             storage: self.storage,
             start: self.start,
             time_limit: self.time_limit,
+            pictures: self.pictures,
         })
     }
 }

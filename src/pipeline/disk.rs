@@ -180,6 +180,7 @@ impl Known {
                 .collect(),
             bounds: self.text.map(|text| text.bounds),
             decimals: self.text.map_or(DECIMALS, |text| text.decimals),
+            compress: params.compress_glb,
             ..Mesh::default()
         }
     }

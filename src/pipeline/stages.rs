@@ -1,6 +1,7 @@
 //! The stages of a run: each with its parameters, its part of the report, and the check of disk space for the
 //! following stages.
 
+mod draw;
 mod export;
 mod values;
 
@@ -26,7 +27,8 @@ use crate::stages::spacing::{Density, Spacings};
 use crate::stages::stitch::{StitchOptions, Stitched, stitch};
 use crate::stages::thin::{Grid, LeftOut, thin};
 use crate::stages::triples::{Triples, triples};
-use crate::workspace::{Workspace, limits};
+use crate::workspace::Workspace;
+use crate::workspace::course::Course;
 use export::written;
 use std::time::Instant;
 use values::Values;
@@ -52,6 +54,8 @@ pub(super) struct Stages<'a> {
     coarse: f64,
     /// Well-known text of the reference system.
     wkt: Option<String>,
+    /// The course of the attempt, if the report shows it.
+    course: Option<Course>,
 }
 
 impl<'a> Stages<'a> {
@@ -78,6 +82,8 @@ impl<'a> Stages<'a> {
             carried: Carried::default(),
             coarse: 0.0,
             wkt: None,
+            course: (job.pictures && !workspace.is_shared())
+                .then(|| Course::start(job.memory.clone(), workspace.io.clone())),
             report: Report {
                 version: env!("CARGO_PKG_VERSION"),
                 parameters: job.params.clone(),
@@ -469,22 +475,5 @@ impl<'a> Stages<'a> {
         repaired.release(workspace)?;
         self.report.cut = stats;
         Ok(Some(pieces))
-    }
-
-    /// The report of the run.
-    pub fn report(self) -> Report {
-        let memory = &self.job.memory;
-        Report {
-            peak_resident_bytes: limits::peak_resident(),
-            resident_file_bytes: limits::resident_file(),
-            peak_held_bytes: memory.peak_held(),
-            held_at_peak: memory.held_at_peak(),
-            peak_reserved_bytes: memory.peak(),
-            reserved_at_peak: memory.at_peak(),
-            peak_scratch_bytes: self.workspace.io.scratch_peak(),
-            seconds: self.begin.elapsed().as_secs_f64() + self.clock.earlier,
-            stages: self.clock.stages,
-            ..self.report
-        }
     }
 }

@@ -3,6 +3,7 @@
 //! The workspace knows neither stages nor rows. Stages obtain memory, files and threads from it.
 
 pub mod compressed;
+pub mod course;
 mod disk;
 pub mod fault;
 pub mod file;

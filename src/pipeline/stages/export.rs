@@ -88,6 +88,7 @@ impl Stages<'_> {
             columns,
             normals: job.params.normals,
             decimals: self.known.text.map_or(0, |text| text.decimals),
+            compress: job.params.compress_glb,
         };
         let items = match pieces {
             Some(pieces) => pieces.count() as u64,
@@ -104,7 +105,6 @@ impl Stages<'_> {
             None => export(store, repaired, blocks, lattice, options, workspace),
         };
         self.report.mesh = self.clock.stage("export", "blocks", items, write)?;
-        pieces.map_or(Ok(()), |pieces| pieces.release(workspace))?;
         columns.map_or(Ok(()), |columns| columns.release(workspace))?;
         beside::write(&job.output, &job.inputs, &self.report, self.wkt.as_deref())
     }

@@ -188,7 +188,7 @@ pub struct StoredAttributes {
     pub scanners: Option<StoredScanners>,
 }
 
-/// Puts the columns and scanners `carried` of a spool in the order of the ids of `store`.
+/// Puts the columns and scanners `carried` of a spool in the order of the ids of `store`, and deletes the spool.
 ///
 /// # Errors
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`], [`crate::Error::Cancelled`].
@@ -238,6 +238,8 @@ impl Job<'_> {
         );
         let sent = Shuffle::<R>::new("attributes.sent");
         self.send(&source, &cuts, &sent)?;
+        // What was read is on its way now.
+        self.spool.release(workspace)?;
         let store = store.open(workspace)?;
         let buckets = Buckets::new(&store, &cuts, blocks, workspace)?;
         let inbox = sent.open(workspace, buckets.count())?;

@@ -1,5 +1,6 @@
 //! Meshes in all formats: each has the triangles and positions of the PLY mesh.
 
+mod packed;
 mod read;
 
 use crate::util::{self, Bench};
