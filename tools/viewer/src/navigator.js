@@ -180,7 +180,7 @@ export class Navigator {
 
 			const far = Math.max( position.distanceTo( center ) + 1.05 * radius, 1e-3 * radius );
 			const outside = Math.max( position.distanceTo( center ) - 1.05 * radius, 0 );
-			Object.assign( camera, { aspect, far, near: Math.max( outside, Math.min( 0.02 * this.distance, 0.1 * far ), 1e-5 * far ) } );
+			Object.assign( camera, { aspect, far, near: Math.max( outside, Math.min( 0.005 * this.distance, 0.1 * far ), 1e-5 * far ) } );
 
 		}
 
