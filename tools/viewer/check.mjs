@@ -228,6 +228,9 @@ async function main() {
 
 	} );
 	await overlap( shown, camera, reference );
+	await page.selectOption( '#color', 'plain' );
+	await page.locator( '#color' ).blur();
+	await settled();
 	const calm = await colors();
 	for ( const key of [ 'e', 't', 'k', 'x', 'b' ] ) { await page.keyboard.press( key ); await settled(); }
 	const busy = await colors();
