@@ -17,6 +17,9 @@ pub struct Header {
     pub place: Place,
 }
 
+/// A property of one number: its index among the element's properties, and its type.
+pub type Field = (usize, Scalar);
+
 /// An element: entries that all have the same properties.
 #[derive(Debug, Clone)]
 pub struct Element {
@@ -68,7 +71,7 @@ impl Element {
     ///
     /// # Errors
     /// [`Error::Input`] unless there is one of each, a number.
-    pub fn coordinates(&self) -> Result<[(usize, Scalar); 3]> {
+    pub fn coordinates(&self) -> Result<[Field; 3]> {
         let mut coordinates = [(0, Scalar::F32); 3];
         for (to, name) in coordinates.iter_mut().zip(["x", "y", "z"]) {
             let named = || self.properties.iter().enumerate().filter(|p| p.1.0 == name);

@@ -16,7 +16,7 @@ mod stream;
 mod types;
 
 pub use error::{Error, FileError, Result};
-pub use header::{Element, Header};
+pub use header::{Element, Field, Header};
 pub use layout::{Layout, TRIANGLE, put_triangle};
 pub use mesh::Mesh;
 pub use numbers::{Numbers, real};

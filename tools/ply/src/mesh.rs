@@ -1,7 +1,7 @@
 //! Whole meshes and clouds in memory.
 
 use crate::error::{Error, Result};
-use crate::header::{Element, Header};
+use crate::header::{Element, Field, Header};
 use crate::numbers::Numbers;
 use crate::types::{Property, Scalar};
 use std::io::BufRead;
@@ -88,7 +88,7 @@ fn read_vertices(
 }
 
 /// Index and type of the properties red, green and blue; empty unless all are there in this order, of one type.
-fn colors(element: &Element) -> Vec<(usize, Scalar)> {
+fn colors(element: &Element) -> Vec<Field> {
     let place = |name: &str| {
         let mut numbers = element.properties.iter().enumerate();
         numbers.find_map(|(at, (own, property))| match property {

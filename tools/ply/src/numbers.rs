@@ -1,7 +1,7 @@
 //! The data after a header, as a sequence of numbers.
 
 use crate::error::Result;
-use crate::header::Element;
+use crate::header::{Element, Field};
 use crate::types::{Encoding, Property, Scalar};
 use std::io::{self, BufRead, ErrorKind, Read};
 
@@ -86,7 +86,7 @@ impl<R: BufRead> Numbers<R> {
     pub fn point(
         &mut self,
         element: &Element,
-        coordinates: &[(usize, Scalar); 3],
+        coordinates: &[Field; 3],
     ) -> Result<[f64; 3], String> {
         self.point_with(element, coordinates, &[], &mut Vec::new())
     }
@@ -99,8 +99,8 @@ impl<R: BufRead> Numbers<R> {
     pub fn point_with(
         &mut self,
         element: &Element,
-        coordinates: &[(usize, Scalar); 3],
-        columns: &[(usize, Scalar)],
+        coordinates: &[Field; 3],
+        columns: &[Field],
         others: &mut Vec<f64>,
     ) -> Result<[f64; 3], String> {
         let mut point = [0.0; 3];

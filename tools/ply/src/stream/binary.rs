@@ -3,7 +3,7 @@
 use super::index;
 use super::source::Source;
 use crate::error::FileError;
-use crate::header::{Element, bytes_of};
+use crate::header::{Element, Field, bytes_of};
 use crate::numbers::{integer, real};
 use crate::types::Scalar;
 
@@ -12,7 +12,7 @@ impl Source {
     pub(super) fn fixed_vertices(
         &mut self,
         element: &Element,
-        (axes, columns): ([(usize, Scalar); 3], &[(usize, Scalar)]),
+        (axes, columns): ([Field; 3], &[Field]),
         most: usize,
         (slice, values): (&mut Vec<[f64; 3]>, &mut Vec<f64>),
     ) -> Result<(), FileError> {

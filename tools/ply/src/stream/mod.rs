@@ -8,7 +8,7 @@ mod tests;
 mod values;
 
 use crate::error::{Error, FileError, Result};
-use crate::header::{Element, Header};
+use crate::header::{Element, Field, Header};
 use crate::place::Place;
 use crate::types::{Encoding, Property, Scalar};
 use source::Source;
@@ -44,7 +44,7 @@ pub struct MeshStream {
     header: Header,
     source: Source,
     /// Indices and types of the vertices' properties that are wanted, ascending.
-    columns: Vec<(usize, Scalar)>,
+    columns: Vec<Field>,
 }
 
 fn index(value: i64) -> u32 {
@@ -143,7 +143,7 @@ impl MeshStream {
 
     /// Reads the values of these of the [`MeshStream::columns`] as well, given by index and type, ascending.
     #[must_use]
-    pub fn wanting(mut self, columns: Vec<(usize, Scalar)>) -> Self {
+    pub fn wanting(mut self, columns: Vec<Field>) -> Self {
         self.columns = columns;
         self
     }
@@ -213,7 +213,7 @@ impl MeshStream {
 /// The use of an element.
 enum Role {
     /// Vertices: positions and types of `x`, `y` and `z` among the properties.
-    Vertices([(usize, Scalar); 3]),
+    Vertices([Field; 3]),
     /// Faces: position of the property with the corners, and the types of its count and its items.
     Faces((usize, Scalar, Scalar)),
     Other,
@@ -247,7 +247,7 @@ fn skip(source: &mut Source, element: &Element) -> Result<(), FileError> {
 fn vertices<E: From<FileError>>(
     source: &mut Source,
     element: &Element,
-    (axes, columns): ([(usize, Scalar); 3], &[(usize, Scalar)]),
+    (axes, columns): ([Field; 3], &[Field]),
     take: &mut impl FnMut(Part<'_>) -> Result<(), E>,
 ) -> Result<(), E> {
     let (mut slice, mut values) = (Vec::with_capacity(SLICE), Vec::new());

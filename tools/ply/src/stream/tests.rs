@@ -6,6 +6,8 @@ use proptest::prelude::*;
 #[derive(Debug, Default, PartialEq)]
 struct Read {
     vertices: Vec<[f64; 3]>,
+    /// Of all properties of one number.
+    values: Vec<f64>,
     triangles: Vec<[u32; 3]>,
     others: u64,
 }
@@ -17,6 +19,7 @@ impl Read {
                 assert!(positions.len() <= SLICE);
                 self.vertices.extend_from_slice(positions);
             }
+            Part::Values(values) => self.values.extend_from_slice(values),
             Part::Triangles(triangles) => {
                 assert!(triangles.len() <= SLICE);
                 self.triangles.extend_from_slice(triangles);
@@ -31,7 +34,13 @@ fn read(bytes: &[u8]) -> Result<Read, FileError> {
     let path = folder.path().join("mesh.ply");
     std::fs::write(&path, bytes).unwrap();
     let mut read = Read::default();
-    MeshStream::open(&path)?.read(|part| {
+    let mesh = MeshStream::open(&path)?;
+    let columns = mesh
+        .columns()
+        .into_iter()
+        .map(|(at, _, scalar)| (at, scalar));
+    let columns = columns.collect();
+    mesh.wanting(columns).read(|part| {
         read.take(part);
         Ok::<(), FileError>(())
     })?;
@@ -124,6 +133,7 @@ fn reads_every_variant() {
                     numbers.push(("int", 3.0));
                     let got = read(&file(encoding, &header, &numbers)).unwrap();
                     assert_eq!(got.vertices, positions, "{header}");
+                    assert_eq!(got.values, [200.0, -7.0].repeat(4), "{header}");
                     assert_eq!(got.triangles, [[0, 1, 2], [3, 2, 1]], "{header}");
                     assert_eq!(got.others, 2);
                 }

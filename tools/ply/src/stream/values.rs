@@ -3,7 +3,7 @@
 use super::index;
 use super::source::Source;
 use crate::error::FileError;
-use crate::header::Element;
+use crate::header::{Element, Field};
 use crate::numbers::{integer, real};
 use crate::types::{Property, Scalar};
 use std::fmt::Display;
@@ -64,8 +64,8 @@ impl Source {
     pub(super) fn vertex(
         &mut self,
         element: &Element,
-        axes: [(usize, Scalar); 3],
-        columns: &[(usize, Scalar)],
+        axes: [Field; 3],
+        columns: &[Field],
         values: &mut Vec<f64>,
     ) -> Result<[f64; 3], FileError> {
         let mut position = [0.0; 3];
