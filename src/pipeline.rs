@@ -11,8 +11,10 @@ mod origin;
 mod shared;
 mod stages;
 mod start;
+mod tiles;
 
 use crate::error::Result;
+use crate::levels;
 use crate::params::Params;
 use crate::report::Report;
 use crate::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
@@ -28,15 +30,18 @@ pub use shared::{
 };
 use stages::Stages;
 pub use start::Start;
-pub(crate) use start::scratch_folder;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
+pub use tiles::Tiles;
 
 /// A reconstruction that is ready to run, made by [`Reconstruction::builder`].
 pub struct Reconstruction {
     inputs: Vec<PathBuf>,
+    /// The mesh: of a tileset one in the scratch's place, which is deleted at the end.
     output: PathBuf,
+    /// The folder of the tileset, if that is wanted.
+    tiles: Option<PathBuf>,
     folder: PathBuf,
     params: Params,
     memory: MemoryPool,
@@ -83,10 +88,11 @@ impl Reconstruction {
         builder::unfinished(folder.as_ref())
     }
 
-    /// Path of the mesh.
+    /// Path of the mesh, or of the tileset.
     #[must_use]
-    pub fn output(&self) -> &Path {
-        &self.output
+    pub fn output(&self) -> PathBuf {
+        let tiles = self.tiles.as_ref();
+        tiles.map_or_else(|| self.output.clone(), |tiles| tiles.join(levels::NAME))
     }
 
     /// Reconstructs the surface and writes the mesh.
@@ -96,6 +102,7 @@ impl Reconstruction {
     /// run can be resumed, see [`Reconstruction::is_unfinished`].
     pub fn run(&self) -> Result<Report> {
         writable(&self.output)?;
+        self.tiles.as_deref().map_or(Ok(()), levels::check_folder)?;
         not_an_input(&self.output, self.params.split.is_some(), &self.inputs)?;
         one_system(&self.params, &self.inputs)?;
         let _alarm = self
@@ -133,6 +140,7 @@ impl Reconstruction {
             pieces.as_ref(),
             &lattice,
         )?;
+        stages.levels()?;
         Ok(stages.report())
     }
 }

@@ -1,5 +1,6 @@
 //! The report of a run: the content of `--report`.
 
+use crate::levels::TilesReport;
 use crate::params::Params;
 pub use crate::stages::cells::CellStats;
 pub use crate::stages::cut::CutStats;
@@ -61,6 +62,8 @@ pub struct Report {
     pub cut: CutStats,
     /// The mesh.
     pub mesh: MeshStats,
+    /// Levels of detail, if they were made.
+    pub tiles: Option<TilesReport>,
     /// Type of the coordinates in the file.
     pub coordinates: CoordinateType,
     /// The position of the cloud that is the origin of the mesh's coordinates; none if that is the same as the

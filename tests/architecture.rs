@@ -20,14 +20,17 @@ const MAY_USE: &[(&str, &str)] = &[
         "geom method params pipeline spill stages/cells stages/ingest stages/order stages/tiles workspace",
     ),
     ("kernels", ""),
-    ("levels", "inspect pipeline spill stages/ingest workspace"),
+    ("levels", "inspect spill stages/ingest workspace"),
     ("method", ""),
     (
         "params",
         "geom method stages/ingest stages/smooth stages/spacing stages/surface",
     ),
-    ("pipeline", "geom method params report stages/* workspace"),
-    ("report", "params stages/*"),
+    (
+        "pipeline",
+        "geom levels method params report stages/* workspace",
+    ),
+    ("report", "levels params stages/*"),
     ("spill", "workspace"),
     (
         "stages/attributes",

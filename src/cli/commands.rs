@@ -1,13 +1,15 @@
 //! The commands.
 
-use super::args::{Compare, Demo, Ends, Info, Limits, Reconstruct, Resume, Tiles, Verify};
+use super::args::{
+    Compare, Demo, Ends, Info, Limits, Reconstruct, Resume, Tiles as TilesArgs, Verify,
+};
 use super::command::Command;
 use super::output::{print, show, summary, write_report};
 use super::{shared, stop, style};
 use crate::error::{Error, Result};
 use crate::inspect::{compare, info, verify};
 use crate::levels;
-use crate::pipeline::{Builder, Reconstruction, Start, default_memory, default_threads};
+use crate::pipeline::{Builder, Reconstruction, Start, Tiles, default_memory, default_threads};
 use crate::workspace::Workspace;
 use crate::workspace::memory::MemoryPool;
 use crate::workspace::progress::{Cancel, Silent};
@@ -83,7 +85,7 @@ fn run_reconstruction(builder: Builder, ends: &Ends, quiet: bool) -> Result<bool
         builder = builder.time_limit(limit);
     }
     let run = builder.build()?;
-    if ends.report.as_deref() == Some(run.output()) {
+    if ends.report.as_deref() == Some(&*run.output()) {
         return Err(Error::Parameter {
             name: "--report",
             found: run.output().display().to_string(),
@@ -109,7 +111,7 @@ fn run_reconstruction(builder: Builder, ends: &Ends, quiet: bool) -> Result<bool
     }
     let report = outcome?;
     if !quiet && std::io::stdout().is_terminal() {
-        print(&summary(&report, run.output()))?;
+        print(&summary(&report, &run.output()))?;
     }
     Ok(true)
 }
@@ -141,13 +143,13 @@ fn measure(args: &Compare) -> Result<bool> {
     Ok(true)
 }
 
-fn tiles(args: &Tiles) -> Result<bool> {
+fn tiles(args: &TilesArgs) -> Result<bool> {
     let (observer, cancel) = stop::watched(args.limits.quiet);
     let options = levels::Options {
         geo: args.geo,
         most_triangles: args.most_triangles,
     };
-    let mut tiles = levels::Tiles::new(&args.mesh, &args.output)
+    let mut tiles = Tiles::new(&args.mesh, &args.output)
         .options(options)
         .memory(memory(&args.limits))
         .threads(threads(&args.limits))

@@ -333,7 +333,7 @@ pub fn advance(args: &Advance) -> Result<bool> {
                 write_report(path, &report)?;
             }
             if !args.json {
-                print(&summary(&report, run.output()))?;
+                print(&summary(&report, &run.output()))?;
             }
         }
         Advanced::Finished(None) => {}

@@ -40,9 +40,18 @@ impl Globe {
         let wrong = |e: proj4rs::errors::Error| refuse(format!("EPSG:{code} ({e})"));
         let short = u16::try_from(code).map_err(|_| refuse(format!("EPSG:{code}")))?;
         let system = Proj::from_epsg_code(short).map_err(wrong)?;
-        let target = Proj::from_proj_string("+proj=longlat +datum=WGS84 +no_defs").map_err(wrong)?;
-        let unit = if system.is_latlong() { 1.0 } else { system.to_meter() };
-        Ok(Self { system, target, unit })
+        let target =
+            Proj::from_proj_string("+proj=longlat +datum=WGS84 +no_defs").map_err(wrong)?;
+        let unit = if system.is_latlong() {
+            1.0
+        } else {
+            system.to_meter()
+        };
+        Ok(Self {
+            system,
+            target,
+            unit,
+        })
     }
 
     /// Geocentric coordinates of a position.
@@ -60,7 +69,11 @@ impl Globe {
     /// The matrix, by columns, from coordinates less `origin` to geocentric ones: exact at `middle` and to first
     /// order around it.
     pub fn matrix(&self, mesh: &Path, origin: [f64; 3], middle: [f64; 3]) -> Result<[f64; 16]> {
-        let step = if self.system.is_latlong() { 1e-4 } else { 10.0 / self.unit };
+        let step = if self.system.is_latlong() {
+            1e-4
+        } else {
+            10.0 / self.unit
+        };
         let moved = |axis: usize, by: f64| {
             let mut position = middle;
             position[axis] += by;
@@ -112,7 +125,11 @@ mod tests {
             (43.0 + 38.0 / 60.0 + 33.24 / 3600.0f64).to_radians(),
             100.0,
         ]);
-        near(tower.place([630_084.0, 4_833_438.0, 100.0]).unwrap(), want, 1.0);
+        near(
+            tower.place([630_084.0, 4_833_438.0, 100.0]).unwrap(),
+            want,
+            1.0,
+        );
         assert!(Globe::of(mesh, None).is_err() && Globe::of(mesh, Some(1)).is_err());
         assert!(Globe::of(mesh, Some(1_000_000)).is_err());
     }
@@ -121,9 +138,17 @@ mod tests {
     fn the_matrix_is_true_around_the_middle() {
         let mesh = Path::new("mesh.ply");
         let globe = Globe::of(mesh, Some(32617)).unwrap();
-        let (origin, middle) = ([630_000.0, 4_833_000.0, 0.0], [630_500.0, 4_833_500.0, 50.0]);
+        let (origin, middle) = (
+            [630_000.0, 4_833_000.0, 0.0],
+            [630_500.0, 4_833_500.0, 50.0],
+        );
         let matrix = globe.matrix(mesh, origin, middle).unwrap();
-        for by in [[0.0; 3], [100.0, 0.0, 0.0], [0.0, -100.0, 20.0], [-70.0, 70.0, 0.0]] {
+        for by in [
+            [0.0; 3],
+            [100.0, 0.0, 0.0],
+            [0.0, -100.0, 20.0],
+            [-70.0, 70.0, 0.0],
+        ] {
             let position: [f64; 3] = std::array::from_fn(|k| middle[k] + by[k]);
             let local: [f64; 3] = std::array::from_fn(|k| position[k] - origin[k]);
             let mapped = std::array::from_fn(|k| {

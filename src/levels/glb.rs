@@ -42,14 +42,18 @@ impl Grids<'_> {
     /// which it is shown beside this one, so that they agree.
     fn hidden(&self, depth: u32, vertex_depth: u8) -> u32 {
         let most = (self.low_bits.len() - 1) as u32;
-        let depth = depth.min(u32::from(vertex_depth).saturating_add(1)).min(most);
+        let depth = depth
+            .min(u32::from(vertex_depth).saturating_add(1))
+            .min(most);
         self.low_bits[depth as usize]
     }
 }
 
 /// Low bits of positions that a tile hides whose longest side is twice `half`: the rest must fit 24 bits with a sign.
 pub(super) fn low_bits(half: u32) -> u32 {
-    (0..32).find(|bits| (half >> bits) + 2 < 1 << 23).unwrap_or(31)
+    (0..32)
+        .find(|bits| (half >> bits) + 2 < 1 << 23)
+        .unwrap_or(31)
 }
 
 struct Writer<'a> {
@@ -115,8 +119,14 @@ impl Writer<'_> {
     fn indices(&mut self, indices: &[u32], vertices: usize, triangles: bool) -> Result<usize> {
         let (encoding, workspace) = (IndexEncoding::DEFAULT, &mut *self.workspace);
         let (packed, mode) = match triangles {
-            true => (encode_index_buffer(indices, encoding, workspace), "TRIANGLES"),
-            false => (encode_index_sequence(indices, encoding, workspace), "INDICES"),
+            true => (
+                encode_index_buffer(indices, encoding, workspace),
+                "TRIANGLES",
+            ),
+            false => (
+                encode_index_sequence(indices, encoding, workspace),
+                "INDICES",
+            ),
         };
         let packed = packed.map_err(|e| failed("encode indices", e))?;
         let (stride, component) = match vertices < 1 << 16 {
@@ -160,7 +170,9 @@ pub(super) fn write(
         .flat_map(|[x, y]| [x.cast_unsigned(), y.cast_unsigned(), 127, 0])
         .collect();
     let accessor = json!({ "componentType": 5120, "normalized": true, "type": "VEC3" });
-    attributes["NORMAL"] = writer.attribute(&normals, 4, Some("OCTAHEDRAL"), accessor)?.into();
+    attributes["NORMAL"] = writer
+        .attribute(&normals, 4, Some("OCTAHEDRAL"), accessor)?
+        .into();
     values(&mut writer, node, columns, &mut attributes)?;
     let vertices = node.ids.len();
     let indices = writer.indices(node.triangles.as_flattened(), vertices, true)?;
@@ -176,9 +188,26 @@ pub(super) fn write(
     let step = grids.lattice.step;
     let [x, y, z] = place.map(|x| f64::from(x) * step);
     let matrix = [
-        step, 0.0, 0.0, 0.0, 0.0, 0.0, -step, 0.0, 0.0, step, 0.0, 0.0, x, z, 0.0 - y, 1.0,
+        step,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        -step,
+        0.0,
+        0.0,
+        step,
+        0.0,
+        0.0,
+        x,
+        z,
+        0.0 - y,
+        1.0,
     ];
-    writer.bytes.resize(writer.bytes.len().next_multiple_of(4), 0);
+    writer
+        .bytes
+        .resize(writer.bytes.len().next_multiple_of(4), 0);
     let json = json!({
         "asset": { "version": "2.0", "generator": concat!("outcrop ", env!("CARGO_PKG_VERSION")) },
         "extensionsUsed": [EXTENSION, "KHR_mesh_quantization"],

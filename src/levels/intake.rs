@@ -142,7 +142,10 @@ impl<'a> Reader<'a> {
     /// Writes the block.
     fn write(&mut self) -> Result<()> {
         let number = self.intake.parts.len() / (BLOCK / PART);
-        let places = self.intake.table.put_parts(self.unit, number, &self.block)?;
+        let places = self
+            .intake
+            .table
+            .put_parts(self.unit, number, &self.block)?;
         self.intake.parts.extend(places);
         self.block.clear();
         Ok(())
@@ -203,7 +206,12 @@ impl Sink for Reader<'_> {
 
     fn non_triangles(&mut self, count: u64) -> Result<()> {
         let found = format!("{count} that are not triangles");
-        Err(Error::input(self.path, "faces", found, "triangles; split them first"))
+        Err(Error::input(
+            self.path,
+            "faces",
+            found,
+            "triangles; split them first",
+        ))
     }
 }
 

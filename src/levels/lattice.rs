@@ -49,7 +49,6 @@ impl Lattice {
             None => first * self.step,
         })
     }
-
 }
 
 fn steps(x: f64, scale: Option<f64>, step: f64) -> f64 {
@@ -86,7 +85,11 @@ fn has_decimals(x: f64, scale: f64) -> bool {
 fn lowest_bit(x: f64) -> i32 {
     let bits = x.to_bits();
     let (exponent, mantissa) = ((bits >> 52 & 0x7ff) as i32, bits & ((1 << 52) - 1));
-    let whole = if exponent == 0 { mantissa } else { mantissa | 1 << 52 };
+    let whole = if exponent == 0 {
+        mantissa
+    } else {
+        mantissa | 1 << 52
+    };
     exponent.max(1) - 1075 + whole.trailing_zeros() as i32
 }
 
@@ -117,10 +120,12 @@ impl Finder {
         let spans = (0..3).map(|axis| self.max[axis] - self.min[axis]);
         let span = spans.fold(0.0, f64::max);
         let (min, max) = (self.min.iter(), self.max.iter());
-        let largest = min.chain(max).fold(0.0, |most: f64, x| match x.is_finite() {
-            true => most.max(x.abs()),
-            false => most,
-        });
+        let largest = min
+            .chain(max)
+            .fold(0.0, |most: f64, x| match x.is_finite() {
+                true => most.max(x.abs()),
+                false => most,
+            });
         let fits = |step: f64| span / step < POSITIONS - 2.0 && largest / step < EXACT;
         let of = |scale: Option<f64>, step: f64, exact| Lattice {
             scale,
@@ -156,7 +161,10 @@ mod tests {
 
     #[test]
     fn decimals_and_bits_are_found() {
-        let utm = of(&[[635_123.45, 4_848_000.01, 17.3], [635_001.0, 4_849_000.99, -2.25]]);
+        let utm = of(&[
+            [635_123.45, 4_848_000.01, 17.3],
+            [635_001.0, 4_849_000.99, -2.25],
+        ]);
         assert_eq!((utm.step, utm.exact), (0.01, true));
         assert_eq!(utm.index([635_001.01, 4_848_000.02, -2.24]), [1, 1, 1]);
         assert_eq!(utm.origin(), [635_001.0, 4_848_000.01, -2.25]);

@@ -24,6 +24,9 @@ const TARGETS: [f64; 2] = [0.25, 0.75];
 /// The part of the children's triangles that a tile has otherwise.
 const PART: usize = 4;
 
+/// What is added to measured distances, as a factor: between two samples they may be larger.
+const MARGIN: f64 = 1.1;
+
 /// Bytes of memory for each triangle of the children while a tile is made from them.
 const EACH: u64 = 420;
 
@@ -256,9 +259,7 @@ impl Maker<'_> {
             None | Some(0) => 0.0,
             Some(bits) => 3f64.sqrt() * f64::from(1u32 << bits),
         };
-        // Distances were rounded, at most in the last digits.
-        (distance * (1.0 + 1e-9)).max(0.5) * self.intake.lattice.step
-            + hidden * self.intake.lattice.step
+        (distance * MARGIN).max(0.5) * self.intake.lattice.step + hidden * self.intake.lattice.step
     }
 }
 
@@ -296,8 +297,12 @@ fn join(nodes: Vec<Node>) -> Node {
             }
         }
         let corners = node.triangles.iter();
-        all.triangles.extend(corners.map(|t| t.map(|corner| new[corner as usize])));
-        let seams = node.seams.iter().map(|ends| ends.map(|end| new[end as usize]));
+        all.triangles
+            .extend(corners.map(|t| t.map(|corner| new[corner as usize])));
+        let seams = node
+            .seams
+            .iter()
+            .map(|ends| ends.map(|end| new[end as usize]));
         all.seams.extend(seams.map(|[a, b]| [a.min(b), a.max(b)]));
     }
     all.seams.sort_unstable();
@@ -347,7 +352,10 @@ impl Points {
     /// ear that it was the tip of is gone, which moves the boundary.
     fn keeps_borders(&self, node: &Node, triangles: &[[u32; 3]]) -> bool {
         let mut lost = self.locked.clone();
-        triangles.as_flattened().iter().for_each(|v| lost[*v as usize] = false);
+        triangles
+            .as_flattened()
+            .iter()
+            .for_each(|v| lost[*v as usize] = false);
         if !lost.contains(&true) {
             return true;
         }

@@ -222,7 +222,10 @@ mod tests {
         assert_eq!(Node::of_words(&[]).ids.len(), 0);
         let part = node.with_triangles(&[[3, 2, 1]]);
         assert_eq!(part.ids, [8, 4, 9]);
-        assert_eq!((part.seams, part.values), (vec![[0, 2]], vec![7, 8, 5, 6, 3, 4]));
+        assert_eq!(
+            (part.seams, part.values),
+            (vec![[0, 2]], vec![7, 8, 5, 6, 3, 4])
+        );
         let b = node.bounds();
         assert_eq!((b.half(), b.middle()), (3, [0, 0, 2]));
     }

@@ -63,7 +63,9 @@ fn local(rows: &[CellTriangle]) -> (Vec<u32>, Vec<[u32; 3]>) {
 /// Sorts numbers by their upper halves, stably, if the lower halves ascend already.
 fn radsort(all: &mut Vec<u64>) {
     let mut other = vec![0; all.len()];
-    let changing = all.iter().fold((u64::MAX, 0), |(and, or), x| (and & x, or | x));
+    let changing = all
+        .iter()
+        .fold((u64::MAX, 0), |(and, or), x| (and & x, or | x));
     for shift in [32, 43, 54] {
         let digit = |x: u64| (x >> shift) as usize & 0x7ff;
         // A digit that all have in common needs no pass.
@@ -94,15 +96,24 @@ fn share_vertices(intake: &Intake, cells: &Cells, workspace: &Workspace) -> Resu
         let mut all: Vec<u64> = ids.iter().map(|id| u64::from(*id) << 32).collect();
         radsort(&mut all);
         all.dedup();
-        let rows = all.iter().map(|id| (id >> 32) as u32).map(|vertex| CellVertex {
-            block: vertex / BLOCK as u32,
-            vertex,
-            cell: cell as u32,
-        });
+        let rows = all
+            .iter()
+            .map(|id| (id >> 32) as u32)
+            .map(|vertex| CellVertex {
+                block: vertex / BLOCK as u32,
+                vertex,
+                cell: cell as u32,
+            });
         unit.advance(u64::from(list[cell].triangles));
         sent.send(unit, cell, rows.collect())
     };
-    workspace.units(("vertices of cells", "levels: cells"), list.len(), bytes_of, work, |_, ()| Ok(()))?;
+    workspace.units(
+        ("vertices of cells", "levels: cells"),
+        list.len(),
+        bytes_of,
+        work,
+        |_, ()| Ok(()),
+    )?;
     let inbox = sent.open(workspace, intake.blocks())?;
     let shared = Shuffle::<SharedVertex>::new(SHARED);
     let bytes_of = |block: usize| 48 * inbox.rows(block) as u64 + (1 << 20);
@@ -181,10 +192,16 @@ fn share_edges(shared: &Shared<'_>, workspace: &Workspace) -> Result<Vec<Bounds>
         edges.open(workspace, intake.blocks())?,
         parts.open(workspace, intake.blocks())?,
     );
-    let (seams, wholes) = (Shuffle::<SeamEdge>::new(SEAMS), Shuffle::<WholeNormal>::new(WHOLES));
+    let (seams, wholes) = (
+        Shuffle::<SeamEdge>::new(SEAMS),
+        Shuffle::<WholeNormal>::new(WHOLES),
+    );
     let work = |unit: &Unit<'_>| {
         let mut told = Vec::new();
-        for same in edges_in.get(unit, unit.number())?.chunk_by(|a, b| a.ends == b.ends) {
+        for same in edges_in
+            .get(unit, unit.number())?
+            .chunk_by(|a, b| a.ends == b.ends)
+        {
             if same.len() > 1 {
                 let to = same.iter().map(|row| row.cell);
                 told.extend(to.map(|cell| SeamEdge {
@@ -195,7 +212,10 @@ fn share_edges(shared: &Shared<'_>, workspace: &Workspace) -> Result<Vec<Bounds>
         }
         seams.send(unit, unit.number(), told)?;
         let mut told = Vec::new();
-        for same in parts_in.get(unit, unit.number())?.chunk_by(|a, b| a.vertex == b.vertex) {
+        for same in parts_in
+            .get(unit, unit.number())?
+            .chunk_by(|a, b| a.vertex == b.vertex)
+        {
             let mut sum = [0.0; 3];
             for row in same {
                 (0..3).for_each(|axis| sum[axis] += f64::from(f32::from_bits(row.sum[axis])));
@@ -211,7 +231,13 @@ fn share_edges(shared: &Shared<'_>, workspace: &Workspace) -> Result<Vec<Bounds>
     };
     let bytes_of =
         |block: usize| 80 * (edges_in.rows(block) + parts_in.rows(block)) as u64 + (1 << 20);
-    workspace.units(("seams", "levels: blocks"), intake.blocks(), bytes_of, work, |_, ()| Ok(()))?;
+    workspace.units(
+        ("seams", "levels: blocks"),
+        intake.blocks(),
+        bytes_of,
+        work,
+        |_, ()| Ok(()),
+    )?;
     edges.release(workspace)?;
     parts.release(workspace)?;
     Ok(bounds)

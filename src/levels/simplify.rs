@@ -32,7 +32,12 @@ pub trait Simplifier: Sync {
     ///
     /// # Errors
     /// [`Error::Io`] if the method fails.
-    fn simplify(&self, surface: Surface<'_>, target: usize, manner: Manner) -> Result<Vec<[u32; 3]>>;
+    fn simplify(
+        &self,
+        surface: Surface<'_>,
+        target: usize,
+        manner: Manner,
+    ) -> Result<Vec<[u32; 3]>>;
 }
 
 /// Contracts edges by quadrics, as the library meshoptimizer does.
@@ -46,7 +51,12 @@ pub(super) fn failed(action: &str, error: meshoptimizer_rs::Error) -> Error {
 }
 
 impl Simplifier for Quadrics {
-    fn simplify(&self, surface: Surface<'_>, target: usize, manner: Manner) -> Result<Vec<[u32; 3]>> {
+    fn simplify(
+        &self,
+        surface: Surface<'_>,
+        target: usize,
+        manner: Manner,
+    ) -> Result<Vec<[u32; 3]>> {
         let mut workspace = meshoptimizer_rs::Workspace::default();
         let indices = surface.triangles.as_flattened();
         let positions = Positions::from_packed(surface.points);
@@ -69,10 +79,17 @@ impl Simplifier for Quadrics {
                     _ => SimplifyOptions::ERROR_ABSOLUTE,
                 },
             };
-            let none = meshoptimizer_rs::Attributes::from_interleaved(&[], surface.points.len(), 0, 0, 0);
+            let none =
+                meshoptimizer_rs::Attributes::from_interleaved(&[], surface.points.len(), 0, 0, 0);
             let none = none.map_err(|e| failed("simplify", e))?;
             meshoptimizer_rs::simplify_with_attributes(
-                indices, positions, none, &[], flags, settings, &mut workspace,
+                indices,
+                positions,
+                none,
+                &[],
+                flags,
+                settings,
+                &mut workspace,
             )
         };
         let simple = indices.map_err(|e| failed("simplify", e))?;
@@ -84,7 +101,12 @@ impl Simplifier for Quadrics {
 fn checked(surface: Surface<'_>, indices: Vec<u32>) -> Result<Vec<[u32; 3]>> {
     let (triangles, rest) = indices.as_chunks::<3>();
     let count = surface.points.len();
-    if !rest.is_empty() || triangles.as_flattened().iter().any(|v| *v as usize >= count) {
+    if !rest.is_empty()
+        || triangles
+            .as_flattened()
+            .iter()
+            .any(|v| *v as usize >= count)
+    {
         let error = std::io::Error::other("the simplified mesh has corners that are none");
         return Err(Error::io(Path::new("tile"), "simplify", error));
     }

@@ -103,7 +103,12 @@ mod tests {
 
     #[test]
     fn nodes_are_where_cells_come_together() {
-        let cells = [cell(&[0, 3, 1]), cell(&[0, 3, 7]), cell(&[0, 5]), cell(&[6])];
+        let cells = [
+            cell(&[0, 3, 1]),
+            cell(&[0, 3, 7]),
+            cell(&[0, 5]),
+            cell(&[6]),
+        ];
         assert_eq!(common_depth(&cells[0], &cells[1]), 2);
         assert_eq!(common_depth(&cells[0], &cells[3]), 0);
         let nodes = build(&cells);

@@ -74,7 +74,9 @@ impl Mesh {
         }
         let corners = self.triangles.as_flattened_mut().iter_mut();
         corners.for_each(|v| *v = order[*v as usize]);
-        (1..self.triangles.len()).rev().for_each(|n| self.triangles.swap(n, mix(n)));
+        (1..self.triangles.len())
+            .rev()
+            .for_each(|n| self.triangles.swap(n, mix(n)));
     }
 }
 
@@ -87,7 +89,8 @@ pub fn hills(side: u32, holes: bool) -> Mesh {
             let [x, y] = [x, y].map(|c| f64::from(c) + f64::from(rng.rand_float()) * 0.4);
             let z = 4.0 * (x / 9.0).sin() * (y / 7.0).cos() + f64::from(rng.rand_float()) * 0.3;
             let position = [635_000.0 + x, 4_848_000.0 + y, 100.0 + z];
-            mesh.vertices.push(position.map(|c| (c * 100.0).round() / 100.0));
+            mesh.vertices
+                .push(position.map(|c| (c * 100.0).round() / 100.0));
         }
     }
     for y in 0..side - 1 {
@@ -95,7 +98,9 @@ pub fn hills(side: u32, holes: bool) -> Mesh {
             // Some round holes, one across the middle, and single squares.
             let hole = |a: u32, b: u32, r: u32| x.abs_diff(a).pow(2) + y.abs_diff(b).pow(2) < r * r;
             let half = side / 2;
-            if holes && (hole(half, half, 5) || hole(side / 4, 9, 4) || (x * 31 + y * 17) % 211 == 5) {
+            if holes
+                && (hole(half, half, 5) || hole(side / 4, 9, 4) || (x * 31 + y * 17) % 211 == 5)
+            {
                 continue;
             }
             let a = y * side + x;
@@ -114,7 +119,8 @@ pub fn sphere(side: u32) -> Mesh {
         *numbers.entry(p).or_insert_with(|| {
             let v = p.map(|c| c as f64 / f64::from(side) * 2.0 - 1.0);
             let length = v.iter().map(|c| c * c).sum::<f64>().sqrt();
-            mesh.vertices.push(v.map(|c| (c / length * 1e5).round() / 1e3));
+            mesh.vertices
+                .push(v.map(|c| (c / length * 1e5).round() / 1e3));
             mesh.vertices.len() as u32 - 1
         })
     };
@@ -131,7 +137,11 @@ pub fn sphere(side: u32) -> Mesh {
                     };
                     let square = [corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)];
                     let [a, b, c, d] = square.map(&mut vertex);
-                    let two = if end == n { [[a, b, c], [a, c, d]] } else { [[a, c, b], [a, d, c]] };
+                    let two = if end == n {
+                        [[a, b, c], [a, c, d]]
+                    } else {
+                        [[a, c, b], [a, d, c]]
+                    };
                     triangles.extend(two);
                 }
             }
@@ -214,7 +224,9 @@ pub fn distance(from: &[&Tile], to: &[&Tile]) -> f64 {
                 (u, v) = (1.0 - u, 1.0 - v);
             }
             let [a, b, c] = *triangle;
-            points.push(std::array::from_fn(|k| a[k] + u * (b[k] - a[k]) + v * (c[k] - a[k])));
+            points.push(std::array::from_fn(|k| {
+                a[k] + u * (b[k] - a[k]) + v * (c[k] - a[k])
+            }));
         }
         for p in points {
             let mut best = f64::INFINITY;

@@ -1,8 +1,8 @@
 //! The same bytes for any memory and threads, and after a run was stopped or killed.
 
 use super::meshes::hills;
-use outcrop::levels::{Options, Tiles};
-use outcrop::{Cancel, Error, Observer, Start};
+use outcrop::levels::Options;
+use outcrop::{Cancel, Error, Observer, Start, Tiles};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -23,7 +23,9 @@ fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
         }
     }
     let relative = |path: PathBuf| path.strip_prefix(folder).unwrap().to_path_buf();
-    all.into_iter().map(|(path, bytes)| (relative(path), bytes)).collect()
+    all.into_iter()
+        .map(|(path, bytes)| (relative(path), bytes))
+        .collect()
 }
 
 fn tiles(mesh: &Path, folder: &Path) -> Tiles {
@@ -31,12 +33,19 @@ fn tiles(mesh: &Path, folder: &Path) -> Tiles {
         most_triangles: 300,
         ..Options::default()
     };
-    Tiles::new(mesh, folder).options(options).memory(192 << 20).threads(2)
+    Tiles::new(mesh, folder)
+        .options(options)
+        .memory(192 << 20)
+        .threads(2)
 }
 
 fn equal(found: &Path, want: &BTreeMap<PathBuf, Vec<u8>>, what: &str) {
     let found = files(found);
-    assert_eq!(found.keys().collect::<Vec<_>>(), want.keys().collect::<Vec<_>>(), "{what}");
+    assert_eq!(
+        found.keys().collect::<Vec<_>>(),
+        want.keys().collect::<Vec<_>>(),
+        "{what}"
+    );
     assert!(found == *want, "{what}");
 }
 
@@ -50,7 +59,11 @@ fn memory_and_threads_change_nothing() {
     let want = files(&first);
     for (threads, memory) in [(1, 192), (2, 1024), (5, 400)] {
         let other = folder.path().join(format!("{threads}"));
-        tiles(&mesh, &other).threads(threads).memory(memory << 20).run().unwrap();
+        tiles(&mesh, &other)
+            .threads(threads)
+            .memory(memory << 20)
+            .run()
+            .unwrap();
         equal(&other, &want, &format!("{threads} threads"));
     }
     // A tileset is replaced by another one of the same name, and compressed meshes are read.
@@ -74,7 +87,10 @@ struct Stop {
 
 impl Observer for Stop {
     fn advance(&self, count: u64) {
-        let before = self.left.fetch_sub(count.min(self.left.load(Ordering::Relaxed)), Ordering::Relaxed);
+        let before = self.left.fetch_sub(
+            count.min(self.left.load(Ordering::Relaxed)),
+            Ordering::Relaxed,
+        );
         if before <= count {
             self.cancel.cancel();
         }
@@ -97,7 +113,10 @@ fn a_stopped_run_goes_on() {
             left: AtomicU64::new(after),
             cancel: cancel.clone(),
         });
-        let run = tiles(&mesh, &output).start(Start::Resume).observer(observer).cancel(cancel);
+        let run = tiles(&mesh, &output)
+            .start(Start::Resume)
+            .observer(observer)
+            .cancel(cancel);
         match run.run() {
             Ok(_) => break,
             Err(Error::Cancelled) => stops += 1,
@@ -107,7 +126,9 @@ fn a_stopped_run_goes_on() {
         if stops == 3 {
             let refused = tiles(&mesh, &output).run().unwrap_err();
             assert!(matches!(refused, Error::Unfinished { .. }), "{refused}");
-            let other = tiles(&mesh, &output).options(Options::default()).start(Start::Resume);
+            let other = tiles(&mesh, &output)
+                .options(Options::default())
+                .start(Start::Resume);
             assert!(matches!(other.run().unwrap_err(), Error::Mismatch { .. }));
         }
     }
@@ -124,7 +145,13 @@ fn a_killed_run_goes_on() {
     let program = |output: &Path, fault: &str| {
         let mut command = Command::new(env!("CARGO_BIN_EXE_outcrop"));
         command.arg("tiles").arg(&mesh).arg("-o").arg(output);
-        command.args(["--quiet", "--resume", "--memory=192MiB", "--threads=2", "--most-triangles=300"]);
+        command.args([
+            "--quiet",
+            "--resume",
+            "--memory=192MiB",
+            "--threads=2",
+            "--most-triangles=300",
+        ]);
         if !fault.is_empty() {
             command.env("OUTCROP_FAULT", fault);
         }
@@ -132,12 +159,17 @@ fn a_killed_run_goes_on() {
     };
     let events = folder.path().join("events");
     let counted = program(&first, &format!("count:{}", events.display()));
-    assert!(counted.status.success(), "{}", String::from_utf8_lossy(&counted.stderr));
+    assert!(
+        counted.status.success(),
+        "{}",
+        String::from_utf8_lossy(&counted.stderr)
+    );
     let want = files(&first);
     let counts = std::fs::read_to_string(&events).unwrap();
     let count = |event: &str| -> u64 {
         let line = counts.lines().find(|line| line.starts_with(event));
-        line.and_then(|line| line.split_whitespace().last()?.parse().ok()).unwrap_or(0)
+        line.and_then(|line| line.split_whitespace().last()?.parse().ok())
+            .unwrap_or(0)
     };
     let mut killed = 0;
     for event in ["record", "torn", "recorded", "write", "synced", "delete"] {
@@ -157,4 +189,67 @@ fn a_killed_run_goes_on() {
     assert!(killed > 20, "{killed}: {counts}");
     // Nothing is left beside.
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 3);
+}
+
+/// A cloud of a landscape, as text.
+fn cloud(path: &Path) {
+    let points = hills(60, false).vertices;
+    let lines = points.iter().map(|[x, y, z]| format!("{x} {y} {z}\n"));
+    std::fs::write(path, lines.collect::<String>()).unwrap();
+}
+
+#[test]
+fn a_cloud_becomes_the_tileset_of_its_mesh() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    cloud(&at("scan.xyz"));
+    let run = |output: &Path| {
+        let run = outcrop::Reconstruction::builder()
+            .input(at("scan.xyz"))
+            .output(output);
+        run.memory(192 << 20).threads(2).start(Start::Resume)
+    };
+    run(&at("mesh.ply")).build().unwrap().run().unwrap();
+    Tiles::new(at("mesh.ply"), at("want"))
+        .memory(192 << 20)
+        .run()
+        .unwrap();
+    let output = at("town").join("tileset.json");
+    let cancel = Cancel::new();
+    let observer = Arc::new(Stop {
+        left: AtomicU64::new(60_000),
+        cancel: cancel.clone(),
+    });
+    let stopped = run(&output)
+        .observer(observer)
+        .cancel(cancel)
+        .build()
+        .unwrap();
+    assert!(matches!(stopped.run().unwrap_err(), Error::Cancelled));
+    assert_eq!(stopped.output(), output);
+    let resumed = outcrop::Reconstruction::resume(at("town.outcrop-scratch")).unwrap();
+    let report = resumed.memory(192 << 20).build().unwrap().run().unwrap();
+    let tiles = report.tiles.unwrap();
+    assert_eq!(
+        (tiles.triangles, tiles.vertices),
+        (report.mesh.triangles, report.mesh.vertices)
+    );
+    let (mut found, mut want) = (files(&at("town")), files(&at("want")));
+    let name = Path::new("tileset.json");
+    let json = |files: &mut BTreeMap<PathBuf, Vec<u8>>| {
+        let mut json: serde_json::Value =
+            serde_json::from_slice(&files.remove(name).unwrap()).unwrap();
+        json["extras"]["outcrop"]["source"] = "".into();
+        json
+    };
+    assert_eq!(json(&mut found), json(&mut want));
+    assert!(found == want);
+    // Nothing else is left.
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 4);
+    for wrong in ["tileset.json", "/tileset.json"] {
+        assert!(
+            matches!(run(Path::new(wrong)).build(), Err(Error::Parameter { .. })),
+            "{wrong}"
+        );
+    }
 }

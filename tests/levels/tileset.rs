@@ -153,7 +153,9 @@ fn glb(file: &[u8], step: f64) -> Tile {
         }
     }
     let (normals, _) = data(&json, binary, &attributes["NORMAL"]);
-    let normals = normals.chunks_exact(4).map(|n| [0, 1, 2].map(|k| n[k] as i8));
+    let normals = normals
+        .chunks_exact(4)
+        .map(|n| [0, 1, 2].map(|k| n[k] as i8));
     let others = attributes.as_object().unwrap().iter();
     let others = others.filter(|(name, _)| !["POSITION", "NORMAL", "_LOW"].contains(&&***name));
     let lines = match primitives[1].is_null() {
