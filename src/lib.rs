@@ -50,7 +50,8 @@
 //! [`Tiles`] makes levels of detail of a mesh, of any size, for viewers of 3D Tiles.
 //!
 //! [`inspect`] describes a cloud, checks that a mesh is a manifold, and measures the distance between two
-//! shapes. [`Report`] has the counts and measurements of a run.
+//! shapes. [`Report`] has the counts and measurements of a run. [`page`] puts all of these into pages with
+//! pictures.
 //!
 //! These items are the interface. The hidden modules are public only for the project's own tests, benches and
 //! tools, and change without notice; `ARCHITECTURE.md` has their map.
@@ -60,12 +61,15 @@ pub mod cli;
 pub mod error;
 #[doc(hidden)]
 pub mod geom;
+mod histogram;
 pub mod inspect;
 #[doc(hidden)]
 pub mod kernels;
 pub mod levels;
 mod method;
+pub mod page;
 pub mod params;
+mod picture;
 #[doc(hidden)]
 pub mod pipeline;
 pub mod report;
@@ -73,6 +77,8 @@ pub mod report;
 pub mod spill;
 #[doc(hidden)]
 pub mod stages;
+#[doc(hidden)]
+pub mod view;
 #[doc(hidden)]
 pub mod workspace;
 
@@ -83,4 +89,5 @@ pub use report::{DiskEstimate, Report};
 pub use stages::ingest::Classes;
 pub use workspace::Workspace;
 pub use workspace::memory::MemoryPool;
+pub use workspace::outlook::{Outlook, Planned, Position};
 pub use workspace::progress::{Cancel, Observer, Silent};

@@ -192,6 +192,8 @@ pub struct Params {
     pub keep_far: bool,
     /// Vertices have normals, in formats that hold them.
     pub normals: bool,
+    /// GLB with meshopt compression.
+    pub compress_glb: bool,
     /// Do not use the positions of scanners that files give: what a scanner saw is out otherwise (robust).
     pub ignore_scanners: bool,
     /// Take coordinates as they are if files give different reference systems, which is an error otherwise.
@@ -245,6 +247,7 @@ impl Default for Params {
             repair: true,
             keep_far: false,
             normals: false,
+            compress_glb: false,
             ignore_scanners: false,
             ignore_crs: false,
             origin: Origin::None,
@@ -266,6 +269,7 @@ impl Params {
             keep_all: true,
             max_edge: MaxWidth::None,
             max_fill: MaxWidth::None,
+            max_hole_edges: 500,
             min_component: Some(10),
             ..Self::default()
         }
@@ -395,6 +399,11 @@ impl Params {
         {
             let expected = "other columns: with --normals these are the mesh's own";
             return error("--attributes", name.clone(), expected);
+        }
+        if self.compress_glb && self.normals {
+            let expected =
+                "one of the two: a compressed GLB has no normals yet, and viewers make them";
+            return error("--compress-glb", "--normals".into(), expected);
         }
         if !(3..=MAX_NEIGHBORS).contains(&self.neighbors) {
             return error("--neighbors", self.neighbors.to_string(), "3 to 255");

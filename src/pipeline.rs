@@ -8,6 +8,7 @@ mod clock;
 mod disk;
 mod manifest;
 mod origin;
+mod outlook;
 mod shared;
 mod stages;
 mod start;
@@ -40,6 +41,8 @@ pub struct Reconstruction {
     inputs: Vec<PathBuf>,
     /// The mesh: of a tileset one in the scratch's place, which is deleted at the end.
     output: PathBuf,
+    /// The output that was asked for.
+    target: PathBuf,
     /// The folder of the tileset, if that is wanted.
     tiles: Option<PathBuf>,
     folder: PathBuf,
@@ -53,6 +56,7 @@ pub struct Reconstruction {
     storage: Storage,
     start: Start,
     time_limit: Option<Duration>,
+    pictures: bool,
 }
 
 /// Half of the memory that machine and cgroup allow.
@@ -90,9 +94,8 @@ impl Reconstruction {
 
     /// Path of the mesh, or of the tileset.
     #[must_use]
-    pub fn output(&self) -> PathBuf {
-        let tiles = self.tiles.as_ref();
-        tiles.map_or_else(|| self.output.clone(), |tiles| tiles.join(levels::NAME))
+    pub fn output(&self) -> &Path {
+        &self.target
     }
 
     /// Reconstructs the surface and writes the mesh.
@@ -140,6 +143,7 @@ impl Reconstruction {
             pieces.as_ref(),
             &lattice,
         )?;
+        stages.draw(&store, &shape, &repaired, pieces.as_ref(), &lattice)?;
         stages.levels()?;
         Ok(stages.report())
     }

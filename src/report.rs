@@ -1,9 +1,12 @@
 //! The report of a run: the content of `--report`.
 
+use crate::histogram;
 use crate::levels::TilesReport;
 use crate::params::Params;
+use crate::picture;
 pub use crate::stages::cells::CellStats;
 pub use crate::stages::cut::CutStats;
+pub use crate::stages::draw::Drawn;
 pub use crate::stages::export::{CoordinateType, MeshStats};
 pub use crate::stages::ingest::{Attribute, IngestStats};
 pub use crate::stages::outliers::OutlierStats;
@@ -12,6 +15,9 @@ pub use crate::stages::smooth::RelaxStats;
 pub use crate::stages::stitch::{BaseStats, InsertStats};
 pub use crate::stages::thin::ThinStats;
 pub use crate::stages::triples::TripleStats;
+pub use crate::workspace::course::Sample;
+pub use histogram::{Bin, Histogram};
+pub use picture::Picture;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -95,6 +101,31 @@ pub struct Report {
     pub stages: Vec<StageReport>,
     /// Warnings for the user, one line each.
     pub warnings: Vec<String>,
+    /// Distributions, and the course of the run, if pictures were asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub details: Option<Details>,
+    /// The pictures, if they were asked for.
+    #[serde(skip)]
+    pub pictures: Vec<Picture>,
+}
+
+/// Distributions, and the course of a run.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct Details {
+    /// Lengths of all edges, in the input's unit.
+    pub edges: Option<Histogram>,
+    /// Numbers of edges of the boundary loops; loops that meet at a vertex count as one.
+    pub loops: Option<Histogram>,
+    /// True if there are too many boundary edges for their loops to be counted.
+    pub many_loops: bool,
+    /// Numbers of triangles of the components, without those that fill holes; none of a cut mesh.
+    pub components: Option<Histogram>,
+    /// Local spacings of the points, by patch, in the input's unit.
+    pub spacings: Option<Histogram>,
+    /// Memory and disk over this attempt; nothing if tasks shared the run.
+    pub course: Vec<Sample>,
+    /// When stages of this attempt began.
+    pub begun: Vec<PartReport>,
 }
 
 /// Estimated disk space of a run, in bytes.

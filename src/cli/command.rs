@@ -2,6 +2,7 @@
 
 use super::args::{Compare, Demo, Info, Reconstruct, Resume, Tiles, Verify};
 use super::shared::{Advance, Plan, Status, Submit, Work};
+use super::view::View;
 use clap::{Parser, Subcommand};
 
 /// Turns point clouds of any size into clean triangle meshes within a memory budget.
@@ -21,14 +22,15 @@ and parameters give the same file, byte for byte, whatever memory, threads and o
 
 const EXAMPLES: &str = "Examples:
   outcrop reconstruct scan.laz -o mesh.ply
-  outcrop reconstruct tiles/ -o town.ply --memory 4GiB --report town.json
+  outcrop reconstruct tiles/ -o town.ply --memory 4GiB --report town.html
   outcrop reconstruct noisy.las -o smooth.ply --smooth 1
   outcrop reconstruct scan.laz -o mesh.ply --resume --time-limit 7h30m
   outcrop resume mesh.ply.outcrop-scratch
   outcrop info scan.laz
   outcrop verify mesh.ply && echo manifold
-  outcrop compare mesh.ply scan.laz
+  outcrop compare mesh.ply scan.laz --html distances.html
   outcrop tiles mesh.ply -o town
+  outcrop view mesh.ply
   outcrop demo
   outcrop plan tiles/ -o town.ply --shards 200 --task-memory 4GiB --task-threads 8
   outcrop submit town.ply.outcrop-scratch --engine slurm -- --partition=long
@@ -51,6 +53,8 @@ pub enum Command {
     Tiles(Tiles),
     /// Measure the distance between two meshes or clouds
     Compare(Compare),
+    /// Show a mesh of any size in the browser
+    View(View),
     /// Generate a cloud, reconstruct it and verify the mesh
     Demo(Demo),
     /// Plan a run for many tasks, on a cluster or on this machine; makes its folder

@@ -4,11 +4,12 @@ use super::args::{
     Compare, Demo, Ends, Info, Limits, Reconstruct, Resume, Tiles as TilesArgs, Verify,
 };
 use super::command::Command;
-use super::output::{print, show, summary, write_report};
-use super::{shared, stop, style};
+use super::output::{NewFile, is_page, print, report_text, show, summary, write_report};
+use super::{shared, stop, style, view};
 use crate::error::{Error, Result};
 use crate::inspect::{compare, info, verify};
 use crate::levels;
+use crate::page;
 use crate::pipeline::{Builder, Reconstruction, Start, Tiles, default_memory, default_threads};
 use crate::workspace::Workspace;
 use crate::workspace::memory::MemoryPool;
@@ -26,6 +27,7 @@ pub fn run(command: Command) -> Result<bool> {
         Command::Verify(args) => check(&args),
         Command::Compare(args) => measure(&args),
         Command::Tiles(args) => tiles(&args),
+        Command::View(args) => view::run(&args),
         Command::Demo(args) => demo(&args),
         Command::Plan(args) => shared::plan(&args),
         Command::Work(args) => shared::work(&args),
@@ -84,41 +86,41 @@ fn run_reconstruction(builder: Builder, ends: &Ends, quiet: bool) -> Result<bool
     if let Some(limit) = ends.time_limit {
         builder = builder.time_limit(limit);
     }
-    let run = builder.build()?;
-    if ends.report.as_deref() == Some(&*run.output()) {
+    let page = ends.report.iter().any(|path| is_page(path));
+    let run = builder.pictures(page).build()?;
+    if let Some(path) = ends.report.iter().find(|path| **path == run.output()) {
         return Err(Error::Parameter {
             name: "--report",
-            found: run.output().display().to_string(),
+            found: path.display().to_string(),
             expected: "a file other than the mesh".into(),
         });
     }
-    let new_report = ends.report.as_ref().is_some_and(|path| !path.exists());
-    if let Some(path) = &ends.report {
-        // An unwritable report is an error before the work, not after it.
-        let opened = std::fs::File::options()
-            .append(true)
-            .create(true)
-            .open(path);
-        opened.map_err(|e| Error::io(path, "write the report", e))?;
-    }
+    let reports = ends.report.iter().map(|path| NewFile::open(path));
+    let reports = reports.collect::<Result<Vec<_>>>()?;
     stop::can_end(&run);
-    let outcome = run.run();
-    match (&outcome, &ends.report) {
-        (Ok(report), Some(path)) => write_report(path, report)?,
-        // No empty report of a failed run.
-        (Err(_), Some(path)) if new_report => drop(std::fs::remove_file(path)),
-        _ => {}
+    let report = run.run()?;
+    for file in reports {
+        let text = report_text(file.path(), &report, run.output())?;
+        file.write(&text)?;
     }
-    let report = outcome?;
     if !quiet && std::io::stdout().is_terminal() {
-        print(&summary(&report, &run.output()))?;
+        print(&summary(&report, run.output()))?;
     }
     Ok(true)
 }
 
 fn info(args: &Info) -> Result<bool> {
     let workspace = workspace(&args.limits, &std::env::temp_dir())?;
-    let info = info::info(&args.inputs, &args.points.params(), &workspace)?;
+    let params = args.points.params();
+    let info = match &args.html {
+        None => info::info(&args.inputs, &params, &workspace)?,
+        Some(path) => {
+            let page = NewFile::page(path)?;
+            let (info, drawn) = info::illustrated(&args.inputs, &params, &workspace)?;
+            page.write(&page::cloud(&args.inputs, &info, &drawn))?;
+            info
+        }
+    };
     show(&info, args.json)?;
     Ok(true)
 }
@@ -129,7 +131,15 @@ fn check(args: &Verify) -> Result<bool> {
         allow_unreferenced: args.allow_unreferenced,
         range: None,
     };
-    let verdict = verify::verify_with(&args.mesh, &options, &workspace)?;
+    let verdict = match &args.html {
+        None => verify::verify_with(&args.mesh, &options, &workspace)?,
+        Some(path) => {
+            let page = NewFile::page(path)?;
+            let (verdict, drawn) = verify::illustrated(&args.mesh, &options, &workspace)?;
+            page.write(&page::verdict(&args.mesh, &verdict, &drawn))?;
+            verdict
+        }
+    };
     show(&verdict, args.json)?;
     Ok(verdict.manifold)
 }
@@ -138,7 +148,16 @@ fn measure(args: &Compare) -> Result<bool> {
     let workspace = workspace(&args.limits, &std::env::temp_dir())?;
     let (samples, seed) = (args.samples, args.seed);
     let options = compare::Options { samples, seed };
-    let comparison = compare::compare(&args.a, &args.b, &options, &workspace)?;
+    let (a, b) = (&args.a, &args.b);
+    let comparison = match &args.html {
+        None => compare::compare(a, b, &options, &workspace)?,
+        Some(path) => {
+            let page = NewFile::page(path)?;
+            let (comparison, drawn) = compare::illustrated(a, b, &options, &workspace)?;
+            page.write(&page::comparison(&comparison, &drawn))?;
+            comparison
+        }
+    };
     show(&comparison, args.json)?;
     Ok(true)
 }
@@ -191,7 +210,7 @@ fn demo(args: &Demo) -> Result<bool> {
         .build()?
         .run()?;
     let path = folder.join("report.json");
-    write_report(&path, &report)?;
+    write_report(&path, &report, &mesh)?;
     print(&summary(&report, &mesh))?;
     let memory = MemoryPool::new(memory(&args.limits))?;
     let threads = threads(&args.limits);

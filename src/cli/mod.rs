@@ -4,10 +4,12 @@ mod args;
 mod command;
 mod commands;
 mod output;
+mod parse;
 mod progress;
 mod shared;
 mod stop;
 mod style;
+mod view;
 
 use crate::error::Error;
 use clap::Parser;

@@ -2,6 +2,7 @@
 
 use super::style;
 use crate::error::{Error, Result};
+use crate::page;
 use crate::report::Report;
 use serde::Serialize;
 use std::fmt::Display;
@@ -27,8 +28,81 @@ pub fn show<T: Serialize + Display>(value: &T, as_json: bool) -> Result<()> {
     })
 }
 
-pub fn write_report(path: &Path, report: &Report) -> Result<()> {
-    std::fs::write(path, json(report)? + "\n").map_err(|e| Error::io(path, "write the report", e))
+/// True if a report with this name is a page.
+pub fn is_page(path: &Path) -> bool {
+    let extension = path.extension().unwrap_or_default();
+    ["html", "htm"]
+        .iter()
+        .any(|page| extension.eq_ignore_ascii_case(page))
+}
+
+/// The report of a run, whose mesh is `mesh`, in the format that its name says.
+pub fn report_text(path: &Path, report: &Report, mesh: &Path) -> Result<String> {
+    Ok(match is_page(path) {
+        true => page::report(report, mesh),
+        false => json(report)? + "\n",
+    })
+}
+
+/// Writes the report of a run.
+pub fn write_report(path: &Path, report: &Report, mesh: &Path) -> Result<()> {
+    let text = report_text(path, report, mesh)?;
+    std::fs::write(path, text).map_err(|e| Error::io(path, "write the report", e))
+}
+
+/// A file to be written after the work. That it cannot be written is an error before the work; if the work fails,
+/// no empty file is left.
+pub struct NewFile<'a> {
+    path: &'a Path,
+    is_new: bool,
+}
+
+impl<'a> NewFile<'a> {
+    /// Makes sure that the file can be written; its content stays.
+    pub fn open(path: &'a Path) -> Result<Self> {
+        Self::opened(path)
+    }
+
+    /// The same for a page, which has to be named so: nothing else is overwritten by mistake.
+    pub fn page(path: &'a Path) -> Result<Self> {
+        if !is_page(path) {
+            return Err(Error::Parameter {
+                name: "--html",
+                found: path.display().to_string(),
+                expected: "a name that ends in .html".into(),
+            });
+        }
+        Self::opened(path)
+    }
+
+    fn opened(path: &'a Path) -> Result<Self> {
+        let is_new = !path.exists();
+        let opened = std::fs::File::options()
+            .append(true)
+            .create(true)
+            .open(path);
+        opened.map_err(|e| Error::io(path, "write the report", e))?;
+        Ok(Self { path, is_new })
+    }
+
+    /// Its path.
+    pub fn path(&self) -> &'a Path {
+        self.path
+    }
+
+    /// Writes it.
+    pub fn write(mut self, text: &str) -> Result<()> {
+        self.is_new = false;
+        std::fs::write(self.path, text).map_err(|e| Error::io(self.path, "write the report", e))
+    }
+}
+
+impl Drop for NewFile<'_> {
+    fn drop(&mut self) {
+        if self.is_new {
+            let _ = std::fs::remove_file(self.path);
+        }
+    }
 }
 
 pub fn summary(report: &Report, output: &Path) -> String {

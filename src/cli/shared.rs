@@ -7,8 +7,9 @@ mod submit;
 pub use status::status;
 pub use submit::submit;
 
-use super::args::{Job, Storing, size};
-use super::output::{json, print, summary, write_report};
+use super::args::{Job, Storing};
+use super::output::{is_page, json, print, summary, write_report};
+use super::parse::size;
 use super::{stop, style};
 use crate::error::{Error, Result};
 use crate::pipeline::{self, Advanced, Reconstruction, Totals, Worked};
@@ -101,8 +102,8 @@ pub struct Advance {
     pub folder: PathBuf,
     #[command(flatten)]
     pub process: Process,
-    /// Write a report as JSON when the mesh is finished
-    #[arg(long, value_name = "FILE.json")]
+    /// Write a report when the mesh is finished: as a page if its name ends in .html, else as JSON
+    #[arg(long, value_name = "FILE.html|FILE.json")]
     pub report: Option<PathBuf>,
     /// Print JSON
     #[arg(long)]
@@ -160,8 +161,8 @@ pub struct How {
     /// With Slurm, inside sbatch or salloc: run tasks by srun, so that no step waits in a queue
     #[arg(long, conflicts_with = "foreground")]
     pub within_allocation: bool,
-    /// Write a report as JSON when the mesh is finished
-    #[arg(long, value_name = "FILE.json")]
+    /// Write a report when the mesh is finished: as a page if its name ends in .html, else as JSON
+    #[arg(long, value_name = "FILE.html|FILE.json")]
     pub report: Option<PathBuf>,
     /// Options for sbatch or srun, like --partition=long
     #[arg(last = true, value_name = "SITE FLAGS")]
@@ -224,11 +225,12 @@ pub fn plan(args: &Plan) -> Result<bool> {
     Ok(true)
 }
 
-fn opened(folder: &std::path::Path, process: &Process) -> Result<Reconstruction> {
+fn opened(folder: &std::path::Path, process: &Process, pictures: bool) -> Result<Reconstruction> {
     let (observer, cancel) = stop::watched(process.quiet);
     let mut builder = Reconstruction::shared(folder)?
         .observer(observer)
         .cancel(cancel)
+        .pictures(pictures)
         .storage(process.storing.storage());
     if let Some(memory) = process.memory {
         builder = builder.memory(memory);
@@ -254,7 +256,7 @@ pub fn work(args: &Work) -> Result<bool> {
             });
         }
     }
-    let run = opened(&args.folder, &args.process)?;
+    let run = opened(&args.folder, &args.process, false)?;
     match run.work(args.generation, shard.number)? {
         Worked::Done | Worked::Superseded => Ok(true),
         Worked::TooEarly => Err(Error::NotYet {
@@ -314,7 +316,8 @@ impl Display for Totals {
 
 /// Does the work between two generations.
 pub fn advance(args: &Advance) -> Result<bool> {
-    let run = opened(&args.folder, &args.process)?;
+    let page = args.report.as_deref().is_some_and(is_page);
+    let run = opened(&args.folder, &args.process, page)?;
     let mut after = After {
         finished: true,
         generation: None,
@@ -330,10 +333,10 @@ pub fn advance(args: &Advance) -> Result<bool> {
                 after.warnings.clone_from(&report.warnings);
             }
             if let Some(path) = &args.report {
-                write_report(path, &report)?;
+                write_report(path, &report, run.output())?;
             }
             if !args.json {
-                print(&summary(&report, &run.output()))?;
+                print(&summary(&report, run.output()))?;
             }
         }
         Advanced::Finished(None) => {}

@@ -1,7 +1,10 @@
 //! Description of a cloud, and estimates for a run on it.
 
+use super::pictures;
+pub use super::pictures::Illustration;
 use crate::error::Result;
 use crate::geom::aabb::Aabb;
+use crate::histogram::Tally;
 use crate::method::METHOD;
 use crate::params::Params;
 use crate::pipeline::Known;
@@ -71,12 +74,38 @@ pub struct Info {
 /// # Errors
 /// As for a reconstruction, but a cloud that is too small for a surface is no error.
 pub fn info(inputs: &[PathBuf], params: &Params, workspace: &Workspace) -> Result<Info> {
+    described(inputs, params, false, workspace).map(|(info, _)| info)
+}
+
+/// As [`info`], with pictures and counts for [`crate::page::cloud`].
+///
+/// # Errors
+/// See [`info`].
+pub fn illustrated(
+    inputs: &[PathBuf],
+    params: &Params,
+    workspace: &Workspace,
+) -> Result<(Info, Illustration)> {
+    described(inputs, params, true, workspace)
+}
+
+fn described(
+    inputs: &[PathBuf],
+    params: &Params,
+    drawn: bool,
+    workspace: &Workspace,
+) -> Result<(Info, Illustration)> {
     let start = Instant::now();
     let observer = &workspace.observer;
     observer.begin("ingest", "points", 0);
     let headers = Known::from_headers(inputs, &Attributes::None, true);
     let selection = Selection {
         scanners: false,
+        attributes: match drawn {
+            // A list would have to be of columns that are there.
+            true => Attributes::Auto,
+            false => Attributes::None,
+        },
         ..params.selection()
     };
     let mut spool = ingest_selected(inputs, &selection, workspace)?;
@@ -84,6 +113,10 @@ pub fn info(inputs: &[PathBuf], params: &Params, workspace: &Workspace) -> Resul
     observer.end();
     let input = spool.stats().clone();
     let lattice = spool.choose_lattice(0)?;
+    let classes = match drawn {
+        true => pictures::classes(&spool, &lattice, workspace)?,
+        false => Vec::new(),
+    };
     let double = spool.source_precision() == CoordinateType::F64;
     let spool_bytes = spool.bytes();
     observer.begin("order", "points", input.kept);
@@ -93,6 +126,13 @@ pub fn info(inputs: &[PathBuf], params: &Params, workspace: &Workspace) -> Resul
     let read = start.elapsed().as_secs_f64();
     let sample = sample(&store, workspace)?;
     let Aabb { min, max } = store.bounds();
+    let illustration = match drawn {
+        true => Illustration {
+            classes,
+            ..Illustration::of(&store, &lattice, &sample.tally, workspace)?
+        },
+        false => Illustration::default(),
+    };
     stored.release(workspace)?;
     let points = store.len() as u64;
     let cells = sample.seconds / sample.points.max(1) as f64 * points as f64;
@@ -108,7 +148,7 @@ pub fn info(inputs: &[PathBuf], params: &Params, workspace: &Workspace) -> Resul
         text: None,
     };
     let disk = known.estimate(&Params::default(), Path::new("mesh.ply"));
-    Ok(Info {
+    let info = Info {
         duplicates,
         points,
         min: lattice.position(min),
@@ -122,13 +162,16 @@ pub fn info(inputs: &[PathBuf], params: &Params, workspace: &Workspace) -> Resul
         output_bytes: disk.output,
         seconds: read + cells / workspace.threads as f64 * (1.0 + OTHER_STAGES),
         input,
-    })
+    };
+    Ok((info, illustration))
 }
 
 #[derive(Default)]
 struct Sample {
     nearest: Vec<f64>,
     radius: Vec<f64>,
+    /// Squared distances to the nearest point.
+    tally: Tally,
     points: usize,
     seconds: f64,
 }
@@ -157,6 +200,7 @@ fn sample(store: &PointStore, workspace: &Workspace) -> Result<Sample> {
                 if let Some(last) = near.get(neighbors - 1) {
                     let first2 = near.get(0).map_or(0, |n| n.distance2);
                     sample.nearest.push((first2 as f64).sqrt());
+                    sample.tally.add(first2);
                     let radius = METHOD.disk.reach * (last.distance2 as f64).sqrt();
                     sample.radius.push(radius);
                 }
@@ -209,7 +253,7 @@ fn shown(scanners: &[[f64; 3]]) -> Option<String> {
 
 impl Info {
     /// The columns of all files, for `--attributes`.
-    fn columns(&self) -> String {
+    pub(crate) fn columns(&self) -> String {
         let mut names: Vec<&str> = Vec::new();
         for name in self.input.files.iter().flat_map(|file| &file.columns) {
             if !names.contains(&name.as_str()) {

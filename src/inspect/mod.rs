@@ -2,5 +2,6 @@
 
 pub mod compare;
 pub mod info;
+mod pictures;
 pub mod ply_mesh;
 pub mod verify;

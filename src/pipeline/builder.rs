@@ -33,6 +33,7 @@ pub struct Builder {
     /// The scratch folder, if an unfinished run is continued.
     folder: Option<PathBuf>,
     time_limit: Option<Duration>,
+    pictures: bool,
 }
 
 impl Builder {
@@ -128,6 +129,14 @@ impl Builder {
         self
     }
 
+    /// The report has pictures, distributions, and the course of memory and disk: [`Report::pictures`](crate::Report::pictures) and
+    /// [`Report::details`](crate::Report::details), for [`crate::page::report`].
+    #[must_use]
+    pub fn pictures(mut self, wanted: bool) -> Self {
+        self.pictures = wanted;
+        self
+    }
+
     /// The scratch folder of the run.
     pub(super) fn folder(mut self, folder: PathBuf) -> Self {
         self.folder = Some(folder);
@@ -155,13 +164,14 @@ impl Builder {
         }
         let tiles = tiles(&self.output, self.params.split.is_some())?;
         let mesh = tiles.as_deref().map(mesh_of);
-        check_name(mesh.as_deref().unwrap_or(&self.output))?;
+        check_name(mesh.as_deref().unwrap_or(&self.output), self.params.compress_glb)?;
         let budget = self.memory.unwrap_or_else(default_memory);
         let target = tiles.as_deref().unwrap_or(&self.output);
         let folder = scratch_folder(target, self.scratch.as_deref());
         Ok(Reconstruction {
             folder: self.folder.unwrap_or(folder),
             inputs: self.inputs,
+            target: self.output.clone(),
             output: mesh.unwrap_or(self.output),
             tiles,
             memory: MemoryPool::new(budget)?,
@@ -174,6 +184,7 @@ impl Builder {
             storage: self.storage,
             start: self.start,
             time_limit: self.time_limit,
+            pictures: self.pictures,
         })
     }
 }

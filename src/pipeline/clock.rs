@@ -12,6 +12,9 @@ pub(crate) struct Clock<'a> {
     workspace: &'a Workspace,
     /// Measurements of the stages, with those of earlier attempts.
     pub stages: Vec<StageReport>,
+    /// When the stages of this attempt began.
+    pub begun: Vec<PartReport>,
+    begin: Instant,
     /// Seconds of the stages that an earlier attempt finished.
     pub earlier: f64,
 }
@@ -32,6 +35,8 @@ impl<'a> Clock<'a> {
         Self {
             workspace,
             stages: Vec::new(),
+            begun: Vec::new(),
+            begin: Instant::now(),
             earlier: 0.0,
         }
     }
@@ -56,7 +61,7 @@ impl<'a> Clock<'a> {
         work: impl FnOnce() -> Result<T>,
     ) -> Result<T> {
         let workspace = self.workspace;
-        let mut now = false;
+        let (mut now, since) = (false, self.begin.elapsed().as_secs_f64());
         let (value, took) = workspace.once(step, |_| {
             now = true;
             let io = &workspace.io;
@@ -78,8 +83,12 @@ impl<'a> Clock<'a> {
             };
             Ok((outcome?, took))
         })?;
-        if !now {
-            self.earlier += took.seconds;
+        match now {
+            true => self.begun.push(PartReport {
+                name: name.to_owned(),
+                seconds: since,
+            }),
+            false => self.earlier += took.seconds,
         }
         let parts = took.parts.into_iter();
         self.stages.push(StageReport {

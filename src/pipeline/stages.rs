@@ -1,7 +1,9 @@
 //! The stages of a run: each with its parameters, its part of the report, and the check of disk space for the
 //! following stages.
 
+mod draw;
 mod export;
+mod plan;
 mod values;
 
 use super::checks::{all_are_kept, disk_radius, enough, not_a_line, room};
@@ -16,7 +18,7 @@ use crate::stages::blocks::Blocks;
 use crate::stages::cells::{CellTriples, DiskRadius, TileRanges, Widen, cells};
 use crate::stages::cut::{CutOptions, StoredPieces, cut};
 use crate::stages::export::CoordinateType;
-use crate::stages::ingest::{Carried, Spool, ingest_selected};
+use crate::stages::ingest::{Attributes, Carried, Spool, ingest_selected};
 use crate::stages::located::Places;
 use crate::stages::order::{Orderer, PointStore, StoredPoints, order, sample_sort};
 use crate::stages::outliers::{OutlierOptions, drop_outliers};
@@ -26,7 +28,8 @@ use crate::stages::spacing::{Density, Spacings};
 use crate::stages::stitch::{StitchOptions, Stitched, stitch};
 use crate::stages::thin::{Grid, LeftOut, thin};
 use crate::stages::triples::{Triples, triples};
-use crate::workspace::{Workspace, limits};
+use crate::workspace::Workspace;
+use crate::workspace::course::Course;
 use export::written;
 use std::time::Instant;
 use values::Values;
@@ -52,6 +55,8 @@ pub(super) struct Stages<'a> {
     coarse: f64,
     /// Well-known text of the reference system.
     wkt: Option<String>,
+    /// The course of the attempt, if the report shows it.
+    course: Option<Course>,
 }
 
 impl<'a> Stages<'a> {
@@ -78,6 +83,8 @@ impl<'a> Stages<'a> {
             carried: Carried::default(),
             coarse: 0.0,
             wkt: None,
+            course: (job.pictures && !workspace.is_shared())
+                .then(|| Course::start(job.memory.clone(), workspace.io.clone())),
             report: Report {
                 version: env!("CARGO_PKG_VERSION"),
                 parameters: job.params.clone(),
@@ -87,6 +94,11 @@ impl<'a> Stages<'a> {
                 ..Report::default()
             },
         };
+        stages.plan(
+            stages.known.read,
+            None,
+            job.params.attributes != Attributes::None,
+        );
         if let Some(estimate) = first {
             room(&job.folder, &job.output, estimate, workspace)?;
         }
@@ -158,6 +170,7 @@ impl<'a> Stages<'a> {
             text: None,
         };
         workspace.note_points(input.kept);
+        self.plan(input.kept, Some("ingest"), !self.carried.is_empty());
         let narrow = params.narrow_margin(&input);
         self.report.input = input;
         narrow.into_iter().for_each(|warning| self.warn(warning));
@@ -213,15 +226,19 @@ impl<'a> Stages<'a> {
         enough(&store)?;
         self.known.points = store.len() as u64;
         self.known.text = Some(text);
-        let coordinates = self.report.coordinates;
         let columns = &self.carried.columns;
+        let (shift, coordinates) = self.shift(store.bounds(), lattice)?;
+        let place = (coordinates, shift.map_or([0.0; 3], |shift| shift.origin));
         let warnings = self
             .known
-            .left_out(&job.params, columns, coordinates, &job.output)?;
+            .left_out(&job.params, columns, place, &job.output)?;
         for warning in warnings {
             self.warn(warning);
         }
         workspace.note_points(self.known.points);
+        if job.params.thin.is_some() {
+            self.plan(self.known.points, Some("order"), !self.carried.is_empty());
+        }
         self.check_room()?;
         Ok(store)
     }
@@ -469,22 +486,5 @@ impl<'a> Stages<'a> {
         repaired.release(workspace)?;
         self.report.cut = stats;
         Ok(Some(pieces))
-    }
-
-    /// The report of the run.
-    pub fn report(self) -> Report {
-        let memory = &self.job.memory;
-        Report {
-            peak_resident_bytes: limits::peak_resident(),
-            resident_file_bytes: limits::resident_file(),
-            peak_held_bytes: memory.peak_held(),
-            held_at_peak: memory.held_at_peak(),
-            peak_reserved_bytes: memory.peak(),
-            reserved_at_peak: memory.at_peak(),
-            peak_scratch_bytes: self.workspace.io.scratch_peak(),
-            seconds: self.begin.elapsed().as_secs_f64() + self.clock.earlier,
-            stages: self.clock.stages,
-            ..self.report
-        }
     }
 }

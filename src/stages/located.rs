@@ -112,6 +112,12 @@ impl Located {
         Ok(())
     }
 
+    /// The positions of the block's vertices, in their order.
+    #[must_use]
+    pub fn own(&self) -> &[Point] {
+        &self.own
+    }
+
     /// Allocated bytes.
     #[must_use]
     pub fn bytes(&self) -> u64 {

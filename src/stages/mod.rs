@@ -38,6 +38,8 @@ pub mod cut;
 
 pub mod export;
 
+pub mod draw;
+
 pub mod blocks;
 pub mod located;
 pub mod scanners;

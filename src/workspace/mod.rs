@@ -3,6 +3,7 @@
 //! The workspace knows neither stages nor rows. Stages obtain memory, files and threads from it.
 
 pub mod compressed;
+pub mod course;
 mod disk;
 pub mod fault;
 pub mod file;
@@ -16,6 +17,7 @@ pub mod limits;
 pub mod mapped;
 pub mod memory;
 pub mod open;
+pub mod outlook;
 mod pipe;
 pub mod place;
 pub mod progress;

@@ -27,6 +27,7 @@ const KEYS: &[&str] = &[
     "/parameters/ignore_scanners",
     "/parameters/ignore_crs",
     "/parameters/normals",
+    "/parameters/compress_glb",
     "/memory_budget",
     "/threads",
     "/input/read",

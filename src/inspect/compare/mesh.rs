@@ -6,7 +6,7 @@
 
 use super::Options;
 use super::corners::Joined;
-use super::shape::Shape;
+use super::shape::{Shape, usable};
 use super::triangles::{KeyedTriangle, Reading};
 use super::vector::{Box3, V3};
 use crate::error::Result;
@@ -27,6 +27,17 @@ pub(super) fn read(
     options: &Options,
     workspace: &Workspace,
 ) -> Result<Shape> {
+    read_with(mesh, path, name, options, None, workspace)
+}
+
+fn read_with(
+    mesh: PlyMesh,
+    path: &Path,
+    name: &'static str,
+    options: &Options,
+    sound: Option<Sound>,
+    workspace: &Workspace,
+) -> Result<Shape> {
     let reading = Reading {
         path,
         name,
@@ -44,14 +55,81 @@ pub(super) fn read(
     if small {
         let _held = workspace.reserve("compare: vertices", bytes)?;
         let mut direct = Direct::new(reading)?;
-        mesh.read_in_place(&mut direct)?;
+        mesh.read_in_place(&mut Sieve(&mut direct, sound))?;
         observer.end();
         direct.finish()
     } else {
         let mut joined = Joined::new(reading)?;
-        mesh.read_in_place(&mut joined)?;
+        mesh.read_in_place(&mut Sieve(&mut joined, sound))?;
         observer.end();
         joined.finish()
+    }
+}
+
+/// Reads a mesh without the faces that cannot be drawn: those that are no triangles, or have corners that do not
+/// exist or are not finite.
+pub(super) fn read_sound(
+    mesh: PlyMesh,
+    path: &Path,
+    name: &'static str,
+    options: &Options,
+    workspace: &Workspace,
+) -> Result<Shape> {
+    let vertices = mesh.vertices();
+    let _held = workspace.reserve("draw: vertices", vertices.div_ceil(64) * 8)?;
+    let sound = Sound {
+        bad: vec![0; vertices.div_ceil(64) as usize],
+        vertices,
+        seen: 0,
+        batch: Vec::new(),
+    };
+    read_with(mesh, path, name, options, Some(sound), workspace)
+}
+
+/// Leaves out faces that cannot be drawn.
+struct Sound {
+    /// One bit for each vertex, set if its position cannot be used.
+    bad: Vec<u64>,
+    vertices: u64,
+    seen: usize,
+    batch: Vec<[u32; 3]>,
+}
+
+/// Passes on what is sound.
+struct Sieve<'s, S>(&'s mut S, Option<Sound>);
+
+impl<S: Sink> Sink for Sieve<'_, S> {
+    fn vertices(&mut self, positions: &[V3]) -> Result<()> {
+        if let Some(sound) = &mut self.1 {
+            for p in positions {
+                if !usable(*p) {
+                    sound.bad[sound.seen / 64] |= 1 << (sound.seen % 64);
+                }
+                sound.seen += 1;
+            }
+        }
+        self.0.vertices(positions)
+    }
+
+    fn triangles(&mut self, triangles: &[[u32; 3]]) -> Result<()> {
+        let Some(sound) = &mut self.1 else {
+            return self.0.triangles(triangles);
+        };
+        let good = |v: &u32| {
+            let v = *v as usize;
+            (v as u64) < sound.vertices && sound.bad[v / 64] >> (v % 64) & 1 == 0
+        };
+        sound.batch.clear();
+        let all = triangles.iter().filter(|t| t.iter().all(good));
+        sound.batch.extend(all);
+        self.0.triangles(&sound.batch)
+    }
+
+    fn non_triangles(&mut self, count: u64) -> Result<()> {
+        match &self.1 {
+            Some(_) => Ok(()),
+            None => self.0.non_triangles(count),
+        }
     }
 }
 

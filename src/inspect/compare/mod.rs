@@ -17,6 +17,7 @@
 
 mod cloud;
 mod corners;
+mod drawing;
 mod figures;
 mod measure;
 mod mesh;
@@ -29,6 +30,7 @@ mod triangle;
 mod triangles;
 mod vector;
 
+pub use drawing::Illustration;
 use figures::DistanceRow;
 pub use figures::{Comparison, Distances, Figures};
 pub use shape::{Kind, Side};
@@ -36,7 +38,9 @@ pub(crate) use triangle::distance2;
 
 use crate::error::{Error, Result};
 use crate::inspect::ply_mesh::{PlyMesh, clearer, holds_faces};
+use crate::picture::Picture;
 use crate::workspace::Workspace;
+use drawing::{Drawing, Sketch};
 use figures::Sums;
 use samples::Numbers;
 use shape::Shape;
@@ -87,6 +91,46 @@ fn read_side(
 /// [`Error::Parameter`] without samples; [`Error::Io`], [`Error::Corrupt`] from the scratch folder;
 /// [`Error::Memory`] if the free part of the budget is too small; [`Error::Cancelled`].
 pub fn compare(a: &Path, b: &Path, options: &Options, workspace: &Workspace) -> Result<Comparison> {
+    measured(a, b, options, false, workspace).map(|(comparison, _)| comparison)
+}
+
+/// As [`compare`], with pictures and distributions for [`crate::page::comparison`].
+///
+/// # Errors
+/// See [`compare`].
+pub fn illustrated(
+    a: &Path,
+    b: &Path,
+    options: &Options,
+    workspace: &Workspace,
+) -> Result<(Comparison, Illustration)> {
+    measured(a, b, options, true, workspace)
+}
+
+/// Pictures of a mesh with marks; faces that cannot be drawn are left out.
+pub(in crate::inspect) fn marked(
+    path: &Path,
+    marks: &[[f64; 3]],
+    workspace: &Workspace,
+) -> Result<Vec<Picture>> {
+    let options = Options {
+        samples: 0,
+        seed: 0,
+    };
+    let mesh = PlyMesh::open_any(path, workspace)?;
+    let shape = mesh::read_sound(mesh, path, "verify.picture", &options, workspace)?;
+    let sketch = Sketch::of(&shape, workspace)?;
+    marks.iter().for_each(|mark| sketch.mark(*mark));
+    sketch.pictures("Mesh", (0.0, 0.0), workspace)
+}
+
+fn measured(
+    a: &Path,
+    b: &Path,
+    options: &Options,
+    drawn: bool,
+    workspace: &Workspace,
+) -> Result<(Comparison, Illustration)> {
     let Options { samples, seed } = *options;
     if samples == 0 {
         return Err(Error::Parameter {
@@ -101,10 +145,17 @@ pub fn compare(a: &Path, b: &Path, options: &Options, workspace: &Workspace) -> 
     let bytes = number * size_of::<DistanceRow>() as u64;
     let buffer = bytes.min(workspace.memory.available() / 8) + (1 << 20);
     let (sorter, _held) = triangles::sorter(workspace, "compare.distances", buffer)?;
+    let (min, max) = (a.side.min, a.side.max);
+    let diagonal = vector::Box3 { min, max }.diagonal();
+    let drawing = drawn.then(|| Drawing::of(&a, &b, diagonal, workspace));
+    let mut drawing = drawing.transpose()?;
     let mut sums = [Sums::default(); 2];
     for (way, (from, to)) in [(&a, &b), (&b, &a)].into_iter().enumerate() {
         measure::distances(from, to, options, workspace, |sample, distance| {
             sums[way].add(&sample, distance);
+            if let Some(drawing) = &mut drawing {
+                drawing.take(way, sample.position, distance);
+            }
             if sample.counts {
                 sorter.push(&[DistanceRow::new(distance, way)])?;
             }
@@ -113,10 +164,8 @@ pub fn compare(a: &Path, b: &Path, options: &Options, workspace: &Workspace) -> 
     }
     let sums = [sums[0], sums[1], sums[0].with(sums[1])];
     let percentiles = figures::percentiles(sorter, &sums, workspace)?;
-    let (min, max) = (a.side.min, a.side.max);
-    let diagonal = vector::Box3 { min, max }.diagonal();
     let distances = |way: usize| Distances::new(&sums[way], percentiles[way], diagonal);
-    Ok(Comparison {
+    let comparison = Comparison {
         a_to_b: distances(0),
         b_to_a: distances(1),
         symmetric: distances(2),
@@ -125,7 +174,10 @@ pub fn compare(a: &Path, b: &Path, options: &Options, workspace: &Workspace) -> 
         diagonal,
         most_samples: samples,
         seed,
-    })
+    };
+    let top = comparison.symmetric.figures.p99;
+    let illustration = drawing.map(|drawing| drawing.finish(top, workspace));
+    Ok((comparison, illustration.transpose()?.unwrap_or_default()))
 }
 
 /// A point of a cloud and its distance to a shape.

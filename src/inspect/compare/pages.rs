@@ -20,6 +20,9 @@ const LEAST: u64 = 64;
 /// Largest number of pages.
 const MOST_PAGES: u64 = 1 << 17;
 
+/// Pages that one thread takes at a time.
+const RUN: usize = 256;
+
 /// Items that share a box within a page.
 const LEAF: usize = 8;
 
@@ -94,6 +97,35 @@ impl<T: Item> Pages<T> {
             each(&items)?;
         }
         Ok(())
+    }
+
+    /// Calls `each` with the first items of at most `most` pages.
+    pub(super) fn some(&self, most: usize, mut each: impl FnMut(&T)) -> Result<()> {
+        let mut items = Vec::new();
+        for page in (0..self.count()).step_by(self.count().div_ceil(most).max(1)) {
+            self.stored.get_into(page, &mut items)?;
+            items.first().into_iter().for_each(&mut each);
+        }
+        Ok(())
+    }
+
+    /// Calls `each` with the items of every page, on all threads.
+    pub(super) fn visit(&self, workspace: &Workspace, each: impl Fn(&[T]) + Sync) -> Result<()> {
+        let (runs, bytes) = (self.count().div_ceil(RUN), self.page_bytes());
+        workspace.for_each_unit(
+            "draw: pages",
+            runs,
+            |_| bytes,
+            |unit| {
+                let mut items = Vec::new();
+                let first = unit.number() * RUN;
+                for page in first..(first + RUN).min(self.count()) {
+                    self.stored.get_into(page, &mut items)?;
+                    each(&items);
+                }
+                Ok(())
+            },
+        )
     }
 
     fn load(&self, page: usize) -> Result<Page<T>> {

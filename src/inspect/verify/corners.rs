@@ -1,5 +1,6 @@
 //! The triangles around each vertex of one range, contiguous in memory.
 
+use super::places::Places;
 use super::star::{Inspector, NO_MORE, Tally};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -110,7 +111,7 @@ impl Corners {
     }
 
     /// Examines all stars of up to `most` triangles, on all threads.
-    pub(super) fn inspect(&mut self, most: usize) -> Tally {
+    pub(super) fn inspect(&mut self, most: usize) -> (Tally, Places) {
         let mut tasks = Vec::with_capacity(self.part.len() / TASK + 1);
         let (mut rest, mut start) = (&mut self.links[..], self.part.start);
         while start < self.part.end {
@@ -135,8 +136,8 @@ impl Corners {
         tasks
             .into_par_iter()
             .fold(Inspector::default, inspect)
-            .map(|inspector| inspector.tally)
-            .reduce(Tally::default, |a, b| a + b)
+            .map(|inspector| (inspector.tally, inspector.places))
+            .reduce(Default::default, |a, b| (a.0 + b.0, a.1.with(b.1)))
     }
 
     /// The next vertex of the part, from `at` on, with more than `most` triangles: its number in the range,

@@ -2,6 +2,7 @@
 
 use super::bounds::Bounds;
 use super::buckets::Buckets;
+use super::places::{Kind, Places};
 use super::plan::Plan;
 use super::positions::Positions;
 use super::verdict::Verdict;
@@ -16,6 +17,8 @@ pub(super) struct Intake<'a> {
     /// All that reading can tell.
     pub(super) verdict: Verdict,
     pub(super) positions: Positions,
+    /// Where triangles are degenerate.
+    pub(super) places: Places,
     /// Triangles with three distinct, valid corners, in the buckets of the ranges of their corners.
     pub(super) triangles: Buckets<[u32; 3]>,
 }
@@ -35,6 +38,7 @@ pub(super) fn read<'a>(
         workspace,
         verdict: Verdict::default(),
         positions: Positions::new(workspace, plan)?,
+        places: Places::default(),
         triangles: Buckets::new(workspace, "verify.triangles", plan.ranges, plan.blocks[0])?,
     };
     mesh.read(&mut intake)?;
@@ -69,6 +73,7 @@ impl Sink for Intake<'_> {
             }
             if x == y || y == z || z == x {
                 self.verdict.degenerate_triangles += 1;
+                self.places.note(Kind::Degenerate, x);
                 continue;
             }
             let [a, b, c] = [x, y, z].map(|v| self.plan.range_of(v));

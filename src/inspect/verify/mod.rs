@@ -14,6 +14,7 @@ mod collinear;
 mod contract;
 mod corners;
 mod intake;
+mod places;
 mod plan;
 mod positions;
 mod star;
@@ -23,11 +24,13 @@ mod tests;
 mod verdict;
 
 pub use bounds::Bounds;
+pub use places::{Illustration, Kind, Place};
 pub use verdict::Verdict;
 
 use super::ply_mesh::PlyMesh;
 use crate::error::Result;
 use crate::workspace::Workspace;
+use places::Places;
 use plan::Plan;
 use std::path::Path;
 
@@ -57,17 +60,40 @@ pub fn verify(mesh: &Path, workspace: &Workspace) -> Result<Verdict> {
 /// # Errors
 /// See [`verify`].
 pub fn verify_with(mesh: &Path, options: &Options, workspace: &Workspace) -> Result<Verdict> {
+    examined(mesh, options, workspace).map(|(verdict, _)| verdict)
+}
+
+/// Like [`verify_with`], with pictures and the places of defects for [`crate::page::verdict`].
+///
+/// # Errors
+/// See [`verify`].
+pub fn illustrated(
+    mesh: &Path,
+    options: &Options,
+    workspace: &Workspace,
+) -> Result<(Verdict, Illustration)> {
+    let (verdict, places) = examined(mesh, options, workspace)?;
+    let illustration = places::illustrate(mesh, places, &verdict, workspace)?;
+    Ok((verdict, illustration))
+}
+
+fn examined(mesh: &Path, options: &Options, workspace: &Workspace) -> Result<(Verdict, Places)> {
     let mesh = PlyMesh::open_any(mesh, workspace)?;
     let free = workspace.memory.available();
     let plan = Plan::new(mesh.vertices(), mesh.faces(), free, options.range);
     check(mesh, &plan, options, workspace)
 }
 
-fn check(mesh: PlyMesh, plan: &Plan, options: &Options, workspace: &Workspace) -> Result<Verdict> {
+fn check(
+    mesh: PlyMesh,
+    plan: &Plan,
+    options: &Options,
+    workspace: &Workspace,
+) -> Result<(Verdict, Places)> {
     let _held = plan.reserve(workspace)?;
     let (origin, place) = (mesh.origin(), mesh.place());
     let intake = intake::read(mesh, plan, workspace)?;
-    let verdict = workspace.install(|| sweep::run(intake, plan, workspace))?;
+    let (verdict, places) = workspace.install(|| sweep::run(intake, plan, workspace))?;
     // Areas are judged by the coordinates in the file, which are exact.
     let bounds = verdict.bounds.map(|Bounds { min, max }| Bounds {
         min: place(min),
@@ -78,5 +104,5 @@ fn check(mesh: PlyMesh, plan: &Plan, options: &Options, workspace: &Workspace) -
         origin,
         ..verdict
     };
-    Ok(verdict.judged(options))
+    Ok((verdict.judged(options), places))
 }

@@ -1,5 +1,7 @@
 //! Properties of one vertex, decided by the triangles around it.
 
+use super::places::{Kind, Places};
+
 /// Counts over some vertices. An edge counts at its higher vertex, a triangle at its highest.
 #[derive(Debug, Clone, Copy, Default, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
@@ -29,6 +31,8 @@ pub(super) const NO_MORE: u32 = u32::MAX;
 #[derive(Debug, Default)]
 pub(super) struct Inspector {
     pub(super) tally: Tally,
+    /// Where defects are.
+    pub(super) places: Places,
     /// (neighbour, slot): slot `2i` runs from the vertex to the neighbour in triangle `i`,
     /// slot `2i + 1` from the neighbour to the vertex.
     ends: Vec<u64>,
@@ -86,6 +90,11 @@ impl Inspector {
                 self.tally.boundary_edges += u64::from(group.len() == 1);
                 self.tally.non_manifold_edges += u64::from(group.len() > 2);
                 self.tally.inconsistent_edges += u64::from(group.len() == 2 && leaving != 1);
+                match group.len() {
+                    2 if leaving != 1 => self.places.note(Kind::Inconsistent, vertex),
+                    3.. => self.places.note(Kind::NonManifold, vertex),
+                    _ => {}
+                }
             }
         }
         if let Some(end) = boundary.get_mut(open) {
@@ -93,6 +102,7 @@ impl Inspector {
         }
         if manifold && self.pieces() > 1 {
             self.tally.pinched_vertices += 1;
+            self.places.note(Kind::Pinched, vertex);
         }
     }
 
@@ -104,7 +114,11 @@ impl Inspector {
         self.ends.extend(highest.map(key));
         self.ends.sort_unstable();
         let again = self.ends.windows(2).filter(|pair| pair[0] == pair[1]);
-        self.tally.repeated_triangles += again.count() as u64;
+        let again = again.count() as u64;
+        self.tally.repeated_triangles += again;
+        if again > 0 {
+            self.places.note(Kind::Repeated, vertex);
+        }
     }
 
     /// Number of connected components of the triangles around the vertex.

@@ -5,6 +5,7 @@ use super::buckets::Buckets;
 use super::contract::{Contraction, Forest};
 use super::corners::Corners;
 use super::intake::Intake;
+use super::places::Places;
 use super::plan::Plan;
 use super::star::{Inspector, Tally, scratch_bytes};
 use super::verdict::Verdict;
@@ -24,10 +25,15 @@ struct Sweep<'a> {
     surface: Contraction,
     boundary: Contraction,
     tally: Tally,
+    places: Places,
 }
 
 /// Processes all ranges of the mesh; completes the counts of the verdict.
-pub(super) fn run(intake: Intake<'_>, plan: &Plan, workspace: &Workspace) -> Result<Verdict> {
+pub(super) fn run(
+    intake: Intake<'_>,
+    plan: &Plan,
+    workspace: &Workspace,
+) -> Result<(Verdict, Places)> {
     let mut sweep = Sweep {
         plan,
         workspace,
@@ -38,6 +44,7 @@ pub(super) fn run(intake: Intake<'_>, plan: &Plan, workspace: &Workspace) -> Res
         surface: Contraction::new(workspace, plan, "verify.surface")?,
         boundary: Contraction::new(workspace, plan, "verify.boundary")?,
         tally: Tally::default(),
+        places: intake.places,
     };
     let vertices = u64::from(plan.vertices);
     workspace.observer.begin("check mesh", "vertices", vertices);
@@ -48,7 +55,7 @@ pub(super) fn run(intake: Intake<'_>, plan: &Plan, workspace: &Workspace) -> Res
     }
     workspace.observer.end();
     let tally = sweep.tally;
-    Ok(Verdict {
+    let verdict = Verdict {
         repeated_triangles: tally.repeated_triangles,
         non_manifold_edges: tally.non_manifold_edges,
         inconsistent_edges: tally.inconsistent_edges,
@@ -60,7 +67,8 @@ pub(super) fn run(intake: Intake<'_>, plan: &Plan, workspace: &Workspace) -> Res
         boundary_loops: sweep.boundary.complete,
         components: sweep.surface.complete,
         ..intake.verdict
-    })
+    };
+    Ok((verdict, sweep.places))
 }
 
 impl Sweep<'_> {
@@ -137,7 +145,9 @@ impl Sweep<'_> {
 
     /// Examines the stars of the current part.
     fn inspect(&mut self) -> Result<()> {
-        self.tally = self.tally + self.corners.inspect(self.plan.large_star);
+        let (tally, places) = self.corners.inspect(self.plan.large_star);
+        self.tally = self.tally + tally;
+        self.places = std::mem::take(&mut self.places).with(places);
         let (first, mut from) = (self.corners.first(), 0);
         while let Some((at, star)) = self.corners.large(from, self.plan.large_star) {
             self.workspace.check_cancel()?;
@@ -146,6 +156,7 @@ impl Sweep<'_> {
             let mut inspector = Inspector::default();
             inspector.inspect(first + at as u32, star);
             self.tally = self.tally + inspector.tally;
+            self.places = std::mem::take(&mut self.places).with(inspector.places);
             from = at + 1;
         }
         for (vertex, others) in self.corners.boundaries() {

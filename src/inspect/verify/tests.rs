@@ -50,7 +50,7 @@ fn no_plan_changes_the_verdict() {
             large_star,
         };
         let mesh = PlyMesh::open(&path).unwrap();
-        let got = check(mesh, &odd, &options, &workspace).unwrap();
+        let (got, _) = check(mesh, &odd, &options, &workspace).unwrap();
         prop_assert_eq!(got, expected, "{:?}", odd);
         prop_assert_eq!(workspace.memory.available(), workspace.memory.capacity());
     });
@@ -72,7 +72,7 @@ fn large_stars() {
     let mut plan = Plan::new(u64::from(n) + 1, u64::from(n), 100 << 20, Some(256));
     plan.corners = 1000;
     let mesh = PlyMesh::open(&path).unwrap();
-    let got = check(mesh, &plan, &Options::default(), &workspace).unwrap();
+    let (got, _) = check(mesh, &plan, &Options::default(), &workspace).unwrap();
     assert_eq!(got, expected);
 }
 

@@ -65,13 +65,14 @@ impl Stages<'_> {
         }
         let (workspace, blocks, carried) = (self.workspace, self.blocks(), &self.carried);
         let mut stored = StoredAttributes::default();
-        if !carried.is_empty() {
+        if carried.is_empty() {
+            spool.release(workspace)?;
+        } else {
             let points = spool.points();
             stored = self.clock.stage("attributes", "points", points, || {
                 attributes(spool, lattice, carried, store, blocks, workspace)
             })?;
         }
-        spool.release(workspace)?;
         Ok(Values { stored, places })
     }
 }

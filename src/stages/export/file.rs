@@ -172,11 +172,8 @@ impl<'a> MeshFile<'a> {
             .open(&self.temporary)
             .map_err(|e| Error::io(&self.output, "create a file beside it", e))?;
         // The size of a compressed mesh is unknown.
-        let length = if is_compressed(&self.output) {
-            0
-        } else {
-            bytes
-        };
+        let compressed = self.mesh.compress || is_compressed(&self.output);
+        let length = if compressed { 0 } else { bytes };
         let room = fault::write().and_then(|()| file.set_len(length));
         room.map_err(|e| match failed_write(&self.output, 0, bytes, e) {
             Error::Io { source, .. } => Error::io(&self.output, "make room for the mesh", source),
@@ -294,6 +291,22 @@ impl<'a> MeshFile<'a> {
     /// True if triangles are written with the positions of their corners.
     pub fn wants_positions(&self) -> bool {
         self.format.wants_positions()
+    }
+
+    /// What is known of the mesh.
+    pub fn mesh(&self) -> &Mesh {
+        &self.mesh
+    }
+
+    /// The error of a mesh that turns out to have more than `most` bytes.
+    pub fn too_large(&self, most: u64) -> Error {
+        Error::TooLarge {
+            path: self.output.clone(),
+            format: self.format.name(),
+            unit: "bytes",
+            most,
+            found: "more".into(),
+        }
     }
 
     /// Bytes of the values that a vertex has in all columns.

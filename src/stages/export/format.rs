@@ -42,6 +42,11 @@ pub trait MeshFormat: Sync {
     /// True if the file can have coordinates in double precision.
     fn holds_doubles(&self) -> bool;
 
+    /// True if the format has compression of its own.
+    fn has_compression(&self) -> bool {
+        false
+    }
+
     /// True if vertices have this column in the file; others are left out.
     fn holds(&self, mesh: &Mesh, column: &VertexColumn) -> bool;
 
@@ -98,6 +103,8 @@ pub struct Mesh {
     /// Decimals with which coordinates are written as text: exact for files with decimal coordinates, else to
     /// a hundredth of a step of the lattice.
     pub decimals: usize,
+    /// GLB with meshopt compression.
+    pub compress: bool,
 }
 
 impl Mesh {

@@ -40,12 +40,21 @@ fn known_names() -> String {
     )
 }
 
-/// Checks that the extension of a mesh is known.
+/// Checks that the extension of a mesh is known, and that the format has compression of its own if that is asked
+/// for by `compress`.
 ///
 /// # Errors
 /// [`Error::Parameter`].
-pub(crate) fn check_name(output: &Path) -> Result<()> {
-    format_of(output).map(drop)
+pub(crate) fn check_name(output: &Path, compress: bool) -> Result<()> {
+    let format = format_of(output)?;
+    if compress && (!format.has_compression() || is_compressed(output)) {
+        return Err(Error::Parameter {
+            name: "--compress-glb",
+            found: output.display().to_string(),
+            expected: "a mesh that ends with .glb".into(),
+        });
+    }
+    Ok(())
 }
 
 /// Bytes of the uncompressed file of a mesh; as PLY if the extension of `output` is unknown.

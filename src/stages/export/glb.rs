@@ -17,17 +17,17 @@ pub struct Glb;
 const TRIANGLE: u64 = 12;
 
 /// Numbers of the types of components in glTF.
-const BYTE: u32 = 5121;
-const SHORT: u32 = 5123;
-const INDEX: u32 = 5125;
-const FLOAT: u32 = 5126;
+pub const BYTE: u32 = 5121;
+pub const SHORT: u32 = 5123;
+pub const INDEX: u32 = 5125;
+pub const FLOAT: u32 = 5126;
 
 /// Numbers of the uses of parts of the buffer in glTF.
-const FOR_VERTICES: u32 = 34962;
-const FOR_INDICES: u32 = 34963;
+pub const FOR_VERTICES: u32 = 34962;
+pub const FOR_INDICES: u32 = 34963;
 
 /// The matrix of a node that turns z up into y up, by columns.
-const Y_UP: [i32; 16] = [1, 0, 0, 0, 0, 0, -1, 0, 0, 1, 0, 0, 0, 0, 0, 1];
+pub const Y_UP: [i32; 16] = [1, 0, 0, 0, 0, 0, -1, 0, 0, 1, 0, 0, 0, 0, 0, 1];
 
 impl MeshFormat for Glb {
     fn name(&self) -> &'static str {
@@ -47,11 +47,19 @@ impl MeshFormat for Glb {
         true
     }
 
+    fn has_compression(&self) -> bool {
+        true
+    }
+
     fn holds(&self, mesh: &Mesh, column: &VertexColumn) -> bool {
         mesh.is_colour_or_normal(column)
     }
 
     fn exceeded(&self, mesh: &Mesh) -> Option<Exceeded> {
+        // How large it is if it is compressed is not known before.
+        if mesh.compress {
+            return None;
+        }
         let (found, most) = (self.layout(mesh).bytes, u64::from(u32::MAX));
         (found > most).then_some(Exceeded {
             unit: "bytes",
@@ -66,17 +74,12 @@ impl MeshFormat for Glb {
         let mut json = document(mesh, &record).to_string().into_bytes();
         json.resize(json.len().next_multiple_of(4), b' ');
         let all = 12 + 8 + json.len() as u64 + 8 + binary;
-        let word = |count: u64| u32::try_from(count).unwrap_or(u32::MAX).to_le_bytes();
-        let mut header = Vec::with_capacity(28 + json.len());
-        header.extend_from_slice(b"glTF");
-        header.extend_from_slice(&2u32.to_le_bytes());
-        header.extend_from_slice(&word(all));
-        header.extend_from_slice(&word(json.len() as u64));
-        header.extend_from_slice(b"JSON");
-        header.extend_from_slice(&json);
-        header.extend_from_slice(&word(binary));
-        header.extend_from_slice(b"BIN\0");
-        Layout::of(header, mesh, record.bytes as u64, TRIANGLE)
+        Layout::of(
+            header(&json, all, binary),
+            mesh,
+            record.bytes as u64,
+            TRIANGLE,
+        )
     }
 
     fn put_vertices(
@@ -117,6 +120,29 @@ impl MeshFormat for Glb {
             bytes.extend_from_slice(&corner.to_le_bytes());
         }
     }
+}
+
+/// All before the binary content: `json` is padded already, the file has `all` bytes, of which `binary` follow.
+pub fn header(json: &[u8], all: u64, binary: u64) -> Vec<u8> {
+    let word = |count: u64| u32::try_from(count).unwrap_or(u32::MAX).to_le_bytes();
+    let mut header = Vec::with_capacity(28 + json.len());
+    header.extend_from_slice(b"glTF");
+    header.extend_from_slice(&2u32.to_le_bytes());
+    header.extend_from_slice(&word(all));
+    header.extend_from_slice(&word(json.len() as u64));
+    header.extend_from_slice(b"JSON");
+    header.extend_from_slice(json);
+    header.extend_from_slice(&word(binary));
+    header.extend_from_slice(b"BIN\0");
+    header
+}
+
+/// The material: not metallic, rough, seen from both sides.
+pub fn material() -> Value {
+    json!({
+        "doubleSided": true,
+        "pbrMetallicRoughness": { "metallicFactor": 0, "roughnessFactor": 1 },
+    })
 }
 
 /// The parts of a vertex: its position, then what it has of these.
@@ -221,10 +247,7 @@ fn document(mesh: &Mesh, record: &Record) -> Value {
         "meshes": [{
             "primitives": [{ "attributes": attributes, "indices": 1, "material": 0, "mode": 4 }],
         }],
-        "materials": [{
-            "doubleSided": true,
-            "pbrMetallicRoughness": { "metallicFactor": 0, "roughnessFactor": 1 },
-        }],
+        "materials": [material()],
         "accessors": accessors,
         "bufferViews": [
             {

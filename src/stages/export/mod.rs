@@ -8,15 +8,19 @@ mod bounds;
 mod compressed;
 mod coordinates;
 mod corners;
+mod document;
 mod faces;
 mod file;
 mod format;
 mod formats;
 mod glb;
+mod meshopt;
 mod normals;
 mod number;
 mod obj;
+mod packed;
 mod parts;
+mod piece;
 mod ply;
 mod split;
 mod stl;
@@ -31,6 +35,7 @@ pub use split::{SplitOptions, export_split};
 pub(crate) use split::{is_square_of, remove_unfinished};
 
 use crate::error::{Error, Result};
+use crate::geom::Point;
 use crate::geom::lattice::{Lattice, Shift};
 use crate::stages::attributes::StoredColumns;
 use crate::stages::blocks::Blocks;
@@ -38,7 +43,7 @@ use crate::stages::cut::StoredPieces;
 use crate::stages::ingest::Column;
 use crate::stages::order::PointStore;
 use crate::stages::repair::Repaired;
-use crate::workspace::Workspace;
+use crate::workspace::{Unit, Workspace};
 use coordinates::Coordinates;
 use file::MeshFile;
 use format::{MeshFormat, VertexColumn};
@@ -80,6 +85,8 @@ pub struct ExportOptions<'a> {
     pub columns: Option<&'a StoredColumns>,
     /// Decimals of coordinates as text.
     pub decimals: usize,
+    /// Meshopt compression, in formats that have it.
+    pub compress: bool,
 }
 
 impl<'a> ExportOptions<'a> {
@@ -94,6 +101,7 @@ impl<'a> ExportOptions<'a> {
             normals: false,
             decimals: 3,
             columns: None,
+            compress: false,
         }
     }
 }
@@ -129,12 +137,14 @@ pub fn export(
         });
     }
     let (format, mut mesh) = options.mesh(&stats)?;
+    let mut bounds = None;
     if format.wants_bounds() {
-        let bounds = bounds::bounds(store, &parts.numbering, workspace)?;
+        let found = bounds::bounds(store, &parts.numbering, workspace)?;
         let in_file = options.in_file(lattice);
-        mesh.bounds = Some(bounds.map(|corner| in_file.of(corner)));
+        mesh.bounds = Some(found.map(|corner| in_file.of(corner)));
+        bounds = Some(found);
     }
-    let parts = write(store, parts, lattice, mesh, &options, workspace)?;
+    let parts = write(store, parts, lattice, (mesh, bounds), &options, workspace)?;
     parts.numbering.release(workspace)?;
     Ok(stats)
 }
@@ -160,6 +170,7 @@ pub fn export_cut(
     let (_, mut mesh) = options.mesh(&parts.stats())?;
     let in_file = options.in_file(lattice);
     mesh.bounds = Some(tile.bounds.map(|corner| in_file.of(corner)));
+    let mesh = (mesh, Some(tile.bounds));
     write(store, parts, lattice, mesh, &options, workspace)?;
     Ok(parts.stats())
 }
@@ -180,6 +191,7 @@ impl ExportOptions<'_> {
             origin: self.origin.map(|shift| shift.origin),
             bounds: None,
             decimals: self.decimals,
+            compress: self.compress,
         };
         // Columns that the format does not hold are not made.
         mesh.columns = mesh
@@ -189,6 +201,11 @@ impl ExportOptions<'_> {
             .cloned()
             .collect();
         Ok((format, mesh))
+    }
+
+    /// True if the mesh is compressed, so that its parts are written in their order.
+    fn in_order(&self) -> bool {
+        self.compress || is_compressed(self.output)
     }
 
     /// The coordinates in the file.
@@ -213,12 +230,12 @@ fn of_points(columns: Option<&StoredColumns>) -> impl Iterator<Item = &Column> {
     columns.into_iter().flat_map(StoredColumns::columns)
 }
 
-/// Writes the file of a mesh; returns its parts.
+/// Writes the file of a mesh, of whose vertices the bounds may be known; returns its parts.
 fn write<P: Parts>(
     store: &PointStore,
     parts: P,
     lattice: &Lattice,
-    mesh: Mesh,
+    (mesh, bounds): (Mesh, Option<[Point; 2]>),
     options: &ExportOptions<'_>,
     workspace: &Workspace,
 ) -> Result<P> {
@@ -230,16 +247,27 @@ fn write<P: Parts>(
         columns: options.held(&mesh),
         normals: mesh.normals().is_some(),
         coordinates: options.in_file(lattice),
+        bounds,
         file: MeshFile::open(output, format_of(output)?, mesh, workspace)?,
     };
-    match is_compressed(output) {
-        true => workspace.once("compress", |unit| {
-            compressed::write(&writer, unit, workspace)
-        })?,
+    match options.in_order() {
+        true => workspace.once("compress", |unit| in_order(&writer, unit, workspace))?,
         false => writer.write(workspace)?,
     }
     writer.file.finish()?;
     Ok(writer.parts)
+}
+
+/// Writes a compressed mesh.
+fn in_order<P: Parts>(
+    writer: &Writer<'_, P>,
+    unit: &Unit<'_>,
+    workspace: &Workspace,
+) -> Result<()> {
+    match writer.file.mesh().compress {
+        true => packed::write(writer, unit, workspace),
+        false => compressed::write(writer, unit, workspace),
+    }
 }
 
 const NO_TRIANGLES: &str = "no three cells agree on one that belongs to a component large enough; \

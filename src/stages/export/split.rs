@@ -3,11 +3,11 @@
 //! The meshes are written under temporary names, all pieces in parallel. When all are complete they get their
 //! names, the index last: if it is there, everything is.
 
-use super::file::{MeshFile, folder_of, is_compressed, temporary, temporary_of};
+use super::file::{MeshFile, folder_of, temporary, temporary_of};
 use super::formats::{check_size, format_of};
 use super::parts::{OfTile, Parts};
 use super::write::Writer;
-use super::{ExportOptions, MeshStats, NO_TRIANGLES, compressed};
+use super::{ExportOptions, MeshStats, NO_TRIANGLES, in_order};
 use crate::error::{Error, Result};
 use crate::geom::lattice::Lattice;
 use crate::stages::cut::{Pieces, Square, StoredPieces, Tile};
@@ -134,11 +134,11 @@ pub fn export_split(
         }
         Ok(())
     })?;
-    if is_compressed(options.output) {
+    if options.in_order() {
         for tile in pieces.tiles() {
             let step = format!("compress {}", name_of(tile.square));
             workspace.once(&step, |unit| {
-                compressed::write(&split_up.writer(tile)?, unit, workspace)
+                in_order(&split_up.writer(tile)?, unit, workspace)
             })?;
         }
     } else {
@@ -183,7 +183,7 @@ impl Split<'_> {
         let free = limits::disk_free(folder).filter(|free| *free < bytes);
         // What an earlier attempt wrote takes space already, and a compressed mesh takes less.
         let new = self.workspace.places(&self.first_name()).is_empty();
-        match free.filter(|_| new && !is_compressed(self.options.output)) {
+        match free.filter(|_| new && !self.options.in_order()) {
             Some(free) => Err(Error::Disk {
                 path: self.options.output.to_path_buf(),
                 needed: bytes,
@@ -222,6 +222,7 @@ impl Split<'_> {
             columns: self.options.held(&mesh),
             normals: mesh.normals().is_some(),
             coordinates: self.options.in_file(self.lattice),
+            bounds: Some(tile.bounds),
             file: MeshFile::one_of_several(&path, temporary, name, format, mesh, self.workspace)?,
         })
     }

@@ -24,6 +24,8 @@ pub struct Writer<'a, P> {
     pub normals: bool,
     /// The coordinates in the file.
     pub coordinates: Coordinates<'a>,
+    /// Lowest and highest positions of the vertices, if the format wants them.
+    pub bounds: Option<[Point; 2]>,
     /// The file.
     pub file: MeshFile<'a>,
 }
@@ -94,6 +96,14 @@ impl<P: Parts> Writer<'_, P> {
         }
     }
 
+    /// Number of a part's first triangle.
+    pub fn first_triangle(&self, part: usize) -> u64 {
+        match part < self.parts.count() {
+            true => self.parts.firsts(part)[2],
+            false => self.parts.stats().triangles,
+        }
+    }
+
     /// Encodes a slice.
     pub fn encode(&self, unit: &Unit<'_>, slice: usize, bytes: &mut Vec<u8>) -> Result<()> {
         let (kind, part) = (slice / self.parts.count(), slice % self.parts.count());
@@ -143,7 +153,7 @@ impl<P: Parts> Writer<'_, P> {
     }
 
     /// The values of points with ascending `ids`: their normals, if any, and their columns.
-    fn values(
+    pub fn values(
         &self,
         unit: &Unit<'_>,
         ids: &[u32],

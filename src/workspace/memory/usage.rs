@@ -7,6 +7,14 @@ use std::collections::HashMap;
 /// Smaller changes are not reported at once.
 const STEP: u64 = 64 << 10;
 
+impl MemoryPool {
+    /// Bytes held now, with those of the program.
+    #[must_use]
+    pub fn held(&self) -> u64 {
+        self.state().held.sum
+    }
+}
+
 /// The reservation of a unit of work and what it holds of it.
 #[derive(Debug, Default)]
 pub(in crate::workspace) struct Usage {

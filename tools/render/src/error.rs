@@ -28,12 +28,6 @@ pub(crate) enum Error {
         found: String,
         expected: &'static str,
     },
-    /// The image could not be encoded.
-    #[error("{path}: cannot write the PNG: {source}", path = path.display())]
-    Png {
-        path: PathBuf,
-        source: png::EncodingError,
-    },
 }
 
 impl Error {

@@ -1,28 +1,19 @@
 //! Draws a PLY mesh or cloud into a PNG. Front faces are warm grey and back faces blue, so that
 //! turned triangles stand out.
 
-mod camera;
 mod edges;
 mod error;
-mod raster;
 mod scene;
 mod shade;
-mod vec3;
 
-use std::{
-    fs::File,
-    io::BufWriter,
-    path::{Path, PathBuf},
-    process::ExitCode,
-};
+use std::{path::PathBuf, process::ExitCode};
 
-use camera::{Camera, Framing, View};
 use clap::Parser;
 use error::{Error, Result};
-use raster::{Mark, Raster};
+use outcrop_raster::vec3::{cross, dot, sub};
+use outcrop_raster::{Camera, Framing, Mark, Raster, Vec3, View, picture};
 use scene::Scene;
-use shade::Shader;
-use vec3::Vec3;
+use shade::{Shader, value_of};
 
 /// Draws a PLY mesh or cloud into a PNG. Front faces (counter-clockwise) are warm grey, back faces
 /// blue; points are coloured by height.
@@ -158,35 +149,51 @@ fn run(args: &Args) -> Result<()> {
     let framing = Framing {
         size: [args.width * factor, args.height * factor],
         zoom: args.zoom,
-        centre: args.center.0.map(|centre| vec3::sub(centre, mesh.origin)),
+        centre: args.center.0.map(|centre| sub(centre, mesh.origin)),
         crop: args.crop_percentile,
     };
     let camera = Camera::new(args.view, framing, &mesh.positions);
-    let mut raster = Raster::new(framing.size[0], framing.size[1]);
+    let raster = Raster::new(framing.size[0], framing.size[1]);
     if mesh.triangles.is_empty() {
-        raster.points(
-            &camera,
-            &mesh.positions,
-            (args.point_size * factor as f64).max(1.0),
-        );
+        let size = (args.point_size * factor as f64).max(1.0);
+        for (number, &p) in mesh.positions.iter().enumerate() {
+            raster.point(camera.project(p), size, value_of(number as u32));
+        }
         println!("{} points", mesh.positions.len());
     } else {
-        raster.triangles(&camera, &mesh.positions, &mesh.triangles, args.cull);
+        triangles(&mesh, &camera, &raster, args.cull);
         println!(
             "{} vertices, {} triangles",
             mesh.positions.len(),
             mesh.triangles.len()
         );
-        overlay(args, &mesh, &camera, &mut raster);
+        overlay(args, &mesh, &camera, &raster);
     }
     let image = Shader::new(&mesh, &camera, &raster).image(&raster, factor);
-    write_png(&args.output, args.width as u32, args.height as u32, &image)
+    let png = picture::png(args.width as u32, args.height as u32, &image, true);
+    let png =
+        png.map_err(|why| Error::io(&args.output, "make the PNG", std::io::Error::other(why)))?;
+    std::fs::write(&args.output, png).map_err(|e| Error::io(&args.output, "write", e))
+}
+
+/// Draws all triangles; with `cull` only those that face the viewer.
+fn triangles(mesh: &Scene, camera: &Camera, raster: &Raster, cull: bool) {
+    for (number, triangle) in mesh.triangles.iter().enumerate() {
+        let corners = triangle.map(|v| mesh.positions[v as usize]);
+        let [a, b, c] = corners;
+        if cull && dot(cross(sub(b, a), sub(c, a)), camera.towards) <= 0.0 {
+            continue;
+        }
+        raster.triangle(corners.map(|p| camera.project(p)), || {
+            value_of(number as u32)
+        });
+    }
 }
 
 /// Draws wires and special edges.
-fn overlay(args: &Args, mesh: &Scene, camera: &Camera, raster: &mut Raster) {
+fn overlay(args: &Args, mesh: &Scene, camera: &Camera, raster: &Raster) {
     let factor = args.supersample as f64;
-    let mut line = |[a, b]: [u32; 2], mark: Mark, thickness: f64| {
+    let line = |[a, b]: [u32; 2], mark: Mark, thickness: f64| {
         let ends = [a, b].map(|v| mesh.positions[v as usize]);
         raster.line(camera, ends, mark, thickness);
     };
@@ -213,24 +220,6 @@ fn overlay(args: &Args, mesh: &Scene, camera: &Camera, raster: &mut Raster) {
             .iter()
             .for_each(|&edge| line(edge, Mark::NonManifold, 2.5 * factor));
     }
-}
-
-fn write_png(path: &Path, width: u32, height: u32, rgb: &[u8]) -> Result<()> {
-    let png = |source| match source {
-        png::EncodingError::IoError(source) => Error::io(path, "write", source),
-        source => Error::Png {
-            path: path.to_path_buf(),
-            source,
-        },
-    };
-    let file = File::create(path).map_err(|e| Error::io(path, "create the file", e))?;
-    let mut encoder = png::Encoder::new(BufWriter::new(file), width, height);
-    encoder.set_color(png::ColorType::Rgb);
-    encoder.set_depth(png::BitDepth::Eight);
-    encoder.set_compression(png::Compression::High);
-    let mut writer = encoder.write_header().map_err(png)?;
-    writer.write_image_data(rgb).map_err(png)?;
-    writer.finish().map_err(png)
 }
 
 fn main() -> ExitCode {

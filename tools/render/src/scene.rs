@@ -1,8 +1,8 @@
 //! The mesh or cloud of a PLY file, relative to its centre.
 
 use crate::error::{Error, Result};
-use crate::vec3::{Vec3, sub};
 use outcrop_ply::Mesh;
+use outcrop_raster::vec3::{Vec3, sub};
 use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;

@@ -1,14 +1,15 @@
 //! The view: direction, framing, projection.
 
-use std::str::FromStr;
-
 use crate::vec3::{Vec3, cross, dot, sub};
+use std::str::FromStr;
 
 /// Viewing direction, as azimuth and elevation of the camera in degrees.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct View {
-    azimuth: f64,
-    elevation: f64,
+pub struct View {
+    /// Angle in the plane of x and y, from x towards y.
+    pub azimuth: f64,
+    /// Angle above that plane.
+    pub elevation: f64,
 }
 
 impl FromStr for View {
@@ -36,7 +37,7 @@ impl FromStr for View {
 
 /// Part of the scene in the image.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Framing {
+pub struct Framing {
     /// Size of the image in pixels.
     pub size: [usize; 2],
     /// Magnification after fitting.
@@ -49,8 +50,10 @@ pub(crate) struct Framing {
 
 /// An orthographic camera.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Camera {
+pub struct Camera {
+    /// Direction to the right of the image.
     pub right: Vec3,
+    /// Direction to the top of the image.
     pub up: Vec3,
     /// Direction from the scene to the viewer.
     pub towards: Vec3,
@@ -70,7 +73,9 @@ const CROP_MARGIN: f64 = 0.15;
 const FRAMING_SAMPLES: usize = 1 << 21;
 
 impl Camera {
-    pub(crate) fn new(view: View, framing: Framing, positions: &[Vec3]) -> Self {
+    /// A camera that sees all `positions`, as far as the framing says so.
+    #[must_use]
+    pub fn new(view: View, framing: Framing, positions: &[Vec3]) -> Self {
         let (sin_a, cos_a) = view.azimuth.to_radians().sin_cos();
         let (sin_e, cos_e) = view.elevation.to_radians().sin_cos();
         let towards = [cos_a * cos_e, sin_a * cos_e, sin_e];
@@ -95,8 +100,16 @@ impl Camera {
         }
     }
 
+    /// The position at the middle of the image.
+    #[must_use]
+    pub fn centre(&self) -> Vec3 {
+        self.centre
+    }
+
     /// Pixel coordinates, and depth in units, increasing towards the viewer.
-    pub(crate) fn project(&self, p: Vec3) -> Vec3 {
+    #[must_use]
+    #[inline]
+    pub fn project(&self, p: Vec3) -> Vec3 {
         let p = sub(p, self.centre);
         [
             self.middle[0] + self.scale * dot(p, self.right),
@@ -115,7 +128,8 @@ fn framed(positions: &[Vec3], axis: Vec3, crop: f64) -> [f64; 2] {
 }
 
 /// Extent of the positions along an axis without the outermost `crop` percent on both sides.
-pub(crate) fn span(positions: &[Vec3], axis: Vec3, crop: f64) -> [f64; 2] {
+#[must_use]
+pub fn span(positions: &[Vec3], axis: Vec3, crop: f64) -> [f64; 2] {
     let stride = positions.len().div_ceil(FRAMING_SAMPLES).max(1);
     let along = positions.iter().step_by(stride).map(|&p| dot(p, axis));
     let mut values: Vec<f64> = along.filter(|value| value.is_finite()).collect();

@@ -1,0 +1,199 @@
+//! `outcrop view`: a mesh in the browser.
+
+use super::args::{Again, Limits};
+use super::output::print;
+use super::parse::size;
+use super::{stop, style};
+use crate::error::{Error, Result};
+use crate::pipeline::Tiles;
+use crate::pipeline::{default_memory, default_threads};
+use crate::view::{Server, write_html};
+use crate::workspace::progress::{Cancel, Observer};
+use clap::Args as ClapArgs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::sync::Arc;
+use std::time::Duration;
+
+/// Time between two looks whether the program is to end.
+const WAIT: Duration = Duration::from_millis(100);
+
+/// `outcrop view`
+#[derive(Debug, ClapArgs)]
+#[command(
+    after_help = "The page is served to browsers on this machine only, until Ctrl-C. Nothing is fetched from elsewhere."
+)]
+pub struct View {
+    /// A folder that `outcrop tiles` made, or a mesh (PLY), of which levels of detail are made first
+    #[arg(value_name = "DIR|MESH.ply")]
+    pub mesh: PathBuf,
+    /// Port of the server [default: a free one]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub port: Option<u16>,
+    /// Only print the address, open no browser
+    #[arg(long)]
+    pub no_browser: bool,
+    /// Write one page that shows the coarser levels without a server, for sending, instead of serving
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["port", "no_browser"])]
+    pub html: Option<PathBuf>,
+    /// Largest size of that page
+    #[arg(long, value_name = "SIZE", default_value = "20MB", requires = "html", value_parser = size)]
+    pub html_limit: u64,
+    /// Keep the levels of detail of a mesh for the next time [without a folder: MESH-tiles beside the mesh]
+    #[arg(long, value_name = "DIR", num_args = 0..=1, require_equals = true)]
+    pub keep: Option<Option<PathBuf>>,
+    #[command(flatten)]
+    pub limits: Limits,
+    #[command(flatten)]
+    pub again: Again,
+}
+
+/// Shows a mesh until a signal comes, or writes the page.
+pub fn run(args: &View) -> Result<bool> {
+    let (observer, cancel) = stop::watched(args.limits.quiet);
+    let shown = Shown::of(args, observer, &cancel)?;
+    if let Some(page) = &args.html {
+        return write(&shown.folder, page, args.html_limit, args.limits.quiet);
+    }
+    let server = Server::start(&shown.folder, args.port)?;
+    let url = server.url();
+    print(&url)?;
+    if !args.limits.quiet {
+        eprintln!(
+            "outcrop: {} is shown there; Ctrl-C ends it",
+            args.mesh.display()
+        );
+    }
+    if !args.no_browser {
+        open(&url);
+    }
+    while !cancel.is_cancelled() {
+        std::thread::sleep(WAIT);
+    }
+    server.stop();
+    Ok(true)
+}
+
+/// The folder that is shown.
+struct Shown {
+    folder: PathBuf,
+    /// Deleted at the end, if the levels of detail are not to be kept.
+    _scratch: Option<tempfile::TempDir>,
+}
+
+impl Shown {
+    /// The folder of the arguments, or one with levels of detail that are made.
+    fn of(args: &View, observer: Arc<dyn Observer>, cancel: &Cancel) -> Result<Self> {
+        let mesh = &args.mesh;
+        let tileset = mesh.file_name().is_some_and(|name| name == "tileset.json");
+        if mesh.is_dir() || tileset {
+            let folder = match mesh.parent().filter(|_| !mesh.is_dir()) {
+                Some(parent) if parent.as_os_str().is_empty() => PathBuf::from("."),
+                Some(parent) => parent.to_path_buf(),
+                None => mesh.clone(),
+            };
+            return Ok(Self {
+                folder,
+                _scratch: None,
+            });
+        }
+        let beside = mesh
+            .parent()
+            .filter(|parent| !parent.as_os_str().is_empty());
+        let beside = beside.unwrap_or(Path::new("."));
+        // A mesh that is not there is an error of the tiles, and not of the folder beside it.
+        let (folder, scratch) = match &args.keep {
+            Some(kept) => (kept.clone().unwrap_or_else(|| tiles_of(mesh)), None),
+            None => {
+                let place = args.limits.scratch.as_deref().unwrap_or(beside);
+                let made = scratch(place)?;
+                (made.path().join("tiles"), Some(made))
+            }
+        };
+        if scratch.is_some() || !is_newer(&folder.join("tileset.json"), mesh) {
+            let limits = &args.limits;
+            let place = scratch.as_ref().map(tempfile::TempDir::path);
+            let mut tiles = Tiles::new(mesh, &folder)
+                .memory(limits.memory.unwrap_or_else(default_memory))
+                .threads(limits.threads.map_or_else(default_threads, usize::from))
+                .storage(limits.storing.storage())
+                .start(args.again.start())
+                .observer(observer)
+                .cancel(cancel.clone());
+            if let Some(place) = place.or(limits.scratch.as_deref()) {
+                tiles = tiles.scratch(place);
+            }
+            tiles.run()?;
+        }
+        Ok(Self {
+            folder,
+            _scratch: scratch,
+        })
+    }
+}
+
+/// A folder for what is deleted at the end: here, or where temporary files go if nothing can be written here.
+fn scratch(place: &Path) -> Result<tempfile::TempDir> {
+    let make = |place: &Path| {
+        tempfile::Builder::new()
+            .prefix("outcrop-view-")
+            .tempdir_in(place)
+    };
+    make(place)
+        .or_else(|_| make(&std::env::temp_dir()))
+        .map_err(|e| Error::io(place, "make a folder", e))
+}
+
+/// The folder where the levels of detail of a mesh are kept.
+fn tiles_of(mesh: &Path) -> PathBuf {
+    let mut name = mesh.file_stem().unwrap_or_default().to_os_string();
+    name.push("-tiles");
+    mesh.with_file_name(name)
+}
+
+/// True if a file was made after another one.
+fn is_newer(file: &Path, other: &Path) -> bool {
+    let modified = |path: &Path| path.metadata().and_then(|about| about.modified()).ok();
+    matches!((modified(file), modified(other)), (Some(file), Some(other)) if file > other)
+}
+
+fn write(folder: &Path, page: &Path, limit: u64, quiet: bool) -> Result<bool> {
+    let embedded = write_html(folder, page, limit)?;
+    if !quiet {
+        print(&format!(
+            "{}: {}, {} of {} tiles, {} of {} triangles",
+            page.display(),
+            style::bytes(embedded.bytes),
+            style::grouped(embedded.tiles),
+            style::grouped(embedded.of_tiles),
+            style::grouped(embedded.triangles),
+            style::grouped(embedded.of_triangles),
+        ))?;
+    }
+    Ok(true)
+}
+
+/// Opens a browser, if there is one.
+fn open(url: &str) {
+    let (program, before): (&str, &[&str]) = if cfg!(target_os = "macos") {
+        ("open", &[])
+    } else if cfg!(windows) {
+        ("cmd", &["/C", "start", ""])
+    } else {
+        let screen = |name| std::env::var_os(name).is_some_and(|value| !value.is_empty());
+        if !["DISPLAY", "WAYLAND_DISPLAY"].into_iter().any(screen) {
+            return;
+        }
+        ("xdg-open", &[])
+    };
+    let mut command = Command::new(program);
+    command.args(before).arg(url);
+    let silent = command
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null());
+    if let Ok(mut child) = silent.spawn() {
+        // It may stay for as long as the browser does.
+        std::thread::spawn(move || child.wait());
+    }
+}

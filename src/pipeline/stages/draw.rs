@@ -1,0 +1,91 @@
+//! The report, and its pictures.
+
+use super::{Shape, Stages};
+use crate::error::{Error, Result};
+use crate::geom::lattice::Lattice;
+use crate::report::{Details, Drawn, Report};
+use crate::stages::cut::StoredPieces;
+use crate::stages::draw::{Finished, Subject, draw};
+use crate::stages::order::PointStore;
+use crate::stages::repair::Repaired;
+use crate::workspace::course::Course;
+use crate::workspace::limits;
+
+impl Stages<'_> {
+    /// Draws the mesh, if pictures are wanted. What it reads is deleted with the folder: a run that was resumed
+    /// may want pictures when all else is finished.
+    pub fn draw(
+        &mut self,
+        store: &PointStore,
+        shape: &Shape,
+        repaired: &Repaired,
+        pieces: Option<&StoredPieces>,
+        lattice: &Lattice,
+    ) -> Result<()> {
+        if !self.job.pictures {
+            return Ok(());
+        }
+        let (workspace, blocks) = (self.workspace, self.blocks());
+        let neighbors = self.job.params.neighbors;
+        let (finished, items) = match pieces {
+            Some(pieces) => (Finished::Cut(pieces), pieces.count()),
+            None => (Finished::Whole(repaired), blocks.count()),
+        };
+        let subject = Subject {
+            store,
+            finished,
+            blocks,
+            step: lattice.step,
+            spacings: shape.spacings.as_ref().map(|s| (s, neighbors)),
+        };
+        workspace.trim();
+        let work = || draw(subject, workspace);
+        let drawn = match self.clock.stage("draw", "blocks", items as u64, work) {
+            // The mesh is finished, and its report can be written without them.
+            Err(error @ Error::Memory { .. }) => {
+                self.warn(format!("no pictures in the report: {error}"));
+                return Ok(());
+            }
+            drawn => drawn?,
+        };
+        let Drawn {
+            pictures,
+            edges,
+            loops,
+            many_loops,
+            components,
+            spacings,
+        } = drawn;
+        self.report.pictures = pictures;
+        self.report.details = Some(Details {
+            edges,
+            loops,
+            many_loops,
+            components,
+            spacings,
+            ..Details::default()
+        });
+        Ok(())
+    }
+
+    /// The report of the run.
+    pub fn report(mut self) -> Report {
+        let memory = &self.job.memory;
+        if let Some(details) = &mut self.report.details {
+            details.begun = std::mem::take(&mut self.clock.begun);
+            details.course = self.course.as_ref().map_or_else(Vec::new, Course::samples);
+        }
+        Report {
+            peak_resident_bytes: limits::peak_resident(),
+            resident_file_bytes: limits::resident_file(),
+            peak_held_bytes: memory.peak_held(),
+            held_at_peak: memory.held_at_peak(),
+            peak_reserved_bytes: memory.peak(),
+            reserved_at_peak: memory.at_peak(),
+            peak_scratch_bytes: self.workspace.io.scratch_peak(),
+            seconds: self.begin.elapsed().as_secs_f64() + self.clock.earlier,
+            stages: self.clock.stages,
+            ..self.report
+        }
+    }
+}
