@@ -14,7 +14,7 @@
 //! # std::fs::write(&cloud, points.collect::<String>())?;
 //! let report = Reconstruction::builder()
 //!     .input(cloud) // LAS, LAZ, E57, PLY, PCD, PTX or text, or a folder
-//!     .output(mesh) // PLY, OBJ, STL or GLB
+//!     .output(mesh) // PLY, OBJ, STL or GLB; or DIR/tileset.json
 //!     .params(Params { neighbors: 20, ..Params::default() })
 //!     .memory(256 << 20) // the ceiling, in bytes
 //!     .build()?
@@ -47,6 +47,8 @@
 //!
 //! `examples/reconstruct.rs` shows progress ([`Observer`]) and cancellation ([`Cancel`]).
 //!
+//! [`Tiles`] makes levels of detail of a mesh, of any size, for viewers of 3D Tiles.
+//!
 //! [`inspect`] describes a cloud, checks that a mesh is a manifold, and measures the distance between two
 //! shapes. [`Report`] has the counts and measurements of a run. [`page`] puts all of these into pages with
 //! pictures.
@@ -63,7 +65,6 @@ mod histogram;
 pub mod inspect;
 #[doc(hidden)]
 pub mod kernels;
-#[doc(hidden)]
 pub mod levels;
 mod method;
 pub mod page;
@@ -83,7 +84,7 @@ pub mod workspace;
 
 pub use error::{Error, Result};
 pub use params::{Division, MaxWidth, Method, Origin, Params, Radius, Region, Smoothing};
-pub use pipeline::{Builder, Reconstruction, Start, default_memory, default_threads};
+pub use pipeline::{Builder, Reconstruction, Start, Tiles, default_memory, default_threads};
 pub use report::{DiskEstimate, Report};
 pub use stages::ingest::Classes;
 pub use workspace::Workspace;

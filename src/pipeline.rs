@@ -12,8 +12,10 @@ mod outlook;
 mod shared;
 mod stages;
 mod start;
+mod tiles;
 
 use crate::error::Result;
+use crate::levels;
 use crate::params::Params;
 use crate::report::Report;
 use crate::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
@@ -29,15 +31,20 @@ pub use shared::{
 };
 use stages::Stages;
 pub use start::Start;
-pub(crate) use start::scratch_folder;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
+pub use tiles::Tiles;
 
 /// A reconstruction that is ready to run, made by [`Reconstruction::builder`].
 pub struct Reconstruction {
     inputs: Vec<PathBuf>,
+    /// The mesh: of a tileset one in the scratch's place, which is deleted at the end.
     output: PathBuf,
+    /// The output that was asked for.
+    target: PathBuf,
+    /// The folder of the tileset, if that is wanted.
+    tiles: Option<PathBuf>,
     folder: PathBuf,
     params: Params,
     memory: MemoryPool,
@@ -85,10 +92,10 @@ impl Reconstruction {
         builder::unfinished(folder.as_ref())
     }
 
-    /// Path of the mesh.
+    /// Path of the mesh, or of the tileset.
     #[must_use]
     pub fn output(&self) -> &Path {
-        &self.output
+        &self.target
     }
 
     /// Reconstructs the surface and writes the mesh.
@@ -98,6 +105,7 @@ impl Reconstruction {
     /// run can be resumed, see [`Reconstruction::is_unfinished`].
     pub fn run(&self) -> Result<Report> {
         writable(&self.output)?;
+        self.tiles.as_deref().map_or(Ok(()), levels::check_folder)?;
         not_an_input(&self.output, self.params.split.is_some(), &self.inputs)?;
         one_system(&self.params, &self.inputs)?;
         let _alarm = self
@@ -136,6 +144,7 @@ impl Reconstruction {
             &lattice,
         )?;
         stages.draw(&store, &shape, &repaired, pieces.as_ref(), &lattice)?;
+        stages.levels()?;
         Ok(stages.report())
     }
 }

@@ -1,6 +1,7 @@
 //! The report of a run: the content of `--report`.
 
 use crate::histogram;
+use crate::levels::TilesReport;
 use crate::params::Params;
 use crate::picture;
 pub use crate::stages::cells::CellStats;
@@ -67,6 +68,8 @@ pub struct Report {
     pub cut: CutStats,
     /// The mesh.
     pub mesh: MeshStats,
+    /// Levels of detail, if they were made.
+    pub tiles: Option<TilesReport>,
     /// Type of the coordinates in the file.
     pub coordinates: CoordinateType,
     /// The position of the cloud that is the origin of the mesh's coordinates; none if that is the same as the

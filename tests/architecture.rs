@@ -22,7 +22,7 @@ const MAY_USE: &[(&str, &str)] = &[
          workspace",
     ),
     ("kernels", ""),
-    ("levels", "inspect pipeline spill stages/ingest workspace"),
+    ("levels", "inspect spill stages/ingest workspace"),
     ("method", ""),
     (
         "params",
@@ -30,8 +30,8 @@ const MAY_USE: &[(&str, &str)] = &[
     ),
     ("page", "histogram inspect picture report"),
     ("picture", ""),
-    ("pipeline", "geom method params report stages/* workspace"),
-    ("report", "histogram params picture stages/* workspace"),
+    ("pipeline", "geom levels method params report stages/* workspace"),
+    ("report", "histogram levels params picture stages/* workspace"),
     ("spill", "workspace"),
     (
         "stages/attributes",

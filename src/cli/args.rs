@@ -234,7 +234,8 @@ pub struct Job {
     /// Files (LAS, LAZ, E57, PLY, PCD, PTX, XYZ text; also as .gz and .zst) or folders of files; together they are one cloud
     #[arg(value_name = "INPUT", required = true)]
     pub inputs: Vec<PathBuf>,
-    /// The mesh to write: .ply, .obj, .stl or .glb (all but OBJ binary), compressed with .zst behind it
+    /// The mesh to write: .ply, .obj, .stl or .glb (all but OBJ binary), compressed with .zst behind it; or
+    /// DIR/tileset.json for levels of detail
     #[arg(long, short, value_name = "MESH.ply")]
     pub output: PathBuf,
     /// Write a normal for each vertex (PLY, OBJ, GLB)

@@ -1,6 +1,8 @@
 //! The commands.
 
-use super::args::{Compare, Demo, Ends, Info, Limits, Reconstruct, Resume, Tiles, Verify};
+use super::args::{
+    Compare, Demo, Ends, Info, Limits, Reconstruct, Resume, Tiles as TilesArgs, Verify,
+};
 use super::command::Command;
 use super::output::{NewFile, is_page, print, report_text, show, summary, write_report};
 use super::{shared, stop, style, view};
@@ -8,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::inspect::{compare, info, verify};
 use crate::levels;
 use crate::page;
-use crate::pipeline::{Builder, Reconstruction, Start, default_memory, default_threads};
+use crate::pipeline::{Builder, Reconstruction, Start, Tiles, default_memory, default_threads};
 use crate::workspace::Workspace;
 use crate::workspace::memory::MemoryPool;
 use crate::workspace::progress::{Cancel, Silent};
@@ -160,13 +162,13 @@ fn measure(args: &Compare) -> Result<bool> {
     Ok(true)
 }
 
-fn tiles(args: &Tiles) -> Result<bool> {
+fn tiles(args: &TilesArgs) -> Result<bool> {
     let (observer, cancel) = stop::watched(args.limits.quiet);
     let options = levels::Options {
         geo: args.geo,
         most_triangles: args.most_triangles,
     };
-    let mut tiles = levels::Tiles::new(&args.mesh, &args.output)
+    let mut tiles = Tiles::new(&args.mesh, &args.output)
         .options(options)
         .memory(memory(&args.limits))
         .threads(threads(&args.limits))

@@ -5,7 +5,7 @@ use super::output::print;
 use super::parse::size;
 use super::{stop, style};
 use crate::error::{Error, Result};
-use crate::levels::Tiles;
+use crate::pipeline::Tiles;
 use crate::pipeline::{default_memory, default_threads};
 use crate::view::{Server, write_html};
 use crate::workspace::progress::{Cancel, Observer};

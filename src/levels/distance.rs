@@ -1,7 +1,7 @@
 //! The distance between a tile and its children, measured both ways.
 //!
-//! From the finer surface to the coarser it is measured at all vertices, and at the centres of triangles that are
-//! larger than the distance found so far; from the coarser to the finer at points all over its triangles, about as
+//! From the finer surface to the coarser it is measured at all vertices, at the centres of all triangles and in the
+//! middles of their edges; from the coarser to the finer at points all over its triangles, about as
 //! dense as the vertices of the finer. Each is the exact distance of a point to the nearest triangle. Only the
 //! largest matters, so points that are certainly nearer are passed over.
 
@@ -29,7 +29,40 @@ struct Grid<'a> {
     side: f64,
     size: [usize; 3],
     starts: Vec<u32>,
-    triangles: Vec<u32>,
+    /// The triangles of the cells, with balls around them.
+    triangles: Vec<Ball>,
+}
+
+/// A triangle and a ball that holds it.
+#[derive(Clone, Copy, Default)]
+struct Ball {
+    middle: [f32; 3],
+    radius: f32,
+    triangle: u32,
+}
+
+impl Ball {
+    fn of(corners: [V3; 3], triangle: u32) -> Self {
+        let middle = between(corners, [1.0 / 3.0; 3]).map(|x| x as f32);
+        let reach = corners.map(|c| {
+            (0..3)
+                .map(|k| (c[k] - f64::from(middle[k])).powi(2))
+                .sum::<f64>()
+        });
+        let radius = reach.into_iter().fold(0.0, f64::max).sqrt();
+        Self {
+            middle,
+            radius: radius as f32 * 1.000_01,
+            triangle,
+        }
+    }
+
+    /// True if all of it is certainly farther from `p` than `most`.
+    fn is_farther(&self, p: V3, most: f64) -> bool {
+        let reach = most + f64::from(self.radius);
+        let from = (0..3).map(|k| (p[k] - f64::from(self.middle[k])).powi(2));
+        from.sum::<f64>() > reach * reach
+    }
 }
 
 fn longest([a, b, c]: [V3; 3]) -> f64 {
@@ -76,10 +109,11 @@ impl<'a> Grid<'a> {
             self.around(number, |cell| starts[cell + 2] += 1);
         }
         (2..cells + 2).for_each(|cell| starts[cell] += starts[cell - 1]);
-        let mut triangles = vec![0; starts[cells + 1] as usize];
+        let mut triangles = vec![Ball::default(); starts[cells + 1] as usize];
         for number in 0..self.surface.triangles.len() {
+            let ball = Ball::of(self.surface.corners(number), number as u32);
             self.around(number, |cell| {
-                triangles[starts[cell + 1] as usize] = number as u32;
+                triangles[starts[cell + 1] as usize] = ball;
                 starts[cell + 1] += 1;
             });
         }
@@ -114,28 +148,33 @@ impl<'a> Grid<'a> {
 
     /// The distance to the nearest triangle if it is more than `enough`; otherwise any number up to that.
     fn distance(&self, p: V3, enough: f64) -> f64 {
-        let (middle, enough) = (self.cell(p), enough * enough);
+        let middle = self.cell(p);
         let mut best = f64::INFINITY;
         let farthest = self.size.iter().max().copied().unwrap_or(1);
         for ring in 0..=farthest {
             // Whatever is in no cell yet looked at is farther than the cells between.
             let between = ring.saturating_sub(1) as f64 * self.side;
-            if best <= between * between {
+            if best <= between {
                 break;
             }
             self.ring(middle, ring, |cell| {
-                for &number in
-                    &self.triangles[self.starts[cell] as usize..self.starts[cell + 1] as usize]
-                {
-                    best = best.min(distance2(&self.surface.corners(number as usize), p));
+                let range = self.starts[cell] as usize..self.starts[cell + 1] as usize;
+                for ball in &self.triangles[range] {
+                    if !ball.is_farther(p, best) {
+                        let corners = self.surface.corners(ball.triangle as usize);
+                        best = best.min(distance2(&corners, p).sqrt());
+                        if best <= enough {
+                            return true;
+                        }
+                    }
                 }
-                best <= enough
+                false
             });
             if best <= enough {
                 break;
             }
         }
-        best.sqrt()
+        best
     }
 
     /// Calls `each` with the cells at this distance from one, counted in cells, until it returns true.
@@ -168,7 +207,7 @@ impl<'a> Grid<'a> {
 const REACH: f64 = 0.577_350_27;
 
 /// Most parts into which an edge of a coarse triangle is divided by points.
-const PARTS: usize = 4;
+const PARTS: usize = 6;
 
 /// The largest distance of points of either surface from the other. The coarser has vertices of the finer, in the
 /// same list.
@@ -215,7 +254,10 @@ fn between(corners: [V3; 3], weights: V3) -> V3 {
 /// The largest distance of points of the finer surface from the coarser, to whose corners its `kept` vertices belong.
 fn from_fine(fine: Surface<'_>, coarse: &Grid<'_>, kept: &[bool]) -> f64 {
     // An upper bound for each vertex: its distance from a neighbour that was kept.
-    let mut near = vec![f32::INFINITY; fine.points.len()];
+    let mut near: Vec<f32> = kept
+        .iter()
+        .map(|kept| if *kept { 0.0 } else { f32::INFINITY })
+        .collect();
     for triangle in fine.triangles {
         for (a, b) in [(0, 1), (1, 2), (2, 0)] {
             let [a, b] = [triangle[a] as usize, triangle[b] as usize];
@@ -232,19 +274,32 @@ fn from_fine(fine: Surface<'_>, coarse: &Grid<'_>, kept: &[bool]) -> f64 {
     }
     let mut farthest = 0.0f64;
     let mut look = |vertex: usize| {
-        if !kept[vertex] && f64::from(near[vertex]) > farthest {
+        if f64::from(near[vertex]) > farthest {
             farthest = farthest.max(coarse.distance(fine.points[vertex], farthest));
         }
     };
     // A few first, so that most others can be passed over.
     (0..fine.points.len()).step_by(61).for_each(&mut look);
     (0..fine.points.len()).for_each(&mut look);
-    for number in 0..fine.triangles.len() {
+    for (number, triangle) in fine.triangles.iter().enumerate() {
         let corners = fine.corners(number);
-        if longest(corners) * REACH > farthest {
-            let middle = between(corners, [1.0 / 3.0; 3]);
-            farthest = farthest.max(coarse.distance(middle, farthest));
+        let nearest = triangle
+            .map(|v| near[v as usize])
+            .into_iter()
+            .fold(f32::INFINITY, f32::min);
+        if f64::from(nearest) + longest(corners) > farthest {
+            for weights in SAMPLES {
+                farthest = farthest.max(coarse.distance(between(corners, weights), farthest));
+            }
         }
     }
     farthest
 }
+
+/// Points of a fine triangle: its centre, and the middles of its edges.
+const SAMPLES: [V3; 4] = [
+    [1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0],
+    [0.5, 0.5, 0.0],
+    [0.0, 0.5, 0.5],
+    [0.5, 0.0, 0.5],
+];

@@ -24,6 +24,9 @@ const TARGETS: [f64; 2] = [0.25, 0.75];
 /// The part of the children's triangles that a tile has otherwise.
 const PART: usize = 4;
 
+/// What is added to measured distances, as a factor: between two samples they may be larger.
+const MARGIN: f64 = 1.1;
+
 /// Bytes of memory for each triangle of the children while a tile is made from them.
 const EACH: u64 = 420;
 
@@ -256,9 +259,7 @@ impl Maker<'_> {
             None | Some(0) => 0.0,
             Some(bits) => 3f64.sqrt() * f64::from(1u32 << bits),
         };
-        // Distances were rounded, at most in the last digits.
-        (distance * (1.0 + 1e-9)).max(0.5) * self.intake.lattice.step
-            + hidden * self.intake.lattice.step
+        (distance * MARGIN).max(0.5) * self.intake.lattice.step + hidden * self.intake.lattice.step
     }
 }
 

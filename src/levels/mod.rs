@@ -8,31 +8,69 @@
 mod cells;
 mod columns;
 mod distance;
+mod folder;
 mod geo;
 mod glb;
 mod intake;
-mod job;
 mod lattice;
 mod make;
 mod node;
+mod report;
 mod rows;
 mod shared;
 mod simplify;
-mod tileset;
 mod tree;
 
-pub use job::{Options, Tiles, TilesReport};
+pub use report::{Options, TilesReport};
 pub use simplify::{Manner, Quadrics, Simplifier, Surface};
 
 use crate::error::{Error, Result};
 use crate::spill::Table;
+use crate::stages::ingest;
 use crate::workspace::Workspace;
+use folder::About;
+pub use folder::{NAME, check_folder, remove_unfinished};
+use geo::Globe;
 use make::Maker;
 use shared::Shared;
 use std::path::Path;
-use tileset::About;
 
-/// Makes the tileset `folder` of the mesh `path`.
+/// Makes the tileset `folder` of the mesh `path`, which is called `source` in it.
+///
+/// # Errors
+/// [`Error::Input`] for a file that is no mesh of triangles in PLY; [`Error::Memory`], [`Error::Io`],
+/// [`Error::Disk`], [`Error::Corrupt`], [`Error::Cancelled`].
+pub fn tileset(
+    path: &Path,
+    source: &str,
+    folder: &Path,
+    options: &Options,
+    workspace: &Workspace,
+) -> Result<TilesReport> {
+    let (crs, warning) = ingest::of_prj(&ingest::prj_of(path));
+    if let Some(warning) = warning {
+        workspace.observer.warn(&warning);
+    }
+    let code = crs.as_ref().and_then(|crs| crs.horizontal);
+    // What cannot be placed is refused before the work.
+    let globe = match options.geo {
+        true => Some(Globe::of(path, code)?),
+        false => None,
+    };
+    let about = |origin: [f64; 3], high: [f64; 3]| {
+        let middle = std::array::from_fn(|axis| (origin[axis] + high[axis]) / 2.0);
+        let globe = globe.as_ref();
+        let matrix = globe.map(|globe| globe.matrix(path, origin, middle));
+        Ok(About {
+            source: source.to_owned(),
+            epsg: code,
+            crs: crs.map(|crs| crs.wkt().map_or_else(|| crs.line(), str::to_owned)),
+            transform: matrix.transpose()?,
+        })
+    };
+    make(path, folder, options, about, workspace)
+}
+
 fn make(
     path: &Path,
     folder: &Path,

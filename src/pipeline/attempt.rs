@@ -1,8 +1,9 @@
 //! One attempt at a run: its beginning, its time limit, and the removal of its scratch files.
 
 use super::manifest::Manifest;
-use super::{Reconstruction, Start};
+use super::{Reconstruction, Start, beside};
 use crate::error::{Error, Result};
+use crate::levels;
 use crate::stages::export;
 use crate::workspace::progress::Cancel;
 use crate::workspace::{Folder, Found, Workspace, fault};
@@ -88,6 +89,10 @@ impl Reconstruction {
             workspace.remove(outcome.is_ok());
             // An unfinished mesh; if it cannot be deleted it does no harm.
             let _ = std::fs::remove_file(export::temporary(&self.output));
+            if let Some(tiles) = &self.tiles {
+                levels::remove_unfinished(tiles);
+                beside::remove(&self.output);
+            }
             if self.params.split.is_some() {
                 export::remove_unfinished(&self.output);
             }

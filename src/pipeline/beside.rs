@@ -69,6 +69,17 @@ pub(super) fn write(
     }
 }
 
+/// Removes a mesh and the files beside it; they do no harm if they cannot be deleted.
+pub(super) fn remove(mesh: &Path) {
+    for path in [
+        mesh,
+        &path_beside(mesh, "prj"),
+        &path_beside(mesh, "origin.json"),
+    ] {
+        let _ = std::fs::remove_file(path);
+    }
+}
+
 fn write_origin(output: &Path, report: &Report) -> Result<()> {
     let path = path_beside(output, "origin.json");
     let Some(origin) = report.origin else {

@@ -4,6 +4,7 @@ use super::manifest::Manifest;
 use super::start::{Start, scratch_folder};
 use super::{Reconstruction, default_memory, default_threads};
 use crate::error::{Error, Result};
+use crate::levels;
 use crate::params::Params;
 use crate::stages::export::check_name;
 use crate::stages::order::PAGE;
@@ -44,7 +45,7 @@ impl Builder {
     }
 
     /// Path of the mesh. Its extension selects the format: `.ply`, `.obj`, `.stl` or `.glb`; with `.zst`
-    /// behind it the mesh is compressed.
+    /// behind it the mesh is compressed. `DIR/tileset.json` makes levels of detail in that folder.
     #[must_use]
     pub fn output(mut self, path: impl Into<PathBuf>) -> Self {
         self.output = path.into();
@@ -161,13 +162,18 @@ impl Builder {
         if self.output.as_os_str().is_empty() {
             return missing("--output", "the path of the mesh");
         }
-        check_name(&self.output, self.params.compress_glb)?;
+        let tiles = tiles(&self.output, self.params.split.is_some())?;
+        let mesh = tiles.as_deref().map(mesh_of);
+        check_name(mesh.as_deref().unwrap_or(&self.output), self.params.compress_glb)?;
         let budget = self.memory.unwrap_or_else(default_memory);
-        let folder = || scratch_folder(&self.output, self.scratch.as_deref());
+        let target = tiles.as_deref().unwrap_or(&self.output);
+        let folder = scratch_folder(target, self.scratch.as_deref());
         Ok(Reconstruction {
-            folder: self.folder.clone().unwrap_or_else(folder),
+            folder: self.folder.unwrap_or(folder),
             inputs: self.inputs,
-            output: self.output,
+            target: self.output.clone(),
+            output: mesh.unwrap_or(self.output),
+            tiles,
             memory: MemoryPool::new(budget)?,
             threads: self.threads.unwrap_or_else(default_threads),
             tile_points: self.tile_points.unwrap_or(self.params.block),
@@ -181,6 +187,39 @@ impl Builder {
             pictures: self.pictures,
         })
     }
+}
+
+/// The folder of the tileset, if the output is one.
+fn tiles(output: &Path, split: bool) -> Result<Option<PathBuf>> {
+    if output.file_name().is_none_or(|name| name != levels::NAME) {
+        return Ok(None);
+    }
+    let refuse = |found: String, expected: &str| {
+        Err(Error::Parameter {
+            name: "--output",
+            found,
+            expected: expected.into(),
+        })
+    };
+    let folder = output
+        .parent()
+        .filter(|folder| folder.file_name().is_some());
+    match folder {
+        _ if split => refuse("a tileset, with --split".into(), "one of both"),
+        Some(folder) => Ok(Some(folder.to_path_buf())),
+        None => refuse(
+            output.display().to_string(),
+            "DIR/tileset.json, with the name of a folder",
+        ),
+    }
+}
+
+/// The mesh from which a tileset is made.
+fn mesh_of(folder: &Path) -> PathBuf {
+    let mut name = std::ffi::OsString::from(".");
+    name.push(folder.file_name().unwrap_or_default());
+    name.push(".outcrop-mesh.ply");
+    folder.with_file_name(name)
 }
 
 /// The builder of the unfinished run in a scratch folder.

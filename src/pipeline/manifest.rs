@@ -124,7 +124,7 @@ impl Manifest {
         Ok(Self {
             format: FORMAT,
             version: env!("CARGO_PKG_VERSION").into(),
-            output: Name::of(&job.output)?,
+            output: Name::of(job.output())?,
             params: job.params.clone(),
             block: job.params.block,
             division: job.params.division,

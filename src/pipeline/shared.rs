@@ -85,6 +85,13 @@ impl Reconstruction {
                 expected: format!("1 to {MOST_SHARDS}"),
             });
         }
+        if self.tiles.is_some() {
+            return Err(Error::Parameter {
+                name: "--output",
+                found: self.output().display().to_string(),
+                expected: "a mesh; `outcrop tiles` makes levels of detail of it afterwards".into(),
+            });
+        }
         writable(&self.output)?;
         not_an_input(&self.output, self.params.split.is_some(), &self.inputs)?;
         one_system(&self.params, &self.inputs)?;

@@ -16,7 +16,7 @@ pub enum Start {
 }
 
 /// The scratch folder of a run with this output: beside it, or in the folder `parent`.
-pub(crate) fn scratch_folder(output: &Path, parent: Option<&Path>) -> PathBuf {
+pub(super) fn scratch_folder(output: &Path, parent: Option<&Path>) -> PathBuf {
     let mut name = output.file_name().unwrap_or_default().to_os_string();
     let beside = export::folder_of(output);
     let Some(parent) = parent.filter(|parent| *parent != beside) else {

@@ -105,6 +105,7 @@ const KEYS: &[&str] = &[
     "/mesh/pinched_copies",
     "/mesh/triangles",
     "/mesh/boundary_edges",
+    "/tiles",
     "/coordinates",
     "/peak_resident_bytes",
     "/resident_file_bytes",

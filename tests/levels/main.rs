@@ -5,7 +5,8 @@ mod resumed;
 mod tileset;
 
 use meshes::{Mesh, hills, sphere};
-use outcrop::levels::{Options, Tiles, TilesReport};
+use outcrop::Tiles;
+use outcrop::levels::{Options, TilesReport};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use tileset::{Tile, Tileset};
@@ -321,7 +322,7 @@ fn low_bits_are_kept() {
     for (number, p) in mesh.vertices.iter_mut().enumerate() {
         for (axis, x) in p.iter_mut().enumerate() {
             let fine = (number * 7919 * (axis + 1) % 100_000) as f64 / 1e5;
-            *x = ((*x - 635_000.0 * f64::from(axis == 0)).floor() * 1000.0) + fine;
+            *x = ((*x - 635_000.0 * f64::from(axis == 0)).floor() * 200.0) + fine;
             *x = (*x * 1e5).round() / 1e5;
         }
     }

@@ -1,8 +1,8 @@
 //! The same bytes for any memory and threads, and after a run was stopped or killed.
 
 use super::meshes::hills;
-use outcrop::levels::{Options, Tiles};
-use outcrop::{Cancel, Error, Observer, Start};
+use outcrop::levels::Options;
+use outcrop::{Cancel, Error, Observer, Start, Tiles};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -189,4 +189,67 @@ fn a_killed_run_goes_on() {
     assert!(killed > 20, "{killed}: {counts}");
     // Nothing is left beside.
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 3);
+}
+
+/// A cloud of a landscape, as text.
+fn cloud(path: &Path) {
+    let points = hills(60, false).vertices;
+    let lines = points.iter().map(|[x, y, z]| format!("{x} {y} {z}\n"));
+    std::fs::write(path, lines.collect::<String>()).unwrap();
+}
+
+#[test]
+fn a_cloud_becomes_the_tileset_of_its_mesh() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    cloud(&at("scan.xyz"));
+    let run = |output: &Path| {
+        let run = outcrop::Reconstruction::builder()
+            .input(at("scan.xyz"))
+            .output(output);
+        run.memory(192 << 20).threads(2).start(Start::Resume)
+    };
+    run(&at("mesh.ply")).build().unwrap().run().unwrap();
+    Tiles::new(at("mesh.ply"), at("want"))
+        .memory(192 << 20)
+        .run()
+        .unwrap();
+    let output = at("town").join("tileset.json");
+    let cancel = Cancel::new();
+    let observer = Arc::new(Stop {
+        left: AtomicU64::new(60_000),
+        cancel: cancel.clone(),
+    });
+    let stopped = run(&output)
+        .observer(observer)
+        .cancel(cancel)
+        .build()
+        .unwrap();
+    assert!(matches!(stopped.run().unwrap_err(), Error::Cancelled));
+    assert_eq!(stopped.output(), output);
+    let resumed = outcrop::Reconstruction::resume(at("town.outcrop-scratch")).unwrap();
+    let report = resumed.memory(192 << 20).build().unwrap().run().unwrap();
+    let tiles = report.tiles.unwrap();
+    assert_eq!(
+        (tiles.triangles, tiles.vertices),
+        (report.mesh.triangles, report.mesh.vertices)
+    );
+    let (mut found, mut want) = (files(&at("town")), files(&at("want")));
+    let name = Path::new("tileset.json");
+    let json = |files: &mut BTreeMap<PathBuf, Vec<u8>>| {
+        let mut json: serde_json::Value =
+            serde_json::from_slice(&files.remove(name).unwrap()).unwrap();
+        json["extras"]["outcrop"]["source"] = "".into();
+        json
+    };
+    assert_eq!(json(&mut found), json(&mut want));
+    assert!(found == want);
+    // Nothing else is left.
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 4);
+    for wrong in ["tileset.json", "/tileset.json"] {
+        assert!(
+            matches!(run(Path::new(wrong)).build(), Err(Error::Parameter { .. })),
+            "{wrong}"
+        );
+    }
 }

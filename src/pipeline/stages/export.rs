@@ -6,6 +6,7 @@ use super::Stages;
 use crate::error::Result;
 use crate::geom::aabb::Aabb;
 use crate::geom::lattice::{Lattice, Shift};
+use crate::levels;
 use crate::params::Origin;
 use crate::stages::attributes::StoredColumns;
 use crate::stages::cut::StoredPieces;
@@ -112,5 +113,21 @@ impl Stages<'_> {
         self.report.mesh = self.clock.stage("export", "blocks", items, write)?;
         columns.map_or(Ok(()), |columns| columns.release(workspace))?;
         beside::write(&job.output, &job.inputs, &self.report, self.wkt.as_deref())
+    }
+
+    /// Levels of detail of the mesh, if they are wanted.
+    pub fn levels(&mut self) -> Result<()> {
+        let (job, workspace) = (self.job, self.workspace);
+        let Some(folder) = &job.tiles else {
+            return Ok(());
+        };
+        workspace.trim();
+        let source = job.inputs.first().and_then(|input| input.file_name());
+        let source = source.unwrap_or_default().to_string_lossy();
+        let options = levels::Options::default();
+        let make = || levels::tileset(&job.output, &source, folder, &options, workspace);
+        let triangles = self.report.mesh.triangles;
+        self.report.tiles = Some(self.clock.stage("tiles", "triangles", triangles, make)?);
+        Ok(())
     }
 }

@@ -10,7 +10,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Name of the file with the tree.
-pub(super) const NAME: &str = "tileset.json";
+pub const NAME: &str = "tileset.json";
 
 /// Name of the folder of the tiles.
 const TILES: &str = "tiles";
@@ -101,6 +101,11 @@ impl Maker<'_> {
 
     /// Writes the folder. It has its name when all is in it; a tileset that had the name is then deleted.
     pub fn write_folder(&self, folder: &Path, about: &About, workspace: &Workspace) -> Result<u64> {
+        // A finished run that was stopped while its scratch files were deleted has nothing to write again.
+        workspace.once("folder", |_| self.put_folder(folder, about, workspace))
+    }
+
+    fn put_folder(&self, folder: &Path, about: &About, workspace: &Workspace) -> Result<u64> {
         let unfinished = beside(folder, "part");
         let failed = |path: &Path, action: &str| {
             let (path, action) = (path.to_path_buf(), action.to_owned());
@@ -144,7 +149,7 @@ impl Maker<'_> {
 }
 
 /// A hidden folder beside this one.
-pub(super) fn beside(folder: &Path, ending: &str) -> PathBuf {
+fn beside(folder: &Path, ending: &str) -> PathBuf {
     let mut name = std::ffi::OsString::from(".");
     name.push(folder.file_name().unwrap_or_default());
     name.push(".outcrop-");
@@ -153,15 +158,23 @@ pub(super) fn beside(folder: &Path, ending: &str) -> PathBuf {
 }
 
 /// Removes what an earlier run left.
-pub(super) fn remove(folder: &Path) -> Result<()> {
+fn remove(folder: &Path) -> Result<()> {
     match std::fs::remove_dir_all(folder) {
         Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::io(folder, "delete", e)),
         _ => Ok(()),
     }
 }
 
+/// Removes what an unfinished run left beside the folder; it does no harm if it cannot be deleted.
+pub fn remove_unfinished(folder: &Path) {
+    let _ = remove(&beside(folder, "part"));
+}
+
 /// An error unless the folder does not exist, is empty, or has a tileset of this program.
-pub(super) fn check_folder(folder: &Path) -> Result<()> {
+///
+/// # Errors
+/// [`Error::Parameter`], [`Error::Io`].
+pub fn check_folder(folder: &Path) -> Result<()> {
     let refuse = |found: &str| {
         Err(Error::Parameter {
             name: "--output",

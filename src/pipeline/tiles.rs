@@ -1,11 +1,8 @@
 //! A run that makes a tileset, and that can be resumed.
 
-use super::cells::MOST;
-use super::geo::Globe;
-use super::tileset::{self, About, beside};
+use super::{Start, default_memory, default_threads, start::scratch_folder};
 use crate::error::{Error, Result};
-use crate::pipeline::Start;
-use crate::stages::ingest;
+use crate::levels::{self, Options, TilesReport};
 use crate::workspace::memory::MemoryPool;
 use crate::workspace::progress::{Cancel, Observer, Silent};
 use crate::workspace::{Folder, Found, Storage, Workspace, fault};
@@ -17,76 +14,6 @@ use std::sync::Arc;
 
 /// The version of what a resumed run reads.
 const FORMAT: &str = "tiles 1";
-
-/// What decides the tileset besides the mesh.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct Options {
-    /// Place the tileset on the globe, by the reference system of the mesh.
-    pub geo: bool,
-    /// Most triangles of a leaf, unless it cannot be divided: for tests.
-    #[doc(hidden)]
-    pub most_triangles: u32,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self {
-            geo: false,
-            most_triangles: MOST,
-        }
-    }
-}
-
-/// What was made.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
-pub struct TilesReport {
-    /// Vertices of the mesh.
-    pub vertices: u64,
-    /// Triangles of the mesh: those of the leaves.
-    pub triangles: u64,
-    /// Edges of the mesh with one triangle.
-    pub boundary_edges: u64,
-    /// Number of tiles.
-    pub tiles: u64,
-    /// Tiles without children.
-    pub leaves: u64,
-    /// Levels of the tree.
-    pub levels: u32,
-    /// Bytes of all files.
-    pub bytes: u64,
-    /// Bytes of the root's file.
-    pub root_bytes: u64,
-    /// Triangles of the root.
-    pub root_triangles: u64,
-    /// Largest distance of the root from the mesh, at most, in the mesh's unit.
-    pub root_error: f64,
-    /// Step of the coordinates, in the mesh's unit.
-    pub step: f64,
-    /// True if all coordinates are multiples of the step.
-    pub exact: bool,
-}
-
-impl std::fmt::Display for TilesReport {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let megabytes = |bytes: u64| bytes as f64 / 1e6;
-        writeln!(
-            f,
-            "{} triangles in {} tiles of {} levels, {:.1} MB",
-            self.triangles,
-            self.tiles,
-            self.levels,
-            megabytes(self.bytes)
-        )?;
-        write!(
-            f,
-            "coarsest tile: {} triangles, {:.2} MB, at most {:.6} from the mesh",
-            self.root_triangles,
-            megabytes(self.root_bytes),
-            self.root_error
-        )
-    }
-}
 
 /// The making of a tileset.
 pub struct Tiles {
@@ -246,7 +173,7 @@ impl Tiles {
     /// The scratch folder of the run.
     #[must_use]
     pub fn scratch_folder(&self) -> PathBuf {
-        crate::pipeline::scratch_folder(&self.folder, self.scratch.as_deref())
+        scratch_folder(&self.folder, self.scratch.as_deref())
     }
 
     fn open(&self) -> Result<Workspace> {
@@ -264,10 +191,8 @@ impl Tiles {
             }
             (Found::Run(folder) | Found::Damaged(folder), _) => folder.restart(bytes)?,
         };
-        let memory = self.memory.unwrap_or_else(crate::pipeline::default_memory);
-        let threads = self
-            .threads
-            .unwrap_or_else(crate::pipeline::default_threads);
+        let memory = self.memory.unwrap_or_else(default_memory);
+        let threads = self.threads.unwrap_or_else(default_threads);
         let pool = MemoryPool::new(memory)?;
         let (observer, cancel) = (self.observer.clone(), self.cancel.clone());
         let workspace = Workspace::resumable(folder, pool, threads, observer, cancel)?;
@@ -282,15 +207,14 @@ impl Tiles {
     /// files; [`Error::Memory`] if the budget is too small; [`Error::Io`], [`Error::Disk`], [`Error::Corrupt`],
     /// [`Error::Cancelled`]; those of an unfinished run, as of [`crate::Reconstruction::run`].
     pub fn run(&self) -> Result<TilesReport> {
-        tileset::check_folder(&self.folder)?;
+        levels::check_folder(&self.folder)?;
         let workspace = self.open()?;
         let outcome = self.make(&workspace);
         let path = self.scratch_folder();
         let keep = outcome.as_ref().is_err_and(Error::can_resume) && Folder::has_progress(&path);
         if !keep {
             workspace.remove(outcome.is_ok());
-            // If it cannot be deleted it does no harm.
-            let _ = tileset::remove(&beside(&self.folder, "part"));
+            levels::remove_unfinished(&self.folder);
         }
         drop(workspace);
         fault::finish();
@@ -298,28 +222,8 @@ impl Tiles {
     }
 
     fn make(&self, workspace: &Workspace) -> Result<TilesReport> {
-        let (crs, warning) = ingest::of_prj(&ingest::prj_of(&self.mesh));
-        if let Some(warning) = warning {
-            workspace.observer.warn(&warning);
-        }
-        let code = crs.as_ref().and_then(|crs| crs.horizontal);
-        // What cannot be placed is refused before the work.
-        let globe = match self.options.geo {
-            true => Some(Globe::of(&self.mesh, code)?),
-            false => None,
-        };
         let source = self.mesh.file_name().unwrap_or_default();
-        let about = |origin: [f64; 3], high: [f64; 3]| {
-            let middle = std::array::from_fn(|axis| (origin[axis] + high[axis]) / 2.0);
-            let globe = globe.as_ref();
-            let matrix = globe.map(|globe| globe.matrix(&self.mesh, origin, middle));
-            Ok(About {
-                source: source.to_string_lossy().into_owned(),
-                epsg: code,
-                crs: crs.map(|crs| crs.wkt().map_or_else(|| crs.line(), str::to_owned)),
-                transform: matrix.transpose()?,
-            })
-        };
-        super::make(&self.mesh, &self.folder, &self.options, about, workspace)
+        let source = source.to_string_lossy();
+        levels::tileset(&self.mesh, &source, &self.folder, &self.options, workspace)
     }
 }

@@ -1,0 +1,74 @@
+//! What is asked of a tileset, and what was made.
+
+use super::cells::MOST;
+use serde::{Deserialize, Serialize};
+
+/// What decides the tileset besides the mesh.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Options {
+    /// Place the tileset on the globe, by the reference system of the mesh.
+    pub geo: bool,
+    /// Most triangles of a leaf, unless it cannot be divided: for tests.
+    #[doc(hidden)]
+    pub most_triangles: u32,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            geo: false,
+            most_triangles: MOST,
+        }
+    }
+}
+
+/// What was made.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct TilesReport {
+    /// Vertices of the mesh.
+    pub vertices: u64,
+    /// Triangles of the mesh: those of the leaves.
+    pub triangles: u64,
+    /// Edges of the mesh with one triangle.
+    pub boundary_edges: u64,
+    /// Number of tiles.
+    pub tiles: u64,
+    /// Tiles without children.
+    pub leaves: u64,
+    /// Levels of the tree.
+    pub levels: u32,
+    /// Bytes of all files.
+    pub bytes: u64,
+    /// Bytes of the root's file.
+    pub root_bytes: u64,
+    /// Triangles of the root.
+    pub root_triangles: u64,
+    /// Largest distance of the root from the mesh, at most, in the mesh's unit.
+    pub root_error: f64,
+    /// Step of the coordinates, in the mesh's unit.
+    pub step: f64,
+    /// True if all coordinates are multiples of the step.
+    pub exact: bool,
+}
+
+impl std::fmt::Display for TilesReport {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let megabytes = |bytes: u64| bytes as f64 / 1e6;
+        writeln!(
+            f,
+            "{} triangles in {} tiles of {} levels, {:.1} MB",
+            self.triangles,
+            self.tiles,
+            self.levels,
+            megabytes(self.bytes)
+        )?;
+        write!(
+            f,
+            "coarsest tile: {} triangles, {:.2} MB, at most {:.6} from the mesh",
+            self.root_triangles,
+            megabytes(self.root_bytes),
+            self.root_error
+        )
+    }
+}
