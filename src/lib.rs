@@ -88,4 +88,5 @@ pub use report::{DiskEstimate, Report};
 pub use stages::ingest::Classes;
 pub use workspace::Workspace;
 pub use workspace::memory::MemoryPool;
+pub use workspace::outlook::{Outlook, Planned, Position};
 pub use workspace::progress::{Cancel, Observer, Silent};

@@ -190,9 +190,9 @@ pub struct Surface {
 #[command(next_help_heading = "Repair")]
 pub struct Repair {
     /// Fill holes of up to this many edges; 0 fills none (missing single triangles are still filled, except
-    /// with --method paper)
-    #[arg(long, value_name = "N", default_value_t = METHOD.filling.longest)]
-    pub max_hole_edges: usize,
+    /// with --method paper) [default: 2000; with --method paper 500]
+    #[arg(long, value_name = "N")]
+    pub max_hole_edges: Option<usize>,
     /// Largest triangle of a filling, as the side of an equilateral triangle: a length in the cloud's unit, a
     /// number of local spacings like 8x, or none [default: 8x; with --method paper none]
     #[arg(long, value_name = "LENGTH|Nx|none")]
@@ -471,7 +471,7 @@ impl Job {
             keep_all: self.surface.keep_all || usual.keep_all,
             max_edge: self.surface.max_edge.unwrap_or(usual.max_edge),
             max_fill: self.repair.max_fill.unwrap_or(usual.max_fill),
-            max_hole_edges: self.repair.max_hole_edges,
+            max_hole_edges: self.repair.max_hole_edges.unwrap_or(usual.max_hole_edges),
             min_component: self.repair.min_component.or(usual.min_component),
             repair: !self.repair.no_repair,
             normals: self.normals,

@@ -49,7 +49,7 @@ impl Server {
     /// # Errors
     /// If the folder cannot be read or has no valid tileset, or the port is taken.
     pub fn start(folder: &Path, port: Option<u16>) -> Result<Self> {
-        Tileset::open(folder)?;
+        Tileset::check(folder)?;
         let folder = Folder::new(folder).map_err(|e| Error::io(folder, "open the folder", e))?;
         let port = port.unwrap_or(0);
         let failed =

@@ -1,9 +1,10 @@
 //! `tileset.json`: the tree of tiles.
 
 use crate::error::{Error, Result};
+use serde::de::{DeserializeOwned, IgnoredAny};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
-use std::io::Read;
+use std::io::{BufReader, Read};
 use std::path::Path;
 
 /// Name of the file in its folder.
@@ -57,30 +58,96 @@ pub struct Content {
     pub more: Map<String, Value>,
 }
 
+/// The parts of a tileset that a viewer cannot do without, for a check that keeps little.
+#[derive(Deserialize)]
+struct Outline {
+    asset: Version,
+    root: Branch,
+}
+
+#[derive(Deserialize)]
+struct Version {
+    version: String,
+}
+
+#[derive(Deserialize)]
+struct Branch {
+    #[serde(rename = "geometricError")]
+    error: f64,
+    #[serde(rename = "content")]
+    _content: Option<Uri>,
+    #[serde(default)]
+    children: Vec<Branch>,
+}
+
+#[derive(Deserialize)]
+struct Uri {
+    #[serde(rename = "uri")]
+    _uri: IgnoredAny,
+}
+
+impl Branch {
+    /// True if all errors are numbers that a viewer can compare.
+    fn is_fine(&self) -> bool {
+        self.error >= 0.0 && self.children.iter().all(Branch::is_fine)
+    }
+}
+
+/// Reads `tileset.json` of a folder.
+fn read<T: DeserializeOwned>(folder: &Path) -> Result<T> {
+    let path = folder.join(NAME);
+    let file = std::fs::File::open(&path).map_err(|e| match e.kind() {
+        std::io::ErrorKind::NotFound if folder.is_dir() => Error::input(
+            folder,
+            "folder",
+            "no tileset.json",
+            "a folder that `outcrop tiles` made",
+        ),
+        _ => Error::io(&path, "open", e),
+    })?;
+    let length = file
+        .metadata()
+        .map_err(|e| Error::io(&path, "read", e))?
+        .len();
+    if length > LONGEST {
+        let found = format!("{length} bytes");
+        return Err(Error::input(
+            &path,
+            "length",
+            found,
+            format!("at most {LONGEST} bytes"),
+        ));
+    }
+    serde_json::from_reader(BufReader::new(file.take(length))).map_err(|e| {
+        let place = format!("line {}, column {}", e.line(), e.column());
+        Error::input(&path, place, e.to_string(), "a tileset of 3D Tiles")
+    })
+}
+
 impl Tileset {
-    /// Reads the tileset of a folder.
+    /// Reads the tileset of a folder. It takes some ten times its length of memory.
     pub fn open(folder: &Path) -> Result<Self> {
-        let path = folder.join(NAME);
-        let opened = std::fs::File::open(&path).map_err(|e| match e.kind() {
-            std::io::ErrorKind::NotFound if folder.is_dir() => Error::input(
-                folder,
-                "folder",
-                "no tileset.json",
-                "a folder that `outcrop tiles` made",
-            ),
-            _ => Error::io(&path, "open", e),
-        })?;
-        let mut text = Vec::new();
-        let read = opened.take(LONGEST + 1).read_to_end(&mut text);
-        read.map_err(|e| Error::io(&path, "read", e))?;
-        if text.len() as u64 > LONGEST {
-            let found = format!("more than {LONGEST} bytes");
-            return Err(Error::input(&path, "length", found, "a shorter tileset"));
+        read(folder)
+    }
+
+    /// An error if the folder has no valid tileset; less memory is taken than the file is long.
+    pub fn check(folder: &Path) -> Result<()> {
+        let outline: Outline = read(folder)?;
+        let invalid = |place: &str, found: String, expected: &str| {
+            Err(Error::input(folder.join(NAME), place, found, expected))
+        };
+        let version = outline.asset.version;
+        if version != "1.0" && version != "1.1" {
+            return invalid("asset", format!("version {version:?}"), "1.0 or 1.1");
         }
-        serde_json::from_slice(&text).map_err(|e| {
-            let place = format!("line {}, column {}", e.line(), e.column());
-            Error::input(&path, place, e.to_string(), "a tileset of 3D Tiles")
-        })
+        if !outline.root.is_fine() {
+            return invalid(
+                "root",
+                "a negative geometricError".into(),
+                "errors of at least 0",
+            );
+        }
+        Ok(())
     }
 
     /// A property of the mesh that `outcrop tiles` notes, by its name in `extras.outcrop`.

@@ -32,9 +32,9 @@ void main() {
 		float there = distanceAt( vAt + vec2( cos( angle ), sin( angle ) ) * 1.4 * uPixel );
 		// How far this place lies behind its neighbour, in parts of the distance.
 		float behind = uParallel == 1 ? ( here - there ) / uScale : log2( here / there );
-		sum += clamp( behind, 0.0, 0.05 );
+		sum += clamp( behind, 0.0, 0.016 );
 	}
-	outColor = vec4( color.rgb * exp( -sum * 14.0 ), color.a );
+	outColor = vec4( color.rgb * exp( -sum * 13.0 ), color.a );
 }`;
 
 export class Dome {

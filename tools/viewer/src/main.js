@@ -19,7 +19,7 @@ const settings = { color: 'plain', edl: true, flat: false, backs: true, wire: fa
 
 function start() {
 
-	const renderer = new WebGLRenderer( { canvas, antialias: true, powerPreference: 'high-performance', preserveDrawingBuffer: true } );
+	const renderer = new WebGLRenderer( { canvas, antialias: true, powerPreference: 'high-performance' } );
 	renderer.outputColorSpace = LinearSRGBColorSpace;
 	renderer.setPixelRatio( Math.min( devicePixelRatio, 2 ) );
 	const scene = new Scene(), dome = new Dome( renderer ), marks = new Marks(), section = new Section();
@@ -93,7 +93,7 @@ function start() {
 		ready = true;
 		const columns = info.columns.map( c => c.name ).filter( name => ! [ 'red', 'green', 'blue', 'nx', 'ny', 'nz' ].includes( name ) );
 		const colored = info.columns.some( c => c.name === 'red' );
-		const modes = [ [ 'plain', 'One colour' ], ...( colored ? [ [ 'color', 'Colour of the scan' ] ] : [] ), [ 'height', 'Height' ],
+		const modes = [ [ 'plain', 'One colour' ], ...( colored ? [ [ 'color', 'Scan colour' ] ] : [] ), [ 'height', 'Height' ],
 			...columns.map( name => [ `column:${ name }`, name[ 0 ].toUpperCase() + name.slice( 1 ).replaceAll( '_', ' ' ) ] ), [ 'tile', 'Tile' ], [ 'level', 'Level of detail' ] ];
 		panel.opened( info, modes );
 		actions.modes = modes.map( ( [ mode ] ) => mode );
@@ -327,6 +327,8 @@ function start() {
 		get frame() { return frame; },
 		/** True if nothing is loading and the last change is drawn. */
 		get settled() { return ready && ! dirty && busy <= 0 && ! navigator.moving && ! mesh.tiles.isLoading && mesh.stats().loading === 0; },
+		/** What is drawn, as a PNG in a URL. */
+		picture() { draw(); return canvas.toDataURL(); },
 		stats: () => mesh.stats(), vertexAt, hit, click, redraw: changed, use: () => mesh.use( navigator.camera, renderer ),
 		get measured() { return lengths( measured ); },
 	};

@@ -74,7 +74,7 @@ const AXES = [ [ 'x', '#d8433b' ], [ 'y', '#3f9b46' ], [ 'z', '#2f74d0' ] ];
 /** The directions of the axes, in a corner. */
 export function drawAxes( canvas, navigator ) {
 
-	const context = canvas.getContext( '2d' ), middle = canvas.width / 2, length = middle * 0.66;
+	const context = canvas.getContext( '2d' ), middle = canvas.width / 2, length = middle * 0.56;
 	const [ right, up, ahead ] = [ navigator.right(), navigator.up(), navigator.direction() ];
 	context.clearRect( 0, 0, canvas.width, canvas.height );
 	context.font = `600 ${ canvas.width * 0.14 }px system-ui, "DejaVu Sans", sans-serif`;
@@ -89,7 +89,7 @@ export function drawAxes( canvas, navigator ) {
 		context.moveTo( middle, middle );
 		context.lineTo( middle + x * length, middle + y * length );
 		context.stroke();
-		context.fillText( name.toUpperCase(), middle + x * length * 1.32, middle + y * length * 1.32 );
+		context.fillText( name.toUpperCase(), middle + x * length * 1.38, middle + y * length * 1.38 );
 
 	}
 

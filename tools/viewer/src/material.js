@@ -99,9 +99,10 @@ uniform float uNear;
 void main() {
 	vec4 view = modelViewMatrix * vec4( position, 1.0 );
 	vView = view.xyz;
+	// A little nearer than the triangles that the line belongs to, at the same place of the picture.
+	if ( projectionMatrix[3][3] == 1.0 ) view.z += uNear * 2.0 / projectionMatrix[1][1];
+	else view.xyz *= 1.0 - uNear;
 	gl_Position = projectionMatrix * view;
-	// Before the triangles that the line belongs to.
-	gl_Position.z -= uNear * gl_Position.w;
 }`;
 
 const LINE_FRAGMENT = /* glsl */`
@@ -144,7 +145,7 @@ function lines( color, opacity, near, wireframe ) {
 }
 
 /** The material of boundary edges. */
-export const boundary = () => lines( shared.uLine, 1, 4e-5, false );
+export const boundary = () => lines( shared.uLine, 1, 8e-4, false );
 
 /** The material of the edges of all triangles. */
-export const wire = () => lines( shared.uWire, 0.35, 2e-5, true );
+export const wire = () => lines( shared.uWire, 0.35, 4e-4, true );

@@ -109,11 +109,18 @@ export class Navigator {
 		const up = right.clone().cross( ahead );
 		const center = min.clone().add( max ).multiplyScalar( 0.5 );
 		const half = max.clone().sub( min ).multiplyScalar( 0.5 );
-		const extent = axis => Math.abs( axis.x ) * half.x + Math.abs( axis.y ) * half.y + Math.abs( axis.z ) * half.z;
 		const tan = Math.tan( MathUtils.degToRad( this.perspective.fov ) / 2 );
 		const aspect = this.canvas.clientWidth / this.canvas.clientHeight;
-		const size = 1.08 * Math.max( extent( up ), extent( right ) / aspect, 1e-6 );
-		const distance = size / tan + ( this.orthographic ? 0 : 0.6 * extent( ahead ) );
+		// The least distance at which every corner of the box is in the picture.
+		let distance = 1e-6;
+		for ( let corner = 0; corner < 8; corner ++ ) {
+
+			const at = new Vector3( ...[ 'x', 'y', 'z' ].map( ( axis, k ) => half[ axis ] * ( corner >> k & 1 ? 1 : - 1 ) ) );
+			const aside = Math.max( Math.abs( at.dot( up ) ), Math.abs( at.dot( right ) ) / aspect );
+			distance = Math.max( distance, 1.04 * aside / tan - ( this.orthographic ? 0 : at.dot( ahead ) ) );
+
+		}
+
 		this.go( { ...wanted, focus: center, distance }, smooth );
 
 	}
@@ -173,7 +180,7 @@ export class Navigator {
 
 			const far = Math.max( position.distanceTo( center ) + 1.05 * radius, 1e-3 * radius );
 			const outside = Math.max( position.distanceTo( center ) - 1.05 * radius, 0 );
-			Object.assign( camera, { aspect, far, near: Math.max( outside, Math.min( 0.02 * this.distance, 0.1 * far ), 1e-5 * far ) } );
+			Object.assign( camera, { aspect, far, near: Math.max( outside, Math.min( 0.005 * this.distance, 0.1 * far ), 1e-5 * far ) } );
 
 		}
 

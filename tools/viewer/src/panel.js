@@ -8,8 +8,8 @@ const $ = id => document.getElementById( id );
 
 const KEYS = [
 	[ 'Moving', [
-		[ 'Drag', 'turn around the point under the pointer' ], [ 'Right drag, Shift + drag', 'shift' ], [ 'Wheel', 'zoom to the pointer' ],
-		[ 'Double click', 'go there' ], [ 'G', 'fly: W A S D, Q E, Shift is faster' ], [ 'F', 'fit' ],
+		[ 'Drag', 'turn around the point there' ], [ 'Right drag', 'shift; also Shift and drag' ], [ 'Wheel', 'zoom to the pointer' ],
+		[ 'Double click', 'go there' ], [ 'G', 'fly with W A S D, Q, E, Shift' ], [ 'F', 'fit' ],
 		[ '1  2  3', 'top, front, right' ], [ '4  5  6', 'left, back, bottom' ], [ '0', 'oblique' ], [ 'O', 'parallel projection' ],
 	] ],
 	[ 'Looking', [
@@ -52,7 +52,7 @@ export class Panel {
 			make( 'h1', { textContent: 'Keys and pointer' } ),
 			make( 'div', { className: 'columns' }, ...KEYS.map( ( [ title, rows ] ) => make( 'section', {}, make( 'h2', { textContent: title } ),
 				make( 'table', {}, ...rows.map( ( [ key, does ] ) => make( 'tr', {}, make( 'td', {}, make( 'kbd', { textContent: key } ) ), make( 'td', { textContent: does } ) ) ) ) ) ) ),
-			make( 'footer', {}, licences(), make( 'button', { className: 'small', textContent: 'Close', onclick: () => $( 'help' ).close() } ) ),
+			make( 'footer', {}, licences(), make( 'button', { className: 'small', textContent: 'Close', autofocus: true, onclick: () => $( 'help' ).close() } ) ),
 		);
 
 	}

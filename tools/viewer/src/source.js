@@ -20,7 +20,9 @@ export function source() {
 	const read = json => {
 
 		if ( ! /^1\.[01]$/.test( json?.asset?.version ) || ! json.root ) throw new Error( 'tileset.json is no tileset of 3D Tiles 1.0 or 1.1' );
-		return { ...json, asset: { ...json.asset, version: '1.0' } };
+		// A mesh that is placed on the globe is shown in the scan's own frame.
+		const { transform, ...tile } = json.root;
+		return { ...json, asset: { ...json.asset, version: '1.0' }, root: tile };
 
 	};
 

@@ -1,0 +1,311 @@
+// Looks at a mesh in a real browser: called by scripts/check-view with the program, the renderer, the browser, and
+// a folder that has mesh.ply. Numbers and pictures are compared with the mesh file and with tools/render.
+
+import { execFileSync, spawn } from 'node:child_process';
+import { cpSync, readFileSync, readdirSync, rmSync } from 'node:fs';
+import { createRequire } from 'node:module';
+import { join } from 'node:path';
+
+const [ outcrop, render, chromium, modules, folder ] = process.argv.slice( 2 );
+const { chromium: driver } = createRequire( join( modules, 'x.js' ) )( 'playwright-core' );
+const SIZE = { width: 900, height: 700 };
+const PATIENCE = 240000;
+const HALF = Math.tan( 45 / 2 * Math.PI / 180 );
+let passed = 0;
+
+function check( what, fine, found = '' ) {
+
+	if ( ! fine ) throw new Error( `${ what }: ${ typeof found === 'string' ? found : JSON.stringify( found ) }` );
+	passed ++;
+	console.log( `  ${ what }${ found === '' ? '' : `: ${ typeof found === 'string' ? found : JSON.stringify( found ) }` }` );
+
+}
+
+/** Vertices of a binary PLY with doubles first, and the place of other properties of a byte. */
+function vertices( path ) {
+
+	const bytes = readFileSync( path ), end = bytes.indexOf( 'end_header\n' ) + 11;
+	const lines = bytes.subarray( 0, end ).toString( 'latin1' ).split( '\n' );
+	const count = Number( lines.find( line => line.startsWith( 'element vertex' ) ).split( ' ' )[ 2 ] );
+	const sizes = { double: 8, float: 4, uchar: 1, ushort: 2, int: 4 };
+	const face = lines.findIndex( line => line.startsWith( 'element face' ) );
+	const properties = lines.slice( 0, face ).filter( line => line.startsWith( 'property' ) ).map( line => line.split( ' ' ) );
+	const stride = properties.reduce( ( sum, [ , type ] ) => sum + sizes[ type ], 0 );
+	let at = 0;
+	const places = {};
+	for ( const [ , type, name ] of properties ) {
+
+		places[ name ] = at;
+		at += sizes[ type ];
+
+	}
+
+	return Array.from( { length: count }, ( _, n ) => {
+
+		const from = end + n * stride;
+		return { at: [ 0, 8, 16 ].map( k => bytes.readDoubleLE( from + k ) ), color: [ 'red', 'green', 'blue' ].map( name => bytes[ from + places[ name ] ] ) };
+
+	} );
+
+}
+
+/** The camera of tools/render, without its cropping. */
+function cameraOf( points, azimuth, elevation ) {
+
+	const [ a, e ] = [ azimuth, elevation ].map( x => x * Math.PI / 180 );
+	const towards = [ Math.cos( a ) * Math.cos( e ), Math.sin( a ) * Math.cos( e ), Math.sin( e ) ];
+	const right = [ - Math.sin( a ), Math.cos( a ), 0 ];
+	const up = [ 0, 1, 2 ].map( k => towards[ ( k + 1 ) % 3 ] * right[ ( k + 2 ) % 3 ] - towards[ ( k + 2 ) % 3 ] * right[ ( k + 1 ) % 3 ] );
+	const spans = [ right, up, towards ].map( axis => {
+
+		let [ low, high ] = [ Infinity, - Infinity ];
+		for ( const { at } of points ) {
+
+			const x = at[ 0 ] * axis[ 0 ] + at[ 1 ] * axis[ 1 ] + at[ 2 ] * axis[ 2 ];
+			[ low, high ] = [ Math.min( low, x ), Math.max( high, x ) ];
+
+		}
+
+		return [ low, high ];
+
+	} );
+	const middle = spans.map( ( [ low, high ] ) => ( low + high ) / 2 );
+	const scale = Math.min( 0.9 * SIZE.width / ( spans[ 0 ][ 1 ] - spans[ 0 ][ 0 ] ), 0.9 * SIZE.height / ( spans[ 1 ][ 1 ] - spans[ 1 ][ 0 ] ) );
+	return { center: [ 0, 1, 2 ].map( k => right[ k ] * middle[ 0 ] + up[ k ] * middle[ 1 ] + towards[ k ] * middle[ 2 ] ), yaw: a + Math.PI, pitch: - e, distance: SIZE.height / scale / 2 / HALF };
+
+}
+
+/** A running `outcrop view`, and its URL. */
+async function serve( ...args ) {
+
+	const child = spawn( outcrop, [ 'view', '--no-browser', '--quiet', ...args ], { stdio: [ 'ignore', 'pipe', 'inherit' ] } );
+	const url = await new Promise( ( resolve, reject ) => {
+
+		let text = '';
+		child.stdout.on( 'data', part => ( text += part ).includes( '\n' ) && resolve( text.trim() ) );
+		child.on( 'exit', code => reject( new Error( `outcrop view ended with ${ code }` ) ) );
+
+	} );
+	return { url, stop: signal => new Promise( resolve => { child.on( 'exit', ( code, by ) => resolve( code ?? by ) ); child.kill( signal ); } ) };
+
+}
+
+const browser = await driver.launch( { executablePath: chromium, args: [
+	'--headless', '--no-sandbox', '--enable-unsafe-swiftshader', '--use-angle=swiftshader', '--disable-quic', '--no-first-run',
+	'--disable-background-networking', '--disable-component-update', '--disable-sync',
+] } );
+
+/** A page with all that it asked for, and all that went wrong. */
+async function open( url ) {
+
+	const page = await browser.newPage( { viewport: SIZE } );
+	const asked = [], errors = [];
+	page.on( 'request', request => asked.push( request.url() ) );
+	page.on( 'console', message => [ 'error', 'warning' ].includes( message.type() ) && ! /GPU stall|swiftshader/i.test( message.text() ) && errors.push( message.text() ) );
+	page.on( 'pageerror', error => errors.push( String( error ) ) );
+	await page.goto( url );
+	const settled = async () => {
+
+		await page.waitForFunction( () => window.outcropViewer?.settled, null, { timeout: PATIENCE } );
+		await page.waitForTimeout( 350 );
+		await page.waitForFunction( () => window.outcropViewer.settled, null, { timeout: PATIENCE } );
+
+	};
+	await settled();
+	return { page, asked, errors, settled };
+
+}
+
+/** Looks as tools/render does, and compares where the mesh is: shared pixels of all that either has. */
+async function overlap( { page, settled }, camera, reference ) {
+
+	await page.evaluate( ( { center, yaw, pitch, distance } ) => {
+
+		const v = window.outcropViewer;
+		v.navigator.go( { focus: v.mesh.toLocal( center ), yaw, pitch, distance, orthographic: true } );
+		v.use();
+
+	}, camera );
+	await settled();
+	return page.evaluate( async reference => {
+
+		const masks = [];
+		for ( const url of [ window.outcropViewer.picture(), reference ] ) {
+
+			const image = new Image();
+			image.src = url;
+			await image.decode();
+			const canvas = new OffscreenCanvas( image.width, image.height ), context = canvas.getContext( '2d' );
+			context.drawImage( image, 0, 0 );
+			const { data } = context.getImageData( 0, 0, image.width, image.height );
+			masks.push( { size: [ image.width, image.height ].join(), mask: Array.from( { length: data.length / 4 }, ( _, n ) => [ 0, 1, 2 ].some( k => Math.abs( data[ 4 * n + k ] - data[ k ] ) > 8 ) ) } );
+
+		}
+
+		const [ a, b ] = masks;
+		if ( a.size !== b.size ) return { size: [ a.size, b.size ] };
+		let [ both, either ] = [ 0, 0 ];
+		for ( let n = 0; n < a.mask.length; n ++ ) {
+
+			both += a.mask[ n ] && b.mask[ n ];
+			either += a.mask[ n ] || b.mask[ n ];
+
+		}
+
+		return { both, part: both / either };
+
+	}, reference );
+
+}
+
+async function main() {
+
+	const mesh = join( folder, 'mesh.ply' ), tiles = join( folder, 'kept' );
+	const points = vertices( mesh );
+	const known = new Map( points.map( point => [ point.at.map( x => x.toFixed( 3 ) ).join( ' ' ), point ] ) );
+	const camera = cameraOf( points, - 50, 32 );
+	execFileSync( render, [ mesh, '-o', join( folder, 'render.png' ), '--width', SIZE.width, '--height', SIZE.height, '--view', 'iso', '--supersample', '1', '--crop-percentile', '0' ] );
+	const reference = 'data:image/png;base64,' + readFileSync( join( folder, 'render.png' ) ).toString( 'base64' );
+
+	const server = await serve( mesh, `--keep=${ tiles }` );
+	const shown = await open( server.url ), { page, asked, errors, settled } = shown;
+	const first = await page.evaluate( () => window.outcropViewer.stats() );
+	check( 'it loads', first.triangles > 1000 && first.tiles > 0 && first.missing === 0, first );
+	check( 'the title', await page.title() === 'mesh.ply – outcrop' );
+	const seen = await overlap( shown, camera, reference );
+	check( 'the picture shows the mesh where tools/render does', seen.part > 0.98 && seen.both > 50000, seen );
+
+	// Zoom to the middle with the wheel.
+	await page.mouse.move( SIZE.width / 2, SIZE.height / 2 );
+	const levels = () => page.evaluate( () => [ ...window.outcropViewer.mesh.tiles.visibleTiles ].map( tile => tile.extras.outcrop.level ) );
+	const before = await levels();
+	for ( let n = 0; n < 14; n ++ ) await page.mouse.wheel( 0, - 240 );
+	await settled();
+	const after = await levels();
+	check( 'it refines when zooming', Math.max( ...before ) > 0 && Math.min( ...after ) === 0 && Math.max( ...after ) < Math.max( ...before ), { before, after } );
+
+	// A vertex, by a click.
+	const result = () => page.evaluate( () => Object.fromEntries( [ ...document.querySelectorAll( '#result dt' ) ].map( dt => [ dt.textContent, dt.nextSibling.textContent ] ) ) );
+	const click = async ( x, y ) => { await page.mouse.click( x, y ); await settled(); };
+	await click( SIZE.width / 2, SIZE.height / 2 );
+	const vertex = await result();
+	const point = known.get( [ vertex.X, vertex.Y, vertex.Z ].join( ' ' ) );
+	check( 'a picked vertex has the coordinates in the mesh', Boolean( point ), vertex );
+	check( 'and its values', vertex.color === point.color.join( ' ' ), vertex.color );
+
+	// A distance.
+	const places = [ [ 330, 300 ], [ 520, 420 ] ];
+	const ends = [];
+	for ( const place of places ) {
+
+		await click( ...place );
+		const { X, Y, Z } = await result();
+		ends.push( known.get( [ X, Y, Z ].join( ' ' ) ).at );
+
+	}
+
+	await page.keyboard.press( 'm' );
+	for ( const place of places ) await click( ...place );
+	const distance = await result(), truth = Math.hypot( ...[ 0, 1, 2 ].map( k => ends[ 1 ][ k ] - ends[ 0 ][ k ] ) );
+	check( 'it measures', truth > 0.01 && distance.Distance === truth.toFixed( 3 ), { distance, truth } );
+	check( 'the label has it, too', await page.textContent( '.label' ) === truth.toFixed( 3 ) );
+	await page.keyboard.press( 'Escape' );
+	await page.keyboard.press( 'Escape' );
+
+	// Every way to look, by keys.
+	const colors = () => page.evaluate( async () => {
+
+		const image = new Image();
+		image.src = window.outcropViewer.picture();
+		await image.decode();
+		const canvas = new OffscreenCanvas( image.width, image.height ), context = canvas.getContext( '2d' );
+		context.drawImage( image, 0, 0 );
+		const { data } = context.getImageData( 0, 0, image.width, image.height );
+		let [ red, all ] = [ 0, 0 ];
+		for ( let n = 0; n < data.length; n += 4 ) red += data[ n ] > 150 && data[ n + 1 ] < 90 && data[ n + 2 ] < 90;
+		for ( let n = 0; n < data.length; n += 4 ) all += [ 0, 1, 2 ].some( k => Math.abs( data[ n + k ] - data[ k ] ) > 8 );
+		return { red, all };
+
+	} );
+	await overlap( shown, camera, reference );
+	await page.selectOption( '#color', 'plain' );
+	await page.locator( '#color' ).blur();
+	await settled();
+	const calm = await colors();
+	for ( const key of [ 'e', 't', 'k', 'x', 'b' ] ) { await page.keyboard.press( key ); await settled(); }
+	const busy = await colors();
+	check( 'boundary edges are drawn', busy.red > calm.red + 200, { calm, busy } );
+	for ( const key of [ 'e', 't', 'k', 'x', 'b' ] ) await page.keyboard.press( key );
+	for ( let n = 0; n < 6; n ++ ) { await page.keyboard.press( 'c' ); await settled(); }
+	await page.click( '#section-axis [data-axis=x]' );
+	await settled();
+	const cut = await colors();
+	check( 'a section hides a part', cut.all > 0.2 * calm.all && cut.all < 0.8 * calm.all, { cut, calm } );
+	await page.click( '#section-axis [data-axis=""]' );
+
+	// A link.
+	await page.evaluate( () => window.outcropViewer.actions.view( 'front' ) );
+	await settled();
+	await page.waitForTimeout( 600 );
+	const state = () => page.evaluate( () => { const { focus, ...s } = window.outcropViewer.navigator.state(); return { ...s, at: window.outcropViewer.mesh.toScan( focus ) }; } );
+	const left = await state();
+	await page.reload();
+	await settled();
+	const back = await state();
+	const near = ( a, b ) => Math.abs( a - b ) < 1e-3;
+	check( 'a link leads to the same view', near( left.yaw, back.yaw ) && near( left.pitch, back.pitch ) && near( left.distance, back.distance ) && left.at.every( ( x, k ) => near( x, back.at[ k ] ) ), back );
+
+	// Little memory.
+	await page.evaluate( () => window.outcropViewer.actions.budget( 8 ) );
+	await page.keyboard.press( 'Escape' );
+	for ( let n = 0; n < 8; n ++ ) await page.mouse.wheel( 0, - 240 );
+	await page.waitForTimeout( 3000 );
+	const little = await page.evaluate( () => window.outcropViewer.stats() );
+	check( 'the memory is bounded', little.bytes < 12 * 2 ** 20 && little.triangles > 0, little );
+
+	check( 'no console errors', errors.length === 0, errors.join( '; ' ) );
+	const origin = new URL( server.url ).origin;
+	check( 'no request to anywhere else', asked.length > 5 && asked.every( url => url.startsWith( server.url ) || url.startsWith( 'data:' ) || url.startsWith( `blob:${ origin }` ) ), `${ asked.length } requests` );
+	await page.close();
+	check( 'Ctrl-C ends it', await server.stop( 'SIGINT' ) === 0 );
+
+	// Without a tile.
+	const holed = join( folder, 'holed' );
+	cpSync( tiles, holed, { recursive: true } );
+	const leaf = tile => tile.children?.length ? leaf( tile.children[ 0 ] ) : tile.content.uri;
+	const lost = leaf( JSON.parse( readFileSync( join( holed, 'tileset.json' ) ) ).root );
+	rmSync( join( holed, lost ) );
+	const second = await serve( holed );
+	const damaged = await open( second.url );
+	await damaged.page.evaluate( () => window.outcropViewer.actions.detail( 0.01 ) );
+	await damaged.settled();
+	const hole = await overlap( damaged, camera, reference );
+	check( 'a missing tile leaves no hole', hole.part > 0.98, hole );
+	const text = await damaged.page.textContent( '#messages' );
+	check( 'and is told', text.includes( lost ), text );
+	check( 'without other errors', damaged.errors.every( error => /404/.test( error ) ), damaged.errors.join( '; ' ) );
+	await damaged.page.close();
+	check( 'SIGTERM ends it, too', await second.stop( 'SIGTERM' ) === 0 );
+
+	// One file.
+	const page1 = join( folder, 'mesh.html' );
+	execFileSync( outcrop, [ 'view', tiles, '--html', page1, '--html-limit', '3MB', '--quiet' ] );
+	check( 'the page is as small as asked for', readFileSync( page1 ).length <= 3e6, `${ readFileSync( page1 ).length } bytes` );
+	const single = await open( `file://${ page1 }` );
+	const alone = await overlap( single, camera, reference );
+	check( 'it shows the mesh from a file', alone.part > 0.97, alone );
+	check( 'which asks for nothing', single.asked.every( url => url.startsWith( `file://${ page1 }` ) || /^(data|blob):/.test( url ) ), single.asked.filter( url => ! url.startsWith( 'data:' ) ).join( ' ' ) );
+	check( 'without errors', single.errors.length === 0, single.errors.join( '; ' ) );
+	await single.page.close();
+
+	// Levels of detail that are not kept.
+	const third = await serve( mesh );
+	const made = () => readdirSync( folder ).filter( name => name.startsWith( 'outcrop-view-' ) );
+	check( 'levels of detail are made for the time of looking', made().length === 1, made() );
+	await third.stop( 'SIGINT' );
+	check( 'and deleted after it', made().length === 0, made() );
+
+}
+
+main().then( () => console.log( `check-view: ${ passed } checks` ), error => { console.error( `check-view: ${ error.message }` ); process.exitCode = 1; } )
+	.finally( () => browser.close() );
