@@ -68,7 +68,7 @@ impl Illustration {
         let points = store.len() as u64;
         let (map, canvas) = (Map::new(&frame, points), Canvas::new(OBLIQUE[0], &frame));
         let pixels = (SIZE[0] * SIZE[1]) as f64;
-        let size = (0.7 * pixels / points.max(1) as f64).sqrt().clamp(0.6, 4.0);
+        let size = (2.0 * pixels / points.max(1) as f64).sqrt().clamp(0.6, 4.0);
         let runs = store.pages().div_ceil(RUN);
         let bytes = (RUN * store.page_size() * 24 + (64 << 10)) as u64;
         workspace.observer.begin("draw", "points", points);

@@ -23,8 +23,8 @@ pub enum Finished<'a> {
 /// The finished surface while it is read.
 pub(super) enum Source<'a> {
     Whole {
-        surface: Surface<'a>,
-        filled: Inbox<FilledTriangle>,
+        surface: Box<Surface<'a>>,
+        filled: Box<Inbox<FilledTriangle>>,
         used: Vertices,
     },
     Cut(Box<Pieces>),
@@ -46,8 +46,8 @@ impl<'a> Source<'a> {
     pub fn open(finished: Finished<'a>, blocks: Blocks, workspace: &Workspace) -> Result<Self> {
         Ok(match finished {
             Finished::Whole(repaired) => Self::Whole {
-                surface: repaired.surface.open(workspace)?,
-                filled: repaired.filled.open(workspace, blocks.count())?,
+                surface: Box::new(repaired.surface.open(workspace)?),
+                filled: Box::new(repaired.filled.open(workspace, blocks.count())?),
                 used: repaired.numbering.open(workspace)?,
             },
             Finished::Cut(pieces) => Self::Cut(Box::new(pieces.open(workspace)?)),
