@@ -48,7 +48,8 @@
 //! `examples/reconstruct.rs` shows progress ([`Observer`]) and cancellation ([`Cancel`]).
 //!
 //! [`inspect`] describes a cloud, checks that a mesh is a manifold, and measures the distance between two
-//! shapes. [`Report`] has the counts and measurements of a run.
+//! shapes. [`Report`] has the counts and measurements of a run. [`page`] puts all of these into pages with
+//! pictures.
 //!
 //! These items are the interface. The hidden modules are public only for the project's own tests, benches and
 //! tools, and change without notice; `ARCHITECTURE.md` has their map.
@@ -87,4 +88,5 @@ pub use report::{DiskEstimate, Report};
 pub use stages::ingest::Classes;
 pub use workspace::Workspace;
 pub use workspace::memory::MemoryPool;
+pub use workspace::outlook::{Outlook, Planned, Position};
 pub use workspace::progress::{Cancel, Observer, Silent};

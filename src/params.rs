@@ -269,6 +269,7 @@ impl Params {
             keep_all: true,
             max_edge: MaxWidth::None,
             max_fill: MaxWidth::None,
+            max_hole_edges: 500,
             min_component: Some(10),
             ..Self::default()
         }

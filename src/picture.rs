@@ -35,6 +35,9 @@ pub const OBLIQUE: [View; 2] = [
     },
 ];
 
+/// Boundary edges above which they are drawn thin.
+const MANY: u64 = 20_000;
+
 /// A picture.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Picture {
@@ -108,15 +111,32 @@ impl Canvas {
         }
     }
 
+    /// The cell of a position, for [`Canvas::misses`].
+    #[must_use]
+    #[inline]
+    pub fn cell(&self, p: Vec3) -> u32 {
+        Raster::cell(self.camera.project(p))
+    }
+
+    /// True if a triangle whose corners have these cells is not seen for certain.
+    #[must_use]
+    #[inline]
+    pub fn misses(cells: [u32; 3]) -> bool {
+        Raster::misses(cells)
+    }
+
+    /// The value of a triangle in the raster.
+    fn lit(&self, corners: [Vec3; 3]) -> u32 {
+        let lit = self.light.on(corners);
+        let kind = if lit.front { kind::FRONT } else { kind::BACK };
+        kind << 16 | level(lit.brightness)
+    }
+
     /// Draws a triangle.
     #[inline]
     pub fn triangle(&self, corners: [Vec3; 3]) {
         let at = corners.map(|p| self.camera.project(p));
-        self.raster.triangle(at, || {
-            let lit = self.light.on(corners);
-            let kind = if lit.front { kind::FRONT } else { kind::BACK };
-            kind << 16 | level(lit.brightness)
-        });
+        self.raster.triangle(at, || self.lit(corners));
     }
 
     /// Draws a point as a square of `size` pixels; `share` is its colour on a scale from 0 to 1. It is in front of
@@ -128,9 +148,14 @@ impl Canvas {
         self.raster.point(at, size, kind::RAMP << 16 | level(share));
     }
 
-    /// Draws a boundary edge. To be called when all triangles are drawn.
-    pub fn edge(&self, ends: [Vec3; 2]) {
-        let thickness = 1.1 * FACTOR as f64;
+    /// Draws a boundary edge, one of `many`: thinner if they would hide the surface. To be called when all triangles
+    /// are drawn.
+    pub fn edge(&self, ends: [Vec3; 2], many: u64) {
+        let thickness = if many > MANY {
+            1.0
+        } else {
+            1.1 * FACTOR as f64
+        };
         self.raster
             .line(&self.camera, ends, Mark::Boundary, thickness);
     }
@@ -257,7 +282,8 @@ impl Map {
         const NONE: Colour = [176.0, 178.0, 182.0];
         const ALL: Colour = [222.0, 92.0, 0.0];
         let image = self.image(|all, some| {
-            let share = f64::from(some) / f64::from(all);
+            // Few of many are seen as well.
+            let share = (f64::from(some) / f64::from(all)).sqrt();
             std::array::from_fn(|k| NONE[k] * (1.0 - share) + ALL[k] * share)
         });
         encoded(name, self.camera.scale / unit, &image)

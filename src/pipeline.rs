@@ -8,6 +8,7 @@ mod clock;
 mod disk;
 mod manifest;
 mod origin;
+mod outlook;
 mod shared;
 mod stages;
 mod start;

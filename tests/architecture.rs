@@ -11,13 +11,15 @@ use std::collections::{BTreeMap, BTreeSet};
 const MAY_USE: &[(&str, &str)] = &[
     (
         "cli",
-        "inspect levels method params pipeline report stages/ingest view workspace",
+        "inspect levels method page params pipeline report stages/ingest view workspace",
     ),
     ("error", ""),
     ("geom", "kernels method"),
+    ("histogram", ""),
     (
         "inspect",
-        "geom method params pipeline spill stages/cells stages/ingest stages/order stages/tiles workspace",
+        "geom histogram method params picture pipeline spill stages/cells stages/ingest stages/order stages/tiles \
+         workspace",
     ),
     ("kernels", ""),
     ("levels", "inspect pipeline spill stages/ingest workspace"),
@@ -26,8 +28,10 @@ const MAY_USE: &[(&str, &str)] = &[
         "params",
         "geom method stages/ingest stages/smooth stages/spacing stages/surface",
     ),
+    ("page", "histogram inspect picture report"),
+    ("picture", ""),
     ("pipeline", "geom method params report stages/* workspace"),
-    ("report", "params stages/*"),
+    ("report", "histogram params picture stages/* workspace"),
     ("spill", "workspace"),
     (
         "stages/attributes",
@@ -41,6 +45,10 @@ const MAY_USE: &[(&str, &str)] = &[
     (
         "stages/cut",
         "stages/blocks stages/located stages/order stages/repair stages/surface",
+    ),
+    (
+        "stages/draw",
+        "histogram picture stages/blocks stages/cut stages/located stages/order stages/repair stages/spacing",
     ),
     (
         "stages/export",

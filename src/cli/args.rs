@@ -1,13 +1,13 @@
 //! Command-line arguments.
 
+use super::parse::{count, region, size, time};
 use crate::method::METHOD;
-use crate::params::{MaxWidth, Method, NoRegion, Origin, Params, Radius, Region, Smoothing};
+use crate::params::{MaxWidth, Method, Origin, Params, Radius, Region, Smoothing};
 use crate::pipeline::{Builder, Reconstruction, Start};
 use crate::stages::ingest::{Attributes, Classes};
 use crate::workspace::mapped::Io;
 use crate::workspace::{Compression, Storage};
 use clap::Args as ClapArgs;
-use std::io::Read;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -190,9 +190,9 @@ pub struct Surface {
 #[command(next_help_heading = "Repair")]
 pub struct Repair {
     /// Fill holes of up to this many edges; 0 fills none (missing single triangles are still filled, except
-    /// with --method paper)
-    #[arg(long, value_name = "N", default_value_t = METHOD.filling.longest)]
-    pub max_hole_edges: usize,
+    /// with --method paper) [default: 2000; with --method paper 500]
+    #[arg(long, value_name = "N")]
+    pub max_hole_edges: Option<usize>,
     /// Largest triangle of a filling, as the side of an equilateral triangle: a length in the cloud's unit, a
     /// number of local spacings like 8x, or none [default: 8x; with --method paper none]
     #[arg(long, value_name = "LENGTH|Nx|none")]
@@ -471,7 +471,7 @@ impl Job {
             keep_all: self.surface.keep_all || usual.keep_all,
             max_edge: self.surface.max_edge.unwrap_or(usual.max_edge),
             max_fill: self.repair.max_fill.unwrap_or(usual.max_fill),
-            max_hole_edges: self.repair.max_hole_edges,
+            max_hole_edges: self.repair.max_hole_edges.unwrap_or(usual.max_hole_edges),
             min_component: self.repair.min_component.or(usual.min_component),
             repair: !self.repair.no_repair,
             normals: self.normals,
@@ -486,45 +486,6 @@ impl Job {
     }
 }
 
-pub fn size(text: &str) -> Result<u64, String> {
-    let size: bytesize::ByteSize = text
-        .parse()
-        .map_err(|_| format!("{text:?} is not a size like 512MiB, 4GiB or 2000000000"))?;
-    Ok(size.as_u64())
-}
-
-/// A region: numbers, or the name of a file.
-fn region(text: &str) -> Result<Region, String> {
-    if Region::is_numbers(text) {
-        return text.parse().map_err(|e: NoRegion| e.to_string());
-    }
-    // A point cloud given by mistake must not be read as a whole.
-    let limit = Region::LONGEST as u64 + 1;
-    let read = std::fs::File::open(text).and_then(|file| {
-        let mut content = Vec::new();
-        file.take(limit).read_to_end(&mut content).map(|_| content)
-    });
-    let content = read.map_err(|e| format!("neither numbers nor a file that can be read ({e})"))?;
-    let content = String::from_utf8_lossy(&content);
-    content.parse().map_err(|e: NoRegion| e.to_string())
-}
-
-fn time(text: &str) -> Result<Duration, String> {
-    match humantime::parse_duration(text) {
-        Ok(time) if time > Duration::ZERO => Ok(time),
-        _ => Err(format!("{text:?} is not a time like 90s, 45m or 7h30m")),
-    }
-}
-
-fn count(text: &str) -> Result<u64, String> {
-    match text.parse::<f64>() {
-        Ok(x) if (1.0..=4e9).contains(&x) && x.fract() == 0.0 => Ok(x as u64),
-        _ => Err(format!(
-            "{text:?} is not a number of points like 200000 or 1e6"
-        )),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -535,13 +496,5 @@ mod tests {
             OUTLIER_FACTOR_TEXT.parse(),
             Ok(crate::params::OUTLIER_FACTOR)
         );
-    }
-
-    #[test]
-    fn sizes_are_read() {
-        assert_eq!(size("512MiB"), Ok(512 << 20));
-        assert_eq!(size("2GiB"), Ok(2 << 30));
-        assert_eq!(size("1000"), Ok(1000));
-        assert!(size("lots").is_err());
     }
 }

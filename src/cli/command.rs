@@ -22,13 +22,13 @@ and parameters give the same file, byte for byte, whatever memory, threads and o
 
 const EXAMPLES: &str = "Examples:
   outcrop reconstruct scan.laz -o mesh.ply
-  outcrop reconstruct tiles/ -o town.ply --memory 4GiB --report town.json
+  outcrop reconstruct tiles/ -o town.ply --memory 4GiB --report town.html
   outcrop reconstruct noisy.las -o smooth.ply --smooth 1
   outcrop reconstruct scan.laz -o mesh.ply --resume --time-limit 7h30m
   outcrop resume mesh.ply.outcrop-scratch
   outcrop info scan.laz
   outcrop verify mesh.ply && echo manifold
-  outcrop compare mesh.ply scan.laz
+  outcrop compare mesh.ply scan.laz --html distances.html
   outcrop tiles mesh.ply -o town
   outcrop view mesh.ply
   outcrop demo

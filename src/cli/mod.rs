@@ -4,6 +4,7 @@ mod args;
 mod command;
 mod commands;
 mod output;
+mod parse;
 mod progress;
 mod shared;
 mod stop;

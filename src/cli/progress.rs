@@ -1,23 +1,82 @@
-//! Progress on a terminal: stage, rate, time left, memory; one line for each stage.
+//! Progress on a terminal: stage, rate, time left, memory, one line for each stage; and one for the whole run.
 
+use crate::workspace::outlook::{Outlook, Planned, Position};
 use crate::workspace::progress::Observer;
 use crate::workspace::{limits, lock};
-use indicatif::{HumanCount, ProgressBar, ProgressState, ProgressStyle};
+use indicatif::{
+    HumanCount, HumanDuration, MultiProgress, ProgressBar, ProgressState, ProgressStyle,
+};
 use std::fmt::Write;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant};
 
-/// A progress bar for the current stage on standard error. Only [`Bars::draw`] draws it, so that workers never
-/// wait for the terminal.
+/// A progress bar for the current stage on standard error, and one for the whole run below it. Only
+/// [`Bars::draw`] draws them, so that workers never wait for the terminal.
 #[derive(Default)]
 pub struct Bars {
+    lines: MultiProgress,
     current: Mutex<Option<ProgressBar>>,
+    whole: Mutex<Whole>,
     done: AtomicU64,
+}
+
+/// The line of the whole run.
+struct Whole {
+    outlook: Outlook,
+    began: Instant,
+    /// None without a plan, and when the run is over.
+    bar: Option<ProgressBar>,
+}
+
+impl Default for Whole {
+    fn default() -> Self {
+        Self {
+            outlook: Outlook::default(),
+            began: Instant::now(),
+            bar: None,
+        }
+    }
+}
+
+impl Whole {
+    fn now(&self) -> Duration {
+        self.began.elapsed()
+    }
+
+    fn draw(&mut self, items: u64) {
+        let now = self.now();
+        if let (Some(bar), Some(position)) = (&self.bar, self.outlook.position(items, now)) {
+            bar.set_position(parts(&position));
+            bar.set_message(left(&position));
+        }
+    }
+}
+
+/// Parts of the bar of the whole run.
+const PARTS: u64 = 1000;
+
+/// The parts that are done.
+fn parts(position: &Position) -> u64 {
+    (position.share * PARTS as f64) as u64
+}
+
+/// The time left, in words.
+fn left(position: &Position) -> String {
+    // Estimates are not that precise.
+    let seconds = position.left.as_secs();
+    let rounded = if seconds > 20 {
+        seconds.next_multiple_of(5)
+    } else {
+        seconds
+    };
+    format!("about {} left", HumanDuration(Duration::from_secs(rounded)))
 }
 
 const KNOWN: &str =
     "{prefix:>8} [{bar:24}] {human_pos}/{human_len} {msg}  {rate}  {eta} left  {memory}";
 const UNKNOWN: &str = "{prefix:>8} {spinner} {human_pos} {msg}  {rate}  {elapsed}  {memory}";
+const WHOLE: &str = "{prefix:>8} [{bar:24}] {percent} %  {msg}";
 const DONE: &str = "{prefix:>8} {human_pos} {msg} in {elapsed_precise}";
 
 fn style(template: &str) -> ProgressStyle {
@@ -33,15 +92,26 @@ fn style(template: &str) -> ProgressStyle {
 }
 
 impl Bars {
-    /// Draws the bar, if there is one.
+    /// Draws the bars, if there are any.
     pub fn draw(&self) {
+        let done = self.done.load(Ordering::Relaxed);
         if let Some(bar) = &*lock(&self.current) {
-            bar.set_position(self.done.load(Ordering::Relaxed));
+            bar.set_position(done);
         }
+        lock(&self.whole).draw(done);
     }
 }
 
 impl Observer for Bars {
+    fn plan(&self, stages: &[Planned]) {
+        let mut whole = lock(&self.whole);
+        whole.outlook.plan(stages);
+        if whole.bar.is_none() && stages.iter().any(|stage| stage.seconds > 0.0) {
+            let bar = ProgressBar::new(PARTS).with_style(style(WHOLE));
+            whole.bar = Some(self.lines.add(bar.with_prefix("all")));
+        }
+    }
+
     fn begin(&self, name: &'static str, unit: &'static str, total: u64) {
         let bar = if total > 0 {
             ProgressBar::new(total).with_style(style(KNOWN))
@@ -50,6 +120,13 @@ impl Observer for Bars {
         };
         let bar = bar.with_prefix(name).with_message(unit);
         self.done.store(0, Ordering::Relaxed);
+        let mut whole = lock(&self.whole);
+        let now = whole.now();
+        whole.outlook.begin(name, total, now);
+        let bar = match &whole.bar {
+            Some(below) => self.lines.insert_before(below, bar),
+            None => self.lines.add(bar),
+        };
         *lock(&self.current) = Some(bar);
     }
 
@@ -63,13 +140,18 @@ impl Observer for Bars {
             bar.set_style(style(DONE));
             bar.finish();
         }
+        let mut whole = lock(&self.whole);
+        let now = whole.now();
+        whole.outlook.end(now);
+        if whole.outlook.is_over()
+            && let Some(bar) = whole.bar.take()
+        {
+            bar.finish_and_clear();
+        }
     }
 
     fn warn(&self, message: &str) {
-        match &*lock(&self.current) {
-            Some(bar) => bar.suspend(|| Warnings.warn(message)),
-            None => Warnings.warn(message),
-        }
+        self.lines.suspend(|| Warnings.warn(message));
     }
 }
 
@@ -79,5 +161,43 @@ pub struct Warnings;
 impl Observer for Warnings {
     fn warn(&self, message: &str) {
         eprintln!("outcrop: warning: {message}");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_line_of_the_whole_run_says_how_much_and_how_long() {
+        let position = |share, seconds| Position {
+            share,
+            left: Duration::from_secs(seconds),
+        };
+        assert_eq!(parts(&position(0.4567, 0)), 456);
+        assert_eq!(parts(&position(1.0, 0)), PARTS);
+        assert_eq!(left(&position(0.5, 7)), "about 7 seconds left");
+        assert_eq!(left(&position(0.5, 48)), "about 50 seconds left");
+        assert_eq!(left(&position(0.5, 7000)), "about 2 hours left");
+    }
+
+    #[test]
+    fn the_line_is_there_from_the_plan_to_the_end_of_the_last_stage() {
+        let bars = Bars::default();
+        bars.begin("verify", "triangles", 5);
+        assert!(lock(&bars.whole).bar.is_none());
+        bars.end();
+        let planned = |name, seconds| Planned { name, seconds };
+        bars.plan(&[planned("cells", 3.0), planned("export", 1.0)]);
+        bars.begin("cells", "points", 10);
+        bars.advance(5);
+        bars.draw();
+        let shown = lock(&bars.whole).bar.as_ref().map(ProgressBar::position);
+        assert_eq!(shown, Some(375));
+        bars.end();
+        bars.begin("export", "blocks", 0);
+        assert!(lock(&bars.whole).bar.is_some());
+        bars.end();
+        assert!(lock(&bars.whole).bar.is_none());
     }
 }

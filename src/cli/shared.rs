@@ -7,8 +7,9 @@ mod submit;
 pub use status::status;
 pub use submit::submit;
 
-use super::args::{Job, Storing, size};
+use super::args::{Job, Storing};
 use super::output::{is_page, json, print, summary, write_report};
+use super::parse::size;
 use super::{stop, style};
 use crate::error::{Error, Result};
 use crate::pipeline::{self, Advanced, Reconstruction, Totals, Worked};

@@ -1,7 +1,8 @@
 //! `outcrop view`: a mesh in the browser.
 
-use super::args::{Again, Limits, size};
+use super::args::{Again, Limits};
 use super::output::print;
+use super::parse::size;
 use super::{stop, style};
 use crate::error::{Error, Result};
 use crate::levels::Tiles;

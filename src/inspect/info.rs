@@ -102,7 +102,8 @@ fn described(
     let selection = Selection {
         scanners: false,
         attributes: match drawn {
-            true => pictures::columns(),
+            // A list would have to be of columns that are there.
+            true => Attributes::Auto,
             false => Attributes::None,
         },
         ..params.selection()

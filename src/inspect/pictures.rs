@@ -103,21 +103,17 @@ impl Illustration {
     }
 }
 
-/// The columns that are read to count classes.
-pub(super) fn columns() -> Attributes {
-    Attributes::List(vec![CLASSES.to_owned()])
-}
-
 /// Name of the column of classes.
 const CLASSES: &str = "classification";
 
-/// Points of each class; nothing if no file has classes of one byte.
+/// Points of each class, of a spool with columns; nothing if no file has classes of one byte.
 pub(super) fn classes(
     spool: &Spool,
     lattice: &Lattice,
     workspace: &Workspace,
 ) -> Result<Vec<(u8, u64)>> {
-    let carried = spool.carried(&columns(), false);
+    let wanted = Attributes::List(vec![CLASSES.to_owned()]);
+    let carried = spool.carried(&wanted, false);
     let [column] = &carried.columns[..] else {
         return Ok(Vec::new());
     };

@@ -2,6 +2,19 @@
 //! needs no script, and fetches nothing.
 //!
 //! These functions only put into words and pictures what their arguments have.
+//!
+//! ```no_run
+//! use outcrop::{Reconstruction, page};
+//!
+//! let run = Reconstruction::builder()
+//!     .input("scan.laz")
+//!     .output("mesh.ply")
+//!     .pictures(true) // draw the mesh, and note memory and disk over time
+//!     .build()?;
+//! let report = run.run()?;
+//! std::fs::write("mesh.html", page::report(&report, run.output())).unwrap();
+//! # Ok::<(), outcrop::Error>(())
+//! ```
 
 mod advice;
 mod charts;

@@ -3,6 +3,7 @@
 
 mod draw;
 mod export;
+mod plan;
 mod values;
 
 use super::checks::{all_are_kept, disk_radius, enough, not_a_line, room};
@@ -17,7 +18,7 @@ use crate::stages::blocks::Blocks;
 use crate::stages::cells::{CellTriples, DiskRadius, TileRanges, Widen, cells};
 use crate::stages::cut::{CutOptions, StoredPieces, cut};
 use crate::stages::export::CoordinateType;
-use crate::stages::ingest::{Carried, Spool, ingest_selected};
+use crate::stages::ingest::{Attributes, Carried, Spool, ingest_selected};
 use crate::stages::located::Places;
 use crate::stages::order::{Orderer, PointStore, StoredPoints, order, sample_sort};
 use crate::stages::outliers::{OutlierOptions, drop_outliers};
@@ -93,6 +94,11 @@ impl<'a> Stages<'a> {
                 ..Report::default()
             },
         };
+        stages.plan(
+            stages.known.read,
+            None,
+            job.params.attributes != Attributes::None,
+        );
         if let Some(estimate) = first {
             room(&job.folder, &job.output, estimate, workspace)?;
         }
@@ -164,6 +170,7 @@ impl<'a> Stages<'a> {
             text: None,
         };
         workspace.note_points(input.kept);
+        self.plan(input.kept, Some("ingest"), !self.carried.is_empty());
         let narrow = params.narrow_margin(&input);
         self.report.input = input;
         narrow.into_iter().for_each(|warning| self.warn(warning));
@@ -219,15 +226,19 @@ impl<'a> Stages<'a> {
         enough(&store)?;
         self.known.points = store.len() as u64;
         self.known.text = Some(text);
-        let coordinates = self.report.coordinates;
         let columns = &self.carried.columns;
+        let (shift, coordinates) = self.shift(store.bounds(), lattice)?;
+        let place = (coordinates, shift.map_or([0.0; 3], |shift| shift.origin));
         let warnings = self
             .known
-            .left_out(&job.params, columns, coordinates, &job.output)?;
+            .left_out(&job.params, columns, place, &job.output)?;
         for warning in warnings {
             self.warn(warning);
         }
         workspace.note_points(self.known.points);
+        if job.params.thin.is_some() {
+            self.plan(self.known.points, Some("order"), !self.carried.is_empty());
+        }
         self.check_room()?;
         Ok(store)
     }

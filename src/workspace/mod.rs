@@ -17,6 +17,7 @@ pub mod limits;
 pub mod mapped;
 pub mod memory;
 pub mod open;
+pub mod outlook;
 mod pipe;
 pub mod place;
 pub mod progress;

@@ -1,5 +1,6 @@
 //! Progress reports of a run, and the flag that stops it.
 
+use super::outlook::Planned;
 use crate::error::{Error, Result};
 use crossbeam_channel::{Receiver, Sender, bounded};
 use std::sync::Arc;
@@ -7,6 +8,11 @@ use std::sync::atomic::{AtomicU8, Ordering};
 
 /// Receives the progress of a run. Methods may be called from several threads.
 pub trait Observer: Send + Sync {
+    /// The stages that are to come, in their order; called again when more is known of them. A
+    /// [`Outlook`](super::outlook::Outlook) tells from it how long the whole run takes.
+    fn plan(&self, stages: &[Planned]) {
+        let _ = stages;
+    }
     /// Stage `name` begins; it has `total` items called `unit` (0: unknown).
     fn begin(&self, name: &'static str, unit: &'static str, total: u64) {
         let _ = (name, unit, total);

@@ -11,6 +11,7 @@ mod library;
 mod odd;
 mod outdoor;
 mod outputs;
+mod pages;
 mod regions;
 mod report;
 mod scanners;

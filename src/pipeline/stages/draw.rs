@@ -1,7 +1,7 @@
 //! The report, and its pictures.
 
 use super::{Shape, Stages};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::geom::lattice::Lattice;
 use crate::report::{Details, Drawn, Report};
 use crate::stages::cut::StoredPieces;
@@ -40,7 +40,14 @@ impl Stages<'_> {
         };
         workspace.trim();
         let work = || draw(subject, workspace);
-        let drawn = self.clock.stage("draw", "blocks", items as u64, work)?;
+        let drawn = match self.clock.stage("draw", "blocks", items as u64, work) {
+            // The mesh is finished, and its report can be written without them.
+            Err(error @ Error::Memory { .. }) => {
+                self.warn(format!("no pictures in the report: {error}"));
+                return Ok(());
+            }
+            drawn => drawn?,
+        };
         let Drawn {
             pictures,
             edges,

@@ -4,6 +4,7 @@ use super::super::beside;
 use super::super::origin::Steps;
 use super::Stages;
 use crate::error::Result;
+use crate::geom::aabb::Aabb;
 use crate::geom::lattice::{Lattice, Shift};
 use crate::params::Origin;
 use crate::stages::attributes::StoredColumns;
@@ -40,21 +41,23 @@ impl Stages<'_> {
         Ok(())
     }
 
-    /// The origin of the mesh's coordinates, if it is not that of the cloud, and their type.
-    fn shift(&mut self, store: &PointStore, lattice: &Lattice) -> Result<Option<Shift>> {
+    /// The origin of the coordinates in a mesh of points with these bounds, if it is not that of the cloud, and
+    /// their type.
+    pub(super) fn shift(
+        &self,
+        bounds: Aabb,
+        lattice: &Lattice,
+    ) -> Result<(Option<Shift>, CoordinateType)> {
         let coarse = self.coarse;
         let steps = Steps { lattice, coarse };
-        let doubles = self.report.coordinates == CoordinateType::Double;
+        let of_cloud = self.report.coordinates;
         let shift = match self.job.params.origin {
-            Origin::Auto if doubles => steps.automatic(store.bounds()),
+            Origin::Auto if of_cloud == CoordinateType::Double => steps.automatic(bounds),
             Origin::Auto | Origin::None => None,
             Origin::At(to) => Some(steps.given(to)?),
         };
-        if let Some(shift) = &shift {
-            self.report.coordinates = written(steps.precision(shift, store.bounds()));
-            self.report.origin = Some(shift.origin);
-        }
-        Ok(shift)
+        let of_mesh = shift.map(|shift| written(steps.precision(&shift, bounds)));
+        Ok((shift, of_mesh.unwrap_or(of_cloud)))
     }
 
     /// The comments of the mesh.
@@ -79,7 +82,9 @@ impl Stages<'_> {
         lattice: &Lattice,
     ) -> Result<()> {
         let (job, workspace, blocks) = (self.job, self.workspace, self.blocks());
-        let shift = self.shift(store, lattice)?;
+        let (shift, coordinates) = self.shift(store.bounds(), lattice)?;
+        self.report.coordinates = coordinates;
+        self.report.origin = shift.map(|shift| shift.origin);
         let options = ExportOptions {
             output: &job.output,
             coordinates: self.report.coordinates,

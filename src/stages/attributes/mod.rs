@@ -10,6 +10,7 @@ mod rows;
 
 use crate::error::Result;
 use crate::geom::lattice::Lattice;
+use crate::method::METHOD;
 use crate::spill::{Row, Shuffle, Table, release};
 use crate::stages::blocks::Blocks;
 use crate::stages::ingest::{Carried, Column, Spool, VALUE_BUFFERS};
@@ -41,9 +42,13 @@ struct Words {
 release!(Words: table);
 
 impl Words {
-    /// Bytes of memory for `ids` ids while they are read.
+    /// Bytes of memory for `ids` ids while they are read: their words, and the words of a whole section as they are
+    /// on disk and as rows.
     fn bytes(&self, ids: usize) -> u64 {
-        (ids * self.words * 4 * 3) as u64
+        let sections = self.starts.windows(2).map(|pair| pair[1] - pair[0]);
+        // The last one ends with a block, too.
+        let section = sections.max().unwrap_or(METHOD.curve.block) as usize;
+        ((ids + 2 * section) * self.words * 4) as u64
     }
 
     /// The words of the ids of a block, id by id.

@@ -5,6 +5,8 @@
 
 mod border;
 mod source;
+#[cfg(test)]
+mod tests;
 
 pub use source::Finished;
 
@@ -170,15 +172,16 @@ impl Drawing<'_> {
             .collect();
         match boundary {
             None => *boundary = Some(self.first_round(&canvases)?),
-            Some(_) => self.each_part(|_, part| {
-                paint(part, &canvases);
+            Some(_) => self.each_part(|unit, part| {
+                paint(unit, part, &canvases);
                 Ok(())
             })?,
         }
         if let Some(boundary) = boundary {
+            let many = boundary.edges.total();
             boundary.for_each(|edge| {
                 let ends = edge.at.map(position);
-                canvases.iter().for_each(|canvas| canvas.edge(ends));
+                canvases.iter().for_each(|canvas| canvas.edge(ends, many));
             })?;
         }
         let step = self.subject.step;
@@ -216,7 +219,7 @@ impl Drawing<'_> {
         let counts: Mutex<Counts> = Mutex::default();
         let components = Mutex::new(workspace.promise("draw: components", 0)?);
         self.each_part(|unit, part| {
-            paint(part, canvases);
+            paint(unit, part, canvases);
             if let (Some(map), Source::Whole { used, .. }) = (&map, self.source) {
                 for (id, p) in part.ids.clone().zip(part.at.own()) {
                     let is_used = used.used[id as usize / 64] >> (id % 64) & 1 == 1;
@@ -273,11 +276,25 @@ impl Drawing<'_> {
     }
 }
 
-/// Draws the triangles of a part.
-fn paint(part: &Part, canvases: &[Canvas]) {
-    for t in &part.triangles {
-        let corners = part.at.corners(*t).map(position);
-        canvases.iter().for_each(|canvas| canvas.triangle(corners));
+/// Draws the triangles of a part. Most triangles of a large mesh lie between the centres of pixels, which the cells
+/// of their corners tell.
+fn paint(unit: &Unit<'_>, part: &Part, canvases: &[Canvas]) {
+    let first = part.ids.start;
+    let mut own: Vec<u32> = Vec::with_capacity(part.at.own().len());
+    let _held = unit.hold(4 * part.at.own().len() as u64);
+    for canvas in canvases {
+        let cell = |p: &Point| canvas.cell(position(*p));
+        own.clear();
+        own.extend(part.at.own().iter().map(cell));
+        for t in &part.triangles {
+            let cells = t.map(|v| match own.get(v.wrapping_sub(first) as usize) {
+                Some(cell) => *cell,
+                None => cell(&part.at.at(v)),
+            });
+            if !Canvas::misses(cells) {
+                canvas.triangle(part.at.corners(*t).map(position));
+            }
+        }
     }
 }
 

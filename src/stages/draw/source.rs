@@ -63,7 +63,7 @@ impl<'a> Source<'a> {
     }
 
     /// Bytes of memory for a part: its triangles, the positions of their corners, two of which may be in other
-    /// blocks, and sums over the edges at each vertex.
+    /// blocks, their places in a picture, and sums over the edges at each vertex.
     pub fn memory(&self, workspace: &Workspace, blocks: Blocks, part: usize) -> u64 {
         let (points, triangles) = match self {
             Self::Whole {
@@ -74,7 +74,7 @@ impl<'a> Source<'a> {
             }
             Self::Cut(pieces) => (blocks.ids(0).len(), pieces.counts(part)[2] as usize),
         };
-        24 * points as u64 + 160 * triangles as u64 + (1 << 20)
+        40 * points as u64 + 160 * triangles as u64 + (1 << 20)
     }
 
     /// Reads a part; none if it has no triangles.

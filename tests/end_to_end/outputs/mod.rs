@@ -151,6 +151,39 @@ fn same_as_glb(ply: &Mesh, bytes: &[u8], double: bool) {
     assert_eq!(mesh.vertices.len(), ply.vertices.len());
 }
 
+#[test]
+fn rounding_is_told_by_the_distance_from_the_origin_of_the_mesh() {
+    let bench = Bench::new();
+    let near = bench.cloud("near.laz", &cloud(2_000));
+    let far = cloud(2_000).offset([500_000.0, 5_400_000.0, 300.0]);
+    let far = bench.cloud("far.laz", &far);
+    for (input, origin, step) in [
+        (&near, "none", None),
+        (&near, "-5000000,0,0", Some("0.5")),
+        (&far, "none", Some("0.5")),
+        (&far, "auto", None),
+        (&far, "500000,5400000,0", None),
+        (&far, "500000,9600000,0", Some("0.25")),
+    ] {
+        let params = Params {
+            origin: origin.parse().unwrap(),
+            ..params(false)
+        };
+        let (_, report) = make(&bench, input, "mesh.stl", &params);
+        let said = report.warnings.concat();
+        assert_eq!(
+            said.contains("32-bit floats"),
+            step.is_some(),
+            "{origin}: {said}"
+        );
+        let step = step.map(|step| format!("steps of up to {step};"));
+        assert!(
+            step.is_none_or(|step| said.contains(&step)),
+            "{origin}: {said}"
+        );
+    }
+}
+
 /// The sums of the triangles of the mesh on the lattice, in integers; copies have triangles of their own.
 #[test]
 fn normals_are_those_of_the_triangles_around_each_vertex() {

@@ -71,6 +71,7 @@ impl Light {
 
     /// The light on a triangle.
     #[must_use]
+    #[inline]
     pub fn on(&self, [a, b, c]: [Vec3; 3]) -> Lit {
         let mut normal = normalize(cross(sub(b, a), sub(c, a)));
         let front = dot(normal, self.towards) >= 0.0;

@@ -1,0 +1,60 @@
+//! Values of options.
+
+use crate::params::{NoRegion, Region};
+use std::io::Read;
+use std::time::Duration;
+
+/// A size in bytes.
+pub fn size(text: &str) -> Result<u64, String> {
+    let size: bytesize::ByteSize = text
+        .parse()
+        .map_err(|_| format!("{text:?} is not a size like 512MiB, 4GiB or 2000000000"))?;
+    Ok(size.as_u64())
+}
+
+/// A region: numbers, or the name of a file.
+pub fn region(text: &str) -> Result<Region, String> {
+    if Region::is_numbers(text) {
+        return text.parse().map_err(|e: NoRegion| e.to_string());
+    }
+    // A point cloud given by mistake must not be read as a whole.
+    let limit = Region::LONGEST as u64 + 1;
+    let read = std::fs::File::open(text).and_then(|file| {
+        let mut content = Vec::new();
+        file.take(limit).read_to_end(&mut content).map(|_| content)
+    });
+    let content = read.map_err(|e| format!("neither numbers nor a file that can be read ({e})"))?;
+    let content = String::from_utf8_lossy(&content);
+    content.parse().map_err(|e: NoRegion| e.to_string())
+}
+
+/// A time that is not zero.
+pub fn time(text: &str) -> Result<Duration, String> {
+    match humantime::parse_duration(text) {
+        Ok(time) if time > Duration::ZERO => Ok(time),
+        _ => Err(format!("{text:?} is not a time like 90s, 45m or 7h30m")),
+    }
+}
+
+/// A number of points.
+pub fn count(text: &str) -> Result<u64, String> {
+    match text.parse::<f64>() {
+        Ok(x) if (1.0..=4e9).contains(&x) && x.fract() == 0.0 => Ok(x as u64),
+        _ => Err(format!(
+            "{text:?} is not a number of points like 200000 or 1e6"
+        )),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_are_read() {
+        assert_eq!(size("512MiB"), Ok(512 << 20));
+        assert_eq!(size("2GiB"), Ok(2 << 30));
+        assert_eq!(size("1000"), Ok(1000));
+        assert!(size("lots").is_err());
+    }
+}

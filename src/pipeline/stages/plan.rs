@@ -1,0 +1,19 @@
+//! The stages that are to come, for the progress.
+
+use super::super::outlook;
+use super::Stages;
+use crate::stages::export::is_compressed;
+
+impl Stages<'_> {
+    /// Tells which stages are to come behind `after`, and how long they take for so many points.
+    pub(super) fn plan(&self, points: u64, after: Option<&str>, valued: bool) {
+        let (job, workspace) = (self.job, self.workspace);
+        if workspace.is_shared() {
+            return;
+        }
+        let compressed = job.params.compress_glb || is_compressed(&job.output);
+        let stages = outlook::plan(&job.params, points, job.threads, valued, compressed);
+        let first = stages.iter().rposition(|stage| Some(stage.name) == after);
+        job.observer.plan(&stages[first.map_or(0, |at| at + 1)..]);
+    }
+}
