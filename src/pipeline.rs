@@ -40,9 +40,9 @@ pub use tiles::Tiles;
 pub struct Reconstruction {
     inputs: Vec<PathBuf>,
     /// The mesh: of a tileset one in the scratch's place, which is deleted at the end.
-    output: PathBuf,
+    mesh: PathBuf,
     /// The output that was asked for.
-    target: PathBuf,
+    output: PathBuf,
     /// The folder of the tileset, if that is wanted.
     tiles: Option<PathBuf>,
     folder: PathBuf,
@@ -95,7 +95,7 @@ impl Reconstruction {
     /// Path of the mesh, or of the tileset.
     #[must_use]
     pub fn output(&self) -> &Path {
-        &self.target
+        &self.output
     }
 
     /// Reconstructs the surface and writes the mesh.
@@ -104,9 +104,9 @@ impl Reconstruction {
     /// Any [`crate::Error`]; an existing output file is then unchanged. Scratch files are deleted, unless the
     /// run can be resumed, see [`Reconstruction::is_unfinished`].
     pub fn run(&self) -> Result<Report> {
-        writable(&self.output)?;
+        writable(&self.mesh)?;
         self.tiles.as_deref().map_or(Ok(()), levels::check_folder)?;
-        not_an_input(&self.output, self.params.split.is_some(), &self.inputs)?;
+        not_an_input(&self.mesh, self.params.split.is_some(), &self.inputs)?;
         one_system(&self.params, &self.inputs)?;
         let _alarm = self
             .time_limit

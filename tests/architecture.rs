@@ -30,8 +30,14 @@ const MAY_USE: &[(&str, &str)] = &[
     ),
     ("page", "histogram inspect picture report"),
     ("picture", ""),
-    ("pipeline", "geom levels method params report stages/* workspace"),
-    ("report", "histogram levels params picture stages/* workspace"),
+    (
+        "pipeline",
+        "geom levels method params report stages/* workspace",
+    ),
+    (
+        "report",
+        "histogram levels params picture stages/* workspace",
+    ),
     ("spill", "workspace"),
     (
         "stages/attributes",

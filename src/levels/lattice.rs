@@ -98,8 +98,7 @@ impl Finder {
     #[inline]
     pub fn see(&mut self, position: [f64; 3]) -> bool {
         for (axis, &x) in position.iter().enumerate() {
-            // The negated form is also true if it is not a number.
-            if !(x.abs() <= LARGEST) {
+            if x.is_nan() || x.abs() > LARGEST {
                 return false;
             }
             self.min[axis] = self.min[axis].min(x);
@@ -137,10 +136,10 @@ impl Finder {
             exact,
             bits: 32 - ((span / step).ceil().clamp(0.0, POSITIONS - 1.0) as u32).leading_zeros(),
         };
-        if let Some(&scale) = SCALES.get(self.decimals) {
-            if fits(1.0 / scale) {
-                return of(Some(scale), 1.0 / scale, true);
-            }
+        if let Some(&scale) = SCALES.get(self.decimals)
+            && fits(1.0 / scale)
+        {
+            return of(Some(scale), 1.0 / scale, true);
         }
         let wanted = self.lowest.clamp(-1000, 1000);
         let exponent = (wanted..).find(|e| fits(2f64.powi(*e))).unwrap_or(wanted);

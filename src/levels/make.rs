@@ -99,15 +99,15 @@ impl Maker<'_> {
         self.cells.table.release(workspace)?;
         self.intake.release(workspace)?;
         workspace.trim();
-        if let [leaf] = &*self.made {
-            if leaf.bytes as usize > ROOT_BYTES {
-                self.nodes.push(TreeNode {
-                    depth: 0,
-                    level: 1,
-                    children: vec![0],
-                });
-                self.bounds.push(self.bounds[0]);
-            }
+        if let [leaf] = &*self.made
+            && leaf.bytes as usize > ROOT_BYTES
+        {
+            self.nodes.push(TreeNode {
+                depth: 0,
+                level: 1,
+                children: vec![0],
+            });
+            self.bounds.push(self.bounds[0]);
         }
         let last = self.nodes.last().map_or(0, |root| root.level);
         for level in 1..=last {

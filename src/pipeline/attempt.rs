@@ -64,7 +64,7 @@ impl Reconstruction {
             }
             (Found::Run(folder) | Found::Damaged(folder), _) => folder.restart(bytes)?,
         };
-        folder.output = [export::temporary(&self.output), self.output.clone()];
+        folder.output = [export::temporary(&self.mesh), self.mesh.clone()];
         let workspace = Workspace::resumable(
             folder,
             self.memory.clone(),
@@ -88,13 +88,13 @@ impl Reconstruction {
         if !keep {
             workspace.remove(outcome.is_ok());
             // An unfinished mesh; if it cannot be deleted it does no harm.
-            let _ = std::fs::remove_file(export::temporary(&self.output));
+            let _ = std::fs::remove_file(export::temporary(&self.mesh));
             if let Some(tiles) = &self.tiles {
                 levels::remove_unfinished(tiles);
-                beside::remove(&self.output);
+                beside::remove(&self.mesh);
             }
             if self.params.split.is_some() {
-                export::remove_unfinished(&self.output);
+                export::remove_unfinished(&self.mesh);
             }
         }
         // The workspace has the lock, which must outlive the files.

@@ -164,15 +164,18 @@ impl Builder {
         }
         let tiles = tiles(&self.output, self.params.split.is_some())?;
         let mesh = tiles.as_deref().map(mesh_of);
-        check_name(mesh.as_deref().unwrap_or(&self.output), self.params.compress_glb)?;
+        check_name(
+            mesh.as_deref().unwrap_or(&self.output),
+            self.params.compress_glb,
+        )?;
         let budget = self.memory.unwrap_or_else(default_memory);
         let target = tiles.as_deref().unwrap_or(&self.output);
         let folder = scratch_folder(target, self.scratch.as_deref());
         Ok(Reconstruction {
             folder: self.folder.unwrap_or(folder),
             inputs: self.inputs,
-            target: self.output.clone(),
-            output: mesh.unwrap_or(self.output),
+            output: self.output.clone(),
+            mesh: mesh.unwrap_or(self.output),
             tiles,
             memory: MemoryPool::new(budget)?,
             threads: self.threads.unwrap_or_else(default_threads),

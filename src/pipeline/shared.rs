@@ -92,8 +92,8 @@ impl Reconstruction {
                 expected: "a mesh; `outcrop tiles` makes levels of detail of it afterwards".into(),
             });
         }
-        writable(&self.output)?;
-        not_an_input(&self.output, self.params.split.is_some(), &self.inputs)?;
+        writable(&self.mesh)?;
+        not_an_input(&self.mesh, self.params.split.is_some(), &self.inputs)?;
         one_system(&self.params, &self.inputs)?;
         let headers = Known::from_headers(
             &self.inputs,
@@ -101,7 +101,7 @@ impl Reconstruction {
             self.params.scanners(),
         );
         if let Some(known) = headers.filter(|_| all_are_kept(&self.params)) {
-            known.fits(&self.params, &self.output)?;
+            known.fits(&self.params, &self.mesh)?;
         }
         let manifest = Manifest::of(self)?.to_bytes()?;
         let random = std::hash::RandomState::new().build_hasher().finish();
@@ -213,7 +213,7 @@ impl Reconstruction {
 
     fn try_advance(&self, folder: &SharedFolder, number: u64, begin: Instant) -> Result<Advanced> {
         let mut now = self.generation(folder, number)?;
-        writable(&self.output)?;
+        writable(&self.mesh)?;
         let was = Manifest::from_bytes(&self.folder, &folder.manifest)?;
         was.check(&Manifest::of(self)?, &self.folder)?;
         let damaged = folder.is_damaged(&now)?;
@@ -248,7 +248,7 @@ impl Reconstruction {
         if !matches!(published, Ok(true)) {
             folder.withdraw(&workspace);
             if let Some(number) = workspace.shared_number() {
-                let _ = std::fs::remove_file(export::temporary_of(&self.output, number));
+                let _ = std::fs::remove_file(export::temporary_of(&self.mesh, number));
             }
         }
         match (outcome, published?) {
@@ -267,14 +267,14 @@ impl Reconstruction {
 
     /// Deletes meshes that killed attempts left unfinished.
     fn remove_unfinished(&self) {
-        let name = export::temporary(&self.output).into_os_string();
+        let name = export::temporary(&self.mesh).into_os_string();
         let Some(name) = Path::new(&name).file_name().and_then(|name| name.to_str()) else {
             return;
         };
         if self.params.split.is_some() {
-            export::remove_unfinished(&self.output);
+            export::remove_unfinished(&self.mesh);
         }
-        let beside = std::fs::read_dir(export::folder_of(&self.output)).into_iter();
+        let beside = std::fs::read_dir(export::folder_of(&self.mesh)).into_iter();
         for entry in beside.flatten().flatten() {
             let number = entry
                 .file_name()

@@ -70,9 +70,9 @@ impl<'a> Stages<'a> {
                 Known::from_headers(&job.inputs, &job.params.attributes, job.params.scanners())
             }
         };
-        let first = headers.map(|known| known.estimate(&job.params, &job.output));
+        let first = headers.map(|known| known.estimate(&job.params, &job.mesh));
         if let Some(known) = headers.filter(|_| all_are_kept(&job.params)) {
-            known.fits(&job.params, &job.output)?;
+            known.fits(&job.params, &job.mesh)?;
         }
         let stages = Self {
             job,
@@ -100,7 +100,7 @@ impl<'a> Stages<'a> {
             job.params.attributes != Attributes::None,
         );
         if let Some(estimate) = first {
-            room(&job.folder, &job.output, estimate, workspace)?;
+            room(&job.folder, &job.mesh, estimate, workspace)?;
         }
         Ok(stages)
     }
@@ -110,7 +110,7 @@ impl<'a> Stages<'a> {
         if self.workspace.is_task() {
             return Ok(());
         }
-        let (params, output) = (&self.job.params, &self.job.output);
+        let (params, output) = (&self.job.params, &self.job.mesh);
         // What these leave out, and how much a square has, is not known yet.
         let whole = params.crop.is_none() && params.split.is_none();
         if whole && params.drop_outliers.is_none() {
@@ -119,7 +119,7 @@ impl<'a> Stages<'a> {
         let estimate = self.known.estimate(params, output);
         self.report.estimated_scratch_bytes = estimate.scratch;
         self.report.estimated_output_bytes = estimate.output;
-        room(&self.job.folder, &self.job.output, estimate, self.workspace)
+        room(&self.job.folder, &self.job.mesh, estimate, self.workspace)
     }
 
     fn warn(&mut self, warning: String) {
@@ -231,7 +231,7 @@ impl<'a> Stages<'a> {
         let place = (coordinates, shift.map_or([0.0; 3], |shift| shift.origin));
         let warnings = self
             .known
-            .left_out(&job.params, columns, place, &job.output)?;
+            .left_out(&job.params, columns, place, &job.mesh)?;
         for warning in warnings {
             self.warn(warning);
         }

@@ -87,7 +87,7 @@ impl Stages<'_> {
         self.report.coordinates = coordinates;
         self.report.origin = shift.map(|shift| shift.origin);
         let options = ExportOptions {
-            output: &job.output,
+            output: &job.mesh,
             coordinates: self.report.coordinates,
             comments: self.comments(),
             origin: shift,
@@ -112,7 +112,7 @@ impl Stages<'_> {
         };
         self.report.mesh = self.clock.stage("export", "blocks", items, write)?;
         columns.map_or(Ok(()), |columns| columns.release(workspace))?;
-        beside::write(&job.output, &job.inputs, &self.report, self.wkt.as_deref())
+        beside::write(&job.mesh, &job.inputs, &self.report, self.wkt.as_deref())
     }
 
     /// Levels of detail of the mesh, if they are wanted.
@@ -125,7 +125,7 @@ impl Stages<'_> {
         let source = job.inputs.first().and_then(|input| input.file_name());
         let source = source.unwrap_or_default().to_string_lossy();
         let options = levels::Options::default();
-        let make = || levels::tileset(&job.output, &source, folder, &options, workspace);
+        let make = || levels::tileset(&job.mesh, &source, folder, &options, workspace);
         let triangles = self.report.mesh.triangles;
         self.report.tiles = Some(self.clock.stage("tiles", "triangles", triangles, make)?);
         Ok(())

@@ -11,7 +11,7 @@ impl Stages<'_> {
         if workspace.is_shared() {
             return;
         }
-        let compressed = job.params.compress_glb || is_compressed(&job.output);
+        let compressed = job.params.compress_glb || is_compressed(&job.mesh);
         let stages = outlook::plan(&job.params, points, job.threads, valued, compressed);
         let first = stages.iter().rposition(|stage| Some(stage.name) == after);
         job.observer.plan(&stages[first.map_or(0, |at| at + 1)..]);
