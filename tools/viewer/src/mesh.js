@@ -94,7 +94,8 @@ export class MeshView {
 			origin: noted.origin ?? [ 0, 0, 0 ],
 			step: noted.step?.[ 0 ] ?? 0,
 		};
-		this.decimals = this.info.step > 0 ? decimals( this.info.step ) : 3;
+		// Rounded coordinates have as many decimals as are right.
+		this.decimals = this.info.step > 0 ? this.info.exact === false ? Math.max( 0, Math.floor( - Math.log10( 2 * this.info.step ) ) ) : decimals( this.info.step ) : 3;
 		this.height = { low: 0, high: 1 };
 		const sphere = new Sphere();
 		this.tiles.getBoundingSphere( sphere );
