@@ -240,12 +240,15 @@ mod tests {
         assert!(few.bins.windows(2).all(|two| two[0].to == two[1].from));
         assert_eq!(Tally::default().histogram(10, |x| x), None);
         assert_eq!(Tally::default().by_octave(), None);
+        // Few enough to be beyond the usual ones.
         let mut far = tally.clone();
+        far.merge(&tally);
+        far.merge(&tally);
         far.add(u64::MAX);
         far.add(0);
         let far = far.histogram(20, |x| x).unwrap();
         assert!(far.bins.len() <= 20 && far.bins[0].from == 0.0);
-        assert_eq!(far.bins.iter().map(|bin| bin.count).sum::<u64>(), 1002);
+        assert_eq!(far.bins.iter().map(|bin| bin.count).sum::<u64>(), 3002);
         assert_eq!(far.bins[far.bins.len() - 1].to, u64::MAX as f64);
     }
 }

@@ -133,6 +133,7 @@ fn of_commands() -> BTreeMap<&'static str, BTreeSet<String>> {
         "verify",
         "compare",
         "tiles",
+        "view",
         "demo",
         "plan",
         "work",

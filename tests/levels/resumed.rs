@@ -1,13 +1,14 @@
 //! The same bytes for any memory and threads, and after a run was stopped or killed.
 
 use super::meshes::hills;
-use outcrop::levels::Options;
+use outcrop::levels::{Options, TilesReport};
 use outcrop::{Cancel, Error, Observer, Start, Tiles};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
 
 /// All files below a folder, with their content.
 fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
@@ -97,6 +98,16 @@ impl Observer for Stop {
     }
 }
 
+/// Runs a job; a program that another test starts may hold the lock of its folder for a moment.
+fn run(job: impl Fn() -> Tiles) -> Result<TilesReport, Error> {
+    loop {
+        match job().run() {
+            Err(Error::Locked { .. }) => std::thread::sleep(Duration::from_millis(20)),
+            done => return done,
+        }
+    }
+}
+
 #[test]
 fn a_stopped_run_goes_on() {
     let folder = tempfile::tempdir().unwrap();
@@ -113,23 +124,27 @@ fn a_stopped_run_goes_on() {
             left: AtomicU64::new(after),
             cancel: cancel.clone(),
         });
-        let run = tiles(&mesh, &output)
-            .start(Start::Resume)
-            .observer(observer)
-            .cancel(cancel);
-        match run.run() {
+        let resumed = || {
+            tiles(&mesh, &output)
+                .start(Start::Resume)
+                .observer(observer.clone())
+                .cancel(cancel.clone())
+        };
+        match run(resumed) {
             Ok(_) => break,
             Err(Error::Cancelled) => stops += 1,
             Err(other) => panic!("{other}"),
         }
         assert!(!output.exists());
         if stops == 3 {
-            let refused = tiles(&mesh, &output).run().unwrap_err();
+            let refused = run(|| tiles(&mesh, &output)).unwrap_err();
             assert!(matches!(refused, Error::Unfinished { .. }), "{refused}");
-            let other = tiles(&mesh, &output)
-                .options(Options::default())
-                .start(Start::Resume);
-            assert!(matches!(other.run().unwrap_err(), Error::Mismatch { .. }));
+            let other = || {
+                tiles(&mesh, &output)
+                    .options(Options::default())
+                    .start(Start::Resume)
+            };
+            assert!(matches!(run(other).unwrap_err(), Error::Mismatch { .. }));
         }
     }
     assert!(stops > 3, "{stops}");

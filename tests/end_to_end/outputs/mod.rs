@@ -163,7 +163,7 @@ fn rounding_is_told_by_the_distance_from_the_origin_of_the_mesh() {
         (&far, "none", Some("0.5")),
         (&far, "auto", None),
         (&far, "500000,5400000,0", None),
-        (&far, "500000,9600000,0", Some("0.25")),
+        (&far, "500000,9500000,0", Some("0.25")),
     ] {
         let params = Params {
             origin: origin.parse().unwrap(),

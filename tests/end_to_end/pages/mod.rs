@@ -56,7 +56,19 @@ fn a_report_is_a_page_that_stands_alone_and_has_the_figures_of_the_other() {
     let bench = Bench::new();
     let input = bench.cloud("a<b>&\"c' \u{1b}[31m.laz", &land());
     let mesh = bench.path("x<script>alert(1)<script>&amp;.ply");
-    let (page, json) = reported(&bench, &input, &mesh, &["--memory", "192MiB"]);
+    let (page, json) = reported(
+        &bench,
+        &input,
+        &mesh,
+        &[
+            "--memory",
+            "192MiB",
+            "--max-edge",
+            "2x",
+            "--max-hole-edges",
+            "0",
+        ],
+    );
     assert_eq!(page.heading, "x<script>alert(1)<script>&amp;.ply");
     assert!(page.text.contains("a<b>&\"c' \u{fffd}[31m.laz"));
     let n = |key: &str| json.pointer(key).and_then(Value::as_u64).unwrap();
@@ -181,7 +193,9 @@ fn a_cut_mesh_is_drawn_without_its_seams() {
     let verdict = util::verdict(&mesh);
     assert_eq!(json["details"]["edges"]["count"], verdict.edges);
     assert_eq!(page.pictures.len(), 3);
-    assert!(page.pixels().iter().all(|picture| picture.reddish() > 50));
+    let red: Vec<_> = page.pixels().iter().map(|p| p.reddish()).collect();
+    // The third picture is a detail of the middle.
+    assert!(red[..2].iter().all(|pixels| *pixels > 50), "{red:?}");
     // The edges between squares have two triangles.
     let whole = bench.path("whole.ply");
     let (_, of_whole) = reported(&bench, &input, &whole, &[]);
