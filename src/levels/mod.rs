@@ -1,8 +1,8 @@
 //! Levels of detail: a mesh of any size as a tree of tiles, in bounded memory.
 //!
-//! The triangles are divided into the cells of an octree ([`cells`]), which are the leaves of the tree ([`tree`]).
-//! Every other tile is made from its children: they are joined, simplified ([`simplify`]) and measured against the
-//! joined surface ([`distance`]). A vertex that has triangles outside of the tile is not removed, so that tiles of
+//! The triangles are divided into the cells of an octree (`cells`), which are the leaves of the tree (`tree`).
+//! Every other tile is made from its children: they are joined, simplified (`simplify`) and measured against the
+//! joined surface (`distance`). A vertex that has triangles outside of the tile is not removed, so that tiles of
 //! any two levels meet without a crack. `docs/tiles.md` describes the files.
 
 mod cells;

@@ -21,7 +21,7 @@ use std::sync::{Arc, Condvar, Mutex};
 pub const MINIMUM_BUDGET: u64 = 192 << 20;
 
 /// Part of the budget for the program itself before any work: code, tables, stacks.
-pub const PROGRAM: u64 = 9 << 20;
+pub const PROGRAM: u64 = 11 << 20;
 
 /// Bytes that a thread which has worked holds beside its units: its stack, small lists, and the free pieces
 /// that the allocator keeps for it between larger ones. Paid from [`SLACK`].
@@ -35,7 +35,7 @@ const TIGHT_THREAD: u64 = 7 << 18;
 const TIGHT: u64 = 512 << 20;
 
 /// Part of the budget for memory that is not reserved by name: small buffers, allocator slack.
-pub const SLACK: u64 = 39 << 20;
+pub const SLACK: u64 = 37 << 20;
 
 /// Part of the budget that no stage can reserve.
 pub const OVERHEAD: u64 = PROGRAM + SLACK;

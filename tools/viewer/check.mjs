@@ -75,10 +75,14 @@ function cameraOf( points, azimuth, elevation ) {
 
 }
 
+/** Programs that were started; a failed check leaves some running. */
+const children = [];
+
 /** A running `outcrop view`, and its URL. */
 async function serve( ...args ) {
 
 	const child = spawn( outcrop, [ 'view', '--no-browser', '--quiet', ...args ], { stdio: [ 'ignore', 'pipe', 'inherit' ] } );
+	children.push( child );
 	const url = await new Promise( ( resolve, reject ) => {
 
 		let text = '';
@@ -214,8 +218,8 @@ async function main() {
 	await page.keyboard.press( 'm' );
 	for ( const place of places ) await click( ...place );
 	const distance = await result(), truth = Math.hypot( ...[ 0, 1, 2 ].map( k => ends[ 1 ][ k ] - ends[ 0 ][ k ] ) );
-	check( 'it measures', truth > 0.01 && distance.Distance === truth.toFixed( 3 ), { distance, truth } );
-	check( 'the label has it, too', await page.textContent( '.label' ) === truth.toFixed( 3 ) );
+	check( 'it measures', truth > 0.01 && Math.abs( Number( distance.Distance ) - truth ) < 1e-6, { distance, truth } );
+	check( 'the label has it, too', await page.textContent( '.label' ) === distance.Distance );
 	await page.keyboard.press( 'Escape' );
 	await page.keyboard.press( 'Escape' );
 
@@ -315,4 +319,9 @@ async function main() {
 }
 
 main().then( () => console.log( `check-view: ${ passed } checks` ), error => { console.error( `check-view: ${ error.message }` ); process.exitCode = 1; } )
-	.finally( () => browser.close() );
+	.finally( () => {
+
+		for ( const child of children ) child.kill( 'SIGKILL' );
+		return browser.close();
+
+	} );
