@@ -164,7 +164,7 @@ pub enum Error {
     /// A task found that the work of others is damaged.
     #[error("{source}; `outcrop advance` finds what is damaged and has it made again")]
     Damaged {
-        /// What was found.
+        /// The damage that was found.
         source: Box<Error>,
     },
     /// The rest of the run's units are for tasks.

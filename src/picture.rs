@@ -41,7 +41,7 @@ const MANY: u64 = 20_000;
 /// A picture.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Picture {
-    /// What it shows.
+    /// The name of the view or of the map.
     pub name: String,
     /// Width in pixels.
     pub width: u32,
@@ -53,7 +53,7 @@ pub struct Picture {
     pub png: Vec<u8>,
 }
 
-/// What a pixel of the raster shows: the upper half is the kind, the lower a level.
+/// Content of a pixel of the raster: the upper half is the kind, the lower a level.
 mod kind {
     pub const BACK: u32 = 0;
     pub const FRONT: u32 = 1;

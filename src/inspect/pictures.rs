@@ -12,7 +12,7 @@ use outcrop_ply::Scalar;
 use outcrop_raster::Vec3;
 use outcrop_raster::camera::span;
 
-/// What a page shows of a cloud beside its description.
+/// Pictures and distributions of a cloud, for its page.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Illustration {
     /// A map of the density from above, and an oblique picture coloured by height.

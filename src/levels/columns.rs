@@ -1,4 +1,4 @@
-//! What vertices have beside their positions: from the columns of the file to the attributes of tiles.
+//! Values of vertices: from the columns of the file to the attributes of tiles.
 
 use crate::inspect::ply_mesh::PlyMesh;
 use outcrop_ply::Scalar;
@@ -14,7 +14,7 @@ pub struct Column {
     pub scalar: Scalar,
     /// The name of the attribute.
     pub attribute: String,
-    /// What the values of the attribute are to be added to.
+    /// Value of the column = value of the attribute + this.
     pub offset: f64,
 }
 

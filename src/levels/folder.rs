@@ -15,7 +15,7 @@ pub const NAME: &str = "tileset.json";
 /// Name of the folder of the tiles.
 const TILES: &str = "tiles";
 
-/// What the tileset says of the mesh.
+/// Facts about the mesh, for the extras of the tileset.
 #[derive(Debug, Clone, Default)]
 pub(super) struct About {
     /// Name of the mesh file.

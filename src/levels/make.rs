@@ -24,7 +24,7 @@ const TARGETS: [f64; 2] = [0.25, 0.75];
 /// The part of the children's triangles that a tile has otherwise.
 const PART: usize = 4;
 
-/// What is added to measured distances, as a factor: between two samples they may be larger.
+/// Factor for measured distances, which may be larger between two samples.
 const MARGIN: f64 = 1.1;
 
 /// Bytes of memory for each triangle of the children while a tile is made from them.
@@ -36,13 +36,13 @@ pub(super) struct Made {
     pub triangles: u32,
     /// Bytes of the GLB file.
     pub bytes: u32,
-    /// Upper bound of the distance from the full mesh, in its unit.
+    /// Distance from the full mesh, measured at samples, with a margin; in its unit.
     pub error: f64,
     /// Edges of the boundary of the mesh.
     pub boundary: u64,
 }
 
-/// What the making of all tiles needs.
+/// Inputs and state of the making of all tiles.
 pub(super) struct Maker<'a> {
     pub intake: &'a Intake,
     pub cells: &'a Cells,

@@ -1,9 +1,9 @@
-//! What is asked of a tileset, and what was made.
+//! Options of a tileset, and the report on it.
 
 use super::cells::MOST;
 use serde::{Deserialize, Serialize};
 
-/// What decides the tileset besides the mesh.
+/// Options that decide the tileset.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Options {
@@ -23,7 +23,7 @@ impl Default for Options {
     }
 }
 
-/// What was made.
+/// Counts and sizes of a tileset.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct TilesReport {
     /// Vertices of the mesh.

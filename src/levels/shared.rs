@@ -1,4 +1,4 @@
-//! What cells have in common: vertices, edges and normals. Cells tell the blocks of vertices what they have; the
+//! Vertices, edges and normals that cells share. Cells tell the blocks of vertices what they have; the
 //! blocks tell the cells who else has it.
 
 use super::cells::Cells;

@@ -1,4 +1,4 @@
-//! What a report says in words, and what to do about it.
+//! Warnings of a report in words, each with its remedy.
 
 use super::sheet::Advice;
 use super::words::percent;

@@ -10,7 +10,7 @@ const STYLE: &str = include_str!("style.css");
 
 /// A whole page.
 pub struct Sheet<'a> {
-    /// What kind of page it is.
+    /// Kind of page, such as "Reconstruction".
     pub kind: &'a str,
     /// Its title.
     pub title: &'a str,
@@ -107,7 +107,7 @@ pub fn table(head: &[&str], rows: impl IntoIterator<Item = Vec<Markup>>) -> Mark
 pub struct Advice {
     /// The sentence.
     pub words: String,
-    /// What to do; empty if there is nothing to do.
+    /// The remedy; empty if there is none.
     pub remedy: String,
     /// False for a note, which is no warning.
     pub warning: bool,

@@ -1,4 +1,4 @@
-//! What the stages of a run take, for its progress.
+//! Times of the stages of a run, for its progress.
 
 use crate::params::{Method, Params};
 use crate::workspace::outlook::Planned;

@@ -29,7 +29,7 @@ pub struct Tiles {
     start: Start,
 }
 
-/// What a run began with.
+/// Mesh and options of a run, by which it is resumed.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
 struct Manifest {
     format: String,
@@ -114,7 +114,7 @@ impl Tiles {
         }
     }
 
-    /// What decides the tileset.
+    /// Sets the options that decide the tileset.
     #[must_use]
     pub fn options(mut self, options: Options) -> Self {
         self.options = options;

@@ -16,7 +16,7 @@ const SLOW: Duration = Duration::from_secs(30);
 /// The folder in the URL under which the tileset is.
 const MESH: &str = "mesh";
 
-/// What is served, and to whom.
+/// The files that are served, and the secret of their addresses.
 #[derive(Debug)]
 pub struct Site {
     /// The folder with the tileset.

@@ -23,7 +23,7 @@ const POLICY: &str = "<meta http-equiv=\"Content-Security-Policy\" content=\"def
     'unsafe-inline' 'wasm-unsafe-eval'; style-src 'unsafe-inline'; img-src data: blob:; base-uri 'none'; \
     form-action 'none'\">\n";
 
-/// What went into a page.
+/// Counts of the tiles in a page, and its size.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Embedded {
     /// Tiles in the page.

@@ -1,6 +1,6 @@
 //! The outlook of a run: how much of it is done, and how long the rest takes.
 //!
-//! What each stage takes on a usual machine is known beforehand. Stages that are finished, and the one that is
+//! The time of each stage on a usual machine is known beforehand. Stages that are finished, and the one that is
 //! under way, tell how much slower or faster this run is; the rest is expected to be so, too. Times are passed in,
 //! so that nothing here looks at a clock.
 

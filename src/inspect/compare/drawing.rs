@@ -115,7 +115,7 @@ fn framing<T: Item>(pages: &Pages<T>, position: impl Fn(&T) -> V3) -> Result<Vec
     Ok(all)
 }
 
-/// What a page shows of a comparison beside its figures.
+/// Pictures and distributions of a comparison, for its page.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Illustration {
     /// Pictures of both sides, coloured by distance.

@@ -87,7 +87,7 @@ pub struct Place {
     pub position: [f64; 3],
 }
 
-/// What a page shows of a check beside the verdict.
+/// Pictures of a mesh with its defects, for the page of the verdict.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Illustration {
     /// Pictures of the mesh with marks where defects are.

@@ -1,7 +1,7 @@
 //! A compressed mesh: the bytes of the plain file in frames of the Zstandard seekable format. All threads
 //! compress parts, and the calling thread writes them in their order.
 
-use super::file::{HEADER, MeshFile};
+use super::file::MeshFile;
 use super::parts::Parts;
 use super::write::{KINDS, Writer};
 use crate::error::Result;
@@ -34,19 +34,8 @@ struct Frame {
     bytes: Vec<u8>,
 }
 
-/// Writes the file, as one unit.
-pub(super) fn write<P: Parts>(
-    writer: &Writer<'_, P>,
-    unit: &Unit<'_>,
-    workspace: &Workspace,
-) -> Result<()> {
-    let whole = write_all(writer, workspace)?;
-    writer.file.note(unit, HEADER, whole);
-    Ok(())
-}
-
 /// Writes the file; returns its place.
-fn write_all<P: Parts>(writer: &Writer<'_, P>, workspace: &Workspace) -> Result<Place> {
+pub(super) fn write_all<P: Parts>(writer: &Writer<'_, P>, workspace: &Workspace) -> Result<Place> {
     let (bytes, blocks) = (writer.file.layout.bytes, writer.parts.count());
     let count = KINDS * blocks;
     let sizes = (0..count).map(|part| writer.start(part + 1) - writer.start(part));

@@ -12,7 +12,7 @@ const EXTENSION: &str = "EXT_meshopt_compression";
 /// Bytes before the JSON: the head of the file and that of the chunk.
 pub const HEADS: u64 = 12 + 8;
 
-/// What is the same for all pieces.
+/// Properties that all pieces share.
 pub struct Document<'a> {
     /// The mesh.
     pub mesh: &'a Mesh,

@@ -293,7 +293,7 @@ impl<'a> MeshFile<'a> {
         self.format.wants_positions()
     }
 
-    /// What is known of the mesh.
+    /// Facts about the mesh.
     pub fn mesh(&self) -> &Mesh {
         &self.mesh
     }

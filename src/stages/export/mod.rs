@@ -45,7 +45,7 @@ use crate::stages::order::PointStore;
 use crate::stages::repair::Repaired;
 use crate::workspace::{Unit, Workspace};
 use coordinates::Coordinates;
-use file::MeshFile;
+use file::{HEADER, MeshFile};
 use format::{MeshFormat, VertexColumn};
 use formats::format_of;
 use parts::{OfTile, Parts, Whole};
@@ -258,16 +258,18 @@ fn write<P: Parts>(
     Ok(writer.parts)
 }
 
-/// Writes a compressed mesh.
+/// Writes a compressed mesh, as one unit.
 fn in_order<P: Parts>(
     writer: &Writer<'_, P>,
     unit: &Unit<'_>,
     workspace: &Workspace,
 ) -> Result<()> {
-    match writer.file.mesh().compress {
-        true => packed::write(writer, unit, workspace),
-        false => compressed::write(writer, unit, workspace),
-    }
+    let whole = match writer.file.mesh().compress {
+        true => packed::write_all(writer, workspace)?,
+        false => compressed::write_all(writer, workspace)?,
+    };
+    writer.file.note(unit, HEADER, whole);
+    Ok(())
 }
 
 const NO_TRIANGLES: &str = "no three cells agree on one that belongs to a component large enough; \

@@ -6,31 +6,19 @@
 //! that several primitives have are the same in all.
 
 use super::document::{Document, HEADS};
-use super::file::HEADER;
 use super::parts::Parts;
 use super::piece::{self, About, Piece};
 use super::write::Writer;
 use crate::error::Result;
 use crate::geom::Point;
+use crate::workspace::Workspace;
 use crate::workspace::place::Place;
-use crate::workspace::{Unit, Workspace};
 
 /// Most bytes of a file.
 const MOST: u64 = u32::MAX as u64;
 
 /// Steps of which the origin is a multiple above the lowest position.
 const UNIT: i32 = 1 << 20;
-
-/// Writes the file, as one unit.
-pub(super) fn write<P: Parts>(
-    writer: &Writer<'_, P>,
-    unit: &Unit<'_>,
-    workspace: &Workspace,
-) -> Result<()> {
-    let whole = write_all(writer, workspace)?;
-    writer.file.note(unit, HEADER, whole);
-    Ok(())
-}
 
 /// The position from which steps are counted: near the middle, and above the lowest by multiples of a power of
 /// two, so that low bits that are zero in all positions stay zero.
@@ -41,7 +29,7 @@ fn origin([low, high]: [Point; 2]) -> Point {
 }
 
 /// Writes the file; returns its place.
-fn write_all<P: Parts>(writer: &Writer<'_, P>, workspace: &Workspace) -> Result<Place> {
+pub(super) fn write_all<P: Parts>(writer: &Writer<'_, P>, workspace: &Workspace) -> Result<Place> {
     let count = writer.parts.count();
     let origin = origin(writer.bounds.unwrap_or_default());
     let memory = |part| {

@@ -12,7 +12,7 @@ use crate::workspace::memory::bytes_of;
 /// Views of the buffer that a piece may have: positions, colours, triangles.
 pub const VIEWS: usize = 3;
 
-/// What a reader has to know about a piece.
+/// Counts, bounds and sizes of a piece, for the JSON.
 #[derive(Debug, Clone, Copy)]
 pub struct About {
     /// Number of vertices; those at the rim are in other pieces, too.
@@ -29,7 +29,7 @@ pub struct About {
 
 /// A compressed piece.
 pub struct Piece {
-    /// What it is.
+    /// Its counts, bounds and sizes.
     pub about: About,
     /// Its views.
     pub views: [Vec<u8>; VIEWS],
