@@ -53,6 +53,8 @@
 //! shapes. [`Report`] has the counts and measurements of a run. [`page`] puts all of these into pages with
 //! pictures.
 //!
+//! [`call`] runs the commands of the program inside another one.
+//!
 //! These items are the interface. The hidden modules are public only for the project's own tests, benches and
 //! tools, and change without notice; `ARCHITECTURE.md` has their map.
 
@@ -82,6 +84,8 @@ pub mod view;
 #[doc(hidden)]
 pub mod workspace;
 
+#[doc(inline)]
+pub use cli::call;
 pub use error::{Error, Result};
 pub use params::{Division, MaxWidth, Method, Origin, Params, Radius, Region, Smoothing};
 pub use pipeline::{Builder, Reconstruction, Start, Tiles, default_memory, default_threads};

@@ -1,16 +1,13 @@
-//! The commands.
+//! The commands of the program: their work, and what they print.
 
-use super::args::{
-    Compare, Demo, Ends, Info, Limits, Reconstruct, Resume, Tiles as TilesArgs, Verify,
-};
+use super::args::{Compare, Demo, Info, Reconstruct, Resume, Tiles, Verify};
 use super::command::Command;
-use super::output::{NewFile, is_page, print, report_text, show, summary, write_report};
+use super::jobs::{self, memory, threads};
+use super::output::{print, show, summary, write_report};
 use super::{shared, stop, style, view};
 use crate::error::{Error, Result};
-use crate::inspect::{compare, info, verify};
-use crate::levels;
-use crate::page;
-use crate::pipeline::{Builder, Reconstruction, Start, Tiles, default_memory, default_threads};
+use crate::inspect::verify;
+use crate::pipeline::{Reconstruction, Start};
 use crate::workspace::Workspace;
 use crate::workspace::memory::MemoryPool;
 use crate::workspace::progress::{Cancel, Silent};
@@ -37,149 +34,51 @@ pub fn run(command: Command) -> Result<bool> {
     }
 }
 
-fn threads(limits: &Limits) -> usize {
-    limits.threads.map_or_else(default_threads, usize::from)
-}
-
-fn memory(limits: &Limits) -> u64 {
-    limits.memory.unwrap_or_else(default_memory)
-}
-
-fn workspace(limits: &Limits, beside: &Path) -> Result<Workspace> {
-    let memory = MemoryPool::new(memory(limits))?;
-    let scratch = limits.scratch.as_deref().unwrap_or(beside);
-    let (observer, cancel) = stop::watched(limits.quiet);
-    let workspace = Workspace::new(scratch, memory, threads(limits), observer, cancel)?;
-    workspace.set_storage(limits.storing.storage())?;
-    Ok(workspace)
-}
-
 fn reconstruct(args: &Reconstruct) -> Result<bool> {
-    let mut builder = args
-        .job
-        .builder()
-        .threads(threads(&args.limits))
-        .memory(memory(&args.limits))
-        .storage(args.limits.storing.storage())
-        .start(args.again.start());
-    if let Some(scratch) = &args.limits.scratch {
-        builder = builder.scratch(scratch);
-    }
-    run_reconstruction(builder, &args.ends, args.limits.quiet)
+    let quiet = args.limits.quiet;
+    tell(
+        jobs::reconstruct(args, stop::watched(quiet), stop::can_end)?,
+        quiet,
+    )
 }
 
 fn resume(args: &Resume) -> Result<bool> {
-    let mut builder = Reconstruction::resume(&args.folder)?;
-    if let Some(memory) = args.memory {
-        builder = builder.memory(memory);
-    }
-    if let Some(threads) = args.threads {
-        builder = builder.threads(threads.into());
-    }
-    let builder = builder.storage(args.storing.storage());
-    run_reconstruction(builder, &args.ends, args.quiet)
+    let quiet = args.quiet;
+    tell(
+        jobs::resume(args, stop::watched(quiet), stop::can_end)?,
+        quiet,
+    )
 }
 
-fn run_reconstruction(builder: Builder, ends: &Ends, quiet: bool) -> Result<bool> {
-    let (observer, cancel) = stop::watched(quiet);
-    let mut builder = builder.observer(observer).cancel(cancel);
-    if let Some(limit) = ends.time_limit {
-        builder = builder.time_limit(limit);
-    }
-    let page = ends.report.iter().any(|path| is_page(path));
-    let run = builder.pictures(page).build()?;
-    if let Some(path) = ends.report.iter().find(|path| **path == run.output()) {
-        return Err(Error::Parameter {
-            name: "--report",
-            found: path.display().to_string(),
-            expected: "a file other than the mesh".into(),
-        });
-    }
-    let reports = ends.report.iter().map(|path| NewFile::open(path));
-    let reports = reports.collect::<Result<Vec<_>>>()?;
-    stop::can_end(&run);
-    let report = run.run()?;
-    for file in reports {
-        let text = report_text(file.path(), &report, run.output())?;
-        file.write(&text)?;
-    }
+/// Prints the summary of a run on a terminal.
+fn tell((report, output): jobs::Made, quiet: bool) -> Result<bool> {
     if !quiet && std::io::stdout().is_terminal() {
-        print(&summary(&report, run.output()))?;
+        print(&summary(&report, &output))?;
     }
     Ok(true)
 }
 
 fn info(args: &Info) -> Result<bool> {
-    let workspace = workspace(&args.limits, &std::env::temp_dir())?;
-    let params = args.points.params();
-    let info = match &args.html {
-        None => info::info(&args.inputs, &params, &workspace)?,
-        Some(path) => {
-            let page = NewFile::page(path)?;
-            let (info, drawn) = info::illustrated(&args.inputs, &params, &workspace)?;
-            page.write(&page::cloud(&args.inputs, &info, &drawn))?;
-            info
-        }
-    };
+    let info = jobs::info(args, stop::watched(args.limits.quiet))?;
     show(&info, args.json)?;
     Ok(true)
 }
 
 fn check(args: &Verify) -> Result<bool> {
-    let workspace = workspace(&args.limits, &std::env::temp_dir())?;
-    let options = verify::Options {
-        allow_unreferenced: args.allow_unreferenced,
-        range: None,
-    };
-    let verdict = match &args.html {
-        None => verify::verify_with(&args.mesh, &options, &workspace)?,
-        Some(path) => {
-            let page = NewFile::page(path)?;
-            let (verdict, drawn) = verify::illustrated(&args.mesh, &options, &workspace)?;
-            page.write(&page::verdict(&args.mesh, &verdict, &drawn))?;
-            verdict
-        }
-    };
+    let verdict = jobs::verify(args, stop::watched(args.limits.quiet))?;
     show(&verdict, args.json)?;
     Ok(verdict.manifold)
 }
 
 fn measure(args: &Compare) -> Result<bool> {
-    let workspace = workspace(&args.limits, &std::env::temp_dir())?;
-    let (samples, seed) = (args.samples, args.seed);
-    let options = compare::Options { samples, seed };
-    let (a, b) = (&args.a, &args.b);
-    let comparison = match &args.html {
-        None => compare::compare(a, b, &options, &workspace)?,
-        Some(path) => {
-            let page = NewFile::page(path)?;
-            let (comparison, drawn) = compare::illustrated(a, b, &options, &workspace)?;
-            page.write(&page::comparison(&comparison, &drawn))?;
-            comparison
-        }
-    };
+    let comparison = jobs::compare(args, stop::watched(args.limits.quiet))?;
     show(&comparison, args.json)?;
     Ok(true)
 }
 
-fn tiles(args: &TilesArgs) -> Result<bool> {
-    let (observer, cancel) = stop::watched(args.limits.quiet);
-    let options = levels::Options {
-        geo: args.geo,
-        most_triangles: args.most_triangles,
-    };
-    let mut tiles = Tiles::new(&args.mesh, &args.output)
-        .options(options)
-        .memory(memory(&args.limits))
-        .threads(threads(&args.limits))
-        .storage(args.limits.storing.storage())
-        .start(args.again.start())
-        .observer(observer)
-        .cancel(cancel);
-    if let Some(scratch) = &args.limits.scratch {
-        tiles = tiles.scratch(scratch);
-    }
-    show(&tiles.run()?, args.json)?;
+fn tiles(args: &Tiles) -> Result<bool> {
+    let report = jobs::tiles(args, stop::watched(args.limits.quiet))?;
+    show(&report, args.json)?;
     Ok(true)
 }
 

@@ -1,8 +1,10 @@
 //! The command line: arguments, messages, exit codes. The only code that prints.
 
 mod args;
+pub mod call;
 mod command;
 mod commands;
+mod jobs;
 mod output;
 mod parse;
 mod progress;

@@ -1,0 +1,256 @@
+"""Point clouds of any size to clean triangle meshes, inside the memory you give.
+
+Functions are the commands of the program ``outcrop``, and their keywords its options, with ``_`` for ``-``; the text
+of ``outcrop COMMAND --help`` describes them.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import datetime
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, Optional, Union
+
+import numpy as np
+
+from ._mesh import Mesh
+from ._points import Cloud, temporary, written
+from ._run import (
+    Answer,
+    BudgetError,
+    DiskError,
+    Error,
+    FileError,
+    InputError,
+    Interrupted,
+    OutcropWarning,
+    ParameterError,
+    Path,
+    Progress,
+    ScratchError,
+    run,
+    words,
+)
+
+__all__ = [
+    "Answer",
+    "BudgetError",
+    "DiskError",
+    "Error",
+    "FileError",
+    "InputError",
+    "Interrupted",
+    "Mesh",
+    "OutcropWarning",
+    "ParameterError",
+    "ScratchError",
+    "compare",
+    "info",
+    "reconstruct",
+    "tiles",
+    "verify",
+]
+
+Size = Union[int, str]
+Time = Union[float, str, datetime.timedelta]
+Width = Union[float, str]
+Classes = Union[int, str, Sequence[int]]
+Region = Union[Path, Sequence[float]]
+
+
+def reconstruct(
+    points: Any,
+    *,
+    output: Optional[Path] = None,
+    colors: Any = None,
+    columns: Optional[Mapping[str, Any]] = None,
+    progress: Union[Progress, bool, None] = None,
+    normals: bool = False,
+    compress_glb: bool = False,
+    split: Optional[float] = None,
+    drop_classes: Optional[Classes] = None,
+    keep_classes: Optional[Classes] = None,
+    crop: Optional[Region] = None,
+    crop_margin: Optional[float] = None,
+    thin: Optional[float] = None,
+    drop_outliers: Union[float, bool, None] = None,
+    attributes: Union[str, Sequence[str]] = "none",
+    wide_colors: bool = False,
+    method: str = "robust",
+    neighbors: int = 30,
+    smooth: int = 0,
+    smoothing: Optional[str] = None,
+    relax: Optional[int] = None,
+    radius: Width = "auto",
+    max_angle: Optional[float] = None,
+    keep_all: bool = False,
+    max_edge: Optional[Width] = None,
+    ignore_scanners: bool = False,
+    max_hole_edges: Optional[int] = None,
+    max_fill: Optional[Width] = None,
+    min_component: Optional[int] = None,
+    no_repair: bool = False,
+    origin: Union[str, Sequence[float]] = "none",
+    keep_far: bool = False,
+    ignore_crs: bool = False,
+    memory: Optional[Size] = None,
+    threads: Optional[int] = None,
+    scratch: Optional[Path] = None,
+    io: str = "auto",
+    scratch_compression: Union[int, str] = "auto",
+    quiet: bool = False,
+    resume: bool = False,
+    restart: bool = False,
+    time_limit: Optional[Time] = None,
+    report: Union[Path, Sequence[Path], None] = None,
+) -> Mesh:
+    """Makes a mesh from points.
+
+    ``points`` is an array (n x 3), a file or folder of points, or a list of them. ``colors`` (n x 3, uint8 or uint16)
+    and ``columns`` (arrays by name) are values of the points of an array; the mesh keeps them. Without ``output`` the
+    mesh is in a temporary file, which is deleted with the :class:`Mesh`.
+
+    ``progress`` is a function of the name of the stage, the items done, and the items in all (0 if unknown), or
+    ``True`` for bars of tqdm, which notebooks show by default. Time limits are texts such as ``"7h30m"``, or seconds.
+    """
+    options = dict(locals())
+    for name in ("points", "output", "colors", "columns", "progress"):
+        del options[name]
+    if output is None and (resume or restart):
+        raise ParameterError("resume, restart: a run without output= cannot be resumed")
+    with contextlib.ExitStack() as stack:
+        folder = None
+        if output is None:
+            folder = tempfile.mkdtemp(prefix="outcrop-", dir=scratch)
+            failed = stack.enter_context(contextlib.ExitStack())
+            failed.callback(shutil.rmtree, folder, True)
+            output, options["scratch"] = os.path.join(folder, "mesh.ply"), folder
+        inputs = _paths(points)
+        if inputs is None:
+            cloud = Cloud(points, colors, columns)
+            if cloud.names and attributes == "none":
+                options["attributes"] = cloud.names
+            output = os.path.abspath(output)
+            if options["scratch"] is not None:
+                options["scratch"] = os.path.abspath(options["scratch"])
+            place = written(cloud, output, options["scratch"], resume, restart)
+            inputs = [stack.enter_context(place)]
+        elif colors is not None or columns:
+            raise ParameterError("colors, columns: these belong to points in an array; of files, attributes= keeps them")
+        line = ["reconstruct", f"--output={os.fspath(output)}", *words(options), "--", *inputs]
+        answer, made = run(line, progress, quiet)
+        if folder is not None:
+            failed.pop_all()
+    return Mesh(made or output, answer, _temporary=folder)
+
+
+def info(
+    points: Any,
+    *,
+    progress: Union[Progress, bool, None] = None,
+    html: Optional[Path] = None,
+    drop_classes: Optional[Classes] = None,
+    keep_classes: Optional[Classes] = None,
+    crop: Optional[Region] = None,
+    crop_margin: Optional[float] = None,
+    memory: Optional[Size] = None,
+    threads: Optional[int] = None,
+    scratch: Optional[Path] = None,
+    io: str = "auto",
+    scratch_compression: Union[int, str] = "auto",
+    quiet: bool = False,
+) -> Answer:
+    """Describes a cloud (an array, a file or folder, or a list of them) and estimates what a run needs."""
+    options = dict(locals())
+    with _files(points, scratch) as files:
+        del options["points"], options["progress"]
+        return run(["info", *words(options), "--", *files], progress, quiet)[0]
+
+
+def verify(
+    mesh: Union[Mesh, Path],
+    *,
+    progress: Union[Progress, bool, None] = None,
+    html: Optional[Path] = None,
+    allow_unreferenced: bool = False,
+    memory: Optional[Size] = None,
+    threads: Optional[int] = None,
+    scratch: Optional[Path] = None,
+    io: str = "auto",
+    scratch_compression: Union[int, str] = "auto",
+    quiet: bool = False,
+) -> Answer:
+    """Checks that a mesh (PLY) is a manifold: ``["manifold"]`` of the result says so."""
+    options = dict(locals())
+    del options["mesh"], options["progress"]
+    return run(["verify", *words(options), "--", _path(mesh)], progress, quiet)[0]
+
+
+def compare(
+    a: Any,
+    b: Any,
+    *,
+    progress: Union[Progress, bool, None] = None,
+    samples: Union[int, float, str] = 1_000_000,
+    seed: int = 0,
+    html: Optional[Path] = None,
+    memory: Optional[Size] = None,
+    threads: Optional[int] = None,
+    scratch: Optional[Path] = None,
+    io: str = "auto",
+    scratch_compression: Union[int, str] = "auto",
+    quiet: bool = False,
+) -> Answer:
+    """Measures the distance between two meshes or clouds, each a :class:`Mesh`, a file, a folder or an array."""
+    options = dict(locals())
+    del options["a"], options["b"], options["progress"]
+    with _files(a, scratch) as first, _files(b, scratch) as second:
+        return run(["compare", *words(options), "--", *first, *second], progress, quiet)[0]
+
+
+def tiles(
+    mesh: Union[Mesh, Path],
+    *,
+    output: Path,
+    progress: Union[Progress, bool, None] = None,
+    geo: bool = False,
+    memory: Optional[Size] = None,
+    threads: Optional[int] = None,
+    scratch: Optional[Path] = None,
+    io: str = "auto",
+    scratch_compression: Union[int, str] = "auto",
+    quiet: bool = False,
+    resume: bool = False,
+    restart: bool = False,
+) -> Answer:
+    """Cuts a mesh (PLY) into levels of detail for viewers of 3D Tiles, in the folder ``output``."""
+    options = dict(locals())
+    del options["mesh"], options["progress"]
+    return run(["tiles", *words(options), "--", _path(mesh)], progress, quiet)[0]
+
+
+def _path(mesh: Union[Mesh, Path]) -> str:
+    return mesh.path if isinstance(mesh, Mesh) else os.fspath(mesh)
+
+
+def _paths(points: Any) -> Optional[list[str]]:
+    """The files, unless it is points in memory."""
+    if isinstance(points, (str, bytes, os.PathLike)):
+        return [os.fsdecode(points)]
+    if isinstance(points, (list, tuple)) and points and all(isinstance(p, (str, bytes, os.PathLike)) for p in points):
+        return [os.fsdecode(point) for point in points]
+    return None
+
+
+@contextlib.contextmanager
+def _files(shape: Any, scratch: Optional[Path]) -> Iterator[list[str]]:
+    """The files of a mesh, of files, or of points in memory."""
+    paths = [shape.path] if isinstance(shape, Mesh) else _paths(shape)
+    if paths is not None:
+        yield paths
+        return
+    with temporary(np.asarray(shape), scratch) as path:
+        yield [path]

@@ -1,0 +1,175 @@
+"""Meshes from arrays and files, and arrays from meshes."""
+
+from __future__ import annotations
+
+import gc
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from conftest import Points, bumps, write_ply
+
+import outcrop
+
+MEMORY = "256MiB"
+
+
+def test_an_array_gives_the_mesh_of_the_command_line(points: Points, tmp_path: Path, program: Any) -> None:
+    height = np.arange(len(points), dtype=np.float32)
+    cloud = write_ply(tmp_path / "cloud.ply", points, height=height)
+    told = tmp_path / "told.ply"
+    done = program("reconstruct", cloud, "-o", told, "--memory", MEMORY, "--attributes", "height", "--smooth", 1)
+    assert done.returncode == 0, done.stderr
+    mesh = outcrop.reconstruct(
+        points, output=tmp_path / "mesh.ply", columns={"height": height}, smooth=1, memory=MEMORY, threads=1
+    )
+    assert (tmp_path / "mesh.ply").read_bytes() == told.read_bytes()
+    assert sorted(os.listdir(tmp_path)) == ["cloud.ply", "mesh.ply", "told.ply"]
+    file = outcrop.reconstruct([cloud], attributes=["height"], smooth=1, memory=256 << 20)
+    assert Path(file.path).read_bytes() == told.read_bytes()
+    assert mesh.report["mesh"] == file.report["mesh"]
+
+
+def test_arrays_of_a_mesh_are_views_of_its_file(points: Points) -> None:
+    mesh = outcrop.reconstruct(points, memory=MEMORY)
+    vertices, faces = mesh.vertices, mesh.faces
+    assert vertices.shape == (5000, 3) and faces.shape[1:] == (3,) and faces.dtype == np.uint32
+    assert len(faces) == mesh.report["mesh"]["triangles"] and faces.max() < len(vertices)
+    assert not vertices.flags.owndata and not faces.flags.owndata and not vertices.flags.writeable
+    assert np.shares_memory(vertices, mesh.vertices)
+    # Vertices are points of the cloud.
+    assert {tuple(p) for p in np.round(vertices.astype(float), 4)} == {tuple(p) for p in points}
+    assert mesh.columns == {} and mesh.colors is None and mesh.normals is None
+    assert mesh.origin is None and mesh.crs is None
+    assert repr(mesh).startswith("Mesh('") and "5000 vertices" in repr(mesh)
+
+
+def test_colours_and_columns_follow_their_points(points: Points) -> None:
+    colors = (np.arange(len(points) * 3).reshape(-1, 3) * 5 % 251).astype(np.uint8)
+    number = np.arange(len(points), dtype=np.int64)
+    mesh = outcrop.reconstruct(points, colors=colors, columns={"number": number}, normals=True, memory=MEMORY)
+    at = mesh.columns["number"].astype(int)
+    assert np.allclose(mesh.vertices, points[at], atol=1e-5)
+    assert mesh.colors is not None and mesh.colors.dtype == np.uint8
+    assert (mesh.colors == colors[at]).all() and np.shares_memory(mesh.colors, mesh.columns["red"])
+    assert mesh.normals is not None and (np.einsum("ij,ij->i", mesh.normals, points[at]) > 0).mean() > 0.99
+    wide = outcrop.reconstruct(points, colors=colors.astype(np.uint16) * 257, wide_colors=True, memory=MEMORY)
+    assert wide.colors is not None and wide.colors.dtype == np.uint16
+
+
+@pytest.mark.parametrize("dtype", ["f4", "f8", ">f8", "i2", "i4", "i8", "u8", "f2"])
+def test_types_of_numbers(dtype: str) -> None:
+    random = np.random.default_rng(3)
+    plane = np.stack([*random.integers(0, 1000, (2, 500)), np.zeros(500)], axis=1)
+    mesh = outcrop.reconstruct(plane.astype(dtype), memory=MEMORY)
+    assert {tuple(p) for p in mesh.vertices} <= {tuple(p) for p in plane.astype(dtype).astype(float)}
+    strided = np.asfortranarray(plane.astype(dtype))[::-1]
+    again = outcrop.reconstruct(strided, memory=MEMORY)
+    assert Path(again.path).read_bytes() == Path(mesh.path).read_bytes()
+
+
+def test_far_coordinates_are_doubles_or_have_an_origin(points: Points) -> None:
+    far = points + [635_000, 848_000, 0]
+    mesh = outcrop.reconstruct(far, memory=MEMORY)
+    assert mesh.vertices.dtype == np.float64
+    moved = outcrop.reconstruct(far, origin="auto", memory=MEMORY)
+    assert moved.origin is not None and moved.vertices.dtype == np.float32
+    assert np.allclose(np.sort(moved.vertices[:, 0] + moved.origin[0]), np.sort(mesh.vertices[:, 0]), atol=1e-4)
+    assert tuple(moved.report["origin"]) == moved.origin
+
+
+def test_a_temporary_mesh_goes_with_its_object(points: Points) -> None:
+    mesh = outcrop.reconstruct(points, memory=MEMORY)
+    path, vertices = mesh.path, mesh.vertices
+    total = float(vertices.sum())
+    assert os.listdir(os.path.dirname(path)) == ["mesh.ply"]
+    del mesh
+    gc.collect()
+    assert not os.path.exists(os.path.dirname(path))
+    assert float(vertices.sum()) == total
+
+
+def test_saved_meshes(points: Points, tmp_path: Path) -> None:
+    trimesh = pytest.importorskip("trimesh")
+    colors = np.full((len(points), 3), 90, np.uint8)
+    mesh = outcrop.reconstruct(points, colors=colors, memory=MEMORY)
+    for extension in ["ply", "obj", "stl"]:
+        mesh.save(tmp_path / f"saved.{extension}")
+        read = trimesh.load(tmp_path / f"saved.{extension}", process=False)
+        assert np.allclose(read.triangles, mesh.vertices[mesh.faces], atol=1e-6), extension
+    with pytest.raises(outcrop.ParameterError, match="saved.glb"):
+        mesh.save(tmp_path / "saved.glb")
+    held = mesh.to_trimesh()
+    assert (held.faces == mesh.faces).all() and (held.visual.vertex_colors[:, :3] == 90).all()
+    opened = outcrop.Mesh(tmp_path / "saved.ply")
+    assert (opened.faces == mesh.faces).all() and opened.report == {}
+
+
+def test_other_formats_have_no_arrays(points: Points, tmp_path: Path) -> None:
+    mesh = outcrop.reconstruct(points, output=tmp_path / "mesh.obj", memory=MEMORY)
+    assert os.path.getsize(mesh.path) > 0 and mesh.report["mesh"]["vertices"] == 5000
+    with pytest.raises(outcrop.InputError, match="mesh.obj"):
+        mesh.vertices
+    assert "mesh.obj" in repr(mesh) and "mesh.obj" in mesh._repr_html_()
+    tileset = outcrop.reconstruct(points, output=tmp_path / "town" / "tileset.json", memory=MEMORY)
+    assert tileset.report["tiles"]["triangles"] > 0
+    assert sorted(os.listdir(tmp_path)) == ["mesh.obj", "town"]
+
+
+def test_a_mesh_in_a_notebook(points: Points) -> None:
+    mesh = outcrop.reconstruct(points, memory=MEMORY)
+    assert mesh.picture().startswith(b"\x89PNG")
+    shown = mesh._repr_html_()
+    assert "data:image/png;base64," in shown and len(shown) < 1 << 20
+
+
+def test_other_commands(points: Points, tmp_path: Path, program: Any) -> None:
+    mesh = outcrop.reconstruct(points, output=tmp_path / "mesh.ply", memory=MEMORY)
+    verdict = outcrop.verify(mesh, memory=MEMORY)
+    assert verdict["manifold"] is True and verdict["vertices"] == 5000
+    assert str(verdict) == program("verify", mesh.path).stdout.rstrip("\n")
+    described = outcrop.info(points, memory=MEMORY)
+    assert described["points"] == 5000 and "spacing" in str(described)
+    distance = outcrop.compare(mesh, points, samples=1000, memory=MEMORY)
+    assert distance == outcrop.compare(mesh.path, points, samples=1e3, memory=MEMORY)
+    made = outcrop.tiles(mesh, output=tmp_path / "levels", memory=MEMORY)
+    assert made["triangles"] == verdict["triangles"] and (tmp_path / "levels" / "tileset.json").exists()
+
+
+def test_progress_is_told(points: Points) -> None:
+    told: list[tuple[str, int, int]] = []
+    outcrop.reconstruct(points, memory=MEMORY, progress=lambda *now: told.append(now))
+    stages = list(dict.fromkeys(stage for stage, _, _ in told))
+    assert [s for s in stages if s in ("ingest", "order", "cells", "export")] == ["ingest", "order", "cells", "export"]
+    ends = {stage: (done, total) for stage, done, total in told}
+    assert ends["cells"] == (5000, 5000)
+
+
+def test_warnings_are_python_warnings(points: Points, tmp_path: Path) -> None:
+    far = points + [635_000, 848_000, 0]
+    with pytest.warns(outcrop.OutcropWarning, match="rounded|precision"):
+        outcrop.reconstruct(far, output=tmp_path / "mesh.stl", memory=MEMORY)
+
+
+def test_points_in_pieces_are_one_cloud(points: Points, monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = outcrop.reconstruct(points, memory=MEMORY)
+    monkeypatch.setattr("outcrop._points._CHUNK", 999)
+    pieces = outcrop.reconstruct(points, memory=MEMORY)
+    assert Path(whole.path).read_bytes() == Path(pieces.path).read_bytes()
+
+
+def columns_of(count: int) -> dict[str, npt.NDArray[Any]]:
+    return {"a": np.zeros(count), "flag": np.zeros(count, bool)}
+
+
+def test_columns_of_all_types() -> None:
+    cloud = bumps(1000)
+    types = ["u1", "i1", "u2", "i2", "u4", "i4", "f4", "f8", "?", "i8"]
+    columns = {f"c_{n}": (np.arange(1000) % 100).astype(kind) for n, kind in enumerate(types)}
+    mesh = outcrop.reconstruct(cloud, columns=columns, memory=MEMORY)
+    assert list(mesh.columns) == list(columns)
+    for name, values in columns.items():
+        assert sorted(mesh.columns[name].astype(float)) == sorted(values.astype(float)), name

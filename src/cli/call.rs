@@ -1,0 +1,234 @@
+//! The commands for other programs: the words of a command line in, results out. Nothing is printed, no signal
+//! is caught, and the program does not end.
+//!
+//! Options have the names, meanings, defaults and messages that they have on the command line, since the same
+//! code reads them. [`crate::Reconstruction`] and its like have the same abilities with types of their own.
+//!
+//! ```
+//! use outcrop::call::{self, Answer};
+//! use outcrop::{Cancel, Silent};
+//! use std::sync::Arc;
+//!
+//! # let folder = tempfile::tempdir()?;
+//! # let (cloud, mesh) = (folder.path().join("grid.xyz"), folder.path().join("grid.ply"));
+//! # let points = (0..400).map(|n| format!("{} {} 0\n", n % 20, n / 20));
+//! # std::fs::write(&cloud, points.collect::<String>())?;
+//! # let (cloud, output) = (cloud.to_str().unwrap(), format!("--output={}", mesh.display()));
+//! let words = ["reconstruct", "--memory=256MiB", &output, cloud];
+//! let answer = call::run(words, Arc::new(Silent), Cancel::new())?;
+//! let Answer::Mesh { report, .. } = answer else { unreachable!() };
+//! assert_eq!(report.mesh.vertices, 400);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+use super::command::{Args, Command};
+use super::{jobs, output};
+use crate::error::{Error, Result};
+use crate::inspect::compare::Comparison;
+use crate::inspect::info::Info;
+use crate::inspect::verify::Verdict;
+use crate::levels::TilesReport;
+use crate::report::Report;
+use crate::workspace::progress::{Cancel, Observer};
+use clap::error::ErrorKind;
+use clap::{ArgAction, CommandFactory, Parser};
+use std::ffi::OsString;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// The result of a command.
+#[derive(Debug)]
+#[non_exhaustive]
+pub enum Answer {
+    /// Of `reconstruct` and `resume`.
+    Mesh {
+        /// Counts and measurements of the run.
+        report: Box<Report>,
+        /// Path of the mesh.
+        output: PathBuf,
+    },
+    /// Of `info`.
+    Info(Box<Info>),
+    /// Of `verify`.
+    Verdict(Box<Verdict>),
+    /// Of `compare`.
+    Comparison(Box<Comparison>),
+    /// Of `tiles`.
+    Tiles(Box<TilesReport>),
+}
+
+impl Answer {
+    /// As JSON: what `--json` prints, or what `--report` writes.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if a value has no representation in JSON.
+    pub fn json(&self) -> Result<String> {
+        match self {
+            Self::Mesh { report, .. } => output::json(report),
+            Self::Info(info) => output::json(info),
+            Self::Verdict(verdict) => output::json(verdict),
+            Self::Comparison(comparison) => output::json(comparison),
+            Self::Tiles(report) => output::json(report),
+        }
+    }
+
+    /// As text, as the command prints it on a terminal.
+    #[must_use]
+    pub fn text(&self) -> String {
+        match self {
+            Self::Mesh { report, output } => output::summary(report, output),
+            Self::Info(info) => info.to_string(),
+            Self::Verdict(verdict) => verdict.to_string(),
+            Self::Comparison(comparison) => comparison.to_string(),
+            Self::Tiles(report) => report.to_string(),
+        }
+    }
+}
+
+/// The error of a call.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum CallError {
+    /// The words are no command line, or one of a command that only the program has.
+    #[error("{0}")]
+    Usage(String),
+    /// The command failed.
+    #[error(transparent)]
+    Run(#[from] Error),
+}
+
+impl CallError {
+    /// The first paragraph of the message of the parser, on one line.
+    fn usage(error: &clap::Error) -> Self {
+        let text = error.to_string();
+        let text = text.strip_prefix("error: ").unwrap_or(&text);
+        let lines = text.lines().take_while(|line| !line.trim().is_empty());
+        let lines: Vec<&str> = lines.map(str::trim).collect();
+        let asked = matches!(
+            error.kind(),
+            ErrorKind::DisplayHelp | ErrorKind::DisplayVersion
+        );
+        Self::Usage(match asked {
+            true => "help and version are for the command line".to_owned(),
+            false => lines.join(" "),
+        })
+    }
+}
+
+/// Runs `reconstruct`, `resume`, `info`, `verify`, `compare` or `tiles`; `words` are those behind the name of the
+/// program.
+///
+/// # Errors
+/// [`CallError`]. After one that [can be resumed](Error::can_resume) the scratch folder stays.
+pub fn run<W: Into<OsString>>(
+    words: impl IntoIterator<Item = W>,
+    observer: Arc<dyn Observer>,
+    cancel: Cancel,
+) -> Result<Answer, CallError> {
+    let words = words.into_iter().map(Into::into);
+    let words = std::iter::once(OsString::from("outcrop")).chain(words);
+    let args = Args::try_parse_from(words).map_err(|e| CallError::usage(&e))?;
+    let watch = (observer, cancel);
+    let mesh = |(report, output): jobs::Made| Answer::Mesh {
+        report: Box::new(report),
+        output,
+    };
+    Ok(match args.command {
+        Command::Reconstruct(args) => mesh(jobs::reconstruct(&args, watch, |_| ())?),
+        Command::Resume(args) => mesh(jobs::resume(&args, watch, |_| ())?),
+        Command::Info(args) => Answer::Info(Box::new(jobs::info(&args, watch)?)),
+        Command::Verify(args) => Answer::Verdict(Box::new(jobs::verify(&args, watch)?)),
+        Command::Compare(args) => Answer::Comparison(Box::new(jobs::compare(&args, watch)?)),
+        Command::Tiles(args) => Answer::Tiles(Box::new(jobs::tiles(&args, watch)?)),
+        _ => {
+            let why = "this command is for the command line only";
+            return Err(CallError::Usage(why.into()));
+        }
+    })
+}
+
+/// An option of a command.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct OptionOf {
+    /// Name, without dashes in front.
+    pub name: String,
+    /// True if it has no value.
+    pub is_flag: bool,
+    /// True if it may be given several times.
+    pub repeats: bool,
+    /// The default, as text; none if it says so in its help, or has none.
+    pub default: Option<String>,
+    /// True if the help does not show it.
+    pub is_hidden: bool,
+    /// The text of the help.
+    pub help: String,
+}
+
+/// The options of a command, as its help has them; empty if there is no such command.
+#[must_use]
+pub fn options(command: &str) -> Vec<OptionOf> {
+    let mut program = Args::command();
+    program.build();
+    let Some(command) = program.find_subcommand(command) else {
+        return Vec::new();
+    };
+    let described = command.get_arguments().filter_map(|arg| {
+        let action = arg.get_action();
+        let default = arg.get_default_values().first();
+        let is_flag = !action.takes_values();
+        Some(OptionOf {
+            name: arg.get_long()?.to_owned(),
+            is_flag,
+            repeats: matches!(action, ArgAction::Append) && arg.get_value_delimiter().is_none(),
+            default: default
+                .filter(|_| !is_flag)
+                .map(|text| text.to_string_lossy().into_owned()),
+            is_hidden: arg.is_hide_set(),
+            help: arg.get_help().map(ToString::to_string).unwrap_or_default(),
+        })
+    });
+    described.filter(|option| option.name != "help").collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::workspace::progress::Silent;
+
+    fn usage(words: &[&str]) -> String {
+        match run(words, Arc::new(Silent), Cancel::new()) {
+            Err(CallError::Usage(why)) => why,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn a_wrong_command_line_is_one_line() {
+        let why = usage(&["info", "--threads=none", "a.xyz"]);
+        assert!(
+            why.starts_with("invalid value 'none' for '--threads <N>'"),
+            "{why}"
+        );
+        let why = usage(&["reconstruct", "a.xyz"]);
+        assert!(why.contains("--output <MESH.ply>"), "{why}");
+        assert!(!why.contains('\n') && !why.contains("Usage"), "{why}");
+        assert!(usage(&["--help"]).contains("command line"));
+        assert!(usage(&["view", "a.ply"]).contains("command line only"));
+    }
+
+    #[test]
+    fn options_are_those_of_the_help() {
+        let of = |command: &str, name: &str| {
+            let mut all = options(command).into_iter();
+            all.find(|option| option.name == name).unwrap()
+        };
+        assert!(of("reconstruct", "keep-all").is_flag);
+        assert!(!of("reconstruct", "drop-classes").repeats);
+        assert!(of("reconstruct", "report").repeats);
+        assert!(of("reconstruct", "tile-points").is_hidden);
+        assert_eq!(of("compare", "samples").default.as_deref(), Some("1000000"));
+        assert_eq!(of("reconstruct", "keep-all").default, None);
+        assert!(options("nothing").is_empty());
+    }
+}

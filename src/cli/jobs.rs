@@ -1,0 +1,164 @@
+//! The work of the commands: from arguments to results, without a word on the screen.
+
+use super::args::{Compare, Ends, Info, Limits, Reconstruct, Resume, Tiles as TilesArgs, Verify};
+use super::output::{NewFile, is_page, report_text};
+use crate::error::{Error, Result};
+use crate::inspect::{compare, info, verify};
+use crate::levels;
+use crate::page;
+use crate::pipeline::{Builder, Reconstruction, Tiles, default_memory, default_threads};
+use crate::report::Report;
+use crate::workspace::Workspace;
+use crate::workspace::memory::MemoryPool;
+use crate::workspace::progress::{Cancel, Observer};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// The receiver of the progress, and the flag that stops the work.
+pub type Watch = (Arc<dyn Observer>, Cancel);
+
+/// A mesh that was made, and the report of the run.
+pub type Made = (Report, PathBuf);
+
+pub fn threads(limits: &Limits) -> usize {
+    limits.threads.map_or_else(default_threads, usize::from)
+}
+
+pub fn memory(limits: &Limits) -> u64 {
+    limits.memory.unwrap_or_else(default_memory)
+}
+
+fn workspace(limits: &Limits, (observer, cancel): Watch) -> Result<Workspace> {
+    let memory = MemoryPool::new(memory(limits))?;
+    let beside = std::env::temp_dir();
+    let scratch = limits.scratch.as_deref().unwrap_or(&beside);
+    let workspace = Workspace::new(scratch, memory, threads(limits), observer, cancel)?;
+    workspace.set_storage(limits.storing.storage())?;
+    Ok(workspace)
+}
+
+/// Makes a mesh; `begins` is called when all checks are done.
+pub fn reconstruct(
+    args: &Reconstruct,
+    watch: Watch,
+    begins: impl FnOnce(&Reconstruction),
+) -> Result<Made> {
+    let mut builder = args
+        .job
+        .builder()
+        .threads(threads(&args.limits))
+        .memory(memory(&args.limits))
+        .storage(args.limits.storing.storage())
+        .start(args.again.start());
+    if let Some(scratch) = &args.limits.scratch {
+        builder = builder.scratch(scratch);
+    }
+    run(builder, &args.ends, watch, begins)
+}
+
+/// Goes on with an unfinished run; `begins` is called when all checks are done.
+pub fn resume(args: &Resume, watch: Watch, begins: impl FnOnce(&Reconstruction)) -> Result<Made> {
+    let mut builder = Reconstruction::resume(&args.folder)?;
+    if let Some(memory) = args.memory {
+        builder = builder.memory(memory);
+    }
+    if let Some(threads) = args.threads {
+        builder = builder.threads(threads.into());
+    }
+    let builder = builder.storage(args.storing.storage());
+    run(builder, &args.ends, watch, begins)
+}
+
+fn run(
+    builder: Builder,
+    ends: &Ends,
+    (observer, cancel): Watch,
+    begins: impl FnOnce(&Reconstruction),
+) -> Result<Made> {
+    let mut builder = builder.observer(observer).cancel(cancel);
+    if let Some(limit) = ends.time_limit {
+        builder = builder.time_limit(limit);
+    }
+    let page = ends.report.iter().any(|path| is_page(path));
+    let run = builder.pictures(page).build()?;
+    if let Some(path) = ends.report.iter().find(|path| **path == run.output()) {
+        return Err(Error::Parameter {
+            name: "--report",
+            found: path.display().to_string(),
+            expected: "a file other than the mesh".into(),
+        });
+    }
+    let reports = ends.report.iter().map(|path| NewFile::open(path));
+    let reports = reports.collect::<Result<Vec<_>>>()?;
+    begins(&run);
+    let report = run.run()?;
+    for file in reports {
+        let text = report_text(file.path(), &report, run.output())?;
+        file.write(&text)?;
+    }
+    Ok((report, run.output().to_path_buf()))
+}
+
+/// Describes a cloud.
+pub fn info(args: &Info, watch: Watch) -> Result<info::Info> {
+    let workspace = workspace(&args.limits, watch)?;
+    let params = args.points.params();
+    let Some(path) = &args.html else {
+        return info::info(&args.inputs, &params, &workspace);
+    };
+    let page = NewFile::page(path)?;
+    let (info, drawn) = info::illustrated(&args.inputs, &params, &workspace)?;
+    page.write(&page::cloud(&args.inputs, &info, &drawn))?;
+    Ok(info)
+}
+
+/// Checks a mesh.
+pub fn verify(args: &Verify, watch: Watch) -> Result<verify::Verdict> {
+    let workspace = workspace(&args.limits, watch)?;
+    let options = verify::Options {
+        allow_unreferenced: args.allow_unreferenced,
+        range: None,
+    };
+    let Some(path) = &args.html else {
+        return verify::verify_with(&args.mesh, &options, &workspace);
+    };
+    let page = NewFile::page(path)?;
+    let (verdict, drawn) = verify::illustrated(&args.mesh, &options, &workspace)?;
+    page.write(&page::verdict(&args.mesh, &verdict, &drawn))?;
+    Ok(verdict)
+}
+
+/// Measures the distance between two shapes.
+pub fn compare(args: &Compare, watch: Watch) -> Result<compare::Comparison> {
+    let workspace = workspace(&args.limits, watch)?;
+    let (samples, seed) = (args.samples, args.seed);
+    let options = compare::Options { samples, seed };
+    let (a, b) = (&args.a, &args.b);
+    let Some(path) = &args.html else {
+        return compare::compare(a, b, &options, &workspace);
+    };
+    let page = NewFile::page(path)?;
+    let (comparison, drawn) = compare::illustrated(a, b, &options, &workspace)?;
+    page.write(&page::comparison(&comparison, &drawn))?;
+    Ok(comparison)
+}
+
+/// Makes levels of detail.
+pub fn tiles(args: &TilesArgs, (observer, cancel): Watch) -> Result<levels::TilesReport> {
+    let options = levels::Options {
+        geo: args.geo,
+        most_triangles: args.most_triangles,
+    };
+    let mut tiles = Tiles::new(&args.mesh, &args.output)
+        .options(options)
+        .memory(memory(&args.limits))
+        .threads(threads(&args.limits))
+        .storage(args.limits.storing.storage())
+        .start(args.again.start())
+        .observer(observer)
+        .cancel(cancel);
+    if let Some(scratch) = &args.limits.scratch {
+        tiles = tiles.scratch(scratch);
+    }
+    tiles.run()
+}
