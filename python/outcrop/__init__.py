@@ -10,14 +10,14 @@ import contextlib
 import datetime
 import os
 import shutil
-import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Optional, Union
 
 import numpy as np
 
+from . import _outcrop
 from ._mesh import Mesh
-from ._points import Cloud, temporary, written
+from ._points import Cloud, temporary, temporary_folder, written
 from ._run import (
     Answer,
     BudgetError,
@@ -53,6 +53,8 @@ __all__ = [
     "tiles",
     "verify",
 ]
+
+__version__ = _outcrop.__version__
 
 Size = Union[int, str]
 Time = Union[float, str, datetime.timedelta]
@@ -124,7 +126,7 @@ def reconstruct(
     with contextlib.ExitStack() as stack:
         folder = None
         if output is None:
-            folder = tempfile.mkdtemp(prefix="outcrop-", dir=scratch)
+            folder = temporary_folder(scratch)
             failed = stack.enter_context(contextlib.ExitStack())
             failed.callback(shutil.rmtree, folder, True)
             output, options["scratch"] = os.path.join(folder, "mesh.ply"), folder

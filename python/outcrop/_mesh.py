@@ -14,12 +14,10 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _outcrop
-from ._run import Error, InputError, ParameterError, Path, finished
+from ._points import PLY
+from ._run import Error, InputError, ParameterError, Path, finished, named
 
-_NUMPY = {
-    **{"float": "<f4", "double": "<f8", "char": "i1", "uchar": "u1", "short": "<i2", "ushort": "<u2"},
-    **{"int": "<i4", "uint": "<u4", "float32": "<f4", "float64": "<f8", "int32": "<i4", "uint8": "u1"},
-}
+_NUMPY = {name: kind for kind, name in PLY.items()}
 
 # Most triangles of a mesh that is drawn unasked.
 _MOST_DRAWN = 5_000_000
@@ -42,7 +40,7 @@ class Mesh:
     def __init__(
         self, path: Path, report: Optional[Mapping[str, Any]] = None, *, _temporary: Optional[str] = None
     ) -> None:
-        self.path: str = os.fspath(path)
+        self.path: str = os.path.abspath(path)
         #: The report of the run, as ``--report`` writes it; empty for a mesh that was opened.
         self.report: dict[str, Any] = report if isinstance(report, dict) else dict(report or {})
         self._rows: Optional[tuple[Array, Array, list[str]]] = None
@@ -122,7 +120,8 @@ class Mesh:
         name = os.fspath(path)
         extension = os.path.splitext(name)[1].lower()
         if extension == os.path.splitext(self.path)[1].lower():
-            shutil.copyfile(self.path, name)
+            with named(name, "write"):
+                shutil.copyfile(self.path, name)
             return
         writers = {".obj": _write_obj, ".stl": _write_stl}
         if extension not in writers:
@@ -131,12 +130,12 @@ class Mesh:
                 "for others give the name to reconstruct(output=...)"
             )
         self._map()
-        with open(name, "wb") as file:
+        with named(name, "write"), open(name, "wb") as file:
             writers[extension](self, file)
 
     def picture(self) -> bytes:
         """The mesh from the south-west, as PNG, drawn in bounded memory. Boundary edges are marked."""
-        png = finished(_outcrop.Job.picture(self.path), False).png()
+        png = finished(_outcrop.Job.picture(self.path)).png()
         return png or b""
 
     def to_trimesh(self) -> Any:
@@ -171,10 +170,11 @@ class Mesh:
         return (colors >> 8).astype(np.uint8)
 
     def __repr__(self) -> str:
+        name = os.path.basename(self.path)
         if not self.path.endswith(".ply"):
-            return f"Mesh({self.path!r})"
+            return f"<Mesh {name}>"
         vertices, faces, _ = self._map()
-        return f"Mesh({self.path!r}: {len(vertices)} vertices, {len(faces)} triangles)"
+        return f"<Mesh {name}: {len(vertices)} vertices, {len(faces)} triangles>"
 
     def _repr_html_(self) -> str:
         text = f"<p>{html.escape(repr(self))}</p>"
@@ -192,12 +192,10 @@ class Mesh:
 
 def _mapped(path: str) -> tuple[Array, Array, list[str]]:
     """Vertices, triangles and comments of a mesh as outcrop writes it."""
-    with open(path, "rb") as file:
+    with named(path, "read"), open(path, "rb") as file:
         counts, properties, comments = _header(path, file)
         start = file.tell()
-    fields: list[Any] = []
-    for name, kind in properties.get("vertex", []):
-        fields.append((name, kind))
+    fields: list[Any] = list(properties.get("vertex", []))
     if [name for name, _ in fields[:3]] != ["x", "y", "z"] or len({kind for _, kind in fields[:3]}) != 1:
         raise _unfit(path, "vertices that begin with x, y and z of one type")
     vertex = np.dtype([("xyz", fields[0][1], (3,)), *fields[3:]])

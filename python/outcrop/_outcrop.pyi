@@ -1,5 +1,9 @@
 from typing import Any, Optional, final
 
+__all__ = ["Job", "__version__", "options"]
+
+__version__: str
+
 def options(command: str) -> list[tuple[str, bool, bool, Optional[str], bool, str]]: ...
 @final
 class Job:

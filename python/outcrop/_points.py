@@ -16,14 +16,24 @@ from typing import IO, Any, Optional
 import numpy as np
 import numpy.typing as npt
 
-from ._run import FileError, InputError, Path, ScratchError
+from ._run import InputError, Path, ScratchError, named
 
 Array = npt.NDArray[Any]
 
 # Points that are copied at a time.
 _CHUNK = 1 << 17
 
-_PLY = {"f4": "float", "f8": "double", "i1": "char", "u1": "uchar", "i2": "short", "u2": "ushort", "i4": "int", "u4": "uint"}
+# Types of numbers: as numpy and as PLY calls them.
+PLY = {
+    "<f4": "float",
+    "<f8": "double",
+    "|i1": "char",
+    "|u1": "uchar",
+    "<i2": "short",
+    "<u2": "ushort",
+    "<i4": "int",
+    "<u4": "uint",
+}
 
 
 class Cloud:
@@ -59,12 +69,12 @@ class Cloud:
     def _add(self, name: str, values: Array) -> None:
         if values.shape != (self.count,):
             raise InputError(f"{name}: found an array of shape {values.shape}, expected ({self.count},)")
-        self._fields.append((name, _stored(name, values), values))
+        self._fields.append((name, np.dtype(_stored(name, values)).str, values))
 
     def header(self) -> bytes:
         """The header of the file."""
         lines = ["ply", "format binary_little_endian 1.0", f"element vertex {self.count}"]
-        lines += [f"property {_PLY[kind[1:]]} {name}" for name, kind, _ in self._fields]
+        lines += [f"property {PLY[kind]} {name}" for name, kind, _ in self._fields]
         return "\n".join([*lines, "end_header", ""]).encode("ascii")
 
     def rows(self) -> Iterator[bytes]:
@@ -98,7 +108,7 @@ def _stored(name: str, values: Array) -> str:
     if kind == "f":
         return "<f4" if size <= 4 else "<f8"
     if kind == "b":
-        return "<u1"
+        return "u1"
     if kind in "iu" and size <= 4:
         return f"<{kind}{size}"
     if kind in "iu":
@@ -122,11 +132,12 @@ def written(cloud: Cloud, output: str, scratch: Optional[str], resume: bool, res
     with _opened(place) as file:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
+        except BlockingIOError:
             raise ScratchError(f"{place}: another run is at work here; wait for it, or choose another scratch=") from None
         try:
             if restart or not os.path.isdir(folder):
-                cloud.write(file)
+                with named(place, "write the points"):
+                    cloud.write(file)
             elif not resume:
                 raise ScratchError(
                     f"{folder}: an unfinished run is here already; resume=True goes on with it, restart=True begins again"
@@ -140,12 +151,14 @@ def written(cloud: Cloud, output: str, scratch: Optional[str], resume: bool, res
 
 
 def _opened(place: str) -> IO[bytes]:
-    try:
+    with named(place, "open"):
         return os.fdopen(os.open(place, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o600), "r+b")
-    except OSError as error:
-        failed = FileError(f"{place}: cannot open: {error.strerror}")
-        failed.errno = error.errno
-        raise failed from None
+
+
+def temporary_folder(scratch: Optional[Path]) -> str:
+    """A new folder in that of the scratch files, or where the system has temporary files."""
+    with named(scratch or tempfile.gettempdir(), "make a folder"):
+        return os.path.abspath(tempfile.mkdtemp(prefix="outcrop-", dir=scratch))
 
 
 def _place(output: str, scratch: Optional[str]) -> str:
@@ -163,10 +176,10 @@ def _place(output: str, scratch: Optional[str]) -> str:
 def temporary(points: Any, scratch: Optional[Path]) -> Iterator[str]:
     """A file with points, for the time of one command."""
     cloud = Cloud(points)
-    folder = tempfile.mkdtemp(prefix="outcrop-", dir=scratch)
+    folder = temporary_folder(scratch)
     try:
         place = os.path.join(folder, "points.ply")
-        with open(place, "w+b") as file:
+        with open(place, "w+b") as file, named(place, "write the points"):
             cloud.write(file)
         yield place
     finally:

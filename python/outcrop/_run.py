@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import datetime
+import errno
 import json
 import os
 import sys
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from numbers import Integral, Real
 from typing import Any, Callable, Optional, Union
 
@@ -123,39 +125,49 @@ def _text(value: object) -> str:
     raise TypeError(f"{value!r} cannot be the value of an option")
 
 
+@contextlib.contextmanager
+def named(place: Optional[Path], action: str) -> Iterator[None]:
+    """Errors of the system have the name of a file, and what failed."""
+    try:
+        yield
+    except OSError as error:
+        kind = DiskError if error.errno in (errno.ENOSPC, errno.EDQUOT) else FileError
+        failed = kind(f"{place}: cannot {action}: {error.strerror}")
+        failed.errno = error.errno
+        raise failed from None
+
+
 def run(
     words: list[str], progress: Union[Progress, bool, None] = None, quiet: bool = False
 ) -> tuple[Answer, Optional[str]]:
     """Runs a command; returns its result and the path of what was made."""
-    job = finished(_outcrop.Job.command(words), progress, quiet)
+    shown = _Bars() if progress is True or (progress is None and not quiet and _in_notebook()) else progress
+    try:
+        job = finished(_outcrop.Job.command(words), shown if callable(shown) else None)
+    finally:
+        if isinstance(shown, _Bars):
+            shown.close()
     answer = job.answer()
     assert answer is not None
     values, text, made = answer
     return Answer(json.loads(values), text), None if made is None else os.fspath(made)
 
 
-def finished(
-    job: _outcrop.Job, progress: Union[Progress, bool, None] = None, quiet: bool = False
-) -> _outcrop.Job:
+def finished(job: _outcrop.Job, told: Optional[Progress] = None) -> _outcrop.Job:
     """Waits for a job. Whatever ends the waiting, such as Ctrl-C, stops the job."""
-    shown = _Bars() if progress is True or (progress is None and not quiet and _in_notebook()) else progress
     try:
-        while True:
+        ended = False
+        while not ended:
             ended = job.wait(_LOOK)
             for message in job.warnings():
                 warnings.warn(message, OutcropWarning, stacklevel=4)
-            if callable(shown):
+            if told is not None:
                 for stage, _, done, total in job.stages():
-                    shown(stage, done, total)
-            if ended:
-                break
+                    told(stage, done, total)
     except BaseException:
         job.cancel()
         job.wait(_PATIENCE)
         raise
-    finally:
-        if isinstance(shown, _Bars):
-            shown.close()
     failure = job.failure()
     if failure is not None:
         raise _error(*failure)

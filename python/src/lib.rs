@@ -15,6 +15,12 @@ mod _outcrop {
     use super::job::Job;
     #[pymodule_export]
     use super::options;
+    use pyo3::prelude::*;
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
 }
 
 /// An option: name, is a flag, repeats, default, is hidden, help.

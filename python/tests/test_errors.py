@@ -11,6 +11,7 @@ import pytest
 from conftest import Points, bumps
 
 import outcrop
+from outcrop._run import named
 
 
 def said(done: Any) -> str:
@@ -45,6 +46,12 @@ def test_exceptions_are_those_that_python_programs_expect(tmp_path: Path) -> Non
     with pytest.raises(OSError) as caught:
         outcrop.info(tmp_path / "absent.laz")
     assert caught.value.errno == 2
+    with pytest.raises(outcrop.FileError, match="absent: cannot make a folder: No such file"):
+        outcrop.reconstruct(bumps(100), scratch=tmp_path / "absent")
+    with pytest.raises(outcrop.FileError, match="absent.mesh.ply"):
+        outcrop.reconstruct(bumps(100), output=tmp_path / "absent" / "mesh.ply")
+    with pytest.raises(outcrop.FileError, match="absent.ply: cannot read: No such"):
+        outcrop.Mesh(tmp_path / "absent.ply")
     with pytest.raises(MemoryError):
         outcrop.reconstruct(bumps(100), memory="1MiB")
     with pytest.raises(ValueError, match="--threads"):
@@ -66,8 +73,8 @@ def test_exceptions_are_those_that_python_programs_expect(tmp_path: Path) -> Non
         (np.zeros((4, 3)), {"columns": {"a": np.zeros(3)}}, "a: found an array of shape"),
         (np.zeros((4, 3)), {"columns": {"a b": np.zeros(4)}}, "'a b'"),
         (np.zeros((4, 3)), {"columns": {"x": np.zeros(4)}}, "'x'"),
-        (np.zeros((0, 3)), {}, "no points"),
-        (np.full((9, 3), np.nan), {}, "no points"),
+        (np.zeros((0, 3)), {}, "no usable point"),
+        (np.full((9, 3), np.nan), {}, "no usable point"),
     ],
 )
 def test_arrays_that_are_no_cloud(points: Any, options: Any, message: str, tmp_path: Path) -> None:
@@ -81,6 +88,12 @@ def test_values_of_files_are_not_arrays(tmp_path: Path) -> None:
         outcrop.reconstruct("a.laz", colors=np.zeros((4, 3), np.uint8))
     with pytest.raises(outcrop.ParameterError, match="output"):
         outcrop.reconstruct(bumps(100), resume=True)
+
+
+def test_a_full_disk_is_told() -> None:
+    with pytest.raises(outcrop.DiskError, match="f.ply: cannot write the points: No space left"):
+        with named("f.ply", "write the points"), open("/dev/full", "wb") as full:
+            full.write(bytes(1 << 20))
 
 
 def test_no_temporary_folder_is_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

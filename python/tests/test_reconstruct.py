@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from conftest import Points, bumps, write_ply
 
@@ -43,8 +42,8 @@ def test_arrays_of_a_mesh_are_views_of_its_file(points: Points) -> None:
     # Vertices are points of the cloud.
     assert {tuple(p) for p in np.round(vertices.astype(float), 4)} == {tuple(p) for p in points}
     assert mesh.columns == {} and mesh.colors is None and mesh.normals is None
-    assert mesh.origin is None and mesh.crs is None
-    assert repr(mesh).startswith("Mesh('") and "5000 vertices" in repr(mesh)
+    assert mesh.origin is None and mesh.crs is None and mesh.report["version"] == outcrop.__version__
+    assert repr(mesh).startswith("<Mesh mesh.ply: 5000 vertices")
 
 
 def test_colours_and_columns_follow_their_points(points: Points) -> None:
@@ -75,9 +74,9 @@ def test_far_coordinates_are_doubles_or_have_an_origin(points: Points) -> None:
     far = points + [635_000, 848_000, 0]
     mesh = outcrop.reconstruct(far, memory=MEMORY)
     assert mesh.vertices.dtype == np.float64
-    moved = outcrop.reconstruct(far, origin="auto", memory=MEMORY)
-    assert moved.origin is not None and moved.vertices.dtype == np.float32
-    assert np.allclose(np.sort(moved.vertices[:, 0] + moved.origin[0]), np.sort(mesh.vertices[:, 0]), atol=1e-4)
+    moved = outcrop.reconstruct(far, origin=(635_000, 848_000, 0), memory=MEMORY)
+    assert moved.origin == (635_000, 848_000, 0)
+    assert np.allclose(moved.vertices + moved.origin, mesh.vertices, atol=1e-6)
     assert tuple(moved.report["origin"]) == moved.origin
 
 
@@ -108,6 +107,13 @@ def test_saved_meshes(points: Points, tmp_path: Path) -> None:
     assert (opened.faces == mesh.faces).all() and opened.report == {}
 
 
+def test_the_reference_system_is_known(points: Points, tmp_path: Path) -> None:
+    cloud = write_ply(tmp_path / "cloud.ply", points)
+    (tmp_path / "cloud.prj").write_text('PROJCS["somewhere",UNIT["metre",1]]')
+    mesh = outcrop.reconstruct(cloud, output=tmp_path / "mesh.ply", memory=MEMORY)
+    assert mesh.crs is not None and mesh.crs.startswith("somewhere")
+
+
 def test_other_formats_have_no_arrays(points: Points, tmp_path: Path) -> None:
     mesh = outcrop.reconstruct(points, output=tmp_path / "mesh.obj", memory=MEMORY)
     assert os.path.getsize(mesh.path) > 0 and mesh.report["mesh"]["vertices"] == 5000
@@ -134,18 +140,31 @@ def test_other_commands(points: Points, tmp_path: Path, program: Any) -> None:
     described = outcrop.info(points, memory=MEMORY)
     assert described["points"] == 5000 and "spacing" in str(described)
     distance = outcrop.compare(mesh, points, samples=1000, memory=MEMORY)
-    assert distance == outcrop.compare(mesh.path, points, samples=1e3, memory=MEMORY)
+    again = outcrop.compare(mesh.path, points, samples=1e3, memory=MEMORY)
+    assert distance["a_to_b"] == again["a_to_b"]
     made = outcrop.tiles(mesh, output=tmp_path / "levels", memory=MEMORY)
     assert made["triangles"] == verdict["triangles"] and (tmp_path / "levels" / "tileset.json").exists()
 
 
 def test_progress_is_told(points: Points) -> None:
     told: list[tuple[str, int, int]] = []
-    outcrop.reconstruct(points, memory=MEMORY, progress=lambda *now: told.append(now))
+
+    def note(stage: str, done: int, total: int) -> None:
+        told.append((stage, done, total))
+
+    outcrop.reconstruct(points, memory=MEMORY, progress=note)
     stages = list(dict.fromkeys(stage for stage, _, _ in told))
     assert [s for s in stages if s in ("ingest", "order", "cells", "export")] == ["ingest", "order", "cells", "export"]
     ends = {stage: (done, total) for stage, done, total in told}
     assert ends["cells"] == (5000, 5000)
+
+
+def test_bars_of_tqdm(points: Points, capfd: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("tqdm")
+    outcrop.reconstruct(points, memory=MEMORY, progress=True)
+    assert "cells" in capfd.readouterr().err
+    outcrop.reconstruct(points, memory=MEMORY)
+    assert capfd.readouterr().err == ""
 
 
 def test_warnings_are_python_warnings(points: Points, tmp_path: Path) -> None:
@@ -159,10 +178,6 @@ def test_points_in_pieces_are_one_cloud(points: Points, monkeypatch: pytest.Monk
     monkeypatch.setattr("outcrop._points._CHUNK", 999)
     pieces = outcrop.reconstruct(points, memory=MEMORY)
     assert Path(whole.path).read_bytes() == Path(pieces.path).read_bytes()
-
-
-def columns_of(count: int) -> dict[str, npt.NDArray[Any]]:
-    return {"a": np.zeros(count), "flag": np.zeros(count, bool)}
 
 
 def test_columns_of_all_types() -> None:

@@ -17,6 +17,9 @@ from conftest import Points, bumps
 
 import outcrop
 
+# Points of a run that takes long enough to be stopped.
+MANY = 1_000_000
+
 CHILD = """
 import sys, time
 import numpy as np
@@ -38,21 +41,22 @@ else:
 
 @pytest.mark.parametrize("scratch", [False, True])
 def test_control_c_leaves_a_run_that_goes_on(tmp_path: Path, scratch: bool) -> None:
-    points = bumps(150_000)
+    points = bumps(MANY)
     np.save(tmp_path / "points.npy", points)
     mesh = tmp_path / "mesh.ply"
     code = CHILD.replace("resume=True", f"resume=True, scratch={str(tmp_path / 'scratch')!r}") if scratch else CHILD
     (tmp_path / "scratch").mkdir()
     line = [sys.executable, "-c", code, str(tmp_path / "points.npy"), str(mesh)]
-    child = subprocess.Popen(line, stdout=subprocess.PIPE, text=True)
-    assert child.stdout is not None and child.stdout.readline() == "cells\n"
-    sent = time.monotonic()
-    child.send_signal(signal.SIGINT)
-    *_, (word, at) = (line.split() for line in child.stdout if "interrupted" in line or "finished" in line)
-    child.wait()
-    assert word == "interrupted"
-    print(f"stopped {float(at) - sent:.2f} s after the signal")
-    assert float(at) - sent < 2.0
+    with subprocess.Popen(line, stdout=subprocess.PIPE, text=True) as child:
+        assert child.stdout is not None and child.stdout.readline() == "cells\n"
+        sent = time.monotonic()
+        child.send_signal(signal.SIGINT)
+        last = child.stdout.read().splitlines()[-1]
+    assert last.startswith("interrupted "), last
+    seconds = float(last.split()[1]) - sent
+    print(f"stopped {seconds:.2f} s after the signal")
+    # Less than a second, and what a busy machine adds.
+    assert seconds < 2.0
     folder = tmp_path / "scratch" if scratch else tmp_path
     kept = {name.rsplit(".", 1)[-1] for name in os.listdir(folder) if "outcrop" in name}
     assert kept == {"outcrop-scratch", "ply"} and not mesh.exists()
@@ -73,12 +77,13 @@ def test_control_c_leaves_a_run_that_goes_on(tmp_path: Path, scratch: bool) -> N
 
 
 def test_a_time_limit_leaves_a_run_that_goes_on(tmp_path: Path) -> None:
-    points, mesh = bumps(150_000), tmp_path / "mesh.ply"
+    points, mesh = bumps(MANY), tmp_path / "mesh.ply"
     with pytest.raises(outcrop.Interrupted, match="time limit") as caught:
         outcrop.reconstruct(points, output=mesh, memory="256MiB", time_limit=1)
     assert caught.value.can_resume
-    again = outcrop.reconstruct(points[::-1], output=mesh, memory="256MiB", restart=True)
-    assert again.report["points"] == len(np.unique(points, axis=0))
+    few = bumps(1000)
+    again = outcrop.reconstruct(few, output=mesh, memory="256MiB", restart=True)
+    assert again.report["points"] == len(few) and os.listdir(tmp_path) == ["mesh.ply"]
 
 
 def test_an_error_of_the_callback_stops_the_run(points: Points) -> None:
@@ -93,7 +98,8 @@ def test_two_runs_at_once_give_the_same_meshes() -> None:
     clouds = [bumps(40_000, seed) for seed in (1, 2)]
 
     def mesh(cloud: Points) -> bytes:
-        return Path(outcrop.reconstruct(cloud, memory="256MiB", threads=1).path).read_bytes()
+        made = outcrop.reconstruct(cloud, memory="256MiB", threads=1)
+        return Path(made.path).read_bytes()
 
     alone = [mesh(cloud) for cloud in clouds]
     with ThreadPoolExecutor(2) as pool:
@@ -113,11 +119,11 @@ def test_other_threads_go_on() -> None:
     thread = threading.Thread(target=count)
     thread.start()
     began = time.monotonic()
-    outcrop.reconstruct(bumps(60_000), memory="256MiB", threads=1)
+    outcrop.reconstruct(bumps(300_000), memory="256MiB", threads=1)
     took = time.monotonic() - began
     over.set()
     thread.join()
-    assert took > 0.3 and max(gaps) < took / 2 and len(gaps) > 10
+    assert max(gaps) < took / 2 and len(gaps) > 10
 
 
 def test_one_run_at_a_time_for_an_output(tmp_path: Path) -> None:
@@ -130,5 +136,5 @@ def test_one_run_at_a_time_for_an_output(tmp_path: Path) -> None:
                 outcrop.reconstruct(bumps(1000), output=mesh, memory="256MiB", restart=True)
             refused.append(caught.value)
 
-    outcrop.reconstruct(bumps(20_000), output=mesh, memory="256MiB", progress=told)
+    outcrop.reconstruct(bumps(100_000), output=mesh, memory="256MiB", progress=told)
     assert len(refused) == 1 and os.listdir(tmp_path) == ["mesh.ply"]
