@@ -198,7 +198,10 @@ class _Bars:
     """Progress bars of tqdm, one for each stage."""
 
     def __init__(self) -> None:
-        from tqdm.auto import tqdm  # type: ignore[import-untyped, unused-ignore]
+        with warnings.catch_warnings():
+            # Without ipywidgets bars are text, which is fine.
+            warnings.simplefilter("ignore")
+            from tqdm.auto import tqdm  # type: ignore[import-untyped, unused-ignore]
 
         self._make = tqdm
         self._bar: Any = None
