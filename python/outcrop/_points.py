@@ -105,7 +105,7 @@ class Cloud:
 def _stored(name: str, values: Array) -> str:
     """The type that holds all values exactly, as a little-endian dtype."""
     kind, size = values.dtype.kind, values.dtype.itemsize
-    if kind == "f":
+    if kind == "f" and size <= 8:
         return "<f4" if size <= 4 else "<f8"
     if kind == "b":
         return "u1"
@@ -125,29 +125,33 @@ def _stored(name: str, values: Array) -> str:
 
 @contextlib.contextmanager
 def written(cloud: Cloud, output: str, scratch: Optional[str], resume: bool, restart: bool) -> Iterator[str]:
-    """A file with the points, beside the scratch folder of a run with absolute paths. It is deleted at the end, unless
-    the run can be resumed: a run knows its inputs by the times of their files, so it needs this very file."""
+    """A file with the points, beside the scratch folder of a run with absolute paths.
+
+    It is deleted at the end, unless the run can be resumed: a run knows its inputs by the times of their files, so it
+    needs this very file.
+    """
     start = _place(output, scratch)
     place, folder = f"{start}.outcrop-points.ply", f"{start}.outcrop-scratch"
     with _opened(place) as file:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            raise ScratchError(f"{place}: another run is at work here; wait for it, or choose another scratch=") from None
+            why = "another run is at work here; wait for it, or choose another scratch="
+            raise ScratchError(f"{place}: {why}") from None
         try:
             if restart or not os.path.isdir(folder):
                 with named(place, "write the points"):
                     cloud.write(file)
             elif not resume:
-                raise ScratchError(
-                    f"{folder}: an unfinished run is here already; resume=True goes on with it, restart=True begins again"
-                )
+                why = "an unfinished run is here already; resume=True goes on with it, restart=True begins again"
+                raise ScratchError(f"{folder}: {why}")
             elif not cloud.is_in(file):
                 raise ScratchError(f"{folder}: cannot go on: the points were other ones; restart=True begins again")
             yield place
         finally:
             if not os.path.isdir(folder):
-                os.unlink(place)
+                with contextlib.suppress(FileNotFoundError):
+                    os.unlink(place)
 
 
 def _opened(place: str) -> IO[bytes]:

@@ -65,6 +65,7 @@ def test_exceptions_are_those_that_python_programs_expect(tmp_path: Path) -> Non
     [
         (np.zeros((4, 2)), {}, r"points: found an array of shape \(4, 2\), expected \(n, 3\)"),
         (np.zeros((4, 3), complex), {}, "x: found values of type complex128"),
+        (np.zeros((4, 3), np.longdouble), {}, "x: found values of type"),
         (np.array([["a"] * 3]), {}, "x: found values of type <U1"),
         (np.array([[1 << 60, 0, 0]] * 4), {}, "expected integers of at most"),
         (np.zeros((4, 3)), {"colors": np.zeros((4, 3))}, "colors: found float64"),
