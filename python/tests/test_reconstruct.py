@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import os
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -105,6 +106,23 @@ def test_saved_meshes(points: Points, tmp_path: Path) -> None:
     assert (held.faces == mesh.faces).all() and (held.visual.vertex_colors[:, :3] == 90).all()
     opened = outcrop.Mesh(tmp_path / "saved.ply")
     assert (opened.faces == mesh.faces).all() and opened.report == {}
+
+
+def test_what_is_not_installed_is_named(points: Points, monkeypatch: pytest.MonkeyPatch) -> None:
+    mesh = outcrop.reconstruct(points, memory=MEMORY)
+    for name in ["trimesh", "open3d"]:
+        monkeypatch.setitem(sys.modules, name, None)
+        with pytest.raises(ImportError, match=f"pip install {name}"):
+            getattr(mesh, f"to_{name}")()
+
+
+def test_a_mesh_in_open3d(points: Points) -> None:
+    pytest.importorskip("open3d")
+    colors = np.full((len(points), 3), [10, 20, 250], np.uint8)
+    mesh = outcrop.reconstruct(points, colors=colors, memory=MEMORY)
+    held = mesh.to_open3d()
+    assert (np.asarray(held.triangles) == mesh.faces).all() and (np.asarray(held.vertices) == mesh.vertices).all()
+    assert np.allclose(np.asarray(held.vertex_colors) * 255, mesh.colors)
 
 
 def test_the_reference_system_is_known(points: Points, tmp_path: Path) -> None:
