@@ -25,8 +25,8 @@ pub(crate) use distances::{count_body, distances_body};
 pub use distances::{count_within, distances};
 pub use pick::pick_column;
 pub(crate) use pick::{BLOCK, Pick, first_bits, pick_body};
-pub use ranks::ranks;
-pub(crate) use ranks::{RANKED, ranks_body};
+pub(crate) use ranks::{RANKED, SHORT_RANKED, ranks_body, short_ranks_body};
+pub use ranks::{ranks, short_ranks};
 pub(crate) use sums::{MOST_SUMMED, SUMMED_LIMIT2};
 pub use sums::{SecondMoments, second_moments};
 
