@@ -20,7 +20,9 @@ pub(crate) use corners::SLACK;
 pub use corners::{
     CornerGroup, Frame, LANES, Line, LineGroup, bisectors, cut_corners, farthest, touching_lines,
 };
-pub(crate) use corners::{bisectors_body, cut_body, farthest_body, touching_body};
+pub(crate) use corners::{
+    Place, bisectors_body, cut_body, farthest_body, touching_body, touching_places_body,
+};
 pub(crate) use distances::{count_body, distances_body};
 pub use distances::{count_within, distances};
 pub use pick::pick_column;

@@ -20,6 +20,7 @@ use crate::kernels::{
 use lines::{Corner, error_of_meeting, frame, meet};
 use many::{MANY, Many};
 use rim::{RIM, RIM_CORNERS, RIM_DISTANCE, RIM_PLACES, RIM_SIDES};
+pub use touch::Spheres;
 
 /// Id of a side that belongs to the disk's rim instead of a bisector.
 const RIM_ID: u32 = u32::MAX;
