@@ -237,11 +237,7 @@ pub(crate) fn farthest_body<E: Eight>(corners: &[CornerGroup]) -> f64 {
     for group in corners {
         most = E::load(&group.reach2).larger(most);
     }
-    let mut lanes = [0.0; LANES];
-    most.store(&mut lanes);
-    lanes
-        .into_iter()
-        .fold(0.0, |a, b| if b > a { b } else { a })
+    most.largest()
 }
 
 #[cfg(test)]
