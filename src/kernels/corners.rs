@@ -166,19 +166,62 @@ kernel! {
 
 #[inline(always)]
 pub(crate) fn touching_body<E: Eight>(corners: &[CornerGroup], lines: &LineGroup) -> u64 {
+    let corners = corners
+        .iter()
+        .flat_map(|group| (0..LANES).map(|k| Place::of(group, k)));
+    touching_places_body::<E>(corners, lines)
+}
+
+/// A corner, as far as it decides whether lines touch it.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Place {
+    x: f64,
+    y: f64,
+    /// The part of [`Line::bound`] that does not depend on the line.
+    error: f64,
+}
+
+impl Place {
+    #[inline(always)]
+    fn of(group: &CornerGroup, k: usize) -> Self {
+        let (x, y) = (group.x[k], group.y[k]);
+        let error = group.error[k] + SLACK * (x.abs() + y.abs());
+        Self { x, y, error }
+    }
+
+    /// Writes the corners to `to`, without the places where there is none, and returns how many there are;
+    /// `None` if there are more than `to` has room for.
+    #[inline(always)]
+    pub fn list(corners: &[CornerGroup], to: &mut [Self]) -> Option<usize> {
+        let mut count = 0;
+        for group in corners {
+            for k in 0..LANES {
+                if group.reach2[k] != 0.0 {
+                    *to.get_mut(count)? = Self::of(group, k);
+                    count += 1;
+                }
+            }
+        }
+        Some(count)
+    }
+}
+
+/// As [`touching_body`], for corners one by one.
+#[inline(always)]
+pub(crate) fn touching_places_body<E: Eight>(
+    corners: impl Iterator<Item = Place>,
+    lines: &LineGroup,
+) -> u64 {
     let (u, v) = (E::load(&lines.x), E::load(&lines.y));
     let (offset, length) = (E::load(&lines.offset), E::load(&lines.length));
     let least = E::splat(SLACK).mul(offset);
     let mut clear = 0xff;
-    for corners in corners {
-        for k in 0..LANES {
-            let (x, y) = (corners.x[k], corners.y[k]);
-            // As in `cut_body`.
-            let depth = u.mul(E::splat(x)).add(v.mul(E::splat(y))).sub(offset);
-            let error = corners.error[k] + SLACK * (x.abs() + y.abs());
-            let bound = length.mul(E::splat(error)).add(least);
-            clear &= E::splat(0.0).sub(depth).greater(bound);
-        }
+    for corner in corners {
+        // As in `cut_body`.
+        let (x, y) = (E::splat(corner.x), E::splat(corner.y));
+        let depth = u.mul(x).add(v.mul(y)).sub(offset);
+        let bound = length.mul(E::splat(corner.error)).add(least);
+        clear &= E::splat(0.0).sub(depth).greater(bound);
     }
     !clear & 0xff
 }
@@ -194,11 +237,7 @@ pub(crate) fn farthest_body<E: Eight>(corners: &[CornerGroup]) -> f64 {
     for group in corners {
         most = E::load(&group.reach2).larger(most);
     }
-    let mut lanes = [0.0; LANES];
-    most.store(&mut lanes);
-    lanes
-        .into_iter()
-        .fold(0.0, |a, b| if b > a { b } else { a })
+    most.largest()
 }
 
 #[cfg(test)]

@@ -31,6 +31,21 @@ pub(crate) trait Eight: Numbers {
     fn convert(from: &[i32; 8]) -> Self;
     /// Stores to memory.
     fn store(self, to: &mut [f64; 8]);
+    /// Sets one of eight numbers in memory, with a store as wide as a load: the processor passes it on to the
+    /// next load without waiting for the cache.
+    #[inline(always)]
+    fn put(to: &mut [f64; 8], k: usize, x: f64) {
+        to[k] = x;
+    }
+    /// The largest number; no number is NaN.
+    #[inline(always)]
+    fn largest(self) -> f64 {
+        let mut lanes = [0.0; 8];
+        self.store(&mut lanes);
+        lanes[1..]
+            .iter()
+            .fold(lanes[0], |a, b| if *b > a { *b } else { a })
+    }
     /// Absolute values.
     fn abs(self) -> Self;
 }
@@ -297,6 +312,37 @@ mod wide {
                 )
             }
         }
+
+        #[inline(always)]
+        fn put(to: &mut [f64; 8], k: usize, x: f64) {
+            let (half, k) = (k / 4 % 2, (k % 4) as i64);
+            // SAFETY: see above; a half is four numbers.
+            unsafe {
+                let to = to.as_mut_ptr().add(4 * half);
+                let places = _mm256_setr_epi64x(0, 1, 2, 3);
+                let at = _mm256_cmpeq_epi64(places, _mm256_set1_epi64x(k));
+                let put = _mm256_blendv_pd(
+                    _mm256_loadu_pd(to),
+                    _mm256_set1_pd(x),
+                    _mm256_castsi256_pd(at),
+                );
+                _mm256_storeu_pd(to, put);
+            }
+        }
+
+        #[inline(always)]
+        fn largest(self) -> f64 {
+            // SAFETY: see above.
+            unsafe {
+                let four = _mm256_max_pd(self.0, self.1);
+                let (low, high) = (
+                    _mm256_castpd256_pd128(four),
+                    _mm256_extractf128_pd::<1>(four),
+                );
+                let two = _mm_max_pd(low, high);
+                _mm_cvtsd_f64(_mm_max_sd(two, _mm_unpackhi_pd(two, two)))
+            }
+        }
     }
 
     operators! { Avx512:
@@ -373,6 +419,22 @@ mod wide {
         fn abs(self) -> Self {
             // SAFETY: see above.
             unsafe { Self(_mm512_abs_pd(self.0)) }
+        }
+
+        #[inline(always)]
+        fn put(to: &mut [f64; 8], k: usize, x: f64) {
+            // SAFETY: see above.
+            unsafe {
+                let at = 1u8 << (k % 8);
+                let put = _mm512_mask_mov_pd(_mm512_loadu_pd(to.as_ptr()), at, _mm512_set1_pd(x));
+                _mm512_storeu_pd(to.as_mut_ptr(), put);
+            }
+        }
+
+        #[inline(always)]
+        fn largest(self) -> f64 {
+            // SAFETY: see above.
+            unsafe { _mm512_reduce_max_pd(self.0) }
         }
     }
 }

@@ -20,13 +20,15 @@ pub(crate) use corners::SLACK;
 pub use corners::{
     CornerGroup, Frame, LANES, Line, LineGroup, bisectors, cut_corners, farthest, touching_lines,
 };
-pub(crate) use corners::{bisectors_body, cut_body, farthest_body, touching_body};
+pub(crate) use corners::{
+    Place, bisectors_body, cut_body, farthest_body, touching_body, touching_places_body,
+};
 pub(crate) use distances::{count_body, distances_body};
 pub use distances::{count_within, distances};
 pub use pick::pick_column;
 pub(crate) use pick::{BLOCK, Pick, first_bits, pick_body};
-pub use ranks::ranks;
-pub(crate) use ranks::{RANKED, ranks_body};
+pub(crate) use ranks::{RANKED, SHORT_RANKED, ranks_body, short_ranks_body};
+pub use ranks::{ranks, short_ranks};
 pub(crate) use sums::{MOST_SUMMED, SUMMED_LIMIT2};
 pub use sums::{SecondMoments, second_moments};
 

@@ -4,6 +4,7 @@
 
 use super::eight::Base;
 use super::kernel;
+use super::ranks::{RANKED, SHORT_RANKED};
 
 /// Values processed together; the length of a column to select from is a multiple of this.
 pub(crate) const BLOCK: usize = 16;
@@ -22,6 +23,31 @@ pub(crate) trait Pick {
     /// Writes the values whose bits are set, in their order, to the front of `to`; the rest of `to` is
     /// undefined.
     fn pack(values: &[u32; BLOCK], bits: u32, to: &mut [u32; BLOCK]);
+
+    /// For each key of a block, how many of `keys` are smaller.
+    #[inline(always)]
+    fn smaller(block: &[i64; RANKED], keys: &[i64]) -> [u32; RANKED] {
+        let mut smaller = [0i64; RANKED];
+        for other in keys {
+            for (smaller, key) in smaller.iter_mut().zip(block) {
+                // Adds the sign bit of the difference, which avoids a comparison: keys are not negative.
+                *smaller += ((other - key) as u64 >> 63) as i64;
+            }
+        }
+        smaller.map(|smaller| smaller as u32)
+    }
+
+    /// As [`Pick::smaller`], for short keys.
+    #[inline(always)]
+    fn short_smaller(block: &[i32; SHORT_RANKED], keys: &[i32]) -> [u32; SHORT_RANKED] {
+        let mut smaller = [0; SHORT_RANKED];
+        for other in keys {
+            for (smaller, key) in smaller.iter_mut().zip(block) {
+                *smaller += u32::from(other < key);
+            }
+        }
+        smaller
+    }
 
     /// As [`Pick::pack`], at place `at` of a column that has room for a block there.
     #[inline(always)]
@@ -91,7 +117,7 @@ fn pick_one_body<P: Pick>(numbers: &[f32], limit: f32, from: &[u32], to: &mut [u
     reason = "instructions that were looked for; unaligned loads and stores"
 )]
 mod wide {
-    use super::{BLOCK, Pick};
+    use super::{BLOCK, Pick, RANKED, SHORT_RANKED};
     use crate::kernels::eight::{Avx2, Avx512};
     use std::arch::x86_64::*;
 
@@ -145,6 +171,48 @@ mod wide {
                 _mm256_storeu_si256(behind.cast(), packed(1, high));
             }
         }
+
+        #[inline(always)]
+        fn smaller(block: &[i64; RANKED], keys: &[i64]) -> [u32; RANKED] {
+            // SAFETY: see above.
+            unsafe {
+                let p = block.as_ptr().cast::<__m256i>();
+                let (low, high) = (_mm256_loadu_si256(p), _mm256_loadu_si256(p.add(1)));
+                let (mut below, mut above) = (_mm256_setzero_si256(), _mm256_setzero_si256());
+                for other in keys {
+                    // True is -1.
+                    let other = _mm256_set1_epi64x(*other);
+                    below = _mm256_sub_epi64(below, _mm256_cmpgt_epi64(low, other));
+                    above = _mm256_sub_epi64(above, _mm256_cmpgt_epi64(high, other));
+                }
+                let mut out = [0i64; RANKED];
+                let to = out.as_mut_ptr().cast::<__m256i>();
+                _mm256_storeu_si256(to, below);
+                _mm256_storeu_si256(to.add(1), above);
+                out.map(|count| count as u32)
+            }
+        }
+
+        #[inline(always)]
+        fn short_smaller(block: &[i32; SHORT_RANKED], keys: &[i32]) -> [u32; SHORT_RANKED] {
+            // SAFETY: see above.
+            unsafe {
+                let p = block.as_ptr().cast::<__m256i>();
+                let (low, high) = (_mm256_loadu_si256(p), _mm256_loadu_si256(p.add(1)));
+                let (mut below, mut above) = (_mm256_setzero_si256(), _mm256_setzero_si256());
+                for other in keys {
+                    // True is -1.
+                    let other = _mm256_set1_epi32(*other);
+                    below = _mm256_sub_epi32(below, _mm256_cmpgt_epi32(low, other));
+                    above = _mm256_sub_epi32(above, _mm256_cmpgt_epi32(high, other));
+                }
+                let mut out = [0; SHORT_RANKED];
+                let to = out.as_mut_ptr().cast::<__m256i>();
+                _mm256_storeu_si256(to, below);
+                _mm256_storeu_si256(to.add(1), above);
+                out
+            }
+        }
     }
 
     impl Pick for Avx512 {
@@ -166,6 +234,60 @@ mod wide {
                 let values = _mm512_loadu_si512(values.as_ptr().cast());
                 let packed = _mm512_maskz_compress_epi32(bits as u16, values);
                 _mm512_storeu_si512(to.as_mut_ptr().cast(), packed);
+            }
+        }
+
+        #[inline(always)]
+        fn smaller(block: &[i64; RANKED], keys: &[i64]) -> [u32; RANKED] {
+            // SAFETY: see above. Two sums, so that an addition need not wait for the one before.
+            unsafe {
+                let (block, one) = (
+                    _mm512_loadu_si512(block.as_ptr().cast()),
+                    _mm512_set1_epi64(1),
+                );
+                let mut sums = [_mm512_setzero_si512(); 2];
+                let (pairs, last) = keys.as_chunks::<2>();
+                for others in pairs {
+                    for (sum, other) in sums.iter_mut().zip(others) {
+                        let is = _mm512_cmplt_epi64_mask(_mm512_set1_epi64(*other), block);
+                        *sum = _mm512_mask_add_epi64(*sum, is, *sum, one);
+                    }
+                }
+                for other in last {
+                    let is = _mm512_cmplt_epi64_mask(_mm512_set1_epi64(*other), block);
+                    sums[0] = _mm512_mask_add_epi64(sums[0], is, sums[0], one);
+                }
+                let sum = _mm512_cvtepi64_epi32(_mm512_add_epi64(sums[0], sums[1]));
+                let mut out = [0; RANKED];
+                _mm256_storeu_si256(out.as_mut_ptr().cast(), sum);
+                out
+            }
+        }
+
+        #[inline(always)]
+        fn short_smaller(block: &[i32; SHORT_RANKED], keys: &[i32]) -> [u32; SHORT_RANKED] {
+            // SAFETY: see above.
+            unsafe {
+                let (block, one) = (
+                    _mm512_loadu_si512(block.as_ptr().cast()),
+                    _mm512_set1_epi32(1),
+                );
+                let mut sums = [_mm512_setzero_si512(); 2];
+                let (pairs, last) = keys.as_chunks::<2>();
+                for others in pairs {
+                    for (sum, other) in sums.iter_mut().zip(others) {
+                        let is = _mm512_cmplt_epi32_mask(_mm512_set1_epi32(*other), block);
+                        *sum = _mm512_mask_add_epi32(*sum, is, *sum, one);
+                    }
+                }
+                for other in last {
+                    let is = _mm512_cmplt_epi32_mask(_mm512_set1_epi32(*other), block);
+                    sums[0] = _mm512_mask_add_epi32(sums[0], is, sums[0], one);
+                }
+                let mut out = [0; SHORT_RANKED];
+                let sum = _mm512_add_epi32(sums[0], sums[1]);
+                _mm512_storeu_si512(out.as_mut_ptr().cast(), sum);
+                out
             }
         }
     }

@@ -1,20 +1,21 @@
 //! Sorting a few dozen keys by counting.
 
 use super::kernel;
+use super::pick::Pick;
 
 kernel! {
     /// For each key, the number of smaller keys: its rank if all keys are different. Keys must not be
     /// negative. Quadratic, but without branches: faster than sorting up to about a hundred keys.
-    pub fn ranks(keys: &[i64], out: &mut [u32]) = ranks_of
+    pub fn ranks(keys: &[i64], out: &mut [u32]) = ranks_of<Eight>
 }
 
 #[inline(always)]
-fn ranks_of(keys: &[i64], out: &mut [u32]) {
+fn ranks_of<P: Pick>(keys: &[i64], out: &mut [u32]) {
     let count = keys.len();
     let mut padded = keys.to_vec();
     padded.resize(count.next_multiple_of(RANKED), i64::MAX);
     let mut places = vec![0; padded.len()];
-    ranks_body(&padded, count, &mut places);
+    ranks_body::<P>(&padded, count, &mut places);
     out.copy_from_slice(&places[..count]);
 }
 
@@ -23,18 +24,39 @@ pub(crate) const RANKED: usize = 8;
 
 /// As [`ranks`], for the first `count` keys.
 #[inline(always)]
-pub(crate) fn ranks_body(keys: &[i64], count: usize, out: &mut [u32]) {
+pub(crate) fn ranks_body<P: Pick>(keys: &[i64], count: usize, out: &mut [u32]) {
     let blocks = keys.as_chunks::<RANKED>().0;
     let outs = out.as_chunks_mut::<RANKED>().0;
     for (block, out) in blocks.iter().zip(outs) {
-        let mut smaller = [0i64; RANKED];
-        for other in &keys[..count] {
-            for (smaller, key) in smaller.iter_mut().zip(block) {
-                // Adds the sign bit of the difference, which avoids a comparison.
-                *smaller += ((other - key) as u64 >> 63) as i64;
-            }
-        }
-        *out = smaller.map(|smaller| smaller as u32);
+        *out = P::smaller(block, &keys[..count]);
+    }
+}
+
+/// Short keys whose ranks are counted in registers.
+pub(crate) const SHORT_RANKED: usize = 16;
+
+kernel! {
+    /// As [`ranks`], for keys of 32 bits: twice as fast.
+    pub fn short_ranks(keys: &[i32], out: &mut [u32]) = short_ranks_of<Eight>
+}
+
+#[inline(always)]
+fn short_ranks_of<P: Pick>(keys: &[i32], out: &mut [u32]) {
+    let count = keys.len();
+    let mut padded = keys.to_vec();
+    padded.resize(count.next_multiple_of(SHORT_RANKED), i32::MAX);
+    let mut places = vec![0; padded.len()];
+    short_ranks_body::<P>(&padded, count, &mut places);
+    out.copy_from_slice(&places[..count]);
+}
+
+/// As [`short_ranks`], for the first `count` keys.
+#[inline(always)]
+pub(crate) fn short_ranks_body<P: Pick>(keys: &[i32], count: usize, out: &mut [u32]) {
+    let blocks = keys.as_chunks::<SHORT_RANKED>().0;
+    let outs = out.as_chunks_mut::<SHORT_RANKED>().0;
+    for (block, out) in blocks.iter().zip(outs) {
+        *out = P::short_smaller(block, &keys[..count]);
     }
 }
 
@@ -56,6 +78,19 @@ mod tests {
                 for (key, place) in keys.iter().zip(&places) {
                     prop_assert_eq!(sorted[*place as usize], *key);
                 }
+            }
+        }
+
+        #[test]
+        fn short_keys_are_ranked_as_long_ones(keys in prop::collection::hash_set(0..i32::MAX, 0..130)) {
+            let keys: Vec<i32> = keys.into_iter().collect();
+            let long: Vec<i64> = keys.iter().map(|key| i64::from(*key)).collect();
+            let mut expected = vec![0; keys.len()];
+            ranks(Level::BASE, &long, &mut expected);
+            for level in Level::all() {
+                let mut places = vec![0; keys.len()];
+                short_ranks(level, &keys, &mut places);
+                prop_assert_eq!(&places, &expected);
             }
         }
     }

@@ -8,7 +8,8 @@
 
 use super::{Cell, Nearest, RIM_CORNERS, RIM_ID, Side};
 use crate::geom::predicate::{Neighbor, turn};
-use crate::kernels::{Line, SLACK, bisectors, cut_corners};
+use crate::kernels::eight::Base;
+use crate::kernels::{Line, SLACK, bisectors};
 use std::cell::OnceCell;
 use std::collections::{BTreeMap, BinaryHeap};
 
@@ -77,16 +78,15 @@ impl Cell {
         }
         let side = Side { line, neighbor };
         let run = self.run_around(&side).unwrap_or_else(|| {
-            let level = self.level;
             #[cfg(test)]
             {
                 self.looks += self.places();
             }
-            self.scan(&side, |corners, line| cut_corners(level, corners, line))
+            self.scan_words(&side)
         });
         if let Some((first, last)) = run {
             self.unlist(first, last);
-            let second = self.replace(first, last, side);
+            let second = self.replace::<Base>(first, last, side);
             self.list(first, second);
         }
     }

@@ -8,18 +8,19 @@
 mod lines;
 mod many;
 mod rim;
+mod scan;
 mod touch;
 
 use super::plane::Normal;
 use super::predicate::{Neighbor, cuts_corner, cuts_parallel};
-use crate::kernels::eight::{Base, Eight};
+use crate::kernels::eight::Eight;
 use crate::kernels::{
-    CornerGroup, Frame, LANES, Level, Line, bisectors_body, cut_body, farthest_body, kernel,
-    touching_body,
+    CornerGroup, Frame, LANES, Level, Line, bisectors_body, farthest_body, kernel, touching_body,
 };
 use lines::{Corner, error_of_meeting, frame, meet};
 use many::{MANY, Many};
 use rim::{RIM, RIM_CORNERS, RIM_DISTANCE, RIM_PLACES, RIM_SIDES};
+pub use touch::Spheres;
 
 /// Id of a side that belongs to the disk's rim instead of a bisector.
 const RIM_ID: u32 = u32::MAX;
@@ -159,7 +160,7 @@ impl Cell {
         self.free.clear();
         self.free
             .extend((RIM_CORNERS as u32..RIM_PLACES as u32).rev());
-        self.set_reach(farthest_body::<Base>(&self.corners));
+        self.set_reach(RIM.corners[0].reach2[0] * radius * radius);
     }
 
     #[inline(always)]
@@ -195,11 +196,12 @@ impl Cell {
     }
 
     #[inline(always)]
-    fn set_corner(&mut self, k: usize, corner: Corner) {
+    fn set_corner<E: Eight>(&mut self, k: usize, corner: Corner) {
         let (group, k) = (&mut self.corners[k / LANES], k % LANES);
-        [group.x[k], group.y[k]] = corner.at;
-        group.error[k] = corner.error;
-        group.reach2[k] = corner.reach2;
+        E::put(&mut group.x, k, corner.at[0]);
+        E::put(&mut group.y, k, corner.at[1]);
+        E::put(&mut group.error, k, corner.error);
+        E::put(&mut group.reach2, k, corner.reach2);
     }
 
     /// Points at a larger squared distance cannot touch the cell: four times the squared radius of security,
@@ -236,8 +238,8 @@ impl Cell {
             return;
         }
         let side = Side { line, neighbor };
-        if let Some((first, last)) = self.scan(&side, cut_body::<E>) {
-            self.replace(first, last, side);
+        if let Some((first, last)) = self.scan::<E>(&side) {
+            self.replace::<E>(first, last, side);
             self.set_reach(farthest_body::<E>(&self.corners));
         }
     }
@@ -249,47 +251,6 @@ impl Cell {
         // Of points at one position, the one with the lowest id (the largest weight) has the cell.
         self.hidden |= same && neighbor.id < self.own;
         same
-    }
-
-    /// The connected run of corners that `side` cuts off, found by testing all corners.
-    #[inline(always)]
-    fn scan(
-        &mut self,
-        side: &Side,
-        cut_corners: impl Fn(&[CornerGroup], &Line) -> (u64, u64),
-    ) -> Option<(u32, u32)> {
-        let (mut doubts, mut all) = (0, 0);
-        let words = self.cut.iter_mut().zip(&mut self.doubt);
-        for (corners, (cut, doubt)) in self.corners.chunks(64 / LANES).zip(words) {
-            (*cut, *doubt) = cut_corners(corners, &side.line);
-            doubts |= *doubt;
-            all |= *cut | *doubt;
-        }
-        if all == 0 {
-            return None;
-        }
-        if doubts != 0 {
-            self.settle_doubts(side);
-        }
-        self.arc(side)
-    }
-
-    /// Decides the corners that floating point leaves in doubt.
-    #[cold]
-    fn settle_doubts(&mut self, side: &Side) {
-        for word in 0..self.doubt.len() {
-            let mut doubt = self.doubt[word];
-            while doubt != 0 {
-                let bit = doubt.trailing_zeros();
-                doubt &= doubt - 1;
-                let k = word * 64 + bit as usize;
-                let cut = self.cuts(k, side).unwrap_or_else(|| {
-                    self.unsure |= !self.is_certain(k, side);
-                    self.depth(k, side) > 0.0
-                });
-                self.cut[word] |= u64::from(cut) << bit;
-            }
-        }
     }
 
     /// True if `side` cuts off corner `k`, decided exactly; `None` for a corner on the rim.
@@ -328,66 +289,16 @@ impl Cell {
         side.line.depth(x, y)
     }
 
-    #[inline(always)]
-    fn is_cut(&self, k: u32) -> bool {
-        self.cut[k as usize / 64] >> (k % 64) & 1 == 1
-    }
-
-    /// The connected run of corners that is cut off, as its first and last; `None` if there is none.
-    #[inline(always)]
-    fn arc(&self, side: &Side) -> Option<(u32, u32)> {
-        let total: usize = self.cut.iter().map(|w| w.count_ones() as usize).sum();
-        let word = self.cut.iter().position(|w| *w != 0)?;
-        let seed = (word * 64) as u32 + self.cut[word].trailing_zeros();
-        let (first, last, count) = self.run(seed)?;
-        if count == total {
-            return Some((first, last));
-        }
-        self.deepest_run(side)
-    }
-
-    /// Of several runs, the one that contains the corner deepest beyond `side`.
-    #[cold]
-    fn deepest_run(&self, side: &Side) -> Option<(u32, u32)> {
-        // A line cuts one run off a convex polygon. Rounding at rim corners can split it; the run of the
-        // deepest corner is then taken.
-        let mut deepest: Option<(f64, u32)> = None;
-        for k in (0..self.places() as u32).filter(|k| self.is_cut(*k)) {
-            let depth = self.depth(k as usize, side).max(f64::MIN_POSITIVE);
-            if deepest.is_none_or(|(d, _)| depth > d) {
-                deepest = Some((depth, k));
-            }
-        }
-        let (first, last, _) = self.run(deepest?.1)?;
-        Some((first, last))
-    }
-
-    /// The run of cut corners around `seed`: first, last, length. `None` if no corner would remain, which is
-    /// impossible in exact arithmetic: the cell contains its own point.
-    #[inline(always)]
-    fn run(&self, seed: u32) -> Option<(u32, u32, usize)> {
-        let (mut first, mut last, mut count) = (seed, seed, 1);
-        while count < self.count && self.is_cut(self.links[first as usize].before) {
-            first = self.links[first as usize].before;
-            count += 1;
-        }
-        while count < self.count && self.is_cut(self.links[last as usize].next) {
-            last = self.links[last as usize].next;
-            count += 1;
-        }
-        (count < self.count).then_some((first, last, count))
-    }
-
     /// Replaces the corners from `first` to `last`, and the sides between them, by `side`. Returns the corner
     /// at which it ends.
     #[inline(always)]
-    fn replace(&mut self, first: u32, last: u32, side: Side) -> u32 {
+    fn replace<E: Eight>(&mut self, first: u32, last: u32, side: Side) -> u32 {
         let start = self.links[first as usize];
         let end = self.links[last as usize];
         let mut gone = first;
         while gone != last {
             gone = self.links[gone as usize].next;
-            self.set_corner(gone as usize, Corner::default());
+            self.set_corner::<E>(gone as usize, Corner::default());
             self.free.push(gone);
             self.count -= 1;
         }
@@ -396,9 +307,9 @@ impl Cell {
         let exit = meet(&side.line, &self.sides[into as usize].line);
         // The side before the run now ends at its intersection with the new side, and the new side at its
         // intersection with the side after the run.
-        self.set_corner(first as usize, entry);
+        self.set_corner::<E>(first as usize, entry);
         let second = self.free_place();
-        self.set_corner(second as usize, exit);
+        self.set_corner::<E>(second as usize, exit);
         self.links[second as usize] = Link {
             next: end.next,
             before: first,

@@ -1,15 +1,63 @@
 //! Conservative tests whether boxes and points can touch a cell.
 
-use super::Cell;
+use super::{Cell, RIM_PLACES};
 use crate::geom::Point;
 use crate::kernels::eight::Eight;
-use crate::kernels::{LANES, bisectors_body, kernel, touching_body};
+use crate::kernels::{LANES, Place, bisectors_body, kernel, touching_body, touching_places_body};
+
+/// Groups of spheres and places of corners in memory of fixed size; cells with more corners do without.
+const GROUPS: usize = 2 * RIM_PLACES / LANES;
+
+/// The spheres around the corners of a cell through its own point, relative to this point. A point cuts off
+/// a corner only if it is nearer to the corner than the cell's own point.
+#[derive(Debug)]
+pub struct Spheres<'a> {
+    cell: &'a Cell,
+    groups: [SphereGroup; GROUPS],
+    /// Number of groups; 0 if there are too many corners.
+    used: usize,
+}
+
+/// Spheres in columns; a negative squared radius means none.
+#[derive(Debug, Clone, Copy)]
+struct SphereGroup {
+    at: [[f64; LANES]; 3],
+    /// Upper bounds on the squared radii.
+    reach2: [f64; LANES],
+}
+
+impl SphereGroup {
+    const NONE: Self = Self {
+        at: [[0.0; LANES]; 3],
+        reach2: [-1.0; LANES],
+    };
+}
 
 impl Cell {
-    /// False if no point in a box, given relative to the cell's point, can change the cell. A point cuts off
-    /// a corner only if it is nearer to the corner than the cell's own point.
+    /// Its spheres, for the tests of many boxes.
     #[must_use]
-    pub fn may_touch(&self, low: [f64; 3], high: [f64; 3]) -> bool {
+    pub fn spheres(&self) -> Spheres<'_> {
+        let mut spheres = Spheres {
+            cell: self,
+            groups: [SphereGroup::NONE; GROUPS],
+            used: 0,
+        };
+        if self.many.is_none() && self.count <= GROUPS * LANES {
+            let [u, v] = self.frame;
+            for (to, k) in self.ring().enumerate() {
+                let (corner, group) = (self.corner(k), &mut spheres.groups[to / LANES]);
+                for axis in 0..3 {
+                    group.at[axis][to % LANES] = corner.at[0] * u[axis] + corner.at[1] * v[axis];
+                }
+                group.reach2[to % LANES] = corner.reach2 * (1.0 + 1e-9);
+            }
+            spheres.used = self.count.div_ceil(LANES);
+        }
+        spheres
+    }
+
+    /// As [`Spheres::meet`], for one box.
+    pub(super) fn may_touch(&self, low: [f64; 3], high: [f64; 3]) -> bool {
         if let Some(many) = &self.many {
             return many.may_touch(self, low, high);
         }
@@ -37,6 +85,41 @@ impl Cell {
     }
 }
 
+impl Spheres<'_> {
+    /// False if no point in a box, given relative to the cell's point, can change the cell.
+    #[must_use]
+    pub fn meet(&self, low: [f64; 3], high: [f64; 3]) -> bool {
+        match self.used {
+            0 => self.cell.may_touch(low, high),
+            used => meet(self.cell.level, &self.groups[..used], low, high),
+        }
+    }
+}
+
+kernel! {
+    /// True if a sphere may meet the box.
+    fn meet(spheres: &[SphereGroup], low: [f64; 3], high: [f64; 3]) -> bool = meet_body<Eight>
+}
+
+#[inline(always)]
+fn meet_body<E: Eight>(spheres: &[SphereGroup], low: [f64; 3], high: [f64; 3]) -> bool {
+    let zero = E::splat(0.0);
+    for group in spheres {
+        let mut distance2 = zero;
+        for axis in 0..3 {
+            let at = E::load(&group.at[axis]);
+            let below = E::splat(low[axis]).sub(at);
+            let above = at.sub(E::splat(high[axis]));
+            let gap = below.larger(above).larger(zero);
+            distance2 = distance2.add(gap.mul(gap));
+        }
+        if distance2.greater(E::load(&group.reach2)) != 0xff {
+            return true;
+        }
+    }
+    false
+}
+
 kernel! {
     /// See [`Cell::touching`].
     fn touching(cell: &Cell, columns: [&[i32]; 3], own: Point, places: &mut Vec<u32>) = touching_points_body<Eight>
@@ -49,6 +132,8 @@ fn touching_points_body<E: Eight>(
     own: Point,
     places: &mut Vec<u32>,
 ) {
+    let mut listed = [Place::default(); GROUPS * LANES];
+    let count = Place::list(&cell.corners, &mut listed);
     for start in (0..x.len()).step_by(LANES) {
         let group = start..(start + LANES).min(x.len());
         let mut from = [[0; LANES]; 3];
@@ -58,7 +143,10 @@ fn touching_points_body<E: Eight>(
             }
         }
         let lines = bisectors_body::<E>(&from[0], &from[1], &from[2], &cell.frame);
-        let mut touching = touching_body::<E>(&cell.corners, &lines);
+        let mut touching = match count {
+            Some(count) => touching_places_body::<E>(listed[..count].iter().copied(), &lines),
+            None => touching_body::<E>(&cell.corners, &lines),
+        };
         while touching != 0 {
             let place = start as u32 + touching.trailing_zeros();
             touching &= touching - 1;

@@ -4,7 +4,7 @@
 use crate::error::Result;
 use crate::geom::Point;
 use crate::geom::aabb::Aabb;
-use crate::geom::clip::Cell;
+use crate::geom::clip::{Cell, Spheres};
 use crate::geom::plane::{Moments, Plane};
 use crate::kernels::Level;
 use crate::method::METHOD;
@@ -14,6 +14,7 @@ use crate::stages::tiles::near::{Query, Sums};
 use crate::stages::tiles::neighbors::Neighbors;
 use crate::stages::tiles::walk::{PageCache, Walk};
 use crate::stages::tiles::wanted::Wanted;
+use std::cell::OnceCell;
 
 /// The radius of the disk.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -222,8 +223,8 @@ impl<'a> CellMaker<'a> {
                 return Ok(Outcome::Complete);
             }
             // On scan lines, thousands of points are nearer than the farthest one that can touch the cell.
-            let (cell, own) = (&self.cell, query.point());
-            if !query.extend_where(cell.reach2(), &Touching { cell, own }) {
+            let wanted = Touching::new(&self.cell, query.point());
+            if !query.extend_where(self.cell.reach2(), &wanted) {
                 return Ok(Outcome::Uncertain);
             }
         }
@@ -250,8 +251,8 @@ impl<'a> CellMaker<'a> {
         }
         let (mut walk, mut near) = source;
         while !near.is_empty() && self.cell.clip_nearest(near.columns(), 0) == near.len() {
-            let (cell, own) = (&self.cell, point);
-            walk.list_where(cell.reach2(), &Touching { cell, own }, &mut near)?;
+            let wanted = Touching::new(&self.cell, point);
+            walk.list_where(self.cell.reach2(), &wanted, &mut near)?;
         }
         self.cell.triples(each);
         Ok(Outcome::Complete)
@@ -262,12 +263,21 @@ impl<'a> CellMaker<'a> {
 struct Touching<'a> {
     cell: &'a Cell,
     own: Point,
+    spheres: OnceCell<Spheres<'a>>,
+}
+
+impl<'a> Touching<'a> {
+    fn new(cell: &'a Cell, own: Point) -> Self {
+        let spheres = OnceCell::new();
+        Self { cell, own, spheres }
+    }
 }
 
 impl Wanted for Touching<'_> {
     fn may_be_in(&self, bounds: &Aabb) -> bool {
         let from = |at: Point| std::array::from_fn(|k| f64::from(at[k]) - f64::from(self.own[k]));
-        self.cell.may_touch(from(bounds.min), from(bounds.max))
+        let spheres = self.spheres.get_or_init(|| self.cell.spheres());
+        spheres.meet(from(bounds.min), from(bounds.max))
     }
 
     fn pick(&self, columns: [&[i32]; 3], places: &mut Vec<u32>) {

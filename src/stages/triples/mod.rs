@@ -4,7 +4,7 @@ use crate::error::Result;
 use crate::spill::{Shuffle, Table};
 use crate::stages::blocks::Blocks;
 use crate::stages::cells::{CellTriples, CountedTriple, SentTriple};
-use crate::workspace::memory::bytes_of;
+use crate::workspace::memory::{Reservation, bytes_of};
 use crate::workspace::{Unit, Workspace};
 use serde::{Deserialize, Serialize};
 
@@ -52,7 +52,8 @@ pub fn triples(
     for tile in 0..cells.off.count() {
         off.extend(cells.off.get(&unit, tile)?.into_iter().map(|off| off.id));
     }
-    let is_off = |v: &u32| off.binary_search(v).is_ok();
+    let runs = Runs::of(&off, blocks.points(), workspace)?;
+    let is_off = |v: &u32| runs.contain(*v) && off.binary_search(v).is_ok();
     let bytes = |block: usize| {
         let tiles = cells.tiles.of_block(block);
         tiles
@@ -100,6 +101,36 @@ pub fn triples(
         crossing,
     };
     Ok((Triples { own, visiting }, stats))
+}
+
+/// The runs of ids with points off the surface: these are few and together, so most other points need no
+/// search.
+struct Runs {
+    words: Vec<u64>,
+    _held: Reservation,
+}
+
+impl Runs {
+    /// Binary logarithm of the number of ids in a run.
+    const SHIFT: u32 = 7;
+
+    fn of(off: &[u32], points: usize, workspace: &Workspace) -> Result<Self> {
+        let words = (points >> Self::SHIFT) / 64 + 1;
+        let mut runs = Self {
+            _held: workspace.reserve("off the surface", 8 * words as u64)?,
+            words: vec![0; words],
+        };
+        for id in off {
+            let run = id >> Self::SHIFT;
+            runs.words[run as usize / 64] |= 1 << (run % 64);
+        }
+        Ok(runs)
+    }
+
+    fn contain(&self, id: u32) -> bool {
+        let run = id >> Self::SHIFT;
+        self.words[run as usize / 64] >> (run % 64) & 1 == 1
+    }
 }
 
 /// Merges two ascending lists and adds up the counts; `received` may contain a triple more than once.

@@ -87,6 +87,7 @@ proptest! {
             let low = low.map(|c| (c >> shift) as f64);
             let high = low.map(|c| c + (side >> shift) as f64);
             prop_assert!(many.may_touch(low, high) || !plain.may_touch(low, high));
+            prop_assert_eq!(plain.spheres().meet(low, high), plain.may_touch(low, high));
         }
         // Memory is reused for the next cell.
         many.start(50, normal, radius);

@@ -3,7 +3,8 @@
 use super::{APPROXIMATE, CORRECTIONS, Search, above};
 use crate::geom::{Point, distance2, sub};
 use crate::kernels::{
-    BLOCK, Pick, RANKED, count_body, distances_body, first_bits, kernel, pick_body, ranks_body,
+    BLOCK, Pick, RANKED, SHORT_RANKED, count_body, distances_body, first_bits, kernel, pick_body,
+    ranks_body, short_ranks_body,
 };
 use crate::stages::tiles::Near;
 use crate::stages::tiles::candidates::Columns;
@@ -29,12 +30,14 @@ impl Search {
     /// Lists the picked candidates within `limit` in order of (distance, id). Returns the squared distance up
     /// to which all are listed.
     #[inline(always)]
-    fn list_picked(&mut self, picked: usize, point: Point, own: u32, limit: f32) -> u64 {
+    fn list_picked<P: Pick>(&mut self, picked: usize, point: Point, own: u32, limit: f32) -> u64 {
         let below = (f64::from(limit) * (1.0 - APPROXIMATE)) as u64;
         let complete2 = below.min(self.candidates.complete2);
         let bits = usize::BITS - picked.leading_zeros();
-        if bits < 32 && complete2 < 1 << (63 - bits) {
-            self.list_short(picked, point, own, complete2, bits);
+        if picked <= MOST_RANKED && complete2 < (1 << (31 - bits)) - 1 {
+            self.list_shortest::<P>(picked, point, own, complete2, bits);
+        } else if bits < 32 && complete2 < 1 << (63 - bits) {
+            self.list_short::<P>(picked, point, own, complete2, bits);
         } else {
             self.list_long(picked, point, own, complete2);
         }
@@ -43,7 +46,14 @@ impl Search {
 
     /// Candidates are picked in order of id, so a word of distance and place sorts by (distance, id).
     #[inline(always)]
-    fn list_short(&mut self, picked: usize, point: Point, own: u32, complete2: u64, bits: u32) {
+    fn list_short<P: Pick>(
+        &mut self,
+        picked: usize,
+        point: Point,
+        own: u32,
+        complete2: u64,
+        bits: u32,
+    ) {
         let [x, y, z] = self.picked.coordinates(picked);
         let ids = self.picked.numbers(picked);
         let room = picked.next_multiple_of(RANKED);
@@ -68,7 +78,7 @@ impl Search {
         if picked <= MOST_RANKED {
             self.places.resize(room.max(self.places.len()), 0);
             let places = &mut self.places[..room];
-            ranks_body(keys, picked, places);
+            ranks_body::<P>(keys, picked, places);
             let picks = x.iter().zip(y).zip(z).zip(ids);
             for ((key, to), (((x, y), z), id)) in keys.iter().zip(places).zip(picks) {
                 let difference = [x - point[0], y - point[1], z - point[2]];
@@ -81,6 +91,47 @@ impl Search {
                 let difference = [x[at] - point[0], y[at] - point[1], z[at] - point[2]];
                 near.put(to, (key >> bits) as u64, ids[at], difference);
             }
+        }
+        self.near.resize(count as usize);
+    }
+
+    /// As [`Search::list_short`], for few candidates at distances of few steps, as on most scans: a word of
+    /// 32 bits suffices.
+    #[inline(always)]
+    fn list_shortest<P: Pick>(
+        &mut self,
+        picked: usize,
+        point: Point,
+        own: u32,
+        complete2: u64,
+        bits: u32,
+    ) {
+        let [x, y, z] = self.picked.coordinates(picked);
+        let ids = self.picked.numbers(picked);
+        let mut keys = [i32::MAX; MOST_RANKED];
+        let mut count = 0;
+        let picks = x.iter().zip(y).zip(z).zip(ids);
+        for (place, (key, (((x, y), z), id))) in (0i32..).zip(keys.iter_mut().zip(picks)) {
+            // Approximate distances are within the limit, so the exact ones fit.
+            let [x, y, z] = [x - point[0], y - point[1], z - point[2]];
+            let squares = [x.wrapping_mul(x), y.wrapping_mul(y), z.wrapping_mul(z)];
+            let d2 = squares[0].wrapping_add(squares[1]).wrapping_add(squares[2]) as u32;
+            let listed = (d2 <= complete2 as u32) & (*id != own);
+            *key = if listed {
+                (d2 << bits) as i32 | place
+            } else {
+                i32::MAX
+            };
+            count += i32::from(listed);
+        }
+        let mut places = [0; MOST_RANKED];
+        let room = picked.next_multiple_of(SHORT_RANKED);
+        short_ranks_body::<P>(&keys[..room], picked, &mut places[..room]);
+        let mut near = self.near.resize(picked);
+        let picks = x.iter().zip(y).zip(z).zip(ids);
+        for ((key, to), (((x, y), z), id)) in keys.iter().zip(places).zip(picks) {
+            let difference = [x - point[0], y - point[1], z - point[2]];
+            near.put(to as usize, (key >> bits) as u64, *id, difference);
         }
         self.near.resize(count as usize);
     }
@@ -158,7 +209,7 @@ fn nearest_body<P: Pick>(search: &mut Search, point: Point, own: u32, k: usize) 
         picked = search.pick_measured::<P>(limit);
     }
     loop {
-        let complete2 = search.list_picked(picked, point, own, limit);
+        let complete2 = search.list_picked::<P>(picked, point, own, limit);
         if search.near.len() >= k {
             return Some(complete2);
         }
