@@ -140,6 +140,8 @@ fn of_commands() -> BTreeMap<&'static str, BTreeSet<String>> {
         "advance",
         "status",
         "submit",
+        "completions",
+        "man",
     ];
     let help = |command: &'static str| {
         let mut outcrop = Command::new(env!("CARGO_BIN_EXE_outcrop"));

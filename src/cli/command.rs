@@ -1,13 +1,14 @@
 //! The commands and their help.
 
 use super::args::{Compare, Demo, Info, Reconstruct, Resume, Tiles, Verify};
+use super::manual::{Completions, Man};
 use super::shared::{Advance, Plan, Status, Submit, Work};
 use super::view::View;
 use clap::{Parser, Subcommand};
 
 /// Turns point clouds of any size into clean triangle meshes within a memory budget.
 #[derive(Debug, Parser)]
-#[command(version, about, long_about = LONG_ABOUT, max_term_width = 100, after_help = EXAMPLES)]
+#[command(version, about, long_about = LONG_ABOUT, max_term_width = 100, after_help = after_help())]
 pub struct Args {
     #[command(subcommand)]
     pub command: Command,
@@ -20,8 +21,8 @@ The mesh interpolates the points: its vertices are points of the cloud. Every ed
 triangles, every vertex is a disk or a half-disk, and triangles run consistently. The same cloud \
 and parameters give the same file, byte for byte, whatever memory, threads and order of inputs.";
 
-const EXAMPLES: &str = "Examples:
-  outcrop reconstruct scan.laz -o mesh.ply
+/// Commands as they are typed, one a line.
+pub const EXAMPLES: &str = "  outcrop reconstruct scan.laz -o mesh.ply
   outcrop reconstruct tiles/ -o town.ply --memory 4GiB --report town.html
   outcrop reconstruct noisy.las -o smooth.ply --smooth 1
   outcrop reconstruct scan.laz -o mesh.ply --resume --time-limit 7h30m
@@ -33,10 +34,16 @@ const EXAMPLES: &str = "Examples:
   outcrop view mesh.ply
   outcrop demo
   outcrop plan tiles/ -o town.ply --shards 200 --task-memory 4GiB --task-threads 8
-  outcrop submit town.ply.outcrop-scratch --engine slurm -- --partition=long
+  outcrop submit town.ply.outcrop-scratch --engine slurm -- --partition=long";
 
-Exit codes: 0 fine, 1 the answer is no (verify), 2 error. A run that was stopped can be resumed: 75 its \
+/// Meaning of the exit codes.
+pub const EXIT_CODES: &str = "\
+0 fine, 1 the answer is no (verify), 2 error. A run that was stopped can be resumed: 75 its \
 time limit was reached (of work, advance: try again later), 130 Ctrl-C, 143 SIGTERM, 129 SIGHUP.";
+
+fn after_help() -> String {
+    format!("Examples:\n{EXAMPLES}\n\nExit codes: {EXIT_CODES}")
+}
 
 /// The commands.
 #[derive(Debug, Subcommand)]
@@ -67,6 +74,10 @@ pub enum Command {
     Status(Status),
     /// Run the tasks of a planned run, by Slurm or as processes on this machine
     Submit(Submit),
+    /// Print a script that completes commands and options in a shell
+    Completions(Completions),
+    /// Write manual pages
+    Man(Man),
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use super::args::{
 };
 use super::command::Command;
 use super::output::{NewFile, is_page, print, report_text, show, summary, write_report};
-use super::{shared, stop, style, view};
+use super::{manual, shared, stop, style, view};
 use crate::error::{Error, Result};
 use crate::inspect::{compare, info, verify};
 use crate::levels;
@@ -34,6 +34,8 @@ pub fn run(command: Command) -> Result<bool> {
         Command::Advance(args) => shared::advance(&args),
         Command::Status(args) => shared::status(&args),
         Command::Submit(args) => shared::submit(&args),
+        Command::Completions(args) => manual::completions(&args),
+        Command::Man(args) => manual::man(&args),
     }
 }
 

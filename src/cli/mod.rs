@@ -3,6 +3,7 @@
 mod args;
 mod command;
 mod commands;
+mod manual;
 mod output;
 mod parse;
 mod progress;

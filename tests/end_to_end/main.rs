@@ -7,6 +7,7 @@ mod compressed;
 mod coordinates;
 mod determinism;
 mod filters;
+mod installed;
 mod library;
 mod odd;
 mod outdoor;
