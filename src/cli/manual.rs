@@ -28,9 +28,21 @@ pub struct Man {
 /// Prints a script that completes commands and options.
 pub fn completions(args: &Completions) -> Result<bool> {
     let mut script = Vec::new();
-    clap_complete::generate(args.shell, &mut Args::command(), "outcrop", &mut script);
+    let mut command = shown(&Args::command());
+    clap_complete::generate(args.shell, &mut command, "outcrop", &mut script);
     print(String::from_utf8_lossy(&script).trim_end())?;
     Ok(true)
+}
+
+/// A command without hidden options, which completions would show.
+fn shown(command: &Command) -> Command {
+    let arguments = command.get_arguments().filter(|a| !a.is_hide_set());
+    Command::new(command.get_name().to_owned())
+        .about(command.get_about().cloned().unwrap_or_default())
+        .version(env!("CARGO_PKG_VERSION"))
+        .disable_version_flag(command.get_version().is_none())
+        .args(arguments.cloned())
+        .subcommands(command.get_subcommands().map(shown))
 }
 
 /// Writes all manual pages.

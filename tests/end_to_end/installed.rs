@@ -7,7 +7,10 @@ use std::process::Command;
 /// Commands that `outcrop --help` lists.
 fn commands() -> Vec<String> {
     let help = util::run(["--help"]).out;
-    let list = help.split("Commands:\n").nth(1).expect("a list of commands");
+    let list = help
+        .split("Commands:\n")
+        .nth(1)
+        .expect("a list of commands");
     let lines = list.lines().take_while(|line| !line.is_empty());
     let names = lines.filter(|line| line.starts_with("  ") && !line.starts_with("   "));
     let names = names.filter_map(|line| line.split_whitespace().next());
