@@ -4,15 +4,24 @@ use super::args::{Compare, Demo, Info, Reconstruct, Resume, Tiles, Verify};
 use super::manual::{Completions, Man};
 use super::shared::{Advance, Plan, Status, Submit, Work};
 use super::view::View;
+use crate::method::method_version;
 use clap::{Parser, Subcommand};
 
 /// Turns point clouds of any size into clean triangle meshes within a memory budget.
 #[derive(Debug, Parser)]
-#[command(version, about, long_about = LONG_ABOUT, max_term_width = 100, after_help = after_help())]
+#[command(version, long_version = VERSION, about, long_about = LONG_ABOUT, max_term_width = 100, after_help = after_help())]
 pub struct Args {
     #[command(subcommand)]
     pub command: Command,
 }
+
+/// The versions of the program and of its method.
+const VERSION: &str = concat!(
+    env!("CARGO_PKG_VERSION"),
+    " (method ",
+    method_version!(),
+    ")"
+);
 
 const LONG_ABOUT: &str = "Turns point clouds of any size into clean triangle meshes, inside the \
 memory you give it.

@@ -20,3 +20,4 @@ mod scans;
 mod stop;
 mod topology;
 mod util;
+mod versions;
