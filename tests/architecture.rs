@@ -290,7 +290,9 @@ fn only_kernels_are_tied_to_a_processor() {
     });
     assert_eq!(found.map(|(module, _)| module).collect::<Vec<_>>(), [""; 0]);
     // Of the kernels every use is for x86-64 only: what else there is, is for every processor.
-    let kernels = modules().into_iter().filter(|(m, _)| m.starts_with("kernels"));
+    let kernels = modules()
+        .into_iter()
+        .filter(|(m, _)| m.starts_with("kernels"));
     let mut uses = 0;
     for (module, text) in kernels {
         uses += text.matches("target_arch = \"x86_64\"").count();

@@ -328,7 +328,10 @@ fn packages_agree_with_the_program() {
     // What the Debian package contains is what the script makes.
     let (cargo, package) = (read("Cargo.toml"), read("scripts/package"));
     for made in ["outcrop", "man", "complete", "licences"] {
-        assert!(cargo.contains(&format!("\"target/package/{made}")), "{made}");
+        assert!(
+            cargo.contains(&format!("\"target/package/{made}")),
+            "{made}"
+        );
         assert!(package.contains(&format!("$stage/{made}")), "{made}");
     }
 }
