@@ -1,11 +1,12 @@
 //! The commands and their help.
 
 use super::args::{Compare, Demo, Info, Reconstruct, Resume, Tiles, Verify};
-use super::manual::{Completions, Man};
 use super::shared::{Advance, Plan, Status, Submit, Work};
 use super::view::View;
 use crate::method::method_version;
 use clap::{Parser, Subcommand};
+use clap_complete::Shell;
+use std::path::PathBuf;
 
 /// Turns point clouds of any size into clean triangle meshes within a memory budget.
 #[derive(Debug, Parser)]
@@ -84,9 +85,17 @@ pub enum Command {
     /// Run the tasks of a planned run, by Slurm or as processes on this machine
     Submit(Submit),
     /// Print a script that completes commands and options in a shell
-    Completions(Completions),
+    Completions {
+        /// The shell
+        #[arg(value_name = "SHELL")]
+        shell: Shell,
+    },
     /// Write manual pages
-    Man(Man),
+    Man {
+        /// Folder for the pages: outcrop.1, and outcrop-COMMAND.1 for each command
+        #[arg(value_name = "DIR")]
+        folder: PathBuf,
+    },
 }
 
 #[cfg(test)]

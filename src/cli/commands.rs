@@ -34,8 +34,8 @@ pub fn run(command: Command) -> Result<bool> {
         Command::Advance(args) => shared::advance(&args),
         Command::Status(args) => shared::status(&args),
         Command::Submit(args) => shared::submit(&args),
-        Command::Completions(args) => manual::completions(&args),
-        Command::Man(args) => manual::man(&args),
+        Command::Completions { shell } => manual::completions(shell),
+        Command::Man { folder } => manual::man(&folder),
     }
 }
 

@@ -3,33 +3,17 @@
 use super::command::{Args, EXAMPLES, EXIT_CODES};
 use super::output::print;
 use crate::error::{Error, Result};
-use clap::{Args as ClapArgs, Command, CommandFactory};
+use clap::{Command, CommandFactory};
 use clap_complete::Shell;
 use clap_mangen::roff::{Roff, bold, roman};
 use std::io;
-use std::path::PathBuf;
-
-/// `outcrop completions`
-#[derive(Debug, ClapArgs)]
-pub struct Completions {
-    /// The shell
-    #[arg(value_name = "SHELL")]
-    pub shell: Shell,
-}
-
-/// `outcrop man`
-#[derive(Debug, ClapArgs)]
-pub struct Man {
-    /// Folder for the pages: outcrop.1, and outcrop-COMMAND.1 for each command
-    #[arg(value_name = "DIR")]
-    pub folder: PathBuf,
-}
+use std::path::Path;
 
 /// Prints a script that completes commands and options.
-pub fn completions(args: &Completions) -> Result<bool> {
+pub fn completions(shell: Shell) -> Result<bool> {
     let mut script = Vec::new();
     let mut command = shown(&Args::command());
-    clap_complete::generate(args.shell, &mut command, "outcrop", &mut script);
+    clap_complete::generate(shell, &mut command, "outcrop", &mut script);
     print(String::from_utf8_lossy(&script).trim_end())?;
     Ok(true)
 }
@@ -46,8 +30,7 @@ fn shown(command: &Command) -> Command {
 }
 
 /// Writes all manual pages.
-pub fn man(args: &Man) -> Result<bool> {
-    let folder = &args.folder;
+pub fn man(folder: &Path) -> Result<bool> {
     std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, "make the folder", e))?;
     let pages = pages().map_err(|e| Error::io(folder, "make the pages", e))?;
     for (name, page) in pages {
