@@ -14,13 +14,14 @@ const SHORT: [(&str, usize); 2] = [("README.md", 200), ("ARCHITECTURE.md", 200)]
 const WIDTH: usize = 110;
 
 /// Options that documents give to other programs: cargo, scripts and tools.
-const OTHERS: [&str; 7] = [
+const OTHERS: [&str; 8] = [
     "--address",
     "--format",
     "--fraction",
     "--kind",
     "--large",
     "--seconds",
+    "--strict",
     "--tried",
 ];
 
