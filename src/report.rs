@@ -26,6 +26,8 @@ use std::collections::BTreeMap;
 pub struct Report {
     /// Version of the program.
     pub version: &'static str,
+    /// Version of the method: meshes of equal points and parameters are equal if it is.
+    pub method_version: u32,
     /// Geometric parameters.
     pub parameters: Params,
     /// Memory budget in bytes.

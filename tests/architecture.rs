@@ -283,6 +283,32 @@ fn no_state_is_hidden_in_threads() {
 }
 
 #[test]
+fn only_kernels_are_tied_to_a_processor() {
+    let tied = [
+        "target_arch",
+        "std::arch",
+        "core::arch",
+        "is_x86_feature_detected",
+        "asm!",
+    ];
+    let found = modules().into_iter().filter(|(module, text)| {
+        !module.starts_with("kernels") && tied.iter().any(|word| text.contains(word))
+    });
+    assert_eq!(found.map(|(module, _)| module).collect::<Vec<_>>(), [""; 0]);
+    // Of the kernels every use is for x86-64 only: what else there is, is for every processor.
+    let kernels = modules()
+        .into_iter()
+        .filter(|(m, _)| m.starts_with("kernels"));
+    let mut uses = 0;
+    for (module, text) in kernels {
+        uses += text.matches("target_arch = \"x86_64\"").count();
+        let others = text.matches("target_arch").count() - text.matches("x86_64\")").count();
+        assert_eq!(others, 0, "{module}");
+    }
+    assert!(uses > 5, "{uses}");
+}
+
+#[test]
 fn files_are_about_one_thing() {
     let long: Vec<_> = modules()
         .into_iter()

@@ -14,13 +14,14 @@ const SHORT: [(&str, usize); 2] = [("README.md", 200), ("ARCHITECTURE.md", 200)]
 const WIDTH: usize = 110;
 
 /// Options that documents give to other programs: cargo, scripts and tools.
-const OTHERS: [&str; 7] = [
+const OTHERS: [&str; 8] = [
     "--address",
     "--format",
     "--fraction",
     "--kind",
     "--large",
     "--seconds",
+    "--strict",
     "--tried",
 ];
 
@@ -140,6 +141,8 @@ fn of_commands() -> BTreeMap<&'static str, BTreeSet<String>> {
         "advance",
         "status",
         "submit",
+        "completions",
+        "man",
     ];
     let help = |command: &'static str| {
         let mut outcrop = Command::new(env!("CARGO_BIN_EXE_outcrop"));
@@ -291,5 +294,45 @@ fn records_are_the_rows_of_the_program() {
                 assert!(listed, "docs/records.md has no file {name}");
             }
         }
+    }
+}
+
+#[test]
+fn the_index_of_the_manual_has_all_documents() {
+    let all = documents();
+    let index = all.iter().find(|d| d.path == Path::new("docs/README.md"));
+    let listed = index.expect("docs/README.md").targets();
+    let inside = all.iter().filter_map(|d| d.path.strip_prefix("docs").ok());
+    let missing: Vec<_> = inside
+        .filter(|path| *path != Path::new("README.md"))
+        .filter(|path| !listed.iter().any(|target| Path::new(target) == *path))
+        .collect();
+    assert!(missing.is_empty(), "{missing:?}");
+}
+
+#[test]
+fn packages_agree_with_the_program() {
+    let read = |path: &str| std::fs::read_to_string(root().join(path)).expect(path);
+    let version = env!("CARGO_PKG_VERSION");
+    assert!(read("CITATION.cff").contains(&format!("\nversion: {version}\n")));
+    let conda = read("packaging/conda/recipe.yaml");
+    assert!(conda.contains(&format!("\n  version: \"{version}\"\n")));
+    // The same licences for cargo-deny and for the script that needs nothing else.
+    let script = read("scripts/check-licences");
+    let (_, list) = script.split_once("\nallowed=\"").expect("a list");
+    let (list, _) = list.split_once('"').expect("its end");
+    let script: BTreeSet<&str> = list.split(' ').collect();
+    let deny = read("deny.toml");
+    let lines = deny.lines().map(str::trim);
+    let lines = lines.filter_map(|line| line.strip_prefix('"')?.strip_suffix("\","));
+    assert_eq!(lines.collect::<BTreeSet<&str>>(), script);
+    // What the Debian package contains is what the script makes.
+    let (cargo, package) = (read("Cargo.toml"), read("scripts/package"));
+    for made in ["outcrop", "man", "complete", "licences"] {
+        assert!(
+            cargo.contains(&format!("\"target/package/{made}")),
+            "{made}"
+        );
+        assert!(package.contains(&format!("$stage/{made}")), "{made}");
     }
 }

@@ -3,15 +3,26 @@
 use super::args::{Compare, Demo, Info, Reconstruct, Resume, Tiles, Verify};
 use super::shared::{Advance, Plan, Status, Submit, Work};
 use super::view::View;
+use crate::method::method_version;
 use clap::{Parser, Subcommand};
+use clap_complete::Shell;
+use std::path::PathBuf;
 
 /// Turns point clouds of any size into clean triangle meshes within a memory budget.
 #[derive(Debug, Parser)]
-#[command(version, about, long_about = LONG_ABOUT, max_term_width = 100, after_help = EXAMPLES)]
+#[command(version, long_version = VERSION, about, long_about = LONG_ABOUT, max_term_width = 100, after_help = after_help())]
 pub struct Args {
     #[command(subcommand)]
     pub command: Command,
 }
+
+/// The versions of the program and of its method.
+const VERSION: &str = concat!(
+    env!("CARGO_PKG_VERSION"),
+    " (method ",
+    method_version!(),
+    ")"
+);
 
 const LONG_ABOUT: &str = "Turns point clouds of any size into clean triangle meshes, inside the \
 memory you give it.
@@ -20,8 +31,8 @@ The mesh interpolates the points: its vertices are points of the cloud. Every ed
 triangles, every vertex is a disk or a half-disk, and triangles run consistently. The same cloud \
 and parameters give the same file, byte for byte, whatever memory, threads and order of inputs.";
 
-const EXAMPLES: &str = "Examples:
-  outcrop reconstruct scan.laz -o mesh.ply
+/// Commands as they are typed, one a line.
+pub const EXAMPLES: &str = "  outcrop reconstruct scan.laz -o mesh.ply
   outcrop reconstruct tiles/ -o town.ply --memory 4GiB --report town.html
   outcrop reconstruct noisy.las -o smooth.ply --smooth 1
   outcrop reconstruct scan.laz -o mesh.ply --resume --time-limit 7h30m
@@ -33,10 +44,16 @@ const EXAMPLES: &str = "Examples:
   outcrop view mesh.ply
   outcrop demo
   outcrop plan tiles/ -o town.ply --shards 200 --task-memory 4GiB --task-threads 8
-  outcrop submit town.ply.outcrop-scratch --engine slurm -- --partition=long
+  outcrop submit town.ply.outcrop-scratch --engine slurm -- --partition=long";
 
-Exit codes: 0 fine, 1 the answer is no (verify), 2 error. A run that was stopped can be resumed: 75 its \
+/// Meaning of the exit codes.
+pub const EXIT_CODES: &str = "\
+0 fine, 1 the answer is no (verify), 2 error. A run that was stopped can be resumed: 75 its \
 time limit was reached (of work, advance: try again later), 130 Ctrl-C, 143 SIGTERM, 129 SIGHUP.";
+
+fn after_help() -> String {
+    format!("Examples:\n{EXAMPLES}\n\nExit codes: {EXIT_CODES}")
+}
 
 /// The commands.
 #[derive(Debug, Subcommand)]
@@ -67,6 +84,18 @@ pub enum Command {
     Status(Status),
     /// Run the tasks of a planned run, by Slurm or as processes on this machine
     Submit(Submit),
+    /// Print a script that completes commands and options in a shell
+    Completions {
+        /// The shell
+        #[arg(value_name = "SHELL")]
+        shell: Shell,
+    },
+    /// Write manual pages
+    Man {
+        /// Folder for the pages: outcrop.1, and outcrop-COMMAND.1 for each command
+        #[arg(value_name = "DIR")]
+        folder: PathBuf,
+    },
 }
 
 #[cfg(test)]

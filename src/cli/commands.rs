@@ -4,7 +4,7 @@ use super::args::{Compare, Demo, Info, Reconstruct, Resume, Tiles, Verify};
 use super::command::Command;
 use super::jobs::{self, memory, threads};
 use super::output::{print, show, summary, write_report};
-use super::{shared, stop, style, view};
+use super::{manual, shared, stop, style, view};
 use crate::error::{Error, Result};
 use crate::inspect::verify;
 use crate::pipeline::{Reconstruction, Start};
@@ -31,6 +31,8 @@ pub fn run(command: Command) -> Result<bool> {
         Command::Advance(args) => shared::advance(&args),
         Command::Status(args) => shared::status(&args),
         Command::Submit(args) => shared::submit(&args),
+        Command::Completions { shell } => manual::completions(shell),
+        Command::Man { folder } => manual::man(&folder),
     }
 }
 

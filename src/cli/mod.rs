@@ -5,6 +5,7 @@ pub mod call;
 mod command;
 mod commands;
 mod jobs;
+mod manual;
 mod output;
 mod parse;
 mod progress;

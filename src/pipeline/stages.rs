@@ -11,7 +11,7 @@ use super::disk::{SCANNER, Text};
 use super::{Clock, Known, Reconstruction};
 use crate::error::Result;
 use crate::geom::lattice::Lattice;
-use crate::method::METHOD;
+use crate::method::{METHOD, method_version};
 use crate::params::Method;
 use crate::report::{LatticeReport, Report};
 use crate::stages::blocks::Blocks;
@@ -87,6 +87,7 @@ impl<'a> Stages<'a> {
                 .then(|| Course::start(job.memory.clone(), workspace.io.clone())),
             report: Report {
                 version: env!("CARGO_PKG_VERSION"),
+                method_version: method_version!(),
                 parameters: job.params.clone(),
                 memory_budget: job.memory.budget(),
                 threads: job.threads,

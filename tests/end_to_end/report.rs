@@ -7,6 +7,7 @@ use serde_json::Value;
 /// Every key that a user may rely on.
 const KEYS: &[&str] = &[
     "/version",
+    "/method_version",
     "/parameters/classes",
     "/parameters/crop",
     "/parameters/crop_margin",

@@ -1,5 +1,6 @@
 //! The interface of mesh formats.
 
+use crate::method::method_version;
 use crate::stages::ingest::Column;
 use outcrop_ply::Scalar;
 
@@ -15,7 +16,12 @@ pub enum CoordinateType {
 }
 
 /// The program, as every mesh names it.
-pub const MADE_BY: &str = concat!("made by outcrop ", env!("CARGO_PKG_VERSION"));
+pub const MADE_BY: &str = concat!(
+    "made by outcrop ",
+    env!("CARGO_PKG_VERSION"),
+    ", method ",
+    method_version!()
+);
 
 /// The positions of the corners of a triangle.
 pub type Positions = [[f64; 3]; 3];
