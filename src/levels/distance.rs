@@ -1,9 +1,9 @@
-//! The distance between a tile and its children, measured both ways.
+//! The distance between a tile and its children, both ways: an upper bound that is proved, near to the distance.
 //!
-//! From the finer surface to the coarser it is measured at all vertices, at the centres of all triangles and in the
-//! middles of their edges; from the coarser to the finer at points all over its triangles, about as
-//! dense as the vertices of the finer. Each is the exact distance of a point to the nearest triangle. Only the
-//! largest matters, so points that are certainly nearer are passed over.
+//! A part of a triangle is at most as far from the other surface as from any one triangle of it; since that is
+//! convex, the largest distance from it is at a corner of the part. So one triangle near the middle of the part
+//! gives a bound; where it is not good enough the part is divided. What is good enough follows from the largest
+//! distance that was measured at a point so far, so most parts need one look, or none.
 
 use crate::inspect::compare::distance2;
 
@@ -146,10 +146,12 @@ impl<'a> Grid<'a> {
         }
     }
 
-    /// The distance to the nearest triangle if it is more than `enough`; otherwise any number up to that.
-    fn distance(&self, p: V3, enough: f64) -> f64 {
+    /// A bound of the distances of all points of a triangle from this surface, and the distance of its middle. It is
+    /// the best that one triangle gives, or the first that is at most `enough`; then the distance may be larger.
+    fn bound(&self, part: [V3; 3], enough: f64) -> (f64, f64) {
+        let p = between(part, [1.0 / 3.0; 3]);
         let middle = self.cell(p);
-        let mut best = f64::INFINITY;
+        let (mut best, mut bound) = (f64::INFINITY, f64::INFINITY);
         let farthest = self.size.iter().max().copied().unwrap_or(1);
         for ring in 0..=farthest {
             // Whatever is in no cell yet looked at is farther than the cells between.
@@ -160,21 +162,27 @@ impl<'a> Grid<'a> {
             self.ring(middle, ring, |cell| {
                 let range = self.starts[cell] as usize..self.starts[cell + 1] as usize;
                 for ball in &self.triangles[range] {
-                    if !ball.is_farther(p, best) {
-                        let corners = self.surface.corners(ball.triangle as usize);
-                        best = best.min(distance2(&corners, p).sqrt());
-                        if best <= enough {
+                    if ball.is_farther(p, best) {
+                        continue;
+                    }
+                    let corners = self.surface.corners(ball.triangle as usize);
+                    let distance = distance2(&corners, p).sqrt();
+                    if distance < best {
+                        best = distance;
+                        let ends = part.map(|corner| distance2(&corners, corner));
+                        bound = bound.min(ends.into_iter().fold(0.0, f64::max).sqrt());
+                        if bound <= enough {
                             return true;
                         }
                     }
                 }
                 false
             });
-            if best <= enough {
+            if bound <= enough {
                 break;
             }
         }
-        best
+        (bound.min(best + reach(part, p)), best)
     }
 
     /// Calls `each` with the cells at this distance from one, counted in cells, until it returns true.
@@ -206,14 +214,20 @@ impl<'a> Grid<'a> {
 /// A point of a triangle is at most this times its longest edge from the nearest corner.
 const REACH: f64 = 0.577_350_27;
 
-/// Most parts into which an edge of a coarse triangle is divided by points.
-const PARTS: usize = 6;
+/// Factor of the largest distance at a point for bounds that are good enough.
+const MARGIN: f64 = 1.1;
 
-/// The largest distance of points of either surface from the other. The coarser has vertices of the finer, in the
-/// same list.
+/// The least bound, in steps, so that finer tiles are always better.
+const LEAST: f64 = 0.5;
+
+/// How often a triangle is halved at most.
+const HALVINGS: u32 = 8;
+
+/// An upper bound of the distance of each surface from the other, at least [`LEAST`]. The coarser has vertices of the
+/// finer, in the same list.
 pub(super) fn measure(fine: Surface<'_>, coarse: Surface<'_>) -> f64 {
     if fine.triangles.is_empty() {
-        return 0.0;
+        return LEAST;
     }
     if coarse.triangles.is_empty() {
         return f64::INFINITY;
@@ -224,82 +238,119 @@ pub(super) fn measure(fine: Surface<'_>, coarse: Surface<'_>) -> f64 {
         .as_flattened()
         .iter()
         .for_each(|v| kept[*v as usize] = true);
-    let mut farthest = from_fine(fine, &Grid::new(coarse), &kept);
+    let near = near(fine, &kept);
+    let mut found = Found::default();
+    let grid = Grid::new(coarse);
+    // A few first, so that most others can be passed over.
+    let vertices = (0..fine.points.len()).step_by(61);
+    for vertex in vertices.filter(|v| near[*v] > 0.0) {
+        found.look([fine.points[vertex]; 3], &grid);
+    }
+    let of_fine = |number: usize| {
+        let nearest = fine.triangles[number].map(|v| near[v as usize]);
+        let nearest = nearest.into_iter().fold(f32::INFINITY, f32::min);
+        f64::from(nearest) + longest(fine.corners(number))
+    };
+    found.all(fine, of_fine, &grid);
+    drop(grid);
     let mut grid = None;
     for number in 0..coarse.triangles.len() {
         let corners = coarse.corners(number);
-        let edge = longest(corners);
-        if edge * REACH <= farthest {
-            continue;
-        }
-        let grid = grid.get_or_insert_with(|| Grid::new(fine));
-        let parts = ((edge / grid.side).ceil() as usize).clamp(2, PARTS);
-        for i in 0..=parts {
-            for j in 0..=parts - i {
-                let k = parts - i - j;
-                if i.max(j).max(k) < parts {
-                    let weights = [i, j, k].map(|w| w as f64 / parts as f64);
-                    farthest = farthest.max(grid.distance(between(corners, weights), farthest));
-                }
-            }
+        if longest(corners) * REACH > found.limit() {
+            let grid = grid.get_or_insert_with(|| Grid::new(fine));
+            found.look(corners, grid);
         }
     }
-    farthest
+    found.limit()
 }
 
 fn between(corners: [V3; 3], weights: V3) -> V3 {
     std::array::from_fn(|k| (0..3).map(|n| weights[n] * corners[n][k]).sum())
 }
 
-/// The largest distance of points of the finer surface from the coarser, to whose corners its `kept` vertices belong.
-fn from_fine(fine: Surface<'_>, coarse: &Grid<'_>, kept: &[bool]) -> f64 {
-    // An upper bound for each vertex: its distance from a neighbour that was kept.
-    let mut near: Vec<f32> = kept
-        .iter()
-        .map(|kept| if *kept { 0.0 } else { f32::INFINITY })
-        .collect();
+fn apart(a: V3, b: V3) -> f64 {
+    let squares = (0..3).map(|k| (a[k] - b[k]) * (a[k] - b[k]));
+    squares.sum::<f64>().sqrt()
+}
+
+/// The distance of the farthest corner.
+fn reach(corners: [V3; 3], from: V3) -> f64 {
+    corners
+        .into_iter()
+        .fold(0.0, |most, c| apart(c, from).max(most))
+}
+
+/// The halves of a triangle, cut through its longest edge.
+fn halves([a, b, c]: [V3; 3]) -> [[V3; 3]; 2] {
+    let (ab, bc, ca) = (apart(a, b), apart(b, c), apart(c, a));
+    let [a, b, c] = match (ab >= bc && ab >= ca, bc >= ca) {
+        (true, _) => [a, b, c],
+        (false, true) => [b, c, a],
+        (false, false) => [c, a, b],
+    };
+    let middle = between([a, b, c], [0.5, 0.5, 0.0]);
+    [[a, middle, c], [middle, b, c]]
+}
+
+/// Distances found so far.
+#[derive(Default)]
+struct Found {
+    /// The largest distance of a point.
+    point: f64,
+    /// The largest bound of a part that was not divided.
+    part: f64,
+}
+
+impl Found {
+    /// The bound of all that was looked at, and the one up to which nothing needs to be.
+    fn limit(&self) -> f64 {
+        (self.point * MARGIN).max(self.part).max(LEAST)
+    }
+
+    /// Looks at the triangles of a surface whose bounds in advance are too large.
+    fn all(&mut self, surface: Surface<'_>, bound: impl Fn(usize) -> f64, other: &Grid<'_>) {
+        for number in 0..surface.triangles.len() {
+            if bound(number) > self.limit() {
+                self.look(surface.corners(number), other);
+            }
+        }
+    }
+
+    /// Looks at a triangle.
+    fn look(&mut self, corners: [V3; 3], other: &Grid<'_>) {
+        let mut parts = vec![(corners, 0)];
+        while let Some((part, halvings)) = parts.pop() {
+            let (bound, distance) = other.bound(part, self.limit());
+            if bound <= self.limit() {
+                continue;
+            }
+            self.point = self.point.max(distance);
+            if bound <= self.limit() {
+                continue;
+            }
+            if halvings == HALVINGS {
+                self.part = self.part.max(bound);
+            } else {
+                parts.extend(halves(part).map(|half| (half, halvings + 1)));
+            }
+        }
+    }
+}
+
+/// For each vertex of the finer surface an upper bound of its distance from the coarser: that from a neighbour that
+/// was `kept`.
+fn near(fine: Surface<'_>, kept: &[bool]) -> Vec<f32> {
+    let zero = |kept: &bool| if *kept { 0.0 } else { f32::INFINITY };
+    let mut near: Vec<f32> = kept.iter().map(zero).collect();
     for triangle in fine.triangles {
         for (a, b) in [(0, 1), (1, 2), (2, 0)] {
             let [a, b] = [triangle[a] as usize, triangle[b] as usize];
             if kept[a] != kept[b] {
-                let (p, q) = (fine.points[a], fine.points[b]);
-                let edge = (0..3)
-                    .map(|k| (p[k] - q[k]) * (p[k] - q[k]))
-                    .sum::<f64>()
-                    .sqrt();
+                let edge = apart(fine.points[a], fine.points[b]);
                 let gone = if kept[a] { b } else { a };
                 near[gone] = near[gone].min(edge as f32 * 1.000_001);
             }
         }
     }
-    let mut farthest = 0.0f64;
-    let mut look = |vertex: usize| {
-        if f64::from(near[vertex]) > farthest {
-            farthest = farthest.max(coarse.distance(fine.points[vertex], farthest));
-        }
-    };
-    // A few first, so that most others can be passed over.
-    (0..fine.points.len()).step_by(61).for_each(&mut look);
-    (0..fine.points.len()).for_each(&mut look);
-    for (number, triangle) in fine.triangles.iter().enumerate() {
-        let corners = fine.corners(number);
-        let nearest = triangle
-            .map(|v| near[v as usize])
-            .into_iter()
-            .fold(f32::INFINITY, f32::min);
-        if f64::from(nearest) + longest(corners) > farthest {
-            for weights in SAMPLES {
-                farthest = farthest.max(coarse.distance(between(corners, weights), farthest));
-            }
-        }
-    }
-    farthest
+    near
 }
-
-/// Points of a fine triangle: its centre, and the middles of its edges.
-const SAMPLES: [V3; 4] = [
-    [1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0],
-    [0.5, 0.5, 0.0],
-    [0.0, 0.5, 0.5],
-    [0.5, 0.0, 0.5],
-];

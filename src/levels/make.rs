@@ -19,13 +19,10 @@ use serde::{Deserialize, Serialize};
 pub(super) const ROOT_BYTES: usize = 1_000_000;
 
 /// Fewest and most triangles for which a tile is simplified, if it can be: parts of the most that a cell has.
-const TARGETS: [f64; 2] = [0.25, 0.75];
+const TARGETS: [f64; 2] = [0.1875, 0.75];
 
 /// The part of the children's triangles that a tile has otherwise.
-const PART: usize = 4;
-
-/// Factor for measured distances, which may be larger between two samples.
-const MARGIN: f64 = 1.1;
+const PART: usize = 6;
 
 /// Bytes of memory for each triangle of the children while a tile is made from them.
 const EACH: u64 = 420;
@@ -36,7 +33,7 @@ pub(super) struct Made {
     pub triangles: u32,
     /// Bytes of the GLB file.
     pub bytes: u32,
-    /// Distance from the full mesh, measured at samples, with a margin; in its unit.
+    /// A bound of the distance from the full mesh, in its unit.
     pub error: f64,
     /// Edges of the boundary of the mesh.
     pub boundary: u64,
@@ -252,14 +249,13 @@ impl Maker<'_> {
         }
     }
 
-    /// The error of a tile besides that of its children, from the measured distance in steps; at least half a step,
-    /// so that leaves are always better.
+    /// The error of a tile besides that of its children, from the bound of their distance in steps.
     fn error(&self, distance: f64) -> f64 {
         let hidden = match self.low_bits.first() {
             None | Some(0) => 0.0,
             Some(bits) => 3f64.sqrt() * f64::from(1u32 << bits),
         };
-        (distance * MARGIN).max(0.5) * self.intake.lattice.step + hidden * self.intake.lattice.step
+        (distance + hidden) * self.intake.lattice.step
     }
 }
 
@@ -267,7 +263,8 @@ impl Maker<'_> {
 fn ordered(node: &Node) -> Result<Vec<[u32; 3]>> {
     let mut workspace = meshoptimizer_rs::Workspace::default();
     let indices = node.triangles.as_flattened();
-    let ordered = meshoptimizer_rs::optimize_vertex_cache(indices, node.ids.len(), &mut workspace);
+    let ordered =
+        meshoptimizer_rs::optimize_vertex_cache_strip(indices, node.ids.len(), &mut workspace);
     let ordered = ordered.map_err(|e| failed("order triangles", e))?;
     Ok(ordered.as_chunks().0.to_vec())
 }
@@ -365,7 +362,7 @@ impl Points {
         !lost.contains(&true)
     }
 
-    /// The distance of these triangles from those of the node, in steps.
+    /// A bound of the distance of these triangles from those of the node, in steps.
     fn distance(&self, node: &Node, triangles: &[[u32; 3]]) -> f64 {
         let surface = |triangles| distance::Surface {
             points: &self.points,
