@@ -1,9 +1,12 @@
-//! The distance between a tile and its children, both ways: an upper bound that is proved, near to the distance.
+//! The distance between a tile and its children, both ways.
 //!
-//! A part of a triangle is at most as far from the other surface as from any one triangle of it; since that is
-//! convex, the largest distance from it is at a corner of the part. So one triangle near the middle of the part
-//! gives a bound; where it is not good enough the part is divided. What is good enough follows from the largest
-//! distance that was measured at a point so far, so most parts need one look, or none.
+//! From the finer surface to the coarser it is measured at all vertices, at the centres of all triangles and in the
+//! middles of their edges. Only the largest matters, so points that are certainly nearer are passed over.
+//!
+//! From the coarser to the finer there is a bound for all points. A part of a triangle is at most as far from the
+//! other surface as from any one triangle of it; since that is convex, the largest distance from it is at a corner of
+//! the part. So one triangle near the middle of the part gives a bound; where it is not good enough the part is
+//! divided.
 
 use crate::inspect::compare::distance2;
 
@@ -146,12 +149,44 @@ impl<'a> Grid<'a> {
         }
     }
 
+    /// The distance to the nearest triangle if it is more than `enough`; otherwise any number up to that.
+    fn distance(&self, p: V3, enough: f64) -> f64 {
+        let middle = self.cell(p);
+        let mut best = f64::INFINITY;
+        let farthest = self.size.iter().max().copied().unwrap_or(1);
+        for ring in 0..=farthest {
+            // Whatever is in no cell yet looked at is farther than the cells between.
+            let between = ring.saturating_sub(1) as f64 * self.side;
+            if best <= between {
+                break;
+            }
+            self.ring(middle, ring, |cell| {
+                let range = self.starts[cell] as usize..self.starts[cell + 1] as usize;
+                for ball in &self.triangles[range] {
+                    if !ball.is_farther(p, best) {
+                        let corners = self.surface.corners(ball.triangle as usize);
+                        best = best.min(distance2(&corners, p).sqrt());
+                        if best <= enough {
+                            return true;
+                        }
+                    }
+                }
+                false
+            });
+            if best <= enough {
+                break;
+            }
+        }
+        best
+    }
+
     /// A bound of the distances of all points of a triangle from this surface, and the distance of its middle. It is
     /// the best that one triangle gives, or the first that is at most `enough`; then the distance may be larger.
     fn bound(&self, part: [V3; 3], enough: f64) -> (f64, f64) {
         let p = between(part, [1.0 / 3.0; 3]);
         let middle = self.cell(p);
         let (mut best, mut bound) = (f64::INFINITY, f64::INFINITY);
+        let reach = reach(part, p);
         let farthest = self.size.iter().max().copied().unwrap_or(1);
         for ring in 0..=farthest {
             // Whatever is in no cell yet looked at is farther than the cells between.
@@ -169,8 +204,11 @@ impl<'a> Grid<'a> {
                     let distance = distance2(&corners, p).sqrt();
                     if distance < best {
                         best = distance;
-                        let ends = part.map(|corner| distance2(&corners, corner));
-                        bound = bound.min(ends.into_iter().fold(0.0, f64::max).sqrt());
+                        bound = bound.min(distance + reach);
+                        if bound > enough {
+                            let ends = part.map(|corner| distance2(&corners, corner));
+                            bound = bound.min(ends.into_iter().fold(0.0, f64::max).sqrt());
+                        }
                         if bound <= enough {
                             return true;
                         }
@@ -182,7 +220,7 @@ impl<'a> Grid<'a> {
                 break;
             }
         }
-        (bound.min(best + reach(part, p)), best)
+        (bound, best)
     }
 
     /// Calls `each` with the cells at this distance from one, counted in cells, until it returns true.
@@ -214,7 +252,8 @@ impl<'a> Grid<'a> {
 /// A point of a triangle is at most this times its longest edge from the nearest corner.
 const REACH: f64 = 0.577_350_27;
 
-/// Factor of the largest distance at a point for bounds that are good enough.
+/// Factor of the largest distance at a point, since it may be larger between them, and for bounds that are good
+/// enough.
 const MARGIN: f64 = 1.1;
 
 /// The least bound, in steps, so that finer tiles are always better.
@@ -223,8 +262,8 @@ const LEAST: f64 = 0.5;
 /// How often a triangle is halved at most.
 const HALVINGS: u32 = 8;
 
-/// An upper bound of the distance of each surface from the other, at least [`LEAST`]. The coarser has vertices of the
-/// finer, in the same list.
+/// A bound of the distance of each surface from the other, at least [`LEAST`]; that of the finer from the coarser is
+/// measured at points. The coarser has vertices of the finer, in the same list.
 pub(super) fn measure(fine: Surface<'_>, coarse: Surface<'_>) -> f64 {
     if fine.triangles.is_empty() {
         return LEAST;
@@ -238,21 +277,10 @@ pub(super) fn measure(fine: Surface<'_>, coarse: Surface<'_>) -> f64 {
         .as_flattened()
         .iter()
         .for_each(|v| kept[*v as usize] = true);
-    let near = near(fine, &kept);
-    let mut found = Found::default();
-    let grid = Grid::new(coarse);
-    // A few first, so that most others can be passed over.
-    let vertices = (0..fine.points.len()).step_by(61);
-    for vertex in vertices.filter(|v| near[*v] > 0.0) {
-        found.look([fine.points[vertex]; 3], &grid);
-    }
-    let of_fine = |number: usize| {
-        let nearest = fine.triangles[number].map(|v| near[v as usize]);
-        let nearest = nearest.into_iter().fold(f32::INFINITY, f32::min);
-        f64::from(nearest) + longest(fine.corners(number))
+    let mut found = Found {
+        point: from_fine(fine, &Grid::new(coarse), &kept),
+        part: 0.0,
     };
-    found.all(fine, of_fine, &grid);
-    drop(grid);
     let mut grid = None;
     for number in 0..coarse.triangles.len() {
         let corners = coarse.corners(number);
@@ -293,11 +321,10 @@ fn halves([a, b, c]: [V3; 3]) -> [[V3; 3]; 2] {
 }
 
 /// Distances found so far.
-#[derive(Default)]
 struct Found {
     /// The largest distance of a point.
     point: f64,
-    /// The largest bound of a part that was not divided.
+    /// The largest bound of a part that was not divided further.
     part: f64,
 }
 
@@ -305,15 +332,6 @@ impl Found {
     /// The bound of all that was looked at, and the one up to which nothing needs to be.
     fn limit(&self) -> f64 {
         (self.point * MARGIN).max(self.part).max(LEAST)
-    }
-
-    /// Looks at the triangles of a surface whose bounds in advance are too large.
-    fn all(&mut self, surface: Surface<'_>, bound: impl Fn(usize) -> f64, other: &Grid<'_>) {
-        for number in 0..surface.triangles.len() {
-            if bound(number) > self.limit() {
-                self.look(surface.corners(number), other);
-            }
-        }
     }
 
     /// Looks at a triangle.
@@ -337,11 +355,13 @@ impl Found {
     }
 }
 
-/// For each vertex of the finer surface an upper bound of its distance from the coarser: that from a neighbour that
-/// was `kept`.
-fn near(fine: Surface<'_>, kept: &[bool]) -> Vec<f32> {
-    let zero = |kept: &bool| if *kept { 0.0 } else { f32::INFINITY };
-    let mut near: Vec<f32> = kept.iter().map(zero).collect();
+/// The largest distance of points of the finer surface from the coarser, to whose corners its `kept` vertices belong.
+fn from_fine(fine: Surface<'_>, coarse: &Grid<'_>, kept: &[bool]) -> f64 {
+    // An upper bound for each vertex: its distance from a neighbour that was kept.
+    let mut near: Vec<f32> = kept
+        .iter()
+        .map(|kept| if *kept { 0.0 } else { f32::INFINITY })
+        .collect();
     for triangle in fine.triangles {
         for (a, b) in [(0, 1), (1, 2), (2, 0)] {
             let [a, b] = [triangle[a] as usize, triangle[b] as usize];
@@ -352,5 +372,34 @@ fn near(fine: Surface<'_>, kept: &[bool]) -> Vec<f32> {
             }
         }
     }
-    near
+    let mut farthest = 0.0f64;
+    let mut look = |vertex: usize| {
+        if f64::from(near[vertex]) > farthest {
+            farthest = farthest.max(coarse.distance(fine.points[vertex], farthest));
+        }
+    };
+    // A few first, so that most others can be passed over.
+    (0..fine.points.len()).step_by(61).for_each(&mut look);
+    (0..fine.points.len()).for_each(&mut look);
+    for (number, triangle) in fine.triangles.iter().enumerate() {
+        let corners = fine.corners(number);
+        let nearest = triangle
+            .map(|v| near[v as usize])
+            .into_iter()
+            .fold(f32::INFINITY, f32::min);
+        if f64::from(nearest) + longest(corners) > farthest {
+            for weights in SAMPLES {
+                farthest = farthest.max(coarse.distance(between(corners, weights), farthest));
+            }
+        }
+    }
+    farthest
 }
+
+/// Points of a fine triangle: its centre, and the middles of its edges.
+const SAMPLES: [V3; 4] = [
+    [1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0],
+    [0.5, 0.5, 0.0],
+    [0.0, 0.5, 0.5],
+    [0.5, 0.0, 0.5],
+];
