@@ -403,3 +403,50 @@ const SAMPLES: [V3; 4] = [
     [0.0, 0.5, 0.5],
     [0.5, 0.0, 0.5],
 ];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A square of `side` by `side` points with these heights, and its triangles.
+    fn square(side: usize, mut height: impl FnMut() -> f64) -> (Vec<V3>, Vec<[u32; 3]>) {
+        let at = |n: usize| [(n % side) as f64 * 10.0, (n / side) as f64 * 10.0];
+        let points = (0..side * side).map(at).map(|[x, y]| [x, y, height()]);
+        let cells = (0..side * side).filter(|n| n % side + 1 < side && n / side + 1 < side);
+        let s = side as u32;
+        let triangles = cells.map(|n| n as u32).flat_map(|n| {
+            let two = [[n, n + 1, n + s], [n + 1, n + s + 1, n + s]];
+            two.into_iter()
+        });
+        (points.collect(), triangles.collect())
+    }
+
+    #[test]
+    fn all_points_of_coarse_triangles_are_within_the_bound() {
+        let mut random = oorandom::Rand64::new(11);
+        for roughness in [0.0, 1.0, 30.0] {
+            let side = 9;
+            let (points, fine) = square(side, || roughness * random.rand_float());
+            let last = (side * side - 1) as u32;
+            let (right, up) = (side as u32 - 1, last + 1 - side as u32);
+            let coarse = [[0, right, up], [right, last, up]];
+            let surface = |triangles| Surface {
+                points: &points,
+                triangles,
+            };
+            let bound = measure(surface(&fine), surface(&coarse));
+            let grid = Grid::new(surface(&fine));
+            let mut farthest = 0.0f64;
+            for triangle in 0..2 {
+                let corners = surface(&coarse).corners(triangle);
+                for (i, j) in (0..=60).flat_map(|i| (0..=60 - i).map(move |j| (i, j))) {
+                    let weights = [i, j, 60 - i - j].map(|w| f64::from(w) / 60.0);
+                    farthest = farthest.max(grid.distance(between(corners, weights), 0.0));
+                }
+            }
+            assert!(farthest <= bound, "{farthest} {bound}");
+            let highest = points.iter().fold(0.0, |most: f64, p| most.max(p[2]));
+            assert!(bound <= LEAST.max(1.5 * highest), "{bound} {highest}");
+        }
+    }
+}
