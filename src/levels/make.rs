@@ -24,6 +24,9 @@ const TARGETS: [f64; 2] = [0.1875, 0.75];
 /// The part of the children's triangles that a tile has otherwise.
 const PART: usize = 6;
 
+/// Factor for measured distances, which may be larger between two samples.
+const MARGIN: f64 = 1.1;
+
 /// Bytes of memory for each triangle of the children while a tile is made from them.
 const EACH: u64 = 420;
 
@@ -33,7 +36,7 @@ pub(super) struct Made {
     pub triangles: u32,
     /// Bytes of the GLB file.
     pub bytes: u32,
-    /// A bound of the distance from the full mesh, in its unit.
+    /// Distance from the full mesh, measured at samples, with a margin; in its unit.
     pub error: f64,
     /// Edges of the boundary of the mesh.
     pub boundary: u64,
@@ -249,13 +252,14 @@ impl Maker<'_> {
         }
     }
 
-    /// The error of a tile besides that of its children, from the bound of their distance in steps.
+    /// The error of a tile besides that of its children, from the measured distance in steps; at least half a step,
+    /// so that leaves are always better.
     fn error(&self, distance: f64) -> f64 {
         let hidden = match self.low_bits.first() {
             None | Some(0) => 0.0,
             Some(bits) => 3f64.sqrt() * f64::from(1u32 << bits),
         };
-        (distance + hidden) * self.intake.lattice.step
+        ((distance * MARGIN).max(0.5) + hidden) * self.intake.lattice.step
     }
 }
 
@@ -362,7 +366,7 @@ impl Points {
         !lost.contains(&true)
     }
 
-    /// A bound of the distance of these triangles from those of the node, in steps.
+    /// The distance of these triangles from those of the node, in steps.
     fn distance(&self, node: &Node, triangles: &[[u32; 3]]) -> f64 {
         let surface = |triangles| distance::Surface {
             points: &self.points,
