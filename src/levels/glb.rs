@@ -295,14 +295,18 @@ fn values(
     let column = |number: usize| node.values.iter().skip(number).step_by(each.max(1));
     let mut number = 0;
     if columns.has_colors() {
-        let data: Vec<u8> = column(0)
-            .flat_map(|word| {
-                let [r, g, b, _] = word.to_le_bytes();
-                [r, g, b, 0]
-            })
-            .collect();
-        let accessor = json!({ "componentType": 5121, "normalized": true, "type": "VEC3" });
-        attributes["COLOR_0"] = writer.attribute(&data, 4, None, accessor)?.into();
+        let linear = super::color::table();
+        let mut data = Vec::with_capacity(8 * node.ids.len());
+        for word in column(0) {
+            let [rgb @ .., _] = word.to_le_bytes();
+            for component in rgb {
+                data.extend_from_slice(&linear[usize::from(component)].to_le_bytes());
+            }
+            data.extend_from_slice(&[0, 0]);
+        }
+        let accessor =
+            json!({ "componentType": UNSIGNED_SHORT, "normalized": true, "type": "VEC3" });
+        attributes["COLOR_0"] = writer.attribute(&data, 8, None, accessor)?.into();
         number = 1;
     }
     for (other, number) in columns.others().zip(number..) {

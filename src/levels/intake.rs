@@ -94,7 +94,10 @@ impl<'a> Reader<'a> {
                 table: Table::new("levels.vertices", blocks),
                 sent: Shuffle::new("levels.triangles"),
             },
-            finder: Finder::default(),
+            finder: match mesh.has_plain_floats() {
+                true => Finder::of_floats(),
+                false => Finder::default(),
+            },
             positions: Vec::new(),
             block: Vec::new(),
             taken: 0,

@@ -55,13 +55,42 @@ fn steps(x: f64, scale: Option<f64>, step: f64) -> f64 {
     scale.map_or_else(|| x / step, |scale| x * scale).round()
 }
 
+/// How coordinates are rounded in the file.
+#[derive(Debug, Clone, Copy)]
+struct Rounding {
+    /// Largest error of a coordinate, as a part of it.
+    part: f64,
+    /// True if errors may be as large as those of the largest coordinates, since all were added to an offset.
+    sums: bool,
+    /// Largest error as a part of the step: any number is a decimal number with more.
+    most: f64,
+}
+
+/// Coordinates as `f64`, after a few roundings.
+const DOUBLES: Rounding = Rounding {
+    part: 4.0 * f64::EPSILON,
+    sums: true,
+    most: 0.01,
+};
+
+/// Decimal coordinates as `f32`: the nearest ones.
+const FLOATS: Rounding = Rounding {
+    part: f32::EPSILON as f64 * 0.500_001,
+    sums: false,
+    most: 0.25,
+};
+
 /// Finds the lattice of coordinates that it is shown.
 #[derive(Debug)]
 pub struct Finder {
     min: [f64; 3],
     max: [f64; 3],
-    /// The number of decimals that all coordinates have so far; that of `SCALES` if they have more.
+    rounding: Rounding,
+    /// The least number of decimals that all coordinates may have so far; that of `SCALES` if they have more.
     decimals: usize,
+    /// By axis and number of decimals: the largest distance of a coordinate from a number with as many, counting
+    /// those that are farther than the error of the coordinate itself.
+    rounded: [[f64; SCALES.len()]; 3],
     /// The exponent of the lowest bit that is set in a coordinate.
     lowest: i32,
 }
@@ -71,15 +100,17 @@ impl Default for Finder {
         Self {
             min: [f64::INFINITY; 3],
             max: [f64::NEG_INFINITY; 3],
+            rounding: DOUBLES,
             decimals: 0,
+            rounded: [[0.0; SCALES.len()]; 3],
             lowest: i32::MAX,
         }
     }
 }
 
-fn has_decimals(x: f64, scale: f64) -> bool {
-    let steps = (x * scale).round();
-    steps.abs() < EXACT && (steps / scale - x).abs() <= 4.0 * f64::EPSILON * x.abs()
+/// The distance of a number from the nearest multiple of `1 / scale`.
+fn distance(x: f64, scale: f64) -> f64 {
+    ((x * scale).round() / scale - x).abs()
 }
 
 fn lowest_bit(x: f64) -> i32 {
@@ -94,6 +125,15 @@ fn lowest_bit(x: f64) -> i32 {
 }
 
 impl Finder {
+    /// For coordinates that are `f32` in the file.
+    #[must_use]
+    pub fn of_floats() -> Self {
+        Self {
+            rounding: FLOATS,
+            ..Self::default()
+        }
+    }
+
     /// Takes a position; false if it is not a number, or too large.
     #[inline]
     pub fn see(&mut self, position: [f64; 3]) -> bool {
@@ -103,14 +143,50 @@ impl Finder {
             }
             self.min[axis] = self.min[axis].min(x);
             self.max[axis] = self.max[axis].max(x);
-            while self.decimals < SCALES.len() && !has_decimals(x, SCALES[self.decimals]) {
-                self.decimals += 1;
+            if self.decimals < SCALES.len()
+                && distance(x, SCALES[self.decimals]) > self.rounding.part * x.abs()
+            {
+                self.see_decimals(axis, x);
             }
-            if x != 0.0 && self.decimals > 0 {
+            if x != 0.0 {
                 self.lowest = self.lowest.min(lowest_bit(x));
             }
         }
         true
+    }
+
+    /// Takes a coordinate that is not a number with as few decimals as the others: it has more, or it is small and has
+    /// the rounding errors of large ones.
+    fn see_decimals(&mut self, axis: usize, x: f64) {
+        for (decimals, scale) in SCALES.iter().enumerate().skip(self.decimals) {
+            let distance = distance(x, *scale);
+            if distance > self.rounding.part * x.abs() {
+                let most = &mut self.rounded[axis][decimals];
+                *most = most.max(distance);
+            }
+            if decimals == self.decimals && distance * scale > self.rounding.most {
+                self.decimals += 1;
+            }
+        }
+    }
+
+    /// The power of ten of which all coordinates are fractions, up to their rounding.
+    fn scale(&self) -> Option<f64> {
+        let Rounding { part, sums, most } = self.rounding;
+        let explains = |decimals: &usize| {
+            (0..3).all(|axis| {
+                let largest = self.min[axis].abs().max(self.max[axis].abs());
+                let error = if largest.is_finite() {
+                    part * largest
+                } else {
+                    0.0
+                };
+                let allowed = if sums { error } else { 0.0 };
+                self.rounded[axis][*decimals] <= allowed && error * SCALES[*decimals] <= most
+            })
+        };
+        let decimals = (self.decimals..SCALES.len()).find(explains)?;
+        Some(SCALES[decimals])
     }
 
     /// The lattice of all positions.
@@ -136,14 +212,14 @@ impl Finder {
             exact,
             bits: 32 - ((span / step).ceil().clamp(0.0, POSITIONS - 1.0) as u32).leading_zeros(),
         };
-        if let Some(&scale) = SCALES.get(self.decimals)
+        if let Some(scale) = self.scale()
             && fits(1.0 / scale)
         {
             return of(Some(scale), 1.0 / scale, true);
         }
         let wanted = self.lowest.clamp(-1000, 1000);
         let exponent = (wanted..).find(|e| fits(2f64.powi(*e))).unwrap_or(wanted);
-        let exact = exponent == self.lowest || self.decimals == 0 && exponent <= 0;
+        let exact = exponent == self.lowest;
         of(None, 2f64.powi(exponent), exact)
     }
 }
@@ -169,6 +245,13 @@ mod tests {
         assert_eq!(utm.origin(), [635_001.0, 4_848_000.01, -2.25]);
         let floats = of(&[[0.1f32, 0.7f32, -1.3f32].map(f64::from), [0.0; 3]]);
         assert!(floats.exact && floats.step == 2f64.powi(-27), "{floats:?}");
+        // The rounding errors of an offset that was added, seen near zero.
+        let offset = of(&[[300.0; 3], [300.0 + -299_999.0 * 0.001, 0.0, 645.483]]);
+        assert_eq!((offset.step, offset.exact), (0.001, true));
+        let other = of(&[[1.0, 0.0, 0.0], [1e-3 + 1e-15, 0.0, 0.0]]);
+        assert!(other.scale.is_none() && !other.exact, "{other:?}");
+        let shifted = of(&[[2.0, 0.0, 0.0], [3e-9 + 1e-7, 0.0, 0.0]]);
+        assert_eq!((shifted.step, shifted.exact), (1e-9, true));
         let tiny = of(&[[1.0, 1e-30, 0.0], [0.0, 0.3, 1.0]]);
         assert!(!tiny.exact && tiny.step > 0.0);
         assert_eq!(of(&[[3.0; 3]]).index([3.0; 3]), [0; 3]);
@@ -177,6 +260,32 @@ mod tests {
         assert!(!huge.exact && huge.index([1e99; 3])[0] > 1 << 29);
         let mut finder = Finder::default();
         assert!(!finder.see([f64::NAN, 0.0, 0.0]) && !finder.see([1e101, 0.0, 0.0]));
+    }
+
+    #[test]
+    fn floats_of_decimals_are_decimals() {
+        let of = |positions: &[[f32; 3]]| {
+            let mut finder = Finder::of_floats();
+            assert!(positions.iter().all(|p| finder.see(p.map(f64::from))));
+            finder.finish()
+        };
+        let (mut metres, mut random) = (Vec::new(), Vec::new());
+        for n in 0..2000u32 {
+            let steps = [n * 7919, n * 104_729, n].map(|x| x % 1_500_000);
+            metres.push(steps.map(|x| x as f32 / 1000.0));
+            random.push(steps.map(|x| (x as f32).sin()));
+        }
+        let lattice = of(&metres);
+        assert_eq!((lattice.step, lattice.exact), (0.001, true));
+        for point in &metres {
+            let index = lattice.index(point.map(f64::from));
+            let origin = lattice.origin();
+            let again = [0, 1, 2].map(|k| (origin[k] + f64::from(index[k]) * lattice.step) as f32);
+            assert_eq!(again, *point);
+        }
+        // All bits of floats that are no decimals.
+        let lattice = of(&random);
+        assert!(lattice.scale.is_none(), "{lattice:?}");
     }
 
     #[test]

@@ -19,10 +19,10 @@ use serde::{Deserialize, Serialize};
 pub(super) const ROOT_BYTES: usize = 1_000_000;
 
 /// Fewest and most triangles for which a tile is simplified, if it can be: parts of the most that a cell has.
-const TARGETS: [f64; 2] = [0.25, 0.75];
+const TARGETS: [f64; 2] = [0.1875, 0.75];
 
 /// The part of the children's triangles that a tile has otherwise.
-const PART: usize = 4;
+const PART: usize = 6;
 
 /// Factor for measured distances, which may be larger between two samples.
 const MARGIN: f64 = 1.1;
@@ -259,7 +259,7 @@ impl Maker<'_> {
             None | Some(0) => 0.0,
             Some(bits) => 3f64.sqrt() * f64::from(1u32 << bits),
         };
-        (distance * MARGIN).max(0.5) * self.intake.lattice.step + hidden * self.intake.lattice.step
+        ((distance * MARGIN).max(0.5) + hidden) * self.intake.lattice.step
     }
 }
 
@@ -267,7 +267,8 @@ impl Maker<'_> {
 fn ordered(node: &Node) -> Result<Vec<[u32; 3]>> {
     let mut workspace = meshoptimizer_rs::Workspace::default();
     let indices = node.triangles.as_flattened();
-    let ordered = meshoptimizer_rs::optimize_vertex_cache(indices, node.ids.len(), &mut workspace);
+    let ordered =
+        meshoptimizer_rs::optimize_vertex_cache_strip(indices, node.ids.len(), &mut workspace);
     let ordered = ordered.map_err(|e| failed("order triangles", e))?;
     Ok(ordered.as_chunks().0.to_vec())
 }

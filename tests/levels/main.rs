@@ -47,6 +47,16 @@ fn case(mesh: Mesh, most: u32) -> Case {
     }
 }
 
+/// A component of linear light as one of sRGB.
+fn srgb(linear: u16) -> u8 {
+    let x = f64::from(linear) / 65535.0;
+    let encoded = match x <= 0.003_130_8 {
+        true => 12.92 * x,
+        false => 1.055 * x.powf(1.0 / 2.4) - 0.055,
+    };
+    (255.0 * encoded).round() as u8
+}
+
 /// Positions of a mesh in steps from the origin of a tileset.
 fn steps(mesh: &Mesh, tileset: &Tileset) -> Vec<[i64; 3]> {
     let step = |p: &[f64; 3]| {
@@ -311,7 +321,9 @@ fn values_stay_with_their_vertices() {
     for tile in &case.tileset.tiles {
         for (number, position) in tile.exact.iter().enumerate() {
             let (color, intensity, time) = Mesh::values_of(at[position]);
-            assert_eq!(tile.others["COLOR_0"][4 * number..][..3], color);
+            let components = tile.others["COLOR_0"][8 * number..][..6].chunks_exact(2);
+            let components = components.map(|b| srgb(u16::from_le_bytes([b[0], b[1]])));
+            assert_eq!(components.collect::<Vec<u8>>(), color);
             let bytes = &tile.others["_INTENSITY"][4 * number..][..2];
             assert_eq!(bytes, intensity.to_le_bytes());
             let bytes = &tile.others["_GPS_TIME"][4 * number..][..4];

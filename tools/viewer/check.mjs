@@ -2,7 +2,7 @@
 // a folder that has mesh.ply. Numbers and pictures are compared with the mesh file and with tools/render.
 
 import { execFileSync, spawn } from 'node:child_process';
-import { cpSync, readFileSync, readdirSync, rmSync } from 'node:fs';
+import { cpSync, readFileSync, readdirSync, rmSync, writeFileSync } from 'node:fs';
 import { createRequire } from 'node:module';
 import { join } from 'node:path';
 
@@ -266,6 +266,50 @@ async function main() {
 	const near = ( a, b ) => Math.abs( a - b ) < 1e-3;
 	check( 'a link leads to the same view', near( left.yaw, back.yaw ) && near( left.pitch, back.pitch ) && near( left.distance, back.distance ) && left.at.every( ( x, k ) => near( x, back.at[ k ] ) ), back );
 
+	// Flying by keys.
+	const camera1 = () => page.evaluate( () => window.outcropViewer.navigator.camera.position.toArray() );
+	const moved = ( a, b ) => Math.hypot( ...a.map( ( x, k ) => x - b[ k ] ) );
+	await page.keyboard.press( 'g' );
+	const flights = {};
+	for ( const key of [ 'w', 's', 'a', 'd', 'q', 'e' ] ) {
+
+		const from = await camera1();
+		await page.keyboard.down( key );
+		await page.waitForTimeout( 400 );
+		await page.keyboard.up( key );
+		await page.waitForTimeout( 100 );
+		flights[ key ] = ( await camera1() ).map( ( x, k ) => x - from[ k ] );
+
+	}
+
+	const against = ( a, b ) => a.reduce( ( sum, x, k ) => sum + x * b[ k ], 0 ) < 0;
+	check( 'keys fly to all sides', Object.values( flights ).every( way => Math.hypot( ...way ) > 0 ) && against( flights.w, flights.s ) && against( flights.a, flights.d ) && flights.q[ 2 ] < 0 && flights.e[ 2 ] > 0,
+		Object.fromEntries( Object.entries( flights ).map( ( [ key, way ] ) => [ key, way.map( x => Number( x.toFixed( 2 ) ) ).join( ' ' ) ] ) ) );
+	await page.keyboard.press( 'Escape' );
+
+	// Fingers.
+	await page.keyboard.press( 'f' );
+	await settled();
+	const devtools = await page.context().newCDPSession( page );
+	const fingers = async ( ...path ) => {
+
+		for ( const [ n, points ] of path.entries() ) await devtools.send( 'Input.dispatchTouchEvent', { type: n ? 'touchMove' : 'touchStart', touchPoints: points.map( ( [ x, y ], id ) => ( { x, y, id } ) ) } );
+		await devtools.send( 'Input.dispatchTouchEvent', { type: 'touchEnd', touchPoints: [] } );
+		await settled();
+
+	};
+	const look = () => page.evaluate( () => { const { yaw, pitch, distance, focus } = window.outcropViewer.navigator; return { yaw, pitch, distance, focus: focus.toArray() }; } );
+	const still = await look();
+	await fingers( [ [ 400, 300 ] ], [ [ 430, 310 ] ], [ [ 500, 330 ] ] );
+	const turned = await look();
+	check( 'a finger turns', Math.abs( turned.yaw - still.yaw ) > 0.05, turned.yaw - still.yaw );
+	await fingers( [ [ 400, 350 ], [ 500, 350 ] ], [ [ 350, 350 ], [ 550, 350 ] ], [ [ 300, 350 ], [ 600, 350 ] ] );
+	const pinched = await look();
+	check( 'two fingers zoom', pinched.distance < 0.7 * turned.distance, pinched.distance / turned.distance );
+	await fingers( [ [ 400, 350 ], [ 500, 350 ] ], [ [ 400, 300 ], [ 500, 300 ] ], [ [ 400, 250 ], [ 500, 250 ] ] );
+	const shifted = await look();
+	check( 'and shift', moved( shifted.focus, pinched.focus ) > 0.01 && Math.abs( shifted.distance / pinched.distance - 1 ) < 0.2, moved( shifted.focus, pinched.focus ) );
+
 	// Little memory.
 	await page.evaluate( () => window.outcropViewer.actions.budget( 8 ) );
 	await page.keyboard.press( 'Escape' );
@@ -297,6 +341,24 @@ async function main() {
 	check( 'without other errors', damaged.errors.every( error => /404|Failed to load tile/.test( error ) ), damaged.errors.join( '; ' ) );
 	await damaged.page.close();
 	check( 'SIGTERM ends it, too', await second.stop( 'SIGTERM' ) === 0 );
+
+	// On the globe.
+	writeFileSync( join( folder, 'mesh.prj' ), 'EPSG:32633\n' );
+	const globe = join( folder, 'globe' );
+	execFileSync( outcrop, [ 'tiles', mesh, '-o', globe, '--geo', '--quiet' ] );
+	rmSync( join( folder, 'mesh.prj' ) );
+	check( 'a tileset has a place on the globe', Math.hypot( ...JSON.parse( readFileSync( join( globe, 'tileset.json' ) ) ).root.transform.slice( 12, 15 ) ) > 6.3e6 );
+	const fourth = await serve( globe );
+	const placed = await open( fourth.url );
+	const there = await overlap( placed, camera, reference );
+	check( 'which is shown as the others', there.part > 0.98, there );
+	await placed.page.mouse.click( SIZE.width / 2, SIZE.height / 2 );
+	await placed.settled();
+	const onGlobe = await placed.page.evaluate( () => Object.fromEntries( [ ...document.querySelectorAll( '#result dt' ) ].map( dt => [ dt.textContent, dt.nextSibling.textContent ] ) ) );
+	check( 'and has the coordinates of the scan', Boolean( find( onGlobe ) ), onGlobe );
+	check( 'without errors there', placed.errors.length === 0, placed.errors.join( '; ' ) );
+	await placed.page.close();
+	await fourth.stop( 'SIGINT' );
 
 	// One file.
 	const page1 = join( folder, 'mesh.html' );

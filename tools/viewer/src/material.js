@@ -79,7 +79,7 @@ void main() {
 	// The side that is seen is lit, whichever way the triangle runs.
 	if ( dot( n, face ) < 0.0 ) n = -n;
 	vec3 base = uFront;
-	if ( uMode == 1 ) base = vColor;
+	if ( uMode == 1 ) base = mix( 12.92 * vColor, 1.055 * pow( max( vColor, 0.0 ), vec3( 1.0 / 2.4 ) ) - 0.055, step( 0.0031308, vColor ) );
 	else if ( uMode == 2 ) base = ramp( vValue );
 	else if ( uMode == 3 ) base = ramp( vHeight );
 	else if ( uMode == 4 ) base = uTile;

@@ -8,6 +8,9 @@ import { boundary, MODES, shared, surface, wire } from './material.js';
 import { classTexture, distinct, rampTexture } from './ramps.js';
 import { source } from './source.js';
 
+/** Linear light as sRGB, both from 0 to 1. */
+const encoded = x => x <= 0.0031308 ? 12.92 * x : 1.055 * x ** ( 1 / 2.4 ) - 0.055;
+
 /** Triangles that are drawn at most, as far as levels of detail allow. */
 const MOST_TRIANGLES = 6e6;
 
@@ -399,7 +402,7 @@ export class MeshView {
 
 		} ).filter( Boolean );
 		const color = geometry.attributes.color;
-		if ( color ) values.unshift( [ 'color', [ color.getX( index ), color.getY( index ), color.getZ( index ) ].map( x => Math.round( 255 * x ) ).join( ' ' ) ] );
+		if ( color ) values.unshift( [ 'color', [ color.getX( index ), color.getY( index ), color.getZ( index ) ].map( x => Math.round( 255 * encoded( x ) ) ).join( ' ' ) ] );
 		return { local, scan, values, level: tile?.extras?.outcrop?.level, text: scan.map( x => x.toFixed( this.decimals ) ) };
 
 	}
