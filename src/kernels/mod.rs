@@ -26,9 +26,9 @@ pub(crate) use corners::{
 pub(crate) use distances::{count_body, distances_body};
 pub use distances::{count_within, distances};
 pub use pick::pick_column;
-pub(crate) use pick::{BLOCK, Pick, first_bits, pick_body};
-pub(crate) use ranks::{RANKED, SHORT_RANKED, ranks_body, short_ranks_body};
+pub(crate) use pick::{BLOCK, Pick, RANKED, SHORT_RANKED, first_bits, pick_body};
 pub use ranks::{ranks, short_ranks};
+pub(crate) use ranks::{ranks_body, short_ranks_body};
 pub(crate) use sums::{MOST_SUMMED, SUMMED_LIMIT2};
 pub use sums::{SecondMoments, second_moments};
 

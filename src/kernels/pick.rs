@@ -4,10 +4,15 @@
 
 use super::eight::Base;
 use super::kernel;
-use super::ranks::{RANKED, SHORT_RANKED};
 
 /// Values processed together; the length of a column to select from is a multiple of this.
 pub(crate) const BLOCK: usize = 16;
+
+/// Keys whose ranks are counted in registers; the length of a column of keys is a multiple of this.
+pub(crate) const RANKED: usize = 8;
+
+/// Short keys whose ranks are counted in registers.
+pub(crate) const SHORT_RANKED: usize = 16;
 
 /// The lowest `count` bits of a block; all bits if `count` is larger.
 #[inline(always)]

@@ -1,7 +1,7 @@
 //! Sorting a few dozen keys by counting.
 
 use super::kernel;
-use super::pick::Pick;
+use super::pick::{Pick, RANKED, SHORT_RANKED};
 
 kernel! {
     /// For each key, the number of smaller keys: its rank if all keys are different. Keys must not be
@@ -19,9 +19,6 @@ fn ranks_of<P: Pick>(keys: &[i64], out: &mut [u32]) {
     out.copy_from_slice(&places[..count]);
 }
 
-/// Keys whose ranks are counted in registers; the length of a column of keys is a multiple of this.
-pub(crate) const RANKED: usize = 8;
-
 /// As [`ranks`], for the first `count` keys.
 #[inline(always)]
 pub(crate) fn ranks_body<P: Pick>(keys: &[i64], count: usize, out: &mut [u32]) {
@@ -31,9 +28,6 @@ pub(crate) fn ranks_body<P: Pick>(keys: &[i64], count: usize, out: &mut [u32]) {
         *out = P::smaller(block, &keys[..count]);
     }
 }
-
-/// Short keys whose ranks are counted in registers.
-pub(crate) const SHORT_RANKED: usize = 16;
 
 kernel! {
     /// As [`ranks`], for keys of 32 bits: twice as fast.

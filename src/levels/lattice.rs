@@ -252,7 +252,7 @@ mod tests {
         assert!(other.scale.is_none() && !other.exact, "{other:?}");
         let shifted = of(&[[2.0, 0.0, 0.0], [3e-9 + 1e-7, 0.0, 0.0]]);
         assert_eq!((shifted.step, shifted.exact), (1e-9, true));
-        let tiny = of(&[[1.0, 1e-30, 0.0], [0.0, 0.3, 1.0]]);
+        let tiny = of(&[[1.0, 1.3e-13, 0.0], [0.0, 0.3, 1.0]]);
         assert!(!tiny.exact && tiny.step > 0.0);
         assert_eq!(of(&[[3.0; 3]]).index([3.0; 3]), [0; 3]);
         assert_eq!(of(&[]).index([0.0; 3]), [0; 3]);
