@@ -101,6 +101,19 @@ constants! {
         neighbors: usize = 3, "times those of a plane";
         /// Squared distance at which weights vanish.
         reach2: f64 = 1.1, "squared distances of the last neighbour", [1.05, 1.4];
+        /// Squared height over a surface of second order above which a neighbour counts as a stray and is left
+        /// out.
+        stray2: f64 = 9.0, "mean squares";
+        /// A plane is enough up to this: what second order explains, by unknown, against what it leaves, by
+        /// degree of freedom. In noise it is 1, and more than 4 for one point in a hundred.
+        enough: f64 = 1.5, "times", [1.0, 2.5];
+        /// From here on only the curved surface counts; between, the foot is between both.
+        needed: f64 = 4.0, "times", [3.0, 6.0];
+        /// The plane counts if the mean squared height is at least this share of that over the first surface
+        /// after weights were lowered. In noise it is 0.44, and less than 0.33 for one point in 20.
+        alike: f64 = 0.35, "share", [0.3, 0.4];
+        /// Down from here only the surface of the lowered weights counts: there are two layers.
+        apart: f64 = 0.25, "share", [0.2, 0.3];
         /// Squared height over the first surface at which weights vanish: points across an edge lose their
         /// weight.
         height2: f64 = 4.0, "mean squares";

@@ -13,6 +13,7 @@ pub(crate) mod eight;
 mod pick;
 mod ranks;
 mod sums;
+mod weighted;
 
 pub(crate) use boxes::point_box_body;
 pub use boxes::{Boxes, SearchBox, near_boxes, take_boxes};
@@ -31,6 +32,10 @@ pub use ranks::{ranks, short_ranks};
 pub(crate) use ranks::{ranks_body, short_ranks_body};
 pub(crate) use sums::{MOST_SUMMED, SUMMED_LIMIT2};
 pub use sums::{SecondMoments, second_moments};
+pub use weighted::{
+    SpreadSums, SurfaceSums, Weighted, drop_beyond, fade, spread_sums, surface_sums, take_weighted,
+    turn,
+};
 
 /// A set of vector instructions that this machine supports.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -33,38 +33,78 @@ fn moved(points: &[Point], i: usize, k: usize) -> Point {
     let mut all = Vec::new();
     for j in [i].into_iter().chain(others) {
         let at = sub(points[j], points[i]).map(|c| c as f64 / reach);
-        let weight = (1.0 - dot(at, at)) * (1.0 - dot(at, at));
+        let weight = 1.0 - dot(at, at);
         all.push(Weighted { at, weight });
     }
     let Some(normal) = least_scatter(&all) else {
         return points[i];
     };
-    let first = Surface::best(&all, normal);
-    let off = |a: Vec3| first.off(a);
-    let total: f64 = all.iter().map(|p| p.weight).sum();
-    let squares: f64 = all.iter().map(|p| p.weight * (off(p.at) * off(p.at))).sum();
-    let limit = 4.0 * (squares / total);
-    if squares / total > 0.0 {
+    let first = Surface::best(&all, normal, 6);
+    let limit = 9.0 * first.left / sum(&all);
+    let stray = |p: &&Weighted| first.off(p.at) * first.off(p.at) > limit;
+    let kept: Vec<Weighted> = all.iter().filter(|p| !stray(p)).copied().collect();
+    let plane = Surface::best(&kept, normal, 3);
+    let curved = Surface::best(&kept, normal, 6);
+    // What three more unknowns explain, against what is left for each degree of freedom.
+    let squares: f64 = kept.iter().map(|p| p.weight * p.weight).sum();
+    let freedom = sum(&kept) * sum(&kept) / squares - 6.0;
+    let worth = (plane.left - curved.left) / 3.0 / (curved.left / freedom);
+    let share = if worth > 1.5 {
+        ((worth - 1.5) / 2.5).min(1.0)
+    } else {
+        0.0
+    };
+    // How much smaller the heights are over the surface beside edges: two layers.
+    let (beside, mean2) = beside_edges(all, normal);
+    let ratio = mean2 / (curved.left / sum(&kept));
+    let layers = if ratio < 0.35 {
+        ((0.35 - ratio) / (0.35 - 0.25)).min(1.0)
+    } else {
+        0.0
+    };
+    let share = f64::max(share, layers);
+    let mut offset = [0.0; 3];
+    let mut add = |part: f64, surface: &Surface| {
+        let foot = surface.foot();
+        (0..3).for_each(|axis| offset[axis] += part * reach * foot[axis]);
+    };
+    if share < 1.0 {
+        add(1.0 - share, &plane);
+    }
+    if share > 0.0 {
+        add(share, &beside);
+    }
+    std::array::from_fn(|axis| {
+        let to = i64::from(points[i][axis]) + offset[axis].round() as i64;
+        to.clamp(0, COORDINATE_LIMIT - 1) as i32
+    })
+}
+
+/// The surface of those points that lie on one surface with the moving one, and the mean square over it.
+fn beside_edges(mut all: Vec<Weighted>, normal: Vec3) -> (Surface, f64) {
+    all.iter_mut().for_each(|p| p.weight *= p.weight);
+    let first = Surface::best(&all, normal, 6);
+    let mean2 = first.left / sum(&all);
+    if mean2 > 0.0 {
         for p in &mut all {
-            let rest = (1.0 - off(p.at) * off(p.at) / limit).max(0.0);
+            let rest = (1.0 - first.off(p.at) * first.off(p.at) / (4.0 * mean2)).max(0.0);
             p.weight *= rest * rest;
         }
     }
-    let normal = least_scatter(&all).unwrap_or(normal);
-    let curved = Surface::best(&all, normal);
-    let sum = |of: &dyn Fn(Vec3) -> f64| all.iter().map(|p| p.weight * of(p.at)).sum::<f64>();
-    let (total, heights) = (sum(&|_| 1.0), sum(&|a| dot(a, normal)));
-    let over_plane = sum(&|a| dot(a, normal) * dot(a, normal)) - heights * heights / total;
-    let flat = over_plane <= 1.25 * sum(&|a| curved.off(a) * curved.off(a));
-    let up = if flat {
-        heights / total
+    let plane = Surface::best(&all, normal, 3);
+    let curved = Surface::best(&all, normal, 6);
+    let surface = if plane.left <= 1.25 * curved.left {
+        plane
     } else {
-        curved.terms[0]
-    } * reach;
-    std::array::from_fn(|axis| {
-        let to = i64::from(points[i][axis]) + (normal[axis] * up).round() as i64;
-        to.clamp(0, COORDINATE_LIMIT - 1) as i32
-    })
+        curved
+    };
+    let mean2 = surface.left / sum(&all);
+    (surface, mean2)
+}
+
+/// The sum of all weights.
+fn sum(all: &[Weighted]) -> f64 {
+    all.iter().map(|p| p.weight).sum()
 }
 
 /// True if a surface of second order leaves less than half of the squared heights over the plane, with equal
@@ -105,7 +145,7 @@ fn heights(points: &[Point], i: usize, k: usize) -> Option<(f64, f64)> {
     };
     let all: Vec<Weighted> = [i].into_iter().chain(others).map(weighted).collect();
     let normal = least_scatter(&all)?;
-    let curved = Surface::best(&all, normal);
+    let curved = Surface::best(&all, normal, 6);
     let mean = all.iter().map(|p| dot(p.at, normal)).sum::<f64>() / all.len() as f64;
     let squares = all.iter().map(|p| (dot(p.at, normal) - mean).powi(2));
     let left = all.iter().map(|p| curved.off(p.at).powi(2));
@@ -140,6 +180,8 @@ struct Surface {
     along: [Vec3; 2],
     normal: Vec3,
     terms: [f64; 6],
+    /// The weighted sum of squared residuals and ridge.
+    left: f64,
 }
 
 fn terms(x: f64, y: f64) -> [f64; 6] {
@@ -147,8 +189,8 @@ fn terms(x: f64, y: f64) -> [f64; 6] {
 }
 
 impl Surface {
-    /// The surface with the least weighted sum of squared residuals and ridge.
-    fn best(all: &[Weighted], normal: Vec3) -> Self {
+    /// The surface with the first `count` terms and the least weighted sum of squared residuals and ridge.
+    fn best(all: &[Weighted], normal: Vec3, count: usize) -> Self {
         // Any frame gives the same result up to rounding.
         let least = (0..3).min_by(|&a, &b| normal[a].abs().total_cmp(&normal[b].abs()));
         let mut axis = [0.0; 3];
@@ -171,17 +213,36 @@ impl Surface {
         for (term, equation) in equations.iter_mut().enumerate().skip(1) {
             equation[term] += ridge;
         }
-        Self {
+        // The other terms are 0.
+        for term in count..6 {
+            equations.iter_mut().for_each(|e| e[term] = 0.0);
+            equations[term] = [0.0; 7];
+            equations[term][term] = 1.0;
+        }
+        let mut surface = Self {
             along,
             normal,
             terms: solve(equations),
-        }
+            left: 0.0,
+        };
+        let bent: f64 = surface.terms[1..].iter().map(|c| c * c).sum();
+        let squares = all.iter().map(|p| p.weight * surface.off(p.at).powi(2));
+        surface.left = squares.sum::<f64>() + ridge * bent;
+        surface
     }
 
     fn off(&self, a: Vec3) -> f64 {
         let terms = terms(dot(a, self.along[0]), dot(a, self.along[1]));
         let on: f64 = terms.iter().zip(self.terms).map(|(t, c)| t * c).sum();
         dot(a, self.normal) - on
+    }
+
+    /// The foot of the origin on the plane that touches the surface above it.
+    fn foot(&self) -> Vec3 {
+        let [height, a, b, ..] = self.terms;
+        let up: Vec3 =
+            std::array::from_fn(|k| self.normal[k] - a * self.along[0][k] - b * self.along[1][k]);
+        up.map(|c| c * height / dot(up, up))
     }
 }
 

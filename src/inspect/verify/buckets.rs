@@ -35,6 +35,8 @@ pub(super) struct Cursor<R> {
     bucket: usize,
     next: Option<Link>,
     block: Vec<R>,
+    /// A block as it is in the file.
+    bytes: Vec<u8>,
 }
 
 impl<R: Row> Buckets<R> {
@@ -69,11 +71,11 @@ impl<R: Row> Buckets<R> {
 
     /// A cursor at the start of a bucket.
     pub(super) fn cursor(&self, bucket: usize) -> Cursor<R> {
-        let (next, block) = (None, Vec::new());
         Cursor {
             bucket,
-            next,
-            block,
+            next: None,
+            block: Vec::new(),
+            bytes: Vec::new(),
         }
     }
 
@@ -88,7 +90,8 @@ impl<R: Row> Buckets<R> {
         } else if link == NONE {
             return Ok(None);
         } else {
-            let mut bytes = vec![0; size_of::<Link>() + self.block * size_of::<R>()];
+            let bytes = &mut cursor.bytes;
+            bytes.resize(size_of::<Link>() + self.block * size_of::<R>(), 0);
             let [segment, offset, crc] = link;
             let place = Place {
                 segment: segment as u32,
@@ -97,13 +100,11 @@ impl<R: Row> Buckets<R> {
                 records: self.block,
                 crc: crc as u32,
             };
-            self.file.read_part(place, &mut bytes)?;
+            self.file.read_part(place, bytes)?;
             let (before, rows) = bytes.split_at(size_of::<Link>());
             cursor.next = Some(bytemuck::pod_read_unaligned(before));
-            let rows = rows.chunks_exact(size_of::<R>());
-            cursor
-                .block
-                .extend(rows.map(bytemuck::pod_read_unaligned::<R>));
+            cursor.block.resize(self.block, R::zeroed());
+            bytemuck::cast_slice_mut(&mut cursor.block).copy_from_slice(rows);
         }
         Ok(Some(&cursor.block))
     }

@@ -52,6 +52,11 @@ impl Forest {
     }
 
     fn join(&mut self, a: u32, b: u32) {
+        // Most are joined already, and know it.
+        let [up, other] = [a, b].map(|vertex| self.parent[(vertex - self.first) as usize]);
+        if up == other && up != NONE {
+            return;
+        }
         let (a, b) = (self.root(a), self.root(b));
         let (low, high) = (a.min(b), a.max(b));
         self.parent[high as usize] = low;

@@ -57,6 +57,20 @@ impl Inspector {
         if star.is_empty() {
             return;
         }
+        let Some(fan) = Fan::of(star) else {
+            return self.inspect_any(vertex, star);
+        };
+        self.tally.referenced += 1;
+        self.tally.edges += fan.edges_below(vertex, star);
+        self.tally.boundary_edges += fan.ends_below(vertex);
+        fan.put_ends(star);
+    }
+
+    /// As [`Inspector::inspect`], for any star.
+    fn inspect_any(&mut self, vertex: u32, star: &mut [[u32; 2]]) {
+        if star.is_empty() {
+            return;
+        }
         self.tally.referenced += 1;
         self.count_repeated(vertex, star);
         self.ends.clear();
@@ -135,6 +149,69 @@ impl Inspector {
     }
 }
 
+/// Largest star that is tried as a fan.
+const MOST_IN_FAN: usize = 16;
+
+/// A star without defects: its triangles (vertex, a, b) follow one another around the vertex, each beginning
+/// at the end of the one before, and no two begin or end at the same neighbour.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Fan {
+    /// The neighbours at the begin and at the end of the row; none if it is closed.
+    ends: Option<[u32; 2]>,
+}
+
+impl Fan {
+    /// The fan that a star of a few triangles is; `None` if it is none, or too large to tell.
+    fn of(star: &[[u32; 2]]) -> Option<Self> {
+        if star.len() > MOST_IN_FAN {
+            return None;
+        }
+        let begins_at = |at: u32| star.iter().position(|[a, _]| *a == at);
+        // From the begin of the row, or from any triangle if every one begins where another ends.
+        let begins = |triangle: &&[u32; 2]| star.iter().all(|[_, b]| *b != triangle[0]);
+        let open = star.iter().find(begins);
+        let [first, mut at] = *open.unwrap_or(star.first()?);
+        let mut seen = 1;
+        while let Some(next) = begins_at(at).filter(|_| at != first && seen < star.len()) {
+            at = star[next][1];
+            seen += 1;
+        }
+        // All triangles in one row or ring. Two that begin at one neighbour are never both seen; two that
+        // end at one neighbour leave the row too short.
+        if seen < star.len() {
+            return None;
+        }
+        match open {
+            Some(_) if at != first && begins_at(at).is_none() => Some(Self {
+                ends: Some([first, at]),
+            }),
+            // Two triangles in a ring have the same corners.
+            None if at == first && seen > 2 => Some(Self { ends: None }),
+            _ => None,
+        }
+    }
+
+    /// Number of edges to neighbours below `vertex`.
+    fn edges_below(self, vertex: u32, star: &[[u32; 2]]) -> u64 {
+        let begins = star.iter().filter(|[a, _]| *a < vertex).count() as u64;
+        begins + self.ends.map_or(0, |[_, end]| u64::from(end < vertex))
+    }
+
+    /// Number of boundary edges to neighbours below `vertex`.
+    fn ends_below(self, vertex: u32) -> u64 {
+        let ends = self.ends.into_iter().flatten();
+        ends.map(|end| u64::from(end < vertex)).sum()
+    }
+
+    /// Replaces a star by the neighbours at the ends, ascending, then [`NO_MORE`] if there is room.
+    fn put_ends(self, star: &mut [[u32; 2]]) {
+        let words: &mut [u32] = bytemuck::cast_slice_mut(star);
+        let ends = self.ends.map(|[a, b]| [a.min(b), a.max(b)]);
+        let all = ends.into_iter().flatten().chain([NO_MORE]);
+        words.iter_mut().zip(all).for_each(|(to, end)| *to = end);
+    }
+}
+
 /// The root of `at` in a union–find; shortens the way to it.
 pub(super) fn root(parent: &mut [u32], mut at: u32) -> u32 {
     while parent[at as usize] != at {
@@ -143,4 +220,53 @@ pub(super) fn root(parent: &mut [u32], mut at: u32) -> u32 {
         at = up;
     }
     at
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// Fans are counted as other stars are.
+        #[test]
+        fn fans_are_as_they_are_without_being_fans(
+            steps in prop::collection::vec((0u32..7, 0u32..7), 1..7),
+            ring in any::<bool>(),
+            row in any::<bool>(),
+            turn in 0usize..7,
+            vertex in 0u32..8,
+        ) {
+            let mut star: Vec<[u32; 2]> = if row {
+                // A row of neighbours, or a ring.
+                let len = steps.len() as u32;
+                let next = |k: u32| if ring { (k + 1) % len } else { k + 1 };
+                (0..len).map(|k| [k, next(k)]).collect()
+            } else {
+                steps.iter().map(|(a, b)| [*a, *b]).collect()
+            };
+            // Numbers from which that of the vertex is left out; corners differ.
+            let other = |k: u32| k + u32::from(k >= vertex);
+            star.iter_mut().for_each(|t| *t = t.map(other));
+            star.retain(|[a, b]| a != b);
+            let turn = turn % star.len().max(1);
+            star.rotate_left(turn);
+            let is_fan = !star.is_empty() && Fan::of(&star).is_some();
+            prop_assert!(!row || star.len() < 3 || is_fan);
+            let (mut small, mut large) = (Inspector::default(), Inspector::default());
+            let mut copy = star.clone();
+            small.inspect(vertex, &mut copy);
+            let mut same = star.clone();
+            large.inspect_any(vertex, &mut same);
+            prop_assert_eq!(bytemuck::bytes_of(&small.tally), bytemuck::bytes_of(&large.tally));
+            let ends = |star: &[[u32; 2]]| -> Vec<u32> {
+                let words = star.as_flattened().iter().copied();
+                words.take_while(|w| *w != NO_MORE).collect()
+            };
+            if is_fan {
+                prop_assert_eq!(ends(&copy), ends(&same));
+                prop_assert_eq!(large.tally.repeated_triangles, 0);
+            }
+        }
+    }
 }

@@ -7,7 +7,7 @@ use crate::geom::plane::{Moments, planes};
 use crate::kernels::{LANES, Level};
 use crate::stages::order::PointStore;
 use crate::stages::tiles::Tile;
-use crate::stages::tiles::near::{Query, Search, Sums};
+use crate::stages::tiles::near::{Around, Query, Search, Sums};
 use crate::stages::tiles::neighbors::Neighbors;
 use crate::stages::tiles::walk::PageCache;
 use crate::workspace::Unit;
@@ -148,6 +148,41 @@ pub fn each_neighborhood<T>(
 ) -> Result<()> {
     let all = |_| true;
     Planes::load(unit, store, ids, all, count)?.each_neighborhood(all, of, each)
+}
+
+/// Calls `each` with the value of `of` for every point of a tile and its `count` nearest neighbours, or all
+/// points if there are fewer, in order of id.
+///
+/// # Errors
+/// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+pub(crate) fn each_around<T>(
+    unit: &Unit<'_>,
+    store: &PointStore,
+    ids: Range<usize>,
+    count: usize,
+    of: impl FnMut(&Around) -> T,
+    each: impl FnMut(usize, Point, T),
+) -> Result<()> {
+    let all = |_| true;
+    let planes = Planes::load(unit, store, ids, all, count)?;
+    let of = RefCell::new(of);
+    let in_tile = |(search, grown): Watched<'_, '_>, found: &mut Found<'_, T>| {
+        let look = |id: u32, point: Point, around: Option<&Around>| {
+            found(
+                id,
+                point,
+                Ok(around.map(|around| (of.borrow_mut())(around))),
+            );
+        };
+        planes.tile.for_some_around(count, search, all, grown, look);
+    };
+    let mut around = Around::default();
+    let in_store = |cache: &mut PageCache, id: u32, point: Point| {
+        let near = near_in_store(store, cache, id, point, count)?;
+        around.set(&near, count, id);
+        Ok(Some((of.borrow_mut())(&around)))
+    };
+    look(unit, in_tile, in_store, each)
 }
 
 /// Points with summed neighbours, collected until their planes are computed together.

@@ -5,7 +5,7 @@ mod fits;
 mod fold;
 
 pub use cell::{CellMaker, DiskRadius, Fit, Outcome, Widen};
-pub(crate) use fits::Planes;
+pub(crate) use fits::{Planes, each_around};
 pub use fits::{each_neighborhood, each_plane};
 
 use crate::error::Result;

@@ -1,5 +1,5 @@
-//! Smoothing that keeps edges and does not shrink: a point moves to a curved surface through those of its
-//! neighbours that lie on one surface with it (docs/method.md, section 3.2).
+//! Tests of relaxing: whether the neighbours of a point lie on a curved surface, and whether they show noise
+//! (docs/method.md, section 4.3).
 //!
 //! Sums run over the point and then its neighbours, nearest first, with `+ - * / sqrt` only. So the bits are
 //! the same on every machine and do not depend on how the neighbours were found.
@@ -21,20 +21,6 @@ pub(super) struct WeightedNeighbors {
 }
 
 impl WeightedNeighbors {
-    /// Offset of the point's new position, in steps, from the first `count` neighbours.
-    pub(super) fn offset(&mut self, near: &Neighbors, count: usize) -> [f64; 3] {
-        let Some(reach) = self.gather(near, count) else {
-            return [0.0; 3];
-        };
-        let Some(normal) = self.normal() else {
-            return [0.0; 3];
-        };
-        self.reweigh(&self.surface(normal));
-        let normal = self.normal().unwrap_or(normal);
-        let height = self.height(normal) * reach;
-        normal.map(|n| n * height)
-    }
-
     /// True if the heights of a point and `count` neighbours over their plane come from a curved surface:
     /// with equal weights, it leaves less than half of the sum of their squares.
     pub(super) fn is_curved(&mut self, near: &Neighbors, count: usize) -> bool {
@@ -113,38 +99,6 @@ impl WeightedNeighbors {
         Some(normal.map(|n| n / length))
     }
 
-    /// Lowers the weights of points off a surface, as across an edge or on another layer.
-    fn reweigh(&mut self, surface: &Surface) {
-        let off2 = |a: &[f64; 3]| {
-            let off = surface.off(*a);
-            off * off
-        };
-        let (mut total, mut sum) = (0.0, 0.0);
-        for (a, w) in self.at.iter().zip(&self.weights) {
-            total += w;
-            sum += w * off2(a);
-        }
-        let mean2 = sum / total;
-        if mean2 > 0.0 {
-            let limit = METHOD.smoothing.height2 * mean2;
-            for (a, w) in self.at.iter().zip(&mut self.weights) {
-                let t = (1.0 - off2(a) / limit).max(0.0);
-                *w *= t * t;
-            }
-        }
-    }
-
-    /// Height of the surface above the point: that of the plane, unless a curved surface fits far better.
-    fn height(&self, normal: [f64; 3]) -> f64 {
-        let curved = self.surface(normal);
-        let heights = self.heights(normal, &curved);
-        if heights.square <= METHOD.smoothing.gain * heights.left {
-            heights.mean
-        } else {
-            curved.terms[0]
-        }
-    }
-
     /// Heights over the plane with `normal` and over a curved surface.
     fn heights(&self, normal: [f64; 3], curved: &Surface) -> Heights {
         let (mut total, mut sum, mut square, mut left) = (0.0, 0.0, 0.0, 0.0);
@@ -158,7 +112,6 @@ impl WeightedNeighbors {
         }
         let mean = sum / total;
         Heights {
-            mean,
             square: square - sum * mean,
             left,
         }
@@ -210,7 +163,6 @@ fn in_layers(near: &Neighbors) -> bool {
 
 /// Weighted heights over the least-squares plane.
 struct Heights {
-    mean: f64,
     /// Sum of the squared deviations from the mean.
     square: f64,
     /// Sum of the squared heights over a curved surface.
@@ -242,7 +194,7 @@ impl Surface {
 }
 
 /// Two unit vectors at right angles to each other and to `n`.
-fn frame(n: [f64; 3]) -> [[f64; 3]; 2] {
+pub(super) fn frame(n: [f64; 3]) -> [[f64; 3]; 2] {
     // Across x, unless x is close to the normal.
     let u = if n[0] * n[0] < 0.5 {
         [0.0, n[2], -n[1]]

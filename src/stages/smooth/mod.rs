@@ -5,6 +5,7 @@
 
 mod edges;
 mod first;
+mod foot;
 mod pass;
 mod relax;
 mod seen;
@@ -18,11 +19,11 @@ use crate::geom::Point;
 use crate::geom::lattice::COORDINATE_LIMIT;
 use crate::geom::round::rounded;
 use crate::method::METHOD;
-use crate::stages::cells::{Fit, TileRanges, Widen, each_neighborhood, each_plane};
+use crate::stages::cells::{Fit, TileRanges, Widen, each_around, each_plane};
 use crate::stages::order::{PointStore, StoredPoints};
-use crate::stages::tiles::neighbors::Neighbors;
+use crate::stages::tiles::near::Around;
 use crate::workspace::{Unit, Workspace};
-use edges::WeightedNeighbors;
+use foot::Foot;
 use pass::Pass;
 use std::ops::Range;
 
@@ -32,8 +33,8 @@ use std::ops::Range;
 pub enum Smoothing {
     /// A point moves to the plane of its neighbours (paper, section 3.2).
     Plain,
-    /// A point moves to a curved surface through those neighbours that lie on one surface with it: keeps
-    /// edges, does not shrink.
+    /// A point moves to the plane of its neighbours, or to a curved surface through those that lie on one
+    /// surface with it: keeps edges, shrinks little.
     Edges,
 }
 
@@ -89,9 +90,9 @@ pub fn smooth(
         }
         Smoothing::Edges => {
             let count = neighbors * METHOD.smoothing.neighbors;
-            let mut around = WeightedNeighbors::default();
-            let of = |_, near: &Neighbors| around.offset(near, count);
-            each_neighborhood(unit, store, ids.clone(), count, of, |id, point, offset| {
+            let mut foot = Foot::default();
+            let of = |around: &Around| foot.offset(around);
+            each_around(unit, store, ids.clone(), count, of, |id, point, offset| {
                 points[id - ids.start] = moved(point, offset);
             })
         }

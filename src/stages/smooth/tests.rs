@@ -309,7 +309,7 @@ fn a_noisy_sphere_shrinks_less() {
         let (before, after) = smoothed(&points, smoothing, 1000, 256);
         mean(&before) - mean(&after)
     });
-    assert!(plain > 0.0 && edges.abs() < 0.2 * plain, "{edges} {plain}");
+    assert!(plain > 0.0 && edges.abs() < 0.25 * plain, "{edges} {plain}");
 }
 
 #[test]

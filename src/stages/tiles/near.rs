@@ -14,10 +14,12 @@ use crate::kernels::{BLOCK, Level};
 use crate::workspace::memory::bytes_of;
 use std::ops::Range;
 
+mod around;
 mod list;
 mod sums;
 
 pub use super::neighbors::Sums;
+pub use around::Around;
 use list::list_nearest;
 
 /// Bytes of a search for each candidate: three sets of columns, the picked candidates, distances and keys.

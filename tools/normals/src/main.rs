@@ -38,6 +38,9 @@ struct Arguments {
     /// Standard deviation of noise along the normal, in mean spacings (root of area per point)
     #[arg(long, value_name = "SPACINGS", default_value_t = 0.0)]
     noise: f64,
+    /// Move this fraction of the points three mean spacings along the normal, to either side
+    #[arg(long, value_name = "FRACTION", default_value_t = 0.0)]
+    strays: f64,
     /// Distribute the points among two layers this many mean spacings apart
     #[arg(long, value_name = "SPACINGS")]
     layers: Option<f64>,

@@ -21,6 +21,9 @@ use std::sync::Arc;
 /// Steps of the lattice per size of a cloud.
 const STEPS: f64 = (1u64 << 28) as f64;
 
+/// Distance of a stray point from the surface, in mean spacings.
+const STRAY: f64 = 3.0;
+
 /// A cloud, ordered and relaxed.
 pub(crate) struct World {
     pub(crate) store: PointStore,
@@ -47,7 +50,23 @@ pub(crate) fn name(kind: Kind, args: &Arguments) -> String {
     if args.noise > 0.0 {
         name += &format!(", noise {}", args.noise);
     }
+    if args.strays > 0.0 {
+        name += &format!(", {} % strays", 100.0 * args.strays);
+    }
     name
+}
+
+/// The way, in spacings along the normal, by which a point is off the surface: 0 for most.
+fn stray(index: u64, fraction: f64) -> f64 {
+    if fraction <= 0.0 {
+        return 0.0;
+    }
+    let every = (1.0 / fraction).round().max(1.0) as u64;
+    match index % (2 * every) {
+        0 => STRAY,
+        n if n == every => -STRAY,
+        _ => 0.0,
+    }
 }
 
 impl World {
@@ -65,9 +84,11 @@ impl World {
         let step = cloud.size / STEPS;
         for index in 0..generator.len() {
             let sample = generator.sample(index);
-            let place = sample
-                .position
-                .map(|c| ((c + cloud.size) / step).round() as i32);
+            let away = stray(index, args.strays) * spacing;
+            let place = std::array::from_fn(|axis| {
+                let c = sample.position[axis] + away * sample.normal[axis];
+                ((c + cloud.size) / step).round() as i32
+            });
             normals.entry(place).or_insert(sample.normal);
         }
         let points: Vec<Point> = normals.keys().copied().collect();

@@ -108,7 +108,7 @@ impl Query<'_> {
 
 /// The reason why there are no sums.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Unknown {
+pub(super) enum Unknown {
     /// There are too few neighbours within the distance up to which the candidates are complete.
     Few,
     /// Ties at the last place, which would be decided by id; or distances too close or too large to be
@@ -128,6 +128,29 @@ fn sum_body<P: Pick>(
     k: usize,
     sums: &mut Sums,
 ) -> Result<(), Unknown> {
+    let (room, limit) = divided_body::<P>(search, point, k)?;
+    if k >= MOST_SUMMED || certain_body(limit) >= SUMMED_LIMIT2 as f64 {
+        return Err(Unknown::Close);
+    }
+    let distances = bytemuck::cast_slice(search.picked.numbers(room));
+    let [x, y, z] = search.picked.coordinates(room);
+    let (sum, products, last2) = sums_within([x, y, z], point, distances, limit);
+    *sums = Sums {
+        moments: Moments::from_sums(k, sum, products),
+        last2,
+    };
+    Ok(())
+}
+
+/// Picks candidates, with their approximate squared distances from `point` as numbers, and finds a limit
+/// within which exactly the point itself and its `k` nearest neighbours lie. Returns the number of picked
+/// places, whole blocks, and the limit.
+#[inline(always)]
+pub(super) fn divided_body<P: Pick>(
+    search: &mut Search,
+    point: Point,
+    k: usize,
+) -> Result<(usize, f32), Unknown> {
     let most = above(search.candidates.complete2);
     let limits = likely_body(search.last * MARGIN, most)..=most;
     let (picked, limit) = pick_enough_body::<P, true>(search, point, k + 2, limits);
@@ -141,18 +164,16 @@ fn sum_body<P: Pick>(
     }
     let limit = divide_body::<P>(distances, picked, k + 1, limit).ok_or(Unknown::Close)?;
     search.last = limit;
-    let certain = f64::from(limit) * (1.0 + 2.0 * APPROXIMATE);
-    let exact = k < MOST_SUMMED && certain < SUMMED_LIMIT2 as f64;
-    if !exact || certain > search.candidates.complete2 as f64 {
+    if certain_body(limit) > search.candidates.complete2 as f64 {
         return Err(Unknown::Close);
     }
-    let [x, y, z] = search.picked.coordinates(room);
-    let (sum, products, last2) = sums_within([x, y, z], point, distances, limit);
-    *sums = Sums {
-        moments: Moments::from_sums(k, sum, products),
-        last2,
-    };
-    Ok(())
+    Ok((room, limit))
+}
+
+/// An upper bound on the squared distances of the points whose approximate ones are within `limit`.
+#[inline(always)]
+fn certain_body(limit: f32) -> f64 {
+    f64::from(limit) * (1.0 + 2.0 * APPROXIMATE)
 }
 
 /// A limit within which exactly `wanted` of `count` numbers lie, with no other number close to it; the

@@ -7,6 +7,20 @@ use crate::header::{Element, Field, bytes_of};
 use crate::numbers::{integer, real};
 use crate::types::Scalar;
 
+/// Bytes of a triangle in the usual form: the number 3 and three corners of 32 bits.
+const PLAIN: usize = 13;
+
+/// The corners of a triangle in the usual form.
+#[inline]
+fn plain(row: &[u8; PLAIN]) -> [u32; 3] {
+    let corner = |at: usize| i32::from_le_bytes([row[at], row[at + 1], row[at + 2], row[at + 3]]);
+    [
+        index(corner(1).into()),
+        index(corner(5).into()),
+        index(corner(9).into()),
+    ]
+}
+
 impl Source {
     /// Decodes 1 to `most` vertices, and the values of `columns`; none if they are text or have lists.
     pub(super) fn fixed_vertices(
@@ -53,6 +67,13 @@ impl Source {
         let (list, size) = (before + count.bytes(), item.bytes());
         let each = list + 3 * size + after;
         let old = slice.len();
+        if (count, item, after, big) == (Scalar::U8, Scalar::I32, 0, false) && list == 1 {
+            let rows = self.peek(each)?.as_chunks::<PLAIN>().0.iter().take(most);
+            let triangles = rows.take_while(|row| row[0] == 3).map(plain);
+            slice.extend(triangles);
+            self.consume((slice.len() - old) * each);
+            return Ok(());
+        }
         let entries = self.peek(each)?.chunks_exact(each).take(most);
         let triangles = entries.take_while(|e| integer(count, &e[before..], big) == 3);
         let corner = |e: &[u8], k: usize, item| index(integer(item, &e[list + k * size..], big));

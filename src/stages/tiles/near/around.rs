@@ -1,0 +1,163 @@
+//! The nearest neighbours of many points together with each point itself, in order of id. Nothing is sorted.
+
+use super::sums::{Unknown, divided_body};
+use super::{OwnPage, Search};
+use crate::geom::{Point, distance2};
+use crate::kernels::{BLOCK, Pick, kernel};
+use crate::stages::tiles::Tile;
+use crate::stages::tiles::neighbors::Neighbors;
+
+/// A point and its nearest neighbours, in order of id, in columns that end with zeros to whole groups of
+/// eight.
+#[derive(Debug, Clone, Default)]
+pub struct Around {
+    count: usize,
+    /// Differences to the point.
+    columns: [Vec<u32>; 3],
+    last2: u64,
+}
+
+impl Around {
+    /// Number of points, the one in the middle included.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    /// Squared distance of the farthest.
+    #[must_use]
+    pub fn last2(&self) -> u64 {
+        self.last2
+    }
+
+    /// The differences to the point in the middle, one axis after the other; whole groups of eight.
+    #[must_use]
+    pub fn columns(&self) -> [&[i32]; 3] {
+        let whole = self.count.next_multiple_of(8);
+        [0, 1, 2].map(|axis| bytemuck::cast_slice(&self.columns[axis][..whole]))
+    }
+
+    /// Takes the first `count` of `near`, or all if there are fewer, and point `id` itself.
+    pub fn set(&mut self, near: &Neighbors, count: usize, id: u32) {
+        let mut all: Vec<_> = near.iter().take(count).collect();
+        self.last2 = all.last().map_or(0, |near| near.distance2);
+        all.sort_unstable_by_key(|near| near.id);
+        let before = all.partition_point(|near| near.id < id);
+        let mut differences: Vec<_> = all.iter().map(|near| near.difference).collect();
+        differences.insert(before, [0; 3]);
+        self.reserve(differences.len());
+        self.count = differences.len();
+        for (axis, column) in self.columns.iter_mut().enumerate() {
+            for (to, difference) in column.iter_mut().zip(&differences) {
+                // Differences of coordinates in 0..2^30 fit 32 bits.
+                *to = difference[axis] as i32 as u32;
+            }
+        }
+        self.end();
+    }
+
+    /// Makes room for `count` points and the rest of a block.
+    fn reserve(&mut self, count: usize) {
+        let room = count.next_multiple_of(8) + BLOCK;
+        for column in &mut self.columns {
+            column.resize(room.max(column.len()), 0);
+        }
+    }
+
+    /// Fills the last group with zeros.
+    fn end(&mut self) {
+        let whole = self.count..self.count.next_multiple_of(8);
+        for column in &mut self.columns {
+            column[whole.clone()].fill(0);
+        }
+    }
+}
+
+impl Tile {
+    /// Calls `each` with every point whose id is `wanted` and its `k` nearest neighbours, in order of id; with
+    /// `None` if the halo cannot certify these neighbours.
+    pub fn for_some_around(
+        &self,
+        k: usize,
+        search: &mut Search,
+        wanted: impl Fn(usize) -> bool,
+        grown: impl FnMut(u64),
+        mut each: impl FnMut(u32, Point, Option<&Around>),
+    ) {
+        let mut around = Around::default();
+        self.for_groups(k, search, wanted, grown, |own, index, id, search| {
+            let known = self.around(own, index, id, k, search, &mut around);
+            let around = known.then_some(&around);
+            each(id, self.points.get(index), around);
+            around.map_or(0, Around::last2)
+        });
+    }
+
+    /// The `k` nearest neighbours of point `index`, and the point; false if the halo cannot certify them.
+    fn around(
+        &self,
+        own: &OwnPage,
+        index: usize,
+        id: u32,
+        k: usize,
+        search: &mut Search,
+        around: &mut Around,
+    ) -> bool {
+        let point = self.points.get(index);
+        let mut found = take_nearest(search.level, search, point, k, around);
+        if found == Err(Unknown::Few) && self.gather_for_one(own, index, k, search) {
+            found = take_nearest(search.level, search, point, k, around);
+        }
+        match found {
+            Ok(()) => true,
+            Err(Unknown::Few) => false,
+            Err(Unknown::Close) => {
+                let known = self.nearest(own, index, id, k, search).is_some();
+                if known {
+                    around.set(&search.near, k, id);
+                }
+                known
+            }
+        }
+    }
+}
+
+kernel! {
+    /// Measures the candidates from `point` and takes it and the `k` nearest.
+    fn take_nearest(search: &mut Search, point: Point, k: usize, around: &mut Around) -> Result<(), Unknown> = take_body<Eight>
+}
+
+#[inline(always)]
+fn take_body<P: Pick>(
+    search: &mut Search,
+    point: Point,
+    k: usize,
+    around: &mut Around,
+) -> Result<(), Unknown> {
+    let (room, limit) = divided_body::<P>(search, point, k)?;
+    around.reserve(k + 1);
+    let [from_x, from_y, from_z, numbers] = search.picked.blocks(room);
+    let [to_x, to_y, to_z] = &mut around.columns;
+    let mut count = 0;
+    for (((x, y), z), distances) in from_x.iter().zip(from_y).zip(from_z).zip(numbers) {
+        let distances: &[f32; BLOCK] = bytemuck::cast_ref(distances);
+        let within = P::within(distances, limit);
+        P::pack_at(x, within, to_x, count);
+        P::pack_at(y, within, to_y, count);
+        P::pack_at(z, within, to_z, count);
+        count += within.count_ones() as usize;
+    }
+    around.count = count;
+    let mut last2 = 0;
+    let (to_x, to_y, to_z) = (&mut to_x[..count], &mut to_y[..count], &mut to_z[..count]);
+    for ((x, y), z) in to_x.iter_mut().zip(to_y).zip(to_z) {
+        *x = x.wrapping_sub(point[0] as u32);
+        *y = y.wrapping_sub(point[1] as u32);
+        *z = z.wrapping_sub(point[2] as u32);
+        let difference = [*x, *y, *z].map(|c| c as i32);
+        last2 = distance2(difference, [0; 3]).max(last2);
+    }
+    around.last2 = last2;
+    around.end();
+    Ok(())
+}
