@@ -21,7 +21,7 @@ const ERROR: f64 = 0.3;
 
 /// The components in 16 bits of linear light by those in 8 bits of sRGB: 8 bits of linear light cannot tell dark
 /// components apart. Of the numbers that are near enough those with the most low bits of zero, which compress best:
-/// bright components need one byte.
+/// the brightest (from 194) need one byte.
 pub(super) fn table() -> [u16; 256] {
     std::array::from_fn(|component| {
         let exact = linear(component as f64 / 255.0) * 65535.0;
