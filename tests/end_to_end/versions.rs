@@ -13,7 +13,7 @@ const MESHES: [(&str, u32); 8] = [
     ("clean, paper", 2_771_001_501),
     ("noisy, robust", 201_764_715),
     ("noisy, paper", 1_777_962_663),
-    ("noisy, smooth", 2_786_264_640),
+    ("noisy, smooth", 2_103_198_551),
     ("scan lines, robust", 3_396_308_488),
     ("outdoor, robust", 2_308_261_800),
     ("outdoor, thinned", 2_489_473_080),
