@@ -343,7 +343,7 @@ async function main() {
 	check( 'SIGTERM ends it, too', await second.stop( 'SIGTERM' ) === 0 );
 
 	// On the globe.
-	writeFileSync( join( folder, 'mesh.prj' ), 'EPSG:32633\n' );
+	writeFileSync( join( folder, 'mesh.prj' ), 'PROJCS["UTM zone 33N",GEOGCS["WGS 84"],AUTHORITY["EPSG","32633"]]\n' );
 	const globe = join( folder, 'globe' );
 	execFileSync( outcrop, [ 'tiles', mesh, '-o', globe, '--geo', '--quiet' ] );
 	rmSync( join( folder, 'mesh.prj' ) );
