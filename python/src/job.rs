@@ -31,7 +31,7 @@ enum Outcome {
     Failure(Failure),
 }
 
-/// What the thread and Python share.
+/// State shared by the thread of the run and the thread of Python that waits for it.
 #[derive(Default)]
 struct Shared {
     outcome: Mutex<Option<Outcome>>,

@@ -1,4 +1,4 @@
-//! What a run tells of its progress, kept until Python asks.
+//! The progress of a run: the latest state of its stages, kept until Python reads it.
 
 use outcrop::{Observer, Outlook, Planned};
 use std::sync::atomic::{AtomicU64, Ordering};
