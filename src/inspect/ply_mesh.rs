@@ -3,7 +3,7 @@
 use crate::error::{Error, Result};
 use crate::workspace::Workspace;
 use crate::workspace::compressed::{Beginning, Content};
-use outcrop_ply::{FileError, Header, MeshStream, Part, Scalar};
+use outcrop_ply::{FileError, FixedMesh, Header, MeshStream, Part, Scalar};
 use std::path::Path;
 
 pub use outcrop_ply::{NO_VERTEX, SLICE};
@@ -187,6 +187,57 @@ impl PlyMesh {
             Part::NonTriangle => sink.non_triangles(1),
         };
         let read = self.stream.read(|part| take(part).map_err(Failure));
+        read.map_err(converted)
+    }
+}
+
+/// A mesh read at any place, by many threads; see [`PlyMesh::fixed`].
+#[derive(Debug)]
+pub struct AnyPlace(FixedMesh);
+
+impl PlyMesh {
+    /// The mesh for reading at any place, as long as the mesh itself lives: if its vertices have entries of one
+    /// size, and its faces if they are triangles.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn fixed(&self) -> Result<Option<AnyPlace>> {
+        Ok(self.stream.fixed().map_err(converted)?.map(AnyPlace))
+    }
+}
+
+impl AnyPlace {
+    /// Bytes of a vertex, and of a face that is a triangle.
+    #[must_use]
+    pub fn entries(&self) -> [usize; 2] {
+        [self.0.vertex_bytes(), self.0.face_bytes()]
+    }
+
+    /// See [`FixedMesh::positions`].
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn positions(
+        &self,
+        range: (u64, usize),
+        bytes: &mut Vec<u8>,
+        positions: &mut Vec<[f64; 3]>,
+    ) -> Result<()> {
+        let read = self.0.positions(range, bytes, positions);
+        read.map_err(converted)
+    }
+
+    /// See [`FixedMesh::triangles`].
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn triangles(
+        &self,
+        range: (u64, usize),
+        bytes: &mut Vec<u8>,
+        triangles: &mut Vec<[u32; 3]>,
+    ) -> Result<bool> {
+        let read = self.0.triangles(range, bytes, triangles);
         read.map_err(converted)
     }
 }

@@ -41,13 +41,19 @@ pub(super) struct Areas {
 }
 
 impl Areas {
-    pub(super) fn new(workspace: &Workspace, plan: &Plan, positions: Positions) -> Result<Self> {
+    /// With `zero` triangles that are found already.
+    pub(super) fn new(
+        workspace: &Workspace,
+        plan: &Plan,
+        positions: Positions,
+        zero: u64,
+    ) -> Result<Self> {
         let name = "verify.areas";
         Ok(Self {
             plan: plan.clone(),
             positions,
             travelling: Buckets::new(workspace, name, plan.ranges, plan.blocks[2])?,
-            zero: 0,
+            zero,
         })
     }
 

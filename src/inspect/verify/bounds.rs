@@ -11,6 +11,8 @@ pub struct Bounds {
 
 impl Bounds {
     pub(super) fn with(bounds: Option<Self>, p: [f64; 3]) -> Self {
+        // No negative zero: which of two zeros is less would depend on the order.
+        let p = p.map(|c| c + 0.0);
         let Some(b) = bounds else {
             return Self { min: p, max: p };
         };
@@ -18,5 +20,13 @@ impl Bounds {
             min: std::array::from_fn(|i| b.min[i].min(p[i])),
             max: std::array::from_fn(|i| b.max[i].max(p[i])),
         }
+    }
+
+    /// The box around two boxes.
+    pub(super) fn around(a: Option<Self>, b: Option<Self>) -> Option<Self> {
+        let Some(other) = b else {
+            return a;
+        };
+        Some(Self::with(Some(Self::with(a, other.min)), other.max))
     }
 }

@@ -103,6 +103,12 @@ impl Contraction {
             .push(self.plan.range_of(high), Edge { low, high })
     }
 
+    /// Adds an edge before the range of its higher end is entered; its ends may be equal.
+    pub(super) fn send(&mut self, low: u32, high: u32) -> Result<()> {
+        self.edges
+            .push(self.plan.range_of(high), Edge { low, high })
+    }
+
     /// Contracts range `k`, to which nothing more is added.
     pub(super) fn close(&mut self, forest: &mut Forest, k: usize) -> Result<()> {
         let first = forest.first;

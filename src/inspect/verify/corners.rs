@@ -57,6 +57,15 @@ impl Corners {
         degrees.filter(|(_, degree)| **degree > 0).map(|(v, _)| v)
     }
 
+    /// Leaves out the stars of vertices that are not `wanted`.
+    pub(super) fn keep(&mut self, wanted: impl Fn(u32) -> bool) {
+        for (vertex, degree) in (self.first..).zip(&mut self.degree) {
+            if *degree > 0 && !wanted(vertex) {
+                *degree = 0;
+            }
+        }
+    }
+
     /// The part from vertex `start` of the range with at most `most` corners, but at least one vertex; and
     /// its number of corners.
     pub(super) fn part_from(&self, start: usize, most: usize) -> (Range<usize>, usize) {
@@ -90,7 +99,7 @@ impl Corners {
         for &[x, y, z] in triangles {
             for (v, link) in [(x, [y, z]), (y, [z, x]), (z, [x, y])] {
                 let at = self.local(v);
-                if self.part.contains(&at) {
+                if self.part.contains(&at) && self.degree[at] > 0 {
                     self.links[self.end[at] as usize] = link;
                     self.end[at] += 1;
                 }

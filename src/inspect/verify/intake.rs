@@ -2,18 +2,22 @@
 
 use super::bounds::Bounds;
 use super::buckets::Buckets;
+use super::contract::Contraction;
+use super::homes::Shared;
 use super::places::{Kind, Places};
 use super::plan::Plan;
 use super::positions::Positions;
+use super::star::Tally;
 use super::verdict::Verdict;
 use crate::error::Result;
 use crate::inspect::ply_mesh::{PlyMesh, Sink};
 use crate::workspace::Workspace;
+use crate::workspace::memory::Reservation;
 
 /// The mesh, ready for the sweep over the ranges.
 pub(super) struct Intake<'a> {
-    plan: &'a Plan,
-    workspace: &'a Workspace,
+    pub(super) plan: &'a Plan,
+    pub(super) workspace: &'a Workspace,
     /// All that reading can tell.
     pub(super) verdict: Verdict,
     pub(super) positions: Positions,
@@ -21,6 +25,14 @@ pub(super) struct Intake<'a> {
     pub(super) places: Places,
     /// Triangles with three distinct, valid corners, in the buckets of the ranges of their corners.
     pub(super) triangles: Buckets<[u32; 3]>,
+    /// Components of the triangles, and of the boundary edges.
+    pub(super) surface: Contraction,
+    pub(super) boundary: Contraction,
+    /// Counts of the vertices that are examined already, and triangles without area there.
+    pub(super) tally: Tally,
+    pub(super) zero_area: u64,
+    /// The vertices that are not examined yet, with their memory; all if there is none.
+    pub(super) shared: Option<(Shared, Reservation)>,
 }
 
 /// Reads all of `mesh`.
@@ -33,24 +45,40 @@ pub(super) fn read<'a>(
     workspace
         .observer
         .begin("read mesh", "vertices and faces", total);
-    let mut intake = Intake {
-        plan,
-        workspace,
-        verdict: Verdict::default(),
-        positions: Positions::new(workspace, plan)?,
-        places: Places::default(),
-        triangles: Buckets::new(workspace, "verify.triangles", plan.ranges, plan.blocks[0])?,
-    };
+    let mut intake = Intake::new(plan, workspace, Positions::new(workspace, plan)?)?;
     mesh.read(&mut intake)?;
     intake.positions.finish()?;
     workspace.observer.end();
     Ok(intake)
 }
 
-impl Sink for Intake<'_> {
-    fn vertices(&mut self, positions: &[[f64; 3]]) -> Result<()> {
-        self.workspace.check_cancel()?;
-        self.verdict.vertices += positions.len() as u64;
+impl<'a> Intake<'a> {
+    fn new(plan: &'a Plan, workspace: &'a Workspace, positions: Positions) -> Result<Self> {
+        let (ranges, block) = (plan.ranges, plan.blocks[0]);
+        Ok(Intake {
+            plan,
+            workspace,
+            verdict: Verdict::default(),
+            positions,
+            places: Places::default(),
+            triangles: Buckets::new(workspace, "verify.triangles", ranges, block)?,
+            surface: Contraction::new(workspace, plan, "verify.surface")?,
+            boundary: Contraction::new(workspace, plan, "verify.boundary")?,
+            tally: Tally::default(),
+            zero_area: 0,
+            shared: None,
+        })
+    }
+
+    /// An empty one, for a mesh that is read by pieces.
+    pub(super) fn of_pieces(plan: &'a Plan, workspace: &'a Workspace) -> Result<Self> {
+        let mut intake = Self::new(plan, workspace, Positions::of_some(workspace, plan)?)?;
+        intake.verdict.vertices = plan.vertices.into();
+        Ok(intake)
+    }
+
+    /// Takes note of the positions of further vertices.
+    pub(super) fn note(&mut self, positions: &[[f64; 3]]) {
         for &position in positions {
             if position.iter().all(|c| c.is_finite()) {
                 self.verdict.bounds = Some(Bounds::with(self.verdict.bounds, position));
@@ -58,6 +86,25 @@ impl Sink for Intake<'_> {
                 self.verdict.non_finite_vertices += 1;
             }
         }
+    }
+
+    /// Sends a triangle with three distinct, valid corners to the ranges of its corners.
+    pub(super) fn send(&mut self, triangle: [u32; 3]) -> Result<()> {
+        let [a, b, c] = triangle.map(|v| self.plan.range_of(v));
+        for (range, new) in [(a, true), (b, b != a), (c, c != a && c != b)] {
+            if new {
+                self.triangles.push(range, triangle)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Sink for Intake<'_> {
+    fn vertices(&mut self, positions: &[[f64; 3]]) -> Result<()> {
+        self.workspace.check_cancel()?;
+        self.verdict.vertices += positions.len() as u64;
+        self.note(positions);
         self.positions.append(positions)?;
         self.workspace.observer.advance(positions.len() as u64);
         Ok(())
@@ -76,12 +123,7 @@ impl Sink for Intake<'_> {
                 self.places.note(Kind::Degenerate, x);
                 continue;
             }
-            let [a, b, c] = [x, y, z].map(|v| self.plan.range_of(v));
-            for (range, new) in [(a, true), (b, b != a), (c, c != a && c != b)] {
-                if new {
-                    self.triangles.push(range, [x, y, z])?;
-                }
-            }
+            self.send([x, y, z])?;
         }
         self.workspace.observer.advance(triangles.len() as u64);
         Ok(())

@@ -13,7 +13,10 @@ mod buckets;
 mod collinear;
 mod contract;
 mod corners;
+mod homes;
 mod intake;
+mod near;
+mod piece;
 mod places;
 mod plan;
 mod positions;
@@ -30,6 +33,7 @@ pub use verdict::Verdict;
 use super::ply_mesh::PlyMesh;
 use crate::error::Result;
 use crate::workspace::Workspace;
+use homes::Division;
 use places::Places;
 use plan::Plan;
 use std::path::Path;
@@ -79,9 +83,48 @@ pub fn illustrated(
 
 fn examined(mesh: &Path, options: &Options, workspace: &Workspace) -> Result<(Verdict, Places)> {
     let mesh = PlyMesh::open_any(mesh, workspace)?;
+    if let Some(found) = by_pieces(&mesh, options, workspace)? {
+        return Ok(found);
+    }
     let free = workspace.memory.available();
     let plan = Plan::new(mesh.vertices(), mesh.faces(), free, options.range);
     check(mesh, &plan, options, workspace)
+}
+
+/// The verdict on a mesh that can be read by pieces.
+fn by_pieces(
+    mesh: &PlyMesh,
+    options: &Options,
+    workspace: &Workspace,
+) -> Result<Option<(Verdict, Places)>> {
+    let free = workspace.memory.available();
+    let Some(fixed) = mesh.fixed()? else {
+        return Ok(None);
+    };
+    let division = near::division(mesh, fixed.entries(), workspace.threads, free);
+    let plan = Plan::of_rims(mesh.vertices(), mesh.faces(), free / 2, options.range);
+    let (Some(division), Some(plan)) = (division, plan) else {
+        return Ok(None);
+    };
+    check_pieces(mesh, division, &plan, options, workspace)
+}
+
+fn check_pieces(
+    mesh: &PlyMesh,
+    division: Division,
+    plan: &Plan,
+    options: &Options,
+    workspace: &Workspace,
+) -> Result<Option<(Verdict, Places)>> {
+    let Some(fixed) = mesh.fixed()? else {
+        return Ok(None);
+    };
+    let _held = plan.reserve(workspace)?;
+    let Some(intake) = near::read(&fixed, division, plan, workspace)? else {
+        return Ok(None);
+    };
+    let swept = workspace.install(|| sweep::run(intake, plan, workspace))?;
+    Ok(Some(finished(swept, mesh.origin(), mesh.place(), options)))
 }
 
 fn check(
@@ -93,7 +136,16 @@ fn check(
     let _held = plan.reserve(workspace)?;
     let (origin, place) = (mesh.origin(), mesh.place());
     let intake = intake::read(mesh, plan, workspace)?;
-    let (verdict, places) = workspace.install(|| sweep::run(intake, plan, workspace))?;
+    let swept = workspace.install(|| sweep::run(intake, plan, workspace))?;
+    Ok(finished(swept, origin, place, options))
+}
+
+fn finished(
+    (verdict, places): (Verdict, Places),
+    origin: Option<[f64; 3]>,
+    place: impl Fn([f64; 3]) -> [f64; 3],
+    options: &Options,
+) -> (Verdict, Places) {
     // Areas are judged by the coordinates in the file, which are exact.
     let bounds = verdict.bounds.map(|Bounds { min, max }| Bounds {
         min: place(min),
@@ -104,5 +156,5 @@ fn check(
         origin,
         ..verdict
     };
-    Ok((verdict.judged(options), places))
+    (verdict.judged(options), places)
 }

@@ -11,11 +11,14 @@ const LARGEST_BLOCK: u64 = 256 << 10;
 /// Smallest such block, except for very small ranges.
 const SMALLEST_BLOCK: u64 = 512;
 
+/// log2 of the vertices of a range in which only rims of pieces are examined.
+const RIMS: u32 = 18;
+
 /// Largest number of ranges.
 const MOST_RANGES: u64 = 1 << 16;
 
-/// Bytes of an empty range in four kinds of buckets and in the table of positions.
-const PER_RANGE: u64 = 4 * 48 + 24;
+/// Bytes of an empty range in five kinds of buckets and in the table of positions.
+const PER_RANGE: u64 = 5 * 48 + 24;
 
 /// Bytes of a vertex while its range is in memory, without triangles and position: union–find (8), number of
 /// triangles and place of the first (8).
@@ -40,8 +43,9 @@ pub(super) struct Plan {
     pub(super) all_positions: bool,
     /// Number of corners held at a time.
     pub(super) corners: usize,
-    /// Bytes of a block in the buckets of triangles, of contractions, and of triangles without all positions.
-    pub(super) blocks: [u64; 3],
+    /// Bytes of a block in the buckets of triangles, of contractions, of triangles without all positions, and of
+    /// single positions.
+    pub(super) blocks: [u64; 4],
     /// Larger stars, in triangles, are examined one at a time.
     pub(super) large_star: usize,
 }
@@ -52,9 +56,11 @@ impl Plan {
         let all = vertices * POSITION;
         let all_positions = range.is_none() && all <= free / 4;
         let rest = if all_positions { free - all } else { free };
-        // An eighth for the buckets of triangles, a sixteenth for triangles without all positions, a
-        // thirty-second for each of two contractions, half for the range; the rest for large stars.
-        let (quotas, quota) = ([rest / 8, rest / 32, rest / 16], rest / 2);
+        // An eighth for the buckets of triangles, a sixteenth each for triangles without all positions and for
+        // single positions, a thirty-second for each of two contractions, half for the range; the rest for large
+        // stars.
+        // Single positions take the place of those that are all in memory.
+        let (quotas, quota) = ([rest / 8, rest / 32, rest / 16, rest / 16], rest / 2);
         let fixed = PER_VERTEX + if all_positions { 0 } else { POSITION };
         // A quarter more corners than the mean, for ranges above the mean.
         let degree = (3 * u128::from(faces)).div_ceil(u128::from(vertices.max(1)));
@@ -88,6 +94,22 @@ impl Plan {
         }
     }
 
+    /// The plan for the sweep over what several pieces share, for a mesh that is read by pieces: smaller ranges,
+    /// which stay near the processor. None if memory is too small for them.
+    pub(super) fn of_rims(
+        vertices: u64,
+        faces: u64,
+        free: u64,
+        range: Option<u32>,
+    ) -> Option<Self> {
+        let shift = |range: u32| range.max(1).ilog2();
+        let fits = |shift: &u32| (vertices >> shift) * SMALLEST_BLOCK <= free / 32;
+        let shift = range.map(shift).or_else(|| (RIMS..31).find(fits))?;
+        let length = (1u64 << shift).min(vertices);
+        let held = (PER_VERTEX + POSITION) * length;
+        (held <= free / 4).then(|| Self::new(vertices, faces, free, Some(1 << shift)))
+    }
+
     /// Number of vertices of a range that is not the last.
     pub(super) fn range_length(&self) -> usize {
         1 << self.shift
@@ -117,7 +139,7 @@ impl Plan {
 
     /// Reserves the planned memory.
     pub(super) fn reserve(&self, workspace: &Workspace) -> Result<Vec<Reservation>> {
-        let [triangles, contraction, area] = self.blocks.map(|b| b * self.ranges as u64);
+        let [triangles, contraction, area, places] = self.blocks.map(|b| b * self.ranges as u64);
         let held = self.held_positions() as u64;
         let range = self.range_length().min(self.vertices as usize) as u64;
         // The bytes of a block and its rows.
@@ -129,6 +151,7 @@ impl Plan {
             ("verify: buckets of triangles", triangles),
             ("verify: buckets of edges", 2 * contraction),
             ("verify: triangles between ranges", area),
+            ("verify: places of vertices", places),
             ("verify: positions", held * POSITION),
             ("verify: vertices of one range", range * PER_VERTEX),
             ("verify: corners of one range", corners),

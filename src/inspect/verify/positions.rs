@@ -1,9 +1,21 @@
 //! Vertex positions: all in memory, or those of one range.
 
+use super::buckets::Buckets;
 use super::plan::Plan;
 use crate::error::Result;
-use crate::spill::LocalTable;
+use crate::spill::{LocalTable, row};
 use crate::workspace::Workspace;
+
+row! {
+    /// The position of a vertex.
+    struct Placed {
+        /// The vertex.
+        vertex: u64,
+        /// Its position.
+        at: [f64; 3],
+    }
+    unpacked
+}
 
 /// Positions of the vertices.
 #[derive(Debug)]
@@ -12,6 +24,8 @@ pub(super) struct Positions {
     window: Vec<[f64; 3]>,
     /// One section for each range, unless all positions stay in memory.
     stored: Option<LocalTable<[f64; 3]>>,
+    /// Positions of single vertices instead, in the buckets of their ranges.
+    some: Option<Buckets<Placed>>,
     length: usize,
 }
 
@@ -24,8 +38,30 @@ impl Positions {
             first: 0,
             window: Vec::with_capacity(length),
             stored: stored.transpose()?,
+            some: None,
             length,
         })
+    }
+
+    /// Positions of single vertices, each added by [`Positions::put`].
+    pub(super) fn of_some(workspace: &Workspace, plan: &Plan) -> Result<Self> {
+        let (ranges, block) = (plan.ranges, plan.blocks[3]);
+        let some = Buckets::new(workspace, "verify.places", ranges, block)?;
+        let length = plan.range_length().min(plan.vertices as usize);
+        Ok(Self {
+            first: 0,
+            window: vec![[0.0; 3]; length],
+            stored: None,
+            some: Some(some),
+            length,
+        })
+    }
+
+    /// Adds the position of a vertex of range `k`.
+    pub(super) fn put(&mut self, k: usize, vertex: u32, at: [f64; 3]) -> Result<()> {
+        let vertex = vertex.into();
+        let some = self.some.as_mut();
+        some.map_or(Ok(()), |some| some.push(k, Placed { vertex, at }))
     }
 
     /// Adds the positions of the next vertices.
@@ -67,6 +103,19 @@ impl Positions {
         if let Some(stored) = &self.stored {
             stored.get_into(k, &mut self.window)?;
             self.first = first;
+        }
+        if let Some(some) = &mut self.some {
+            self.first = first;
+            let mut cursor = some.cursor(k);
+            while let Some(block) = some.next(&mut cursor)? {
+                for row in block {
+                    let at = row.vertex.wrapping_sub(first.into()) as usize;
+                    if let Some(place) = self.window.get_mut(at) {
+                        *place = row.at;
+                    }
+                }
+            }
+            some.clear(k);
         }
         Ok(())
     }

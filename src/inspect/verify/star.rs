@@ -149,9 +149,6 @@ impl Inspector {
     }
 }
 
-/// Largest star that is tried as a fan.
-const MOST_IN_FAN: usize = 16;
-
 /// A star without defects: its triangles (vertex, a, b) follow one another around the vertex, each beginning
 /// at the end of the one before, and no two begin or end at the same neighbour.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -163,32 +160,46 @@ struct Fan {
 impl Fan {
     /// The fan that a star of a few triangles is; `None` if it is none, or too large to tell.
     fn of(star: &[[u32; 2]]) -> Option<Self> {
-        if star.len() > MOST_IN_FAN {
-            return None;
-        }
-        let begins_at = |at: u32| star.iter().position(|[a, _]| *a == at);
-        // From the begin of the row, or from any triangle if every one begins where another ends.
-        let begins = |triangle: &&[u32; 2]| star.iter().all(|[_, b]| *b != triangle[0]);
-        let open = star.iter().find(begins);
-        let [first, mut at] = *open.unwrap_or(star.first()?);
-        let mut seen = 1;
-        while let Some(next) = begins_at(at).filter(|_| at != first && seen < star.len()) {
-            at = star[next][1];
-            seen += 1;
-        }
-        // All triangles in one row or ring. Two that begin at one neighbour are never both seen; two that
-        // end at one neighbour leave the row too short.
-        if seen < star.len() {
-            return None;
-        }
-        match open {
-            Some(_) if at != first && begins_at(at).is_none() => Some(Self {
-                ends: Some([first, at]),
-            }),
-            // Two triangles in a ring have the same corners.
-            None if at == first && seen > 2 => Some(Self { ends: None }),
+        match star.len() {
+            0..=8 => Self::among::<8>(star),
+            9..=16 => Self::among::<16>(star),
             _ => None,
         }
+    }
+
+    /// As [`Fan::of`], for up to `N` triangles. Without branches that depend on the order of the triangles.
+    fn among<const N: usize>(star: &[[u32; 2]]) -> Option<Self> {
+        let mut begins = [NO_MORE; N];
+        begins
+            .iter_mut()
+            .zip(star)
+            .for_each(|(to, [a, _])| *to = *a);
+        // For each triangle the triangles that begin at its end, as bits; and all that do.
+        let (mut next, mut follow) = ([0u32; N], 0);
+        for (next, [_, end]) in next.iter_mut().zip(star) {
+            let bits = begins.iter().enumerate();
+            *next = bits.fold(0, |sum, (k, a)| sum | u32::from(a == end) << k);
+            follow |= *next;
+        }
+        let all = (1u32 << star.len()) - 1;
+        let first = all & !follow;
+        let open = first != 0;
+        let begin = if open { first.trailing_zeros() } else { 0 } as usize;
+        let (mut at, mut seen, mut single) = (begin, 1u32 << begin, true);
+        for _ in 1..star.len() {
+            single &= next[at].is_power_of_two();
+            at = next[at].trailing_zeros() as usize % N;
+            seen |= 1 << at;
+        }
+        // All triangles in one row or ring. Two that begin at one neighbour are never both seen; two that
+        // end at one neighbour are followed by the same, or by none.
+        if !single || seen != all {
+            return None;
+        }
+        let ends = open.then_some([star[begin][0], star[at][1]]);
+        // Two triangles in a ring have the same corners.
+        let closed = next[at] == 1 << begin && star.len() > 2;
+        (if open { next[at] == 0 } else { closed }).then_some(Self { ends })
     }
 
     /// Number of edges to neighbours below `vertex`.

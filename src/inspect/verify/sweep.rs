@@ -4,6 +4,7 @@ use super::area::Areas;
 use super::buckets::Buckets;
 use super::contract::{Contraction, Forest};
 use super::corners::Corners;
+use super::homes::Shared;
 use super::intake::Intake;
 use super::places::Places;
 use super::plan::Plan;
@@ -26,6 +27,8 @@ struct Sweep<'a> {
     boundary: Contraction,
     tally: Tally,
     places: Places,
+    /// The vertices to be examined; all if there are none.
+    shared: Option<Shared>,
 }
 
 /// Processes all ranges of the mesh; completes the counts of the verdict.
@@ -34,17 +37,19 @@ pub(super) fn run(
     plan: &Plan,
     workspace: &Workspace,
 ) -> Result<(Verdict, Places)> {
+    let (shared, _held) = intake.shared.unzip();
     let mut sweep = Sweep {
         plan,
         workspace,
-        areas: Areas::new(workspace, plan, intake.positions)?,
+        areas: Areas::new(workspace, plan, intake.positions, intake.zero_area)?,
         triangles: intake.triangles,
         corners: Corners::default(),
         forest: Forest::default(),
-        surface: Contraction::new(workspace, plan, "verify.surface")?,
-        boundary: Contraction::new(workspace, plan, "verify.boundary")?,
-        tally: Tally::default(),
+        surface: intake.surface,
+        boundary: intake.boundary,
+        tally: intake.tally,
         places: intake.places,
+        shared,
     };
     let vertices = u64::from(plan.vertices);
     workspace.observer.begin("check mesh", "vertices", vertices);
@@ -77,6 +82,9 @@ impl Sweep<'_> {
         self.corners.reset(first, length);
         self.forest.reset(first, length);
         self.join_surface(k)?;
+        if let Some(shared) = &self.shared {
+            self.corners.keep(|vertex| shared.has(vertex));
+        }
         self.forest.reset(first, length);
         self.areas.enter(k, first)?;
         let mut start = 0;

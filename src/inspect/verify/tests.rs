@@ -5,6 +5,7 @@ use crate::error::Error;
 use crate::workspace::memory::MemoryPool;
 use crate::workspace::progress::{Cancel, Silent};
 use buckets::Buckets;
+use outcrop_ply::{Encoding, Layout, Scalar};
 use proptest::prelude::*;
 use std::fmt::Write as _;
 use std::sync::Arc;
@@ -46,7 +47,7 @@ fn no_plan_changes_the_verdict() {
             ranges: 40usize.div_ceil(1 << shift),
             all_positions: all,
             corners,
-            blocks: [block; 3],
+            blocks: [block; 4],
             large_star,
         };
         let mesh = PlyMesh::open(&path).unwrap();
@@ -54,6 +55,159 @@ fn no_plan_changes_the_verdict() {
         prop_assert_eq!(got, expected, "{:?}", odd);
         prop_assert_eq!(workspace.memory.available(), workspace.memory.capacity());
     });
+}
+
+/// A binary mesh with some coordinates that are no numbers.
+fn write_binary(workspace: &Workspace, faces: &[[u32; 3]], big: bool) -> std::path::PathBuf {
+    let encoding = if big { Encoding::Big } else { Encoding::Little };
+    let layout = Layout {
+        encoding,
+        comments: &[],
+        vertices: 40,
+        coordinates: Scalar::F32,
+        columns: &[("red", Scalar::U8)],
+        triangles: Some((faces.len() as u64, Scalar::I32)),
+    };
+    let mut bytes = layout.header().into_bytes();
+    let order = |mut word: [u8; 4]| {
+        if big {
+            word.reverse();
+        }
+        word
+    };
+    for v in 0..40u8 {
+        let odd = if v == 17 { f32::NAN } else { 0.0 };
+        for c in [
+            f32::from(v % 3),
+            f32::from(v / 3 % 3),
+            f32::from(v / 9) + odd,
+        ] {
+            bytes.extend(order(c.to_le_bytes()));
+        }
+        bytes.push(v);
+    }
+    for face in faces {
+        bytes.push(3);
+        face.iter()
+            .for_each(|v| bytes.extend(order(v.to_le_bytes())));
+    }
+    let path = workspace.path("binary.ply");
+    std::fs::write(&path, bytes).unwrap();
+    path
+}
+
+/// A grid of 6 by 6 vertices without some of its triangles.
+fn grid(keep: u64) -> Vec<[u32; 3]> {
+    let squares = (0..5).flat_map(|i| (0..5).map(move |j| 6 * i + j));
+    let triangles = squares.flat_map(|v| [[v, v + 6, v + 7], [v, v + 7, v + 1]]);
+    let kept = triangles.enumerate().filter(|(at, _)| keep >> at & 1 != 0);
+    kept.map(|(_, triangle)| triangle).collect()
+}
+
+#[test]
+fn pieces_change_no_verdict() {
+    let workspace = Workspace::for_tests(2);
+    let options = Options::default();
+    let faces = (
+        any::<u64>(),
+        any::<u64>(),
+        prop::collection::vec(prop::array::uniform3(0u32..42), 0..12),
+        any::<prop::sample::Index>(),
+    );
+    let sizes = (1usize..30, 0u32..5, 1usize..12, 0u32..7, 1u64..200);
+    let config = ProptestConfig {
+        cases: 400,
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    };
+    proptest!(config, |(
+        (keep, more, others, turn) in faces,
+        (piece, shift, most_groups, range, block) in sizes,
+        big in any::<bool>(),
+    )| {
+        let mut faces = grid(keep | more);
+        faces.extend(others);
+        let turn = turn.index(faces.len() + 1);
+        faces.rotate_left(turn);
+        let path = write_binary(&workspace, &faces, big);
+        let expected = verify(&path, &workspace).unwrap();
+        let division = Division {
+            vertices: 40,
+            faces: faces.len() as u64,
+            piece,
+            shift,
+            most_groups,
+            at_home: 0,
+        };
+        let mut plan = Plan::of_rims(40, division.faces, 1 << 24, Some(1 << range)).unwrap();
+        plan.blocks = [block; 4];
+        let mesh = PlyMesh::open(&path).unwrap();
+        let got = check_pieces(&mesh, division, &plan, &options, &workspace).unwrap();
+        let (got, _) = got.unwrap();
+        prop_assert_eq!(got, expected, "{:?} {:?}", division, faces);
+        prop_assert_eq!(workspace.memory.available(), workspace.memory.capacity());
+    });
+}
+
+/// A mesh large enough to be read by pieces, in its order, in another, and with a face that is no triangle.
+#[test]
+fn large_meshes_are_read_by_pieces_if_their_order_allows() {
+    let workspace = Workspace::for_tests(2);
+    let (rows, columns) = (1030u32, 1024u32);
+    let id = |i: u32, j: u32| i * columns + j;
+    let squares = (0..rows - 1).flat_map(|i| (0..columns - 1).map(move |j| (i, j)));
+    let mut faces: Vec<[u32; 3]> = squares
+        .filter(|(i, j)| i % 100 != 50 || j % 3 != 1)
+        .flat_map(|(i, j)| {
+            let [a, b, c, d] = [id(i, j), id(i + 1, j), id(i + 1, j + 1), id(i, j + 1)];
+            [[a, b, c], [a, c, d]]
+        })
+        .collect();
+    let written = |faces: &[[u32; 3]], length: u8| {
+        let (vertices, count) = (rows * columns, faces.len() as u64);
+        let layout = Layout {
+            encoding: Encoding::Little,
+            comments: &[],
+            vertices: vertices.into(),
+            coordinates: Scalar::F64,
+            columns: &[],
+            triangles: Some((count, Scalar::I32)),
+        };
+        let mut bytes = layout.header().into_bytes();
+        for v in 0..vertices {
+            let [x, y] = [f64::from(v / columns), f64::from(v % columns)];
+            [x, y, x * y]
+                .iter()
+                .for_each(|c| bytes.extend(c.to_le_bytes()));
+        }
+        let faces_at = bytes.len();
+        faces
+            .iter()
+            .for_each(|face| outcrop_ply::put_triangle(*face, &mut bytes));
+        bytes[faces_at] = length;
+        let path = workspace.path("large.ply");
+        std::fs::write(&path, bytes).unwrap();
+        path
+    };
+    let options = Options::default();
+    let read = |path: &Path| by_pieces(&PlyMesh::open(path).unwrap(), &options, &workspace);
+    let path = written(&faces, 3);
+    let (ordered, _) = read(&path).unwrap().unwrap();
+    assert!(ordered.manifold, "{ordered}");
+    assert_eq!((ordered.components, ordered.genus), (1, Some(0)));
+    assert_eq!(ordered.boundary_loops, 1 + 341 * 10);
+    // The same mesh, in an order without neighbours.
+    let count = faces.len();
+    for at in 0..count {
+        faces.swap(at, (at * 1_000_003 + 17) % count);
+    }
+    let path = written(&faces, 3);
+    assert!(read(&path).unwrap().is_none());
+    assert_eq!(verify(&path, &workspace).unwrap(), ordered);
+    // A face of two corners takes bytes of the last.
+    let path = written(&faces, 2);
+    assert!(read(&path).unwrap().is_none());
+    assert!(verify(&path, &workspace).is_err());
 }
 
 /// A fan around one vertex, larger than a range may be.

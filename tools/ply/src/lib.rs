@@ -21,5 +21,5 @@ pub use layout::{Layout, TRIANGLE, put_triangle};
 pub use mesh::Mesh;
 pub use numbers::{Numbers, real};
 pub use place::Place;
-pub use stream::{MeshStream, NO_VERTEX, Part, SLICE};
+pub use stream::{FixedMesh, MeshStream, NO_VERTEX, Part, SLICE};
 pub use types::{Encoding, Property, Scalar};

@@ -8,11 +8,11 @@ use crate::numbers::{integer, real};
 use crate::types::Scalar;
 
 /// Bytes of a triangle in the usual form: the number 3 and three corners of 32 bits.
-const PLAIN: usize = 13;
+pub(super) const PLAIN: usize = 13;
 
 /// The corners of a triangle in the usual form.
 #[inline]
-fn plain(row: &[u8; PLAIN]) -> [u32; 3] {
+pub(super) fn plain(row: &[u8; PLAIN]) -> [u32; 3] {
     let corner = |at: usize| i32::from_le_bytes([row[at], row[at + 1], row[at + 2], row[at + 3]]);
     [
         index(corner(1).into()),

@@ -2,6 +2,7 @@
 
 mod ascii;
 mod binary;
+mod fixed;
 mod source;
 #[cfg(test)]
 mod tests;
@@ -13,6 +14,8 @@ use crate::place::Place;
 use crate::types::{Encoding, Property, Scalar};
 use source::Source;
 use std::path::Path;
+
+pub use fixed::FixedMesh;
 
 /// Largest number of items in a [`Part`].
 pub const SLICE: usize = 8192;

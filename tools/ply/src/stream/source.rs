@@ -90,6 +90,18 @@ impl Source {
         self.end - (self.buffer.len() - self.at) as u64
     }
 
+    /// Bytes in the file.
+    pub(super) fn bytes(&self) -> u64 {
+        self.length
+    }
+
+    /// The name of the file in errors, and the file once more.
+    pub(super) fn again(&self) -> Result<(PathBuf, File), FileError> {
+        let file = self.file.try_clone();
+        let file = file.map_err(|e| FileError::io(&self.path, "open", e))?;
+        Ok((self.path.clone(), file))
+    }
+
     /// Bytes in the file from the next one on.
     pub(super) fn left(&self) -> u64 {
         self.length.saturating_sub(self.position())
