@@ -1,8 +1,8 @@
 //! Division of a mesh into pieces that can be examined on their own.
 //!
-//! A piece is a run of consecutive faces. A group of consecutive vertices belongs to the piece that most faces
-//! of a sample have there: its home. A vertex is shared if a face of another piece than its home has it. The
-//! triangles of all other vertices are in one piece.
+//! A piece is a run of consecutive faces. A group of consecutive vertices belongs to the piece that most
+//! faces of a sample have there: its home. A vertex is shared if a face of another piece than its home has
+//! it. The triangles of all other vertices are in one piece.
 
 use crate::error::Result;
 use crate::inspect::ply_mesh::AnyPlace;

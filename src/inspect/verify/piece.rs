@@ -1,5 +1,5 @@
-//! Examination of one piece of the mesh ([`super::homes`]): all vertices at home that are not shared, with all
-//! their triangles. What touches a shared vertex is left for the sweep over the ranges.
+//! Examination of one piece of the mesh ([`super::homes`]): all vertices at home that are not shared, with
+//! all their triangles. What touches a shared vertex is left for the sweep over the ranges.
 
 use super::bounds::Bounds;
 use super::collinear::collinear;
@@ -250,8 +250,8 @@ impl Piece {
         }
     }
 
-    /// Counts the components of a graph that no triangle with a shared corner touches, and connects the vertices
-    /// of such triangles in each of the others.
+    /// Counts the components of a graph that no triangle with a shared corner touches, and connects the
+    /// vertices of such triangles in each of the others.
     fn close(&mut self, homes: &Homes, graph: usize) {
         self.last.clear();
         self.last.resize(self.positions.len(), NONE);

@@ -43,8 +43,8 @@ pub(super) struct Plan {
     pub(super) all_positions: bool,
     /// Number of corners held at a time.
     pub(super) corners: usize,
-    /// Bytes of a block in the buckets of triangles, of contractions, of triangles without all positions, and of
-    /// single positions.
+    /// Bytes of a block in the buckets of triangles, of contractions, of triangles without all positions,
+    /// and of single positions.
     pub(super) blocks: [u64; 4],
     /// Larger stars, in triangles, are examined one at a time.
     pub(super) large_star: usize,
@@ -56,10 +56,9 @@ impl Plan {
         let all = vertices * POSITION;
         let all_positions = range.is_none() && all <= free / 4;
         let rest = if all_positions { free - all } else { free };
-        // An eighth for the buckets of triangles, a sixteenth each for triangles without all positions and for
-        // single positions, a thirty-second for each of two contractions, half for the range; the rest for large
-        // stars.
-        // Single positions take the place of those that are all in memory.
+        // An eighth for the buckets of triangles, a sixteenth each for triangles without all positions and
+        // for single positions, a thirty-second for each of two contractions, half for the range; the rest
+        // for large stars. Single positions take the place of those that are all in memory.
         let (quotas, quota) = ([rest / 8, rest / 32, rest / 16, rest / 16], rest / 2);
         let fixed = PER_VERTEX + if all_positions { 0 } else { POSITION };
         // A quarter more corners than the mean, for ranges above the mean.
@@ -94,8 +93,8 @@ impl Plan {
         }
     }
 
-    /// The plan for the sweep over what several pieces share, for a mesh that is read by pieces: smaller ranges,
-    /// which stay near the processor. None if memory is too small for them.
+    /// The plan for the sweep over what several pieces share, for a mesh that is read by pieces: smaller
+    /// ranges, which stay near the processor. None if memory is too small for them.
     pub(super) fn of_rims(
         vertices: u64,
         faces: u64,
