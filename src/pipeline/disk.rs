@@ -213,6 +213,7 @@ impl Known {
         let kept = values + scanner / 4.0;
         let cut = params.crop.is_some() || params.split.is_some();
         let pieces = match (cut, params.normals) {
+            (false, true) if params.compress_glb => NORMALS,
             (false, _) => 0.0,
             (true, false) => PIECES,
             (true, true) => PIECES + NORMALS,
