@@ -34,6 +34,12 @@ use export::written;
 use std::time::Instant;
 use values::Values;
 
+/// Part of the points in headers that are certainly different: duplicates are not known before they are read.
+const DISTINCT: f64 = 0.5;
+
+/// Part of the triangles that are certainly made of points that were counted.
+const SURE: f64 = 0.9;
+
 /// The positions that decide which points are connected, if they are not those of the mesh, and the local
 /// spacings.
 #[derive(Debug, Default)]
@@ -71,10 +77,11 @@ impl<'a> Stages<'a> {
             }
         };
         let first = headers.map(|known| known.estimate(&job.params, &job.mesh));
+        let mut exceeded = None;
         if let Some(known) = headers.filter(|_| all_are_kept(&job.params)) {
-            known.fits(&job.params, &job.mesh)?;
+            exceeded = known.fits(&job.params, &job.mesh, DISTINCT)?;
         }
-        let stages = Self {
+        let mut stages = Self {
             job,
             workspace,
             clock: Clock::new(workspace),
@@ -100,6 +107,9 @@ impl<'a> Stages<'a> {
             None,
             job.params.attributes != Attributes::None,
         );
+        if let Some(error) = exceeded {
+            stages.warn(format!("{error}; unless many points are the same"));
+        }
         if let Some(estimate) = first {
             room(&job.folder, &job.mesh, estimate, workspace)?;
         }
@@ -115,7 +125,7 @@ impl<'a> Stages<'a> {
         // What these leave out, and how much a square has, is not known yet.
         let whole = params.crop.is_none() && params.split.is_none();
         if whole && params.drop_outliers.is_none() {
-            self.known.fits(params, output)?;
+            self.known.fits(params, output, SURE)?;
         }
         let estimate = self.known.estimate(params, output);
         self.report.estimated_scratch_bytes = estimate.scratch;
