@@ -210,7 +210,7 @@ mod tests {
             descriptor(1, 0, "", none),
             descriptor(10, 0, "cut off", none),
         ];
-        let found = parse(&data.concat(), 20, 50);
+        let found = parse(&data.concat(), 20, 49);
         let names: Vec<(&str, usize, Scalar)> = found
             .iter()
             .map(|e| (&*e.name, e.at, e.value.scalar()))
