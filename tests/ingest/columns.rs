@@ -287,7 +287,7 @@ fn extra_bytes_of_las_are_columns_by_their_names() {
         descriptor(3, 0b11000, "Pulse width", 0.5, 100.0),
         descriptor(0, 3, "", 0.0, 0.0),
         descriptor(19, 0, "Normal", 0.0, 0.0),
-        descriptor(8, 0, "tick", 0.0, 0.0),
+        descriptor(8, 0, "Intensity", 0.0, 0.0),
     ];
     for (kind, format) in [("las", 1), ("laz", 3), ("las", 6), ("laz", 7), ("laz", 4)] {
         let path = bench.path(&format!("{format}.{kind}"));
@@ -325,8 +325,8 @@ fn extra_bytes_of_las_are_columns_by_their_names() {
         writer.close().unwrap();
         let columns = probe(&path).unwrap().columns;
         let names: Vec<&str> = columns.iter().map(|c| &*c.name).collect();
-        assert!(names.ends_with(&["pulse_width", "normal0", "normal1", "tick"]));
-        let list = "tick,normal1,pulse_width,normal0";
+        assert!(names.ends_with(&["pulse_width", "normal0", "normal1", "extra_intensity"]));
+        let list = "extra_intensity,normal1,pulse_width,normal0";
         let (spool, carried) = read(&bench, std::slice::from_ref(&path), list, true);
         let found = rows(&bench, &spool, &carried);
         assert_eq!(found.len(), count as usize);

@@ -153,7 +153,13 @@ fn all(header: &Header) -> Vec<Field> {
             Layers::decompress_nir,
         ));
     }
-    fields.extend(header.extra.iter().map(Field::extra));
+    for extra in &header.extra {
+        let mut field = Field::extra(extra);
+        if fields.iter().any(|other| other.name == field.name) {
+            field.name = format!("extra_{}", field.name).into();
+        }
+        fields.push(field);
+    }
     fields
 }
 
