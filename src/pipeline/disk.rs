@@ -49,6 +49,12 @@ const COMPRESSED: f64 = 0.55;
 /// Bytes of the number of a scanner.
 pub(crate) const SCANNER: u64 = 4;
 
+/// Part of the points in headers that are certainly different: duplicates are not known before they are read.
+pub(crate) const DISTINCT: f64 = 0.5;
+
+/// Part of the triangles that are certainly made of points that were counted.
+pub(crate) const SURE: f64 = 0.9;
+
 /// Checksums, boxes and other small data: bytes per point, and in all.
 const SMALL: (f64, f64) = (0.8, 4096.0);
 

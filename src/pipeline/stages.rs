@@ -7,7 +7,7 @@ mod plan;
 mod values;
 
 use super::checks::{all_are_kept, disk_radius, enough, not_a_line, room};
-use super::disk::{SCANNER, Text};
+use super::disk::{DISTINCT, SCANNER, SURE, Text};
 use super::{Clock, Known, Reconstruction};
 use crate::error::Result;
 use crate::geom::lattice::Lattice;
@@ -33,12 +33,6 @@ use crate::workspace::course::Course;
 use export::written;
 use std::time::Instant;
 use values::Values;
-
-/// Part of the points in headers that are certainly different: duplicates are not known before they are read.
-const DISTINCT: f64 = 0.5;
-
-/// Part of the triangles that are certainly made of points that were counted.
-const SURE: f64 = 0.9;
 
 /// The positions that decide which points are connected, if they are not those of the mesh, and the local
 /// spacings.
