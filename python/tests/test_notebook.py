@@ -31,8 +31,8 @@ def test_the_cells_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def executed(cells: list[str], folder: Path) -> list[dict[str, Any]]:
     """What the cells show in a kernel of Jupyter."""
     nbclient = pytest.importorskip("nbclient")
+    nbformat: Any = pytest.importorskip("nbformat")
     pytest.importorskip("ipykernel")
-    import nbformat
 
     book = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(cell) for cell in cells])
     client = nbclient.NotebookClient(book, timeout=300, resources={"metadata": {"path": str(folder)}})

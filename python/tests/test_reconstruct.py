@@ -113,12 +113,13 @@ def test_a_saved_glb_is_that_of_a_run(points: Points, tmp_path: Path) -> None:
     random = np.random.default_rng(1)
     colors = random.integers(0, 256, (len(points), 3)).astype(np.uint8)
     far = points + [635_000, 848_000, 0]
-    for name, cloud, options in [
+    cases: list[tuple[str, Points, dict[str, Any]]] = [
         ("near", points, {"colors": colors, "normals": True}),
         ("far", far, {"colors": colors}),
         ("wide", points, {"colors": colors.astype(np.uint16) * 257, "wide_colors": True}),
         ("moved", far, {"origin": (635_000, 848_000, 0), "normals": True}),
-    ]:
+    ]
+    for name, cloud, options in cases:
         mesh = outcrop.reconstruct(cloud, memory=MEMORY, **options)
         mesh.save(tmp_path / f"{name}.glb")
         outcrop.reconstruct(cloud, output=tmp_path / "run.glb", memory=MEMORY, **options)
