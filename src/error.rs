@@ -52,7 +52,7 @@ pub enum Error {
         bounds: String,
     },
     /// A mesh exceeds a limit of its format.
-    #[error("{path}: {format} holds at most {most} {unit}, this mesh has {found}; write .ply or .obj, or a smaller mesh (--thin, --split)", path = path.display())]
+    #[error("{path}: {format} holds at most {most} {unit}, this mesh has {found}; {advice}", path = path.display(), advice = too_large(*finished))]
     TooLarge {
         /// Path of the mesh.
         path: PathBuf,
@@ -64,6 +64,8 @@ pub enum Error {
         most: u64,
         /// The number that the mesh has; with `about` if it is estimated.
         found: String,
+        /// True if the surface is finished: the run can go on with another output.
+        finished: bool,
     },
     /// The cells gave no triangle.
     #[error("the cloud yields no triangle: {why}")]
@@ -178,6 +180,14 @@ pub enum Error {
     Cancelled,
 }
 
+/// What can be done about a mesh that is too large for its format.
+fn too_large(finished: bool) -> &'static str {
+    match finished {
+        true => "the surface is finished, and .ply and .obj can hold it",
+        false => "write .ply or .obj, or a smaller mesh (--thin, --split)",
+    }
+}
+
 impl Error {
     /// True if a run that ended with this error can be resumed once the cause is removed.
     #[must_use]
@@ -190,11 +200,11 @@ impl Error {
             | Error::Shared
             | Error::TimeLimit
             | Error::Cancelled => true,
+            Error::TooLarge { finished, .. } => *finished,
             Error::Input { .. }
             | Error::Degenerate { .. }
             | Error::Outside { .. }
             | Error::NoTriangles { .. }
-            | Error::TooLarge { .. }
             | Error::Parameter { .. }
             | Error::TooManyPoints { .. }
             | Error::Locked { .. }

@@ -47,6 +47,8 @@
 //!
 //! `examples/reconstruct.rs` shows progress ([`Observer`]) and cancellation ([`Cancel`]).
 //!
+//! [`convert`] writes a finished mesh in another format.
+//!
 //! [`Tiles`] makes levels of detail of a mesh, of any size, for viewers of 3D Tiles.
 //!
 //! [`inspect`] describes a cloud, checks that a mesh is a manifold, and measures the distance between two
@@ -60,6 +62,7 @@
 
 #[doc(hidden)]
 pub mod cli;
+pub mod convert;
 pub mod error;
 #[doc(hidden)]
 pub mod geom;
@@ -68,6 +71,7 @@ pub mod inspect;
 #[doc(hidden)]
 pub mod kernels;
 pub mod levels;
+mod light;
 mod method;
 pub mod page;
 pub mod params;

@@ -400,11 +400,6 @@ impl Params {
             let expected = "other columns: with --normals these are the mesh's own";
             return error("--attributes", name.clone(), expected);
         }
-        if self.compress_glb && self.normals {
-            let expected =
-                "one of the two: a compressed GLB has no normals yet, and viewers make them";
-            return error("--compress-glb", "--normals".into(), expected);
-        }
         if !(3..=MAX_NEIGHBORS).contains(&self.neighbors) {
             return error("--neighbors", self.neighbors.to_string(), "3 to 255");
         }

@@ -46,6 +46,8 @@ pub struct Reconstruction {
     /// The folder of the tileset, if that is wanted.
     tiles: Option<PathBuf>,
     folder: PathBuf,
+    /// True if the run was found by its folder.
+    goes_on: bool,
     params: Params,
     memory: MemoryPool,
     threads: usize,
@@ -84,7 +86,7 @@ impl Reconstruction {
     }
 
     /// The builder of the unfinished run in a scratch folder. Threads, memory, observer, flag and time limit
-    /// can be changed.
+    /// can be changed; the output too, as for a mesh that is [too large](crate::Error::TooLarge) for its format.
     ///
     /// # Errors
     /// [`crate::Error::NotResumable`], [`crate::Error::Locked`], [`crate::Error::Io`].

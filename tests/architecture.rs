@@ -13,6 +13,7 @@ const MAY_USE: &[(&str, &str)] = &[
         "cli",
         "inspect levels method page params pipeline report stages/ingest view workspace",
     ),
+    ("convert", "inspect stages/export workspace"),
     ("error", ""),
     ("geom", "kernels method"),
     ("histogram", ""),
@@ -22,7 +23,8 @@ const MAY_USE: &[(&str, &str)] = &[
          workspace",
     ),
     ("kernels", ""),
-    ("levels", "inspect spill stages/ingest workspace"),
+    ("levels", "inspect light spill stages/ingest workspace"),
+    ("light", ""),
     ("method", ""),
     (
         "params",
@@ -58,7 +60,7 @@ const MAY_USE: &[(&str, &str)] = &[
     ),
     (
         "stages/export",
-        "stages/attributes stages/blocks stages/cut stages/ingest stages/order stages/repair stages/surface",
+        "light stages/attributes stages/blocks stages/cut stages/ingest stages/order stages/repair stages/surface",
     ),
     ("stages/ingest", ""),
     (

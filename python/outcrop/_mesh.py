@@ -116,17 +116,24 @@ class Mesh:
         return next(found, None)
 
     def save(self, path: Path) -> None:
-        """Writes the mesh: ``.ply`` (a copy), ``.obj`` or ``.stl`` (positions and triangles only)."""
-        name = os.fspath(path)
+        """Writes the mesh.
+
+        ``.ply`` is a copy, ``.glb`` has positions, colours and normals, ``.obj`` and ``.stl`` positions and triangles.
+        """
+        name = os.fsdecode(path)
         extension = os.path.splitext(name)[1].lower()
         if extension == os.path.splitext(self.path)[1].lower():
             with named(name, "write"):
                 shutil.copyfile(self.path, name)
             return
+        if extension == ".glb":
+            comments = [line for line in self._map()[2] if not line.startswith("made by ")]
+            finished(_outcrop.Job.save_glb(self.path, name, comments))
+            return
         writers = {".obj": _write_obj, ".stl": _write_stl}
         if extension not in writers:
             raise ParameterError(
-                f"{name}: cannot save as {extension or 'a name without extension'}: .ply, .obj and .stl can be; "
+                f"{name}: cannot save as {extension or 'a name without extension'}: .ply, .glb, .obj and .stl can be; "
                 "for others give the name to reconstruct(output=...)"
             )
         self._map()

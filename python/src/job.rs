@@ -2,6 +2,7 @@
 
 use crate::progress::{Progress, Stage};
 use outcrop::call::{self, CallError};
+use outcrop::convert;
 use outcrop::inspect::verify;
 use outcrop::{Cancel, Error, MemoryPool, Result, Workspace, default_memory, default_threads};
 use pyo3::exceptions::PyOSError;
@@ -71,6 +72,16 @@ impl Job {
     #[staticmethod]
     fn picture(mesh: PathBuf) -> PyResult<Self> {
         Self::begin(move |shared| Ok(Outcome::Picture(draw(&mesh, shared)?)))
+    }
+
+    /// Begins to write a mesh as GLB, with these comments.
+    #[staticmethod]
+    fn save_glb(mesh: PathBuf, output: PathBuf, comments: Vec<String>) -> PyResult<Self> {
+        Self::begin(move |shared| {
+            let workspace = workspace(shared)?;
+            convert::to_glb(&mesh, &output, comments, &workspace)?;
+            Ok(Outcome::Answer(("null".into(), String::new(), Some(output))))
+        })
     }
 
     /// Waits until the work has ended, at most so many seconds; true if it has.
@@ -162,15 +173,20 @@ impl Job {
     }
 }
 
-/// A picture of a mesh, as PNG.
-fn draw(mesh: &Path, shared: &Shared) -> Result<Vec<u8>> {
-    let workspace = Workspace::new(
+/// A place for work beside the commands, with the usual memory and threads.
+fn workspace(shared: &Shared) -> Result<Workspace> {
+    Workspace::new(
         &std::env::temp_dir(),
         MemoryPool::new(default_memory())?,
         default_threads(),
         shared.progress.clone(),
         shared.cancel.clone(),
-    )?;
+    )
+}
+
+/// A picture of a mesh, as PNG.
+fn draw(mesh: &Path, shared: &Shared) -> Result<Vec<u8>> {
+    let workspace = workspace(shared)?;
     let options = verify::Options::default();
     let (_, drawn) = verify::illustrated(mesh, &options, &workspace)?;
     let first = drawn.pictures.into_iter().next();

@@ -100,12 +100,39 @@ def test_saved_meshes(points: Points, tmp_path: Path) -> None:
         mesh.save(tmp_path / f"saved.{extension}")
         read = trimesh.load(tmp_path / f"saved.{extension}", process=False)
         assert np.allclose(read.triangles, mesh.vertices[mesh.faces], atol=1e-6), extension
-    with pytest.raises(outcrop.ParameterError, match="saved.glb"):
-        mesh.save(tmp_path / "saved.glb")
+    with pytest.raises(outcrop.ParameterError, match="saved.off"):
+        mesh.save(tmp_path / "saved.off")
     held = mesh.to_trimesh()
     assert (held.faces == mesh.faces).all() and (held.visual.vertex_colors[:, :3] == 90).all()
     opened = outcrop.Mesh(tmp_path / "saved.ply")
     assert (opened.faces == mesh.faces).all() and opened.report == {}
+
+
+def test_a_saved_glb_is_that_of_a_run(points: Points, tmp_path: Path) -> None:
+    trimesh = pytest.importorskip("trimesh")
+    random = np.random.default_rng(1)
+    colors = random.integers(0, 256, (len(points), 3)).astype(np.uint8)
+    far = points + [635_000, 848_000, 0]
+    cases: list[tuple[str, Points, dict[str, Any]]] = [
+        ("near", points, {"colors": colors, "normals": True}),
+        ("far", far, {"colors": colors}),
+        ("wide", points, {"colors": colors.astype(np.uint16) * 257, "wide_colors": True}),
+        ("moved", far, {"origin": (635_000, 848_000, 0), "normals": True}),
+    ]
+    for name, cloud, options in cases:
+        mesh = outcrop.reconstruct(cloud, memory=MEMORY, **options)
+        mesh.save(tmp_path / f"{name}.glb")
+        outcrop.reconstruct(cloud, output=tmp_path / "run.glb", memory=MEMORY, **options)
+        assert (tmp_path / f"{name}.glb").read_bytes() == (tmp_path / "run.glb").read_bytes(), name
+        scene = trimesh.load(tmp_path / f"{name}.glb", process=False)
+        (part,) = scene.geometry.values()
+        assert (part.faces == mesh.faces).all()
+    assert sorted(os.listdir(tmp_path)) == ["far.glb", "moved.glb", "near.glb", "run.glb", "wide.glb"]
+    other = outcrop.reconstruct(points, output=tmp_path / "mesh.obj", memory=MEMORY)
+    with pytest.raises(outcrop.InputError, match="mesh.obj"):
+        other.save(tmp_path / "no.glb")
+    with pytest.raises(outcrop.FileError, match="absent"):
+        mesh.save(tmp_path / "absent" / "no.glb")
 
 
 def test_what_is_not_installed_is_named(points: Points, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -323,6 +323,9 @@ pub struct Resume {
     /// The scratch folder of the run: MESH.ply.outcrop-scratch beside the mesh, or in --scratch
     #[arg(value_name = "FOLDER")]
     pub folder: PathBuf,
+    /// Another name for the mesh, and so another format: for a mesh that is too large for GLB or STL
+    #[arg(long, short, value_name = "MESH")]
+    pub output: Option<PathBuf>,
     /// Memory budget; may differ from the earlier one
     #[arg(long, value_name = "SIZE", value_parser = size)]
     pub memory: Option<u64>,

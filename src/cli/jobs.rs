@@ -65,6 +65,9 @@ pub fn resume(args: &Resume, watch: Watch, begins: impl FnOnce(&Reconstruction))
     if let Some(threads) = args.threads {
         builder = builder.threads(threads.into());
     }
+    if let Some(output) = &args.output {
+        builder = builder.output(output);
+    }
     let builder = builder.storage(args.storing.storage());
     run(builder, &args.ends, watch, begins)
 }

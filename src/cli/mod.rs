@@ -49,7 +49,11 @@ pub fn main() -> ExitCode {
         Err(error) => {
             // A closed pipe (`| head`) is no error.
             if !style::is_broken_pipe(&error) {
-                let hint = error.can_resume().then(stop::hint).unwrap_or_default();
+                let mut hint = error.can_resume().then(stop::hint).unwrap_or_default();
+                if let (Error::TooLarge { path, .. }, false) = (&error, hint.is_empty()) {
+                    let other = stop::quoted(&path.with_extension("ply"));
+                    hint.push_str(&format!(" --output {other}"));
+                }
                 eprintln!("outcrop: {error}{hint}");
             }
             ExitCode::from(match error {

@@ -133,7 +133,13 @@ impl PlyMesh {
     /// True if all coordinates are `f32` in the file, and not moved by an origin.
     #[must_use]
     pub fn has_plain_floats(&self) -> bool {
-        self.origin().is_none() && self.stream.types() == Some([Scalar::F32; 3])
+        self.origin().is_none() && self.has_floats()
+    }
+
+    /// True if all coordinates are `f32` in the file.
+    #[must_use]
+    pub fn has_floats(&self) -> bool {
+        self.stream.types() == Some([Scalar::F32; 3])
     }
 
     /// Index, name and type of each property of the vertices that is one number and no coordinate.

@@ -5,6 +5,7 @@ use super::lattice::Lattice;
 use super::node::Node;
 use super::simplify::failed;
 use crate::error::Result;
+use crate::light;
 use meshoptimizer_rs::Workspace;
 use meshoptimizer_rs::codec::{
     IndexEncoding, VertexEncoding, encode_index_buffer, encode_index_sequence, encode_vertex_buffer,
@@ -295,12 +296,11 @@ fn values(
     let column = |number: usize| node.values.iter().skip(number).step_by(each.max(1));
     let mut number = 0;
     if columns.has_colors() {
-        let linear = super::color::table();
         let mut data = Vec::with_capacity(8 * node.ids.len());
         for word in column(0) {
             let [rgb @ .., _] = word.to_le_bytes();
             for component in rgb {
-                data.extend_from_slice(&linear[usize::from(component)].to_le_bytes());
+                data.extend_from_slice(&light::of_byte(component).to_le_bytes());
             }
             data.extend_from_slice(&[0, 0]);
         }

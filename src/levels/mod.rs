@@ -6,7 +6,6 @@
 //! any two levels meet without a crack. `docs/tiles.md` describes the files.
 
 mod cells;
-mod color;
 mod columns;
 mod distance;
 mod folder;

@@ -53,7 +53,10 @@ impl Reconstruction {
         let mut folder = match (found, self.start) {
             (Found::Nothing, _) => Folder::create(&self.folder, bytes)?,
             (Found::Run(folder), Start::Resume) => {
-                let was = Manifest::from_bytes(&self.folder, &folder.manifest)?;
+                let mut was = Manifest::from_bytes(&self.folder, &folder.manifest)?;
+                if self.goes_on {
+                    was.write_elsewhere(&manifest);
+                }
                 was.check(&manifest, &self.folder)?;
                 folder
             }

@@ -147,7 +147,7 @@ impl Builder {
     ///
     /// # Errors
     /// [`Error::Parameter`], [`Error::Memory`].
-    pub fn build(self) -> Result<Reconstruction> {
+    pub fn build(mut self) -> Result<Reconstruction> {
         self.params.check()?;
         let missing = |name, expected: &str| {
             Err(Error::Parameter {
@@ -164,14 +164,17 @@ impl Builder {
         }
         let tiles = tiles(&self.output, self.params.split.is_some())?;
         let mesh = tiles.as_deref().map(mesh_of);
-        check_name(
-            mesh.as_deref().unwrap_or(&self.output),
-            self.params.compress_glb,
-        )?;
+        let named = mesh.as_deref().unwrap_or(&self.output);
+        if self.folder.is_some() && check_name(named, true).is_err() {
+            // An unfinished run whose mesh was a GLB, and is to be another now.
+            self.params.compress_glb = false;
+        }
+        check_name(named, self.params.compress_glb)?;
         let budget = self.memory.unwrap_or_else(default_memory);
         let target = tiles.as_deref().unwrap_or(&self.output);
         let folder = scratch_folder(target, self.scratch.as_deref());
         Ok(Reconstruction {
+            goes_on: self.folder.is_some(),
             folder: self.folder.unwrap_or(folder),
             inputs: self.inputs,
             output: self.output.clone(),

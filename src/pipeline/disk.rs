@@ -9,7 +9,7 @@
 //! Unneeded files are not counted. They are deleted as soon as the deletion is synced
 //! (`workspace/keeper.rs`), within a moment.
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::geom::aabb::Aabb;
 use crate::geom::lattice::Lattice;
 use crate::params::{Method, Params};
@@ -48,6 +48,12 @@ const COMPRESSED: [f64; 2] = [0.55, 0.45];
 
 /// Bytes of the number of a scanner.
 pub(crate) const SCANNER: u64 = 4;
+
+/// Part of the points in headers that are certainly different: duplicates are not known before they are read.
+pub(crate) const DISTINCT: f64 = 0.5;
+
+/// Part of the triangles that are certainly made of points that were counted.
+pub(crate) const SURE: f64 = 0.9;
 
 /// Checksums, boxes and other small data: bytes per point, and in all.
 const SMALL: (f64, f64) = (0.8, 4096.0);
@@ -145,13 +151,23 @@ impl Known {
         Some(known)
     }
 
-    /// Checks that the mesh of the points does not exceed a limit of the format of `output`.
+    /// Checks that the mesh of the points will not exceed a limit of the format of `output`. Refused is what
+    /// exceeds it even if only `certain` of the points were left, as a part of 1; else the error is returned, for a
+    /// warning.
     ///
     /// # Errors
     /// [`crate::Error::TooLarge`].
-    pub fn fits(&self, params: &Params, output: &Path) -> Result<()> {
-        let coordinates = CoordinateType::Float;
-        export::check_size(output, &self.mesh(params, coordinates), true)
+    pub fn fits(&self, params: &Params, output: &Path, certain: f64) -> Result<Option<Error>> {
+        let size = |part: f64| {
+            let points = (self.points as f64 * part) as u64;
+            let known = Self { points, ..*self };
+            export::check_size(output, &known.mesh(params, CoordinateType::Float), true)
+        };
+        let likely = size(1.0);
+        if size(certain).is_err() {
+            return likely.map(|()| None);
+        }
+        Ok(likely.err())
     }
 
     /// Warnings about what the format of `output` leaves out, of points with these columns, in coordinates from
@@ -217,6 +233,7 @@ impl Known {
         let kept = values + scanner / 4.0;
         let cut = params.crop.is_some() || params.split.is_some();
         let pieces = match (cut, params.normals) {
+            (false, true) if params.compress_glb => NORMALS,
             (false, _) => 0.0,
             (true, false) => PIECES,
             (true, true) => PIECES + NORMALS,
@@ -322,6 +339,32 @@ mod tests {
         .estimate(&params, output);
         // "double" is one letter longer than "float", three times.
         assert_eq!(double.output - first.output, 12_000_003);
+    }
+
+    #[test]
+    fn limits_of_formats_are_refused_if_certain_and_told_if_likely() {
+        let params = Params::default();
+        let fits = |millions: u64, name: &str| {
+            let points = millions * 1_000_000;
+            let known = Known { points, ..MILLION };
+            known.fits(&params, Path::new(name), 0.5)
+        };
+        // A point has about 36 bytes in GLB.
+        assert!(fits(110, "mesh.glb").unwrap().is_none());
+        for millions in [130, 230] {
+            let told = fits(millions, "mesh.glb").unwrap().unwrap();
+            assert!(matches!(
+                told,
+                Error::TooLarge {
+                    finished: false,
+                    ..
+                }
+            ));
+            assert!(!told.can_resume());
+        }
+        assert!(matches!(fits(250, "mesh.glb"), Err(Error::TooLarge { .. })));
+        assert!(fits(4000, "mesh.ply").unwrap().is_none());
+        assert!(fits(3000, "mesh.stl").unwrap().is_some());
     }
 
     #[test]

@@ -184,6 +184,14 @@ impl Manifest {
             .page_points(self.page_points)
     }
 
+    /// Takes the output of `now`, if that is another one. Nothing but the export depends on it.
+    pub fn write_elsewhere(&mut self, now: &Self) {
+        if self.output != now.output {
+            self.output = now.output.clone();
+            self.params.compress_glb = now.params.compress_glb;
+        }
+    }
+
     /// # Errors
     /// [`Error::Mismatch`] with the first difference to `now`.
     pub fn check(&self, now: &Self, folder: &Path) -> Result<()> {

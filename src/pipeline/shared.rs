@@ -101,7 +101,8 @@ impl Reconstruction {
             self.params.scanners(),
         );
         if let Some(known) = headers.filter(|_| all_are_kept(&self.params)) {
-            known.fits(&self.params, &self.mesh)?;
+            // Its output cannot be changed later.
+            known.fits(&self.params, &self.mesh, 1.0)?;
         }
         let manifest = Manifest::of(self)?.to_bytes()?;
         let random = std::hash::RandomState::new().build_hasher().finish();

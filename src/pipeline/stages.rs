@@ -7,7 +7,7 @@ mod plan;
 mod values;
 
 use super::checks::{all_are_kept, disk_radius, enough, not_a_line, room};
-use super::disk::{SCANNER, Text};
+use super::disk::{DISTINCT, SCANNER, SURE, Text};
 use super::{Clock, Known, Reconstruction};
 use crate::error::Result;
 use crate::geom::lattice::Lattice;
@@ -71,10 +71,11 @@ impl<'a> Stages<'a> {
             }
         };
         let first = headers.map(|known| known.estimate(&job.params, &job.mesh));
+        let mut exceeded = None;
         if let Some(known) = headers.filter(|_| all_are_kept(&job.params)) {
-            known.fits(&job.params, &job.mesh)?;
+            exceeded = known.fits(&job.params, &job.mesh, DISTINCT)?;
         }
-        let stages = Self {
+        let mut stages = Self {
             job,
             workspace,
             clock: Clock::new(workspace),
@@ -100,6 +101,9 @@ impl<'a> Stages<'a> {
             None,
             job.params.attributes != Attributes::None,
         );
+        if let Some(error) = exceeded {
+            stages.warn(format!("{error}; unless many points are the same"));
+        }
         if let Some(estimate) = first {
             room(&job.folder, &job.mesh, estimate, workspace)?;
         }
@@ -115,7 +119,7 @@ impl<'a> Stages<'a> {
         // What these leave out, and how much a square has, is not known yet.
         let whole = params.crop.is_none() && params.split.is_none();
         if whole && params.drop_outliers.is_none() {
-            self.known.fits(params, output)?;
+            self.known.fits(params, output, SURE)?;
         }
         let estimate = self.known.estimate(params, output);
         self.report.estimated_scratch_bytes = estimate.scratch;

@@ -2,7 +2,7 @@
 //!
 //! `KIND:N` kills the program at the `N`th event of a kind, or makes that event fail; `count:FILE` writes the
 //! number of events of each kind; `freeze:publish` stops it before it publishes a finished journal, and
-//! `hold:N` makes it take N MiB there. See `CONTRIBUTING.md`.
+//! `hold:N` makes it take N MiB there; with `most:N` a format of meshes with a limit holds N bytes. See `CONTRIBUTING.md`.
 
 use std::io;
 use std::sync::OnceLock;
@@ -55,6 +55,8 @@ enum Plan {
     /// Have this number of MiB resident for some seconds before a finished journal is published.
     Hold(u64),
     Fail(rustix::io::Errno, u64),
+    /// A format of meshes with a limit holds this number of bytes.
+    Most(u64),
     Count(std::path::PathBuf),
 }
 
@@ -74,6 +76,7 @@ fn read() -> Option<Plan> {
     match kind {
         "full" => Some(Plan::Fail(rustix::io::Errno::NOSPC, number)),
         "hold" => Some(Plan::Hold(number)),
+        "most" => Some(Plan::Most(number)),
         "eio" => Some(Plan::Fail(rustix::io::Errno::IO, number)),
         _ => NAMES
             .iter()
@@ -142,6 +145,15 @@ pub fn write() -> io::Result<()> {
             Err((*error).into())
         }
         _ => Ok(()),
+    }
+}
+
+/// Most bytes that a format of meshes holds, of `bytes` without a fault.
+#[must_use]
+pub fn most(bytes: u64) -> u64 {
+    match plan() {
+        Some(Plan::Most(number)) => *number,
+        _ => bytes,
     }
 }
 

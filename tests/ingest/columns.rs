@@ -266,3 +266,87 @@ fn what_no_file_has_is_refused_and_what_is_always_the_same_is_left_out() {
     assert!(!spool.has_values() && carried.columns.is_empty());
     assert_eq!(Attributes::default(), Attributes::None);
 }
+
+/// A descriptor of extra bytes: type, options, name, scale, offset.
+fn descriptor(kind: u8, options: u8, name: &str, scale: f64, offset: f64) -> Vec<u8> {
+    let mut bytes = vec![0; 192];
+    (bytes[2], bytes[3]) = (kind, options);
+    bytes[4..4 + name.len()].copy_from_slice(name.as_bytes());
+    for part in 0..3 {
+        bytes[112 + 8 * part..][..8].copy_from_slice(&scale.to_le_bytes());
+        bytes[136 + 8 * part..][..8].copy_from_slice(&offset.to_le_bytes());
+    }
+    bytes
+}
+
+#[test]
+fn extra_bytes_of_las_are_columns_by_their_names() {
+    let bench = Bench::new();
+    // Unsigned 16 bits with scale and offset, three bytes of nothing, two floats, signed 64 bits.
+    let data = [
+        descriptor(3, 0b11000, "Pulse width", 0.5, 100.0),
+        descriptor(0, 3, "", 0.0, 0.0),
+        descriptor(19, 0, "Normal", 0.0, 0.0),
+        descriptor(8, 0, "Intensity", 0.0, 0.0),
+    ];
+    for (kind, format) in [("las", 1), ("laz", 3), ("las", 6), ("laz", 7), ("laz", 4)] {
+        let path = bench.path(&format!("{format}.{kind}"));
+        let mut builder = las::Builder::from((1, 4));
+        builder.point_format = las::point::Format::new(format).unwrap();
+        builder.point_format.extra_bytes = 21;
+        builder.vlrs.push(las::Vlr {
+            user_id: "LASF_Spec".into(),
+            record_id: 4,
+            description: String::new(),
+            data: data.concat(),
+        });
+        let header = builder.into_header().unwrap();
+        let format = *header.point_format();
+        let mut writer = las::Writer::from_path(&path, header).unwrap();
+        let count = 70_000u32;
+        for i in 0..count {
+            let extra = [
+                &(i as u16).to_le_bytes()[..],
+                &[7; 3],
+                &(i as f32 / 3.0).to_le_bytes(),
+                &(-1f32).to_le_bytes(),
+                &(i64::from(i) - 9).to_le_bytes(),
+            ];
+            let point = las::Point {
+                x: f64::from(i),
+                gps_time: format.has_gps_time.then_some(1.0),
+                color: format.has_color.then(las::Color::default),
+                waveform: format.has_waveform.then(Default::default),
+                extra_bytes: extra.concat(),
+                ..Default::default()
+            };
+            writer.write_point(point).unwrap();
+        }
+        writer.close().unwrap();
+        let columns = probe(&path).unwrap().columns;
+        let names: Vec<&str> = columns.iter().map(|c| &*c.name).collect();
+        assert!(names.ends_with(&["pulse_width", "normal0", "normal1", "extra_intensity"]));
+        let list = "extra_intensity,normal1,pulse_width,normal0";
+        let (spool, carried) = read(&bench, std::slice::from_ref(&path), list, true);
+        let found = rows(&bench, &spool, &carried);
+        assert_eq!(found.len(), count as usize);
+        for (i, (_, values)) in found.iter().enumerate() {
+            let width = f64::from(i as u16) * 0.5 + 100.0;
+            let normal = f64::from(i as f32 / 3.0);
+            assert_eq!(
+                *values,
+                [i as f64 - 9.0, -1.0, width, normal],
+                "{path:?} {i}"
+            );
+        }
+        spool.release(&bench.workspace).unwrap();
+        // Nothing of it is decoded unless it is wanted, and the usual columns are as before.
+        let (spool, carried) = read(&bench, std::slice::from_ref(&path), "intensity", true);
+        assert!(
+            rows(&bench, &spool, &carried)
+                .iter()
+                .all(|(_, v)| v == &[0.0])
+        );
+        spool.release(&bench.workspace).unwrap();
+    }
+}

@@ -5,7 +5,7 @@ use crate::columns::{read, rows};
 use crate::formats::e57::{Scan, cartesian, scaled, write};
 use crate::formats::{pcd, ptx};
 use e57::{Record, RecordDataType, RecordName, RecordValue};
-use outcrop::stages::ingest::probe;
+use outcrop::stages::ingest::{Selection, ingest_selected, probe};
 use std::path::Path;
 
 fn names(path: &Path) -> Vec<String> {
@@ -218,4 +218,46 @@ fn parts_of_e57_records_are_columns() {
     let (spool, _) = read(&bench, &[path], "row", false);
     let lattice = spool.choose_lattice(0).unwrap();
     assert_eq!((lattice.step, lattice.exact), (0.5, true));
+}
+
+/// Its description is behind the points, where the beginning of a compressed file does not reach.
+#[test]
+fn a_compressed_e57_has_an_estimate_and_columns() {
+    let bench = Bench::new();
+    let mut random = oorandom::Rand64::new(3);
+    let places: Vec<[f64; 3]> = (0..120_000)
+        .map(|i| [f64::from(i), random.rand_float(), random.rand_float()])
+        .collect();
+    let mut scan = cartesian(&RecordDataType::F64, &places);
+    scan.fields.push(Record {
+        name: RecordName::Intensity,
+        data_type: RecordDataType::F32,
+    });
+    for (n, row) in scan.rows.iter_mut().enumerate() {
+        row.push(RecordValue::Single(n as f32));
+    }
+    let plain = write(&bench, "a.e57", &[scan]);
+    let bytes = std::fs::read(&plain).unwrap();
+    let mut encoder = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+    std::io::Write::write_all(&mut encoder, &bytes).unwrap();
+    let path = bench.write("b.e57.gz", encoder.finish().unwrap());
+    let known = probe(&path).unwrap();
+    assert!(!known.is_described && probe(&plain).unwrap().is_described);
+    let likely = known.points_likely as f64 / 120_000.0;
+    assert!((0.5..4.0).contains(&likely), "{likely}");
+    assert_eq!(
+        values(&bench, &path, "intensity"),
+        values(&bench, &plain, "intensity")
+    );
+    // A column that is in no file is found when all were read.
+    let selection = Selection {
+        attributes: "depth".parse().unwrap(),
+        ..Selection::default()
+    };
+    let refused = ingest_selected(&[path], &selection, &bench.workspace).err();
+    let said = refused.unwrap().to_string();
+    assert!(
+        said.contains("depth") && said.contains("intensity"),
+        "{said}"
+    );
 }

@@ -5,6 +5,7 @@
 mod util;
 
 mod damage;
+mod formats;
 mod kills;
 mod refusals;
 mod run;

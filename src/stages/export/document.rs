@@ -3,7 +3,6 @@
 use super::format::{MADE_BY, Mesh};
 use super::glb::{self, Y_UP};
 use super::piece::{About, VIEWS};
-use outcrop_ply::Scalar;
 use serde_json::{Value, json};
 
 /// The name of the extension.
@@ -153,16 +152,17 @@ impl Document<'_> {
         let accessor =
             json!({ "componentType": glb::FLOAT, "type": "VEC3", "min": low, "max": high });
         next.add(lists, view, accessor);
-        if let Some((_, scalar)) = self.mesh.colours() {
+        if self.mesh.normals().is_some() {
+            attributes["NORMAL"] = next.accessors.into();
+            let view = of_vertices(12, Some("EXPONENTIAL"), about.bytes[1]);
+            let accessor = json!({ "componentType": glb::FLOAT, "type": "VEC3" });
+            next.add(lists, view, accessor);
+        }
+        if self.mesh.colours().is_some() {
             attributes["COLOR_0"] = next.accessors.into();
-            let component = if scalar == Scalar::U8 {
-                glb::BYTE
-            } else {
-                glb::SHORT
-            };
-            let view = of_vertices(4 * scalar.bytes() as u64, None, about.bytes[1]);
+            let view = of_vertices(glb::COLOUR as u64, None, about.bytes[2]);
             let accessor =
-                json!({ "componentType": component, "type": "VEC4", "normalized": true });
+                json!({ "componentType": glb::SHORT, "type": "VEC4", "normalized": true });
             next.add(lists, view, accessor);
         }
         let indices = next.accessors;
@@ -171,7 +171,7 @@ impl Document<'_> {
             count: 3 * u64::from(about.triangles),
             mode: ("TRIANGLES", None),
             target: glb::FOR_INDICES,
-            bytes: about.bytes[2],
+            bytes: about.bytes[3],
         };
         next.add(
             lists,
@@ -218,7 +218,8 @@ impl Next {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stages::export::format::VertexColumn;
+    use crate::stages::export::format::{VertexColumn, normal_columns};
+    use outcrop_ply::Scalar;
 
     #[test]
     fn the_room_suffices_for_any_pieces() {
@@ -227,7 +228,7 @@ mod tests {
             scalar: Scalar::U16,
         });
         let mesh = Mesh {
-            columns: colours.to_vec(),
+            columns: colours.into_iter().chain(normal_columns()).collect(),
             comments: vec!["crs \"x\" \u{1}".into()],
             ..Mesh::default()
         };
@@ -245,7 +246,7 @@ mod tests {
             let json = &header[HEADS as usize..][..room as usize];
             let json: Value = serde_json::from_slice(json).unwrap();
             let lists = ["accessors", "bufferViews"].map(|k| json[k].as_array().unwrap().len());
-            assert_eq!(lists, [3 * count; 2]);
+            assert_eq!(lists, [4 * count; 2]);
             assert_eq!(
                 json["meshes"][0]["primitives"].as_array().unwrap().len(),
                 count

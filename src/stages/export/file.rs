@@ -298,14 +298,16 @@ impl<'a> MeshFile<'a> {
         &self.mesh
     }
 
-    /// The error of a mesh that turns out to have more than `most` bytes.
+    /// The error of a mesh that turns out to have more than `most` bytes; its file is deleted.
     pub fn too_large(&self, most: u64) -> Error {
+        let _ = std::fs::remove_file(&self.temporary);
         Error::TooLarge {
             path: self.output.clone(),
             format: self.format.name(),
             unit: "bytes",
             most,
             found: "more".into(),
+            finished: true,
         }
     }
 

@@ -81,6 +81,7 @@ pub(crate) fn check_size(output: &Path, mesh: &Mesh, estimated: bool) -> Result<
             true => format!("about {}", exceeded.found),
             false => exceeded.found.to_string(),
         },
+        finished: !estimated,
     })
 }
 

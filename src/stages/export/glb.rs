@@ -5,8 +5,10 @@
 //! in glTF.
 
 use super::format::{
-    CoordinateType, Exceeded, Layout, MADE_BY, Mesh, MeshFormat, Positions, VertexColumn, four,
+    CoordinateType, Exceeded, Layout, MADE_BY, Mesh, MeshFormat, Positions, VertexColumn, four, two,
 };
+use crate::light;
+use crate::workspace::fault;
 use outcrop_ply::Scalar;
 use serde_json::{Value, json};
 
@@ -17,7 +19,6 @@ pub struct Glb;
 const TRIANGLE: u64 = 12;
 
 /// Numbers of the types of components in glTF.
-pub const BYTE: u32 = 5121;
 pub const SHORT: u32 = 5123;
 pub const INDEX: u32 = 5125;
 pub const FLOAT: u32 = 5126;
@@ -60,7 +61,7 @@ impl MeshFormat for Glb {
         if mesh.compress {
             return None;
         }
-        let (found, most) = (self.layout(mesh).bytes, u64::from(u32::MAX));
+        let (found, most) = (self.layout(mesh).bytes, most());
         (found > most).then_some(Exceeded {
             unit: "bytes",
             found,
@@ -99,12 +100,8 @@ impl MeshFormat for Glb {
             for at in normals.into_iter().flatten() {
                 bytes.extend_from_slice(&four(values, at));
             }
-            if let Some((places, scalar)) = colours {
-                let size = scalar.bytes();
-                let parts = places.map(|at| &values[at..at + size]);
-                parts.iter().for_each(|part| bytes.extend_from_slice(part));
-                // Opaque.
-                bytes.extend_from_slice(&[u8::MAX; 2][..size]);
+            if let Some(colour) = colours {
+                put_colour(values, colour, bytes);
             }
         }
     }
@@ -120,6 +117,26 @@ impl MeshFormat for Glb {
             bytes.extend_from_slice(&corner.to_le_bytes());
         }
     }
+}
+
+/// Most bytes of a file.
+pub fn most() -> u64 {
+    fault::most(u32::MAX.into())
+}
+
+/// Bytes of the colour of a vertex: linear light in 16 bits, as glTF wants it, and opaque.
+pub const COLOUR: usize = 8;
+
+/// Appends the colour of a vertex; its components are at `places` of `values`.
+pub fn put_colour(values: &[u8], (places, scalar): ([usize; 3], Scalar), bytes: &mut Vec<u8>) {
+    for at in places {
+        let light = match scalar {
+            Scalar::U8 => light::of_byte(values[at]),
+            _ => light::of_word(u16::from_le_bytes(two(values, at))),
+        };
+        bytes.extend_from_slice(&light.to_le_bytes());
+    }
+    bytes.extend_from_slice(&u16::MAX.to_le_bytes());
 }
 
 /// All before the binary content: `json` is padded already, the file has `all` bytes, of which `binary` follow.
@@ -149,8 +166,8 @@ pub fn material() -> Value {
 struct Record {
     /// Offset of the normal.
     normal: Option<usize>,
-    /// Offset of the colour, and type of its components.
-    colour: Option<(usize, Scalar)>,
+    /// Offset of the colour.
+    colour: Option<usize>,
     bytes: usize,
 }
 
@@ -162,8 +179,7 @@ impl Record {
             bytes - size
         };
         let normal = mesh.normals().map(|_| take(12));
-        let colour = mesh.colours();
-        let colour = colour.map(|(_, scalar)| (take(4 * scalar.bytes()), scalar));
+        let colour = mesh.colours().map(|_| take(COLOUR));
         Self {
             normal,
             colour,
@@ -224,11 +240,10 @@ fn document(mesh: &Mesh, record: &Record) -> Value {
             "type": "VEC3",
         }));
     }
-    if let Some((at, scalar)) = record.colour {
+    if let Some(at) = record.colour {
         attributes["COLOR_0"] = accessors.len().into();
-        let component = if scalar == Scalar::U8 { BYTE } else { SHORT };
         accessors.push(json!({
-            "bufferView": 0, "byteOffset": at, "componentType": component, "normalized": true,
+            "bufferView": 0, "byteOffset": at, "componentType": SHORT, "normalized": true,
             "count": mesh.vertices, "type": "VEC4",
         }));
     }
@@ -289,13 +304,14 @@ mod tests {
 
     #[test]
     fn colours_normals_and_comments_are_there() {
-        for (scalar, red, size, component) in [
-            (Scalar::U8, vec![7], 4, BYTE),
-            (Scalar::U16, vec![7, 1], 8, SHORT),
+        // Half of the light of white, in sRGB.
+        for (scalar, red, near) in [
+            (Scalar::U8, vec![188], 600),
+            (Scalar::U16, vec![83, 188], 100),
         ] {
             let mesh = mesh(scalar);
             let layout = Glb.layout(&mesh);
-            assert_eq!(layout.vertices.bytes, 24 + size);
+            assert_eq!(layout.vertices.bytes, 32);
             assert!(layout.vertices.at.is_multiple_of(4));
             let document = json_of(&layout.header);
             assert_eq!(document["asset"]["extras"]["comments"][0], mesh.comments[0]);
@@ -304,7 +320,7 @@ mod tests {
                 |name: &str| &document["accessors"][attributes[name].as_u64().unwrap() as usize];
             assert_eq!(accessor("NORMAL")["byteOffset"], 12);
             assert_eq!(accessor("COLOR_0")["byteOffset"], 24);
-            assert_eq!(accessor("COLOR_0")["componentType"], component);
+            assert_eq!(accessor("COLOR_0")["componentType"], SHORT);
             // Rounded to four units: a sixteenth of the size is 6.25.
             let translation = &document["nodes"][1]["translation"];
             assert_eq!(*translation, json!([1_500_052.0, 20.0, 0.0]));
@@ -316,12 +332,9 @@ mod tests {
             let floats = [-51.75f32, 20.0, 3.0, 0.0, 0.0, 1.0];
             let floats = floats.map(f32::to_le_bytes);
             assert_eq!(&bytes[..24], floats.as_flattened());
-            assert_eq!(bytes[24..24 + scalar.bytes()], values[..scalar.bytes()]);
-            assert!(
-                bytes[bytes.len() - scalar.bytes()..]
-                    .iter()
-                    .all(|b| *b == 255)
-            );
+            let red = u16::from_le_bytes(two(&bytes, 24));
+            assert!(red.abs_diff(32767) < near, "{red}");
+            assert_eq!(bytes[26..], [0, 0, 0, 0, 255, 255]);
             assert_eq!(bytes.len() as u64, layout.vertices.bytes);
         }
     }

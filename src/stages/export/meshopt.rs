@@ -56,6 +56,16 @@ pub fn words(steps: &[[i32; 3]]) -> Words {
     }
 }
 
+/// Bits of the components of a normal behind the point.
+const NORMAL_BITS: u32 = 12;
+
+/// The words of a normal for the exponential filter: each component in whole steps of 2^-12.
+pub fn direction(normal: [f32; 3]) -> [u32; 3] {
+    let one = (1 << NORMAL_BITS) as f32;
+    let exponent = 0u32.wrapping_sub(NORMAL_BITS) << BITS;
+    normal.map(|x| exponent | (x * one).round() as i32 as u32 & ((1 << BITS) - 1))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -93,6 +103,28 @@ mod tests {
             assert_eq!(filtered, exact, "{:?}", steps[0]);
             let expected: Vec<f32> = steps.as_flattened().iter().map(|x| *x as f32).collect();
             assert_eq!(read, expected);
+        }
+    }
+
+    #[test]
+    fn normals_are_read_to_half_a_step() {
+        let mut random = oorandom::Rand64::new(2);
+        let mut normals = vec![[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -0.6, 0.8]];
+        normals.extend((0..500).map(|_| {
+            let x = [0, 1, 2].map(|_| random.rand_float() * 2.0 - 1.0);
+            let length = x.iter().map(|x| x * x).sum::<f64>().sqrt();
+            x.map(|x| (x / length) as f32)
+        }));
+        let words: Vec<[u32; 3]> = normals.iter().map(|n| direction(*n)).collect();
+        let encoded = vertices(bytemuck::cast_slice(&words), 12).unwrap();
+        let workspace = &mut Workspace::default();
+        let mut bytes = decode_vertex_buffer(words.len(), 12, &encoded, workspace).unwrap();
+        decode_filter_exp(&mut bytes, words.len(), 12, workspace).unwrap();
+        let read = bytes.as_chunks::<4>().0.iter();
+        let read: Vec<f32> = read.map(|b| f32::from_le_bytes(*b)).collect();
+        assert_eq!(read[..6], [0.0, 0.0, 1.0, -1.0, 0.0, 0.0]);
+        for (x, exact) in read.iter().zip(normals.as_flattened()) {
+            assert!((x - exact).abs() <= 0.5 / 4096.0, "{x} {exact}");
         }
     }
 

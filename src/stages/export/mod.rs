@@ -24,12 +24,13 @@ mod piece;
 mod ply;
 mod split;
 mod stl;
+mod stored;
 mod write;
 
 pub(crate) use file::{folder_of, is_compressed, temporary, temporary_of};
 pub use format::CoordinateType;
-pub(crate) use format::{Mesh, normal_columns};
-pub(crate) use formats::{check_name, check_size, left_out, mesh_bytes};
+pub(crate) use format::{Mesh, MeshFormat as Format, VertexColumn, normal_columns};
+pub(crate) use formats::{check_name, check_size, format_of, left_out, mesh_bytes};
 pub(crate) use obj::decimals;
 pub use split::{SplitOptions, export_split};
 pub(crate) use split::{is_square_of, remove_unfinished};
@@ -46,8 +47,7 @@ use crate::stages::repair::Repaired;
 use crate::workspace::{Unit, Workspace};
 use coordinates::Coordinates;
 use file::{HEADER, MeshFile};
-use format::{MeshFormat, VertexColumn};
-use formats::format_of;
+use format::MeshFormat;
 use parts::{OfTile, Parts, Whole};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -128,6 +128,7 @@ pub fn export(
         filled,
         pinches: &repaired.numbering.pinches,
         numbering,
+        normals: stored::table(blocks.count()),
         blocks,
     };
     let stats = parts.stats();
@@ -144,7 +145,14 @@ pub fn export(
         mesh.bounds = Some(found.map(|corner| in_file.of(corner)));
         bounds = Some(found);
     }
+    let with_normals = mesh.compress && mesh.normals().is_some();
+    if with_normals {
+        stored::make(&parts, workspace)?;
+    }
     let parts = write(store, parts, lattice, (mesh, bounds), &options, workspace)?;
+    if with_normals {
+        parts.normals.release(workspace)?;
+    }
     parts.numbering.release(workspace)?;
     Ok(stats)
 }
@@ -245,7 +253,7 @@ fn write<P: Parts>(
         store,
         parts,
         columns: options.held(&mesh),
-        normals: mesh.normals().is_some(),
+        normals: mesh.normals().is_some() && !mesh.compress,
         coordinates: options.in_file(lattice),
         bounds,
         file: MeshFile::open(output, format_of(output)?, mesh, workspace)?,

@@ -6,16 +6,15 @@
 //! that several primitives have are the same in all.
 
 use super::document::{Document, HEADS};
+use super::glb;
 use super::parts::Parts;
 use super::piece::{self, About, Piece};
 use super::write::Writer;
 use crate::error::Result;
 use crate::geom::Point;
+use crate::stages::cut::Normal;
 use crate::workspace::Workspace;
 use crate::workspace::place::Place;
-
-/// Most bytes of a file.
-const MOST: u64 = u32::MAX as u64;
 
 /// Steps of which the origin is a multiple above the lowest position.
 const UNIT: i32 = 1 << 20;
@@ -38,7 +37,12 @@ pub(super) fn write_all<P: Parts>(writer: &Writer<'_, P>, workspace: &Workspace)
         let own = piece::estimate(points + 2 * triangles, triangles, writer.file.mesh());
         writer.memory(workspace, part) + own
     };
-    let part = (0..count).map(memory).max().unwrap_or(0);
+    let mut part = (0..count).map(memory).max().unwrap_or(0);
+    if writer.file.mesh().normals().is_some() {
+        // Those of a whole part, whichever it is.
+        let points = |part| writer.parts.sizes(workspace, part)[0];
+        part += (0..count).map(points).max().unwrap_or(0) * size_of::<Normal>() as u64;
+    }
     let document = Document {
         mesh: writer.file.mesh(),
         translation: writer.coordinates.lattice.position(origin),
@@ -51,7 +55,7 @@ pub(super) fn write_all<P: Parts>(writer: &Writer<'_, P>, workspace: &Workspace)
     let threads = (left / part.max(1)).clamp(1, workspace.threads as u64);
     let _held = workspace.reserve("export: pieces", threads * part + table)?;
 
-    let start = HEADS + room + 8;
+    let (start, most) = (HEADS + room + 8, glb::most());
     let (mut end, mut crc) = (start, crc32fast::Hasher::new());
     let mut pieces: Vec<About> = Vec::with_capacity(count);
     let make = |part| {
@@ -65,8 +69,8 @@ pub(super) fn write_all<P: Parts>(writer: &Writer<'_, P>, workspace: &Workspace)
         };
         for mut view in views {
             view.resize(view.len().next_multiple_of(4), 0);
-            if end + view.len() as u64 > MOST {
-                return Err(writer.file.too_large(MOST));
+            if end + view.len() as u64 > most {
+                return Err(writer.file.too_large(most));
             }
             writer.file.put(&view, end)?;
             crc.update(&view);

@@ -8,7 +8,7 @@ use super::number::Numbering;
 use crate::error::Result;
 use crate::spill::{Id, Inbox, Table};
 use crate::stages::blocks::Blocks;
-use crate::stages::cut::{Face, Pieces, Tile};
+use crate::stages::cut::{Face, Normal, Pieces, Tile};
 use crate::stages::order::PointStore;
 use crate::stages::repair::{FilledTriangle, Surface};
 use crate::workspace::memory::bytes_of;
@@ -44,6 +44,9 @@ pub trait Parts: Sync {
         copies: bool,
         ids: &[u32],
     ) -> Result<Vec<[f32; 3]>>;
+
+    /// The normals of a part's vertices, then of its copies, from scratch.
+    fn stored_normals(&self, unit: &Unit<'_>, part: usize) -> Result<Vec<Normal>>;
 
     /// The part's triangles.
     fn faces(&self, unit: &Unit<'_>, part: usize) -> Result<Loaded<'_>>;
@@ -95,8 +98,31 @@ pub struct Whole<'a> {
     pub pinches: &'a Table<Id>,
     /// Numbers of vertices and triangles.
     pub numbering: Numbering,
+    /// Normals by block, if [they were made](super::stored::make).
+    pub normals: Table<Normal>,
     /// Division into blocks.
     pub blocks: Blocks,
+}
+
+/// Normals of vertices, and of copies of vertices.
+type Both = (Vec<[f32; 3]>, Vec<[f32; 3]>);
+
+impl Whole<'_> {
+    /// The normals of these vertices of a block, and of all its copies.
+    pub fn both_normals(&self, unit: &Unit<'_>, block: usize, ids: &[u32]) -> Result<Both> {
+        let sources = Sources {
+            store: self.store,
+            surface: &self.surface,
+            filled: &self.filled,
+            pinches: self.pinches,
+            blocks: self.blocks,
+        };
+        let normals = Normals::of(unit, &sources, block)?;
+        let _held = unit.hold(normals.bytes());
+        let first = self.blocks.ids(block).start;
+        let own = |v: &u32| normals.points[(v - first) as usize];
+        Ok((ids.iter().map(own).collect(), normals.copies))
+    }
 }
 
 impl Parts for Whole<'_> {
@@ -140,21 +166,13 @@ impl Parts for Whole<'_> {
         copies: bool,
         ids: &[u32],
     ) -> Result<Vec<[f32; 3]>> {
-        let sources = Sources {
-            store: self.store,
-            surface: &self.surface,
-            filled: &self.filled,
-            pinches: self.pinches,
-            blocks: self.blocks,
-        };
-        let normals = Normals::of(unit, &sources, block)?;
-        if copies {
-            return Ok(normals.copies);
-        }
-        let _held = unit.hold(normals.bytes());
-        let first = self.blocks.ids(block).start;
-        let own = |v: &u32| normals.points[(v - first) as usize];
-        Ok(ids.iter().map(own).collect())
+        let own = if copies { &[] } else { ids };
+        let (own, of_copies) = self.both_normals(unit, block, own)?;
+        Ok(if copies { of_copies } else { own })
+    }
+
+    fn stored_normals(&self, unit: &Unit<'_>, block: usize) -> Result<Vec<Normal>> {
+        self.normals.get(unit, block)
     }
 
     fn faces(&self, unit: &Unit<'_>, block: usize) -> Result<Loaded<'_>> {
@@ -218,8 +236,7 @@ impl Parts for OfTile<'_> {
         copies: bool,
         ids: &[u32],
     ) -> Result<Vec<[f32; 3]>> {
-        let piece = self.tile.pieces.start + part;
-        let mut all = self.pieces.normals(unit, piece)?;
+        let mut all = self.stored_normals(unit, part)?;
         let first = all.len().saturating_sub(ids.len());
         match copies {
             true => drop(all.drain(..first)),
@@ -227,6 +244,10 @@ impl Parts for OfTile<'_> {
         }
         all.resize(ids.len(), Default::default());
         Ok(all.into_iter().map(|normal| normal.direction).collect())
+    }
+
+    fn stored_normals(&self, unit: &Unit<'_>, part: usize) -> Result<Vec<Normal>> {
+        self.pieces.normals(unit, self.tile.pieces.start + part)
     }
 
     fn faces(&self, unit: &Unit<'_>, part: usize) -> Result<Loaded<'_>> {

@@ -1,16 +1,18 @@
 //! A part of a mesh with vertices of its own, compressed for `EXT_meshopt_compression`.
 
 use super::format::Mesh;
+use super::glb::{self, COLOUR};
 use super::meshopt;
 use super::parts::Parts;
+use super::stored;
 use super::write::Writer;
 use crate::error::Result;
 use crate::geom::Point;
 use crate::workspace::Unit;
 use crate::workspace::memory::bytes_of;
 
-/// Views of the buffer that a piece may have: positions, colours, triangles.
-pub const VIEWS: usize = 3;
+/// Views of the buffer that a piece may have: positions, normals, colours, triangles.
+pub const VIEWS: usize = 4;
 
 /// Counts, bounds and sizes of a piece, for the JSON.
 #[derive(Debug, Clone, Copy)]
@@ -23,7 +25,7 @@ pub struct About {
     pub filtered: bool,
     /// Lowest and highest numbers of the positions.
     pub bounds: [[f32; 3]; 2],
-    /// Bytes of each view; none for colours if there are none.
+    /// Bytes of each view; none of what vertices do not have.
     pub bytes: [u32; VIEWS],
 }
 
@@ -40,9 +42,15 @@ type Vertex = (u32, u32);
 
 /// Bytes of memory for a piece of at most so many vertices and triangles, beside the triangles as they are read.
 pub fn estimate(vertices: u64, triangles: u64, mesh: &Mesh) -> u64 {
-    // Corners and indices; of a vertex its names, order, position twice, values and record, packed.
-    let values = mesh.value_bytes() as u64;
-    72 * triangles + (64 + 4 * values) * vertices + (256 << 10)
+    // Corners and indices; of a vertex its names, order, position twice, values and records, packed.
+    let mut values = 4 * mesh.value_bytes() as u64;
+    if mesh.colours().is_some() {
+        values += 2 * COLOUR as u64;
+    }
+    if mesh.normals().is_some() {
+        values += NORMALS;
+    }
+    72 * triangles + (64 + values) * vertices + (256 << 10)
 }
 
 /// Compresses a part; `None` if it has no triangle. Positions are steps of the lattice from `origin`.
@@ -64,16 +72,23 @@ pub fn compress<P: Parts>(
     writer.store.fetch(&ids, &mut points)?;
     let step = |at: &u32| [0, 1, 2].map(|k| points[*at as usize][k] - origin[k]);
     let steps: Vec<[i32; 3]> = order.iter().map(step).collect();
-    let colours = colours(writer, unit, &ids, &order)?;
     let lists = bytes_of(&known) + bytes_of(&triangles) + bytes_of(&order) + bytes_of(&ids);
-    let _held = unit.hold(lists + bytes_of(&points) + bytes_of(&steps) + bytes_of(&colours));
+    let _held = unit.hold(lists + bytes_of(&points) + bytes_of(&steps));
+    let normals = normals(writer, unit, &known, &order)?;
+    let _normals = unit.hold(bytes_of(&normals));
+    let colours = colours(writer, unit, &ids, &order)?;
+    let _colours = unit.hold(bytes_of(&colours));
     let words = meshopt::words(&steps);
     let pack = || {
         Ok([
             meshopt::vertices(bytemuck::cast_slice(&words.words), 12)?,
+            match normals.is_empty() {
+                true => Vec::new(),
+                false => meshopt::vertices(bytemuck::cast_slice(&normals), 12)?,
+            },
             match colours.is_empty() {
                 true => Vec::new(),
-                false => meshopt::vertices(&colours, colours.len() / order.len())?,
+                false => meshopt::vertices(&colours, COLOUR)?,
             },
             meshopt::triangles(&triangles)?,
         ])
@@ -84,7 +99,7 @@ pub fn compress<P: Parts>(
         triangles: triangles.len() as u32,
         filtered: words.filtered,
         bounds: bounds(&steps),
-        bytes: [0, 1, 2].map(|view: usize| views[view].len() as u32),
+        bytes: [0, 1, 2, 3].map(|view: usize| views[view].len() as u32),
     };
     Ok(Some(Piece { about, views }))
 }
@@ -128,6 +143,26 @@ fn number(corners: &[[Vertex; 3]]) -> (Vec<Vertex>, Vec<[u32; 3]>, Vec<u32>) {
     (known, triangles, order)
 }
 
+/// Bytes of memory for the normal of a vertex: found, with its number, as words, packed.
+const NORMALS: u64 = 3 * 12 + 8;
+
+/// The words of the normals of vertices in this order; nothing if the mesh has none.
+fn normals<P: Parts>(
+    writer: &Writer<'_, P>,
+    unit: &Unit<'_>,
+    known: &[Vertex],
+    order: &[u32],
+) -> Result<Vec<[u32; 3]>> {
+    if writer.file.mesh().normals().is_none() {
+        return Ok(Vec::new());
+    }
+    let numbers = known.iter().map(|(_, number)| *number);
+    let normals = stored::of_vertices(&writer.parts, unit, numbers)?;
+    let _held = unit.hold(bytes_of(&normals));
+    let word = |at: &u32| meshopt::direction(normals[*at as usize]);
+    Ok(order.iter().map(word).collect())
+}
+
 /// The colours of vertices in this order, with an opaque fourth component; nothing if there are none.
 fn colours<P: Parts>(
     writer: &Writer<'_, P>,
@@ -139,15 +174,16 @@ fn colours<P: Parts>(
     let Some((places, scalar)) = mesh.colours() else {
         return Ok(Vec::new());
     };
+    // Normals come before the columns of points.
+    let before = if mesh.normals().is_some() { 12 } else { 0 };
+    let places = places.map(|place| place - before);
     let values = writer.values(unit, ids, None)?;
-    let (each, size) = (mesh.value_bytes(), scalar.bytes());
-    let mut colours = Vec::with_capacity(order.len() * 4 * size);
+    let _held = unit.hold(bytes_of(&values));
+    let each = mesh.value_bytes() - before;
+    let mut colours = Vec::with_capacity(order.len() * COLOUR);
     for at in order {
         let own = &values[*at as usize * each..][..each];
-        for place in places {
-            colours.extend_from_slice(&own[place..place + size]);
-        }
-        colours.extend_from_slice(&[u8::MAX; 2][..size]);
+        glb::put_colour(own, (places, scalar), &mut colours);
     }
     Ok(colours)
 }

@@ -220,7 +220,7 @@ impl Split<'_> {
                 tile,
             },
             columns: self.options.held(&mesh),
-            normals: mesh.normals().is_some(),
+            normals: mesh.normals().is_some() && !mesh.compress,
             coordinates: self.options.in_file(self.lattice),
             bounds: Some(tile.bounds),
             file: MeshFile::one_of_several(&path, temporary, name, format, mesh, self.workspace)?,

@@ -20,7 +20,7 @@ pub struct Writer<'a, P> {
     pub parts: P,
     /// Columns of the points, and true for each of them that the file holds; behind the normals.
     pub columns: Option<(&'a StoredColumns, Vec<bool>)>,
-    /// Normals are among the columns, as the first.
+    /// Normals are among the columns, as the first; those of a compressed mesh come from scratch.
     pub normals: bool,
     /// The coordinates in the file.
     pub coordinates: Coordinates<'a>,

@@ -164,7 +164,12 @@ fn check_columns(paths: &[PathBuf], attributes: &Attributes) -> Result<()> {
     }
     let mut present = Vec::new();
     for path in paths {
-        present.extend(probe(path)?.columns);
+        let probe = probe(path)?;
+        if !probe.is_described {
+            // Checked when all files were read.
+            return Ok(());
+        }
+        present.extend(probe.columns);
     }
     attributes.check(&present)
 }
@@ -185,12 +190,15 @@ fn read_all(
     let mut stats = IngestStats::default();
     let mut systems = Systems::default();
     let mut shared = false;
+    let mut present = Vec::new();
     for path in paths {
         workspace.check_cancel()?;
         let opened = Opened::new(Input::open(path, workspace)?)?;
         let number = sources.len() as u32;
         let scanners = selection.scanners && opened.has_scanners();
-        let wanted = Wanted::of(&selection.attributes, &opened.file.columns(), scanners)?;
+        let columns = opened.file.columns();
+        let wanted = Wanted::of(&selection.attributes, &columns, scanners)?;
+        present.extend(columns);
         let target = SourceWriter::new(workspace, name, section, number, classes, &wanted)?
             .within(nearby.as_ref(), opened.claims.native);
         let outside =
@@ -241,6 +249,7 @@ fn read_all(
     if shared {
         return Err(Error::Shared);
     }
+    selection.attributes.check(&present)?;
     if let Some(crop) = crop.filter(|_| stats.kept == 0) {
         crop.check_met(&sources)?;
     }

@@ -101,6 +101,12 @@ pub(super) trait PointFile {
         Vec::new()
     }
 
+    /// False if columns, reference system and scanners are not known, since only the beginning of a compressed file is
+    /// at hand.
+    fn is_described(&self) -> bool {
+        true
+    }
+
     /// The columns of the file. A [`SourceWriter`] says which are wanted, by their numbers in this list.
     fn columns(&self) -> Vec<Column> {
         Vec::new()

@@ -35,6 +35,8 @@ pub struct Probe {
     pub offset: Option<[f64; 3]>,
     /// Smallest and largest coordinates given in the header of LAS and LAZ.
     pub bounds: Option<[[f64; 3]; 2]>,
+    /// False if its columns are not known: they are described behind the points of a compressed file.
+    pub is_described: bool,
     /// Columns of its points beside the coordinates.
     pub columns: Vec<Column>,
     /// Bytes of the number of the scanner that saw a point, if the file gives positions of scanners.
@@ -88,6 +90,7 @@ pub fn probe(path: &Path) -> Result<Probe> {
             true => size_of::<u16>() as u64,
             false => 0,
         },
+        is_described: file.is_described(),
         columns: file.columns(),
         spool_bytes_per_point: claims.native.point_bytes() as u64,
         path: input.path,

@@ -298,8 +298,8 @@ fn an_unknown_extension_is_refused_before_any_work() {
 #[test]
 fn a_mesh_too_large_for_its_format_is_refused_before_any_work() {
     let bench = Bench::new();
-    // A LAS file of zeros, on no disk: 150 million points of 20 bytes.
-    let points = 150_000_000u32;
+    // A LAS file of zeros, on no disk: 300 million points of 20 bytes.
+    let points = 300_000_000u32;
     let mut header = vec![0; 227];
     header[..4].copy_from_slice(b"LASF");
     header[24..26].copy_from_slice(&[1, 2]);

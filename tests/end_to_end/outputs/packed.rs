@@ -14,8 +14,18 @@ use serde_json::Value;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-/// A corner: bits of its numbers of steps as floats, and its colour.
-type Corner = ([u32; 3], [u8; 3]);
+/// A corner: bits of its numbers of steps as floats, its colour in sRGB, and its normal in steps of 2^-12.
+type Corner = ([u32; 3], [u8; 3], [i32; 3]);
+
+/// Linear light as a component of sRGB in 8 bits.
+fn srgb(light: u32) -> u8 {
+    let x = f64::from(light) / 65535.0;
+    let encoded = match x <= 0.003_130_8 {
+        true => x * 12.92,
+        false => 1.055 * x.powf(1.0 / 2.4) - 0.055,
+    };
+    (encoded * 255.0).round() as u8
+}
 
 /// A compressed GLB as it is read.
 struct Packed {
@@ -90,6 +100,8 @@ fn read(path: &Path) -> Packed {
         let colours = attributes
             .get("COLOR_0")
             .map(|c| decoded(&document, buffer, c));
+        let normals = attributes.get("NORMAL");
+        let normals = normals.map(|n| words_of(&decoded(&document, buffer, n)));
         let indices = words_of(&decoded(&document, buffer, &primitive["indices"]));
         // None is unused.
         let vertices = words.len() / 3;
@@ -98,10 +110,22 @@ fn read(path: &Path) -> Packed {
             let v = v as usize;
             used[v] = true;
             let colour = colours.as_ref().map_or([0; 3], |c| {
-                assert_eq!(c[4 * v + 3], 255);
-                [c[4 * v], c[4 * v + 1], c[4 * v + 2]]
+                let light = |k: usize| u16::from_le_bytes([c[8 * v + 2 * k], c[8 * v + 2 * k + 1]]);
+                assert_eq!(light(3), u16::MAX);
+                [0, 1, 2].map(|k| srgb(light(k).into()))
             });
-            ([words[3 * v], words[3 * v + 1], words[3 * v + 2]], colour)
+            let normal = normals.as_ref().map_or([0; 3], |n| {
+                [0, 1, 2].map(|k| {
+                    let steps = f32::from_bits(n[3 * v + k]) * 4096.0;
+                    assert_eq!(steps, steps.round());
+                    steps as i32
+                })
+            });
+            (
+                [words[3 * v], words[3 * v + 1], words[3 * v + 2]],
+                colour,
+                normal,
+            )
         };
         for t in indices.as_chunks::<3>().0 {
             triangles.push(from_smallest(t.map(&mut corner)));
@@ -140,8 +164,14 @@ fn expected(path: &Path, packed: &Packed) -> Vec<[Corner; 3]> {
     let vertex = &header.elements[0];
     let has_colours = vertex.properties.last().unwrap().0 == "blue";
     if has_colours {
-        assert_eq!(vertex.properties[5].1, Property::One(Scalar::U8));
+        let last = vertex.properties.last().unwrap();
+        assert_eq!(last.1, Property::One(Scalar::U8));
     }
+    let width = match vertex.properties[0].1 {
+        Property::One(Scalar::F64) => 8,
+        _ => 4,
+    };
+    let has_normals = vertex.properties[3..].iter().any(|p| p.0 == "nx");
     let size = vertex.record_bytes().unwrap();
     let start = bytes
         .windows(11)
@@ -161,7 +191,15 @@ fn expected(path: &Path, packed: &Packed) -> Vec<[Corner; 3]> {
             true => bytes[end - 3..end].try_into().unwrap(),
             false => [0; 3],
         };
-        (steps, colour)
+        let normal = match has_normals {
+            true => [0, 1, 2].map(|k| {
+                let at = start + v as usize * size + 3 * width + 4 * k;
+                let x = f32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
+                (x * 4096.0).round() as i32
+            }),
+            false => [0; 3],
+        };
+        (steps, colour, normal)
     };
     let mut all: Vec<_> = mesh
         .triangles
@@ -189,8 +227,13 @@ fn coloured(bench: &Bench, points: u64) -> PathBuf {
 }
 
 fn params(compress: bool) -> Params {
+    with_normals(compress, false)
+}
+
+fn with_normals(compress: bool, normals: bool) -> Params {
     Params {
         block: 1500,
+        normals,
         compress_glb: compress,
         attributes: "auto".parse().unwrap(),
         ..Params::default()
@@ -207,22 +250,24 @@ fn the_mesh_is_exact_in_one_file_and_in_squares() {
         // Numbers of steps have more bits than floats.
         (bench.cloud("doubles.ply", &cloud(20_000)), false),
     ];
-    for (input, colours) in inputs {
+    for ((input, colours), normals) in inputs.into_iter().zip([true, true, false]) {
         println!("{}", input.display());
         let (ply, glb) = (bench.path("mesh.ply"), bench.path("mesh.glb"));
-        let report = util::reconstruct(&input, &ply, &params(false));
-        let again = util::reconstruct(&input, &glb, &params(true));
+        let report = util::reconstruct(&input, &ply, &with_normals(false, normals));
+        let again = util::reconstruct(&input, &glb, &with_normals(true, normals));
         assert_eq!(report.mesh, again.mesh);
         let packed = read(&glb);
         assert!(packed.pieces > 5);
         let whole = expected(&ply, &packed);
         assert_eq!(whole.iter().flatten().any(|c| c.1 != [0; 3]), colours);
+        let is_turned = |c: &Corner| c.2.iter().map(|x| x * x).sum::<i32>() > 4000 * 4000;
+        assert!(whole.iter().flatten().all(|c| is_turned(c) == normals));
         assert!(packed.triangles == whole);
 
         // One file for each square: the same triangles, from origins of their own.
         let side = Params {
             split: Some(300.0),
-            ..params(true)
+            ..with_normals(true, normals)
         };
         let squares = bench.subfolder("squares");
         let report = util::reconstruct(&input, &squares.join("mesh.glb"), &side);
@@ -251,10 +296,11 @@ fn the_bytes_do_not_depend_on_threads_memory_and_parts() {
     let bench = Bench::new();
     let input = coloured(&bench, 30_000);
     let glb = bench.path("mesh.glb");
-    util::reconstruct(&input, &glb, &params(true));
+    let params = with_normals(true, true);
+    util::reconstruct(&input, &glb, &params);
     let expected = std::fs::read(&glb).unwrap();
     for (threads, memory, tile, page) in [(1, MINIMUM_BUDGET, 97, 7), (3, 4 << 30, 500, 64)] {
-        let builder = util::builder(std::slice::from_ref(&input), &glb, &params(true))
+        let builder = util::builder(std::slice::from_ref(&input), &glb, &params)
             .threads(threads)
             .memory(memory)
             .tile_points(tile)
@@ -272,16 +318,11 @@ fn the_bytes_do_not_depend_on_threads_memory_and_parts() {
 fn only_glb_can_be_compressed_so() {
     let bench = Bench::new();
     let input = bench.cloud("cloud.xyz", &cloud(500));
-    for (name, more) in [
-        ("mesh.ply", None),
-        ("mesh.glb.zst", None),
-        ("mesh.glb", Some("--normals")),
-    ] {
+    for name in ["mesh.ply", "mesh.glb.zst"] {
         let output = bench.path(name);
         let arguments = ["reconstruct", "--compress-glb", "-o"].map(std::ffi::OsStr::new);
         let rest = [output.as_os_str(), input.as_os_str()];
-        let more = more.map(std::ffi::OsStr::new);
-        let said = util::run(arguments.into_iter().chain(rest).chain(more));
+        let said = util::run(arguments.into_iter().chain(rest));
         assert_eq!(said.code, Some(2), "{said:?}");
         assert!(said.err.contains("--compress-glb"), "{said:?}");
         assert_eq!(said.err.lines().count(), 1, "{said:?}");

@@ -72,8 +72,41 @@ impl PointFormat for E57 {
             let expected = format!("at most {}, the size of the file", input.bytes);
             return Err(input.error("length at byte 16", format!("{length} bytes"), expected));
         }
-        let description = Description::read(input, u64_at(bytes, 24), u64_at(bytes, 32))?;
-        Ok(Box::new(Scans::of(description)))
+        match Description::read(input, u64_at(bytes, 24), u64_at(bytes, 32)) {
+            Ok(description) => Ok(Box::new(Scans::of(description))),
+            // The description is behind the points, and only the beginning of the content is at hand.
+            Err(_) if input.is_compressed() => Ok(Box::new(Beginning {
+                length: length.min(input.bytes),
+            })),
+            Err(e) => Err(e),
+        }
+    }
+}
+
+/// The beginning of a compressed file, without its description.
+struct Beginning {
+    /// Bytes of the content.
+    length: u64,
+}
+
+/// Bytes of a record in a file whose description is not known.
+const USUAL: u64 = 16;
+
+impl PointFile for Beginning {
+    fn claims(&self, input: &Input) -> Claims {
+        let points = self.length / USUAL;
+        Claims {
+            points: None,
+            ..Claims::new(input, Format::E57, Native::F64, points, 1)
+        }
+    }
+
+    fn is_described(&self) -> bool {
+        false
+    }
+
+    fn read(&self, input: &Input, _: &SourceWriter<'_>) -> Result<Vec<String>> {
+        Err(input.error("description", "the beginning of the file", "the whole file"))
     }
 }
 

@@ -1,9 +1,11 @@
-//! The columns of a record: all fields but the position and the flags.
+//! The columns of a record: all fields but the position and the flags, and extra bytes that are described.
 
 use super::super::columns::{CLASSIFICATION, COLORS, Column, INTENSITY, Wanted};
+use super::extra::{Extra, Value};
 use super::{CLASS, FLAGS, Header};
 use laz::DecompressionSelection;
 use outcrop_ply::Scalar;
+use std::borrow::Cow;
 
 /// Degrees for each unit of the scan angle in point formats 6 to 10.
 const ANGLE: f64 = 0.006;
@@ -20,12 +22,14 @@ enum Stored {
     Bits(u32, u8),
     /// Units of this many degrees.
     Angle(Scalar, f64),
+    /// Among the extra bytes.
+    Extra(Value),
 }
 
 /// A field of a record.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(super) struct Field {
-    name: &'static str,
+    name: Cow<'static, str>,
     scalar: Scalar,
     /// Byte in the record.
     at: usize,
@@ -34,9 +38,9 @@ pub(super) struct Field {
 }
 
 impl Field {
-    const fn plain(name: &'static str, scalar: Scalar, at: usize, layer: Layer) -> Self {
+    fn plain(name: &'static str, scalar: Scalar, at: usize, layer: Layer) -> Self {
         Self {
-            name,
+            name: Cow::Borrowed(name),
             scalar,
             at,
             stored: Stored::Plain,
@@ -44,18 +48,28 @@ impl Field {
         }
     }
 
-    const fn bits(name: &'static str, at: usize, shift: u32, mask: u8, layer: Layer) -> Self {
+    fn bits(name: &'static str, at: usize, shift: u32, mask: u8, layer: Layer) -> Self {
         Self {
             stored: Stored::Bits(shift, mask),
             ..Self::plain(name, Scalar::U8, at, layer)
         }
     }
 
-    const fn angle(of: Scalar, at: usize, degrees: f64) -> Self {
+    fn angle(of: Scalar, at: usize, degrees: f64) -> Self {
         let layer = DecompressionSelection::decompress_scan_angle;
         Self {
             stored: Stored::Angle(of, degrees),
             ..Self::plain("scan_angle", Scalar::F32, at, layer)
+        }
+    }
+
+    fn extra(extra: &Extra) -> Self {
+        Self {
+            name: Cow::Owned(extra.name.clone()),
+            scalar: extra.value.scalar(),
+            at: extra.at,
+            stored: Stored::Extra(extra.value),
+            layer: DecompressionSelection::decompress_extra_bytes,
         }
     }
 
@@ -70,6 +84,7 @@ impl Field {
                 let value = outcrop_ply::real(of, bytes, false) * degrees;
                 self.scalar.put(value, values);
             }
+            Stored::Extra(value) => value.put(bytes, values),
         }
     }
 }
@@ -138,13 +153,20 @@ fn all(header: &Header) -> Vec<Field> {
             Layers::decompress_nir,
         ));
     }
+    for extra in &header.extra {
+        let mut field = Field::extra(extra);
+        if fields.iter().any(|other| other.name == field.name) {
+            field.name = format!("extra_{}", field.name).into();
+        }
+        fields.push(field);
+    }
     fields
 }
 
 /// The columns of records of this file.
 pub(super) fn columns(header: &Header) -> Vec<Column> {
     let column = |field: Field| Column {
-        name: field.name.to_owned(),
+        name: field.name.into_owned(),
         scalar: field.scalar,
     };
     all(header).into_iter().map(column).collect()
@@ -157,7 +179,7 @@ pub(super) struct Fields(Vec<Field>);
 impl Fields {
     pub(super) fn of(header: &Header, wanted: &Wanted) -> Self {
         let all = all(header);
-        Self(wanted.numbers.iter().map(|n| all[*n]).collect())
+        Self(wanted.numbers.iter().map(|n| all[*n].clone()).collect())
     }
 
     /// Appends the values in a record.

@@ -1,6 +1,7 @@
 //! The public header block, read leniently: fields without influence on positions are not checked.
 
 use super::super::input::Input;
+use super::extra::{self, Extra};
 use crate::error::Result;
 use las::point::Format;
 use las::raw;
@@ -33,6 +34,8 @@ pub(super) struct Header {
     pub(super) data_end: u64,
     pub(super) scale: [f64; 3],
     pub(super) offset: [f64; 3],
+    /// Numbers in the extra bytes of a record.
+    pub(super) extra: Vec<Extra>,
     pub(super) warnings: Vec<String>,
 }
 
@@ -62,9 +65,11 @@ impl Header {
             data_end: data_end.min().unwrap_or(input.bytes),
             scale: [raw.x_scale_factor, raw.y_scale_factor, raw.z_scale_factor],
             offset: [raw.x_offset, raw.y_offset, raw.z_offset],
+            extra: Vec::new(),
             warnings: Vec::new(),
             raw,
         };
+        header.extra = extra::read(input, &header);
         if header.raw.version.minor > 4 {
             let warning = format!("LAS version {} is read as 1.4", header.raw.version);
             header.warnings.push(warning);

@@ -3,6 +3,7 @@
 mod chunks;
 mod copc;
 mod crs;
+mod extra;
 mod fields;
 mod gps;
 mod header;
