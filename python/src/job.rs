@@ -80,7 +80,11 @@ impl Job {
         Self::begin(move |shared| {
             let workspace = workspace(shared)?;
             convert::to_glb(&mesh, &output, comments, &workspace)?;
-            Ok(Outcome::Answer(("null".into(), String::new(), Some(output))))
+            Ok(Outcome::Answer((
+                "null".into(),
+                String::new(),
+                Some(output),
+            )))
         })
     }
 
