@@ -1,9 +1,10 @@
 //! Makes the tiles: leaves from the cells, every other tile from its children.
 
 use super::cells::Cells;
-use super::distance::{self, measure};
+use super::distance::measure;
 use super::glb::{self, Grids};
 use super::intake::Intake;
+use super::nearest;
 use super::node::{Bounds, INNER, Node};
 use super::rows::LevelWord;
 use super::shared::{Shared, boundary, bytes};
@@ -368,7 +369,7 @@ impl Points {
 
     /// The distance of these triangles from those of the node, in steps.
     fn distance(&self, node: &Node, triangles: &[[u32; 3]]) -> f64 {
-        let surface = |triangles| distance::Surface {
+        let surface = |triangles| nearest::Surface {
             points: &self.points,
             triangles,
         };

@@ -15,6 +15,7 @@ mod glb;
 mod intake;
 mod lattice;
 mod make;
+mod nearest;
 mod node;
 mod report;
 mod rows;
