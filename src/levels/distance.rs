@@ -7,13 +7,14 @@
 
 use super::nearest::{Hint, Surface, Tree, V3};
 
-fn distance(p: V3, q: V3) -> f64 {
+/// Squared distance of two points.
+fn squared(p: V3, q: V3) -> f64 {
     let (x, y, z) = (p[0] - q[0], p[1] - q[1], p[2] - q[2]);
-    (x * x + y * y + z * z).sqrt()
+    x * x + y * y + z * z
 }
 
 fn longest([a, b, c]: [V3; 3]) -> f64 {
-    distance(a, b).max(distance(b, c)).max(distance(c, a))
+    squared(a, b).max(squared(b, c)).max(squared(c, a)).sqrt()
 }
 
 /// A point of a triangle is at most this times its longest edge from the nearest corner.
@@ -69,7 +70,8 @@ fn from_coarse(fine: Surface<'_>, coarse: Surface<'_>, farthest: f64) -> f64 {
                     continue;
                 }
                 let p = between(corners, [i, j, k].map(|w| w as f64 / parts as f64));
-                if corners.iter().all(|corner| distance(*corner, p) > farthest) {
+                let within2 = farthest * farthest;
+                if corners.iter().all(|corner| squared(*corner, p) > within2) {
                     farthest = farthest.max(tree.distance(p, farthest, hint));
                 }
             }
@@ -89,12 +91,15 @@ fn near_kept(fine: Surface<'_>, kept: &[bool]) -> Vec<f32> {
         for triangle in fine.triangles {
             for (a, b) in [(0, 1), (1, 2), (2, 0)] {
                 let [a, b] = [triangle[a] as usize, triangle[b] as usize];
-                // A length of 0 at least, so one of them may be nearer by way of the other only if this differs.
-                if near[a] != near[b] {
-                    let edge = distance(fine.points[a], fine.points[b]) as f32;
-                    let least = (near[a].min(near[b]) + edge) * 1.000_001;
-                    near[a] = near[a].min(least);
-                    near[b] = near[b].min(least);
+                let apart = near[a] - near[b];
+                // Equal ones, also if both are not known, cannot be nearer by way of each other.
+                if apart != 0.0 && !apart.is_nan() {
+                    let edge2 = squared(fine.points[a], fine.points[b]) as f32;
+                    if apart * apart > edge2 {
+                        let least = (near[a].min(near[b]) + edge2.sqrt()) * 1.000_001;
+                        near[a] = near[a].min(least);
+                        near[b] = near[b].min(least);
+                    }
                 }
             }
         }
@@ -124,7 +129,7 @@ fn from_fine(fine: Surface<'_>, coarse: Surface<'_>, kept: &[bool]) -> f64 {
         for weights in SAMPLES {
             let p = between(corners, weights);
             let mut bounds = corners.iter().zip(nearest);
-            if bounds.all(|(corner, near)| near + distance(*corner, p) > farthest) {
+            if bounds.all(|(corner, near)| near + squared(*corner, p).sqrt() > farthest) {
                 farthest = farthest.max(tree.distance(p, farthest, &mut hint));
             }
         }

@@ -74,8 +74,8 @@ pub(super) struct Tree<'a> {
     levels: Vec<Vec<Bounds>>,
 }
 
-/// Where the last search ended: the next one, of a point nearby, begins there.
-pub(super) type Hint = usize;
+/// Leaf and triangle where the last search ended: the next one, of a point nearby, begins there.
+pub(super) type Hint = (usize, usize);
 
 impl<'a> Tree<'a> {
     pub fn new(surface: Surface<'a>) -> Self {
@@ -125,10 +125,11 @@ impl<'a> Tree<'a> {
             enough2: enough * enough,
             best2: f64::INFINITY,
         };
-        if !search.leaf(*hint)
-            && let Some(found) = search.below(self.levels.len() - 1, 0)
-        {
-            *hint = found;
+        let (leaf, triangle) = *hint;
+        if !search.is_enough(triangle) {
+            let found = search.leaf(leaf);
+            let found = found.or_else(|| search.below(self.levels.len() - 1, 0));
+            *hint = found.unwrap_or(*hint);
         }
         search.best2.sqrt()
     }
@@ -145,29 +146,30 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// Looks at the triangles of a leaf; true if that is enough.
-    fn leaf(&mut self, leaf: usize) -> bool {
-        if self.tree.levels[0][leaf].reach2(self.p) <= self.enough2 {
-            self.best2 = 0.0;
-            return true;
-        }
-        let surface = &self.tree.surface;
-        let first = self.tree.runs[leaf] as usize * RUN;
-        for triangle in first..(first + RUN).min(surface.triangles.len()) {
-            let found = distance2(&surface.corners(triangle), self.p);
-            self.best2 = self.best2.min(found);
-            if self.best2 <= self.enough2 {
-                return true;
-            }
-        }
-        false
+    /// Looks at a triangle; true if that is enough.
+    fn is_enough(&mut self, triangle: usize) -> bool {
+        let found = distance2(&self.tree.surface.corners(triangle), self.p);
+        self.best2 = self.best2.min(found);
+        self.best2 <= self.enough2
     }
 
-    /// Looks at all that is in a box, the nearest first; returns the leaf where the search ended. The depth of the
+    /// Looks at the triangles of a leaf; returns the one that is enough.
+    fn leaf(&mut self, leaf: usize) -> Option<Hint> {
+        let first = self.tree.runs[leaf] as usize * RUN;
+        if self.tree.levels[0][leaf].reach2(self.p) <= self.enough2 {
+            self.best2 = self.enough2;
+            return Some((leaf, first));
+        }
+        let end = (first + RUN).min(self.tree.surface.triangles.len());
+        let found = (first..end).find(|triangle| self.is_enough(*triangle));
+        found.map(|triangle| (leaf, triangle))
+    }
+
+    /// Looks at all that is in a box, the nearest first; returns the triangle that is enough. The depth of the
     /// recursion is the number of levels.
-    fn below(&mut self, level: usize, number: usize) -> Option<usize> {
+    fn below(&mut self, level: usize, number: usize) -> Option<Hint> {
         if level == 0 {
-            return self.leaf(number).then_some(number);
+            return self.leaf(number);
         }
         let inside = &self.tree.levels[level - 1];
         let first = number * WIDTH;
@@ -226,7 +228,7 @@ mod tests {
                 let nearest = all.fold(f64::INFINITY, f64::min).sqrt();
                 let found = tree.distance(p, enough, &mut hint);
                 prop_assert_eq!(found.max(enough), nearest.max(enough));
-                prop_assert_eq!(tree.distance(p, 0.0, &mut 0), nearest);
+                prop_assert_eq!(tree.distance(p, 0.0, &mut Hint::default()), nearest);
             }
         }
     }
