@@ -68,6 +68,7 @@ pub mod inspect;
 #[doc(hidden)]
 pub mod kernels;
 pub mod levels;
+mod meshopt;
 mod method;
 pub mod page;
 pub mod params;

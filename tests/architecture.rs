@@ -22,7 +22,8 @@ const MAY_USE: &[(&str, &str)] = &[
          workspace",
     ),
     ("kernels", ""),
-    ("levels", "inspect spill stages/ingest workspace"),
+    ("levels", "inspect meshopt spill stages/ingest workspace"),
+    ("meshopt", ""),
     ("method", ""),
     (
         "params",
@@ -58,7 +59,7 @@ const MAY_USE: &[(&str, &str)] = &[
     ),
     (
         "stages/export",
-        "stages/attributes stages/blocks stages/cut stages/ingest stages/order stages/repair stages/surface",
+        "meshopt stages/attributes stages/blocks stages/cut stages/ingest stages/order stages/repair stages/surface",
     ),
     ("stages/ingest", ""),
     (

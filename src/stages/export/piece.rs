@@ -1,11 +1,11 @@
 //! A part of a mesh with vertices of its own, compressed for `EXT_meshopt_compression`.
 
 use super::format::Mesh;
-use super::meshopt;
 use super::parts::Parts;
 use super::write::Writer;
 use crate::error::Result;
 use crate::geom::Point;
+use crate::meshopt;
 use crate::workspace::Unit;
 use crate::workspace::memory::bytes_of;
 
