@@ -58,6 +58,12 @@ pub(super) struct Maker<'a> {
     pub made: Vec<Made>,
 }
 
+/// The number of triangles to which `count` are simplified, if a cell has at most `most`.
+pub(super) fn target(count: usize, most: u32) -> usize {
+    let [least, most] = TARGETS.map(|part| (part * f64::from(most)) as usize);
+    (count / PART).clamp(least, most).min(count / 2)
+}
+
 /// The bounds of all nodes.
 pub(super) fn bounds(nodes: &[TreeNode], cells: &[Bounds]) -> Vec<Bounds> {
     let mut all: Vec<Bounds> = Vec::with_capacity(nodes.len());
@@ -223,8 +229,7 @@ impl Maker<'_> {
         let joined = join(nodes);
         let is_root = number + 1 == self.nodes.len();
         let count = joined.triangles.len();
-        let [least, most] = TARGETS.map(|part| (part * f64::from(self.most)) as usize);
-        let mut target = (count / PART).clamp(least, most).min(count / 2);
+        let mut target = target(count, self.most);
         let mut manner = Manner::Careful;
         let errors = children.iter().map(|child| self.made[*child].error);
         let below = errors.fold(0.0, f64::max);
