@@ -72,6 +72,7 @@ pub mod inspect;
 pub mod kernels;
 pub mod levels;
 mod light;
+mod meshopt;
 mod method;
 pub mod page;
 pub mod params;

@@ -9,6 +9,7 @@ mod disk;
 mod manifest;
 mod origin;
 mod outlook;
+mod resources;
 mod shared;
 mod stages;
 mod start;

@@ -23,8 +23,9 @@ const MAY_USE: &[(&str, &str)] = &[
          workspace",
     ),
     ("kernels", ""),
-    ("levels", "inspect light spill stages/ingest workspace"),
+    ("levels", "inspect light meshopt spill stages/ingest workspace"),
     ("light", ""),
+    ("meshopt", ""),
     ("method", ""),
     (
         "params",
@@ -60,7 +61,7 @@ const MAY_USE: &[(&str, &str)] = &[
     ),
     (
         "stages/export",
-        "light stages/attributes stages/blocks stages/cut stages/ingest stages/order stages/repair stages/surface",
+        "light meshopt stages/attributes stages/blocks stages/cut stages/ingest stages/order stages/repair stages/surface",
     ),
     ("stages/ingest", ""),
     (

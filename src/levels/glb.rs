@@ -3,15 +3,11 @@
 use super::columns::Columns;
 use super::lattice::Lattice;
 use super::node::Node;
-use super::simplify::failed;
-use crate::error::Result;
-use crate::light;
-use meshoptimizer_rs::Workspace;
-use meshoptimizer_rs::codec::{
-    IndexEncoding, VertexEncoding, encode_index_buffer, encode_index_sequence, encode_vertex_buffer,
-};
+use crate::error::{Error, Result};
+use crate::{light, meshopt};
 use outcrop_ply::Scalar;
 use serde_json::{Value, json};
+use std::path::Path;
 
 /// Component types of glTF.
 fn component(scalar: Scalar) -> u32 {
@@ -57,16 +53,21 @@ pub(super) fn low_bits(half: u32) -> u32 {
         .unwrap_or(31)
 }
 
-struct Writer<'a> {
+#[derive(Default)]
+struct Writer {
     bytes: Vec<u8>,
     views: Vec<Value>,
     accessors: Vec<Value>,
     /// Bytes of all views when they are decoded.
     decoded: usize,
-    workspace: &'a mut Workspace,
 }
 
-impl Writer<'_> {
+/// The data, if they could be encoded.
+fn encoded(data: std::io::Result<Vec<u8>>) -> Result<Vec<u8>> {
+    data.map_err(|e| Error::io(Path::new("tile"), "encode", e))
+}
+
+impl Writer {
     /// Adds a buffer view of compressed data; returns its number.
     fn view(
         &mut self,
@@ -105,9 +106,7 @@ impl Writer<'_> {
         accessor: Value,
     ) -> Result<usize> {
         let count = data.len() / stride;
-        let encoding = VertexEncoding::new(0, 0).map_err(|e| failed("encode vertices", e))?;
-        let packed = encode_vertex_buffer(data, count, stride, encoding, self.workspace);
-        let packed = packed.map_err(|e| failed("encode vertices", e))?;
+        let packed = encoded(meshopt::vertices(data, stride))?;
         let view = self.view((packed, "ATTRIBUTES", filter), (count, stride), 34962);
         let mut accessor = accessor;
         accessor["bufferView"] = view.into();
@@ -116,27 +115,21 @@ impl Writer<'_> {
         Ok(self.accessors.len() - 1)
     }
 
-    /// Adds indices, of triangles or lines.
-    fn indices(&mut self, indices: &[u32], vertices: usize, triangles: bool) -> Result<usize> {
-        let (encoding, workspace) = (IndexEncoding::DEFAULT, &mut *self.workspace);
-        let (packed, mode) = match triangles {
-            true => (
-                encode_index_buffer(indices, encoding, workspace),
-                "TRIANGLES",
-            ),
-            false => (
-                encode_index_sequence(indices, encoding, workspace),
-                "INDICES",
-            ),
-        };
-        let packed = packed.map_err(|e| failed("encode indices", e))?;
+    /// Adds indices of corners or ends, encoded so.
+    fn indices(
+        &mut self,
+        (packed, mode): (std::io::Result<Vec<u8>>, &str),
+        count: usize,
+        vertices: usize,
+    ) -> Result<usize> {
+        let packed = encoded(packed)?;
         let (stride, component) = match vertices < 1 << 16 {
             true => (2, UNSIGNED_SHORT),
             false => (4, UNSIGNED_INT),
         };
-        let view = self.view((packed, mode, None), (indices.len(), stride), 34963);
+        let view = self.view((packed, mode, None), (count, stride), 34963);
         self.accessors.push(json!({
-            "bufferView": view, "componentType": component, "count": indices.len(), "type": "SCALAR",
+            "bufferView": view, "componentType": component, "count": count, "type": "SCALAR",
         }));
         Ok(self.accessors.len() - 1)
     }
@@ -155,14 +148,7 @@ pub(super) fn write(
     boundary: &[[u32; 2]],
     (grids, columns): (&Grids<'_>, &Columns),
 ) -> Result<Vec<u8>> {
-    let mut workspace = Workspace::default();
-    let mut writer = Writer {
-        bytes: Vec::new(),
-        views: Vec::new(),
-        accessors: Vec::new(),
-        decoded: 0,
-        workspace: &mut workspace,
-    };
+    let mut writer = Writer::default();
     let place = place(node, grids);
     let mut attributes = positions(&mut writer, node, depth, (grids, place))?;
     let normals: Vec<u8> = node
@@ -176,12 +162,14 @@ pub(super) fn write(
         .into();
     values(&mut writer, node, columns, &mut attributes)?;
     let vertices = node.ids.len();
-    let indices = writer.indices(node.triangles.as_flattened(), vertices, true)?;
+    let packed = (meshopt::triangles(&node.triangles), "TRIANGLES");
+    let indices = writer.indices(packed, 3 * node.triangles.len(), vertices)?;
     let mut primitives = vec![json!({
         "attributes": attributes, "indices": indices, "mode": 4, "material": 0,
     })];
     if !boundary.is_empty() {
-        let indices = writer.indices(boundary.as_flattened(), vertices, false)?;
+        let packed = (meshopt::sequence(boundary.as_flattened()), "INDICES");
+        let indices = writer.indices(packed, 2 * boundary.len(), vertices)?;
         primitives.push(json!({
             "attributes": attributes, "indices": indices, "mode": 1, "material": 0,
         }));
@@ -249,7 +237,7 @@ fn container(json: &Value, binary: &[u8]) -> Vec<u8> {
 
 /// Positions as whole steps from the place, in the filter `EXPONENTIAL`, and the bits that this leaves out.
 fn positions(
-    writer: &mut Writer<'_>,
+    writer: &mut Writer,
     node: &Node,
     depth: u32,
     (grids, place): (&Grids<'_>, [u32; 3]),
@@ -287,7 +275,7 @@ fn positions(
 
 /// Colours and other values.
 fn values(
-    writer: &mut Writer<'_>,
+    writer: &mut Writer,
     node: &Node,
     columns: &Columns,
     attributes: &mut Value,

@@ -53,6 +53,10 @@ pub(super) fn read(path: &Path, workspace: &Workspace) -> Result<Intake> {
         let columns = Columns::of(&mesh);
         let _held = workspace.reserve("levels: reading", bytes(&columns, mesh.vertices()))?;
         let total = mesh.vertices() + mesh.faces();
+        if !workspace.is_shared() {
+            let stages = super::outlook::all(mesh.faces(), workspace.threads);
+            workspace.observer.plan(&stages);
+        }
         workspace
             .observer
             .begin("read mesh", "vertices and faces", total);

@@ -1,9 +1,10 @@
 //! Makes the tiles: leaves from the cells, every other tile from its children.
 
 use super::cells::Cells;
-use super::distance::{self, measure};
+use super::distance::measure;
 use super::glb::{self, Grids};
 use super::intake::Intake;
+use super::nearest;
 use super::node::{Bounds, INNER, Node};
 use super::rows::LevelWord;
 use super::shared::{Shared, boundary, bytes};
@@ -55,6 +56,12 @@ pub(super) struct Maker<'a> {
     /// The GLB files, as words, by tile.
     pub files: Table<LevelWord>,
     pub made: Vec<Made>,
+}
+
+/// The number of triangles to which `count` are simplified, if a cell has at most `most`.
+pub(super) fn target(count: usize, most: u32) -> usize {
+    let [least, most] = TARGETS.map(|part| (part * f64::from(most)) as usize);
+    (count / PART).clamp(least, most).min(count / 2)
 }
 
 /// The bounds of all nodes.
@@ -222,8 +229,7 @@ impl Maker<'_> {
         let joined = join(nodes);
         let is_root = number + 1 == self.nodes.len();
         let count = joined.triangles.len();
-        let [least, most] = TARGETS.map(|part| (part * f64::from(self.most)) as usize);
-        let mut target = (count / PART).clamp(least, most).min(count / 2);
+        let mut target = target(count, self.most);
         let mut manner = Manner::Careful;
         let errors = children.iter().map(|child| self.made[*child].error);
         let below = errors.fold(0.0, f64::max);
@@ -368,7 +374,7 @@ impl Points {
 
     /// The distance of these triangles from those of the node, in steps.
     fn distance(&self, node: &Node, triangles: &[[u32; 3]]) -> f64 {
-        let surface = |triangles| distance::Surface {
+        let surface = |triangles| nearest::Surface {
             points: &self.points,
             triangles,
         };

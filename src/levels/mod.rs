@@ -14,7 +14,9 @@ mod glb;
 mod intake;
 mod lattice;
 mod make;
+mod nearest;
 mod node;
+pub(crate) mod outlook;
 mod report;
 mod rows;
 mod shared;
@@ -87,6 +89,13 @@ fn make(
             "a mesh with triangles",
         ));
     }
+    let plan = |stages: &[_]| {
+        if !workspace.is_shared() {
+            workspace.observer.plan(stages);
+        }
+    };
+    // Without the first, which is over.
+    plan(&outlook::all(intake.triangles, workspace.threads)[1..]);
     let cells = cells::divide(&intake, options.most_triangles, workspace)?;
     intake.sent.release(workspace)?;
     workspace.trim();
@@ -95,6 +104,8 @@ fn make(
     let shared = Shared::find(&intake, &cells, workspace)?;
     observer.end();
     let nodes = tree::build(&cells.cells);
+    let (most, threads) = (options.most_triangles, workspace.threads);
+    plan(&outlook::of_tree(&cells.cells, &nodes, most, threads));
     let bounds = make::bounds(&nodes, &shared.bounds);
     let low_bits = make::low_bits(&nodes, &bounds);
     let mut maker = Maker {

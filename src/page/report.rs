@@ -56,7 +56,7 @@ fn cards(report: &Report) -> Markup {
         .components_found
         .saturating_sub(repair.components_removed);
     let loops = report.details.as_ref().and_then(|d| d.loops.as_ref());
-    let memory = html! { "of " (bytes(report.memory_budget)) ", " (report.threads) " threads" };
+    let memory = html! { "of " (bytes(report.memory_budget)) ", " (counted(report.threads as u64, "thread")) };
     html! {
         div.cards {
             (card("Points read", &count(report.input.read), &html! { (count(report.points)) " distinct used" }))

@@ -1,15 +1,16 @@
 //! The builder of a reconstruction, with all checks before it begins.
 
+use super::Reconstruction;
 use super::manifest::Manifest;
+use super::resources::{Resources, resource_setters};
 use super::start::{Start, scratch_folder};
-use super::{Reconstruction, default_memory, default_threads};
 use crate::error::{Error, Result};
 use crate::levels;
 use crate::params::Params;
 use crate::stages::export::check_name;
 use crate::stages::order::PAGE;
 use crate::workspace::memory::MemoryPool;
-use crate::workspace::progress::{Cancel, Observer, Silent};
+use crate::workspace::progress::{Cancel, Observer};
 use crate::workspace::{Folder, Found, Storage};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -20,16 +21,10 @@ use std::time::Duration;
 pub struct Builder {
     inputs: Vec<PathBuf>,
     output: PathBuf,
-    scratch: Option<PathBuf>,
     params: Params,
-    memory: Option<u64>,
-    threads: Option<usize>,
     tile_points: Option<u32>,
     page_points: Option<usize>,
-    observer: Option<Arc<dyn Observer>>,
-    cancel: Cancel,
-    storage: Storage,
-    start: Start,
+    resources: Resources,
     /// The scratch folder, if an unfinished run is continued.
     folder: Option<PathBuf>,
     time_limit: Option<Duration>,
@@ -52,31 +47,12 @@ impl Builder {
         self
     }
 
-    /// Folder for scratch files; default: beside the output.
-    #[must_use]
-    pub fn scratch(mut self, path: impl Into<PathBuf>) -> Self {
-        self.scratch = Some(path.into());
-        self
-    }
+    resource_setters!();
 
     /// Parameters of the reconstruction.
     #[must_use]
     pub fn params(mut self, params: Params) -> Self {
         self.params = params;
-        self
-    }
-
-    /// Memory budget in bytes; default: half of what machine and cgroup allow.
-    #[must_use]
-    pub fn memory(mut self, bytes: u64) -> Self {
-        self.memory = Some(bytes);
-        self
-    }
-
-    /// Worker threads; default: all available.
-    #[must_use]
-    pub fn threads(mut self, threads: usize) -> Self {
-        self.threads = Some(threads);
         self
     }
 
@@ -91,34 +67,6 @@ impl Builder {
     #[must_use]
     pub fn page_points(mut self, points: usize) -> Self {
         self.page_points = Some(points);
-        self
-    }
-
-    /// Receiver of progress.
-    #[must_use]
-    pub fn observer(mut self, observer: Arc<dyn Observer>) -> Self {
-        self.observer = Some(observer);
-        self
-    }
-
-    /// How scratch files are read and written; does not change the result.
-    #[must_use]
-    pub fn storage(mut self, storage: Storage) -> Self {
-        self.storage = storage;
-        self
-    }
-
-    /// The flag that stops the run.
-    #[must_use]
-    pub fn cancel(mut self, cancel: Cancel) -> Self {
-        self.cancel = cancel;
-        self
-    }
-
-    /// Treatment of an unfinished run with the same output and scratch folder; default: an error.
-    #[must_use]
-    pub fn start(mut self, start: Start) -> Self {
-        self.start = start;
         self
     }
 
@@ -170,9 +118,9 @@ impl Builder {
             self.params.compress_glb = false;
         }
         check_name(named, self.params.compress_glb)?;
-        let budget = self.memory.unwrap_or_else(default_memory);
+        let resources = self.resources;
         let target = tiles.as_deref().unwrap_or(&self.output);
-        let folder = scratch_folder(target, self.scratch.as_deref());
+        let folder = scratch_folder(target, resources.scratch.as_deref());
         Ok(Reconstruction {
             goes_on: self.folder.is_some(),
             folder: self.folder.unwrap_or(folder),
@@ -180,15 +128,15 @@ impl Builder {
             output: self.output.clone(),
             mesh: mesh.unwrap_or(self.output),
             tiles,
-            memory: MemoryPool::new(budget)?,
-            threads: self.threads.unwrap_or_else(default_threads),
+            memory: MemoryPool::new(resources.memory())?,
+            threads: resources.threads(),
             tile_points: self.tile_points.unwrap_or(self.params.block),
             page_points: self.page_points.unwrap_or(PAGE),
             params: self.params,
-            observer: self.observer.unwrap_or_else(|| Arc::new(Silent)),
-            cancel: self.cancel,
-            storage: self.storage,
-            start: self.start,
+            observer: resources.observer,
+            cancel: resources.cancel,
+            storage: resources.storage,
+            start: resources.start,
             time_limit: self.time_limit,
             pictures: self.pictures,
         })

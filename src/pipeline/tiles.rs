@@ -1,10 +1,11 @@
 //! A run that makes a tileset, and that can be resumed.
 
-use super::{Start, default_memory, default_threads, start::scratch_folder};
+use super::resources::{Resources, resource_setters};
+use super::{Start, start::scratch_folder};
 use crate::error::{Error, Result};
 use crate::levels::{self, Options, TilesReport};
 use crate::workspace::memory::MemoryPool;
-use crate::workspace::progress::{Cancel, Observer, Silent};
+use crate::workspace::progress::{Cancel, Observer};
 use crate::workspace::{Folder, Found, Storage, Workspace, fault};
 use serde::{Deserialize, Serialize};
 use std::fs::File;
@@ -19,14 +20,8 @@ const FORMAT: &str = "tiles 1";
 pub struct Tiles {
     mesh: PathBuf,
     folder: PathBuf,
-    scratch: Option<PathBuf>,
     options: Options,
-    memory: Option<u64>,
-    threads: Option<usize>,
-    observer: Arc<dyn Observer>,
-    cancel: Cancel,
-    storage: Storage,
-    start: Start,
+    resources: Resources,
 }
 
 /// Mesh and options of a run, by which it is resumed.
@@ -103,16 +98,12 @@ impl Tiles {
         Self {
             mesh: mesh.into(),
             folder: folder.into(),
-            scratch: None,
             options: Options::default(),
-            memory: None,
-            threads: None,
-            observer: Arc::new(Silent),
-            cancel: Cancel::new(),
-            storage: Storage::default(),
-            start: Start::New,
+            resources: Resources::default(),
         }
     }
+
+    resource_setters!();
 
     /// Sets the options that decide the tileset.
     #[must_use]
@@ -121,66 +112,17 @@ impl Tiles {
         self
     }
 
-    /// Folder for scratch files; default: beside the output.
-    #[must_use]
-    pub fn scratch(mut self, path: impl Into<PathBuf>) -> Self {
-        self.scratch = Some(path.into());
-        self
-    }
-
-    /// Memory budget in bytes; default: half of what machine and cgroup allow.
-    #[must_use]
-    pub fn memory(mut self, bytes: u64) -> Self {
-        self.memory = Some(bytes);
-        self
-    }
-
-    /// Worker threads; default: all available.
-    #[must_use]
-    pub fn threads(mut self, threads: usize) -> Self {
-        self.threads = Some(threads);
-        self
-    }
-
-    /// Receiver of progress.
-    #[must_use]
-    pub fn observer(mut self, observer: Arc<dyn Observer>) -> Self {
-        self.observer = observer;
-        self
-    }
-
-    /// The flag that stops the run.
-    #[must_use]
-    pub fn cancel(mut self, cancel: Cancel) -> Self {
-        self.cancel = cancel;
-        self
-    }
-
-    /// How scratch files are read and written.
-    #[must_use]
-    pub fn storage(mut self, storage: Storage) -> Self {
-        self.storage = storage;
-        self
-    }
-
-    /// Treatment of an unfinished run with the same output and scratch folder; default: an error.
-    #[must_use]
-    pub fn start(mut self, start: Start) -> Self {
-        self.start = start;
-        self
-    }
-
     /// The scratch folder of the run.
     #[must_use]
     pub fn scratch_folder(&self) -> PathBuf {
-        scratch_folder(&self.folder, self.scratch.as_deref())
+        scratch_folder(&self.folder, self.resources.scratch.as_deref())
     }
 
     fn open(&self) -> Result<Workspace> {
         let path = self.scratch_folder();
         let manifest = Manifest::of(self)?;
         let bytes = manifest.to_bytes(&path)?;
-        let folder = match (Folder::find(&path)?, self.start) {
+        let folder = match (Folder::find(&path)?, self.resources.start) {
             (Found::Nothing, _) => Folder::create(&path, bytes)?,
             (Found::Run(folder), Start::Resume) => {
                 manifest.check(&folder.manifest, &path)?;
@@ -191,12 +133,17 @@ impl Tiles {
             }
             (Found::Run(folder) | Found::Damaged(folder), _) => folder.restart(bytes)?,
         };
-        let memory = self.memory.unwrap_or_else(default_memory);
-        let threads = self.threads.unwrap_or_else(default_threads);
-        let pool = MemoryPool::new(memory)?;
-        let (observer, cancel) = (self.observer.clone(), self.cancel.clone());
+        let Resources {
+            observer,
+            cancel,
+            storage,
+            ..
+        } = &self.resources;
+        let pool = MemoryPool::new(self.resources.memory())?;
+        let threads = self.resources.threads();
+        let (observer, cancel) = (observer.clone(), cancel.clone());
         let workspace = Workspace::resumable(folder, pool, threads, observer, cancel)?;
-        workspace.set_storage(self.storage)?;
+        workspace.set_storage(*storage)?;
         Ok(workspace)
     }
 

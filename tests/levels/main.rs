@@ -5,10 +5,11 @@ mod resumed;
 mod tileset;
 
 use meshes::{Mesh, hills, sphere};
-use outcrop::Tiles;
 use outcrop::levels::{Options, TilesReport};
+use outcrop::{Observer, Planned, Tiles};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex};
 use tileset::{Tile, Tileset};
 
 const MEMORY: u64 = 192 << 20;
@@ -452,4 +453,44 @@ fn wrong_meshes_are_refused() {
     let error = Tiles::new(&path, &output).memory(MEMORY).run().unwrap_err();
     assert!(matches!(error, outcrop::Error::Parameter { .. }), "{error}");
     assert!(output.join("thesis.tex").exists());
+}
+
+/// Notes the plans, and the stages that begin.
+#[derive(Default)]
+struct Notes(Mutex<(usize, Vec<&'static str>, Vec<&'static str>)>);
+
+impl Observer for Notes {
+    fn plan(&self, stages: &[Planned]) {
+        let mut notes = self.0.lock().unwrap();
+        assert!(stages.iter().all(|stage| stage.seconds > 0.0));
+        notes.0 += 1;
+        notes.1 = stages.iter().map(|stage| stage.name).collect();
+    }
+
+    fn begin(&self, name: &'static str, _: &'static str, _: u64) {
+        let mut notes = self.0.lock().unwrap();
+        assert_eq!(notes.1.first(), Some(&name), "after {:?}", notes.2);
+        notes.1.remove(0);
+        notes.2.push(name);
+    }
+}
+
+#[test]
+fn all_stages_are_planned_before_they_begin() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("mesh.ply");
+    hills(60, true).write(&path);
+    let options = Options {
+        most_triangles: 300,
+        ..Options::default()
+    };
+    let notes = Arc::new(Notes::default());
+    let tiles = Tiles::new(&path, folder.path().join("tiles")).options(options);
+    let report = tiles.memory(MEMORY).observer(notes.clone()).run().unwrap();
+    let (plans, left, begun) = std::mem::take(&mut *notes.0.lock().unwrap());
+    assert!(plans == 3 && left.is_empty(), "{plans} plans, {left:?}");
+    let mut expected = vec!["read mesh", "divide", "share", "leaves"];
+    expected.resize(3 + report.levels as usize, "level");
+    assert_eq!(begun, expected);
+    assert!(report.levels > 2);
 }

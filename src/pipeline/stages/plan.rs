@@ -2,6 +2,7 @@
 
 use super::super::outlook;
 use super::Stages;
+use crate::levels;
 use crate::stages::export::is_compressed;
 
 impl Stages<'_> {
@@ -12,7 +13,10 @@ impl Stages<'_> {
             return;
         }
         let compressed = job.params.compress_glb || is_compressed(&job.mesh);
-        let stages = outlook::plan(&job.params, points, job.threads, valued, compressed);
+        let mut stages = outlook::plan(&job.params, points, job.threads, valued, compressed);
+        if job.tiles.is_some() {
+            stages.extend(levels::outlook::of_points(points, job.threads));
+        }
         let first = stages.iter().rposition(|stage| Some(stage.name) == after);
         job.observer.plan(&stages[first.map_or(0, |at| at + 1)..]);
     }

@@ -14,7 +14,6 @@ mod file;
 mod format;
 mod formats;
 mod glb;
-mod meshopt;
 mod normals;
 mod number;
 mod obj;

@@ -2,12 +2,12 @@
 
 use super::format::Mesh;
 use super::glb::{self, COLOUR};
-use super::meshopt;
 use super::parts::Parts;
 use super::stored;
 use super::write::Writer;
 use crate::error::Result;
 use crate::geom::Point;
+use crate::meshopt;
 use crate::workspace::Unit;
 use crate::workspace::memory::bytes_of;
 

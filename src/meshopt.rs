@@ -3,7 +3,10 @@
 
 use meshoptimizer_rs::{
     Workspace,
-    codec::{IndexEncoding, VertexEncoding, encode_index_buffer, encode_vertex_buffer},
+    codec::{
+        IndexEncoding, VertexEncoding, encode_index_buffer, encode_index_sequence,
+        encode_vertex_buffer,
+    },
 };
 
 /// The result of an encoder: it fails only if memory cannot be had.
@@ -25,6 +28,12 @@ pub fn vertices(records: &[u8], stride: usize) -> Encoded {
 pub fn triangles(triangles: &[[u32; 3]]) -> Encoded {
     let indices = triangles.as_flattened();
     encode_index_buffer(indices, IndexEncoding::DEFAULT, &mut Workspace::default()).map_err(failed)
+}
+
+/// Encodes indices of vertices in any order, such as those of lines.
+pub fn sequence(indices: &[u32]) -> Encoded {
+    encode_index_sequence(indices, IndexEncoding::DEFAULT, &mut Workspace::default())
+        .map_err(failed)
 }
 
 /// Positions in whole steps, as words of four bytes.
