@@ -23,7 +23,10 @@ const MAY_USE: &[(&str, &str)] = &[
          workspace",
     ),
     ("kernels", ""),
-    ("levels", "inspect light meshopt spill stages/ingest workspace"),
+    (
+        "levels",
+        "inspect light meshopt spill stages/ingest workspace",
+    ),
     ("light", ""),
     ("meshopt", ""),
     ("method", ""),
