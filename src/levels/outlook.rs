@@ -12,6 +12,7 @@ const DIVIDE: (&str, f64) = ("divide", 0.25);
 const SHARE: (&str, f64) = ("share", 0.25);
 const LEAVES: (&str, f64) = ("leaves", 0.4);
 const LEVEL: (&str, f64) = ("level", 0.55);
+const WRITE: (&str, f64) = ("write", 0.02);
 
 /// Triangles of the children of all tiles for each triangle of the mesh, before they are known.
 const ABOVE: f64 = 1.3;
@@ -33,6 +34,7 @@ pub(super) fn all(triangles: u64, threads: usize) -> Vec<Planned> {
         planned(SHARE, count, threads),
         planned(LEAVES, count, threads),
         planned(LEVEL, ABOVE * count, threads),
+        planned(WRITE, count, threads),
     ]
 }
 
@@ -41,7 +43,7 @@ pub(crate) fn of_points(points: u64, threads: usize) -> Vec<Planned> {
     all(OF_POINTS * points, threads)
 }
 
-/// The stages that follow when the tree is known: the leaves, and each level.
+/// The stages that follow when the tree is known: the leaves, each level, and the files.
 pub(super) fn of_tree(
     cells: &[Cell],
     nodes: &[TreeNode],
@@ -59,13 +61,13 @@ pub(super) fn of_tree(
         triangles.push(own.unwrap_or_else(|| target(count, most)));
     }
     joined[0] = cells.iter().map(|cell| cell.triangles as usize).sum();
-    let stages = joined.into_iter().enumerate();
-    stages
-        .map(|(level, count)| {
-            let stage = if level == 0 { LEAVES } else { LEVEL };
-            planned(stage, count as f64, threads)
-        })
-        .collect()
+    let write = planned(WRITE, joined[0] as f64, threads);
+    let levels = joined.into_iter().enumerate();
+    let levels = levels.map(|(level, count)| {
+        let stage = if level == 0 { LEAVES } else { LEVEL };
+        planned(stage, count as f64, threads)
+    });
+    levels.chain([write]).collect()
 }
 
 #[cfg(test)]
@@ -93,9 +95,11 @@ mod tests {
         ];
         let stages = of_tree(&cells, &nodes, 65_536, 2);
         let names: Vec<_> = stages.iter().map(|stage| stage.name).collect();
-        assert_eq!(names, ["leaves", "level", "level"]);
-        let joined = [150_000.0, 100_000.0, 50_000.0 + 100_000.0 / 6.0];
-        for (stage, (joined, each)) in stages.iter().zip(joined.into_iter().zip([0.4, 0.55, 0.55]))
+        assert_eq!(names, ["leaves", "level", "level", "write"]);
+        let joined = [150_000.0, 100_000.0, 50_000.0 + 16_666.0, 150_000.0];
+        for (stage, (joined, each)) in stages
+            .iter()
+            .zip(joined.into_iter().zip([0.4, 0.55, 0.55, 0.02]))
         {
             assert!((stage.seconds - joined * each * 1e-6 / 2.0).abs() < 1e-6);
         }

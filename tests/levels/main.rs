@@ -491,6 +491,7 @@ fn all_stages_are_planned_before_they_begin() {
     assert!(plans == 3 && left.is_empty(), "{plans} plans, {left:?}");
     let mut expected = vec!["read mesh", "divide", "share", "leaves"];
     expected.resize(3 + report.levels as usize, "level");
+    expected.push("write");
     assert_eq!(begun, expected);
     assert!(report.levels > 2);
 }
