@@ -180,7 +180,7 @@ pub enum Error {
     Cancelled,
 }
 
-/// What can be done about a mesh that is too large for its format.
+/// Advice for a mesh that is too large for its format.
 fn too_large(finished: bool) -> &'static str {
     match finished {
         true => "the surface is finished, and .ply and .obj can hold it",

@@ -2,7 +2,8 @@
 //!
 //! `KIND:N` kills the program at the `N`th event of a kind, or makes that event fail; `count:FILE` writes the
 //! number of events of each kind; `freeze:publish` stops it before it publishes a finished journal, and
-//! `hold:N` makes it take N MiB there; with `most:N` a format of meshes with a limit holds N bytes. See `CONTRIBUTING.md`.
+//! `hold:N` makes it take N MiB there; with `most:N` a format of meshes with a limit holds N bytes. See
+//! `CONTRIBUTING.md`.
 
 use std::io;
 use std::sync::OnceLock;

@@ -146,7 +146,7 @@ pub struct Surface {
 #[command(next_help_heading = "Repair")]
 pub struct Repair {
     /// Fill holes of up to this many edges; 0 fills none (missing single triangles are still filled, except
-    /// with --method paper) [default: 2000; with --method paper 500]
+    /// with --method paper) [default: 1500; with --method paper 500]
     #[arg(long, value_name = "N")]
     pub max_hole_edges: Option<usize>,
     /// Largest triangle of a filling, as the side of an equilateral triangle: a length in the cloud's unit, a

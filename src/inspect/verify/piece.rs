@@ -16,7 +16,7 @@ const NONE: u32 = u32::MAX;
 const SHARED: u8 = 1;
 const OPEN: u8 = 2;
 
-/// What was found in a piece.
+/// Counts and open triangles of a piece.
 #[derive(Debug, Default)]
 pub(super) struct Found {
     /// Triangles in the file, those with a corner that is no vertex, and those with two equal corners.

@@ -86,7 +86,7 @@ pub(super) struct Extra {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Value {
     kind: Kind,
-    /// What the number is multiplied with, and what is added then.
+    /// Scale and offset: the value is the number times the scale, plus the offset.
     map: Option<[f64; 2]>,
 }
 
