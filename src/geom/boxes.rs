@@ -59,11 +59,17 @@ impl<S: RTreeNum> BoxTree<S> {
         entries.map(|entry| entry.data as usize)
     }
 
-    /// The boxes whose corners are `wanted`, in any order. It must be true of a box around a wanted box; it
-    /// may become false between two steps.
-    pub fn that(&self, wanted: impl Fn([S; 3], [S; 3]) -> bool) -> impl Iterator<Item = usize> {
+    /// The boxes whose corners are `wanted`, with these corners, in any order. It must be true of a box around a
+    /// wanted box; it may become false between two steps.
+    pub fn that(
+        &self,
+        wanted: impl Fn([S; 3], [S; 3]) -> bool,
+    ) -> impl Iterator<Item = (usize, [[S; 3]; 2])> {
         let entries = self.0.locate_with_selection_function(That(wanted));
-        entries.map(|entry| entry.data as usize)
+        entries.map(|entry| {
+            let corners = [entry.geom().lower(), entry.geom().upper()];
+            (entry.data as usize, corners)
+        })
     }
 
     /// All boxes with their squared distance from a point, the nearest first.
@@ -135,7 +141,8 @@ mod tests {
                 let expected: Vec<_> = boxes.iter().map(|b| b.distance2(p)).enumerate().collect();
                 prop_assert_eq!(&all, &expected);
                 let low = |min: [i64; 3], _: [i64; 3]| min[0] <= i64::from(p[0]);
-                let mut some: Vec<_> = tree.that(low).collect();
+                let (mut some, corners): (Vec<_>, Vec<_>) = tree.that(low).unzip();
+                prop_assert!(some.iter().zip(&corners).all(|(k, at)| *at == boxes[*k].wide(0)));
                 some.sort_unstable();
                 let low = |k: &usize| boxes[*k].min[0] <= p[0];
                 prop_assert_eq!(some, (0..boxes.len()).filter(low).collect::<Vec<_>>());

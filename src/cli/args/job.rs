@@ -279,6 +279,32 @@ mod tests {
     use super::*;
 
     #[test]
+    fn the_help_has_the_defaults_of_both_methods() {
+        let options = crate::cli::call::options("reconstruct");
+        let (robust, paper) = (Params::default(), Params::paper());
+        for (name, of) in [
+            ("relax", (|p| p.relax.to_string()) as fn(&Params) -> String),
+            ("max-angle", |p| p.max_angle.to_string()),
+            ("max-edge", |p| p.max_edge.to_string()),
+            ("max-hole-edges", |p| p.max_hole_edges.to_string()),
+            ("max-fill", |p| p.max_fill.to_string()),
+        ] {
+            let option = options.iter().find(|option| option.name == name).unwrap();
+            let words: Vec<&str> = option.help.split_whitespace().collect();
+            let wanted = format!(
+                "[default: {}; with --method paper {}]",
+                of(&robust),
+                of(&paper)
+            );
+            assert!(
+                words.join(" ").contains(&wanted),
+                "{wanted}: {}",
+                option.help
+            );
+        }
+    }
+
+    #[test]
     fn the_default_factor_is_what_the_library_says() {
         assert_eq!(
             OUTLIER_FACTOR_TEXT.parse(),

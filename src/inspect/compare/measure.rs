@@ -1,17 +1,18 @@
 //! Distances of samples, measured on all threads and passed on in the order of the samples.
 
 use super::Options;
-use super::pages::{Best, Cache, Item, Pages};
+use super::pages::{Item, Pages, Searcher};
 use super::samples::{self, Sample};
 use super::shape::{Items, Shape};
+use super::vector::V3;
 use crate::error::Result;
 use crate::workspace::memory::Reservation;
 use crate::workspace::{Workspace, lock};
 use rayon::prelude::*;
 use std::sync::Mutex;
 
-/// Samples that one thread takes at a time. A search begins with the nearest item of the sample before, so
-/// this number is fixed.
+/// Samples that one thread takes at a time. A search begins with the nearest item of the sample before, by which
+/// results are rounded, so this number is fixed.
 const CHUNK: usize = 1024;
 
 /// Samples in memory at a time.
@@ -59,8 +60,7 @@ pub(super) fn distances(
     Ok(())
 }
 
-/// Search for nearest items, with a page cache for each thread, and the memory of these caches and of the
-/// samples.
+/// Search for nearest items, with pages at hand for each thread, and the memory of these and of the samples.
 fn search<'a, T: Item>(
     pages: &'a Pages<T>,
     workspace: &Workspace,
@@ -68,26 +68,17 @@ fn search<'a, T: Item>(
     let threads = workspace.threads as u64;
     let share = workspace.memory.available() / 4 / threads;
     let cached = (share / pages.page_bytes()).clamp(1, pages.count().max(1) as u64);
-    let wave = WAVE * (size_of::<Sample>() + 2 * size_of::<f64>());
+    let wave = WAVE * (size_of::<Sample>() + size_of::<V3>() + 2 * size_of::<f64>());
     let bytes = threads * cached * pages.page_bytes() + wave as u64;
     let held = workspace.reserve("compare: pages at hand", bytes)?;
-    let caches = Mutex::new(Vec::new());
+    let searchers = Mutex::new(Vec::new());
     let search = move |samples: &[Sample]| {
-        let cache = lock(&caches).pop();
-        let mut cache = cache.unwrap_or_else(|| Cache::new(cached as usize));
-        let mut item: Option<T> = None;
-        let mut distances = Vec::with_capacity(samples.len());
-        for sample in samples {
-            let from = |item: T| item.distance2(sample.position);
-            let mut best = Best {
-                distance2: item.map_or(f64::INFINITY, from),
-                item,
-            };
-            pages.nearest(sample.position, &mut best, &mut cache)?;
-            item = best.item;
-            distances.push(best.distance2.sqrt());
-        }
-        lock(&caches).push(cache);
+        let searcher = lock(&searchers).pop();
+        let mut searcher = searcher.unwrap_or_else(|| Searcher::new(cached as usize));
+        let positions: Vec<V3> = samples.iter().map(|sample| sample.position).collect();
+        let mut distances = pages.distances2(&positions, &mut searcher)?;
+        distances.iter_mut().for_each(|d| *d = d.sqrt());
+        lock(&searchers).push(searcher);
         Ok(distances)
     };
     Ok((Box::new(search), held))

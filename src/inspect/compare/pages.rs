@@ -26,10 +26,21 @@ const RUN: usize = 256;
 /// Items that share a box within a page.
 const LEAF: usize = 8;
 
+/// Positions for which the tree is asked once.
+const TOGETHER: usize = 32;
+
+/// Most pages near such a run of positions; if there are more, the tree is asked for each position.
+const MOST_NEAR: usize = 64;
+
 /// An item with a distance from a point.
 pub(super) trait Item: Row {
     fn bounds(&self) -> Box3;
     fn distance2(&self, p: V3) -> f64;
+
+    /// True if it is easily told that the squared distance from `p` is not below `limit`.
+    fn is_beyond(&self, _p: V3, _limit: f64) -> bool {
+        false
+    }
 }
 
 impl Row for V3 {
@@ -58,6 +69,10 @@ impl Item for [V3; 3] {
 
     fn distance2(&self, p: V3) -> f64 {
         triangle::distance2(self, p)
+    }
+
+    fn is_beyond(&self, p: V3, limit: f64) -> bool {
+        self.bounds().distance2(p) >= limit
     }
 }
 
@@ -140,16 +155,69 @@ impl<T: Item> Pages<T> {
         })
     }
 
-    /// Updates `best`, a squared distance from `p`, if an item is nearer.
-    pub(super) fn nearest(&self, p: V3, best: &mut Best<T>, cache: &mut Cache<T>) -> Result<()> {
-        if best.item.is_none()
-            && let Some((_, page)) = self.tree.nearest(p).next()
-        {
-            cache.page(self, page)?.look(p, best);
+    /// The squared distances from positions to the nearest item, in their order; infinite if there is none.
+    /// Positions that follow each other should be near each other: the tree is asked once for a run of them.
+    pub(super) fn distances2(
+        &self,
+        positions: &[V3],
+        searcher: &mut Searcher<T>,
+    ) -> Result<Vec<f64>> {
+        let Searcher { cache, near } = searcher;
+        let mut found = Vec::with_capacity(positions.len());
+        let Some(mut item) = self.first(positions, cache)? else {
+            found.resize(positions.len(), f64::INFINITY);
+            return Ok(found);
+        };
+        for run in positions.chunks(TOGETHER) {
+            // The nearest item of each position is not farther than this one, so it is in one of these pages.
+            let around = Box3::of(run);
+            let far = run.iter().map(|p| item.distance2(*p));
+            let far = far.fold(0.0, f64::max);
+            let reach = |min, max| Box3 { min, max }.distance2_box(&around) <= far;
+            near.clear();
+            near.extend(self.tree.that(reach).take(MOST_NEAR + 1));
+            for &p in run {
+                let mut best = Best {
+                    distance2: item.distance2(p),
+                    item,
+                };
+                match near.len() {
+                    0..=MOST_NEAR => {
+                        for &(page, [min, max]) in &*near {
+                            if (Box3 { min, max }).distance2(p) < best.distance2 {
+                                cache.page(self, page)?.look(p, &mut best);
+                            }
+                        }
+                    }
+                    _ => self.descend(p, &mut best, cache)?,
+                }
+                item = best.item;
+                found.push(best.distance2);
+            }
         }
+        Ok(found)
+    }
+
+    /// The nearest item of the page whose box is nearest to the first position.
+    fn first(&self, positions: &[V3], cache: &mut Cache<T>) -> Result<Option<T>> {
+        let nearest = positions
+            .first()
+            .and_then(|p| Some((*p, self.tree.nearest(*p).next()?)));
+        let Some((p, (_, page))) = nearest else {
+            return Ok(None);
+        };
+        let page = cache.page(self, page)?;
+        let distance = |item: &&T| item.distance2(p);
+        Ok((page.items.iter())
+            .min_by(|a, b| distance(a).total_cmp(&distance(b)))
+            .copied())
+    }
+
+    /// Updates `best` if an item is nearer to `p`, by a descent of the tree.
+    fn descend(&self, p: V3, best: &mut Best<T>, cache: &mut Cache<T>) -> Result<()> {
         let limit = Cell::new(best.distance2);
         let nearer = |min, max| Box3 { min, max }.distance2(p) < limit.get();
-        for page in self.tree.that(nearer) {
+        for (page, _) in self.tree.that(nearer) {
             cache.page(self, page)?.look(p, best);
             limit.set(best.distance2);
         }
@@ -159,9 +227,9 @@ impl<T: Item> Pages<T> {
 
 /// The nearest item so far and its squared distance.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Best<T> {
-    pub(super) distance2: f64,
-    pub(super) item: Option<T>,
+struct Best<T> {
+    distance2: f64,
+    item: T,
 }
 
 /// A page in memory.
@@ -181,11 +249,14 @@ impl<T> Page<T> {
                 continue;
             }
             for item in leaf {
+                if item.is_beyond(p, best.distance2) {
+                    continue;
+                }
                 let distance2 = item.distance2(p);
                 if distance2 < best.distance2 {
                     *best = Best {
                         distance2,
-                        item: Some(*item),
+                        item: *item,
                     };
                 }
             }
@@ -193,16 +264,34 @@ impl<T> Page<T> {
     }
 }
 
-/// Cache of recently read pages, for one thread.
+/// What one thread needs to search.
 #[derive(Debug)]
-pub(super) struct Cache<T> {
+pub(super) struct Searcher<T> {
+    cache: Cache<T>,
+    /// Pages near a run of positions, with their lowest and highest corners.
+    near: Vec<(usize, [V3; 2])>,
+}
+
+impl<T> Searcher<T> {
+    /// Keeps at most `most` pages in memory.
+    pub(super) fn new(most: usize) -> Self {
+        Self {
+            cache: Cache::new(most),
+            near: Vec::new(),
+        }
+    }
+}
+
+/// Cache of recently read pages.
+#[derive(Debug)]
+struct Cache<T> {
     pages: FxHashMap<usize, Page<T>>,
     most: usize,
 }
 
 impl<T> Cache<T> {
     /// A cache of at most `most` pages.
-    pub(super) fn new(most: usize) -> Self {
+    fn new(most: usize) -> Self {
         Self {
             pages: FxHashMap::default(),
             most: most.max(1),

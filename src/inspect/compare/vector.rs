@@ -62,6 +62,13 @@ impl Box3 {
         x * x + y * y + z * z
     }
 
+    /// Squared distance to another box; 0 if they meet.
+    pub(super) fn distance2_box(&self, other: &Self) -> f64 {
+        let gap = |i: usize| (self.min[i] - other.max[i]).max(other.min[i] - self.max[i]);
+        let gaps = [0, 1, 2].map(|i| gap(i).max(0.0));
+        dot(gaps, gaps)
+    }
+
     pub(super) fn diagonal(&self) -> f64 {
         if self.min[0] > self.max[0] {
             return 0.0;
