@@ -5,6 +5,7 @@ import { execFileSync, spawn } from 'node:child_process';
 import { cpSync, readFileSync, readdirSync, rmSync, writeFileSync } from 'node:fs';
 import { createRequire } from 'node:module';
 import { join } from 'node:path';
+import { Pace } from './src/pace.js';
 
 const [ outcrop, render, chromium, modules, folder ] = process.argv.slice( 2 );
 const { chromium: driver } = createRequire( join( modules, 'x.js' ) )( 'playwright-core' );
@@ -18,6 +19,41 @@ function check( what, fine, found = '' ) {
 	if ( ! fine ) throw new Error( `${ what }: ${ typeof found === 'string' ? found : JSON.stringify( found ) }` );
 	passed ++;
 	console.log( `  ${ what }${ found === '' ? '' : `: ${ typeof found === 'string' ? found : JSON.stringify( found ) }` }` );
+
+}
+
+/** The pace by itself: pictures that take long make it coarser, short ones finer, and a view at rest has all detail. */
+function paces() {
+
+	const pace = new Pace();
+	let now = 0;
+	const move = ( pictures, time ) => {
+
+		for ( let n = 0; n < pictures; n ++ ) {
+
+			pace.moved( now );
+			const took = time( pace.factor );
+			pace.took( now, took, true );
+			now += took;
+
+		}
+
+		pace.moved( now );
+		return pace.coarser( now );
+
+	};
+	const fine = move( 30, () => 16 );
+	// As on a processor: what is fixed, and the triangles.
+	const time = factor => 20 + 3000 / factor ** 2;
+	const coarse = move( 60, time );
+	check( 'the pace follows a slow machine', fine === 1 && time( coarse ) < 70 && coarse < 16 && pace.pixels( now ) === 0.5, { fine, coarse } );
+	now += 1000;
+	check( 'a view at rest has all detail', pace.coarser( now ) === 1 && pace.pixels( now ) === 1 );
+	pace.took( now, 5000, false );
+	now += 5000;
+	check( 'and is not drawn all the time while tiles load', pace.due( now, false ) && ! pace.due( now, true ) && pace.due( now + 10000, true ) );
+	check( 'the pace is kept for the next move', move( 0, time ) === coarse );
+	check( 'and finer again on a fast machine', move( 200, () => 16 ) === 1 );
 
 }
 
@@ -178,6 +214,7 @@ async function main() {
 	execFileSync( render, [ mesh, '-o', join( folder, 'render.png' ), '--width', SIZE.width, '--height', SIZE.height, '--view', 'iso', '--supersample', '1', '--crop-percentile', '0' ] );
 	const reference = 'data:image/png;base64,' + readFileSync( join( folder, 'render.png' ) ).toString( 'base64' );
 
+	paces();
 	const server = await serve( mesh, `--keep=${ tiles }` );
 	const shown = await open( server.url ), { page, asked, errors, settled } = shown;
 	const first = await page.evaluate( () => window.outcropViewer.stats() );
@@ -194,6 +231,37 @@ async function main() {
 	await settled();
 	const after = await levels();
 	check( 'it refines when zooming', Math.max( ...before ) > 0 && Math.min( ...after ) === 0 && Math.max( ...after ) < Math.max( ...before ), { before, after } );
+
+	// On a slow machine a moving view is coarser, and as it was when it rests.
+	const slow = await page.evaluate( () => new Promise( resolve => {
+
+		const v = window.outcropViewer, { yaw } = v.navigator, rest = v.stats().triangles;
+		v.pace.factor = 64;
+		v.pace.took = () => {};
+		let frame = 0, least = rest, pixels = 1;
+		const step = () => {
+
+			least = Math.min( least, v.stats().triangles );
+			pixels = Math.min( pixels, v.pace.pixels( performance.now() ) );
+			v.navigator.yaw = ++ frame < 20 ? yaw + 0.01 * frame : yaw;
+			v.redraw();
+			if ( frame < 20 ) requestAnimationFrame( step );
+			else resolve( { rest, least, pixels } );
+
+		};
+		step();
+
+	} ) );
+	await settled();
+	const again = await page.evaluate( () => {
+
+		const v = window.outcropViewer;
+		v.pace.factor = 1;
+		delete v.pace.took;
+		return v.stats().triangles;
+
+	} );
+	check( 'a moving view is coarser on a slow machine, not at rest', slow.least < 0.5 * slow.rest && slow.pixels === 0.5 && again === slow.rest, { ...slow, again } );
 
 	// A vertex, by a click.
 	const result = () => page.evaluate( () => Object.fromEntries( [ ...document.querySelectorAll( '#result dt' ) ].map( dt => [ dt.textContent, dt.nextSibling.textContent ] ) ) );

@@ -1,12 +1,13 @@
 // The page: puts the parts together, and draws when something has changed.
 
-import { ColorManagement, LinearSRGBColorSpace, Raycaster, Scene, Vector2, Vector3, WebGLRenderer } from 'three';
+import { ColorManagement, LinearSRGBColorSpace, Matrix4, Raycaster, Scene, Vector2, Vector3, WebGLRenderer } from 'three';
 import { Dome } from './dome.js';
 import { drawAxes, Marks, roundLength } from './marks.js';
 import * as link from './link.js';
 import { shared } from './material.js';
 import { MeshView } from './mesh.js';
 import { Navigator } from './navigator.js';
+import { Fence, Pace, SLOW } from './pace.js';
 import { Panel } from './panel.js';
 import { Section } from './section.js';
 
@@ -21,9 +22,10 @@ function start() {
 
 	const renderer = new WebGLRenderer( { canvas, antialias: true, powerPreference: 'high-performance' } );
 	renderer.outputColorSpace = LinearSRGBColorSpace;
-	renderer.setPixelRatio( Math.min( devicePixelRatio, 2 ) );
+	const sharp = Math.min( devicePixelRatio, 2 );
+	renderer.setPixelRatio( sharp );
 	const scene = new Scene(), dome = new Dome( renderer ), marks = new Marks(), section = new Section();
-	const raycaster = new Raycaster();
+	const raycaster = new Raycaster(), pace = new Pace(), fence = new Fence( renderer.getContext() );
 	let dirty = true, measuring = false, measured = [], ready = false, frame = 0;
 	const changed = () => dirty = true;
 
@@ -254,10 +256,31 @@ function start() {
 	canvas.addEventListener( 'pointermove', event => pointer = event.buttons ? null : { x: event.offsetX, y: event.offsetY, at: performance.now() } );
 	canvas.addEventListener( 'pointerleave', () => { pointer = null; panel.cursor( '' ); } );
 
-	function draw() {
+	const seen = { view: new Matrix4(), projection: new Matrix4() };
+	/** True if the camera is not where it was when this was asked the last time. */
+	function moved() {
+
+		const { matrixWorld, projectionMatrix } = navigator.camera;
+		const same = seen.view.equals( matrixWorld ) && seen.projection.equals( projectionMatrix );
+		seen.view.copy( matrixWorld );
+		seen.projection.copy( projectionMatrix );
+		return ! same;
+
+	}
+
+	/** Chooses the tiles for where the camera is. */
+	function update( now ) {
 
 		navigator.apply();
-		mesh.update( navigator.camera, renderer );
+		if ( moved() ) pace.moved( now );
+		mesh.update( navigator.camera, renderer, pace.coarser( now ) );
+
+	}
+
+	function draw( now ) {
+
+		const ratio = sharp * pace.pixels( now );
+		if ( renderer.getPixelRatio() !== ratio ) renderer.setPixelRatio( ratio );
 		section.apply( navigator.camera );
 		if ( settings.edl ) dome.draw( scene, navigator.camera, navigator.viewHeight() );
 		else renderer.render( scene, navigator.camera );
@@ -265,14 +288,16 @@ function start() {
 		drawAxes( document.getElementById( 'axes' ), navigator );
 		const pixel = navigator.pixel(), length = roundLength( 130 * pixel );
 		panel.scale( length / pixel, length );
+		fence.set( now, pace.moves( now ) );
 		frame ++;
 
 	}
 
-	let busy = 0;
+	let busy = 0, paced = false, stale = true;
 	function loop( now ) {
 
 		requestAnimationFrame( loop );
+		fence.poll( now, pace );
 		if ( canvas.clientWidth !== width || canvas.clientHeight !== height ) {
 
 			[ width, height ] = [ canvas.clientWidth, canvas.clientHeight ];
@@ -282,28 +307,38 @@ function start() {
 		}
 
 		const moves = navigator.advance( ( now - last ) / 1000 );
+		last = now;
+		// The view has come to rest: all detail again.
+		if ( paced && ! pace.moves( now ) ) changed();
 		// The renderer of tiles wants some frames after the last change, until nothing is on its way.
 		if ( dirty || moves ) busy = 3;
-		if ( busy > 0 || ! ready || mesh.tiles.isLoading ) {
+		const loading = ! ready || mesh.tiles.isLoading;
+		if ( busy > 0 || loading ) {
 
-			const began = performance.now();
 			busy --;
 			dirty = false;
-			draw();
-			milliseconds += 0.2 * ( performance.now() - began - milliseconds );
+			stale = true;
+			update( now );
 
 		}
 
-		last = now;
+		paced = pace.moves( now );
+		// Pictures do not queue up, so that the next one has the camera as it is then.
+		if ( ! stale || fence.pending( now ) > SLOW || ! pace.due( now, loading ) ) return;
+		const began = performance.now();
+		stale = false;
+		draw( now );
+		milliseconds += 0.2 * ( performance.now() - began - milliseconds );
 
 	}
 
 	setInterval( () => {
 
 		if ( ! ready ) return;
-		const before = mesh.coarser;
-		panel.stats( mesh.stats(), mesh.info, milliseconds );
-		if ( mesh.coarser !== before ) changed();
+		const stats = mesh.stats(), moves = pace.moves( performance.now() );
+		panel.stats( { ...stats, coarser: Math.max( stats.coarser, pace.coarser( performance.now() ) ) }, mesh.info, milliseconds );
+		// While the view moves, the pace decides.
+		if ( ! moves ) mesh.limit( stats.triangles );
 		if ( ! navigator.moving && ! navigator.pointers.size ) remember();
 
 	}, 250 );
@@ -322,13 +357,15 @@ function start() {
 
 	// For tests and for those who drive the page by a program.
 	window.outcropViewer = {
-		mesh, navigator, actions, settings, section,
+		mesh, navigator, actions, settings, section, pace,
 		get ready() { return ready; },
 		get frame() { return frame; },
+		/** Time that the page itself takes for a picture, without that of the graphics, in ms. */
+		get milliseconds() { return milliseconds; },
 		/** True if nothing is loading and the last change is drawn. */
-		get settled() { return ready && ! dirty && busy <= 0 && ! navigator.moving && ! mesh.tiles.isLoading && mesh.stats().loading === 0; },
+		get settled() { return ready && ! dirty && ! stale && busy <= 0 && ! navigator.moving && ! paced && ! mesh.tiles.isLoading && mesh.stats().loading === 0; },
 		/** What is drawn, as a PNG in a URL. */
-		picture() { draw(); return canvas.toDataURL(); },
+		picture() { const now = performance.now(); update( now ); draw( now ); return canvas.toDataURL(); },
 		stats: () => mesh.stats(), vertexAt, hit, click, redraw: changed, use: () => mesh.use( navigator.camera, renderer ),
 		get measured() { return lengths( measured ); },
 	};

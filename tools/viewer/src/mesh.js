@@ -343,22 +343,31 @@ export class MeshView {
 
 	// Each frame.
 
-	update( camera, renderer ) {
+	/** Chooses the tiles that are drawn, for errors that may be larger by a factor while the view moves. */
+	update( camera, renderer, factor ) {
 
 		this.tiles.setResolutionFromRenderer( camera, renderer );
-		this.tiles.errorTarget = this.detail * this.coarser;
+		this.tiles.errorTarget = this.detail * Math.max( this.coarser, factor );
 		this.tiles.update();
 
 	}
 
-	/** Counts of what is drawn. Too many triangles make the next frames coarser. */
+	/** Makes the next frames coarser if there are too many triangles, or less so if there are few. */
+	limit( triangles ) {
+
+		const before = this.coarser;
+		if ( triangles > MOST_TRIANGLES ) this.coarser = Math.min( this.coarser * 1.25, 64 );
+		else if ( triangles < 0.6 * MOST_TRIANGLES && this.coarser > 1 ) this.coarser = Math.max( this.coarser / 1.1, 1 );
+		if ( this.coarser !== before ) this.changed();
+
+	}
+
+	/** Counts of what is drawn. */
 	stats() {
 
 		const { tiles } = this;
 		let triangles = 0;
 		for ( const tile of tiles.visibleTiles ) triangles += ( tile.surface?.geometry.index?.count ?? 0 ) / 3;
-		if ( triangles > MOST_TRIANGLES ) this.coarser = Math.min( this.coarser * 1.25, 64 );
-		else if ( triangles < 0.6 * MOST_TRIANGLES && this.coarser > 1 ) this.coarser = Math.max( this.coarser / 1.1, 1 );
 		const { stats } = tiles;
 		return {
 			triangles,
