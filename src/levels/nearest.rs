@@ -119,17 +119,27 @@ impl<'a> Tree<'a> {
 
     /// The distance to the nearest triangle if it is more than `enough`; otherwise any number up to that.
     pub fn distance(&self, p: V3, enough: f64, hint: &mut Hint) -> f64 {
+        let enough2 = enough * enough;
+        // Most points have a triangle that is near enough, which is found soon among the few boxes that are.
         let mut search = Search {
             tree: self,
             p,
-            enough2: enough * enough,
-            best2: f64::INFINITY,
+            enough2,
+            best2: enough2,
         };
         let (leaf, triangle) = *hint;
-        if !search.is_enough(triangle) {
-            let found = search.leaf(leaf);
-            let found = found.or_else(|| search.below(self.levels.len() - 1, 0));
-            *hint = found.unwrap_or(*hint);
+        let top = self.levels.len() - 1;
+        if search.is_enough(triangle) {
+            return enough;
+        }
+        let found = search.leaf(leaf);
+        if let Some(found) = found.or_else(|| search.below(top, 0)) {
+            *hint = found;
+            return enough;
+        }
+        search.best2 = f64::INFINITY;
+        if search.leaf(leaf).is_none() {
+            search.below(top, 0);
         }
         search.best2.sqrt()
     }
@@ -141,16 +151,23 @@ struct Search<'a> {
     p: V3,
     /// Squared distance at which it ends.
     enough2: f64,
-    /// The least squared distance so far.
+    /// The least squared distance so far; what is not nearer is passed over.
     best2: f64,
 }
 
 impl Search<'_> {
     /// Looks at a triangle; true if that is enough.
     fn is_enough(&mut self, triangle: usize) -> bool {
-        let found = distance2(&self.tree.surface.corners(triangle), self.p);
+        let corners = self.tree.surface.corners(triangle);
+        let around = corners
+            .iter()
+            .fold(Bounds::EMPTY, |all, p| all.joined(*p, *p));
+        if around.distance2(self.p) > self.best2 {
+            return false;
+        }
+        let found = distance2(&corners, self.p);
         self.best2 = self.best2.min(found);
-        self.best2 <= self.enough2
+        found <= self.enough2
     }
 
     /// Looks at the triangles of a leaf; returns the one that is enough.
