@@ -293,7 +293,7 @@ function start() {
 
 	}
 
-	let busy = 0, paced = false, stale = true;
+	let busy = 0, paced = false, stale = true, limited = 0;
 	function loop( now ) {
 
 		requestAnimationFrame( loop );
@@ -337,8 +337,9 @@ function start() {
 		if ( ! ready ) return;
 		const stats = mesh.stats(), moves = pace.moves( performance.now() );
 		panel.stats( { ...stats, coarser: Math.max( stats.coarser, pace.coarser( performance.now() ) ) }, mesh.info, milliseconds );
-		// While the view moves, the pace decides.
-		if ( ! moves ) mesh.limit( stats.triangles );
+		// While the view moves, the pace decides. One change for each picture, which shows what it did.
+		if ( ! moves && frame !== limited ) mesh.limit( stats.triangles );
+		limited = frame;
 		if ( ! navigator.moving && ! navigator.pointers.size ) remember();
 
 	}, 250 );
