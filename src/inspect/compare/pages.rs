@@ -26,10 +26,10 @@ const RUN: usize = 256;
 /// Items that share a box within a page.
 const LEAF: usize = 8;
 
-/// Positions for which the tree is asked once.
+/// Positions of one query of the tree.
 const TOGETHER: usize = 32;
 
-/// Most pages near such a run of positions; if there are more, the tree is asked for each position.
+/// Most pages near such a run of positions; if there are more, the tree is queried for each position.
 const MOST_NEAR: usize = 64;
 
 /// An item with a distance from a point.
@@ -156,7 +156,7 @@ impl<T: Item> Pages<T> {
     }
 
     /// The squared distances from positions to the nearest item, in their order; infinite if there is none.
-    /// Positions that follow each other should be near each other: the tree is asked once for a run of them.
+    /// Positions that follow each other should be near each other: the tree is queried once for a run of them.
     pub(super) fn distances2(
         &self,
         positions: &[V3],
