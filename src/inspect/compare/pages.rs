@@ -207,10 +207,15 @@ impl<T: Item> Pages<T> {
             return Ok(None);
         };
         let page = cache.page(self, page)?;
-        let distance = |item: &&T| item.distance2(p);
-        Ok((page.items.iter())
-            .min_by(|a, b| distance(a).total_cmp(&distance(b)))
-            .copied())
+        let best = page.items.first().map(|item| {
+            let mut best = Best {
+                distance2: f64::INFINITY,
+                item: *item,
+            };
+            page.look(p, &mut best);
+            best.item
+        });
+        Ok(best)
     }
 
     /// Updates `best` if an item is nearer to `p`, by a descent of the tree.
@@ -264,7 +269,7 @@ impl<T> Page<T> {
     }
 }
 
-/// What one thread needs to search.
+/// The pages at hand and the buffer of one thread for its searches.
 #[derive(Debug)]
 pub(super) struct Searcher<T> {
     cache: Cache<T>,
