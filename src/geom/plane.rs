@@ -43,7 +43,8 @@ pub struct Plane {
 }
 
 impl Plane {
-    const NONE: Self = Self {
+    /// No plane.
+    pub const NONE: Self = Self {
         normal: None,
         spans: false,
         wide: false,

@@ -53,10 +53,14 @@ impl Line {
 /// Lines in columns.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct LineGroup {
-    x: [f64; LANES],
-    y: [f64; LANES],
-    offset: [f64; LANES],
-    length: [f64; LANES],
+    /// Normals of the lines, along x.
+    pub x: [f64; LANES],
+    /// Along y.
+    pub y: [f64; LANES],
+    /// Right-hand sides.
+    pub offset: [f64; LANES],
+    /// Upper bounds on the lengths of the differences.
+    pub length: [f64; LANES],
 }
 
 impl LineGroup {

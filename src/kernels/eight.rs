@@ -14,6 +14,8 @@ pub(crate) trait Numbers:
     fn splat(x: f64) -> Self;
     /// Square roots.
     fn sqrt(self) -> Self;
+    /// Absolute values.
+    fn abs(self) -> Self;
     /// Bit `k` is set if number `k` is greater than that of `other` (false for NaN).
     fn greater(self, other: Self) -> u64;
     /// For each pair the first number if it is greater, else the second.
@@ -46,8 +48,6 @@ pub(crate) trait Eight: Numbers {
             .iter()
             .fold(lanes[0], |a, b| if *b > a { *b } else { a })
     }
-    /// Absolute values.
-    fn abs(self) -> Self;
 }
 
 /// One number.
@@ -62,6 +62,11 @@ impl Numbers for f64 {
     #[inline(always)]
     fn sqrt(self) -> Self {
         self.sqrt()
+    }
+
+    #[inline(always)]
+    fn abs(self) -> Self {
+        self.abs()
     }
 
     #[inline(always)]
@@ -127,6 +132,11 @@ impl Numbers for Base {
     }
 
     #[inline(always)]
+    fn abs(self) -> Self {
+        Self(self.0.map(f64::abs))
+    }
+
+    #[inline(always)]
     fn greater(self, other: Self) -> u64 {
         (0..8).fold(0, |bits, k| bits | u64::from(self.0[k] > other.0[k]) << k)
     }
@@ -162,11 +172,6 @@ impl Eight for Base {
     #[inline(always)]
     fn store(self, to: &mut [f64; 8]) {
         *to = self.0;
-    }
-
-    #[inline(always)]
-    fn abs(self) -> Self {
-        Self(self.0.map(f64::abs))
     }
 }
 
@@ -226,6 +231,18 @@ mod wide {
         fn sqrt(self) -> Self {
             // SAFETY: see above.
             unsafe { Self(_mm256_sqrt_pd(self.0), _mm256_sqrt_pd(self.1)) }
+        }
+
+        #[inline(always)]
+        fn abs(self) -> Self {
+            // SAFETY: see above.
+            unsafe {
+                let sign = _mm256_set1_pd(-0.0);
+                Self(
+                    _mm256_andnot_pd(sign, self.0),
+                    _mm256_andnot_pd(sign, self.1),
+                )
+            }
         }
 
         #[inline(always)]
@@ -302,18 +319,6 @@ mod wide {
         }
 
         #[inline(always)]
-        fn abs(self) -> Self {
-            // SAFETY: see above.
-            unsafe {
-                let sign = _mm256_set1_pd(-0.0);
-                Self(
-                    _mm256_andnot_pd(sign, self.0),
-                    _mm256_andnot_pd(sign, self.1),
-                )
-            }
-        }
-
-        #[inline(always)]
         fn put(to: &mut [f64; 8], k: usize, x: f64) {
             let (half, k) = (k / 4 % 2, (k % 4) as i64);
             // SAFETY: see above; a half is four numbers.
@@ -372,6 +377,12 @@ mod wide {
         }
 
         #[inline(always)]
+        fn abs(self) -> Self {
+            // SAFETY: see above.
+            unsafe { Self(_mm512_abs_pd(self.0)) }
+        }
+
+        #[inline(always)]
         fn greater(self, other: Self) -> u64 {
             // SAFETY: see above.
             unsafe { u64::from(_mm512_cmp_pd_mask::<_CMP_GT_OQ>(self.0, other.0)) }
@@ -413,12 +424,6 @@ mod wide {
         fn store(self, to: &mut [f64; 8]) {
             // SAFETY: see above.
             unsafe { _mm512_storeu_pd(to.as_mut_ptr(), self.0) }
-        }
-
-        #[inline(always)]
-        fn abs(self) -> Self {
-            // SAFETY: see above.
-            unsafe { Self(_mm512_abs_pd(self.0)) }
         }
 
         #[inline(always)]

@@ -12,6 +12,7 @@ mod distances;
 pub(crate) mod eight;
 mod pick;
 mod ranks;
+pub(crate) mod sixteen;
 mod sums;
 mod weighted;
 
@@ -30,7 +31,7 @@ pub use pick::pick_column;
 pub(crate) use pick::{BLOCK, Pick, RANKED, SHORT_RANKED, first_bits, pick_body};
 pub use ranks::{ranks, short_ranks};
 pub(crate) use ranks::{ranks_body, short_ranks_body};
-pub(crate) use sums::{MOST_SUMMED, SUMMED_LIMIT2};
+pub(crate) use sums::{MOST_SUMMED, SUMMED_LIMIT2, second_moments_body};
 pub use sums::{SecondMoments, second_moments};
 pub use weighted::{
     SpreadSums, SurfaceSums, Weighted, drop_beyond, fade, spread_sums, surface_sums, take_weighted,

@@ -18,7 +18,7 @@ kernel! {
 }
 
 #[inline(always)]
-fn second_moments_body(x: &[i32], y: &[i32], z: &[i32]) -> SecondMoments {
+pub(crate) fn second_moments_body(x: &[i32], y: &[i32], z: &[i32]) -> SecondMoments {
     let mut sum = [0i64; 3];
     let mut products = [0i64; 6];
     for ((&x, &y), &z) in x.iter().zip(y).zip(z) {

@@ -1,6 +1,7 @@
 //! Lines in a disk's plane and their intersections.
 
 use super::Normal;
+use crate::kernels::eight::Numbers;
 use crate::kernels::{Frame, Line, SLACK};
 
 /// A corner of the polygon.
@@ -42,18 +43,33 @@ pub(super) fn frame(normal: Normal) -> Frame {
 /// The intersection of two lines.
 #[inline(always)]
 pub(super) fn meet(a: &Line, b: &Line) -> Corner {
-    let determinant = a.line[0] * b.line[1] - a.line[1] * b.line[0];
-    let inverse = 1.0 / determinant;
-    let x = (a.offset * b.line[1] - b.offset * a.line[1]) * inverse;
-    let y = (b.offset * a.line[0] - a.offset * b.line[0]) * inverse;
-    let distance = x.abs() + y.abs();
-    let lengths = a.length + b.length;
-    let error = SLACK * lengths * inverse.abs() * (a.offset + b.offset + lengths * distance);
+    let columns = |line: &Line| [line.line[0], line.line[1], line.offset, line.length];
+    let ([x, y], error, reach2) = meet_columns(columns(a), columns(b));
     Corner {
         at: [x, y],
         error,
-        reach2: (x * x + y * y) * (1.0 + SLACK) + error * (2.0 * distance + error),
+        reach2,
     }
+}
+
+/// The intersections of pairs of lines, each given by its normal, offset and length: positions, bounds of
+/// their errors, bounds of their squared distances from the centre.
+#[inline(always)]
+pub(super) fn meet_columns<N: Numbers>(
+    [a_x, a_y, a_offset, a_length]: [N; 4],
+    [b_x, b_y, b_offset, b_length]: [N; 4],
+) -> ([N; 2], N, N) {
+    let slack = N::splat(SLACK);
+    let determinant = a_x * b_y - a_y * b_x;
+    let inverse = N::splat(1.0) / determinant;
+    let x = (a_offset * b_y - b_offset * a_y) * inverse;
+    let y = (b_offset * a_x - a_offset * b_x) * inverse;
+    let distance = x.abs() + y.abs();
+    let lengths = a_length + b_length;
+    let error = slack * lengths * inverse.abs() * (a_offset + b_offset + lengths * distance);
+    let reach2 =
+        (x * x + y * y) * N::splat(1.0 + SLACK) + error * (N::splat(2.0) * distance + error);
+    ([x, y], error, reach2)
 }
 
 /// A tighter bound on the distance of `at`, the intersection computed by [`meet`], from the true corner.

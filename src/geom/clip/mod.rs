@@ -10,6 +10,7 @@ mod many;
 mod rim;
 mod scan;
 mod touch;
+pub mod wrap;
 
 use super::plane::Normal;
 use super::predicate::{Neighbor, cuts_corner, cuts_parallel};

@@ -4,8 +4,9 @@
 use crate::error::Result;
 use crate::geom::Point;
 use crate::geom::aabb::Aabb;
+use crate::geom::clip::wrap::Wrapper;
 use crate::geom::clip::{Cell, Spheres};
-use crate::geom::plane::{Moments, Plane};
+use crate::geom::plane::{Moments, Normal, Plane};
 use crate::kernels::Level;
 use crate::method::METHOD;
 use crate::stages::order::PointStore;
@@ -120,12 +121,7 @@ fn fit_from(source: &mut impl Source, neighbors: usize, widen: Widen) -> Result<
     let mut fit = Fit::of(source.near().sums(used, Level::best()));
     let mut wanted = neighbors;
     for _ in 0..METHOD.plane.doublings {
-        let enough = match widen {
-            Widen::Never => true,
-            Widen::OnLines => fit.plane.spans,
-            Widen::OnBands => fit.plane.wide,
-        };
-        if enough || used < wanted {
+        if widen.is_enough(&fit.plane) || used < wanted {
             break;
         }
         // Only the set of neighbours matters here, not yet their order.
@@ -153,15 +149,28 @@ pub enum Widen {
     OnBands,
 }
 
+impl Widen {
+    /// True if a plane needs no more neighbours.
+    pub(super) fn is_enough(self, plane: &Plane) -> bool {
+        match self {
+            Self::Never => true,
+            Self::OnLines => plane.spans,
+            Self::OnBands => plane.wide,
+        }
+    }
+}
+
 /// Computes cells one after another in the same memory.
 #[derive(Debug)]
 pub struct CellMaker<'a> {
-    neighbors: usize,
+    pub(super) level: Level,
+    pub(super) neighbors: usize,
     radius: DiskRadius,
-    widen: Widen,
+    pub(super) widen: Widen,
     /// If given, points off the surface get no cell.
     density: Option<Density<'a>>,
     cell: Cell,
+    pub(super) wrapper: Box<Wrapper>,
 }
 
 impl<'a> CellMaker<'a> {
@@ -174,30 +183,40 @@ impl<'a> CellMaker<'a> {
         density: Option<Density<'a>>,
     ) -> Self {
         Self {
+            level: Level::best(),
             neighbors,
             radius,
             widen,
             density,
             cell: Cell::new(0, [0, 0, 1 << 24], 1.0),
+            wrapper: Box::default(),
         }
     }
 
-    /// Starts the cell of a point, or returns the reason why it has none.
-    fn start(&mut self, id: u32, fit: &Fit) -> Option<Outcome> {
-        let Some(normal) = fit.plane.normal else {
-            return Some(Outcome::NoPlane);
-        };
+    /// The normal and the radius of a point's disk, or the reason why it has none.
+    pub(super) fn disk(&self, id: u32, fit: &Fit) -> std::result::Result<(Normal, f64), Outcome> {
+        let normal = fit.plane.normal.ok_or(Outcome::NoPlane)?;
         if let Some(density) = self.density
             && density.is_off_surface(id, fit.near2)
         {
-            return Some(Outcome::OffSurface);
+            return Err(Outcome::OffSurface);
         }
         let radius = match self.radius {
             DiskRadius::Auto => METHOD.disk.reach * (fit.last2 as f64).sqrt(),
             DiskRadius::Steps(steps) => steps,
         };
-        self.cell.start(id, normal, radius);
-        None
+        Ok((normal, radius))
+    }
+
+    /// Starts the cell of a point, or returns the reason why it has none.
+    fn start(&mut self, id: u32, fit: &Fit) -> Option<Outcome> {
+        match self.disk(id, fit) {
+            Ok((normal, radius)) => {
+                self.cell.start(id, normal, radius);
+                None
+            }
+            Err(outcome) => Some(outcome),
+        }
     }
 
     /// Computes the cell of a point from the points in its tile and halo. `each` receives the ids at its

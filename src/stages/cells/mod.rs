@@ -3,6 +3,7 @@
 mod cell;
 mod fits;
 mod fold;
+mod together;
 
 pub use cell::{CellMaker, DiskRadius, Fit, Outcome, Widen};
 pub(crate) use fits::{Planes, each_around};
@@ -210,17 +211,25 @@ fn one_tile(
     let mut failed = None;
     let mut searching = unit.hold(0);
     let grown = |bytes| searching.set(bytes);
-    tile.for_each_query(neighbors, &mut search, grown, |id, point, query| {
-        let outcome = match query {
-            None => Ok(Outcome::Uncertain),
-            Some(mut query) => maker.from_tile(&mut query, |a, b| seen.see(id, a, b)),
-        };
-        match outcome {
-            Ok(Outcome::Complete) => {}
-            Ok(Outcome::NoPlane) => no_plane += 1,
-            Ok(Outcome::OffSurface) => off.push(Id { id }),
-            Ok(Outcome::Uncertain) => uncertain.push((id, point)),
-            Err(error) => failed = Some(error),
+    tile.for_each_group(neighbors, &mut search, grown, |group| {
+        let members = group.members();
+        let outcomes = maker.from_group(members, |id, a, b| seen.see(id, a, b));
+        for (number, (member, outcome)) in members.iter().zip(outcomes).enumerate() {
+            let id = member.id;
+            let outcome = match outcome {
+                Some(outcome) => Ok(outcome),
+                None => match group.query(number) {
+                    None => Ok(Outcome::Uncertain),
+                    Some(mut query) => maker.from_tile(&mut query, |a, b| seen.see(id, a, b)),
+                },
+            };
+            match outcome {
+                Ok(Outcome::Complete) => {}
+                Ok(Outcome::NoPlane) => no_plane += 1,
+                Ok(Outcome::OffSurface) => off.push(Id { id }),
+                Ok(Outcome::Uncertain) => uncertain.push((id, member.point)),
+                Err(error) => failed = Some(error),
+            }
         }
     });
     if let Some(error) = failed {

@@ -15,11 +15,13 @@ use crate::workspace::memory::bytes_of;
 use std::ops::Range;
 
 mod around;
+mod groups;
 mod list;
 mod sums;
 
 pub use super::neighbors::Sums;
 pub use around::Around;
+pub use groups::{Group, MOST_MEMBERS, Neighborhood};
 use list::list_nearest;
 
 /// Bytes of a search for each candidate: three sets of columns, the picked candidates, distances and keys.
@@ -95,23 +97,31 @@ impl Tile {
         mut each: impl FnMut(u32, Point, Option<Query<'_>>),
     ) {
         self.for_groups(k, search, wanted, grown, |own, index, id, search| {
-            let point = self.points.get(index);
-            let Some(complete2) = self.nearest(own, index, id, k, search) else {
-                each(id, point, None);
-                return 0;
-            };
-            let farthest = search.near.get(k - 1).map_or(0, |n| n.distance2);
-            let query = Query {
-                tile: self,
-                own,
-                search,
-                point,
-                id,
-                complete2,
-            };
-            each(id, point, Some(query));
+            let query = self.query(own, index, id, k, search);
+            let farthest = query.as_ref().map_or(0, |query| query.farthest2(k));
+            each(id, self.points.get(index), query);
             farthest
         });
+    }
+
+    /// The query for the `k` nearest neighbours of point `index`; `None` if the halo cannot certify them.
+    fn query<'a>(
+        &'a self,
+        own: &'a OwnPage,
+        index: usize,
+        id: u32,
+        k: usize,
+        search: &'a mut Search,
+    ) -> Option<Query<'a>> {
+        let complete2 = self.nearest(own, index, id, k, search)?;
+        Some(Query {
+            tile: self,
+            own,
+            search,
+            point: self.points.get(index),
+            id,
+            complete2,
+        })
     }
 
     /// Gathers the candidates of each leaf with `wanted` ids, and calls `one` with the page, index and id of
@@ -121,8 +131,31 @@ impl Tile {
         k: usize,
         search: &mut Search,
         wanted: impl Fn(usize) -> bool,
-        mut grown: impl FnMut(u64),
+        grown: impl FnMut(u64),
         mut one: impl FnMut(&OwnPage, usize, u32, &mut Search) -> u64,
+    ) {
+        let leaf = |own: &OwnPage, first: usize, group: Range<usize>, search: &mut Search| {
+            let mut farthest = 0;
+            for (id, index) in (first..).zip(group) {
+                if self.ids.contains(&id) && wanted(id) {
+                    farthest = one(own, index, id as u32, search).max(farthest);
+                    search.swap_back();
+                }
+            }
+            farthest
+        };
+        self.for_leaves(k, search, &wanted, grown, leaf);
+    }
+
+    /// Gathers the candidates of each leaf with `wanted` ids, and calls `each` with the page, the id of the
+    /// leaf's first point, and the indices of its points; `each` returns the squared distance that it needed.
+    fn for_leaves(
+        &self,
+        k: usize,
+        search: &mut Search,
+        wanted: impl Fn(usize) -> bool,
+        mut grown: impl FnMut(u64),
+        mut each: impl FnMut(&OwnPage, usize, Range<usize>, &mut Search) -> u64,
     ) {
         let mut guess = None;
         for own in &self.own {
@@ -131,8 +164,8 @@ impl Tile {
             for start in range.clone().step_by(self.leaf) {
                 let group = start..(start + self.leaf).min(range.end);
                 let first = self.id(own.local, start - range.start);
-                let asked = |id: usize| self.ids.contains(&id) && wanted(id);
-                if !(first..first + group.len()).any(asked) {
+                let is_wanted = |id: usize| self.ids.contains(&id) && wanted(id);
+                if !(first..first + group.len()).any(is_wanted) {
                     continue;
                 }
                 if !set {
@@ -142,14 +175,8 @@ impl Tile {
                 let likely = guess.unwrap_or_else(|| self.limit(group.clone(), k, search));
                 let around = self.points.bounds(group.clone());
                 search.gather(self, &around, likely.min(own.reach2));
-                let mut farthest = 0;
                 search.wider2 = 0;
-                for (id, index) in (first..).zip(group) {
-                    if asked(id) {
-                        farthest = one(own, index, id as u32, search).max(farthest);
-                        search.swap_back();
-                    }
-                }
+                let farthest = each(own, first, group, search);
                 if farthest > 0 {
                     // A little farther than the previous leaf needed: gathering for one point alone costs as
                     // much as for a leaf.
@@ -308,6 +335,11 @@ impl Query<'_> {
     #[must_use]
     pub fn complete2(&self) -> u64 {
         self.complete2
+    }
+
+    /// Squared distance of the `k`th neighbour; 0 if it is not listed.
+    fn farthest2(&self, k: usize) -> u64 {
+        self.near().get(k - 1).map_or(0, |near| near.distance2)
     }
 
     /// Replaces the list by the neighbours farther than [`Query::complete2`], up to a squared distance, that

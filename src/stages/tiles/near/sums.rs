@@ -5,7 +5,7 @@ use super::list::{likely_body, pick_enough_body};
 use super::{APPROXIMATE, OwnPage, Query, Search, above};
 use crate::geom::Point;
 use crate::geom::plane::Moments;
-use crate::kernels::{BLOCK, MOST_SUMMED, Pick, SUMMED_LIMIT2, kernel};
+use crate::kernels::{BLOCK, MOST_SUMMED, Pick, SUMMED_LIMIT2, distances_body, kernel};
 use crate::stages::tiles::Tile;
 use crate::stages::tiles::neighbors::Sums;
 
@@ -158,21 +158,58 @@ pub(super) fn divided_body<P: Pick>(
     let [_, _, _, numbers] = search.picked.slices_mut();
     numbers[picked..room].fill(f32::INFINITY.to_bits());
     let distances = bytemuck::cast_slice(search.picked.numbers(room));
-    // The point itself is included, and adds nothing to the sums.
+    let limit = divided_limit::<P>(distances, picked, k, limit, search.candidates.complete2)?;
+    search.last = limit;
+    Ok((room, limit))
+}
+
+/// As [`divided_body`], but with the ids of the picked candidates as numbers, and their distances in
+/// `search.distances`.
+#[inline(always)]
+pub(super) fn divided_with_ids<P: Pick>(
+    search: &mut Search,
+    point: Point,
+    k: usize,
+) -> Result<(usize, f32), Unknown> {
+    let most = above(search.candidates.complete2);
+    let limits = likely_body(search.last * MARGIN, most)..=most;
+    let (picked, limit) = pick_enough_body::<P, false>(search, point, k + 2, limits);
+    let room = picked.next_multiple_of(BLOCK);
+    let wanted = room.max(search.distances.len());
+    search.distances.resize(wanted, 0.0);
+    let [x, y, z] = search.picked.coordinates(room);
+    let distances = &mut search.distances[..room];
+    distances_body(x, y, z, point, distances);
+    distances[picked..].fill(f32::INFINITY);
+    let limit = divided_limit::<P>(distances, picked, k, limit, search.candidates.complete2)?;
+    search.last = limit;
+    Ok((room, limit))
+}
+
+/// A limit within which the point itself and exactly its `k` nearest neighbours lie, from the distances of
+/// `picked` candidates within `limit`.
+#[inline(always)]
+fn divided_limit<P: Pick>(
+    distances: &[f32],
+    picked: usize,
+    k: usize,
+    limit: f32,
+    complete2: u64,
+) -> Result<f32, Unknown> {
+    // The point itself is included.
     if picked <= k {
         return Err(Unknown::Few);
     }
     let limit = divide_body::<P>(distances, picked, k + 1, limit).ok_or(Unknown::Close)?;
-    search.last = limit;
-    if certain_body(limit) > search.candidates.complete2 as f64 {
+    if certain_body(limit) > complete2 as f64 {
         return Err(Unknown::Close);
     }
-    Ok((room, limit))
+    Ok(limit)
 }
 
 /// An upper bound on the squared distances of the points whose approximate ones are within `limit`.
 #[inline(always)]
-fn certain_body(limit: f32) -> f64 {
+pub(super) fn certain_body(limit: f32) -> f64 {
     f64::from(limit) * (1.0 + 2.0 * APPROXIMATE)
 }
 

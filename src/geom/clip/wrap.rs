@@ -1,0 +1,496 @@
+//! The cells of several points at once, by gift wrapping.
+//!
+//! In the dual, the line `l · q = o` is the point `l / o`, and the corners of a cell are the sides of the
+//! convex hull of these points. Hulls are wrapped in `f32`, one in each lane; they are guesses. A guess is
+//! certified as the cell: the intersection of each side with the next, with a bound on its error, must be
+//! clear of all other lines. A cell without a certificate has to be clipped ([`super::Cell`]); most of these
+//! have co-circular neighbours, or reach beyond the points at hand.
+
+use super::RIM_DISTANCE;
+use super::lines::{frame, meet_columns};
+use crate::geom::plane::Normal;
+use crate::kernels::eight::Eight;
+use crate::kernels::sixteen::Sixteen;
+use crate::kernels::{LANES, Level, LineGroup, SLACK, bisectors_body, kernel};
+
+/// Most points whose cells are computed together, one in each lane.
+pub const TOGETHER: usize = 16;
+
+/// Most neighbours of a point.
+pub const MOST_NEIGHBORS: usize = 32;
+
+/// Comparisons that need not wait for each other.
+const CHAINS: usize = 4;
+
+/// Most sides of a cell.
+const MOST_SIDES: usize = 2 * LANES;
+
+/// A point and its disk, with all points within a distance.
+#[derive(Debug, Clone, Copy)]
+pub struct Site<'a> {
+    /// Differences to the neighbours, one axis after the other; [`MOST_NEIGHBORS`] with zeros at the end.
+    pub differences: [&'a [i32; MOST_NEIGHBORS]; 3],
+    /// Number of neighbours.
+    pub count: usize,
+    /// All points within this squared distance are neighbours.
+    pub complete2: u64,
+    /// Normal of the disk's plane.
+    pub normal: Normal,
+    /// Radius of the disk, in steps.
+    pub radius: f64,
+}
+
+/// The sides of a cell in order around it, as indices of neighbours; none if the cell is not certified.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Outline {
+    count: usize,
+    sides: [u8; MOST_SIDES],
+}
+
+impl Outline {
+    /// The sides; none if the cell is not certified.
+    #[must_use]
+    pub fn sides(&self) -> &[u8] {
+        &self.sides[..self.count]
+    }
+
+    /// The pairs of sides that meet at a corner.
+    pub fn corners(&self) -> impl Iterator<Item = (u8, u8)> + '_ {
+        let sides = self.sides();
+        let next = sides.iter().cycle().skip(1);
+        sides.iter().zip(next).map(|(a, b)| (*a, *b))
+    }
+}
+
+type Lines = [LineGroup; MOST_NEIGHBORS / LANES];
+type Lanes<T> = [T; TOGETHER];
+
+/// Memory for cells that are computed together.
+#[derive(Debug, Clone)]
+pub struct Wrapper {
+    level: Level,
+    lines: Lanes<Lines>,
+    /// Points of the dual, by coordinate, neighbour and lane.
+    dual: [[Lanes<f32>; MOST_NEIGHBORS]; 2],
+    /// The sides of the guesses, by place around the cell and lane.
+    sides: [Lanes<u32>; MOST_SIDES],
+    outlines: Lanes<Outline>,
+}
+
+impl Default for Wrapper {
+    fn default() -> Self {
+        Self::at(Level::best())
+    }
+}
+
+impl Wrapper {
+    /// With the kernels of `level`; levels differ only in speed.
+    #[must_use]
+    pub fn at(level: Level) -> Self {
+        Self {
+            level,
+            lines: Default::default(),
+            dual: [[[0.0; TOGETHER]; MOST_NEIGHBORS]; 2],
+            sides: [[0; TOGETHER]; MOST_SIDES],
+            outlines: Default::default(),
+        }
+    }
+
+    /// The cells of the first [`TOGETHER`] sites.
+    pub fn cells(&mut self, sites: &[Site<'_>]) -> &[Outline] {
+        let sites = &sites[..sites.len().min(TOGETHER)];
+        wrap(self.level, self, sites);
+        &self.outlines[..sites.len()]
+    }
+}
+
+kernel! {
+    /// Computes the outlines of at most [`TOGETHER`] sites.
+    fn wrap(wrapper: &mut Wrapper, sites: &[Site<'_>]) = wrap_body<Eight>
+}
+
+#[inline(always)]
+fn wrap_body<E: Eight + Sixteen>(wrapper: &mut Wrapper, sites: &[Site<'_>]) {
+    let lanes = wrapper.lines.iter_mut().enumerate();
+    let mut most = 0;
+    for (site, (lane, lines)) in sites.iter().zip(lanes) {
+        set_lines::<E>(site, lines);
+        set_dual(lines, lane, site.count, &mut wrapper.dual);
+        most = site.count.max(most);
+    }
+    let counts = guess_body::<E>(&wrapper.dual, most, sites.len(), &mut wrapper.sides);
+    for (lane, site) in sites.iter().enumerate() {
+        let outline = &mut wrapper.outlines[lane];
+        for (to, sides) in outline.sides.iter_mut().zip(&wrapper.sides) {
+            *to = sides[lane] as u8;
+        }
+        outline.count = counts[lane] as usize;
+        if !certify::<E>(site, &wrapper.lines[lane], outline.sides()) {
+            outline.count = 0;
+        }
+    }
+}
+
+/// The bisectors of a site.
+#[inline(always)]
+fn set_lines<E: Eight>(site: &Site<'_>, lines: &mut Lines) {
+    let frame = frame(site.normal);
+    let [x, y, z] = site.differences.map(|column| column.as_chunks::<LANES>().0);
+    for (((x, y), z), lines) in x.iter().zip(y).zip(z).zip(lines) {
+        *lines = bisectors_body::<E>(x, y, z, &frame);
+    }
+}
+
+/// Writes the lines as points of the dual into a lane; the origin for places without a line.
+#[inline(always)]
+fn set_dual(
+    lines: &Lines,
+    lane: usize,
+    count: usize,
+    dual: &mut [[Lanes<f32>; MOST_NEIGHBORS]; 2],
+) {
+    let mut columns = [[0.0; MOST_NEIGHBORS]; 2];
+    for (group, lines) in lines.iter().enumerate() {
+        for k in 0..LANES {
+            let inverse = 1.0 / lines.offset[k] as f32;
+            columns[0][group * LANES + k] = lines.x[k] as f32 * inverse;
+            columns[1][group * LANES + k] = lines.y[k] as f32 * inverse;
+        }
+    }
+    for (columns, dual) in columns.iter().zip(dual) {
+        for (n, (at, dual)) in columns.iter().zip(dual).enumerate() {
+            dual[lane] = if n < count { *at } else { 0.0 };
+        }
+    }
+}
+
+/// Wraps the hulls of the first `lanes` lanes, counter-clockwise. Returns their numbers of sides, 0 where
+/// there are too many.
+#[inline(always)]
+fn guess_body<S: Sixteen>(
+    dual: &[[Lanes<f32>; MOST_NEIGHBORS]; 2],
+    count: usize,
+    lanes: usize,
+    sides: &mut [Lanes<u32>; MOST_SIDES],
+) -> Lanes<u32> {
+    let rows = count.next_multiple_of(CHAINS).min(MOST_NEIGHBORS);
+    let duals = [&dual[0][..rows], &dual[1][..rows]];
+    let first = nearest_lines::<S>(duals);
+    let mut side = first;
+    let mut at = points_of(dual, &side);
+    // Backwards along the tangent; the hull is to the left of the tangent.
+    let mut back = [[0.0; TOGETHER]; 2];
+    for l in 0..TOGETHER {
+        (back[0][l], back[1][l]) = (at[1][l], -at[0][l]);
+    }
+    let mut counts = [0; TOGETHER];
+    let mut open = [0; TOGETHER];
+    open[..lanes].fill(u32::MAX);
+    for (place, sides) in (1u32..).zip(sides) {
+        *sides = side;
+        let next = rightmost::<S>(duals, &at, &back);
+        let mut any = 0;
+        for l in 0..TOGETHER {
+            let closed = if next[l] == first[l] { open[l] } else { 0 };
+            counts[l] |= closed & place;
+            open[l] &= !closed;
+            any |= open[l];
+        }
+        if any == 0 {
+            break;
+        }
+        let to = points_of(dual, &next);
+        for (back, (at, to)) in back.iter_mut().zip(at.iter().zip(&to)) {
+            for l in 0..TOGETHER {
+                back[l] = at[l] - to[l];
+            }
+        }
+        (at, side) = (to, next);
+    }
+    counts
+}
+
+/// The points of the dual with these numbers, by coordinate and lane.
+#[inline(always)]
+fn points_of(dual: &[[Lanes<f32>; MOST_NEIGHBORS]; 2], numbers: &Lanes<u32>) -> [Lanes<f32>; 2] {
+    let mut at = [[0.0; TOGETHER]; 2];
+    for (dual, at) in dual.iter().zip(&mut at) {
+        for l in 0..TOGETHER {
+            at[l] = dual[numbers[l] as usize % MOST_NEIGHBORS][l];
+        }
+    }
+    at
+}
+
+/// The numbers of the lines nearest to the centre.
+#[inline(always)]
+fn nearest_lines<S: Sixteen>([dual_x, dual_y]: [&[Lanes<f32>]; 2]) -> Lanes<u32> {
+    let zero = S::floats(&[0.0; TOGETHER]);
+    let mut far = [(zero, S::integer(0)); CHAINS];
+    let rows = dual_x.chunks_exact(CHAINS).zip(dual_y.chunks_exact(CHAINS));
+    for (chunk, (dual_x, dual_y)) in (0u32..).zip(rows) {
+        for (link, far) in far.iter_mut().enumerate() {
+            let (x, y) = (S::floats(&dual_x[link]), S::floats(&dual_y[link]));
+            let far2 = S::minus(S::times(x, x), S::times(S::minus(zero, y), y));
+            let take = S::less(far.0, far2);
+            let number = S::integer(chunk * CHAINS as u32 + link as u32);
+            *far = (
+                S::choose(take, far2, far.0),
+                S::choose_integers(take, number, far.1),
+            );
+        }
+    }
+    let farther = |a: (S::Floats, S::Integers), b: (S::Floats, S::Integers)| {
+        let take = S::less(a.0, b.0);
+        let number = S::choose_integers(take, b.1, a.1);
+        (S::choose(take, b.0, a.0), number)
+    };
+    let (_, number) = far[1..].iter().fold(far[0], |a, b| farther(a, *b));
+    let mut numbers = [0; TOGETHER];
+    S::store_integers(number, &mut numbers);
+    numbers
+}
+
+/// The numbers of the points that are farthest to the right as seen from `at`, where `back` is a direction to
+/// the left of all of them.
+#[inline(always)]
+fn rightmost<S: Sixteen>(
+    [dual_x, dual_y]: [&[Lanes<f32>]; 2],
+    at: &[Lanes<f32>; 2],
+    back: &[Lanes<f32>; 2],
+) -> Lanes<u32> {
+    let (at_x, at_y) = (S::floats(&at[0]), S::floats(&at[1]));
+    let start = (S::floats(&back[0]), S::floats(&back[1]), S::integer(0));
+    let right = |a: (S::Floats, S::Floats, S::Integers), b: (S::Floats, S::Floats, S::Integers)| {
+        let take = S::less(S::times(a.0, b.1), S::times(a.1, b.0));
+        (
+            S::choose(take, b.0, a.0),
+            S::choose(take, b.1, a.1),
+            S::choose_integers(take, b.2, a.2),
+        )
+    };
+    let mut best = [start; CHAINS];
+    let rows = dual_x.chunks_exact(CHAINS).zip(dual_y.chunks_exact(CHAINS));
+    for (chunk, (dual_x, dual_y)) in (0u32..).zip(rows) {
+        for (link, best) in best.iter_mut().enumerate() {
+            let x = S::minus(S::floats(&dual_x[link]), at_x);
+            let y = S::minus(S::floats(&dual_y[link]), at_y);
+            let number = S::integer(chunk * CHAINS as u32 + link as u32);
+            *best = right(*best, (x, y, number));
+        }
+    }
+    let (.., number) = best[1..].iter().fold(best[0], |a, b| right(a, *b));
+    let mut numbers = [0; TOGETHER];
+    S::store_integers(number, &mut numbers);
+    numbers
+}
+
+/// True if the lines `sides`, in this order, are the sides of the cell.
+#[inline(always)]
+fn certify<E: Eight>(site: &Site<'_>, lines: &Lines, sides: &[u8]) -> bool {
+    if sides.len() < 3 {
+        return false;
+    }
+    // Each side beside the next one.
+    let mut columns = [[0.0; MOST_SIDES + 1]; 4];
+    let around = sides.iter().chain(&sides[..1]);
+    for (place, side) in around.enumerate() {
+        let (group, k) = (*side as usize / LANES, *side as usize % LANES);
+        let Some(lines) = lines.get(group) else {
+            return false;
+        };
+        columns[0][place] = lines.x[k];
+        columns[1][place] = lines.y[k];
+        columns[2][place] = lines.offset[k];
+        columns[3][place] = lines.length[k];
+    }
+    let mut at = [[0.0; MOST_SIDES]; 2];
+    let (mut errors, mut reaches) = ([0.0; MOST_SIDES], [0.0; MOST_SIDES]);
+    for start in (0..sides.len()).step_by(LANES) {
+        let from = |start: usize| {
+            columns.each_ref().map(|column| {
+                let lanes = column[start..].first_chunk().unwrap_or(&[0.0; LANES]);
+                E::load(lanes)
+            })
+        };
+        let ([x, y], error, reach2) = meet_columns(from(start), from(start + 1));
+        let around = E::splat(SLACK).mul(x.abs().add(y.abs()));
+        let to = start..start + LANES;
+        store(x, &mut at[0][to.clone()]);
+        store(y, &mut at[1][to.clone()]);
+        store(error.add(around), &mut errors[to.clone()]);
+        store(reach2, &mut reaches[to]);
+    }
+    let mut reach2 = 0.0f64;
+    let (mut unclear, mut seen) = (0, 0);
+    for (place, side) in sides.iter().enumerate() {
+        reach2 = reach2.max(reaches[place]);
+        let next = sides.get(place + 1).unwrap_or(&sides[0]);
+        let own = 1u64 << side | 1 << next;
+        let corner = [at[0][place], at[1][place], errors[place]];
+        unclear |= !(clear_lines::<E>(lines, corner) | own);
+        seen |= 1u64 << side;
+    }
+    let clear = unclear & ((1 << site.count) - 1) == 0;
+    // A side has two corners: if all sides are different, they close around the cell once.
+    let once = seen.count_ones() as usize == sides.len();
+    let secure2 = 4.0 * reach2 * (1.0 + 1e-9) + 1.0;
+    let rim = site.radius * RIM_DISTANCE;
+    // Far from the rim, whose sides then do not matter.
+    clear && once && secure2 <= site.complete2 as f64 * (1.0 - 1e-9) && secure2 <= rim * rim
+}
+
+#[inline(always)]
+fn store<E: Eight>(lanes: E, to: &mut [f64]) {
+    if let Some(to) = to.first_chunk_mut() {
+        lanes.store(to);
+    }
+}
+
+/// Bit `k` is set if line `k` certainly does not cut off the corner. See
+/// [`crate::kernels::touching_lines`].
+#[inline(always)]
+fn clear_lines<E: Eight>(lines: &Lines, [x, y, error]: [f64; 3]) -> u64 {
+    let (x, y, error) = (E::splat(x), E::splat(y), E::splat(error));
+    let slack = E::splat(SLACK);
+    let mut clear = 0;
+    for (group, lines) in lines.iter().enumerate() {
+        let offset = E::load(&lines.offset);
+        let depth = E::load(&lines.x)
+            .mul(x)
+            .add(E::load(&lines.y).mul(y))
+            .sub(offset);
+        let bound = E::load(&lines.length).mul(error).add(slack.mul(offset));
+        clear |= E::splat(0.0).sub(depth).greater(bound) << (group * LANES);
+    }
+    clear
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Cell;
+    use super::*;
+    use proptest::prelude::*;
+
+    type Differences = Vec<[i32; 3]>;
+
+    /// Anywhere, in a plane, on a grid in a plane (with many co-circular points), or around a circle.
+    fn clouds() -> impl Strategy<Value = Differences> {
+        let all = |from: i32| prop::collection::vec(prop::array::uniform3(-from..from), 3..=32);
+        prop_oneof![
+            2 => all(1 << 20),
+            1 => all(1 << 29),
+            4 => (all(1 << 12), 0i32..1 << 8).prop_map(|(all, thick)| {
+                all.iter().map(|[x, y, z]| [*x, *y, z % (thick + 1)]).collect()
+            }),
+            2 => all(4).prop_map(|all| all.iter().map(|[x, y, _]| [*x, *y, 0]).collect()),
+            1 => (3usize..32, 10.0f64..1e6).prop_map(|(count, radius)| {
+                let at = |k: usize| (k as f64 * std::f64::consts::TAU / count as f64).sin_cos();
+                (0..count).map(at).map(|(s, c)| [(s * radius) as i32, (c * radius) as i32, 0]).collect()
+            }),
+        ]
+    }
+
+    fn length2(d: &[i32; 3]) -> u64 {
+        d.iter().map(|c| i64::from(*c).pow(2) as u64).sum()
+    }
+
+    /// The pairs of neighbours at the corners of the cell, clipped line by line; `None` if it reaches farther
+    /// than the points are known.
+    fn clipped(differences: &Differences, site: &Site<'_>) -> Option<Vec<(u32, u32)>> {
+        let mut cell = Cell::new(1000, site.normal, site.radius);
+        let mut numbers: Vec<u32> = (0..differences.len() as u32).collect();
+        numbers.sort_by_key(|n| (length2(&differences[*n as usize]), *n));
+        for number in numbers {
+            cell.clip(differences[number as usize].map(i64::from), number);
+        }
+        let mut pairs = Vec::new();
+        cell.triples(|a, b| pairs.push((a.min(b), a.max(b))));
+        pairs.sort_unstable();
+        (cell.reach2() <= site.complete2).then_some(pairs)
+    }
+
+    fn columns(differences: &Differences) -> [[i32; MOST_NEIGHBORS]; 3] {
+        let mut columns = [[0; MOST_NEIGHBORS]; 3];
+        for (place, difference) in differences.iter().enumerate() {
+            for (column, at) in columns.iter_mut().zip(difference) {
+                column[place] = *at;
+            }
+        }
+        columns
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(1000))]
+        #[test]
+        fn certified_cells_are_those_of_clipping(
+            clouds in prop::collection::vec(clouds(), 1..=TOGETHER),
+            normal in prop_oneof![
+                3 => Just([0, 0, 1 << 24]),
+                1 => (-9i32..9, -9i32..9).prop_map(|(x, y)| [x << 18, y << 18, 1 << 24]),
+            ],
+            radius in prop_oneof![3 => Just(1e10), 1 => 1.0f64..1e6],
+            complete in 0.5f64..4.0,
+        ) {
+            let clouds: Vec<Differences> = clouds.into_iter()
+                .map(|all| all.into_iter().filter(|d| *d != [0; 3]).collect()).collect();
+            let columns: Vec<_> = clouds.iter().map(columns).collect();
+            let sites: Vec<_> = clouds.iter().zip(&columns).map(|(cloud, columns)| Site {
+                differences: columns.each_ref(),
+                count: cloud.len(),
+                complete2: (cloud.iter().map(length2).max().unwrap_or(0) as f64 * complete) as u64,
+                normal,
+                radius,
+            }).collect();
+            for level in Level::all() {
+                let mut wrapper = Wrapper::at(level);
+                for ((cloud, site), outline) in clouds.iter().zip(&sites).zip(wrapper.cells(&sites)) {
+                    let mut pairs: Vec<_> = outline.corners().map(|(a, b)| {
+                        (u32::from(a.min(b)), u32::from(a.max(b)))
+                    }).collect();
+                    pairs.sort_unstable();
+                    if !pairs.is_empty() {
+                        prop_assert_eq!(clipped(cloud, site), Some(pairs));
+                    }
+                }
+            }
+        }
+
+        /// Also where the last lanes are not used, and after cells with more neighbours.
+        #[test]
+        fn cells_of_scattered_points_are_certified(
+            clouds in prop::collection::vec(
+                prop::collection::vec((-1i32 << 24..1 << 24, -1i32 << 24..1 << 24), 20..=32), 1..=2 * TOGETHER),
+        ) {
+            let mut known = 0;
+            let clouds: Vec<Differences> = clouds.iter()
+                .map(|all| all.iter().map(|(x, y)| [*x | 1, *y, (x ^ y) % 64]).collect()).collect();
+            for level in Level::all() {
+                let mut wrapper = Wrapper::at(level);
+                for clouds in clouds.chunks(TOGETHER) {
+                    let columns: Vec<_> = clouds.iter().map(columns).collect();
+                    let sites: Vec<_> = clouds.iter().zip(&columns).map(|(cloud, columns)| Site {
+                        differences: columns.each_ref(),
+                        count: cloud.len(),
+                        complete2: u64::MAX,
+                        normal: [0, 0, 1 << 24],
+                        radius: 1e10,
+                    }).collect();
+                    let outlines = wrapper.cells(&sites);
+                    for ((cloud, site), outline) in clouds.iter().zip(&sites).zip(outlines) {
+                        let pairs = clipped(cloud, site).unwrap_or_default();
+                        // On the rim, or with more sides than there is room for.
+                        let closed = pairs.len() >= 3 && {
+                            let mut ends: Vec<_> = pairs.iter().flat_map(|(a, b)| [a, b]).collect();
+                            ends.sort_unstable();
+                            ends.chunk_by(|a, b| a == b).all(|same| same.len() == 2)
+                        };
+                        known += usize::from(closed);
+                        prop_assert!(!closed || outline.sides().len() == pairs.len());
+                    }
+                }
+            }
+            prop_assert!(known * 2 > clouds.len());
+        }
+    }
+}

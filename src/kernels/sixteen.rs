@@ -1,0 +1,216 @@
+//! Vectors of sixteen `f32`, for loops that the compiler does not keep in registers by itself.
+//!
+//! [`Base`] is the definition. The other types perform the same operations in wider registers.
+
+use super::eight::Base;
+
+/// Numbers, operations on sixteen of them, and choices between sixteen integers.
+pub(crate) trait Sixteen {
+    /// Sixteen numbers.
+    type Floats: Copy;
+    /// Sixteen integers.
+    type Integers: Copy;
+    /// Sixteen conditions.
+    type Mask: Copy;
+    /// Loads from memory.
+    fn floats(from: &[f32; 16]) -> Self::Floats;
+    /// All integers equal to `x`.
+    fn integer(x: u32) -> Self::Integers;
+    /// Stores to memory.
+    fn store_integers(x: Self::Integers, to: &mut [u32; 16]);
+    /// Differences.
+    fn minus(a: Self::Floats, b: Self::Floats) -> Self::Floats;
+    /// Products.
+    fn times(a: Self::Floats, b: Self::Floats) -> Self::Floats;
+    /// True where `a` is less than `b`.
+    fn less(a: Self::Floats, b: Self::Floats) -> Self::Mask;
+    /// For each pair the first number where the mask is true, else the second.
+    fn choose(mask: Self::Mask, a: Self::Floats, b: Self::Floats) -> Self::Floats;
+    /// The same for integers.
+    fn choose_integers(mask: Self::Mask, a: Self::Integers, b: Self::Integers) -> Self::Integers;
+}
+
+impl Sixteen for Base {
+    type Floats = [f32; 16];
+    type Integers = [u32; 16];
+    type Mask = [bool; 16];
+
+    #[inline(always)]
+    fn floats(from: &[f32; 16]) -> [f32; 16] {
+        *from
+    }
+
+    #[inline(always)]
+    fn integer(x: u32) -> [u32; 16] {
+        [x; 16]
+    }
+
+    #[inline(always)]
+    fn store_integers(x: [u32; 16], to: &mut [u32; 16]) {
+        *to = x;
+    }
+
+    #[inline(always)]
+    fn minus(a: [f32; 16], b: [f32; 16]) -> [f32; 16] {
+        std::array::from_fn(|k| a[k] - b[k])
+    }
+
+    #[inline(always)]
+    fn times(a: [f32; 16], b: [f32; 16]) -> [f32; 16] {
+        std::array::from_fn(|k| a[k] * b[k])
+    }
+
+    #[inline(always)]
+    fn less(a: [f32; 16], b: [f32; 16]) -> [bool; 16] {
+        std::array::from_fn(|k| a[k] < b[k])
+    }
+
+    #[inline(always)]
+    fn choose(mask: [bool; 16], a: [f32; 16], b: [f32; 16]) -> [f32; 16] {
+        std::array::from_fn(|k| if mask[k] { a[k] } else { b[k] })
+    }
+
+    #[inline(always)]
+    fn choose_integers(mask: [bool; 16], a: [u32; 16], b: [u32; 16]) -> [u32; 16] {
+        std::array::from_fn(|k| if mask[k] { a[k] } else { b[k] })
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[allow(
+    unsafe_code,
+    reason = "instructions that were looked for; unaligned loads and stores"
+)]
+mod wide {
+    use super::Sixteen;
+    use crate::kernels::eight::{Avx2, Avx512};
+    use std::arch::x86_64::*;
+
+    // SAFETY (all of both types): they are named only by the versions of a kernel that are compiled for these
+    // instructions, and those are called only after `Level` found the instructions on the machine. Loads and
+    // stores stay within an array of sixteen and need no alignment.
+    impl Sixteen for Avx2 {
+        type Floats = [__m256; 2];
+        type Integers = [__m256i; 2];
+        type Mask = [__m256; 2];
+
+        #[inline(always)]
+        fn floats(from: &[f32; 16]) -> [__m256; 2] {
+            // SAFETY: see above.
+            unsafe {
+                let p = from.as_ptr();
+                [_mm256_loadu_ps(p), _mm256_loadu_ps(p.add(8))]
+            }
+        }
+
+        #[inline(always)]
+        fn integer(x: u32) -> [__m256i; 2] {
+            // SAFETY: see above.
+            unsafe { [_mm256_set1_epi32(x as i32); 2] }
+        }
+
+        #[inline(always)]
+        fn store_integers(x: [__m256i; 2], to: &mut [u32; 16]) {
+            // SAFETY: see above.
+            unsafe {
+                let p = to.as_mut_ptr().cast::<__m256i>();
+                _mm256_storeu_si256(p, x[0]);
+                _mm256_storeu_si256(p.add(1), x[1]);
+            }
+        }
+
+        #[inline(always)]
+        fn minus(a: [__m256; 2], b: [__m256; 2]) -> [__m256; 2] {
+            // SAFETY: see above.
+            unsafe { [_mm256_sub_ps(a[0], b[0]), _mm256_sub_ps(a[1], b[1])] }
+        }
+
+        #[inline(always)]
+        fn times(a: [__m256; 2], b: [__m256; 2]) -> [__m256; 2] {
+            // SAFETY: see above.
+            unsafe { [_mm256_mul_ps(a[0], b[0]), _mm256_mul_ps(a[1], b[1])] }
+        }
+
+        #[inline(always)]
+        fn less(a: [__m256; 2], b: [__m256; 2]) -> [__m256; 2] {
+            // SAFETY: see above.
+            unsafe {
+                let low = _mm256_cmp_ps::<_CMP_LT_OQ>(a[0], b[0]);
+                [low, _mm256_cmp_ps::<_CMP_LT_OQ>(a[1], b[1])]
+            }
+        }
+
+        #[inline(always)]
+        fn choose(mask: [__m256; 2], a: [__m256; 2], b: [__m256; 2]) -> [__m256; 2] {
+            // SAFETY: see above.
+            unsafe {
+                let low = _mm256_blendv_ps(b[0], a[0], mask[0]);
+                [low, _mm256_blendv_ps(b[1], a[1], mask[1])]
+            }
+        }
+
+        #[inline(always)]
+        fn choose_integers(mask: [__m256; 2], a: [__m256i; 2], b: [__m256i; 2]) -> [__m256i; 2] {
+            // SAFETY: see above. A true mask has all bits set.
+            unsafe {
+                let choose =
+                    |k: usize| _mm256_blendv_epi8(b[k], a[k], _mm256_castps_si256(mask[k]));
+                [choose(0), choose(1)]
+            }
+        }
+    }
+
+    impl Sixteen for Avx512 {
+        type Floats = __m512;
+        type Integers = __m512i;
+        type Mask = __mmask16;
+
+        #[inline(always)]
+        fn floats(from: &[f32; 16]) -> __m512 {
+            // SAFETY: see above.
+            unsafe { _mm512_loadu_ps(from.as_ptr()) }
+        }
+
+        #[inline(always)]
+        fn integer(x: u32) -> __m512i {
+            // SAFETY: see above.
+            unsafe { _mm512_set1_epi32(x as i32) }
+        }
+
+        #[inline(always)]
+        fn store_integers(x: __m512i, to: &mut [u32; 16]) {
+            // SAFETY: see above.
+            unsafe { _mm512_storeu_si512(to.as_mut_ptr().cast(), x) }
+        }
+
+        #[inline(always)]
+        fn minus(a: __m512, b: __m512) -> __m512 {
+            // SAFETY: see above.
+            unsafe { _mm512_sub_ps(a, b) }
+        }
+
+        #[inline(always)]
+        fn times(a: __m512, b: __m512) -> __m512 {
+            // SAFETY: see above.
+            unsafe { _mm512_mul_ps(a, b) }
+        }
+
+        #[inline(always)]
+        fn less(a: __m512, b: __m512) -> __mmask16 {
+            // SAFETY: see above.
+            unsafe { _mm512_cmp_ps_mask::<_CMP_LT_OQ>(a, b) }
+        }
+
+        #[inline(always)]
+        fn choose(mask: __mmask16, a: __m512, b: __m512) -> __m512 {
+            // SAFETY: see above.
+            unsafe { _mm512_mask_blend_ps(mask, b, a) }
+        }
+
+        #[inline(always)]
+        fn choose_integers(mask: __mmask16, a: __m512i, b: __m512i) -> __m512i {
+            // SAFETY: see above.
+            unsafe { _mm512_mask_blend_epi32(mask, b, a) }
+        }
+    }
+}

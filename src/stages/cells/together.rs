@@ -1,0 +1,69 @@
+//! Cells of the points of a leaf, computed together from their nearest neighbours.
+
+use super::cell::{CellMaker, Fit, Outcome};
+use crate::geom::clip::wrap::Site;
+use crate::geom::plane::{Moments, Plane, planes};
+use crate::kernels::{LANES, Level};
+use crate::stages::tiles::near::{MOST_MEMBERS, Neighborhood};
+
+impl CellMaker<'_> {
+    /// Computes the cells of all `members` that their neighbourhoods certify. `each` receives a member's id
+    /// and the ids at the corners of its cell. The outcome is `None` for the members that need a query.
+    pub fn from_group(
+        &mut self,
+        members: &[Neighborhood],
+        mut each: impl FnMut(u32, u32, u32),
+    ) -> [Option<Outcome>; MOST_MEMBERS] {
+        let mut outcomes = [None; MOST_MEMBERS];
+        let planes = planes_of(self.level, members);
+        let mut sites = Vec::new();
+        let mut places = Vec::new();
+        for (place, (member, plane)) in members.iter().zip(planes).enumerate() {
+            let Some(sums) = member.sums else { continue };
+            let fit = Fit {
+                plane,
+                moments: sums.moments,
+                last2: sums.last2,
+                near2: sums.last2,
+            };
+            if !self.widen.is_enough(&fit.plane) {
+                continue;
+            }
+            match self.disk(member.id, &fit) {
+                Err(outcome) => outcomes[place] = Some(outcome),
+                Ok((normal, radius)) => {
+                    places.push(place);
+                    sites.push(Site {
+                        differences: member.differences(),
+                        count: self.neighbors,
+                        complete2: member.complete2,
+                        normal,
+                        radius,
+                    });
+                }
+            }
+        }
+        for (place, outline) in places.into_iter().zip(self.wrapper.cells(&sites)) {
+            let member = &members[place];
+            let ids = member.ids();
+            for (a, b) in outline.corners() {
+                each(member.id, ids[a as usize], ids[b as usize]);
+                outcomes[place] = Some(Outcome::Complete);
+            }
+        }
+        outcomes
+    }
+}
+
+/// The planes of the members whose sums are known.
+fn planes_of(level: Level, members: &[Neighborhood]) -> [Plane; MOST_MEMBERS] {
+    let mut all = [Plane::NONE; MOST_MEMBERS];
+    for (members, all) in members.chunks(LANES).zip(all.chunks_mut(LANES)) {
+        let mut moments = [Moments::default(); LANES];
+        for (member, moments) in members.iter().zip(&mut moments) {
+            *moments = member.sums.map_or(*moments, |sums| sums.moments);
+        }
+        all.copy_from_slice(&planes(level, &moments));
+    }
+    all
+}
