@@ -102,7 +102,7 @@ macro_rules! operators {
 
 /// The definition, in plain code.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Base([f64; 8]);
+pub(crate) struct Base(pub [f64; 8]);
 
 impl Base {
     #[inline(always)]
@@ -190,11 +190,11 @@ mod wide {
 
     /// Two registers of 256 bits.
     #[derive(Debug, Clone, Copy)]
-    pub(crate) struct Avx2(__m256d, __m256d);
+    pub(crate) struct Avx2(pub __m256d, pub __m256d);
 
     /// A register of 512 bits.
     #[derive(Debug, Clone, Copy)]
-    pub(crate) struct Avx512(__m512d);
+    pub(crate) struct Avx512(pub __m512d);
 
     // SAFETY (all of both types): they are named only by the versions of a kernel that are compiled for these
     // instructions, and those are called only after `Level` found the instructions on the machine. Loads and

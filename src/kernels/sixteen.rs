@@ -5,7 +5,7 @@
 use super::eight::Base;
 
 /// Numbers, operations on sixteen of them, and choices between sixteen integers.
-pub(crate) trait Sixteen {
+pub(crate) trait Sixteen: Sized {
     /// Sixteen numbers.
     type Floats: Copy;
     /// Sixteen integers.
@@ -14,6 +14,19 @@ pub(crate) trait Sixteen {
     type Mask: Copy;
     /// Loads from memory.
     fn floats(from: &[f32; 16]) -> Self::Floats;
+    /// Stores to memory.
+    fn store_floats(x: Self::Floats, to: &mut [f32; 16]);
+    /// Two vectors of eight, rounded.
+    fn rounded(low: Self, high: Self) -> Self::Floats;
+    /// Stores rows as columns.
+    #[inline(always)]
+    fn store_turned(rows: &[[f32; 16]; 16], columns: &mut [[f32; 16]; 16]) {
+        for (place, row) in rows.iter().enumerate() {
+            for (x, column) in row.iter().zip(&mut *columns) {
+                column[place] = *x;
+            }
+        }
+    }
     /// All integers equal to `x`.
     fn integer(x: u32) -> Self::Integers;
     /// Stores to memory.
@@ -22,6 +35,8 @@ pub(crate) trait Sixteen {
     fn minus(a: Self::Floats, b: Self::Floats) -> Self::Floats;
     /// Products.
     fn times(a: Self::Floats, b: Self::Floats) -> Self::Floats;
+    /// Quotients.
+    fn over(a: Self::Floats, b: Self::Floats) -> Self::Floats;
     /// True where `a` is less than `b`.
     fn less(a: Self::Floats, b: Self::Floats) -> Self::Mask;
     /// For each pair the first number where the mask is true, else the second.
@@ -38,6 +53,16 @@ impl Sixteen for Base {
     #[inline(always)]
     fn floats(from: &[f32; 16]) -> [f32; 16] {
         *from
+    }
+
+    #[inline(always)]
+    fn store_floats(x: [f32; 16], to: &mut [f32; 16]) {
+        *to = x;
+    }
+
+    #[inline(always)]
+    fn rounded(low: Self, high: Self) -> [f32; 16] {
+        std::array::from_fn(|k| if k < 8 { low.0[k] } else { high.0[k - 8] } as f32)
     }
 
     #[inline(always)]
@@ -58,6 +83,11 @@ impl Sixteen for Base {
     #[inline(always)]
     fn times(a: [f32; 16], b: [f32; 16]) -> [f32; 16] {
         std::array::from_fn(|k| a[k] * b[k])
+    }
+
+    #[inline(always)]
+    fn over(a: [f32; 16], b: [f32; 16]) -> [f32; 16] {
+        std::array::from_fn(|k| a[k] / b[k])
     }
 
     #[inline(always)]
@@ -104,6 +134,25 @@ mod wide {
         }
 
         #[inline(always)]
+        fn store_floats(x: [__m256; 2], to: &mut [f32; 16]) {
+            // SAFETY: see above.
+            unsafe {
+                let p = to.as_mut_ptr();
+                _mm256_storeu_ps(p, x[0]);
+                _mm256_storeu_ps(p.add(8), x[1]);
+            }
+        }
+
+        #[inline(always)]
+        fn rounded(low: Self, high: Self) -> [__m256; 2] {
+            // SAFETY: see above.
+            unsafe {
+                let round = |x: Self| _mm256_set_m128(_mm256_cvtpd_ps(x.1), _mm256_cvtpd_ps(x.0));
+                [round(low), round(high)]
+            }
+        }
+
+        #[inline(always)]
         fn integer(x: u32) -> [__m256i; 2] {
             // SAFETY: see above.
             unsafe { [_mm256_set1_epi32(x as i32); 2] }
@@ -129,6 +178,12 @@ mod wide {
         fn times(a: [__m256; 2], b: [__m256; 2]) -> [__m256; 2] {
             // SAFETY: see above.
             unsafe { [_mm256_mul_ps(a[0], b[0]), _mm256_mul_ps(a[1], b[1])] }
+        }
+
+        #[inline(always)]
+        fn over(a: [__m256; 2], b: [__m256; 2]) -> [__m256; 2] {
+            // SAFETY: see above.
+            unsafe { [_mm256_div_ps(a[0], b[0]), _mm256_div_ps(a[1], b[1])] }
         }
 
         #[inline(always)]
@@ -172,6 +227,56 @@ mod wide {
         }
 
         #[inline(always)]
+        fn store_floats(x: __m512, to: &mut [f32; 16]) {
+            // SAFETY: see above.
+            unsafe { _mm512_storeu_ps(to.as_mut_ptr(), x) }
+        }
+
+        #[inline(always)]
+        fn rounded(low: Self, high: Self) -> __m512 {
+            // SAFETY: see above.
+            unsafe {
+                let low = _mm512_castps256_ps512(_mm512_cvtpd_ps(low.0));
+                _mm512_insertf32x8::<1>(low, _mm512_cvtpd_ps(high.0))
+            }
+        }
+
+        #[inline(always)]
+        fn store_turned(rows: &[[f32; 16]; 16], columns: &mut [[f32; 16]; 16]) {
+            // SAFETY: see above. Pairs of rows, then of pairs, then of quarters of registers.
+            unsafe {
+                let row = |k: usize| _mm512_loadu_ps(rows[k].as_ptr());
+                let mut fours = [_mm512_setzero_ps(); 16];
+                for k in 0..4 {
+                    let [a, b, c, d] = [0, 1, 2, 3].map(|n| row(4 * k + n));
+                    let pairs = [
+                        _mm512_unpacklo_ps(a, b),
+                        _mm512_unpackhi_ps(a, b),
+                        _mm512_unpacklo_ps(c, d),
+                        _mm512_unpackhi_ps(c, d),
+                    ]
+                    .map(|pair| _mm512_castps_pd(pair));
+                    fours[4 * k] = _mm512_castpd_ps(_mm512_unpacklo_pd(pairs[0], pairs[2]));
+                    fours[4 * k + 1] = _mm512_castpd_ps(_mm512_unpackhi_pd(pairs[0], pairs[2]));
+                    fours[4 * k + 2] = _mm512_castpd_ps(_mm512_unpacklo_pd(pairs[1], pairs[3]));
+                    fours[4 * k + 3] = _mm512_castpd_ps(_mm512_unpackhi_pd(pairs[1], pairs[3]));
+                }
+                for n in 0..4 {
+                    let [a, b, c, d] = [0, 4, 8, 12].map(|k| fours[k + n]);
+                    let even = _mm512_shuffle_f32x4::<0x88>(a, b);
+                    let odd = _mm512_shuffle_f32x4::<0xdd>(a, b);
+                    let even_high = _mm512_shuffle_f32x4::<0x88>(c, d);
+                    let odd_high = _mm512_shuffle_f32x4::<0xdd>(c, d);
+                    let mut put = |k: usize, x| _mm512_storeu_ps(columns[k].as_mut_ptr(), x);
+                    put(n, _mm512_shuffle_f32x4::<0x88>(even, even_high));
+                    put(n + 8, _mm512_shuffle_f32x4::<0xdd>(even, even_high));
+                    put(n + 4, _mm512_shuffle_f32x4::<0x88>(odd, odd_high));
+                    put(n + 12, _mm512_shuffle_f32x4::<0xdd>(odd, odd_high));
+                }
+            }
+        }
+
+        #[inline(always)]
         fn integer(x: u32) -> __m512i {
             // SAFETY: see above.
             unsafe { _mm512_set1_epi32(x as i32) }
@@ -196,6 +301,12 @@ mod wide {
         }
 
         #[inline(always)]
+        fn over(a: __m512, b: __m512) -> __m512 {
+            // SAFETY: see above.
+            unsafe { _mm512_div_ps(a, b) }
+        }
+
+        #[inline(always)]
         fn less(a: __m512, b: __m512) -> __mmask16 {
             // SAFETY: see above.
             unsafe { _mm512_cmp_ps_mask::<_CMP_LT_OQ>(a, b) }
@@ -211,6 +322,33 @@ mod wide {
         fn choose_integers(mask: __mmask16, a: __m512i, b: __m512i) -> __m512i {
             // SAFETY: see above.
             unsafe { _mm512_mask_blend_epi32(mask, b, a) }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::kernels::{Level, kernel};
+
+    kernel! {
+        fn turned(rows: &[[f32; 16]; 16], columns: &mut [[f32; 16]; 16]) = turned_body<Eight>
+    }
+
+    fn turned_body<S: Sixteen>(rows: &[[f32; 16]; 16], columns: &mut [[f32; 16]; 16]) {
+        S::store_turned(rows, columns);
+    }
+
+    #[test]
+    fn every_level_turns_rows_into_columns() {
+        let rows = std::array::from_fn(|k| std::array::from_fn(|n| (16 * k + n) as f32));
+        for level in Level::all() {
+            let mut columns = [[0.0; 16]; 16];
+            turned(level, &rows, &mut columns);
+            for (k, row) in rows.iter().enumerate() {
+                let column = columns.map(|column| column[k]);
+                assert_eq!(&column, row);
+            }
         }
     }
 }

@@ -7,7 +7,7 @@
 //! have co-circular neighbours, or reach beyond the points at hand.
 
 use super::RIM_DISTANCE;
-use super::lines::{frame, meet_columns};
+use super::lines::meet_columns;
 use crate::geom::plane::Normal;
 use crate::kernels::eight::Eight;
 use crate::kernels::sixteen::Sixteen;
@@ -65,6 +65,10 @@ impl Outline {
 type Lines = [LineGroup; MOST_NEIGHBORS / LANES];
 type Lanes<T> = [T; TOGETHER];
 
+/// The lines of a guess in order, as columns of their normals, offsets and lengths; the first one again after
+/// the last.
+type Around = [[f64; MOST_SIDES + 1]; 4];
+
 /// Memory for cells that are computed together.
 #[derive(Debug, Clone)]
 pub struct Wrapper {
@@ -74,6 +78,7 @@ pub struct Wrapper {
     dual: [[Lanes<f32>; MOST_NEIGHBORS]; 2],
     /// The sides of the guesses, by place around the cell and lane.
     sides: [Lanes<u32>; MOST_SIDES],
+    around: Lanes<Around>,
     outlines: Lanes<Outline>,
 }
 
@@ -92,6 +97,7 @@ impl Wrapper {
             lines: Default::default(),
             dual: [[[0.0; TOGETHER]; MOST_NEIGHBORS]; 2],
             sides: [[0; TOGETHER]; MOST_SIDES],
+            around: [[[0.0; MOST_SIDES + 1]; 4]; TOGETHER],
             outlines: Default::default(),
         }
     }
@@ -111,55 +117,106 @@ kernel! {
 
 #[inline(always)]
 fn wrap_body<E: Eight + Sixteen>(wrapper: &mut Wrapper, sites: &[Site<'_>]) {
-    let lanes = wrapper.lines.iter_mut().enumerate();
     let mut most = 0;
-    for (site, (lane, lines)) in sites.iter().zip(lanes) {
-        set_lines::<E>(site, lines);
-        set_dual(lines, lane, site.count, &mut wrapper.dual);
-        most = site.count.max(most);
+    // By coordinate and half of the neighbours.
+    let mut rows = [[[[0.0; TOGETHER]; TOGETHER]; 2]; 2];
+    for (half, sites) in sites.chunks(LANES).enumerate() {
+        let frames = frames::<E>(sites);
+        for (place, site) in sites.iter().enumerate() {
+            let lane = half * LANES + place;
+            let frame = frames.map(|vector| vector.map(|column| column[place]));
+            let lines = &mut wrapper.lines[lane];
+            let [x, y, z] = site.differences.map(|column| column.as_chunks::<LANES>().0);
+            for (((x, y), z), lines) in x.iter().zip(y).zip(z).zip(&mut *lines) {
+                *lines = bisectors_body::<E>(x, y, z, &frame);
+            }
+            let rows = rows
+                .each_mut()
+                .map(|rows| rows.each_mut().map(|rows| &mut rows[lane]));
+            set_dual::<E>(lines, site.count, rows);
+            most = site.count.max(most);
+        }
+    }
+    let halves = wrapper
+        .dual
+        .iter_mut()
+        .flat_map(|dual| dual.as_chunks_mut().0);
+    for (rows, half) in rows.iter().flatten().zip(halves) {
+        E::store_turned(rows, half);
     }
     let counts = guess_body::<E>(&wrapper.dual, most, sites.len(), &mut wrapper.sides);
-    for (lane, site) in sites.iter().enumerate() {
+    // In two steps: what is written number by number is then not read at once as a whole.
+    for (lane, around) in wrapper.around.iter_mut().enumerate().take(sites.len()) {
         let outline = &mut wrapper.outlines[lane];
         for (to, sides) in outline.sides.iter_mut().zip(&wrapper.sides) {
             *to = sides[lane] as u8;
         }
         outline.count = counts[lane] as usize;
-        if !certify::<E>(site, &wrapper.lines[lane], outline.sides()) {
+        if !line_up(&wrapper.lines[lane], outline.sides(), around) {
+            outline.count = 0;
+        }
+    }
+    for (lane, site) in sites.iter().enumerate() {
+        let outline = &mut wrapper.outlines[lane];
+        let (lines, around) = (&wrapper.lines[lane], &wrapper.around[lane]);
+        if outline.count > 0 && !certify::<E>(site, lines, outline.sides(), around) {
             outline.count = 0;
         }
     }
 }
 
-/// The bisectors of a site.
+/// Two unit vectors that span the plane of each site, in columns. Any two do for a certificate.
 #[inline(always)]
-fn set_lines<E: Eight>(site: &Site<'_>, lines: &mut Lines) {
-    let frame = frame(site.normal);
-    let [x, y, z] = site.differences.map(|column| column.as_chunks::<LANES>().0);
-    for (((x, y), z), lines) in x.iter().zip(y).zip(z).zip(lines) {
-        *lines = bisectors_body::<E>(x, y, z, &frame);
-    }
-}
-
-/// Writes the lines as points of the dual into a lane; the origin for places without a line.
-#[inline(always)]
-fn set_dual(
-    lines: &Lines,
-    lane: usize,
-    count: usize,
-    dual: &mut [[Lanes<f32>; MOST_NEIGHBORS]; 2],
-) {
-    let mut columns = [[0.0; MOST_NEIGHBORS]; 2];
-    for (group, lines) in lines.iter().enumerate() {
-        for k in 0..LANES {
-            let inverse = 1.0 / lines.offset[k] as f32;
-            columns[0][group * LANES + k] = lines.x[k] as f32 * inverse;
-            columns[1][group * LANES + k] = lines.y[k] as f32 * inverse;
+fn frames<E: Eight>(sites: &[Site<'_>]) -> [[[f64; LANES]; 3]; 2] {
+    // Along z where there is no site.
+    let mut columns = [[0.0; LANES], [0.0; LANES], [1.0; LANES]];
+    for (place, site) in sites.iter().enumerate() {
+        for (column, x) in columns.iter_mut().zip(site.normal) {
+            column[place] = f64::from(x);
         }
     }
-    for (columns, dual) in columns.iter().zip(dual) {
-        for (n, (at, dual)) in columns.iter().zip(dual).enumerate() {
-            dual[lane] = if n < count { *at } else { 0.0 };
+    let normal = columns.each_ref().map(E::load);
+    let [x, y, z] = normal;
+    let zero = E::splat(0.0);
+    // Across x or y, whichever is farther from the normal.
+    let is_along_x = x.abs().greater(y.abs());
+    let across = E::choose(is_along_x, [zero - z, zero, x], [zero, z, zero - y]);
+    let unit = |[x, y, z]: [E; 3]| {
+        let length = (x * x + y * y + z * z).sqrt();
+        let inverse = E::splat(1.0) / length;
+        [x * inverse, y * inverse, z * inverse]
+    };
+    let u = unit(across);
+    let n = unit(normal);
+    let v = [
+        n[1] * u[2] - n[2] * u[1],
+        n[2] * u[0] - n[0] * u[2],
+        n[0] * u[1] - n[1] * u[0],
+    ];
+    let mut frames = [[[0.0; LANES]; 3]; 2];
+    for (to, vector) in frames.iter_mut().zip([u, v]) {
+        for (to, x) in to.iter_mut().zip(vector) {
+            x.store(to);
+        }
+    }
+    frames
+}
+
+/// The lines as points of the dual, in rows by coordinate and half; the origin for places without a line.
+#[inline(always)]
+fn set_dual<E: Eight + Sixteen>(lines: &Lines, count: usize, rows: [[&mut Lanes<f32>; 2]; 2]) {
+    let one = E::floats(&[1.0; TOGETHER]);
+    let [rows_x, rows_y] = rows;
+    let halves = lines.as_chunks::<2>().0.iter().enumerate();
+    for ((half, [low, high]), (row_x, row_y)) in halves.zip(rows_x.into_iter().zip(rows_y)) {
+        let offset = E::rounded(E::load(&low.offset), E::load(&high.offset));
+        let inverse = E::over(one, offset);
+        let x = E::rounded(E::load(&low.x), E::load(&high.x));
+        let y = E::rounded(E::load(&low.y), E::load(&high.y));
+        let left = count.saturating_sub(half * TOGETHER).min(TOGETHER);
+        for (row, x) in [(row_x, x), (row_y, y)] {
+            E::store_floats(E::times(x, inverse), row);
+            row[left..].fill(0.0);
         }
     }
 }
@@ -285,40 +342,42 @@ fn rightmost<S: Sixteen>(
     numbers
 }
 
-/// True if the lines `sides`, in this order, are the sides of the cell.
+/// Writes the lines `sides` to `around`; false if they are not the sides of a cell.
 #[inline(always)]
-fn certify<E: Eight>(site: &Site<'_>, lines: &Lines, sides: &[u8]) -> bool {
-    if sides.len() < 3 {
-        return false;
-    }
-    // Each side beside the next one.
-    let mut columns = [[0.0; MOST_SIDES + 1]; 4];
-    let around = sides.iter().chain(&sides[..1]);
-    for (place, side) in around.enumerate() {
+fn line_up(lines: &Lines, sides: &[u8], around: &mut Around) -> bool {
+    let [x, y, offset, length] = around;
+    let again = sides.iter().chain(sides.first());
+    for (place, side) in again.enumerate() {
         let (group, k) = (*side as usize / LANES, *side as usize % LANES);
         let Some(lines) = lines.get(group) else {
             return false;
         };
-        columns[0][place] = lines.x[k];
-        columns[1][place] = lines.y[k];
-        columns[2][place] = lines.offset[k];
-        columns[3][place] = lines.length[k];
+        x[place] = lines.x[k];
+        y[place] = lines.y[k];
+        offset[place] = lines.offset[k];
+        length[place] = lines.length[k];
     }
+    sides.len() >= 3
+}
+
+/// True if the lines `sides`, in this order, are the sides of the cell.
+#[inline(always)]
+fn certify<E: Eight>(site: &Site<'_>, lines: &Lines, sides: &[u8], around: &Around) -> bool {
     let mut at = [[0.0; MOST_SIDES]; 2];
     let (mut errors, mut reaches) = ([0.0; MOST_SIDES], [0.0; MOST_SIDES]);
     for start in (0..sides.len()).step_by(LANES) {
         let from = |start: usize| {
-            columns.each_ref().map(|column| {
+            around.each_ref().map(|column| {
                 let lanes = column[start..].first_chunk().unwrap_or(&[0.0; LANES]);
                 E::load(lanes)
             })
         };
         let ([x, y], error, reach2) = meet_columns(from(start), from(start + 1));
-        let around = E::splat(SLACK).mul(x.abs().add(y.abs()));
+        let near = E::splat(SLACK).mul(x.abs().add(y.abs()));
         let to = start..start + LANES;
         store(x, &mut at[0][to.clone()]);
         store(y, &mut at[1][to.clone()]);
-        store(error.add(around), &mut errors[to.clone()]);
+        store(error.add(near), &mut errors[to.clone()]);
         store(reach2, &mut reaches[to]);
     }
     let mut reach2 = 0.0f64;

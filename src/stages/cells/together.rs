@@ -45,11 +45,15 @@ impl CellMaker<'_> {
         }
         for (place, outline) in places.into_iter().zip(self.wrapper.cells(&sites)) {
             let member = &members[place];
-            let ids = member.ids();
-            for (a, b) in outline.corners() {
-                each(member.id, ids[a as usize], ids[b as usize]);
-                outcomes[place] = Some(Outcome::Complete);
+            let (ids, sides) = (member.ids(), outline.sides());
+            let Some(last) = sides.last() else { continue };
+            let mut before = ids[*last as usize];
+            for side in sides {
+                let id = ids[*side as usize];
+                each(member.id, before, id);
+                before = id;
             }
+            outcomes[place] = Some(Outcome::Complete);
         }
         outcomes
     }

@@ -176,16 +176,26 @@ impl<E: Fn(u32, u32) -> bool> Splitter<'_, E> {
             along.push(total);
             total += length(x, (x + 1) % n);
         }
+        let columns = [0, 1, 2].map(|axis| {
+            let column = (0..n).map(|x| f64::from(at(x)[axis]));
+            column.collect::<Vec<_>>()
+        });
         let mut best: Option<(f64, usize, usize)> = None;
         for i in 0..n {
-            for j in i + 2..n {
-                if i == 0 && j == n - 1 {
+            let last = if i == 0 { n - 1 } else { n };
+            for start in (i + 2..last).step_by(LANES) {
+                let chords = start..(start + LANES).min(last);
+                if let Some((least, ..)) = best
+                    && !may_be_less(&columns, &along, total, i, chords.clone(), least)
+                {
                     continue;
                 }
-                let way = along[j] - along[i];
-                let ratio = length(i, j) / way.min(total - way);
-                if best.is_none_or(|(least, ..)| ratio < least) && self.allowed(ring, i, j) {
-                    best = Some((ratio, i, j));
+                for j in chords {
+                    let way = along[j] - along[i];
+                    let ratio = length(i, j) / way.min(total - way);
+                    if best.is_none_or(|(least, ..)| ratio < least) && self.allowed(ring, i, j) {
+                        best = Some((ratio, i, j));
+                    }
                 }
             }
         }
@@ -206,4 +216,31 @@ impl<E: Fn(u32, u32) -> bool> Splitter<'_, E> {
         let outer = n - (j - i) == 2 && self.is_flat(ring[i], ring[j], ring[(j + 1) % n]);
         !inner && !outer
     }
+}
+
+/// Chords that are compared together with the best so far.
+const LANES: usize = 8;
+
+/// False if no chord from `i` to a corner in `to` has a ratio below `least`; without a division or a root.
+#[inline]
+fn may_be_less(
+    columns: &[Vec<f64>; 3],
+    along: &[f64],
+    total: f64,
+    i: usize,
+    to: std::ops::Range<usize>,
+    least: f64,
+) -> bool {
+    // More than the rounding of both sides.
+    let slack = least * (1.0 + 1e-9);
+    let [x, y, z] = columns.each_ref().map(|column| &column[to.clone()]);
+    let own = columns.each_ref().map(|column| column[i]);
+    let mut less = false;
+    for (((x, y), z), along_j) in x.iter().zip(y).zip(z).zip(&along[to]) {
+        let (x, y, z) = (x - own[0], y - own[1], z - own[2]);
+        let way = along_j - along[i];
+        let limit = slack * way.min(total - way);
+        less |= x * x + y * y + z * z <= limit * limit;
+    }
+    less
 }
