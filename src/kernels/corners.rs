@@ -187,6 +187,11 @@ pub(crate) struct Place {
 
 impl Place {
     #[inline(always)]
+    pub fn new(x: f64, y: f64, error: f64) -> Self {
+        Self { x, y, error }
+    }
+
+    #[inline(always)]
     fn of(group: &CornerGroup, k: usize) -> Self {
         let (x, y) = (group.x[k], group.y[k]);
         let error = group.error[k] + SLACK * (x.abs() + y.abs());

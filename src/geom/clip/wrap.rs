@@ -8,10 +8,13 @@
 
 use super::RIM_DISTANCE;
 use super::lines::meet_columns;
+use crate::geom::Point;
 use crate::geom::plane::Normal;
 use crate::kernels::eight::Eight;
 use crate::kernels::sixteen::Sixteen;
-use crate::kernels::{LANES, Level, LineGroup, SLACK, bisectors_body, kernel};
+use crate::kernels::{
+    Frame, LANES, Level, LineGroup, Place, SLACK, bisectors_body, kernel, touching_places_body,
+};
 
 /// Most points whose cells are computed together, one in each lane.
 pub const TOGETHER: usize = 16;
@@ -25,40 +28,45 @@ const CHAINS: usize = 4;
 /// Most sides of a cell.
 const MOST_SIDES: usize = 2 * LANES;
 
-/// A point and its disk, with all points within a distance.
+/// A point, its disk, and its neighbours: all points within a distance.
 #[derive(Debug, Clone, Copy)]
 pub struct Site<'a> {
     /// Differences to the neighbours, one axis after the other; [`MOST_NEIGHBORS`] with zeros at the end.
     pub differences: [&'a [i32; MOST_NEIGHBORS]; 3],
     /// Number of neighbours.
     pub count: usize,
-    /// All points within this squared distance are neighbours.
-    pub complete2: u64,
     /// Normal of the disk's plane.
     pub normal: Normal,
     /// Radius of the disk, in steps.
     pub radius: f64,
 }
 
-/// The sides of a cell in order around it, as indices of neighbours; none if the cell is not certified.
-#[derive(Debug, Clone, Copy, Default)]
+/// The cell that the neighbours leave of a disk.
+#[derive(Debug, Clone, Copy)]
 pub struct Outline {
     count: usize,
     sides: [u8; MOST_SIDES],
+    secure2: u64,
 }
 
 impl Outline {
-    /// The sides; none if the cell is not certified.
+    const NONE: Self = Self {
+        count: 0,
+        sides: [0; MOST_SIDES],
+        secure2: u64::MAX,
+    };
+
+    /// The sides in order around the cell, as indices of neighbours; none if the cell is not certified.
     #[must_use]
     pub fn sides(&self) -> &[u8] {
         &self.sides[..self.count]
     }
 
-    /// The pairs of sides that meet at a corner.
-    pub fn corners(&self) -> impl Iterator<Item = (u8, u8)> + '_ {
-        let sides = self.sides();
-        let next = sides.iter().cycle().skip(1);
-        sides.iter().zip(next).map(|(a, b)| (*a, *b))
+    /// Points at a larger squared distance cannot touch the cell: four times the squared radius of security,
+    /// rounded up.
+    #[must_use]
+    pub fn reach2(&self) -> u64 {
+        self.secure2
     }
 }
 
@@ -69,16 +77,21 @@ type Lanes<T> = [T; TOGETHER];
 /// the last.
 type Around = [[f64; MOST_SIDES + 1]; 4];
 
+/// The corners of a cell in columns: x, y, and the part of the error bound that depends on no line.
+type Corners = [[f64; MOST_SIDES]; 3];
+
 /// Memory for cells that are computed together.
 #[derive(Debug, Clone)]
 pub struct Wrapper {
     level: Level,
+    frames: Lanes<Frame>,
     lines: Lanes<Lines>,
     /// Points of the dual, by coordinate, neighbour and lane.
     dual: [[Lanes<f32>; MOST_NEIGHBORS]; 2],
     /// The sides of the guesses, by place around the cell and lane.
     sides: [Lanes<u32>; MOST_SIDES],
     around: Lanes<Around>,
+    corners: Lanes<Corners>,
     outlines: Lanes<Outline>,
 }
 
@@ -94,20 +107,85 @@ impl Wrapper {
     pub fn at(level: Level) -> Self {
         Self {
             level,
+            frames: Default::default(),
             lines: Default::default(),
             dual: [[[0.0; TOGETHER]; MOST_NEIGHBORS]; 2],
             sides: [[0; TOGETHER]; MOST_SIDES],
             around: [[[0.0; MOST_SIDES + 1]; 4]; TOGETHER],
-            outlines: Default::default(),
+            corners: [[[0.0; MOST_SIDES]; 3]; TOGETHER],
+            outlines: [Outline::NONE; TOGETHER],
         }
     }
 
-    /// The cells of the first [`TOGETHER`] sites.
-    pub fn cells(&mut self, sites: &[Site<'_>]) -> &[Outline] {
-        let sites = &sites[..sites.len().min(TOGETHER)];
-        wrap(self.level, self, sites);
-        &self.outlines[..sites.len()]
+    /// Computes the cells of the first [`TOGETHER`] sites.
+    pub fn wrap(&mut self, sites: &[Site<'_>]) {
+        wrap(self.level, self, &sites[..sites.len().min(TOGETHER)]);
     }
+
+    /// The cell of the site at a place.
+    #[must_use]
+    pub fn outline(&self, place: usize) -> &Outline {
+        &self.outlines[place]
+    }
+
+    /// True if none of the points in `columns` touches the cell of the site at a place, whose position is
+    /// `own`; only points at more than the squared distance `known2` count.
+    #[must_use]
+    pub fn is_clear(&self, place: usize, own: Point, known2: u64, columns: [&[i32]; 3]) -> bool {
+        is_clear(self.level, self, place, own, known2, columns)
+    }
+}
+
+kernel! {
+    /// See [`Wrapper::is_clear`].
+    fn is_clear(
+        wrapper: &Wrapper,
+        place: usize,
+        own: Point,
+        known2: u64,
+        columns: [&[i32]; 3],
+    ) -> bool = is_clear_body<Eight>
+}
+
+#[inline(always)]
+fn is_clear_body<E: Eight>(
+    wrapper: &Wrapper,
+    lane: usize,
+    own: Point,
+    known2: u64,
+    [x, y, z]: [&[i32]; 3],
+) -> bool {
+    let (frame, outline) = (&wrapper.frames[lane], &wrapper.outlines[lane]);
+    let [corner_x, corner_y, errors] = &wrapper.corners[lane];
+    // Far distances are rounded; then more points count.
+    let exact = known2 < 1 << 52;
+    let known = E::splat(known2 as f64 * if exact { 0.5 } else { 0.5 - SLACK });
+    let secure = E::splat(outline.secure2 as f64 * (0.5 + SLACK));
+    for start in (0..x.len()).step_by(LANES) {
+        let group = start..(start + LANES).min(x.len());
+        let mut from = [[0; LANES]; 3];
+        for ((from, column), own) in from.iter_mut().zip([x, y, z]).zip(own) {
+            for (from, at) in from.iter_mut().zip(&column[group.clone()]) {
+                *from = at.wrapping_sub(own);
+            }
+        }
+        let lines = bisectors_body::<E>(&from[0], &from[1], &from[2], frame);
+        let halves = E::load(&lines.offset);
+        let near = halves.greater(known) & !halves.greater(secure) & 0xff;
+        if near == 0 {
+            continue;
+        }
+        let corners = corner_x
+            .iter()
+            .zip(corner_y)
+            .zip(errors)
+            .take(outline.count);
+        let corners = corners.map(|((x, y), error)| Place::new(*x, *y, *error));
+        if touching_places_body::<E>(corners, &lines) & near != 0 {
+            return false;
+        }
+    }
+    true
 }
 
 kernel! {
@@ -125,6 +203,7 @@ fn wrap_body<E: Eight + Sixteen>(wrapper: &mut Wrapper, sites: &[Site<'_>]) {
         for (place, site) in sites.iter().enumerate() {
             let lane = half * LANES + place;
             let frame = frames.map(|vector| vector.map(|column| column[place]));
+            wrapper.frames[lane] = frame;
             let lines = &mut wrapper.lines[lane];
             let [x, y, z] = site.differences.map(|column| column.as_chunks::<LANES>().0);
             for (((x, y), z), lines) in x.iter().zip(y).zip(z).zip(&mut *lines) {
@@ -157,10 +236,14 @@ fn wrap_body<E: Eight + Sixteen>(wrapper: &mut Wrapper, sites: &[Site<'_>]) {
         }
     }
     for (lane, site) in sites.iter().enumerate() {
-        let outline = &mut wrapper.outlines[lane];
+        let (outline, corners) = (&mut wrapper.outlines[lane], &mut wrapper.corners[lane]);
         let (lines, around) = (&wrapper.lines[lane], &wrapper.around[lane]);
-        if outline.count > 0 && !certify::<E>(site, lines, outline.sides(), around) {
-            outline.count = 0;
+        let reach2 = (outline.count > 0)
+            .then(|| certify::<E>(site, lines, outline.sides(), around, corners))
+            .flatten();
+        match reach2 {
+            Some(reach2) => outline.secure2 = reach2,
+            None => *outline = Outline::NONE,
         }
     }
 }
@@ -360,11 +443,18 @@ fn line_up(lines: &Lines, sides: &[u8], around: &mut Around) -> bool {
     sides.len() >= 3
 }
 
-/// True if the lines `sides`, in this order, are the sides of the cell.
+/// Four times the squared radius of security if the lines `sides`, in this order, are the sides of the cell,
+/// far from the rim. Writes the corners.
 #[inline(always)]
-fn certify<E: Eight>(site: &Site<'_>, lines: &Lines, sides: &[u8], around: &Around) -> bool {
-    let mut at = [[0.0; MOST_SIDES]; 2];
-    let (mut errors, mut reaches) = ([0.0; MOST_SIDES], [0.0; MOST_SIDES]);
+fn certify<E: Eight>(
+    site: &Site<'_>,
+    lines: &Lines,
+    sides: &[u8],
+    around: &Around,
+    corners: &mut Corners,
+) -> Option<u64> {
+    let [corner_x, corner_y, errors] = corners;
+    let mut reaches = [0.0; MOST_SIDES];
     for start in (0..sides.len()).step_by(LANES) {
         let from = |start: usize| {
             around.each_ref().map(|column| {
@@ -375,8 +465,8 @@ fn certify<E: Eight>(site: &Site<'_>, lines: &Lines, sides: &[u8], around: &Arou
         let ([x, y], error, reach2) = meet_columns(from(start), from(start + 1));
         let near = E::splat(SLACK).mul(x.abs().add(y.abs()));
         let to = start..start + LANES;
-        store(x, &mut at[0][to.clone()]);
-        store(y, &mut at[1][to.clone()]);
+        store(x, &mut corner_x[to.clone()]);
+        store(y, &mut corner_y[to.clone()]);
         store(error.add(near), &mut errors[to.clone()]);
         store(reach2, &mut reaches[to]);
     }
@@ -386,17 +476,17 @@ fn certify<E: Eight>(site: &Site<'_>, lines: &Lines, sides: &[u8], around: &Arou
         reach2 = reach2.max(reaches[place]);
         let next = sides.get(place + 1).unwrap_or(&sides[0]);
         let own = 1u64 << side | 1 << next;
-        let corner = [at[0][place], at[1][place], errors[place]];
+        let corner = [corner_x[place], corner_y[place], errors[place]];
         unclear |= !(clear_lines::<E>(lines, corner) | own);
         seen |= 1u64 << side;
     }
     let clear = unclear & ((1 << site.count) - 1) == 0;
     // A side has two corners: if all sides are different, they close around the cell once.
     let once = seen.count_ones() as usize == sides.len();
-    let secure2 = 4.0 * reach2 * (1.0 + 1e-9) + 1.0;
+    let secure2 = 4.0 * reach2 * (1.0 + 1e-9);
+    // At half the distance of the rim: its sides, and what rounding decides there, do not matter.
     let rim = site.radius * RIM_DISTANCE;
-    // Far from the rim, whose sides then do not matter.
-    clear && once && secure2 <= site.complete2 as f64 * (1.0 - 1e-9) && secure2 <= rim * rim
+    (clear && once && secure2 <= rim * rim).then_some((secure2 as u64).saturating_add(1))
 }
 
 #[inline(always)]
@@ -454,9 +544,8 @@ mod tests {
         d.iter().map(|c| i64::from(*c).pow(2) as u64).sum()
     }
 
-    /// The pairs of neighbours at the corners of the cell, clipped line by line; `None` if it reaches farther
-    /// than the points are known.
-    fn clipped(differences: &Differences, site: &Site<'_>) -> Option<Vec<(u32, u32)>> {
+    /// The pairs of neighbours at the corners of the cell, clipped line by line, and its reach.
+    fn clipped(differences: &[[i32; 3]], site: &Site<'_>) -> (Vec<(u32, u32)>, u64) {
         let mut cell = Cell::new(1000, site.normal, site.radius);
         let mut numbers: Vec<u32> = (0..differences.len() as u32).collect();
         numbers.sort_by_key(|n| (length2(&differences[*n as usize]), *n));
@@ -466,10 +555,20 @@ mod tests {
         let mut pairs = Vec::new();
         cell.triples(|a, b| pairs.push((a.min(b), a.max(b))));
         pairs.sort_unstable();
-        (cell.reach2() <= site.complete2).then_some(pairs)
+        (pairs, cell.reach2())
     }
 
-    fn columns(differences: &Differences) -> [[i32; MOST_NEIGHBORS]; 3] {
+    fn pairs(outline: &Outline) -> Vec<(u32, u32)> {
+        let sides = outline.sides();
+        let next = sides.iter().cycle().skip(1);
+        let mut pairs: Vec<_> = (sides.iter().zip(next))
+            .map(|(a, b)| (u32::from(*a.min(b)), u32::from(*a.max(b))))
+            .collect();
+        pairs.sort_unstable();
+        pairs
+    }
+
+    fn columns(differences: &[[i32; 3]]) -> [[i32; MOST_NEIGHBORS]; 3] {
         let mut columns = [[0; MOST_NEIGHBORS]; 3];
         for (place, difference) in differences.iter().enumerate() {
             for (column, at) in columns.iter_mut().zip(difference) {
@@ -489,27 +588,44 @@ mod tests {
                 1 => (-9i32..9, -9i32..9).prop_map(|(x, y)| [x << 18, y << 18, 1 << 24]),
             ],
             radius in prop_oneof![3 => Just(1e10), 1 => 1.0f64..1e6],
-            complete in 0.5f64..4.0,
+            near in 0usize..40,
         ) {
-            let clouds: Vec<Differences> = clouds.into_iter()
-                .map(|all| all.into_iter().filter(|d| *d != [0; 3]).collect()).collect();
-            let columns: Vec<_> = clouds.iter().map(columns).collect();
-            let sites: Vec<_> = clouds.iter().zip(&columns).map(|(cloud, columns)| Site {
+            let clouds: Vec<Differences> = clouds.into_iter().map(|all| {
+                let mut all: Vec<_> = all.into_iter().filter(|d| *d != [0; 3]).collect();
+                all.sort_by_key(length2);
+                all
+            }).collect();
+            // Some of the neighbours are first left out, and examined later.
+            let near: Vec<_> = clouds.iter().map(|all| {
+                let last2 = all.get(near).or(all.last()).map_or(0, length2);
+                all.partition_point(|d| length2(d) <= last2)
+            }).collect();
+            let columns: Vec<_> = clouds.iter().zip(&near)
+                .map(|(all, near)| columns(&all[..*near])).collect();
+            let sites: Vec<_> = columns.iter().zip(&near).map(|(columns, near)| Site {
                 differences: columns.each_ref(),
-                count: cloud.len(),
-                complete2: (cloud.iter().map(length2).max().unwrap_or(0) as f64 * complete) as u64,
+                count: *near,
                 normal,
                 radius,
             }).collect();
             for level in Level::all() {
                 let mut wrapper = Wrapper::at(level);
-                for ((cloud, site), outline) in clouds.iter().zip(&sites).zip(wrapper.cells(&sites)) {
-                    let mut pairs: Vec<_> = outline.corners().map(|(a, b)| {
-                        (u32::from(a.min(b)), u32::from(a.max(b)))
-                    }).collect();
-                    pairs.sort_unstable();
-                    if !pairs.is_empty() {
-                        prop_assert_eq!(clipped(cloud, site), Some(pairs));
+                wrapper.wrap(&sites);
+                for (place, ((cloud, site), near)) in clouds.iter().zip(&sites).zip(&near).enumerate() {
+                    let outline = wrapper.outline(place);
+                    let pairs = pairs(outline);
+                    if pairs.is_empty() {
+                        continue;
+                    }
+                    let (expected, reach2) = clipped(&cloud[..*near], site);
+                    prop_assert_eq!(&pairs, &expected);
+                    prop_assert!(outline.reach2().abs_diff(reach2) <= reach2 >> 20);
+                    let own = [1 << 28; 3];
+                    let all = [0, 1, 2].map(|axis| cloud.iter().map(|d| d[axis] + own[axis]).collect::<Vec<_>>());
+                    let known2 = cloud[..*near].last().map_or(0, length2);
+                    let all = all.each_ref().map(|column| &column[..]);
+                    if wrapper.is_clear(place, own, known2, all) {
+                        prop_assert_eq!(&pairs, &clipped(cloud, site).0);
                     }
                 }
             }
@@ -527,17 +643,17 @@ mod tests {
             for level in Level::all() {
                 let mut wrapper = Wrapper::at(level);
                 for clouds in clouds.chunks(TOGETHER) {
-                    let columns: Vec<_> = clouds.iter().map(columns).collect();
+                    let columns: Vec<_> = clouds.iter().map(|all| columns(all)).collect();
                     let sites: Vec<_> = clouds.iter().zip(&columns).map(|(cloud, columns)| Site {
                         differences: columns.each_ref(),
                         count: cloud.len(),
-                        complete2: u64::MAX,
                         normal: [0, 0, 1 << 24],
                         radius: 1e10,
                     }).collect();
-                    let outlines = wrapper.cells(&sites);
-                    for ((cloud, site), outline) in clouds.iter().zip(&sites).zip(outlines) {
-                        let pairs = clipped(cloud, site).unwrap_or_default();
+                    wrapper.wrap(&sites);
+                    for (place, (cloud, site)) in clouds.iter().zip(&sites).enumerate() {
+                        let outline = wrapper.outline(place);
+                        let (pairs, _) = clipped(cloud, site);
                         // On the rim, or with more sides than there is room for.
                         let closed = pairs.len() >= 3 && {
                             let mut ends: Vec<_> = pairs.iter().flat_map(|(a, b)| [a, b]).collect();

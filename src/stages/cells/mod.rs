@@ -212,9 +212,8 @@ fn one_tile(
     let mut searching = unit.hold(0);
     let grown = |bytes| searching.set(bytes);
     tile.for_each_group(neighbors, &mut search, grown, |group| {
-        let members = group.members();
-        let outcomes = maker.from_group(members, |id, a, b| seen.see(id, a, b));
-        for (number, (member, outcome)) in members.iter().zip(outcomes).enumerate() {
+        let outcomes = maker.from_group(group, |id, a, b| seen.see(id, a, b));
+        for (number, (member, outcome)) in group.members().iter().zip(outcomes).enumerate() {
             let id = member.id;
             let outcome = match outcome {
                 Some(outcome) => Ok(outcome),

@@ -4,16 +4,17 @@ use super::cell::{CellMaker, Fit, Outcome};
 use crate::geom::clip::wrap::Site;
 use crate::geom::plane::{Moments, Plane, planes};
 use crate::kernels::{LANES, Level};
-use crate::stages::tiles::near::{MOST_MEMBERS, Neighborhood};
+use crate::stages::tiles::near::{Group, MOST_MEMBERS, Neighborhood};
 
 impl CellMaker<'_> {
-    /// Computes the cells of all `members` that their neighbourhoods certify. `each` receives a member's id
-    /// and the ids at the corners of its cell. The outcome is `None` for the members that need a query.
+    /// Computes the cells of all members that the points around the leaf certify. `each` receives a member's
+    /// id and the ids at the corners of its cell. The outcome is `None` for the members that need a query.
     pub fn from_group(
         &mut self,
-        members: &[Neighborhood],
+        group: &Group<'_>,
         mut each: impl FnMut(u32, u32, u32),
     ) -> [Option<Outcome>; MOST_MEMBERS] {
+        let members = group.members();
         let mut outcomes = [None; MOST_MEMBERS];
         let planes = planes_of(self.level, members);
         let mut sites = Vec::new();
@@ -36,17 +37,24 @@ impl CellMaker<'_> {
                     sites.push(Site {
                         differences: member.differences(),
                         count: self.neighbors,
-                        complete2: member.complete2,
                         normal,
                         radius,
                     });
                 }
             }
         }
-        for (place, outline) in places.into_iter().zip(self.wrapper.cells(&sites)) {
-            let member = &members[place];
+        self.wrapper.wrap(&sites);
+        for (lane, place) in places.into_iter().enumerate() {
+            let (member, outline) = (&members[place], self.wrapper.outline(lane));
             let (ids, sides) = (member.ids(), outline.sides());
             let Some(last) = sides.last() else { continue };
+            if outline.reach2() > member.complete2 {
+                let last2 = member.sums.map_or(0, |sums| sums.last2);
+                let is_clear = |columns| self.wrapper.is_clear(lane, member.point, last2, columns);
+                if !group.within(outline.reach2()).is_some_and(is_clear) {
+                    continue;
+                }
+            }
             let mut before = ids[*last as usize];
             for side in sides {
                 let id = ids[*side as usize];

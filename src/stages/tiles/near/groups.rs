@@ -6,12 +6,19 @@ use crate::geom::Point;
 use crate::geom::plane::Moments;
 use crate::kernels::{BLOCK, Pick, SUMMED_LIMIT2, kernel, second_moments_body};
 use crate::stages::tiles::Tile;
+use std::ops::Range;
 
 /// Most points in a group.
 pub const MOST_MEMBERS: usize = BLOCK;
 
 /// Most neighbours in a [`Neighborhood`].
 pub const MOST_NEIGHBORS: usize = 2 * BLOCK;
+
+/// Factor, in squared distance, by which a leaf's candidates are gathered farther for members with too few.
+const FARTHER: u64 = 2;
+
+/// Most times that this is done; members that then have too few need queries.
+const MOST_FARTHER: usize = 2;
 
 /// A point and its `k` nearest neighbours.
 #[derive(Debug, Clone)]
@@ -76,6 +83,15 @@ impl<'a> Group<'a> {
         self.members
     }
 
+    /// The coordinates of all points within a squared distance of any member, and of others; `None` if the
+    /// points at hand do not reach that far.
+    #[must_use]
+    pub fn within(&self, distance2: u64) -> Option<[&[i32]; 3]> {
+        let candidates = &self.search.candidates;
+        let known = distance2 <= candidates.complete2;
+        known.then(|| candidates.columns.coordinates(candidates.len))
+    }
+
     /// A query for the neighbours of a member, as by [`Tile::for_each_query`].
     pub fn query(&mut self, member: usize) -> Option<Query<'_>> {
         let Neighborhood { index, id, .. } = self.members[member];
@@ -105,27 +121,27 @@ impl Tile {
             grown,
             |own, first, leaf, search| {
                 let mut farthest2 = 0;
-                let start = leaf.start;
                 let ids = self.ids.start.max(first)..self.ids.end.min(first + leaf.len());
-                for start_id in ids.clone().step_by(members.len()) {
-                    let count = members.len().min(ids.end - start_id);
-                    for (id, member) in (start_id..).zip(&mut members[..count]) {
+                for begin in ids.clone().step_by(members.len()) {
+                    let count = members.len().min(ids.end - begin);
+                    let members = &mut members[..count];
+                    for (id, member) in (begin..).zip(&mut *members) {
                         member.id = id as u32;
-                        member.index = start + (id - first);
+                        member.index = leaf.start + (id - first);
                         member.point = self.points.get(member.index);
                         member.sums = None;
-                        if k <= MOST_NEIGHBORS
-                            && take_nearest(search.level, search, k, member).is_ok()
-                        {
-                            farthest2 = member.sums.map_or(0, |sums| sums.last2).max(farthest2);
-                        }
                     }
+                    if k <= MOST_NEIGHBORS {
+                        self.take(own, leaf.clone(), k, search, members);
+                    }
+                    let last2 = members.iter().filter_map(|member| Some(member.sums?.last2));
+                    farthest2 = last2.max().unwrap_or(0).max(farthest2);
                     let mut group = Group {
                         tile: self,
                         own,
                         search: &mut *search,
                         k,
-                        members: &members[..count],
+                        members,
                         farthest2,
                     };
                     each(&mut group);
@@ -135,6 +151,39 @@ impl Tile {
                 farthest2
             },
         );
+    }
+
+    /// Takes the neighbours of the members; gathers candidates farther from the leaf if there are too few.
+    fn take(
+        &self,
+        own: &OwnPage,
+        leaf: Range<usize>,
+        k: usize,
+        search: &mut Search,
+        members: &mut [Neighborhood],
+    ) {
+        let level = search.level;
+        let mut few = 0u32;
+        for (place, member) in members.iter_mut().enumerate() {
+            let taken = take_nearest(level, search, k, member);
+            few |= u32::from(taken == Err(Unknown::Few)) << place;
+        }
+        for _ in 0..MOST_FARTHER {
+            let before2 = search.candidates.complete2;
+            if few == 0 || before2 >= own.reach2 {
+                return;
+            }
+            let around = self.points.bounds(leaf.clone());
+            let farther2 = before2.saturating_mul(FARTHER).min(own.reach2);
+            search.gather(self, &around, farther2);
+            for (place, member) in members.iter_mut().enumerate() {
+                if few >> place & 1 == 1
+                    && take_nearest(level, search, k, member) != Err(Unknown::Few)
+                {
+                    few &= !(1 << place);
+                }
+            }
+        }
     }
 }
 
