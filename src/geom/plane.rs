@@ -190,7 +190,9 @@ fn planes_body<F: Eight>(moments: &[Moments; LANES]) -> [Plane; LANES] {
             column[lane] = x;
         }
     }
-    let columns = columns.each_ref().map(F::load);
+    let [a, b, c, d, e, f] = &columns;
+    let (a, b, c) = (F::load(a), F::load(b), F::load(c));
+    let columns = [a, b, c, F::load(d), F::load(e), F::load(f)];
     let spread = Spread::of(columns);
     let (direction, length) = spread.direction();
     let some = extent(&columns).greater(F::splat(0.0)) & length.greater(F::splat(0.0));

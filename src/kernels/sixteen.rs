@@ -208,9 +208,10 @@ mod wide {
         fn choose_integers(mask: [__m256; 2], a: [__m256i; 2], b: [__m256i; 2]) -> [__m256i; 2] {
             // SAFETY: see above. A true mask has all bits set.
             unsafe {
-                let choose =
-                    |k: usize| _mm256_blendv_epi8(b[k], a[k], _mm256_castps_si256(mask[k]));
-                [choose(0), choose(1)]
+                [
+                    _mm256_blendv_epi8(b[0], a[0], _mm256_castps_si256(mask[0])),
+                    _mm256_blendv_epi8(b[1], a[1], _mm256_castps_si256(mask[1])),
+                ]
             }
         }
     }
@@ -245,33 +246,42 @@ mod wide {
         fn store_turned(rows: &[[f32; 16]; 16], columns: &mut [[f32; 16]; 16]) {
             // SAFETY: see above. Pairs of rows, then of pairs, then of quarters of registers.
             unsafe {
-                let row = |k: usize| _mm512_loadu_ps(rows[k].as_ptr());
                 let mut fours = [_mm512_setzero_ps(); 16];
                 for k in 0..4 {
-                    let [a, b, c, d] = [0, 1, 2, 3].map(|n| row(4 * k + n));
+                    let (a, b) = (Self::floats(&rows[4 * k]), Self::floats(&rows[4 * k + 1]));
+                    let (c, d) = (
+                        Self::floats(&rows[4 * k + 2]),
+                        Self::floats(&rows[4 * k + 3]),
+                    );
                     let pairs = [
-                        _mm512_unpacklo_ps(a, b),
-                        _mm512_unpackhi_ps(a, b),
-                        _mm512_unpacklo_ps(c, d),
-                        _mm512_unpackhi_ps(c, d),
-                    ]
-                    .map(|pair| _mm512_castps_pd(pair));
+                        _mm512_castps_pd(_mm512_unpacklo_ps(a, b)),
+                        _mm512_castps_pd(_mm512_unpackhi_ps(a, b)),
+                        _mm512_castps_pd(_mm512_unpacklo_ps(c, d)),
+                        _mm512_castps_pd(_mm512_unpackhi_ps(c, d)),
+                    ];
                     fours[4 * k] = _mm512_castpd_ps(_mm512_unpacklo_pd(pairs[0], pairs[2]));
                     fours[4 * k + 1] = _mm512_castpd_ps(_mm512_unpackhi_pd(pairs[0], pairs[2]));
                     fours[4 * k + 2] = _mm512_castpd_ps(_mm512_unpacklo_pd(pairs[1], pairs[3]));
                     fours[4 * k + 3] = _mm512_castpd_ps(_mm512_unpackhi_pd(pairs[1], pairs[3]));
                 }
                 for n in 0..4 {
-                    let [a, b, c, d] = [0, 4, 8, 12].map(|k| fours[k + n]);
+                    let (a, b, c, d) = (fours[n], fours[n + 4], fours[n + 8], fours[n + 12]);
                     let even = _mm512_shuffle_f32x4::<0x88>(a, b);
                     let odd = _mm512_shuffle_f32x4::<0xdd>(a, b);
                     let even_high = _mm512_shuffle_f32x4::<0x88>(c, d);
                     let odd_high = _mm512_shuffle_f32x4::<0xdd>(c, d);
-                    let mut put = |k: usize, x| _mm512_storeu_ps(columns[k].as_mut_ptr(), x);
-                    put(n, _mm512_shuffle_f32x4::<0x88>(even, even_high));
-                    put(n + 8, _mm512_shuffle_f32x4::<0xdd>(even, even_high));
-                    put(n + 4, _mm512_shuffle_f32x4::<0x88>(odd, odd_high));
-                    put(n + 12, _mm512_shuffle_f32x4::<0xdd>(odd, odd_high));
+                    let (first, third) = (
+                        _mm512_shuffle_f32x4::<0x88>(even, even_high),
+                        _mm512_shuffle_f32x4::<0xdd>(even, even_high),
+                    );
+                    let (second, fourth) = (
+                        _mm512_shuffle_f32x4::<0x88>(odd, odd_high),
+                        _mm512_shuffle_f32x4::<0xdd>(odd, odd_high),
+                    );
+                    Self::store_floats(first, &mut columns[n]);
+                    Self::store_floats(second, &mut columns[n + 4]);
+                    Self::store_floats(third, &mut columns[n + 8]);
+                    Self::store_floats(fourth, &mut columns[n + 12]);
                 }
             }
         }

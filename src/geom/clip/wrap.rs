@@ -258,19 +258,14 @@ fn frames<E: Eight>(sites: &[Site<'_>]) -> [[[f64; LANES]; 3]; 2] {
             column[place] = f64::from(x);
         }
     }
-    let normal = columns.each_ref().map(E::load);
-    let [x, y, z] = normal;
+    let [x, y, z] = &columns;
+    let [x, y, z] = [E::load(x), E::load(y), E::load(z)];
     let zero = E::splat(0.0);
     // Across x or y, whichever is farther from the normal.
     let is_along_x = x.abs().greater(y.abs());
     let across = E::choose(is_along_x, [zero - z, zero, x], [zero, z, zero - y]);
-    let unit = |[x, y, z]: [E; 3]| {
-        let length = (x * x + y * y + z * z).sqrt();
-        let inverse = E::splat(1.0) / length;
-        [x * inverse, y * inverse, z * inverse]
-    };
-    let u = unit(across);
-    let n = unit(normal);
+    let u = unit::<E>(across);
+    let n = unit::<E>([x, y, z]);
     let v = [
         n[1] * u[2] - n[2] * u[1],
         n[2] * u[0] - n[0] * u[2],
@@ -283,6 +278,13 @@ fn frames<E: Eight>(sites: &[Site<'_>]) -> [[[f64; LANES]; 3]; 2] {
         }
     }
     frames
+}
+
+#[inline(always)]
+fn unit<E: Eight>([x, y, z]: [E; 3]) -> [E; 3] {
+    let length = (x * x + y * y + z * z).sqrt();
+    let inverse = E::splat(1.0) / length;
+    [x * inverse, y * inverse, z * inverse]
 }
 
 /// The lines as points of the dual, in rows by coordinate and half; the origin for places without a line.
@@ -380,15 +382,33 @@ fn nearest_lines<S: Sixteen>([dual_x, dual_y]: [&[Lanes<f32>]; 2]) -> Lanes<u32>
             );
         }
     }
-    let farther = |a: (S::Floats, S::Integers), b: (S::Floats, S::Integers)| {
-        let take = S::less(a.0, b.0);
-        let number = S::choose_integers(take, b.1, a.1);
-        (S::choose(take, b.0, a.0), number)
-    };
-    let (_, number) = far[1..].iter().fold(far[0], |a, b| farther(a, *b));
+    let (mut most, mut number) = far[0];
+    for other in &far[1..] {
+        let take = S::less(most, other.0);
+        most = S::choose(take, other.0, most);
+        number = S::choose_integers(take, other.1, number);
+    }
     let mut numbers = [0; TOGETHER];
     S::store_integers(number, &mut numbers);
     numbers
+}
+
+/// A direction and the number of the point there.
+type Direction<S> = (
+    <S as Sixteen>::Floats,
+    <S as Sixteen>::Floats,
+    <S as Sixteen>::Integers,
+);
+
+/// Of two directions, that to the right.
+#[inline(always)]
+fn right<S: Sixteen>(a: Direction<S>, b: Direction<S>) -> Direction<S> {
+    let take = S::less(S::times(a.0, b.1), S::times(a.1, b.0));
+    (
+        S::choose(take, b.0, a.0),
+        S::choose(take, b.1, a.1),
+        S::choose_integers(take, b.2, a.2),
+    )
 }
 
 /// The numbers of the points that are farthest to the right as seen from `at`, where `back` is a direction to
@@ -401,14 +421,6 @@ fn rightmost<S: Sixteen>(
 ) -> Lanes<u32> {
     let (at_x, at_y) = (S::floats(&at[0]), S::floats(&at[1]));
     let start = (S::floats(&back[0]), S::floats(&back[1]), S::integer(0));
-    let right = |a: (S::Floats, S::Floats, S::Integers), b: (S::Floats, S::Floats, S::Integers)| {
-        let take = S::less(S::times(a.0, b.1), S::times(a.1, b.0));
-        (
-            S::choose(take, b.0, a.0),
-            S::choose(take, b.1, a.1),
-            S::choose_integers(take, b.2, a.2),
-        )
-    };
     let mut best = [start; CHAINS];
     let rows = dual_x.chunks_exact(CHAINS).zip(dual_y.chunks_exact(CHAINS));
     for (chunk, (dual_x, dual_y)) in (0u32..).zip(rows) {
@@ -416,10 +428,14 @@ fn rightmost<S: Sixteen>(
             let x = S::minus(S::floats(&dual_x[link]), at_x);
             let y = S::minus(S::floats(&dual_y[link]), at_y);
             let number = S::integer(chunk * CHAINS as u32 + link as u32);
-            *best = right(*best, (x, y, number));
+            *best = right::<S>(*best, (x, y, number));
         }
     }
-    let (.., number) = best[1..].iter().fold(best[0], |a, b| right(a, *b));
+    let mut all = best[0];
+    for other in &best[1..] {
+        all = right::<S>(all, *other);
+    }
+    let (.., number) = all;
     let mut numbers = [0; TOGETHER];
     S::store_integers(number, &mut numbers);
     numbers
@@ -456,13 +472,11 @@ fn certify<E: Eight>(
     let [corner_x, corner_y, errors] = corners;
     let mut reaches = [0.0; MOST_SIDES];
     for start in (0..sides.len()).step_by(LANES) {
-        let from = |start: usize| {
-            around.each_ref().map(|column| {
-                let lanes = column[start..].first_chunk().unwrap_or(&[0.0; LANES]);
-                E::load(lanes)
-            })
-        };
-        let ([x, y], error, reach2) = meet_columns(from(start), from(start + 1));
+        let (these, next) = (
+            load_lines::<E>(around, start),
+            load_lines::<E>(around, start + 1),
+        );
+        let ([x, y], error, reach2) = meet_columns(these, next);
         let near = E::splat(SLACK).mul(x.abs().add(y.abs()));
         let to = start..start + LANES;
         store(x, &mut corner_x[to.clone()]);
@@ -487,6 +501,19 @@ fn certify<E: Eight>(
     // At half the distance of the rim: its sides, and what rounding decides there, do not matter.
     let rim = site.radius * RIM_DISTANCE;
     (clear && once && secure2 <= rim * rim).then_some((secure2 as u64).saturating_add(1))
+}
+
+/// Eight lines.
+#[inline(always)]
+fn load_lines<E: Eight>([x, y, offset, length]: &Around, start: usize) -> [E; 4] {
+    let (x, y) = (load::<E>(x, start), load::<E>(y, start));
+    [x, y, load::<E>(offset, start), load::<E>(length, start)]
+}
+
+#[inline(always)]
+fn load<E: Eight>(column: &[f64], start: usize) -> E {
+    let lanes = column[start..].first_chunk();
+    E::load(lanes.unwrap_or(&[0.0; LANES]))
 }
 
 #[inline(always)]

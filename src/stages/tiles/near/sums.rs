@@ -12,6 +12,15 @@ use crate::stages::tiles::neighbors::Sums;
 /// Most corrections of the limit that separates the nearest from the others.
 const DIVISIONS: usize = 16;
 
+/// Up to this many numbers, several limits are tried at once.
+const FEW: usize = 4 * BLOCK;
+
+/// The limits that are tried first: distances from the expected one, in mean gaps between numbers.
+const FIRST_PROBES: [f32; 4] = [-2.5, -0.8, 0.8, 2.5];
+
+/// The limits that are tried then.
+const NEXT_PROBES: [f32; 4] = [-0.9, -0.3, 0.3, 0.9];
+
 /// Factor from the limit of the previous query to that of a query that only divides what it picks.
 const MARGIN: f32 = 1.3;
 
@@ -155,9 +164,11 @@ pub(super) fn divided_body<P: Pick>(
     let limits = likely_body(search.last * MARGIN, most)..=most;
     let (picked, limit) = pick_enough_body::<P, true>(search, point, k + 2, limits);
     let room = picked.next_multiple_of(BLOCK);
+    let padded = room.max(FEW);
+    search.picked.reserve(padded);
     let [_, _, _, numbers] = search.picked.slices_mut();
-    numbers[picked..room].fill(f32::INFINITY.to_bits());
-    let distances = bytemuck::cast_slice(search.picked.numbers(room));
+    numbers[picked..padded].fill(f32::INFINITY.to_bits());
+    let distances = bytemuck::cast_slice(search.picked.numbers(padded));
     let limit = divided_limit::<P>(distances, picked, k, limit, search.candidates.complete2)?;
     search.last = limit;
     Ok((room, limit))
@@ -175,11 +186,13 @@ pub(super) fn divided_with_ids<P: Pick>(
     let limits = likely_body(search.last * MARGIN, most)..=most;
     let (picked, limit) = pick_enough_body::<P, false>(search, point, k + 2, limits);
     let room = picked.next_multiple_of(BLOCK);
-    let wanted = room.max(search.distances.len());
-    search.distances.resize(wanted, 0.0);
+    let padded = room.max(FEW);
+    search
+        .distances
+        .resize(padded.max(search.distances.len()), 0.0);
     let [x, y, z] = search.picked.coordinates(room);
-    let distances = &mut search.distances[..room];
-    distances_body(x, y, z, point, distances);
+    let distances = &mut search.distances[..padded];
+    distances_body(x, y, z, point, &mut distances[..room]);
     distances[picked..].fill(f32::INFINITY);
     let limit = divided_limit::<P>(distances, picked, k, limit, search.candidates.complete2)?;
     search.last = limit;
@@ -213,10 +226,59 @@ pub(super) fn certain_body(limit: f32) -> f64 {
     f64::from(limit) * (1.0 + 2.0 * APPROXIMATE)
 }
 
-/// A limit within which exactly `wanted` of `count` numbers lie, with no other number close to it; the
-/// numbers are roughly evenly distributed up to `most`.
+/// A limit within which exactly `wanted` of the first `count` numbers lie, with no other number close to it;
+/// the numbers are roughly evenly distributed up to `most`, and those after the last are infinite.
 #[inline(always)]
 fn divide_body<P: Pick>(numbers: &[f32], count: usize, wanted: usize, most: f32) -> Option<f32> {
+    match numbers.first_chunk() {
+        Some(few) if count <= FEW => divide_few::<P>(few, count, wanted, most),
+        _ => divide_many::<P>(numbers, count, wanted, most),
+    }
+}
+
+/// As [`divide_body`], by probes: of the limits tried in a round, the two next to the wanted one are where the
+/// next round begins.
+#[inline(always)]
+fn divide_few<P: Pick>(
+    numbers: &[f32; FEW],
+    count: usize,
+    wanted: usize,
+    most: f32,
+) -> Option<f32> {
+    let (mut low, mut high) = (0.0, most);
+    let (mut below, mut above) = (0, count as u32);
+    let wanted = wanted as u32;
+    let mut steps = FIRST_PROBES;
+    for _ in 0..DIVISIONS {
+        let between = (high - low) / (above - below) as f32;
+        let middle = low + (wanted as f32 + 0.5 - below as f32) * between;
+        let (before, mut found) = ((low, high), f32::NAN);
+        for step in steps {
+            let limit = middle + step * between;
+            let count = count_few::<P>(numbers, limit);
+            // Choices, not branches: nothing predicts them.
+            found = if count == wanted { limit } else { found };
+            let is_low = (count < wanted) & (limit > low);
+            low = if is_low { limit } else { low };
+            below = if is_low { count } else { below };
+            let is_high = (count > wanted) & (limit < high);
+            high = if is_high { limit } else { high };
+            above = if is_high { count } else { above };
+        }
+        if !found.is_nan() {
+            return (count_few::<P>(numbers, found * GAP) == wanted).then_some(found);
+        }
+        if before == (low, high) {
+            return None;
+        }
+        steps = NEXT_PROBES;
+    }
+    None
+}
+
+/// As [`divide_body`], one limit after another.
+#[inline(always)]
+fn divide_many<P: Pick>(numbers: &[f32], count: usize, wanted: usize, most: f32) -> Option<f32> {
     let (mut low, mut high) = (0.0, most);
     let between = most / count as f32;
     let (mut limit, mut count) = (most, count);
@@ -239,12 +301,24 @@ fn divide_body<P: Pick>(numbers: &[f32], count: usize, wanted: usize, most: f32)
     None
 }
 
+/// The number of values that are at most `limit`.
+#[inline(always)]
+fn count_few<P: Pick>(numbers: &[f32; FEW], limit: f32) -> u32 {
+    let mut count = 0;
+    for block in numbers.as_chunks::<BLOCK>().0 {
+        count += P::within(block, limit).count_ones();
+    }
+    count
+}
+
 /// The number of values in whole blocks that are at most `limit`.
 #[inline(always)]
 fn count_within_body<P: Pick>(numbers: &[f32], limit: f32) -> usize {
-    let blocks = numbers.as_chunks::<BLOCK>().0.iter();
-    let within = blocks.map(|block| P::within(block, limit).count_ones());
-    within.sum::<u32>() as usize
+    let mut count = 0;
+    for block in numbers.as_chunks::<BLOCK>().0 {
+        count += P::within(block, limit).count_ones();
+    }
+    count as usize
 }
 
 /// First and second moments of the points within `limit`, and the largest squared distance.
