@@ -13,9 +13,10 @@ use crate::stages::blocks::Blocks;
 use crate::stages::located::Places;
 use crate::stages::surface::star::sorted;
 use crate::workspace::place::Place;
-use crate::workspace::{Unit, Workspace};
+use crate::workspace::{Unit, Workspace, lock};
 use rustc_hash::FxHashMap;
 use serde::{Deserialize, Serialize};
+use std::sync::Mutex;
 
 /// Part of a loop inside one block: it enters at `start` (from, at) and leaves at `end` (at, to).
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
@@ -227,6 +228,9 @@ fn link_up(fragments: &[Fragment]) -> Vec<Vec<usize>> {
 /// Loops across blocks that are processed at a time.
 const RINGS: usize = 256;
 
+/// Bytes for each edge of a loop across blocks while it is filled: its rows and corners, and lists.
+const EDGE_BYTES: u64 = 400;
+
 /// Fragments of loops across blocks, and the rules for filling them.
 struct Fragments<'a> {
     places: Places<'a>,
@@ -238,17 +242,29 @@ struct Fragments<'a> {
 impl Fragments<'_> {
     /// Fills the loops `rings`, each a list of fragments.
     fn fill(&self, rings: &[Vec<usize>], workspace: &Workspace) -> Result<Settled> {
+        let edges = |ring: &Vec<usize>| ring.iter().map(|&f| self.fragments[f].steps).sum();
+        let longest = self.rules.map_or(0, |rules| rules.longest_loop());
+        let fillings = Mutex::new(vec![None; rings.len()]);
+        let bytes = |number: usize| {
+            let edges: usize = edges(&rings[number]);
+            edges.min(longest) as u64 * EDGE_BYTES
+        };
+        workspace.for_each_unit("repair: loops", rings.len(), bytes, |unit| {
+            let ring = &rings[unit.number()];
+            if let Some(rules) = self.rules
+                && edges(ring) <= longest
+            {
+                let filling = self.fill_across(unit, ring, rules)?;
+                lock(&fillings)[unit.number()] = Some(filling);
+            }
+            Ok(())
+        })?;
         let mut settled = Settled::default();
-        let unit = workspace.unit();
-        for ring in rings {
-            workspace.check_cancel()?;
-            let edges: usize = ring.iter().map(|&f| self.fragments[f].steps).sum();
-            let Some(rules) = self.rules.filter(|m| edges <= m.longest_loop()) else {
-                settled.too_long();
-                continue;
-            };
-            let filling = self.fill_across(&unit, ring, rules)?;
-            settled.settle(filling, edges);
+        for (ring, filling) in rings.iter().zip(lock(&fillings).drain(..)) {
+            match filling {
+                Some(filling) => settled.settle(filling, edges(ring)),
+                None => settled.too_long(),
+            }
         }
         Ok(settled)
     }
