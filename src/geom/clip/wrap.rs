@@ -6,6 +6,8 @@
 //! clear of all other lines. A cell without a certificate has to be clipped ([`super::Cell`]); most of these
 //! have co-circular neighbours, or reach beyond the points at hand.
 
+mod hull;
+
 use super::RIM_DISTANCE;
 use super::lines::meet_columns;
 use crate::geom::Point;
@@ -15,15 +17,13 @@ use crate::kernels::sixteen::Sixteen;
 use crate::kernels::{
     Frame, LANES, Level, LineGroup, Place, SLACK, bisectors_body, kernel, touching_places_body,
 };
+use hull::hulls;
 
 /// Most points whose cells are computed together, one in each lane.
 pub const TOGETHER: usize = 16;
 
 /// Most neighbours of a point.
 pub const MOST_NEIGHBORS: usize = 32;
-
-/// Comparisons that need not wait for each other.
-const CHAINS: usize = 4;
 
 /// Most sides of a cell.
 const MOST_SIDES: usize = 2 * LANES;
@@ -223,7 +223,7 @@ fn wrap_body<E: Eight + Sixteen>(wrapper: &mut Wrapper, sites: &[Site<'_>]) {
     for (rows, half) in rows.iter().flatten().zip(halves) {
         E::store_turned(rows, half);
     }
-    let counts = guess_body::<E>(&wrapper.dual, most, sites.len(), &mut wrapper.sides);
+    let counts = hulls::<E>(&wrapper.dual, most, sites.len(), &mut wrapper.sides);
     // In two steps: what is written number by number is then not read at once as a whole.
     for (lane, around) in wrapper.around.iter_mut().enumerate().take(sites.len()) {
         let outline = &mut wrapper.outlines[lane];
@@ -304,141 +304,6 @@ fn set_dual<E: Eight + Sixteen>(lines: &Lines, count: usize, rows: [[&mut Lanes<
             row[left..].fill(0.0);
         }
     }
-}
-
-/// Wraps the hulls of the first `lanes` lanes, counter-clockwise. Returns their numbers of sides, 0 where
-/// there are too many.
-#[inline(always)]
-fn guess_body<S: Sixteen>(
-    dual: &[[Lanes<f32>; MOST_NEIGHBORS]; 2],
-    count: usize,
-    lanes: usize,
-    sides: &mut [Lanes<u32>; MOST_SIDES],
-) -> Lanes<u32> {
-    let rows = count.next_multiple_of(CHAINS).min(MOST_NEIGHBORS);
-    let duals = [&dual[0][..rows], &dual[1][..rows]];
-    let first = nearest_lines::<S>(duals);
-    let mut side = first;
-    let mut at = points_of(dual, &side);
-    // Backwards along the tangent; the hull is to the left of the tangent.
-    let mut back = [[0.0; TOGETHER]; 2];
-    for l in 0..TOGETHER {
-        (back[0][l], back[1][l]) = (at[1][l], -at[0][l]);
-    }
-    let mut counts = [0; TOGETHER];
-    let mut open = [0; TOGETHER];
-    open[..lanes].fill(u32::MAX);
-    for (place, sides) in (1u32..).zip(sides) {
-        *sides = side;
-        let next = rightmost::<S>(duals, &at, &back);
-        let mut any = 0;
-        for l in 0..TOGETHER {
-            let closed = if next[l] == first[l] { open[l] } else { 0 };
-            counts[l] |= closed & place;
-            open[l] &= !closed;
-            any |= open[l];
-        }
-        if any == 0 {
-            break;
-        }
-        let to = points_of(dual, &next);
-        for (back, (at, to)) in back.iter_mut().zip(at.iter().zip(&to)) {
-            for l in 0..TOGETHER {
-                back[l] = at[l] - to[l];
-            }
-        }
-        (at, side) = (to, next);
-    }
-    counts
-}
-
-/// The points of the dual with these numbers, by coordinate and lane.
-#[inline(always)]
-fn points_of(dual: &[[Lanes<f32>; MOST_NEIGHBORS]; 2], numbers: &Lanes<u32>) -> [Lanes<f32>; 2] {
-    let mut at = [[0.0; TOGETHER]; 2];
-    for (dual, at) in dual.iter().zip(&mut at) {
-        for l in 0..TOGETHER {
-            at[l] = dual[numbers[l] as usize % MOST_NEIGHBORS][l];
-        }
-    }
-    at
-}
-
-/// The numbers of the lines nearest to the centre.
-#[inline(always)]
-fn nearest_lines<S: Sixteen>([dual_x, dual_y]: [&[Lanes<f32>]; 2]) -> Lanes<u32> {
-    let zero = S::floats(&[0.0; TOGETHER]);
-    let mut far = [(zero, S::integer(0)); CHAINS];
-    let rows = dual_x.chunks_exact(CHAINS).zip(dual_y.chunks_exact(CHAINS));
-    for (chunk, (dual_x, dual_y)) in (0u32..).zip(rows) {
-        for (link, far) in far.iter_mut().enumerate() {
-            let (x, y) = (S::floats(&dual_x[link]), S::floats(&dual_y[link]));
-            let far2 = S::minus(S::times(x, x), S::times(S::minus(zero, y), y));
-            let take = S::less(far.0, far2);
-            let number = S::integer(chunk * CHAINS as u32 + link as u32);
-            *far = (
-                S::choose(take, far2, far.0),
-                S::choose_integers(take, number, far.1),
-            );
-        }
-    }
-    let (mut most, mut number) = far[0];
-    for other in &far[1..] {
-        let take = S::less(most, other.0);
-        most = S::choose(take, other.0, most);
-        number = S::choose_integers(take, other.1, number);
-    }
-    let mut numbers = [0; TOGETHER];
-    S::store_integers(number, &mut numbers);
-    numbers
-}
-
-/// A direction and the number of the point there.
-type Direction<S> = (
-    <S as Sixteen>::Floats,
-    <S as Sixteen>::Floats,
-    <S as Sixteen>::Integers,
-);
-
-/// Of two directions, that to the right.
-#[inline(always)]
-fn right<S: Sixteen>(a: Direction<S>, b: Direction<S>) -> Direction<S> {
-    let take = S::less(S::times(a.0, b.1), S::times(a.1, b.0));
-    (
-        S::choose(take, b.0, a.0),
-        S::choose(take, b.1, a.1),
-        S::choose_integers(take, b.2, a.2),
-    )
-}
-
-/// The numbers of the points that are farthest to the right as seen from `at`, where `back` is a direction to
-/// the left of all of them.
-#[inline(always)]
-fn rightmost<S: Sixteen>(
-    [dual_x, dual_y]: [&[Lanes<f32>]; 2],
-    at: &[Lanes<f32>; 2],
-    back: &[Lanes<f32>; 2],
-) -> Lanes<u32> {
-    let (at_x, at_y) = (S::floats(&at[0]), S::floats(&at[1]));
-    let start = (S::floats(&back[0]), S::floats(&back[1]), S::integer(0));
-    let mut best = [start; CHAINS];
-    let rows = dual_x.chunks_exact(CHAINS).zip(dual_y.chunks_exact(CHAINS));
-    for (chunk, (dual_x, dual_y)) in (0u32..).zip(rows) {
-        for (link, best) in best.iter_mut().enumerate() {
-            let x = S::minus(S::floats(&dual_x[link]), at_x);
-            let y = S::minus(S::floats(&dual_y[link]), at_y);
-            let number = S::integer(chunk * CHAINS as u32 + link as u32);
-            *best = right::<S>(*best, (x, y, number));
-        }
-    }
-    let mut all = best[0];
-    for other in &best[1..] {
-        all = right::<S>(all, *other);
-    }
-    let (.., number) = all;
-    let mut numbers = [0; TOGETHER];
-    S::store_integers(number, &mut numbers);
-    numbers
 }
 
 /// Writes the lines `sides` to `around`; false if they are not the sides of a cell.
@@ -543,156 +408,4 @@ fn clear_lines<E: Eight>(lines: &Lines, [x, y, error]: [f64; 3]) -> u64 {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::super::Cell;
-    use super::*;
-    use proptest::prelude::*;
-
-    type Differences = Vec<[i32; 3]>;
-
-    /// Anywhere, in a plane, on a grid in a plane (with many co-circular points), or around a circle.
-    fn clouds() -> impl Strategy<Value = Differences> {
-        let all = |from: i32| prop::collection::vec(prop::array::uniform3(-from..from), 3..=32);
-        prop_oneof![
-            2 => all(1 << 20),
-            1 => all(1 << 29),
-            4 => (all(1 << 12), 0i32..1 << 8).prop_map(|(all, thick)| {
-                all.iter().map(|[x, y, z]| [*x, *y, z % (thick + 1)]).collect()
-            }),
-            2 => all(4).prop_map(|all| all.iter().map(|[x, y, _]| [*x, *y, 0]).collect()),
-            1 => (3usize..32, 10.0f64..1e6).prop_map(|(count, radius)| {
-                let at = |k: usize| (k as f64 * std::f64::consts::TAU / count as f64).sin_cos();
-                (0..count).map(at).map(|(s, c)| [(s * radius) as i32, (c * radius) as i32, 0]).collect()
-            }),
-        ]
-    }
-
-    fn length2(d: &[i32; 3]) -> u64 {
-        d.iter().map(|c| i64::from(*c).pow(2) as u64).sum()
-    }
-
-    /// The pairs of neighbours at the corners of the cell, clipped line by line, and its reach.
-    fn clipped(differences: &[[i32; 3]], site: &Site<'_>) -> (Vec<(u32, u32)>, u64) {
-        let mut cell = Cell::new(1000, site.normal, site.radius);
-        let mut numbers: Vec<u32> = (0..differences.len() as u32).collect();
-        numbers.sort_by_key(|n| (length2(&differences[*n as usize]), *n));
-        for number in numbers {
-            cell.clip(differences[number as usize].map(i64::from), number);
-        }
-        let mut pairs = Vec::new();
-        cell.triples(|a, b| pairs.push((a.min(b), a.max(b))));
-        pairs.sort_unstable();
-        (pairs, cell.reach2())
-    }
-
-    fn pairs(outline: &Outline) -> Vec<(u32, u32)> {
-        let sides = outline.sides();
-        let next = sides.iter().cycle().skip(1);
-        let mut pairs: Vec<_> = (sides.iter().zip(next))
-            .map(|(a, b)| (u32::from(*a.min(b)), u32::from(*a.max(b))))
-            .collect();
-        pairs.sort_unstable();
-        pairs
-    }
-
-    fn columns(differences: &[[i32; 3]]) -> [[i32; MOST_NEIGHBORS]; 3] {
-        let mut columns = [[0; MOST_NEIGHBORS]; 3];
-        for (place, difference) in differences.iter().enumerate() {
-            for (column, at) in columns.iter_mut().zip(difference) {
-                column[place] = *at;
-            }
-        }
-        columns
-    }
-
-    proptest! {
-        #![proptest_config(ProptestConfig::with_cases(1000))]
-        #[test]
-        fn certified_cells_are_those_of_clipping(
-            clouds in prop::collection::vec(clouds(), 1..=TOGETHER),
-            normal in prop_oneof![
-                3 => Just([0, 0, 1 << 24]),
-                1 => (-9i32..9, -9i32..9).prop_map(|(x, y)| [x << 18, y << 18, 1 << 24]),
-            ],
-            radius in prop_oneof![3 => Just(1e10), 1 => 1.0f64..1e6],
-            near in 0usize..40,
-        ) {
-            let clouds: Vec<Differences> = clouds.into_iter().map(|all| {
-                let mut all: Vec<_> = all.into_iter().filter(|d| *d != [0; 3]).collect();
-                all.sort_by_key(length2);
-                all
-            }).collect();
-            // Some of the neighbours are first left out, and examined later.
-            let near: Vec<_> = clouds.iter().map(|all| {
-                let last2 = all.get(near).or(all.last()).map_or(0, length2);
-                all.partition_point(|d| length2(d) <= last2)
-            }).collect();
-            let columns: Vec<_> = clouds.iter().zip(&near)
-                .map(|(all, near)| columns(&all[..*near])).collect();
-            let sites: Vec<_> = columns.iter().zip(&near).map(|(columns, near)| Site {
-                differences: columns.each_ref(),
-                count: *near,
-                normal,
-                radius,
-            }).collect();
-            for level in Level::all() {
-                let mut wrapper = Wrapper::at(level);
-                wrapper.wrap(&sites);
-                for (place, ((cloud, site), near)) in clouds.iter().zip(&sites).zip(&near).enumerate() {
-                    let outline = wrapper.outline(place);
-                    let pairs = pairs(outline);
-                    if pairs.is_empty() {
-                        continue;
-                    }
-                    let (expected, reach2) = clipped(&cloud[..*near], site);
-                    prop_assert_eq!(&pairs, &expected);
-                    prop_assert!(outline.reach2().abs_diff(reach2) <= reach2 >> 20);
-                    let own = [1 << 28; 3];
-                    let all = [0, 1, 2].map(|axis| cloud.iter().map(|d| d[axis] + own[axis]).collect::<Vec<_>>());
-                    let known2 = cloud[..*near].last().map_or(0, length2);
-                    let all = all.each_ref().map(|column| &column[..]);
-                    if wrapper.is_clear(place, own, known2, all) {
-                        prop_assert_eq!(&pairs, &clipped(cloud, site).0);
-                    }
-                }
-            }
-        }
-
-        /// Also where the last lanes are not used, and after cells with more neighbours.
-        #[test]
-        fn cells_of_scattered_points_are_certified(
-            clouds in prop::collection::vec(
-                prop::collection::vec((-1i32 << 24..1 << 24, -1i32 << 24..1 << 24), 20..=32), 1..=2 * TOGETHER),
-        ) {
-            let mut known = 0;
-            let clouds: Vec<Differences> = clouds.iter()
-                .map(|all| all.iter().map(|(x, y)| [*x | 1, *y, (x ^ y) % 64]).collect()).collect();
-            for level in Level::all() {
-                let mut wrapper = Wrapper::at(level);
-                for clouds in clouds.chunks(TOGETHER) {
-                    let columns: Vec<_> = clouds.iter().map(|all| columns(all)).collect();
-                    let sites: Vec<_> = clouds.iter().zip(&columns).map(|(cloud, columns)| Site {
-                        differences: columns.each_ref(),
-                        count: cloud.len(),
-                        normal: [0, 0, 1 << 24],
-                        radius: 1e10,
-                    }).collect();
-                    wrapper.wrap(&sites);
-                    for (place, (cloud, site)) in clouds.iter().zip(&sites).enumerate() {
-                        let outline = wrapper.outline(place);
-                        let (pairs, _) = clipped(cloud, site);
-                        // On the rim, or with more sides than there is room for.
-                        let closed = pairs.len() >= 3 && {
-                            let mut ends: Vec<_> = pairs.iter().flat_map(|(a, b)| [a, b]).collect();
-                            ends.sort_unstable();
-                            ends.chunk_by(|a, b| a == b).all(|same| same.len() == 2)
-                        };
-                        known += usize::from(closed);
-                        prop_assert!(!closed || outline.sides().len() == pairs.len());
-                    }
-                }
-            }
-            prop_assert!(known * 2 > clouds.len());
-        }
-    }
-}
+mod tests;

@@ -169,6 +169,79 @@ fn check_sums(points: &[Point], tile: &Tile, k: usize, search: &mut Search) {
     assert!(next.is_empty());
 }
 
+/// Compares the sets of neighbours of groups with those of a sorted list. Returns how many are known.
+fn check_groups(points: &[Point], tile: &Tile, k: usize, search: &mut Search) -> usize {
+    let (mut next, mut known) = (tile.ids().start, 0);
+    let each = |group: &mut near::Group<'_>| {
+        for (number, member) in group.members().iter().enumerate() {
+            assert_eq!(member.id as usize, next);
+            next += 1;
+            assert_eq!(member.point, points[member.id as usize]);
+            let expected = all_near(points, member.id as usize);
+            let far2 = expected[expected.len() / 2].0;
+            if let Some(columns) = group.within(far2) {
+                let listed =
+                    |at: &Point| (0..columns[0].len()).any(|n| columns.map(|c| c[n]) == *at);
+                let near = expected.iter().take_while(|(d2, _)| *d2 <= far2);
+                assert!(
+                    near.into_iter()
+                        .all(|(_, id)| listed(&points[*id as usize]))
+                );
+            }
+            if let Some(sums) = member.sums {
+                known += 1;
+                assert_eq!(sums, sums_over(points, member.point, &expected[..k]));
+                let ids = &member.ids()[..k];
+                assert!(ids.is_sorted());
+                assert!(expected[..k].iter().all(|(_, id)| ids.contains(id)));
+                let [x, y, z] = member.differences();
+                for (place, id) in ids.iter().enumerate() {
+                    let difference = [x[place], y[place], z[place]].map(i64::from);
+                    let at = points[*id as usize];
+                    assert_eq!(difference, crate::geom::sub(at, member.point));
+                }
+                assert!(
+                    [x, y, z]
+                        .iter()
+                        .all(|column| column[k..].iter().all(|c| *c == 0))
+                );
+                assert!(expected[k..].iter().all(|(d2, _)| *d2 > member.complete2));
+            }
+            if let Some(query) = group.query(number) {
+                let got = query.near().iter().take(k).map(|n| (n.distance2, n.id));
+                assert!(got.eq(expected[..k].iter().copied()));
+            }
+        }
+    };
+    tile.for_each_group(k, search, |_| (), each);
+    assert_eq!(next, tile.ids().end);
+    known
+}
+
+/// Without ties, nearly all neighbourhoods are known, also where the density changes.
+#[test]
+fn groups_know_most_neighbors() {
+    let at = |n: i32| {
+        let side = 1000 + n / 2 * (n / 500);
+        [
+            n.wrapping_mul(7919).rem_euclid(side * 97),
+            n.wrapping_mul(104_729).rem_euclid(side * 89),
+            n % 7,
+        ]
+    };
+    let cloud: Vec<Point> = (0..3000).map(at).collect();
+    let (_workspace, store, points) = ordered(&cloud, 256);
+    let tile = Tile::load(&store, 0..store.len()).unwrap();
+    for level in Level::all() {
+        let known = check_groups(&points, &tile, 30, &mut Search::at(level));
+        assert!(
+            known * 100 > points.len() * 95,
+            "{known} of {}",
+            points.len()
+        );
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(96))]
     #[test]
@@ -188,6 +261,7 @@ proptest! {
             for level in Level::all() {
                 check(&points, &tile, k, &mut Search::at(level));
                 check_sums(&points, &tile, k, &mut Search::at(level));
+                check_groups(&points, &tile, k, &mut Search::at(level));
             }
         }
     }

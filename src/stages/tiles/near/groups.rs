@@ -87,7 +87,12 @@ impl<'a> Group<'a> {
     /// points at hand do not reach that far.
     #[must_use]
     pub fn within(&self, distance2: u64) -> Option<[&[i32]; 3]> {
-        let candidates = &self.search.candidates;
+        // Those of the leaf, also while a query uses its own.
+        let candidates = self
+            .search
+            .aside
+            .as_ref()
+            .unwrap_or(&self.search.candidates);
         let known = distance2 <= candidates.complete2;
         known.then(|| candidates.columns.coordinates(candidates.len))
     }
