@@ -1,10 +1,12 @@
-//! The restricted Voronoi cell of a point, given its plane and its neighbours nearest first.
+//! The restricted Voronoi cell of a point, given its plane and its neighbours nearest first, and the cells of
+//! several points together, at every level of instructions of the machine.
 
 mod util;
 
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 use outcrop::geom::clip::Cell;
+use outcrop::geom::clip::wrap::{MOST_NEIGHBORS, Site, TOGETHER, Wrapper};
 use outcrop::geom::plane::Normal;
 use outcrop::kernels::Level;
 use outcrop::stages::tiles::neighbors::Neighbors;
@@ -62,6 +64,40 @@ fn whole_cell(bencher: Bencher<'_, '_>) {
                 cell.triples(|a, b| {
                     black_box((a, b));
                 });
+            }
+        });
+}
+
+#[divan::bench(args = Level::all())]
+fn together(bencher: Bencher<'_, '_>, level: Level) {
+    let tasks = tasks();
+    let columns: Vec<[[i32; MOST_NEIGHBORS]; 3]> = (tasks.iter())
+        .map(|(.., near)| {
+            let near = near.columns();
+            [near.x, near.y, near.z].map(|from| {
+                let mut column = [0; MOST_NEIGHBORS];
+                column[..util::NEIGHBORS].copy_from_slice(&from[..util::NEIGHBORS]);
+                column
+            })
+        })
+        .collect();
+    let sites: Vec<Site<'_>> = (tasks.iter().zip(&columns))
+        .map(|((_, normal, radius, _), columns)| Site {
+            differences: columns.each_ref(),
+            count: util::NEIGHBORS,
+            normal: *normal,
+            radius: *radius,
+        })
+        .collect();
+    let mut wrapper = Wrapper::at(level);
+    bencher
+        .counter(ItemsCount::new(sites.len()))
+        .bench_local(|| {
+            for sites in sites.chunks(TOGETHER) {
+                wrapper.wrap(sites);
+                for place in 0..sites.len() {
+                    black_box(wrapper.outline(place).sides());
+                }
             }
         });
 }

@@ -4,6 +4,7 @@ mod util;
 
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
+use outcrop::kernels::Level;
 use outcrop::stages::tiles::Tile;
 use outcrop::stages::tiles::near::Search;
 
@@ -62,6 +63,24 @@ fn sums(bencher: Bencher<'_, '_>, k: usize) {
                 |_| (),
                 |_, _, sums| {
                     black_box(sums.map_or(0, |sums| sums.last2));
+                },
+            );
+        });
+}
+
+#[divan::bench(args = Level::all(), sample_count = 30)]
+fn groups(bencher: Bencher<'_, '_>, level: Level) {
+    let tile = tile();
+    let mut search = Search::at(level);
+    bencher
+        .counter(ItemsCount::new(TILE.len()))
+        .bench_local(|| {
+            tile.for_each_group(
+                30,
+                &mut search,
+                |_| (),
+                |group| {
+                    black_box(group.members().len());
                 },
             );
         });
