@@ -38,6 +38,7 @@ use file::Shared;
 use generations::{Opened, Resources};
 use memory::{MemoryPool, Reservation};
 use progress::{Cancel, Observer};
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicI32, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
@@ -135,6 +136,16 @@ pub struct Workspace {
     numbers: AtomicU64,
     parts: Mutex<Vec<(&'static str, f64)>>,
     pool: Arc<rayon::ThreadPool>,
+}
+
+/// Makes a folder in one that exists, unless it is there.
+pub(crate) fn make_folder(folder: &Path) -> Result<()> {
+    match std::fs::create_dir(folder) {
+        Err(e) if e.kind() != ErrorKind::AlreadyExists => {
+            Err(Error::io(folder, "make the folder", e))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Locks a mutex; whoever panicked with it left consistent data.

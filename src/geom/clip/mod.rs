@@ -167,8 +167,7 @@ impl Cell {
     #[inline(always)]
     fn set_reach(&mut self, reach2: f64) {
         self.reach2 = reach2;
-        // The conversion saturates for disks larger than any cloud.
-        self.secure2 = ((4.0 * reach2 * (1.0 + 1e-9)) as u64).saturating_add(1);
+        self.secure2 = secure2(reach2);
     }
 
     /// Number of places for corners, used or not.
@@ -354,6 +353,14 @@ impl Cell {
             }
         }
     }
+}
+
+/// The squared distance beyond which no point touches a cell whose corners have at most the squared distance
+/// `reach2`: four times as much, rounded up.
+#[inline(always)]
+fn secure2(reach2: f64) -> u64 {
+    // The conversion saturates for disks larger than any cloud.
+    ((4.0 * reach2 * (1.0 + 1e-9)) as u64).saturating_add(1)
 }
 
 kernel! {

@@ -135,13 +135,7 @@ fn touching_points_body<E: Eight>(
     let mut listed = [Place::default(); GROUPS * LANES];
     let count = Place::list(&cell.corners, &mut listed);
     for start in (0..x.len()).step_by(LANES) {
-        let group = start..(start + LANES).min(x.len());
-        let mut from = [[0; LANES]; 3];
-        for ((from, column), own) in from.iter_mut().zip([x, y, z]).zip(own) {
-            for (from, at) in from.iter_mut().zip(&column[group.clone()]) {
-                *from = at.wrapping_sub(own);
-            }
-        }
+        let from = differences([x, y, z], start, own);
         let lines = bisectors_body::<E>(&from[0], &from[1], &from[2], &cell.frame);
         let mut touching = match count {
             Some(count) => touching_places_body::<E>(listed[..count].iter().copied(), &lines),
@@ -150,9 +144,22 @@ fn touching_points_body<E: Eight>(
         while touching != 0 {
             let place = start as u32 + touching.trailing_zeros();
             touching &= touching - 1;
-            if (place as usize) < group.end {
+            if (place as usize) < x.len() {
                 places.push(place);
             }
         }
     }
+}
+
+/// The differences to `own` of up to [`LANES`] points from `start` on; zeros after the last point.
+#[inline(always)]
+pub(super) fn differences(columns: [&[i32]; 3], start: usize, own: Point) -> [[i32; LANES]; 3] {
+    let group = start..(start + LANES).min(columns[0].len());
+    let mut from = [[0; LANES]; 3];
+    for ((from, column), own) in from.iter_mut().zip(columns).zip(own) {
+        for (from, at) in from.iter_mut().zip(&column[group.clone()]) {
+            *from = at.wrapping_sub(own);
+        }
+    }
+    from
 }

@@ -8,8 +8,9 @@
 
 mod hull;
 
-use super::RIM_DISTANCE;
 use super::lines::meet_columns;
+use super::touch::differences;
+use super::{RIM_DISTANCE, secure2};
 use crate::geom::Point;
 use crate::geom::plane::Normal;
 use crate::kernels::eight::Eight;
@@ -162,14 +163,8 @@ fn is_clear_body<E: Eight>(
     let known = E::splat(known2 as f64 * if exact { 0.5 } else { 0.5 - SLACK });
     let secure = E::splat(outline.secure2 as f64 * (0.5 + SLACK));
     for start in (0..x.len()).step_by(LANES) {
-        let group = start..(start + LANES).min(x.len());
-        let mut from = [[0; LANES]; 3];
-        for ((from, column), own) in from.iter_mut().zip([x, y, z]).zip(own) {
-            for (from, at) in from.iter_mut().zip(&column[group.clone()]) {
-                *from = at.wrapping_sub(own);
-            }
-        }
-        let lines = bisectors_body::<E>(&from[0], &from[1], &from[2], frame);
+        let [x, y, z] = differences([x, y, z], start, own);
+        let lines = bisectors_body::<E>(&x, &y, &z, frame);
         let halves = E::load(&lines.offset);
         let near = halves.greater(known) & !halves.greater(secure) & 0xff;
         if near == 0 {
@@ -350,22 +345,22 @@ fn certify<E: Eight>(
         store(reach2, &mut reaches[to]);
     }
     let mut reach2 = 0.0f64;
-    let (mut unclear, mut seen) = (0, 0);
+    let (mut touching, mut seen) = (0, 0);
     for (place, side) in sides.iter().enumerate() {
         reach2 = reach2.max(reaches[place]);
         let next = sides.get(place + 1).unwrap_or(&sides[0]);
         let own = 1u64 << side | 1 << next;
-        let corner = [corner_x[place], corner_y[place], errors[place]];
-        unclear |= !(clear_lines::<E>(lines, corner) | own);
+        let corner = Place::new(corner_x[place], corner_y[place], errors[place]);
+        touching |= touching_lines::<E>(lines, corner) & !own;
         seen |= 1u64 << side;
     }
-    let clear = unclear & ((1 << site.count) - 1) == 0;
+    let clear = touching & ((1 << site.count) - 1) == 0;
     // A side has two corners: if all sides are different, they close around the cell once.
     let once = seen.count_ones() as usize == sides.len();
-    let secure2 = 4.0 * reach2 * (1.0 + 1e-9);
-    // At half the distance of the rim: its sides, and what rounding decides there, do not matter.
+    // At half the distance of the rim: its sides, and what rounding decides there, do not matter. (What is
+    // rounded to an integer would not show a corner beyond the rim of a disk larger than any cloud.)
     let rim = site.radius * RIM_DISTANCE;
-    (clear && once && secure2 <= rim * rim).then_some((secure2 as u64).saturating_add(1))
+    (clear && once && 4.0 * reach2 <= rim * rim).then(|| secure2(reach2))
 }
 
 /// Eight lines.
@@ -388,23 +383,14 @@ fn store<E: Eight>(lanes: E, to: &mut [f64]) {
     }
 }
 
-/// Bit `k` is set if line `k` certainly does not cut off the corner. See
-/// [`crate::kernels::touching_lines`].
+/// Bit `k` is set unless line `k` certainly does not cut off the corner.
 #[inline(always)]
-fn clear_lines<E: Eight>(lines: &Lines, [x, y, error]: [f64; 3]) -> u64 {
-    let (x, y, error) = (E::splat(x), E::splat(y), E::splat(error));
-    let slack = E::splat(SLACK);
-    let mut clear = 0;
+fn touching_lines<E: Eight>(lines: &Lines, corner: Place) -> u64 {
+    let mut touching = 0;
     for (group, lines) in lines.iter().enumerate() {
-        let offset = E::load(&lines.offset);
-        let depth = E::load(&lines.x)
-            .mul(x)
-            .add(E::load(&lines.y).mul(y))
-            .sub(offset);
-        let bound = E::load(&lines.length).mul(error).add(slack.mul(offset));
-        clear |= E::splat(0.0).sub(depth).greater(bound) << (group * LANES);
+        touching |= touching_places_body::<E>(std::iter::once(corner), lines) << (group * LANES);
     }
-    clear
+    touching
 }
 
 #[cfg(test)]

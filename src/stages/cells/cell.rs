@@ -104,8 +104,14 @@ impl Fit {
     /// The plane of neighbours given by their sums.
     #[must_use]
     pub fn of(sums: Sums) -> Self {
+        Self::with(sums.moments.plane(), sums)
+    }
+
+    /// As [`Fit::of`], if the plane of the sums is known.
+    #[must_use]
+    pub fn with(plane: Plane, sums: Sums) -> Self {
         Self {
-            plane: sums.moments.plane(),
+            plane,
             moments: sums.moments,
             last2: sums.last2,
             near2: sums.last2,
@@ -163,7 +169,6 @@ impl Widen {
 /// Computes cells one after another in the same memory.
 #[derive(Debug)]
 pub struct CellMaker<'a> {
-    pub(super) level: Level,
     pub(super) neighbors: usize,
     radius: DiskRadius,
     pub(super) widen: Widen,
@@ -183,7 +188,6 @@ impl<'a> CellMaker<'a> {
         density: Option<Density<'a>>,
     ) -> Self {
         Self {
-            level: Level::best(),
             neighbors,
             radius,
             widen,
@@ -209,14 +213,10 @@ impl<'a> CellMaker<'a> {
     }
 
     /// Starts the cell of a point, or returns the reason why it has none.
-    fn start(&mut self, id: u32, fit: &Fit) -> Option<Outcome> {
-        match self.disk(id, fit) {
-            Ok((normal, radius)) => {
-                self.cell.start(id, normal, radius);
-                None
-            }
-            Err(outcome) => Some(outcome),
-        }
+    fn start(&mut self, id: u32, fit: &Fit) -> std::result::Result<(), Outcome> {
+        let (normal, radius) = self.disk(id, fit)?;
+        self.cell.start(id, normal, radius);
+        Ok(())
     }
 
     /// Computes the cell of a point from the points in its tile and halo. `each` receives the ids at its
@@ -232,7 +232,7 @@ impl<'a> CellMaker<'a> {
         let Some(fit) = fit_from(query, self.neighbors, self.widen)? else {
             return Ok(Outcome::Uncertain);
         };
-        if let Some(outcome) = self.start(query.id(), &fit) {
+        if let Err(outcome) = self.start(query.id(), &fit) {
             return Ok(outcome);
         }
         loop {
@@ -265,7 +265,7 @@ impl<'a> CellMaker<'a> {
         let Some(fit) = fit_from(&mut source, self.neighbors, self.widen)? else {
             return Ok(Outcome::Uncertain);
         };
-        if let Some(outcome) = self.start(id, &fit) {
+        if let Err(outcome) = self.start(id, &fit) {
             return Ok(outcome);
         }
         let (mut walk, mut near) = source;

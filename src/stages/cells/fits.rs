@@ -213,12 +213,7 @@ impl Several {
         for (lane, plane) in planes.into_iter().enumerate().take(self.count) {
             let (id, point) = self.points[lane];
             let (moments, last2) = (self.moments[lane], self.lasts[lane]);
-            let fit = Fit {
-                plane,
-                moments,
-                last2,
-                near2: last2,
-            };
+            let fit = Fit::with(plane, Sums { moments, last2 });
             found(id, point, Ok(Some(fit)));
         }
         self.count = 0;

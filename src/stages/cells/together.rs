@@ -1,10 +1,10 @@
 //! Cells of the points of a leaf, computed together from their nearest neighbours.
 
 use super::cell::{CellMaker, Fit, Outcome};
-use crate::geom::clip::wrap::Site;
+use crate::geom::clip::wrap::{Site, TOGETHER};
 use crate::geom::plane::{Moments, Plane, planes};
 use crate::kernels::{LANES, Level};
-use crate::stages::tiles::near::{Group, MOST_MEMBERS, Neighborhood};
+use crate::stages::tiles::near::{Group, Neighborhood};
 
 impl CellMaker<'_> {
     /// Computes the cells of all members that the points around the leaf certify. `each` receives a member's
@@ -13,20 +13,15 @@ impl CellMaker<'_> {
         &mut self,
         group: &Group<'_>,
         mut each: impl FnMut(u32, u32, u32),
-    ) -> [Option<Outcome>; MOST_MEMBERS] {
+    ) -> [Option<Outcome>; TOGETHER] {
         let members = group.members();
-        let mut outcomes = [None; MOST_MEMBERS];
-        let planes = planes_of(self.level, members);
-        let mut sites = Vec::new();
-        let mut places = Vec::new();
+        let mut outcomes = [None; TOGETHER];
+        let planes = planes_of(members);
+        let mut sites = Vec::with_capacity(members.len());
+        let mut places = Vec::with_capacity(members.len());
         for (place, (member, plane)) in members.iter().zip(planes).enumerate() {
             let Some(sums) = member.sums else { continue };
-            let fit = Fit {
-                plane,
-                moments: sums.moments,
-                last2: sums.last2,
-                near2: sums.last2,
-            };
+            let fit = Fit::with(plane, sums);
             if !self.widen.is_enough(&fit.plane) {
                 continue;
             }
@@ -68,14 +63,14 @@ impl CellMaker<'_> {
 }
 
 /// The planes of the members whose sums are known.
-fn planes_of(level: Level, members: &[Neighborhood]) -> [Plane; MOST_MEMBERS] {
-    let mut all = [Plane::NONE; MOST_MEMBERS];
+fn planes_of(members: &[Neighborhood]) -> [Plane; TOGETHER] {
+    let mut all = [Plane::NONE; TOGETHER];
     for (members, all) in members.chunks(LANES).zip(all.chunks_mut(LANES)) {
         let mut moments = [Moments::default(); LANES];
         for (member, moments) in members.iter().zip(&mut moments) {
             *moments = member.sums.map_or(*moments, |sums| sums.moments);
         }
-        all.copy_from_slice(&planes(level, &moments));
+        all.copy_from_slice(&planes(Level::best(), &moments));
     }
     all
 }

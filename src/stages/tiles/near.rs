@@ -21,7 +21,7 @@ mod sums;
 
 pub use super::neighbors::Sums;
 pub use around::Around;
-pub use groups::{Group, MOST_MEMBERS, Neighborhood};
+pub use groups::{Group, Neighborhood};
 use list::list_nearest;
 
 /// Bytes of a search for each candidate: three sets of columns, the picked candidates, distances and keys.
@@ -134,17 +134,18 @@ impl Tile {
         grown: impl FnMut(u64),
         mut one: impl FnMut(&OwnPage, usize, u32, &mut Search) -> u64,
     ) {
+        let wanted = |id: usize| self.ids.contains(&id) && wanted(id);
         let leaf = |own: &OwnPage, first: usize, group: Range<usize>, search: &mut Search| {
             let mut farthest = 0;
             for (id, index) in (first..).zip(group) {
-                if self.ids.contains(&id) && wanted(id) {
+                if wanted(id) {
                     farthest = one(own, index, id as u32, search).max(farthest);
                     search.swap_back();
                 }
             }
             farthest
         };
-        self.for_leaves(k, search, &wanted, grown, leaf);
+        self.for_leaves(k, search, wanted, grown, leaf);
     }
 
     /// Gathers the candidates of each leaf with `wanted` ids, and calls `each` with the page, the id of the
@@ -164,8 +165,7 @@ impl Tile {
             for start in range.clone().step_by(self.leaf) {
                 let group = start..(start + self.leaf).min(range.end);
                 let first = self.id(own.local, start - range.start);
-                let is_wanted = |id: usize| self.ids.contains(&id) && wanted(id);
-                if !(first..first + group.len()).any(is_wanted) {
+                if !(first..first + group.len()).any(&wanted) {
                     continue;
                 }
                 if !set {

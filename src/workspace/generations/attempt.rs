@@ -4,6 +4,7 @@ use super::{Generation, Opened, Resources, SharedFolder, TRIES};
 use crate::error::{Error, Result};
 use crate::workspace::journal::{self, Entry, Journal, Record, Task};
 use crate::workspace::keeper::Keeper;
+use crate::workspace::make_folder;
 use crate::workspace::open::open_existing;
 use crate::workspace::run::{ResumableRun, Role};
 use std::collections::{BTreeMap, BTreeSet};
@@ -28,12 +29,7 @@ impl SharedFolder {
             return Ok(Opened::Done);
         }
         let folder = self.tasks(number);
-        match std::fs::create_dir(&folder) {
-            Err(e) if e.kind() != ErrorKind::AlreadyExists => {
-                return Err(Error::io(&folder, "make the folder", e));
-            }
-            _ => {}
-        }
+        make_folder(&folder)?;
         let path = |attempt: u32| folder.join(format!("{shard}.{attempt}"));
         let (attempt, path, journal) = self.claim(path)?;
         let task = Task {

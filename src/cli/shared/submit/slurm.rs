@@ -6,7 +6,7 @@ use crate::cli::output::print;
 use crate::cli::{stop, style};
 use crate::error::{Error, Result};
 use crate::pipeline::{Status, TaskState};
-use std::io::ErrorKind;
+use crate::workspace::make_folder;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
@@ -94,12 +94,7 @@ impl<'a> Slurm<'a> {
         }
         let logs = self.folder.join("logs");
         // Not the run's folder: another chain of jobs may have finished the run and removed it meanwhile.
-        match std::fs::create_dir(&logs) {
-            Err(e) if e.kind() != ErrorKind::AlreadyExists => {
-                return Err(Error::io(&logs, "make the folder", e));
-            }
-            _ => {}
-        }
+        make_folder(&logs)?;
         for (name, text) in &scripts {
             let path = self.folder.join(name);
             std::fs::write(&path, text).map_err(|e| Error::io(&path, "write", e))?;

@@ -18,14 +18,11 @@ pub(super) fn hulls<S: Sixteen>(
 ) -> Lanes<u32> {
     let rows = count.next_multiple_of(CHAINS).min(MOST_NEIGHBORS);
     let duals = [&dual[0][..rows], &dual[1][..rows]];
-    let first = nearest_lines::<S>(duals);
+    let first = farthest_along_x::<S>(duals[0]);
     let mut side = first;
     let mut at = points_of(dual, &side);
     // Backwards along the tangent; the hull is to the left of the tangent.
-    let mut back = [[0.0; TOGETHER]; 2];
-    for l in 0..TOGETHER {
-        (back[0][l], back[1][l]) = (at[1][l], -at[0][l]);
-    }
+    let mut back = [[0.0; TOGETHER], [-1.0; TOGETHER]];
     let mut counts = [0; TOGETHER];
     let mut open = [0; TOGETHER];
     open[..lanes].fill(u32::MAX);
@@ -65,29 +62,16 @@ fn points_of(dual: &[[Lanes<f32>; MOST_NEIGHBORS]; 2], numbers: &Lanes<u32>) -> 
     at
 }
 
-/// The numbers of the lines nearest to the centre.
+/// The numbers of the points with the largest x, which are corners of the hulls.
 #[inline(always)]
-fn nearest_lines<S: Sixteen>([dual_x, dual_y]: [&[Lanes<f32>]; 2]) -> Lanes<u32> {
-    let zero = S::floats(&[0.0; TOGETHER]);
-    let mut far = [(zero, S::integer(0)); CHAINS];
-    let rows = dual_x.chunks_exact(CHAINS).zip(dual_y.chunks_exact(CHAINS));
-    for (chunk, (dual_x, dual_y)) in (0u32..).zip(rows) {
-        for (link, far) in far.iter_mut().enumerate() {
-            let (x, y) = (S::floats(&dual_x[link]), S::floats(&dual_y[link]));
-            let far2 = S::minus(S::times(x, x), S::times(S::minus(zero, y), y));
-            let take = S::less(far.0, far2);
-            let number = S::integer(chunk * CHAINS as u32 + link as u32);
-            *far = (
-                S::choose(take, far2, far.0),
-                S::choose_integers(take, number, far.1),
-            );
-        }
-    }
-    let (mut most, mut number) = far[0];
-    for other in &far[1..] {
-        let take = S::less(most, other.0);
-        most = S::choose(take, other.0, most);
-        number = S::choose_integers(take, other.1, number);
+fn farthest_along_x<S: Sixteen>(dual_x: &[Lanes<f32>]) -> Lanes<u32> {
+    let mut most = S::floats(&[0.0; TOGETHER]);
+    let mut number = S::integer(0);
+    for (this, x) in (0u32..).zip(dual_x) {
+        let x = S::floats(x);
+        let take = S::less(most, x);
+        most = S::choose(take, x, most);
+        number = S::choose_integers(take, S::integer(this), number);
     }
     let mut numbers = [0; TOGETHER];
     S::store_integers(number, &mut numbers);

@@ -151,3 +151,26 @@ proptest! {
         prop_assert!(known * 2 > clouds.len());
     }
 }
+
+/// Two bisectors that are almost parallel meet at 10^16 steps, a million times as far as the rim.
+#[test]
+fn a_corner_beyond_the_rim_is_not_certified() {
+    let cloud = [
+        [0, 2393, 0],
+        [369_425_182, 244_874_119, 278_959_911],
+        [-486_112_637, -322_220_617, 95_775_782],
+    ];
+    let columns = columns(&cloud);
+    let site = Site {
+        differences: columns.each_ref(),
+        count: cloud.len(),
+        normal: [0, 0, 1 << 24],
+        radius: 1e10,
+    };
+    assert_eq!(clipped(&cloud, &site).0.len(), 2);
+    for level in Level::all() {
+        let mut wrapper = Wrapper::at(level);
+        wrapper.wrap(&[site]);
+        assert!(wrapper.outline(0).sides().is_empty());
+    }
+}

@@ -136,11 +136,11 @@ fn take_body<P: Pick>(
 ) -> Result<(), Unknown> {
     let (room, limit) = divided_body::<P>(search, point, k)?;
     around.reserve(k + 1);
-    let [from_x, from_y, from_z, numbers] = search.picked.blocks(room);
+    let [from_x, from_y, from_z, _] = search.picked.blocks(room);
+    let distances = search.distances[..room].as_chunks::<BLOCK>().0;
     let [to_x, to_y, to_z] = &mut around.columns;
     let mut count = 0;
-    for (((x, y), z), distances) in from_x.iter().zip(from_y).zip(from_z).zip(numbers) {
-        let distances: &[f32; BLOCK] = bytemuck::cast_ref(distances);
+    for (((x, y), z), distances) in from_x.iter().zip(from_y).zip(from_z).zip(distances) {
         let within = P::within(distances, limit);
         P::pack_at(x, within, to_x, count);
         P::pack_at(y, within, to_y, count);

@@ -1,18 +1,13 @@
 //! The nearest neighbours of all points of a leaf together, each set in order of id. Nothing is sorted.
 
-use super::sums::{Unknown, certain_body, divided_with_ids};
+use super::sums::{Unknown, certain_body, divided_body};
 use super::{APPROXIMATE, OwnPage, Query, Search, Sums};
-use crate::geom::Point;
+use crate::geom::clip::wrap::{MOST_NEIGHBORS, TOGETHER};
 use crate::geom::plane::Moments;
+use crate::geom::{Point, distance2};
 use crate::kernels::{BLOCK, Pick, SUMMED_LIMIT2, kernel, second_moments_body};
 use crate::stages::tiles::Tile;
 use std::ops::Range;
-
-/// Most points in a group.
-pub const MOST_MEMBERS: usize = BLOCK;
-
-/// Most neighbours in a [`Neighborhood`].
-pub const MOST_NEIGHBORS: usize = 2 * BLOCK;
 
 /// Factor, in squared distance, by which a leaf's candidates are gathered farther for members with too few.
 const FARTHER: u64 = 2;
@@ -108,7 +103,7 @@ impl<'a> Group<'a> {
 }
 
 impl Tile {
-    /// Calls `each` with all points of the tile, at most [`MOST_MEMBERS`] of a leaf at a time, in order of
+    /// Calls `each` with all points of the tile, at most [`TOGETHER`] of a leaf at a time, in order of
     /// id. The neighbours of a member are not known if there are more than [`MOST_NEIGHBORS`], if the leaf's
     /// candidates do not include them, or if only ids tell the last one from others.
     pub fn for_each_group(
@@ -118,11 +113,11 @@ impl Tile {
         grown: impl FnMut(u64),
         mut each: impl FnMut(&mut Group<'_>),
     ) {
-        let mut members = vec![Neighborhood::NONE; MOST_MEMBERS.min(self.leaf)];
+        let mut members = vec![Neighborhood::NONE; TOGETHER.min(self.leaf)];
         self.for_leaves(
             k,
             search,
-            |_| true,
+            |id| self.ids.contains(&id),
             grown,
             |own, first, leaf, search| {
                 let mut farthest2 = 0;
@@ -167,20 +162,9 @@ impl Tile {
         search: &mut Search,
         members: &mut [Neighborhood],
     ) {
-        let level = search.level;
-        let mut few = 0u32;
-        for (place, member) in members.iter_mut().enumerate() {
-            let taken = take_nearest(level, search, k, member);
-            few |= u32::from(taken == Err(Unknown::Few)) << place;
-        }
-        for _ in 0..MOST_FARTHER {
-            let before2 = search.candidates.complete2;
-            if few == 0 || before2 >= own.reach2 {
-                return;
-            }
-            let around = self.points.bounds(leaf.clone());
-            let farther2 = before2.saturating_mul(FARTHER).min(own.reach2);
-            search.gather(self, &around, farther2);
+        let (level, mut left) = (search.level, MOST_FARTHER);
+        let mut few = (1u32 << members.len()) - 1;
+        loop {
             for (place, member) in members.iter_mut().enumerate() {
                 if few >> place & 1 == 1
                     && take_nearest(level, search, k, member) != Err(Unknown::Few)
@@ -188,6 +172,14 @@ impl Tile {
                     few &= !(1 << place);
                 }
             }
+            let before2 = search.candidates.complete2;
+            if few == 0 || left == 0 || before2 >= own.reach2 {
+                return;
+            }
+            left -= 1;
+            let around = self.points.bounds(leaf.clone());
+            let farther2 = before2.saturating_mul(FARTHER).min(own.reach2);
+            search.gather(self, &around, farther2);
         }
     }
 }
@@ -203,7 +195,7 @@ fn take_body<P: Pick>(
     k: usize,
     member: &mut Neighborhood,
 ) -> Result<(), Unknown> {
-    let (room, limit) = divided_with_ids::<P>(search, member.point, k)?;
+    let (room, limit) = divided_body::<P>(search, member.point, k)?;
     if certain_body(limit) >= SUMMED_LIMIT2 as f64 {
         return Err(Unknown::Close);
     }
@@ -242,12 +234,11 @@ fn take_body<P: Pick>(
     let (sum, products) = second_moments_body(x, y, z);
     let mut last2 = 0;
     for ((x, y), z) in x.iter().zip(y).zip(z) {
-        let [x, y, z] = [*x, *y, *z].map(i64::from);
-        last2 = (x * x + y * y + z * z).max(last2);
+        last2 = distance2([*x, *y, *z], [0; 3]).max(last2);
     }
     member.sums = Some(Sums {
         moments: Moments::from_sums(k, sum, products),
-        last2: last2 as u64,
+        last2,
     });
     member.complete2 = (f64::from(limit) * (1.0 - APPROXIMATE)) as u64;
     Ok(())

@@ -141,7 +141,7 @@ fn sum_body<P: Pick>(
     if k >= MOST_SUMMED || certain_body(limit) >= SUMMED_LIMIT2 as f64 {
         return Err(Unknown::Close);
     }
-    let distances = bytemuck::cast_slice(search.picked.numbers(room));
+    let distances = &search.distances[..room];
     let [x, y, z] = search.picked.coordinates(room);
     let (sum, products, last2) = sums_within([x, y, z], point, distances, limit);
     *sums = Sums {
@@ -151,9 +151,9 @@ fn sum_body<P: Pick>(
     Ok(())
 }
 
-/// Picks candidates, with their approximate squared distances from `point` as numbers, and finds a limit
-/// within which exactly the point itself and its `k` nearest neighbours lie. Returns the number of picked
-/// places, whole blocks, and the limit.
+/// Picks candidates, with their approximate squared distances from `point` in `search.distances`, and finds a
+/// limit within which exactly the point itself and its `k` nearest neighbours lie. Returns the number of
+/// picked places, whole blocks, and the limit.
 #[inline(always)]
 pub(super) fn divided_body<P: Pick>(
     search: &mut Search,
@@ -162,29 +162,11 @@ pub(super) fn divided_body<P: Pick>(
 ) -> Result<(usize, f32), Unknown> {
     let most = above(search.candidates.complete2);
     let limits = likely_body(search.last * MARGIN, most)..=most;
-    let (picked, limit) = pick_enough_body::<P, true>(search, point, k + 2, limits);
-    let room = picked.next_multiple_of(BLOCK);
-    let padded = room.max(FEW);
-    search.picked.reserve(padded);
-    let [_, _, _, numbers] = search.picked.slices_mut();
-    numbers[picked..padded].fill(f32::INFINITY.to_bits());
-    let distances = bytemuck::cast_slice(search.picked.numbers(padded));
-    let limit = divided_limit::<P>(distances, picked, k, limit, search.candidates.complete2)?;
-    search.last = limit;
-    Ok((room, limit))
-}
-
-/// As [`divided_body`], but with the ids of the picked candidates as numbers, and their distances in
-/// `search.distances`.
-#[inline(always)]
-pub(super) fn divided_with_ids<P: Pick>(
-    search: &mut Search,
-    point: Point,
-    k: usize,
-) -> Result<(usize, f32), Unknown> {
-    let most = above(search.candidates.complete2);
-    let limits = likely_body(search.last * MARGIN, most)..=most;
-    let (picked, limit) = pick_enough_body::<P, false>(search, point, k + 2, limits);
+    let (picked, limit) = pick_enough_body::<P>(search, point, k + 2, limits);
+    // The point itself is included.
+    if picked <= k {
+        return Err(Unknown::Few);
+    }
     let room = picked.next_multiple_of(BLOCK);
     let padded = room.max(FEW);
     search
@@ -194,30 +176,12 @@ pub(super) fn divided_with_ids<P: Pick>(
     let distances = &mut search.distances[..padded];
     distances_body(x, y, z, point, &mut distances[..room]);
     distances[picked..].fill(f32::INFINITY);
-    let limit = divided_limit::<P>(distances, picked, k, limit, search.candidates.complete2)?;
-    search.last = limit;
-    Ok((room, limit))
-}
-
-/// A limit within which the point itself and exactly its `k` nearest neighbours lie, from the distances of
-/// `picked` candidates within `limit`.
-#[inline(always)]
-fn divided_limit<P: Pick>(
-    distances: &[f32],
-    picked: usize,
-    k: usize,
-    limit: f32,
-    complete2: u64,
-) -> Result<f32, Unknown> {
-    // The point itself is included.
-    if picked <= k {
-        return Err(Unknown::Few);
-    }
     let limit = divide_body::<P>(distances, picked, k + 1, limit).ok_or(Unknown::Close)?;
-    if certain_body(limit) > complete2 as f64 {
+    search.last = limit;
+    if certain_body(limit) > search.candidates.complete2 as f64 {
         return Err(Unknown::Close);
     }
-    Ok(limit)
+    Ok((room, limit))
 }
 
 /// An upper bound on the squared distances of the points whose approximate ones are within `limit`.
@@ -230,24 +194,19 @@ pub(super) fn certain_body(limit: f32) -> f64 {
 /// the numbers are roughly evenly distributed up to `most`, and those after the last are infinite.
 #[inline(always)]
 fn divide_body<P: Pick>(numbers: &[f32], count: usize, wanted: usize, most: f32) -> Option<f32> {
+    let (all, wanted) = (count as u32, wanted as u32);
     match numbers.first_chunk() {
-        Some(few) if count <= FEW => divide_few::<P>(few, count, wanted, most),
-        _ => divide_many::<P>(numbers, count, wanted, most),
+        Some(few) if count <= FEW => divide_few::<P>(few, all, wanted, most),
+        _ => divide_many::<P>(numbers, all, wanted, most),
     }
 }
 
 /// As [`divide_body`], by probes: of the limits tried in a round, the two next to the wanted one are where the
 /// next round begins.
 #[inline(always)]
-fn divide_few<P: Pick>(
-    numbers: &[f32; FEW],
-    count: usize,
-    wanted: usize,
-    most: f32,
-) -> Option<f32> {
+fn divide_few<P: Pick>(numbers: &[f32; FEW], count: u32, wanted: u32, most: f32) -> Option<f32> {
     let (mut low, mut high) = (0.0, most);
-    let (mut below, mut above) = (0, count as u32);
-    let wanted = wanted as u32;
+    let (mut below, mut above) = (0, count);
     let mut steps = FIRST_PROBES;
     for _ in 0..DIVISIONS {
         let between = (high - low) / (above - below) as f32;
@@ -255,7 +214,7 @@ fn divide_few<P: Pick>(
         let (before, mut found) = ((low, high), f32::NAN);
         for step in steps {
             let limit = middle + step * between;
-            let count = count_few::<P>(numbers, limit);
+            let count = count_within_body::<P>(numbers, limit);
             // Choices, not branches: nothing predicts them.
             found = if count == wanted { limit } else { found };
             let is_low = (count < wanted) & (limit > low);
@@ -266,7 +225,7 @@ fn divide_few<P: Pick>(
             above = if is_high { count } else { above };
         }
         if !found.is_nan() {
-            return (count_few::<P>(numbers, found * GAP) == wanted).then_some(found);
+            return (count_within_body::<P>(numbers, found * GAP) == wanted).then_some(found);
         }
         if before == (low, high) {
             return None;
@@ -278,7 +237,7 @@ fn divide_few<P: Pick>(
 
 /// As [`divide_body`], one limit after another.
 #[inline(always)]
-fn divide_many<P: Pick>(numbers: &[f32], count: usize, wanted: usize, most: f32) -> Option<f32> {
+fn divide_many<P: Pick>(numbers: &[f32], count: u32, wanted: u32, most: f32) -> Option<f32> {
     let (mut low, mut high) = (0.0, most);
     let between = most / count as f32;
     let (mut limit, mut count) = (most, count);
@@ -301,24 +260,14 @@ fn divide_many<P: Pick>(numbers: &[f32], count: usize, wanted: usize, most: f32)
     None
 }
 
-/// The number of values that are at most `limit`.
+/// The number of values in whole blocks that are at most `limit`.
 #[inline(always)]
-fn count_few<P: Pick>(numbers: &[f32; FEW], limit: f32) -> u32 {
+fn count_within_body<P: Pick>(numbers: &[f32], limit: f32) -> u32 {
     let mut count = 0;
     for block in numbers.as_chunks::<BLOCK>().0 {
         count += P::within(block, limit).count_ones();
     }
     count
-}
-
-/// The number of values in whole blocks that are at most `limit`.
-#[inline(always)]
-fn count_within_body<P: Pick>(numbers: &[f32], limit: f32) -> usize {
-    let mut count = 0;
-    for block in numbers.as_chunks::<BLOCK>().0 {
-        count += P::within(block, limit).count_ones();
-    }
-    count as usize
 }
 
 /// First and second moments of the points within `limit`, and the largest squared distance.
