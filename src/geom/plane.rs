@@ -177,6 +177,49 @@ pub fn least_direction(scatter: &[f64; 6]) -> Option<Normal> {
 }
 
 kernel! {
+    /// The directions of least scatter of several scatters, equal to [`least_direction`] of each.
+    pub fn least_directions(scatters: &[[f64; LANES]; 6]) -> [Option<Normal>; LANES] = least_body<Eight>
+}
+
+#[inline(always)]
+fn least_body<F: Eight>(scatters: &[[f64; LANES]; 6]) -> [Option<Normal>; LANES] {
+    let (_, [x, y, z], known) = directions::<F>(scatters);
+    let mut normals = [None; LANES];
+    for (lane, to) in normals.iter_mut().enumerate() {
+        *to = if known >> lane & 1 == 1 {
+            Some(normal([x[lane], y[lane], z[lane]]))
+        } else {
+            least_direction(&lane_of(scatters, lane))
+        };
+    }
+    normals
+}
+
+#[cold]
+fn lane_of<const N: usize>(columns: &[[f64; LANES]; N], lane: usize) -> [f64; N] {
+    columns.map(|column| column[lane])
+}
+
+/// The spreads of several scatters and the directions of least scatter, with the bits of those that are known.
+#[inline(always)]
+fn directions<F: Eight>(scatters: &[[f64; LANES]; 6]) -> (Spread<F>, [[f64; LANES]; 3], u64) {
+    let [a, b, c, d, e, f] = scatters;
+    let (a, b, c) = (F::load(a), F::load(b), F::load(c));
+    let columns = [a, b, c, F::load(d), F::load(e), F::load(f)];
+    let spread = Spread::of(columns);
+    let (direction, length) = spread.direction();
+    let (zero, infinity) = (F::splat(0.0), F::splat(f64::INFINITY));
+    let largest = extent(&columns);
+    let some = largest.greater(zero) & infinity.greater(largest);
+    let known = some & length.greater(zero) & infinity.greater(length);
+    let mut directions = [[0.0; LANES]; 3];
+    for (to, x) in directions.iter_mut().zip(direction) {
+        x.store(to);
+    }
+    (spread, directions, known)
+}
+
+kernel! {
     /// The planes of several moments at a time, equal to [`Moments::plane`] of each.
     pub fn planes(moments: &[Moments; LANES]) -> [Plane; LANES] = planes_body<Eight>
 }
@@ -190,18 +233,9 @@ fn planes_body<F: Eight>(moments: &[Moments; LANES]) -> [Plane; LANES] {
             column[lane] = x;
         }
     }
-    let [a, b, c, d, e, f] = &columns;
-    let (a, b, c) = (F::load(a), F::load(b), F::load(c));
-    let columns = [a, b, c, F::load(d), F::load(e), F::load(f)];
-    let spread = Spread::of(columns);
-    let (direction, length) = spread.direction();
-    let some = extent(&columns).greater(F::splat(0.0)) & length.greater(F::splat(0.0));
-    let known = some & F::splat(f64::INFINITY).greater(length) & !spread.on_lines();
+    let (spread, directions, known) = directions::<F>(&columns);
+    let known = known & !spread.on_lines();
     let narrow = spread.on_bands();
-    let mut directions = [[0.0; LANES]; 3];
-    for (to, x) in directions.iter_mut().zip(direction) {
-        x.store(to);
-    }
     let mut planes = [Plane::NONE; LANES];
     for (lane, plane) in planes.iter_mut().enumerate() {
         // Points on a line or all in one place: rare, and handled by other formulas.
@@ -276,6 +310,30 @@ mod tests {
             let expected = some.map(|m| m.plane());
             for level in Level::all() {
                 prop_assert_eq!(planes(level, &some), expected);
+            }
+        }
+
+        #[test]
+        fn several_directions_are_those_of_each(
+            rows in prop::collection::vec(prop::array::uniform3(-1000.0f64..1000.0), 8 * 4),
+            shrink in prop::array::uniform3(0i32..80),
+            odd in 0usize..3,
+        ) {
+            // Points that fill space or lie near a plane, a line or one place, and values that are no scatter.
+            let mut scatters = [[0.0; LANES]; 6];
+            for (lane, rows) in rows.chunks(4).enumerate() {
+                for row in rows {
+                    let row: [f64; 3] = std::array::from_fn(|axis| row[axis] * 0.5f64.powi(shrink[axis]));
+                    for (to, (a, b)) in scatters.iter_mut().zip(PAIRS) {
+                        to[lane] += row[a] * row[b];
+                    }
+                }
+            }
+            scatters[0][1] = [f64::NAN, f64::INFINITY, -1.0][odd];
+            scatters.iter_mut().for_each(|of| of[2] = 0.0);
+            let expected = std::array::from_fn(|lane| least_direction(&lane_of(&scatters, lane)));
+            for level in Level::all() {
+                prop_assert_eq!(least_directions(level, &scatters), expected);
             }
         }
 

@@ -48,6 +48,13 @@ pub(crate) trait Eight: Numbers {
             .iter()
             .fold(lanes[0], |a, b| if *b > a { *b } else { a })
     }
+    /// The sum of the numbers `p`: ((p0 + p4) + (p2 + p6)) + ((p1 + p5) + (p3 + p7)).
+    #[inline(always)]
+    fn total(self) -> f64 {
+        let mut p = [0.0; 8];
+        self.store(&mut p);
+        ((p[0] + p[4]) + (p[2] + p[6])) + ((p[1] + p[5]) + (p[3] + p[7]))
+    }
 }
 
 /// One number.
@@ -348,6 +355,26 @@ mod wide {
                 _mm_cvtsd_f64(_mm_max_sd(two, _mm_unpackhi_pd(two, two)))
             }
         }
+
+        #[inline(always)]
+        fn total(self) -> f64 {
+            // SAFETY: see above.
+            unsafe { total(_mm256_add_pd(self.0, self.1)) }
+        }
+    }
+
+    /// The sum of four numbers: (a0 + a2) + (a1 + a3).
+    #[inline(always)]
+    fn total(four: __m256d) -> f64 {
+        // SAFETY: see above.
+        unsafe {
+            let (low, high) = (
+                _mm256_castpd256_pd128(four),
+                _mm256_extractf128_pd::<1>(four),
+            );
+            let two = _mm_add_pd(low, high);
+            _mm_cvtsd_f64(_mm_add_sd(two, _mm_unpackhi_pd(two, two)))
+        }
     }
 
     operators! { Avx512:
@@ -440,6 +467,15 @@ mod wide {
         fn largest(self) -> f64 {
             // SAFETY: see above.
             unsafe { _mm512_reduce_max_pd(self.0) }
+        }
+
+        #[inline(always)]
+        fn total(self) -> f64 {
+            // SAFETY: see above.
+            unsafe {
+                let low = _mm512_castpd512_pd256(self.0);
+                total(_mm256_add_pd(low, _mm512_extractf64x4_pd::<1>(self.0)))
+            }
         }
     }
 }

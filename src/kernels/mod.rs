@@ -34,7 +34,7 @@ pub(crate) use ranks::{ranks_body, short_ranks_body};
 pub(crate) use sums::{MOST_SUMMED, SUMMED_LIMIT2, second_moments_body};
 pub use sums::{SecondMoments, second_moments};
 pub use weighted::{
-    SpreadSums, SurfaceSums, Weighted, drop_beyond, fade, spread_sums, surface_sums, take_weighted,
+    LaneSums, SpreadSums, SurfaceSums, Weighted, drop_beyond, fade, square_weights, take_weighted,
     turn,
 };
 

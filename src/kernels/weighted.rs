@@ -1,202 +1,201 @@
 //! Weighted sums over the positions around a point, and over their coordinates in a turned frame.
 //!
 //! A sum has eight parts: position `j` adds to part `j mod 8`. The parts are added in a fixed order. So every
-//! level gives the same bits.
+//! level gives the same bits. The sums of several points stand side by side, one point in each lane, for
+//! arithmetic on all of them at once.
 
+use super::corners::LANES;
 use super::eight::Eight;
 use super::kernel;
 
 /// Positions of one group.
 const GROUP: usize = 8;
 
+/// `N` sums of each of several points.
+pub type LaneSums<const N: usize> = [[f64; LANES]; N];
+
 /// Sums of weights `w` times 1, x, y, z, xx, yy, zz, xy, xz, yz.
-pub type SpreadSums = [f64; 10];
+pub type SpreadSums = LaneSums<10>;
 
 /// Sums of weights `w` times 1, u, v, uu, uv, vv, uuu, uuv, uvv, vvv, uuuu, uuuv, uuvv, uvvv, vvvv, then times
 /// h, hu, hv, huu, huv, hvv, hh; and the sum of `w²`.
-pub type SurfaceSums = [f64; 23];
+pub type SurfaceSums = LaneSums<23>;
 
 /// Positions around a point at the origin, in columns of groups; after the last one, zeros without weight.
 #[derive(Debug, Clone, Default)]
 pub struct Weighted {
-    count: usize,
-    /// x, y, z.
+    /// x, y, z; later u, v, h.
     at: [Vec<[f64; GROUP]>; 3],
-    /// Coordinates in a turned frame: u, v, h.
-    turned: [Vec<[f64; GROUP]>; 3],
     /// The weight by distance, 1 − (x² + y² + z²).
     near: Vec<[f64; GROUP]>,
-    /// The weight that sums use.
-    weight: Vec<[f64; GROUP]>,
+    /// The same, or 0 for positions that [`drop_beyond`] took out.
+    kept: Vec<[f64; GROUP]>,
 }
 
 impl Weighted {
     /// Removes all positions and makes room for `count`.
     fn reset(&mut self, count: usize) {
         let groups = count.div_ceil(GROUP);
-        let columns = self.at.iter_mut().chain(&mut self.turned);
-        for column in columns.chain([&mut self.near, &mut self.weight]) {
+        for column in self.at.iter_mut().chain([&mut self.near, &mut self.kept]) {
             column.resize(groups, [0.0; GROUP]);
         }
-        self.count = count;
-    }
-
-    /// Sets each weight to the square of that by distance.
-    pub fn square_weights(&mut self) {
-        for (to, near) in self.weight.iter_mut().zip(&self.near) {
-            *to = near.map(|w| w * w);
-        }
-    }
-
-    /// The weights after the last position are 0.
-    fn end(&mut self) {
-        let rest = self.count % GROUP;
-        if let Some(last) = self.near.last_mut().filter(|_| rest > 0) {
-            last[rest..].fill(0.0);
-        }
-        self.weight.clone_from(&self.near);
     }
 }
 
-/// The sum of all parts, for each sum. (A function passed to `map` would not be compiled for the level.)
+/// Adds the parts of each sum and writes the totals to a lane. (A function passed to `map` would not be
+/// compiled for the level.)
 #[inline(always)]
-fn totals<F: Eight, const N: usize>(sums: [F; N]) -> [f64; N] {
-    let mut totals = [0.0; N];
-    for (total, parts) in totals.iter_mut().zip(sums) {
-        let mut p = [0.0; GROUP];
-        parts.store(&mut p);
-        *total = ((p[0] + p[4]) + (p[2] + p[6])) + ((p[1] + p[5]) + (p[3] + p[7]));
+fn put_totals<F: Eight, const N: usize>(sums: [F; N], to: &mut LaneSums<N>, lane: usize) {
+    for (to, parts) in to.iter_mut().zip(sums) {
+        to[lane] = parts.total();
     }
-    totals
 }
 
 #[inline(always)]
-fn splat<F: Eight>(c: &[f64; 6]) -> [F; 6] {
-    [
-        F::splat(c[0]),
-        F::splat(c[1]),
-        F::splat(c[2]),
-        F::splat(c[3]),
-        F::splat(c[4]),
-        F::splat(c[5]),
-    ]
+fn splat<F: Eight, const N: usize>(from: &[f64; N]) -> [F; N] {
+    let mut to = [F::splat(0.0); N];
+    for (to, x) in to.iter_mut().zip(from) {
+        *to = F::splat(*x);
+    }
+    to
 }
 
 kernel! {
-    /// Takes `count` positions from columns of whole groups, multiplied by `scale`, with weights by distance.
-    pub fn take_weighted(all: &mut Weighted, columns: [&[i32]; 3], count: usize, scale: f64) -> () = take_body<Eight>
+    /// Takes `count` positions from columns of whole groups, multiplied by `scale`, with weights by distance,
+    /// and writes the sums over them to a lane.
+    pub fn take_weighted(
+        all: &mut Weighted,
+        columns: [&[i32]; 3],
+        count: usize,
+        scale: f64,
+        sums: &mut SpreadSums,
+        lane: usize,
+    ) -> () = take_body<Eight>
 }
 
 #[inline(always)]
-fn take_body<F: Eight>(all: &mut Weighted, columns: [&[i32]; 3], count: usize, scale: f64) {
+fn take_body<F: Eight>(
+    all: &mut Weighted,
+    columns: [&[i32]; 3],
+    count: usize,
+    scale: f64,
+    sums: &mut SpreadSums,
+    lane: usize,
+) {
     all.reset(count);
+    let mut s = [F::splat(0.0); 10];
     let [x, y, z] = columns.map(|column| column.as_chunks::<GROUP>().0);
     let [to_x, to_y, to_z] = &mut all.at;
     let to = to_x.iter_mut().zip(to_y).zip(to_z).zip(&mut all.near);
-    let (scale, one) = (F::splat(scale), F::splat(1.0));
+    let (scale, one, none) = (F::splat(scale), F::splat(1.0), F::splat(0.0));
+    let mut left = count;
     for ((((to_x, to_y), to_z), near), ((x, y), z)) in to.zip(x.iter().zip(y).zip(z)) {
         let (x, y, z) = (F::convert(x), F::convert(y), F::convert(z));
         let (x, y, z) = (x * scale, y * scale, z * scale);
+        let w = one - (x * x + y * y + z * z);
+        // The weights after the last position are 0.
+        let some = if left < GROUP {
+            (1 << left) - 1
+        } else {
+            F::ALL
+        };
+        left = left.saturating_sub(GROUP);
+        let [w] = F::choose(some, [w], [none]);
         x.store(to_x);
         y.store(to_y);
         z.store(to_z);
-        (one - (x * x + y * y + z * z)).store(near);
-    }
-    all.end();
-}
-
-kernel! {
-    /// Sums over the positions.
-    pub fn spread_sums(all: &Weighted) -> SpreadSums = spread_body<Eight>
-}
-
-#[inline(always)]
-fn spread_body<F: Eight>(all: &Weighted) -> SpreadSums {
-    let mut sums = [F::splat(0.0); 10];
-    let [x, y, z] = &all.at;
-    for (((x, y), z), w) in x.iter().zip(y).zip(z).zip(&all.weight) {
-        let (x, y, z, w) = (F::load(x), F::load(y), F::load(z), F::load(w));
+        w.store(near);
         let [wx, wy, wz] = [w * x, w * y, w * z];
-        let terms = [
-            w,
-            wx,
-            wy,
-            wz,
-            wx * x,
-            wy * y,
-            wz * z,
-            wx * y,
-            wx * z,
-            wy * z,
-        ];
-        for (sum, term) in sums.iter_mut().zip(terms) {
-            *sum = *sum + term;
-        }
+        s[0] = s[0] + w;
+        s[1] = s[1] + wx;
+        s[2] = s[2] + wy;
+        s[3] = s[3] + wz;
+        s[4] = s[4] + wx * x;
+        s[5] = s[5] + wy * y;
+        s[6] = s[6] + wz * z;
+        s[7] = s[7] + wx * y;
+        s[8] = s[8] + wx * z;
+        s[9] = s[9] + wy * z;
     }
-    totals(sums)
+    put_totals(s, sums, lane);
+}
+
+/// Adds the terms of a group to the sums of a surface.
+#[inline(always)]
+fn add_surface<F: Eight>(s: &mut [F; 23], [u, v, h, w]: [F; 4]) {
+    s[0] = s[0] + w;
+    s[22] = s[22] + w * w;
+    let wh = w * h;
+    s[15] = s[15] + wh;
+    s[21] = s[21] + wh * h;
+    let wu = w * u;
+    s[1] = s[1] + wu;
+    s[16] = s[16] + wu * h;
+    let wv = w * v;
+    s[2] = s[2] + wv;
+    s[17] = s[17] + wv * h;
+    let wuu = wu * u;
+    s[3] = s[3] + wuu;
+    s[18] = s[18] + wuu * h;
+    let wuuu = wuu * u;
+    s[6] = s[6] + wuuu;
+    s[10] = s[10] + wuuu * u;
+    s[11] = s[11] + wuuu * v;
+    let wuuv = wuu * v;
+    s[7] = s[7] + wuuv;
+    s[12] = s[12] + wuuv * v;
+    let wuv = wu * v;
+    s[4] = s[4] + wuv;
+    s[19] = s[19] + wuv * h;
+    let wvv = wv * v;
+    s[5] = s[5] + wvv;
+    s[20] = s[20] + wvv * h;
+    let wuvv = wvv * u;
+    s[8] = s[8] + wuvv;
+    s[13] = s[13] + wuvv * v;
+    let wvvv = wvv * v;
+    s[9] = s[9] + wvvv;
+    s[14] = s[14] + wvvv * v;
 }
 
 kernel! {
-    /// Computes the coordinates in the frame of three unit vectors u, v, h.
-    pub fn turn(all: &mut Weighted, frame: &[[f64; 3]; 3]) -> () = turn_body<Eight>
+    /// Replaces the coordinates by those in the frame of three unit vectors u, v, h, and writes the sums with weights
+    /// by distance to a lane.
+    pub fn turn(all: &mut Weighted, frame: &[[f64; 3]; 3], sums: &mut SurfaceSums, lane: usize) -> ()
+        = turn_body<Eight>
 }
 
 #[inline(always)]
-fn turn_body<F: Eight>(all: &mut Weighted, frame: &[[f64; 3]; 3]) {
-    let [x, y, z] = &all.at;
-    for (to, axis) in all.turned.iter_mut().zip(frame) {
-        let (a, b, c) = (F::splat(axis[0]), F::splat(axis[1]), F::splat(axis[2]));
-        for (((x, y), z), to) in x.iter().zip(y).zip(z).zip(to) {
-            let (x, y, z) = (F::load(x), F::load(y), F::load(z));
-            (x * a + y * b + z * c).store(to);
-        }
+fn turn_body<F: Eight>(
+    all: &mut Weighted,
+    frame: &[[f64; 3]; 3],
+    sums: &mut SurfaceSums,
+    lane: usize,
+) {
+    let [u, v, h] = frame;
+    let (u, v, h) = (splat(u), splat(v), splat(h));
+    let [x, y, z] = &mut all.at;
+    for ((to_x, to_y), to_z) in x.iter_mut().zip(y).zip(z) {
+        let (x, y, z) = (F::load(to_x), F::load(to_y), F::load(to_z));
+        (x * u[0] + y * u[1] + z * u[2]).store(to_x);
+        (x * v[0] + y * v[1] + z * v[2]).store(to_y);
+        (x * h[0] + y * h[1] + z * h[2]).store(to_z);
     }
-}
-
-kernel! {
-    /// Sums over the coordinates in the turned frame.
-    pub fn surface_sums(all: &Weighted) -> SurfaceSums = surface_body<Eight>
+    put_surface_sums::<F>(&all.at, &all.near, sums, lane);
 }
 
 #[inline(always)]
-fn surface_body<F: Eight>(all: &Weighted) -> SurfaceSums {
-    let mut sums = [F::splat(0.0); 23];
-    let [u, v, h] = &all.turned;
-    for (((u, v), h), w) in u.iter().zip(v).zip(h).zip(&all.weight) {
-        let (u, v, h, w) = (F::load(u), F::load(v), F::load(h), F::load(w));
-        let [wu, wv, wh] = [w * u, w * v, w * h];
-        let [wuu, wuv, wvv] = [wu * u, wu * v, wv * v];
-        let [wuuu, wuuv, wuvv, wvvv] = [wuu * u, wuu * v, wvv * u, wvv * v];
-        let terms = [
-            w,
-            wu,
-            wv,
-            wuu,
-            wuv,
-            wvv,
-            wuuu,
-            wuuv,
-            wuvv,
-            wvvv,
-            wuuu * u,
-            wuuu * v,
-            wuuv * v,
-            wuvv * v,
-            wvvv * v,
-            wh,
-            wu * h,
-            wv * h,
-            wuu * h,
-            wuv * h,
-            wvv * h,
-            wh * h,
-            w * w,
-        ];
-        for (sum, term) in sums.iter_mut().zip(terms) {
-            *sum = *sum + term;
-        }
+fn put_surface_sums<F: Eight>(
+    [u, v, h]: &[Vec<[f64; GROUP]>; 3],
+    weights: &[[f64; GROUP]],
+    sums: &mut SurfaceSums,
+    lane: usize,
+) {
+    let mut s = [F::splat(0.0); 23];
+    for (((u, v), h), w) in u.iter().zip(v).zip(h).zip(weights) {
+        add_surface(&mut s, [F::load(u), F::load(v), F::load(h), F::load(w)]);
     }
-    totals(sums)
+    put_totals(s, sums, lane);
 }
 
 /// The height over the surface `c[0] + c[1] u + c[2] v + c[3] uu + c[4] uv + c[5] vv`.
@@ -206,44 +205,92 @@ fn over<F: Eight>(c: &[F; 6], u: F, v: F, h: F) -> F {
 }
 
 kernel! {
-    /// Takes the weight of the positions whose squared height over a surface is more than `limit`. Returns
-    /// true if there are any.
-    pub fn drop_beyond(all: &mut Weighted, surface: &[f64; 6], limit: f64) -> bool = drop_body<Eight>
+    /// Writes the sums without those positions whose squared height over a surface is more than `limit` to a
+    /// lane. If there are none, writes nothing and returns false.
+    pub fn drop_beyond(
+        all: &mut Weighted,
+        surface: &[f64; 6],
+        limit: f64,
+        sums: &mut SurfaceSums,
+        lane: usize,
+    ) -> bool = drop_body<Eight>
 }
 
 #[inline(always)]
-fn drop_body<F: Eight>(all: &mut Weighted, surface: &[f64; 6], limit: f64) -> bool {
+fn drop_body<F: Eight>(
+    all: &mut Weighted,
+    surface: &[f64; 6],
+    limit: f64,
+    sums: &mut SurfaceSums,
+    lane: usize,
+) -> bool {
     let (c, limit, none) = (splat(surface), F::splat(limit), F::splat(0.0));
-    let [u, v, h] = &all.turned;
+    let [u, v, h] = &all.at;
     let mut any = 0;
-    for (((u, v), h), weight) in u.iter().zip(v).zip(h).zip(&mut all.weight) {
-        let (u, v, h, w) = (F::load(u), F::load(v), F::load(h), F::load(weight));
+    let weights = all.near.iter().zip(&mut all.kept);
+    for (((u, v), h), (near, kept)) in u.iter().zip(v).zip(h).zip(weights) {
+        let (u, v, h, w) = (F::load(u), F::load(v), F::load(h), F::load(near));
         let off = over(&c, u, v, h);
         let beyond = (off * off).greater(limit) & w.greater(none);
         let [w] = F::choose(beyond, [none], [w]);
-        w.store(weight);
+        w.store(kept);
         any |= beyond;
+    }
+    if any != 0 {
+        put_surface_sums::<F>(&all.at, &all.kept, sums, lane);
     }
     any != 0
 }
 
 kernel! {
-    /// Multiplies the weights by the square of 1 − (squared height over a surface) / `limit`, or by 0 where
-    /// that is negative.
-    pub fn fade(all: &mut Weighted, surface: &[f64; 6], limit: f64) -> () = fade_body<Eight>
+    /// Writes the sums with the squares of the weights by distance to a lane.
+    pub fn square_weights(all: &Weighted, sums: &mut SurfaceSums, lane: usize) -> () = square_body<Eight>
 }
 
 #[inline(always)]
-fn fade_body<F: Eight>(all: &mut Weighted, surface: &[f64; 6], limit: f64) {
+fn square_body<F: Eight>(all: &Weighted, sums: &mut SurfaceSums, lane: usize) {
+    let mut s = [F::splat(0.0); 23];
+    let [u, v, h] = &all.at;
+    for (((u, v), h), near) in u.iter().zip(v).zip(h).zip(&all.near) {
+        let near = F::load(near);
+        let w = near * near;
+        add_surface(&mut s, [F::load(u), F::load(v), F::load(h), w]);
+    }
+    put_totals(s, sums, lane);
+}
+
+kernel! {
+    /// Writes the sums with the squares of the weights by distance, multiplied by the square of 1 − (squared
+    /// height over a surface) / `limit`, or by 0 where that is negative, to a lane.
+    pub fn fade(
+        all: &Weighted,
+        surface: &[f64; 6],
+        limit: f64,
+        sums: &mut SurfaceSums,
+        lane: usize,
+    ) -> () = fade_body<Eight>
+}
+
+#[inline(always)]
+fn fade_body<F: Eight>(
+    all: &Weighted,
+    surface: &[f64; 6],
+    limit: f64,
+    sums: &mut SurfaceSums,
+    lane: usize,
+) {
     let (c, one, none) = (splat(surface), F::splat(1.0), F::splat(0.0));
     let part = F::splat(1.0 / limit);
-    let [u, v, h] = &all.turned;
-    for (((u, v), h), weight) in u.iter().zip(v).zip(h).zip(&mut all.weight) {
-        let (u, v, h, w) = (F::load(u), F::load(v), F::load(h), F::load(weight));
+    let mut s = [F::splat(0.0); 23];
+    let [u, v, h] = &all.at;
+    for (((u, v), h), near) in u.iter().zip(v).zip(h).zip(&all.near) {
+        let (u, v, h, near) = (F::load(u), F::load(v), F::load(h), F::load(near));
         let off = over(&c, u, v, h);
         let rest = (one - off * off * part).larger(none);
-        (w * (rest * rest)).store(weight);
+        let w = near * near * (rest * rest);
+        add_surface(&mut s, [u, v, h, w]);
     }
+    put_totals(s, sums, lane);
 }
 
 #[cfg(test)]
@@ -253,25 +300,41 @@ mod tests {
     use proptest::prelude::*;
 
     /// All that the kernels of a level compute.
-    fn all_of(level: Level, columns: [&[i32]; 3], count: usize) -> (Vec<f64>, Weighted) {
+    fn all_of(level: Level, columns: [&[i32]; 3], count: usize) -> Vec<f64> {
         let mut all = Weighted::default();
-        take_weighted(level, &mut all, columns, count, 1.0 / 2000.0);
-        let mut found = spread_sums(level, &all).to_vec();
-        turn(
+        let mut spread = [[0.0; LANES]; 10];
+        take_weighted(
             level,
             &mut all,
-            &[[0.6, 0.8, 0.0], [0.0, 0.0, 1.0], [0.8, -0.6, 0.0]],
+            columns,
+            count,
+            1.0 / 2000.0,
+            &mut spread,
+            LANE,
         );
-        found.extend(surface_sums(level, &all));
+        let mut found = lane(&spread);
+        let mut sums = [[0.0; LANES]; 23];
+        let frame = [[0.6, 0.8, 0.0], [0.0, 0.0, 1.0], [0.8, -0.6, 0.0]];
+        turn(level, &mut all, &frame, &mut sums, LANE);
+        found.extend(lane(&sums));
         let surface = [0.1, 0.2, -0.1, 0.3, 0.1, -0.2];
-        found.push(f64::from(u8::from(drop_beyond(
-            level, &mut all, &surface, 0.1,
-        ))));
-        found.extend(surface_sums(level, &all));
-        all.square_weights();
-        fade(level, &mut all, &surface, 0.2);
-        found.extend(surface_sums(level, &all));
-        (found, all)
+        let dropped = drop_beyond(level, &mut all, &surface, 0.1, &mut sums, LANE);
+        found.push(f64::from(u8::from(dropped)));
+        found.extend(lane(&sums));
+        square_weights(level, &all, &mut sums, LANE);
+        found.extend(lane(&sums));
+        fade(level, &all, &surface, 0.2, &mut sums, LANE);
+        found.extend(lane(&sums));
+        // The other lanes are left alone.
+        let others = spread.iter().chain(&sums).flat_map(|of| &of[..LANE]);
+        assert!(others.copied().all(|sum| sum == 0.0));
+        found
+    }
+
+    const LANE: usize = 5;
+
+    fn lane<const N: usize>(sums: &LaneSums<N>) -> Vec<f64> {
+        sums.iter().map(|of| of[LANE]).collect()
     }
 
     proptest! {
@@ -286,9 +349,9 @@ mod tests {
                 all
             };
             let (x, y, z) = (column(0), column(1), column(2));
-            let (expected, all) = all_of(Level::BASE, [&x, &y, &z], points.len());
+            let expected = all_of(Level::BASE, [&x, &y, &z], points.len());
             for level in Level::all() {
-                prop_assert_eq!(&all_of(level, [&x, &y, &z], points.len()).0, &expected);
+                prop_assert_eq!(&all_of(level, [&x, &y, &z], points.len()), &expected);
             }
             // Against plain sums.
             let at = |p: &[i32; 3]| p.map(|c| f64::from(c) / 2000.0);
@@ -304,19 +367,18 @@ mod tests {
             let uuvv = points.iter().map(|p| near(p) * (turned(p)[0] * turned(p)[1]).powi(2)).sum();
             let huv = points.iter().map(|p| near(p) * turned(p).iter().product::<f64>()).sum();
             prop_assert!(close(expected[10 + 12], uuvv) && close(expected[10 + 19], huv));
-            // The last sums have weights that fade; none after the last position.
-            let weights = all.weight.as_flattened();
-            prop_assert!(weights[points.len()..].iter().all(|w| *w == 0.0));
             let over = |p: &[i32; 3]| {
                 let [u, v, h] = turned(p);
                 h - (0.1 + 0.2 * u - 0.1 * v + 0.3 * u * u + 0.1 * u * v - 0.2 * v * v)
             };
-            for (p, w) in points.iter().zip(weights) {
-                let rest = (1.0 - over(p).powi(2) / 0.2).max(0.0);
-                prop_assert!(close(*w, near(p).powi(2) * rest * rest));
-            }
             let kept = points.iter().filter(|p| over(p).powi(2) <= 0.1);
             prop_assert!(close(expected[34], kept.map(near).sum()));
+            prop_assert!(close(expected[57], points.iter().map(|p| near(p).powi(2)).sum()));
+            let faded = points.iter().map(|p| {
+                let rest = (1.0 - over(p).powi(2) / 0.2).max(0.0);
+                near(p).powi(2) * rest * rest
+            });
+            prop_assert!(close(expected[80], faded.sum()));
         }
     }
 }

@@ -150,29 +150,27 @@ pub fn each_neighborhood<T>(
     Planes::load(unit, store, ids, all, count)?.each_neighborhood(all, of, each)
 }
 
-/// Calls `each` with the value of `of` for every point of a tile and its `count` nearest neighbours, or all
-/// points if there are fewer, in order of id.
+/// Calls `each` with every point of a tile and its `count` nearest neighbours, or all points if there are
+/// fewer, in order of id.
 ///
 /// # Errors
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
-pub(crate) fn each_around<T>(
+pub(crate) fn each_around(
     unit: &Unit<'_>,
     store: &PointStore,
     ids: Range<usize>,
     count: usize,
-    of: impl FnMut(&Around) -> T,
-    each: impl FnMut(usize, Point, T),
+    each: impl FnMut(usize, Point, &Around),
 ) -> Result<()> {
     let all = |_| true;
     let planes = Planes::load(unit, store, ids, all, count)?;
-    let of = RefCell::new(of);
-    let in_tile = |(search, grown): Watched<'_, '_>, found: &mut Found<'_, T>| {
+    let each = RefCell::new(each);
+    let in_tile = |(search, grown): Watched<'_, '_>, found: &mut Found<'_, ()>| {
         let look = |id: u32, point: Point, around: Option<&Around>| {
-            found(
-                id,
-                point,
-                Ok(around.map(|around| (of.borrow_mut())(around))),
-            );
+            if let Some(around) = around {
+                (each.borrow_mut())(id as usize, point, around);
+            }
+            found(id, point, Ok(around.map(|_| ())));
         };
         planes.tile.for_some_around(count, search, all, grown, look);
     };
@@ -180,9 +178,10 @@ pub(crate) fn each_around<T>(
     let in_store = |cache: &mut PageCache, id: u32, point: Point| {
         let near = near_in_store(store, cache, id, point, count)?;
         around.set(&near, count, id);
-        Ok(Some((of.borrow_mut())(&around)))
+        (each.borrow_mut())(id as usize, point, &around);
+        Ok(Some(()))
     };
-    look(unit, in_tile, in_store, each)
+    look(unit, in_tile, in_store, |_, _, ()| ())
 }
 
 /// Points with summed neighbours, collected until their planes are computed together.

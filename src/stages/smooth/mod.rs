@@ -5,6 +5,7 @@
 
 mod edges;
 mod first;
+mod fit;
 mod foot;
 mod pass;
 mod relax;
@@ -21,9 +22,8 @@ use crate::geom::round::rounded;
 use crate::method::METHOD;
 use crate::stages::cells::{Fit, TileRanges, Widen, each_around, each_plane};
 use crate::stages::order::{PointStore, StoredPoints};
-use crate::stages::tiles::near::Around;
 use crate::workspace::{Unit, Workspace};
-use foot::Foot;
+use foot::Feet;
 use pass::Pass;
 use std::ops::Range;
 
@@ -90,11 +90,15 @@ pub fn smooth(
         }
         Smoothing::Edges => {
             let count = neighbors * METHOD.smoothing.neighbors;
-            let mut foot = Foot::default();
-            let of = |around: &Around| foot.offset(around);
-            each_around(unit, store, ids.clone(), count, of, |id, point, offset| {
+            let mut feet = Feet::default();
+            let mut put = |(id, point): (usize, Point), offset| {
                 points[id - ids.start] = moved(point, offset);
-            })
+            };
+            each_around(unit, store, ids.clone(), count, |id, point, around| {
+                feet.add((id, point), around, &mut put);
+            })?;
+            feet.finish(&mut put);
+            Ok(())
         }
     };
     pass.over(store, workspace, work, |()| ())

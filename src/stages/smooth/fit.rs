@@ -1,0 +1,273 @@
+//! Least-squares surfaces of first and second order, fitted for several points at a time.
+
+use crate::kernels::eight::{Eight, Numbers};
+use crate::kernels::{LANES, SurfaceSums, kernel};
+use crate::method::METHOD;
+
+/// Unknowns of a plane over a frame.
+const PLANE: usize = 3;
+
+/// Unknowns of a surface of second order.
+pub(super) const TERMS: usize = 6;
+
+/// A surface of first and one of second order, with a ridge; for one point or, with arrays, for several.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Fit<T> {
+    /// Terms of the plane: 1, u, v; then zeros.
+    pub plane: [T; TERMS],
+    /// Terms of the surface of second order: 1, u, v, uu, uv, vv.
+    pub curved: [T; TERMS],
+    /// Least sum for the plane: weights times squared heights over it, and the ridge.
+    pub over_plane: T,
+    /// The same for the surface of second order.
+    pub over_curved: T,
+    /// Sum of the weights.
+    pub total: T,
+    /// Sum of the squared weights.
+    squares: T,
+}
+
+kernel! {
+    /// The surfaces from sums.
+    pub(super) fn fits(sums: &SurfaceSums) -> Fit<[f64; LANES]> = fits_body<Eight>
+}
+
+#[inline(always)]
+fn fits_body<F: Eight>(sums: &SurfaceSums) -> Fit<[f64; LANES]> {
+    let mut loaded = [F::splat(0.0); 23];
+    for (to, from) in loaded.iter_mut().zip(sums) {
+        *to = F::load(from);
+    }
+    let fit = Fit::of(&loaded);
+    Fit {
+        plane: stored(fit.plane),
+        curved: stored(fit.curved),
+        over_plane: stored([fit.over_plane])[0],
+        over_curved: stored([fit.over_curved])[0],
+        total: stored([fit.total])[0],
+        squares: stored([fit.squares])[0],
+    }
+}
+
+#[inline(always)]
+fn stored<F: Eight, const N: usize>(from: [F; N]) -> [[f64; LANES]; N] {
+    let mut to = [[0.0; LANES]; N];
+    for (to, from) in to.iter_mut().zip(from) {
+        from.store(to);
+    }
+    to
+}
+
+impl<F: Numbers> Fit<F> {
+    #[inline(always)]
+    fn of(sums: &[F; 23]) -> Self {
+        let [
+            w,
+            u,
+            v,
+            uu,
+            uv,
+            vv,
+            uuu,
+            uuv,
+            uvv,
+            vvv,
+            u4,
+            u3v,
+            u2v2,
+            uv3,
+            v4,
+            h,
+            hu,
+            hv,
+            huu,
+            huv,
+            hvv,
+            hh,
+            squares,
+        ] = *sums;
+        let half = F::splat(0.5);
+        let ridge = F::splat(METHOD.smoothing.ridge) * w;
+        let second = half * ridge;
+        // Normal equations; the last column is the right-hand side.
+        let mut m = [
+            [w, u, v, uu, uv, vv, h],
+            [u, uu + ridge, uv, uuu, uuv, uvv, hu],
+            [v, uv, vv + ridge, uuv, uvv, vvv, hv],
+            [uu, uuu, uuv, u4 + second, u3v, u2v2, huu],
+            [uv, uuv, uvv, u3v, u2v2 + half * second, uv3, huv],
+            [vv, uvv, vvv, u2v2, uv3, v4 + second, hvv],
+        ];
+        let mut left = hh;
+        let mut over_plane = hh;
+        for pivot in 0..TERMS {
+            if pivot == PLANE {
+                over_plane = left;
+            }
+            let from = m[pivot];
+            let part = F::splat(1.0) / from[pivot];
+            left = left - from[TERMS] * (from[TERMS] * part);
+            for equation in &mut m[pivot + 1..] {
+                let factor = equation[pivot] * part;
+                for j in pivot + 1..=TERMS {
+                    equation[j] = equation[j] - factor * from[j];
+                }
+            }
+        }
+        Self {
+            plane: solved::<F, PLANE>(&m),
+            curved: solved::<F, TERMS>(&m),
+            over_plane,
+            over_curved: left,
+            total: w,
+            squares,
+        }
+    }
+}
+
+/// The first `N` unknowns of equations in triangular form, without the others.
+#[inline(always)]
+fn solved<F: Numbers, const N: usize>(m: &[[F; TERMS + 1]; TERMS]) -> [F; TERMS] {
+    let mut terms = [F::splat(0.0); TERMS];
+    for i in (0..N).rev() {
+        let mut right = m[i][TERMS];
+        for j in i + 1..N {
+            right = right - m[i][j] * terms[j];
+        }
+        terms[i] = right / m[i][i];
+    }
+    terms
+}
+
+impl Fit<[f64; LANES]> {
+    /// The surfaces of the point in `lane`.
+    pub fn lane(&self, lane: usize) -> Fit<f64> {
+        Fit {
+            plane: self.plane.map(|term| term[lane]),
+            curved: self.curved.map(|term| term[lane]),
+            over_plane: self.over_plane[lane],
+            over_curved: self.over_curved[lane],
+            total: self.total[lane],
+            squares: self.squares[lane],
+        }
+    }
+}
+
+impl Fit<f64> {
+    /// Weighted mean of the squared heights over the surface of second order.
+    pub fn mean2(&self) -> f64 {
+        (self.over_curved / self.total).max(0.0)
+    }
+
+    /// The share of the surface of second order: 0 if a plane is enough, 1 if it is not.
+    pub fn share(&self) -> f64 {
+        // As many points of equal weight would tell as much.
+        let points = self.total * self.total / self.squares;
+        let more = self.over_plane - self.over_curved;
+        let freedom = points - TERMS as f64;
+        let worth = more * freedom / (self.over_curved * (TERMS - PLANE) as f64);
+        let [enough, needed] = [METHOD.smoothing.enough, METHOD.smoothing.needed];
+        if worth > enough {
+            ((worth - enough) / (needed - enough)).min(1.0)
+        } else {
+            0.0
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::kernels::Level;
+    use proptest::prelude::*;
+
+    /// Sums over positions `u, v, h, w`.
+    fn sums(positions: &[[f64; 4]]) -> [f64; 23] {
+        let mut sums = [0.0; 23];
+        for &[u, v, h, w] in positions {
+            let [uu, uv, vv] = [u * u, u * v, v * v];
+            let terms: [f64; 23] = [
+                1.0,
+                u,
+                v,
+                uu,
+                uv,
+                vv,
+                uu * u,
+                uu * v,
+                u * vv,
+                v * vv,
+                uu * uu,
+                uu * uv,
+                uu * vv,
+                uv * vv,
+                vv * vv,
+                h,
+                h * u,
+                h * v,
+                h * uu,
+                h * uv,
+                h * vv,
+                h * h,
+                w,
+            ];
+            sums.iter_mut()
+                .zip(terms)
+                .for_each(|(sum, term)| *sum += w * term);
+        }
+        sums
+    }
+
+    fn bits(fit: &Fit<f64>) -> Vec<u64> {
+        let numbers = [fit.over_plane, fit.over_curved, fit.total, fit.squares];
+        let all = fit.plane.iter().chain(&fit.curved).chain(&numbers);
+        all.map(|x| if x.is_nan() { f64::NAN } else { *x }.to_bits())
+            .collect()
+    }
+
+    proptest! {
+        #[test]
+        fn several_fits_are_those_of_each(
+            positions in prop::collection::vec(prop::array::uniform4(-1.0f64..1.0), 1..120),
+            flat in 0i32..40,
+        ) {
+            let at = |[u, v, h, w]: [f64; 4]| [u, v, 0.1 * u * v + h * 0.5f64.powi(flat), w.abs()];
+            let positions: Vec<_> = positions.into_iter().map(at).collect();
+            // From none to all of them.
+            let lanes: [_; LANES] = std::array::from_fn(|lane| {
+                sums(&positions[..positions.len() * lane / (LANES - 1)])
+            });
+            let together = std::array::from_fn(|sum| lanes.map(|lane| lane[sum]));
+            for level in Level::all() {
+                let found = fits(level, &together);
+                for (lane, sums) in lanes.iter().enumerate() {
+                    prop_assert_eq!(bits(&found.lane(lane)), bits(&Fit::of(sums)));
+                }
+            }
+        }
+
+        #[test]
+        fn a_surface_of_second_order_is_found(
+            positions in prop::collection::vec(prop::array::uniform2(-1.0f64..1.0), 30..60),
+            terms in prop::array::uniform6(-1.0f64..1.0),
+        ) {
+            let height = |u: f64, v: f64| {
+                let row = [1.0, u, v, u * u, u * v, v * v];
+                row.iter().zip(terms).map(|(a, b)| a * b).sum::<f64>()
+            };
+            let positions: Vec<_> = positions.iter().map(|&[u, v]| [u, v, height(u, v), 1.0]).collect();
+            let fit = Fit::<f64>::of(&sums(&positions));
+            let miss: f64 = positions.iter().map(|[u, v, h, _]| {
+                let row = [1.0, *u, *v, u * u, u * v, v * v];
+                let on: f64 = row.iter().zip(fit.curved).map(|(a, b)| a * b).sum();
+                (h - on).powi(2)
+            }).sum();
+            // The ridge takes the terms a little towards 0.
+            let ridge = METHOD.smoothing.ridge * positions.len() as f64;
+            let squares: f64 = terms.iter().map(|t| t * t).sum();
+            prop_assert!(miss <= ridge * squares + 1e-9, "{miss}");
+            prop_assert!(fit.over_curved >= -1e-9 && fit.over_curved <= ridge * squares + 1e-9);
+            prop_assert!(fit.over_plane >= fit.over_curved - 1e-9);
+        }
+    }
+}
