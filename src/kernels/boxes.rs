@@ -39,6 +39,18 @@ impl Boxes {
         self.len += 1;
     }
 
+    /// Replaces the boxes of `covers` by the box around each block of 16 boxes.
+    pub fn cover(&self, covers: &mut Boxes) {
+        covers.clear();
+        for start in (0..self.len).step_by(BLOCK) {
+            let range = start..(start + BLOCK).min(self.len);
+            let column = |axis: usize| self.columns[axis][range.clone()].iter().map(|c| *c as i32);
+            let min = [0, 1, 2].map(|axis| column(axis).min().unwrap_or(0));
+            let max = [3, 4, 5].map(|axis| column(axis).max().unwrap_or(0));
+            covers.push(min, max, (start / BLOCK) as u32);
+        }
+    }
+
     /// Lowest and highest corner of the box at `index`.
     #[must_use]
     #[inline]
@@ -104,12 +116,54 @@ kernel! {
 fn near_body<P: Pick>(boxes: &Boxes, around: SearchBox, to: &mut [u32]) -> usize {
     let mut count = 0;
     for start in (0..boxes.len).step_by(BLOCK) {
-        let Some(block) = boxes.block(start) else {
+        count += put_near::<P>(boxes, start, around, to, count);
+    }
+    count
+}
+
+/// Writes the numbers of the boxes of a block that are within the limit to place `at`; returns how many there
+/// are.
+#[inline(always)]
+fn put_near<P: Pick>(
+    boxes: &Boxes,
+    start: usize,
+    around: SearchBox,
+    to: &mut [u32],
+    at: usize,
+) -> usize {
+    let Some(block) = boxes.block(start) else {
+        return 0;
+    };
+    let within = within_body::<P>(block, around) & first_bits(boxes.len - start);
+    P::pack_at(block[6], within, to, at);
+    within.count_ones() as usize
+}
+
+kernel! {
+    /// As [`near_boxes`], faster for many boxes; `covers` are those of [`Boxes::cover`].
+    pub fn near_covered_boxes(boxes: &Boxes, covers: &Boxes, around: SearchBox, to: &mut [u32]) -> usize
+        = covered_body<Eight>
+}
+
+#[inline(always)]
+fn covered_body<P: Pick>(
+    boxes: &Boxes,
+    covers: &Boxes,
+    around: SearchBox,
+    to: &mut [u32],
+) -> usize {
+    let mut count = 0;
+    for first in (0..covers.len).step_by(BLOCK) {
+        let Some(block) = covers.block(first) else {
             break;
         };
-        let within = within_body::<P>(block, around) & first_bits(boxes.len - start);
-        P::pack_at(block[6], within, to, count);
-        count += within.count_ones() as usize;
+        // Rounding keeps order, so a cover is never farther than a box in it.
+        let mut near = within_body::<P>(block, around) & first_bits(covers.len - first);
+        while near != 0 {
+            let start = (first + near.trailing_zeros() as usize) * BLOCK;
+            count += put_near::<P>(boxes, start, around, to, count);
+            near &= near - 1;
+        }
     }
     count
 }
@@ -184,7 +238,7 @@ mod tests {
     proptest! {
         #[test]
         fn those_near_are_found_at_every_level(
-            corners in prop::collection::vec(prop::array::uniform6(0i32..1 << 30), 1..70),
+            corners in prop::collection::vec(prop::array::uniform6(0i32..1 << 30), 1..600),
             share in 0.0f64..1.1,
         ) {
             let all: Vec<Aabb> = corners.iter()
@@ -208,6 +262,10 @@ mod tests {
                     let near = numbers.contains(&number);
                     prop_assert!(off.abs() <= error || near == (off < 0.0));
                 }
+                let (mut covers, mut near) = (Boxes::default(), vec![0; all.len() + BLOCK]);
+                boxes.cover(&mut covers);
+                let count = near_covered_boxes(level, &boxes, &covers, around, &mut near);
+                prop_assert_eq!(&near[..count], numbers);
                 let mut taken = Boxes::default();
                 take_boxes(level, &boxes, &blocks, around, &mut taken);
                 let taken: Vec<_> = (0..taken.len())

@@ -17,7 +17,7 @@ mod sums;
 mod weighted;
 
 pub(crate) use boxes::point_box_body;
-pub use boxes::{Boxes, SearchBox, near_boxes, take_boxes};
+pub use boxes::{Boxes, SearchBox, near_boxes, near_covered_boxes, take_boxes};
 pub(crate) use corners::SLACK;
 pub use corners::{
     CornerGroup, Frame, LANES, Line, LineGroup, bisectors, cut_corners, farthest, touching_lines,

@@ -134,7 +134,7 @@ fn take_body<P: Pick>(
     k: usize,
     around: &mut Around,
 ) -> Result<(), Unknown> {
-    let (room, limit) = divided_body::<P>(search, point, k)?;
+    let (room, limit) = divided_body::<P, false>(search, point, k)?;
     around.reserve(k + 1);
     let [from_x, from_y, from_z, _] = search.picked.blocks(room);
     let distances = search.distances[..room].as_chunks::<BLOCK>().0;

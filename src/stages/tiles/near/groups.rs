@@ -195,7 +195,7 @@ fn take_body<P: Pick>(
     k: usize,
     member: &mut Neighborhood,
 ) -> Result<(), Unknown> {
-    let (room, limit) = divided_body::<P>(search, member.point, k)?;
+    let (room, limit) = divided_body::<P, true>(search, member.point, k)?;
     if certain_body(limit) >= SUMMED_LIMIT2 as f64 {
         return Err(Unknown::Close);
     }

@@ -200,7 +200,7 @@ fn nearest_body<P: Pick>(search: &mut Search, point: Point, own: u32, k: usize) 
     // The neighbours of the previous query are at about the same distances.
     let last = search.near.get(k.wrapping_sub(1));
     let likely = likely_body(last.map_or(0.0, |n| n.distance2 as f32) * MARGIN, most);
-    let (mut picked, mut limit) = pick_enough_body::<P>(search, point, wanted, likely..=most);
+    let (mut picked, mut limit) = pick_enough_body::<P, true>(search, point, wanted, likely..=most);
     let mut corrections = CORRECTIONS;
     if picked > too_many_body(wanted) {
         measure_body(search, point);
@@ -275,25 +275,29 @@ fn reach_body(
 /// As [`pick_near_body`], with a limit that is likely to contain `wanted` candidates, widened up to the end
 /// of `limits` if it does not. Returns how many were picked, and the limit.
 #[inline(always)]
-pub(super) fn pick_enough_body<P: Pick>(
+pub(super) fn pick_enough_body<P: Pick, const IDS: bool>(
     search: &mut Search,
     point: Point,
     wanted: usize,
     limits: RangeInclusive<f32>,
 ) -> (usize, f32) {
     let (mut limit, most) = limits.into_inner();
-    let mut picked = pick_near_body::<P>(search, point, limit);
+    let mut picked = pick_near_body::<P, IDS>(search, point, limit);
     while picked < wanted && limit < most {
         limit = wider_body(limit, picked, wanted, most);
-        picked = pick_near_body::<P>(search, point, limit);
+        picked = pick_near_body::<P, IDS>(search, point, limit);
     }
     (picked, limit)
 }
 
-/// Picks the candidates whose approximate squared distance to `point` is at most `limit`, in order of id.
-/// Returns how many there are. The distances are not stored.
+/// Picks the candidates whose approximate squared distance to `point` is at most `limit`, in order of id, with
+/// their ids if wanted. Returns how many there are. The distances are not stored.
 #[inline(always)]
-fn pick_near_body<P: Pick>(search: &mut Search, point: Point, limit: f32) -> usize {
+fn pick_near_body<P: Pick, const IDS: bool>(
+    search: &mut Search,
+    point: Point,
+    limit: f32,
+) -> usize {
     let candidates = &search.candidates;
     search.picked.reserve(candidates.len);
     let room = candidates.len.next_multiple_of(BLOCK);
@@ -309,7 +313,9 @@ fn pick_near_body<P: Pick>(search: &mut Search, point: Point, limit: f32) -> usi
         P::pack_at(x, within, to_x, count);
         P::pack_at(y, within, to_y, count);
         P::pack_at(z, within, to_z, count);
-        P::pack_at(ids, within, to_ids, count);
+        if IDS {
+            P::pack_at(ids, within, to_ids, count);
+        }
         count += within.count_ones() as usize;
         left = left.saturating_sub(BLOCK);
     }

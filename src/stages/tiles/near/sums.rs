@@ -137,7 +137,7 @@ fn sum_body<P: Pick>(
     k: usize,
     sums: &mut Sums,
 ) -> Result<(), Unknown> {
-    let (room, limit) = divided_body::<P>(search, point, k)?;
+    let (room, limit) = divided_body::<P, false>(search, point, k)?;
     if k >= MOST_SUMMED || certain_body(limit) >= SUMMED_LIMIT2 as f64 {
         return Err(Unknown::Close);
     }
@@ -151,18 +151,18 @@ fn sum_body<P: Pick>(
     Ok(())
 }
 
-/// Picks candidates, with their approximate squared distances from `point` in `search.distances`, and finds a
+/// Picks candidates, with ids if wanted, with their approximate squared distances from `point` in `search.distances`, and finds a
 /// limit within which exactly the point itself and its `k` nearest neighbours lie. Returns the number of
 /// picked places, whole blocks, and the limit.
 #[inline(always)]
-pub(super) fn divided_body<P: Pick>(
+pub(super) fn divided_body<P: Pick, const IDS: bool>(
     search: &mut Search,
     point: Point,
     k: usize,
 ) -> Result<(usize, f32), Unknown> {
     let most = above(search.candidates.complete2);
     let limits = likely_body(search.last * MARGIN, most)..=most;
-    let (picked, limit) = pick_enough_body::<P>(search, point, k + 2, limits);
+    let (picked, limit) = pick_enough_body::<P, IDS>(search, point, k + 2, limits);
     // The point itself is included.
     if picked <= k {
         return Err(Unknown::Few);
