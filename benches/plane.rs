@@ -4,8 +4,8 @@ mod util;
 
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
-use outcrop::geom::plane::{Moments, planes};
-use outcrop::kernels::{LANES, Level};
+use outcrop::geom::plane::{Moments, PLANES, planes};
+use outcrop::kernels::Level;
 use outcrop::stages::tiles::neighbors::Neighbors;
 
 const POINTS: usize = 20_000;
@@ -47,7 +47,7 @@ fn fit_several(bencher: Bencher<'_, '_>) {
     let all: Vec<Moments> = neighbors().iter().map(|(_, near)| sums(near)).collect();
     let level = Level::best();
     bencher.counter(ItemsCount::new(all.len())).bench_local(|| {
-        for moments in all.as_chunks::<LANES>().0 {
+        for moments in all.as_chunks::<PLANES>().0 {
             black_box(planes(level, black_box(moments)));
         }
     });

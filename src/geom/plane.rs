@@ -5,7 +5,7 @@
 
 mod spread;
 
-use crate::kernels::eight::Eight;
+use crate::kernels::eight::{Eight, Numbers, Pair};
 use crate::kernels::{LANES, kernel};
 use crate::method::METHOD;
 use spread::{Spread, extent, normal};
@@ -18,6 +18,9 @@ pub type Normal = [i32; 3];
 
 /// Length, in integer units, of a [`Normal`].
 pub const NORMAL_SCALE: f64 = (1 << 24) as f64;
+
+/// Moments whose planes are computed together.
+pub const PLANES: usize = 2 * LANES;
 
 /// The pairs of axes of the six second moments, in their order.
 const PAIRS: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
@@ -183,7 +186,10 @@ kernel! {
 
 #[inline(always)]
 fn least_body<F: Eight>(scatters: &[[f64; LANES]; 6]) -> [Option<Normal>; LANES] {
-    let (_, [x, y, z], known) = directions::<F>(scatters);
+    let [a, b, c, d, e, f] = scatters;
+    let (a, b, c) = (F::load(a), F::load(b), F::load(c));
+    let (_, directions, known) = directions([a, b, c, F::load(d), F::load(e), F::load(f)]);
+    let [x, y, z] = stored(directions);
     let mut normals = [None; LANES];
     for (lane, to) in normals.iter_mut().enumerate() {
         *to = if known >> lane & 1 == 1 {
@@ -202,52 +208,59 @@ fn lane_of<const N: usize>(columns: &[[f64; LANES]; N], lane: usize) -> [f64; N]
 
 /// The spreads of several scatters and the directions of least scatter, with the bits of those that are known.
 #[inline(always)]
-fn directions<F: Eight>(scatters: &[[f64; LANES]; 6]) -> (Spread<F>, [[f64; LANES]; 3], u64) {
-    let [a, b, c, d, e, f] = scatters;
-    let (a, b, c) = (F::load(a), F::load(b), F::load(c));
-    let columns = [a, b, c, F::load(d), F::load(e), F::load(f)];
-    let spread = Spread::of(columns);
+fn directions<F: Numbers>(scatters: [F; 6]) -> (Spread<F>, [F; 3], u64) {
+    let spread = Spread::of(scatters);
     let (direction, length) = spread.direction();
     let (zero, infinity) = (F::splat(0.0), F::splat(f64::INFINITY));
-    let largest = extent(&columns);
+    let largest = extent(&scatters);
     let some = largest.greater(zero) & infinity.greater(largest);
     let known = some & length.greater(zero) & infinity.greater(length);
-    let mut directions = [[0.0; LANES]; 3];
-    for (to, x) in directions.iter_mut().zip(direction) {
+    (spread, direction, known)
+}
+
+#[inline(always)]
+fn stored<F: Eight, const N: usize>(from: [F; N]) -> [[f64; LANES]; N] {
+    let mut to = [[0.0; LANES]; N];
+    for (to, x) in to.iter_mut().zip(from) {
         x.store(to);
     }
-    (spread, directions, known)
+    to
 }
 
 kernel! {
     /// The planes of several moments at a time, equal to [`Moments::plane`] of each.
-    pub fn planes(moments: &[Moments; LANES]) -> [Plane; LANES] = planes_body<Eight>
+    pub fn planes(moments: &[Moments; PLANES]) -> [Plane; PLANES] = planes_body<Eight>
 }
 
 #[inline(always)]
-fn planes_body<F: Eight>(moments: &[Moments; LANES]) -> [Plane; LANES] {
-    let mut columns = [[0.0; LANES]; 6];
-    for (lane, moments) in moments.iter().enumerate() {
+fn planes_body<F: Eight>(moments: &[Moments; PLANES]) -> [Plane; PLANES] {
+    let mut columns = [[[0.0; LANES]; 2]; 6];
+    for (place, moments) in moments.iter().enumerate() {
         let scatter = moments.scatter();
         for (column, x) in columns.iter_mut().zip(scatter) {
-            column[lane] = x;
+            column[place / LANES][place % LANES] = x;
         }
     }
-    let (spread, directions, known) = directions::<F>(&columns);
+    let mut scatters = [Pair(F::splat(0.0), F::splat(0.0)); 6];
+    for (to, [low, high]) in scatters.iter_mut().zip(&columns) {
+        *to = Pair(F::load(low), F::load(high));
+    }
+    let (spread, [x, y, z], known) = directions(scatters);
     let known = known & !spread.on_lines();
     let narrow = spread.on_bands();
-    let mut planes = [Plane::NONE; LANES];
-    for (lane, plane) in planes.iter_mut().enumerate() {
+    let halves = [stored([x.0, y.0, z.0]), stored([x.1, y.1, z.1])];
+    let mut planes = [Plane::NONE; PLANES];
+    for (place, plane) in planes.iter_mut().enumerate() {
         // Points on a line or all in one place: rare, and handled by other formulas.
-        if known >> lane & 1 == 0 {
-            *plane = moments[lane].plane();
+        if known >> place & 1 == 0 {
+            *plane = moments[place].plane();
             continue;
         }
-        let [x, y, z] = &directions;
+        let ([x, y, z], lane) = (&halves[place / LANES], place % LANES);
         *plane = Plane {
             normal: Some(normal([x[lane], y[lane], z[lane]])),
             spans: true,
-            wide: narrow >> lane & 1 == 0,
+            wide: narrow >> place & 1 == 0,
         };
     }
     planes
@@ -305,8 +318,8 @@ mod tests {
             let points: Vec<_> = points.iter().map(|p| {
                 std::array::from_fn(|axis| (p[axis] >> shift[axis]) / step * step)
             }).collect();
-            let some: [Moments; LANES] =
-                std::array::from_fn(|lane| moments(&points[..points.len() * lane / (LANES - 1)]));
+            let some: [Moments; PLANES] =
+                std::array::from_fn(|n| moments(&points[..points.len() * n / (PLANES - 1)]));
             let expected = some.map(|m| m.plane());
             for level in Level::all() {
                 prop_assert_eq!(planes(level, &some), expected);

@@ -106,21 +106,6 @@ pub struct SearchBox {
     pub limit: f32,
 }
 
-kernel! {
-    /// Writes the numbers of the `boxes` within the limit, in their order, to the front of `to`, and returns
-    /// how many there are. `to` must be one block longer than there are boxes.
-    pub fn near_boxes(boxes: &Boxes, around: SearchBox, to: &mut [u32]) -> usize = near_body<Eight>
-}
-
-#[inline(always)]
-fn near_body<P: Pick>(boxes: &Boxes, around: SearchBox, to: &mut [u32]) -> usize {
-    let mut count = 0;
-    for start in (0..boxes.len).step_by(BLOCK) {
-        count += put_near::<P>(boxes, start, around, to, count);
-    }
-    count
-}
-
 /// Writes the numbers of the boxes of a block that are within the limit to place `at`; returns how many there
 /// are.
 #[inline(always)]
@@ -140,18 +125,15 @@ fn put_near<P: Pick>(
 }
 
 kernel! {
-    /// As [`near_boxes`], faster for many boxes; `covers` are those of [`Boxes::cover`].
-    pub fn near_covered_boxes(boxes: &Boxes, covers: &Boxes, around: SearchBox, to: &mut [u32]) -> usize
-        = covered_body<Eight>
+    /// Writes the numbers of the `boxes` within the limit, in their order, to the front of `to`, and returns
+    /// how many there are. `covers` are those of [`Boxes::cover`]; `to` must be one block longer than there
+    /// are boxes.
+    pub fn near_boxes(boxes: &Boxes, covers: &Boxes, around: SearchBox, to: &mut [u32]) -> usize
+        = near_body<Eight>
 }
 
 #[inline(always)]
-fn covered_body<P: Pick>(
-    boxes: &Boxes,
-    covers: &Boxes,
-    around: SearchBox,
-    to: &mut [u32],
-) -> usize {
+fn near_body<P: Pick>(boxes: &Boxes, covers: &Boxes, around: SearchBox, to: &mut [u32]) -> usize {
     let mut count = 0;
     for first in (0..covers.len).step_by(BLOCK) {
         let Some(block) = covers.block(first) else {
@@ -253,8 +235,9 @@ mod tests {
                 .map(|start| (start / BLOCK as u32, all.len() as u32 - start)).collect();
             let error = f64::from(limit) / f64::from(1 << 21);
             for level in Level::all() {
-                let mut numbers = vec![0; all.len() + BLOCK];
-                let count = near_boxes(level, &boxes, around, &mut numbers);
+                let (mut covers, mut numbers) = (Boxes::default(), vec![0; all.len() + BLOCK]);
+                boxes.cover(&mut covers);
+                let count = near_boxes(level, &boxes, &covers, around, &mut numbers);
                 let numbers = &numbers[..count];
                 prop_assert!(numbers.is_sorted());
                 for (number, b) in (100..).zip(&all) {
@@ -262,10 +245,6 @@ mod tests {
                     let near = numbers.contains(&number);
                     prop_assert!(off.abs() <= error || near == (off < 0.0));
                 }
-                let (mut covers, mut near) = (Boxes::default(), vec![0; all.len() + BLOCK]);
-                boxes.cover(&mut covers);
-                let count = near_covered_boxes(level, &boxes, &covers, around, &mut near);
-                prop_assert_eq!(&near[..count], numbers);
                 let mut taken = Boxes::default();
                 take_boxes(level, &boxes, &blocks, around, &mut taken);
                 let taken: Vec<_> = (0..taken.len())

@@ -10,6 +10,7 @@ mod boxes;
 mod corners;
 mod distances;
 pub(crate) mod eight;
+mod fan;
 mod pick;
 mod ranks;
 pub(crate) mod sixteen;
@@ -17,7 +18,7 @@ mod sums;
 mod weighted;
 
 pub(crate) use boxes::point_box_body;
-pub use boxes::{Boxes, SearchBox, near_boxes, near_covered_boxes, take_boxes};
+pub use boxes::{Boxes, SearchBox, near_boxes, take_boxes};
 pub(crate) use corners::SLACK;
 pub use corners::{
     CornerGroup, Frame, LANES, Line, LineGroup, bisectors, cut_corners, farthest, touching_lines,
@@ -27,6 +28,7 @@ pub(crate) use corners::{
 };
 pub(crate) use distances::{count_body, distances_body};
 pub use distances::{count_within, distances};
+pub use fan::{MOST_EDGES, is_one_fan};
 pub use pick::pick_column;
 pub(crate) use pick::{BLOCK, Pick, RANKED, SHORT_RANKED, first_bits, pick_body};
 pub use ranks::{ranks, short_ranks};

@@ -25,6 +25,9 @@ pub(crate) trait Pick {
     /// Bit `k` is set if value `k` is at most `limit`.
     fn within(numbers: &[f32; BLOCK], limit: f32) -> u32;
 
+    /// Bit `k` is set if number `k` is `number`.
+    fn equal(numbers: &[u32; BLOCK], number: u32) -> u32;
+
     /// Writes the values whose bits are set, in their order, to the front of `to`; the rest of `to` is
     /// undefined.
     fn pack(values: &[u32; BLOCK], bits: u32, to: &mut [u32; BLOCK]);
@@ -67,6 +70,12 @@ impl Pick for Base {
     #[inline(always)]
     fn within(numbers: &[f32; BLOCK], limit: f32) -> u32 {
         let bit = |bits, (k, x): (usize, &f32)| bits | u32::from(*x <= limit) << k;
+        numbers.iter().enumerate().fold(0, bit)
+    }
+
+    #[inline(always)]
+    fn equal(numbers: &[u32; BLOCK], number: u32) -> u32 {
+        let bit = |bits, (k, n): (usize, &u32)| bits | u32::from(*n == number) << k;
         numbers.iter().enumerate().fold(0, bit)
     }
 
@@ -162,6 +171,20 @@ mod wide {
         }
 
         #[inline(always)]
+        fn equal(numbers: &[u32; BLOCK], number: u32) -> u32 {
+            // SAFETY: see above.
+            unsafe {
+                let p = numbers.as_ptr().cast::<__m256i>();
+                let number = _mm256_set1_epi32(number.cast_signed());
+                let bits = |half: __m256i| {
+                    let equal = _mm256_cmpeq_epi32(half, number);
+                    _mm256_movemask_ps(_mm256_castsi256_ps(equal)).cast_unsigned()
+                };
+                bits(_mm256_loadu_si256(p)) | bits(_mm256_loadu_si256(p.add(1))) << 8
+            }
+        }
+
+        #[inline(always)]
         fn pack(values: &[u32; BLOCK], bits: u32, to: &mut [u32; BLOCK]) {
             let (low, high) = (bits as usize & 0xff, bits as usize >> 8 & 0xff);
             // SAFETY: see above; the second store begins at most eight places after the first.
@@ -228,6 +251,16 @@ mod wide {
                 let numbers = _mm512_loadu_ps(numbers.as_ptr());
                 let limit = _mm512_set1_ps(limit);
                 u32::from(_mm512_cmp_ps_mask::<_CMP_LE_OQ>(numbers, limit))
+            }
+        }
+
+        #[inline(always)]
+        fn equal(numbers: &[u32; BLOCK], number: u32) -> u32 {
+            // SAFETY: see above.
+            unsafe {
+                let numbers = _mm512_loadu_si512(numbers.as_ptr().cast());
+                let number = _mm512_set1_epi32(number.cast_signed());
+                u32::from(_mm512_cmpeq_epi32_mask(numbers, number))
             }
         }
 

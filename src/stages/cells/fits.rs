@@ -3,8 +3,8 @@
 use super::cell::{Fit, Widen, fit_in_store, fit_in_tile, near_in_store};
 use crate::error::Result;
 use crate::geom::Point;
-use crate::geom::plane::{Moments, planes};
-use crate::kernels::{LANES, Level};
+use crate::geom::plane::{Moments, PLANES, planes};
+use crate::kernels::Level;
 use crate::stages::order::PointStore;
 use crate::stages::tiles::Tile;
 use crate::stages::tiles::near::{Around, Query, Search, Sums};
@@ -27,7 +27,7 @@ pub fn each_plane(
     neighbors: usize,
     widen: Widen,
     wanted: impl Fn(usize) -> bool,
-    each: impl FnMut(usize, Point, Fit),
+    each: impl FnMut(usize, Point, &Fit),
 ) -> Result<()> {
     let planes = Planes::load(unit, store, ids, &wanted, neighbors)?;
     Planes { widen, ..planes }.each(wanted, each)
@@ -69,7 +69,7 @@ impl<'a> Planes<'a> {
     pub fn each(
         &self,
         wanted: impl Fn(usize) -> bool,
-        each: impl FnMut(usize, Point, Fit),
+        each: impl FnMut(usize, Point, &Fit),
     ) -> Result<()> {
         let (count, widen) = (self.neighbors, self.widen);
         let in_tile = |(search, grown): Watched<'_, '_>, found: &mut Found<'_, Fit>| {
@@ -78,7 +78,11 @@ impl<'a> Planes<'a> {
             }
             let look = |id: u32, point: Point, query: Option<Query<'_>>| {
                 let fit = query.map(|mut query| fit_in_tile(&mut query, count, widen));
-                found(id, point, fit.transpose().map(Option::flatten));
+                let fit = fit.transpose().map(Option::flatten);
+                match fit {
+                    Ok(fit) => found(id, point, Ok(fit.as_ref())),
+                    Err(error) => found(id, point, Err(error)),
+                }
             };
             self.tile
                 .for_some_queries(count, search, wanted, grown, look);
@@ -94,7 +98,7 @@ impl<'a> Planes<'a> {
         &self,
         wanted: impl Fn(usize) -> bool,
         of: impl FnMut(u32, &Neighbors) -> T,
-        each: impl FnMut(usize, Point, T),
+        each: impl FnMut(usize, Point, &T),
     ) -> Result<()> {
         let (of, count) = (RefCell::new(of), self.neighbors);
         let in_tile = |(search, grown): Watched<'_, '_>, found: &mut Found<'_, T>| {
@@ -103,7 +107,7 @@ impl<'a> Planes<'a> {
                     let known = query.extend_to(count);
                     known.then(|| (of.borrow_mut())(id, query.near()))
                 });
-                found(id, point, Ok(known));
+                found(id, point, Ok(known.as_ref()));
             };
             self.tile
                 .for_some_queries(count, search, wanted, grown, look);
@@ -144,7 +148,7 @@ pub fn each_neighborhood<T>(
     ids: Range<usize>,
     count: usize,
     of: impl FnMut(u32, &Neighbors) -> T,
-    each: impl FnMut(usize, Point, T),
+    each: impl FnMut(usize, Point, &T),
 ) -> Result<()> {
     let all = |_| true;
     Planes::load(unit, store, ids, all, count)?.each_neighborhood(all, of, each)
@@ -170,7 +174,7 @@ pub(crate) fn each_around(
             if let Some(around) = around {
                 (each.borrow_mut())(id as usize, point, around);
             }
-            found(id, point, Ok(around.map(|_| ())));
+            found(id, point, Ok(around.map(|_| &())));
         };
         planes.tile.for_some_around(count, search, all, grown, look);
     };
@@ -181,7 +185,7 @@ pub(crate) fn each_around(
         (each.borrow_mut())(id as usize, point, &around);
         Ok(Some(()))
     };
-    look(unit, in_tile, in_store, |_, _, ()| ())
+    look(unit, in_tile, in_store, |_, _, _| ())
 }
 
 /// Points with summed neighbours, collected until their planes are computed together.
@@ -189,10 +193,10 @@ pub(crate) fn each_around(
 struct Several {
     level: Level,
     count: usize,
-    points: [(u32, Point); LANES],
-    moments: [Moments; LANES],
+    points: [(u32, Point); PLANES],
+    moments: [Moments; PLANES],
     /// Squared distances of the last neighbours.
-    lasts: [u64; LANES],
+    lasts: [u64; PLANES],
 }
 
 impl Several {
@@ -201,7 +205,7 @@ impl Several {
         self.moments[self.count] = sums.moments;
         self.lasts[self.count] = sums.last2;
         self.count += 1;
-        if self.count == LANES {
+        if self.count == PLANES {
             self.fit(found);
         }
     }
@@ -213,14 +217,14 @@ impl Several {
             let (id, point) = self.points[lane];
             let (moments, last2) = (self.moments[lane], self.lasts[lane]);
             let fit = Fit::with(plane, Sums { moments, last2 });
-            found(id, point, Ok(Some(fit)));
+            found(id, point, Ok(Some(&fit)));
         }
         self.count = 0;
     }
 }
 
 /// Receives the result for a point; `None` if the tile cannot certify it.
-type Found<'a, T> = dyn FnMut(u32, Point, Result<Option<T>>) + 'a;
+type Found<'a, T> = dyn FnMut(u32, Point, Result<Option<&T>>) + 'a;
 
 /// A search, and the function that is told how large it has grown.
 type Watched<'a, 'g> = (&'a mut Search, &'a mut (dyn FnMut(u64) + 'g));
@@ -231,7 +235,7 @@ fn look<T>(
     unit: &Unit<'_>,
     in_tile: impl FnOnce(Watched<'_, '_>, &mut Found<'_, T>),
     mut in_store: impl FnMut(&mut PageCache, u32, Point) -> Result<Option<T>>,
-    mut each: impl FnMut(usize, Point, T),
+    mut each: impl FnMut(usize, Point, &T),
 ) -> Result<()> {
     let mut uncertain = Vec::new();
     let mut failed = Ok(());
@@ -248,7 +252,7 @@ fn look<T>(
     let mut cache = PageCache::default();
     for (id, point) in uncertain {
         if let Some(found) = in_store(&mut cache, id, point)? {
-            each(id as usize, point, found);
+            each(id as usize, point, &found);
         }
         held.set(cache.bytes());
     }

@@ -2,8 +2,8 @@
 
 use super::cell::{CellMaker, Fit, Outcome};
 use crate::geom::clip::wrap::{Site, TOGETHER};
-use crate::geom::plane::{Moments, Plane, planes};
-use crate::kernels::{LANES, Level};
+use crate::geom::plane::{Moments, PLANES, Plane, planes};
+use crate::kernels::Level;
 use crate::stages::tiles::near::{Group, Neighborhood};
 
 impl CellMaker<'_> {
@@ -63,14 +63,11 @@ impl CellMaker<'_> {
 }
 
 /// The planes of the members whose sums are known.
-fn planes_of(members: &[Neighborhood]) -> [Plane; TOGETHER] {
-    let mut all = [Plane::NONE; TOGETHER];
-    for (members, all) in members.chunks(LANES).zip(all.chunks_mut(LANES)) {
-        let mut moments = [Moments::default(); LANES];
-        for (member, moments) in members.iter().zip(&mut moments) {
-            *moments = member.sums.map_or(*moments, |sums| sums.moments);
-        }
-        all.copy_from_slice(&planes(Level::best(), &moments));
+fn planes_of(members: &[Neighborhood]) -> [Plane; PLANES] {
+    const { assert!(TOGETHER <= PLANES) };
+    let mut moments = [Moments::default(); PLANES];
+    for (member, moments) in members.iter().zip(&mut moments) {
+        *moments = member.sums.map_or(*moments, |sums| sums.moments);
     }
-    all
+    planes(Level::best(), &moments)
 }

@@ -80,12 +80,15 @@ pub(super) fn pack(page: &[Point], bytes: &mut Vec<u8>) -> (Aabb, u8) {
     let mut to = bytes.len();
     bytes.resize(to + packing.bytes(page.len()), 0);
     for block in page.chunks(BLOCK) {
-        for (axis, bits) in packing.bits.into_iter().enumerate() {
-            let mut values = [0; BLOCK];
-            for (value, point) in values.iter_mut().zip(block) {
-                *value = difference(point, axis) >> shift;
-            }
-            to += packer.compress(&values, &mut bytes[to..], bits);
+        let mut values = [[0; BLOCK]; 3];
+        let [x, y, z] = &mut values;
+        for (((x, y), z), point) in x.iter_mut().zip(y).zip(z).zip(block) {
+            *x = difference(point, 0) >> shift;
+            *y = difference(point, 1) >> shift;
+            *z = difference(point, 2) >> shift;
+        }
+        for (values, bits) in values.iter().zip(packing.bits) {
+            to += packer.compress(values, &mut bytes[to..], bits);
         }
     }
     (bounds, shift)

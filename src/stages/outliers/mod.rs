@@ -118,19 +118,15 @@ fn one_tile(
     let mut failed = Ok(());
     let of = |id, near: &Neighbors| {
         let around = near.columns().ids[..count].iter().copied();
-        spacings.stand_out(id, around, factor)
+        let out = spacings.stand_out(id, around, factor);
+        out.unwrap_or_else(|error| {
+            failed = Err(error);
+            false
+        })
     };
-    each_neighborhood(
-        unit,
-        store,
-        ids.clone(),
-        count,
-        of,
-        |id, point, out| match out {
-            Ok(out) => kept[id - ids.start] = (!out).then_some(point),
-            Err(error) => failed = Err(error),
-        },
-    )?;
+    each_neighborhood(unit, store, ids.clone(), count, of, |id, point, out| {
+        kept[id - ids.start] = (!out).then_some(point);
+    })?;
     failed?;
     Ok(kept.into_iter().flatten().collect())
 }

@@ -60,7 +60,7 @@ fn one_tile(unit: &Unit<'_>, store: &PointStore, ids: Range<usize>) -> Result<Ve
     let count = METHOD.outliers.nearest;
     let of = |_, near: &Neighbors| mean(&near.columns().distances2[..count]);
     each_neighborhood(unit, store, ids.clone(), count, of, |id, _, spacing| {
-        spacings[id - ids.start] = spacing;
+        spacings[id - ids.start] = *spacing;
     })?;
     Ok(spacings)
 }

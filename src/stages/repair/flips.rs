@@ -445,7 +445,8 @@ fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
 /// The vector from `a` to `b`.
 #[inline]
 fn difference(a: Point, b: Point) -> [f32; 3] {
-    std::array::from_fn(|k| (i64::from(b[k]) - i64::from(a[k])) as f32)
+    // Differences of coordinates in 0..2^30 fit 32 bits.
+    std::array::from_fn(|k| b[k].wrapping_sub(a[k]) as f32)
 }
 
 /// The square of twice a triangle's area divided by its two longest sides; zero only if it is degenerate.

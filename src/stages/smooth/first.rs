@@ -71,7 +71,7 @@ pub(super) fn examine_and_move(
     let others = |id: usize| moves(id) && !is_sampled(id);
     planes.each(others, |id, point, fit| {
         let usual2 = usual2[patch(id as u32, &ids)];
-        let (to, rough) = relaxing.target(point, &fit, usual2);
+        let (to, rough) = relaxing.target(point, fit, usual2);
         put(id, to, rough);
     })?;
     Ok(Done {
@@ -95,7 +95,7 @@ fn look(
     let mut samples: Vec<Sample> = Vec::with_capacity(ids.len() / curve.sample + curve.run);
     planes.each(is_sampled, |id, point, fit| {
         // As if the point were on the surface: the usual reach is not known yet.
-        let (to, rough) = relaxing.target(point, &fit, fit.last2);
+        let (to, rough) = relaxing.target(point, fit, fit.last2);
         let fills = |normal| fit.moments.fill_space(normal);
         samples.push(Sample {
             point,
@@ -272,7 +272,7 @@ fn count_witnesses(
         },
         |id, _, known| {
             let counts = &mut counts[patch(id as u32, ids)];
-            let (curved, clean) = known;
+            let (curved, clean) = *known;
             counts.points += 1;
             counts.curved += u8::from(curved);
             counts.fine += u8::from(clean.is_some());

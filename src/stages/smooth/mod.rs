@@ -82,8 +82,8 @@ pub fn smooth(
     let work = |unit: &Unit<'_>, ids: Range<usize>, points: &mut [Point]| match smoothing {
         Smoothing::Plain => {
             let all = |_| true;
-            let each = |id: usize, point: Point, fit: Fit| {
-                points[id - ids.start] = project(point, &fit);
+            let each = |id: usize, point: Point, fit: &Fit| {
+                points[id - ids.start] = project(point, fit);
             };
             let (ids, count) = (ids.clone(), neighbors);
             each_plane(unit, store, ids, count, Widen::Never, all, each)

@@ -184,8 +184,8 @@ fn one_round(
         let mut seen = Roughness::of(&ids);
         let count = relaxing.neighbors;
         if ids.clone().step_by(METHOD.curve.run).any(wanted) {
-            let each = |id: usize, point: Point, fit: Fit| {
-                let (to, rough) = relaxing.target(point, &fit, spacings.usual2(id as u32));
+            let each = |id: usize, point: Point, fit: &Fit| {
+                let (to, rough) = relaxing.target(point, fit, spacings.usual2(id as u32));
                 seen.note(id, rough);
                 points[id - ids.start] = to;
                 seen.moved += 1;

@@ -165,7 +165,7 @@ fn rough_points(points: &[Point]) -> usize {
         Widen::Never,
         |_| true,
         |_, point, fit| {
-            rough += usize::from(relaxing.target(point, &fit, fit.last2).1);
+            rough += usize::from(relaxing.target(point, fit, fit.last2).1);
         },
     )
     .unwrap();

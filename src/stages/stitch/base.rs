@@ -3,6 +3,7 @@
 
 use super::BaseStats;
 use crate::error::Result;
+use crate::kernels::{Level, MOST_EDGES, is_one_fan};
 use crate::method::METHOD;
 use crate::spill::{Id, Inbox, Shuffle, Table, release};
 use crate::stages::blocks::Blocks;
@@ -335,12 +336,10 @@ impl Look<'_> {
     }
 }
 
-/// Most triangles at a vertex for which the fast test is used.
-const FEW: usize = 16;
-
 /// Buffers for finding the triangles that a vertex flags.
 #[derive(Default)]
 struct Refusing {
+    level: Level,
     link: Link,
     kept: Vec<u32>,
 }
@@ -350,7 +349,7 @@ impl Refusing {
     /// closed fan.
     fn at(&mut self, v: u32, star: &Star, triangles: &[Triangle], flagged: &mut Vec<u32>) {
         let around = star.at(v);
-        if one_fan(v, around, triangles) {
+        if one_fan(self.level, v, around, triangles) {
             return;
         }
         let triangle = |n: &u32| triangles[*n as usize];
@@ -381,42 +380,15 @@ impl Refusing {
 
 /// True if the link of `v` is one path, one cycle, or empty: then nothing is flagged. False if this could not
 /// be established by the fast test.
-fn one_fan(v: u32, around: &[u32], triangles: &[Triangle]) -> bool {
-    let count = around.len();
-    if count < 2 {
-        return true;
-    }
-    if count > FEW {
+fn one_fan(level: Level, v: u32, around: &[u32], triangles: &[Triangle]) -> bool {
+    if around.len() > MOST_EDGES {
         return false;
     }
-    let mut edges = [[0u32; 2]; FEW];
-    for (edge, &n) in edges.iter_mut().zip(around) {
-        *edge = others(triangles[n as usize], v);
+    // No edge ends at `v` itself.
+    let mut ends = [[v; MOST_EDGES]; 2];
+    let [low, high] = &mut ends;
+    for ((low, high), &n) in low.iter_mut().zip(high).zip(around) {
+        [*low, *high] = others(triangles[n as usize], v);
     }
-    let edges = &edges[..count];
-    // Bits of the edges not visited yet. The walk starts at the first edge and goes both ways.
-    let mut left = ((1u32 << count) - 1) & !1;
-    for mut node in [edges[0][1], edges[0][0]] {
-        loop {
-            let mut next = 0u32;
-            for (e, edge) in edges.iter().enumerate() {
-                next |= u32::from((edge[0] == node) | (edge[1] == node)) << e;
-            }
-            next &= left;
-            if next == 0 {
-                break;
-            }
-            if !next.is_power_of_two() {
-                return false;
-            }
-            let [a, b] = edges[next.trailing_zeros() as usize];
-            node ^= a ^ b;
-            left &= !next;
-            if node == edges[0][0] {
-                // A cycle; any edge left belongs to another component.
-                return left == 0;
-            }
-        }
-    }
-    left == 0
+    is_one_fan(level, &ends, around.len())
 }

@@ -4,7 +4,7 @@ use super::{LEAVES, OwnPage, Tile};
 use crate::geom::Point;
 use crate::geom::aabb::Aabb;
 use crate::kernels::{
-    BLOCK, Boxes, Level, Pick, SearchBox, first_bits, kernel, near_covered_boxes, point_box_body,
+    BLOCK, Boxes, Level, Pick, SearchBox, first_bits, kernel, near_boxes, point_box_body,
     take_boxes,
 };
 use crate::workspace::memory::bytes_of;
@@ -157,7 +157,7 @@ impl PageLeaves {
         out: &mut Candidates,
     ) {
         let limit = within(around, d2);
-        let mut count = near_covered_boxes(level, &self.boxes, &self.covers, limit, &mut self.near);
+        let mut count = near_boxes(level, &self.boxes, &self.covers, limit, &mut self.near);
         if let Some(wanted) = wanted {
             count = keep(&mut self.near[..count], |leaf| {
                 let (min, max) = tile.leaf_boxes.get(leaf as usize);

@@ -139,6 +139,8 @@ struct ReachablePages<'a> {
     level: Level,
     /// The boxes of the pages within `reach` of the tile's box, with their numbers.
     boxes: Boxes,
+    /// The boxes around blocks of them.
+    covers: Boxes,
     reach: u64,
     found: Vec<u32>,
 }
@@ -154,6 +156,7 @@ impl<'a> ReachablePages<'a> {
             store,
             level: Level::best(),
             boxes: Boxes::default(),
+            covers: Boxes::default(),
             reach: full(longest) * MOST_TIMES,
             found: Vec::new(),
         };
@@ -163,6 +166,7 @@ impl<'a> ReachablePages<'a> {
                 let Aabb { min, max } = *store.page_box(page as usize);
                 around.boxes.push(min, max, page);
             }
+            around.boxes.cover(&mut around.covers);
         } else {
             around.reach = 0;
         }
@@ -176,7 +180,8 @@ impl<'a> ReachablePages<'a> {
         if reach <= self.reach {
             let limit = within(bounds, reach * reach);
             self.found.resize(self.boxes.len() + BLOCK, 0);
-            let count = near_boxes(self.level, &self.boxes, limit, &mut self.found);
+            let (boxes, covers) = (&self.boxes, &self.covers);
+            let count = near_boxes(self.level, boxes, covers, limit, &mut self.found);
             return (&self.found[..count], count <= most);
         }
         let all = (self.store).pages_near(bounds, reach, most, &mut self.found);
