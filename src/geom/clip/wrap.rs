@@ -29,6 +29,10 @@ pub const MOST_NEIGHBORS: usize = 32;
 /// Most sides of a cell.
 const MOST_SIDES: usize = 2 * LANES;
 
+/// Share of the disk's radius by which a certified cell keeps away from the rim. Rounding moves the rim by less
+/// than 10⁻¹⁴ of it.
+const RIM_MARGIN: f64 = 1e-6;
+
 /// A point, its disk, and its neighbours: all points within a distance.
 #[derive(Debug, Clone, Copy)]
 pub struct Site<'a> {
@@ -320,7 +324,7 @@ fn line_up(lines: &Lines, sides: &[u8], around: &mut Around) -> bool {
 }
 
 /// Four times the squared radius of security if the lines `sides`, in this order, are the sides of the cell,
-/// far from the rim. Writes the corners.
+/// inside the rim. Writes the corners.
 #[inline(always)]
 fn certify<E: Eight>(
     site: &Site<'_>,
@@ -357,10 +361,10 @@ fn certify<E: Eight>(
     let clear = touching & ((1 << site.count) - 1) == 0;
     // A side has two corners: if all sides are different, they close around the cell once.
     let once = seen.count_ones() as usize == sides.len();
-    // At half the distance of the rim: its sides, and what rounding decides there, do not matter. (What is
-    // rounded to an integer would not show a corner beyond the rim of a disk larger than any cloud.)
-    let rim = site.radius * RIM_DISTANCE;
-    (clear && once && 4.0 * reach2 <= rim * rim).then(|| secure2(reach2))
+    // Inside the rim: its sides, and what rounding decides there, do not matter. (What is rounded to an
+    // integer would not show a corner beyond the rim of a disk larger than any cloud.)
+    let rim = site.radius * (RIM_DISTANCE - RIM_MARGIN);
+    (clear && once && reach2 <= rim * rim).then(|| secure2(reach2))
 }
 
 /// Eight lines.

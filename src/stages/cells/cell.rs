@@ -174,7 +174,7 @@ pub struct CellMaker<'a> {
     pub(super) widen: Widen,
     /// If given, points off the surface get no cell.
     density: Option<Density<'a>>,
-    cell: Cell,
+    pub(super) cell: Cell,
     pub(super) wrapper: Box<Wrapper>,
 }
 
@@ -235,16 +235,21 @@ impl<'a> CellMaker<'a> {
         if let Err(outcome) = self.start(query.id(), &fit) {
             return Ok(outcome);
         }
+        Ok(self.clip(query, each))
+    }
+
+    /// Clips the cell by the points that a query lists, and by farther ones, until it is complete.
+    pub(super) fn clip(&mut self, query: &mut Query<'_>, each: impl FnMut(u32, u32)) -> Outcome {
         loop {
             let next = self.cell.clip_nearest(query.near().columns(), 0);
             if next < query.near().len() || self.cell.reach2() <= query.complete2() {
                 self.cell.triples(each);
-                return Ok(Outcome::Complete);
+                return Outcome::Complete;
             }
             // On scan lines, thousands of points are nearer than the farthest one that can touch the cell.
             let wanted = Touching::new(&self.cell, query.point());
             if !query.extend_where(self.cell.reach2(), &wanted) {
-                return Ok(Outcome::Uncertain);
+                return Outcome::Uncertain;
             }
         }
     }

@@ -92,6 +92,23 @@ impl<'a> Group<'a> {
         known.then(|| candidates.columns.coordinates(candidates.len))
     }
 
+    /// A query for points beyond the neighbours of a member, which are known; none is listed yet.
+    #[must_use]
+    pub fn beyond(&mut self, member: usize) -> Query<'_> {
+        let member = &self.members[member];
+        self.search.swap_back();
+        self.search.near.clear();
+        let last2 = member.sums.map_or(0, |sums| sums.last2);
+        Query {
+            tile: self.tile,
+            own: self.own,
+            search: self.search,
+            point: member.point,
+            id: member.id,
+            complete2: member.complete2.max(last2),
+        }
+    }
+
     /// A query for the neighbours of a member, as by [`Tile::for_each_query`].
     pub fn query(&mut self, member: usize) -> Option<Query<'_>> {
         let Neighborhood { index, id, .. } = self.members[member];
