@@ -183,7 +183,7 @@ impl World {
         let of = |_, near: &_| (candidate.normal)(near, self.neighbors);
         let (unit, all) = (self.workspace.unit(), 0..store.len());
         each_neighborhood(&unit, store, all, count, of, |id, _, normal| {
-            normals[id] = normal;
+            normals[id] = *normal;
         })?;
         Ok(normals)
     }
