@@ -88,7 +88,7 @@ const MAY_USE: &[(&str, &str)] = &[
     ("stages/spacing", ""),
     (
         "stages/stitch",
-        "stages/blocks stages/cells stages/located stages/surface stages/triples",
+        "kernels stages/blocks stages/cells stages/located stages/surface stages/triples",
     ),
     (
         "stages/surface",

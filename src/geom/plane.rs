@@ -5,7 +5,8 @@
 
 mod spread;
 
-use crate::kernels::eight::{Eight, Numbers, Pair};
+use crate::kernels::eight::{Eight, Numbers};
+use crate::kernels::pair::Pair;
 use crate::kernels::{LANES, kernel};
 use crate::method::METHOD;
 use spread::{Spread, extent, normal};

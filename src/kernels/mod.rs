@@ -11,6 +11,7 @@ mod corners;
 mod distances;
 pub(crate) mod eight;
 mod fan;
+pub(crate) mod pair;
 mod pick;
 mod ranks;
 pub(crate) mod sixteen;
