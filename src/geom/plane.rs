@@ -5,7 +5,7 @@
 
 mod spread;
 
-use crate::kernels::eight::{Eight, Numbers};
+use crate::kernels::eight::{Eight, Numbers, stored};
 use crate::kernels::pair::Pair;
 use crate::kernels::{LANES, kernel};
 use crate::method::METHOD;
@@ -217,15 +217,6 @@ fn directions<F: Numbers>(scatters: [F; 6]) -> (Spread<F>, [F; 3], u64) {
     let some = largest.greater(zero) & infinity.greater(largest);
     let known = some & length.greater(zero) & infinity.greater(length);
     (spread, direction, known)
-}
-
-#[inline(always)]
-fn stored<F: Eight, const N: usize>(from: [F; N]) -> [[f64; LANES]; N] {
-    let mut to = [[0.0; LANES]; N];
-    for (to, x) in to.iter_mut().zip(from) {
-        x.store(to);
-    }
-    to
 }
 
 kernel! {

@@ -57,6 +57,16 @@ pub(crate) trait Eight: Numbers {
     }
 }
 
+/// Vectors as arrays.
+#[inline(always)]
+pub(crate) fn stored<F: Eight, const N: usize>(from: [F; N]) -> [[f64; 8]; N] {
+    let mut to = [[0.0; 8]; N];
+    for (to, from) in to.iter_mut().zip(from) {
+        from.store(to);
+    }
+    to
+}
+
 /// One number.
 impl Numbers for f64 {
     const ALL: u64 = 1;

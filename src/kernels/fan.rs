@@ -15,6 +15,7 @@ kernel! {
 #[inline(always)]
 fn fan_body<P: Pick>(ends: &[[u32; MOST_EDGES]; 2], count: usize) -> bool {
     let count = count.min(MOST_EDGES);
+    let all = (1u32 << count) - 1;
     // For each edge, the bits of the edges that it shares an end with, and its own.
     let mut beside = [0; MOST_EDGES];
     let mut crowded = 0;
@@ -28,7 +29,7 @@ fn fan_body<P: Pick>(ends: &[[u32; MOST_EDGES]; 2], count: usize) -> bool {
             *beside |= here;
         }
     }
-    let mut reached = 1 & ((1u32 << count) - 1);
+    let mut reached = 1 & all;
     let mut new = reached;
     while new != 0 {
         let mut more = 0;
@@ -39,7 +40,7 @@ fn fan_body<P: Pick>(ends: &[[u32; MOST_EDGES]; 2], count: usize) -> bool {
         new = more & !reached;
         reached |= more;
     }
-    crowded == 0 && reached == (1u32 << count) - 1
+    crowded == 0 && reached == all
 }
 
 #[cfg(test)]

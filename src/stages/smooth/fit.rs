@@ -1,6 +1,6 @@
 //! Least-squares surfaces of first and second order, fitted for several points at a time.
 
-use crate::kernels::eight::{Eight, Numbers};
+use crate::kernels::eight::{Eight, Numbers, stored};
 use crate::kernels::{LANES, SurfaceSums, kernel};
 use crate::method::METHOD;
 
@@ -39,23 +39,16 @@ fn fits_body<F: Eight>(sums: &SurfaceSums) -> Fit<[f64; LANES]> {
         *to = F::load(from);
     }
     let fit = Fit::of(&loaded);
+    let [over_plane, over_curved, total, squares] =
+        stored([fit.over_plane, fit.over_curved, fit.total, fit.squares]);
     Fit {
         plane: stored(fit.plane),
         curved: stored(fit.curved),
-        over_plane: stored([fit.over_plane])[0],
-        over_curved: stored([fit.over_curved])[0],
-        total: stored([fit.total])[0],
-        squares: stored([fit.squares])[0],
+        over_plane,
+        over_curved,
+        total,
+        squares,
     }
-}
-
-#[inline(always)]
-fn stored<F: Eight, const N: usize>(from: [F; N]) -> [[f64; LANES]; N] {
-    let mut to = [[0.0; LANES]; N];
-    for (to, from) in to.iter_mut().zip(from) {
-        from.store(to);
-    }
-    to
 }
 
 impl<F: Numbers> Fit<F> {

@@ -9,7 +9,7 @@
 use super::edges::frame;
 use super::fit::{Fit, TERMS, fits};
 use crate::geom::plane::{Normal, least_directions};
-use crate::kernels::eight::Eight;
+use crate::kernels::eight::{Eight, stored};
 use crate::kernels::{
     LANES, Level, SpreadSums, SurfaceSums, Weighted, drop_beyond, fade, kernel, square_weights,
     take_weighted, turn,
@@ -155,14 +155,14 @@ fn scatters_body<F: Eight>(sums: &SpreadSums) -> [[f64; LANES]; 6] {
     let [total, x, y, z, xx, yy, zz, xy, xz, yz] = sums;
     let (total, x, y, z) = (F::load(total), F::load(x), F::load(y), F::load(z));
     let [mx, my, mz] = [x / total, y / total, z / total];
-    let mut scatters = [[0.0; LANES]; 6];
-    (F::load(xx) - x * mx).store(&mut scatters[0]);
-    (F::load(yy) - y * my).store(&mut scatters[1]);
-    (F::load(zz) - z * mz).store(&mut scatters[2]);
-    (F::load(xy) - x * my).store(&mut scatters[3]);
-    (F::load(xz) - x * mz).store(&mut scatters[4]);
-    (F::load(yz) - y * mz).store(&mut scatters[5]);
-    scatters
+    stored([
+        F::load(xx) - x * mx,
+        F::load(yy) - y * my,
+        F::load(zz) - z * mz,
+        F::load(xy) - x * my,
+        F::load(xz) - x * mz,
+        F::load(yz) - y * mz,
+    ])
 }
 
 fn frame_along(normal: Normal) -> Frame {
