@@ -5,7 +5,8 @@
 
 mod spread;
 
-use crate::kernels::eight::{Eight, Numbers, stored};
+use crate::kernels::eight::{Eight, loaded, stored};
+use crate::kernels::numbers::Numbers;
 use crate::kernels::pair::Pair;
 use crate::kernels::{LANES, kernel};
 use crate::method::METHOD;
@@ -187,9 +188,7 @@ kernel! {
 
 #[inline(always)]
 fn least_body<F: Eight>(scatters: &[[f64; LANES]; 6]) -> [Option<Normal>; LANES] {
-    let [a, b, c, d, e, f] = scatters;
-    let (a, b, c) = (F::load(a), F::load(b), F::load(c));
-    let (_, directions, known) = directions([a, b, c, F::load(d), F::load(e), F::load(f)]);
+    let (_, directions, known) = directions(loaded::<F, 6>(scatters));
     let [x, y, z] = stored(directions);
     let mut normals = [None; LANES];
     for (lane, to) in normals.iter_mut().enumerate() {
@@ -226,16 +225,17 @@ kernel! {
 
 #[inline(always)]
 fn planes_body<F: Eight>(moments: &[Moments; PLANES]) -> [Plane; PLANES] {
-    let mut columns = [[[0.0; LANES]; 2]; 6];
+    let mut columns = [[[0.0; LANES]; 6]; 2];
     for (place, moments) in moments.iter().enumerate() {
         let scatter = moments.scatter();
-        for (column, x) in columns.iter_mut().zip(scatter) {
-            column[place / LANES][place % LANES] = x;
+        for (column, x) in columns[place / LANES].iter_mut().zip(scatter) {
+            column[place % LANES] = x;
         }
     }
+    let [low, high] = [loaded(&columns[0]), loaded(&columns[1])];
     let mut scatters = [Pair(F::splat(0.0), F::splat(0.0)); 6];
-    for (to, [low, high]) in scatters.iter_mut().zip(&columns) {
-        *to = Pair(F::load(low), F::load(high));
+    for (to, (low, high)) in scatters.iter_mut().zip(low.into_iter().zip(high)) {
+        *to = Pair(low, high);
     }
     let (spread, [x, y, z], known) = directions(scatters);
     let known = known & !spread.on_lines();

@@ -39,18 +39,6 @@ impl Boxes {
         self.len += 1;
     }
 
-    /// Replaces the boxes of `covers` by the box around each block of 16 boxes.
-    pub fn cover(&self, covers: &mut Boxes) {
-        covers.clear();
-        for start in (0..self.len).step_by(BLOCK) {
-            let range = start..(start + BLOCK).min(self.len);
-            let column = |axis: usize| self.columns[axis][range.clone()].iter().map(|c| *c as i32);
-            let min = [0, 1, 2].map(|axis| column(axis).min().unwrap_or(0));
-            let max = [3, 4, 5].map(|axis| column(axis).max().unwrap_or(0));
-            covers.push(min, max, (start / BLOCK) as u32);
-        }
-    }
-
     /// Lowest and highest corner of the box at `index`.
     #[must_use]
     #[inline]
@@ -106,6 +94,48 @@ pub struct SearchBox {
     pub limit: f32,
 }
 
+/// Boxes with a box around each block of 16 of them, to be searched.
+#[derive(Debug, Clone, Default)]
+pub struct CoveredBoxes {
+    boxes: Boxes,
+    covers: Boxes,
+}
+
+impl CoveredBoxes {
+    /// Replaces all boxes by those that `fill` appends.
+    pub fn set(&mut self, fill: impl FnOnce(&mut Boxes)) {
+        let Self { boxes, covers } = self;
+        boxes.clear();
+        fill(boxes);
+        covers.clear();
+        for start in (0..boxes.len).step_by(BLOCK) {
+            let block = start..(start + BLOCK).min(boxes.len);
+            let column = |axis: usize| boxes.columns[axis][block.clone()].iter().map(|c| *c as i32);
+            let min = [0, 1, 2].map(|axis| column(axis).min().unwrap_or(0));
+            let max = [3, 4, 5].map(|axis| column(axis).max().unwrap_or(0));
+            covers.push(min, max, (start / BLOCK) as u32);
+        }
+    }
+
+    /// Number of boxes.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.boxes.len
+    }
+
+    /// True if there is no box.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.boxes.is_empty()
+    }
+
+    /// Allocated bytes.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        self.boxes.bytes() + self.covers.bytes()
+    }
+}
+
 /// Writes the numbers of the boxes of a block that are within the limit to place `at`; returns how many there
 /// are.
 #[inline(always)]
@@ -126,14 +156,13 @@ fn put_near<P: Pick>(
 
 kernel! {
     /// Writes the numbers of the `boxes` within the limit, in their order, to the front of `to`, and returns
-    /// how many there are. `covers` are those of [`Boxes::cover`]; `to` must be one block longer than there
-    /// are boxes.
-    pub fn near_boxes(boxes: &Boxes, covers: &Boxes, around: SearchBox, to: &mut [u32]) -> usize
-        = near_body<Eight>
+    /// how many there are. `to` must be one block longer than there are boxes.
+    pub fn near_boxes(boxes: &CoveredBoxes, around: SearchBox, to: &mut [u32]) -> usize = near_body<Eight>
 }
 
 #[inline(always)]
-fn near_body<P: Pick>(boxes: &Boxes, covers: &Boxes, around: SearchBox, to: &mut [u32]) -> usize {
+fn near_body<P: Pick>(boxes: &CoveredBoxes, around: SearchBox, to: &mut [u32]) -> usize {
+    let CoveredBoxes { boxes, covers } = boxes;
     let mut count = 0;
     for first in (0..covers.len).step_by(BLOCK) {
         let Some(block) = covers.block(first) else {
@@ -235,9 +264,10 @@ mod tests {
                 .map(|start| (start / BLOCK as u32, all.len() as u32 - start)).collect();
             let error = f64::from(limit) / f64::from(1 << 21);
             for level in Level::all() {
-                let (mut covers, mut numbers) = (Boxes::default(), vec![0; all.len() + BLOCK]);
-                boxes.cover(&mut covers);
-                let count = near_boxes(level, &boxes, &covers, around, &mut numbers);
+                let mut covered = CoveredBoxes::default();
+                covered.set(|to| to.clone_from(&boxes));
+                let mut numbers = vec![0; all.len() + BLOCK];
+                let count = near_boxes(level, &covered, around, &mut numbers);
                 let numbers = &numbers[..count];
                 prop_assert!(numbers.is_sorted());
                 for (number, b) in (100..).zip(&all) {

@@ -2,28 +2,8 @@
 //!
 //! [`Base`] is the definition. The other types perform the same operations in wider registers.
 
+use super::numbers::Numbers;
 use std::ops::{Add, Div, Mul, Sub};
-
-/// One or several numbers; every operation applies to each of them.
-pub(crate) trait Numbers:
-    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
-{
-    /// One set bit for each number.
-    const ALL: u64;
-    /// All numbers equal to `x`.
-    fn splat(x: f64) -> Self;
-    /// Square roots.
-    fn sqrt(self) -> Self;
-    /// Absolute values.
-    fn abs(self) -> Self;
-    /// Bit `k` is set if number `k` is greater than that of `other` (false for NaN).
-    fn greater(self, other: Self) -> u64;
-    /// For each pair the first number if it is greater, else the second.
-    fn larger(self, other: Self) -> Self;
-    /// For each pair the first number if its bit is set, else the second; applied to `N` vectors with the
-    /// same bits.
-    fn choose<const N: usize>(bits: u64, first: [Self; N], second: [Self; N]) -> [Self; N];
-}
 
 /// Eight numbers.
 pub(crate) trait Eight: Numbers {
@@ -57,6 +37,16 @@ pub(crate) trait Eight: Numbers {
     }
 }
 
+/// Vectors from arrays.
+#[inline(always)]
+pub(crate) fn loaded<F: Eight, const N: usize>(from: &[[f64; 8]; N]) -> [F; N] {
+    let mut to = [F::splat(0.0); N];
+    for (to, from) in to.iter_mut().zip(from) {
+        *to = F::load(from);
+    }
+    to
+}
+
 /// Vectors as arrays.
 #[inline(always)]
 pub(crate) fn stored<F: Eight, const N: usize>(from: [F; N]) -> [[f64; 8]; N] {
@@ -65,41 +55,6 @@ pub(crate) fn stored<F: Eight, const N: usize>(from: [F; N]) -> [[f64; 8]; N] {
         from.store(to);
     }
     to
-}
-
-/// One number.
-impl Numbers for f64 {
-    const ALL: u64 = 1;
-
-    #[inline(always)]
-    fn splat(x: f64) -> Self {
-        x
-    }
-
-    #[inline(always)]
-    fn sqrt(self) -> Self {
-        self.sqrt()
-    }
-
-    #[inline(always)]
-    fn abs(self) -> Self {
-        self.abs()
-    }
-
-    #[inline(always)]
-    fn greater(self, other: Self) -> u64 {
-        u64::from(self > other)
-    }
-
-    #[inline(always)]
-    fn larger(self, other: Self) -> Self {
-        if self > other { self } else { other }
-    }
-
-    #[inline(always)]
-    fn choose<const N: usize>(bits: u64, first: [Self; N], second: [Self; N]) -> [Self; N] {
-        if bits != 0 { first } else { second }
-    }
 }
 
 /// Implements the arithmetic operators of a type.

@@ -1,7 +1,7 @@
 //! Whether the edges opposite a vertex, one for each triangle around it, form one path or one cycle.
 
 use super::kernel;
-use super::pick::{BLOCK, Pick};
+use super::pick::{BLOCK, Pick, first_bits};
 
 /// Most edges of one call.
 pub const MOST_EDGES: usize = BLOCK;
@@ -14,8 +14,7 @@ kernel! {
 
 #[inline(always)]
 fn fan_body<P: Pick>(ends: &[[u32; MOST_EDGES]; 2], count: usize) -> bool {
-    let count = count.min(MOST_EDGES);
-    let all = (1u32 << count) - 1;
+    let all = first_bits(count);
     // For each edge, the bits of the edges that it shares an end with, and its own.
     let mut beside = [0; MOST_EDGES];
     let mut crowded = 0;

@@ -11,6 +11,7 @@ mod corners;
 mod distances;
 pub(crate) mod eight;
 mod fan;
+pub(crate) mod numbers;
 pub(crate) mod pair;
 mod pick;
 mod ranks;
@@ -19,7 +20,7 @@ mod sums;
 mod weighted;
 
 pub(crate) use boxes::point_box_body;
-pub use boxes::{Boxes, SearchBox, near_boxes, take_boxes};
+pub use boxes::{Boxes, CoveredBoxes, SearchBox, near_boxes, take_boxes};
 pub(crate) use corners::SLACK;
 pub use corners::{
     CornerGroup, Frame, LANES, Line, LineGroup, bisectors, cut_corners, farthest, touching_lines,

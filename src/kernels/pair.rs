@@ -1,6 +1,6 @@
 //! Two vectors as one, so that their chains of operations run side by side.
 
-use super::eight::Numbers;
+use super::numbers::Numbers;
 use std::ops::{Add, Div, Mul, Sub};
 
 /// Twice as many numbers, for operations that would wait for one another.

@@ -7,6 +7,7 @@
 use super::corners::LANES;
 use super::eight::Eight;
 use super::kernel;
+use super::pick::first_bits;
 
 /// Positions of one group.
 const GROUP: usize = 8;
@@ -94,11 +95,7 @@ fn take_body<F: Eight>(
         let (x, y, z) = (x * scale, y * scale, z * scale);
         let w = one - (x * x + y * y + z * z);
         // The weights after the last position are 0.
-        let some = if left < GROUP {
-            (1 << left) - 1
-        } else {
-            F::ALL
-        };
+        let some = u64::from(first_bits(left)) & F::ALL;
         left = left.saturating_sub(GROUP);
         let [w] = F::choose(some, [w], [none]);
         x.store(to_x);
@@ -106,61 +103,66 @@ fn take_body<F: Eight>(
         z.store(to_z);
         w.store(near);
         let [wx, wy, wz] = [w * x, w * y, w * z];
-        s[0] = s[0] + w;
-        s[1] = s[1] + wx;
-        s[2] = s[2] + wy;
-        s[3] = s[3] + wz;
-        s[4] = s[4] + wx * x;
-        s[5] = s[5] + wy * y;
-        s[6] = s[6] + wz * z;
-        s[7] = s[7] + wx * y;
-        s[8] = s[8] + wx * z;
-        s[9] = s[9] + wy * z;
+        let terms = [
+            w,
+            wx,
+            wy,
+            wz,
+            wx * x,
+            wy * y,
+            wz * z,
+            wx * y,
+            wx * z,
+            wy * z,
+        ];
+        add(&mut s, terms);
     }
     put_totals(s, sums, lane);
 }
 
-/// Adds the terms of a group to the sums of a surface.
 #[inline(always)]
-fn add_surface<F: Eight>(s: &mut [F; 23], [u, v, h, w]: [F; 4]) {
-    s[0] = s[0] + w;
-    s[22] = s[22] + w * w;
-    let wh = w * h;
-    s[15] = s[15] + wh;
-    s[21] = s[21] + wh * h;
-    let wu = w * u;
-    s[1] = s[1] + wu;
-    s[16] = s[16] + wu * h;
-    let wv = w * v;
-    s[2] = s[2] + wv;
-    s[17] = s[17] + wv * h;
-    let wuu = wu * u;
-    s[3] = s[3] + wuu;
-    s[18] = s[18] + wuu * h;
-    let wuuu = wuu * u;
-    s[6] = s[6] + wuuu;
-    s[10] = s[10] + wuuu * u;
-    s[11] = s[11] + wuuu * v;
-    let wuuv = wuu * v;
-    s[7] = s[7] + wuuv;
-    s[12] = s[12] + wuuv * v;
-    let wuv = wu * v;
-    s[4] = s[4] + wuv;
-    s[19] = s[19] + wuv * h;
-    let wvv = wv * v;
-    s[5] = s[5] + wvv;
-    s[20] = s[20] + wvv * h;
-    let wuvv = wvv * u;
-    s[8] = s[8] + wuvv;
-    s[13] = s[13] + wuvv * v;
-    let wvvv = wvv * v;
-    s[9] = s[9] + wvvv;
-    s[14] = s[14] + wvvv * v;
+fn add<F: Eight, const N: usize>(sums: &mut [F; N], terms: [F; N]) {
+    for (sum, term) in sums.iter_mut().zip(terms) {
+        *sum = *sum + term;
+    }
+}
+
+/// The terms of a group of positions in the sums of a surface.
+#[inline(always)]
+fn surface_terms<F: Eight>(u: F, v: F, h: F, w: F) -> [F; 23] {
+    let [wu, wv, wh] = [w * u, w * v, w * h];
+    let [wuu, wuv, wvv] = [wu * u, wu * v, wv * v];
+    let [wuuu, wuuv, wuvv, wvvv] = [wuu * u, wuu * v, wvv * u, wvv * v];
+    [
+        w,
+        wu,
+        wv,
+        wuu,
+        wuv,
+        wvv,
+        wuuu,
+        wuuv,
+        wuvv,
+        wvvv,
+        wuuu * u,
+        wuuu * v,
+        wuuv * v,
+        wuvv * v,
+        wvvv * v,
+        wh,
+        wu * h,
+        wv * h,
+        wuu * h,
+        wuv * h,
+        wvv * h,
+        wh * h,
+        w * w,
+    ]
 }
 
 kernel! {
-    /// Replaces the coordinates by those in the frame of three unit vectors u, v, h, and writes the sums with weights
-    /// by distance to a lane.
+    /// Replaces the coordinates by those in the frame of three unit vectors u, v, h, and writes the sums with
+    /// weights by distance to a lane.
     pub fn turn(all: &mut Weighted, frame: &[[f64; 3]; 3], sums: &mut SurfaceSums, lane: usize) -> ()
         = turn_body<Eight>
 }
@@ -181,19 +183,38 @@ fn turn_body<F: Eight>(
         (x * v[0] + y * v[1] + z * v[2]).store(to_y);
         (x * h[0] + y * h[1] + z * h[2]).store(to_z);
     }
-    put_surface_sums::<F>(&all.at, &all.near, sums, lane);
+    put_surface_sums::<F>(&all.at, &all.near, &Same, sums, lane);
 }
 
+/// How a position's weight follows from the one in the column. (A trait, since a closure would not be compiled
+/// for the level.)
+trait Weigh<F> {
+    fn weigh(&self, u: F, v: F, h: F, w: F) -> F;
+}
+
+/// The weight in the column.
+struct Same;
+
+impl<F> Weigh<F> for Same {
+    #[inline(always)]
+    fn weigh(&self, _: F, _: F, _: F, w: F) -> F {
+        w
+    }
+}
+
+/// Writes the sums with weights from a column to a lane.
 #[inline(always)]
 fn put_surface_sums<F: Eight>(
     [u, v, h]: &[Vec<[f64; GROUP]>; 3],
     weights: &[[f64; GROUP]],
+    weigh: &impl Weigh<F>,
     sums: &mut SurfaceSums,
     lane: usize,
 ) {
     let mut s = [F::splat(0.0); 23];
     for (((u, v), h), w) in u.iter().zip(v).zip(h).zip(weights) {
-        add_surface(&mut s, [F::load(u), F::load(v), F::load(h), F::load(w)]);
+        let [u, v, h, w] = [F::load(u), F::load(v), F::load(h), F::load(w)];
+        add(&mut s, surface_terms(u, v, h, weigh.weigh(u, v, h, w)));
     }
     put_totals(s, sums, lane);
 }
@@ -237,7 +258,7 @@ fn drop_body<F: Eight>(
         any |= beyond;
     }
     if any != 0 {
-        put_surface_sums::<F>(&all.at, &all.kept, sums, lane);
+        put_surface_sums::<F>(&all.at, &all.kept, &Same, sums, lane);
     }
     any != 0
 }
@@ -249,14 +270,16 @@ kernel! {
 
 #[inline(always)]
 fn square_body<F: Eight>(all: &Weighted, sums: &mut SurfaceSums, lane: usize) {
-    let mut s = [F::splat(0.0); 23];
-    let [u, v, h] = &all.at;
-    for (((u, v), h), near) in u.iter().zip(v).zip(h).zip(&all.near) {
-        let near = F::load(near);
-        let w = near * near;
-        add_surface(&mut s, [F::load(u), F::load(v), F::load(h), w]);
+    put_surface_sums::<F>(&all.at, &all.near, &Square, sums, lane);
+}
+
+struct Square;
+
+impl<F: Eight> Weigh<F> for Square {
+    #[inline(always)]
+    fn weigh(&self, _: F, _: F, _: F, w: F) -> F {
+        w * w
     }
-    put_totals(s, sums, lane);
 }
 
 kernel! {
@@ -279,18 +302,24 @@ fn fade_body<F: Eight>(
     sums: &mut SurfaceSums,
     lane: usize,
 ) {
-    let (c, one, none) = (splat(surface), F::splat(1.0), F::splat(0.0));
-    let part = F::splat(1.0 / limit);
-    let mut s = [F::splat(0.0); 23];
-    let [u, v, h] = &all.at;
-    for (((u, v), h), near) in u.iter().zip(v).zip(h).zip(&all.near) {
-        let (u, v, h, near) = (F::load(u), F::load(v), F::load(h), F::load(near));
-        let off = over(&c, u, v, h);
-        let rest = (one - off * off * part).larger(none);
-        let w = near * near * (rest * rest);
-        add_surface(&mut s, [u, v, h, w]);
+    let (surface, part) = (splat(surface), F::splat(1.0 / limit));
+    let fade = Fade { surface, part };
+    put_surface_sums::<F>(&all.at, &all.near, &fade, sums, lane);
+}
+
+struct Fade<F> {
+    surface: [F; 6],
+    /// 1 / limit.
+    part: F,
+}
+
+impl<F: Eight> Weigh<F> for Fade<F> {
+    #[inline(always)]
+    fn weigh(&self, u: F, v: F, h: F, w: F) -> F {
+        let off = over(&self.surface, u, v, h);
+        let rest = (F::splat(1.0) - off * off * self.part).larger(F::splat(0.0));
+        w * w * (rest * rest)
     }
-    put_totals(s, sums, lane);
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Lines in a disk's plane and their intersections.
 
 use super::Normal;
-use crate::kernels::eight::Numbers;
+use crate::kernels::numbers::Numbers;
 use crate::kernels::{Frame, Line, SLACK};
 
 /// A corner of the polygon.

@@ -13,7 +13,7 @@ use super::touch::differences;
 use super::{RIM_DISTANCE, secure2};
 use crate::geom::Point;
 use crate::geom::plane::Normal;
-use crate::kernels::eight::Eight;
+use crate::kernels::eight::{Eight, loaded, stored};
 use crate::kernels::sixteen::Sixteen;
 use crate::kernels::{
     Frame, LANES, Level, LineGroup, Place, SLACK, bisectors_body, kernel, touching_places_body,
@@ -257,8 +257,7 @@ fn frames<E: Eight>(sites: &[Site<'_>]) -> [[[f64; LANES]; 3]; 2] {
             column[place] = f64::from(x);
         }
     }
-    let [x, y, z] = &columns;
-    let [x, y, z] = [E::load(x), E::load(y), E::load(z)];
+    let [x, y, z] = loaded::<E, 3>(&columns);
     let zero = E::splat(0.0);
     // Across x or y, whichever is farther from the normal.
     let is_along_x = x.abs().greater(y.abs());
@@ -270,13 +269,7 @@ fn frames<E: Eight>(sites: &[Site<'_>]) -> [[[f64; LANES]; 3]; 2] {
         n[2] * u[0] - n[0] * u[2],
         n[0] * u[1] - n[1] * u[0],
     ];
-    let mut frames = [[[0.0; LANES]; 3]; 2];
-    for (to, vector) in frames.iter_mut().zip([u, v]) {
-        for (to, x) in to.iter_mut().zip(vector) {
-            x.store(to);
-        }
-    }
-    frames
+    [stored(u), stored(v)]
 }
 
 #[inline(always)]

@@ -2,7 +2,7 @@
 
 use super::{NORMAL_SCALE, Normal};
 use crate::geom::round::rounded;
-use crate::kernels::eight::Numbers;
+use crate::kernels::numbers::Numbers;
 use crate::method::METHOD;
 
 /// A scatter matrix that is not zero, divided by the largest of its diagonal, and its eigenvalues.

@@ -4,7 +4,7 @@
 //! Sums run over the point and then its neighbours, nearest first, with `+ - * / sqrt` only. So the bits are
 //! the same on every machine and do not depend on how the neighbours were found.
 
-use crate::geom::plane::least_direction;
+use crate::geom::plane::{Normal, least_direction};
 use crate::method::METHOD;
 use crate::stages::spacing::spacing2;
 use crate::stages::tiles::neighbors::Neighbors;
@@ -94,9 +94,7 @@ impl WeightedNeighbors {
             sum[1] * mean[2],
         ];
         let scatter = std::array::from_fn(|k| products[k] - crossed[k]);
-        let normal = least_direction(&scatter)?.map(f64::from);
-        let length = dot(normal, normal).sqrt();
-        Some(normal.map(|n| n / length))
+        least_direction(&scatter).map(unit)
     }
 
     /// Heights over the plane with `normal` and over a curved surface.
@@ -191,6 +189,13 @@ impl Surface {
         let on: f64 = (0..TERMS).map(|i| self.terms[i] * row[i]).sum();
         row[TERMS] - on
     }
+}
+
+/// A normal, scaled to unit length.
+pub(super) fn unit(normal: Normal) -> [f64; 3] {
+    let normal = normal.map(f64::from);
+    let length = dot(normal, normal).sqrt();
+    normal.map(|n| n / length)
 }
 
 /// Two unit vectors at right angles to each other and to `n`.

@@ -1,6 +1,7 @@
 //! Least-squares surfaces of first and second order, fitted for several points at a time.
 
-use crate::kernels::eight::{Eight, Numbers, stored};
+use crate::kernels::eight::{Eight, loaded, stored};
+use crate::kernels::numbers::Numbers;
 use crate::kernels::{LANES, SurfaceSums, kernel};
 use crate::method::METHOD;
 
@@ -34,11 +35,7 @@ kernel! {
 
 #[inline(always)]
 fn fits_body<F: Eight>(sums: &SurfaceSums) -> Fit<[f64; LANES]> {
-    let mut loaded = [F::splat(0.0); 23];
-    for (to, from) in loaded.iter_mut().zip(sums) {
-        *to = F::load(from);
-    }
-    let fit = Fit::of(&loaded);
+    let fit = Fit::of(&loaded::<F, 23>(sums));
     let [over_plane, over_curved, total, squares] =
         stored([fit.over_plane, fit.over_curved, fit.total, fit.squares]);
     Fit {

@@ -6,10 +6,10 @@
 //! the bits are the same on every machine and do not depend on how the neighbours were found. Several points
 //! are collected, and each step is taken for all of them.
 
-use super::edges::frame;
+use super::edges::{frame, unit};
 use super::fit::{Fit, TERMS, fits};
 use crate::geom::plane::{Normal, least_directions};
-use crate::kernels::eight::{Eight, stored};
+use crate::kernels::eight::{Eight, loaded, stored};
 use crate::kernels::{
     LANES, Level, SpreadSums, SurfaceSums, Weighted, drop_beyond, fade, kernel, square_weights,
     take_weighted, turn,
@@ -152,23 +152,20 @@ kernel! {
 
 #[inline(always)]
 fn scatters_body<F: Eight>(sums: &SpreadSums) -> [[f64; LANES]; 6] {
-    let [total, x, y, z, xx, yy, zz, xy, xz, yz] = sums;
-    let (total, x, y, z) = (F::load(total), F::load(x), F::load(y), F::load(z));
+    let [total, x, y, z, xx, yy, zz, xy, xz, yz] = loaded::<F, 10>(sums);
     let [mx, my, mz] = [x / total, y / total, z / total];
     stored([
-        F::load(xx) - x * mx,
-        F::load(yy) - y * my,
-        F::load(zz) - z * mz,
-        F::load(xy) - x * my,
-        F::load(xz) - x * mz,
-        F::load(yz) - y * mz,
+        xx - x * mx,
+        yy - y * my,
+        zz - z * mz,
+        xy - x * my,
+        xz - x * mz,
+        yz - y * mz,
     ])
 }
 
 fn frame_along(normal: Normal) -> Frame {
-    let [x, y, z] = normal.map(f64::from);
-    let length = (x * x + y * y + z * z).sqrt();
-    let normal = [x / length, y / length, z / length];
+    let normal = unit(normal);
     let [u, v] = frame(normal);
     [u, v, normal]
 }

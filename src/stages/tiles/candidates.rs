@@ -4,7 +4,7 @@ use super::{LEAVES, OwnPage, Tile};
 use crate::geom::Point;
 use crate::geom::aabb::Aabb;
 use crate::kernels::{
-    BLOCK, Boxes, Level, Pick, SearchBox, first_bits, kernel, near_boxes, point_box_body,
+    BLOCK, CoveredBoxes, Level, Pick, SearchBox, first_bits, kernel, near_boxes, point_box_body,
     take_boxes,
 };
 use crate::workspace::memory::bytes_of;
@@ -108,9 +108,7 @@ pub(super) struct Candidates {
 #[derive(Debug, Default)]
 pub(super) struct PageLeaves {
     /// The boxes of the leaves, with their numbers in the tile.
-    boxes: Boxes,
-    /// The boxes around blocks of them.
-    covers: Boxes,
+    boxes: CoveredBoxes,
     /// The pages, each with its number of leaves.
     pages: Vec<(u32, u32)>,
     near: Vec<u32>,
@@ -126,23 +124,17 @@ impl PageLeaves {
         self.pages.clear();
         self.pages
             .extend(tile.near[own.near.clone()].iter().map(page));
-        self.boxes.clear();
         let around = within(&tile.page_boxes[own.local], own.reach2);
-        take_boxes(
-            level,
-            &tile.leaf_boxes,
-            &self.pages,
-            around,
-            &mut self.boxes,
-        );
-        self.boxes.cover(&mut self.covers);
+        let (from, pages) = (&tile.leaf_boxes, &self.pages);
+        self.boxes
+            .set(|boxes| take_boxes(level, from, pages, around, boxes));
         self.near
             .resize((self.boxes.len() + BLOCK).max(self.near.len()), 0);
     }
 
     /// Allocated bytes of its lists.
     pub fn bytes(&self) -> u64 {
-        self.boxes.bytes() + self.covers.bytes() + bytes_of(&self.pages) + bytes_of(&self.near)
+        self.boxes.bytes() + bytes_of(&self.pages) + bytes_of(&self.near)
     }
 
     /// Collects the points of all leaves within `d2` of `around`, a box inside the page; `d2` is at most the
@@ -157,7 +149,7 @@ impl PageLeaves {
         out: &mut Candidates,
     ) {
         let limit = within(around, d2);
-        let mut count = near_boxes(level, &self.boxes, &self.covers, limit, &mut self.near);
+        let mut count = near_boxes(level, &self.boxes, limit, &mut self.near);
         if let Some(wanted) = wanted {
             count = keep(&mut self.near[..count], |leaf| {
                 let (min, max) = tile.leaf_boxes.get(leaf as usize);

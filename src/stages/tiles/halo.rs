@@ -4,7 +4,7 @@
 use super::MOST_HALO;
 use super::candidates::within;
 use crate::geom::aabb::Aabb;
-use crate::kernels::{BLOCK, Boxes, Level, near_boxes};
+use crate::kernels::{BLOCK, CoveredBoxes, Level, near_boxes};
 use crate::stages::order::PointStore;
 
 /// Most pages within the reach of a page; a reach that touches more is shortened.
@@ -138,9 +138,7 @@ struct ReachablePages<'a> {
     store: &'a PointStore,
     level: Level,
     /// The boxes of the pages within `reach` of the tile's box, with their numbers.
-    boxes: Boxes,
-    /// The boxes around blocks of them.
-    covers: Boxes,
+    boxes: CoveredBoxes,
     reach: u64,
     found: Vec<u32>,
 }
@@ -155,18 +153,18 @@ impl<'a> ReachablePages<'a> {
         let mut around = Self {
             store,
             level: Level::best(),
-            boxes: Boxes::default(),
-            covers: Boxes::default(),
+            boxes: CoveredBoxes::default(),
             reach: full(longest) * MOST_TIMES,
             found: Vec::new(),
         };
         let most = MOST_AROUND * size;
         if store.pages_near(&all, around.reach, most, &mut around.found) {
-            for &page in &around.found {
-                let Aabb { min, max } = *store.page_box(page as usize);
-                around.boxes.push(min, max, page);
-            }
-            around.boxes.cover(&mut around.covers);
+            around.boxes.set(|boxes| {
+                for &page in &around.found {
+                    let Aabb { min, max } = *store.page_box(page as usize);
+                    boxes.push(min, max, page);
+                }
+            });
         } else {
             around.reach = 0;
         }
@@ -180,8 +178,7 @@ impl<'a> ReachablePages<'a> {
         if reach <= self.reach {
             let limit = within(bounds, reach * reach);
             self.found.resize(self.boxes.len() + BLOCK, 0);
-            let (boxes, covers) = (&self.boxes, &self.covers);
-            let count = near_boxes(self.level, boxes, covers, limit, &mut self.found);
+            let count = near_boxes(self.level, &self.boxes, limit, &mut self.found);
             return (&self.found[..count], count <= most);
         }
         let all = (self.store).pages_near(bounds, reach, most, &mut self.found);

@@ -151,9 +151,9 @@ fn sum_body<P: Pick>(
     Ok(())
 }
 
-/// Picks candidates, with ids if wanted, with their approximate squared distances from `point` in `search.distances`, and finds a
-/// limit within which exactly the point itself and its `k` nearest neighbours lie. Returns the number of
-/// picked places, whole blocks, and the limit.
+/// Picks candidates, with ids if wanted, puts their approximate squared distances from `point` into
+/// `search.distances`, and finds a limit within which exactly the point itself and its `k` nearest neighbours
+/// lie. Returns the number of picked places, whole blocks, and the limit.
 #[inline(always)]
 pub(super) fn divided_body<P: Pick, const IDS: bool>(
     search: &mut Search,
