@@ -28,16 +28,16 @@ pub(crate) const METHOD: Constants = VALUES;
 constants! {
     /// Intervals of the curve that orders the points: small pieces of surface.
     curve: Curve {
-        /// Length of a patch. Local spacings are measured for patches, rough patches are relaxed, and flat
-        /// parts of the surface are joined inside patches before the rest is oriented.
+        /// Length of a patch. Local spacings are measured for patches, and flat parts of the surface are joined
+        /// inside patches before the rest is oriented.
         patch: usize = 256, "ids";
-        /// Length of a run: its points are sampled together and moved again together.
+        /// Length of a run: its points are sampled together.
         run: usize = 16, "ids";
-        /// One in this number of runs is sampled to decide which points move. More samples cost time on clean
+        /// One in this number of runs is sampled to find the regions with noise. More samples cost time on clean
         /// clouds.
         sample: usize = 8, "runs";
-        /// Length of a block, in which T12 triangles are inserted and edges flipped, and of a region, in
-        /// which noise is distinguished from edges as the cause of rough patches.
+        /// Length of a block, in which T12 triangles are inserted and edges flipped, and of a region, whose
+        /// points are examined if its samples show noise.
         block: u32 = 1 << 16, "ids";
     }
     /// The plane fitted to a point's neighbours.
@@ -72,26 +72,20 @@ constants! {
     }
     /// Points off the surface, such as birds, dust and wires.
     off_surface: OffSurface {
-        /// A point is off the surface if its neighbours reach more than this many usual reaches of its patch.
-        /// With 4, three times as many points of terrestrial scans are left out; with 6, points in the air
-        /// are connected over a twentieth of the ground of a generated world.
+        /// A point can be off the surface if its neighbours reach more than this many usual reaches of its
+        /// region.
         far: u128 = 5, "usual reaches";
         /// The usual reach of a patch is the quantile of its samples with this denominator: the lower
         /// quartile.
         quantile: usize = 4, "one in";
-        /// A neighbourhood fills space if its scatter along the normal is more than one part in this number
-        /// of the total scatter. On a surface with noise of one spacing it is a sixth.
+        /// Such a point is off the surface if its neighbours fill space: their scatter along the normal is
+        /// more than one part in this number of the total scatter. On a surface with noise of one spacing it
+        /// is a sixth.
         space: f64 = 7.0, "one part in", [6.0, 9.0];
-        /// A patch that is far for its region is in the air if at least one in this number of its samples
-        /// fills space. With 2 everywhere, sheets of birds hang over 1.4 % of the ground of a landscape.
-        airy: usize = 2, "one in", [1, 4];
-        /// The same share where far patches are few. With 16 everywhere, a seventh of a room scanned from its
-        /// middle is lost.
-        airy_if_few: usize = 16, "one in";
-        /// Far patches are few if they are at most one in this number of the patches of a region. Where
-        /// density falls with the distance from a scanner they are many; in a landscape with one bird for 200
-        /// points they are one in 60.
-        few: usize = 16, "one in";
+        /// Or if it is farther from the plane of its neighbours than this share of their reach. A bird over
+        /// the ground is above it, a coarse point beside a dense area is not. Nor does smoothing move a point
+        /// that far.
+        beside: f64 = 0.5, "reaches", [0.35, 0.7];
     }
     /// Smoothing by a curved surface, which also distinguishes edges from noise.
     smoothing: Smoothing {
@@ -123,41 +117,25 @@ constants! {
         /// over it: in noise a plane is more accurate.
         gain: f64 = 1.25, "times", [1.1, 1.5];
     }
-    /// Relaxing: selection of the points that move for the connectivity.
-    relax: Relax {
-        /// Default number of rounds.
-        rounds: u32 = 3, "rounds";
-        /// A point is rough if it is farther from its plane. With 0.3, noise of 0.15 spacings is not relaxed;
-        /// with 0.15, details of a machine part are relaxed.
-        rough: f64 = 0.2, "local spacings";
-        /// A patch is rough if more than one in this number of its samples are rough.
-        patch: usize = 16, "one in";
-        /// Number of witnesses: rough points of a patch that decide whether it is curved or noisy.
-        witnesses: usize = 3, "points";
-        /// A point is curved if a curved surface leaves a smaller share of the squared heights over the
-        /// plane: edges leave a quarter to a half, noise nearly all.
-        curved: f64 = 0.5, "share", [0.4, 0.65];
-        /// A patch is noisy if fewer than one in this number of its witnesses are curved.
-        noisy: usize = 2, "one in";
-        /// Nothing moves in a region of which fewer than one patch in this number is noisy.
-        region: usize = 8, "one in";
-        /// Nothing moves in a region where a smaller share of the rough patches is noisy: the others are
-        /// edges. A machine part has 27 % at most, a carved lion 35 % at least.
-        edges: usize = 30, "% of the rough patches";
-        /// Nothing moves in a region where more than this share of the fine witnesses is clean: the details
-        /// are too fine for the points. Clean parts have 16 % and more, real scans 4 % at most.
-        clean: usize = 10, "% of the fine witnesses";
-        /// If more than this share is clean, the points lie in clean layers, which relaxing merges into one
-        /// surface if they are up to three spacings apart.
-        layers: usize = 70, "% of the fine witnesses", [50, 90];
-        /// Nearest neighbours used to measure noise, whatever the shape of the surface.
-        nearest: usize = 12, "points", [9, 18];
-        /// A point is fine if it and these neighbours have at least this number of different coordinates on
-        /// each axis. Coarsely rounded points lie in layers, which look smooth.
-        different: usize = 9, "values", [5, 12];
-        /// A fine point is clean if the root mean square height of its nearest neighbours over a curved
-        /// surface, for each degree of freedom, is less.
-        height: f64 = 0.03, "local spacings";
+    /// Noise: which points are smoothed, and how often.
+    noise: Noise {
+        /// Nearest neighbours whose heights over a surface of second order are the noise at a point. So few
+        /// that they lie on one sheet of a plate 1.5 spacings thick; with 12, a tenth of the points of such a
+        /// plate seem noisy.
+        nearest: usize = 8, "points", [7, 12];
+        /// A point is clean if its noise is at most this. A clean scan of a face has 0.031 at one point of
+        /// 120 000, a scan with noise of a quarter of the spacing less than 0.083 at one point of 20.
+        floor: f64 = 0.035, "local spacings";
+        /// Noise above which there is a second round; twice as much asks for a third.
+        round: f64 = 0.15, "local spacings";
+        /// Root mean square height of the neighbours over their surface, for each round that the noise asks for,
+        /// above which they lie in layers or show details: then fewer neighbours are used.
+        layers: f64 = 0.4, "local spacings", [0.3, 0.6];
+        /// A point stays where it is if at least one in this number of its neighbours is clean: they tell
+        /// edges, details and thin sheets from noise.
+        few: usize = 10, "one in";
+        /// Most rounds, by default.
+        rounds: u32 = 3, "rounds", [2, 4];
     }
     /// Orientation of the surface, and the cuts where it is one-sided.
     orientation: Orientation {
@@ -234,17 +212,12 @@ constants! {
     components: Components {
         /// Least number of triangles (paper: 10).
         least: u64 = 10, "triangles";
-        /// A cloud is noisy if the sum of moved points over all rounds is at least one in this number of its
-        /// points.
+        /// A cloud is noisy if at least one in this number of its points is.
         noisy: u64 = 2, "one in";
         /// In a noisy cloud a component needs one triangle for each of this number of points of the cloud.
         each_if_noisy: u64 = 5000, "points";
         /// Largest number of triangles required in a noisy cloud.
         most_if_noisy: u64 = 150, "triangles";
-        /// With smoothing a component needs one triangle for each of this number of points of the cloud.
-        each_if_smoothed: u64 = 2500, "points";
-        /// Largest number of triangles required with smoothing.
-        most_if_smoothed: u64 = 1000, "triangles";
         /// An open component is oriented by its vector area if this is at least one part in this number of
         /// its area; else outwards.
         open: f64 = 4.0, "one part in";

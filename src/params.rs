@@ -62,6 +62,51 @@ impl std::str::FromStr for Method {
     }
 }
 
+/// How often points are smoothed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Smooth {
+    /// Each point as often as its neighbourhood is noisy: clean points stay where they are.
+    Auto,
+    /// All points, in this number of rounds.
+    #[serde(untagged)]
+    Rounds(u32),
+}
+
+impl Smooth {
+    /// Rounds in which all points move.
+    #[must_use]
+    pub fn rounds(self) -> u32 {
+        match self {
+            Self::Auto => 0,
+            Self::Rounds(rounds) => rounds,
+        }
+    }
+}
+
+impl std::str::FromStr for Smooth {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text.trim() {
+            "auto" => Ok(Self::Auto),
+            number => {
+                let wrong = |_| format!("{text:?} is not auto or a number of rounds");
+                number.parse().map(Self::Rounds).map_err(wrong)
+            }
+        }
+    }
+}
+
+impl std::fmt::Display for Smooth {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Auto => f.write_str("auto"),
+            Self::Rounds(rounds) => write!(f, "{rounds}"),
+        }
+    }
+}
+
 /// A limit for lengths.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -162,11 +207,12 @@ pub struct Params {
     pub method: Method,
     /// Neighbours for planes and smoothing (paper: 30).
     pub neighbors: usize,
-    /// Rounds of smoothing (paper: 0 to 2).
-    pub smooth: u32,
-    /// Method of smoothing.
+    /// Rounds of smoothing (paper: 0 to 2), or only where points are noisy.
+    pub smooth: Smooth,
+    /// Method of smoothing in rounds; points that are smoothed because they are noisy keep edges.
     pub smoothing: Smoothing,
-    /// Largest number of rounds of relaxing: smoothing that decides only which points are connected.
+    /// Largest number of rounds in which noisy points move: for the connectivity only, or with
+    /// [`Smooth::Auto`] in the mesh too.
     pub relax: u32,
     /// Disk radius.
     pub radius: Radius,
@@ -174,9 +220,8 @@ pub struct Params {
     pub max_angle: f64,
     /// Fill holes of up to this many edges (paper: 500).
     pub max_hole_edges: usize,
-    /// Remove components with fewer triangles (paper: 10). `None`: 10; in noise, where many points were
-    /// relaxed, one for each 5000 points, from 10 to 150, or with smoothing one for each 2500, from 10 to
-    /// 1000.
+    /// Remove components with fewer triangles (paper: 10). `None`: 10; if at least half of the points are
+    /// noisy, or with rounds of smoothing, one for each 5000 points, from 10 to 150.
     pub min_component: Option<u64>,
     /// Keep points off the surface: those far from their neighbours for the density of the surroundings. The
     /// paper's method always keeps them, and has no limits of length.
@@ -234,9 +279,9 @@ impl Default for Params {
             drop_outliers: None,
             method: Method::Robust,
             neighbors: METHOD.plane.neighbors,
-            smooth: 0,
+            smooth: Smooth::Auto,
             smoothing: Smoothing::Edges,
-            relax: METHOD.relax.rounds,
+            relax: METHOD.noise.rounds,
             radius: Radius::Auto,
             max_angle: METHOD.admissibility.angle,
             max_hole_edges: METHOD.filling.longest,
@@ -263,6 +308,7 @@ impl Params {
     pub fn paper() -> Self {
         Self {
             method: Method::Paper,
+            smooth: Smooth::Rounds(0),
             smoothing: Smoothing::Plain,
             relax: 0,
             max_angle: 60.0,
@@ -348,17 +394,16 @@ impl Params {
     }
 
     /// The least number of triangles of a component that stays, in a cloud of `points` points; `noisy` if
-    /// many were relaxed.
+    /// at least half of them are.
     #[must_use]
     pub fn least_component(&self, points: u64, noisy: bool) -> u64 {
         let limits = METHOD.components;
-        let (each, most) = match (self.smooth > 0, noisy) {
-            (true, _) => (limits.each_if_smoothed, limits.most_if_smoothed),
-            (false, true) => (limits.each_if_noisy, limits.most_if_noisy),
-            (false, false) => return self.min_component.unwrap_or(limits.least),
+        let usual = match noisy || self.smooth.rounds() > 0 {
+            true => (points / limits.each_if_noisy).min(limits.most_if_noisy),
+            false => 0,
         };
         self.min_component
-            .unwrap_or_else(|| (points / each).min(most).max(limits.least))
+            .unwrap_or_else(|| usual.max(limits.least))
     }
 
     /// # Errors
@@ -423,8 +468,8 @@ impl Params {
         {
             return error("--origin", format!("{at:?}"), "finite coordinates");
         }
-        if self.smooth > 100 {
-            return error("--smooth", self.smooth.to_string(), "0 to 100");
+        if self.smooth.rounds() > 100 {
+            return error("--smooth", self.smooth.to_string(), "auto, or 0 to 100");
         }
         if self.relax > 100 {
             return error("--relax", self.relax.to_string(), "0 to 100");

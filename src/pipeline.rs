@@ -129,11 +129,12 @@ impl Reconstruction {
         let values = stages.values(&spool, &lattice, &points)?;
         let radius = stages.radius(&points, &lattice);
         let points = stages.smooth(points)?;
+        let (points, relaxed) = stages.relax(points)?;
         let store = points.open(workspace)?;
-        let relaxed = stages.relax(&store)?;
         let shape = stages.open_shape(relaxed)?;
         let places = stages.places(&store, &shape, &values, &lattice);
-        let seen = stages.cells(places, radius)?;
+        let (seen, coarse) = stages.cells(places, radius)?;
+        let places = places.with_coarse(coarse.as_ref());
         let triples = stages.triples(&seen)?;
         let stitched = stages.stitch(places, &triples)?;
         let repaired = stages.repair(places, &stitched)?;

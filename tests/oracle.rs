@@ -5,7 +5,7 @@ mod reference;
 
 use outcrop::inspect::ply_mesh::{PlyMesh, Sink};
 use outcrop::{
-    Division, Error, MaxWidth, Method, Params, Radius, Reconstruction, Report, Smoothing,
+    Division, Error, MaxWidth, Method, Params, Radius, Reconstruction, Report, Smooth, Smoothing,
 };
 use reference::weighing::Weighing;
 use reference::{Counts, Mesh, Settings, clouds};
@@ -152,7 +152,10 @@ fn pipeline(
     let inputs = seen.write(points, folder.path());
     let params = Params {
         neighbors: settings.neighbors,
-        smooth: settings.smooth,
+        smooth: match settings.auto {
+            true => Smooth::Auto,
+            false => Smooth::Rounds(settings.smooth),
+        },
         radius: match settings.radius {
             reference::Radius::Auto => Radius::Auto,
             reference::Radius::Percent(x) => Radius::Percent(x),
@@ -362,8 +365,7 @@ const CUTS: [Cut; 3] = [
 #[derive(Debug, Default)]
 struct Reached {
     rounds: u32,
-    curved: usize,
-    clean: usize,
+    kept: usize,
     on_a_line: usize,
     one_sided: usize,
     met: Weighing,
@@ -382,8 +384,7 @@ struct Reached {
 impl Reached {
     fn add(&mut self, counts: &Counts) {
         self.rounds = self.rounds.max(counts.rounds);
-        self.curved += counts.curved;
-        self.clean += counts.clean;
+        self.kept += counts.kept;
         self.on_a_line += counts.flat + counts.flat_candidates;
         self.one_sided += counts.one_sided;
         self.met.add(&counts.met);
@@ -481,6 +482,7 @@ fn holes_of_few_edges_and_wide_angles() {
 fn robust() {
     let reached = run(100..112, |seed| Settings {
         relax: seed as u32 % 4,
+        auto: seed.is_multiple_of(2),
         neighbors: [30, 12][seed as usize / 6 % 2],
         block: [40, 7, 100, 15, 25, 65_536][seed as usize % 6],
         patch: [4, 256, 16, 7, 10][seed as usize % 5],
@@ -492,7 +494,7 @@ fn robust() {
         ..Settings::robust()
     });
     let parts = [
-        reached.curved,
+        reached.kept,
         reached.on_a_line,
         reached.one_sided,
         reached.merges_reverted,
@@ -593,6 +595,7 @@ fn robust_on_torn_sheets_and_doors() {
         let settings = Settings {
             smooth: (seed == 3) as u32,
             relax: 1 + seed as u32 % 3,
+            auto: seed == 0,
             neighbors: [12, 20][seed as usize % 2],
             block: [30, 200, 65_536][seed as usize % 3],
             patch: [256, 8, 16][seed as usize % 3],
@@ -600,8 +603,7 @@ fn robust_on_torn_sheets_and_doors() {
             ..Settings::robust()
         };
         let counts = compare("half rough", &points, &settings, &CUTS);
-        let all = settings.relax as usize * points.len();
-        some_stayed += usize::from(0 < counts.moved && counts.moved < all);
+        some_stayed += usize::from(0 < counts.moved && counts.moved < points.len());
         reached.add(&counts);
         let settings = Settings {
             neighbors: 8,
@@ -626,7 +628,7 @@ fn robust_on_torn_sheets_and_doors() {
     }
     let parts = [
         reached.openings,
-        reached.clean,
+        reached.kept,
         reached.met.folded,
         reached.met.cut_inside,
         reached.met.votes,

@@ -122,6 +122,18 @@ impl Moments {
         METHOD.off_surface.space * along > (xx + yy + zz) * (x * x + y * y + z * z)
     }
 
+    /// True if the point is beside the plane with `normal` through the centroid of its neighbours: farther
+    /// from it than a share of the distance that the neighbours reach, whose square is `last2`.
+    #[must_use]
+    pub fn is_beside(&self, normal: Normal, last2: u64) -> bool {
+        let n = normal.map(f64::from);
+        let s = self.sum.map(|sum| sum as f64);
+        let along = s[0] * n[0] + s[1] * n[1] + s[2] * n[2];
+        let length2 = n[0] * n[0] + n[1] * n[1] + n[2] * n[2];
+        let limit = METHOD.off_surface.beside * self.count as f64;
+        along * along > limit * limit * (last2 as f64 * length2)
+    }
+
     /// The best-fitting plane of the point and its neighbours.
     #[must_use]
     pub fn plane(&self) -> Plane {

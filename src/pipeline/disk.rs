@@ -12,7 +12,7 @@
 use crate::error::{Error, Result};
 use crate::geom::aabb::Aabb;
 use crate::geom::lattice::Lattice;
-use crate::params::{Method, Params};
+use crate::params::{Method, Params, Smooth};
 use crate::report::DiskEstimate;
 use crate::stages::export::{self, CoordinateType, Mesh};
 use crate::stages::ingest::{self, Attributes, Column, Probe, Spool};
@@ -100,7 +100,7 @@ impl Text {
         points: &StoredPoints,
     ) -> Result<Self> {
         let own = spool.choose_lattice(0)?;
-        let finer = params.smooth > 0 || !own.exact;
+        let finer = params.smooth != Smooth::Rounds(0) || !own.exact;
         let Aabb { min, max } = points.bounds();
         Ok(Self {
             decimals: export::decimals(if finer { lattice } else { &own }),
@@ -223,7 +223,7 @@ impl Known {
         if params.thin.is_some() {
             early = early.max(self.spool as f64 + 2.0 * POSITION * self.read as f64);
         }
-        if params.smooth > 0 || params.drop_outliers.is_some() {
+        if params.smooth.rounds() > 0 || params.drop_outliers.is_some() {
             early = early.max(2.0 * STORED * points);
         }
         if params.relax > 1 {
@@ -274,7 +274,7 @@ impl Known {
             Some(true) => (1.0, 2.3, 1.97),
             Some(false) if params.relax > 0 => (0.0, 2.05, 1.98),
             None if params.relax > 0 => (0.5, 2.2, 1.97),
-            _ if params.smooth > 0 => (0.0, 2.3, 1.9),
+            _ if params.smooth.rounds() > 0 => (0.0, 2.3, 1.9),
             _ if robust => (0.0, 2.7, 1.85),
             _ => (0.0, 2.7, 1.75),
         }

@@ -50,7 +50,7 @@ pub(super) fn plan(
     if valued {
         add("attributes", ATTRIBUTES);
     }
-    for _ in 0..params.smooth {
+    for _ in 0..params.smooth.rounds() {
         add("smooth", SMOOTH);
     }
     if params.relax > 0 || params.method == Method::Robust {

@@ -12,7 +12,7 @@ use super::{Clock, Known, Reconstruction};
 use crate::error::Result;
 use crate::geom::lattice::Lattice;
 use crate::method::{METHOD, method_version};
-use crate::params::Method;
+use crate::params::{Method, Smooth};
 use crate::report::{LatticeReport, Report};
 use crate::stages::blocks::Blocks;
 use crate::stages::cells::{CellTriples, DiskRadius, TileRanges, Widen, cells};
@@ -24,7 +24,7 @@ use crate::stages::order::{Orderer, PointStore, StoredPoints, order, sample_sort
 use crate::stages::outliers::{OutlierOptions, drop_outliers};
 use crate::stages::repair::{RepairOptions, Repaired, repair};
 use crate::stages::smooth::{Relaxed, Relaxing, relax, smooth};
-use crate::stages::spacing::{Density, Spacings};
+use crate::stages::spacing::{Coarse, Density, Spacings};
 use crate::stages::stitch::{StitchOptions, Stitched, stitch};
 use crate::stages::thin::{Grid, LeftOut, thin};
 use crate::stages::triples::{Triples, triples};
@@ -180,7 +180,7 @@ impl<'a> Stages<'a> {
         self.report.input = input;
         narrow.into_iter().for_each(|warning| self.warn(warning));
         self.check_room()?;
-        let moves = params.smooth + params.relax > 0;
+        let moves = params.smooth.rounds() + params.relax > 0;
         let lattice = spool.choose_lattice(if moves { METHOD.smoothing.halvings } else { 0 })?;
         self.coarse = spool.choose_lattice(0)?.step;
         self.check_origin(&lattice)?;
@@ -322,7 +322,7 @@ impl<'a> Stages<'a> {
         let (params, workspace, tiles) = (&self.job.params, self.workspace, self.tiles());
         workspace.trim();
         let points = self.report.points;
-        for round in 1..=params.smooth {
+        for round in 1..=params.smooth.rounds() {
             let step = format!("smooth {round}");
             let next = self.clock.round("smooth", &step, "points", points, || {
                 let (k, smoothing) = (params.neighbors, params.smoothing);
@@ -335,28 +335,43 @@ impl<'a> Stages<'a> {
         Ok(store)
     }
 
-    /// The relaxed positions, which decide how points are connected.
-    pub fn relax(&mut self, store: &PointStore) -> Result<Option<Relaxed>> {
+    /// Smooths the noisy points: returns the points of the mesh, and the positions that decide how they are
+    /// connected.
+    pub fn relax(&mut self, points: StoredPoints) -> Result<(StoredPoints, Option<Relaxed>)> {
         let (params, workspace, tiles) = (&self.job.params, self.workspace, self.tiles());
         let options = Relaxing {
             neighbors: params.neighbors,
             rounds: params.relax,
-            smoothed: params.smooth > 0,
-            off_surface: params.off_surface(),
         };
-        let wanted = params.relax > 0 || params.method == Method::Robust;
-        let items = self.report.points * u64::from(params.relax.max(1));
-        let relaxed = wanted.then(|| {
-            self.clock.stage("relax", "points", items, || {
-                relax(store, tiles, options, workspace)
-            })
-        });
-        let relaxed = relaxed.transpose()?;
+        let mut relaxed = None;
+        if params.relax > 0 || params.method == Method::Robust {
+            let items = self.report.points * u64::from(params.relax + 1);
+            relaxed = Some(self.clock.stage("relax", "points", items, || {
+                relax(&points.open(workspace)?, tiles, options, workspace)
+            })?);
+        }
+        let moved = relaxed.as_mut().filter(|_| params.smooth == Smooth::Auto);
+        let points = match moved.and_then(|relaxed| relaxed.store.take()) {
+            Some(moved) => {
+                points.release(workspace)?;
+                moved
+            }
+            None => points,
+        };
         self.report.relax = relaxed.as_ref().map(|r| r.stats);
         self.known.points = self.report.points;
         self.known.moved = relaxed.as_ref().map(|r| r.store.is_some());
         self.check_room()?;
-        Ok(relaxed)
+        Ok((points, relaxed))
+    }
+
+    /// True if the points of the mesh are not where they were measured.
+    fn is_smoothed(&self) -> bool {
+        let noisy = self.report.relax.is_some_and(|relax| relax.moved > 0);
+        match self.job.params.smooth {
+            Smooth::Auto => noisy,
+            Smooth::Rounds(rounds) => rounds > 0,
+        }
     }
 
     /// Opens the shape.
@@ -389,6 +404,7 @@ impl<'a> Stages<'a> {
             scanners: values.scanners(),
             density: robust.map(|spacings| Density {
                 spacings,
+                coarse: None,
                 neighbors: params.neighbors,
                 limits: params.limits(lattice.step),
             }),
@@ -396,7 +412,11 @@ impl<'a> Stages<'a> {
     }
 
     /// Computes the restricted Voronoi cells.
-    pub fn cells(&mut self, places: Places<'_>, radius: DiskRadius) -> Result<CellTriples> {
+    pub fn cells(
+        &mut self,
+        places: Places<'_>,
+        radius: DiskRadius,
+    ) -> Result<(CellTriples, Option<Coarse>)> {
         let (params, workspace, tiles) = (&self.job.params, self.workspace, self.tiles());
         let (k, points) = (params.neighbors, self.report.points);
         let widen = match params.method {
@@ -405,12 +425,13 @@ impl<'a> Stages<'a> {
         };
         workspace.trim();
         let (shape, density) = (places.shape, places.density);
-        let (seen, stats) = self.clock.stage("cells", "points", points, || {
+        let (seen, coarse, stats) = self.clock.stage("cells", "points", points, || {
             cells(shape, tiles, k, radius, widen, density, workspace)
         })?;
         not_a_line(&stats, points)?;
         self.report.cells = stats;
-        Ok(seen)
+        let coarse = coarse.map(|coarse| Coarse::open(coarse, workspace));
+        Ok((seen, coarse.transpose()?))
     }
 
     /// Adds up the number of cells of each triple.

@@ -4,7 +4,7 @@ use super::blocks::Blocks;
 use super::cells::CountedTriple;
 use super::order::PointStore;
 use super::scanners::Scanners;
-use super::spacing::Density;
+use super::spacing::{Coarse, Density};
 use crate::error::Result;
 use crate::geom::Point;
 use crate::geom::triangle::on_a_line;
@@ -26,7 +26,17 @@ pub struct Places<'a> {
     pub scanners: Option<Scanners<'a>>,
 }
 
-impl Places<'_> {
+impl<'a> Places<'a> {
+    /// With the points that are coarser than their patch.
+    #[must_use]
+    pub fn with_coarse(self, coarse: Option<&'a Coarse>) -> Self {
+        let with = |density| Density { coarse, ..density };
+        Self {
+            density: self.density.map(with),
+            ..self
+        }
+    }
+
     /// True if the positions in the file differ from those that decide the connectivity.
     #[must_use]
     pub fn differ(&self) -> bool {

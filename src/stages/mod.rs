@@ -41,6 +41,7 @@ pub mod export;
 pub mod draw;
 
 pub mod blocks;
+pub mod levels;
 pub mod located;
 pub mod scanners;
 pub mod surface;

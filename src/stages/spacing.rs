@@ -3,8 +3,10 @@
 use crate::error::Result;
 use crate::geom::Point;
 use crate::geom::distance2;
+use crate::geom::plane::{Moments, Normal};
 use crate::geom::triangle::area;
 use crate::method::METHOD;
+use crate::stages::levels::Levels;
 use crate::workspace::Workspace;
 use crate::workspace::memory::Reservation;
 use serde::{Deserialize, Serialize};
@@ -41,11 +43,12 @@ pub struct Limits {
     pub fill: Width,
 }
 
-/// For each patch, the squared distance that the `k` nearest neighbours of a point usually reach (the usual
-/// reach).
+/// For each patch and each region, the squared distance that the `k` nearest neighbours of a point usually
+/// reach (the usual reach).
 #[derive(Debug, Serialize, Deserialize)]
 pub struct StoredSpacings {
     usual2: Vec<u64>,
+    regions2: Vec<u64>,
 }
 
 /// [`StoredSpacings`] with a reservation of memory.
@@ -55,11 +58,57 @@ pub struct Spacings {
     _held: Reservation,
 }
 
+/// The points that are coarser than their patch: for each point a number from 0 to 3, by which its own reach
+/// exceeds the usual reach of the patch.
+#[derive(Debug)]
+pub struct Coarse {
+    levels: Levels,
+    _held: Reservation,
+}
+
+impl Coarse {
+    /// With a reservation of the memory.
+    ///
+    /// # Errors
+    /// [`crate::Error::Memory`].
+    pub fn open(levels: Levels, workspace: &Workspace) -> Result<Self> {
+        let held = workspace.reserve("coarse points", levels.bytes())?;
+        Ok(Self {
+            levels,
+            _held: held,
+        })
+    }
+}
+
+/// The factors from the usual reach of a patch, squared, to that of a coarse point.
+const COARSER: [u64; 4] = [1, 4, 16, 256];
+
+/// The number of a point in [`Coarse`]: the largest whose factor its own squared reach `last2` allows.
+#[must_use]
+pub fn coarseness(last2: u64, usual2: u64) -> u8 {
+    let allows = |factor: &&u64| u128::from(last2) >= u128::from(**factor) * u128::from(usual2);
+    let count = COARSER[1..].iter().take_while(allows).count();
+    if usual2 > 0 { count as u8 } else { 0 }
+}
+
+/// How a point lies to its neighbours.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Standing {
+    /// As is usual in its patch.
+    Usual,
+    /// Coarser, on one surface with them; with its number in [`Coarse`].
+    Coarse(u8),
+    /// Off the surface: they reach far for the region, and do not lie on one surface with it.
+    Off,
+}
+
 /// The density of the surface, and the limits that depend on it.
 #[derive(Debug, Clone, Copy)]
 pub struct Density<'a> {
     /// The usual reaches by patch.
     pub spacings: &'a Spacings,
+    /// The points that are coarser, if there are any and they are known.
+    pub coarse: Option<&'a Coarse>,
     /// The number of neighbours `k`.
     pub neighbors: usize,
     /// The limits, in local spacings or in lattice steps.
@@ -68,8 +117,7 @@ pub struct Density<'a> {
 
 /// True if neighbours at squared distances up to `last2` reach farther than those of a surface with the usual
 /// reach `usual2`.
-#[must_use]
-pub fn is_far(last2: u64, usual2: u64) -> bool {
+fn is_far(last2: u64, usual2: u64) -> bool {
     u128::from(last2) > METHOD.off_surface.far * METHOD.off_surface.far * u128::from(usual2)
 }
 
@@ -81,10 +129,20 @@ pub fn spacing2(last2: u64, neighbors: usize) -> f64 {
 }
 
 impl StoredSpacings {
-    /// From the measured values.
+    /// Zeros, for a number of points.
     #[must_use]
-    pub fn new(usual2: Vec<u64>) -> Self {
-        Self { usual2 }
+    pub fn new(points: usize) -> Self {
+        Self {
+            usual2: vec![0; points.div_ceil(METHOD.curve.patch)],
+            regions2: vec![0; points.div_ceil(METHOD.curve.block as usize)],
+        }
+    }
+
+    /// Sets the usual reaches, squared, of the patches of the region that begins with the id `first`, and of
+    /// the region.
+    pub fn put(&mut self, first: usize, usual2: &[u64], region2: u64) {
+        self.usual2[first / METHOD.curve.patch..][..usual2.len()].copy_from_slice(usual2);
+        self.regions2[first / METHOD.curve.block as usize] = region2;
     }
 
     /// Reserves memory for a number of points.
@@ -92,8 +150,11 @@ impl StoredSpacings {
     /// # Errors
     /// [`crate::Error::Memory`].
     pub fn reserve(points: usize, workspace: &Workspace) -> Result<Reservation> {
-        let bytes = 8 * points.div_ceil(METHOD.curve.patch) as u64;
-        workspace.reserve("patch spacings", bytes)
+        workspace.reserve("patch spacings", Self::new(points).bytes())
+    }
+
+    fn bytes(&self) -> u64 {
+        8 * (self.usual2.len() + self.regions2.len()) as u64
     }
 
     /// The spacings with a reservation of their memory.
@@ -101,7 +162,7 @@ impl StoredSpacings {
     /// # Errors
     /// [`crate::Error::Memory`].
     pub fn open(self, workspace: &Workspace) -> Result<Spacings> {
-        let held = workspace.reserve("patch spacings", 8 * self.usual2.len() as u64)?;
+        let held = workspace.reserve("patch spacings", self.bytes())?;
         Ok(Spacings {
             stored: self,
             _held: held,
@@ -126,11 +187,33 @@ impl Spacings {
 }
 
 impl Density<'_> {
-    /// True if a point is off the surface; `last2` is the squared distance of the last of its `k` nearest
-    /// neighbours.
+    /// The squared reach of neighbours that is usual for a point: that of its patch, or more for a coarse point.
+    fn reach2(&self, id: u32) -> u64 {
+        let level = self
+            .coarse
+            .map_or(0, |coarse| coarse.levels.get(id as usize));
+        let usual2 = self.spacings.usual2(id);
+        usual2.saturating_mul(COARSER[usize::from(level)])
+    }
+
+    /// How a point with the plane `normal` through its neighbours lies to them. The last of its `k` nearest is
+    /// at the squared distance `last2`.
     #[must_use]
-    pub fn is_off_surface(&self, id: u32, last2: u64) -> bool {
-        self.limits.off_surface && is_far(last2, self.spacings.usual2(id))
+    pub fn standing(&self, id: u32, last2: u64, moments: &Moments, normal: Normal) -> Standing {
+        let coarseness = coarseness(last2, self.spacings.usual2(id));
+        let region2 = self.spacings.stored.regions2[id as usize / METHOD.curve.block as usize];
+        let far = self.limits.off_surface && is_far(last2, region2);
+        if coarseness == 0 && !far {
+            return Standing::Usual;
+        }
+        match (
+            moments.fill_space(normal) || moments.is_beside(normal, last2),
+            far,
+        ) {
+            (true, true) => Standing::Off,
+            (true, false) => Standing::Usual,
+            (false, _) => Standing::Coarse(coarseness),
+        }
     }
 
     /// Returns a test of triangles: true if a side is longer than the limit at both of its ends.
@@ -141,6 +224,7 @@ impl Density<'_> {
         move |t: [u32; 3], at: [Point; 3]| {
             // The square of the third side is at most twice the sum of the squares of the other two.
             let two = distance2(at[0], at[1]) as f64 + distance2(at[0], at[2]) as f64;
+            // Coarse points have larger limits.
             let usual2 = |v: u32| density.spacings.usual2(v);
             let least = usual2(t[0]).min(usual2(t[1])).min(usual2(t[2]));
             2.0 * two > sure * least as f64 && density.exceeds(width, t, at)
@@ -162,7 +246,7 @@ impl Density<'_> {
     pub fn is_wide(&self, t: [u32; 3], at: [Point; 3]) -> bool {
         let width = self.limits.fill;
         let most = |usual2: u64| 0.25 * 3f64.sqrt() * self.square(width, usual2);
-        let usual2 = t.map(|v| self.spacings.usual2(v));
+        let usual2 = t.map(|v| self.reach2(v));
         width != Width::Any
             && (self.exceeds(width.times(METHOD.filling.slender), t, at)
                 || area(at) > most(usual2[0].max(usual2[1]).max(usual2[2])))
@@ -180,7 +264,7 @@ impl Density<'_> {
     #[cold]
     fn exceeds(&self, width: Width, t: [u32; 3], at: [Point; 3]) -> bool {
         let long = |(a, b): (usize, usize)| {
-            let usual2 = self.spacings.usual2(t[a]).max(self.spacings.usual2(t[b]));
+            let usual2 = self.reach2(t[a]).max(self.reach2(t[b]));
             distance2(at[a], at[b]) as f64 > self.square(width, usual2)
         };
         width != Width::Any && [(0, 1), (0, 2), (1, 2)].into_iter().any(long)
@@ -195,7 +279,9 @@ mod tests {
 
     fn spacings(usual2: Vec<u64>) -> Spacings {
         let workspace = Workspace::for_tests(1);
-        StoredSpacings::new(usual2).open(&workspace).unwrap()
+        let mut stored = StoredSpacings::new(METHOD.curve.patch * usual2.len());
+        stored.put(0, &usual2, 0);
+        stored.open(&workspace).unwrap()
     }
 
     proptest! {
@@ -209,7 +295,7 @@ mod tests {
             let spacings = spacings(usual2.to_vec());
             let edge = if steps { Width::Steps(limit) } else { Width::Spacings(limit) };
             let limits = Limits { off_surface: true, edge, fill: Width::Any };
-            let density = Density { spacings: &spacings, neighbors: 30, limits };
+            let density = Density { spacings: &spacings, coarse: None, neighbors: 30, limits };
             let t = [0, 1, 2].map(|patch| patch * METHOD.curve.patch as u32 + 7);
             prop_assert_eq!(density.is_long()(t, at), density.exceeds(edge, t, at));
         }

@@ -64,26 +64,38 @@ pub fn smooth(points: &[Point], k: usize) -> Vec<Point> {
 fn is_off_surface(points: &[Point], i: usize, settings: &Settings, density: &Density) -> bool {
     let others = by_distance(points, i);
     let last = others[..settings.neighbors.min(others.len())].last();
-    last.is_some_and(|&j| density.is_off_surface(i, distance2(points[i], points[j])))
+    let (moments, plane, _) = widened_plane(points, i, settings.neighbors, settings.robust);
+    let (Some(&last), Some(normal)) = (last, plane.normal) else {
+        return false;
+    };
+    density.is_off_surface(i, distance2(points[i], points[last]), &moments, normal)
+}
+
+/// The plane of a point, through more neighbours than `k` if these lie on a line or, with `bands`, on a band;
+/// and the last of them.
+pub fn widened_plane(
+    points: &[Point],
+    i: usize,
+    k: usize,
+    bands: bool,
+) -> (Moments, Plane, Option<usize>) {
+    let others = by_distance(points, i);
+    let mut wanted = k;
+    loop {
+        let used = &others[..wanted.min(others.len())];
+        let (moments, plane) = plane_of(points, i, used);
+        let enough = if bands { plane.wide } else { plane.spans };
+        if enough || wanted >= 8 * k {
+            return (moments, plane, used.last().copied());
+        }
+        wanted *= 2;
+    }
 }
 
 /// The pairs with which the cell of `i` makes triples. `diagonal` is that of the whole cloud.
 fn corners(points: &[Point], i: usize, settings: &Settings, diagonal: f64) -> Vec<(u32, u32)> {
     let others = by_distance(points, i);
-    let mut k = settings.neighbors;
-    let (plane, last) = loop {
-        let used = &others[..k.min(others.len())];
-        let (_, plane) = plane_of(points, i, used);
-        let enough = if settings.robust {
-            plane.wide
-        } else {
-            plane.spans
-        };
-        if enough || k >= 8 * settings.neighbors {
-            break (plane, used.last().copied());
-        }
-        k *= 2;
-    };
+    let (_, plane, last) = widened_plane(points, i, settings.neighbors, settings.robust);
     let (Some(normal), Some(last)) = (plane.normal, last) else {
         return Vec::new();
     };

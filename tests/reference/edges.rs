@@ -2,9 +2,8 @@
 
 use super::cells::by_distance;
 use outcrop::geom::lattice::COORDINATE_LIMIT;
-use outcrop::geom::plane::least_direction;
+use outcrop::geom::plane::{Normal, least_direction};
 use outcrop::geom::{Point, distance2, sub};
-use std::collections::BTreeSet;
 
 type Vec3 = [f64; 3];
 
@@ -21,14 +20,26 @@ pub fn smooth(points: &[Point], k: usize) -> Vec<Point> {
 }
 
 fn moved(points: &[Point], i: usize, k: usize) -> Point {
+    let Some((offset, _)) = offset(points, i, 3 * k) else {
+        return points[i];
+    };
+    std::array::from_fn(|axis| {
+        let to = i64::from(points[i][axis]) + offset[axis].round() as i64;
+        to.clamp(0, COORDINATE_LIMIT - 1) as i32
+    })
+}
+
+/// The offset from a point to the surface through it and `count` others, and the weighted mean of the squared
+/// heights over the surface of second order; `None` if there is no surface.
+pub fn offset(points: &[Point], i: usize, count: usize) -> Option<(Vec3, f64)> {
     let mut others = by_distance(points, i);
-    others.truncate(3 * k);
+    others.truncate(count);
     let last2 = others
         .last()
         .map_or(0, |&j| distance2(points[i], points[j]));
     let reach = (1.1 * last2 as f64).sqrt();
     if last2 == 0 {
-        return points[i];
+        return None;
     }
     let mut all = Vec::new();
     for j in [i].into_iter().chain(others) {
@@ -36,9 +47,7 @@ fn moved(points: &[Point], i: usize, k: usize) -> Point {
         let weight = 1.0 - dot(at, at);
         all.push(Weighted { at, weight });
     }
-    let Some(normal) = least_scatter(&all) else {
-        return points[i];
-    };
+    let normal = least_scatter(&all)?;
     let first = Surface::best(&all, normal, 6);
     let limit = 9.0 * first.left / sum(&all);
     let stray = |p: &&Weighted| first.off(p.at) * first.off(p.at) > limit;
@@ -74,10 +83,7 @@ fn moved(points: &[Point], i: usize, k: usize) -> Point {
     if share > 0.0 {
         add(share, &beside);
     }
-    std::array::from_fn(|axis| {
-        let to = i64::from(points[i][axis]) + offset[axis].round() as i64;
-        to.clamp(0, COORDINATE_LIMIT - 1) as i32
-    })
+    Some((offset, curved.left / sum(&kept) * reach * reach))
 }
 
 /// The surface of those points that lie on one surface with the moving one, and the mean square over it.
@@ -107,50 +113,24 @@ fn sum(all: &[Weighted]) -> f64 {
     all.iter().map(|p| p.weight).sum()
 }
 
-/// True if a surface of second order leaves less than half of the squared heights over the plane, with equal
-/// weights.
-pub fn is_curved(points: &[Point], i: usize, k: usize) -> bool {
-    heights(points, i, k).is_some_and(|(over_plane, left)| left < 0.5 * over_plane)
-}
-
-/// True if there is no noise: the squared heights over a surface of second order through a point and its
-/// twelve nearest sum to less than 7 times the square of 0.03 local spacings (seven degrees of freedom).
-/// `None` without twelve of the `k` neighbours or nine different values of each coordinate.
-pub fn is_clean(points: &[Point], i: usize, k: usize) -> Option<bool> {
-    let others = by_distance(points, i);
-    let last = *others[..k.min(others.len())].last()?;
-    let spacing2 = std::f64::consts::PI * distance2(points[i], points[last]) as f64 / k as f64;
-    let nearest = others[..k.min(others.len())].get(..12)?;
-    let is_fine = (0..3).all(|axis| {
-        let all = [i].into_iter().chain(nearest.iter().copied());
-        let values: BTreeSet<i32> = all.map(|j| points[j][axis]).collect();
-        values.len() >= 9
-    });
-    let (_, left) = heights(points, i, 12).filter(|_| is_fine)?;
-    Some(left < 7.0 * 0.03 * 0.03 * spacing2)
-}
-
-/// The squared heights of a point and `k` others over their plane, and over a surface of second order, with
-/// equal weights.
-fn heights(points: &[Point], i: usize, k: usize) -> Option<(f64, f64)> {
-    let mut others = by_distance(points, i);
-    others.truncate(k);
-    let last2 = others
-        .last()
-        .map_or(0, |&j| distance2(points[i], points[j]));
+/// The sum of the squared heights of a point and its nearest over a surface of second order, in steps, with
+/// equal weights and heights along a normal; `None` if all are at one position.
+pub fn heights2(points: &[Point], i: usize, nearest: &[usize], normal: Normal) -> Option<f64> {
+    let last2 = distance2(points[i], points[*nearest.last()?]);
+    if last2 == 0 {
+        return None;
+    }
     let reach = (1.1 * last2 as f64).sqrt();
-    let weighted = |j: usize| Weighted {
+    let weighted = |&j: &usize| Weighted {
         at: sub(points[j], points[i]).map(|c| c as f64 / reach),
         weight: 1.0,
     };
-    let all: Vec<Weighted> = [i].into_iter().chain(others).map(weighted).collect();
-    let normal = least_scatter(&all)?;
-    let curved = Surface::best(&all, normal, 6);
-    let mean = all.iter().map(|p| dot(p.at, normal)).sum::<f64>() / all.len() as f64;
-    let squares = all.iter().map(|p| (dot(p.at, normal) - mean).powi(2));
+    let all: Vec<Weighted> = [i].iter().chain(nearest).map(weighted).collect();
+    let normal = normal.map(f64::from);
+    let length = dot(normal, normal).sqrt();
+    let curved = Surface::best(&all, normal.map(|n| n / length), 6);
     let left = all.iter().map(|p| curved.off(p.at).powi(2));
-    let unit = reach * reach;
-    Some((squares.sum::<f64>() * unit, left.sum::<f64>() * unit))
+    Some(left.sum::<f64>() * (reach * reach))
 }
 
 /// The direction of least scatter of the weighted points.

@@ -73,8 +73,10 @@ pub struct Settings {
     pub patch: u32,
     /// `C`.
     pub cluster: usize,
-    /// Largest number of rounds of relaxing.
+    /// Largest number of rounds in which noisy points move.
     pub relax: u32,
+    /// They move in the mesh too.
+    pub auto: bool,
     /// Orientation by evidence, and ear clipping.
     pub robust: bool,
     /// Points off the surface are kept.
@@ -99,6 +101,7 @@ impl Default for Settings {
             patch: 256,
             cluster: 1024,
             relax: 0,
+            auto: false,
             robust: false,
             keep_all: true,
             max_edge: f64::INFINITY,
@@ -113,6 +116,7 @@ impl Settings {
         Self {
             cos_max_angle: outcrop::Params::default().cos_max_angle(),
             relax: 3,
+            auto: true,
             edges: true,
             robust: true,
             keep_all: false,
@@ -147,13 +151,11 @@ pub struct Counts {
     pub t3: usize,
     pub t2: usize,
     pub t1: usize,
-    /// Rounds of relaxing, and the sum over rounds of the points in patches that moved.
+    /// Rounds of relaxing, and the noisy points.
     pub rounds: u32,
     pub moved: usize,
-    /// Rough patches that stayed because their region is curved.
-    pub curved: usize,
-    /// Rough patches that stayed because their region has no noise.
-    pub clean: usize,
+    /// Points whose nearest neighbours show noise and which are kept in place by clean ones.
+    pub kept: usize,
     /// Points off the surface.
     pub off_surface: usize,
     /// T3 and candidates on a line in the file, or too long.
@@ -220,13 +222,10 @@ pub fn reconstruct_seen(
     }
     let density = settings.robust.then(|| spacing::measure(&points, settings));
     let density = density.as_ref();
-    let relaxed = relax::relax(
-        &points,
-        settings.neighbors,
-        settings.relax,
-        settings.smooth > 0,
-        density,
-    );
+    let relaxed = relax::relax(&points, settings);
+    if settings.auto {
+        points = relaxed.shape.clone();
+    }
     let (triples, off_surface) = cells::triples(&relaxed.shape, settings, diagonal, density);
     let mut mesh = connect(
         &relaxed.shape,
@@ -238,7 +237,7 @@ pub fn reconstruct_seen(
     );
     mesh.counts.off_surface = off_surface;
     (mesh.counts.rounds, mesh.counts.moved) = (relaxed.rounds, relaxed.moved);
-    (mesh.counts.curved, mesh.counts.clean) = (relaxed.curved, relaxed.clean);
+    mesh.counts.kept = relaxed.kept;
     mesh
 }
 

@@ -1,8 +1,8 @@
-//! Relaxing (section 4.3): the shape, positions that decide which points are connected.
+//! Smoothing of noisy points (section 4): the shape, positions that decide which points are connected.
 
-use super::cells::{by_distance, plane_of};
-use super::edges::{is_clean, is_curved};
-use super::spacing::Density;
+use super::Settings;
+use super::cells::{by_distance, widened_plane};
+use super::edges::{heights2, offset};
 use outcrop::geom::lattice::COORDINATE_LIMIT;
 use outcrop::geom::{Point, distance2};
 
@@ -11,134 +11,122 @@ pub struct Relaxed {
     pub shape: Vec<Point>,
     /// Rounds in which points moved.
     pub rounds: u32,
-    /// Points that moved, counted in each round.
+    /// Noisy points.
     pub moved: usize,
-    /// Rough patches that stay because most rough ones of their region are curved.
-    pub curved: usize,
-    /// Rough patches that stay because their region has no noise.
-    pub clean: usize,
+    /// Points whose nearest neighbours show noise and which are kept in place by clean ones.
+    pub kept: usize,
 }
 
-/// Ids in a patch.
-const PATCH: usize = 256;
-
-/// Ids in a run.
+/// Ids in a run, runs of which one is sampled, ids in a region.
 const RUN: usize = 16;
+const SAMPLED: usize = 8;
+const REGION: usize = 65_536;
 
-/// Patches in a region.
-const REGION: usize = 256;
-
-/// The new position of a point; true if it is rough. A point without a plane, or off the surface, stays and
-/// is not rough.
-fn foot(points: &[Point], i: usize, k: usize, density: Option<&Density>) -> (Point, bool) {
+/// The number of limits that the noise at a point exceeds.
+fn level(points: &[Point], i: usize, k: usize) -> u8 {
     let others = by_distance(points, i);
-    let used = &others[..k.min(others.len())];
-    let (moments, plane) = plane_of(points, i, used);
-    let (Some(normal), Some(&last)) = (plane.normal, used.last()) else {
-        return (points[i], false);
+    let plane = widened_plane(points, i, k, true).1;
+    let (Some(normal), Some(nearest)) = (plane.normal, others.get(..8)) else {
+        return 0;
     };
-    let last2 = distance2(points[i], points[last]);
-    if density.is_some_and(|d| d.is_off_surface(i, last2)) {
-        return (points[i], false);
+    let Some(left) = heights2(points, i, nearest, normal) else {
+        return 0;
+    };
+    let reach2 = distance2(points[i], points[others[k.min(others.len()) - 1]]);
+    let spacing2 = std::f64::consts::PI * reach2 as f64 / k as f64;
+    let exceeded = [0.035, 0.15, 0.3].map(|limit: f64| left / 3.0 > limit * limit * spacing2);
+    exceeded.iter().take_while(|exceeded| **exceeded).count() as u8
+}
+
+/// The levels of all points; 0 in regions without a sampled run of which fewer than a tenth is clean.
+fn levels(points: &[Point], k: usize) -> Vec<u8> {
+    let ids: Vec<usize> = (0..points.len()).collect();
+    let of_region = |region: &[usize]| -> Vec<u8> {
+        let all: Vec<u8> = region.iter().map(|&i| level(points, i, k)).collect();
+        let runs = all.chunks_exact(RUN).step_by(SAMPLED);
+        let clean = |run: &[u8]| run.iter().filter(|level| **level == 0).count();
+        if { runs }.any(|run| 10 * clean(run) < RUN) {
+            all
+        } else {
+            vec![0; all.len()]
+        }
+    };
+    ids.chunks(REGION).flat_map(of_region).collect()
+}
+
+/// The number of rounds in which a point moves.
+fn rounds(points: &[Point], levels: &[u8], i: usize, k: usize) -> u8 {
+    let mut around = by_distance(points, i);
+    around.truncate(3 * k);
+    around.push(i);
+    let below = |limit: u8| around.iter().filter(|&&j| levels[j] < limit).count();
+    (1..=3)
+        .take_while(|&limit| 10 * below(limit) < around.len())
+        .count() as u8
+}
+
+/// The position to which a noisy point moves; one too far from the surface stays. Where more neighbours lie in
+/// layers, fewer are used.
+fn moved(points: &[Point], i: usize, k: usize, rounds: u8) -> Point {
+    let others = by_distance(points, i);
+    let last2 = |count: usize| {
+        let last = others[..count.min(others.len())].last();
+        last.map_or(0, |&j| distance2(points[i], points[j]))
+    };
+    let mut count = 3 * k;
+    let Some((mut offset, mean2)) = offset(points, i, count) else {
+        return points[i];
+    };
+    let limit = 0.4 * f64::from(rounds);
+    let spacing2 = std::f64::consts::PI * last2(count) as f64 / count as f64;
+    if mean2 > limit * limit * spacing2 {
+        count = k;
+        match super::edges::offset(points, i, count) {
+            Some(fewer) => offset = fewer.0,
+            None => return points[i],
+        }
     }
-    let offset = moments.project(normal);
-    let to = std::array::from_fn(|axis| {
-        let moved = i64::from(points[i][axis]) + offset[axis].round() as i64;
-        moved.clamp(0, COORDINATE_LIMIT - 1) as i32
-    });
-    let square = offset[0] * offset[0] + offset[1] * offset[1] + offset[2] * offset[2];
-    let spacing2 = std::f64::consts::PI * last2 as f64 / k as f64;
-    (to, square > 0.2 * 0.2 * spacing2)
+    let length2 = offset[0] * offset[0] + offset[1] * offset[1] + offset[2] * offset[2];
+    if length2 > 0.25 * last2(count) as f64 {
+        return points[i];
+    }
+    std::array::from_fn(|axis| {
+        let to = i64::from(points[i][axis]) + offset[axis].round() as i64;
+        to.clamp(0, COORDINATE_LIMIT - 1) as i32
+    })
 }
 
-/// True if a patch is rough, by its samples.
-fn uneven(rough: &[bool]) -> bool {
-    16 * rough.iter().filter(|r| **r).count() > rough.len()
-}
-
-/// True if a rough patch has noise, by its telling points.
-fn noisy(points: &[Point], telling: &[usize], k: usize) -> bool {
-    let curved = telling.iter().filter(|&&id| is_curved(points, id, k));
-    2 * curved.count() < telling.len()
-}
-
-/// At most `rounds` rounds; smoothed points are never clean.
-pub fn relax(
-    points: &[Point],
-    k: usize,
-    rounds: u32,
-    smoothed: bool,
-    density: Option<&Density>,
-) -> Relaxed {
-    let foot = |points: &[Point], id: usize, k: usize| foot(points, id, k, density);
+/// The shape of a cloud.
+pub fn relax(points: &[Point], settings: &Settings) -> Relaxed {
+    let k = settings.neighbors;
     let mut relaxed = Relaxed {
         shape: points.to_vec(),
         rounds: 0,
         moved: 0,
-        curved: 0,
-        clean: 0,
+        kept: 0,
     };
-    let patches = points.len().div_ceil(PATCH);
-    let ids = |patch: usize| PATCH * patch..points.len().min(PATCH * (patch + 1));
-    let some = |patch: usize| ids(patch).filter(|id| (id / RUN).is_multiple_of(8));
-    let look =
-        |patch: usize| -> Vec<bool> { some(patch).map(|id| foot(points, id, k).1).collect() };
-    let mut moving: Vec<usize> = (0..patches).filter(|&p| uneven(&look(p))).collect();
-    let of_region =
-        |all: &[usize], p: usize| all.iter().filter(|&&q| q / REGION == p / REGION).count();
-    let in_region = |p: usize| (0..patches).filter(|q| q / REGION == p / REGION).count();
-    let rough = moving.clone();
-    // The first rough samples of a patch.
-    let telling = |p: usize| -> Vec<usize> {
-        some(p)
-            .filter(|&id| foot(points, id, k).1)
-            .take(3)
-            .collect()
-    };
-    let mut noise = rough.clone();
-    noise.retain(|&p| noisy(points, &telling(p), k));
-    let is_clean_region = |p: usize| {
-        let of_region = rough.iter().filter(|&&q| q / REGION == p / REGION);
-        let telling: Vec<usize> = of_region.flat_map(|&q| telling(q)).collect();
-        let told = telling.iter().filter_map(|&id| is_clean(points, id, k));
-        let told: Vec<bool> = told.collect();
-        let (fine, clean) = (told.len(), told.iter().filter(|c| **c).count());
-        !smoothed && 10 * clean > fine && 10 * clean <= 7 * fine
-    };
-    let regions = patches.div_ceil(REGION);
-    let clean: Vec<bool> = (0..regions)
-        .map(|region| is_clean_region(REGION * region))
-        .collect();
-    moving.retain(|&p| {
-        let (noise, rough) = (of_region(&noise, p), of_region(&rough, p));
-        let moves = 8 * noise >= in_region(p) && 10 * noise >= 3 * rough;
-        relaxed.curved += usize::from(!moves && 8 * rough >= in_region(p));
-        relaxed.clean += usize::from(moves && clean[p / REGION]);
-        moves && !clean[p / REGION]
-    });
-    let mut runs: Vec<Vec<usize>> = moving
-        .into_iter()
-        .flat_map(|p| {
-            ids(p)
-                .collect::<Vec<_>>()
-                .chunks(RUN)
-                .map(Vec::from)
-                .collect::<Vec<_>>()
-        })
-        .collect();
-    while relaxed.rounds < rounds && !runs.is_empty() {
+    if settings.relax == 0 {
+        return relaxed;
+    }
+    let levels = levels(points, k);
+    if levels.iter().all(|level| *level == 0) {
+        return relaxed;
+    }
+    let most = settings.relax.min(3) as u8;
+    let all = (0..points.len()).map(|i| rounds(points, &levels, i, k).min(most));
+    let all: Vec<u8> = all.collect();
+    relaxed.moved = all.iter().filter(|rounds| **rounds > 0).count();
+    relaxed.kept = levels
+        .iter()
+        .zip(&all)
+        .filter(|(level, rounds)| **level > **rounds)
+        .count();
+    relaxed.rounds = u32::from(all.iter().copied().max().unwrap_or(0));
+    for round in 1..=most {
         let before = relaxed.shape.clone();
-        runs.retain(|run| {
-            let mut rough = 0;
-            for &id in run {
-                let (to, far) = foot(&before, id, k);
-                relaxed.shape[id] = to;
-                rough += usize::from(far);
-            }
-            relaxed.moved += run.len();
-            rough >= 1
-        });
-        relaxed.rounds += 1;
+        for i in (0..points.len()).filter(|&i| all[i] >= round) {
+            relaxed.shape[i] = moved(&before, i, k, all[i]);
+        }
     }
     relaxed
 }

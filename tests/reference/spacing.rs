@@ -1,28 +1,28 @@
 //! The density of the surface (sections 4.1 and 4.2), and the limits of distance.
 
 use super::Settings;
-use super::cells::{by_distance, plane_of};
+use super::cells::by_distance;
 use super::insert::normal;
 use super::surface::Triangle;
+use outcrop::geom::plane::{Moments, Normal};
 use outcrop::geom::{Point, distance2};
 
 /// Ids in a patch, and patches in a region.
 const PATCH: usize = 256;
 const REGION: usize = 256;
 
-/// The usual reach of neighbours, by patch, and the resulting limits.
+/// The usual reach of neighbours, by patch and by region, and the resulting limits.
 pub struct Density {
     usual2: Vec<u64>,
+    regions2: Vec<u64>,
     settings: Settings,
 }
 
-/// The squared distance of the last of `N_k`; true if `i` and these fill space.
-fn reach(points: &[Point], i: usize, k: usize) -> (u64, bool) {
+/// The squared distance of the last of `N_k`.
+fn reach2(points: &[Point], i: usize, k: usize) -> u64 {
     let others = by_distance(points, i);
     let used = &others[..k.min(others.len())];
-    let (moments, plane) = plane_of(points, i, used);
-    let last2 = used.last().map_or(0, |&j| distance2(points[i], points[j]));
-    (last2, plane.normal.is_some_and(|n| moments.fill_space(n)))
+    used.last().map_or(0, |&j| distance2(points[i], points[j]))
 }
 
 fn lower_quartile(mut all: Vec<u64>) -> u64 {
@@ -35,44 +35,35 @@ fn is_far(last2: u64, usual2: u64) -> bool {
     u128::from(last2) > 25 * u128::from(usual2)
 }
 
-/// Measures a cloud before relaxing.
+/// Measures a cloud before points move.
 pub fn measure(points: &[Point], settings: &Settings) -> Density {
     let ids: Vec<usize> = (0..points.len()).collect();
-    let looks: Vec<Vec<(u64, bool)>> = ids
-        .chunks(PATCH)
-        .map(|patch| {
-            let looked = patch.iter().filter(|&&id| (id / 16).is_multiple_of(8));
-            looked
-                .map(|&id| reach(points, id, settings.neighbors))
-                .collect()
-        })
-        .collect();
-    let quartile = |look: &Vec<(u64, bool)>| lower_quartile(look.iter().map(|l| l.0).collect());
-    let mut usual2 = Vec::new();
-    for region in looks.chunks(REGION) {
-        let own: Vec<u64> = region.iter().map(quartile).collect();
-        let usual = lower_quartile(own.clone());
-        let far = own.iter().filter(|own| is_far(**own, usual)).count();
-        let one_in = if 16 * far <= region.len() { 16 } else { 2 };
-        for (look, own) in region.iter().zip(own) {
-            let fills = one_in * look.iter().filter(|l| l.1).count() >= look.len();
-            usual2.push(if fills && is_far(own, usual) {
-                usual
-            } else {
-                own
-            });
-        }
-    }
+    let quartile = |patch: &[usize]| {
+        let sampled = patch.iter().filter(|&&id| (id / 16).is_multiple_of(8));
+        lower_quartile(
+            sampled
+                .map(|&id| reach2(points, id, settings.neighbors))
+                .collect(),
+        )
+    };
+    let usual2: Vec<u64> = ids.chunks(PATCH).map(quartile).collect();
+    let regions = usual2.chunks(REGION);
     Density {
+        regions2: regions
+            .map(|region| lower_quartile(region.to_vec()))
+            .collect(),
         usual2,
         settings: *settings,
     }
 }
 
 impl Density {
-    /// True if a point with the last of `N_k` at this distance is off the surface.
-    pub fn is_off_surface(&self, id: usize, last2: u64) -> bool {
-        !self.settings.keep_all && is_far(last2, self.usual2[id / PATCH])
+    /// True if a point with the last of `N_k` at this distance, and with this plane of its neighbours, is off
+    /// the surface.
+    pub fn is_off_surface(&self, id: usize, last2: u64, moments: &Moments, normal: Normal) -> bool {
+        !self.settings.keep_all
+            && is_far(last2, self.regions2[id / (PATCH * REGION)])
+            && (moments.fill_space(normal) || moments.is_beside(normal, last2))
     }
 
     /// The square of the local spacing at a point.

@@ -2,7 +2,7 @@
 
 use super::super::parse::region;
 use crate::method::METHOD;
-use crate::params::{MaxWidth, Method, Origin, Params, Radius, Region, Smoothing};
+use crate::params::{MaxWidth, Method, Origin, Params, Radius, Region, Smooth, Smoothing};
 use crate::pipeline::{Builder, Reconstruction};
 use crate::stages::ingest::{Attributes, Classes};
 use clap::Args as ClapArgs;
@@ -109,15 +109,17 @@ pub struct Surface {
     /// Number of neighbours for the plane at each point
     #[arg(long, value_name = "N", default_value_t = METHOD.plane.neighbors)]
     pub neighbors: usize,
-    /// Rounds of smoothing before the reconstruction; 1 or 2 help with noisy scans
-    #[arg(long, value_name = "ROUNDS", default_value_t = 0)]
-    pub smooth: u32,
-    /// Smoothing moves points: plain, to the plane of their neighbours; edges, preserving edges and without
-    /// shrinking [default: edges; with --method paper plain]
+    /// Smoothing: auto moves noisy points, as much as they are noisy, and leaves clean ones where they are; a
+    /// number of rounds moves all points; 0 keeps all where they were measured [default: auto; with --method
+    /// paper 0]
+    #[arg(long, value_name = "auto|ROUNDS")]
+    pub smooth: Option<Smooth>,
+    /// Rounds of smoothing move points: plain, to the plane of their neighbours; edges, preserving edges and
+    /// without shrinking [default: edges; with --method paper plain]
     #[arg(long, value_name = "plain|edges")]
     pub smoothing: Option<Smoothing>,
-    /// Largest number of rounds of relaxing: smoothing that decides which points are connected, but does not
-    /// move the points of the mesh [default: 3; with --method paper 0]
+    /// Largest number of rounds in which noisy points move. With --smooth 0 this only decides which points are
+    /// connected: the mesh has them where they were measured [default: 3; with --method paper 0]
     #[arg(long, value_name = "ROUNDS")]
     pub relax: Option<u32>,
     /// Disk radius: auto (follows the local density), a percentage of the diagonal of the bounding box like
@@ -153,8 +155,8 @@ pub struct Repair {
     /// number of local spacings like 8x, or none [default: 8x; with --method paper none]
     #[arg(long, value_name = "LENGTH|Nx|none")]
     pub max_fill: Option<MaxWidth>,
-    /// Remove components with fewer triangles [default: 10; in noise one for each 5000 points, from 10 to
-    /// 150, or with --smooth one for each 2500, from 10 to 1000; with --method paper 10]
+    /// Remove components with fewer triangles [default: 10; if half of the points are noisy one for each
+    /// 5000 points, from 10 to 150; with --method paper 10]
     #[arg(long, value_name = "N")]
     pub min_component: Option<u64>,
     /// No repair: keep bridges, holes and small components
@@ -251,7 +253,7 @@ impl Job {
             thin: self.filters.thin,
             drop_outliers: self.filters.drop_outliers,
             neighbors: self.surface.neighbors,
-            smooth: self.surface.smooth,
+            smooth: self.surface.smooth.unwrap_or(usual.smooth),
             smoothing: self.surface.smoothing.unwrap_or(usual.smoothing),
             relax: self.surface.relax.unwrap_or(usual.relax),
             radius: self.surface.radius,

@@ -63,7 +63,7 @@ impl Stages<'_> {
 
     /// The comments of the mesh.
     fn comments(&self) -> Vec<String> {
-        let step = (self.job.params.smooth == 0).then_some(self.coarse);
+        let step = (!self.is_smoothed()).then_some(self.coarse);
         let place = self.report.origin.map(|origin| Place::new(origin, step));
         let mut comments = place.map_or_else(Vec::new, |place| place.comments());
         if let Some(crs) = &self.report.input.crs {

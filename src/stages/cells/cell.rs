@@ -10,7 +10,7 @@ use crate::geom::plane::{Moments, Normal, Plane};
 use crate::kernels::Level;
 use crate::method::METHOD;
 use crate::stages::order::PointStore;
-use crate::stages::spacing::Density;
+use crate::stages::spacing::{Density, Standing};
 use crate::stages::tiles::near::{Query, Sums};
 use crate::stages::tiles::neighbors::Neighbors;
 use crate::stages::tiles::walk::{PageCache, Walk};
@@ -174,6 +174,8 @@ pub struct CellMaker<'a> {
     pub(super) widen: Widen,
     /// If given, points off the surface get no cell.
     density: Option<Density<'a>>,
+    /// The points that are coarser than their patch, with their numbers.
+    pub(super) coarse: Vec<(u32, u8)>,
     pub(super) cell: Cell,
     pub(super) wrapper: Box<Wrapper>,
 }
@@ -192,18 +194,25 @@ impl<'a> CellMaker<'a> {
             radius,
             widen,
             density,
+            coarse: Vec::new(),
             cell: Cell::new(0, [0, 0, 1 << 24], 1.0),
             wrapper: Box::default(),
         }
     }
 
     /// The normal and the radius of a point's disk, or the reason why it has none.
-    pub(super) fn disk(&self, id: u32, fit: &Fit) -> std::result::Result<(Normal, f64), Outcome> {
+    pub(super) fn disk(
+        &mut self,
+        id: u32,
+        fit: &Fit,
+    ) -> std::result::Result<(Normal, f64), Outcome> {
         let normal = fit.plane.normal.ok_or(Outcome::NoPlane)?;
-        if let Some(density) = self.density
-            && density.is_off_surface(id, fit.near2)
-        {
-            return Err(Outcome::OffSurface);
+        if let Some(density) = self.density {
+            match density.standing(id, fit.near2, &fit.moments, normal) {
+                Standing::Off => return Err(Outcome::OffSurface),
+                Standing::Coarse(level) if level > 0 => self.coarse.push((id, level)),
+                Standing::Coarse(_) | Standing::Usual => {}
+            }
         }
         let radius = match self.radius {
             DiskRadius::Auto => METHOD.disk.reach * (fit.last2 as f64).sqrt(),
@@ -332,6 +341,23 @@ pub fn fit_in_store(
 ) -> Result<Option<Fit>> {
     let mut source = (Walk::new(store, cache, id, point), Neighbors::default());
     fit_from(&mut source, neighbors, widen)
+}
+
+/// As [`fit_in_store`], with the neighbours, nearest first.
+///
+/// # Errors
+/// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+pub fn fit_and_near_in_store(
+    store: &PointStore,
+    cache: &mut PageCache,
+    id: u32,
+    point: Point,
+    neighbors: usize,
+    widen: Widen,
+) -> Result<Option<(Fit, Neighbors)>> {
+    let mut source = (Walk::new(store, cache, id, point), Neighbors::default());
+    let fit = fit_from(&mut source, neighbors, widen)?;
+    Ok(fit.map(|fit| (fit, source.1)))
 }
 
 /// The `count` nearest neighbours of a point, or all other points if there are fewer, from the whole store.

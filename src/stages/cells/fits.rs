@@ -1,6 +1,6 @@
 //! The planes and neighbours of the points of a tile, for stages other than this one.
 
-use super::cell::{Fit, Widen, fit_in_store, fit_in_tile, near_in_store};
+use super::cell::{Fit, Widen, fit_and_near_in_store, fit_in_store, fit_in_tile, near_in_store};
 use crate::error::Result;
 use crate::geom::Point;
 use crate::geom::plane::{Moments, PLANES, planes};
@@ -93,6 +93,38 @@ impl<'a> Planes<'a> {
         look(self.unit, in_tile, in_store, each)
     }
 
+    /// Calls `each` with the value of `of` for every point whose id is `wanted`: for its plane, widened as for
+    /// a cell, and its neighbours, nearest first.
+    pub fn each_fit<T>(
+        &self,
+        widen: Widen,
+        wanted: impl Fn(usize) -> bool,
+        of: impl FnMut(u32, &Fit, &Neighbors) -> T,
+        each: impl FnMut(usize, Point, &T),
+    ) -> Result<()> {
+        let (of, count) = (RefCell::new(of), self.neighbors);
+        let in_tile = |(search, grown): Watched<'_, '_>, found: &mut Found<'_, T>| {
+            let look = |id: u32, point: Point, query: Option<Query<'_>>| {
+                let value = |mut query: Query<'_>| -> Result<Option<T>> {
+                    let fit = fit_in_tile(&mut query, count, widen)?;
+                    Ok(fit.map(|fit| (of.borrow_mut())(id, &fit, query.near())))
+                };
+                let value = query.map_or(Ok(None), value);
+                match &value {
+                    Ok(value) => found(id, point, Ok(value.as_ref())),
+                    Err(_) => found(id, point, value.map(|_| None)),
+                }
+            };
+            self.tile
+                .for_some_queries(count, search, wanted, grown, look);
+        };
+        let in_store = |cache: &mut PageCache, id: u32, point: Point| {
+            let known = fit_and_near_in_store(self.store, cache, id, point, count, widen)?;
+            Ok(known.map(|(fit, near)| (of.borrow_mut())(id, &fit, &near)))
+        };
+        look(self.unit, in_tile, in_store, each)
+    }
+
     /// Calls `each` with the value of `of` for the neighbours of every point whose id is `wanted`.
     pub fn each_neighborhood<T>(
         &self,
@@ -154,8 +186,8 @@ pub fn each_neighborhood<T>(
     Planes::load(unit, store, ids, all, count)?.each_neighborhood(all, of, each)
 }
 
-/// Calls `each` with every point of a tile and its `count` nearest neighbours, or all points if there are
-/// fewer, in order of id.
+/// Calls `each` with every point of a tile whose id is `wanted`, and its `count` nearest neighbours, or all
+/// points if there are fewer, in order of id.
 ///
 /// # Errors
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
@@ -164,10 +196,10 @@ pub(crate) fn each_around(
     store: &PointStore,
     ids: Range<usize>,
     count: usize,
+    wanted: impl Fn(usize) -> bool,
     each: impl FnMut(usize, Point, &Around),
 ) -> Result<()> {
-    let all = |_| true;
-    let planes = Planes::load(unit, store, ids, all, count)?;
+    let planes = Planes::load(unit, store, ids, &wanted, count)?;
     let each = RefCell::new(each);
     let in_tile = |(search, grown): Watched<'_, '_>, found: &mut Found<'_, ()>| {
         let look = |id: u32, point: Point, around: Option<&Around>| {
@@ -176,7 +208,9 @@ pub(crate) fn each_around(
             }
             found(id, point, Ok(around.map(|_| &())));
         };
-        planes.tile.for_some_around(count, search, all, grown, look);
+        planes
+            .tile
+            .for_some_around(count, search, &wanted, grown, look);
     };
     let mut around = Around::default();
     let in_store = |cache: &mut PageCache, id: u32, point: Point| {

@@ -13,6 +13,7 @@ use crate::error::Result;
 use crate::geom::Point;
 use crate::spill::{Id, Shuffle, Table, release, row};
 use crate::stages::blocks::Blocks;
+use crate::stages::levels::Levels;
 use crate::stages::order::PointStore;
 use crate::stages::spacing::Density;
 use crate::stages::tiles::Tile;
@@ -133,7 +134,8 @@ impl TileRanges {
     }
 }
 
-/// Computes all cells and collects their triples.
+/// Computes all cells and collects their triples. Also returns how coarse points are, as
+/// [`coarseness`](crate::stages::spacing::coarseness), if any is coarse.
 ///
 /// # Errors
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
@@ -146,7 +148,7 @@ pub fn cells(
     widen: Widen,
     density: Option<Density<'_>>,
     workspace: &Workspace,
-) -> Result<(CellTriples, CellStats)> {
+) -> Result<(CellTriples, Option<Levels>, CellStats)> {
     let own = Table::new("cells.own", tiles.count());
     let off = Table::new("cells.off", tiles.count());
     let shuffle = Shuffle::new("cells.sent");
@@ -165,6 +167,7 @@ pub fn cells(
         off.put(unit, tile, &no_cell)?;
         stats.raw_triples = seen.len() as u64;
         let folding = seen.fold_bytes();
+        let coarse = by_place(&maker.coarse, &ids);
         let mut held = unit.hold(seen.bytes() + folding);
         let (kept, sent) = seen.fold(&tiles);
         let folded = (size_of_val(&*kept) + size_of_val(&*sent)) as u64;
@@ -174,23 +177,53 @@ pub fn cells(
         own.put(unit, tile, &kept)?;
         shuffle.send(unit, tile, sent)?;
         unit.advance(ids.len() as u64);
-        Ok(stats)
+        Ok((stats, coarse))
     };
     let mut stats = CellStats::default();
-    workspace.units("cells: tile", tiles.count(), bytes, work, |_, more| {
-        stats.global_fallbacks += more.global_fallbacks;
-        stats.no_plane += more.no_plane;
-        stats.off_surface += more.off_surface;
-        stats.raw_triples += more.raw_triples;
-        Ok(())
-    })?;
+    let mut all_coarse: Option<Levels> = None;
+    let mut held = workspace.reserve("coarse points", 0)?;
+    let step = "cells: tile";
+    workspace.units(
+        step,
+        tiles.count(),
+        bytes,
+        work,
+        |tile, (more, coarse): Noted| {
+            if !coarse.is_empty() {
+                if all_coarse.is_none() {
+                    held = workspace.reserve("coarse points", Levels::size(store.len()))?;
+                }
+                let all = all_coarse.get_or_insert_with(|| Levels::new(store.len()));
+                all.put_range(tiles.ids(tile), &coarse);
+            }
+
+            stats.global_fallbacks += more.global_fallbacks;
+            stats.no_plane += more.no_plane;
+            stats.off_surface += more.off_surface;
+            stats.raw_triples += more.raw_triples;
+            Ok(())
+        },
+    )?;
+    drop(held);
     let triples = CellTriples {
         tiles,
         own,
         sent: shuffle,
         off,
     };
-    Ok((triples, stats))
+    Ok((triples, all_coarse, stats))
+}
+
+/// What a unit notes besides its triples: counts, and how coarse its points are; empty if none is.
+type Noted = (CellStats, Levels);
+
+/// The numbers of the coarse points among `ids`, by place; empty if there is none.
+fn by_place(coarse: &[(u32, u8)], ids: &Range<usize>) -> Levels {
+    let mut levels = Levels::new(if coarse.is_empty() { 0 } else { ids.len() });
+    for (id, level) in coarse {
+        levels.set(*id as usize - ids.start, *level);
+    }
+    levels
 }
 
 fn one_tile(

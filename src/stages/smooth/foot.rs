@@ -6,8 +6,8 @@
 //! the bits are the same on every machine and do not depend on how the neighbours were found. Several points
 //! are collected, and each step is taken for all of them.
 
-use super::edges::{frame, unit};
 use super::fit::{Fit, TERMS, fits};
+use super::level::{frame, unit};
 use crate::geom::plane::{Normal, least_directions};
 use crate::kernels::eight::{Eight, loaded, stored};
 use crate::kernels::{
@@ -19,6 +19,15 @@ use crate::stages::tiles::near::Around;
 
 /// Two directions along a plane, and its normal.
 type Frame = [[f64; 3]; 3];
+
+/// The foot of a point on the surface around it; without a surface the point itself.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Foot {
+    /// From the point, in steps.
+    pub offset: [f64; 3],
+    /// Weighted mean of the squared heights of the neighbours over the surface of second order, in steps.
+    pub mean2: f64,
+}
 
 /// The feet of several points, in memory that is reused.
 #[derive(Debug, Default)]
@@ -34,10 +43,10 @@ pub(super) struct Feet<T> {
 }
 
 impl<T: Copy> Feet<T> {
-    /// Adds a point. Calls `put` with points whose new position is known, and its offset in steps.
-    pub fn add(&mut self, point: T, around: &Around, put: &mut impl FnMut(T, [f64; 3])) {
+    /// Adds a point. Calls `put` with points whose feet are known.
+    pub fn add(&mut self, point: T, around: &Around, put: &mut impl FnMut(T, Foot)) {
         if around.last2() == 0 {
-            return put(point, [0.0; 3]);
+            return put(point, Foot::default());
         }
         let lane = self.count;
         let reach = (METHOD.smoothing.reach2 * around.last2() as f64).sqrt();
@@ -61,16 +70,20 @@ impl<T: Copy> Feet<T> {
     }
 
     /// Calls `put` with the points that are left.
-    pub fn finish(&mut self, put: &mut impl FnMut(T, [f64; 3])) {
+    pub fn finish(&mut self, put: &mut impl FnMut(T, Foot)) {
         let frames = self.frames();
         self.turn(&frames);
         let fits = self.fits_without_strays(&frames);
         let beside = self.beside_edges(&frames);
         for lane in 0..self.count {
-            let offset = frames[lane].map_or([0.0; 3], |frame| {
-                offset(&frame, &fits.lane(lane), beside[lane], self.reach[lane])
+            let foot = frames[lane].map_or(Foot::default(), |frame| {
+                let (fit, reach) = (fits.lane(lane), self.reach[lane]);
+                Foot {
+                    offset: offset(&frame, &fit, beside[lane], reach),
+                    mean2: fit.mean2() * (reach * reach),
+                }
             });
-            put(self.points[lane], offset);
+            put(self.points[lane], foot);
         }
         self.count = 0;
     }

@@ -3,16 +3,17 @@
 //!
 //! Ids are kept; only positions and bounding boxes change.
 
-mod edges;
-mod first;
 mod fit;
 mod foot;
+mod level;
+mod moves;
+mod noise;
 mod pass;
 mod relax;
-mod seen;
 #[cfg(test)]
 mod tests;
 
+pub use moves::Lengths;
 pub use relax::{RelaxStats, Relaxed, relax};
 
 use crate::error::Result;
@@ -23,7 +24,7 @@ use crate::method::METHOD;
 use crate::stages::cells::{Fit, TileRanges, Widen, each_around, each_plane};
 use crate::stages::order::{PointStore, StoredPoints};
 use crate::workspace::{Unit, Workspace};
-use foot::Feet;
+use foot::{Feet, Foot};
 use pass::Pass;
 use std::ops::Range;
 
@@ -50,17 +51,13 @@ impl std::str::FromStr for Smoothing {
     }
 }
 
-/// The parameters of relaxing.
+/// The parameters of smoothing where points are noisy.
 #[derive(Debug, Clone, Copy)]
 pub struct Relaxing {
-    /// Number of neighbours for the plane to which a point moves.
+    /// Number of neighbours for a plane.
     pub neighbors: usize,
     /// Largest number of rounds.
     pub rounds: u32,
-    /// True if the points were smoothed: they are noisy, even if this does not show any more.
-    pub smoothed: bool,
-    /// True if points off the surface stay where they are.
-    pub off_surface: bool,
 }
 
 /// One round of smoothing: every point moves to the plane of its `neighbors` nearest, or, with
@@ -91,12 +88,19 @@ pub fn smooth(
         Smoothing::Edges => {
             let count = neighbors * METHOD.smoothing.neighbors;
             let mut feet = Feet::default();
-            let mut put = |(id, point): (usize, Point), offset| {
-                points[id - ids.start] = moved(point, offset);
+            let mut put = |(id, point): (usize, Point), foot: Foot| {
+                points[id - ids.start] = moved(point, foot.offset);
             };
-            each_around(unit, store, ids.clone(), count, |id, point, around| {
-                feet.add((id, point), around, &mut put);
-            })?;
+            each_around(
+                unit,
+                store,
+                ids.clone(),
+                count,
+                |_| true,
+                |id, point, around| {
+                    feet.add((id, point), around, &mut put);
+                },
+            )?;
             feet.finish(&mut put);
             Ok(())
         }

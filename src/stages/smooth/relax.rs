@@ -1,21 +1,24 @@
-//! Relaxing: smoothing that only serves to decide which points are connected (scale space; Digne et al.,
-//! *Scale space meshing of raw data point sets*, Computer Graphics Forum 30, 2011). The mesh keeps the
-//! measured positions.
+//! Smoothing where the points are noisy, as much as they are noisy, and nowhere else: positions that decide
+//! which points are connected, and, by default, are those of the mesh.
 //!
-//! Restricted Voronoi cells disagree where points lie off the surface by a part of their spacing. Points move
-//! only there; of smooth patches only samples are examined.
+//! Restricted Voronoi cells disagree where points lie off the surface by a part of their spacing (scale space;
+//! Digne et al., *Scale space meshing of raw data point sets*, Computer Graphics Forum 30, 2011).
 
-use super::Relaxing;
-use super::first::{self, Done};
+use super::foot::{Feet, Foot};
+use super::level::HIGHEST;
+use super::moves::{Lengths, Moves};
+use super::noise::{Found, look};
 use super::pass::Pass;
-use super::seen::Roughness;
+use super::{Relaxing, moved};
 use crate::error::Result;
 use crate::geom::Point;
 use crate::method::METHOD;
-use crate::stages::cells::{Fit, TileRanges, Widen, each_plane};
+use crate::stages::cells::{TileRanges, each_around};
+use crate::stages::levels::Levels;
 use crate::stages::order::{PointStore, StoredPoints};
-use crate::stages::spacing::StoredSpacings;
-use crate::workspace::memory::Reservation;
+use crate::stages::spacing::{StoredSpacings, spacing2};
+use crate::stages::tiles::near::Around;
+use crate::workspace::memory::bytes_of;
 use crate::workspace::{Unit, Workspace};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
@@ -31,72 +34,205 @@ pub struct Relaxed {
     pub stats: RelaxStats,
 }
 
-impl Relaxed {
-    /// Records the positions after a round, and the number of points that moved. Deletes the positions that
-    /// are not needed: those before the round, or those after it if no point moved.
-    fn take(
-        &mut self,
-        round: u32,
-        (store, moved): (StoredPoints, u64),
-        workspace: &Workspace,
-    ) -> Result<()> {
-        let old = if moved > 0 {
-            self.stats.rounds = round;
-            self.stats.moved += moved;
-            self.store.replace(store)
-        } else {
-            Some(store)
-        };
-        old.map_or(Ok(()), |old| old.release(workspace))
-    }
-}
-
 /// Counts of this stage.
-#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize, PartialEq)]
 pub struct RelaxStats {
     /// Rounds in which points moved.
     pub rounds: u32,
-    /// Points that moved, summed over the rounds.
+    /// Noisy points, which moved.
     pub moved: u64,
-}
-
-/// The runs that move, and the rough points in them.
-struct Runs {
-    active: Vec<bool>,
-    /// Number of rough points in each run.
-    rough: Vec<u8>,
-    _held: Reservation,
-}
-
-impl Runs {
-    fn new(points: usize, workspace: &Workspace) -> Result<Self> {
-        let count = points.div_ceil(METHOD.curve.run);
-        Ok(Self {
-            _held: workspace.reserve("relax: runs", count as u64 * 2)?,
-            active: vec![false; count],
-            rough: vec![0; count],
-        })
-    }
-
-    /// Selects the runs for the next round: those with a rough point.
-    fn settle(&mut self) {
-        for (active, rough) in self.active.iter_mut().zip(&mut self.rough) {
-            *active &= std::mem::take(rough) > 0;
-        }
-    }
+    /// How far they moved, in steps of the lattice.
+    pub lengths: Lengths,
 }
 
 impl RelaxStats {
-    /// True if the sum of moved points over all rounds is at least half the number of points: the whole cloud
-    /// is noisy, not only parts of it.
+    /// True if at least half of the points are noisy: the whole cloud, not only parts of it.
     #[must_use]
     pub fn is_noisy(&self, points: u64) -> bool {
         METHOD.components.noisy * self.moved >= points
     }
 }
 
-/// Rounds of relaxing: points move to the planes of their nearest neighbours. After the first round, only the
-/// points of runs that were rough in the previous round move.
+/// The number of rounds in which a point with these neighbours moves, itself included: the highest level that
+/// more than nine tenths of them reach.
+fn rounds(levels: &Levels, around: &Around) -> u8 {
+    let mut counts = [0; 4];
+    for id in around.ids() {
+        counts[levels.get(*id as usize) as usize] += 1;
+    }
+    let (mut below, mut rounds) = (0, 0);
+    for (level, count) in (1..).zip(&counts[..3]) {
+        below += count;
+        if METHOD.noise.few * below >= around.count() {
+            break;
+        }
+        rounds = level;
+    }
+    rounds
+}
+
+/// A noisy point.
+#[derive(Debug, Clone, Copy, Default)]
+struct Noisy {
+    id: usize,
+    point: Point,
+    /// Number of rounds in which it moves.
+    rounds: u8,
+    /// Squared distance of the last of its neighbours.
+    reach2: u64,
+}
+
+impl Noisy {
+    fn new((id, point): (usize, Point), rounds: u8, around: &Around) -> Self {
+        Self {
+            id,
+            point,
+            rounds,
+            reach2: around.last2(),
+        }
+    }
+
+    /// The position to which it moves. An outlier, which is too far from the surface, stays.
+    fn moved(&self, Foot { offset, .. }: Foot) -> Point {
+        let limit = METHOD.off_surface.beside;
+        let length2 = offset[0] * offset[0] + offset[1] * offset[1] + offset[2] * offset[2];
+        if length2 > limit * limit * self.reach2 as f64 {
+            self.point
+        } else {
+            moved(self.point, offset)
+        }
+    }
+
+    /// True if `count` neighbours are farther from their surface than noise explains: there are layers, such
+    /// as the two sides of a thin plate, or details.
+    fn has_layers(&self, foot: Foot, count: usize) -> bool {
+        let limit = METHOD.noise.layers * f64::from(self.rounds);
+        foot.mean2 > limit * limit * spacing2(self.reach2, count)
+    }
+}
+
+/// The result of a round for some points.
+#[derive(Serialize, Deserialize)]
+struct Done {
+    /// The first of the points.
+    first: usize,
+    /// For each of them, the number of rounds in which it moves; empty after the first round.
+    rounds: Levels,
+    moves: Moves,
+}
+
+/// One round.
+struct Round<'a> {
+    number: u32,
+    relaxing: Relaxing,
+    /// The positions before the first round.
+    original: &'a PointStore,
+    /// In the first round the levels of noise, then the number of rounds in which each point moves.
+    levels: &'a Levels,
+}
+
+impl Round<'_> {
+    fn is_first(&self) -> bool {
+        self.number == 1
+    }
+
+    /// Moves the noisy ones of the points `ids`.
+    fn advance(
+        &self,
+        unit: &Unit<'_>,
+        store: &PointStore,
+        ids: Range<usize>,
+        points: &mut [Point],
+    ) -> Result<Done> {
+        let mut done = Done {
+            first: ids.start,
+            rounds: Levels::new(if self.is_first() { ids.len() } else { 0 }),
+            moves: Moves::default(),
+        };
+        // Points are noisy only where some of them have a level.
+        if !self.levels.any(&ids) {
+            return Ok(done);
+        }
+        let original = self.original.slice(ids.clone())?;
+        let Done { rounds, moves, .. } = &mut done;
+        let mut put = |noisy: Noisy, to: Point| {
+            points[noisy.id - ids.start] = to;
+            let last = u32::from(noisy.rounds) == self.number;
+            moves.note(last, original[noisy.id - ids.start], to);
+        };
+        let layered = self.move_most(unit, store, ids.clone(), rounds, &mut put)?;
+        let _held = unit.hold(bytes_of(&layered));
+        self.move_layered(unit, store, ids.clone(), &layered, put)?;
+        Ok(done)
+    }
+
+    /// Calls `put` with the noisy points and the positions to which they move; sets the `rounds` in which
+    /// points move, if this is the first. Returns the ids of those whose neighbours lie in layers, ascending,
+    /// with their rounds.
+    fn move_most(
+        &self,
+        unit: &Unit<'_>,
+        store: &PointStore,
+        ids: Range<usize>,
+        to: &mut Levels,
+        put: &mut impl FnMut(Noisy, Point),
+    ) -> Result<Vec<(usize, u8)>> {
+        let most = self.relaxing.rounds.min(u32::from(HIGHEST)) as u8;
+        let count = self.relaxing.neighbors * METHOD.smoothing.neighbors;
+        let mut layered = Vec::new();
+        let mut feet = Feet::default();
+        let mut settle = |noisy: Noisy, foot: Foot| match noisy.has_layers(foot, count) {
+            true => layered.push((noisy.id, noisy.rounds)),
+            false => put(noisy, noisy.moved(foot)),
+        };
+        let wanted = |id: usize| self.is_first() || u32::from(self.levels.get(id)) >= self.number;
+        let first = ids.start;
+        each_around(unit, store, ids, count, wanted, |id, point, around| {
+            let rounds = if self.is_first() {
+                let rounds = rounds(self.levels, around).min(most);
+                to.set(id - first, rounds);
+                rounds
+            } else {
+                self.levels.get(id)
+            };
+            if rounds > 0 {
+                feet.add(Noisy::new((id, point), rounds, around), around, &mut settle);
+            }
+        })?;
+        feet.finish(&mut settle);
+        layered.sort_unstable();
+        Ok(layered)
+    }
+
+    /// As [`Round::move_most`], for the points whose neighbours lie in layers: they move by fewer neighbours.
+    fn move_layered(
+        &self,
+        unit: &Unit<'_>,
+        store: &PointStore,
+        ids: Range<usize>,
+        layered: &[(usize, u8)],
+        mut put: impl FnMut(Noisy, Point),
+    ) -> Result<()> {
+        if layered.is_empty() {
+            return Ok(());
+        }
+        let place = |id: usize| layered.binary_search_by_key(&id, |(id, _)| *id);
+        let count = self.relaxing.neighbors;
+        let mut feet = Feet::default();
+        let mut settle = |noisy: Noisy, foot: Foot| put(noisy, noisy.moved(foot));
+        let wanted = |id: usize| place(id).is_ok();
+        each_around(unit, store, ids, count, wanted, |id, point, around| {
+            if let Ok(place) = place(id) {
+                let noisy = Noisy::new((id, point), layered[place].1, around);
+                feet.add(noisy, around, &mut settle);
+            }
+        })?;
+        feet.finish(&mut settle);
+        Ok(())
+    }
+}
+
+/// Measures the local spacings, and smooths the points that are noisy.
 ///
 /// # Errors
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
@@ -108,96 +244,78 @@ pub fn relax(
     workspace: &Workspace,
 ) -> Result<Relaxed> {
     let _held = StoredSpacings::reserve(store.len(), workspace)?;
-    let mut runs = Runs::new(store.len(), workspace)?;
-    let mut usual2 = vec![0; store.len().div_ceil(METHOD.curve.patch)];
-    let first = first_round(store, tiles, relaxing, &mut runs, &mut usual2, workspace)?;
+    let bytes = Levels::size(store.len());
+    let _levels_held = workspace.reserve("levels of noise", bytes)?;
+    let levels = Levels::new(store.len());
+    let Found {
+        spacings,
+        mut levels,
+        noisy,
+    } = look(store, relaxing, levels, workspace)?;
     let mut relaxed = Relaxed {
         store: None,
-        spacings: StoredSpacings::new(usual2),
+        spacings,
         stats: RelaxStats::default(),
     };
-    relaxed.take(1, first, workspace)?;
-    runs.settle();
-    for round in 2..=relaxing.rounds {
-        if !runs.active.contains(&true) {
-            let left = u64::from(relaxing.rounds + 1 - round) * store.len() as u64;
+    if !noisy {
+        let left = u64::from(relaxing.rounds) * store.len() as u64;
+        workspace.observer.advance(left);
+        return Ok(relaxed);
+    }
+    let _rounds_held = workspace.reserve("rounds of smoothing", bytes)?;
+    let mut rounds = Levels::new(store.len());
+    let mut moves = Moves::default();
+    for number in 1..=relaxing.rounds {
+        let round = Round {
+            number,
+            relaxing,
+            original: store,
+            levels: &levels,
+        };
+        let before = relaxed
+            .store
+            .as_ref()
+            .map(|store| store.open(workspace))
+            .transpose()?;
+        let current = before.as_ref().unwrap_or(store);
+        let (next, done) = one_round(current, tiles, &round, &mut rounds, workspace)?;
+        drop(before);
+        if number == 1 {
+            std::mem::swap(&mut levels, &mut rounds);
+        }
+        if done.moved() == 0 {
+            next.release(workspace)?;
+            let left = u64::from(relaxing.rounds - number) * store.len() as u64;
             workspace.observer.advance(left);
             break;
         }
-        let before = relaxed.store.as_ref();
-        let before = before.map(|store| store.open(workspace)).transpose()?;
-        let current = before.as_ref().unwrap_or(store);
-        let spacings = &relaxed.spacings;
-        let next = one_round(
-            current, tiles, relaxing, round, &mut runs, spacings, workspace,
-        )?;
-        drop(before);
-        relaxed.take(round, next, workspace)?;
-        runs.settle();
+        relaxed.stats.rounds = number;
+        moves.add(&done);
+        if let Some(old) = relaxed.store.replace(next) {
+            old.release(workspace)?;
+        }
     }
+    (relaxed.stats.moved, relaxed.stats.lengths) = (moves.ended(), moves.lengths());
     Ok(relaxed)
 }
 
-/// Examines samples of every patch and moves the points of rough patches; returns the number of moved points.
-fn first_round(
-    store: &PointStore,
-    tiles: TileRanges,
-    relaxing: Relaxing,
-    runs: &mut Runs,
-    usual2: &mut [u64],
-    workspace: &Workspace,
-) -> Result<(StoredPoints, u64)> {
-    let pass = Pass {
-        whole: METHOD.curve.block as usize,
-        bytes: first::bytes(),
-        ..Pass::new("relaxed1", "relax: tile", tiles)
-    };
-    let work = |unit: &Unit<'_>, ids: Range<usize>, points: &mut [Point]| {
-        first::examine_and_move(unit, store, ids, relaxing, points)
-    };
-    let mut moved = 0;
-    let next = pass.over(store, workspace, work, |done: Done| {
-        let patch = done.seen.first * METHOD.curve.run / METHOD.curve.patch;
-        usual2[patch..][..done.usual2.len()].copy_from_slice(&done.usual2);
-        runs.active[done.seen.first..][..done.active.len()].copy_from_slice(&done.active);
-        moved += done.seen.moved;
-        done.seen.put(&mut runs.rough);
-    })?;
-    Ok((next, moved))
-}
-
-/// Moves the points of all active runs; returns their number.
+/// Moves the points of one round; returns the new positions and what moved.
 fn one_round(
     store: &PointStore,
     tiles: TileRanges,
-    relaxing: Relaxing,
-    round: u32,
-    runs: &mut Runs,
-    spacings: &StoredSpacings,
+    round: &Round<'_>,
+    rounds: &mut Levels,
     workspace: &Workspace,
-) -> Result<(StoredPoints, u64)> {
-    let file = format!("relaxed{round}");
+) -> Result<(StoredPoints, Moves)> {
+    let file = format!("relaxed{}", round.number);
     let pass = Pass::new(&file, "relax: tile", tiles);
-    let Runs { active, rough, .. } = runs;
     let work = |unit: &Unit<'_>, ids: Range<usize>, points: &mut [Point]| {
-        let wanted = |id: usize| active[id / METHOD.curve.run];
-        let mut seen = Roughness::of(&ids);
-        let count = relaxing.neighbors;
-        if ids.clone().step_by(METHOD.curve.run).any(wanted) {
-            let each = |id: usize, point: Point, fit: &Fit| {
-                let (to, rough) = relaxing.target(point, fit, spacings.usual2(id as u32));
-                seen.note(id, rough);
-                points[id - ids.start] = to;
-                seen.moved += 1;
-            };
-            each_plane(unit, store, ids.clone(), count, Widen::Never, wanted, each)?;
-        }
-        Ok(seen)
+        round.advance(unit, store, ids, points)
     };
-    let mut moved = 0;
-    let next = pass.over(store, workspace, work, |seen: Roughness| {
-        moved += seen.moved;
-        seen.put(rough);
+    let mut moves = Moves::default();
+    let next = pass.over(store, workspace, work, |done: Done| {
+        rounds.put(done.first, &done.rounds);
+        moves.add(&done.moves);
     })?;
-    Ok((next, moved))
+    Ok((next, moves))
 }

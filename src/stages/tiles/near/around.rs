@@ -14,6 +14,7 @@ pub struct Around {
     count: usize,
     /// Differences to the point.
     columns: [Vec<u32>; 3],
+    ids: Vec<u32>,
     last2: u64,
 }
 
@@ -37,6 +38,12 @@ impl Around {
         [0, 1, 2].map(|axis| bytemuck::cast_slice(&self.columns[axis][..whole]))
     }
 
+    /// The ids, ascending.
+    #[must_use]
+    pub fn ids(&self) -> &[u32] {
+        &self.ids[..self.count]
+    }
+
     /// Takes the first `count` of `near`, or all if there are fewer, and point `id` itself.
     pub fn set(&mut self, near: &Neighbors, count: usize, id: u32) {
         let mut all: Vec<_> = near.iter().take(count).collect();
@@ -47,6 +54,14 @@ impl Around {
         differences.insert(before, [0; 3]);
         self.reserve(differences.len());
         self.count = differences.len();
+        let ids = all.iter().map(|near| near.id);
+        for (to, other) in self.ids.iter_mut().zip(ids.clone().take(before)) {
+            *to = other;
+        }
+        self.ids[before] = id;
+        for (to, other) in self.ids[before + 1..].iter_mut().zip(ids.skip(before)) {
+            *to = other;
+        }
         for (axis, column) in self.columns.iter_mut().enumerate() {
             for (to, difference) in column.iter_mut().zip(&differences) {
                 // Differences of coordinates in 0..2^30 fit 32 bits.
@@ -59,7 +74,7 @@ impl Around {
     /// Makes room for `count` points and the rest of a block.
     fn reserve(&mut self, count: usize) {
         let room = count.next_multiple_of(8) + BLOCK;
-        for column in &mut self.columns {
+        for column in self.columns.iter_mut().chain([&mut self.ids]) {
             column.resize(room.max(column.len()), 0);
         }
     }
@@ -134,14 +149,16 @@ fn take_body<P: Pick>(
     k: usize,
     around: &mut Around,
 ) -> Result<(), Unknown> {
-    let (room, limit) = divided_body::<P, false>(search, point, k)?;
+    let (room, limit) = divided_body::<P, true>(search, point, k)?;
     around.reserve(k + 1);
-    let [from_x, from_y, from_z, _] = search.picked.blocks(room);
+    let [from_x, from_y, from_z, from_ids] = search.picked.blocks(room);
     let distances = search.distances[..room].as_chunks::<BLOCK>().0;
     let [to_x, to_y, to_z] = &mut around.columns;
     let mut count = 0;
-    for (((x, y), z), distances) in from_x.iter().zip(from_y).zip(from_z).zip(distances) {
+    let columns = from_x.iter().zip(from_y).zip(from_z).zip(from_ids);
+    for ((((x, y), z), ids), distances) in columns.zip(distances) {
         let within = P::within(distances, limit);
+        P::pack_at(ids, within, &mut around.ids, count);
         P::pack_at(x, within, to_x, count);
         P::pack_at(y, within, to_y, count);
         P::pack_at(z, within, to_z, count);

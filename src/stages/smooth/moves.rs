@@ -1,0 +1,128 @@
+//! How far points moved: counts by length.
+
+use crate::geom::{Point, distance2};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Parts into which the squares of lengths between two powers of two are divided.
+const PARTS: u64 = 64;
+
+/// How far points moved, in steps of the lattice.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct Lengths {
+    /// Half of the points moved at most this far (to within 1 %).
+    pub median: f64,
+    /// 99 % of the points moved at most this far (to within 1 %).
+    pub most: f64,
+    /// The largest length.
+    pub largest: f64,
+}
+
+/// Points that moved.
+#[derive(Debug, Default, Serialize, Deserialize)]
+pub(super) struct Moves {
+    moved: u64,
+    /// Number of points that have ended, by a number that grows with the length of their way.
+    ended: BTreeMap<u64, u64>,
+    /// The largest squared length.
+    largest2: u64,
+}
+
+impl Moves {
+    /// Notes a point that moved. If it moves for the `last` time, its way is that between two positions.
+    pub fn note(&mut self, last: bool, from: Point, to: Point) {
+        self.moved += 1;
+        if last {
+            let length2 = distance2(from, to);
+            self.largest2 = self.largest2.max(length2);
+            *self.ended.entry(class(length2)).or_default() += 1;
+        }
+    }
+
+    /// Adds the points of another part.
+    pub fn add(&mut self, other: &Self) {
+        self.moved += other.moved;
+        self.largest2 = self.largest2.max(other.largest2);
+        for (class, count) in &other.ended {
+            *self.ended.entry(*class).or_default() += count;
+        }
+    }
+
+    /// Number of points that moved, counted in each round.
+    pub fn moved(&self) -> u64 {
+        self.moved
+    }
+
+    /// Number of points that moved for the last time.
+    pub fn ended(&self) -> u64 {
+        self.ended.values().sum()
+    }
+
+    /// How far points moved.
+    pub fn lengths(&self) -> Lengths {
+        let within = |share: f64| {
+            let wanted = (share * self.ended() as f64).ceil() as u64;
+            let mut count = 0;
+            let reached = self.ended.iter().find(|(_, more)| {
+                count += **more;
+                count >= wanted
+            });
+            reached.map_or(0.0, |(class, _)| (least(*class) as f64).sqrt())
+        };
+        Lengths {
+            median: within(0.5),
+            most: within(0.99),
+            largest: (self.largest2 as f64).sqrt(),
+        }
+    }
+}
+
+/// A number that grows with the squared length, in parts of a 64th.
+fn class(length2: u64) -> u64 {
+    if length2 < PARTS {
+        return length2;
+    }
+    let shift = u64::from(length2.ilog2() - PARTS.ilog2());
+    PARTS * shift + (length2 >> shift)
+}
+
+/// The least squared length of a class.
+fn least(class: u64) -> u64 {
+    if class < 2 * PARTS {
+        return class;
+    }
+    let shift = class / PARTS - 1;
+    (class - PARTS * shift) << shift
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn classes_are_ordered_and_narrow(a in 0u64..1 << 62, shift in 0u32..62) {
+            let length2 = a >> shift;
+            let low = least(class(length2));
+            prop_assert!(low <= length2 && length2 - low <= length2 / PARTS);
+            prop_assert!(class(length2) <= class(length2 + 1));
+        }
+    }
+
+    #[test]
+    fn lengths_are_those_of_the_last_moves() {
+        let mut moves = Moves::default();
+        moves.note(false, [0; 3], [0, 0, 90]);
+        for length in 1..=100 {
+            moves.note(true, [0; 3], [0, length, 0]);
+        }
+        let Lengths {
+            median,
+            most,
+            largest,
+        } = moves.lengths();
+        assert!((median - 50.0).abs() < 1.0 && (most - 99.0).abs() < 1.0);
+        assert_eq!((largest, moves.moved(), moves.ended()), (100.0, 101, 100));
+    }
+}

@@ -1,0 +1,168 @@
+//! The look at all regions before points move: the usual reach of each patch, from samples, and the level of
+//! noise at each point of those regions whose samples show noise.
+
+use super::Relaxing;
+use super::level::Gauge;
+use crate::error::Result;
+use crate::method::METHOD;
+use crate::stages::cells::{Planes, Widen};
+use crate::stages::levels::Levels;
+use crate::stages::order::PointStore;
+use crate::stages::spacing::StoredSpacings;
+use crate::stages::tiles::Tile;
+use crate::stages::tiles::walk::PageCache;
+use crate::workspace::memory::bytes_of;
+use crate::workspace::{Unit, Workspace};
+use serde::{Deserialize, Serialize};
+use std::ops::Range;
+
+/// What the look at all regions found.
+pub(super) struct Found {
+    /// The local spacings.
+    pub spacings: StoredSpacings,
+    /// The level of noise at each point; 0 in regions without noise.
+    pub levels: Levels,
+    /// True if a region has noise.
+    pub noisy: bool,
+}
+
+/// What the look at one region found.
+#[derive(Serialize, Deserialize)]
+struct Seen {
+    /// The usual reach of each patch, squared.
+    usual2: Vec<u64>,
+    /// The usual reach of the region, squared.
+    region2: u64,
+    /// Empty if the region has no noise.
+    levels: Levels,
+}
+
+/// A sample of a region.
+struct Sample {
+    id: u32,
+    /// Squared distance of the last neighbour.
+    last2: u64,
+    level: u8,
+}
+
+/// Looks at all regions; `levels` are zeros.
+pub(super) fn look(
+    store: &PointStore,
+    relaxing: Relaxing,
+    levels: Levels,
+    workspace: &Workspace,
+) -> Result<Found> {
+    let size = METHOD.curve.block as usize;
+    let region = |number: usize| number * size..((number + 1) * size).min(store.len());
+    let bytes = |number: usize| {
+        let points = region(number).len();
+        let lists = size_of::<Sample>() / METHOD.curve.sample + 2;
+        Tile::estimate(points) + PageCache::estimate(store) + (points * lists) as u64
+    };
+    let work = |unit: &Unit<'_>| {
+        let ids = region(unit.number());
+        let seen = look_at(unit, store, ids.clone(), relaxing)?;
+        unit.advance(ids.len() as u64);
+        Ok(seen)
+    };
+    let mut found = Found {
+        spacings: StoredSpacings::new(store.len()),
+        levels,
+        noisy: false,
+    };
+    let each = |number: usize, seen: Seen| {
+        let first = region(number).start;
+        found.spacings.put(first, &seen.usual2, seen.region2);
+        found.noisy |= !seen.levels.is_empty();
+        found.levels.put(first, &seen.levels);
+        Ok(())
+    };
+    let step = ("noise", "noise: region");
+    workspace.units(step, store.len().div_ceil(size), bytes, work, each)?;
+    Ok(found)
+}
+
+/// Looks at the samples of a region, and at all its points if the samples show noise.
+fn look_at(
+    unit: &Unit<'_>,
+    store: &PointStore,
+    ids: Range<usize>,
+    relaxing: Relaxing,
+) -> Result<Seen> {
+    let planes = Planes::load(unit, store, ids.clone(), |_| true, relaxing.neighbors)?;
+    let mut gauge = Gauge::default();
+    let mut samples: Vec<Sample> = Vec::with_capacity(ids.len() / METHOD.curve.sample + 16);
+    let measured = relaxing.rounds > 0;
+    planes.each_fit(
+        Widen::OnBands,
+        is_sampled,
+        |id, fit, near| {
+            let level = if measured {
+                gauge.level(near, fit, relaxing.neighbors)
+            } else {
+                0
+            };
+            (id, fit.near2, level)
+        },
+        |_, _, &(id, last2, level)| samples.push(Sample { id, last2, level }),
+    )?;
+    samples.sort_unstable_by_key(|sample| sample.id);
+    let held = unit.hold(bytes_of(&samples));
+    let usual2 = usual_reach(&samples);
+    let region2 = lower_quartile(usual2.clone());
+    let noisy = is_noisy(&samples);
+    let mut levels = Levels::new(if noisy { ids.len() } else { 0 });
+    if noisy {
+        for sample in &samples {
+            levels.set(sample.id as usize - ids.start, sample.level);
+        }
+    }
+    drop((samples, held));
+    let _held = unit.hold(levels.bytes());
+    if noisy {
+        let mut put = |id: usize, level: u8| levels.set(id - ids.start, level);
+        planes.each_fit(
+            Widen::OnBands,
+            |id| !is_sampled(id),
+            |_, fit, near| gauge.level(near, fit, relaxing.neighbors),
+            |id, _, level| put(id, *level),
+        )?;
+    }
+    Ok(Seen {
+        usual2,
+        region2,
+        levels,
+    })
+}
+
+fn is_sampled(id: usize) -> bool {
+    (id / METHOD.curve.run).is_multiple_of(METHOD.curve.sample)
+}
+
+/// True if there is a run in which fewer than one in ten samples are clean. Edges and details beside smooth
+/// surface leave more.
+fn is_noisy(samples: &[Sample]) -> bool {
+    let run = |sample: &Sample| sample.id as usize / METHOD.curve.run;
+    let runs = samples.chunk_by(|a, b| run(a) == run(b));
+    let mut full = runs.filter(|run| run.len() == METHOD.curve.run);
+    full.any(|run| {
+        let clean = run.iter().filter(|sample| sample.level == 0).count();
+        METHOD.noise.few * clean < run.len()
+    })
+}
+
+/// The usual reach of each patch, squared: the lower quartile over its samples.
+fn usual_reach(samples: &[Sample]) -> Vec<u64> {
+    let patch = |sample: &Sample| sample.id as usize / METHOD.curve.patch;
+    let patches = samples.chunk_by(|a, b| patch(a) == patch(b));
+    let reach = |patch: &[Sample]| patch.iter().map(|sample| sample.last2).collect();
+    patches.map(|patch| lower_quartile(reach(patch))).collect()
+}
+
+fn lower_quartile(mut all: Vec<u64>) -> u64 {
+    if all.is_empty() {
+        return 0;
+    }
+    let place = all.len() / METHOD.off_surface.quantile;
+    *all.select_nth_unstable(place).1
+}
