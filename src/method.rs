@@ -86,6 +86,9 @@ constants! {
         /// the ground is above it, a coarse point beside a dense area is not. Nor does smoothing move a point
         /// that far.
         beside: f64 = 0.5, "reaches", [0.35, 0.7];
+        /// A coarse point has wider limits of length if it and its neighbours are level: their root mean square
+        /// height over their plane is at most this share of their reach. Strewn points are not.
+        level: f64 = 0.12, "reaches", [0.08, 0.2];
     }
     /// Smoothing by a curved surface, which also distinguishes edges from noise.
     smoothing: Smoothing {
@@ -130,7 +133,7 @@ constants! {
         round: f64 = 0.15, "local spacings";
         /// Root mean square height of the neighbours over their surface, for each round that the noise asks for,
         /// above which they lie in layers or show details: then fewer neighbours are used.
-        layers: f64 = 0.4, "local spacings", [0.3, 0.6];
+        layers: f64 = 0.6, "local spacings", [0.4, 0.8];
         /// A point stays where it is if at least one in this number of its neighbours is clean: they tell
         /// edges, details and thin sheets from noise.
         few: usize = 10, "one in";

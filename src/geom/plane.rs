@@ -115,11 +115,18 @@ impl Moments {
     /// is a sixth.
     #[must_use]
     pub fn fill_space(&self, normal: Normal) -> bool {
+        let [xx, yy, zz, ..] = self.scatter();
+        let (along, length2) = self.scatter_along(normal);
+        METHOD.off_surface.space * along > (xx + yy + zz) * length2
+    }
+
+    /// The scatter along a normal, times the square of its length, and that square.
+    fn scatter_along(&self, normal: Normal) -> (f64, f64) {
         let [xx, yy, zz, xy, xz, yz] = self.scatter();
         let [x, y, z] = normal.map(f64::from);
         let along =
             (xx * x * x + yy * y * y + zz * z * z) + 2.0 * (xy * x * y + xz * x * z + yz * y * z);
-        METHOD.off_surface.space * along > (xx + yy + zz) * (x * x + y * y + z * z)
+        (along, x * x + y * y + z * z)
     }
 
     /// True if the point is beside the plane with `normal` through the centroid of its neighbours: farther
@@ -132,6 +139,19 @@ impl Moments {
         let length2 = n[0] * n[0] + n[1] * n[1] + n[2] * n[2];
         let limit = METHOD.off_surface.beside * self.count as f64;
         along * along > limit * limit * (last2 as f64 * length2)
+    }
+
+    /// True if the point and its neighbours are level: the root mean square of their heights over the plane
+    /// with `normal` is a small share of the distance that the neighbours reach, and the point is no stray.
+    #[must_use]
+    pub fn is_level(&self, normal: Normal, last2: u64) -> bool {
+        let (along, length2) = self.scatter_along(normal);
+        let count = (self.count + 1) as f64;
+        let mean2 = along / (count * count * length2);
+        let share = METHOD.off_surface.level;
+        let [x, y, z] = self.project(normal);
+        mean2 <= share * share * last2 as f64
+            && x * x + y * y + z * z <= METHOD.smoothing.stray2 * mean2
     }
 
     /// The best-fitting plane of the point and its neighbours.

@@ -96,7 +96,7 @@ pub fn coarseness(last2: u64, usual2: u64) -> u8 {
 pub enum Standing {
     /// As is usual in its patch.
     Usual,
-    /// Coarser, on one surface with them; with its number in [`Coarse`].
+    /// Coarser, and level with them; with its number in [`Coarse`].
     Coarse(u8),
     /// Off the surface: they reach far for the region, and do not lie on one surface with it.
     Off,
@@ -206,13 +206,12 @@ impl Density<'_> {
         if coarseness == 0 && !far {
             return Standing::Usual;
         }
-        match (
-            moments.fill_space(normal) || moments.is_beside(normal, last2),
-            far,
-        ) {
-            (true, true) => Standing::Off,
-            (true, false) => Standing::Usual,
-            (false, _) => Standing::Coarse(coarseness),
+        if far && (moments.fill_space(normal) || moments.is_beside(normal, last2)) {
+            Standing::Off
+        } else if moments.is_level(normal, last2) {
+            Standing::Coarse(coarseness)
+        } else {
+            Standing::Usual
         }
     }
 
