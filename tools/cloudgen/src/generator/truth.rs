@@ -32,12 +32,12 @@ impl Generator {
         write::write_part(self, path.as_ref(), format, 0, 1)
     }
 
-    /// Writes the places that were measured: see [`Cloud::write_seen`].
+    /// Writes the places that were measured: see [`Cloud::write_seen`](crate::Cloud::write_seen).
     pub fn write_seen(&self, path: impl AsRef<Path>) -> Result<()> {
         write::write_seen(self, path.as_ref())
     }
 
-    /// Writes the true surface: see [`Cloud::write_reference`].
+    /// Writes the true surface: see [`Cloud::write_reference`](crate::Cloud::write_reference).
     pub fn write_reference(&self, path: impl AsRef<Path>, tolerance: f64) -> Result<()> {
         let made = match &self.source {
             Source::Scene(made) => Some(&made.truth),
