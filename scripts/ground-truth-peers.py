@@ -1,12 +1,12 @@
 """Open3D's methods, for scripts/ground-truth.
 
 usage: ground-truth-peers.py normals tree|up CLOUD.ply OUT.ply
-       ground-truth-peers.py poisson|bpa NORMALS.ply OUT.ply
+       ground-truth-peers.py poisson|bpa open|closed NORMALS.ply OUT.ply
        ground-truth-peers.py depth CLOUD.ply
 
 normals: by principal components of 16 neighbours, turned by a spanning tree, or up. poisson: screened Poisson
-surface with a finest cell of about one spacing, trimmed where density is below depth - 2. bpa: ball pivoting
-with radii of 1.5, 3 and 6 mean distances of neighbours. depth: prints that of the finest cell.
+surface with a finest cell of about one spacing; if it is open, trimmed where density is below depth - 2. bpa:
+ball pivoting with radii of 1.5, 3 and 6 mean distances of neighbours. depth: prints that of the finest cell.
 """
 
 import math
@@ -40,11 +40,12 @@ def with_normals(points, direction):
     return points
 
 
-def poisson(points):
-    """Screened Poisson surface, trimmed."""
+def poisson(points, surface):
+    """Screened Poisson surface, trimmed if it is open."""
     depth = depth_of(points)
     mesh, density = o3d.geometry.TriangleMesh.create_from_point_cloud_poisson(points, depth=depth, n_threads=1)
-    mesh.remove_vertices_by_mask(np.asarray(density) < depth - 2)
+    if surface == "open":
+        mesh.remove_vertices_by_mask(np.asarray(density) < depth - 2)
     return mesh
 
 
@@ -60,9 +61,9 @@ def main():
         case ["normals", ("tree" | "up") as direction, source, target]:
             cloud = with_normals(o3d.io.read_point_cloud(source), direction)
             done = o3d.io.write_point_cloud(target, cloud)
-        case ["poisson", source, target]:
-            done = o3d.io.write_triangle_mesh(target, poisson(o3d.io.read_point_cloud(source)))
-        case ["bpa", source, target]:
+        case ["poisson", ("open" | "closed") as surface, source, target]:
+            done = o3d.io.write_triangle_mesh(target, poisson(o3d.io.read_point_cloud(source), surface))
+        case ["bpa", _, source, target]:
             done = o3d.io.write_triangle_mesh(target, pivoted(o3d.io.read_point_cloud(source)))
         case ["depth", source]:
             print(depth_of(o3d.io.read_point_cloud(source)))
