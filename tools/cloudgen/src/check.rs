@@ -5,6 +5,7 @@ use crate::error::{Error, Result};
 use crate::kind::Kind;
 use crate::outdoor::{HIGHEST_WALL, MOST_TREES, MOST_WIRES, Objects};
 use crate::sampling::Sampling;
+use crate::scene::{Measuring, Scene};
 
 /// Largest number of layers of a cloud.
 const MOST_LAYERS: u32 = 100;
@@ -16,7 +17,9 @@ pub(crate) fn check(cloud: &Cloud) -> Result<()> {
     if cloud.kind == Kind::Mesh && cloud.mesh.is_none() {
         return Err(Error::parameter("mesh", "nothing", "a mesh file"));
     }
-    match excluded(cloud).or_else(|| excluded_outdoors(cloud)) {
+    measuring(cloud)?;
+    let excluded = excluded(cloud).or_else(|| excluded_outdoors(cloud));
+    match excluded.or_else(|| excluded_in_scenes(cloud)) {
         Some((first, second, why)) => Err(Error::Conflict { first, second, why }),
         None => Ok(()),
     }
@@ -106,8 +109,12 @@ fn excluded(cloud: &Cloud) -> Option<(&'static str, &'static str, &'static str)>
         let why = "the falloff draws points by chance, in no order";
         return Some(("falloff", "sorted order", why));
     }
-    if cloud.mesh.is_some() && cloud.kind != Kind::Mesh {
-        let why = "only the kind mesh takes a file";
+    let takes_mesh = match cloud.kind {
+        Kind::Scene(scene) => scene.takes_mesh(),
+        kind => kind == Kind::Mesh,
+    };
+    if cloud.mesh.is_some() && !takes_mesh {
+        let why = "only the kinds mesh, body-scan and edged take a file";
         return Some(("a mesh file", cloud.kind.name(), why));
     }
     if cloud.layers == 1 && cloud.layer_offset != 0.0 {
@@ -130,6 +137,59 @@ fn excluded(cloud: &Cloud) -> Option<(&'static str, &'static str, &'static str)>
         return Some(("scanlines", "mesh", why));
     }
     None
+}
+
+/// The same for scenes.
+fn excluded_in_scenes(cloud: &Cloud) -> Option<(&'static str, &'static str, &'static str)> {
+    let Kind::Scene(scene) = cloud.kind else {
+        let why = "only scenes have them";
+        let plain = cloud.measuring == Measuring::EXACT;
+        let first = "range-noise, registration, flying or ratio";
+        return (!plain).then_some((first, cloud.kind.name(), why));
+    };
+    let sized = scene.takes_mesh() || scene == Scene::Strewn;
+    let density = "it has a density of its own";
+    [
+        (
+            cloud.size != DEFAULT_SIZE && !sized,
+            "size",
+            "it has a size of its own",
+        ),
+        (cloud.falloff, "falloff", density),
+        (cloud.scanlines.is_some(), "scanlines", density),
+        (cloud.sampling != Sampling::Uniform, "sampling", density),
+        (
+            cloud.measuring.ratio.is_some() && scene.ratio().is_none(),
+            "ratio",
+            "it has nothing that a ratio could change",
+        ),
+    ]
+    .into_iter()
+    .find_map(|(set, first, why)| set.then_some((first, scene.name(), why)))
+}
+
+/// Refuses errors of measurement that are out of range.
+fn measuring(cloud: &Cloud) -> Result<()> {
+    let measuring = &cloud.measuring;
+    for (name, value, most) in [
+        ("range-noise", measuring.noise, 100.0),
+        ("registration", measuring.registration, 100.0),
+        ("flying", measuring.flying, 0.5),
+    ] {
+        if !(0.0..=most).contains(&value) {
+            return Err(Error::parameter(name, value, format!("0 to {most}")));
+        }
+    }
+    let Kind::Scene(scene) = cloud.kind else {
+        return Ok(());
+    };
+    match (scene.ratio(), measuring.ratio) {
+        (Some((least, most, _)), Some(ratio)) if !(least..=most).contains(&ratio) => {
+            let expected = format!("{least} to {most}");
+            Err(Error::parameter("ratio", ratio, expected))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// The same for the outdoor world.

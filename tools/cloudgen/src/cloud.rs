@@ -9,6 +9,7 @@ use crate::kind::Kind;
 use crate::outdoor::{self, GroundReport, Land, Objects};
 use crate::reference;
 use crate::sampling::Sampling;
+use crate::scene::Measuring;
 use crate::write::{self, Format};
 
 /// Default diagonal of the bounding box.
@@ -52,11 +53,12 @@ pub enum NoiseMode {
 pub struct Cloud {
     /// The surface.
     pub kind: Kind,
-    /// The mesh file, OBJ or PLY, for the kind `Mesh`. It is moved to the origin and scaled to the size.
+    /// The mesh file, OBJ or PLY, for the kind `Mesh` and scenes of one body. It is moved to the origin and
+    /// scaled to the size.
     pub mesh: Option<PathBuf>,
     /// Distribution of the points on the surface.
     pub sampling: Sampling,
-    /// Number of points, outliers and duplicates included.
+    /// Number of points, outliers and duplicates included; a scene has about as many.
     pub points: u64,
     /// Seed of all random numbers.
     pub seed: u64,
@@ -90,6 +92,8 @@ pub struct Cloud {
     pub order: Order,
     /// Objects of the outdoor world.
     pub objects: Objects,
+    /// Errors of the measurement of a scene.
+    pub measuring: Measuring,
 }
 
 impl Cloud {
@@ -115,6 +119,7 @@ impl Cloud {
             offset: [0.0; 3],
             order: Order::Random,
             objects: Objects::default(),
+            measuring: Measuring::EXACT,
         }
     }
 
@@ -216,6 +221,11 @@ impl Cloud {
         Cloud { objects, ..self }
     }
 
+    /// Sets the errors of the measurement of a scene.
+    pub fn measuring(self, measuring: Measuring) -> Self {
+        Cloud { measuring, ..self }
+    }
+
     /// Euler characteristic of the surface if it is closed: 2 - 2 * genus.
     pub fn euler_characteristic(&self) -> Option<i64> {
         self.kind.euler_characteristic()
@@ -229,7 +239,7 @@ impl Cloud {
 
     /// Writes the cloud to a file.
     pub fn write(&self, path: impl AsRef<Path>, format: Format) -> Result<()> {
-        write::write_part(&self.generator()?, path.as_ref(), format, 0, 1)
+        self.generator()?.write(path, format)
     }
 
     /// Writes the cloud as a random partition into the files `NAME-0.EXT`, `NAME-1.EXT`, and so
@@ -257,7 +267,15 @@ impl Cloud {
     /// noise. Curved surfaces are approximated within `tolerance` times the size, terrain roughly.
     pub fn write_reference(&self, path: impl AsRef<Path>, tolerance: f64) -> Result<()> {
         check(self)?;
-        write::write_reference(&reference::reference(self, tolerance)?, path.as_ref())
+        let mesh = reference::reference(self, tolerance, None)?;
+        write::write_reference(&mesh, path.as_ref())
+    }
+
+    /// Writes the places of the true surface that were measured, with its normals, as a PLY cloud: without
+    /// noise and other errors, in no relation to the order of the points. Outliers and points between near
+    /// and far are left out.
+    pub fn write_seen(&self, path: impl AsRef<Path>) -> Result<()> {
+        self.generator()?.write_seen(path)
     }
 
     /// Discs (x, y, radius) around the houses, trees and walls of the outdoor world, with a margin,

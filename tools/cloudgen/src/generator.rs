@@ -1,5 +1,7 @@
 //! The points of a cloud.
 
+mod truth;
+
 use std::thread;
 
 use crate::cloud::{Cloud, NoiseMode, Order};
@@ -11,6 +13,7 @@ use crate::picker::Picker;
 use crate::reference;
 use crate::rng::{Permutation, Purpose, Rng};
 use crate::sampling::{Sampling, choose};
+use crate::scene::{self, Made};
 use crate::surface::{Grid, Line, Sample, Surface, box_distance, box_point, turned, turned_back};
 use crate::vec3::{Vec3, add, length, scale, sub};
 
@@ -39,6 +42,8 @@ enum Source {
         surface: Box<dyn Surface>,
         samples: Vec<Sample>,
     },
+    /// A scene and its points.
+    Scene(Made),
 }
 
 /// Position of point `i` in the sweep over the surface.
@@ -71,6 +76,12 @@ impl Generator {
             let half = [odd.reach(cloud.points, cloud.size); 3];
             let bounds = [scale(half, -1.0), half];
             return Ok(Self::with(cloud, Source::Odd(odd), bounds, [0.0; 3]));
+        }
+        if let Kind::Scene(scene) = cloud.kind {
+            let made = scene::make(cloud, scene)?;
+            let cloud = cloud.clone().points(made.points.len() as u64);
+            let bounds = made.truth.bounds();
+            return Ok(Self::with(&cloud, Source::Scene(made), bounds, [0.0; 3]));
         }
         if cloud.kind == Kind::Outdoor {
             let land = Land::new(cloud.seed, &cloud.objects);
@@ -106,7 +117,7 @@ impl Generator {
     }
 
     fn with(cloud: &Cloud, source: Source, bounds: [Vec3; 2], scanner: Vec3) -> Self {
-        let regular = matches!(cloud.kind, Kind::Grid | Kind::Outdoor)
+        let regular = matches!(cloud.kind, Kind::Grid | Kind::Outdoor | Kind::Scene(_))
             || cloud.sampling != Sampling::Uniform
             || (cloud.scanlines.is_some() && !cloud.falloff);
         let sweep = match cloud.order {
@@ -153,6 +164,11 @@ impl Generator {
 
     /// Point `index` with the normal of the surface; `index` is taken modulo the number of points.
     pub fn sample(&self, index: u64) -> Sample {
+        self.original(self.source_of(index))
+    }
+
+    /// The index of the point of which a point is a copy; that of its own for most.
+    fn source_of(&self, index: u64) -> u64 {
         let mut index = index % self.cloud.points.max(1);
         if self.cloud.duplicates > 0.0 {
             // A copy is always of an earlier point, so the loop ends.
@@ -164,13 +180,13 @@ impl Generator {
                 index = rng.below(index);
             }
         }
-        self.original(index)
+        index
     }
 
     /// Area of one layer of the surface; `None` for a grid and if there is no single surface.
     pub fn area(&self) -> Option<f64> {
         match &self.source {
-            Source::Grid(_) | Source::Odd(_) | Source::Outdoor(_) => None,
+            Source::Grid(_) | Source::Odd(_) | Source::Outdoor(_) | Source::Scene(_) => None,
             Source::Surface { surface, .. } | Source::Chosen { surface, .. } => {
                 Some(surface.area())
             }
@@ -204,7 +220,7 @@ impl Generator {
         let p = sub(position, self.cloud.offset);
         match &self.source {
             Source::Grid(grid) => grid.distance(p),
-            Source::Odd(_) | Source::Outdoor(_) => f64::NAN,
+            Source::Odd(_) | Source::Outdoor(_) | Source::Scene(_) => f64::NAN,
             Source::Surface { surface, .. } | Source::Chosen { surface, .. } => {
                 surface.distance(if self.cloud.rotated {
                     turned_back(p)
@@ -275,23 +291,12 @@ impl Generator {
     }
 
     fn noisy(&self, index: u64) -> Sample {
-        let mut sample = match &self.source {
-            Source::Grid(grid) => grid.node(self.rank(index)),
-            Source::Outdoor(outdoor) => {
-                let rank = self.rank(index);
-                outdoor.point(rank, &mut Rng::at(self.cloud.seed, Purpose::Position, rank))
-            }
-            Source::Odd(odd) => {
-                let mut rng = Rng::at(self.cloud.seed, Purpose::Position, index);
-                let position = odd.point(index, self.cloud.points, self.cloud.size, &mut rng);
-                let normal = [0.0; 3];
-                self.turn(Sample { position, normal })
-            }
-            Source::Surface { surface, scan } => {
-                self.turn(self.on_surface(surface.as_ref(), scan.as_ref(), index))
-            }
-            Source::Chosen { samples, .. } => self.turn(samples[self.rank(index) as usize]),
-        };
+        let mut sample = self.place(index);
+        if let Source::Scene(made) = &self.source {
+            let error = made.points[self.rank(index) as usize].error;
+            let turn = |v| if self.cloud.rotated { turned(v) } else { v };
+            sample.position = add(sample.position, turn(error));
+        }
         if self.cloud.layers > 1 {
             let layer = (index % u64::from(self.cloud.layers)) as f64;
             let shift = scale(sample.normal, layer * self.cloud.layer_offset);
@@ -307,6 +312,34 @@ impl Generator {
             sample.position = add(sample.position, shift);
         }
         sample
+    }
+
+    /// Point `index` on the surface, without any error.
+    fn place(&self, index: u64) -> Sample {
+        match &self.source {
+            Source::Grid(grid) => grid.node(self.rank(index)),
+            Source::Outdoor(outdoor) => {
+                let rank = self.rank(index);
+                outdoor.point(rank, &mut Rng::at(self.cloud.seed, Purpose::Position, rank))
+            }
+            Source::Odd(odd) => {
+                let mut rng = Rng::at(self.cloud.seed, Purpose::Position, index);
+                let position = odd.point(index, self.cloud.points, self.cloud.size, &mut rng);
+                let normal = [0.0; 3];
+                self.turn(Sample { position, normal })
+            }
+            Source::Surface { surface, scan } => {
+                self.turn(self.on_surface(surface.as_ref(), scan.as_ref(), index))
+            }
+            Source::Chosen { samples, .. } => self.turn(samples[self.rank(index) as usize]),
+            Source::Scene(made) => {
+                let point = &made.points[self.rank(index) as usize];
+                self.turn(Sample {
+                    position: point.place,
+                    normal: point.normal,
+                })
+            }
+        }
     }
 
     /// Position of point `index` in the order of the source.

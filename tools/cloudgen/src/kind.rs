@@ -4,6 +4,7 @@ use std::{fmt, str::FromStr};
 
 use crate::error::Error;
 use crate::odd::Odd;
+use crate::scene::Scene;
 
 /// A surface with known geometry and topology.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -31,6 +32,8 @@ pub enum Kind {
     Outdoor,
     /// A cloud without a surface, or with one unfit for reconstruction.
     Odd(Odd),
+    /// A scene as virtual scanners measure it, or a sample of a surface with a known mesh.
+    Scene(Scene),
 }
 
 impl Kind {
@@ -60,6 +63,7 @@ impl Kind {
             Kind::Mesh => "mesh",
             Kind::Outdoor => "outdoor",
             Kind::Odd(odd) => odd.name(),
+            Kind::Scene(scene) => scene.name(),
         }
     }
 
@@ -70,6 +74,7 @@ impl Kind {
             Kind::Torus => Some(0),
             Kind::Bumpy => Some(-8),
             Kind::Room => Some(-6),
+            Kind::Scene(scene) => scene.euler_characteristic(),
             Kind::Terrain
             | Kind::Plane
             | Kind::Grid
@@ -92,11 +97,13 @@ impl FromStr for Kind {
 
     fn from_str(text: &str) -> Result<Self, Error> {
         let odd = || Odd::ALL.into_iter().map(Kind::Odd);
+        let scenes = || Scene::ALL.into_iter().map(Kind::Scene);
         let kinds = || {
             Kind::ALL
                 .into_iter()
                 .chain([Kind::Mesh, Kind::Outdoor])
                 .chain(odd())
+                .chain(scenes())
         };
         let names: Vec<_> = kinds().map(Kind::name).collect();
         let names = names.join(", ");

@@ -4,13 +4,17 @@
 //! a real scanner (noise, outliers, duplicates, uneven density). Its [`Generator`] makes any point on demand,
 //! and [`Cloud::write`] streams all of them to a file, in a few megabytes of memory for any number of points.
 //!
-//! This holds for uniform clouds. For other [`Sampling`] all points are chosen in advance and held in memory.
+//! This holds for uniform clouds. For other [`Sampling`], and for a [`Scene`], all points are chosen in advance
+//! and held in memory.
 //!
 //! Every point is a pure function of the description and its index, and all transcendental
 //! functions come from `libm`: the same description gives the same bytes everywhere.
 //!
 //! Surfaces other than the grid are centred on the origin before the offset; the grid and the
 //! outdoor world start at the origin.
+//!
+//! [`Cloud::write_reference`] writes the true surface as a mesh, [`Cloud::write_seen`] the places that were
+//! measured, without any error. [`Triangles`] and [`Spots`] find what is nearest to a place.
 //!
 //! [`Cloud::measure_mesh`] compares a mesh of the outdoor world with its ground.
 
@@ -27,7 +31,10 @@ mod ply_stream;
 mod reference;
 mod rng;
 mod sampling;
+mod scene;
+mod spots;
 mod surface;
+mod triangles;
 mod vec3;
 mod write;
 
@@ -38,5 +45,8 @@ pub use kind::Kind;
 pub use odd::Odd;
 pub use outdoor::{GroundReport, OUTDOOR_SIDE, Objects};
 pub use sampling::{MOST_HELD, Sampling};
+pub use scene::{MOST_IN_SCENE, Measuring, Scene};
+pub use spots::{Spots, median};
 pub use surface::Sample;
+pub use triangles::{Found, Triangles};
 pub use write::{Encoding, Format, LasOptions, PointFormat, Precision};

@@ -8,8 +8,8 @@ use std::{
 
 use clap::{Parser, ValueEnum};
 use outcrop_cloudgen::{
-    Cloud, Error, Format, Kind, LasOptions, NoiseMode, Objects, Order, PointFormat, Result,
-    Sampling,
+    Cloud, Error, Format, Kind, LasOptions, Measuring, NoiseMode, Objects, Order, PointFormat,
+    Result, Sampling,
 };
 
 /// Writes a point cloud with known ground truth. Equal arguments give equal files.
@@ -20,11 +20,13 @@ struct Args {
     /// orthogonal plates) or mesh (a file); many surfaces: outdoor (ground with houses, trees and
     /// walls, from 0 to 400 along x and y); without a surface: two-clusters, line-grid, cube-grid,
     /// one-place, few-places, icosahedron, line, volume, powers, dense-in-sparse, scan-line, wheel,
-    /// shell or patches
+    /// shell or patches; scenes as virtual scanners measure them: body-scan, edged-scan, fins-scan, room-scan,
+    /// street-scan, mobile-scan, air-scan or photo; samples whose mesh is known: edged, density-jump,
+    /// thin-plate, voxel-slab, voxel-cube, sparse-cap, two-squares or strewn
     kind: Kind,
 
-    /// The mesh to sample, OBJ or PLY, for the kind mesh; it is moved to the origin and scaled to
-    /// the size
+    /// The mesh to sample, OBJ or PLY, for the kind mesh, and for body-scan and edged if it is given; it is
+    /// moved to the origin and scaled to the size
     #[arg(long, value_name = "FILE")]
     mesh: Option<PathBuf>,
 
@@ -42,7 +44,12 @@ struct Args {
     #[arg(long, value_name = "FRACTION", default_value_t = 1e-6)]
     reference_tolerance: f64,
 
-    /// Number of points, e.g. 1e6, 100k or 10M
+    /// Also write the places of the true surface that were measured, without any error, as a PLY cloud with
+    /// the normals of the surface
+    #[arg(long, value_name = "FILE.ply")]
+    seen: Option<PathBuf>,
+
+    /// Number of points; scenes of scanners have about as many, e.g. 1e6, 100k or 10M
     #[arg(short, long, value_name = "N", default_value = "100k", value_parser = parse_count)]
     points: u64,
 
@@ -62,7 +69,7 @@ struct Args {
     #[arg(
         long,
         value_name = "FILE.ply",
-        conflicts_with_all = ["output", "split", "reference", "format"]
+        conflicts_with_all = ["output", "split", "reference", "seen", "format"]
     )]
     check_mesh: Option<PathBuf>,
 
@@ -114,6 +121,25 @@ struct Args {
     /// Height of the free-standing walls of the outdoor world [default: from 1 to 3]
     #[arg(long, value_name = "UNITS")]
     wall_height: Option<f64>,
+
+    /// Noise of a scene, in spacings: along the ray at the mean range, growing with the range; in all
+    /// directions where there is no scanner
+    #[arg(long, value_name = "SPACINGS", default_value_t = 0.0)]
+    range_noise: f64,
+
+    /// How far the scans of a scene are from fitting together, in spacings
+    #[arg(long, value_name = "SPACINGS", default_value_t = 0.0)]
+    registration: f64,
+
+    /// Fraction of the points of a scene that lie between near and far at depth edges
+    #[arg(long, value_name = "FRACTION", default_value_t = 0.0)]
+    flying: f64,
+
+    /// Density ratio of density-jump [default: 7] and sparse-cap [default: 5], thickness of thin-plate in
+    /// spacings [default: 2.5] and of voxel-slab in steps [default: 2], distance of two-squares in spacings
+    /// [default: 3], per cent of outliers of strewn [default: 1]
+    #[arg(long, value_name = "RATIO")]
+    ratio: Option<f64>,
 
     /// Let density fall with the squared distance from a scanner
     #[arg(long)]
@@ -249,6 +275,12 @@ fn cloud(args: &Args) -> Cloud {
             wires: args.wires,
             wall_height: args.wall_height,
         })
+        .measuring(Measuring {
+            noise: args.range_noise,
+            registration: args.registration,
+            flying: args.flying,
+            ratio: args.ratio,
+        })
         .falloff(args.falloff)
         .rotated(args.rotated)
         .order(match args.order {
@@ -288,6 +320,7 @@ fn write(args: &Args, cloud: &Cloud, output: &Path) -> Result<()> {
         scale: args.scale,
     };
     let format = format.with_las_options(options);
+    let generator = cloud.generator()?;
     if let Some(reference) = &args.reference {
         if reference == output {
             return Err(Error::Conflict {
@@ -296,11 +329,21 @@ fn write(args: &Args, cloud: &Cloud, output: &Path) -> Result<()> {
                 why: "both would go to the same file",
             });
         }
-        cloud.write_reference(reference, args.reference_tolerance)?;
+        generator.write_reference(reference, args.reference_tolerance)?;
+    }
+    if let Some(seen) = &args.seen {
+        if seen == output || args.reference.as_ref() == Some(seen) {
+            return Err(Error::Conflict {
+                first: "seen",
+                second: "output or reference",
+                why: "both would go to the same file",
+            });
+        }
+        generator.write_seen(seen)?;
     }
     match args.split {
         Some(parts) => cloud.write_split(output, format, parts).map(drop),
-        None => cloud.write(output, format),
+        None => generator.write(output, format),
     }
 }
 

@@ -4,6 +4,7 @@ use crate::cloud::Cloud;
 use crate::error::{Error, Result};
 use crate::kind::Kind;
 use crate::mesh_file;
+use crate::scene;
 use crate::surface::{
     Bumpy, Corner, Grid, Mesh, Plane, Room, Sphere, Surface, Terrain, Tessellation, Torus, turned,
 };
@@ -27,12 +28,17 @@ pub(crate) fn surface(cloud: &Cloud) -> Result<Option<Box<dyn Surface>>> {
             let path = cloud.mesh.as_deref().unwrap_or_else(|| "".as_ref());
             Box::new(Mesh::new(&mesh_file::read(path)?, size, path)?)
         }
-        Kind::Grid | Kind::Outdoor | Kind::Odd(_) => return Ok(None),
+        Kind::Grid | Kind::Outdoor | Kind::Odd(_) | Kind::Scene(_) => return Ok(None),
     }))
 }
 
-/// The first layer, without noise; `tolerance` in units of the size.
-pub(crate) fn reference(cloud: &Cloud, tolerance: f64) -> Result<Tessellation> {
+/// The first layer, without noise; `tolerance` in units of the size. The surface of a scene is not made again
+/// if it is there.
+pub(crate) fn reference(
+    cloud: &Cloud,
+    tolerance: f64,
+    scene: Option<&Tessellation>,
+) -> Result<Tessellation> {
     if !(LEAST_TOLERANCE..1.0).contains(&tolerance) {
         let expected = format!("{LEAST_TOLERANCE:e} to below 1");
         return Err(Error::parameter("reference-tolerance", tolerance, expected));
@@ -45,9 +51,13 @@ pub(crate) fn reference(cloud: &Cloud, tolerance: f64) -> Result<Tessellation> {
         });
     }
     let tolerance = tolerance * cloud.size;
-    let (mut mesh, turn) = match surface(cloud)? {
-        Some(surface) => (surface.reference(tolerance), cloud.rotated),
-        None => {
+    let (mut mesh, turn) = match (surface(cloud)?, cloud.kind) {
+        (Some(surface), _) => (surface.reference(tolerance), cloud.rotated),
+        (None, Kind::Scene(kind)) => {
+            let made = scene.map_or_else(|| scene::truth(cloud, kind), |made| Ok(made.clone()));
+            (made?, cloud.rotated)
+        }
+        (None, _) => {
             let grid = Grid::new(cloud.points, cloud.size, cloud.rotated)?;
             (grid.reference(), false)
         }

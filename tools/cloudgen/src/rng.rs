@@ -27,6 +27,8 @@ pub(crate) enum Purpose {
     Split,
     Permutation,
     Object,
+    Scanner,
+    Ray,
 }
 
 /// A splitmix64 stream.

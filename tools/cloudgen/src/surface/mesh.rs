@@ -22,7 +22,7 @@ impl Mesh {
     /// `path` is for error messages.
     pub(crate) fn new(mesh: &Tessellation, size: f64, path: &Path) -> Result<Self> {
         let mut mesh = weld(mesh);
-        let [low, high] = bounds(&mesh);
+        let [low, high] = mesh.bounds();
         let unit = size / length(sub(high, low));
         let middle = scale(add(low, high), 0.5);
         for vertex in &mut mesh.vertices {
@@ -36,7 +36,7 @@ impl Mesh {
         let picker = Picker::new((0..mesh.triangles.len()).map(|t| self::area(&mesh, t)));
         Ok(Mesh {
             curvature: curvature(&mesh),
-            bounds: bounds(&mesh),
+            bounds: mesh.bounds(),
             picker,
             mesh,
         })
@@ -66,16 +66,6 @@ fn weld(mesh: &Tessellation) -> Tessellation {
         }
     }
     out
-}
-
-fn bounds(mesh: &Tessellation) -> [Vec3; 2] {
-    let fold = |start: f64, pick: fn(f64, f64) -> f64| {
-        std::array::from_fn(|k| mesh.vertices.iter().map(|v| v[k]).fold(start, pick))
-    };
-    [
-        fold(f64::INFINITY, f64::min),
-        fold(f64::NEG_INFINITY, f64::max),
-    ]
 }
 
 fn corners(mesh: &Tessellation, triangle: usize) -> [Vec3; 3] {
@@ -119,7 +109,7 @@ fn curvature(mesh: &Tessellation) -> Vec<f64> {
 }
 
 /// Squared distance of a point to a triangle.
-fn distance2([a, b, c]: [Vec3; 3], p: Vec3) -> f64 {
+pub(crate) fn distance2([a, b, c]: [Vec3; 3], p: Vec3) -> f64 {
     let full = normal([a, b, c]);
     let inner = |(s, e): (Vec3, Vec3)| dot(cross(sub(e, s), sub(p, s)), full) >= 0.0;
     let edges = [(a, b), (b, c), (c, a)];

@@ -15,10 +15,13 @@ pub(crate) use bumpy::Bumpy;
 pub(crate) use corner::Corner;
 use grid::FRAME;
 pub(crate) use grid::Grid;
-pub(crate) use mesh::Mesh;
+pub(crate) use mesh::{Mesh, distance2};
+pub(crate) use refine::patch;
 pub(crate) use room::Room;
 pub(crate) use terrain::Terrain;
 pub(crate) use tessellate::Tessellation;
+#[cfg(test)]
+pub(crate) use tessellate::topology;
 
 use crate::vec3::{Vec3, add, dot, length, scale, sub};
 

@@ -106,7 +106,7 @@ pub(super) fn orient(mesh: &mut Tessellation) {
 
 /// A grid of `cells` quadrilaterals over the unit square, each divided in two; anticlockwise as seen along
 /// `-(du x dv)`. An axis that is `closed` is periodic.
-pub(super) fn patch(
+pub(crate) fn patch(
     cells: [usize; 2],
     closed: [bool; 2],
     place: impl Fn(f64, f64) -> Vec3,

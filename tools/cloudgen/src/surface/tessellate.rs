@@ -12,6 +12,19 @@ pub(crate) struct Tessellation {
     pub triangles: Vec<[u32; 3]>,
 }
 
+impl Tessellation {
+    /// Corners of the bounding box.
+    pub(crate) fn bounds(&self) -> [Vec3; 2] {
+        let fold = |start: f64, pick: fn(f64, f64) -> f64| {
+            std::array::from_fn(|k| self.vertices.iter().map(|v| v[k]).fold(start, pick))
+        };
+        [
+            fold(f64::INFINITY, f64::min),
+            fold(f64::NEG_INFINITY, f64::max),
+        ]
+    }
+}
+
 /// The six tetrahedra of a cube around its main diagonal. Bit `k` of a corner number is the step along axis
 /// `k`. All cubes are divided alike, so neighbours have the same diagonals on common faces.
 const TETRAHEDRA: [[usize; 4]; 6] = [

@@ -4,10 +4,12 @@ mod format;
 mod las;
 mod ply;
 mod reference;
+mod seen;
 mod xyz;
 
 pub use format::{Encoding, Format, LasOptions, PointFormat, Precision};
 pub(crate) use reference::write_reference;
+pub(crate) use seen::write_seen;
 
 use std::{
     fs::File,
