@@ -94,7 +94,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         .output(output.clone())
         .params(Params {
             radius: Radius::Auto,
-            smooth: 0,
+            smooth: outcrop::Smooth::Rounds(0),
             ..Params::default()
         })
         .memory(256 << 20)

@@ -16,7 +16,7 @@ use constants::constants;
 /// rule or a correction. docs/versions.md lists all versions, and `tests/end_to_end/versions.rs` holds it.
 macro_rules! method_version {
     () => {
-        2
+        3
     };
 }
 pub(crate) use method_version;
@@ -88,7 +88,7 @@ constants! {
         beside: f64 = 0.5, "reaches", [0.35, 0.7];
         /// A coarse point has wider limits of length if it and its neighbours are level: their root mean square
         /// height over their plane is at most this share of their reach. Strewn points are not.
-        level: f64 = 0.12, "reaches", [0.08, 0.2];
+        level: f64 = 0.15, "reaches";
     }
     /// Smoothing by a curved surface, which also distinguishes edges from noise.
     smoothing: Smoothing {
@@ -126,14 +126,15 @@ constants! {
         /// that they lie on one sheet of a plate 1.5 spacings thick; with 12, a tenth of the points of such a
         /// plate seem noisy.
         nearest: usize = 8, "points", [7, 12];
-        /// A point is clean if its noise is at most this. A clean scan of a face has 0.031 at one point of
-        /// 120 000, a scan with noise of a quarter of the spacing less than 0.083 at one point of 20.
-        floor: f64 = 0.035, "local spacings";
+        /// A point is clean if its noise is at most this. A region is examined if there is twice as much in a
+        /// sampled run: a clean scan of a face has 0.031 at one point of 120 000, a scan with noise of a quarter
+        /// of the spacing less than 0.083 at one point of 20. With 0.035 a carved lion has a sixth more boundary.
+        floor: f64 = 0.02, "local spacings";
         /// Noise above which there is a second round; twice as much asks for a third.
         round: f64 = 0.15, "local spacings";
         /// Root mean square height of the neighbours over their surface, for each round that the noise asks for,
         /// above which they lie in layers or show details: then fewer neighbours are used.
-        layers: f64 = 0.6, "local spacings", [0.4, 0.8];
+        layers: f64 = 0.45, "local spacings", [0.3, 0.6];
         /// A point stays where it is if at least one in this number of its neighbours is clean: they tell
         /// edges, details and thin sheets from noise.
         few: usize = 10, "one in";

@@ -52,7 +52,7 @@ pub struct Report {
     pub lattice: LatticeReport,
     /// Disk radius in the input's unit; absent if it follows the local density.
     pub radius: Option<f64>,
-    /// Counts of relaxing; none with `--relax 0`.
+    /// Counts of the noisy points; none with `--method paper` unless they are to move.
     pub relax: Option<RelaxStats>,
     /// Cells.
     pub cells: CellStats,

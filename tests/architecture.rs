@@ -52,7 +52,7 @@ const MAY_USE: &[(&str, &str)] = &[
     ("stages/blocks", ""),
     (
         "stages/cells",
-        "kernels stages/blocks stages/order stages/spacing stages/tiles",
+        "kernels stages/blocks stages/levels stages/order stages/spacing stages/tiles",
     ),
     (
         "stages/cut",
@@ -67,6 +67,7 @@ const MAY_USE: &[(&str, &str)] = &[
         "light meshopt stages/attributes stages/blocks stages/cut stages/ingest stages/order stages/repair stages/surface",
     ),
     ("stages/ingest", ""),
+    ("stages/levels", ""),
     (
         "stages/located",
         "stages/blocks stages/cells stages/order stages/scanners stages/spacing",
@@ -82,10 +83,10 @@ const MAY_USE: &[(&str, &str)] = &[
     ),
     (
         "stages/smooth",
-        "kernels stages/cells stages/order stages/spacing stages/tiles",
+        "kernels stages/cells stages/levels stages/order stages/spacing stages/tiles",
     ),
     ("stages/scanners", "stages/attributes"),
-    ("stages/spacing", ""),
+    ("stages/spacing", "stages/levels"),
     (
         "stages/stitch",
         "kernels stages/blocks stages/cells stages/located stages/surface stages/triples",

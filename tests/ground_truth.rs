@@ -126,11 +126,18 @@ const CASES: &[Case] = &[
         &[Components(1), Complete(0.995)],
     ),
     shape(
+        "thin plate of 3 spacings",
+        Scene::ThinPlate,
+        20_000,
+        3.0,
+        &[Boundary(0), Euler(2)],
+    ),
+    shape(
         "thin plate of 2.5 spacings",
         Scene::ThinPlate,
         20_000,
         2.5,
-        &[Boundary(0), Euler(2)],
+        &[Boundary(0)],
     ),
     shape(
         "voxel slab of 2 steps",

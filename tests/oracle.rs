@@ -263,17 +263,17 @@ fn compare_seen(
 
 fn same(what: &str, mesh: &ReadBack, report: &Report, expected: &Mesh, scale: f64) {
     let counts = &expected.counts;
-    let t = &report.triples;
-    assert_eq!(
-        (t.t3 as usize, t.t2 as usize, t.t1 as usize),
-        (counts.t3, counts.t2, counts.t1),
-        "{what}: triples"
-    );
     let relax = report.relax.unwrap_or_default();
     assert_eq!(
         (relax.rounds, relax.moved as usize),
         (counts.rounds, counts.moved),
         "{what}: relaxing"
+    );
+    let t = &report.triples;
+    assert_eq!(
+        (t.t3 as usize, t.t2 as usize, t.t1 as usize),
+        (counts.t3, counts.t2, counts.t1),
+        "{what}: triples"
     );
     let b = &report.base;
     assert_eq!(
@@ -554,6 +554,7 @@ fn robust_and_seen_by_scanners() {
 fn robust_and_smoothed() {
     run(80..82, |seed| Settings {
         smooth: 1,
+        auto: false,
         relax: 1 + seed as u32 % 2,
         neighbors: 12,
         block: [50, 90][seed as usize % 2],
@@ -595,7 +596,7 @@ fn robust_on_torn_sheets_and_doors() {
         let settings = Settings {
             smooth: (seed == 3) as u32,
             relax: 1 + seed as u32 % 3,
-            auto: seed == 0,
+            auto: seed < 2,
             neighbors: [12, 20][seed as usize % 2],
             block: [30, 200, 65_536][seed as usize % 3],
             patch: [256, 8, 16][seed as usize % 3],

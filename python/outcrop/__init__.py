@@ -83,7 +83,7 @@ def reconstruct(
     wide_colors: bool = False,
     method: str = "robust",
     neighbors: int = 30,
-    smooth: int = 0,
+    smooth: Union[int, str, None] = None,
     smoothing: Optional[str] = None,
     relax: Optional[int] = None,
     radius: Width = "auto",

@@ -27,14 +27,14 @@ const VERSION: &str = concat!(
 const LONG_ABOUT: &str = "Turns point clouds of any size into clean triangle meshes, inside the \
 memory you give it.
 
-The mesh interpolates the points: its vertices are points of the cloud. Every edge has at most two \
+Points are kept where they are consistent, and smoothed where they are noisy (not with --smooth 0). Every edge has at most two \
 triangles, every vertex is a disk or a half-disk, and triangles run consistently. The same cloud \
 and parameters give the same file, byte for byte, whatever memory, threads and order of inputs.";
 
 /// Commands as they are typed, one a line.
 pub const EXAMPLES: &str = "  outcrop reconstruct scan.laz -o mesh.ply
   outcrop reconstruct tiles/ -o town.ply --memory 4GiB --report town.html
-  outcrop reconstruct noisy.las -o smooth.ply --smooth 1
+  outcrop reconstruct scan.las -o measured.ply --smooth 0
   outcrop reconstruct scan.laz -o mesh.ply --resume --time-limit 7h30m
   outcrop resume mesh.ply.outcrop-scratch
   outcrop info scan.laz

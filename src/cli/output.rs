@@ -3,6 +3,7 @@
 use super::style;
 use crate::error::{Error, Result};
 use crate::page;
+use crate::params::Smooth;
 use crate::report::Report;
 use serde::Serialize;
 use std::fmt::Display;
@@ -122,7 +123,26 @@ pub fn summary(report: &Report, output: &Path) -> String {
         style::seconds(report.seconds),
         style::bytes(report.peak_resident_bytes),
         style::bytes(report.peak_scratch_bytes),
-    ) + &left_out(report)
+    ) + &smoothed(report)
+        + &left_out(report)
+}
+
+/// A line about the points that were smoothed because they are noisy, if there are any.
+fn smoothed(report: &Report) -> String {
+    let Some(relax) = report.relax.filter(|relax| relax.moved > 0) else {
+        return String::new();
+    };
+    let lengths = [relax.median, relax.most, relax.largest].map(|length| format!("{length:.2e}"));
+    let [median, most, largest] = lengths.map(|length| length.parse().unwrap_or(0.0f64));
+    let what = match report.parameters.smooth {
+        Smooth::Auto => "smoothed",
+        Smooth::Rounds(_) => "smoothed to connect them, and kept where they were",
+    };
+    format!(
+        "\n{} noisy points {what}: moved by {median} (median), {most} (99 %), at most {largest}; {} are clean",
+        style::grouped(relax.moved),
+        style::grouped(report.points.saturating_sub(relax.moved)),
+    )
 }
 
 /// A line about the points left out by options, if there are any.

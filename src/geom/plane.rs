@@ -142,16 +142,17 @@ impl Moments {
     }
 
     /// True if the point and its neighbours are level: the root mean square of their heights over the plane
-    /// with `normal` is a small share of the distance that the neighbours reach, and the point is no stray.
+    /// with `normal` is a small share of the distance that the neighbours reach, and so is the height of the
+    /// point, or it is no stray among them.
     #[must_use]
     pub fn is_level(&self, normal: Normal, last2: u64) -> bool {
         let (along, length2) = self.scatter_along(normal);
         let count = (self.count + 1) as f64;
         let mean2 = along / (count * count * length2);
-        let share = METHOD.off_surface.level;
+        let limit2 = METHOD.off_surface.level * METHOD.off_surface.level * last2 as f64;
         let [x, y, z] = self.project(normal);
-        mean2 <= share * share * last2 as f64
-            && x * x + y * y + z * z <= METHOD.smoothing.stray2 * mean2
+        let most2 = limit2.max(METHOD.smoothing.stray2 * mean2);
+        mean2 <= limit2 && x * x + y * y + z * z <= most2
     }
 
     /// The best-fitting plane of the point and its neighbours.

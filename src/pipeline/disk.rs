@@ -389,9 +389,9 @@ mod tests {
             let estimate = MILLION.estimate(&params, Path::new("mesh.ply"));
             (estimate.scratch, estimate.together - estimate.output)
         };
-        let (whole, writing) = scratch(None, false, 0);
-        let (cut, of_cut) = scratch(Some(10.0), false, 0);
-        let (turned, of_turned) = scratch(Some(10.0), true, 0);
+        let (whole, writing) = scratch(None, false, Smooth::Rounds(0));
+        let (cut, of_cut) = scratch(Some(10.0), false, Smooth::Rounds(0));
+        let (turned, of_turned) = scratch(Some(10.0), true, Smooth::Rounds(0));
         assert!(whole <= cut && cut < turned);
         assert!(writing < of_cut && of_cut < of_turned);
     }

@@ -48,6 +48,7 @@ fn write(bench: &Bench, name: &str, points: &[Valued]) -> PathBuf {
 fn params() -> Params {
     Params {
         attributes: "level,color".parse().unwrap(),
+        smooth: outcrop::Smooth::Rounds(0),
         ..Params::default()
     }
 }

@@ -231,7 +231,7 @@ fn every_command_explains_itself() {
     let said = util::run(["--version"]);
     assert_eq!(
         said.out.trim(),
-        format!("outcrop {} (method 2)", env!("CARGO_PKG_VERSION"))
+        format!("outcrop {} (method 3)", env!("CARGO_PKG_VERSION"))
     );
 }
 

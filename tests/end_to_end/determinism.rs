@@ -143,7 +143,7 @@ fn nor_do_they_with_smoothing() {
     let bench = Bench::new();
     let cloud = bench.cloud("cloud.laz", &nasty(150_000));
     let params = Params {
-        smooth: 1,
+        smooth: outcrop::Smooth::Rounds(1),
         ..Params::default()
     };
     one_hash(&bench, &params, &settings(&Way::of(&cloud)));
@@ -168,7 +168,7 @@ fn nor_do_they_with_fewer_points() {
     ways.push(ways[0].clone().inputs(&parts));
     one_hash(&bench, &params, &ways);
     let params = Params {
-        smooth: 1,
+        smooth: outcrop::Smooth::Rounds(1),
         drop_outliers: Some(3.0),
         block: 1000,
         ..Params::default()
@@ -186,7 +186,7 @@ fn nor_do_they_where_many_blocks_meet() {
     for (block, smooth, repair) in [(1000, 0, true), (1000, 2, true), (333, 0, false)] {
         let params = Params {
             block,
-            smooth,
+            smooth: outcrop::Smooth::Rounds(smooth),
             repair,
             ..Params::default()
         };
@@ -301,7 +301,7 @@ fn a_photogrammetric_scan_smoothed() {
         return;
     };
     let params = Params {
-        smooth: 1,
+        smooth: outcrop::Smooth::Rounds(1),
         ..Params::default()
     };
     let base = Way::of(&scan);

@@ -64,7 +64,7 @@ fn small(bench: &Bench) -> PathBuf {
 
 fn smooth() -> Params {
     Params {
-        smooth: 1,
+        smooth: outcrop::Smooth::Rounds(1),
         block: 5000,
         ..Params::default()
     }
@@ -190,7 +190,7 @@ fn a_builder_refuses_what_cannot_work() {
     );
     assert_eq!(
         parameter(with(Params {
-            smooth: 101,
+            smooth: outcrop::Smooth::Rounds(101),
             ..default()
         })),
         "--smooth"

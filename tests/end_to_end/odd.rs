@@ -81,11 +81,11 @@ fn options() -> Vec<Params> {
         robust.clone(),
         Params::paper(),
         Params {
-            smooth: 2,
+            smooth: outcrop::Smooth::Rounds(2),
             ..robust.clone()
         },
         Params {
-            smooth: 1,
+            smooth: outcrop::Smooth::Rounds(1),
             smoothing: Smoothing::Plain,
             radius: Radius::Percent(5.0),
             ..Params::paper()

@@ -97,7 +97,7 @@ fn smoothed_scans() {
         manifold(
             &scan,
             &Params {
-                smooth: 1,
+                smooth: outcrop::Smooth::Rounds(1),
                 ..Params::default()
             },
         );

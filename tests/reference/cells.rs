@@ -61,14 +61,15 @@ pub fn smooth(points: &[Point], k: usize) -> Vec<Point> {
 }
 
 /// True if a point lies too far from its neighbours for a point of the surface.
-fn is_off_surface(points: &[Point], i: usize, settings: &Settings, density: &Density) -> bool {
+fn is_off_surface(points: &[Point], i: usize, settings: &Settings, density: &mut Density) -> bool {
     let others = by_distance(points, i);
     let last = others[..settings.neighbors.min(others.len())].last();
     let (moments, plane, _) = widened_plane(points, i, settings.neighbors, settings.robust);
     let (Some(&last), Some(normal)) = (last, plane.normal) else {
         return false;
     };
-    density.is_off_surface(i, distance2(points[i], points[last]), &moments, normal)
+    let last2 = distance2(points[i], points[last]);
+    density.is_off_surface(i, last2, (&moments, &plane), normal)
 }
 
 /// The plane of a point, through more neighbours than `k` if these lie on a line or, with `bands`, on a band;
@@ -123,10 +124,13 @@ pub fn triples(
     points: &[Point],
     settings: &Settings,
     diagonal: f64,
-    density: Option<&Density>,
+    mut density: Option<&mut Density>,
 ) -> (BTreeMap<Triangle, u32>, usize) {
     let off: Vec<bool> = (0..points.len())
-        .map(|i| density.is_some_and(|d| is_off_surface(points, i, settings, d)))
+        .map(|i| match &mut density {
+            Some(density) => is_off_surface(points, i, settings, density),
+            None => false,
+        })
         .collect();
     let mut cells_of: BTreeMap<Triangle, BTreeSet<u32>> = BTreeMap::new();
     for i in (0..points.len()).filter(|&i| !off[i]) {

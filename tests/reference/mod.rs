@@ -220,13 +220,14 @@ pub fn reconstruct_seen(
         };
         points = smooth(&points, settings.neighbors);
     }
-    let density = settings.robust.then(|| spacing::measure(&points, settings));
-    let density = density.as_ref();
+    let mut density = settings.robust.then(|| spacing::measure(&points, settings));
     let relaxed = relax::relax(&points, settings);
     if settings.auto {
         points = relaxed.shape.clone();
     }
-    let (triples, off_surface) = cells::triples(&relaxed.shape, settings, diagonal, density);
+    let (triples, off_surface) =
+        cells::triples(&relaxed.shape, settings, diagonal, density.as_mut());
+    let density = density.as_ref();
     let mut mesh = connect(
         &relaxed.shape,
         points,

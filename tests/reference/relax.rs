@@ -22,34 +22,36 @@ const RUN: usize = 16;
 const SAMPLED: usize = 8;
 const REGION: usize = 65_536;
 
-/// The number of limits that the noise at a point exceeds.
-fn level(points: &[Point], i: usize, k: usize) -> u8 {
+/// The number of limits that the noise at a point exceeds, and true if it is plain: twice the first.
+fn level(points: &[Point], i: usize, k: usize) -> (u8, bool) {
     let others = by_distance(points, i);
     let plane = widened_plane(points, i, k, true).1;
     let (Some(normal), Some(nearest)) = (plane.normal, others.get(..8)) else {
-        return 0;
+        return (0, false);
     };
     let Some(left) = heights2(points, i, nearest, normal) else {
-        return 0;
+        return (0, false);
     };
     let reach2 = distance2(points[i], points[others[k.min(others.len()) - 1]]);
     let spacing2 = std::f64::consts::PI * reach2 as f64 / k as f64;
-    let exceeded = [0.035, 0.15, 0.3].map(|limit: f64| left / 3.0 > limit * limit * spacing2);
-    exceeded.iter().take_while(|exceeded| **exceeded).count() as u8
+    let above = |limit: f64| left / 3.0 > limit * limit * spacing2;
+    let level = [0.02, 0.15, 0.3]
+        .into_iter()
+        .take_while(|limit| above(*limit))
+        .count();
+    (level as u8, above(0.04))
 }
 
-/// The levels of all points; 0 in regions without a sampled run of which fewer than a tenth is clean.
+/// The levels of all points; 0 in regions without a sampled run of which fewer than a tenth has no plain noise.
 fn levels(points: &[Point], k: usize) -> Vec<u8> {
     let ids: Vec<usize> = (0..points.len()).collect();
     let of_region = |region: &[usize]| -> Vec<u8> {
-        let all: Vec<u8> = region.iter().map(|&i| level(points, i, k)).collect();
+        let all: Vec<(u8, bool)> = region.iter().map(|&i| level(points, i, k)).collect();
         let runs = all.chunks_exact(RUN).step_by(SAMPLED);
-        let clean = |run: &[u8]| run.iter().filter(|level| **level == 0).count();
-        if { runs }.any(|run| 10 * clean(run) < RUN) {
-            all
-        } else {
-            vec![0; all.len()]
-        }
+        let clean = |run: &[(u8, bool)]| run.iter().filter(|(_, plain)| !plain).count();
+        let noisy = { runs }.any(|run| 10 * clean(run) < RUN);
+        let level = |(level, _): &(u8, bool)| if noisy { *level } else { 0 };
+        all.iter().map(level).collect()
     };
     ids.chunks(REGION).flat_map(of_region).collect()
 }
@@ -77,10 +79,10 @@ fn moved(points: &[Point], i: usize, k: usize, rounds: u8) -> Point {
     let Some((mut offset, mean2)) = offset(points, i, count) else {
         return points[i];
     };
-    let limit = 0.4 * f64::from(rounds);
+    let limit = 0.45 * f64::from(rounds);
     let spacing2 = std::f64::consts::PI * last2(count) as f64 / count as f64;
-    if mean2 > limit * limit * spacing2 {
-        count = k;
+    if k.max(30) < count && mean2 > limit * limit * spacing2 {
+        count = k.max(30);
         match super::edges::offset(points, i, count) {
             Some(fewer) => offset = fewer.0,
             None => return points[i],

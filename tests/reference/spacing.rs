@@ -4,7 +4,7 @@ use super::Settings;
 use super::cells::by_distance;
 use super::insert::normal;
 use super::surface::Triangle;
-use outcrop::geom::plane::{Moments, Normal};
+use outcrop::geom::plane::{Moments, Normal, Plane};
 use outcrop::geom::{Point, distance2};
 
 /// Ids in a patch, and patches in a region.
@@ -15,6 +15,8 @@ const REGION: usize = 256;
 pub struct Density {
     usual2: Vec<u64>,
     regions2: Vec<u64>,
+    /// By which a point's squared reach exceeds that of its patch; 1 if it is not coarse.
+    coarse: Vec<u64>,
     settings: Settings,
 }
 
@@ -53,22 +55,37 @@ pub fn measure(points: &[Point], settings: &Settings) -> Density {
             .map(|region| lower_quartile(region.to_vec()))
             .collect(),
         usual2,
+        coarse: vec![1; points.len()],
         settings: *settings,
     }
 }
 
 impl Density {
-    /// True if a point with the last of `N_k` at this distance, and with this plane of its neighbours, is off
-    /// the surface.
-    pub fn is_off_surface(&self, id: usize, last2: u64, moments: &Moments, normal: Normal) -> bool {
-        !self.settings.keep_all
-            && is_far(last2, self.regions2[id / (PATCH * REGION)])
-            && (moments.fill_space(normal) || moments.is_beside(normal, last2))
+    /// Looks at a point with the last of `N_k` at this distance, and with this plane of its neighbours: true if
+    /// it is off the surface. Notes how coarse it is.
+    pub fn is_off_surface(
+        &mut self,
+        id: usize,
+        last2: u64,
+        (moments, plane): (&Moments, &Plane),
+        normal: Normal,
+    ) -> bool {
+        let usual2 = u128::from(self.usual2[id / PATCH]);
+        let allowed =
+            |factor: &u64| usual2 > 0 && u128::from(last2) >= u128::from(*factor) * usual2;
+        let far = !self.settings.keep_all && is_far(last2, self.regions2[id / (PATCH * REGION)]);
+        if far && (moments.fill_space(normal) || moments.is_beside(normal, last2)) {
+            return true;
+        }
+        if plane.wide && moments.is_level(normal, last2) {
+            self.coarse[id] = [4, 16, 256].into_iter().rfind(allowed).unwrap_or(1);
+        }
+        false
     }
 
     /// The square of the local spacing at a point.
     fn local2(&self, v: u32) -> f64 {
-        let usual2 = self.usual2[v as usize / PATCH];
+        let usual2 = self.usual2[v as usize / PATCH] * self.coarse[v as usize];
         std::f64::consts::PI * usual2 as f64 / self.settings.neighbors as f64
     }
 

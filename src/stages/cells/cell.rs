@@ -210,7 +210,9 @@ impl<'a> CellMaker<'a> {
         if let Some(density) = self.density {
             match density.standing(id, fit.near2, &fit.moments, normal) {
                 Standing::Off => return Err(Outcome::OffSurface),
-                Standing::Coarse(level) if level > 0 => self.coarse.push((id, level)),
+                Standing::Coarse(level) if level > 0 && fit.plane.wide => {
+                    self.coarse.push((id, level));
+                }
                 Standing::Coarse(_) | Standing::Usual => {}
             }
         }
@@ -343,7 +345,7 @@ pub fn fit_in_store(
     fit_from(&mut source, neighbors, widen)
 }
 
-/// As [`fit_in_store`], with the neighbours, nearest first.
+/// As [`fit_in_store`], with the neighbours, nearest first: at least the `least` nearest.
 ///
 /// # Errors
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
@@ -352,11 +354,12 @@ pub fn fit_and_near_in_store(
     cache: &mut PageCache,
     id: u32,
     point: Point,
-    neighbors: usize,
+    (neighbors, least): (usize, usize),
     widen: Widen,
 ) -> Result<Option<(Fit, Neighbors)>> {
     let mut source = (Walk::new(store, cache, id, point), Neighbors::default());
     let fit = fit_from(&mut source, neighbors, widen)?;
+    source.reach(least)?;
     Ok(fit.map(|fit| (fit, source.1)))
 }
 

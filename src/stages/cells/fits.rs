@@ -94,10 +94,11 @@ impl<'a> Planes<'a> {
     }
 
     /// Calls `each` with the value of `of` for every point whose id is `wanted`: for its plane, widened as for
-    /// a cell, and its neighbours, nearest first.
+    /// a cell, and its neighbours, nearest first: at least the `least` nearest, or all points if there are fewer.
     pub fn each_fit<T>(
         &self,
         widen: Widen,
+        least: usize,
         wanted: impl Fn(usize) -> bool,
         of: impl FnMut(u32, &Fit, &Neighbors) -> T,
         each: impl FnMut(usize, Point, &T),
@@ -107,7 +108,10 @@ impl<'a> Planes<'a> {
             let look = |id: u32, point: Point, query: Option<Query<'_>>| {
                 let value = |mut query: Query<'_>| -> Result<Option<T>> {
                     let fit = fit_in_tile(&mut query, count, widen)?;
-                    Ok(fit.map(|fit| (of.borrow_mut())(id, &fit, query.near())))
+                    let enough = query.near().len() >= least || query.extend_to(least);
+                    Ok(fit
+                        .filter(|_| enough)
+                        .map(|fit| (of.borrow_mut())(id, &fit, query.near())))
                 };
                 let value = query.map_or(Ok(None), value);
                 match &value {
@@ -119,7 +123,8 @@ impl<'a> Planes<'a> {
                 .for_some_queries(count, search, wanted, grown, look);
         };
         let in_store = |cache: &mut PageCache, id: u32, point: Point| {
-            let known = fit_and_near_in_store(self.store, cache, id, point, count, widen)?;
+            let counts = (count, least);
+            let known = fit_and_near_in_store(self.store, cache, id, point, counts, widen)?;
             Ok(known.map(|(fit, near)| (of.borrow_mut())(id, &fit, &near)))
         };
         look(self.unit, in_tile, in_store, each)

@@ -280,4 +280,4 @@ fn in_order<P: Parts>(
 }
 
 const NO_TRIANGLES: &str = "no three cells agree on one that belongs to a component large enough; \
-    try a larger --radius, --smooth 1 for noisy scans, or a smaller --min-component";
+    try a larger --radius, --smooth 2 for noisy scans, or a smaller --min-component";

@@ -25,14 +25,18 @@ pub(super) struct Gauge {
 
 impl Gauge {
     /// The level of noise at a point whose plane is `fit`, through `neighbors` of its neighbours or more: the
-    /// number of limits that the noise exceeds. The level is 0 if there is no plane, or too few neighbours.
-    pub fn level(&mut self, near: &Neighbors, fit: &Fit, neighbors: usize) -> u8 {
+    /// number of limits that the noise exceeds; and true if it is plain, at twice the first limit. The level is
+    /// 0 if there is no plane, or too few neighbours.
+    pub fn level(&mut self, near: &Neighbors, fit: &Fit, neighbors: usize) -> (u8, bool) {
         let Some(noise2) = self.noise2(near, fit) else {
-            return 0;
+            return (0, false);
         };
         let spacing2 = spacing2(fit.near2, neighbors);
-        let exceeds = |level: &u8| noise2 > limit(*level) * limit(*level) * spacing2;
-        (1..=HIGHEST).take_while(exceeds).count() as u8
+        let above = |limit: f64| noise2 > limit * limit * spacing2;
+        let level = (1..=HIGHEST)
+            .take_while(|level| above(limit(*level)))
+            .count();
+        (level as u8, above(2.0 * limit(1)))
     }
 
     /// The mean square of the heights over the surface, for each degree of freedom, in steps.

@@ -13,7 +13,6 @@ mod relax;
 #[cfg(test)]
 mod tests;
 
-pub use moves::Lengths;
 pub use relax::{RelaxStats, Relaxed, relax};
 
 use crate::error::Result;
@@ -58,6 +57,8 @@ pub struct Relaxing {
     pub neighbors: usize,
     /// Largest number of rounds.
     pub rounds: u32,
+    /// Length of a step of the lattice, in the cloud's unit; for the counts only.
+    pub step: f64,
 }
 
 /// One round of smoothing: every point moves to the plane of its `neighbors` nearest, or, with

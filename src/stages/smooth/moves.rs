@@ -1,22 +1,12 @@
 //! How far points moved: counts by length.
 
+use super::RelaxStats;
 use crate::geom::{Point, distance2};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Parts into which the squares of lengths between two powers of two are divided.
 const PARTS: u64 = 64;
-
-/// How far points moved, in steps of the lattice.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
-pub struct Lengths {
-    /// Half of the points moved at most this far (to within 1 %).
-    pub median: f64,
-    /// 99 % of the points moved at most this far (to within 1 %).
-    pub most: f64,
-    /// The largest length.
-    pub largest: f64,
-}
 
 /// Points that moved.
 #[derive(Debug, Default, Serialize, Deserialize)]
@@ -53,26 +43,24 @@ impl Moves {
         self.moved
     }
 
-    /// Number of points that moved for the last time.
-    pub fn ended(&self) -> u64 {
-        self.ended.values().sum()
-    }
-
-    /// How far points moved.
-    pub fn lengths(&self) -> Lengths {
+    /// The counts after a number of `rounds`, with lengths in units of which a step has `step`.
+    pub fn stats(&self, rounds: u32, step: f64) -> RelaxStats {
+        let moved = self.ended.values().sum();
         let within = |share: f64| {
-            let wanted = (share * self.ended() as f64).ceil() as u64;
+            let wanted = (share * moved as f64).ceil() as u64;
             let mut count = 0;
             let reached = self.ended.iter().find(|(_, more)| {
                 count += **more;
                 count >= wanted
             });
-            reached.map_or(0.0, |(class, _)| (least(*class) as f64).sqrt())
+            reached.map_or(0.0, |(class, _)| (least(*class) as f64).sqrt() * step)
         };
-        Lengths {
+        RelaxStats {
+            rounds,
+            moved,
             median: within(0.5),
             most: within(0.99),
-            largest: (self.largest2 as f64).sqrt(),
+            largest: (self.largest2 as f64).sqrt() * step,
         }
     }
 }
@@ -117,12 +105,9 @@ mod tests {
         for length in 1..=100 {
             moves.note(true, [0; 3], [0, length, 0]);
         }
-        let Lengths {
-            median,
-            most,
-            largest,
-        } = moves.lengths();
-        assert!((median - 50.0).abs() < 1.0 && (most - 99.0).abs() < 1.0);
-        assert_eq!((largest, moves.moved(), moves.ended()), (100.0, 101, 100));
+        let stats = moves.stats(2, 0.5);
+        assert!((stats.median - 25.0).abs() < 0.5 && (stats.most - 49.5).abs() < 0.5);
+        assert_eq!((stats.largest, stats.rounds), (50.0, 2));
+        assert_eq!((moves.moved(), stats.moved), (101, 100));
     }
 }

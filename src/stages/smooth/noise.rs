@@ -38,11 +38,14 @@ struct Seen {
 }
 
 /// A sample of a region.
+#[derive(Debug, Clone, Copy)]
 struct Sample {
     id: u32,
     /// Squared distance of the last neighbour.
     last2: u64,
     level: u8,
+    /// True if the noise is plain.
+    plain: bool,
 }
 
 /// Looks at all regions; `levels` are zeros.
@@ -95,16 +98,21 @@ fn look_at(
     let measured = relaxing.rounds > 0;
     planes.each_fit(
         Widen::OnBands,
+        METHOD.noise.nearest,
         is_sampled,
         |id, fit, near| {
-            let level = if measured {
-                gauge.level(near, fit, relaxing.neighbors)
-            } else {
-                0
+            let (level, plain) = match measured {
+                true => gauge.level(near, fit, relaxing.neighbors),
+                false => (0, false),
             };
-            (id, fit.near2, level)
+            Sample {
+                id,
+                last2: fit.near2,
+                level,
+                plain,
+            }
         },
-        |_, _, &(id, last2, level)| samples.push(Sample { id, last2, level }),
+        |_, _, sample: &Sample| samples.push(*sample),
     )?;
     samples.sort_unstable_by_key(|sample| sample.id);
     let held = unit.hold(bytes_of(&samples));
@@ -123,8 +131,9 @@ fn look_at(
         let mut put = |id: usize, level: u8| levels.set(id - ids.start, level);
         planes.each_fit(
             Widen::OnBands,
+            METHOD.noise.nearest,
             |id| !is_sampled(id),
-            |_, fit, near| gauge.level(near, fit, relaxing.neighbors),
+            |_, fit, near| gauge.level(near, fit, relaxing.neighbors).0,
             |id, _, level| put(id, *level),
         )?;
     }
@@ -139,14 +148,14 @@ fn is_sampled(id: usize) -> bool {
     (id / METHOD.curve.run).is_multiple_of(METHOD.curve.sample)
 }
 
-/// True if there is a run in which fewer than one in ten samples are clean. Edges and details beside smooth
-/// surface leave more.
+/// True if there is a run in which fewer than one in ten samples have no plain noise. Edges and details beside
+/// smooth surface leave more.
 fn is_noisy(samples: &[Sample]) -> bool {
     let run = |sample: &Sample| sample.id as usize / METHOD.curve.run;
     let runs = samples.chunk_by(|a, b| run(a) == run(b));
     let mut full = runs.filter(|run| run.len() == METHOD.curve.run);
     full.any(|run| {
-        let clean = run.iter().filter(|sample| sample.level == 0).count();
+        let clean = run.iter().filter(|sample| !sample.plain).count();
         METHOD.noise.few * clean < run.len()
     })
 }

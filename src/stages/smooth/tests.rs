@@ -35,6 +35,7 @@ fn relaxed(points: &[Point], rounds: u32, tile: u32, page: usize) -> (Vec<Point>
     let relaxing = Relaxing {
         neighbors: 12,
         rounds,
+        step: 1.0,
     };
     relaxed_as(points, relaxing, tile, page)
 }
@@ -115,6 +116,7 @@ fn details_stay_unless_there_is_noise() {
     let relaxing = Relaxing {
         neighbors: 30,
         rounds: 1,
+        step: 1.0,
     };
     let moved = |points: &[Point]| relaxed_as(points, relaxing, 1000, 256).1.moved as usize;
     assert_eq!(moved(&pillars(&|_| 0)), 0);

@@ -178,7 +178,7 @@ fn check_groups(points: &[Point], tile: &Tile, k: usize, search: &mut Search) ->
             next += 1;
             assert_eq!(member.point, points[member.id as usize]);
             let expected = all_near(points, member.id as usize);
-            let far2 = expected[expected.len() / 2].0;
+            let far2 = expected.get(expected.len() / 2).map_or(0, |near| near.0);
             if let Some(columns) = group.within(far2) {
                 let listed =
                     |at: &Point| (0..columns[0].len()).any(|n| columns.map(|c| c[n]) == *at);

@@ -32,6 +32,7 @@ fn params(normals: bool) -> Params {
     Params {
         block: 1500,
         normals,
+        smooth: outcrop::Smooth::Rounds(0),
         ..Params::default()
     }
 }

@@ -104,8 +104,7 @@ impl World {
         let relaxing = Relaxing {
             neighbors: args.neighbors,
             rounds: Params::default().relax,
-            smoothed: false,
-            off_surface: true,
+            step: 1.0,
         };
         let relaxed = relax(&store, tiles, relaxing, &workspace)?.store;
         let relaxed = relaxed.map(|store| store.open(&workspace)).transpose()?;
