@@ -4,6 +4,7 @@
 mod draw;
 mod export;
 mod plan;
+mod side;
 mod values;
 
 use super::checks::{all_are_kept, disk_radius, enough, not_a_line, room};
@@ -22,6 +23,7 @@ use crate::stages::ingest::{Attributes, Carried, Spool, ingest_selected};
 use crate::stages::located::Places;
 use crate::stages::order::{Orderer, PointStore, StoredPoints, order, sample_sort};
 use crate::stages::outliers::{OutlierOptions, drop_outliers};
+use crate::stages::outside::Outside;
 use crate::stages::repair::{RepairOptions, Repaired, repair};
 use crate::stages::smooth::{Relaxed, Relaxing, relax, smooth};
 use crate::stages::spacing::{Density, Spacings};
@@ -32,7 +34,6 @@ use crate::workspace::Workspace;
 use crate::workspace::course::Course;
 use export::written;
 use std::time::Instant;
-use values::Values;
 
 /// The positions that decide which points are connected, if they are not those of the mesh, and the local
 /// spacings.
@@ -40,6 +41,13 @@ use values::Values;
 pub(super) struct Shape {
     store: Option<PointStore>,
     spacings: Option<Spacings>,
+}
+
+impl Shape {
+    /// The positions that decide the connectivity: those of the mesh in `store` if there are no others.
+    pub fn or<'a>(&'a self, store: &'a PointStore) -> &'a PointStore {
+        self.store.as_ref().unwrap_or(store)
+    }
 }
 
 /// The stages of one run.
@@ -184,6 +192,7 @@ impl<'a> Stages<'a> {
         let lattice = spool.choose_lattice(if moves { METHOD.smoothing.halvings } else { 0 })?;
         self.coarse = spool.choose_lattice(0)?.step;
         self.check_origin(&lattice)?;
+        self.check_facing(&lattice)?;
         self.report.lattice = LatticeReport {
             step: lattice.step,
             exact: lattice.exact,
@@ -377,16 +386,16 @@ impl<'a> Stages<'a> {
         &self,
         store: &'p PointStore,
         shape: &'p Shape,
-        values: &'p Values,
+        outside: Option<Outside<'p>>,
         lattice: &Lattice,
     ) -> Places<'p> {
         let params = &self.job.params;
         let spacings = shape.spacings.as_ref();
         let robust = spacings.filter(|_| params.method == Method::Robust);
         Places {
-            shape: shape.store.as_ref().unwrap_or(store),
+            shape: shape.or(store),
             file: store,
-            scanners: values.scanners(),
+            outside,
             density: robust.map(|spacings| Density {
                 spacings,
                 neighbors: params.neighbors,

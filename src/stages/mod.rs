@@ -41,6 +41,8 @@ pub mod export;
 pub mod draw;
 
 pub mod blocks;
+pub mod columns;
 pub mod located;
+pub mod outside;
 pub mod scanners;
 pub mod surface;
