@@ -484,7 +484,7 @@ fn arbitrary_triples_that_face_a_side() {
     };
     let side = |seed: u64| [200, 40][seed as usize % 2];
     let reached = compare(1000..1300, true, settings, side, |p, _| p);
-    assert!(reached.met.faced > 1000, "{reached:?}");
+    assert!(reached.met.faced > 500, "{reached:?}");
 }
 
 #[test]
