@@ -4,6 +4,7 @@
 mod draw;
 mod export;
 mod plan;
+mod shape;
 mod side;
 mod values;
 
@@ -23,10 +24,8 @@ use crate::stages::ingest::{Attributes, Carried, Spool, ingest_selected};
 use crate::stages::located::Places;
 use crate::stages::order::{Orderer, PointStore, StoredPoints, order, sample_sort};
 use crate::stages::outliers::{OutlierOptions, drop_outliers};
-use crate::stages::outside::Outside;
 use crate::stages::repair::{RepairOptions, Repaired, repair};
 use crate::stages::smooth::{Relaxed, Relaxing, relax, smooth};
-use crate::stages::spacing::{Density, Spacings};
 use crate::stages::stitch::{StitchOptions, Stitched, stitch};
 use crate::stages::thin::{Grid, LeftOut, thin};
 use crate::stages::triples::{Triples, triples};
@@ -34,21 +33,6 @@ use crate::workspace::Workspace;
 use crate::workspace::course::Course;
 use export::written;
 use std::time::Instant;
-
-/// The positions that decide which points are connected, if they are not those of the mesh, and the local
-/// spacings.
-#[derive(Debug, Default)]
-pub(super) struct Shape {
-    store: Option<PointStore>,
-    spacings: Option<Spacings>,
-}
-
-impl Shape {
-    /// The positions that decide the connectivity: those of the mesh in `store` if there are no others.
-    pub fn or<'a>(&'a self, store: &'a PointStore) -> &'a PointStore {
-        self.store.as_ref().unwrap_or(store)
-    }
-}
 
 /// The stages of one run.
 pub(super) struct Stages<'a> {
@@ -366,42 +350,6 @@ impl<'a> Stages<'a> {
         self.known.moved = relaxed.as_ref().map(|r| r.store.is_some());
         self.check_room()?;
         Ok(relaxed)
-    }
-
-    /// Opens the shape.
-    pub fn open_shape(&self, relaxed: Option<Relaxed>) -> Result<Shape> {
-        let workspace = self.workspace;
-        let Some(relaxed) = relaxed else {
-            return Ok(Shape::default());
-        };
-        let store = relaxed.store.as_ref();
-        Ok(Shape {
-            store: store.map(|store| store.open(workspace)).transpose()?,
-            spacings: Some(relaxed.spacings.open(workspace)?),
-        })
-    }
-
-    /// The positions from which the surface is made.
-    pub fn places<'p>(
-        &self,
-        store: &'p PointStore,
-        shape: &'p Shape,
-        outside: Option<Outside<'p>>,
-        lattice: &Lattice,
-    ) -> Places<'p> {
-        let params = &self.job.params;
-        let spacings = shape.spacings.as_ref();
-        let robust = spacings.filter(|_| params.method == Method::Robust);
-        Places {
-            shape: shape.or(store),
-            file: store,
-            outside,
-            density: robust.map(|spacings| Density {
-                spacings,
-                neighbors: params.neighbors,
-                limits: params.limits(lattice.step),
-            }),
-        }
     }
 
     /// Computes the restricted Voronoi cells.

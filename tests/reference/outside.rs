@@ -40,11 +40,9 @@ pub fn known(points: &[Point], scanners: &[Option<Scanner>], facing: Facing) -> 
         Facing::In => -1,
     };
     let mut sums = vec![[0; 3]; points.len()];
-    for axis in 0..3 {
-        for direction in [-1, 1] {
-            for v in extreme(points, axis, direction) {
-                sums[v as usize][axis] += sign * direction;
-            }
+    for (axis, direction) in (0..3).flat_map(|axis| [(axis, -1), (axis, 1)]) {
+        for v in extreme(points, axis, direction) {
+            sums[v as usize][axis] += sign * direction;
         }
     }
     sums.into_iter().map(|sum| Some(Known::Ends(sum))).collect()

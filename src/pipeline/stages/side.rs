@@ -59,9 +59,7 @@ impl Stages<'_> {
         };
         let (workspace, blocks) = (self.workspace, self.blocks());
         let find = || StoredExtremes::of(shape, inward, blocks, workspace);
-        let stored = self
-            .clock
-            .stage("facing", "blocks", 6 * blocks.count() as u64, find)?;
+        let stored = self.clock.stage("facing", "points", 0, find)?;
         Ok(Side::Extremes(stored))
     }
 }
@@ -72,8 +70,8 @@ fn faced(position: [f64; 3], lattice: &Lattice) -> Result<[i64; 3]> {
         let [x, y, z] = position;
         Error::Parameter {
             name: "--facing",
-            found: format!("{x},{y},{z}"),
-            expected: format!("a position less than {:e} away", FARTHEST * lattice.step),
+            found: format!("{x:?},{y:?},{z:?}"),
+            expected: format!("a position less than {:.0} away", FARTHEST * lattice.step),
         }
     })
 }
