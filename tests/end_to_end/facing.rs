@@ -165,11 +165,15 @@ fn far_positions_are_refused() {
     let bench = Bench::new();
     let input = bench.points("room.xyz", &room([2.0, 2.0, 1.5], &[], 1));
     let run = |facing| {
-        util::builder(&[input.clone()], &bench.path("mesh.ply"), &params(facing))
-            .build()
-            .and_then(|run| run.run())
-            .map(drop)
-            .map_err(|error| error.to_string())
+        util::builder(
+            std::slice::from_ref(&input),
+            &bench.path("mesh.ply"),
+            &params(facing),
+        )
+        .build()
+        .and_then(|run| run.run())
+        .map(drop)
+        .map_err(|error| error.to_string())
     };
     let error = run(Facing::At([1e300, 0.0, -2.0])).unwrap_err();
     assert!(error.starts_with("--facing: 1e300,0.0,-2.0 "), "{error}");
