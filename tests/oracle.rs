@@ -5,7 +5,7 @@ mod reference;
 
 use outcrop::inspect::ply_mesh::{PlyMesh, Sink};
 use outcrop::{
-    Division, Error, MaxWidth, Method, Params, Radius, Reconstruction, Report, Smoothing,
+    Division, Error, Facing, MaxWidth, Method, Params, Radius, Reconstruction, Report, Smoothing,
 };
 use reference::weighing::Weighing;
 use reference::{Counts, Mesh, Settings, clouds};
