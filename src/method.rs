@@ -60,6 +60,17 @@ constants! {
         /// triangles that very large disks see.
         reach: f64 = 2.0, "distances of the last neighbour";
     }
+    /// Normals that points bring.
+    normals: Normals {
+        /// A normal suits the points if their scatter along it is at most this many times that along the estimated
+        /// normal (and a share of `plane.line` of all scatter besides): at edges, between layers and in noise it may
+        /// be farther from the estimate than on a clean surface.
+        scatter: f64 = 4.0, "times";
+        /// The neighbours of a point agree with the side of its normal if at most one in this number does not; the
+        /// normals of a cloud are oriented if at least one point in this number has such neighbours. Of true
+        /// normals nearly all have, with a fifth flipped half, with random signs one in 50.
+        sides: u64 = 4, "one in", [3, 8];
+    }
     /// Outliers, which are dropped on request.
     outliers: Outliers {
         /// Neighbours whose mean distance is the spacing of a point.

@@ -4,6 +4,7 @@ use crate::error::{Error, Result};
 pub use crate::geom::region::{NoRegion, Region};
 use crate::method::METHOD;
 use crate::stages::ingest::{Attributes, Classes, Crop, IngestStats, Selection};
+pub use crate::stages::normals::InputNormals;
 pub use crate::stages::smooth::Smoothing;
 use crate::stages::spacing::{Limits, Width};
 pub use crate::stages::surface::evidence::Division;
@@ -196,6 +197,8 @@ pub struct Params {
     pub compress_glb: bool,
     /// Do not use the positions of scanners that files give: what a scanner saw is out otherwise (robust).
     pub ignore_scanners: bool,
+    /// What is done with the normals that points bring.
+    pub input_normals: InputNormals,
     /// Take coordinates as they are if files give different reference systems, which is an error otherwise.
     pub ignore_crs: bool,
     /// Origin of the coordinates in the mesh file.
@@ -249,6 +252,7 @@ impl Default for Params {
             normals: false,
             compress_glb: false,
             ignore_scanners: false,
+            input_normals: InputNormals::Auto,
             ignore_crs: false,
             origin: Origin::None,
             block: METHOD.curve.block,
@@ -267,6 +271,7 @@ impl Params {
             relax: 0,
             max_angle: 60.0,
             keep_all: true,
+            input_normals: InputNormals::Use,
             max_edge: MaxWidth::None,
             max_fill: MaxWidth::None,
             max_hole_edges: 500,
@@ -291,6 +296,7 @@ impl Params {
             crop: self.crop.as_ref().map(crop),
             attributes: self.attributes.clone(),
             scanners: self.scanners(),
+            normals: self.input_normals != InputNormals::Ignore,
         }
     }
 

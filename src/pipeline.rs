@@ -133,11 +133,11 @@ impl Reconstruction {
         let relaxed = stages.relax(&store)?;
         let shape = stages.open_shape(relaxed)?;
         let places = stages.places(&store, &shape, &values, &lattice);
-        let seen = stages.cells(places, radius)?;
+        let seen = stages.cells(places, radius, &values)?;
         let triples = stages.triples(&seen)?;
         let stitched = stages.stitch(places, &triples)?;
         let repaired = stages.repair(places, &stitched)?;
-        values.release_scanners(workspace)?;
+        values.release_sides(workspace)?;
         let pieces = stages.cut(&store, &repaired, &lattice)?;
         stages.export(
             &store,

@@ -19,7 +19,8 @@ const MAY_USE: &[(&str, &str)] = &[
     ("histogram", ""),
     (
         "inspect",
-        "geom histogram method params picture pipeline spill stages/cells stages/ingest stages/order stages/tiles \
+        "geom histogram method params picture pipeline spill stages/attributes stages/blocks stages/cells stages/ingest \
+         stages/normals stages/order stages/tiles \
          workspace",
     ),
     ("kernels", ""),
@@ -32,7 +33,7 @@ const MAY_USE: &[(&str, &str)] = &[
     ("method", ""),
     (
         "params",
-        "geom method stages/ingest stages/smooth stages/spacing stages/surface",
+        "geom method stages/ingest stages/normals stages/smooth stages/spacing stages/surface",
     ),
     ("page", "histogram inspect picture report"),
     ("picture", ""),
@@ -52,7 +53,7 @@ const MAY_USE: &[(&str, &str)] = &[
     ("stages/blocks", ""),
     (
         "stages/cells",
-        "kernels stages/blocks stages/order stages/spacing stages/tiles",
+        "kernels stages/blocks stages/normals stages/order stages/spacing stages/tiles",
     ),
     (
         "stages/cut",
@@ -71,6 +72,10 @@ const MAY_USE: &[(&str, &str)] = &[
         "stages/located",
         "stages/blocks stages/cells stages/order stages/scanners stages/spacing",
     ),
+    (
+        "stages/normals",
+        "stages/attributes stages/blocks stages/ingest",
+    ),
     ("stages/order", "stages/ingest"),
     (
         "stages/outliers",
@@ -84,7 +89,7 @@ const MAY_USE: &[(&str, &str)] = &[
         "stages/smooth",
         "kernels stages/cells stages/order stages/spacing stages/tiles",
     ),
-    ("stages/scanners", "stages/attributes"),
+    ("stages/scanners", "stages/attributes stages/normals"),
     ("stages/spacing", ""),
     (
         "stages/stitch",

@@ -19,6 +19,7 @@ use outcrop::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
 use outcrop::workspace::progress::{Cancel, Silent};
 use outcrop::{Division, Error, spill};
 use reference::clouds::Random;
+use reference::patches::Outer;
 use reference::{Counts, Settings, cells, connect};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -123,7 +124,7 @@ fn pipeline(
         density: None,
         scanners: stored
             .as_ref()
-            .map(|(stored, places)| Scanners::new(stored, places)),
+            .and_then(|(stored, places)| Scanners::of(Some(stored), places, None)),
     };
     let division = Division {
         patch: settings.patch,
@@ -405,7 +406,10 @@ fn compare(
         // Of every other cloud some or all points were seen by scanners.
         let (numbers, places) = some_scanners(&mut random, points.len());
         let seen = settings.robust && seed % 2 == 0;
-        let of = |number: &u32| places.get(number.checked_sub(1)? as usize).copied()?;
+        let of = |number: &u32| {
+            let place = places.get(number.checked_sub(1)? as usize).copied()?;
+            place.map(Outer::Scanner)
+        };
         let scanners: Vec<_> = numbers.iter().map(of).collect();
         let scanners = if seen { &scanners[..] } else { &[] };
         let expected = connect(&shape, points.clone(), &all, None, scanners, &settings);

@@ -91,6 +91,7 @@ def reconstruct(
     keep_all: bool = False,
     max_edge: Optional[Width] = None,
     ignore_scanners: bool = False,
+    input_normals: Optional[str] = None,
     max_hole_edges: Optional[int] = None,
     max_fill: Optional[Width] = None,
     min_component: Optional[int] = None,

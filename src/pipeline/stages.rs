@@ -7,7 +7,7 @@ mod plan;
 mod values;
 
 use super::checks::{all_are_kept, disk_radius, enough, not_a_line, room};
-use super::disk::{DISTINCT, SCANNER, SURE, Text};
+use super::disk::{DISTINCT, NORMAL, SCANNER, SURE, Text};
 use super::{Clock, Known, Reconstruction};
 use crate::error::Result;
 use crate::geom::lattice::Lattice;
@@ -15,7 +15,7 @@ use crate::method::{METHOD, method_version};
 use crate::params::Method;
 use crate::report::{LatticeReport, Report};
 use crate::stages::blocks::Blocks;
-use crate::stages::cells::{CellTriples, DiskRadius, TileRanges, Widen, cells};
+use crate::stages::cells::{CellOptions, CellTriples, DiskRadius, TileRanges, Widen, cells};
 use crate::stages::cut::{CutOptions, StoredPieces, cut};
 use crate::stages::export::CoordinateType;
 use crate::stages::ingest::{Attributes, Carried, Spool, ingest_selected};
@@ -66,9 +66,7 @@ impl<'a> Stages<'a> {
         // With a region, headers do not tell how many points there will be.
         let headers = match workspace.is_task() || job.params.crop.is_some() {
             true => None,
-            false => {
-                Known::from_headers(&job.inputs, &job.params.attributes, job.params.scanners())
-            }
+            false => Known::from_headers(&job.inputs, &job.params.selection()),
         };
         let first = headers.map(|known| known.estimate(&job.params, &job.mesh));
         let mut exceeded = None;
@@ -147,10 +145,7 @@ impl<'a> Stages<'a> {
             }
             Ok(spool)
         })?;
-        self.carried = spool.carried(&params.attributes, params.wide_colors);
-        if params.scanners() {
-            self.carried = spool.with_scanners(std::mem::take(&mut self.carried));
-        }
+        self.carried = self.carry(&spool);
         self.report.attributes = self.carried.attributes.clone();
         let input = spool.stats().clone();
         if let Some(mixed) = input.mixed.as_ref().filter(|_| !params.ignore_crs) {
@@ -158,9 +153,15 @@ impl<'a> Stages<'a> {
         }
         self.wkt = spool.wkt().map(str::to_owned);
         self.report.coordinates = written(spool.source_precision());
-        let scanner = match self.carried.has_scanners() {
-            true => SCANNER,
-            false => 0,
+        let scanner = if self.carried.has_scanners() {
+            SCANNER
+        } else {
+            0
+        };
+        let normal = if self.carried.has_normals() {
+            NORMAL
+        } else {
+            0
         };
         self.known = Known {
             read: input.kept,
@@ -168,8 +169,9 @@ impl<'a> Stages<'a> {
             decompressed: 0,
             // With thinning, the number of points that stay is unknown.
             points: if params.thin.is_some() { 0 } else { input.kept },
-            values: self.carried.bytes() as u64 - scanner,
+            values: self.carried.bytes() as u64 - scanner - normal,
             scanner,
+            normal,
             double: Some(self.report.coordinates == CoordinateType::Double),
             moved: None,
             text: None,
@@ -396,18 +398,29 @@ impl<'a> Stages<'a> {
     }
 
     /// Computes the restricted Voronoi cells.
-    pub fn cells(&mut self, places: Places<'_>, radius: DiskRadius) -> Result<CellTriples> {
+    pub fn cells(
+        &mut self,
+        places: Places<'_>,
+        radius: DiskRadius,
+        values: &Values,
+    ) -> Result<CellTriples> {
         let (params, workspace, tiles) = (&self.job.params, self.workspace, self.tiles());
-        let (k, points) = (params.neighbors, self.report.points);
-        let widen = match params.method {
-            Method::Robust => Widen::OnBands,
-            Method::Paper => Widen::OnLines,
+        let points = self.report.points;
+        let options = CellOptions {
+            neighbors: params.neighbors,
+            radius,
+            widen: match params.method {
+                Method::Robust => Widen::OnBands,
+                Method::Paper => Widen::OnLines,
+            },
+            density: places.density,
+            directions: values.directions(params.input_normals),
         };
         workspace.trim();
-        let (shape, density) = (places.shape, places.density);
-        let (seen, stats) = self.clock.stage("cells", "points", points, || {
-            cells(shape, tiles, k, radius, widen, density, workspace)
+        let (seen, stats, disks) = self.clock.stage("cells", "points", points, || {
+            cells(places.shape, tiles, options, workspace)
         })?;
+        self.note_disks(disks);
         not_a_line(&stats, points)?;
         self.report.cells = stats;
         Ok(seen)

@@ -2,6 +2,7 @@
 //! of every surface that it saw.
 
 use super::attributes::StoredScanners;
+use super::normals::{Given, Normals};
 use crate::error::Result;
 use crate::geom::Point;
 use crate::geom::aabb::Aabb;
@@ -41,21 +42,34 @@ pub fn place(position: [f64; 3], lattice: &Lattice, bounds: Aabb) -> Option<[i64
 /// The scanners of a cloud.
 #[derive(Debug, Clone, Copy)]
 pub struct Scanners<'a> {
-    stored: &'a StoredScanners,
+    stored: Option<&'a StoredScanners>,
     places: &'a [Option<[i64; 3]>],
+    /// The normals of the points, if they tell which side is out: they count before scanners.
+    normals: Option<Normals<'a>>,
 }
 
 impl<'a> Scanners<'a> {
-    /// The scanners of the points, with their places in the order of their numbers.
+    /// The scanners of the points, with their places in the order of their numbers, and the normals of the points, if
+    /// these tell which side is out; none without any of both.
     #[must_use]
-    pub fn new(stored: &'a StoredScanners, places: &'a [Option<[i64; 3]>]) -> Self {
-        Self { stored, places }
+    pub fn of(
+        stored: Option<&'a StoredScanners>,
+        places: &'a [Option<[i64; 3]>],
+        normals: Option<Normals<'a>>,
+    ) -> Option<Self> {
+        let some = stored.is_some() || normals.is_some();
+        some.then_some(Self {
+            stored,
+            places,
+            normals,
+        })
     }
 
     /// Bytes of memory for those of `ids` points while they are read.
     #[must_use]
     pub fn bytes(&self, ids: usize) -> u64 {
-        self.stored.bytes(ids)
+        self.stored.map_or(0, |stored| stored.bytes(ids))
+            + self.normals.map_or(0, |normals| normals.bytes(ids))
     }
 
     /// The scanners of the points of a block.
@@ -65,7 +79,14 @@ impl<'a> Scanners<'a> {
     pub fn open(&self, unit: &Unit<'_>, ids: Range<u32>) -> Result<Seen<'a>> {
         Ok(Seen {
             first: ids.start,
-            numbers: self.stored.open(unit, ids)?,
+            given: match self.normals {
+                Some(normals) => Some(normals.open(unit, ids.clone())?),
+                None => None,
+            },
+            numbers: match self.stored {
+                Some(stored) => stored.open(unit, ids)?,
+                None => Vec::new(),
+            },
             places: self.places,
         })
     }
@@ -77,13 +98,14 @@ pub struct Seen<'a> {
     first: u32,
     numbers: Vec<u32>,
     places: &'a [Option<[i64; 3]>],
+    given: Option<Given>,
 }
 
 impl Seen<'_> {
     /// Allocated bytes.
     #[must_use]
     pub fn bytes(&self) -> u64 {
-        bytes_of(&self.numbers)
+        bytes_of(&self.numbers) + self.given.as_ref().map_or(0, Given::bytes)
     }
 
     /// The place of the scanner that saw a point of the block.
@@ -93,15 +115,32 @@ impl Seen<'_> {
         place.copied().flatten()
     }
 
-    /// True if the scanner that saw a point of the block is known.
-    #[must_use]
-    pub fn has(&self, id: u32) -> bool {
-        self.of(id).is_some()
+    /// The normal of a point of the block, if it tells which side is out.
+    fn normal(&self, id: u32) -> Option<[f64; 3]> {
+        self.given.as_ref()?.unit(id)
     }
 
-    /// The unit vector from a point of the block, at `from`, to the scanner that saw it.
+    /// True if the outer side, or the scanner that saw a point of the block, is known.
+    #[must_use]
+    pub fn has(&self, id: u32) -> bool {
+        self.normal(id).is_some() || self.of(id).is_some()
+    }
+
+    /// As [`Seen::toward`], but none for a point with a normal that does not agree with those around it.
+    #[must_use]
+    pub fn witness(&self, id: u32, from: Point) -> Option<[f64; 3]> {
+        let agrees = |given: &Given| given.of(id).is_none() || given.agrees(id);
+        let sure = self.given.as_ref().is_none_or(agrees);
+        self.toward(id, from).filter(|_| sure)
+    }
+
+    /// The unit vector from a point of the block, at `from`, to its outer side: its normal, or the direction to the
+    /// scanner that saw it.
     #[must_use]
     pub fn toward(&self, id: u32, from: Point) -> Option<[f64; 3]> {
+        if let Some(normal) = self.normal(id) {
+            return Some(normal);
+        }
         let to = self.of(id)?;
         let v: [f64; 3] = std::array::from_fn(|axis| (to[axis] - i64::from(from[axis])) as f64);
         let length = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
@@ -142,6 +181,7 @@ mod tests {
             first: 5,
             numbers: vec![1, 2, 0, 3, 1],
             places: &places,
+            given: None,
         };
         let vector = [4.0 / 13.0, -3.0 / 13.0, 12.0 / 13.0];
         assert_eq!(seen.toward(5, [0; 3]), Some(vector));

@@ -2,7 +2,7 @@
 
 use super::evidence::{self, Known};
 use super::homes::Side;
-use super::patches::Scanner;
+use super::patches::Outer;
 use super::surface::{Surface, Triangle, fans};
 use super::{Settings, Weighing};
 use outcrop::geom::Point;
@@ -87,7 +87,7 @@ pub fn weighed(
     points: &[Point],
     t3: &BTreeSet<Triangle>,
     open: &BTreeSet<Triangle>,
-    scanners: &[Option<Scanner>],
+    scanners: &[Option<Outer>],
     settings: &Settings,
 ) -> Base {
     let block = settings.block;

@@ -1,5 +1,6 @@
 //! Sections 1, 2, 3.1 and 5: ids, neighbours, planes, cells and their triples.
 
+use super::normals::{self, Short};
 use super::spacing::Density;
 use super::surface::Triangle;
 use super::{Radius, Settings};
@@ -67,28 +68,39 @@ fn is_off_surface(points: &[Point], i: usize, settings: &Settings, density: &Den
     last.is_some_and(|&j| density.is_off_surface(i, distance2(points[i], points[j])))
 }
 
-/// The pairs with which the cell of `i` makes triples. `diagonal` is that of the whole cloud.
-fn corners(points: &[Point], i: usize, settings: &Settings, diagonal: f64) -> Vec<(u32, u32)> {
+/// The pairs with which the cell of `i`, which has the normal `given`, makes triples. `diagonal` is that of the whole
+/// cloud.
+fn corners(
+    points: &[Point],
+    i: usize,
+    given: Option<Short>,
+    settings: &Settings,
+    diagonal: f64,
+) -> Vec<(u32, u32)> {
     let others = by_distance(points, i);
     let mut k = settings.neighbors;
-    let (plane, last) = loop {
+    let (moments, plane, last) = loop {
         let used = &others[..k.min(others.len())];
-        let (_, plane) = plane_of(points, i, used);
+        let (moments, plane) = plane_of(points, i, used);
         let enough = if settings.robust {
             plane.wide
         } else {
             plane.spans
         };
         if enough || k >= 8 * settings.neighbors {
-            break (plane, used.last().copied());
+            break (moments, plane, used.last().copied());
         }
         k *= 2;
     };
-    let (Some(normal), Some(last)) = (plane.normal, last) else {
+    let Some(last) = last else {
+        return Vec::new();
+    };
+    let reach2 = distance2(points[i], points[last]);
+    let Some(normal) = normals::direction(given, settings, (&moments, &plane), reach2) else {
         return Vec::new();
     };
     let radius = match settings.radius {
-        Radius::Auto => 2.0 * (distance2(points[i], points[last]) as f64).sqrt(),
+        Radius::Auto => 2.0 * (reach2 as f64).sqrt(),
         Radius::Percent(percent) => percent / 100.0 * diagonal,
         Radius::Length(steps) => steps,
     };
@@ -113,12 +125,24 @@ pub fn triples(
     diagonal: f64,
     density: Option<&Density>,
 ) -> (BTreeMap<Triangle, u32>, usize) {
+    let none = vec![None; points.len()];
+    triples_given(points, &none, settings, diagonal, density)
+}
+
+/// As [`triples`], of points that have normals.
+pub fn triples_given(
+    points: &[Point],
+    given: &[Option<Short>],
+    settings: &Settings,
+    diagonal: f64,
+    density: Option<&Density>,
+) -> (BTreeMap<Triangle, u32>, usize) {
     let off: Vec<bool> = (0..points.len())
         .map(|i| density.is_some_and(|d| is_off_surface(points, i, settings, d)))
         .collect();
     let mut cells_of: BTreeMap<Triangle, BTreeSet<u32>> = BTreeMap::new();
     for i in (0..points.len()).filter(|&i| !off[i]) {
-        for (j, l) in corners(points, i, settings, diagonal) {
+        for (j, l) in corners(points, i, given[i], settings, diagonal) {
             let mut triple = [i as u32, j, l];
             triple.sort_unstable();
             if triple.iter().any(|&v| off[v as usize]) {

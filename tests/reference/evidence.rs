@@ -3,7 +3,7 @@
 use super::base::is_interior;
 use super::contract::Graph;
 use super::homes::{Homes, Side};
-use super::patches::{Block, Scanner, cosine, highest, unit_normal, weight};
+use super::patches::{Block, Outer, cosine, highest, unit_normal, weight};
 use super::surface::{Edge, Surface, Triangle, alike, edges};
 use super::{Settings, Weighing};
 use outcrop::geom::Point;
@@ -14,8 +14,8 @@ pub struct Known<'a> {
     /// The shape.
     pub points: &'a [Point],
     pub settings: &'a Settings,
-    /// The scanner of each point.
-    pub scanners: &'a [Option<Scanner>],
+    /// The outer side of each point.
+    pub scanners: &'a [Option<Outer>],
     /// The T3 that no vertex flags.
     pub kept: &'a BTreeSet<Triangle>,
     /// By block, the crossing T3 that touch it and are not flagged by its own vertices.

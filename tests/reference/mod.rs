@@ -22,6 +22,7 @@ pub mod homes;
 pub mod insert;
 pub mod mend;
 pub mod narrow;
+pub mod normals;
 pub mod output;
 pub mod patches;
 pub mod relax;
@@ -32,7 +33,7 @@ pub mod weighing;
 
 use holes::Filling;
 use outcrop::geom::Point;
-use patches::Scanner;
+use patches::Outer;
 use spacing::Density;
 use std::collections::{BTreeMap, BTreeSet};
 use surface::{Component, Surface, Triangle};
@@ -47,6 +48,14 @@ pub enum Radius {
     Percent(f64),
     /// In lattice steps.
     Length(f64),
+}
+
+/// What is done with the normals that points bring.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Given {
+    Auto,
+    Use,
+    Ignore,
 }
 
 /// The parameters of the method.
@@ -82,6 +91,8 @@ pub struct Settings {
     /// Longest side of a triangle, and largest triangle of a filling, in local spacings.
     pub max_edge: f64,
     pub max_fill: f64,
+    /// `--input-normals`
+    pub given: Given,
 }
 
 impl Default for Settings {
@@ -103,6 +114,7 @@ impl Default for Settings {
             keep_all: true,
             max_edge: f64::INFINITY,
             max_fill: f64::INFINITY,
+            given: Given::Use,
         }
     }
 }
@@ -118,6 +130,7 @@ impl Settings {
             keep_all: false,
             max_edge: 8.0,
             max_fill: 8.0,
+            given: Given::Auto,
             ..Self::default()
         }
     }
@@ -199,17 +212,25 @@ pub struct Mesh {
 
 /// Reconstructs the surface of a cloud.
 pub fn reconstruct(points: &[Point], settings: &Settings) -> Mesh {
-    reconstruct_seen(points, |_| None, settings)
+    reconstruct_given(points, |_| None, |_| None, settings)
 }
 
-/// As [`reconstruct`], of points that scanners saw; `scanner` has that of a position.
-pub fn reconstruct_seen(
+/// As [`reconstruct`], of points that scanners saw, and that have normals; `scanner` and `normal` have those of a
+/// position.
+pub fn reconstruct_given(
     points: &[Point],
-    scanner: impl Fn(&Point) -> Option<Scanner>,
+    scanner: impl Fn(&Point) -> Option<[i64; 3]>,
+    normal: impl Fn(&Point) -> Option<normals::Short>,
     settings: &Settings,
 ) -> Mesh {
     let mut points = cells::in_id_order(points);
-    let scanners: Vec<Option<Scanner>> = points.iter().map(scanner).collect();
+    let scanners: Vec<Option<[i64; 3]>> = points.iter().map(scanner).collect();
+    let wanted = settings.given != Given::Ignore;
+    let given: Vec<Option<normals::Short>> = points
+        .iter()
+        .map(|p| normal(p).filter(|_| wanted))
+        .collect();
+    let outer = normals::outer(&scanners, &given, settings);
     let diagonal = cells::diagonal(&points);
     for _ in 0..settings.smooth {
         let smooth = match settings.edges {
@@ -227,15 +248,9 @@ pub fn reconstruct_seen(
         settings.smooth > 0,
         density,
     );
-    let (triples, off_surface) = cells::triples(&relaxed.shape, settings, diagonal, density);
-    let mut mesh = connect(
-        &relaxed.shape,
-        points,
-        &triples,
-        density,
-        &scanners,
-        settings,
-    );
+    let (triples, off_surface) =
+        cells::triples_given(&relaxed.shape, &given, settings, diagonal, density);
+    let mut mesh = connect(&relaxed.shape, points, &triples, density, &outer, settings);
     mesh.counts.off_surface = off_surface;
     (mesh.counts.rounds, mesh.counts.moved) = (relaxed.rounds, relaxed.moved);
     (mesh.counts.curved, mesh.counts.clean) = (relaxed.curved, relaxed.clean);
@@ -259,7 +274,7 @@ pub fn connect(
     file: Vec<Point>,
     triples: &BTreeMap<Triangle, u32>,
     density: Option<&Density>,
-    scanners: &[Option<Scanner>],
+    scanners: &[Option<Outer>],
     settings: &Settings,
 ) -> Mesh {
     let mut counts = Counts {
@@ -325,7 +340,7 @@ fn repair_and_orient(
     shape: &[Point],
     file: &[Point],
     density: Option<&Density>,
-    scanners: &[Option<Scanner>],
+    scanners: &[Option<Outer>],
     surface: &mut Surface,
     settings: &Settings,
     counts: &mut Counts,

@@ -27,21 +27,32 @@ pub fn weight(cosine: f64) -> i64 {
     1 + (15.0 * cosine.max(0.0)).floor() as i64
 }
 
-/// The place of a scanner on the lattice.
-pub type Scanner = [i64; 3];
+/// How the outer side of a point is known.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Outer {
+    /// By the place of its scanner on the lattice.
+    Scanner([i64; 3]),
+    /// By its normal, a unit vector; true if those around it agree.
+    Normal([f64; 3], bool),
+}
 
-/// The evidence that the run i → j → k of a triangle faces the scanner that saw its vertex `v`.
-pub fn facing(points: &[Point], scanners: &[Option<Scanner>], t: Triangle, v: u32) -> i64 {
-    let Some(Some(scanner)) = scanners.get(v as usize) else {
-        return 0;
+/// The evidence that the run i → j → k of a triangle faces the outer side of its vertex `v`.
+pub fn facing(points: &[Point], scanners: &[Option<Outer>], t: Triangle, v: u32) -> i64 {
+    let d = match scanners.get(v as usize).copied().flatten() {
+        None => return 0,
+        Some(Outer::Normal(normal, _)) => normal,
+        Some(Outer::Scanner(scanner)) => {
+            let at = points[v as usize];
+            let way: [f64; 3] =
+                std::array::from_fn(|axis| (scanner[axis] - i64::from(at[axis])) as f64);
+            let length = (way[0] * way[0] + way[1] * way[1] + way[2] * way[2]).sqrt();
+            if length == 0.0 {
+                return 0;
+            }
+            way.map(|x| x / length)
+        }
     };
-    let at = points[v as usize];
-    let way: [f64; 3] = std::array::from_fn(|axis| (scanner[axis] - i64::from(at[axis])) as f64);
-    let length = (way[0] * way[0] + way[1] * way[1] + way[2] * way[2]).sqrt();
-    if length == 0.0 {
-        return 0;
-    }
-    let (n, d) = (unit_normal(points, t), way.map(|x| x / length));
+    let n = unit_normal(points, t);
     (16.0 * (n[0] * d[0] + n[1] * d[1] + n[2] * d[2])).trunc() as i64
 }
 
@@ -82,8 +93,8 @@ pub struct Block<'a> {
     pub candidates: BTreeSet<Triangle>,
     /// The highest points of columns.
     pub highest: &'a BTreeSet<u32>,
-    /// The scanner of each point.
-    pub scanners: &'a [Option<Scanner>],
+    /// The outer side of each point.
+    pub scanners: &'a [Option<Outer>],
     /// `P`.
     pub run: u32,
 }
@@ -178,9 +189,11 @@ impl Block<'_> {
             let node = &mut patches.graph.nodes[side.home];
             node.triangles += 1;
             for v in t {
-                let known = self.scanners.get(v as usize).is_some_and(Option::is_some);
+                let outer = self.scanners.get(v as usize).copied().flatten();
+                let known = outer.is_some();
+                let sure = !matches!(outer, Some(Outer::Normal(_, false)));
                 let up = match known {
-                    true if v % 64 == 0 => facing(self.points, self.scanners, t, v),
+                    true if v % 64 == 0 && sure => facing(self.points, self.scanners, t, v),
                     false if self.highest.contains(&v) => {
                         (16.0 * unit_normal(self.points, t)[2]).trunc() as i64
                     }

@@ -2,7 +2,7 @@
 
 use super::big::{Big, Big3, cross, determinant, dot, plus, vector};
 use super::insert::normal;
-use super::patches::{Scanner, facing};
+use super::patches::{Outer, facing};
 use super::surface::{Component, Edge, Surface, Triangle, edges};
 use outcrop::geom::Point;
 use std::collections::BTreeSet;
@@ -55,11 +55,7 @@ pub fn run([i, j, k]: Triangle, turned: bool) -> [u32; 3] {
 
 /// All triangles as they run after every component is oriented: to the scanners that saw it, else by its volume or
 /// area.
-pub fn oriented(
-    points: &[Point],
-    scanners: &[Option<Scanner>],
-    surface: &Surface,
-) -> Vec<Component> {
+pub fn oriented(points: &[Point], scanners: &[Option<Outer>], surface: &Surface) -> Vec<Component> {
     let mut components = surface.components().expect("the mesh is orientable");
     for component in &mut components {
         let open = component

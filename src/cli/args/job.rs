@@ -2,7 +2,7 @@
 
 use super::super::parse::region;
 use crate::method::METHOD;
-use crate::params::{MaxWidth, Method, Origin, Params, Radius, Region, Smoothing};
+use crate::params::{InputNormals, MaxWidth, Method, Origin, Params, Radius, Region, Smoothing};
 use crate::pipeline::{Builder, Reconstruction};
 use crate::stages::ingest::{Attributes, Classes};
 use clap::Args as ClapArgs;
@@ -139,6 +139,10 @@ pub struct Surface {
     /// Do not use the positions of scanners in E57 and PTX files, by which the side that the scanner saw is out
     #[arg(long)]
     pub ignore_scanners: bool,
+    /// Normals that the points bring: use them for the disks and, if neighbours agree in sign, for the outer side; auto
+    /// uses each where it suits the points around it, and ignore none [default: auto; with --method paper use]
+    #[arg(long, value_name = "auto|use|ignore")]
+    pub input_normals: Option<InputNormals>,
 }
 
 /// Post-processing.
@@ -268,6 +272,7 @@ impl Job {
             keep_far: self.coordinates.keep_far,
             ignore_crs: self.coordinates.ignore_crs,
             ignore_scanners: self.surface.ignore_scanners,
+            input_normals: self.surface.input_normals.unwrap_or(usual.input_normals),
             block: self.block_points,
             ..usual
         }
@@ -288,6 +293,7 @@ mod tests {
             ("max-edge", |p| p.max_edge.to_string()),
             ("max-hole-edges", |p| p.max_hole_edges.to_string()),
             ("max-fill", |p| p.max_fill.to_string()),
+            ("input-normals", |p| p.input_normals.to_string()),
         ] {
             let option = options.iter().find(|option| option.name == name).unwrap();
             let words: Vec<&str> = option.help.split_whitespace().collect();

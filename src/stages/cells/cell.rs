@@ -1,6 +1,7 @@
 //! Computation of one cell: neighbours, plane, disk, clipping up to the radius of security (paper, 3.3 and
 //! 3.4).
 
+use super::directions::{Directions, DiskStats};
 use crate::error::Result;
 use crate::geom::Point;
 use crate::geom::aabb::Aabb;
@@ -174,6 +175,8 @@ pub struct CellMaker<'a> {
     pub(super) widen: Widen,
     /// If given, points off the surface get no cell.
     density: Option<Density<'a>>,
+    /// The normals of the points, if they bring any.
+    directions: Option<Directions>,
     pub(super) cell: Cell,
     pub(super) wrapper: Box<Wrapper>,
 }
@@ -192,14 +195,33 @@ impl<'a> CellMaker<'a> {
             radius,
             widen,
             density,
+            directions: None,
             cell: Cell::new(0, [0, 0, 1 << 24], 1.0),
             wrapper: Box::default(),
         }
     }
 
+    /// Takes the directions of disks from the normals of the points, too.
+    pub(super) fn set_directions(&mut self, directions: Directions) {
+        self.directions = Some(directions);
+    }
+
+    /// Bytes and counts of the normals of the points.
+    pub(super) fn of_directions(&self) -> (u64, DiskStats) {
+        let directions = self.directions.as_ref();
+        directions.map_or_else(Default::default, |d| (d.bytes(), d.stats()))
+    }
+
     /// The normal and the radius of a point's disk, or the reason why it has none.
-    pub(super) fn disk(&self, id: u32, fit: &Fit) -> std::result::Result<(Normal, f64), Outcome> {
-        let normal = fit.plane.normal.ok_or(Outcome::NoPlane)?;
+    pub(super) fn disk(
+        &mut self,
+        id: u32,
+        fit: &Fit,
+    ) -> std::result::Result<(Normal, f64), Outcome> {
+        let estimated = fit.plane.normal;
+        let directions = self.directions.as_mut();
+        let normal = directions.map_or(estimated, |directions| directions.choose(id, fit));
+        let normal = normal.ok_or(Outcome::NoPlane)?;
         if let Some(density) = self.density
             && density.is_off_surface(id, fit.near2)
         {

@@ -1,5 +1,6 @@
 //! Columns of input files: values that points have beside their positions, such as colours.
 
+use super::directions::normal_columns;
 use crate::error::{Error, Result};
 use outcrop_ply::Scalar;
 use serde::{Deserialize, Serialize};
@@ -39,8 +40,8 @@ const ALIASES: [(&str, &str); 12] = [
 /// Most bytes of all columns of a point that are wanted for the mesh.
 pub(super) const MOST_BYTES: usize = 48;
 
-/// Most bytes of a point's row: these, and the number of its scanner.
-pub(super) const MOST_ROW: usize = MOST_BYTES + size_of::<u32>();
+/// Most bytes of a point's row: these, the number of its scanner, and its normal.
+pub(super) const MOST_ROW: usize = MOST_BYTES + size_of::<u32>() + 3 * size_of::<f64>();
 
 /// A column of a file.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -174,20 +175,24 @@ pub(super) struct Wanted {
 }
 
 impl Wanted {
-    /// Of a file with these columns; also that of scanners if `scanners`.
+    /// Of a file with these columns; also that of scanners if `scanners`, and those of normals if `normals`.
     ///
     /// # Errors
     /// [`Error::Parameter`] if those for the mesh take more than [`MOST_BYTES`].
-    pub(super) fn of(attributes: &Attributes, columns: &[Column], scanners: bool) -> Result<Self> {
+    pub(super) fn of(
+        attributes: &Attributes,
+        columns: &[Column],
+        scanners: bool,
+        normals: bool,
+    ) -> Result<Self> {
         let mut numbers = attributes.of(columns);
         let bytes: usize = numbers.iter().map(|n| columns[*n].scalar.bytes()).sum();
-        if scanners
-            && let Some(scanner) = columns.iter().position(|c| c.name == SCANNER)
-            && !numbers.contains(&scanner)
-        {
-            numbers.push(scanner);
-            numbers.sort_unstable();
-        }
+        let scanner = columns.iter().position(|c| c.name == SCANNER);
+        numbers.extend(scanner.filter(|_| scanners));
+        let normal = normal_columns(columns).filter(|_| normals);
+        numbers.extend(normal.into_iter().flatten());
+        numbers.sort_unstable();
+        numbers.dedup();
         let columns = numbers.iter().map(|n| columns[*n].clone()).collect();
         if bytes > MOST_BYTES {
             return Err(Error::Parameter {
@@ -284,15 +289,22 @@ mod tests {
             .map(|n| Column::new(&n.to_string(), Scalar::F64))
             .collect();
         let list = |n: usize| Attributes::List((0..n).map(|n| n.to_string()).collect());
-        assert_eq!(Wanted::of(&list(6), &columns, false).unwrap().bytes(), 48);
-        assert!(Wanted::of(&list(7), &columns, false).is_err());
+        assert_eq!(
+            Wanted::of(&list(6), &columns, false, false)
+                .unwrap()
+                .bytes(),
+            48
+        );
+        assert!(Wanted::of(&list(7), &columns, false, false).is_err());
     }
 
     #[test]
     fn scanners_are_wanted_beside_others() {
         let columns = ["intensity", SCANNER, "red"].map(|n| Column::new(n, Scalar::U16));
         let numbers = |attributes: &Attributes, scanners| {
-            Wanted::of(attributes, &columns, scanners).unwrap().numbers
+            Wanted::of(attributes, &columns, scanners, false)
+                .unwrap()
+                .numbers
         };
         assert_eq!(numbers(&Attributes::None, true), [1]);
         assert_eq!(numbers(&Attributes::Auto, true), [0, 1, 2]);
