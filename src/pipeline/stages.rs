@@ -1,12 +1,13 @@
 //! The stages of a run: each with its parameters, its part of the report, and the check of disk space for the
 //! following stages.
 
+mod cells;
 mod draw;
 mod export;
 mod plan;
 mod values;
 
-use super::checks::{all_are_kept, disk_radius, enough, not_a_line, room};
+use super::checks::{all_are_kept, disk_radius, enough, room};
 use super::disk::{DISTINCT, NORMAL, SCANNER, SURE, Text};
 use super::{Clock, Known, Reconstruction};
 use crate::error::Result;
@@ -15,7 +16,7 @@ use crate::method::{METHOD, method_version};
 use crate::params::Method;
 use crate::report::{LatticeReport, Report};
 use crate::stages::blocks::Blocks;
-use crate::stages::cells::{CellOptions, CellTriples, DiskRadius, TileRanges, Widen, cells};
+use crate::stages::cells::{CellTriples, DiskRadius, TileRanges};
 use crate::stages::cut::{CutOptions, StoredPieces, cut};
 use crate::stages::export::CoordinateType;
 use crate::stages::ingest::{Attributes, Carried, Spool, ingest_selected};
@@ -395,35 +396,6 @@ impl<'a> Stages<'a> {
                 limits: params.limits(lattice.step),
             }),
         }
-    }
-
-    /// Computes the restricted Voronoi cells.
-    pub fn cells(
-        &mut self,
-        places: Places<'_>,
-        radius: DiskRadius,
-        values: &Values,
-    ) -> Result<CellTriples> {
-        let (params, workspace, tiles) = (&self.job.params, self.workspace, self.tiles());
-        let points = self.report.points;
-        let options = CellOptions {
-            neighbors: params.neighbors,
-            radius,
-            widen: match params.method {
-                Method::Robust => Widen::OnBands,
-                Method::Paper => Widen::OnLines,
-            },
-            density: places.density,
-            directions: values.directions(params.input_normals),
-        };
-        workspace.trim();
-        let (seen, stats, disks) = self.clock.stage("cells", "points", points, || {
-            cells(places.shape, tiles, options, workspace)
-        })?;
-        self.note_disks(disks);
-        not_a_line(&stats, points)?;
-        self.report.cells = stats;
-        Ok(seen)
     }
 
     /// Adds up the number of cells of each triple.

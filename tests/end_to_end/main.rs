@@ -9,6 +9,7 @@ mod determinism;
 mod filters;
 mod installed;
 mod library;
+mod normals;
 mod odd;
 mod outdoor;
 mod outputs;

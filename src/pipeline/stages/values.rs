@@ -74,13 +74,6 @@ impl Stages<'_> {
         carried
     }
 
-    /// Notes which disks have the direction of the normal of their point.
-    pub(super) fn note_disks(&mut self, disks: DiskStats) {
-        if let Some(normals) = &mut self.report.normals {
-            normals.disks = disks;
-        }
-    }
-
     /// The values of the points that remain, if any are needed.
     pub fn values(
         &mut self,
