@@ -74,7 +74,7 @@ const MAY_USE: &[(&str, &str)] = &[
     ),
     (
         "stages/normals",
-        "stages/attributes stages/blocks stages/ingest",
+        "stages/attributes stages/blocks stages/ingest stages/order",
     ),
     ("stages/order", "stages/ingest"),
     (

@@ -146,7 +146,7 @@ fn described(
         },
         false => Illustration::default(),
     };
-    let normals = normals(&spool, &lattice, &stored, workspace)?;
+    let normals = normals(&spool, &lattice, (&stored, &store), workspace)?;
     stored.release(workspace)?;
     let points = store.len() as u64;
     let cells = sample.seconds / sample.points.max(1) as f64 * points as f64;
@@ -186,7 +186,7 @@ fn described(
 fn normals(
     spool: &Spool,
     lattice: &Lattice,
-    stored: &StoredPoints,
+    (stored, store): (&StoredPoints, &PointStore),
     workspace: &Workspace,
 ) -> Result<Option<NormalStats>> {
     let Some(names) = spool.normal_names() else {
@@ -198,7 +198,7 @@ fn normals(
     let carried = spool.with_normals(spool.carried(&Attributes::None, false));
     let values = attributes(spool, lattice, &carried, stored, blocks, workspace)?;
     let found = values.normals.as_ref().map(|of| {
-        let found = look(Normals::new(of, blocks), names.to_vec(), workspace)?;
+        let found = look(Normals::new(of, blocks), store, names.to_vec(), workspace)?;
         of.release(workspace)?;
         Ok(found)
     });

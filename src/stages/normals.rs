@@ -5,8 +5,10 @@ use super::attributes::StoredNormals;
 use super::blocks::Blocks;
 use crate::error::Result;
 use crate::geom::plane::Normal;
+use crate::geom::{Point, sub};
 use crate::method::METHOD;
 use crate::stages::ingest::direction;
+use crate::stages::order::PointStore;
 use crate::workspace::memory::bytes_of;
 use crate::workspace::{Unit, Workspace};
 use serde::{Deserialize, Serialize};
@@ -107,6 +109,16 @@ fn dot(a: Normal, b: Normal) -> i64 {
     x + y + z
 }
 
+/// True if a point at the difference `d` is beside one with this normal: its height over the plane is at most a
+/// quarter of its distance.
+fn is_beside(normal: Normal, d: [i64; 3]) -> bool {
+    let wide = |x: i64| i128::from(x);
+    let along: i128 = (0..3).map(|k| wide(d[k]) * i128::from(normal[k])).sum();
+    let distance2: i128 = d.iter().map(|x| wide(*x) * wide(*x)).sum();
+    let sides = i128::from(METHOD.normals.sides);
+    sides * sides * along * along <= distance2 * wide(dot(normal, normal))
+}
+
 /// The normals of consecutive points.
 #[derive(Debug)]
 pub struct Given {
@@ -144,19 +156,23 @@ impl Given {
         Some(n.map(|x| x / length))
     }
 
-    /// True if a point has a normal, and most points behind it on the curve that have one agree with its side: those
-    /// of its run in its block.
+    /// True if a point has a normal, and most points beside it agree with its side: those behind it on the curve, of
+    /// its run in its block, that have a normal and are not on another sheet. `at` has their positions.
     #[must_use]
-    pub fn agrees(&self, id: u32) -> bool {
+    pub fn agrees(&self, id: u32, at: impl Fn(u32) -> Point) -> bool {
         let Some(own) = self.of(id) else { return false };
         let end = self.blocks.ids(self.blocks.of(id) as usize).end;
         let run = id + 1..id.saturating_add(METHOD.curve.run as u32).min(end);
         let (mut others, mut against) = (0, 0);
-        for other in run.filter_map(|other| self.of(other)) {
-            others += 1;
-            against += u64::from(dot(own, other) <= 0);
+        for other in run {
+            if let Some(normal) = self.of(other)
+                && is_beside(own, sub(at(other), at(id)))
+            {
+                others += 1;
+                against += u64::from(dot(own, normal) <= 0);
+            }
         }
-        others > 0 && against * METHOD.normals.sides <= others
+        others >= METHOD.normals.beside && against * METHOD.normals.sides <= others
     }
 }
 
@@ -205,14 +221,15 @@ struct Looked {
 }
 
 impl Looked {
-    fn of(given: &Given) -> Self {
+    fn of(given: &Given, points: &[Point]) -> Self {
+        let at = |id: u32| points[(id - given.ids.start) as usize];
         let mut looked = Self::default();
         for id in given.ids() {
             let normal = given.of(id);
             looked.missing += u64::from(normal.is_none());
             if let Some([_, _, z]) = normal.filter(|_| is_sample(id)) {
                 looked.sampled += 1;
-                looked.agreeing += u64::from(given.agrees(id));
+                looked.agreeing += u64::from(given.agrees(id, at));
                 looked.down += u64::from(z < 0);
             }
         }
@@ -231,15 +248,21 @@ impl Looked {
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`], [`crate::Error::Cancelled`].
 pub fn look(
     normals: Normals<'_>,
+    store: &PointStore,
     columns: Vec<String>,
     workspace: &Workspace,
 ) -> Result<NormalStats> {
     let blocks = normals.blocks;
-    let bytes = |block: usize| normals.bytes(blocks.ids(block).len());
+    let bytes = |block: usize| {
+        let ids = blocks.ids(block).len();
+        normals.bytes(ids) + (ids * size_of::<Point>()) as u64
+    };
     let work = |unit: &Unit<'_>| {
-        let given = normals.open(unit, blocks.ids(unit.number()))?;
-        let _held = unit.hold(given.bytes());
-        Ok(Looked::of(&given))
+        let ids = blocks.ids(unit.number());
+        let points = store.slice(ids.start as usize..ids.end as usize)?;
+        let given = normals.open(unit, ids)?;
+        let _held = unit.hold(given.bytes() + bytes_of(&points));
+        Ok(Looked::of(&given, &points))
     };
     let mut all = Looked::default();
     workspace.units("normals", blocks.count(), bytes, work, |_, more| {
@@ -281,24 +304,50 @@ mod tests {
     const UP: Option<[i32; 3]> = Some([0, 0, 32767]);
     const DOWN: Option<[i32; 3]> = Some([0, 0, -32767]);
 
+    /// Places on a plane, four in a row.
+    fn flat(id: u32) -> Point {
+        [id as i32 % 4, id as i32 / 4, 0].map(|x| 10 * x)
+    }
+
     #[test]
     fn a_quarter_may_disagree() {
         let mut all = vec![UP; 128];
-        assert!(given(&all, 100).agrees(64));
+        let agrees = |all: &[_], block, id| given(all, block).agrees(id, flat);
+        assert!(agrees(&all, 100, 64));
         // Three of fifteen, and behind the run.
         (all[65], all[70], all[79], all[80]) = (DOWN, DOWN, DOWN, DOWN);
-        assert!(given(&all, 1000).agrees(64));
+        assert!(agrees(&all, 1000, 64));
         all[71] = Some([32767, 0, 0]);
-        assert!(!given(&all, 1000).agrees(64));
-        // Those in another block do not count.
-        assert!(given(&all, 70).agrees(64) && !given(&all, 65).agrees(64));
-        // Nor those without a normal.
+        assert!(!agrees(&all, 1000, 64));
+        // Those without a normal do not count, nor those in another block; six are needed.
         all[65] = None;
-        assert!(given(&all, 1000).agrees(64));
-        assert!(!given(&all, 1000).agrees(65));
+        assert!(agrees(&all, 1000, 64) && !agrees(&all, 1000, 65));
+        assert!(!agrees(&vec![UP; 128], 70, 64) && agrees(&vec![UP; 128], 71, 64));
         assert_eq!(given(&all, 1000).of(71), Some([32767 << 9, 0, 0]));
         assert_eq!(given(&all, 1000).unit(70), Some([0.0, 0.0, -1.0]));
         assert_eq!(given(&all, 1000).of(128), None);
+    }
+
+    #[test]
+    fn points_on_another_sheet_do_not_count() {
+        let normals: Vec<_> = (0..128)
+            .map(|id| if id % 2 == 0 { UP } else { DOWN })
+            .collect();
+        let sheets = |id: u32| {
+            let [x, y, _] = flat(id / 2);
+            [x, y, 20 - 40 * (id as i32 % 2)]
+        };
+        let given = given(&normals, 1000);
+        assert!(given.agrees(64, sheets) && !given.agrees(64, flat));
+        for (d, beside) in [
+            ([4000, 0, 1032], true),
+            ([4000, 0, 1033], false),
+            ([-(1 << 30), 1 << 30, -(1 << 28)], true),
+            ([0, 0, 1], false),
+            ([0; 3], true),
+        ] {
+            assert_eq!(is_beside([0, 0, 1 << 24], d), beside, "{d:?}");
+        }
     }
 
     #[test]
@@ -315,7 +364,8 @@ mod tests {
         assert!(!Looked::default().oriented());
         let mut all = vec![UP; 300];
         (all[0], all[5], all[128]) = (None, None, DOWN);
-        let found = Looked::of(&given(&all, 100));
+        let points: Vec<Point> = (0..300).map(flat).collect();
+        let found = Looked::of(&given(&all, 100), &points);
         assert_eq!(
             (found.missing, found.sampled, found.agreeing, found.down),
             (2, 4, 3, 1)

@@ -126,12 +126,13 @@ impl Seen<'_> {
         self.normal(id).is_some() || self.of(id).is_some()
     }
 
-    /// As [`Seen::toward`], but none for a point with a normal that does not agree with those around it.
+    /// As [`Seen::toward`], but none for a point with a normal that does not agree with those around it; `at` has
+    /// positions of the block.
     #[must_use]
-    pub fn witness(&self, id: u32, from: Point) -> Option<[f64; 3]> {
-        let agrees = |given: &Given| given.of(id).is_none() || given.agrees(id);
+    pub fn witness(&self, id: u32, at: impl Fn(u32) -> Point) -> Option<[f64; 3]> {
+        let agrees = |given: &Given| given.of(id).is_none() || given.agrees(id, &at);
         let sure = self.given.as_ref().is_none_or(agrees);
-        self.toward(id, from).filter(|_| sure)
+        self.toward(id, at(id)).filter(|_| sure)
     }
 
     /// The unit vector from a point of the block, at `from`, to its outer side: its normal, or the direction to the

@@ -230,7 +230,7 @@ pub fn reconstruct_given(
         .iter()
         .map(|p| normal(p).filter(|_| wanted))
         .collect();
-    let outer = normals::outer(&scanners, &given, settings);
+    let oriented = normals::oriented(&points, &given, settings.block);
     let diagonal = cells::diagonal(&points);
     for _ in 0..settings.smooth {
         let smooth = match settings.edges {
@@ -250,6 +250,7 @@ pub fn reconstruct_given(
     );
     let (triples, off_surface) =
         cells::triples_given(&relaxed.shape, &given, settings, diagonal, density);
+    let outer = normals::outer(&relaxed.shape, oriented, &scanners, &given, settings);
     let mut mesh = connect(&relaxed.shape, points, &triples, density, &outer, settings);
     mesh.counts.off_surface = off_surface;
     (mesh.counts.rounds, mesh.counts.moved) = (relaxed.rounds, relaxed.moved);

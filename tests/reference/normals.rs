@@ -3,6 +3,7 @@
 use super::patches::Outer;
 use super::{Given, Settings};
 use outcrop::geom::plane::{Moments, Plane};
+use outcrop::geom::{Point, sub};
 
 /// The short form of a normal.
 pub type Short = [i32; 3];
@@ -18,29 +19,38 @@ pub fn short(direction: [f64; 3]) -> Option<Short> {
     Some([x, y, z].map(|x| (x / length * 32767.0).round() as i32))
 }
 
-/// True if a point has a normal and those behind it agree with its side.
-fn agrees(normals: &[Option<Short>], id: usize, block: u32) -> bool {
+/// True if a point has a normal and those beside it agree with its side.
+fn agrees(points: &[Point], normals: &[Option<Short>], id: usize, block: u32) -> bool {
     let Some(own) = normals[id] else { return false };
     let same_block = |other: &usize| *other as u32 / block == id as u32 / block;
     let run = (id + 1..(id + 16).min(normals.len())).filter(same_block);
-    let others: Vec<Short> = run.filter_map(|other| normals[other]).collect();
+    let beside = |other: &usize| {
+        let d = sub(points[*other], points[id]).map(i128::from);
+        let n = own.map(i128::from);
+        let dot = |a: [i128; 3], b: [i128; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+        16 * dot(d, n) * dot(d, n) <= dot(d, d) * dot(n, n)
+    };
+    let others: Vec<Short> = run
+        .filter(beside)
+        .filter_map(|other| normals[other])
+        .collect();
     let dot = |a: Short| {
         (0..3)
             .map(|k| i64::from(own[k]) * i64::from(a[k]))
             .sum::<i64>()
     };
     let against = others.iter().filter(|other| dot(**other) <= 0).count();
-    !others.is_empty() && 4 * against <= others.len()
+    others.len() >= 6 && 4 * against <= others.len()
 }
 
-/// True if the normals tell which side is out.
-pub fn oriented(normals: &[Option<Short>], block: u32) -> bool {
+/// True if the normals tell which side is out, of points before smoothing.
+pub fn oriented(points: &[Point], normals: &[Option<Short>], block: u32) -> bool {
     let sampled: Vec<usize> = (0..normals.len())
         .filter(|id| id % 64 == 0 && normals[*id].is_some())
         .collect();
     let agreeing = sampled
         .iter()
-        .filter(|id| agrees(normals, **id, block))
+        .filter(|id| agrees(points, normals, **id, block))
         .count();
     let down = sampled
         .iter()
@@ -48,19 +58,25 @@ pub fn oriented(normals: &[Option<Short>], block: u32) -> bool {
     down && 4 * agreeing >= sampled.len()
 }
 
-/// The outer sides of the points that have a scanner or a normal.
+/// The outer sides of the points that have a scanner or a normal. `shape` has their positions, `oriented` says if the
+/// normals are.
 pub fn outer(
+    shape: &[Point],
+    oriented: bool,
     scanners: &[Option<[i64; 3]>],
     normals: &[Option<Short>],
     settings: &Settings,
 ) -> Vec<Option<Outer>> {
-    let counts = settings.robust && oriented(normals, settings.block);
+    let counts = settings.robust && oriented;
     let side = |id: usize| match normals[id].filter(|_| counts) {
         Some(normal) => {
             let n = normal.map(f64::from);
             let length = (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]).sqrt();
             let unit = n.map(|x| x / length);
-            Some(Outer::Normal(unit, agrees(normals, id, settings.block)))
+            Some(Outer::Normal(
+                unit,
+                agrees(shape, normals, id, settings.block),
+            ))
         }
         None => scanners[id].map(Outer::Scanner),
     };

@@ -102,29 +102,36 @@ impl Stages<'_> {
         }
         let (workspace, blocks, carried) = (self.workspace, self.blocks(), &self.carried);
         let names = spool.normal_names().filter(|_| carried.has_normals());
-        let mut stored = StoredAttributes::default();
         if carried.is_empty() {
             spool.release(workspace)?;
-        } else {
-            let points = spool.points();
-            stored = self.clock.stage("attributes", "points", points, || {
-                attributes(spool, lattice, carried, store, blocks, workspace)
-            })?;
+            return Ok(Values {
+                places,
+                ..Values::default()
+            });
         }
-        let mut values = Values {
+        let points = spool.points();
+        let (stored, normals) = self.clock.stage("attributes", "points", points, || {
+            let stored = attributes(spool, lattice, carried, store, blocks, workspace)?;
+            let normals = match (&stored.normals, names) {
+                (Some(of), Some(names)) => {
+                    let normals = Normals::new(of, blocks);
+                    let store = store.open(workspace)?;
+                    Some(look(normals, &store, names.into(), workspace)?)
+                }
+                _ => None,
+            };
+            Ok((stored, normals))
+        })?;
+        let oriented = normals.as_ref().is_some_and(|normals| normals.oriented);
+        self.report.normals = normals.map(|input| NormalsReport {
+            input,
+            disks: DiskStats::default(),
+        });
+        Ok(Values {
             stored,
             places,
             blocks: Some(blocks),
-            oriented: false,
-        };
-        if let (Some(normals), Some(names)) = (values.normals(), names) {
-            let found = look(normals, names.to_vec(), workspace)?;
-            values.oriented = found.oriented && self.job.params.method == Method::Robust;
-            self.report.normals = Some(NormalsReport {
-                input: found,
-                disks: DiskStats::default(),
-            });
-        }
-        Ok(values)
+            oriented: oriented && self.job.params.method == Method::Robust,
+        })
     }
 }

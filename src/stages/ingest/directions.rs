@@ -7,12 +7,13 @@ use super::source::Source;
 use outcrop_ply::{Scalar, real};
 
 /// Names of the columns of a normal, as they are known in all formats: of PLY and CloudCompare, of PCD, of the
-/// extension of E57, and of LAS.
-const NAMES: [[&str; 3]; 4] = [
+/// extension of E57, and of LAS, the last of three numbers in one.
+const NAMES: [[&str; 3]; 5] = [
     ["nx", "ny", "nz"],
     ["normal_x", "normal_y", "normal_z"],
     ["nor_normalx", "nor_normaly", "nor_normalz"],
     ["normalx", "normaly", "normalz"],
+    ["normal0", "normal1", "normal2"],
 ];
 
 /// Length of a normal in its short form.

@@ -248,7 +248,7 @@ impl Look<'_> {
         let _held = unit.hold(scanners.bytes(ids.len()));
         let sampled = |v: &u32| u64::from(*v) % METHOD.orientation.column == 0;
         let facing = |vertex: u32| {
-            let toward = seen.witness(vertex, places.at(vertex))?;
+            let toward = seen.witness(vertex, |id| places.at(id))?;
             Some(Witness { vertex, toward })
         };
         let unseen = highest.iter().filter(|v| !seen.has(**v));
