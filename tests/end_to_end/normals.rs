@@ -249,3 +249,105 @@ fn the_mesh_is_the_same_in_any_order_and_division() {
     assert_eq!(listed.vertices, mesh.vertices);
     assert_eq!(listed.triangles, mesh.triangles);
 }
+
+/// Two sheets that are one spacing apart: their points do not tell the direction at each of them.
+#[test]
+fn a_thin_plate_has_two_sides() {
+    let bench = Bench::new();
+    let mut random = random(3);
+    let points = faces([0.0; 3], [1.0, 1.0, 0.0125], 80.0, 0..6, 1.0, &mut random);
+    let mesh = bench.path("mesh.ply");
+    let mut run = |change, input_normals| {
+        let input = bench.write("plate.xyz", text(&points, change, &mut random));
+        let params = Params {
+            relax: 0,
+            ..with(input_normals)
+        };
+        let report = run(&[input], &mesh, &params);
+        let out = |p: [f64; 3]| [0.0, 0.0, p[2]];
+        let inner = |p: [f64; 3]| p[0].abs() < 0.48 && p[1].abs() < 0.48;
+        (report.mesh.boundary_edges, facing(&read(&mesh), inner, out))
+    };
+    let (torn, _) = run(Change::None, InputNormals::Ignore);
+    assert!(torn > 50, "{torn}");
+    for change in [Change::None, Change::Noise, Change::Signs, Change::Flipped] {
+        for wanted in [InputNormals::Auto, InputNormals::Use] {
+            let (boundary, share) = run(change, wanted);
+            let right = boundary < torn / 4 && share > 0.99;
+            assert!(right, "{change:?} {wanted:?}: {boundary} edges, {share}");
+        }
+    }
+}
+
+/// At the edges of a box estimated directions are between those of its faces.
+#[test]
+fn normals_that_do_not_suit_the_points_are_not_used() {
+    let bench = Bench::new();
+    let mut random = random(4);
+    let points = faces([0.0; 3], [1.0; 3], 40.0, 0..6, 1.0, &mut random);
+    let mesh = bench.path("mesh.ply");
+    for (change, wanted, used) in [
+        (Change::None, InputNormals::Auto, 0.999..=1.0),
+        (Change::Signs, InputNormals::Auto, 0.999..=1.0),
+        (Change::Noise, InputNormals::Auto, 0.1..=0.6),
+        (Change::Garbage, InputNormals::Auto, 0.0..=0.2),
+        (Change::Garbage, InputNormals::Use, 1.0..=1.0),
+    ] {
+        let input = bench.write("box.xyz", text(&points, change, &mut random));
+        let report = run(&[input], &mesh, &with(wanted));
+        let disks = report.normals.unwrap().disks;
+        let share = disks.used as f64 / (disks.used + disks.disagreeing) as f64;
+        assert!(used.contains(&share), "{change:?} {wanted:?}: {share}");
+        assert_eq!(disks.used + disks.disagreeing, report.points);
+        if (change, wanted) != (Change::Garbage, InputNormals::Use) {
+            assert_eq!(report.mesh.boundary_edges, 0, "{change:?}");
+        }
+    }
+}
+
+#[test]
+fn info_and_report_tell_about_normals() {
+    let bench = Bench::new();
+    let mut random = random(5);
+    let points = faces([0.0; 3], [1.0; 3], 20.0, 0..6, 1.0, &mut random);
+    let bare: Vec<[f64; 3]> = points.iter().map(|(p, _)| p.map(|x| x + 2.0)).collect();
+    for (change, kind) in [
+        (Change::None, "oriented"),
+        (Change::Signs, "directions only"),
+    ] {
+        let input = bench.write("box.xyz", text(&points, change, &mut random));
+        let said = util::run(["info".as_ref(), input.as_os_str()]);
+        let line = format!("normals      nx, ny, nz ({kind})\n");
+        assert!(said.out.contains(&line), "{}", said.out);
+        let other = bench.points("other.xyz", &bare);
+        let (mesh, json) = (bench.path("mesh.ply"), bench.path("report.json"));
+        let said = util::run([
+            "reconstruct".as_ref(),
+            input.as_os_str(),
+            other.as_os_str(),
+            "-o".as_ref(),
+            mesh.as_os_str(),
+            "--input-normals".as_ref(),
+            "use".as_ref(),
+            "--report".as_ref(),
+            json.as_os_str(),
+        ]);
+        assert_eq!(said.code, Some(0), "{}", said.err);
+        let text = std::fs::read_to_string(json).unwrap();
+        let report: serde_json::Value = serde_json::from_str(&text).unwrap();
+        assert_eq!(report["parameters"]["input_normals"], "use");
+        let normals = &report["normals"];
+        assert_eq!(normals["columns"], serde_json::json!(["nx", "ny", "nz"]));
+        assert_eq!(normals["oriented"], kind == "oriented");
+        assert_eq!(normals["missing"], bare.len());
+        assert_eq!(normals["used"], points.len());
+        assert_eq!(normals["disagreeing"], 0);
+    }
+    let plain = bench.points("plain.xyz", &bare);
+    let said = util::run(["info".as_ref(), plain.as_os_str()]);
+    assert!(
+        said.code == Some(0) && !said.out.contains("normals"),
+        "{}",
+        said.out
+    );
+}
