@@ -250,12 +250,12 @@ fn the_mesh_is_the_same_in_any_order_and_division() {
     assert_eq!(listed.triangles, mesh.triangles);
 }
 
-/// Two sheets that are one spacing apart: their points do not tell the direction at each of them.
+/// Two sheets that are a little less than one spacing apart: their points do not tell the direction at each of them.
 #[test]
 fn a_thin_plate_has_two_sides() {
     let bench = Bench::new();
     let mut random = random(3);
-    let points = faces([0.0; 3], [1.0, 1.0, 0.0125], 80.0, 0..6, 1.0, &mut random);
+    let points = faces([0.0; 3], [1.0, 1.0, 0.009], 100.0, 0..6, 1.0, &mut random);
     let mesh = bench.path("mesh.ply");
     let mut run = |change, input_normals| {
         let input = bench.write("plate.xyz", text(&points, change, &mut random));
