@@ -220,7 +220,8 @@ impl<'a> CellMaker<'a> {
     ) -> std::result::Result<(Normal, f64), Outcome> {
         let estimated = fit.plane.normal;
         let directions = self.directions.as_mut();
-        let normal = directions.map_or(estimated, |directions| directions.choose(id, fit));
+        let near = (&fit.moments, fit.last2);
+        let normal = directions.map_or(estimated, |d| d.choose(id, estimated, near));
         let normal = normal.ok_or(Outcome::NoPlane)?;
         if let Some(density) = self.density
             && density.is_off_surface(id, fit.near2)

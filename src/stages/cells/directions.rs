@@ -1,7 +1,6 @@
 //! The directions of the disks of a tile whose points bring normals.
 
-use super::cell::Fit;
-use crate::geom::plane::Normal;
+use crate::geom::plane::{Moments, Normal};
 use crate::stages::normals::{Given, InputNormals, Normals};
 use crate::workspace::memory::bytes_of;
 use serde::{Deserialize, Serialize};
@@ -65,14 +64,19 @@ impl Directions {
         self.given.bytes() + bytes_of(&self.marks)
     }
 
-    /// The direction of the disk of a point.
-    pub(super) fn choose(&mut self, id: u32, fit: &Fit) -> Option<Normal> {
-        let estimated = fit.plane.normal;
+    /// The direction of the disk of a point, from that estimated of its neighbours. They have these moments, and the
+    /// last of them has this squared distance.
+    pub(super) fn choose(
+        &mut self,
+        id: u32,
+        estimated: Option<Normal>,
+        (moments, last2): (&Moments, u64),
+    ) -> Option<Normal> {
         // Neighbours in one place are no surface.
-        let Some(given) = self.given.of(id).filter(|_| fit.last2 > 0) else {
+        let Some(given) = self.given.of(id).filter(|_| last2 > 0) else {
             return estimated;
         };
-        let suits = |estimated| self.always || fit.moments.suits(estimated, given);
+        let suits = |estimated| self.always || moments.suits(estimated, given);
         let used = estimated.is_none_or(suits);
         let number = (id - self.given.ids().start) as usize;
         if let Some(mark) = self.marks.get_mut(number) {

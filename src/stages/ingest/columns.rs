@@ -1,6 +1,5 @@
 //! Columns of input files: values that points have beside their positions, such as colours.
 
-use super::directions::normal_columns;
 use crate::error::{Error, Result};
 use outcrop_ply::Scalar;
 use serde::{Deserialize, Serialize};
@@ -35,6 +34,16 @@ const ALIASES: [(&str, &str); 12] = [
     ("pointsourceid", "point_source"),
     ("point_source_id", "point_source"),
     ("returnnumber", "return_number"),
+];
+
+/// Names of the columns of a normal, as they are known in all formats: of PLY and CloudCompare, of PCD, of the
+/// extension of E57, and of LAS, the last of three numbers in one.
+const NORMALS: [[&str; 3]; 5] = [
+    ["nx", "ny", "nz"],
+    ["normal_x", "normal_y", "normal_z"],
+    ["nor_normalx", "nor_normaly", "nor_normalz"],
+    ["normalx", "normaly", "normalz"],
+    ["normal0", "normal1", "normal2"],
 ];
 
 /// Most bytes of all columns of a point that are wanted for the mesh.
@@ -215,6 +224,15 @@ impl Wanted {
     }
 }
 
+/// Numbers of the columns of a normal; of several with the same name the first counts.
+pub(super) fn normal_columns(columns: &[Column]) -> Option<[usize; 3]> {
+    let number = |name: &str| columns.iter().position(|c| c.name == name);
+    NORMALS.iter().find_map(|names| {
+        let [x, y, z] = names.map(number);
+        Some([x?, y?, z?])
+    })
+}
+
 /// Bytes of the values of a point.
 pub(super) fn row_bytes(columns: &[Column]) -> usize {
     columns.iter().map(|c| c.scalar.bytes()).sum()
@@ -253,6 +271,28 @@ impl Span {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn normals_have_many_names() {
+        let columns = |names: &[&str]| -> Vec<Column> {
+            let columns = names.iter().map(|name| Column::new(name, Scalar::F32));
+            columns.collect()
+        };
+        for (names, expected) in [
+            (&["red", "NX", "Ny", "nz"][..], Some([1, 2, 3])),
+            (&["normal_z", "normal_x", "normal_y"], Some([1, 2, 0])),
+            (
+                &["nor_normalX", "nor_normalY", "nor_normalZ"],
+                Some([0, 1, 2]),
+            ),
+            (&["NormalX", "NormalY", "NormalZ", "nx"], Some([0, 1, 2])),
+            (&["scalar_Nx", "scalar_Ny", "scalar_Nz"], Some([0, 1, 2])),
+            (&["nx", "ny", "normalz"], None),
+            (&[], None),
+        ] {
+            assert_eq!(normal_columns(&columns(names)), expected, "{names:?}");
+        }
+    }
 
     #[test]
     fn lists_are_parsed() {

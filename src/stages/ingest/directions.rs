@@ -1,20 +1,6 @@
-//! Normals that points have in their files: the columns, and a short form of their values.
+//! The short form of a normal that a point has in its file.
 
-use super::Spool;
-use super::carry::Carried;
-use super::columns::{Column, row_bytes};
-use super::source::Source;
 use outcrop_ply::{Scalar, real};
-
-/// Names of the columns of a normal, as they are known in all formats: of PLY and CloudCompare, of PCD, of the
-/// extension of E57, and of LAS, the last of three numbers in one.
-const NAMES: [[&str; 3]; 5] = [
-    ["nx", "ny", "nz"],
-    ["normal_x", "normal_y", "normal_z"],
-    ["nor_normalx", "nor_normaly", "nor_normalz"],
-    ["normalx", "normaly", "normalz"],
-    ["normal0", "normal1", "normal2"],
-];
 
 /// Length of a normal in its short form.
 const LENGTH: f64 = i16::MAX as f64;
@@ -27,15 +13,6 @@ pub const NORMAL_BYTES: usize = 8;
 
 /// A component of a point without a normal.
 const NONE: u32 = u16::MAX as u32;
-
-/// Numbers of the columns of a normal; of several with the same name the first counts.
-pub(super) fn normal_columns(columns: &[Column]) -> Option<[usize; 3]> {
-    let number = |name: &str| columns.iter().position(|c| c.name == name);
-    NAMES.iter().find_map(|names| {
-        let [x, y, z] = names.map(number);
-        Some([x?, y?, z?])
-    })
-}
 
 /// The short form of a direction, in words that compare like its components; none is larger than all.
 pub(super) fn short(direction: [f64; 3]) -> [u32; 2] {
@@ -70,60 +47,9 @@ pub(super) fn normal_of(parts: Option<&Parts>, values: &[u8]) -> [u32; 2] {
     short(parts.map_or([0.0; 3], |parts| parts.map(value)))
 }
 
-impl Spool {
-    /// The names of the columns of the normals, if they were read and a file has any: those of the first such file.
-    #[must_use]
-    pub fn normal_names(&self) -> Option<[String; 3]> {
-        let kept = self.sources.iter().filter(|s| s.stats.kept > 0);
-        let names = |source: &Source| {
-            let numbers = normal_columns(&source.columns)?;
-            Some(numbers.map(|number| source.columns[number].name.clone()))
-        };
-        let mut all: Vec<_> = kept.filter_map(names).collect();
-        all.sort_unstable();
-        all.into_iter().next()
-    }
-
-    /// The same columns, and the normals of the points if they were read and a file has any.
-    #[must_use]
-    pub fn with_normals(&self, mut carried: Carried) -> Carried {
-        if self.normal_names().is_some() {
-            let parts = |source: &Source| {
-                let numbers = normal_columns(&source.columns)?;
-                let at = |number: usize| row_bytes(&source.columns[..number]);
-                Some(numbers.map(|number| (at(number), source.columns[number].scalar)))
-            };
-            carried.normals = Some(self.sources.iter().map(parts).collect());
-        }
-        carried
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn normals_have_many_names() {
-        let columns = |names: &[&str]| -> Vec<Column> {
-            let columns = names.iter().map(|name| Column::new(name, Scalar::F32));
-            columns.collect()
-        };
-        for (names, expected) in [
-            (&["red", "NX", "Ny", "nz"][..], Some([1, 2, 3])),
-            (&["normal_z", "normal_x", "normal_y"], Some([1, 2, 0])),
-            (
-                &["nor_normalX", "nor_normalY", "nor_normalZ"],
-                Some([0, 1, 2]),
-            ),
-            (&["NormalX", "NormalY", "NormalZ", "nx"], Some([0, 1, 2])),
-            (&["scalar_Nx", "scalar_Ny", "scalar_Nz"], Some([0, 1, 2])),
-            (&["nx", "ny", "normalz"], None),
-            (&[], None),
-        ] {
-            assert_eq!(normal_columns(&columns(names)), expected, "{names:?}");
-        }
-    }
 
     #[test]
     fn short_forms_are_directions_and_compare_like_them() {

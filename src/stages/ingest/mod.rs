@@ -30,6 +30,7 @@ mod lines;
 mod map;
 mod middle;
 mod native;
+mod normals;
 mod number;
 mod pcd;
 mod ply;

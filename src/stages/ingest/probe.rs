@@ -1,8 +1,7 @@
 //! Reads the header of a file only.
 
 use super::Opened;
-use super::columns::{Attributes, Column};
-use super::directions::normal_columns;
+use super::columns::{Attributes, Column, normal_columns};
 use super::format::Format;
 use super::formats::LONG_HEAD;
 use super::input::Input;

@@ -1,8 +1,7 @@
 //! The points of an E57 file: a unit for each scan.
 
-use super::super::columns::{Column, SCANNER, Wanted};
+use super::super::columns::{Column, SCANNER, Wanted, normal_columns};
 use super::super::coordinate::Coordinate;
-use super::super::directions::normal_columns;
 use super::super::input::Input;
 use super::super::spool::{Sink, SourceWriter, sink_bytes};
 use super::packets::{self, BLOCK, Decoded, Records};
