@@ -91,7 +91,7 @@ fn damage_to_any_file_is_found_and_mended() {
         "journal",
         "ingest-0.spool",
         "points",
-        "relaxed3",
+        "relaxed2",
     ] {
         assert!(named.contains(file), "{file}");
     }
