@@ -92,7 +92,9 @@ pub mod workspace;
 #[doc(inline)]
 pub use cli::call;
 pub use error::{Error, Result};
-pub use params::{Division, MaxWidth, Method, Origin, Params, Radius, Region, Smooth, Smoothing};
+pub use params::{
+    Division, Facing, MaxWidth, Method, Origin, Params, Radius, Region, Smooth, Smoothing,
+};
 pub use pipeline::{Builder, Reconstruction, Start, Tiles, default_memory, default_threads};
 pub use report::{DiskEstimate, Report};
 pub use stages::ingest::Classes;

@@ -126,17 +126,47 @@ impl std::str::FromStr for Origin {
         match text.trim() {
             "auto" => Ok(Self::Auto),
             "none" => Ok(Self::None),
-            numbers => {
-                let parsed = numbers
-                    .split(',')
-                    .map(|number| number.trim().parse::<f64>());
-                let parsed: Vec<f64> = parsed.collect::<Result<_, _>>().map_err(|_| wrong())?;
-                let at: [f64; 3] = parsed.try_into().map_err(|_| wrong())?;
-                match at.iter().all(|c| c.is_finite()) {
-                    true => Ok(Self::At(at)),
-                    false => Err(wrong()),
-                }
-            }
+            numbers => position(numbers).map(Self::At).ok_or_else(wrong),
+        }
+    }
+}
+
+/// Three finite numbers with commas between.
+fn position(text: &str) -> Option<[f64; 3]> {
+    let parsed = text.split(',').map(|number| number.trim().parse::<f64>());
+    let parsed: Vec<f64> = parsed.collect::<Result<_, _>>().ok()?;
+    let at: [f64; 3] = parsed.try_into().ok()?;
+    at.iter().all(|c| c.is_finite()).then_some(at)
+}
+
+/// Which side of the surface is out.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Facing {
+    /// The side that the scanners saw, where files give their positions; else as for [`Facing::Up`].
+    Auto,
+    /// The topmost surface faces up.
+    Up,
+    /// The outermost surface faces outwards: a body.
+    Out,
+    /// The outermost surface faces inwards: a room, a tunnel.
+    In,
+    /// The whole surface faces this position, in the input's coordinates.
+    At([f64; 3]),
+}
+
+impl std::str::FromStr for Facing {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong =
+            || format!("{text:?} is not auto, up, out, in, or three numbers like 12.5,3,1.6");
+        match text.trim() {
+            "auto" => Ok(Self::Auto),
+            "up" => Ok(Self::Up),
+            "out" => Ok(Self::Out),
+            "in" => Ok(Self::In),
+            numbers => position(numbers).map(Self::At).ok_or_else(wrong),
         }
     }
 }
@@ -197,6 +227,8 @@ pub struct Params {
     pub normals: bool,
     /// GLB with meshopt compression.
     pub compress_glb: bool,
+    /// Which side of the surface is out.
+    pub facing: Facing,
     /// Do not use the positions of scanners that files give: what a scanner saw is out otherwise (robust).
     pub ignore_scanners: bool,
     /// Take coordinates as they are if files give different reference systems, which is an error otherwise.
@@ -251,6 +283,7 @@ impl Default for Params {
             keep_far: false,
             normals: false,
             compress_glb: false,
+            facing: Facing::Auto,
             ignore_scanners: false,
             ignore_crs: false,
             origin: Origin::None,
@@ -333,7 +366,8 @@ impl Params {
     /// True if the positions of scanners decide which side is out.
     #[must_use]
     pub fn scanners(&self) -> bool {
-        self.method == Method::Robust && !self.ignore_scanners
+        let auto = self.facing == Facing::Auto && !self.ignore_scanners;
+        auto && self.method == Method::Robust
     }
 
     /// The limits of length on a lattice with this step.
@@ -425,6 +459,11 @@ impl Params {
             && !at.iter().all(|c| c.is_finite())
         {
             return error("--origin", format!("{at:?}"), "finite coordinates");
+        }
+        if let Facing::At(at) = self.facing
+            && !at.iter().all(|c| c.is_finite())
+        {
+            return error("--facing", format!("{at:?}"), "finite coordinates");
         }
         if self.smooth.rounds() > 100 {
             return error("--smooth", self.smooth.to_string(), "auto, or 0 to 100");

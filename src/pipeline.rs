@@ -132,13 +132,15 @@ impl Reconstruction {
         let (points, relaxed) = stages.relax(points)?;
         let store = points.open(workspace)?;
         let shape = stages.open_shape(relaxed)?;
-        let places = stages.places(&store, &shape, &values, &lattice);
+        let side = stages.side(shape.or(&store), &lattice)?;
+        let places = stages.places(&store, &shape, side.outside(&values), &lattice);
         let (seen, coarse) = stages.cells(places, radius)?;
         let places = places.with_coarse(coarse.as_ref());
         let triples = stages.triples(&seen)?;
         let stitched = stages.stitch(places, &triples)?;
         let repaired = stages.repair(places, &stitched)?;
         values.release_scanners(workspace)?;
+        side.release(workspace)?;
         let pieces = stages.cut(&store, &repaired, &lattice)?;
         stages.export(
             &store,

@@ -50,6 +50,7 @@ const MAY_USE: &[(&str, &str)] = &[
         "stages/blocks stages/ingest stages/order",
     ),
     ("stages/blocks", ""),
+    ("stages/columns", "stages/blocks stages/order"),
     (
         "stages/cells",
         "kernels stages/blocks stages/levels stages/order stages/spacing stages/tiles",
@@ -70,7 +71,7 @@ const MAY_USE: &[(&str, &str)] = &[
     ("stages/levels", ""),
     (
         "stages/located",
-        "stages/blocks stages/cells stages/order stages/scanners stages/spacing",
+        "stages/blocks stages/cells stages/order stages/outside stages/spacing",
     ),
     ("stages/order", "stages/ingest"),
     (
@@ -78,8 +79,12 @@ const MAY_USE: &[(&str, &str)] = &[
         "stages/blocks stages/cells stages/order stages/tiles",
     ),
     (
+        "stages/outside",
+        "stages/blocks stages/columns stages/order stages/scanners",
+    ),
+    (
         "stages/repair",
-        "stages/blocks stages/located stages/order stages/scanners stages/spacing stages/stitch stages/surface",
+        "stages/blocks stages/located stages/order stages/outside stages/spacing stages/stitch stages/surface",
     ),
     (
         "stages/smooth",
@@ -89,12 +94,9 @@ const MAY_USE: &[(&str, &str)] = &[
     ("stages/spacing", "stages/levels"),
     (
         "stages/stitch",
-        "kernels stages/blocks stages/cells stages/located stages/surface stages/triples",
+        "kernels stages/blocks stages/cells stages/columns stages/located stages/surface stages/triples",
     ),
-    (
-        "stages/surface",
-        "stages/blocks stages/located stages/order",
-    ),
+    ("stages/surface", "stages/blocks stages/located"),
     ("stages/thin", "stages/ingest"),
     ("stages/tiles", "kernels stages/order"),
     ("stages/triples", "stages/blocks stages/cells"),

@@ -5,7 +5,8 @@ mod reference;
 
 use outcrop::inspect::ply_mesh::{PlyMesh, Sink};
 use outcrop::{
-    Division, Error, MaxWidth, Method, Params, Radius, Reconstruction, Report, Smooth, Smoothing,
+    Division, Error, Facing, MaxWidth, Method, Params, Radius, Reconstruction, Report, Smooth,
+    Smoothing,
 };
 use reference::weighing::Weighing;
 use reference::{Counts, Mesh, Settings, clouds};
@@ -175,6 +176,12 @@ fn pipeline(
         },
         max_hole_edges: settings.max_hole_edges,
         min_component: Some(settings.min_component as u64),
+        facing: match settings.facing {
+            reference::outside::Facing::Auto => Facing::Auto,
+            reference::outside::Facing::In => Facing::In,
+            reference::outside::Facing::Out => Facing::Out,
+            reference::outside::Facing::At(place) => Facing::At(place.map(|x| x as f64)),
+        },
         keep_all: settings.keep_all,
         max_edge: width(settings.max_edge),
         max_fill: width(settings.max_fill),
@@ -238,6 +245,12 @@ fn compare_seen(
     let fine_settings = Settings {
         radius: match settings.radius {
             reference::Radius::Length(x) => reference::Radius::Length(x * f64::from(scale)),
+            other => other,
+        },
+        facing: match settings.facing {
+            reference::outside::Facing::At(place) => {
+                reference::outside::Facing::At(place.map(|x| x * i64::from(scale)))
+            }
             other => other,
         },
         ..*settings
@@ -545,6 +558,34 @@ fn robust_and_seen_by_scanners() {
             let name = format!("{name}, seed {seed}");
             let counts = compare_seen(&name, &points, Some(seed), &settings, &CUTS);
             faced += counts.met.faced;
+        }
+    }
+    assert!(faced > 300, "{faced}");
+}
+
+#[test]
+fn facing_a_side() {
+    let mut faced = 0;
+    for seed in 130..133 {
+        for (name, points) in clouds::one_of_each(seed) {
+            if points.iter().flatten().any(|x| *x >= 1 << 19) {
+                continue;
+            }
+            let settings = Settings {
+                relax: seed as u32 % 4,
+                neighbors: [30, 12][seed as usize % 2],
+                block: [65_536, 100, 40][seed as usize % 3],
+                patch: [256, 16][seed as usize % 2],
+                min_component: 3,
+                facing: [
+                    reference::outside::Facing::In,
+                    reference::outside::Facing::Out,
+                    reference::outside::Facing::At([-20, 50, 300]),
+                ][seed as usize % 3],
+                ..Settings::robust()
+            };
+            let name = format!("{name}, seed {seed}");
+            faced += compare(&name, &points, &settings, &CUTS).met.faced;
         }
     }
     assert!(faced > 300, "{faced}");

@@ -10,6 +10,7 @@ use outcrop::stages::cells::{CountedTriple, SentTriple};
 use outcrop::stages::export::{CoordinateType, ExportOptions, export};
 use outcrop::stages::located::Places;
 use outcrop::stages::order::{Orderer, PointStore, StoreWriter};
+use outcrop::stages::outside::{Outside, StoredExtremes};
 use outcrop::stages::repair::{RepairOptions, repair};
 use outcrop::stages::scanners::Scanners;
 use outcrop::stages::stitch::{StitchOptions, stitch};
@@ -19,6 +20,7 @@ use outcrop::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
 use outcrop::workspace::progress::{Cancel, Silent};
 use outcrop::{Division, Error, spill};
 use reference::clouds::Random;
+use reference::outside::Facing;
 use reference::{Counts, Settings, cells, connect};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -117,13 +119,25 @@ fn pipeline(
         (stored, places)
     };
     let stored = scanners.map(store_scanners);
+    let lie = moved.as_ref().unwrap_or(&store);
+    let extremes = |inward| StoredExtremes::of(lie, inward, blocks, workspace).unwrap();
+    let extremes = match settings.facing {
+        Facing::In => Some(extremes(true)),
+        Facing::Out => Some(extremes(false)),
+        _ => None,
+    };
+    let seen = |(stored, places)| Outside::Scanners(Scanners::new(stored, places));
     let places = Places {
-        shape: moved.as_ref().unwrap_or(&store),
+        shape: lie,
         file: &store,
         density: None,
-        scanners: stored
-            .as_ref()
-            .map(|(stored, places)| Scanners::new(stored, places)),
+        outside: match (settings.facing, &extremes) {
+            (_, Some(extremes)) => Some(Outside::Extremes(extremes)),
+            (Facing::At(place), _) => Some(Outside::Position(place)),
+            _ => stored
+                .as_ref()
+                .map(|(stored, places)| seen((stored, *places))),
+        },
     };
     let division = Division {
         patch: settings.patch,
@@ -404,7 +418,8 @@ fn compare(
         let settings = settings(seed);
         // Of every other cloud some or all points were seen by scanners.
         let (numbers, places) = some_scanners(&mut random, points.len());
-        let seen = settings.robust && seed % 2 == 0;
+        let auto = settings.facing == Facing::Auto;
+        let seen = auto && settings.robust && seed % 2 == 0;
         let of = |number: &u32| places.get(number.checked_sub(1)? as usize).copied()?;
         let scanners: Vec<_> = numbers.iter().map(of).collect();
         let scanners = if seen { &scanners[..] } else { &[] };
@@ -449,6 +464,27 @@ fn arbitrary_triples() {
     let reached = compare(0..400, false, varied, |_| 200, |p, _| p);
     let parts = [reached.flagged, reached.one_sided, reached.merges_reverted];
     assert!(parts.iter().all(|n| *n > 0), "parts not reached: {parts:?}");
+}
+
+/// As in the two tests around this one, with a side that is out.
+#[test]
+fn arbitrary_triples_that_face_a_side() {
+    let settings = |seed: u64| Settings {
+        block: [4, 9, 25, 1000, 60][seed as usize / 4 % 5],
+        patch: [4, 9, 16, 256][seed as usize / 8 % 4],
+        cluster: [2, 7, 40, 1024, 15][seed as usize / 3 % 5],
+        robust: !seed.is_multiple_of(9),
+        facing: [
+            Facing::In,
+            Facing::Out,
+            Facing::At([0, 1000, 300]),
+            Facing::At([-1, 1 << 40, -90_000]),
+        ][seed as usize / 2 % 4],
+        ..varied(seed)
+    };
+    let side = |seed: u64| [200, 40][seed as usize % 2];
+    let reached = compare(1000..1300, true, settings, side, |p, _| p);
+    assert!(reached.met.faced > 500, "{reached:?}");
 }
 
 #[test]

@@ -90,6 +90,7 @@ def reconstruct(
     max_angle: Optional[float] = None,
     keep_all: bool = False,
     max_edge: Optional[Width] = None,
+    facing: Union[str, Sequence[float]] = "auto",
     ignore_scanners: bool = False,
     max_hole_edges: Optional[int] = None,
     max_fill: Optional[Width] = None,

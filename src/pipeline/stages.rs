@@ -5,6 +5,8 @@ mod draw;
 mod export;
 mod moved;
 mod plan;
+mod shape;
+mod side;
 mod values;
 
 use super::checks::{all_are_kept, disk_radius, enough, not_a_line, room};
@@ -24,8 +26,7 @@ use crate::stages::located::Places;
 use crate::stages::order::{Orderer, PointStore, StoredPoints, order, sample_sort};
 use crate::stages::outliers::{OutlierOptions, drop_outliers};
 use crate::stages::repair::{RepairOptions, Repaired, repair};
-use crate::stages::smooth::Relaxed;
-use crate::stages::spacing::{Coarse, Density, Spacings};
+use crate::stages::spacing::Coarse;
 use crate::stages::stitch::{StitchOptions, Stitched, stitch};
 use crate::stages::thin::{Grid, LeftOut, thin};
 use crate::stages::triples::{Triples, triples};
@@ -33,15 +34,6 @@ use crate::workspace::Workspace;
 use crate::workspace::course::Course;
 use export::written;
 use std::time::Instant;
-use values::Values;
-
-/// The positions that decide which points are connected, if they are not those of the mesh, and the local
-/// spacings.
-#[derive(Debug, Default)]
-pub(super) struct Shape {
-    store: Option<PointStore>,
-    spacings: Option<Spacings>,
-}
 
 /// The stages of one run.
 pub(super) struct Stages<'a> {
@@ -185,6 +177,7 @@ impl<'a> Stages<'a> {
         let lattice = spool.choose_lattice(if moves { METHOD.smoothing.halvings } else { 0 })?;
         self.coarse = spool.choose_lattice(0)?.step;
         self.check_origin(&lattice)?;
+        self.check_facing(&lattice)?;
         self.report.lattice = LatticeReport {
             step: lattice.step,
             exact: lattice.exact,
@@ -316,43 +309,6 @@ impl<'a> Stages<'a> {
 
     fn tiles(&self) -> TileRanges {
         TileRanges::new(self.blocks(), self.job.tile_points)
-    }
-
-    /// Opens the shape.
-    pub fn open_shape(&self, relaxed: Option<Relaxed>) -> Result<Shape> {
-        let workspace = self.workspace;
-        let Some(relaxed) = relaxed else {
-            return Ok(Shape::default());
-        };
-        let store = relaxed.store.as_ref();
-        Ok(Shape {
-            store: store.map(|store| store.open(workspace)).transpose()?,
-            spacings: Some(relaxed.spacings.open(workspace)?),
-        })
-    }
-
-    /// The positions from which the surface is made.
-    pub fn places<'p>(
-        &self,
-        store: &'p PointStore,
-        shape: &'p Shape,
-        values: &'p Values,
-        lattice: &Lattice,
-    ) -> Places<'p> {
-        let params = &self.job.params;
-        let spacings = shape.spacings.as_ref();
-        let robust = spacings.filter(|_| params.method == Method::Robust);
-        Places {
-            shape: shape.store.as_ref().unwrap_or(store),
-            file: store,
-            scanners: values.scanners(),
-            density: robust.map(|spacings| Density {
-                spacings,
-                coarse: None,
-                neighbors: params.neighbors,
-                limits: params.limits(lattice.step),
-            }),
-        }
     }
 
     /// Computes the restricted Voronoi cells.

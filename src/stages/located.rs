@@ -3,7 +3,7 @@
 use super::blocks::Blocks;
 use super::cells::CountedTriple;
 use super::order::PointStore;
-use super::scanners::Scanners;
+use super::outside::Outside;
 use super::spacing::{Coarse, Density};
 use crate::error::Result;
 use crate::geom::Point;
@@ -22,8 +22,8 @@ pub struct Places<'a> {
     pub file: &'a PointStore,
     /// The density of the surface, if triangles too long for it are left out.
     pub density: Option<Density<'a>>,
-    /// The scanners that saw the points, if they decide which side is out.
-    pub scanners: Option<Scanners<'a>>,
+    /// What tells which side is out; nothing if the highest points, which face up, are all there is.
+    pub outside: Option<Outside<'a>>,
 }
 
 impl<'a> Places<'a> {

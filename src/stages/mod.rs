@@ -41,7 +41,9 @@ pub mod export;
 pub mod draw;
 
 pub mod blocks;
+pub mod columns;
 pub mod levels;
 pub mod located;
+pub mod outside;
 pub mod scanners;
 pub mod surface;

@@ -13,19 +13,24 @@ use std::ops::Range;
 /// A position farther from the box around all points than this number of its diagonals is no scanner's.
 const MOST_DIAGONALS: i128 = 100;
 
-/// Largest absolute coordinate of a scanner, in steps: farther than any that counts.
-const FARTHEST: f64 = (1u64 << 40) as f64;
+/// A position that a surface faces has coordinates less than this from the offset, in steps.
+pub const FARTHEST: f64 = (1u64 << 40) as f64;
+
+/// A position in lattice steps, rounded; none if it is too far for that.
+#[must_use]
+pub fn on_lattice(position: [f64; 3], lattice: &Lattice) -> Option<[i64; 3]> {
+    let steps: [f64; 3] =
+        std::array::from_fn(|axis| (position[axis] - lattice.offset[axis]) / lattice.step);
+    let near = steps.iter().all(|x| x.abs() < FARTHEST);
+    // The base is less than 2^53.
+    near.then(|| std::array::from_fn(|axis| steps[axis].round() as i64 - lattice.base[axis]))
+}
 
 /// The position of a scanner in lattice steps, rounded; none if it is too far from all points, in `bounds`, to be
 /// one. Such a position is rather the origin of coordinates.
 #[must_use]
 pub fn place(position: [f64; 3], lattice: &Lattice, bounds: Aabb) -> Option<[i64; 3]> {
-    let steps: [f64; 3] =
-        std::array::from_fn(|axis| (position[axis] - lattice.offset[axis]) / lattice.step);
-    let near = steps.iter().all(|x| x.abs() < FARTHEST);
-    // The base is less than 2^53.
-    let place: [i64; 3] =
-        std::array::from_fn(|axis| steps[axis].round() as i64 - lattice.base[axis]);
+    let place = on_lattice(position, lattice)?;
     let (mut gap2, mut diagonal2) = (0, 0);
     for (axis, x) in place.into_iter().enumerate() {
         let ends = [bounds.min[axis], bounds.max[axis]].map(i64::from);
@@ -34,8 +39,16 @@ pub fn place(position: [f64; 3], lattice: &Lattice, bounds: Aabb) -> Option<[i64
         gap2 += gap * gap;
         diagonal2 += side * side;
     }
-    let near = near && gap2 <= MOST_DIAGONALS * MOST_DIAGONALS * diagonal2;
+    let near = gap2 <= MOST_DIAGONALS * MOST_DIAGONALS * diagonal2;
     near.then_some(place)
+}
+
+/// The unit vector from a point to a place; none if they are equal.
+#[must_use]
+pub fn toward(place: [i64; 3], from: Point) -> Option<[f64; 3]> {
+    let v: [f64; 3] = std::array::from_fn(|axis| (place[axis] - i64::from(from[axis])) as f64);
+    let length = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
+    (length > 0.0).then(|| v.map(|x| x / length))
 }
 
 /// The scanners of a cloud.
@@ -102,10 +115,7 @@ impl Seen<'_> {
     /// The unit vector from a point of the block, at `from`, to the scanner that saw it.
     #[must_use]
     pub fn toward(&self, id: u32, from: Point) -> Option<[f64; 3]> {
-        let to = self.of(id)?;
-        let v: [f64; 3] = std::array::from_fn(|axis| (to[axis] - i64::from(from[axis])) as f64);
-        let length = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
-        (length > 0.0).then(|| v.map(|x| x / length))
+        toward(self.of(id)?, from)
     }
 }
 

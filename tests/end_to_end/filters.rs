@@ -175,6 +175,9 @@ fn bad_values_are_refused_in_one_line() {
         &["--drop-classes", "256"],
         &["--keep-classes", "2,x"],
         &["--keep-classes", "2", "--drop-classes", "7"],
+        &["--facing", "sideways"],
+        &["--facing=1,2"],
+        &["--facing=1,2,inf"],
     ] {
         let said = util::run(["reconstruct", input, "-o", &mesh].iter().chain(bad));
         assert_eq!(said.code, Some(2), "{bad:?}: {said:?}");

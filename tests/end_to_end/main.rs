@@ -6,6 +6,7 @@ mod cli;
 mod compressed;
 mod coordinates;
 mod determinism;
+mod facing;
 mod filters;
 mod installed;
 mod library;

@@ -25,6 +25,7 @@ const KEYS: &[&str] = &[
     "/parameters/repair",
     "/parameters/origin",
     "/parameters/keep_far",
+    "/parameters/facing",
     "/parameters/ignore_scanners",
     "/parameters/ignore_crs",
     "/parameters/normals",

@@ -9,9 +9,9 @@ use std::path::{Path, PathBuf};
 
 /// A mesh in memory.
 #[derive(Default)]
-struct Mesh {
-    vertices: Vec<[f64; 3]>,
-    triangles: Vec<[u32; 3]>,
+pub struct Mesh {
+    pub vertices: Vec<[f64; 3]>,
+    pub triangles: Vec<[u32; 3]>,
 }
 
 impl Sink for Mesh {
@@ -30,32 +30,42 @@ impl Sink for Mesh {
     }
 }
 
-/// The share of triangles near `center`, up to `reach` along each axis, that face it.
-fn facing(mesh: &Path, center: [f64; 3], reach: f64) -> f64 {
+/// Reads a mesh.
+pub fn read(mesh: &Path) -> Mesh {
     let mut all = Mesh::default();
     PlyMesh::open(mesh).unwrap().read(&mut all).unwrap();
+    all
+}
+
+/// True if a triangle faces a place.
+pub fn faces([a, b, c]: [[f64; 3]; 3], place: [f64; 3]) -> bool {
+    let side = |p: [f64; 3]| -> [f64; 3] { std::array::from_fn(|k| p[k] - a[k]) };
+    let (p, q, d) = (side(b), side(c), side(place));
+    let n = [
+        p[1] * q[2] - p[2] * q[1],
+        p[2] * q[0] - p[0] * q[2],
+        p[0] * q[1] - p[1] * q[0],
+    ];
+    n[0] * d[0] + n[1] * d[1] + n[2] * d[2] > 0.0
+}
+
+/// The share of triangles near `center`, up to `reach` along each axis, that face it.
+pub fn facing(mesh: &Path, center: [f64; 3], reach: f64) -> f64 {
+    let all = read(mesh);
     let (mut near, mut facing) = (0, 0);
     for t in &all.triangles {
-        let [a, b, c] = t.map(|v| all.vertices[v as usize]);
-        let side = |p: [f64; 3]| -> [f64; 3] { std::array::from_fn(|k| p[k] - a[k]) };
-        let (p, q, d) = (side(b), side(c), side(center));
-        if d.iter().any(|x| x.abs() > reach) {
-            continue;
+        let corners = t.map(|v| all.vertices[v as usize]);
+        if (0..3).all(|k| (center[k] - corners[0][k]).abs() <= reach) {
+            near += 1;
+            facing += usize::from(faces(corners, center));
         }
-        let n = [
-            p[1] * q[2] - p[2] * q[1],
-            p[2] * q[0] - p[0] * q[2],
-            p[0] * q[1] - p[1] * q[0],
-        ];
-        near += 1;
-        facing += usize::from(n[0] * d[0] + n[1] * d[1] + n[2] * d[2] > 0.0);
     }
     assert!(near > 1000, "{near} triangles near {center:?}");
     f64::from(facing as u32) / f64::from(near)
 }
 
 /// A number from 0 to 1 that depends on the seeds.
-fn noise(seeds: [u64; 3]) -> f64 {
+pub fn noise(seeds: [u64; 3]) -> f64 {
     let [a, b, c] = seeds;
     let mut x = a.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ b.wrapping_mul(0xc2b2_ae3d_27d4_eb4f) ^ c;
     for _ in 0..3 {
@@ -66,7 +76,7 @@ fn noise(seeds: [u64; 3]) -> f64 {
 }
 
 /// Points on the faces of a box around `center`, 4 by 4 by 3 wide, without those of `left_out` faces.
-fn room(center: [f64; 3], left_out: &[usize], seed: u64) -> Vec<[f64; 3]> {
+pub fn room(center: [f64; 3], left_out: &[usize], seed: u64) -> Vec<[f64; 3]> {
     let mut points = Vec::new();
     for face in (0..6).filter(|face| !left_out.contains(face)) {
         let axis = face / 2;
@@ -99,7 +109,7 @@ fn scan(scanner: [f64; 3], points: &[[f64; 3]]) -> String {
     text
 }
 
-fn run(inputs: &[PathBuf], mesh: &Path, params: &Params) -> Report {
+pub fn run(inputs: &[PathBuf], mesh: &Path, params: &Params) -> Report {
     util::builder(inputs, mesh, params)
         .build()
         .unwrap()
@@ -206,8 +216,7 @@ fn the_mesh_is_the_same_in_any_order_and_division() {
     let report = run(&inputs, &listed, &attributes);
     assert_eq!(report.attributes[1].range, [0.0, 2.0]);
     let triangles = |mesh: &Path| {
-        let mut all = Mesh::default();
-        PlyMesh::open(mesh).unwrap().read(&mut all).unwrap();
+        let all = read(mesh);
         (all.vertices, all.triangles)
     };
     assert_eq!(triangles(&listed), triangles(&mesh));

@@ -2,7 +2,7 @@
 
 use super::evidence::{self, Known};
 use super::homes::Side;
-use super::patches::Scanner;
+use super::outside::Known as Out;
 use super::surface::{Surface, Triangle, fans};
 use super::{Settings, Weighing};
 use outcrop::geom::Point;
@@ -87,7 +87,7 @@ pub fn weighed(
     points: &[Point],
     t3: &BTreeSet<Triangle>,
     open: &BTreeSet<Triangle>,
-    scanners: &[Option<Scanner>],
+    out: &[Option<Out>],
     settings: &Settings,
 ) -> Base {
     let block = settings.block;
@@ -108,7 +108,7 @@ pub fn weighed(
     let weighed = evidence::orient(Known {
         points,
         settings,
-        scanners,
+        out,
         kept: &kept,
         seen: by.iter().map(seen).collect(),
         candidates: candidates.filter(|&t| is_interior(t, block)).collect(),

@@ -3,7 +3,8 @@
 use super::base::is_interior;
 use super::contract::Graph;
 use super::homes::{Homes, Side};
-use super::patches::{Block, Scanner, cosine, highest, unit_normal, weight};
+use super::outside::{Known as Out, extreme};
+use super::patches::{Block, cosine, unit_normal, weight};
 use super::surface::{Edge, Surface, Triangle, alike, edges};
 use super::{Settings, Weighing};
 use outcrop::geom::Point;
@@ -14,8 +15,8 @@ pub struct Known<'a> {
     /// The shape.
     pub points: &'a [Point],
     pub settings: &'a Settings,
-    /// The scanner of each point.
-    pub scanners: &'a [Option<Scanner>],
+    /// What is known of each point.
+    pub out: &'a [Option<Out>],
     /// The T3 that no vertex flags.
     pub kept: &'a BTreeSet<Triangle>,
     /// By block, the crossing T3 that touch it and are not flagged by its own vertices.
@@ -70,7 +71,7 @@ pub fn orient(known: Known<'_>) -> Weighed {
         met: Weighing::default(),
         known,
     };
-    let highest = highest(weigher.known.points);
+    let highest = extreme(weigher.known.points, 2, 1);
     for g in blocks {
         weigher.orient_block(g, &highest);
     }
@@ -122,7 +123,7 @@ impl Weigher<'_> {
             crossing: self.known.seen[&g].clone(),
             candidates: self.known.candidates.iter().filter(here).copied().collect(),
             highest,
-            scanners: self.known.scanners,
+            known: self.known.out,
             run: settings.patch,
         };
         for t in block.crossing.difference(self.known.kept) {

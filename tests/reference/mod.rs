@@ -23,6 +23,7 @@ pub mod insert;
 pub mod mend;
 pub mod narrow;
 pub mod output;
+pub mod outside;
 pub mod patches;
 pub mod relax;
 pub mod repair;
@@ -32,7 +33,7 @@ pub mod weighing;
 
 use holes::Filling;
 use outcrop::geom::Point;
-use patches::Scanner;
+use outside::{Facing, Known, Scanner};
 use spacing::Density;
 use std::collections::{BTreeMap, BTreeSet};
 use surface::{Component, Surface, Triangle};
@@ -79,6 +80,7 @@ pub struct Settings {
     pub auto: bool,
     /// Orientation by evidence, and ear clipping.
     pub robust: bool,
+    pub facing: Facing,
     /// Points off the surface are kept.
     pub keep_all: bool,
     /// Longest side of a triangle, and largest triangle of a filling, in local spacings.
@@ -103,6 +105,7 @@ impl Default for Settings {
             relax: 0,
             auto: false,
             robust: false,
+            facing: Facing::Auto,
             keep_all: true,
             max_edge: f64::INFINITY,
             max_fill: f64::INFINITY,
@@ -262,6 +265,7 @@ pub fn connect(
     scanners: &[Option<Scanner>],
     settings: &Settings,
 ) -> Mesh {
+    let known = outside::known(shape, scanners, settings.facing);
     let mut counts = Counts {
         points: file.len(),
         ..Counts::default()
@@ -283,7 +287,7 @@ pub fn connect(
     counts.flat_candidates = on_a_line.len() - counts.flat;
     let base = if settings.robust {
         let open = open.into_keys().copied().collect();
-        base::weighed(shape, &t3, &open, scanners, settings)
+        base::weighed(shape, &t3, &open, &known, settings)
     } else {
         base::base(&t3, settings.block)
     };
@@ -304,7 +308,7 @@ pub fn connect(
         shape,
         &file,
         density,
-        scanners,
+        &known,
         &mut surface,
         settings,
         &mut counts,
@@ -325,7 +329,7 @@ fn repair_and_orient(
     shape: &[Point],
     file: &[Point],
     density: Option<&Density>,
-    scanners: &[Option<Scanner>],
+    known: &[Option<Known>],
     surface: &mut Surface,
     settings: &Settings,
     counts: &mut Counts,
@@ -338,7 +342,7 @@ fn repair_and_orient(
         (counts.small_components, counts.small_triangles) =
             repair::remove_small_components(surface, settings.min_component);
     }
-    let components = repair::oriented(shape, scanners, surface);
+    let components = repair::oriented(shape, known, surface);
     let mut turned: Component = components
         .iter()
         .flatten()

@@ -4,6 +4,7 @@ use super::Weighing;
 use super::contract::Graph;
 use super::homes::{Homes, Side};
 use super::insert::normal;
+use super::outside::{Known, facing};
 use super::surface::{Edge, Surface, Triangle, alike, edges};
 use outcrop::geom::Point;
 use std::collections::{BTreeMap, BTreeSet};
@@ -27,49 +28,6 @@ pub fn weight(cosine: f64) -> i64 {
     1 + (15.0 * cosine.max(0.0)).floor() as i64
 }
 
-/// The place of a scanner on the lattice.
-pub type Scanner = [i64; 3];
-
-/// The evidence that the run i → j → k of a triangle faces the scanner that saw its vertex `v`.
-pub fn facing(points: &[Point], scanners: &[Option<Scanner>], t: Triangle, v: u32) -> i64 {
-    let Some(Some(scanner)) = scanners.get(v as usize) else {
-        return 0;
-    };
-    let at = points[v as usize];
-    let way: [f64; 3] = std::array::from_fn(|axis| (scanner[axis] - i64::from(at[axis])) as f64);
-    let length = (way[0] * way[0] + way[1] * way[1] + way[2] * way[2]).sqrt();
-    if length == 0.0 {
-        return 0;
-    }
-    let (n, d) = (unit_normal(points, t), way.map(|x| x / length));
-    (16.0 * (n[0] * d[0] + n[1] * d[1] + n[2] * d[2])).trunc() as i64
-}
-
-/// Step 2: the points that are the highest of their columns.
-pub fn highest(points: &[Point]) -> BTreeSet<u32> {
-    let least = |axis: usize| points.iter().map(|p| i64::from(p[axis])).min();
-    let most = |axis: usize| points.iter().map(|p| i64::from(p[axis])).max();
-    let (Some(x), Some(y)) = (least(0), least(1)) else {
-        return BTreeSet::new();
-    };
-    let (wide, deep) = (most(0).expect("points") - x, most(1).expect("points") - y);
-    let allowed = (points.len() as i64 / 64).max(1);
-    let mut side = 1;
-    while (wide / side + 1) * (deep / side + 1) > allowed {
-        side *= 2;
-    }
-    let mut highest: BTreeMap<[i64; 2], u32> = BTreeMap::new();
-    for (id, p) in (0..).zip(points) {
-        let column = [(i64::from(p[0]) - x) / side, (i64::from(p[1]) - y) / side];
-        let best = highest.entry(column).or_insert(id);
-        // Among equally high points the smallest id came first.
-        if p[2] > points[*best as usize][2] {
-            *best = id;
-        }
-    }
-    highest.into_values().collect()
-}
-
 /// Input: a block.
 pub struct Block<'a> {
     /// The shape.
@@ -82,8 +40,8 @@ pub struct Block<'a> {
     pub candidates: BTreeSet<Triangle>,
     /// The highest points of columns.
     pub highest: &'a BTreeSet<u32>,
-    /// The scanner of each point.
-    pub scanners: &'a [Option<Scanner>],
+    /// What is known of each point.
+    pub known: &'a [Option<Known>],
     /// `P`.
     pub run: u32,
 }
@@ -178,15 +136,16 @@ impl Block<'_> {
             let node = &mut patches.graph.nodes[side.home];
             node.triangles += 1;
             for v in t {
-                let known = self.scanners.get(v as usize).is_some_and(Option::is_some);
+                let known = self.known[v as usize];
                 let up = match known {
-                    true if v % 64 == 0 => facing(self.points, self.scanners, t, v),
-                    false if self.highest.contains(&v) => {
+                    Some(Known::Place(_)) if v % 64 != 0 => 0,
+                    Some(_) => facing(self.points, self.known, t, v),
+                    None if self.highest.contains(&v) => {
                         (16.0 * unit_normal(self.points, t)[2]).trunc() as i64
                     }
-                    _ => 0,
+                    None => 0,
                 };
-                met.faced += usize::from(known && up != 0);
+                met.faced += usize::from(known.is_some() && up != 0);
                 node.up += if side.turned { -up } else { up };
             }
         }

@@ -2,7 +2,7 @@
 
 use super::big::{Big, Big3, cross, determinant, dot, plus, vector};
 use super::insert::normal;
-use super::patches::{Scanner, facing};
+use super::outside::{Known, facing};
 use super::surface::{Component, Edge, Surface, Triangle, edges};
 use outcrop::geom::Point;
 use std::collections::BTreeSet;
@@ -53,13 +53,9 @@ pub fn run([i, j, k]: Triangle, turned: bool) -> [u32; 3] {
     if turned { [i, k, j] } else { [i, j, k] }
 }
 
-/// All triangles as they run after every component is oriented: to the scanners that saw it, else by its volume or
-/// area.
-pub fn oriented(
-    points: &[Point],
-    scanners: &[Option<Scanner>],
-    surface: &Surface,
-) -> Vec<Component> {
+/// All triangles as they run after every component is oriented: by what is known of its points, else by its volume
+/// or area.
+pub fn oriented(points: &[Point], known: &[Option<Known>], surface: &Surface) -> Vec<Component> {
     let mut components = surface.components().expect("the mesh is orientable");
     for component in &mut components {
         let open = component
@@ -68,7 +64,7 @@ pub fn oriented(
         let seen: i64 = component
             .iter()
             .map(|(&t, &turned)| {
-                let seen = facing(points, scanners, t, t[0]);
+                let seen = facing(points, known, t, t[0]);
                 if turned { -seen } else { seen }
             })
             .sum();

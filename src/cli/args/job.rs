@@ -2,7 +2,7 @@
 
 use super::super::parse::region;
 use crate::method::METHOD;
-use crate::params::{MaxWidth, Method, Origin, Params, Radius, Region, Smooth, Smoothing};
+use crate::params::{Facing, MaxWidth, Method, Origin, Params, Radius, Region, Smooth, Smoothing};
 use crate::pipeline::{Builder, Reconstruction};
 use crate::stages::ingest::{Attributes, Classes};
 use clap::Args as ClapArgs;
@@ -138,6 +138,15 @@ pub struct Surface {
     /// [default: 8x; with --method paper none]
     #[arg(long, value_name = "LENGTH|Nx|none")]
     pub max_edge: Option<MaxWidth>,
+    /// Which side is out: auto (what scanners of E57 and PTX files saw, else up), up (the topmost surface faces
+    /// up), out (a body), in (rooms, tunnels), or a position that the whole surface faces, like 12.5,3,1.6
+    #[arg(
+        long,
+        value_name = "auto|up|out|in|X,Y,Z",
+        default_value = "auto",
+        allow_hyphen_values = true
+    )]
+    pub facing: Facing,
     /// Do not use the positions of scanners in E57 and PTX files, by which the side that the scanner saw is out
     #[arg(long)]
     pub ignore_scanners: bool,
@@ -269,6 +278,7 @@ impl Job {
             origin: self.coordinates.origin,
             keep_far: self.coordinates.keep_far,
             ignore_crs: self.coordinates.ignore_crs,
+            facing: self.surface.facing,
             ignore_scanners: self.surface.ignore_scanners,
             block: self.block_points,
             ..usual

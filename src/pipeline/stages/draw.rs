@@ -1,6 +1,7 @@
 //! The report, and its pictures.
 
-use super::{Shape, Stages};
+use super::Stages;
+use super::shape::Shape;
 use crate::error::{Error, Result};
 use crate::geom::lattice::Lattice;
 use crate::report::{Details, Drawn, Report};

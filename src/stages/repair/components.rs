@@ -9,7 +9,7 @@ use crate::geom::Point;
 use crate::spill::{Inbox, Table};
 use crate::stages::blocks::Blocks;
 use crate::stages::order::PointStore;
-use crate::stages::scanners::{Scanners, Seen};
+use crate::stages::outside::{Known, Outside};
 use crate::stages::surface::parity::{ParitySets, constraint};
 use crate::stages::surface::rows::TriangleTo;
 use crate::workspace::memory::{bytes_of, table_bytes};
@@ -49,8 +49,8 @@ pub(super) struct Parts<'a> {
     pub blocks: Blocks,
     /// Positions that decide the connectivity.
     pub store: &'a PointStore,
-    /// The scanners that saw the points, if they decide which side is out.
-    pub scanners: Option<Scanners<'a>>,
+    /// What tells which side is out.
+    pub outside: Option<Outside<'a>>,
     /// Labels and orientations of crossing triangles in the blocks that they touch.
     pub seen: &'a Inbox<SeenTriangle>,
     /// Sums over the interior triangles of each block's global labels.
@@ -75,8 +75,8 @@ impl Parts<'_> {
         let bytes = |block: usize| {
             let labels = self.globals[block].1;
             let ids = self.blocks.ids(block).len();
-            let scanners = self.scanners.map_or(0, |s| s.bytes(ids));
-            self.seen.rows(block) as u64 * 150 + u64::from(labels) * 500 + scanners + (1 << 16)
+            let known = self.outside.map_or(0, |o| o.bytes(ids));
+            self.seen.rows(block) as u64 * 150 + u64::from(labels) * 500 + known + (1 << 16)
         };
         unit.for_each_unit("repair: borders", self.globals.len(), bytes, |unit| {
             let own = self.sum(unit)?;
@@ -117,10 +117,10 @@ impl Parts<'_> {
         let ids = ascending(seen.iter().flat_map(|s| s.triangle));
         let mut points: Vec<Point> = Vec::with_capacity(ids.len());
         self.store.fetch(&ids, &mut points)?;
-        let scanners = self.scanners.map(|s| s.open(unit, self.blocks.ids(block)));
-        let scanners = scanners.transpose()?;
+        let known = self.outside.map(|o| o.open(unit, self.blocks, block));
+        let known = known.transpose()?;
         let bytes = table_bytes(&own) + bytes_of(&seen) + bytes_of(&ids) + bytes_of(&points);
-        let bytes = bytes + scanners.as_ref().map_or(0, Seen::bytes);
+        let bytes = bytes + known.as_ref().map_or(0, Known::bytes);
         let _held = unit.hold(bytes);
         for same in seen.chunk_by(|a, b| a.triangle == b.triangle) {
             let first = same[0];
@@ -134,8 +134,8 @@ impl Parts<'_> {
             // The positions of all corners were fetched.
             let corners = triangle.map(|v| points[ids.partition_point(|id| *id < v)]);
             // The smallest vertex is in this block.
-            let toward = scanners.as_ref();
-            let toward = toward.and_then(|seen| seen.toward(triangle[0], corners[0]));
+            let toward = known.as_ref();
+            let toward = toward.and_then(|known| known.toward(triangle[0], corners[0]));
             own.entry(root)
                 .or_default()
                 .add(triangle, corners, turned ^ flip, toward);

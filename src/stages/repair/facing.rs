@@ -1,7 +1,7 @@
 //! The fate of a component: kept or removed, and its orientation.
 //!
-//! Sums over a component are exact integers, so they do not depend on the order of triangles. Where scanners saw
-//! the points, their side is out; else volume or area decide.
+//! Sums over a component are exact integers, so they do not depend on the order of triangles. Where it is known
+//! at points which side is out, this decides; else volume or area.
 
 use super::RepairStats;
 use crate::geom::Point;
@@ -27,7 +27,7 @@ pub struct Sums {
     area: u128,
     /// Sum of the positions of all corners.
     corners: [i128; 3],
-    /// Evidence that the triangles face the scanners that saw them.
+    /// Evidence that the triangles face the side that is out at their points.
     seen: i64,
     /// The smallest triangle, and true if it is turned (does not run ascending).
     first: Option<(Triangle, bool)>,
@@ -46,7 +46,7 @@ row! {
         corners: [[u32; 4]; 3],
         /// Number of triangles.
         triangles: [u32; 2],
-        /// Evidence that they face the scanners.
+        /// Evidence that they face the side that is out.
         seen: [u32; 2],
         /// Bit 1: the smallest triangle is turned; bit 2: there is a triangle; bit 4: there is a boundary
         /// edge.
@@ -79,7 +79,7 @@ fn number64(words: [u32; 2]) -> u64 {
 
 impl Sums {
     /// Adds a triangle with corners at `corners`; `flip` if it is turned against its ascending ids. `toward` is
-    /// the unit vector from its first corner to the scanner that saw it.
+    /// the unit vector out of the surface at its first corner, if it is known.
     pub fn add(
         &mut self,
         t: Triangle,

@@ -16,7 +16,7 @@ use crate::geom::Point;
 use crate::spill::{Inbox, Shuffle, Table, release};
 use crate::stages::blocks::Blocks;
 use crate::stages::located::Places;
-use crate::stages::scanners::Seen;
+use crate::stages::outside::Known;
 use crate::stages::stitch::Stitched;
 use crate::stages::surface::parity::constraint;
 use crate::stages::surface::rows::TriangleTo;
@@ -237,7 +237,7 @@ impl Build<'_> {
         let parts = Parts {
             blocks: self.blocks,
             store: self.places.shape,
-            scanners: self.places.scanners,
+            outside: self.places.outside,
             seen: &seen,
             sums: &self.sums,
             bridges: &bridges,
@@ -265,8 +265,8 @@ impl Build<'_> {
         let around = Around::open(stitched, self.blocks, workspace)?;
         let bytes = |b: usize| {
             let (records, ids) = (around.records(workspace, b), self.blocks.ids(b).len());
-            let seen = self.places.scanners.map_or(0, |s| s.bytes(ids));
-            230 * records as u64 + ids as u64 * 30 + seen + (1 << 20)
+            let known = self.places.outside.map_or(0, |o| o.bytes(ids));
+            230 * records as u64 + ids as u64 * 30 + known + (1 << 20)
         };
         let work = |unit: &Unit<'_>| {
             let done = self.block(unit, &around);
@@ -315,11 +315,13 @@ impl Build<'_> {
             rims[v / 32].bits |= 1 << (v % 32);
         }
         self.rims.put(unit, block, &rims)?;
-        let seen = self.places.scanners.map(|s| s.open(unit, ids.clone()));
-        let seen = seen.transpose()?;
-        let of_seen = unit.hold(seen.as_ref().map_or(0, Seen::bytes));
-        let sums = self.sum(block, &shape, seen.as_ref(), &triangles, &patch, &bridges);
-        drop((seen, of_seen));
+        let known = self.places.outside;
+        let known = known
+            .map(|o| o.open(unit, self.blocks, block))
+            .transpose()?;
+        let of_known = unit.hold(known.as_ref().map_or(0, Known::bytes));
+        let sums = self.sum(block, &shape, known.as_ref(), &triangles, &patch, &bridges);
+        drop((known, of_known));
         let (global, local) = sums.split_at(patch.global as usize);
         let global: Vec<SumsRow> = global.iter().map(Sums::row).collect();
         let more = unit.hold(bytes_of(&sums) + bytes_of(&global));
@@ -339,7 +341,7 @@ impl Build<'_> {
         &self,
         block: usize,
         points: &[Point],
-        seen: Option<&Seen<'_>>,
+        known: Option<&Known<'_>>,
         triangles: &[Triangle],
         patch: &Patch,
         bridges: &[u32],
@@ -358,7 +360,7 @@ impl Build<'_> {
             }
             if ids.contains(&t[0]) && ids.contains(&t[2]) {
                 let corners = t.map(|v| points[(v - ids.start) as usize]);
-                let toward = seen.and_then(|seen| seen.toward(t[0], corners[0]));
+                let toward = known.and_then(|known| known.toward(t[0], corners[0]));
                 sum.add(*t, corners, flip, toward);
             }
         }

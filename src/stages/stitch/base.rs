@@ -4,12 +4,11 @@
 use super::BaseStats;
 use crate::error::Result;
 use crate::kernels::{Level, MOST_EDGES, is_one_fan};
-use crate::method::METHOD;
 use crate::spill::{Id, Inbox, Shuffle, Table, release};
 use crate::stages::blocks::Blocks;
 use crate::stages::cells::{CountedTriple, SentTriple};
+use crate::stages::columns::{Direction, extreme};
 use crate::stages::located::{Located, Places};
-use crate::stages::surface::columns;
 use crate::stages::surface::evidence::{Division, Evidence, UP, Witness};
 use crate::stages::surface::orient::{BlockTriangles, Oriented, orient_inside};
 use crate::stages::surface::rows::TriangleTo;
@@ -56,9 +55,11 @@ pub(super) fn base(
 ) -> Result<(Base, BaseStats)> {
     let count = blocks.count();
     let visiting = triples.visiting.open(workspace, count)?;
-    let highest = |unit: &Unit<'_>| columns::highest(places.shape, blocks, unit);
+    let highest = |unit: &Unit<'_>| extreme(places.shape, Direction::UP, blocks, unit);
+    let up = !places.outside.is_some_and(|outside| outside.is_for_all());
     let by_evidence = match division {
-        Some(division) => Some((division, workspace.once("columns", highest)?)),
+        Some(division) if up => Some((division, Some(workspace.once("columns", highest)?))),
+        Some(division) => Some((division, None)),
         None => None,
     };
     let weigh = by_evidence.is_some();
@@ -74,9 +75,9 @@ pub(super) fn base(
     };
     let bytes = |block: usize| {
         let records = triples.own.expected_rows(workspace, block) + visiting.rows(block);
-        let scanners = places.scanners.filter(|_| weigh);
-        let seen = scanners.map_or(0, |s| s.bytes(blocks.ids(block).len()));
-        100 * records as u64 + seen + (3 << 20)
+        let outside = places.outside.filter(|_| weigh);
+        let known = outside.map_or(0, |o| o.bytes(blocks.ids(block).len()));
+        100 * records as u64 + known + (3 << 20)
     };
     let around = |unit: &Unit<'_>| look.block(unit);
     let name = "stitch.base";
@@ -100,7 +101,7 @@ pub(super) fn base(
         Ok((inside.join(name, &flags, blocks, unit)?, flagged))
     })?;
     inside.release(workspace)?;
-    if let Some((_, highest)) = &look.by_evidence {
+    if let Some((_, Some(highest))) = &look.by_evidence {
         highest.release(workspace)?;
     }
     workspace.note_part("orient", start.elapsed().as_secs_f64());
@@ -128,8 +129,9 @@ struct Look<'a> {
     own: &'a Table<CountedTriple>,
     visiting: &'a Inbox<SentTriple>,
     places: Places<'a>,
-    /// The division of blocks and the highest points of columns, if the base is oriented by evidence.
-    by_evidence: Option<(Division, Table<Id>)>,
+    /// The division of blocks and the highest points of columns, as far as they count, if the base is oriented by
+    /// evidence.
+    by_evidence: Option<(Division, Option<Table<Id>>)>,
     blocks: Blocks,
     candidates: Table<CountedTriple>,
     crossing: Table<CountedTriple>,
@@ -215,14 +217,15 @@ impl Look<'_> {
         located: Option<Located>,
         triangles: &[Triangle],
         candidates: &[CountedTriple],
-        (division, highest): &(Division, Table<Id>),
+        (division, highest): &(Division, Option<Table<Id>>),
     ) -> Result<Evidence> {
         let block = unit.number();
         let vertices = self.foreign(block, triangles);
         let load = || Located::load(self.places.shape, self.blocks, block, vertices);
         let places = located.map_or_else(load, Ok)?;
         let candidates: Vec<Triangle> = candidates.iter().map(|c| c.triple).collect();
-        let highest = bytemuck::cast_vec(highest.get(unit, block)?);
+        let highest = highest.as_ref().map(|table| table.get(unit, block));
+        let highest = bytemuck::cast_vec(highest.transpose()?.unwrap_or_default());
         Ok(Evidence {
             division: *division,
             witnesses: self.witnesses(unit, &highest, &places)?,
@@ -231,8 +234,8 @@ impl Look<'_> {
         })
     }
 
-    /// The vertices of the block at which it is known to which side the surface faces: one for a number of
-    /// points that faces the scanner that saw it; of the other points those that are the highest of columns.
+    /// The vertices of the block at which it is known to which side the surface faces: up at those of the `highest`
+    /// of columns of which nothing else is known.
     fn witnesses(
         &self,
         unit: &Unit<'_>,
@@ -240,20 +243,20 @@ impl Look<'_> {
         places: &Located,
     ) -> Result<Vec<Witness>> {
         let up = |&vertex: &u32| Witness { vertex, toward: UP };
-        let Some(scanners) = self.places.scanners else {
+        let Some(outside) = self.places.outside else {
             return Ok(highest.iter().map(up).collect());
         };
         let ids = self.blocks.ids(unit.number());
-        let seen = scanners.open(unit, ids.clone())?;
-        let _held = unit.hold(scanners.bytes(ids.len()));
-        let sampled = |v: &u32| u64::from(*v) % METHOD.orientation.column == 0;
+        let known = outside.open(unit, self.blocks, unit.number())?;
+        let _held = unit.hold(outside.bytes(ids.len()));
         let facing = |vertex: u32| {
-            let toward = seen.toward(vertex, places.at(vertex))?;
+            let toward = known.toward(vertex, places.at(vertex))?;
             Some(Witness { vertex, toward })
         };
-        let unseen = highest.iter().filter(|v| !seen.has(**v));
+        let unseen = highest.iter().filter(|v| !known.has(**v));
         let mut all: Vec<Witness> = unseen.map(up).collect();
-        all.extend(ids.filter(sampled).filter_map(facing));
+        let sampled = ids.filter(|v| known.is_sampled(*v));
+        all.extend(sampled.filter_map(facing));
         all.sort_unstable_by_key(|w| w.vertex);
         Ok(all)
     }

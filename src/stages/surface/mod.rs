@@ -4,7 +4,6 @@
 //! for the fans at one vertex, [`sides`] from a triangle to its neighbours, and `crossing_edges` from any
 //! edge of the cloud.
 
-pub mod columns;
 mod contract;
 mod crossing;
 mod crossing_edges;

@@ -52,7 +52,7 @@ fn across(starved: bool) -> (Left, [usize; 2]) {
         shape: &store,
         file: &store,
         density: None,
-        scanners: None,
+        outside: None,
     };
     let division = Some(crate::Division::default());
     let (base, _) = base(places, &triples, blocks, division, workspace).unwrap();

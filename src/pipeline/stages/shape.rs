@@ -1,0 +1,65 @@
+//! The positions from which the surface is made.
+
+use super::Stages;
+use crate::error::Result;
+use crate::geom::lattice::Lattice;
+use crate::params::Method;
+use crate::stages::located::Places;
+use crate::stages::order::PointStore;
+use crate::stages::outside::Outside;
+use crate::stages::smooth::Relaxed;
+use crate::stages::spacing::{Density, Spacings};
+
+/// The positions that decide which points are connected, if they are not those of the mesh, and the local
+/// spacings.
+#[derive(Debug, Default)]
+pub(in crate::pipeline) struct Shape {
+    store: Option<PointStore>,
+    pub spacings: Option<Spacings>,
+}
+
+impl Shape {
+    /// The positions that decide the connectivity: those of the mesh in `store` if there are no others.
+    pub fn or<'a>(&'a self, store: &'a PointStore) -> &'a PointStore {
+        self.store.as_ref().unwrap_or(store)
+    }
+}
+
+impl Stages<'_> {
+    /// Opens the shape.
+    pub fn open_shape(&self, relaxed: Option<Relaxed>) -> Result<Shape> {
+        let workspace = self.workspace;
+        let Some(relaxed) = relaxed else {
+            return Ok(Shape::default());
+        };
+        let store = relaxed.store.as_ref();
+        Ok(Shape {
+            store: store.map(|store| store.open(workspace)).transpose()?,
+            spacings: Some(relaxed.spacings.open(workspace)?),
+        })
+    }
+
+    /// The positions from which the surface is made.
+    pub fn places<'p>(
+        &self,
+        store: &'p PointStore,
+        shape: &'p Shape,
+        outside: Option<Outside<'p>>,
+        lattice: &Lattice,
+    ) -> Places<'p> {
+        let params = &self.job.params;
+        let spacings = shape.spacings.as_ref();
+        let robust = spacings.filter(|_| params.method == Method::Robust);
+        Places {
+            shape: shape.or(store),
+            file: store,
+            outside,
+            density: robust.map(|spacings| Density {
+                spacings,
+                coarse: None,
+                neighbors: params.neighbors,
+                limits: params.limits(lattice.step),
+            }),
+        }
+    }
+}
