@@ -93,7 +93,8 @@ pub mod workspace;
 pub use cli::call;
 pub use error::{Error, Result};
 pub use params::{
-    Division, Facing, MaxWidth, Method, Origin, Params, Radius, Region, Smooth, Smoothing,
+    Division, Facing, InputNormals, MaxWidth, Method, Origin, Params, Radius, Region, Smooth,
+    Smoothing,
 };
 pub use pipeline::{Builder, Reconstruction, Start, Tiles, default_memory, default_threads};
 pub use report::{DiskEstimate, Report};

@@ -60,6 +60,21 @@ constants! {
         /// triangles that very large disks see.
         reach: f64 = 2.0, "distances of the last neighbour";
     }
+    /// Normals that points bring.
+    normals: Normals {
+        /// A normal suits the points if their scatter along it is at most this many times that along the estimated
+        /// normal (and a share of `plane.line` of all scatter besides): at edges, between layers and in noise it may
+        /// be farther from the estimate than on a clean surface.
+        scatter: f64 = 4.0, "times";
+        /// Points beside a point agree with the side of its normal if at most one in this number does not; they are
+        /// beside it if their height over its plane is at most one part in this number of their distance; and the
+        /// normals of a cloud are oriented if at least one point in this number has such neighbours. Of true
+        /// normals nearly all have, with a fifth flipped nearly half, with random signs one in 50.
+        sides: u64 = 4, "one in", [3, 8];
+        /// At least so many points beside a point must have a normal. Of fewer, those with random signs agree too
+        /// often.
+        beside: u64 = 6, "points", [3, 9];
+    }
     /// Outliers, which are dropped on request.
     outliers: Outliers {
         /// Neighbours whose mean distance is the spacing of a point.

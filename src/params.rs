@@ -1,14 +1,17 @@
 //! The parameters of a reconstruction, with their ranges.
 
+mod facing;
 mod smooth;
 
 use crate::error::{Error, Result};
 pub use crate::geom::region::{NoRegion, Region};
 use crate::method::METHOD;
 use crate::stages::ingest::{Attributes, Classes, Crop, IngestStats, Selection};
+pub use crate::stages::normals::InputNormals;
 pub use crate::stages::smooth::Smoothing;
 use crate::stages::spacing::{Limits, Width};
 pub use crate::stages::surface::evidence::Division;
+pub use facing::Facing;
 pub use smooth::Smooth;
 
 /// Radius of the disks (paper, section 3.4).
@@ -126,47 +129,7 @@ impl std::str::FromStr for Origin {
         match text.trim() {
             "auto" => Ok(Self::Auto),
             "none" => Ok(Self::None),
-            numbers => position(numbers).map(Self::At).ok_or_else(wrong),
-        }
-    }
-}
-
-/// Three finite numbers with commas between.
-fn position(text: &str) -> Option<[f64; 3]> {
-    let parsed = text.split(',').map(|number| number.trim().parse::<f64>());
-    let parsed: Vec<f64> = parsed.collect::<Result<_, _>>().ok()?;
-    let at: [f64; 3] = parsed.try_into().ok()?;
-    at.iter().all(|c| c.is_finite()).then_some(at)
-}
-
-/// Which side of the surface is out.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Facing {
-    /// The side that the scanners saw, where files give their positions; else as for [`Facing::Up`].
-    Auto,
-    /// The topmost surface faces up.
-    Up,
-    /// The outermost surface faces outwards: a body.
-    Out,
-    /// The outermost surface faces inwards: a room, a tunnel.
-    In,
-    /// The whole surface faces this position, in the input's coordinates.
-    At([f64; 3]),
-}
-
-impl std::str::FromStr for Facing {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let wrong =
-            || format!("{text:?} is not auto, up, out, in, or three numbers like 12.5,3,1.6");
-        match text.trim() {
-            "auto" => Ok(Self::Auto),
-            "up" => Ok(Self::Up),
-            "out" => Ok(Self::Out),
-            "in" => Ok(Self::In),
-            numbers => position(numbers).map(Self::At).ok_or_else(wrong),
+            numbers => facing::position(numbers).map(Self::At).ok_or_else(wrong),
         }
     }
 }
@@ -231,6 +194,8 @@ pub struct Params {
     pub facing: Facing,
     /// Do not use the positions of scanners that files give: what a scanner saw is out otherwise (robust).
     pub ignore_scanners: bool,
+    /// What is done with the normals that points bring.
+    pub input_normals: InputNormals,
     /// Take coordinates as they are if files give different reference systems, which is an error otherwise.
     pub ignore_crs: bool,
     /// Origin of the coordinates in the mesh file.
@@ -285,6 +250,7 @@ impl Default for Params {
             compress_glb: false,
             facing: Facing::Auto,
             ignore_scanners: false,
+            input_normals: InputNormals::Auto,
             ignore_crs: false,
             origin: Origin::None,
             block: METHOD.curve.block,
@@ -304,6 +270,7 @@ impl Params {
             relax: 0,
             max_angle: 60.0,
             keep_all: true,
+            input_normals: InputNormals::Use,
             max_edge: MaxWidth::None,
             max_fill: MaxWidth::None,
             max_hole_edges: 500,
@@ -328,6 +295,7 @@ impl Params {
             crop: self.crop.as_ref().map(crop),
             attributes: self.attributes.clone(),
             scanners: self.scanners(),
+            normals: self.input_normals != InputNormals::Ignore,
         }
     }
 

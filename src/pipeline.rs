@@ -134,12 +134,12 @@ impl Reconstruction {
         let shape = stages.open_shape(relaxed)?;
         let side = stages.side(shape.or(&store), &lattice)?;
         let places = stages.places(&store, &shape, side.outside(&values), &lattice);
-        let (seen, coarse) = stages.cells(places, radius)?;
+        let (seen, coarse) = stages.cells(places, radius, &values)?;
         let places = places.with_coarse(coarse.as_ref());
         let triples = stages.triples(&seen)?;
         let stitched = stages.stitch(places, &triples)?;
         let repaired = stages.repair(places, &stitched)?;
-        values.release_scanners(workspace)?;
+        values.release_told(workspace)?;
         side.release(workspace)?;
         let pieces = stages.cut(&store, &repaired, &lattice)?;
         stages.export(

@@ -4,11 +4,12 @@ use crate::histogram;
 use crate::levels::TilesReport;
 use crate::params::Params;
 use crate::picture;
-pub use crate::stages::cells::CellStats;
+pub use crate::stages::cells::{CellStats, DiskStats};
 pub use crate::stages::cut::CutStats;
 pub use crate::stages::draw::Drawn;
 pub use crate::stages::export::{CoordinateType, MeshStats};
 pub use crate::stages::ingest::{Attribute, IngestStats};
+pub use crate::stages::normals::NormalStats;
 pub use crate::stages::outliers::OutlierStats;
 pub use crate::stages::repair::RepairStats;
 pub use crate::stages::smooth::RelaxStats;
@@ -40,6 +41,8 @@ pub struct Report {
     pub attributes: Vec<Attribute>,
     /// Positions of the scanners whose side is out, in the input's unit.
     pub scanners: Vec<[f64; 3]>,
+    /// The normals that points bring, if they are used.
+    pub normals: Option<NormalsReport>,
     /// Points with the position of another one, dropped.
     pub duplicates_folded: u64,
     /// Thinning, if requested.
@@ -148,6 +151,17 @@ pub struct LatticeReport {
     pub step: f64,
     /// True if every input position is on the lattice without rounding.
     pub exact: bool,
+}
+
+/// The normals that points bring, for the report.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct NormalsReport {
+    /// The normals.
+    #[serde(flatten)]
+    pub input: NormalStats,
+    /// The disks.
+    #[serde(flatten)]
+    pub disks: DiskStats,
 }
 
 /// Time and bytes of one stage.

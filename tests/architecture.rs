@@ -19,7 +19,8 @@ const MAY_USE: &[(&str, &str)] = &[
     ("histogram", ""),
     (
         "inspect",
-        "geom histogram method params picture pipeline spill stages/cells stages/ingest stages/order stages/tiles \
+        "geom histogram method params picture pipeline spill stages/attributes stages/blocks stages/cells stages/ingest \
+         stages/normals stages/order stages/tiles \
          workspace",
     ),
     ("kernels", ""),
@@ -32,7 +33,7 @@ const MAY_USE: &[(&str, &str)] = &[
     ("method", ""),
     (
         "params",
-        "geom method stages/ingest stages/smooth stages/spacing stages/surface",
+        "geom method stages/ingest stages/normals stages/smooth stages/spacing stages/surface",
     ),
     ("page", "histogram inspect picture report"),
     ("picture", ""),
@@ -53,7 +54,7 @@ const MAY_USE: &[(&str, &str)] = &[
     ("stages/columns", "stages/blocks stages/order"),
     (
         "stages/cells",
-        "kernels stages/blocks stages/levels stages/order stages/spacing stages/tiles",
+        "kernels stages/blocks stages/levels stages/normals stages/order stages/spacing stages/tiles",
     ),
     (
         "stages/cut",
@@ -73,6 +74,10 @@ const MAY_USE: &[(&str, &str)] = &[
         "stages/located",
         "stages/blocks stages/cells stages/order stages/outside stages/spacing",
     ),
+    (
+        "stages/normals",
+        "stages/attributes stages/blocks stages/ingest stages/order",
+    ),
     ("stages/order", "stages/ingest"),
     (
         "stages/outliers",
@@ -80,7 +85,7 @@ const MAY_USE: &[(&str, &str)] = &[
     ),
     (
         "stages/outside",
-        "stages/blocks stages/columns stages/order stages/scanners",
+        "stages/blocks stages/columns stages/normals stages/order stages/scanners",
     ),
     (
         "stages/repair",

@@ -5,11 +5,11 @@ mod reference;
 
 use outcrop::inspect::ply_mesh::{PlyMesh, Sink};
 use outcrop::{
-    Division, Error, Facing, MaxWidth, Method, Params, Radius, Reconstruction, Report, Smooth,
-    Smoothing,
+    Division, Error, Facing, InputNormals, MaxWidth, Method, Params, Radius, Reconstruction,
+    Report, Smooth, Smoothing,
 };
 use reference::weighing::Weighing;
-use reference::{Counts, Mesh, Settings, clouds};
+use reference::{Counts, Given, Mesh, Settings, clouds, normals};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -79,6 +79,8 @@ struct Seen {
     scanners: Vec<Point>,
     /// For each point, the number of its scanner.
     by: Vec<Option<usize>>,
+    /// For each point a normal, which only those without a scanner have; or nothing.
+    normals: Vec<[i32; 3]>,
 }
 
 impl Seen {
@@ -98,7 +100,49 @@ impl Seen {
             .iter()
             .map(|_| one().map(|n| n % all.max(1) as usize));
         let by = by.map(|number| number.filter(|_| all > 0)).collect();
-        Self { scanners, by }
+        Self {
+            scanners,
+            by,
+            normals: Vec::new(),
+        }
+    }
+
+    /// With normals that lead away from the middle, or up, or anywhere; some are turned, and some are none.
+    fn with_normals(mut self, points: &[Point], seed: u64) -> Self {
+        let mut random = clouds::Random::new(seed ^ 77);
+        let most = points.iter().flatten().max().copied().unwrap_or(0);
+        let turned = [0, 2, 10, 5][seed as usize % 4];
+        let normal = |p: &Point| {
+            let anywhere = [0; 3].map(|_: i32| random.integer(-9, 10) as i32);
+            let from_middle = p.map(|x| 2 * x - most);
+            let normal = match seed / 4 % 3 {
+                0 => from_middle,
+                1 => [anywhere[0], anywhere[1], 30],
+                _ => anywhere,
+            };
+            match random.integer(0, 20) {
+                0 => [0; 3],
+                n if n <= turned => normal.map(|x| -x),
+                _ => normal,
+            }
+        };
+        self.normals = points.iter().map(normal).collect();
+        self
+    }
+
+    /// The normal that counts of the points at each position.
+    fn normals_at(&self, points: &[Point]) -> BTreeMap<Point, normals::Short> {
+        let seen = self.at_positions(points);
+        let mut all: BTreeMap<Point, normals::Short> = BTreeMap::new();
+        for (p, normal) in points.iter().zip(&self.normals) {
+            let normal = normals::short(normal.map(f64::from))
+                .filter(|_| seen.get(p).is_none_or(Option::is_none));
+            if let Some(normal) = normal {
+                let least = all.entry(*p).or_insert(normal);
+                *least = normal.min(*least);
+            }
+        }
+        all
     }
 
     /// The scanner that counts of the points at each position.
@@ -119,6 +163,14 @@ impl Seen {
             let by = self.by.get(number).copied().flatten();
             let [a, b, c] = by.map_or([0; 3], |number| self.scanners[number]);
             let (text, count) = &mut texts[by.map_or(0, |number| number + 1)];
+            if by.is_none() && !self.normals.is_empty() {
+                if text.is_empty() {
+                    text.push_str("x y z Nx Ny Nz\n");
+                }
+                let [a, b, c] = self.normals[number];
+                writeln!(text, "{x} {y} {z} {a} {b} {c}").unwrap();
+                continue;
+            }
             writeln!(text, "{} {} {}", x - a, y - b, z - c).unwrap();
             *count += 1;
         }
@@ -183,6 +235,11 @@ fn pipeline(
             reference::outside::Facing::At(place) => Facing::At(place.map(|x| x as f64)),
         },
         keep_all: settings.keep_all,
+        input_normals: match settings.given {
+            Given::Auto => InputNormals::Auto,
+            Given::Use => InputNormals::Use,
+            Given::Ignore => InputNormals::Ignore,
+        },
         max_edge: width(settings.max_edge),
         max_fill: width(settings.max_fill),
         repair: settings.repair,
@@ -235,6 +292,17 @@ fn compare_seen(
 ) -> Counts {
     let points = at_origin(points);
     let seen = scanners.map_or_else(Seen::default, |seed| Seen::some(&points, seed));
+    compare_with(name, &points, &seen, settings, cuts)
+}
+
+/// As [`compare`], of points at the origin of the lattice with these scanners and normals.
+fn compare_with(
+    name: &str,
+    points: &[Point],
+    seen: &Seen,
+    settings: &Settings,
+    cuts: &[Cut],
+) -> Counts {
     // Moved points lie on a lattice whose step was halved ten times.
     let scale = if settings.smooth + settings.relax > 0 {
         1024
@@ -255,15 +323,17 @@ fn compare_seen(
         },
         ..*settings
     };
-    let at = seen.at_positions(&points);
+    let at = seen.at_positions(points);
     let scanner = |p: &Point| {
         let scanner = at.get(&p.map(|x| x / scale)).copied().flatten();
         scanner.map(|s| s.map(|x| i64::from(x) * i64::from(scale)))
     };
-    let expected = reference::reconstruct_seen(&fine, scanner, &fine_settings);
+    let normals = seen.normals_at(points);
+    let normal = |p: &Point| normals.get(&p.map(|x| x / scale)).copied();
+    let expected = reference::reconstruct_given(&fine, scanner, normal, &fine_settings);
     for &cut in cuts {
         let what = format!("{name}, {} points, {settings:?}, {cut:?}", points.len());
-        match pipeline(&points, &seen, settings, cut) {
+        match pipeline(points, seen, settings, cut) {
             Ok((mesh, report)) => same(&what, &mesh, &report, &expected, f64::from(scale)),
             Err(Error::NoTriangles { .. } | Error::Degenerate { .. }) => {
                 assert!(expected.triangles.is_empty(), "{what}: nothing was made");
@@ -589,6 +659,49 @@ fn facing_a_side() {
         }
     }
     assert!(faced > 300, "{faced}");
+}
+
+#[test]
+fn points_with_normals() {
+    let mut faced = 0;
+    for seed in 140..152 {
+        let kind = |name| {
+            clouds::KINDS
+                .iter()
+                .position(|kind| kind.0 == name)
+                .unwrap()
+        };
+        let large = |name| (name, clouds::cloud(kind(name), 500, seed));
+        let more = ["sphere", "noisy sphere"].map(large);
+        for (name, points) in clouds::one_of_each(seed).into_iter().chain(more) {
+            if points.iter().flatten().any(|x| *x >= 1 << 19) {
+                continue;
+            }
+            let usual = match seed % 3 {
+                0 => Settings::default(),
+                _ => Settings::robust(),
+            };
+            let settings = Settings {
+                given: [Given::Auto, Given::Use][seed as usize % 2],
+                relax: if usual.robust { seed as u32 % 4 } else { 0 },
+                neighbors: [30, 12][seed as usize % 2],
+                block: [65_536, 40, 100, 250][seed as usize % 4],
+                min_component: 3,
+                ..usual
+            };
+            let points = at_origin(&points);
+            let seen = match seed % 5 {
+                0 if usual.robust => Seen::some(&points, seed),
+                _ => Seen::default(),
+            };
+            let seen = seen.with_normals(&points, seed);
+            let name = format!("{name}, seed {seed}");
+            let counts = compare_with(&name, &points, &seen, &settings, &CUTS);
+            // Of the others some face scanners.
+            faced += if seed % 5 > 0 { counts.met.faced } else { 0 };
+        }
+    }
+    assert!(faced > 25, "{faced}");
 }
 
 #[test]

@@ -10,7 +10,7 @@ use outcrop::stages::cells::{CountedTriple, SentTriple};
 use outcrop::stages::export::{CoordinateType, ExportOptions, export};
 use outcrop::stages::located::Places;
 use outcrop::stages::order::{Orderer, PointStore, StoreWriter};
-use outcrop::stages::outside::{Outside, StoredExtremes};
+use outcrop::stages::outside::{Outside, StoredExtremes, Told};
 use outcrop::stages::repair::{RepairOptions, repair};
 use outcrop::stages::scanners::Scanners;
 use outcrop::stages::stitch::{StitchOptions, stitch};
@@ -20,7 +20,7 @@ use outcrop::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
 use outcrop::workspace::progress::{Cancel, Silent};
 use outcrop::{Division, Error, spill};
 use reference::clouds::Random;
-use reference::outside::Facing;
+use reference::outside::{Facing, Known};
 use reference::{Counts, Settings, cells, connect};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -126,7 +126,12 @@ fn pipeline(
         Facing::Out => Some(extremes(false)),
         _ => None,
     };
-    let seen = |(stored, places)| Outside::Scanners(Scanners::new(stored, places));
+    let seen = |(stored, places)| {
+        Outside::told(Told {
+            scanners: Some(Scanners::new(stored, places)),
+            normals: None,
+        })
+    };
     let places = Places {
         shape: lie,
         file: &store,
@@ -136,7 +141,7 @@ fn pipeline(
             (Facing::At(place), _) => Some(Outside::Position(place)),
             _ => stored
                 .as_ref()
-                .map(|(stored, places)| seen((stored, *places))),
+                .and_then(|(stored, places)| seen((stored, *places))),
         },
     };
     let division = Division {
@@ -420,7 +425,10 @@ fn compare(
         let (numbers, places) = some_scanners(&mut random, points.len());
         let auto = settings.facing == Facing::Auto;
         let seen = auto && settings.robust && seed % 2 == 0;
-        let of = |number: &u32| places.get(number.checked_sub(1)? as usize).copied()?;
+        let of = |number: &u32| {
+            let place = places.get(number.checked_sub(1)? as usize).copied()?;
+            place.map(Known::Place)
+        };
         let scanners: Vec<_> = numbers.iter().map(of).collect();
         let scanners = if seen { &scanners[..] } else { &[] };
         let expected = connect(&shape, points.clone(), &all, None, scanners, &settings);

@@ -92,6 +92,7 @@ def reconstruct(
     max_edge: Optional[Width] = None,
     facing: Union[str, Sequence[float]] = "auto",
     ignore_scanners: bool = False,
+    input_normals: Optional[str] = None,
     max_hole_edges: Optional[int] = None,
     max_fill: Optional[Width] = None,
     min_component: Optional[int] = None,

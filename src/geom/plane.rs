@@ -155,6 +155,20 @@ impl Moments {
         mean2 <= limit2 && x * x + y * y + z * z <= most2
     }
 
+    /// True if a direction suits the point and its neighbours as well as the `estimated` one, or nearly: their scatter
+    /// along it is not much larger.
+    #[must_use]
+    pub fn suits(&self, estimated: Normal, given: Normal) -> bool {
+        let [xx, yy, zz, xy, xz, yz] = self.scatter();
+        let along = |[x, y, z]: [f64; 3]| {
+            let scatter = (xx * x * x + yy * y * y + zz * z * z)
+                + 2.0 * (xy * x * y + xz * x * z + yz * y * z);
+            scatter / (x * x + y * y + z * z)
+        };
+        let [estimated, given] = [estimated, given].map(|n| along(n.map(f64::from)));
+        given <= METHOD.normals.scatter * estimated + METHOD.plane.line * (xx + yy + zz)
+    }
+
     /// The best-fitting plane of the point and its neighbours.
     #[must_use]
     pub fn plane(&self) -> Plane {

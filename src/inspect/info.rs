@@ -4,13 +4,19 @@ use super::pictures;
 pub use super::pictures::Illustration;
 use crate::error::Result;
 use crate::geom::aabb::Aabb;
+use crate::geom::lattice::Lattice;
 use crate::histogram::Tally;
 use crate::method::METHOD;
 use crate::params::Params;
 use crate::pipeline::Known;
+use crate::stages::attributes::attributes;
+use crate::stages::blocks::Blocks;
 use crate::stages::cells::{CellMaker, DiskRadius, Widen};
-use crate::stages::ingest::{Attributes, CoordinateType, IngestStats, Selection, ingest_selected};
-use crate::stages::order::{PAGE, PointStore, order};
+use crate::stages::ingest::{
+    Attributes, CoordinateType, IngestStats, Selection, Spool, ingest_selected,
+};
+use crate::stages::normals::{NormalStats, Normals, look};
+use crate::stages::order::{PAGE, PointStore, StoredPoints, order};
 use crate::stages::tiles::Tile;
 use crate::stages::tiles::near::Search;
 use crate::workspace::Workspace;
@@ -55,6 +61,8 @@ pub struct Info {
     pub lattice_step: f64,
     /// True if every position is on the lattice without rounding.
     pub lattice_exact: bool,
+    /// The normals that points bring.
+    pub normals: Option<NormalStats>,
     /// Distance to the nearest other point.
     pub spacing: Percentiles,
     /// Disk radius that `--radius auto` would use.
@@ -98,7 +106,12 @@ fn described(
     let start = Instant::now();
     let observer = &workspace.observer;
     observer.begin("ingest", "points", 0);
-    let headers = Known::from_headers(inputs, &Attributes::None, true);
+    let every = Selection {
+        attributes: Attributes::None,
+        scanners: true,
+        ..params.selection()
+    };
+    let headers = Known::from_headers(inputs, &every);
     let selection = Selection {
         scanners: false,
         attributes: match drawn {
@@ -133,6 +146,7 @@ fn described(
         },
         false => Illustration::default(),
     };
+    let normals = normals(&spool, &lattice, (&stored, &store), workspace)?;
     stored.release(workspace)?;
     let points = store.len() as u64;
     let cells = sample.seconds / sample.points.max(1) as f64 * points as f64;
@@ -143,12 +157,14 @@ fn described(
         points,
         values: 0,
         scanner: headers.map_or(0, |headers| headers.scanner),
+        normal: headers.map_or(0, |headers| headers.normal),
         double: Some(double),
         moved: None,
         text: None,
     };
     let disk = known.estimate(&Params::default(), Path::new("mesh.ply"));
     let info = Info {
+        normals,
         duplicates,
         points,
         min: lattice.position(min),
@@ -164,6 +180,30 @@ fn described(
         input,
     };
     Ok((info, illustration))
+}
+
+/// What is known about the normals of the points, if they were read and a file has any.
+fn normals(
+    spool: &Spool,
+    lattice: &Lattice,
+    (stored, store): (&StoredPoints, &PointStore),
+    workspace: &Workspace,
+) -> Result<Option<NormalStats>> {
+    let Some(names) = spool.normal_names() else {
+        return Ok(None);
+    };
+    let observer = &workspace.observer;
+    observer.begin("attributes", "points", spool.points());
+    let blocks = Blocks::new(stored.len(), METHOD.curve.block);
+    let carried = spool.with_normals(spool.carried(&Attributes::None, false));
+    let values = attributes(spool, lattice, &carried, stored, blocks, workspace)?;
+    let found = values.normals.as_ref().map(|of| {
+        let found = look(Normals::new(of, blocks), store, names.to_vec(), workspace)?;
+        of.release(workspace)?;
+        Ok(found)
+    });
+    observer.end();
+    found.transpose()
 }
 
 #[derive(Default)]
@@ -307,6 +347,7 @@ impl fmt::Display for Info {
         } else {
             "rounded"
         };
+        let normals = self.normals.as_ref();
         let rows = [
             (
                 "points",
@@ -314,6 +355,10 @@ impl fmt::Display for Info {
             ),
             ("left out", left_out),
             ("columns", self.columns()),
+            (
+                "normals",
+                normals.map(NormalStats::to_string).unwrap_or_default(),
+            ),
             ("system", system),
             ("lowest", three(&self.min)),
             ("highest", three(&self.max)),
@@ -330,7 +375,7 @@ impl fmt::Display for Info {
             ("scratch", format!("about {}", mib(self.scratch_bytes))),
             ("mesh", format!("about {}", mib(self.output_bytes))),
         ];
-        for (name, text) in rows {
+        for (name, text) in rows.into_iter().filter(|row| !row.1.is_empty()) {
             writeln!(f, "{name:<13}{text}")?;
         }
         write!(f, "time         about {:.0} s", self.seconds.ceil())

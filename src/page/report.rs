@@ -174,6 +174,15 @@ fn input(report: &Report) -> Markup {
             }),
         ),
         ("scanners", some(report.scanners.len() as u64)),
+        (
+            "normals",
+            report.normals.as_ref().map(|normals| {
+                html! {
+                    (clean(&normals.input.to_string())) "; used for " (count(normals.disks.used)) " disks, "
+                    (count(normals.disks.disagreeing)) " disagree with the points"
+                }
+            }),
+        ),
     ];
     html! {
         div.two {

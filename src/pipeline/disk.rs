@@ -15,7 +15,7 @@ use crate::geom::lattice::Lattice;
 use crate::params::{Method, Params, Smooth};
 use crate::report::DiskEstimate;
 use crate::stages::export::{self, CoordinateType, Mesh};
-use crate::stages::ingest::{self, Attributes, Column, Probe, Spool};
+use crate::stages::ingest::{self, Column, Probe, Selection, Spool};
 use crate::stages::order::StoredPoints;
 use std::path::{Path, PathBuf};
 
@@ -49,6 +49,9 @@ const COMPRESSED: [f64; 2] = [0.55, 0.45];
 /// Bytes of the number of a scanner.
 pub(crate) const SCANNER: u64 = 4;
 
+/// Bytes of a normal that a point brings.
+pub(crate) const NORMAL: u64 = ingest::NORMAL_BYTES as u64;
+
 /// Part of the points in headers that are certainly different: duplicates are not known before they are read.
 pub(crate) const DISTINCT: f64 = 0.5;
 
@@ -73,6 +76,8 @@ pub(crate) struct Known {
     pub values: u64,
     /// Bytes of the number of its scanner, if that is carried.
     pub scanner: u64,
+    /// Bytes of its normal, if that is carried.
+    pub normal: u64,
     /// True if the mesh has coordinates in double precision; none if unknown.
     pub double: Option<bool>,
     /// True if points moved in relaxing; none if unknown.
@@ -115,34 +120,21 @@ const DECIMALS: usize = 3;
 impl Known {
     /// The properties in the headers of the inputs. They may be wrong, but cannot exceed the sizes of the
     /// files.
-    pub fn from_headers(
-        inputs: &[PathBuf],
-        attributes: &Attributes,
-        scanners: bool,
-    ) -> Option<Self> {
-        let mut known = Self {
-            read: 0,
-            spool: 0,
-            decompressed: 0,
-            points: 0,
-            values: 0,
-            scanner: 0,
-            double: None,
-            moved: None,
-            text: None,
-        };
+    pub fn from_headers(inputs: &[PathBuf], selection: &Selection) -> Option<Self> {
+        let mut known = Self::default();
         let mut probes = Vec::new();
         for path in ingest::expand(inputs).ok()? {
             let probe = ingest::probe(&path).ok()?;
             let points = probe.points_likely;
             known.read += points;
-            let values = probe.value_bytes(attributes);
+            let values = probe.value_bytes(&selection.attributes);
             known.values = known.values.max(values);
-            let scanner = if scanners { probe.scanner_bytes } else { 0 };
-            if scanner > 0 {
-                known.scanner = SCANNER;
-            }
-            known.spool += points * (probe.spool_bytes_per_point + values + scanner);
+            let wanted = |bytes: u64, wanted| if wanted { bytes } else { 0 };
+            let scanner = wanted(probe.scanner_bytes, selection.scanners);
+            let normal = wanted(probe.normal_bytes, selection.normals);
+            known.scanner = known.scanner.max(wanted(SCANNER, scanner > 0));
+            known.normal = known.normal.max(wanted(NORMAL, normal > 0));
+            known.spool += points * (probe.spool_bytes_per_point + values + scanner + normal);
             known.decompressed = known.decompressed.max(probe.decompressed_bytes);
             probes.push(probe);
         }
@@ -213,10 +205,10 @@ impl Known {
         let early = self.spool as f64 + STORED * points;
         let mut early = early.max((self.spool + self.decompressed) as f64);
         let (read, values) = (self.read as f64, self.values as f64);
-        let scanner = self.scanner as f64;
-        if self.values + self.scanner > 0 {
+        let (scanner, normal) = (self.scanner as f64, self.normal as f64);
+        if self.values + self.scanner + self.normal > 0 {
             // The spool stays until the values are in the order of ids.
-            let sent = SENT + values + scanner;
+            let sent = SENT + values + scanner + normal;
             early = early.max(self.spool as f64 + POSITION * read);
             early = early.max(self.spool as f64 + STORED * points + sent * read);
         }
@@ -230,7 +222,7 @@ impl Known {
             early = early.max(STORED * (1.0 + 2.0 * moved) * points);
         }
         // Points side by side have the same scanner, mostly.
-        let kept = values + scanner / 4.0;
+        let kept = values + normal + scanner / 4.0;
         let cut = params.crop.is_some() || params.split.is_some();
         let pieces = match (cut, params.normals) {
             (false, true) if params.compress_glb => NORMALS,
@@ -313,6 +305,7 @@ mod tests {
         points: 1_000_000,
         values: 0,
         scanner: 0,
+        normal: 0,
         double: Some(false),
         moved: None,
         text: None,
@@ -403,11 +396,10 @@ mod tests {
         let header = "ply\nformat binary_little_endian 1.0\nelement vertex 1000000000000\n\
             property float x\nproperty float y\nproperty float z\nend_header\n";
         std::fs::write(&path, [header.as_bytes(), &[0; 1200]].concat()).unwrap();
-        let known = Known::from_headers(&[path], &Attributes::None, true);
+        let known = Known::from_headers(&[path], &Selection::default());
         assert!(known.is_none_or(|known| known.points < 200), "{known:?}");
         assert!(
-            Known::from_headers(&[folder.path().join("nothing")], &Attributes::None, true)
-                .is_none()
+            Known::from_headers(&[folder.path().join("nothing")], &Selection::default()).is_none()
         );
     }
 
@@ -441,7 +433,7 @@ mod tests {
         let text = file("text.xyz", b"1.25 2.5 3\n4 5.5 6\n");
         let double = |paths: &[&PathBuf]| {
             let paths: Vec<PathBuf> = paths.iter().map(|path| (*path).clone()).collect();
-            Known::from_headers(&paths, &Attributes::None, true)
+            Known::from_headers(&paths, &Selection::default())
                 .unwrap()
                 .double
         };

@@ -95,11 +95,7 @@ impl Reconstruction {
         writable(&self.mesh)?;
         not_an_input(&self.mesh, self.params.split.is_some(), &self.inputs)?;
         one_system(&self.params, &self.inputs)?;
-        let headers = Known::from_headers(
-            &self.inputs,
-            &self.params.attributes,
-            self.params.scanners(),
-        );
+        let headers = Known::from_headers(&self.inputs, &self.params.selection());
         if let Some(known) = headers.filter(|_| all_are_kept(&self.params)) {
             // Its output cannot be changed later.
             known.fits(&self.params, &self.mesh, 1.0)?;

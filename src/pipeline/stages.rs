@@ -1,6 +1,7 @@
 //! The stages of a run: each with its parameters, its part of the report, and the check of disk space for the
 //! following stages.
 
+mod cells;
 mod draw;
 mod export;
 mod moved;
@@ -9,8 +10,8 @@ mod shape;
 mod side;
 mod values;
 
-use super::checks::{all_are_kept, disk_radius, enough, not_a_line, room};
-use super::disk::{DISTINCT, SCANNER, SURE, Text};
+use super::checks::{all_are_kept, disk_radius, enough, room};
+use super::disk::{DISTINCT, NORMAL, SCANNER, SURE, Text};
 use super::{Clock, Known, Reconstruction};
 use crate::error::Result;
 use crate::geom::lattice::Lattice;
@@ -18,7 +19,7 @@ use crate::method::{METHOD, method_version};
 use crate::params::Method;
 use crate::report::{LatticeReport, Report};
 use crate::stages::blocks::Blocks;
-use crate::stages::cells::{CellTriples, DiskRadius, TileRanges, Widen, cells};
+use crate::stages::cells::{CellTriples, DiskRadius, TileRanges};
 use crate::stages::cut::{CutOptions, StoredPieces, cut};
 use crate::stages::export::CoordinateType;
 use crate::stages::ingest::{Attributes, Carried, Spool, ingest_selected};
@@ -26,7 +27,6 @@ use crate::stages::located::Places;
 use crate::stages::order::{Orderer, PointStore, StoredPoints, order, sample_sort};
 use crate::stages::outliers::{OutlierOptions, drop_outliers};
 use crate::stages::repair::{RepairOptions, Repaired, repair};
-use crate::stages::spacing::Coarse;
 use crate::stages::stitch::{StitchOptions, Stitched, stitch};
 use crate::stages::thin::{Grid, LeftOut, thin};
 use crate::stages::triples::{Triples, triples};
@@ -59,9 +59,7 @@ impl<'a> Stages<'a> {
         // With a region, headers do not tell how many points there will be.
         let headers = match workspace.is_task() || job.params.crop.is_some() {
             true => None,
-            false => {
-                Known::from_headers(&job.inputs, &job.params.attributes, job.params.scanners())
-            }
+            false => Known::from_headers(&job.inputs, &job.params.selection()),
         };
         let first = headers.map(|known| known.estimate(&job.params, &job.mesh));
         let mut exceeded = None;
@@ -140,10 +138,7 @@ impl<'a> Stages<'a> {
             }
             Ok(spool)
         })?;
-        self.carried = spool.carried(&params.attributes, params.wide_colors);
-        if params.scanners() {
-            self.carried = spool.with_scanners(std::mem::take(&mut self.carried));
-        }
+        self.carried = self.carry(&spool);
         self.report.attributes = self.carried.attributes.clone();
         let input = spool.stats().clone();
         if let Some(mixed) = input.mixed.as_ref().filter(|_| !params.ignore_crs) {
@@ -151,9 +146,15 @@ impl<'a> Stages<'a> {
         }
         self.wkt = spool.wkt().map(str::to_owned);
         self.report.coordinates = written(spool.source_precision());
-        let scanner = match self.carried.has_scanners() {
-            true => SCANNER,
-            false => 0,
+        let scanner = if self.carried.has_scanners() {
+            SCANNER
+        } else {
+            0
+        };
+        let normal = if self.carried.has_normals() {
+            NORMAL
+        } else {
+            0
         };
         self.known = Known {
             read: input.kept,
@@ -161,8 +162,9 @@ impl<'a> Stages<'a> {
             decompressed: 0,
             // With thinning, the number of points that stay is unknown.
             points: if params.thin.is_some() { 0 } else { input.kept },
-            values: self.carried.bytes() as u64 - scanner,
+            values: self.carried.bytes() as u64 - scanner - normal,
             scanner,
+            normal,
             double: Some(self.report.coordinates == CoordinateType::Double),
             moved: None,
             text: None,
@@ -309,29 +311,6 @@ impl<'a> Stages<'a> {
 
     fn tiles(&self) -> TileRanges {
         TileRanges::new(self.blocks(), self.job.tile_points)
-    }
-
-    /// Computes the restricted Voronoi cells.
-    pub fn cells(
-        &mut self,
-        places: Places<'_>,
-        radius: DiskRadius,
-    ) -> Result<(CellTriples, Option<Coarse>)> {
-        let (params, workspace, tiles) = (&self.job.params, self.workspace, self.tiles());
-        let (k, points) = (params.neighbors, self.report.points);
-        let widen = match params.method {
-            Method::Robust => Widen::OnBands,
-            Method::Paper => Widen::OnLines,
-        };
-        workspace.trim();
-        let (shape, density) = (places.shape, places.density);
-        let (seen, coarse, stats) = self.clock.stage("cells", "points", points, || {
-            cells(shape, tiles, k, radius, widen, density, workspace)
-        })?;
-        not_a_line(&stats, points)?;
-        self.report.cells = stats;
-        let coarse = coarse.map(|coarse| Coarse::open(coarse, workspace));
-        Ok((seen, coarse.transpose()?))
     }
 
     /// Adds up the number of cells of each triple.

@@ -53,7 +53,7 @@ impl Masks {
 }
 
 /// Largest number of words of a packed row.
-const MOST_WORDS: usize = 17;
+const MOST_WORDS: usize = 19;
 
 /// The masks of a row's words, a constant.
 struct Packing<R>(PhantomData<R>);

@@ -22,6 +22,7 @@ pub mod thin;
 pub mod outliers;
 
 pub mod attributes;
+pub mod normals;
 
 pub mod smooth;
 pub mod spacing;

@@ -1,13 +1,13 @@
-//! Which side of the surface is out, at the points where that is known without the surface (not in the paper):
-//! towards what saw them, or at the ends of columns.
+//! Which side of the surface is out, at the points where that is known without the surface (not in the paper): by
+//! their normals, towards what saw them, or at the ends of columns.
 
 use super::blocks::Blocks;
 use super::columns::{Direction, extreme};
+use super::normals::{Given, Normals, is_sample};
 use super::order::PointStore;
 use super::scanners::{Scanners, Seen};
 use crate::error::Result;
 use crate::geom::Point;
-use crate::method::METHOD;
 use crate::spill::{Id, Table};
 use crate::workspace::memory::bytes_of;
 use crate::workspace::{Unit, Workspace};
@@ -81,11 +81,70 @@ impl StoredExtremes {
     }
 }
 
+/// What files tell of single points. Normals count before scanners.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Told<'a> {
+    /// The normals of the points, if these tell which side is out.
+    pub normals: Option<Normals<'a>>,
+    /// The scanners that saw the points.
+    pub scanners: Option<Scanners<'a>>,
+}
+
+impl<'a> Told<'a> {
+    fn bytes(&self, ids: usize) -> u64 {
+        let normals = self.normals.map_or(0, |normals| normals.bytes(ids));
+        normals + self.scanners.map_or(0, |scanners| scanners.bytes(ids))
+    }
+
+    fn open(&self, unit: &Unit<'_>, ids: Range<u32>) -> Result<Heard<'a>> {
+        let normals = self.normals.map(|n| n.open(unit, ids.clone()));
+        let scanners = self.scanners.map(|s| s.open(unit, ids));
+        Ok(Heard {
+            normals: normals.transpose()?,
+            scanners: scanners.transpose()?,
+        })
+    }
+}
+
+/// What files tell of the points of a block.
+#[derive(Debug)]
+pub struct Heard<'a> {
+    normals: Option<Given>,
+    scanners: Option<Seen<'a>>,
+}
+
+impl Heard<'_> {
+    fn bytes(&self) -> u64 {
+        let normals = self.normals.as_ref().map_or(0, Given::bytes);
+        normals + self.scanners.as_ref().map_or(0, Seen::bytes)
+    }
+
+    fn normal(&self, id: u32) -> Option<[f64; 3]> {
+        self.normals.as_ref()?.unit(id)
+    }
+
+    fn has(&self, id: u32) -> bool {
+        let seen = || self.scanners.as_ref().is_some_and(|seen| seen.has(id));
+        self.normal(id).is_some() || seen()
+    }
+
+    fn toward(&self, id: u32, from: Point) -> Option<[f64; 3]> {
+        let seen = || self.scanners.as_ref()?.toward(id, from);
+        self.normal(id).or_else(seen)
+    }
+
+    /// True if a point has no normal, or one that agrees with those around it.
+    fn is_sure(&self, id: u32, at: impl Fn(u32) -> Point) -> bool {
+        let agrees = |given: &Given| given.of(id).is_none() || given.agrees(id, at);
+        self.normals.as_ref().is_none_or(agrees)
+    }
+}
+
 /// What tells which side is out. Where it tells nothing, the highest points face up.
 #[derive(Debug, Clone, Copy)]
 pub enum Outside<'a> {
-    /// The scanners that saw the points.
-    Scanners(Scanners<'a>),
+    /// What files tell of single points.
+    Told(Told<'a>),
     /// A position that the whole surface faces.
     Position([i64; 3]),
     /// The points at the ends of columns.
@@ -93,17 +152,24 @@ pub enum Outside<'a> {
 }
 
 impl<'a> Outside<'a> {
+    /// What files tell; nothing if they tell nothing of any point.
+    #[must_use]
+    pub fn told(told: Told<'a>) -> Option<Self> {
+        let some = told.normals.is_some() || told.scanners.is_some();
+        some.then_some(Self::Told(told))
+    }
+
     /// True if it says all there is to say, so that the highest points say nothing.
     #[must_use]
     pub fn is_for_all(&self) -> bool {
-        !matches!(self, Self::Scanners(_))
+        !matches!(self, Self::Told(_))
     }
 
     /// Bytes of memory for `ids` points while they are read.
     #[must_use]
     pub fn bytes(&self, ids: usize) -> u64 {
         match self {
-            Self::Scanners(scanners) => scanners.bytes(ids),
+            Self::Told(told) => told.bytes(ids),
             Self::Position(_) => 0,
             // The list of one direction beside those of all points.
             Self::Extremes(_) => 5 * ids as u64,
@@ -117,7 +183,7 @@ impl<'a> Outside<'a> {
     pub fn open(&self, unit: &Unit<'_>, blocks: Blocks, block: usize) -> Result<Known<'a>> {
         let ids = blocks.ids(block);
         Ok(match *self {
-            Self::Scanners(scanners) => Known::Scanners(scanners.open(unit, ids)?),
+            Self::Told(told) => Known::Heard(told.open(unit, ids)?),
             Self::Position(place) => Known::Position(place),
             Self::Extremes(stored) => Known::Extremes {
                 directions: stored.open(unit, block, &ids)?,
@@ -131,8 +197,8 @@ impl<'a> Outside<'a> {
 /// Which side is out at the points of a block.
 #[derive(Debug)]
 pub enum Known<'a> {
-    /// The scanners that saw them.
-    Scanners(Seen<'a>),
+    /// What files tell of them.
+    Heard(Heard<'a>),
     /// A position.
     Position([i64; 3]),
     /// The points at the ends of columns.
@@ -151,7 +217,7 @@ impl Known<'_> {
     #[must_use]
     pub fn bytes(&self) -> u64 {
         match self {
-            Self::Scanners(seen) => seen.bytes(),
+            Self::Heard(heard) => heard.bytes(),
             Self::Position(_) => 0,
             Self::Extremes { directions, .. } => bytes_of(directions),
         }
@@ -161,26 +227,28 @@ impl Known<'_> {
     #[must_use]
     pub fn has(&self, id: u32) -> bool {
         match self {
-            Self::Scanners(seen) => seen.has(id),
+            Self::Heard(heard) => heard.has(id),
             Self::Position(_) | Self::Extremes { .. } => true,
         }
     }
 
-    /// True if a point of the block is a witness, if its outer side is known: points at the ends of columns are
-    /// few, of others one for a number of points is enough.
+    /// As [`Known::toward`], for witnesses only: points at the ends of columns are few, of others one for a number of
+    /// points is enough, and its normal must agree with those around it. `at` has the positions of the block.
     #[must_use]
-    pub fn is_sampled(&self, id: u32) -> bool {
-        match self {
+    pub fn witness(&self, id: u32, at: impl Fn(u32) -> Point) -> Option<[f64; 3]> {
+        let is_one = match self {
+            Self::Heard(heard) => is_sample(id) && heard.is_sure(id, &at),
+            Self::Position(_) => is_sample(id),
             Self::Extremes { .. } => true,
-            _ => u64::from(id) % METHOD.orientation.column == 0,
-        }
+        };
+        is_one.then(|| self.toward(id, at(id))).flatten()
     }
 
     /// The unit vector out of the surface at a point of the block, at `from`; none if that is not known.
     #[must_use]
     pub fn toward(&self, id: u32, from: Point) -> Option<[f64; 3]> {
         match self {
-            Self::Scanners(seen) => seen.toward(id, from),
+            Self::Heard(heard) => heard.toward(id, from),
             Self::Position(place) => super::scanners::toward(*place, from),
             Self::Extremes {
                 first,

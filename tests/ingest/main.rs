@@ -9,6 +9,7 @@ mod damage;
 mod far;
 mod formats;
 mod lattices;
+mod normals;
 mod numbers;
 mod ply_headers;
 mod regions;

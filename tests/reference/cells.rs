@@ -1,5 +1,6 @@
 //! Sections 1, 2, 3.1 and 5: ids, neighbours, planes, cells and their triples.
 
+use super::normals::{self, Short};
 use super::spacing::Density;
 use super::surface::Triangle;
 use super::{Radius, Settings};
@@ -93,15 +94,26 @@ pub fn widened_plane(
     }
 }
 
-/// The pairs with which the cell of `i` makes triples. `diagonal` is that of the whole cloud.
-fn corners(points: &[Point], i: usize, settings: &Settings, diagonal: f64) -> Vec<(u32, u32)> {
+/// The pairs with which the cell of `i`, which has the normal `given`, makes triples. `diagonal` is that of the whole
+/// cloud.
+fn corners(
+    points: &[Point],
+    i: usize,
+    given: Option<Short>,
+    settings: &Settings,
+    diagonal: f64,
+) -> Vec<(u32, u32)> {
     let others = by_distance(points, i);
-    let (_, plane, last) = widened_plane(points, i, settings.neighbors, settings.robust);
-    let (Some(normal), Some(last)) = (plane.normal, last) else {
+    let (moments, plane, last) = widened_plane(points, i, settings.neighbors, settings.robust);
+    let Some(last) = last else {
+        return Vec::new();
+    };
+    let reach2 = distance2(points[i], points[last]);
+    let Some(normal) = normals::direction(given, settings, (&moments, &plane), reach2) else {
         return Vec::new();
     };
     let radius = match settings.radius {
-        Radius::Auto => 2.0 * (distance2(points[i], points[last]) as f64).sqrt(),
+        Radius::Auto => 2.0 * (reach2 as f64).sqrt(),
         Radius::Percent(percent) => percent / 100.0 * diagonal,
         Radius::Length(steps) => steps,
     };
@@ -124,6 +136,18 @@ pub fn triples(
     points: &[Point],
     settings: &Settings,
     diagonal: f64,
+    density: Option<&mut Density>,
+) -> (BTreeMap<Triangle, u32>, usize) {
+    let none = vec![None; points.len()];
+    triples_given(points, &none, settings, diagonal, density)
+}
+
+/// As [`triples`], of points that have normals.
+pub fn triples_given(
+    points: &[Point],
+    given: &[Option<Short>],
+    settings: &Settings,
+    diagonal: f64,
     mut density: Option<&mut Density>,
 ) -> (BTreeMap<Triangle, u32>, usize) {
     let off: Vec<bool> = (0..points.len())
@@ -134,7 +158,7 @@ pub fn triples(
         .collect();
     let mut cells_of: BTreeMap<Triangle, BTreeSet<u32>> = BTreeMap::new();
     for i in (0..points.len()).filter(|&i| !off[i]) {
-        for (j, l) in corners(points, i, settings, diagonal) {
+        for (j, l) in corners(points, i, given[i], settings, diagonal) {
             let mut triple = [i as u32, j, l];
             triple.sort_unstable();
             if triple.iter().any(|&v| off[v as usize]) {

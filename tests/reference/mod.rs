@@ -22,6 +22,7 @@ pub mod homes;
 pub mod insert;
 pub mod mend;
 pub mod narrow;
+pub mod normals;
 pub mod output;
 pub mod outside;
 pub mod patches;
@@ -48,6 +49,14 @@ pub enum Radius {
     Percent(f64),
     /// In lattice steps.
     Length(f64),
+}
+
+/// What is done with the normals that points bring.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Given {
+    Auto,
+    Use,
+    Ignore,
 }
 
 /// The parameters of the method.
@@ -86,6 +95,8 @@ pub struct Settings {
     /// Longest side of a triangle, and largest triangle of a filling, in local spacings.
     pub max_edge: f64,
     pub max_fill: f64,
+    /// `--input-normals`
+    pub given: Given,
 }
 
 impl Default for Settings {
@@ -109,6 +120,7 @@ impl Default for Settings {
             keep_all: true,
             max_edge: f64::INFINITY,
             max_fill: f64::INFINITY,
+            given: Given::Use,
         }
     }
 }
@@ -125,6 +137,7 @@ impl Settings {
             keep_all: false,
             max_edge: 8.0,
             max_fill: 8.0,
+            given: Given::Auto,
             ..Self::default()
         }
     }
@@ -204,17 +217,25 @@ pub struct Mesh {
 
 /// Reconstructs the surface of a cloud.
 pub fn reconstruct(points: &[Point], settings: &Settings) -> Mesh {
-    reconstruct_seen(points, |_| None, settings)
+    reconstruct_given(points, |_| None, |_| None, settings)
 }
 
-/// As [`reconstruct`], of points that scanners saw; `scanner` has that of a position.
-pub fn reconstruct_seen(
+/// As [`reconstruct`], of points that scanners saw, and that have normals; `scanner` and `normal` have those of a
+/// position.
+pub fn reconstruct_given(
     points: &[Point],
     scanner: impl Fn(&Point) -> Option<Scanner>,
+    normal: impl Fn(&Point) -> Option<normals::Short>,
     settings: &Settings,
 ) -> Mesh {
     let mut points = cells::in_id_order(points);
     let scanners: Vec<Option<Scanner>> = points.iter().map(scanner).collect();
+    let wanted = settings.given != Given::Ignore;
+    let given: Vec<Option<normals::Short>> = points
+        .iter()
+        .map(|p| normal(p).filter(|_| wanted))
+        .collect();
+    let oriented = normals::oriented(&points, &given, settings.block);
     let diagonal = cells::diagonal(&points);
     for _ in 0..settings.smooth {
         let smooth = match settings.edges {
@@ -229,16 +250,10 @@ pub fn reconstruct_seen(
         points = relaxed.shape.clone();
     }
     let (triples, off_surface) =
-        cells::triples(&relaxed.shape, settings, diagonal, density.as_mut());
+        cells::triples_given(&relaxed.shape, &given, settings, diagonal, density.as_mut());
     let density = density.as_ref();
-    let mut mesh = connect(
-        &relaxed.shape,
-        points,
-        &triples,
-        density,
-        &scanners,
-        settings,
-    );
+    let told = normals::told(&relaxed.shape, oriented, &scanners, &given, settings);
+    let mut mesh = connect(&relaxed.shape, points, &triples, density, &told, settings);
     mesh.counts.off_surface = off_surface;
     (mesh.counts.rounds, mesh.counts.moved) = (relaxed.rounds, relaxed.moved);
     mesh.counts.kept = relaxed.kept;
@@ -256,16 +271,16 @@ pub fn from_triples(
     connect(&points.clone(), points, triples, None, &[], settings)
 }
 
-/// As [`from_triples`], with a shape and file positions, and the scanners of the points (robust).
+/// As [`from_triples`], with a shape and file positions, and what files tell of the points (robust).
 pub fn connect(
     shape: &[Point],
     file: Vec<Point>,
     triples: &BTreeMap<Triangle, u32>,
     density: Option<&Density>,
-    scanners: &[Option<Scanner>],
+    told: &[Option<Known>],
     settings: &Settings,
 ) -> Mesh {
-    let known = outside::known(shape, scanners, settings.facing);
+    let known = outside::known(shape, told, settings.facing);
     let mut counts = Counts {
         points: file.len(),
         ..Counts::default()

@@ -26,14 +26,16 @@ pub enum Known {
     Place([i64; 3]),
     /// The sum of the directions in which it is extreme, or of their opposites; zero for most points.
     Ends([i64; 3]),
+    /// It has this normal, a unit vector; true if those around it agree.
+    Normal([f64; 3], bool),
 }
 
-/// What is known of each point.
-pub fn known(points: &[Point], scanners: &[Option<Scanner>], facing: Facing) -> Vec<Option<Known>> {
+/// What is known of each point, from what files tell.
+pub fn known(points: &[Point], told: &[Option<Known>], facing: Facing) -> Vec<Option<Known>> {
     let sign = match facing {
         Facing::Auto => {
-            let of = |v| scanners.get(v).copied().flatten();
-            return (0..points.len()).map(|v| of(v).map(Known::Place)).collect();
+            let of = |v| told.get(v).copied().flatten();
+            return (0..points.len()).map(of).collect();
         }
         Facing::At(place) => return vec![Some(Known::Place(place)); points.len()],
         Facing::Out => 1,
@@ -83,12 +85,18 @@ pub fn facing(points: &[Point], known: &[Option<Known>], t: Triangle, v: u32) ->
             std::array::from_fn(|axis| (place[axis] - at[axis]) as f64)
         }
         Some(Known::Ends(sum)) => sum.map(|x| x as f64),
+        Some(Known::Normal(normal, _)) => return evidence(points, t, normal),
         None => return 0,
     };
     let length = (way[0] * way[0] + way[1] * way[1] + way[2] * way[2]).sqrt();
     if length == 0.0 {
         return 0;
     }
-    let (n, d) = (unit_normal(points, t), way.map(|x| x / length));
+    evidence(points, t, way.map(|x| x / length))
+}
+
+/// The evidence that the run i → j → k of a triangle faces a direction, a unit vector.
+fn evidence(points: &[Point], t: Triangle, d: [f64; 3]) -> i64 {
+    let n = unit_normal(points, t);
     (16.0 * (n[0] * d[0] + n[1] * d[1] + n[2] * d[2])).trunc() as i64
 }

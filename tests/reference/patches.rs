@@ -138,7 +138,8 @@ impl Block<'_> {
             for v in t {
                 let known = self.known[v as usize];
                 let up = match known {
-                    Some(Known::Place(_)) if v % 64 != 0 => 0,
+                    Some(Known::Place(_) | Known::Normal(..)) if v % 64 != 0 => 0,
+                    Some(Known::Normal(_, false)) => 0,
                     Some(_) => facing(self.points, self.known, t, v),
                     None if self.highest.contains(&v) => {
                         (16.0 * unit_normal(self.points, t)[2]).trunc() as i64

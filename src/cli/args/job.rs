@@ -2,7 +2,9 @@
 
 use super::super::parse::region;
 use crate::method::METHOD;
-use crate::params::{Facing, MaxWidth, Method, Origin, Params, Radius, Region, Smooth, Smoothing};
+use crate::params::{
+    Facing, InputNormals, MaxWidth, Method, Origin, Params, Radius, Region, Smooth, Smoothing,
+};
 use crate::pipeline::{Builder, Reconstruction};
 use crate::stages::ingest::{Attributes, Classes};
 use clap::Args as ClapArgs;
@@ -138,8 +140,9 @@ pub struct Surface {
     /// [default: 8x; with --method paper none]
     #[arg(long, value_name = "LENGTH|Nx|none")]
     pub max_edge: Option<MaxWidth>,
-    /// Which side is out: auto (what scanners of E57 and PTX files saw, else up), up (the topmost surface faces
-    /// up), out (a body), in (rooms, tunnels), or a position that the whole surface faces, like 12.5,3,1.6
+    /// Which side is out: auto (that of the points' normals if neighbours agree in sign, else what scanners of E57
+    /// and PTX files saw, else up), up (the topmost surface faces up), out (a body), in (rooms, tunnels), or a
+    /// position that the whole surface faces, like 12.5,3,1.6
     #[arg(
         long,
         value_name = "auto|up|out|in|X,Y,Z",
@@ -150,6 +153,10 @@ pub struct Surface {
     /// Do not use the positions of scanners in E57 and PTX files, by which the side that the scanner saw is out
     #[arg(long)]
     pub ignore_scanners: bool,
+    /// Normals that the points bring: use them for the disks and, if neighbours agree in sign, for the outer side; auto
+    /// uses each where it suits the points around it, and ignore none [default: auto; with --method paper use]
+    #[arg(long, value_name = "auto|use|ignore")]
+    pub input_normals: Option<InputNormals>,
 }
 
 /// Post-processing.
@@ -280,6 +287,7 @@ impl Job {
             ignore_crs: self.coordinates.ignore_crs,
             facing: self.surface.facing,
             ignore_scanners: self.surface.ignore_scanners,
+            input_normals: self.surface.input_normals.unwrap_or(usual.input_normals),
             block: self.block_points,
             ..usual
         }
@@ -300,6 +308,7 @@ mod tests {
             ("max-edge", |p| p.max_edge.to_string()),
             ("max-hole-edges", |p| p.max_hole_edges.to_string()),
             ("max-fill", |p| p.max_fill.to_string()),
+            ("input-normals", |p| p.input_normals.to_string()),
         ] {
             let option = options.iter().find(|option| option.name == name).unwrap();
             let words: Vec<&str> = option.help.split_whitespace().collect();

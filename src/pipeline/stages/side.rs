@@ -13,8 +13,10 @@ use crate::workspace::Workspace;
 /// What tells which side is out.
 #[derive(Debug)]
 pub(in crate::pipeline) enum Side {
-    /// The scanners, if there are any.
-    Seen,
+    /// What the files tell of each point; up, where they tell nothing.
+    Told,
+    /// Up, whatever files tell.
+    Up,
     /// A position that the surface faces.
     Position([i64; 3]),
     /// The points at the ends of columns.
@@ -25,7 +27,8 @@ impl Side {
     /// The same for the stages; nothing if only the highest points tell something.
     pub fn outside<'a>(&'a self, values: &'a Values) -> Option<Outside<'a>> {
         match self {
-            Self::Seen => values.scanners().map(Outside::Scanners),
+            Self::Told => Outside::told(values.told()),
+            Self::Up => None,
             Self::Position(place) => Some(Outside::Position(*place)),
             Self::Extremes(stored) => Some(Outside::Extremes(stored)),
         }
@@ -52,7 +55,8 @@ impl Stages<'_> {
     /// What tells which side is out, of the positions that decide the connectivity.
     pub fn side(&mut self, shape: &PointStore, lattice: &Lattice) -> Result<Side> {
         let inward = match self.job.params.facing {
-            Facing::Auto | Facing::Up => return Ok(Side::Seen),
+            Facing::Auto => return Ok(Side::Told),
+            Facing::Up => return Ok(Side::Up),
             Facing::At(position) => return faced(position, lattice).map(Side::Position),
             Facing::Out => false,
             Facing::In => true,

@@ -1,11 +1,17 @@
-//! The stage of values by id: columns of the mesh, and the scanners that saw the points.
+//! The stage of values by id: columns of the mesh, the scanners that saw the points, and their normals.
 
 use super::Stages;
 use crate::error::Result;
 use crate::geom::lattice::Lattice;
+use crate::params::{InputNormals, Method};
+use crate::report::NormalsReport;
 use crate::stages::attributes::{StoredAttributes, StoredColumns, attributes};
-use crate::stages::ingest::Spool;
+use crate::stages::blocks::Blocks;
+use crate::stages::cells::{DiskStats, InputDirections};
+use crate::stages::ingest::{Carried, Spool};
+use crate::stages::normals::{Normals, look};
 use crate::stages::order::StoredPoints;
+use crate::stages::outside::Told;
 use crate::stages::scanners::{self, Scanners};
 use crate::workspace::Workspace;
 
@@ -15,6 +21,10 @@ pub(in crate::pipeline) struct Values {
     stored: StoredAttributes,
     /// The places of the scanners in the order of their numbers.
     places: Vec<Option<[i64; 3]>>,
+    /// The blocks of the ids.
+    blocks: Option<Blocks>,
+    /// True if the normals tell which side is out.
+    oriented: bool,
 }
 
 impl Values {
@@ -23,20 +33,51 @@ impl Values {
         self.stored.columns.as_ref()
     }
 
-    /// The scanners, if they decide which side is out.
-    pub fn scanners(&self) -> Option<Scanners<'_>> {
-        let stored = self.stored.scanners.as_ref();
-        stored.map(|stored| Scanners::new(stored, &self.places))
+    /// What tells of single points which side is out.
+    pub fn told(&self) -> Told<'_> {
+        let scanners = self.stored.scanners.as_ref();
+        Told {
+            normals: self.normals().filter(|_| self.oriented),
+            scanners: scanners.map(|stored| Scanners::new(stored, &self.places)),
+        }
     }
 
-    /// Deletes the files of the scanners.
-    pub fn release_scanners(&self, workspace: &Workspace) -> Result<()> {
-        let stored = self.stored.scanners.as_ref();
-        stored.map_or(Ok(()), |stored| stored.release(workspace))
+    /// The normals that the points bring, if they are used.
+    fn normals(&self) -> Option<Normals<'_>> {
+        let stored = self.stored.normals.as_ref()?;
+        Some(Normals::new(stored, self.blocks?))
+    }
+
+    /// The normals that the points bring, and their use for the disks.
+    pub fn directions(&self, wanted: InputNormals) -> Option<InputDirections<'_>> {
+        let normals = self.normals();
+        normals.map(|normals| InputDirections { normals, wanted })
+    }
+
+    /// Deletes the files of the scanners and normals.
+    pub fn release_told(&self, workspace: &Workspace) -> Result<()> {
+        let StoredAttributes {
+            scanners, normals, ..
+        } = &self.stored;
+        scanners.as_ref().map_or(Ok(()), |s| s.release(workspace))?;
+        normals.as_ref().map_or(Ok(()), |n| n.release(workspace))
     }
 }
 
 impl Stages<'_> {
+    /// The values that the points keep.
+    pub(super) fn carry(&self, spool: &Spool) -> Carried {
+        let params = &self.job.params;
+        let mut carried = spool.carried(&params.attributes, params.wide_colors);
+        if params.scanners() {
+            carried = spool.with_scanners(carried);
+        }
+        if params.input_normals != InputNormals::Ignore {
+            carried = spool.with_normals(carried);
+        }
+        carried
+    }
+
     /// The values of the points that remain, if any are needed.
     pub fn values(
         &mut self,
@@ -64,15 +105,37 @@ impl Stages<'_> {
             self.carried.drop_scanners();
         }
         let (workspace, blocks, carried) = (self.workspace, self.blocks(), &self.carried);
-        let mut stored = StoredAttributes::default();
+        let names = spool.normal_names().filter(|_| carried.has_normals());
         if carried.is_empty() {
             spool.release(workspace)?;
-        } else {
-            let points = spool.points();
-            stored = self.clock.stage("attributes", "points", points, || {
-                attributes(spool, lattice, carried, store, blocks, workspace)
-            })?;
+            return Ok(Values {
+                places,
+                ..Values::default()
+            });
         }
-        Ok(Values { stored, places })
+        let points = spool.points();
+        let (stored, normals) = self.clock.stage("attributes", "points", points, || {
+            let stored = attributes(spool, lattice, carried, store, blocks, workspace)?;
+            let normals = match (&stored.normals, names) {
+                (Some(of), Some(names)) => {
+                    let normals = Normals::new(of, blocks);
+                    let store = store.open(workspace)?;
+                    Some(look(normals, &store, names.into(), workspace)?)
+                }
+                _ => None,
+            };
+            Ok((stored, normals))
+        })?;
+        let oriented = normals.as_ref().is_some_and(|normals| normals.oriented);
+        self.report.normals = normals.map(|input| NormalsReport {
+            input,
+            disks: DiskStats::default(),
+        });
+        Ok(Values {
+            stored,
+            places,
+            blocks: Some(blocks),
+            oriented: oriented && self.job.params.method == Method::Robust,
+        })
     }
 }

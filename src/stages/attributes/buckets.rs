@@ -67,20 +67,21 @@ impl<'a> Buckets<'a> {
         section(self.starts[bucket])..section(self.starts[bucket + 1])
     }
 
-    /// Puts the values that were sent in the order of ids, so many words of each point into each of two tables;
+    /// Puts the values that were sent in the order of ids, so many words of each point into each of three tables;
     /// a table of no words is not made.
     pub fn merge<R: Row>(
         &self,
         inbox: &Inbox<R>,
-        parts: [usize; 2],
+        parts: [usize; 3],
         workspace: &Workspace,
-    ) -> Result<[Option<Part>; 2]> {
-        let words = parts[0] + parts[1];
+    ) -> Result<[Option<Part>; 3]> {
+        let words = parts.iter().sum();
         let table =
             |name, words| (words > 0).then(|| (Table::new(name, self.sections.len() - 1), words));
         let tables = [
             table("attributes.scanners", parts[0]),
-            table("attributes", parts[1]),
+            table("attributes.normals", parts[1]),
+            table("attributes", parts[2]),
         ];
         let work = |unit: &Unit<'_>| {
             let bucket = unit.number();

@@ -1,4 +1,5 @@
-//! Columns of the points by id, such as colours, and the scanners that saw them (not in the paper).
+//! Columns of the points by id, such as colours, the scanners that saw them (both not in the paper), and the normals
+//! that their files give.
 //!
 //! The ordered store is there already. Units read parts of the spool again, with values, and send each point's row
 //! to a bucket: a range of ids, cut at a sample of all points. Units of buckets sort the rows and go through them
@@ -18,7 +19,7 @@ use crate::stages::order::{Grouped, MOST_GROUPS, StoredPoints, cuts};
 use crate::workspace::memory::bytes_of;
 use crate::workspace::{Unit, Workspace};
 use buckets::Buckets;
-use rows::{Row1, Row2, Row6, Row12, Row13, Word};
+use rows::{Row1, Row2, Row6, Row12, Row13, Row15, Word};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
@@ -184,6 +185,31 @@ impl StoredScanners {
     }
 }
 
+/// The normal of each point by id.
+#[derive(Debug, Serialize, Deserialize)]
+pub struct StoredNormals {
+    words: Words,
+}
+
+release!(StoredNormals: words);
+
+impl StoredNormals {
+    /// Bytes of memory for the normals of `ids` ids while they are read.
+    #[must_use]
+    pub fn bytes(&self, ids: usize) -> u64 {
+        self.words.bytes(ids)
+    }
+
+    /// The words of the normals of some ids, ascending: two for each, of
+    /// [`direction`](crate::stages::ingest::direction).
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+    pub fn open(&self, unit: &Unit<'_>, ids: impl IntoIterator<Item = u32>) -> Result<Vec<u32>> {
+        self.words.open(unit, ids)
+    }
+}
+
 /// The values of the points by id.
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub struct StoredAttributes {
@@ -191,9 +217,11 @@ pub struct StoredAttributes {
     pub columns: Option<StoredColumns>,
     /// The scanners, if they are carried.
     pub scanners: Option<StoredScanners>,
+    /// The normals, if they are carried.
+    pub normals: Option<StoredNormals>,
 }
 
-/// Puts the columns and scanners `carried` of a spool in the order of the ids of `store`, and deletes the spool.
+/// Puts the columns, scanners and normals `carried` of a spool in the order of the ids of `store`, and deletes the spool.
 ///
 /// # Errors
 /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`], [`crate::Error::Cancelled`].
@@ -217,7 +245,8 @@ pub fn attributes(
         2 => job.run::<Row2>(store, blocks),
         3..=6 => job.run::<Row6>(store, blocks),
         7..=12 => job.run::<Row12>(store, blocks),
-        _ => job.run::<Row13>(store, blocks),
+        13 => job.run::<Row13>(store, blocks),
+        _ => job.run::<Row15>(store, blocks),
     }
 }
 
@@ -249,11 +278,13 @@ impl Job<'_> {
         let buckets = Buckets::new(&store, &cuts, blocks, workspace)?;
         let inbox = sent.open(workspace, buckets.count())?;
         let words = self.carried.bytes().div_ceil(4);
-        let first = usize::from(self.carried.has_scanners());
-        let tables = buckets.merge(&inbox, [first, words - first], workspace)?;
+        let scanner = usize::from(self.carried.has_scanners());
+        let normal = 2 * usize::from(self.carried.has_normals());
+        let parts = [scanner, normal, words - scanner - normal];
+        let tables = buckets.merge(&inbox, parts, workspace)?;
         drop(inbox);
         sent.release(workspace)?;
-        let [scanners, columns] = tables.map(|table| {
+        let [scanners, normals, columns] = tables.map(|table| {
             table.map(|(table, words)| Words {
                 words,
                 table,
@@ -266,6 +297,7 @@ impl Job<'_> {
                 words,
             }),
             scanners: scanners.map(|words| StoredScanners { words }),
+            normals: normals.map(|words| StoredNormals { words }),
         })
     }
 

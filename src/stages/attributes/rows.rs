@@ -34,6 +34,11 @@ valued!(
     Above Above Above Above Above Above Above Above Above Above Above Above Above
 );
 
+valued!(
+    Row15, 15,
+    Above Above Above Above Above Above Above Above Above Above Above Above Above Above Above
+);
+
 row! {
     /// A word of the values of a point.
     pub struct Word {

@@ -1,6 +1,7 @@
 //! Computation of one cell: neighbours, plane, disk, clipping up to the radius of security (paper, 3.3 and
 //! 3.4).
 
+use super::directions::{Directions, DiskStats};
 use crate::error::Result;
 use crate::geom::Point;
 use crate::geom::aabb::Aabb;
@@ -176,6 +177,8 @@ pub struct CellMaker<'a> {
     density: Option<Density<'a>>,
     /// The points that are coarser than their patch, with their numbers.
     pub(super) coarse: Vec<(u32, u8)>,
+    /// The normals of the points, if they bring any.
+    directions: Option<Directions>,
     pub(super) cell: Cell,
     pub(super) wrapper: Box<Wrapper>,
 }
@@ -195,9 +198,21 @@ impl<'a> CellMaker<'a> {
             widen,
             density,
             coarse: Vec::new(),
+            directions: None,
             cell: Cell::new(0, [0, 0, 1 << 24], 1.0),
             wrapper: Box::default(),
         }
+    }
+
+    /// Takes the directions of disks from the normals of the points, too.
+    pub(super) fn set_directions(&mut self, directions: Directions) {
+        self.directions = Some(directions);
+    }
+
+    /// Bytes and counts of the normals of the points.
+    pub(super) fn of_directions(&self) -> (u64, DiskStats) {
+        let directions = self.directions.as_ref();
+        directions.map_or_else(Default::default, |d| (d.bytes(), d.stats()))
     }
 
     /// The normal and the radius of a point's disk, or the reason why it has none.
@@ -206,9 +221,14 @@ impl<'a> CellMaker<'a> {
         id: u32,
         fit: &Fit,
     ) -> std::result::Result<(Normal, f64), Outcome> {
-        let normal = fit.plane.normal.ok_or(Outcome::NoPlane)?;
-        if let Some(density) = self.density {
-            match density.standing(id, fit.near2, &fit.moments, normal) {
+        let estimated = fit.plane.normal;
+        let directions = self.directions.as_mut();
+        let near = (&fit.moments, fit.last2);
+        let normal = directions.map_or(estimated, |d| d.choose(id, estimated, near));
+        let normal = normal.ok_or(Outcome::NoPlane)?;
+        // How a point lies to its neighbours depends on their plane, not on what the point says.
+        if let (Some(density), Some(plane)) = (self.density, estimated) {
+            match density.standing(id, fit.near2, &fit.moments, plane) {
                 Standing::Off => return Err(Outcome::OffSurface),
                 Standing::Coarse(level) if level > 0 && fit.plane.wide => {
                     self.coarse.push((id, level));

@@ -1,11 +1,13 @@
 //! Restricted Voronoi cells of all points, tile by tile (paper, sections 3.3 and 3.4).
 
 mod cell;
+mod directions;
 mod fits;
 mod fold;
 mod together;
 
 pub use cell::{CellMaker, DiskRadius, Fit, Outcome, Widen};
+pub use directions::{DiskStats, InputDirections};
 pub(crate) use fits::{Planes, each_around};
 pub use fits::{each_neighborhood, each_plane};
 
@@ -20,6 +22,7 @@ use crate::stages::tiles::Tile;
 use crate::stages::tiles::near::Search;
 use crate::stages::tiles::walk::PageCache;
 use crate::workspace::{Unit, Workspace};
+use directions::Directions;
 use fold::TileTriples;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
@@ -134,6 +137,30 @@ impl TileRanges {
     }
 }
 
+/// Counts of cells and of their disks.
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
+pub struct CellCounts {
+    /// The cells.
+    pub cells: CellStats,
+    /// The disks of points that bring normals.
+    pub disks: DiskStats,
+}
+
+/// What cells are made of, besides the points.
+#[derive(Debug, Clone, Copy)]
+pub struct CellOptions<'a> {
+    /// Neighbours for the plane.
+    pub neighbors: usize,
+    /// Radius of the disk.
+    pub radius: DiskRadius,
+    /// When planes take more neighbours.
+    pub widen: Widen,
+    /// If given, points off the surface get no cell.
+    pub density: Option<Density<'a>>,
+    /// The normals that points bring, if they are used.
+    pub directions: Option<InputDirections<'a>>,
+}
+
 /// Computes all cells and collects their triples. Also returns how coarse points are, as
 /// [`coarseness`](crate::stages::spacing::coarseness), if any is coarse.
 ///
@@ -143,31 +170,32 @@ impl TileRanges {
 pub fn cells(
     store: &PointStore,
     tiles: TileRanges,
-    neighbors: usize,
-    radius: DiskRadius,
-    widen: Widen,
-    density: Option<Density<'_>>,
+    options: CellOptions<'_>,
     workspace: &Workspace,
-) -> Result<(CellTriples, Option<Levels>, CellStats)> {
+) -> Result<(CellTriples, Option<Levels>, CellCounts)> {
     let own = Table::new("cells.own", tiles.count());
     let off = Table::new("cells.off", tiles.count());
     let shuffle = Shuffle::new("cells.sent");
     let bytes = |tile: usize| {
         let points = tiles.ids(tile).len();
-        Tile::estimate(points) + PageCache::estimate(store) + TileTriples::estimate(points)
+        let given = options.directions.map_or(0, |d| d.bytes(points));
+        Tile::estimate(points) + PageCache::estimate(store) + TileTriples::estimate(points) + given
     };
     let work = |unit: &Unit<'_>| {
         let tile = unit.number();
         let ids = tiles.ids(tile);
         let mut seen = TileTriples::new(ids.clone());
-        let mut maker = CellMaker::new(neighbors, radius, widen, density);
-        let (mut stats, mut no_cell) =
-            one_tile(unit, store, ids.clone(), neighbors, &mut maker, &mut seen)?;
+        let mut maker = maker(unit, &ids, options)?;
+        let (of_directions, _) = maker.of_directions();
+        let of_directions = unit.hold(of_directions);
+        let (mut stats, mut no_cell) = one_tile(unit, store, ids.clone(), &mut maker, &mut seen)?;
+        let (_, disks) = maker.of_directions();
+        let coarse = by_place(&maker.coarse, &ids);
+        drop((maker, of_directions));
         no_cell.sort_unstable();
         off.put(unit, tile, &no_cell)?;
         stats.raw_triples = seen.len() as u64;
         let folding = seen.fold_bytes();
-        let coarse = by_place(&maker.coarse, &ids);
         let mut held = unit.hold(seen.bytes() + folding);
         let (kept, sent) = seen.fold(&tiles);
         let folded = (size_of_val(&*kept) + size_of_val(&*sent)) as u64;
@@ -177,9 +205,10 @@ pub fn cells(
         own.put(unit, tile, &kept)?;
         shuffle.send(unit, tile, sent)?;
         unit.advance(ids.len() as u64);
-        Ok((stats, coarse))
+        Ok((stats, disks, coarse))
     };
-    let mut stats = CellStats::default();
+    let mut counts = CellCounts::default();
+    let (stats, disks) = (&mut counts.cells, &mut counts.disks);
     let mut all_coarse: Option<Levels> = None;
     let mut held = workspace.reserve("coarse points", 0)?;
     let step = "cells: tile";
@@ -188,7 +217,7 @@ pub fn cells(
         tiles.count(),
         bytes,
         work,
-        |tile, (more, coarse): Noted| {
+        |tile, (more, of_disks, coarse): Noted| {
             if !coarse.is_empty() {
                 if all_coarse.is_none() {
                     held = workspace.reserve("coarse points", Levels::size(store.len()))?;
@@ -196,7 +225,7 @@ pub fn cells(
                 let all = all_coarse.get_or_insert_with(|| Levels::new(store.len()));
                 all.put_range(tiles.ids(tile), &coarse);
             }
-
+            disks.add(of_disks);
             stats.global_fallbacks += more.global_fallbacks;
             stats.no_plane += more.no_plane;
             stats.off_surface += more.off_surface;
@@ -211,11 +240,11 @@ pub fn cells(
         sent: shuffle,
         off,
     };
-    Ok((triples, all_coarse, stats))
+    Ok((triples, all_coarse, counts))
 }
 
 /// What a unit notes besides its triples: counts, and how coarse its points are; empty if none is.
-type Noted = (CellStats, Levels);
+type Noted = (CellStats, DiskStats, Levels);
 
 /// The numbers of the coarse points among `ids`, by place; empty if there is none.
 fn by_place(coarse: &[(u32, u8)], ids: &Range<usize>) -> Levels {
@@ -226,11 +255,31 @@ fn by_place(coarse: &[(u32, u8)], ids: &Range<usize>) -> Levels {
     levels
 }
 
+/// What makes the cells of a tile.
+fn maker<'a>(
+    unit: &Unit<'_>,
+    ids: &Range<usize>,
+    options: CellOptions<'a>,
+) -> Result<CellMaker<'a>> {
+    let CellOptions {
+        neighbors,
+        radius,
+        widen,
+        density,
+        directions,
+    } = options;
+    let mut maker = CellMaker::new(neighbors, radius, widen, density);
+    if let Some(InputDirections { normals, wanted }) = directions {
+        let given = normals.open(unit, ids.start as u32..ids.end as u32)?;
+        maker.set_directions(Directions::new(given, wanted));
+    }
+    Ok(maker)
+}
+
 fn one_tile(
     unit: &Unit<'_>,
     store: &PointStore,
     ids: Range<usize>,
-    neighbors: usize,
     maker: &mut CellMaker<'_>,
     seen: &mut TileTriples,
 ) -> Result<(CellStats, Vec<Id>)> {
@@ -244,7 +293,7 @@ fn one_tile(
     let mut failed = None;
     let mut searching = unit.hold(0);
     let grown = |bytes| searching.set(bytes);
-    tile.for_each_group(neighbors, &mut search, grown, |group| {
+    tile.for_each_group(maker.neighbors, &mut search, grown, |group| {
         let outcomes = maker.from_group(group, |id, a, b| seen.see(id, a, b));
         for (number, (member, outcome)) in group.members().iter().zip(outcomes).enumerate() {
             let id = member.id;

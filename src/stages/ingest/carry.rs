@@ -1,11 +1,12 @@
 //! The columns that the mesh keeps, and the values of the spool in their types.
 //!
 //! The columns of all files become one list. Its rows are bytes that compare like the values, column by column,
-//! so that the smallest of several rows does not depend on who read them. The number of the scanner, if it is
-//! carried, comes first: so the scanner of a position is the same whatever columns the mesh keeps.
+//! so that the smallest of several rows does not depend on who read them. The number of the scanner and the normal,
+//! if they are carried, come first: so those of a position are the same whatever columns the mesh keeps.
 
 use super::Spool;
 use super::columns::{Attributes, COLORS, Column, SCANNER, Span, row_bytes};
+use super::directions::{NORMAL_BYTES, Parts, normal_of};
 use super::ranks::Ranks;
 use super::source::Source;
 use outcrop_ply::{Scalar, real};
@@ -75,6 +76,8 @@ pub struct Carried {
     ranks: Ranks,
     /// For each source, the place of the number of the scanner; none if scanners are not carried.
     scanners: Option<Vec<Option<(usize, Scalar)>>>,
+    /// For each source, the places of the normal; none if normals are not carried.
+    pub(super) normals: Option<Vec<Option<Parts>>>,
 }
 
 /// Bytes of the number of a scanner in a row.
@@ -91,13 +94,24 @@ impl Carried {
     #[must_use]
     pub fn bytes(&self) -> usize {
         let number = if self.scanners.is_some() { NUMBER } else { 0 };
-        number + row_bytes(&self.columns)
+        let normal = if self.normals.is_some() {
+            NORMAL_BYTES
+        } else {
+            0
+        };
+        number + normal + row_bytes(&self.columns)
     }
 
     /// True if rows begin with the number of the scanner, from 1, or 0: a word, highest byte first.
     #[must_use]
     pub fn has_scanners(&self) -> bool {
         self.scanners.is_some()
+    }
+
+    /// True if the normal follows: two words, highest byte first, of [`direction`](super::direction).
+    #[must_use]
+    pub fn has_normals(&self) -> bool {
+        self.normals.is_some()
     }
 
     /// The positions of the scanners in the order of their numbers, in the input's unit.
@@ -118,6 +132,10 @@ impl Carried {
         if let Some(scanners) = &self.scanners {
             let scanner = scanners[source].map(|(at, scalar)| real(scalar, &values[at..], false));
             row.extend(scanner.map_or(0, number).to_be_bytes());
+        }
+        if let Some(normals) = &self.normals {
+            let words = normal_of(normals[source].as_ref(), values);
+            row.extend(words.iter().flat_map(|word| word.to_be_bytes()));
         }
         for step in &self.steps[source] {
             let value = match step.from {

@@ -36,11 +36,21 @@ const ALIASES: [(&str, &str); 12] = [
     ("returnnumber", "return_number"),
 ];
 
+/// Names of the columns of a normal, as they are known in all formats: of PLY and CloudCompare, of PCD, of the
+/// extension of E57, and of LAS, the last of three numbers in one.
+const NORMALS: [[&str; 3]; 5] = [
+    ["nx", "ny", "nz"],
+    ["normal_x", "normal_y", "normal_z"],
+    ["nor_normalx", "nor_normaly", "nor_normalz"],
+    ["normalx", "normaly", "normalz"],
+    ["normal0", "normal1", "normal2"],
+];
+
 /// Most bytes of all columns of a point that are wanted for the mesh.
 pub(super) const MOST_BYTES: usize = 48;
 
-/// Most bytes of a point's row: these, and the number of its scanner.
-pub(super) const MOST_ROW: usize = MOST_BYTES + size_of::<u32>();
+/// Most bytes of a point's row: these, the number of its scanner, and its normal.
+pub(super) const MOST_ROW: usize = MOST_BYTES + size_of::<u32>() + 3 * size_of::<f64>();
 
 /// A column of a file.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -174,20 +184,24 @@ pub(super) struct Wanted {
 }
 
 impl Wanted {
-    /// Of a file with these columns; also that of scanners if `scanners`.
+    /// Of a file with these columns; also that of scanners if `scanners`, and those of normals if `normals`.
     ///
     /// # Errors
     /// [`Error::Parameter`] if those for the mesh take more than [`MOST_BYTES`].
-    pub(super) fn of(attributes: &Attributes, columns: &[Column], scanners: bool) -> Result<Self> {
+    pub(super) fn of(
+        attributes: &Attributes,
+        columns: &[Column],
+        scanners: bool,
+        normals: bool,
+    ) -> Result<Self> {
         let mut numbers = attributes.of(columns);
         let bytes: usize = numbers.iter().map(|n| columns[*n].scalar.bytes()).sum();
-        if scanners
-            && let Some(scanner) = columns.iter().position(|c| c.name == SCANNER)
-            && !numbers.contains(&scanner)
-        {
-            numbers.push(scanner);
-            numbers.sort_unstable();
-        }
+        let scanner = columns.iter().position(|c| c.name == SCANNER);
+        numbers.extend(scanner.filter(|_| scanners));
+        let normal = normal_columns(columns).filter(|_| normals);
+        numbers.extend(normal.into_iter().flatten());
+        numbers.sort_unstable();
+        numbers.dedup();
         let columns = numbers.iter().map(|n| columns[*n].clone()).collect();
         if bytes > MOST_BYTES {
             return Err(Error::Parameter {
@@ -208,6 +222,15 @@ impl Wanted {
     pub(super) fn bytes(&self) -> usize {
         row_bytes(&self.columns)
     }
+}
+
+/// Numbers of the columns of a normal; of several with the same name the first counts.
+pub(super) fn normal_columns(columns: &[Column]) -> Option<[usize; 3]> {
+    let number = |name: &str| columns.iter().position(|c| c.name == name);
+    NORMALS.iter().find_map(|names| {
+        let [x, y, z] = names.map(number);
+        Some([x?, y?, z?])
+    })
 }
 
 /// Bytes of the values of a point.
@@ -250,6 +273,28 @@ mod tests {
     use super::*;
 
     #[test]
+    fn normals_have_many_names() {
+        let columns = |names: &[&str]| -> Vec<Column> {
+            let columns = names.iter().map(|name| Column::new(name, Scalar::F32));
+            columns.collect()
+        };
+        for (names, expected) in [
+            (&["red", "NX", "Ny", "nz"][..], Some([1, 2, 3])),
+            (&["normal_z", "normal_x", "normal_y"], Some([1, 2, 0])),
+            (
+                &["nor_normalX", "nor_normalY", "nor_normalZ"],
+                Some([0, 1, 2]),
+            ),
+            (&["NormalX", "NormalY", "NormalZ", "nx"], Some([0, 1, 2])),
+            (&["scalar_Nx", "scalar_Ny", "scalar_Nz"], Some([0, 1, 2])),
+            (&["nx", "ny", "normalz"], None),
+            (&[], None),
+        ] {
+            assert_eq!(normal_columns(&columns(names)), expected, "{names:?}");
+        }
+    }
+
+    #[test]
     fn lists_are_parsed() {
         let list = |names: &[&str]| {
             Ok(Attributes::List(
@@ -284,15 +329,22 @@ mod tests {
             .map(|n| Column::new(&n.to_string(), Scalar::F64))
             .collect();
         let list = |n: usize| Attributes::List((0..n).map(|n| n.to_string()).collect());
-        assert_eq!(Wanted::of(&list(6), &columns, false).unwrap().bytes(), 48);
-        assert!(Wanted::of(&list(7), &columns, false).is_err());
+        assert_eq!(
+            Wanted::of(&list(6), &columns, false, false)
+                .unwrap()
+                .bytes(),
+            48
+        );
+        assert!(Wanted::of(&list(7), &columns, false, false).is_err());
     }
 
     #[test]
     fn scanners_are_wanted_beside_others() {
         let columns = ["intensity", SCANNER, "red"].map(|n| Column::new(n, Scalar::U16));
         let numbers = |attributes: &Attributes, scanners| {
-            Wanted::of(attributes, &columns, scanners).unwrap().numbers
+            Wanted::of(attributes, &columns, scanners, false)
+                .unwrap()
+                .numbers
         };
         assert_eq!(numbers(&Attributes::None, true), [1]);
         assert_eq!(numbers(&Attributes::Auto, true), [0, 1, 2]);

@@ -16,6 +16,7 @@ mod contain;
 mod coordinate;
 mod crop;
 mod crs;
+mod directions;
 mod e57;
 mod expand;
 mod far;
@@ -29,6 +30,7 @@ mod lines;
 mod map;
 mod middle;
 mod native;
+mod normals;
 mod number;
 mod pcd;
 mod ply;
@@ -49,6 +51,7 @@ pub use classes::Classes;
 pub use columns::{Attributes, Column};
 pub use crop::Crop;
 pub use crs::{Crs, CrsSource, of_prj, prj_of};
+pub use directions::{NORMAL_BYTES, direction};
 pub use expand::expand;
 pub use format::Format;
 pub use probe::{Probe, probe};
@@ -93,6 +96,8 @@ pub struct Selection {
     pub attributes: Attributes,
     /// True if the scanners of the points are read, from files that give their positions.
     pub scanners: bool,
+    /// True if the normals of the points are read, from files that have any.
+    pub normals: bool,
 }
 
 /// All points of the inputs in one scratch file.
@@ -197,7 +202,7 @@ fn read_all(
         let number = sources.len() as u32;
         let scanners = selection.scanners && opened.has_scanners();
         let columns = opened.file.columns();
-        let wanted = Wanted::of(&selection.attributes, &columns, scanners)?;
+        let wanted = Wanted::of(&selection.attributes, &columns, scanners, selection.normals)?;
         present.extend(columns);
         let target = SourceWriter::new(workspace, name, section, number, classes, &wanted)?
             .within(nearby.as_ref(), opened.claims.native);
@@ -224,7 +229,7 @@ fn read_all(
         section = next;
         frames.extend(more);
         values.extend(more_values.frames);
-        if selection.attributes != Attributes::None || selection.scanners {
+        if selection.attributes != Attributes::None || selection.scanners || selection.normals {
             // Frames without values.
             values.resize(frames.len(), Frame::default());
         }

@@ -1,7 +1,7 @@
 //! Reads the header of a file only.
 
 use super::Opened;
-use super::columns::{Attributes, Column};
+use super::columns::{Attributes, Column, normal_columns};
 use super::format::Format;
 use super::formats::LONG_HEAD;
 use super::input::Input;
@@ -41,6 +41,8 @@ pub struct Probe {
     pub columns: Vec<Column>,
     /// Bytes of the number of the scanner that saw a point, if the file gives positions of scanners.
     pub scanner_bytes: u64,
+    /// Bytes of the columns of its normal.
+    pub normal_bytes: u64,
     /// Bytes of a point in the scratch folder.
     pub spool_bytes_per_point: u64,
 }
@@ -71,6 +73,13 @@ pub fn probe(path: &Path) -> Result<Probe> {
         Native::Las { scale, offset } => (Some(scale), Some(offset)),
         Native::F32 | Native::F64 => (None, None),
     };
+    let columns = file.columns();
+    let normal = normal_columns(&columns);
+    let bytes = normal
+        .into_iter()
+        .flatten()
+        .map(|n| columns[n].scalar.bytes());
+    let normal_bytes = bytes.sum::<usize>() as u64;
     Ok(Probe {
         format: claims.format,
         bytes: input.size,
@@ -91,7 +100,8 @@ pub fn probe(path: &Path) -> Result<Probe> {
             false => 0,
         },
         is_described: file.is_described(),
-        columns: file.columns(),
+        columns,
+        normal_bytes,
         spool_bytes_per_point: claims.native.point_bytes() as u64,
         path: input.path,
     })

@@ -250,13 +250,12 @@ impl Look<'_> {
         let known = outside.open(unit, self.blocks, unit.number())?;
         let _held = unit.hold(outside.bytes(ids.len()));
         let facing = |vertex: u32| {
-            let toward = known.toward(vertex, places.at(vertex))?;
+            let toward = known.witness(vertex, |id| places.at(id))?;
             Some(Witness { vertex, toward })
         };
         let unseen = highest.iter().filter(|v| !known.has(**v));
         let mut all: Vec<Witness> = unseen.map(up).collect();
-        let sampled = ids.filter(|v| known.is_sampled(*v));
-        all.extend(sampled.filter_map(facing));
+        all.extend(ids.filter_map(facing));
         all.sort_unstable_by_key(|w| w.vertex);
         Ok(all)
     }

@@ -1,6 +1,6 @@
 //! The points of an E57 file: a unit for each scan.
 
-use super::super::columns::{Column, SCANNER, Wanted};
+use super::super::columns::{Column, SCANNER, Wanted, normal_columns};
 use super::super::coordinate::Coordinate;
 use super::super::input::Input;
 use super::super::spool::{Sink, SourceWriter, sink_bytes};
@@ -21,6 +21,8 @@ struct Plan {
     spherical_state: Option<usize>,
     /// The values of wanted columns.
     values: Vec<Value>,
+    /// Numbers of the columns of a normal, if the scan was turned.
+    normal: Option<[usize; 3]>,
     /// The parts of the records that are read; all other fields are numbers of these.
     parts: Vec<Decoded>,
 }
@@ -85,6 +87,7 @@ impl Plan {
             }
         };
         Ok(Self {
+            normal: normal_columns(&wanted.columns).filter(|_| motion.turns()),
             motion,
             cartesian,
             cartesian_state,
@@ -133,11 +136,23 @@ impl Plan {
     /// Appends the values of the wanted columns of a record.
     #[inline]
     fn put(&self, values: &[Vec<f64>], record: usize, out: &mut Vec<u8>) {
-        for column in &self.values {
+        let value = |column: &Value| {
             let valid = |state: &usize| values[*state][record] == 0.0;
             let from = column.from.filter(|(_, state)| state.iter().all(valid));
-            let value = from.map_or(column.otherwise, |(part, _)| values[part][record]);
-            column.scalar.put(value, out);
+            from.map_or(column.otherwise, |(part, _)| values[part][record])
+        };
+        let normal = self.normal.map(|columns| {
+            let normal = columns.map(|number| value(&self.values[number]));
+            (columns, self.motion.turned(normal))
+        });
+        for (number, column) in self.values.iter().enumerate() {
+            let turned = normal.as_ref().and_then(|(columns, turned)| {
+                let axis = columns.iter().position(|own| *own == number)?;
+                Some(turned[axis])
+            });
+            column
+                .scalar
+                .put(turned.unwrap_or_else(|| value(column)), out);
         }
     }
 }

@@ -203,8 +203,14 @@ impl Motion {
     }
 
     /// True if it is not only a translation.
-    fn turns(&self) -> bool {
+    pub(super) fn turns(&self) -> bool {
         self.rows != [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+    }
+
+    /// A direction, turned.
+    #[inline]
+    pub(super) fn turned(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
+        self.rows.map(|[a, b, c]| a * x + b * y + c * z)
     }
 
     #[inline]

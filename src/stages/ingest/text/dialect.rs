@@ -176,7 +176,8 @@ pub(super) fn guess(head: &[u8], whole: bool) -> Result<Dialect, String> {
             others: Vec::new(),
         };
         if explains(&dialect, &lines) {
-            if dialect.counted {
+            dialect.others = dialect.commented_columns(&head[mark..], &lines);
+            if dialect.counted && dialect.others.is_empty() {
                 dialect.others = dialect.counted_columns(&lines);
             }
             return Ok(dialect);
@@ -208,6 +209,26 @@ impl Dialect {
         let color = COLORS.map(|name| Column::new(name, Scalar::U8));
         let color = color.into_iter().filter(|_| matches!(width, 6 | 7));
         (3..).zip(intensity.into_iter().chain(color)).collect()
+    }
+
+    /// The columns but the coordinates, named by the last comment above the points, as CloudCompare does, if the
+    /// coordinates come first in it.
+    fn commented_columns(
+        &self,
+        head: &[u8],
+        lines: &[(usize, usize, &[u8])],
+    ) -> Vec<(usize, Column)> {
+        let first = lines.first().map_or(0, |(start, ..)| *start);
+        let above = head[..first].split(|b| matches!(b, b'\n' | b'\r'));
+        let last = above.map(<[u8]>::trim_ascii).rfind(|line| !line.is_empty());
+        let names = last.and_then(|l| l.strip_prefix(b"//").or_else(|| l.strip_prefix(b"#")));
+        let mut points = lines.iter().filter(|(.., line)| count(line).is_none());
+        match (names, points.next()) {
+            (Some(names), Some((.., line))) if named_columns(names) == Some([0, 1, 2]) => {
+                self.named_others(names, line)
+            }
+            _ => Vec::new(),
+        }
     }
 
     /// The columns with names but the coordinates, if a line has as many words as there are names.
@@ -297,6 +318,34 @@ mod tests {
             "\"X\",\"Y\",\"Z\"\n1.5 2 -3.25\n4 5 6\n",
         ] {
             assert_eq!(points(text), want, "{text:?}");
+        }
+    }
+
+    #[test]
+    fn comments_name_columns() {
+        let names = |text: &str| {
+            let dialect = guess(text.as_bytes(), true).unwrap();
+            let others = dialect.others.into_iter();
+            others
+                .map(|(at, column)| format!("{at} {}", column.name))
+                .collect::<Vec<_>>()
+        };
+        let named = ["3 nx", "4 ny", "5 nz"];
+        for text in [
+            "//X Y Z Nx Ny Nz\n1 2 3 0 0 1\n",
+            "//X Y Z Nx Ny Nz\n1\n1 2 3 0 0 1\n",
+            "# scan\n\n# x,y,z,Nx,Ny,Nz\n1,2,3,0,0,1\n",
+            "X Y Z Nx Ny Nz\n1 2 3 0 0 1\n",
+        ] {
+            assert_eq!(names(text), named, "{text:?}");
+        }
+        for text in [
+            "//X Y Z Nx Ny\n1 2 3 0 0 1\n",
+            "//Nx Ny Nz X Y Z\n1 2 3 0 0 1\n",
+            "//X Y Z Nx Ny Nz\n# note\n1 2 3 0 0 1\n",
+            "1 2 3 0 0 1\n",
+        ] {
+            assert_eq!(names(text), [""; 0], "{text:?}");
         }
     }
 

@@ -5,7 +5,7 @@ use super::super::interior::Interior;
 use super::*;
 use crate::geom::Point;
 use crate::stages::blocks::Blocks;
-use crate::stages::cells::{DiskRadius, TileRanges, Widen, cells};
+use crate::stages::cells::{CellOptions, DiskRadius, TileRanges, Widen, cells};
 use crate::stages::located::Places;
 use crate::stages::order::Orderer;
 use crate::stages::triples::triples;
@@ -43,10 +43,14 @@ fn across(starved: bool) -> (Left, [usize; 2]) {
     let store = stored.open(workspace).unwrap();
     let blocks = Blocks::new(store.len(), BLOCK);
     let tiles = TileRanges::new(blocks, BLOCK);
-    let (radius, widen) = (DiskRadius::Auto, Widen::OnLines);
-    let seen = cells(&store, tiles, 12, radius, widen, None, workspace)
-        .unwrap()
-        .0;
+    let options = CellOptions {
+        neighbors: 12,
+        radius: DiskRadius::Auto,
+        widen: Widen::OnLines,
+        density: None,
+        directions: None,
+    };
+    let seen = cells(&store, tiles, options, workspace).unwrap().0;
     let triples = triples(&seen, blocks, workspace).unwrap().0;
     let places = Places {
         shape: &store,

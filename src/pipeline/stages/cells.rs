@@ -1,0 +1,44 @@
+//! The stage of cells.
+
+use super::super::checks::not_a_line;
+use super::Stages;
+use super::values::Values;
+use crate::error::Result;
+use crate::params::Method;
+use crate::stages::cells::{CellOptions, CellTriples, DiskRadius, Widen, cells};
+use crate::stages::located::Places;
+use crate::stages::spacing::Coarse;
+
+impl Stages<'_> {
+    /// Computes the restricted Voronoi cells.
+    pub fn cells(
+        &mut self,
+        places: Places<'_>,
+        radius: DiskRadius,
+        values: &Values,
+    ) -> Result<(CellTriples, Option<Coarse>)> {
+        let (params, workspace, tiles) = (&self.job.params, self.workspace, self.tiles());
+        let points = self.report.points;
+        let options = CellOptions {
+            neighbors: params.neighbors,
+            radius,
+            widen: match params.method {
+                Method::Robust => Widen::OnBands,
+                Method::Paper => Widen::OnLines,
+            },
+            density: places.density,
+            directions: values.directions(params.input_normals),
+        };
+        workspace.trim();
+        let (seen, coarse, counts) = self.clock.stage("cells", "points", points, || {
+            cells(places.shape, tiles, options, workspace)
+        })?;
+        if let Some(normals) = &mut self.report.normals {
+            normals.disks = counts.disks;
+        }
+        not_a_line(&counts.cells, points)?;
+        self.report.cells = counts.cells;
+        let coarse = coarse.map(|coarse| Coarse::open(coarse, workspace));
+        Ok((seen, coarse.transpose()?))
+    }
+}
