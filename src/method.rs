@@ -88,8 +88,8 @@ constants! {
     /// Points off the surface, such as birds, dust and wires.
     off_surface: OffSurface {
         /// A point can be off the surface if its neighbours reach more than this many usual reaches of its
-        /// region.
-        far: u128 = 5, "usual reaches";
+        /// region. With 3, a third of the points strewn a few spacings beside a surface stay in the mesh.
+        far: u128 = 2, "usual reaches";
         /// The usual reach of a patch is the quantile of its samples with this denominator: the lower
         /// quartile.
         quantile: usize = 4, "one in";
@@ -101,9 +101,6 @@ constants! {
         /// the ground is above it, a coarse point beside a dense area is not. Nor does smoothing move a point
         /// that far.
         beside: f64 = 0.5, "reaches", [0.35, 0.7];
-        /// A coarse point has wider limits of length if it and its neighbours are level: their root mean square
-        /// height over their plane is at most this share of their reach. Strewn points are not.
-        level: f64 = 0.15, "reaches";
     }
     /// Smoothing by a curved surface, which also distinguishes edges from noise.
     smoothing: Smoothing {
@@ -145,11 +142,12 @@ constants! {
         /// sampled run: a clean scan of a face has 0.031 at one point of 120 000, a scan with noise of a quarter
         /// of the spacing less than 0.083 at one point of 20. With 0.035 a carved lion has a sixth more boundary.
         floor: f64 = 0.02, "local spacings";
-        /// Noise above which there is a second round; twice as much asks for a third.
-        round: f64 = 0.15, "local spacings";
+        /// Noise above which there is a second round; twice as much asks for a third. A point with more of it has
+        /// no wider limits of length if it is coarse.
+        round: f64 = 0.075, "local spacings";
         /// Root mean square height of the neighbours over their surface, for each round that the noise asks for,
         /// above which they lie in layers or show details: then fewer neighbours are used.
-        layers: f64 = 0.45, "local spacings", [0.3, 0.6];
+        layers: f64 = 0.3, "local spacings", [0.2, 0.45];
         /// A point stays where it is if at least one in this number of its neighbours is clean: they tell
         /// edges, details and thin sheets from noise.
         few: usize = 10, "one in";
@@ -231,11 +229,11 @@ constants! {
     components: Components {
         /// Least number of triangles (paper: 10).
         least: u64 = 10, "triangles";
-        /// A cloud is noisy if at least one in this number of its points is.
+        /// A component is noisy if at least one in this number of its triangles is at a noisy point.
         noisy: u64 = 2, "one in";
-        /// In a noisy cloud a component needs one triangle for each of this number of points of the cloud.
+        /// A noisy component needs one triangle for each of this number of points of the cloud.
         each_if_noisy: u64 = 5000, "points";
-        /// Largest number of triangles required in a noisy cloud.
+        /// Largest number of triangles that a noisy component needs.
         most_if_noisy: u64 = 150, "triangles";
         /// An open component is oriented by its vector area if this is at least one part in this number of
         /// its area; else outwards.

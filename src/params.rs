@@ -353,8 +353,8 @@ impl Params {
         }
     }
 
-    /// The least number of triangles of a component that stays, in a cloud of `points` points; `noisy` if
-    /// at least half of them are.
+    /// The least number of triangles of a component that stays, in a cloud of `points` points; `noisy` if the
+    /// component is.
     #[must_use]
     pub fn least_component(&self, points: u64, noisy: bool) -> u64 {
         let limits = METHOD.components;

@@ -135,7 +135,7 @@ impl Reconstruction {
         let side = stages.side(shape.or(&store), &lattice)?;
         let places = stages.places(&store, &shape, side.outside(&values), &lattice);
         let (seen, coarse) = stages.cells(places, radius, &values)?;
-        let places = places.with_coarse(coarse.as_ref());
+        let places = places.with_coarse(coarse.as_deref());
         let triples = stages.triples(&seen)?;
         let stitched = stages.stitch(places, &triples)?;
         let repaired = stages.repair(places, &stitched)?;

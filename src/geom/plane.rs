@@ -141,31 +141,15 @@ impl Moments {
         along * along > limit * limit * (last2 as f64 * length2)
     }
 
-    /// True if the point and its neighbours are level: the root mean square of their heights over the plane
-    /// with `normal` is a small share of the distance that the neighbours reach, and so is the height of the
-    /// point, or it is no stray among them.
-    #[must_use]
-    pub fn is_level(&self, normal: Normal, last2: u64) -> bool {
-        let (along, length2) = self.scatter_along(normal);
-        let count = (self.count + 1) as f64;
-        let mean2 = along / (count * count * length2);
-        let limit2 = METHOD.off_surface.level * METHOD.off_surface.level * last2 as f64;
-        let [x, y, z] = self.project(normal);
-        let most2 = limit2.max(METHOD.smoothing.stray2 * mean2);
-        mean2 <= limit2 && x * x + y * y + z * z <= most2
-    }
-
     /// True if a direction suits the point and its neighbours as well as the `estimated` one, or nearly: their scatter
     /// along it is not much larger.
     #[must_use]
     pub fn suits(&self, estimated: Normal, given: Normal) -> bool {
-        let [xx, yy, zz, xy, xz, yz] = self.scatter();
-        let along = |[x, y, z]: [f64; 3]| {
-            let scatter = (xx * x * x + yy * y * y + zz * z * z)
-                + 2.0 * (xy * x * y + xz * x * z + yz * y * z);
-            scatter / (x * x + y * y + z * z)
-        };
-        let [estimated, given] = [estimated, given].map(|n| along(n.map(f64::from)));
+        let [xx, yy, zz, ..] = self.scatter();
+        let [estimated, given] = [estimated, given].map(|normal| {
+            let (along, length2) = self.scatter_along(normal);
+            along / length2
+        });
         given <= METHOD.normals.scatter * estimated + METHOD.plane.line * (xx + yy + zz)
     }
 

@@ -345,14 +345,11 @@ impl<'a> Stages<'a> {
     pub fn repair(&mut self, places: Places<'_>, stitched: &Stitched) -> Result<Repaired> {
         let (params, workspace, blocks) = (&self.job.params, self.workspace, self.blocks());
         let points = self.report.points;
-        let noisy = self
-            .report
-            .relax
-            .is_some_and(|relax| relax.is_noisy(points));
         let robust = params.method == Method::Robust;
         let options = RepairOptions {
             repair: params.repair,
-            min_component: params.least_component(points, noisy),
+            min_component: params.least_component(points, false),
+            min_noisy_component: params.least_component(points, true),
             max_hole_edges: params.max_hole_edges,
             flip: robust,
             clip_ears: robust,

@@ -1,5 +1,8 @@
 //! A number from 0 to 3 for each point of a range, four in a byte.
 
+use crate::error::Result;
+use crate::workspace::Workspace;
+use crate::workspace::memory::Reservation;
 use std::ops::Range;
 
 /// Numbers in a byte.
@@ -8,6 +11,35 @@ const EACH: usize = 4;
 /// Numbers from 0 to 3 by place.
 #[derive(Debug, Clone, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Levels(Vec<u8>);
+
+/// Numbers with a reservation of their memory.
+#[derive(Debug)]
+pub struct HeldLevels {
+    levels: Levels,
+    _held: Reservation,
+}
+
+impl HeldLevels {
+    /// Reserves the memory under a name.
+    ///
+    /// # Errors
+    /// [`crate::Error::Memory`].
+    pub fn open(levels: Levels, name: &'static str, workspace: &Workspace) -> Result<Self> {
+        let held = workspace.reserve(name, levels.bytes())?;
+        Ok(Self {
+            levels,
+            _held: held,
+        })
+    }
+}
+
+impl std::ops::Deref for HeldLevels {
+    type Target = Levels;
+
+    fn deref(&self) -> &Levels {
+        &self.levels
+    }
+}
 
 impl Levels {
     /// Zeros.

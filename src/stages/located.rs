@@ -2,9 +2,10 @@
 
 use super::blocks::Blocks;
 use super::cells::CountedTriple;
+use super::levels::Levels;
 use super::order::PointStore;
 use super::outside::Outside;
-use super::spacing::{Coarse, Density};
+use super::spacing::Density;
 use crate::error::Result;
 use crate::geom::Point;
 use crate::geom::triangle::on_a_line;
@@ -27,9 +28,9 @@ pub struct Places<'a> {
 }
 
 impl<'a> Places<'a> {
-    /// With the points that are coarser than their patch.
+    /// With how coarse points are.
     #[must_use]
-    pub fn with_coarse(self, coarse: Option<&'a Coarse>) -> Self {
+    pub fn with_coarse(self, coarse: Option<&'a Levels>) -> Self {
         let with = |density| Density { coarse, ..density };
         Self {
             density: self.density.map(with),
@@ -41,6 +42,12 @@ impl<'a> Places<'a> {
     #[must_use]
     pub fn differ(&self) -> bool {
         !std::ptr::eq(self.shape, self.file)
+    }
+
+    /// True if there is noise at a point.
+    #[must_use]
+    pub fn is_noisy(&self, id: u32) -> bool {
+        self.density.is_some_and(|density| density.is_noisy(id))
     }
 
     /// True if triangles can be unfit by their positions in the file although cells saw them.

@@ -58,32 +58,11 @@ pub struct Spacings {
     _held: Reservation,
 }
 
-/// The points that are coarser than their patch: for each point a number from 0 to 3, by which its own reach
-/// exceeds the usual reach of the patch.
-#[derive(Debug)]
-pub struct Coarse {
-    levels: Levels,
-    _held: Reservation,
-}
-
-impl Coarse {
-    /// With a reservation of the memory.
-    ///
-    /// # Errors
-    /// [`crate::Error::Memory`].
-    pub fn open(levels: Levels, workspace: &Workspace) -> Result<Self> {
-        let held = workspace.reserve("coarse points", levels.bytes())?;
-        Ok(Self {
-            levels,
-            _held: held,
-        })
-    }
-}
-
 /// The factors from the usual reach of a patch, squared, to that of a coarse point.
 const COARSER: [u64; 4] = [1, 4, 16, 256];
 
-/// The number of a point in [`Coarse`]: the largest whose factor its own squared reach `last2` allows.
+/// How coarse a point is, by its place in the list of factors: the last whose factor its own squared reach
+/// `last2` allows.
 #[must_use]
 pub fn coarseness(last2: u64, usual2: u64) -> u8 {
     let allows = |factor: &&u64| u128::from(last2) >= u128::from(**factor) * u128::from(usual2);
@@ -91,14 +70,17 @@ pub fn coarseness(last2: u64, usual2: u64) -> u8 {
     if usual2 > 0 { count as u8 } else { 0 }
 }
 
+/// The largest level of noise at coarse points: strewn points have more, and are not the surface of a coarser part.
+const MOST_NOISE: u8 = 1;
+
 /// How a point lies to its neighbours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Standing {
     /// As is usual in its patch.
     Usual,
-    /// Coarser, and level with them; with its number in [`Coarse`].
+    /// Coarser than its patch, as [`coarseness`] says, and without much noise.
     Coarse(u8),
-    /// Off the surface: they reach far for the region, and do not lie on one surface with it.
+    /// Off the surface: its neighbours reach far for the region, and do not lie on one surface with it.
     Off,
 }
 
@@ -107,8 +89,10 @@ pub enum Standing {
 pub struct Density<'a> {
     /// The usual reaches by patch.
     pub spacings: &'a Spacings,
-    /// The points that are coarser, if there are any and they are known.
-    pub coarse: Option<&'a Coarse>,
+    /// The level of noise at each point, if there is noise.
+    pub noise: Option<&'a Levels>,
+    /// How coarse each point is, as [`coarseness`] says, if any is and this is known.
+    pub coarse: Option<&'a Levels>,
     /// The number of neighbours `k`.
     pub neighbors: usize,
     /// The limits, in local spacings or in lattice steps.
@@ -189,9 +173,7 @@ impl Spacings {
 impl Density<'_> {
     /// The squared reach of neighbours that is usual for a point: that of its patch, or more for a coarse point.
     fn reach2(&self, id: u32) -> u64 {
-        let level = self
-            .coarse
-            .map_or(0, |coarse| coarse.levels.get(id as usize));
+        let level = self.coarse.map_or(0, |coarse| coarse.get(id as usize));
         let usual2 = self.spacings.usual2(id);
         usual2.saturating_mul(COARSER[usize::from(level)])
     }
@@ -203,16 +185,23 @@ impl Density<'_> {
         let coarseness = coarseness(last2, self.spacings.usual2(id));
         let region2 = self.spacings.stored.regions2[id as usize / METHOD.curve.block as usize];
         let far = self.limits.off_surface && is_far(last2, region2);
-        if coarseness == 0 && !far {
-            return Standing::Usual;
-        }
         if far && (moments.fill_space(normal) || moments.is_beside(normal, last2)) {
             Standing::Off
-        } else if moments.is_level(normal, last2) {
+        } else if coarseness > 0 && self.noise_at(id) <= MOST_NOISE {
             Standing::Coarse(coarseness)
         } else {
             Standing::Usual
         }
+    }
+
+    fn noise_at(&self, id: u32) -> u8 {
+        self.noise.map_or(0, |noise| noise.get(id as usize))
+    }
+
+    /// True if there is noise at a point.
+    #[must_use]
+    pub fn is_noisy(&self, id: u32) -> bool {
+        self.noise_at(id) > 0
     }
 
     /// Returns a test of triangles: true if a side is longer than the limit at both of its ends.
@@ -294,7 +283,7 @@ mod tests {
             let spacings = spacings(usual2.to_vec());
             let edge = if steps { Width::Steps(limit) } else { Width::Spacings(limit) };
             let limits = Limits { off_surface: true, edge, fill: Width::Any };
-            let density = Density { spacings: &spacings, coarse: None, neighbors: 30, limits };
+            let density = Density { spacings: &spacings, noise: None, coarse: None, neighbors: 30, limits };
             let t = [0, 1, 2].map(|patch| patch * METHOD.curve.patch as u32 + 7);
             prop_assert_eq!(density.is_long()(t, at), density.exceeds(edge, t, at));
         }

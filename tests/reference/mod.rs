@@ -246,6 +246,9 @@ pub fn reconstruct_given(
     }
     let mut density = settings.robust.then(|| spacing::measure(&points, settings));
     let relaxed = relax::relax(&points, settings);
+    if let Some(density) = &mut density {
+        density.noise.clone_from(&relaxed.noise);
+    }
     if settings.auto {
         points = relaxed.shape.clone();
     }

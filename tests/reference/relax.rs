@@ -9,6 +9,8 @@ use outcrop::geom::{Point, distance2};
 /// The result of relaxing.
 pub struct Relaxed {
     pub shape: Vec<Point>,
+    /// The level of noise of each point.
+    pub noise: Vec<u8>,
     /// Rounds in which points moved.
     pub rounds: u32,
     /// Noisy points.
@@ -35,7 +37,7 @@ fn level(points: &[Point], i: usize, k: usize) -> (u8, bool) {
     let reach2 = distance2(points[i], points[others[k.min(others.len()) - 1]]);
     let spacing2 = std::f64::consts::PI * reach2 as f64 / k as f64;
     let above = |limit: f64| left / 3.0 > limit * limit * spacing2;
-    let level = [0.02, 0.15, 0.3]
+    let level = [0.02, 0.075, 0.15]
         .into_iter()
         .take_while(|limit| above(*limit))
         .count();
@@ -79,7 +81,7 @@ fn moved(points: &[Point], i: usize, k: usize, rounds: u8) -> Point {
     let Some((mut offset, mean2)) = offset(points, i, count) else {
         return points[i];
     };
-    let limit = 0.45 * f64::from(rounds);
+    let limit = 0.3 * f64::from(rounds);
     let spacing2 = std::f64::consts::PI * last2(count) as f64 / count as f64;
     if k.max(30) < count && mean2 > limit * limit * spacing2 {
         count = k.max(30);
@@ -103,6 +105,7 @@ pub fn relax(points: &[Point], settings: &Settings) -> Relaxed {
     let k = settings.neighbors;
     let mut relaxed = Relaxed {
         shape: points.to_vec(),
+        noise: vec![0; points.len()],
         rounds: 0,
         moved: 0,
         kept: 0,
@@ -123,6 +126,7 @@ pub fn relax(points: &[Point], settings: &Settings) -> Relaxed {
         .zip(&all)
         .filter(|(level, rounds)| **level > **rounds)
         .count();
+    relaxed.noise = levels;
     relaxed.rounds = u32::from(all.iter().copied().max().unwrap_or(0));
     for round in 1..=most {
         let before = relaxed.shape.clone();

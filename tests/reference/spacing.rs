@@ -17,6 +17,8 @@ pub struct Density {
     regions2: Vec<u64>,
     /// By which a point's squared reach exceeds that of its patch; 1 if it is not coarse.
     coarse: Vec<u64>,
+    /// The level of noise of each point.
+    pub noise: Vec<u8>,
     settings: Settings,
 }
 
@@ -32,9 +34,9 @@ fn lower_quartile(mut all: Vec<u64>) -> u64 {
     all[all.len() / 4]
 }
 
-/// True if neighbours reach more than five times as far as is usual.
+/// True if neighbours reach more than twice as far as is usual.
 fn is_far(last2: u64, usual2: u64) -> bool {
-    u128::from(last2) > 25 * u128::from(usual2)
+    u128::from(last2) > 4 * u128::from(usual2)
 }
 
 /// Measures a cloud before points move.
@@ -56,6 +58,7 @@ pub fn measure(points: &[Point], settings: &Settings) -> Density {
             .collect(),
         usual2,
         coarse: vec![1; points.len()],
+        noise: vec![0; points.len()],
         settings: *settings,
     }
 }
@@ -77,7 +80,7 @@ impl Density {
         if far && (moments.fill_space(normal) || moments.is_beside(normal, last2)) {
             return true;
         }
-        if plane.wide && moments.is_level(normal, last2) {
+        if plane.wide && self.noise[id] <= 1 {
             self.coarse[id] = [4, 16, 256].into_iter().rfind(allowed).unwrap_or(1);
         }
         false

@@ -171,8 +171,8 @@ pub struct Repair {
     /// number of local spacings like 8x, or none [default: 8x; with --method paper none]
     #[arg(long, value_name = "LENGTH|Nx|none")]
     pub max_fill: Option<MaxWidth>,
-    /// Remove components with fewer triangles [default: 10; if half of the points are noisy one for each
-    /// 5000 points, from 10 to 150; with --method paper 10]
+    /// Remove components with fewer triangles [default: 10; noisy ones, and all with rounds of --smooth, one for
+    /// each 5000 points, from 10 to 150; with --method paper 10]
     #[arg(long, value_name = "N")]
     pub min_component: Option<u64>,
     /// No repair: keep bridges, holes and small components

@@ -6,8 +6,8 @@ use super::values::Values;
 use crate::error::Result;
 use crate::params::Method;
 use crate::stages::cells::{CellOptions, CellTriples, DiskRadius, Widen, cells};
+use crate::stages::levels::HeldLevels;
 use crate::stages::located::Places;
-use crate::stages::spacing::Coarse;
 
 impl Stages<'_> {
     /// Computes the restricted Voronoi cells.
@@ -16,7 +16,7 @@ impl Stages<'_> {
         places: Places<'_>,
         radius: DiskRadius,
         values: &Values,
-    ) -> Result<(CellTriples, Option<Coarse>)> {
+    ) -> Result<(CellTriples, Option<HeldLevels>)> {
         let (params, workspace, tiles) = (&self.job.params, self.workspace, self.tiles());
         let points = self.report.points;
         let options = CellOptions {
@@ -38,7 +38,7 @@ impl Stages<'_> {
         }
         not_a_line(&counts.cells, points)?;
         self.report.cells = counts.cells;
-        let coarse = coarse.map(|coarse| Coarse::open(coarse, workspace));
+        let coarse = coarse.map(|coarse| HeldLevels::open(coarse, "coarse points", workspace));
         Ok((seen, coarse.transpose()?))
     }
 }

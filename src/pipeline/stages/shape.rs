@@ -4,18 +4,20 @@ use super::Stages;
 use crate::error::Result;
 use crate::geom::lattice::Lattice;
 use crate::params::Method;
+use crate::stages::levels::HeldLevels;
 use crate::stages::located::Places;
 use crate::stages::order::PointStore;
 use crate::stages::outside::Outside;
 use crate::stages::smooth::Relaxed;
 use crate::stages::spacing::{Density, Spacings};
 
-/// The positions that decide which points are connected, if they are not those of the mesh, and the local
-/// spacings.
+/// The positions that decide which points are connected, if they are not those of the mesh, the local spacings,
+/// and the noise.
 #[derive(Debug, Default)]
 pub(in crate::pipeline) struct Shape {
     store: Option<PointStore>,
     pub spacings: Option<Spacings>,
+    noise: Option<HeldLevels>,
 }
 
 impl Shape {
@@ -33,9 +35,12 @@ impl Stages<'_> {
             return Ok(Shape::default());
         };
         let store = relaxed.store.as_ref();
+        let noise = Some(relaxed.noise).filter(|noise| !noise.is_empty());
+        let noise = noise.map(|noise| HeldLevels::open(noise, "noise", workspace));
         Ok(Shape {
             store: store.map(|store| store.open(workspace)).transpose()?,
             spacings: Some(relaxed.spacings.open(workspace)?),
+            noise: noise.transpose()?,
         })
     }
 
@@ -56,6 +61,7 @@ impl Stages<'_> {
             outside,
             density: robust.map(|spacings| Density {
                 spacings,
+                noise: shape.noise.as_deref(),
                 coarse: None,
                 neighbors: params.neighbors,
                 limits: params.limits(lattice.step),

@@ -8,8 +8,8 @@ use crate::error::Result;
 use crate::geom::Point;
 use crate::spill::{Inbox, Table};
 use crate::stages::blocks::Blocks;
-use crate::stages::order::PointStore;
-use crate::stages::outside::{Known, Outside};
+use crate::stages::located::Places;
+use crate::stages::outside::Known;
 use crate::stages::surface::parity::{ParitySets, constraint};
 use crate::stages::surface::rows::TriangleTo;
 use crate::workspace::memory::{bytes_of, table_bytes};
@@ -47,10 +47,7 @@ pub(super) fn join(
 /// The input for the components of global labels.
 pub(super) struct Parts<'a> {
     pub blocks: Blocks,
-    /// Positions that decide the connectivity.
-    pub store: &'a PointStore,
-    /// What tells which side is out.
-    pub outside: Option<Outside<'a>>,
+    pub places: Places<'a>,
     /// Labels and orientations of crossing triangles in the blocks that they touch.
     pub seen: &'a Inbox<SeenTriangle>,
     /// Sums over the interior triangles of each block's global labels.
@@ -75,7 +72,7 @@ impl Parts<'_> {
         let bytes = |block: usize| {
             let labels = self.globals[block].1;
             let ids = self.blocks.ids(block).len();
-            let known = self.outside.map_or(0, |o| o.bytes(ids));
+            let known = self.places.outside.map_or(0, |o| o.bytes(ids));
             self.seen.rows(block) as u64 * 150 + u64::from(labels) * 500 + known + (1 << 16)
         };
         unit.for_each_unit("repair: borders", self.globals.len(), bytes, |unit| {
@@ -116,8 +113,11 @@ impl Parts<'_> {
         let bridges = self.bridges.get(unit, block)?;
         let ids = ascending(seen.iter().flat_map(|s| s.triangle));
         let mut points: Vec<Point> = Vec::with_capacity(ids.len());
-        self.store.fetch(&ids, &mut points)?;
-        let known = self.outside.map(|o| o.open(unit, self.blocks, block));
+        self.places.shape.fetch(&ids, &mut points)?;
+        let known = self
+            .places
+            .outside
+            .map(|o| o.open(unit, self.blocks, block));
         let known = known.transpose()?;
         let bytes = table_bytes(&own) + bytes_of(&seen) + bytes_of(&ids) + bytes_of(&points);
         let bytes = bytes + known.as_ref().map_or(0, Known::bytes);
@@ -136,9 +136,11 @@ impl Parts<'_> {
             // The smallest vertex is in this block.
             let toward = known.as_ref();
             let toward = toward.and_then(|known| known.toward(triangle[0], corners[0]));
-            own.entry(root)
-                .or_default()
-                .add(triangle, corners, turned ^ flip, toward);
+            let sums = own.entry(root).or_default();
+            sums.add(triangle, corners, turned ^ flip, toward);
+            if self.places.is_noisy(triangle[0]) {
+                sums.note_noise();
+            }
         }
         Ok(own)
     }

@@ -17,6 +17,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Sums {
     triangles: u64,
+    /// Triangles whose smallest vertex is a noisy point.
+    noisy: u64,
     /// True if there is a boundary edge.
     open: bool,
     /// Six times the signed volume relative to the lattice's origin.
@@ -46,6 +48,8 @@ row! {
         corners: [[u32; 4]; 3],
         /// Number of triangles.
         triangles: [u32; 2],
+        /// Triangles at noisy points.
+        noisy: [u32; 2],
         /// Evidence that they face the side that is out.
         seen: [u32; 2],
         /// Bit 1: the smallest triangle is turned; bit 2: there is a triangle; bit 4: there is a boundary
@@ -111,6 +115,15 @@ impl Sums {
         }
     }
 
+    /// Records that a triangle is at a noisy point.
+    pub fn note_noise(&mut self) {
+        self.noisy += 1;
+    }
+
+    fn is_noisy(&self) -> bool {
+        METHOD.components.noisy * self.noisy >= self.triangles
+    }
+
     /// Records that there is a boundary edge.
     pub fn open(&mut self) {
         self.open = true;
@@ -129,6 +142,7 @@ impl Sums {
             self.see(t, turned ^ flip);
         }
         self.triangles += other.triangles;
+        self.noisy += other.noisy;
         self.open |= other.open;
         self.volume6 += sign * other.volume6;
         self.area += other.area;
@@ -150,6 +164,7 @@ impl Sums {
             area_vector: self.area_vector.map(words),
             corners: self.corners.map(words),
             triangles: words64(self.triangles),
+            noisy: words64(self.noisy),
             seen: words64(self.seen.cast_unsigned()),
             flags: flags | u32::from(turned),
             first,
@@ -161,6 +176,7 @@ impl Sums {
     pub fn of(row: &SumsRow) -> Self {
         Self {
             triangles: number64(row.triangles),
+            noisy: number64(row.noisy),
             seen: number64(row.seen).cast_signed(),
             open: row.flags & 4 != 0,
             volume6: number(row.volume6),
@@ -234,8 +250,10 @@ impl Fate {
     };
 }
 
-/// Decides about a component with complete sums; components of fewer than `least` triangles are removed.
-pub fn judge(sums: &Sums, least: u64, stats: &mut RepairStats) -> Fate {
+/// Decides about a component with complete sums. It is removed if it has fewer than `least` triangles, or, if
+/// it is noisy, fewer than the second number.
+pub fn judge(sums: &Sums, [least, if_noisy]: [u64; 2], stats: &mut RepairStats) -> Fate {
+    let least = if sums.is_noisy() { if_noisy } else { least };
     let keep = sums.triangles >= least;
     // All triangles of a component may have been removed as bridges.
     if sums.triangles > 0 {
@@ -288,6 +306,7 @@ mod tests {
         sums.add([4, 5, 9], corners, false, Some([-0.8, 0.0, 0.6]));
         assert!(sums.seen != 0);
         sums.open();
+        sums.note_noise();
         assert_eq!(Sums::of(&sums.row()), sums);
         let empty = Sums::default();
         assert_eq!(Sums::of(&empty.row()), empty);

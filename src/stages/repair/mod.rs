@@ -97,6 +97,8 @@ pub struct RepairOptions {
     pub repair: bool,
     /// Components with fewer triangles are removed.
     pub min_component: u64,
+    /// The same for components that are noisy.
+    pub min_noisy_component: u64,
     /// Holes of up to this many edges are filled.
     pub max_hole_edges: usize,
     /// Flip edges where this makes the surface bend less.
@@ -139,9 +141,12 @@ pub struct RepairStats {
 }
 
 impl RepairOptions {
-    /// The smallest number of triangles of a component that is kept.
-    fn least(&self) -> u64 {
-        if self.repair { self.min_component } else { 0 }
+    /// The smallest number of triangles of a component that is kept, and of one that is noisy.
+    fn least(&self) -> [u64; 2] {
+        match self.repair {
+            true => [self.min_component, self.min_noisy_component],
+            false => [0, 0],
+        }
     }
 
     /// The rules for boundary loops; `None` if all stay open.

@@ -236,8 +236,7 @@ impl Build<'_> {
         let sets = join(unit, &seen, &globals, labels)?;
         let parts = Parts {
             blocks: self.blocks,
-            store: self.places.shape,
-            outside: self.places.outside,
+            places: self.places,
             seen: &seen,
             sums: &self.sums,
             bridges: &bridges,
@@ -362,6 +361,9 @@ impl Build<'_> {
                 let corners = t.map(|v| points[(v - ids.start) as usize]);
                 let toward = known.and_then(|known| known.toward(t[0], corners[0]));
                 sum.add(*t, corners, flip, toward);
+                if self.places.is_noisy(t[0]) {
+                    sum.note_noise();
+                }
             }
         }
         sums

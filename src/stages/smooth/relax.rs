@@ -30,6 +30,8 @@ pub struct Relaxed {
     pub store: Option<StoredPoints>,
     /// The local spacings.
     pub spacings: StoredSpacings,
+    /// The level of noise at each point before it moved; empty if no region has noise.
+    pub noise: Levels,
     /// Counts of the rounds.
     pub stats: RelaxStats,
 }
@@ -49,13 +51,7 @@ pub struct RelaxStats {
     pub largest: f64,
 }
 
-impl RelaxStats {
-    /// True if at least half of the points are noisy: the whole cloud, not only parts of it.
-    #[must_use]
-    pub fn is_noisy(&self, points: u64) -> bool {
-        METHOD.components.noisy * self.moved >= points
-    }
-}
+impl RelaxStats {}
 
 /// The number of rounds in which a point with these neighbours moves, itself included: the highest level that
 /// more than nine tenths of them reach.
@@ -265,6 +261,7 @@ pub fn relax(
     let mut relaxed = Relaxed {
         store: None,
         spacings,
+        noise: Levels::default(),
         stats: RelaxStats::default(),
     };
     if !noisy {
@@ -273,7 +270,8 @@ pub fn relax(
         return Ok(relaxed);
     }
     let _rounds_held = workspace.reserve("rounds of smoothing", bytes)?;
-    let mut rounds = Levels::new(store.len());
+    // The levels of noise after the first round, which counts the rounds by them.
+    let mut other = Levels::new(store.len());
     let mut moves = Moves::default();
     for number in 1..=relaxing.rounds {
         let round = Round {
@@ -288,10 +286,10 @@ pub fn relax(
             .map(|store| store.open(workspace))
             .transpose()?;
         let current = before.as_ref().unwrap_or(store);
-        let (next, done) = one_round(current, tiles, &round, &mut rounds, workspace)?;
+        let (next, done) = one_round(current, tiles, &round, &mut other, workspace)?;
         drop(before);
         if number == 1 {
-            std::mem::swap(&mut levels, &mut rounds);
+            std::mem::swap(&mut levels, &mut other);
         }
         if done.moved() == 0 {
             next.release(workspace)?;
@@ -305,6 +303,7 @@ pub fn relax(
             old.release(workspace)?;
         }
     }
+    relaxed.noise = other;
     relaxed.stats = moves.stats(relaxed.stats.rounds, relaxing.step);
     Ok(relaxed)
 }
