@@ -156,6 +156,7 @@ fn pipeline(
     let options = RepairOptions {
         repair: settings.repair,
         min_component: settings.min_component as u64,
+        min_noisy_component: settings.min_component as u64,
         max_hole_edges: settings.max_hole_edges,
         flip: settings.robust,
         clip_ears: settings.robust,

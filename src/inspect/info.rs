@@ -11,12 +11,13 @@ use crate::params::Params;
 use crate::pipeline::Known;
 use crate::stages::attributes::attributes;
 use crate::stages::blocks::Blocks;
-use crate::stages::cells::{CellMaker, DiskRadius, Widen};
+use crate::stages::cells::{CellMaker, DiskRadius, Widen, fit_in_tile};
 use crate::stages::ingest::{
     Attributes, CoordinateType, IngestStats, Selection, Spool, ingest_selected,
 };
 use crate::stages::normals::{NormalStats, Normals, look};
 use crate::stages::order::{PAGE, PointStore, StoredPoints, order};
+use crate::stages::smooth::Gauge;
 use crate::stages::tiles::Tile;
 use crate::stages::tiles::near::Search;
 use crate::workspace::Workspace;
@@ -67,6 +68,12 @@ pub struct Info {
     pub spacing: Percentiles,
     /// Disk radius that `--radius auto` would use.
     pub auto_radius: Percentiles,
+    /// Noise at a point, in local spacings: the root mean square height of the nearest points over a smooth
+    /// surface through them.
+    pub noise: Percentiles,
+    /// Share of the points, from 0 to 1, with more noise than a clean surface has. By default they are smoothed
+    /// where clean points are not among their neighbours.
+    pub noisy: f64,
     /// Smallest memory budget, in bytes.
     pub memory_minimum: u64,
     /// Estimated peak of the scratch space, in bytes.
@@ -173,6 +180,8 @@ fn described(
         lattice_exact: lattice.exact,
         spacing: percentiles(sample.nearest, lattice.step),
         auto_radius: percentiles(sample.radius, lattice.step),
+        noisy: sample.noisy as f64 / sample.noise.len().max(1) as f64,
+        noise: percentiles(sample.noise, 1.0),
         memory_minimum: MINIMUM_BUDGET,
         scratch_bytes: disk.scratch,
         output_bytes: disk.output,
@@ -210,6 +219,10 @@ fn normals(
 struct Sample {
     nearest: Vec<f64>,
     radius: Vec<f64>,
+    /// In local spacings.
+    noise: Vec<f64>,
+    /// Points with more noise than a clean surface has.
+    noisy: usize,
     /// Squared distances to the nearest point.
     tally: Tally,
     points: usize,
@@ -221,6 +234,7 @@ fn sample(store: &PointStore, workspace: &Workspace) -> Result<Sample> {
     let mut sample = Sample::default();
     let neighbors = METHOD.plane.neighbors;
     let mut maker = CellMaker::new(neighbors, DiskRadius::Auto, Widen::OnBands, None);
+    let mut gauge = Gauge::default();
     let mut search = Search::default();
     let count = SAMPLES.min(store.len().div_ceil(SAMPLE_POINTS));
     for index in 0..count {
@@ -243,6 +257,13 @@ fn sample(store: &PointStore, workspace: &Workspace) -> Result<Sample> {
                     sample.tally.add(first2);
                     let radius = METHOD.disk.reach * (last.distance2 as f64).sqrt();
                     sample.radius.push(radius);
+                }
+                let fit = fit_in_tile(&mut query, neighbors, Widen::OnBands);
+                if let Ok(Some(fit)) = fit
+                    && let Some((noise, noisy)) = gauge.noise(query.near(), &fit, neighbors)
+                {
+                    sample.noise.push(noise);
+                    sample.noisy += usize::from(noisy);
                 }
                 let made = maker.from_tile(&mut query, |_, _| {});
                 failed = made.err().or(failed.take());
@@ -307,6 +328,17 @@ impl Info {
     }
 }
 
+impl Info {
+    /// The noise of the sample, and how many of its points are noisy.
+    fn noise_line(&self) -> String {
+        let Percentiles { p5, p50, p95 } = self.noise;
+        let share = 100.0 * self.noisy;
+        format!(
+            "{p50:.3} local spacings (5-95 %: {p5:.3} to {p95:.3}); {share:.0} % of the points are noisy"
+        )
+    }
+}
+
 impl fmt::Display for Info {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for file in &self.input.files {
@@ -368,6 +400,7 @@ impl fmt::Display for Info {
             ),
             ("spacing", spread(&self.spacing)),
             ("auto radius", spread(&self.auto_radius)),
+            ("noise", self.noise_line()),
             (
                 "memory",
                 format!("any budget from {}", mib(self.memory_minimum)),

@@ -75,6 +75,7 @@ fn cards(info: &Info) -> Markup {
             (card("Points", &count(info.points), &html! { (count(info.input.read)) " read" }))
             (card("Extent", &html! { (extent[0]) " × " (extent[1]) }, &html! { "height " (extent[2]) }))
             (card("Spacing", &html! { (length(info.spacing.p50)) }, &html! { "median distance to the nearest point" }))
+            (card("Noise", &html! { (percent(info.noisy, 1.0)) }, &html! { "of the points are noisy" }))
             (card("Density", &html! { (length(info.points as f64 / area)) }, &html! { "points for a square unit of the box" }))
             (card("Reference system", &html! {
                 @match system { Some(crs) => (clean(&crs.label())), None => "none" }

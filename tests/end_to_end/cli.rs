@@ -109,6 +109,7 @@ fn info_tells_what_is_there() {
     for key in [
         "/spacing/p50",
         "/auto_radius/p50",
+        "/noise/p50",
         "/memory_minimum",
         "/scratch_bytes",
         "/output_bytes",

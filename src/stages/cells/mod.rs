@@ -6,6 +6,7 @@ mod fits;
 mod fold;
 mod together;
 
+pub(crate) use cell::fit_in_tile;
 pub use cell::{CellMaker, DiskRadius, Fit, Outcome, Widen};
 pub use directions::{DiskStats, InputDirections};
 pub(crate) use fits::{Planes, each_around};

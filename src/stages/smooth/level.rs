@@ -18,12 +18,20 @@ pub(super) const HIGHEST: u8 = 3;
 
 /// Measures levels of noise, in memory that is reused.
 #[derive(Debug, Default)]
-pub(super) struct Gauge {
+pub struct Gauge {
     /// Differences to the point, divided by the reach; the first is the point itself.
     at: Vec<[f64; 3]>,
 }
 
 impl Gauge {
+    /// The noise at a point, in local spacings, as [`Gauge::level`] judges it; and true if the level is not 0.
+    /// `None` if there is no plane, or too few neighbours.
+    pub fn noise(&mut self, near: &Neighbors, fit: &Fit, neighbors: usize) -> Option<(f64, bool)> {
+        let spacing2 = spacing2(fit.near2, neighbors);
+        let noise = (self.noise2(near, fit)? / spacing2).sqrt();
+        Some((noise, noise > limit(1)))
+    }
+
     /// The level of noise at a point whose plane is `fit`, through `neighbors` of its neighbours or more: the
     /// number of limits that the noise exceeds; and true if it is plain, at twice the first limit. The level is
     /// 0 if there is no plane, or too few neighbours.

@@ -13,6 +13,7 @@ mod relax;
 #[cfg(test)]
 mod tests;
 
+pub use level::Gauge;
 pub use relax::{RelaxStats, Relaxed, relax};
 
 use crate::error::Result;
