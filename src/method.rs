@@ -147,7 +147,7 @@ constants! {
         round: f64 = 0.075, "local spacings";
         /// Root mean square height of the neighbours over their surface, for each round that the noise asks for,
         /// above which they lie in layers or show details: then fewer neighbours are used.
-        layers: f64 = 0.3, "local spacings", [0.2, 0.45];
+        layers: f64 = 0.4, "local spacings", [0.3, 0.6];
         /// A point stays where it is if at least one in this number of its neighbours is clean: they tell
         /// edges, details and thin sheets from noise.
         few: usize = 10, "one in";

@@ -20,7 +20,7 @@ const MAY_USE: &[(&str, &str)] = &[
     (
         "inspect",
         "geom histogram method params picture pipeline spill stages/attributes stages/blocks stages/cells stages/ingest \
-         stages/normals stages/order stages/tiles \
+         stages/normals stages/order stages/smooth stages/tiles \
          workspace",
     ),
     ("kernels", ""),
@@ -72,7 +72,7 @@ const MAY_USE: &[(&str, &str)] = &[
     ("stages/levels", ""),
     (
         "stages/located",
-        "stages/blocks stages/cells stages/order stages/outside stages/spacing",
+        "stages/blocks stages/cells stages/levels stages/order stages/outside stages/spacing",
     ),
     (
         "stages/normals",

@@ -745,7 +745,7 @@ fn walls_and_bands(seed: u64, settings: Settings, reached: &mut Reached) {
 #[test]
 fn robust_on_torn_sheets_and_doors() {
     let (mut reached, mut some_stayed) = (Reached::default(), 0);
-    for seed in 0..4 {
+    for seed in 0..6 {
         let points = clouds::half_rough(seed, 1000);
         let settings = Settings {
             smooth: (seed == 3) as u32,

@@ -81,7 +81,7 @@ fn moved(points: &[Point], i: usize, k: usize, rounds: u8) -> Point {
     let Some((mut offset, mean2)) = offset(points, i, count) else {
         return points[i];
     };
-    let limit = 0.3 * f64::from(rounds);
+    let limit = 0.4 * f64::from(rounds);
     let spacing2 = std::f64::consts::PI * last2(count) as f64 / count as f64;
     if k.max(30) < count && mean2 > limit * limit * spacing2 {
         count = k.max(30);
