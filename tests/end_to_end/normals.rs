@@ -1,40 +1,11 @@
 //! Normals that points bring: directions for the disks, and the outer side.
 
+use crate::scanners::{Mesh, read};
 use crate::util::{self, Bench};
 use outcrop::Report;
-use outcrop::inspect::ply_mesh::{PlyMesh, Sink};
 use outcrop::params::{InputNormals, Params};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
-
-/// A mesh in memory.
-#[derive(Default)]
-struct Mesh {
-    vertices: Vec<[f64; 3]>,
-    triangles: Vec<[u32; 3]>,
-}
-
-impl Sink for Mesh {
-    fn vertices(&mut self, positions: &[[f64; 3]]) -> outcrop::Result<()> {
-        self.vertices.extend_from_slice(positions);
-        Ok(())
-    }
-
-    fn triangles(&mut self, triangles: &[[u32; 3]]) -> outcrop::Result<()> {
-        self.triangles.extend_from_slice(triangles);
-        Ok(())
-    }
-
-    fn non_triangles(&mut self, _: u64) -> outcrop::Result<()> {
-        Ok(())
-    }
-}
-
-fn read(path: &Path) -> Mesh {
-    let mut mesh = Mesh::default();
-    PlyMesh::open(path).unwrap().read(&mut mesh).unwrap();
-    mesh
-}
 
 /// A point with its true normal.
 type Oriented = ([f64; 3], [f64; 3]);
