@@ -25,21 +25,28 @@ struct Row {
     said: &'static str,
 }
 
+/// The rows of the tables of kinds of files; the page has other tables too.
 fn rows() -> Vec<Row> {
     let cells = |line: &'static str| -> Vec<&'static str> {
         line.trim_matches('|').split(" |").map(str::trim).collect()
     };
-    let lines = PAGE.lines().filter(|line| line.starts_with("| "));
-    let rows = lines.map(cells).filter(|cells| cells[0] != "kind of file");
-    rows.map(|cells| {
-        assert_eq!(cells.len(), 3, "{cells:?}");
-        Row {
-            kind: cells[0],
-            outcome: cells[1],
-            said: cells[2].trim_matches('`'),
-        }
-    })
-    .collect()
+    let tables = PAGE.split("| kind of file |").skip(1);
+    let rows = tables.flat_map(|table| {
+        table
+            .lines()
+            .skip(2)
+            .take_while(|line| line.starts_with('|'))
+    });
+    rows.map(cells)
+        .map(|cells| {
+            assert_eq!(cells.len(), 3, "{cells:?}");
+            Row {
+                kind: cells[0],
+                outcome: cells[1],
+                said: cells[2].trim_matches('`'),
+            }
+        })
+        .collect()
 }
 
 /// True if `text` contains the parts of `pattern` between `…` in this order.
