@@ -126,10 +126,9 @@ impl Reconstruction {
         let (spool, lattice) = stages.ingest()?;
         let points = stages.order(&spool, &lattice)?;
         let points = stages.without_outliers(points)?;
-        let values = stages.values(&spool, &lattice, &points)?;
+        let mut values = stages.values(&spool, &lattice, &points)?;
         let radius = stages.radius(&points, &lattice);
-        let points = stages.smooth(points)?;
-        let (points, relaxed) = stages.relax(points)?;
+        let (points, relaxed) = stages.moved(points, &mut values)?;
         let store = points.open(workspace)?;
         let shape = stages.open_shape(relaxed)?;
         let side = stages.side(shape.or(&store), &lattice)?;

@@ -15,7 +15,7 @@ use crate::geom::lattice::Lattice;
 use crate::params::{Method, Params, Smooth};
 use crate::report::DiskEstimate;
 use crate::stages::export::{self, CoordinateType, Mesh};
-use crate::stages::ingest::{self, Column, Probe, Selection, Spool};
+use crate::stages::ingest::{self, Attributes, Column, Probe, Selection, Spool};
 use crate::stages::order::StoredPoints;
 use std::path::{Path, PathBuf};
 
@@ -51,6 +51,14 @@ pub(crate) const SCANNER: u64 = 4;
 
 /// Bytes of a normal that a point brings.
 pub(crate) const NORMAL: u64 = ingest::NORMAL_BYTES as u64;
+
+/// Bytes that tell how far a point moved, if the mesh has them.
+pub(crate) fn displaced(attributes: &Attributes) -> u64 {
+    match attributes.has_displacement() {
+        true => size_of::<f32>() as u64,
+        false => 0,
+    }
+}
 
 /// Part of the points in headers that are certainly different: duplicates are not known before they are read.
 pub(crate) const DISTINCT: f64 = 0.5;
@@ -139,6 +147,7 @@ impl Known {
             probes.push(probe);
         }
         known.points = known.read;
+        known.values += displaced(&selection.attributes);
         known.double = double(&probes);
         Some(known)
     }

@@ -12,6 +12,7 @@ const OUTLIERS: f64 = 0.6;
 const ATTRIBUTES: f64 = 0.3;
 const SMOOTH: f64 = 0.8;
 const RELAX: f64 = 0.3;
+const DISPLACEMENT: f64 = 0.03;
 const CELLS: f64 = 1.3;
 const TRIPLES: f64 = 0.07;
 const STITCH: f64 = 0.4;
@@ -55,6 +56,9 @@ pub(super) fn plan(
     }
     if params.relax > 0 || params.method == Method::Robust {
         add("relax", RELAX);
+    }
+    if params.attributes.has_displacement() {
+        add("displacement", DISPLACEMENT);
     }
     add("cells", CELLS);
     add("triples", TRIPLES);

@@ -11,7 +11,7 @@ mod side;
 mod values;
 
 use super::checks::{all_are_kept, disk_radius, enough, room};
-use super::disk::{DISTINCT, NORMAL, SCANNER, SURE, Text};
+use super::disk::{DISTINCT, NORMAL, SCANNER, SURE, Text, displaced};
 use super::{Clock, Known, Reconstruction};
 use crate::error::Result;
 use crate::geom::lattice::Lattice;
@@ -22,7 +22,7 @@ use crate::stages::blocks::Blocks;
 use crate::stages::cells::{CellTriples, DiskRadius, TileRanges};
 use crate::stages::cut::{CutOptions, StoredPieces, cut};
 use crate::stages::export::CoordinateType;
-use crate::stages::ingest::{Attributes, Carried, Spool, ingest_selected};
+use crate::stages::ingest::{Attributes, Carried, Column, Spool, ingest_selected};
 use crate::stages::located::Places;
 use crate::stages::order::{Orderer, PointStore, StoredPoints, order, sample_sort};
 use crate::stages::outliers::{OutlierOptions, drop_outliers};
@@ -162,7 +162,7 @@ impl<'a> Stages<'a> {
             decompressed: 0,
             // With thinning, the number of points that stay is unknown.
             points: if params.thin.is_some() { 0 } else { input.kept },
-            values: self.carried.bytes() as u64 - scanner - normal,
+            values: self.carried.bytes() as u64 - scanner - normal + displaced(&params.attributes),
             scanner,
             normal,
             double: Some(self.report.coordinates == CoordinateType::Double),
@@ -227,12 +227,14 @@ impl<'a> Stages<'a> {
         enough(&store)?;
         self.known.points = store.len() as u64;
         self.known.text = Some(text);
-        let columns = &self.carried.columns;
+        let mut columns = self.carried.columns.clone();
+        let displaced = job.params.attributes.has_displacement();
+        columns.extend(displaced.then(Column::displacement));
         let (shift, coordinates) = self.shift(store.bounds(), lattice)?;
         let place = (coordinates, shift.map_or([0.0; 3], |shift| shift.origin));
         let warnings = self
             .known
-            .left_out(&job.params, columns, place, &job.mesh)?;
+            .left_out(&job.params, &columns, place, &job.mesh)?;
         for warning in warnings {
             self.warn(warning);
         }

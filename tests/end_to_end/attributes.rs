@@ -1,11 +1,11 @@
 //! Values of points at the vertices of the mesh: the right ones, in the same bytes whatever the run.
 
 use crate::util::{self, Bench};
-use outcrop::Error;
 use outcrop::params::Params;
 use outcrop::pipeline::Start;
 use outcrop::workspace::memory::MINIMUM_BUDGET;
 use outcrop::workspace::progress::{Cancel, Observer};
+use outcrop::{Error, Smooth};
 use outcrop_cloudgen::{Cloud, Kind};
 use std::collections::HashMap;
 use std::fmt::Write as _;
@@ -175,4 +175,82 @@ fn bytes_do_not_depend_on_how_it_was_run() {
         assert_eq!(util::hash(&mesh), expected);
         std::fs::remove_file(&mesh).unwrap();
     }
+}
+
+/// The displacements of the vertices of a mesh with only this column, in coordinates of single precision.
+fn displacements(path: &Path) -> Vec<f32> {
+    let bytes = std::fs::read(path).unwrap();
+    let end = bytes.windows(11).position(|w| w == b"end_header\n");
+    let (header, rows) = bytes.split_at(end.unwrap() + 11);
+    let header = std::str::from_utf8(header).unwrap();
+    assert!(header.contains("float z\nproperty float displacement\nelement face"));
+    let count = header.split("element vertex ").nth(1).unwrap();
+    let count: usize = count.lines().next().unwrap().parse().unwrap();
+    let rows = rows.as_chunks::<16>().0.iter().take(count);
+    rows.map(|row| f32::from_le_bytes(row[12..].try_into().unwrap()))
+        .collect()
+}
+
+#[test]
+fn displacement_tells_how_far_each_point_moved() {
+    let bench = Bench::new();
+    let cloud = |noise| {
+        let cloud = Cloud::new(Kind::Bumpy).points(20_000);
+        bench.cloud(&format!("{noise}.ply"), &cloud.noise(noise).seed(5))
+    };
+    let (clean, noisy) = (cloud(0.0), cloud(0.5));
+    let mesh = bench.path("mesh.ply");
+    let run = |input: &Path, smooth| {
+        let params = Params {
+            attributes: "displacement".parse().unwrap(),
+            smooth,
+            ..Params::default()
+        };
+        let report = util::reconstruct(input, &mesh, &params);
+        (report, displacements(&mesh))
+    };
+    for (input, smooth) in [(&clean, Smooth::Auto), (&noisy, Smooth::Rounds(0))] {
+        let (report, moved) = run(input, smooth);
+        assert!(moved.iter().all(|length| *length == 0.0));
+        assert_eq!(report.attributes[0].range, [0.0; 2]);
+    }
+    let (report, mut moved) = run(&noisy, Smooth::Auto);
+    let relaxed = report.relax.unwrap();
+    moved.sort_by(f32::total_cmp);
+    let rest = moved.iter().filter(|length| **length > 0.0).count() as u64;
+    assert!(rest > 18_000 && rest <= relaxed.moved, "{rest}");
+    let largest = report.attributes[0].range[1];
+    assert_eq!(largest, relaxed.largest);
+    assert!(f64::from(moved[moved.len() - 1]) <= largest * (1.0 + 1e-6));
+    // The counts of the report are in classes of a 64th of the square.
+    let middle = f64::from(moved[moved.len() - rest as usize / 2]);
+    assert!(
+        (middle / relaxed.median - 1.0).abs() < 0.05,
+        "{middle} {}",
+        relaxed.median
+    );
+    let (_, twice) = run(&noisy, Smooth::Rounds(2));
+    assert!(twice.iter().filter(|length| **length > 0.0).count() > 18_000);
+}
+
+#[test]
+fn displacement_comes_behind_other_columns_in_any_division() {
+    let bench = Bench::new();
+    let input = write(&bench, "cloud.ply", &cloud(20_000));
+    let mesh = bench.path("mesh.ply");
+    let mut hashes = Vec::new();
+    for (threads, tile, memory) in [(1, 500, MINIMUM_BUDGET), (4, 3000, 300 << 20)] {
+        let params = Params {
+            attributes: "displacement,level".parse().unwrap(),
+            block: 3000,
+            ..Params::default()
+        };
+        let run = util::builder(std::slice::from_ref(&input), &mesh, &params);
+        let run = run.threads(threads).tile_points(tile).memory(memory);
+        let report = run.build().unwrap().run().unwrap();
+        let names: Vec<_> = report.attributes.iter().map(|a| &*a.name).collect();
+        assert_eq!(names, ["level", "displacement"]);
+        hashes.push(util::hash(&mesh));
+    }
+    assert_eq!(hashes[0], hashes[1]);
 }

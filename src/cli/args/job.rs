@@ -45,7 +45,8 @@ pub struct Points {
 #[command(next_help_heading = "Attributes")]
 pub struct Columns {
     /// Keep the points' own values at the vertices: auto (colours, intensity and classification, unless they are
-    /// the same everywhere), none, or a list of columns by name like color,intensity,gps_time
+    /// the same everywhere), none, or a list of columns by name like color,intensity,gps_time; displacement is how
+    /// far smoothing moved each point
     #[arg(long, value_name = "auto|none|LIST", default_value = "none")]
     pub attributes: Attributes,
     /// Write colours with 16 bits instead of 8

@@ -1,14 +1,61 @@
-//! Stages that move points: rounds of smoothing, and the smoothing of noisy points.
+//! Stages that move points: rounds of smoothing, and the smoothing of noisy points; and how far they moved.
 
 use super::Stages;
+use super::values::Values;
 use crate::error::Result;
 use crate::params::{Method, Smooth};
+use crate::stages::attributes::displacement;
+use crate::stages::ingest::{Attribute, Column};
 use crate::stages::order::StoredPoints;
 use crate::stages::smooth::{Relaxed, Relaxing, relax, smooth};
 
 impl Stages<'_> {
-    /// Smooths the points, if requested.
-    pub fn smooth(&mut self, mut store: StoredPoints) -> Result<StoredPoints> {
+    /// Smooths the measured points, if requested or if they are noisy: returns the points of the mesh, and the
+    /// positions that decide how they are connected. If the mesh tells how far points moved, `values` will.
+    pub fn moved(
+        &mut self,
+        measured: StoredPoints,
+        values: &mut Values,
+    ) -> Result<(StoredPoints, Option<Relaxed>)> {
+        let keeps = self.job.params.attributes.has_displacement();
+        let before = keeps.then(|| measured.clone());
+        let points = self.smooth(measured, keeps)?;
+        let (points, relaxed) = self.relax(points, keeps)?;
+        if let Some(before) = before {
+            self.displacement(&before, &points, values)?;
+        }
+        Ok((points, relaxed))
+    }
+
+    /// Notes in `values` how far the points moved.
+    fn displacement(
+        &mut self,
+        before: &StoredPoints,
+        after: &StoredPoints,
+        values: &mut Values,
+    ) -> Result<()> {
+        let (workspace, blocks) = (self.workspace, self.blocks());
+        let (points, step) = (self.report.points, self.report.lattice.step);
+        let (columns, largest) = self.clock.stage("displacement", "points", points, || {
+            let stores = [before.open(workspace)?, after.open(workspace)?];
+            displacement([&stores[0], &stores[1]], step, blocks, workspace)
+        })?;
+        if before != after {
+            before.release(workspace)?;
+        }
+        values.append(columns);
+        let Column { name, scalar } = Column::displacement();
+        self.report.attributes.push(Attribute {
+            name,
+            scalar,
+            range: [0.0, largest],
+            files_without: 0,
+        });
+        Ok(())
+    }
+
+    /// Smooths the points, if requested. The files of the measured points stay if `keeps`.
+    fn smooth(&mut self, mut store: StoredPoints, keeps: bool) -> Result<StoredPoints> {
         let (params, workspace, tiles) = (&self.job.params, self.workspace, self.tiles());
         workspace.trim();
         let points = self.report.points;
@@ -19,15 +66,21 @@ impl Stages<'_> {
                 let store = store.open(workspace)?;
                 smooth(&store, tiles, k, smoothing, round, workspace)
             })?;
-            store.release(workspace)?;
+            if round > 1 || !keeps {
+                store.release(workspace)?;
+            }
             store = next;
         }
         Ok(store)
     }
 
     /// Smooths the noisy points: returns the points of the mesh, and the positions that decide how they are
-    /// connected.
-    pub fn relax(&mut self, points: StoredPoints) -> Result<(StoredPoints, Option<Relaxed>)> {
+    /// connected. The files of the measured points stay if `keeps`.
+    fn relax(
+        &mut self,
+        points: StoredPoints,
+        keeps: bool,
+    ) -> Result<(StoredPoints, Option<Relaxed>)> {
         let (params, workspace, tiles) = (&self.job.params, self.workspace, self.tiles());
         let options = Relaxing {
             neighbors: params.neighbors,
@@ -44,7 +97,9 @@ impl Stages<'_> {
         let moved = relaxed.as_mut().filter(|_| params.smooth == Smooth::Auto);
         let points = match moved.and_then(|relaxed| relaxed.store.take()) {
             Some(moved) => {
-                points.release(workspace)?;
+                if !keeps {
+                    points.release(workspace)?;
+                }
                 moved
             }
             None => points,

@@ -33,6 +33,12 @@ impl Values {
         self.stored.columns.as_ref()
     }
 
+    /// Adds columns that are not in the files.
+    pub fn append(&mut self, more: StoredColumns) {
+        let columns = self.stored.columns.get_or_insert_default();
+        columns.append(more);
+    }
+
     /// What tells of single points which side is out.
     pub fn told(&self) -> Told<'_> {
         let scanners = self.stored.scanners.as_ref();

@@ -7,6 +7,7 @@
 //! rows at positions that are not in the store belong to points that were left out.
 
 mod buckets;
+mod displacement;
 mod rows;
 
 use crate::error::Result;
@@ -19,6 +20,7 @@ use crate::stages::order::{Grouped, MOST_GROUPS, StoredPoints, cuts};
 use crate::workspace::memory::bytes_of;
 use crate::workspace::{Unit, Workspace};
 use buckets::Buckets;
+pub use displacement::displacement;
 use rows::{Row1, Row2, Row6, Row12, Row13, Row15, Word};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
@@ -75,26 +77,39 @@ impl Words {
     }
 }
 
-/// The columns of all points by id.
+/// Some columns of all points by id.
 #[derive(Debug, Serialize, Deserialize)]
-pub struct StoredColumns {
+struct Columns {
     columns: Vec<Column>,
     words: Words,
 }
 
-release!(StoredColumns: words);
+/// The columns of all points by id: those of the files, then how far points moved.
+#[derive(Debug, Default, Serialize, Deserialize)]
+pub struct StoredColumns {
+    parts: Vec<Columns>,
+}
 
 impl StoredColumns {
+    fn new(columns: Vec<Column>, words: Words) -> Self {
+        let parts = vec![Columns { columns, words }];
+        Self { parts }
+    }
+
     /// The columns, in the order of the values.
-    #[must_use]
-    pub fn columns(&self) -> &[Column] {
-        &self.columns
+    pub fn columns(&self) -> impl Iterator<Item = &Column> {
+        self.parts.iter().flat_map(|part| &part.columns)
+    }
+
+    /// Adds columns behind those that are there.
+    pub fn append(&mut self, more: Self) {
+        self.parts.extend(more.parts);
     }
 
     /// Bytes of memory for the values of `ids` ids while they are read.
     #[must_use]
     pub fn bytes(&self, ids: usize) -> u64 {
-        self.words.bytes(ids)
+        self.parts.iter().map(|part| part.words.bytes(ids)).sum()
     }
 
     /// The values of ascending ids.
@@ -102,42 +117,55 @@ impl StoredColumns {
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
     pub fn open(&self, unit: &Unit<'_>, ids: &[u32]) -> Result<Values<'_>> {
+        let rows = |part: &Columns| part.words.open(unit, ids.iter().copied());
+        let parts = self.parts.iter().map(|part| Ok((part, rows(part)?)));
         Ok(Values {
-            columns: self,
-            rows: self.words.open(unit, ids.iter().copied())?,
+            parts: parts.collect::<Result<_>>()?,
         })
+    }
+
+    /// Deletes the files that no one needs any more.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], [`crate::Error::Disk`].
+    pub fn release(&self, workspace: &Workspace) -> Result<()> {
+        let mut parts = self.parts.iter();
+        parts.try_for_each(|part| part.words.release(workspace))
     }
 }
 
 /// The values of some ids.
 #[derive(Debug)]
 pub struct Values<'a> {
-    columns: &'a StoredColumns,
-    rows: Vec<u32>,
+    /// Columns, and their words id by id.
+    parts: Vec<(&'a Columns, Vec<u32>)>,
 }
 
 impl Values<'_> {
     /// Allocated bytes.
     #[must_use]
     pub fn bytes(&self) -> u64 {
-        bytes_of(&self.rows)
+        self.parts.iter().map(|(_, rows)| bytes_of(rows)).sum()
     }
 
     /// Appends the little-endian values of the id with this number to `bytes`, in the columns that are `held`.
     pub fn put(&self, number: usize, held: &[bool], bytes: &mut Vec<u8>) {
-        let words = self.columns.words.words;
-        let at = number * words;
-        let mut row = [0; 48];
-        for (to, word) in row.chunks_exact_mut(4).zip(&self.rows[at..at + words]) {
-            to.copy_from_slice(&word.to_be_bytes());
-        }
-        let mut at = 0;
-        for (column, held) in self.columns.columns.iter().zip(held) {
-            let own = &row[at..at + column.scalar.bytes()];
-            if *held {
-                Carried::unordered(column, own, bytes);
+        let mut held = held.iter();
+        for (part, rows) in &self.parts {
+            let words = part.words.words;
+            let mut row = [0; 48];
+            let own = &rows[number * words..][..words];
+            for (to, word) in row.chunks_exact_mut(4).zip(own) {
+                to.copy_from_slice(&word.to_be_bytes());
             }
-            at += own.len();
+            let mut at = 0;
+            for (column, held) in part.columns.iter().zip(&mut held) {
+                let own = &row[at..at + column.scalar.bytes()];
+                if *held {
+                    Carried::unordered(column, own, bytes);
+                }
+                at += own.len();
+            }
         }
     }
 }
@@ -292,10 +320,7 @@ impl Job<'_> {
             })
         });
         Ok(StoredAttributes {
-            columns: columns.map(|words| StoredColumns {
-                columns: self.carried.columns.clone(),
-                words,
-            }),
+            columns: columns.map(|words| StoredColumns::new(self.carried.columns.clone(), words)),
             scanners: scanners.map(|words| StoredScanners { words }),
             normals: normals.map(|words| StoredNormals { words }),
         })

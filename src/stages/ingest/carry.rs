@@ -153,6 +153,15 @@ impl Carried {
         }
     }
 
+    /// The bytes of a value of a column of one word, as they are in a row.
+    #[must_use]
+    pub fn word(column: &Column, value: f64) -> u32 {
+        let mut own = Vec::with_capacity(size_of::<u32>());
+        put_ordered(column.scalar, value, &mut own);
+        own.iter()
+            .fold(0, |word, byte| word << 8 | u32::from(*byte))
+    }
+
     /// Appends the little-endian value of a column, whose bytes in a row are `own`.
     pub fn unordered(column: &Column, own: &[u8], values: &mut Vec<u8>) {
         let start = values.len();

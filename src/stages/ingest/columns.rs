@@ -20,6 +20,9 @@ pub(super) const SCANNER: &str = "scanner";
 /// Of points whose scanner is unknown.
 pub(super) const NO_SCANNER: u16 = u16::MAX;
 
+/// How far a point moved from where it was measured, in the cloud's unit: of the mesh, not of a file.
+pub(super) const DISPLACEMENT: &str = "displacement";
+
 /// Other names of columns, in lower case.
 const ALIASES: [(&str, &str); 12] = [
     ("r", "red"),
@@ -67,6 +70,12 @@ impl Column {
         let name = usual_name(name);
         Self { name, scalar }
     }
+
+    /// How far a point moved from where it was measured.
+    #[must_use]
+    pub fn displacement() -> Self {
+        Self::new(DISPLACEMENT, Scalar::F32)
+    }
 }
 
 /// The name by which a column is known in all formats: in lower case, without the prefix that CloudCompare
@@ -92,9 +101,16 @@ pub enum Attributes {
 }
 
 impl Attributes {
-    /// True for the column `name`.
+    /// True if the mesh tells how far each point moved.
+    #[must_use]
+    pub fn has_displacement(&self) -> bool {
+        matches!(self, Self::List(names) if names.iter().any(|name| name == DISPLACEMENT))
+    }
+
+    /// True for the column `name` of a file.
     pub(super) fn wants(&self, name: &str) -> bool {
         match self {
+            _ if name == DISPLACEMENT => false,
             Self::None => false,
             Self::Auto => COLORS.contains(&name) || name == INTENSITY || name == CLASSIFICATION,
             Self::List(names) => names.iter().any(|n| n == name),
@@ -108,22 +124,26 @@ impl Attributes {
         (0..columns.len()).filter(wanted).collect()
     }
 
-    /// The names in the order of the mesh.
+    /// The names of columns of files, in the order of the mesh.
     pub(super) fn names(&self) -> Vec<&str> {
         match self {
             Self::None => Vec::new(),
             Self::Auto => [&COLORS[..], &[INTENSITY, CLASSIFICATION]].concat(),
-            Self::List(names) => names.iter().map(String::as_str).collect(),
+            Self::List(names) => {
+                let names = names.iter().map(String::as_str);
+                names.filter(|name| *name != DISPLACEMENT).collect()
+            }
         }
     }
 
     /// # Errors
     /// [`Error::Parameter`] if a listed column is in none of the files, whose columns are `present`.
     pub(super) fn check(&self, present: &[Column]) -> Result<()> {
-        let Self::List(names) = self else {
+        let Self::List(_) = self else {
             return Ok(());
         };
-        let missing = |name: &&String| present.iter().all(|c| c.name != **name);
+        let names = self.names();
+        let missing = |name: &&&str| present.iter().all(|c| c.name != **name);
         let Some(name) = names.iter().find(missing) else {
             return Ok(());
         };

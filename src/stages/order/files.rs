@@ -48,7 +48,7 @@ pub(super) const STEP: usize = 16;
 pub(super) const WRITTEN: usize = 64;
 
 /// An ordered store in the scratch folder: the name of its file and its size.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StoredPoints {
     pub(super) name: String,
     pub(super) len: usize,

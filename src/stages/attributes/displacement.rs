@@ -1,0 +1,60 @@
+//! How far each point moved from where it was measured: a column of the mesh.
+
+use super::{StoredColumns, Words};
+use crate::error::Result;
+use crate::geom::distance2;
+use crate::spill::Table;
+use crate::stages::blocks::Blocks;
+use crate::stages::ingest::{Carried, Column};
+use crate::stages::order::PointStore;
+use crate::workspace::{Unit, Workspace};
+
+/// The column with the distance of each point `after` smoothing from its place `before`, and the largest of them.
+/// A step of the lattice has the length `step`, in the cloud's unit.
+///
+/// # Errors
+/// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`], [`crate::Error::Cancelled`].
+pub fn displacement(
+    [before, after]: [&PointStore; 2],
+    step: f64,
+    blocks: Blocks,
+    workspace: &Workspace,
+) -> Result<(StoredColumns, f64)> {
+    let column = Column::displacement();
+    let table = Table::new("displacement", blocks.count());
+    let work = |unit: &Unit<'_>| {
+        let ids = blocks.ids(unit.number());
+        let ids = ids.start as usize..ids.end as usize;
+        let (before, after) = (before.slice(ids.clone())?, after.slice(ids)?);
+        let mut largest2 = 0;
+        let words: Vec<u32> = before
+            .iter()
+            .zip(&after)
+            .map(|(from, to)| {
+                let moved2 = distance2(*from, *to);
+                largest2 = largest2.max(moved2);
+                Carried::word(&column, (moved2 as f64).sqrt() * step)
+            })
+            .collect();
+        table.put(unit, unit.number(), bytemuck::cast_slice(&words))?;
+        unit.advance(words.len() as u64);
+        Ok(largest2)
+    };
+    // Two lists of positions with the rest of their pages, and the words.
+    let size = |block| blocks.ids(block).len() + 2 * before.page_size();
+    let bytes = |block| size(block) as u64 * (12 + 12 + 4);
+    let mut largest2 = 0;
+    let each = |_, found: u64| {
+        largest2 = largest2.max(found);
+        Ok(())
+    };
+    workspace.units("displacement", blocks.count(), bytes, work, each)?;
+    let ids = (0..blocks.count()).map(|block| blocks.ids(block));
+    let words = Words {
+        words: 1,
+        table,
+        starts: ids.map(|ids| ids.start).collect(),
+    };
+    let columns = StoredColumns::new(vec![column.clone()], words);
+    Ok((columns, (largest2 as f64).sqrt() * step))
+}
