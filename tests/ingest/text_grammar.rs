@@ -3,6 +3,7 @@
 use crate::bench::Bench;
 use crate::recipe::Recipe;
 use proptest::prelude::*;
+use proptest::test_runner::TestRunner;
 
 /// The coordinates that are read, in thousandths, sorted; none if the file is refused.
 fn found(bench: &Bench, text: &str) -> Option<Vec<[i64; 3]>> {
@@ -20,16 +21,28 @@ fn found(bench: &Bench, text: &str) -> Option<Vec<[i64; 3]>> {
     Some(all)
 }
 
-proptest! {
-    #![proptest_config(ProptestConfig { cases: 600, ..ProptestConfig::default() })]
-
-    #[test]
-    fn text_is_read_as_it_was_written(bytes in proptest::collection::vec(any::<u8>(), 18..60)) {
+#[test]
+fn text_is_read_as_it_was_written() {
+    let bench = Bench::new();
+    let mut runner = TestRunner::new(ProptestConfig {
+        cases: 1000,
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    });
+    let bytes = proptest::collection::vec(any::<u8>(), 18..60);
+    let outcome = runner.run(&bytes, |bytes| {
         let recipe = Recipe::of(&bytes).unwrap();
         let text = recipe.text();
-        let bench = Bench::new();
-        prop_assert_eq!(found(&bench, &text), recipe.expected(), "{}\n{:?}", text, recipe);
-    }
+        prop_assert_eq!(
+            found(&bench, &text),
+            recipe.expected(),
+            "{}\n{:?}",
+            text,
+            recipe
+        );
+        Ok(())
+    });
+    outcome.unwrap_or_else(|error| panic!("{error}"));
 }
 
 /// Neither outcome is rare.

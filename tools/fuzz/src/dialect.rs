@@ -1,7 +1,6 @@
 //! Text with a point a line, as a table of known columns was written.
 
 #[path = "../../../tests/ingest/recipe.rs"]
-#[allow(missing_docs, reason = "a module of the tests")]
 mod recipe;
 
 use crate::{Bench, check_error};

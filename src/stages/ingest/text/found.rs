@@ -33,7 +33,7 @@ pub(super) struct Hint {
 const BYTE: f64 = 255.0;
 const WORD: f64 = 65535.0;
 
-/// Columns of which a message says whether they are read.
+/// Most columns of which a message says which are not read.
 const MOST_READ: usize = 100;
 
 /// Most names in a message.
@@ -84,9 +84,7 @@ impl Found {
                 "column 1 counts the lines and has no name".to_owned()
             } else if unnamed && words && numeric(0) {
                 format!("column {width} has no name")
-            } else if fewer {
-                format!("columns {} have no name", range(names.len()..width))
-            } else if cut {
+            } else if fewer || cut {
                 format!("{} columns have names, lines have {width}", names.len())
             } else {
                 let together = axes.places.windows(2).all(|pair| pair[0] + 1 == pair[1]);
@@ -176,11 +174,11 @@ impl Found {
             parts.push(format!("intensity from {}", places(&[*at])));
         }
         let read = |at: &usize| columns.contains(at) || others.iter().any(|(place, _)| place == at);
-        let unread: Vec<usize> = (0..table.width.min(MOST_READ))
-            .filter(|at| !read(at))
-            .collect();
-        if !unread.is_empty() {
-            parts.push(format!("{} not read", places(&unread)));
+        if table.width > MOST_READ {
+            parts.push(format!("lines have {} columns", table.width));
+        } else {
+            let unread: Vec<usize> = (0..table.width).filter(|at| !read(at)).collect();
+            parts.extend((!unread.is_empty()).then(|| format!("{} not read", places(&unread))));
         }
         parts.extend(table.decimal_comma().then(|| "decimal commas".to_owned()));
         parts.extend(doubt);

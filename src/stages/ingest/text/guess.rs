@@ -187,9 +187,7 @@ impl<'a> Style<'a> {
         }
         if let Some(line) = header {
             let names = named(line, self.separator);
-            return Err(format!(
-                "columns {names}, of which none are called x, y and z"
-            ));
+            return Err(format!("{names}, which are not called x, y and z"));
         }
         Found::unnamed(table, &self.hint(counted))
     }

@@ -80,6 +80,23 @@ pub(super) fn axes(names: &[String]) -> Option<Axes> {
         // Of columns that are as plain the first counts.
         places.min()
     };
+    if let [
+        Some((0, Kind::Axis)),
+        Some((1, Kind::Axis)),
+        Some((_, Kind::Axis)),
+    ] = kinds[..]
+        && of(2, [Kind::Axis; 2]).is_none()
+    {
+        // One slip in a line that has nothing but names of axes.
+        let third = names[2].trim();
+        return Some(Axes {
+            places: [0, 1, 2],
+            plain: true,
+            doubt: Some(format!(
+                "two columns are called {third:?}, the last is taken for z"
+            )),
+        });
+    }
     let both = |wanted| Some([of(0, wanted)?, of(1, wanted)?]);
     let axis_kinds = [Kind::Axis, Kind::Decorated];
     let map_kinds = [Kind::Surveyed, Kind::Letter];
@@ -212,6 +229,7 @@ mod tests {
             ("'x'|'y'|'z'", [0, 1, 2]),
             ("East|North|Elev|x", [0, 1, 2]),
             ("Rechtswert|Hochwert|Höhe", [0, 1, 2]),
+            ("X|Y|X", [0, 1, 2]),
         ] {
             assert_eq!(places(names), Some(want), "{names}");
         }
