@@ -6,7 +6,9 @@ mod smooth;
 use crate::error::{Error, Result};
 pub use crate::geom::region::{NoRegion, Region};
 use crate::method::METHOD;
-use crate::stages::ingest::{Attributes, Classes, Crop, IngestStats, Selection};
+use crate::stages::ingest::{
+    Attributes, Classes, Crop, IngestStats, Layout, Selection, TextColumns,
+};
 pub use crate::stages::normals::InputNormals;
 pub use crate::stages::smooth::Smoothing;
 use crate::stages::spacing::{Limits, Width};
@@ -139,6 +141,10 @@ impl std::str::FromStr for Origin {
 pub struct Params {
     /// Classes of the points that are read.
     pub classes: Classes,
+    /// Names of the columns of text files, if they are not to be read as they say.
+    pub columns: Option<TextColumns>,
+    /// Lines at the beginning of text files that are passed over.
+    pub skip_lines: u64,
     /// The mesh inside this region only.
     pub crop: Option<Region>,
     /// Width of the margin around the region within which points are read as well, in the input's unit.
@@ -225,6 +231,8 @@ impl Default for Params {
     fn default() -> Self {
         Self {
             classes: Classes::All,
+            columns: None,
+            skip_lines: 0,
             crop: None,
             crop_margin: None,
             split: None,
@@ -296,6 +304,10 @@ impl Params {
             attributes: self.attributes.clone(),
             scanners: self.scanners(),
             normals: self.input_normals != InputNormals::Ignore,
+            layout: Layout {
+                columns: self.columns.clone(),
+                skip_lines: self.skip_lines,
+            },
         }
     }
 

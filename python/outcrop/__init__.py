@@ -68,13 +68,14 @@ def reconstruct(
     *,
     output: Optional[Path] = None,
     colors: Any = None,
-    columns: Optional[Mapping[str, Any]] = None,
+    columns: Union[Mapping[str, Any], str, Sequence[str], None] = None,
     progress: Union[Progress, bool, None] = None,
     normals: bool = False,
     compress_glb: bool = False,
     split: Optional[float] = None,
     drop_classes: Optional[Classes] = None,
     keep_classes: Optional[Classes] = None,
+    skip_lines: int = 0,
     crop: Optional[Region] = None,
     crop_margin: Optional[float] = None,
     thin: Optional[float] = None,
@@ -114,8 +115,9 @@ def reconstruct(
     """Makes a mesh from points.
 
     ``points`` is an array (n x 3), a file or folder of points, or a list of them. ``colors`` (n x 3, uint8 or uint16)
-    and ``columns`` (arrays by name) are values of the points of an array; the mesh keeps them. Without ``output`` the
-    mesh is in a temporary file, which is deleted with the :class:`Mesh`.
+    and ``columns`` (arrays by name) are values of the points of an array; the mesh keeps them. Of text files
+    ``columns`` has the names of the columns in their order, such as ``"x,y,z,intensity,-"``. Without ``output`` the mesh
+    is in a temporary file, which is deleted with the :class:`Mesh`.
 
     ``progress`` is a function of the name of the stage, the items done, and the items in all (0 if unknown), or
     ``True`` for bars of tqdm, which notebooks show by default. Time limits are texts such as ``"7h30m"``, or seconds.
@@ -134,6 +136,8 @@ def reconstruct(
             output, options["scratch"] = os.path.join(folder, "mesh.ply"), folder
         inputs = _paths(points)
         if inputs is None:
+            if columns is not None and not isinstance(columns, Mapping):
+                raise ParameterError("columns: of points in an array these are arrays by name")
             cloud = Cloud(points, colors, columns)
             if cloud.names and attributes == "none":
                 options["attributes"] = cloud.names
@@ -142,8 +146,10 @@ def reconstruct(
                 options["scratch"] = os.path.abspath(options["scratch"])
             place = written(cloud, output, options["scratch"], resume, restart)
             inputs = [stack.enter_context(place)]
-        elif colors is not None or columns:
+        elif colors is not None or isinstance(columns, Mapping):
             raise ParameterError("colors, columns: these belong to points in an array; of files, attributes= keeps them")
+        else:
+            options["columns"] = columns
         line = ["reconstruct", f"--output={os.fspath(output)}", *words(options), "--", *inputs]
         answer, made = run(line, progress, quiet)
         if folder is not None:
@@ -158,6 +164,8 @@ def info(
     html: Optional[Path] = None,
     drop_classes: Optional[Classes] = None,
     keep_classes: Optional[Classes] = None,
+    columns: Union[str, Sequence[str], None] = None,
+    skip_lines: int = 0,
     crop: Optional[Region] = None,
     crop_margin: Optional[float] = None,
     memory: Optional[Size] = None,

@@ -14,7 +14,7 @@ from outcrop import _outcrop, _run
 COMMANDS = ["reconstruct", "info", "verify", "compare", "tiles"]
 
 # Keywords that are no options: arrays, and the display of the progress.
-OURS = {"colors", "columns", "progress"}
+OURS = {"colors", "progress"}
 
 # Options that are no keywords: results are not printed but returned.
 PRINTED = {"json"}

@@ -235,3 +235,17 @@ def test_columns_of_all_types() -> None:
     assert list(mesh.columns) == list(columns)
     for name, values in columns.items():
         assert sorted(mesh.columns[name].astype(float)) == sorted(values.astype(float)), name
+
+
+def test_columns_of_text_are_named(points: Points, tmp_path: Path) -> None:
+    lines = [f"{number},{y!r},{x!r},{z!r},tree" for number, (x, y, z) in enumerate(points.astype(float).tolist())]
+    path = tmp_path / "points.csv"
+    path.write_text("a title of 2 lines\nof 2020\n" + "\n".join(lines) + "\n")
+    mesh = outcrop.reconstruct(path, columns=["number", "y", "x", "z", "-"], skip_lines=2, memory=MEMORY)
+    known = outcrop.info(path, columns="-,y,x,z", skip_lines=2)
+    assert known["points"] == len(np.unique(points, axis=0))
+    assert known["min"] == pytest.approx(points.min(axis=0).tolist()) and len(mesh.vertices) > 0
+    with pytest.raises(outcrop.OutcropError, match="columns"):
+        outcrop.info(path, skip_lines=2)
+    with pytest.raises(outcrop.OutcropError, match="columns"):
+        outcrop.reconstruct(points, columns="x,y,z")

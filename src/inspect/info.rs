@@ -353,6 +353,9 @@ impl fmt::Display for Info {
                 write!(f, ", {} ({})", crs.line(), crs.source)?;
             }
             writeln!(f)?;
+            if let Some(taken) = &file.taken {
+                writeln!(f, "  {taken}")?;
+            }
             if let Some(shown) = shown(&file.scanners) {
                 writeln!(f, "  {shown}")?;
             }

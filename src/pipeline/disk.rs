@@ -132,7 +132,7 @@ impl Known {
         let mut known = Self::default();
         let mut probes = Vec::new();
         for path in ingest::expand(inputs).ok()? {
-            let probe = ingest::probe(&path).ok()?;
+            let probe = ingest::probe_as(&path, &selection.layout).ok()?;
             let points = probe.points_likely;
             known.read += points;
             let values = probe.value_bytes(&selection.attributes);

@@ -20,6 +20,7 @@ mod report;
 mod scanners;
 mod scans;
 mod stop;
+mod text;
 mod topology;
 mod util;
 mod versions;

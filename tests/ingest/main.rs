@@ -12,9 +12,12 @@ mod lattices;
 mod normals;
 mod numbers;
 mod ply_headers;
+mod recipe;
 mod regions;
 mod scan_columns;
 mod scans;
+mod text_columns;
+mod text_grammar;
 
 use bench::{Bench, based, cloud, ply, positions, write_las};
 use outcrop::Error;

@@ -129,6 +129,61 @@ fn lines_of_ptx_have_an_intensity_and_a_colour() {
 }
 
 #[test]
+fn six_numbers_in_a_line_of_ptx_are_coordinates_and_a_colour() {
+    let bench = Bench::new();
+    let colored = ["1 0 0 255 20 3", "2 0 0 7 8 9"].map(str::to_owned);
+    let path = bench.write("a.ptx", ptx::scan([1, 2], [0.0; 3], ptx::UNIT, &colored));
+    assert_eq!(names(&path), ["red", "green", "blue", "scanner"]);
+    let found = values(&bench, &path, "color");
+    assert_eq!(found, [[255.0, 20.0, 3.0], [7.0, 8.0, 9.0]]);
+}
+
+/// Whatever the first scan has: a later one has a colour, also behind more lines than are looked at in advance.
+#[test]
+fn colours_of_a_later_scan_of_ptx_are_read() {
+    let bench = Bench::new();
+    for (name, count) in [("few.ptx", 5), ("many.ptx", 60_000)] {
+        let gray: Vec<String> = (0..count).map(|i| format!("{i} 1 1 0.5")).collect();
+        let colored = ["1 0 0 0.25 255 20 3", "2 0 0 7 8 9", "0 0 0 0.5 1 1 1"].map(str::to_owned);
+        let first = ptx::scan([1, count], [0.0; 3], ptx::UNIT, &gray);
+        let text = first.clone() + &ptx::scan([3, 1], [-9.0, 0.0, 0.0], ptx::UNIT, &colored);
+        let path = bench.write(name, text);
+        let (spool, carried) = read(
+            &bench,
+            std::slice::from_ref(&path),
+            "color,intensity",
+            false,
+        );
+        let found = rows(&bench, &spool, &carried);
+        assert_eq!(found[0].1, [255.0, 20.0, 3.0, 0.25], "{name}");
+        assert_eq!(found[1].1[..3], [7.0, 8.0, 9.0], "{name}");
+        assert!(found[1].1[3].is_nan());
+        assert_eq!(found[2].1, [0.0, 0.0, 0.0, 0.5], "{name}");
+        let stats = spool.stats();
+        assert_eq!(
+            stats.files[0].columns,
+            ["intensity", "red", "green", "blue", "scanner"]
+        );
+        assert!(
+            stats.warnings[0].contains("no colour"),
+            "{:?}",
+            stats.warnings
+        );
+        // Of one without any there are none, though its beginning cannot tell.
+        let path = bench.write(name, first);
+        let (spool, carried) = read(&bench, std::slice::from_ref(&path), "auto", false);
+        assert_eq!(spool.stats().files[0].columns, ["intensity", "scanner"]);
+        assert!(carried.columns.is_empty(), "{:?}", carried.columns);
+        let selection = Selection {
+            attributes: "red".parse().unwrap(),
+            ..Selection::default()
+        };
+        let refused = ingest_selected(&[path], &selection, &bench.workspace).map(|_| ());
+        assert!(refused.unwrap_err().to_string().contains("red"));
+    }
+}
+
+#[test]
 fn text_has_the_columns_of_its_header_and_of_pts() {
     let bench = Bench::new();
     let pts = "2\n1 2 3 -1035.25 10 20 30\n4 5 6 7 40 50 60\n1\n7 8 9 0 0 0 0\n";

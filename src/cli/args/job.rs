@@ -6,7 +6,7 @@ use crate::params::{
     Facing, InputNormals, MaxWidth, Method, Origin, Params, Radius, Region, Smooth, Smoothing,
 };
 use crate::pipeline::{Builder, Reconstruction};
-use crate::stages::ingest::{Attributes, Classes};
+use crate::stages::ingest::{Attributes, Classes, TextColumns};
 use clap::Args as ClapArgs;
 use std::path::PathBuf;
 
@@ -38,6 +38,13 @@ pub struct Points {
     /// [default: a twentieth of the region's shorter side]
     #[arg(long, value_name = "LENGTH", requires = "crop")]
     pub crop_margin: Option<f64>,
+    /// Names of the columns of text files in their order, whatever the files say, like
+    /// x,y,z,intensity,r,g,b,-: - passes a column over
+    #[arg(long, value_name = "NAMES", allow_hyphen_values = true)]
+    pub columns: Option<TextColumns>,
+    /// Pass over this many lines at the beginning of text files
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub skip_lines: u64,
 }
 
 /// Columns that the mesh keeps.
@@ -80,6 +87,8 @@ impl Points {
     pub fn params(&self) -> Params {
         Params {
             classes: self.classes(),
+            columns: self.columns.clone(),
+            skip_lines: self.skip_lines,
             crop: self.crop.clone(),
             crop_margin: self.crop_margin,
             ..Params::default()
@@ -206,7 +215,7 @@ pub struct Coordinates {
 /// The points, the mesh, and what decides it.
 #[derive(Debug, ClapArgs)]
 pub struct Job {
-    /// Files (LAS, LAZ, E57, PLY, PCD, PTX, XYZ text; also as .gz and .zst) or folders of files; together they are one cloud
+    /// Files (LAS, LAZ, E57, PLY, PCD, PTX, OFF, XYZ text; also as .gz and .zst) or folders of files; together they are one cloud
     #[arg(value_name = "INPUT", required = true)]
     pub inputs: Vec<PathBuf>,
     /// The mesh to write: .ply, .obj, .stl or .glb (all but OBJ binary), compressed with .zst behind it; or
@@ -262,6 +271,8 @@ impl Job {
         };
         Params {
             classes: selected.classes,
+            columns: selected.columns,
+            skip_lines: selected.skip_lines,
             crop: selected.crop,
             crop_margin: selected.crop_margin,
             split: self.split,

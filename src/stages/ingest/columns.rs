@@ -233,6 +233,17 @@ impl Wanted {
         Ok(Self { numbers, columns })
     }
 
+    /// The columns as they are, when the points were read: those that none of them has have no name.
+    pub(super) fn found(&self, found: &[Column]) -> Vec<Column> {
+        let mut columns = self.columns.clone();
+        let absent = |column: &&mut Column| found.iter().all(|f| f.name != column.name);
+        columns
+            .iter_mut()
+            .filter(absent)
+            .for_each(|c| c.name.clear());
+        columns
+    }
+
     /// True if no column is wanted.
     pub(super) fn is_empty(&self) -> bool {
         self.columns.is_empty()

@@ -4,6 +4,8 @@ use super::e57::E57;
 use super::format::Format;
 use super::input::Input;
 use super::las::Las;
+use super::layout::Layout;
+use super::off::Off;
 use super::pcd::Pcd;
 use super::ply::Ply;
 use super::point_format::{Head, PointFile, PointFormat, Refusal, has_extension};
@@ -15,13 +17,17 @@ use serde::{Deserialize, Deserializer};
 use std::path::Path;
 
 /// All formats, in the order in which they are tested. Text is last: its error explains why no format fits.
-pub(super) const FORMATS: [&dyn PointFormat; 6] = [&Las, &E57, &Ply, &Pcd, &Ptx, &Text];
+pub(super) const FORMATS: [&dyn PointFormat; 7] = [&Las, &E57, &Ply, &Pcd, &Ptx, &Off, &Text];
 
 /// Bytes at the start of a file that are used for detection.
 const HEAD: usize = 64 << 10;
 
 /// The same, for a file with a very long first line, or with many lines before the first point.
 pub(super) const LONG_HEAD: usize = 1 << 20;
+
+/// What is expected of a text whose columns cannot be told.
+const COLUMNS: &str =
+    "columns called x, y and z, or their names in order by --columns, like x,y,z,r,g,b,-";
 
 /// Names of all formats, for messages.
 pub(super) fn readable() -> String {
@@ -43,12 +49,15 @@ fn ask(head: &Head) -> Result<&'static dyn PointFormat, Refusal> {
 }
 
 /// The format of a file, and the bytes used for detection.
-fn find(input: &Input) -> Result<(Head, Result<&'static dyn PointFormat, Refusal>)> {
-    let head = Head::read(input, HEAD)?;
+fn find(
+    input: &Input,
+    layout: &Layout,
+) -> Result<(Head, Result<&'static dyn PointFormat, Refusal>)> {
+    let head = Head::read(input, layout, HEAD)?;
     match ask(&head) {
         // A long first line, or many lines of comments.
         Err(Refusal::Unknown(_)) if !head.whole && !head.bytes.contains(&0) => {
-            let head = Head::read(input, LONG_HEAD)?;
+            let head = Head::read(input, layout, LONG_HEAD)?;
             let found = ask(&head);
             Ok((head, found))
         }
@@ -60,11 +69,12 @@ fn find(input: &Input) -> Result<(Head, Result<&'static dyn PointFormat, Refusal
 ///
 /// # Errors
 /// [`crate::Error::Input`] if it is no point cloud that can be read; [`crate::Error::Io`].
-pub(super) fn open(input: &Input) -> Result<Box<dyn PointFile>> {
-    let (head, found) = find(input)?;
+pub(super) fn open(input: &Input, layout: &Layout) -> Result<Box<dyn PointFile>> {
+    let (head, found) = find(input, layout)?;
     let (found, advice) = match found {
         Ok(format) => return format.open(input, &head),
         Err(Refusal::Foreign(name)) => (format!("{name}, which is not read"), "; convert it first"),
+        Err(Refusal::Columns(found)) => return Err(input.error("columns", found, COLUMNS)),
         Err(Refusal::Unknown(why)) => (why, ""),
     };
     Err(input.error("format", found, readable() + advice))
@@ -82,11 +92,12 @@ pub(super) fn is_points(path: &Path) -> Result<bool> {
         Err(Error::Input { .. }) => return Ok(FORMATS.into_iter().any(named)),
         opened => opened?,
     };
-    let (_, found) = find(&input)?;
+    let (_, found) = find(&input, &Layout::default())?;
     Ok(match found {
         Ok(format) => format.has_signature() || named(format),
         // A point cloud of an unsupported format must not be skipped silently.
         Err(Refusal::Foreign(_)) => true,
+        Err(Refusal::Columns(_)) => FORMATS.into_iter().any(named),
         Err(Refusal::Unknown(_)) => false,
     })
 }

@@ -5,8 +5,8 @@
 //! [`Spool::for_each`] streams the points as positions on it.
 //!
 //! Formats are detected by content: LAS 1.0 to 1.4 with point formats 0 to 10, LAZ (COPC included), E57,
-//! PLY, PCD, PTX, and text with one point in a line; any of them may be compressed with gzip or Zstandard. Each format
-//! is a module that implements `PointFormat`, and an entry of the list in `formats.rs`.
+//! PLY, PCD, PTX, OFF, and text with one point in a line; any of them may be compressed with gzip or Zstandard. Each
+//! format is a module that implements `PointFormat`, and an entry of the list in `formats.rs`.
 
 mod belong;
 mod carry;
@@ -26,12 +26,14 @@ mod frames;
 mod input;
 mod las;
 mod lattice;
+mod layout;
 mod lines;
 mod map;
 mod middle;
 mod native;
 mod normals;
 mod number;
+mod off;
 mod pcd;
 mod ply;
 mod point_format;
@@ -44,6 +46,7 @@ mod spool;
 mod stats;
 mod stream;
 mod systems;
+mod taken;
 mod text;
 
 pub use carry::{Attribute, Carried};
@@ -54,7 +57,8 @@ pub use crs::{Crs, CrsSource, of_prj, prj_of};
 pub use directions::{NORMAL_BYTES, direction};
 pub use expand::expand;
 pub use format::Format;
-pub use probe::{Probe, probe};
+pub use layout::{Layout, TextColumns};
+pub use probe::{Probe, probe, probe_as};
 pub use stats::{FileStats, IngestStats};
 pub use stream::{READ_BUFFERS, VALUE_BUFFERS};
 pub use systems::Mixed;
@@ -74,6 +78,7 @@ use source::Source;
 use spool::SourceWriter;
 use std::path::PathBuf;
 use systems::Systems;
+use taken::Taken;
 
 /// Precision that suffices for writing the coordinates of the cloud.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize)]
@@ -98,6 +103,8 @@ pub struct Selection {
     pub scanners: bool,
     /// True if the normals of the points are read, from files that have any.
     pub normals: bool,
+    /// How text files are read.
+    pub layout: Layout,
 }
 
 /// All points of the inputs in one scratch file.
@@ -152,7 +159,7 @@ pub fn ingest_selected(
     workspace: &Workspace,
 ) -> Result<Spool> {
     let paths = expand(inputs)?;
-    check_columns(&paths, &selection.attributes)?;
+    check_columns(&paths, selection)?;
     let name = format!("ingest-{}.spool", workspace.number());
     let spool = read_all(&paths, selection, &name, workspace);
     if spool.is_err() && !workspace.is_resumable() {
@@ -163,13 +170,14 @@ pub fn ingest_selected(
 }
 
 /// Refuses columns that are in none of the files.
-fn check_columns(paths: &[PathBuf], attributes: &Attributes) -> Result<()> {
+fn check_columns(paths: &[PathBuf], selection: &Selection) -> Result<()> {
+    let attributes = &selection.attributes;
     if !matches!(attributes, Attributes::List(_)) {
         return Ok(());
     }
     let mut present = Vec::new();
     for path in paths {
-        let probe = probe(path)?;
+        let probe = probe_as(path, &selection.layout)?;
         if !probe.is_described {
             // Checked when all files were read.
             return Ok(());
@@ -196,14 +204,14 @@ fn read_all(
     let mut systems = Systems::default();
     let mut shared = false;
     let mut present = Vec::new();
+    let mut taken = Taken::default();
     for path in paths {
         workspace.check_cancel()?;
-        let opened = Opened::new(Input::open(path, workspace)?)?;
+        let opened = Opened::new(Input::open(path, workspace)?, &selection.layout)?;
         let number = sources.len() as u32;
         let scanners = selection.scanners && opened.has_scanners();
         let columns = opened.file.columns();
         let wanted = Wanted::of(&selection.attributes, &columns, scanners, selection.normals)?;
-        present.extend(columns);
         let target = SourceWriter::new(workspace, name, section, number, classes, &wanted)?
             .within(nearby.as_ref(), opened.claims.native);
         let outside =
@@ -224,6 +232,10 @@ fn read_all(
         if *classes != Classes::All && !opened.claims.classes {
             warnings.push("its points have no class, all of them are kept".to_owned());
         }
+        let found = opened.file.found();
+        let columns = wanted.found(&found);
+        present.extend(found);
+        taken.add(&opened);
         let read = target.stats();
         let (next, more, more_values) = target.end();
         section = next;
@@ -238,7 +250,7 @@ fn read_all(
             stats: read,
             text: opened.claims.text,
             cut: false,
-            columns: wanted.columns,
+            columns,
             spans: more_values.spans,
         };
         let shown = |w: String| format!("{}: {w}", path.display());
@@ -255,6 +267,8 @@ fn read_all(
         return Err(Error::Shared);
     }
     selection.attributes.check(&present)?;
+    taken.check(&selection.layout)?;
+    stats.warnings.extend(taken.warnings());
     if let Some(crop) = crop.filter(|_| stats.kept == 0) {
         crop.check_met(&sources)?;
     }
@@ -277,8 +291,8 @@ struct Opened {
 }
 
 impl Opened {
-    fn new(input: Input) -> Result<Self> {
-        let file = formats::open(&input)?;
+    fn new(input: Input, layout: &Layout) -> Result<Self> {
+        let file = formats::open(&input, layout)?;
         let claims = file.claims(&input);
         Ok(Self {
             input,
@@ -311,7 +325,8 @@ impl Opened {
 pub fn check_systems(inputs: &[PathBuf]) -> Result<()> {
     let mut systems = Systems::default();
     for path in expand(inputs)? {
-        let opened = Input::open_head(&path, formats::LONG_HEAD).and_then(Opened::new);
+        let head = Input::open_head(&path, formats::LONG_HEAD);
+        let opened = head.and_then(|input| Opened::new(input, &Layout::default()));
         if let Some(crs) = opened.ok().and_then(|opened| opened.crs().0) {
             systems.add(&path, crs);
         }
@@ -351,11 +366,14 @@ impl IngestStats {
         self.dropped_by_crop += stats.outside;
         self.skipped_by_crop += stats.skipped;
         let bounds = source.bounds();
+        let taken = opened.file.taken();
         self.files.push(FileStats {
             path: opened.input.path.clone(),
             format: opened.claims.format,
             bytes: opened.input.size,
-            columns: opened.file.columns().into_iter().map(|c| c.name).collect(),
+            columns: opened.file.found().into_iter().map(|c| c.name).collect(),
+            taken: taken.map(|(taken, _)| taken.to_owned()),
+            guessed: taken.is_some_and(|(_, guessed)| guessed),
             claimed: opened.claims.points,
             points: stats.read,
             kept: stats.kept,

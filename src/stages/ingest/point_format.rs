@@ -5,6 +5,7 @@ use super::crop::Nearby;
 use super::crs::Crs;
 use super::format::Format;
 use super::input::Input;
+use super::layout::Layout;
 use super::native::Native;
 use super::spool::SourceWriter;
 use crate::error::Result;
@@ -45,15 +46,18 @@ pub(super) struct Head {
     pub(super) bytes: Vec<u8>,
     /// True if this is the whole file.
     pub(super) whole: bool,
+    /// What the caller says about text.
+    pub(super) layout: Layout,
 }
 
 impl Head {
-    pub(super) fn read(input: &Input, most: usize) -> Result<Self> {
+    pub(super) fn read(input: &Input, layout: &Layout, most: usize) -> Result<Self> {
         let bytes = input.head(most)?;
         Ok(Self {
             path: input.path.clone(),
             whole: bytes.len() as u64 == input.bytes,
             bytes,
+            layout: layout.clone(),
         })
     }
 
@@ -81,6 +85,8 @@ pub(super) fn has_extension(path: &Path, extensions: &[&str]) -> bool {
 pub(super) enum Refusal {
     /// It is of an unsupported format with this name.
     Foreign(&'static str),
+    /// It is a text of numbers whose columns cannot be told; what was found.
+    Columns(String),
     /// It is not a point cloud, for this reason.
     Unknown(String),
 }
@@ -107,9 +113,21 @@ pub(super) trait PointFile {
         true
     }
 
-    /// The columns of the file. A [`SourceWriter`] says which are wanted, by their numbers in this list.
+    /// The columns of the file. A [`SourceWriter`] says which are wanted, by their numbers in this list. A file
+    /// whose beginning does not tell gives all that there may be, until its points were read: then
+    /// [`PointFile::found`] tells.
     fn columns(&self) -> Vec<Column> {
         Vec::new()
+    }
+
+    /// The columns that its points have, when they were read.
+    fn found(&self) -> Vec<Column> {
+        self.columns()
+    }
+
+    /// Which columns of a text are read as what, and true if the file does not say so plainly.
+    fn taken(&self) -> Option<(&str, bool)> {
+        None
     }
 
     /// The lowest and highest coordinates in the spool's type, if it is certain from the header and a few points

@@ -5,6 +5,7 @@ use super::columns::{Attributes, Column, normal_columns};
 use super::format::Format;
 use super::formats::LONG_HEAD;
 use super::input::Input;
+use super::layout::Layout;
 use super::native::Native;
 use crate::error::Result;
 use serde::Serialize;
@@ -62,7 +63,15 @@ impl Probe {
 /// # Errors
 /// [`crate::Error::Io`]; [`crate::Error::Input`] if it is not a readable point cloud.
 pub fn probe(path: &Path) -> Result<Probe> {
-    let opened = Opened::new(Input::open_head(path, LONG_HEAD)?)?;
+    probe_as(path, &Layout::default())
+}
+
+/// As [`probe`]; text is read as `layout` says.
+///
+/// # Errors
+/// See [`probe`].
+pub fn probe_as(path: &Path, layout: &Layout) -> Result<Probe> {
+    let opened = Opened::new(Input::open_head(path, LONG_HEAD)?, layout)?;
     let has_scanners = opened.has_scanners();
     let Opened {
         input,

@@ -59,6 +59,10 @@ pub struct FileStats {
     pub bytes: u64,
     /// Names of its columns beside the coordinates.
     pub columns: Vec<String>,
+    /// Of text: which of its columns are read as what.
+    pub taken: Option<String>,
+    /// True if the file does not say so plainly.
+    pub guessed: bool,
     /// Number of points given in the header; `None` for text.
     pub claimed: Option<u64>,
     /// Points in the file.
@@ -116,6 +120,8 @@ pub(super) struct SourceStats {
     pub(super) decimals: u32,
     /// Sum of the point counts given in count lines of a text file.
     pub(super) claimed: u64,
+    /// What lines of a PTX file have, as bits.
+    pub(super) kinds: u8,
 }
 
 /// The extent of no point.
@@ -138,6 +144,7 @@ impl Default for SourceStats {
             exponent: i32::MAX,
             decimals: 0,
             claimed: 0,
+            kinds: 0,
         }
     }
 }
@@ -203,6 +210,7 @@ impl SourceStats {
         self.exponent = self.exponent.min(other.exponent);
         self.decimals = self.decimals.max(other.decimals);
         self.claimed = self.claimed.saturating_add(other.claimed);
+        self.kinds |= other.kinds;
     }
 
     /// Extends the range of coordinates by a point.

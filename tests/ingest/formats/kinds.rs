@@ -1,6 +1,6 @@
 //! The kinds of files and their makers.
 
-use super::{compressed, e57, las, pcd, ply, ptx, text};
+use super::{compressed, e57, las, off, pcd, ply, ptx, text};
 use crate::bench::Bench;
 use std::path::PathBuf;
 
@@ -205,6 +205,19 @@ pub const KINDS: &[(&str, Kind)] = &[
     ("the header of a later scan that is none", ptx::no_header),
     ("a matrix for points in columns", ptx::columns),
     ("a line of PTX that is no point", ptx::bad_line),
+    ("OFF, also with colours or normals, and faces", off::meshes),
+    ("binary OFF", |b| {
+        vec![b.write("a.off", "OFF BINARY\n1 0 0\n")]
+    }),
+    ("an OFF header without numbers", |b| {
+        vec![b.write("a.off", "OFF\n"), b.write("b.off", "OFF\na b c\n")]
+    }),
+    ("OFF that ends early", |b| {
+        vec![b.write("a.off", "OFF\n3 0 0\n1 2 3\n")]
+    }),
+    ("a line of OFF that is no vertex", |b| {
+        vec![b.write("a.off", "OFF\n2 0 0\n1 2 3\n1 2\n")]
+    }),
     (
         "spaces, tabs, commas or semicolons between numbers",
         text::separators,
@@ -213,12 +226,15 @@ pub const KINDS: &[(&str, Kind)] = &[
         "decimal commas, with spaces or semicolons",
         text::decimal_commas,
     ),
+    ("a line or comment of names, x, y and z first", text::names),
     (
-        "a line of names, also with x, y and z in other places",
-        text::names,
+        "names of coordinates in other places, or others",
+        text::other_names,
     ),
+    ("more than three columns without names", text::no_names),
+    ("columns that cannot be told", text::untold),
     (
-        "comments behind `#` or `//`, and blank lines",
+        "comments behind `#`, `//` or `%`, and blank lines",
         text::comments,
     ),
     ("PTS: lines that count the points after them", text::counts),

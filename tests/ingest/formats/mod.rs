@@ -4,6 +4,7 @@ mod compressed;
 pub mod e57;
 mod kinds;
 mod las;
+mod off;
 pub mod pcd;
 mod ply;
 pub mod ptx;

@@ -11,7 +11,7 @@ fn write(bench: &Bench, texts: &[&str]) -> Vec<PathBuf> {
 }
 
 pub fn separators(bench: &Bench) -> Vec<PathBuf> {
-    let text = "1.5 2 -3 9\n4 5 6 9\n";
+    let text = "1.5 2 -3\n4 5 6\n";
     let others = ["   ", "\t", ",", ", ", ";"].map(|separator| text.replace(' ', separator));
     let all: Vec<&str> = [text]
         .into_iter()
@@ -29,14 +29,53 @@ pub fn names(bench: &Bench) -> Vec<PathBuf> {
         bench,
         &[
             "X Y Z Red\n1 2 3 9\n",
-            "\"id\",\"z\",\"x\",\"y\"\nfirst,1,2,3\n",
+            "\"x [m]\",\"y [m]\",\"z [m]\",\"a, b\"\n1,2,3,4\n",
             "//X,Y,Z\n1,2,3\n",
+            "% x y z\n1 2 3\n",
+        ],
+    )
+}
+
+pub fn other_names(bench: &Bench) -> Vec<PathBuf> {
+    write(
+        bench,
+        &[
+            "\"id\",\"z\",\"x\",\"y\"\nfirst,1,2,3\n",
+            ",x,y,z\n0,1,2,3\n",
+            "Northing;Easting;Height\n1,5;2;3\n",
+            "\"Points:0\",\"Points:1\",\"Points:2\"\n1,2,3\n",
+            "# ID, X, Y, Z, TRACK[]\n1 2 3 4\n2 3 4 5 6 7\n",
+        ],
+    )
+}
+
+pub fn no_names(bench: &Bench) -> Vec<PathBuf> {
+    write(
+        bench,
+        &[
+            "1.5 2 -3 9\n4 5 6 9\n",
+            "1 2 3 200 100 50\n",
+            "1 2 3 -1024 200 100 50\n",
+        ],
+    )
+}
+
+pub fn untold(bench: &Bench) -> Vec<PathBuf> {
+    write(
+        bench,
+        &[
+            "a,b,c\n1,2,3\n",
+            "id,x,y,z\n1,2,3,4,5,6\n",
+            "1,2.5,3.5,4.5,tree\n2,3.5,4.5,5.5,rock\n",
         ],
     )
 }
 
 pub fn comments(bench: &Bench) -> Vec<PathBuf> {
-    write(bench, &["# one\n// two\n\n1 2 3\n# three\n4 5 6\n\n"])
+    write(
+        bench,
+        &["# one\n// two\n% three\n\n1 2 3\n# four\n4 5 6\n\n"],
+    )
 }
 
 pub fn counts(bench: &Bench) -> Vec<PathBuf> {

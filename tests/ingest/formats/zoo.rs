@@ -166,11 +166,11 @@ pub const ZOO: &[(&str, &[&str])] = &[
         &["generated/decimal_comma.xyz"],
     ),
     (
-        "a line of names, also with x, y and z in other places",
+        "a line or comment of names, x, y and z first",
         &["generated/header.xyz", "generated/slashheader.xyz"],
     ),
     (
-        "comments behind `#` or `//`, and blank lines",
+        "comments behind `#`, `//` or `%`, and blank lines",
         &["generated/hash.xyz"],
     ),
     (

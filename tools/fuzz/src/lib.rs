@@ -4,6 +4,7 @@
 //! [`HEAP`]. Errors of the kinds that a file may cause are the expected outcome.
 
 pub mod cloud;
+pub mod dialect;
 pub mod folder;
 pub mod mesh;
 pub mod region;

@@ -4,6 +4,7 @@ use super::super::columns::Wanted;
 use super::super::input::{Input, Range, STREAM_BUFFER};
 use super::super::lines::{self, LONGEST_LINE};
 use super::super::spool::{Sink, SourceWriter};
+use super::kinds::Value;
 use super::scan::{HEADER, Scan};
 use crate::error::{Error, Result};
 use crate::workspace::Workspace;
@@ -71,11 +72,20 @@ impl Index {
         let scan = &self.scans[scan as usize];
         let bytes = input.window(start, (end - start) as usize, "lines")?;
         let mut at = start;
+        let values = Value::all(wanted);
+        let every = values.iter().any(|value| !value.is_scanner());
+        // Without values to read, the first point of a unit tells what its lines have.
+        let mut seen = false;
         for line in bytes.split(|b| lines::is_end(*b)) {
             let text = line.trim_ascii();
-            if !text.is_empty()
-                && let Err(found) = scan.take(text, wanted, sink)?
-            {
+            if text.is_empty() {
+                at += line.len() as u64 + 1;
+                continue;
+            }
+            let before = sink.stats.invalid;
+            let taken = scan.take(text, (&values, every || !seen), sink)?;
+            seen |= sink.stats.invalid == before;
+            if let Err(found) = taken {
                 let place = format!("line {}", lines::number_of(input, at)?);
                 let expected = "three coordinates, perhaps with an intensity and a colour";
                 return Err(input.error(place, found, expected));

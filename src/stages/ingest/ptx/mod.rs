@@ -1,9 +1,10 @@
 //! PTX: scans as text, each a header with the pose of the scanner and a line for each direction.
 
 mod index;
+mod kinds;
 mod scan;
 
-use super::columns::{COLORS, Column, INTENSITY, SCANNER, Wanted};
+use super::columns::{COLORS, Column};
 use super::format::Format;
 use super::input::Input;
 use super::lines;
@@ -13,7 +14,7 @@ use super::point_format::{Claims, Head, PointFile, PointFormat, Refusal};
 use super::spool::{Sink, SourceWriter, sink_bytes};
 use crate::error::Result;
 use index::{Index, UNIT};
-use outcrop_ply::Scalar;
+use kinds::{Kinds, MOST_WORDS, Value, columns};
 use scan::{HEADER, Scan, Shape, shape, words};
 use std::cell::OnceCell;
 
@@ -48,11 +49,16 @@ impl PointFormat for Ptx {
     fn open(&self, input: &Input, head: &Head) -> Result<Box<dyn PointFile>> {
         let lines = head.bytes.split(|b| lines::is_end(*b));
         let lines = lines.map(<[u8]>::trim_ascii).filter(|l| !l.is_empty());
-        let lines: Vec<&[u8]> = lines.take(HEADER + 1).collect();
-        let point = lines.get(HEADER).copied().unwrap_or_default();
+        let lines: Vec<&[u8]> = lines.take(HEADER).collect();
+        let first = Scan::of(input, 0, &lines[..lines.len().min(HEADER)])?;
         Ok(Box::new(Scans {
-            first: Scan::of(input, 0, &lines[..lines.len().min(HEADER)])?,
-            words: words(point).count(),
+            // Further scans may have what the first does not.
+            likely: match head.whole {
+                true => Kinds::of_head(&head.bytes),
+                false => Kinds::ALL,
+            },
+            first,
+            kinds: OnceCell::new(),
             scanners: OnceCell::new(),
         }))
     }
@@ -61,8 +67,10 @@ impl PointFormat for Ptx {
 /// A file, of which the first header was read.
 struct Scans {
     first: Scan,
-    /// Words of its first line.
-    words: usize,
+    /// What its lines may have.
+    likely: Kinds,
+    /// What they have, when they were read.
+    kinds: OnceCell<Kinds>,
     /// The positions of all scanners, when they are known.
     scanners: OnceCell<Vec<[f64; 3]>>,
 }
@@ -80,7 +88,11 @@ impl PointFile for Scans {
     }
 
     fn columns(&self) -> Vec<Column> {
-        columns(self.words)
+        columns(self.likely)
+    }
+
+    fn found(&self) -> Vec<Column> {
+        columns(self.kinds.get().copied().unwrap_or(self.likely))
     }
 
     fn scanners(&self) -> Vec<[f64; 3]> {
@@ -96,32 +108,22 @@ impl PointFile for Scans {
         let work =
             |unit: usize, sink: &mut Sink<'_, f64>| index.take(input, unit, target.wanted, sink);
         target.units("PTX lines", index.units.len(), |_| memory, work)?;
-        Ok(Vec::new())
+        let kinds = Kinds::from_bits(target.stats().kinds);
+        let _ = self.kinds.set(kinds);
+        let colors = target.wanted.columns.iter().any(|c| c.name == COLORS[0]);
+        let some = (colors && kinds.is_partly_coloured()).then(|| {
+            "lines of some points have no colour: these are black, or as points with the same position".to_owned()
+        });
+        Ok(some.into_iter().collect())
     }
 }
 
-/// The columns of lines of so many words: an intensity behind the coordinates, and a colour behind that; and the
-/// scanner.
-fn columns(words: usize) -> Vec<Column> {
-    let color = COLORS.map(|name| Column::new(name, Scalar::U8));
-    let all = [Column::new(INTENSITY, Scalar::F32)]
-        .into_iter()
-        .chain(color);
-    let count = match words {
-        0..4 => 0,
-        4..7 => 1,
-        7.. => 4,
-    };
-    let scanner = Column::new(SCANNER, Scalar::U16);
-    all.take(count).chain([scanner]).collect()
-}
-
 impl Scan {
-    /// Passes the point of a line on; the error says what was found.
+    /// Passes the point of a line on, and what the line has if `look`; the error says what was found.
     fn take(
         &self,
         line: &[u8],
-        wanted: &Wanted,
+        (wanted, look): (&[Value], bool),
         sink: &mut Sink<'_, f64>,
     ) -> Result<Result<(), String>> {
         let mut point = [0.0; 3];
@@ -148,18 +150,25 @@ impl Scan {
             fixed => fixed.max(decimals),
         };
         sink.stats.decimals = sink.stats.decimals.max(decimals);
+        let mut all: [&[u8]; MOST_WORDS] = [&[]; MOST_WORDS];
+        let mut count = 0;
+        if look {
+            for (to, word) in all.iter_mut().zip(words(line)) {
+                *to = word;
+                count += 1;
+            }
+            sink.stats.kinds |= Kinds::of(count).bits();
+        }
         sink.push_with(self.placed(point), |values| {
-            let mut others = words(line).skip(3).take(4);
-            let mut next = 0;
-            for (number, column) in wanted.numbers.iter().zip(&wanted.columns) {
-                if column.name == SCANNER {
-                    values.extend(self.number.to_le_bytes());
-                    continue;
+            for value in wanted {
+                match value.place(count) {
+                    _ if value.is_scanner() => values.extend(self.number.to_le_bytes()),
+                    Some(at) => {
+                        let number = number::parse(all[at], false, &mut 0);
+                        value.scalar().put(number.unwrap_or(f64::NAN), values);
+                    }
+                    None => value.scalar().put(f64::NAN, values),
                 }
-                let word = others.nth(number - next);
-                next = number + 1;
-                let value = word.and_then(|w| number::parse(w, false, &mut 0));
-                column.scalar.put(value.unwrap_or(f64::NAN), values);
             }
         })?;
         Ok(Ok(()))

@@ -1,6 +1,6 @@
 //! Names of formats that are recognised but not supported.
 
-use super::dialect::lines;
+use super::sample::lines;
 
 /// The name of an unsupported format with geometry.
 pub(super) fn name(head: &[u8]) -> Option<&'static str> {
@@ -14,6 +14,7 @@ pub(super) fn name(head: &[u8]) -> Option<&'static str> {
 fn of_text(head: &[u8]) -> Option<&'static str> {
     let lines = lines(head, true);
     let keyword = |line: &[u8]| {
+        let line = line.trim_ascii();
         let word = line.split(|b| *b == b' ').next().unwrap_or(line);
         let known: [&[u8]; 7] = [b"v", b"vn", b"vt", b"o", b"g", b"mtllib", b"usemtl"];
         known.contains(&word)
@@ -22,7 +23,7 @@ fn of_text(head: &[u8]) -> Option<&'static str> {
         Some("OBJ")
     } else if lines
         .first()
-        .is_some_and(|(_, _, line)| line.starts_with(b"solid "))
+        .is_some_and(|(_, _, line)| line.trim_ascii().starts_with(b"solid "))
     {
         Some("STL")
     } else {

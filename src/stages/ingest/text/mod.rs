@@ -1,7 +1,12 @@
 //! Lines of numbers: XYZ, TXT, CSV, PTS.
 
+mod cells;
 mod dialect;
 mod foreign;
+mod found;
+mod guess;
+mod names;
+mod sample;
 
 use super::columns::{Column, Wanted};
 use super::format::Format;
@@ -54,14 +59,17 @@ impl PointFormat for Text {
             let why = format!("{}, binary data", head.shown());
             return Err(Refusal::Unknown(why));
         }
-        let dialect = dialect::guess(bytes, head.whole);
-        dialect.map(|_| true).map_err(Refusal::Unknown)
+        guess::guess(head).map(|_| true)
     }
 
     fn open(&self, input: &Input, head: &Head) -> Result<Box<dyn PointFile>> {
-        let dialect = dialect::guess(&head.bytes, head.whole);
-        let wrong = |why| input.error("format", why, self.names());
-        Ok(Box::new(dialect.map_err(wrong)?))
+        let wrong = |why| match why {
+            Refusal::Foreign(name) => input.error("format", name, self.names()),
+            Refusal::Columns(why) | Refusal::Unknown(why) => {
+                input.error("format", why, self.names())
+            }
+        };
+        Ok(Box::new(guess::guess(head).map_err(wrong)?))
     }
 }
 
@@ -80,6 +88,10 @@ impl PointFile for Dialect {
             .iter()
             .map(|(_, column)| column.clone())
             .collect()
+    }
+
+    fn taken(&self) -> Option<(&str, bool)> {
+        Some((&self.taken, self.guessed))
     }
 
     fn read(&self, input: &Input, target: &SourceWriter<'_>) -> Result<Vec<String>> {
