@@ -6,7 +6,7 @@ use super::parse::{count, size, time};
 use crate::pipeline::Start;
 use crate::workspace::mapped::Io;
 use crate::workspace::{Compression, Storage};
-use clap::Args as ClapArgs;
+use clap::{ArgAction, Args as ClapArgs};
 pub use job::{Job, Points};
 use std::path::PathBuf;
 use std::time::Duration;
@@ -25,9 +25,28 @@ pub struct Limits {
     pub scratch: Option<PathBuf>,
     #[command(flatten)]
     pub storing: Storing,
-    /// Show no progress, even on a terminal
-    #[arg(long, short)]
-    pub quiet: bool,
+    #[command(flatten)]
+    pub quiet: Quiet,
+}
+
+/// How much is said.
+#[derive(Debug, Clone, Copy, ClapArgs)]
+pub struct Quiet {
+    /// Show no progress and no summary, even on a terminal; warnings stay. Twice (-qq): no warnings either
+    #[arg(long = "quiet", short = 'q', action = ArgAction::Count)]
+    times: u8,
+}
+
+impl Quiet {
+    /// True if progress and summary are shown.
+    pub fn tells(self) -> bool {
+        self.times == 0
+    }
+
+    /// True if warnings are shown.
+    pub fn warns(self) -> bool {
+        self.times < 2
+    }
 }
 
 /// How scratch files are read and written.
@@ -120,9 +139,8 @@ pub struct Resume {
     pub storing: Storing,
     #[command(flatten)]
     pub ends: Ends,
-    /// Show no progress, even on a terminal
-    #[arg(long, short)]
-    pub quiet: bool,
+    #[command(flatten)]
+    pub quiet: Quiet,
 }
 
 /// `outcrop info`

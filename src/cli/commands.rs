@@ -1,6 +1,6 @@
 //! The commands of the program: their work, and what they print.
 
-use super::args::{Compare, Demo, Info, Reconstruct, Resume, Tiles, Verify};
+use super::args::{Compare, Demo, Info, Quiet, Reconstruct, Resume, Tiles, Verify};
 use super::command::Command;
 use super::jobs::{self, memory, threads};
 use super::output::{print, show, summary, write_report};
@@ -53,8 +53,8 @@ fn resume(args: &Resume) -> Result<bool> {
 }
 
 /// Prints the summary of a run on a terminal.
-fn tell((report, output): jobs::Made, quiet: bool) -> Result<bool> {
-    if !quiet && std::io::stdout().is_terminal() {
+fn tell((report, output): jobs::Made, quiet: Quiet) -> Result<bool> {
+    if quiet.tells() && std::io::stdout().is_terminal() {
         print(&summary(&report, &output))?;
     }
     Ok(true)

@@ -7,7 +7,7 @@ mod submit;
 pub use status::status;
 pub use submit::submit;
 
-use super::args::{Job, Storing};
+use super::args::{Job, Quiet, Storing};
 use super::output::{is_page, json, print, summary, write_report};
 use super::parse::size;
 use super::{stop, style};
@@ -88,9 +88,8 @@ pub struct Process {
     pub threads: Option<u16>,
     #[command(flatten)]
     pub storing: Storing,
-    /// Show no progress, even on a terminal
-    #[arg(long, short)]
-    pub quiet: bool,
+    #[command(flatten)]
+    pub quiet: Quiet,
 }
 
 /// `outcrop advance`

@@ -1,6 +1,7 @@
 //! The thread that waits for signals, the end of a run and the next drawing of the progress; messages about
 //! stopping.
 
+use super::args::Quiet;
 use super::progress::{Bars, Warnings};
 use crate::pipeline::Reconstruction;
 use crate::workspace::progress::{Cancel, Observer, Silent};
@@ -39,10 +40,10 @@ pub fn code(expired: bool) -> u8 {
 }
 
 /// The receiver of the progress, and the flag that signals raise.
-pub fn watched(quiet: bool) -> (Arc<dyn Observer>, Cancel) {
-    if quiet {
+pub fn watched(quiet: Quiet) -> (Arc<dyn Observer>, Cancel) {
+    if !quiet.warns() {
         (Arc::new(Silent), watch(None))
-    } else if std::io::stderr().is_terminal() {
+    } else if quiet.tells() && std::io::stderr().is_terminal() {
         let bars = Arc::new(Bars::default());
         (bars.clone(), watch(Some(bars)))
     } else {

@@ -1,6 +1,6 @@
 //! `outcrop view`: a mesh in the browser.
 
-use super::args::{Again, Limits};
+use super::args::{Again, Limits, Quiet};
 use super::output::print;
 use super::parse::size;
 use super::{stop, style};
@@ -59,7 +59,7 @@ pub fn run(args: &View) -> Result<bool> {
     let server = Server::start(&shown.folder, args.port)?;
     let url = server.url();
     print(&url)?;
-    if !args.limits.quiet {
+    if args.limits.quiet.tells() {
         eprintln!(
             "outcrop: {} is shown there; Ctrl-C ends it",
             args.mesh.display()
@@ -190,9 +190,9 @@ fn is_newer(file: &Path, other: &Path) -> bool {
     matches!((modified(file), modified(other)), (Some(file), Some(other)) if file > other)
 }
 
-fn write(folder: &Path, page: &Path, limit: u64, quiet: bool) -> Result<bool> {
+fn write(folder: &Path, page: &Path, limit: u64, quiet: Quiet) -> Result<bool> {
     let embedded = write_html(folder, page, limit)?;
-    if !quiet {
+    if quiet.tells() {
         print(&format!(
             "{}: {}, {} of {} tiles, {} of {} triangles",
             page.display(),
