@@ -308,6 +308,7 @@ impl Params {
                 columns: self.columns.clone(),
                 skip_lines: self.skip_lines,
             },
+            depths: false,
         }
     }
 

@@ -13,7 +13,7 @@ use crate::stages::attributes::attributes;
 use crate::stages::blocks::Blocks;
 use crate::stages::cells::{CellMaker, DiskRadius, Widen, fit_in_tile};
 use crate::stages::ingest::{
-    Attributes, CoordinateType, IngestStats, Selection, Spool, ingest_selected,
+    Attributes, CoordinateType, IngestStats, Selection, Spool, depths_shown, ingest_selected,
 };
 use crate::stages::normals::{NormalStats, Normals, look};
 use crate::stages::order::{PAGE, PointStore, StoredPoints, order};
@@ -121,6 +121,7 @@ fn described(
     let headers = Known::from_headers(inputs, &every);
     let selection = Selection {
         scanners: false,
+        depths: true,
         attributes: match drawn {
             // A list would have to be of columns that are there.
             true => Attributes::Auto,
@@ -132,6 +133,7 @@ fn described(
     spool.drop_far(workspace)?;
     observer.end();
     let input = spool.stats().clone();
+    input.warnings.iter().for_each(|w| observer.warn(w));
     let lattice = spool.choose_lattice(0)?;
     let classes = match drawn {
         true => pictures::classes(&spool, &lattice, workspace)?,
@@ -333,6 +335,13 @@ impl Info {
 }
 
 impl Info {
+    /// The scale of the colours, if files have any.
+    fn colors(&self) -> String {
+        let depths = self.input.files.iter().filter_map(|file| file.colors);
+        let line = depths_shown(&depths.collect::<Vec<_>>()).unwrap_or_default();
+        line.trim_start_matches("colours ").to_owned()
+    }
+
     /// The noise of the sample, and how many of its points are noisy.
     fn noise_line(&self) -> String {
         let Percentiles { p5, p50, p95 } = self.noise;
@@ -394,6 +403,7 @@ impl fmt::Display for Info {
             ),
             ("left out", left_out),
             ("columns", self.columns()),
+            ("colours", self.colors()),
             (
                 "normals",
                 normals.map(NormalStats::to_string).unwrap_or_default(),

@@ -52,7 +52,7 @@ pub struct PlyMesh {
 /// # Errors
 /// [`Error::Io`].
 pub fn holds_faces(path: &Path) -> Result<bool> {
-    let compressed = match Beginning::of(path, Header::LONGEST) {
+    let compressed = match Beginning::of(path, &is_ply, Header::LONGEST) {
         Err(Error::Input { .. }) => return Ok(false),
         beginning => beginning?,
     };
@@ -61,6 +61,11 @@ pub fn holds_faces(path: &Path) -> Result<bool> {
     };
     let header = Header::read(&mut &beginning.bytes[..]);
     Ok(header.is_ok_and(|header| header.holds_faces()))
+}
+
+/// True for the first bytes of a PLY file.
+fn is_ply(_: &Path, head: &[u8], _: bool) -> bool {
+    head.starts_with(b"ply")
 }
 
 /// Extensions of meshes that the program writes and does not read.
@@ -97,7 +102,7 @@ impl PlyMesh {
     /// # Errors
     /// See [`PlyMesh::open`] and [`Content::of`].
     pub fn open_any(path: &Path, workspace: &Workspace) -> Result<Self> {
-        let Some(content) = Content::of(path, workspace)? else {
+        let Some(content) = Content::of(path, &is_ply, workspace)? else {
             return Self::open(path).map_err(|e| clearer(path, e));
         };
         let stream = MeshStream::open_as(&content.path, path);

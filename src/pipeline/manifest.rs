@@ -14,7 +14,7 @@ use std::os::unix::fs::{FileExt, MetadataExt};
 use std::path::{Path, PathBuf};
 
 /// The format of scratch folders that this program writes and reads.
-const FORMAT: u32 = 13;
+const FORMAT: u32 = 14;
 
 /// Bytes of each sample of an input.
 const SAMPLE: u64 = 64 << 10;

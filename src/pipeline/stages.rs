@@ -173,6 +173,7 @@ impl<'a> Stages<'a> {
         self.plan(input.kept, Some("ingest"), !self.carried.is_empty());
         let narrow = params.narrow_margin(&input);
         self.report.input = input;
+        self.warn_of_input();
         narrow.into_iter().for_each(|warning| self.warn(warning));
         self.check_room()?;
         let moves = params.smooth.rounds() + params.relax > 0;
@@ -220,10 +221,10 @@ impl<'a> Stages<'a> {
             store
         };
         let text = Text::of(spool, lattice, &job.params, &store)?;
+        self.warn_of_duplicates(spool, lattice)?;
         if self.carried.is_empty() {
             spool.release(workspace)?;
         }
-        self.warn_of_input(lattice);
         enough(&store)?;
         self.known.points = store.len() as u64;
         self.known.text = Some(text);
@@ -246,10 +247,10 @@ impl<'a> Stages<'a> {
         Ok(store)
     }
 
-    /// Warnings about the points that were read.
-    fn warn_of_input(&mut self, lattice: &Lattice) {
+    /// Warnings about the points that were read, before anything that may fail because of them.
+    fn warn_of_input(&mut self) {
         let input = &self.report.input;
-        let (kept, left_out) = (input.kept, input.dropped_non_finite);
+        let left_out = input.dropped_non_finite;
         let warnings = [input.warnings.clone(), self.carried.warnings.clone()];
         for warning in warnings.concat() {
             self.warn(warning);
@@ -266,14 +267,25 @@ impl<'a> Stages<'a> {
                  are kept, and all are rounded to coarser steps"
             ));
         }
-        let folded = self.report.duplicates_folded;
-        if !lattice.exact && folded > kept / 100 {
-            self.warn(format!(
-                "{folded} points fell together: the cloud is so wide that positions had to \
-                 be rounded to steps of {}; are there outliers far away?",
-                lattice.step
-            ));
+    }
+
+    /// A warning about many points at the positions of others, if positions are rounded.
+    fn warn_of_duplicates(&mut self, spool: &Spool, lattice: &Lattice) -> Result<()> {
+        let (folded, kept) = (self.report.duplicates_folded, self.report.input.kept);
+        if lattice.exact || folded <= kept / 100 {
+            return Ok(());
         }
+        let step = lattice.step;
+        self.warn(match spool.has_duplicates(lattice, self.workspace)? {
+            true => {
+                format!("{folded} points are duplicates of others: one at each position is kept")
+            }
+            false => format!(
+                "{folded} points fell together: the cloud is so wide that positions had to \
+                 be rounded to steps of {step}; are there outliers far away?"
+            ),
+        });
+        Ok(())
     }
 
     /// Drops outliers, if requested.

@@ -1,9 +1,11 @@
-//! Files compressed with gzip or Zstandard: their content in a scratch file, or its beginning in memory.
+//! Files compressed with gzip or Zstandard, and ZIP archives with one cloud or mesh: their content in a scratch file,
+//! or its beginning in memory.
 
 #[cfg(test)]
 mod tests;
 
 use super::file::ScratchFile;
+use super::zip::{Archive, Wanted, is_archive};
 use super::{Files, Workspace};
 use crate::error::{Error, Result};
 use flate2::bufread::MultiGzDecoder;
@@ -38,6 +40,7 @@ const LARGEST_WINDOW: u32 = 31;
 enum Compression {
     Gzip,
     Zstandard,
+    Zip,
 }
 
 impl Compression {
@@ -45,6 +48,7 @@ impl Compression {
         let head = &head_at(file, 0)?[..];
         Ok(match head {
             [0x1f, 0x8b, ..] => Some(Self::Gzip),
+            _ if is_archive(head) => Some(Self::Zip),
             _ => window(head).map(|_| Self::Zstandard),
         })
     }
@@ -54,7 +58,7 @@ impl Compression {
 #[must_use]
 pub fn plain_name(path: &Path) -> PathBuf {
     let extension = path.extension().unwrap_or_default();
-    match ["gz", "zst"]
+    match ["gz", "zst", "zip"]
         .iter()
         .any(|e| extension.eq_ignore_ascii_case(e))
     {
@@ -74,12 +78,12 @@ pub struct Content {
 }
 
 impl Content {
-    /// The content of the file `path`; none if it is not compressed.
+    /// The content of the file `path`; none if it is not compressed. Of an archive it is the member that is wanted.
     ///
     /// # Errors
-    /// [`Error::Input`] if it is damaged; [`Error::Memory`] if it needs a window larger than the free part of
+    /// [`Error::Input`] if it is damaged, or an archive in which not exactly one member is wanted; [`Error::Memory`] if it needs a window larger than the free part of
     /// the budget; [`Error::Io`], [`Error::Disk`], [`Error::Cancelled`].
-    pub fn of(path: &Path, workspace: &Workspace) -> Result<Option<Self>> {
+    pub fn of(path: &Path, wanted: Wanted<'_>, workspace: &Workspace) -> Result<Option<Self>> {
         let Some((file, compression)) = opened(path)? else {
             return Ok(None);
         };
@@ -96,7 +100,8 @@ impl Content {
             held.set_held(held.bytes());
             Ok(())
         };
-        let read = decode(path, &file, compression, window, |bytes| {
+        let packed = (&file, compression, wanted);
+        let read = decode(path, packed, window, |bytes| {
             workspace.check_cancel()?;
             content.append(&scratch, bytes)?;
             Ok(true)
@@ -139,7 +144,7 @@ impl Beginning {
     ///
     /// # Errors
     /// [`Error::Input`] if it is damaged there, or needs a window of more than 128 MiB; [`Error::Io`].
-    pub fn of(path: &Path, least: usize) -> Result<Option<Self>> {
+    pub fn of(path: &Path, wanted: Wanted<'_>, least: usize) -> Result<Option<Self>> {
         let Some((file, compression)) = opened(path)? else {
             return Ok(None);
         };
@@ -152,7 +157,8 @@ impl Beginning {
             false => Ok(()),
         };
         let mut bytes = Vec::new();
-        let read = decode(path, &file, compression, window, |chunk| {
+        let packed = (&file, compression, wanted);
+        let read = decode(path, packed, window, |chunk| {
             bytes.extend_from_slice(chunk);
             Ok(bytes.len() < least)
         })?;
@@ -204,13 +210,23 @@ fn position(source: &BufReader<Forward<'_>>) -> u64 {
 /// taken. Returns the bytes of the file that were read.
 fn decode(
     path: &Path,
-    file: &File,
-    compression: Compression,
+    (file, compression, wanted): (&File, Compression, Wanted<'_>),
     mut allow: impl FnMut(u64) -> Result<()>,
     mut take: impl FnMut(&[u8]) -> Result<bool>,
 ) -> Result<u64> {
-    let mut source = BufReader::with_capacity(READ, Forward { file, at: 0 });
     let mut buffer = vec![0; CHUNK];
+    if let Compression::Zip = compression {
+        let archive = Archive::open(path, file, wanted)?;
+        let mut bytes = 0;
+        let mut count = |chunk: &[u8]| {
+            bytes += chunk.len() as u64;
+            take(chunk)
+        };
+        let failed = |_: &&mut dyn Read, e| damaged(path, archive.place(), "a whole file", e);
+        archive.read(|mut member| pump(&mut member, &mut buffer, &mut count, failed))?;
+        return Ok(archive.share(bytes));
+    }
+    let mut source = BufReader::with_capacity(READ, Forward { file, at: 0 });
     if let Compression::Gzip = compression {
         let mut decoder = MultiGzDecoder::new(source);
         pump(&mut decoder, &mut buffer, &mut take, |decoder, e| {

@@ -10,6 +10,7 @@ mod facing;
 mod filters;
 mod installed;
 mod library;
+mod messages;
 mod normals;
 mod odd;
 mod outdoor;

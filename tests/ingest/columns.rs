@@ -232,7 +232,7 @@ fn files_without_a_column_and_colours_of_all_kinds_agree() {
     );
     let (spool, carried) = read(&bench, &[dark], "color", false);
     assert_eq!(rows(&bench, &spool, &carried)[0].1, [255.0, 128.0, 1.0]);
-    assert!(carried.warnings[0].contains("8 of their 16 bits"));
+    assert_eq!(carried.warnings, ["colours 8 bits"]);
 }
 
 #[test]
@@ -348,5 +348,54 @@ fn extra_bytes_of_las_are_columns_by_their_names() {
                 .all(|(_, v)| v == &[0.0])
         );
         spool.release(&bench.workspace).unwrap();
+    }
+}
+
+#[test]
+fn columns_with_the_names_of_coordinates_are_extra() {
+    let bench = Bench::new();
+    let path = bench.path("a.las");
+    let mut builder = las::Builder::from((1, 4));
+    builder.point_format.extra_bytes = 8;
+    let names = ["X", "y", "extra_x", "z"];
+    builder.vlrs.push(las::Vlr {
+        user_id: "LASF_Spec".into(),
+        record_id: 4,
+        description: String::new(),
+        data: names.map(|name| descriptor(3, 0, name, 0.0, 0.0)).concat(),
+    });
+    let mut writer = las::Writer::from_path(&path, builder.into_header().unwrap()).unwrap();
+    for i in 0..9u16 {
+        let extra: Vec<u8> = (0..4).flat_map(|n| (10 * i + n).to_le_bytes()).collect();
+        let point = las::Point {
+            x: i.into(),
+            extra_bytes: extra,
+            ..Default::default()
+        };
+        writer.write_point(point).unwrap();
+    }
+    writer.close().unwrap();
+    let columns = probe(&path).unwrap().columns;
+    let found: Vec<&str> = columns.iter().map(|c| &*c.name).collect();
+    assert!(
+        found.ends_with(&["extra_x", "extra_y", "extra_extra_x", "extra_z"]),
+        "{found:?}"
+    );
+    let (spool, carried) = read(&bench, &[path], "X,z,extra_y", false);
+    let names: Vec<&str> = carried.columns.iter().map(|c| &*c.name).collect();
+    assert_eq!(names, ["extra_x", "extra_z", "extra_y"]);
+    for (i, (_, values)) in rows(&bench, &spool, &carried).iter().enumerate() {
+        let base = 10.0 * i as f64;
+        assert_eq!(*values, [base, base + 3.0, base + 1.0]);
+    }
+    let properties = "property float x\nproperty float y\nproperty float z\nproperty float X\nproperty int scalar_Y\n";
+    let ply = bench.write("a.ply", ply("ascii", properties, 1) + "1 2 3 4 5\n");
+    let pcd = "FIELDS x y z X scalar_Y\nSIZE 4 4 4 4 4\nTYPE F F F F I\nPOINTS 1\nDATA ascii\n1 2 3 4 5\n";
+    let pcd = bench.write("a.pcd", pcd);
+    for path in [ply, pcd] {
+        let (spool, carried) = read(&bench, std::slice::from_ref(&path), "x,y", false);
+        let names: Vec<&str> = carried.columns.iter().map(|c| &*c.name).collect();
+        assert_eq!(names, ["extra_x", "extra_y"], "{path:?}");
+        assert_eq!(rows(&bench, &spool, &carried)[0].1, [4.0, 5.0], "{path:?}");
     }
 }

@@ -14,7 +14,7 @@ use std::path::PathBuf;
 #[derive(Debug, ClapArgs)]
 #[command(next_help_heading = "Points")]
 pub struct Points {
-    /// Leave out points of these classes (LAS, LAZ), e.g. 7,18 for noise
+    /// Leave out points of these classes (of LAS and LAZ, or a column classification), e.g. 7,18 for noise
     #[arg(
         long,
         value_name = "CLASSES",
@@ -22,7 +22,8 @@ pub struct Points {
         conflicts_with = "keep_classes"
     )]
     pub drop_classes: Vec<u8>,
-    /// Read only points of these classes (LAS, LAZ), e.g. 2,6 for ground and buildings
+    /// Read only points of these classes (of LAS and LAZ, or a column classification), e.g. 2,6 for ground and
+    /// buildings
     #[arg(long, value_name = "CLASSES", value_delimiter = ',')]
     pub keep_classes: Vec<u8>,
     /// Only the part inside a region: a box, or polygons in x and y in a file (WKT or GeoJSON). The mesh
@@ -215,7 +216,7 @@ pub struct Coordinates {
 /// The points, the mesh, and what decides it.
 #[derive(Debug, ClapArgs)]
 pub struct Job {
-    /// Files (LAS, LAZ, E57, PLY, PCD, PTX, OFF, XYZ text; also as .gz and .zst) or folders of files; together they are one cloud
+    /// Files (LAS, LAZ, E57, PLY, PCD, PTX, OFF, XYZ text; also as .gz, .zst and .zip) or folders of files; together they are one cloud
     #[arg(value_name = "INPUT", required = true)]
     pub inputs: Vec<PathBuf>,
     /// The mesh to write: .ply, .obj, .stl or .glb (all but OBJ binary), compressed with .zst behind it; or

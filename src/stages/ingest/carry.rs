@@ -5,6 +5,7 @@
 //! if they are carried, come first: so those of a position are the same whatever columns the mesh keeps.
 
 use super::Spool;
+use super::colors::{Scale, Tone, said};
 use super::columns::{Attributes, COLORS, Column, SCANNER, Span, row_bytes};
 use super::directions::{NORMAL_BYTES, Parts, normal_of};
 use super::ranks::Ranks;
@@ -43,12 +44,8 @@ pub struct Attribute {
 enum Change {
     /// None but of the type.
     None,
-    /// A colour of 8 bits in 16: times 257.
-    Wider,
-    /// A colour of 16 bits in 8: its upper half. Right for writers that multiply by 256 and by 257.
-    Upper,
-    /// A colour from 0 to 1: times this.
-    Unit(f64),
+    /// A colour: by the scale of its point.
+    Tone,
     /// The number of a scanner in its file: that in the cloud.
     Scanner,
 }
@@ -73,6 +70,8 @@ pub struct Carried {
     pub warnings: Vec<String>,
     /// For each source, the steps of all columns.
     steps: Vec<Vec<Step>>,
+    /// For each source, the way of its colours, if it has any.
+    tones: Vec<Option<Tone>>,
     ranks: Ranks,
     /// For each source, the place of the number of the scanner; none if scanners are not carried.
     scanners: Option<Vec<Option<(usize, Scalar)>>>,
@@ -137,6 +136,8 @@ impl Carried {
             let words = normal_of(normals[source].as_ref(), values);
             row.extend(words.iter().flat_map(|word| word.to_be_bytes()));
         }
+        let tone = self.tones.get(source).and_then(Option::as_ref);
+        let tone = tone.map(|tone| (tone, tone.of_point(values)));
         for step in &self.steps[source] {
             let value = match step.from {
                 Some((at, scalar)) => real(scalar, &values[at..], false),
@@ -144,9 +145,10 @@ impl Carried {
             };
             let value = match step.change {
                 Change::None => value,
-                Change::Wider => value * 257.0,
-                Change::Upper => (value / 256.0).floor(),
-                Change::Unit(most) => (value * most).round(),
+                Change::Tone => match (&tone, step.from) {
+                    (Some((tone, depth)), Some((_, from))) => tone.shade(value, from, *depth),
+                    _ => value,
+                },
                 Change::Scanner => f64::from(number(value)),
             };
             put_ordered(step.to, value, row);
@@ -239,44 +241,11 @@ fn span(sources: &[Source], name: &str) -> Span {
     all
 }
 
-/// How the files store colours.
-#[derive(Debug, Clone, Copy)]
-struct Palette {
-    /// True if integers of more than 8 bits use only 8.
-    of_8_bits: bool,
-    /// True if floats go from 0 to 1, else they are as integers of 8 bits.
-    to_one: bool,
-}
-
-impl Palette {
-    fn of(sources: &[Source]) -> Self {
-        let mut most = [0.0; 2];
-        for (source, name) in used(sources).flat_map(|s| COLORS.map(|name| (s, name))) {
-            if let Some((number, _, scalar)) = place(source, name) {
-                let most = &mut most[usize::from(scalar.is_integer())];
-                *most = f64::max(*most, source.spans[number].max);
-            }
-        }
-        Self {
-            of_8_bits: most[1] <= 255.0,
-            to_one: most[0] <= 1.0,
-        }
-    }
-
-    /// The change of a colour of the type `from`.
-    fn change(self, from: Scalar, wide: bool) -> Change {
-        let eight = match from {
-            Scalar::U8 | Scalar::I8 => true,
-            _ if from.is_integer() => self.of_8_bits,
-            _ if self.to_one => return Change::Unit(if wide { 65535.0 } else { 255.0 }),
-            _ => true,
-        };
-        match (eight, wide) {
-            (true, true) => Change::Wider,
-            (false, false) => Change::Upper,
-            (true, false) | (false, true) => Change::None,
-        }
-    }
+/// The scale of the colours of a source, if some were read.
+fn scale(source: &Source) -> Option<Scale> {
+    let places = COLORS.map(|name| place(source, name));
+    let scalars: Vec<Scalar> = places.into_iter().flatten().map(|p| p.2).collect();
+    (!scalars.is_empty()).then(|| Scale::of(&scalars, source.depth, &source.tally))
 }
 
 impl Spool {
@@ -314,24 +283,17 @@ impl Spool {
                 carried.warnings.push(note);
             }
         }
-        let palette = Palette::of(sources);
         carried.steps = vec![Vec::new(); sources.len()];
         for name in names {
-            self.carry(name, palette, wide, &mut carried);
+            self.carry(name, wide, &mut carried);
         }
-        let narrow = |s: &Source| {
-            COLORS
-                .map(|n| place(s, n))
-                .iter()
-                .flatten()
-                .any(|p| p.2 == Scalar::U16)
-        };
-        if palette.of_8_bits
-            && carried.columns.iter().any(|c| is_color(&c.name))
-            && used(sources).any(narrow)
-        {
-            let note = "colours use 8 of their 16 bits: they are taken as numbers from 0 to 255";
-            carried.warnings.push(note.into());
+        if carried.columns.iter().any(|c| is_color(&c.name)) {
+            let tone = |s: &Source| Some(Tone::new(scale(s)?, &s.columns, wide));
+            carried.tones = sources.iter().map(tone).collect();
+            let scales: Vec<Scale> = used(sources).filter_map(scale).collect();
+            if scales.iter().any(|scale| !scale.certain || scale.stray > 0) {
+                carried.warnings.push(said(&scales));
+            }
         }
         carried
     }
@@ -351,7 +313,7 @@ impl Spool {
     }
 
     /// Adds the column `name`.
-    fn carry(&self, name: &str, palette: Palette, wide: bool, carried: &mut Carried) {
+    fn carry(&self, name: &str, wide: bool, carried: &mut Carried) {
         let sources = &self.sources;
         let scalars = used(sources).filter_map(|s| Some(place(s, name)?.2));
         let scalar = match (is_color(name), wide) {
@@ -368,7 +330,7 @@ impl Spool {
         for (number, (source, steps)) in sources.iter().zip(&mut carried.steps).enumerate() {
             let from = place(source, name).map(|(_, at, scalar)| (at, scalar));
             let change = match from {
-                Some((_, from)) if is_color(name) => palette.change(from, wide),
+                Some(_) if is_color(name) => Change::Tone,
                 Some(_) if name == SCANNER && ranks.has(number) => Change::Scanner,
                 _ => Change::None,
             };
@@ -464,35 +426,6 @@ mod tests {
             (F64, U8, F64),
         ] {
             assert_eq!((common(a, b), common(b, a)), (want, want), "{a:?} {b:?}");
-        }
-    }
-
-    #[test]
-    fn colours_of_all_kinds_become_the_same() {
-        for (from, of_8_bits, value) in [
-            (Scalar::U8, false, 200.0),
-            (Scalar::U16, true, 200.0),
-            (Scalar::U16, false, 200.0 * 256.0),
-            (Scalar::U16, false, 200.0 * 257.0),
-            (Scalar::F32, false, 200.0 / 255.0),
-        ] {
-            let palette = Palette {
-                of_8_bits,
-                to_one: true,
-            };
-            let step = Step {
-                from: Some((0, from)),
-                change: palette.change(from, false),
-                to: Scalar::U8,
-            };
-            let carried = Carried {
-                steps: vec![vec![step]],
-                ..Carried::default()
-            };
-            let (mut values, mut row) = (Vec::new(), Vec::new());
-            from.put(value, &mut values);
-            carried.put(0, &values, &mut row);
-            assert_eq!(row, [200], "{from:?} {value}");
         }
     }
 }

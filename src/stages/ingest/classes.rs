@@ -1,4 +1,4 @@
-//! Selection of points by their class (LAS and LAZ).
+//! Selection of points by their class: that of LAS and LAZ, or a column `classification`.
 
 use serde::{Deserialize, Serialize};
 
@@ -25,6 +25,16 @@ impl Classes {
             Self::Drop(classes) => !classes.contains(&class),
         }
     }
+
+    /// The same of a number in a column; what is no class is in no list.
+    pub(super) fn wants_number(&self, class: f64) -> bool {
+        let is_class = (0.0..=255.0).contains(&class) && class.fract() == 0.0;
+        match self {
+            _ if is_class => self.wants(class as u8),
+            Self::Keep(_) => false,
+            Self::All | Self::Drop(_) => true,
+        }
+    }
 }
 
 #[cfg(test)]
@@ -36,5 +46,10 @@ mod tests {
         assert!(Classes::All.wants(7));
         assert!(Classes::Keep(vec![2, 6]).wants(6) && !Classes::Keep(vec![2, 6]).wants(7));
         assert!(Classes::Drop(vec![7]).wants(6) && !Classes::Drop(vec![7]).wants(7));
+        for odd in [f64::NAN, -1.0, 6.5, 256.0, f64::INFINITY] {
+            assert!(!Classes::Keep(vec![0, 6]).wants_number(odd));
+            assert!(Classes::Drop(vec![0, 6]).wants_number(odd));
+        }
+        assert!(Classes::Keep(vec![6]).wants_number(6.0));
     }
 }

@@ -7,6 +7,9 @@ use serde::{Deserialize, Serialize};
 /// The colour of a point.
 pub(super) const COLORS: [&str; 3] = ["red", "green", "blue"];
 
+/// The coordinates, which are no columns.
+pub(super) const AXES: [&str; 3] = ["x", "y", "z"];
+
 /// The strength of the echo.
 pub(super) const INTENSITY: &str = "intensity";
 
@@ -52,8 +55,8 @@ const NORMALS: [[&str; 3]; 5] = [
 /// Most bytes of all columns of a point that are wanted for the mesh.
 pub(super) const MOST_BYTES: usize = 48;
 
-/// Most bytes of a point's row: these, the number of its scanner, and its normal.
-pub(super) const MOST_ROW: usize = MOST_BYTES + size_of::<u32>() + 3 * size_of::<f64>();
+/// Most bytes of a point's row: these, the number of its scanner, its normal, its class, and colours.
+pub(super) const MOST_ROW: usize = MOST_BYTES + size_of::<u32>() + 7 * size_of::<f64>();
 
 /// A column of a file.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -78,13 +81,24 @@ impl Column {
     }
 }
 
-/// The name by which a column is known in all formats: in lower case, without the prefix that CloudCompare
-/// writes.
+/// The name by which a column is known in all formats: in lower case, with `_` for spaces, which PLY has between
+/// words, and without the prefix that CloudCompare writes. What has the name of a coordinate is `extra_x`.
 pub(super) fn usual_name(name: &str) -> String {
-    let name = name.trim().to_ascii_lowercase();
+    let lower = name.to_ascii_lowercase();
+    let words = lower.split(|c: char| c.is_whitespace() || c.is_control());
+    let words: Vec<&str> = words.filter(|word| !word.is_empty()).collect();
+    let name = words.join("_");
     let name = name.strip_prefix("scalar_").unwrap_or(&name);
+    if AXES.contains(&name) {
+        return extra(name);
+    }
     let alias = ALIASES.iter().find(|(alias, _)| *alias == name);
     alias.map_or(name, |(_, usual)| usual).to_owned()
+}
+
+/// The name of a column whose own is taken.
+pub(super) fn extra(name: &str) -> String {
+    format!("extra_{name}")
 }
 
 /// Columns that the mesh keeps.
@@ -201,28 +215,44 @@ pub(super) struct Wanted {
     pub(super) numbers: Vec<usize>,
     /// The columns.
     pub(super) columns: Vec<Column>,
+    /// Byte and type of the class in a row, if points are left out by it.
+    pub(super) class: Option<(usize, Scalar)>,
+}
+
+/// What is read beside the columns for the mesh.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Also {
+    /// The column of scanners.
+    pub(super) scanners: bool,
+    /// Those of normals.
+    pub(super) normals: bool,
+    /// That of classes, for leaving out points.
+    pub(super) classes: bool,
+    /// Colours whose scale only their numbers tell.
+    pub(super) depths: bool,
 }
 
 impl Wanted {
-    /// Of a file with these columns; also that of scanners if `scanners`, and those of normals if `normals`.
+    /// Of a file with these columns.
     ///
     /// # Errors
     /// [`Error::Parameter`] if those for the mesh take more than [`MOST_BYTES`].
-    pub(super) fn of(
-        attributes: &Attributes,
-        columns: &[Column],
-        scanners: bool,
-        normals: bool,
-    ) -> Result<Self> {
+    pub(super) fn of(attributes: &Attributes, columns: &[Column], also: Also) -> Result<Self> {
         let mut numbers = attributes.of(columns);
         let bytes: usize = numbers.iter().map(|n| columns[*n].scalar.bytes()).sum();
-        let scanner = columns.iter().position(|c| c.name == SCANNER);
-        numbers.extend(scanner.filter(|_| scanners));
-        let normal = normal_columns(columns).filter(|_| normals);
+        let number = |name: &str| columns.iter().position(|c| c.name == name);
+        numbers.extend(number(SCANNER).filter(|_| also.scanners));
+        let normal = normal_columns(columns).filter(|_| also.normals);
         numbers.extend(normal.into_iter().flatten());
+        numbers.extend(number(CLASSIFICATION).filter(|_| also.classes));
+        let colors = COLORS.iter().filter_map(|name| number(name));
+        numbers.extend(colors.filter(|_| also.depths));
         numbers.sort_unstable();
         numbers.dedup();
-        let columns = numbers.iter().map(|n| columns[*n].clone()).collect();
+        let columns: Vec<Column> = numbers.iter().map(|n| columns[*n].clone()).collect();
+        let class = columns.iter().position(|c| c.name == CLASSIFICATION);
+        let class = class.filter(|_| also.classes);
+        let class = class.map(|n| (row_bytes(&columns[..n]), columns[n].scalar));
         if bytes > MOST_BYTES {
             return Err(Error::Parameter {
                 name: "--attributes",
@@ -230,7 +260,11 @@ impl Wanted {
                 expected: format!("at most {MOST_BYTES}"),
             });
         }
-        Ok(Self { numbers, columns })
+        Ok(Self {
+            numbers,
+            columns,
+            class,
+        })
     }
 
     /// The columns as they are, when the points were read: those that none of them has have no name.
@@ -361,21 +395,23 @@ mod tests {
             .collect();
         let list = |n: usize| Attributes::List((0..n).map(|n| n.to_string()).collect());
         assert_eq!(
-            Wanted::of(&list(6), &columns, false, false)
+            Wanted::of(&list(6), &columns, Also::default())
                 .unwrap()
                 .bytes(),
             48
         );
-        assert!(Wanted::of(&list(7), &columns, false, false).is_err());
+        assert!(Wanted::of(&list(7), &columns, Also::default()).is_err());
     }
 
     #[test]
     fn scanners_are_wanted_beside_others() {
         let columns = ["intensity", SCANNER, "red"].map(|n| Column::new(n, Scalar::U16));
         let numbers = |attributes: &Attributes, scanners| {
-            Wanted::of(attributes, &columns, scanners, false)
-                .unwrap()
-                .numbers
+            let also = Also {
+                scanners,
+                ..Also::default()
+            };
+            Wanted::of(attributes, &columns, also).unwrap().numbers
         };
         assert_eq!(numbers(&Attributes::None, true), [1]);
         assert_eq!(numbers(&Attributes::Auto, true), [0, 1, 2]);

@@ -23,6 +23,8 @@ pub enum CrsSource {
     Prj,
     /// GeoTIFF keys in the file.
     GeotiffKeys,
+    /// Comments in the header of a PLY file.
+    Comments,
 }
 
 impl std::fmt::Display for CrsSource {
@@ -31,6 +33,7 @@ impl std::fmt::Display for CrsSource {
             Self::WellKnownText => "well-known text",
             Self::Prj => ".prj file",
             Self::GeotiffKeys => "GeoTIFF keys",
+            Self::Comments => "comments",
         })
     }
 }
@@ -68,10 +71,11 @@ impl Crs {
         }
     }
 
-    /// The kind of the record: GeoTIFF keys, or the first word of a well-known text.
+    /// The kind of the record: GeoTIFF keys, comments, or the first word of a well-known text.
     fn kind(&self) -> Option<&str> {
         match self.source {
             CrsSource::GeotiffKeys => None,
+            CrsSource::Comments => Some("comments"),
             CrsSource::WellKnownText | CrsSource::Prj => self.normal.split(['[', '(']).next(),
         }
     }
@@ -151,6 +155,27 @@ pub fn prj_of(input: &Path) -> PathBuf {
 /// The reference system in the `.prj` file beside an input, if there is one; a warning if it cannot be used.
 pub(super) fn beside(input: &Input) -> (Option<Crs>, Option<String>) {
     of_prj(&prj_of(&input.path))
+}
+
+/// The system of comments, or of the `.prj` file beside the input if that gives the same one as a text; a warning if
+/// it gives another one.
+pub(super) fn fuller(crs: Crs, input: &Input) -> (Option<Crs>, Option<String>) {
+    let (other, warning) = beside(input);
+    match other {
+        Some(other) if crs.horizontal.is_some() && other.horizontal == crs.horizontal => {
+            (Some(other), warning)
+        }
+        Some(other) if other.differs(&crs) => {
+            let prj = prj_of(&input.path);
+            let warning = format!(
+                "{}: its system is {other}, that in the header of {} is {crs}, which is taken",
+                prj.display(),
+                input.path.display()
+            );
+            (Some(crs), Some(warning))
+        }
+        _ => (Some(crs), warning),
+    }
 }
 
 /// The reference system in a `.prj` file, if there is one; a warning if it cannot be used.

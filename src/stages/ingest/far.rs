@@ -262,7 +262,8 @@ fn windows(core: [Window; 3], step: Option<f64>) -> Option<[Window; 3]> {
     }))
 }
 
-fn in_unit(native: Native, point: [f64; 3]) -> [f64; 3] {
+/// Native coordinates in the unit of the input.
+pub(super) fn in_unit(native: Native, point: [f64; 3]) -> [f64; 3] {
     match native {
         Native::Las { scale, offset } => {
             std::array::from_fn(|axis| point[axis] * scale[axis] + offset[axis])

@@ -1,6 +1,7 @@
 //! The list of input formats, and the detection of a file's format.
 
 use super::e57::E57;
+use super::foreign;
 use super::format::Format;
 use super::input::Input;
 use super::las::Las;
@@ -40,6 +41,9 @@ fn ask(head: &Head) -> Result<&'static dyn PointFormat, Refusal> {
     if head.bytes.is_empty() {
         return Err(Refusal::Unknown("an empty file".into()));
     }
+    if let Some(known) = foreign::stand_in(&head.bytes) {
+        return Err(Refusal::Instead(known.what, known.advice));
+    }
     for format in FORMATS {
         if format.recognize(head)? {
             return Ok(format);
@@ -73,11 +77,36 @@ pub(super) fn open(input: &Input, layout: &Layout) -> Result<Box<dyn PointFile>>
     let (head, found) = find(input, layout)?;
     let (found, advice) = match found {
         Ok(format) => return format.open(input, &head),
-        Err(Refusal::Foreign(name)) => (format!("{name}, which is not read"), "; convert it first"),
+        Err(Refusal::Foreign(name)) => (format!("{name}, which is not read"), "convert it first"),
+        Err(Refusal::Instead(what, advice)) => (what.to_owned(), advice),
         Err(Refusal::Columns(found)) => return Err(input.error("columns", found, COLUMNS)),
-        Err(Refusal::Unknown(why)) => (why, ""),
+        Err(Refusal::Unknown(why)) => match foreign::known(&head) {
+            Some(known) => (format!("{}, which is not read", known.what), known.advice),
+            None => (why, ""),
+        },
     };
-    Err(input.error("format", found, readable() + advice))
+    let advice = match advice {
+        "" => String::new(),
+        advice => format!("; {advice}"),
+    };
+    Err(input.error("format", found, readable() + &advice))
+}
+
+/// True if a member of an archive is a point cloud, as in a folder.
+pub(super) fn is_cloud(name: &Path, bytes: &[u8], whole: bool) -> bool {
+    let head = Head {
+        path: name.to_path_buf(),
+        bytes: bytes.to_vec(),
+        whole,
+        layout: Layout::default(),
+    };
+    let named = |format: &dyn PointFormat| has_extension(name, format.extensions());
+    match ask(&head) {
+        Ok(format) => format.has_signature() || named(format),
+        // What cannot be told is told when it is read.
+        Err(Refusal::Columns(_)) => FORMATS.into_iter().any(named),
+        Err(_) => false,
+    }
 }
 
 /// True if a file in a folder is to be read as a point file.
@@ -87,7 +116,7 @@ pub(super) fn is_points(path: &Path) -> Result<bool> {
     if FORMATS.into_iter().any(|f| f.has_signature() && named(f)) {
         return Ok(true);
     }
-    let input = match Input::open_head(path, LONG_HEAD) {
+    let input = match Input::open_head(path, &is_cloud, LONG_HEAD) {
         // A damaged archive of something else is skipped.
         Err(Error::Input { .. }) => return Ok(FORMATS.into_iter().any(named)),
         opened => opened?,
@@ -96,7 +125,7 @@ pub(super) fn is_points(path: &Path) -> Result<bool> {
     Ok(match found {
         Ok(format) => format.has_signature() || named(format),
         // A point cloud of an unsupported format must not be skipped silently.
-        Err(Refusal::Foreign(_)) => true,
+        Err(Refusal::Foreign(_) | Refusal::Instead(..)) => true,
         Err(Refusal::Columns(_)) => FORMATS.into_iter().any(named),
         Err(Refusal::Unknown(_)) => false,
     })

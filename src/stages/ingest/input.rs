@@ -4,6 +4,7 @@
 use crate::error::{Error, Result};
 use crate::workspace::compressed::{Beginning, Content};
 use crate::workspace::mapped::Window;
+use crate::workspace::zip::Wanted;
 use crate::workspace::{IoCounters, Workspace};
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
@@ -53,14 +54,14 @@ impl Source {
 }
 
 impl Input {
-    /// Opens a file to read all of it.
-    pub(super) fn open(path: &Path, workspace: &Workspace) -> Result<Self> {
+    /// Opens a file to read all of it; of an archive the member that is `wanted`.
+    pub(super) fn open(path: &Path, wanted: Wanted<'_>, workspace: &Workspace) -> Result<Self> {
         let maps = workspace.maps_inputs();
         let input = Self {
             maps,
             ..Self::of(path, workspace.io.clone())?
         };
-        let Some(content) = Content::of(path, workspace)? else {
+        let Some(content) = Content::of(path, wanted, workspace)? else {
             return Ok(input);
         };
         let file = File::open(&content.path).map_err(|e| Error::io(&content.path, "open", e))?;
@@ -73,9 +74,9 @@ impl Input {
 
     /// Opens a file of which only the first `most` bytes are read. The size of a compressed one is an
     /// estimate.
-    pub(super) fn open_head(path: &Path, most: usize) -> Result<Self> {
+    pub(super) fn open_head(path: &Path, wanted: Wanted<'_>, most: usize) -> Result<Self> {
         let input = Self::of(path, Arc::default())?;
-        let Some(beginning) = Beginning::of(path, most)? else {
+        let Some(beginning) = Beginning::of(path, wanted, most)? else {
             return Ok(input);
         };
         Ok(Self {

@@ -272,6 +272,8 @@ mod tests {
                     text: false,
                     cut: false,
                     columns: Vec::new(),
+                    depth: None,
+                    tally: Default::default(),
                     spans: Vec::new(),
                 };
                 let found = choose(&[source], &IngestStats::default(), 3);

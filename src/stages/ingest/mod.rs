@@ -5,12 +5,14 @@
 //! [`Spool::for_each`] streams the points as positions on it.
 //!
 //! Formats are detected by content: LAS 1.0 to 1.4 with point formats 0 to 10, LAZ (COPC included), E57,
-//! PLY, PCD, PTX, OFF, and text with one point in a line; any of them may be compressed with gzip or Zstandard. Each
-//! format is a module that implements `PointFormat`, and an entry of the list in `formats.rs`.
+//! PLY, PCD, PTX, OFF, and text with one point in a line; any of them may be compressed with gzip or Zstandard, or
+//! the only cloud of a ZIP archive. Each format is a module that implements `PointFormat`, and an entry of the list in
+//! `formats.rs`.
 
 mod belong;
 mod carry;
 mod classes;
+mod colors;
 mod columns;
 mod contain;
 mod coordinate;
@@ -20,6 +22,7 @@ mod directions;
 mod e57;
 mod expand;
 mod far;
+mod foreign;
 mod format;
 mod formats;
 mod frames;
@@ -37,9 +40,11 @@ mod off;
 mod pcd;
 mod ply;
 mod point_format;
+mod precision;
 mod probe;
 mod ptx;
 mod ranks;
+mod same;
 mod scalar;
 mod source;
 mod spool;
@@ -51,6 +56,8 @@ mod text;
 
 pub use carry::{Attribute, Carried};
 pub use classes::Classes;
+pub use colors::Depth;
+pub(crate) use colors::depths_shown;
 pub use columns::{Attributes, Column};
 pub use crop::Crop;
 pub use crs::{Crs, CrsSource, of_prj, prj_of};
@@ -58,6 +65,8 @@ pub use directions::{NORMAL_BYTES, direction};
 pub use expand::expand;
 pub use format::Format;
 pub use layout::{Layout, TextColumns};
+pub use precision::CoordinateType;
+pub(crate) use precision::enough_for;
 pub use probe::{Probe, probe, probe_as};
 pub use stats::{FileStats, IngestStats};
 pub use stream::{READ_BUFFERS, VALUE_BUFFERS};
@@ -66,11 +75,11 @@ pub use systems::Mixed;
 use crate::error::{Error, Result};
 use crate::geom::lattice::Lattice;
 use crate::workspace::Workspace;
-use columns::{SCANNER, Wanted, row_bytes};
+use colors::depth_of;
+use columns::{Also, SCANNER, Wanted, row_bytes};
 use crop::Nearby;
 use frames::{Frame, values_of};
 use input::Input;
-use native::Native;
 use outcrop_ply::Scalar;
 use point_format::{Claims, PointFile};
 use serde::{Deserialize, Serialize};
@@ -79,16 +88,6 @@ use spool::SourceWriter;
 use std::path::PathBuf;
 use systems::Systems;
 use taken::Taken;
-
-/// Precision that suffices for writing the coordinates of the cloud.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum CoordinateType {
-    /// Single precision: all inputs have it, or it moves no point by a tenth of a step or more.
-    F32,
-    /// Double precision.
-    F64,
-}
 
 /// The points that are read.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -105,6 +104,8 @@ pub struct Selection {
     pub normals: bool,
     /// How text files are read.
     pub layout: Layout,
+    /// True if the colours are read whose scale only their numbers tell, for [`FileStats::colors`].
+    pub depths: bool,
 }
 
 /// All points of the inputs in one scratch file.
@@ -161,7 +162,15 @@ pub fn ingest_selected(
     let paths = expand(inputs)?;
     check_columns(&paths, selection)?;
     let name = format!("ingest-{}.spool", workspace.number());
-    let spool = read_all(&paths, selection, &name, workspace);
+    let mut stats = IngestStats::default();
+    let spool = read_all(&paths, selection, &name, &mut stats, workspace);
+    if let Err(Error::Input { .. } | Error::Parameter { .. }) = spool
+        && !workspace.is_task()
+    {
+        // They may explain the error.
+        let warnings = stats.warnings.iter();
+        warnings.for_each(|w| workspace.observer.warn(w));
+    }
     if spool.is_err() && !workspace.is_resumable() {
         workspace.files.release(&name)?;
         workspace.files.release(&values_of(&name))?;
@@ -192,6 +201,7 @@ fn read_all(
     paths: &[PathBuf],
     selection: &Selection,
     name: &str,
+    stats: &mut IngestStats,
     workspace: &Workspace,
 ) -> Result<Spool> {
     let classes = &selection.classes;
@@ -200,18 +210,28 @@ fn read_all(
     let nearby = nearby.transpose()?;
     let (mut section, mut frames, mut values) = (0, Vec::new(), Vec::new());
     let mut sources = Vec::new();
-    let mut stats = IngestStats::default();
     let mut systems = Systems::default();
     let mut shared = false;
     let mut present = Vec::new();
     let mut taken = Taken::default();
     for path in paths {
         workspace.check_cancel()?;
-        let opened = Opened::new(Input::open(path, workspace)?, &selection.layout)?;
+        let opened = Opened::new(
+            Input::open(path, &formats::is_cloud, workspace)?,
+            &selection.layout,
+        )?;
         let number = sources.len() as u32;
         let scanners = selection.scanners && opened.has_scanners();
         let columns = opened.file.columns();
-        let wanted = Wanted::of(&selection.attributes, &columns, scanners, selection.normals)?;
+        let depth = opened.file.color_depth();
+        let also = Also {
+            scanners,
+            normals: selection.normals,
+            classes: *classes != Classes::All && !opened.claims.classes,
+            depths: selection.depths && depth_of(&columns, depth, None).is_none(),
+        };
+        let wanted = Wanted::of(&selection.attributes, &columns, also)?;
+        let has_classes = opened.claims.classes || wanted.class.is_some();
         let target = SourceWriter::new(workspace, name, section, number, classes, &wanted)?
             .within(nearby.as_ref(), opened.claims.native);
         let outside =
@@ -229,7 +249,7 @@ fn read_all(
                 other => other?,
             }
         };
-        if *classes != Classes::All && !opened.claims.classes {
+        if *classes != Classes::All && !has_classes {
             warnings.push("its points have no class, all of them are kept".to_owned());
         }
         let found = opened.file.found();
@@ -240,10 +260,10 @@ fn read_all(
         let (next, more, more_values) = target.end();
         section = next;
         frames.extend(more);
-        values.extend(more_values.frames);
-        if selection.attributes != Attributes::None || selection.scanners || selection.normals {
-            // Frames without values.
-            values.resize(frames.len(), Frame::default());
+        if !more_values.frames.is_empty() {
+            // Frames without values come before.
+            values.resize(frames.len() - more_values.frames.len(), Frame::default());
+            values.extend(more_values.frames);
         }
         let source = Source {
             native: opened.claims.native,
@@ -252,6 +272,8 @@ fn read_all(
             cut: false,
             columns,
             spans: more_values.spans,
+            depth,
+            tally: more_values.tally,
         };
         let shown = |w: String| format!("{}: {w}", path.display());
         stats.warnings.extend(warnings.into_iter().map(shown));
@@ -266,6 +288,9 @@ fn read_all(
     if shared {
         return Err(Error::Shared);
     }
+    if !values.is_empty() {
+        values.resize(frames.len(), Frame::default());
+    }
     selection.attributes.check(&present)?;
     taken.check(&selection.layout)?;
     stats.warnings.extend(taken.warnings());
@@ -278,7 +303,7 @@ fn read_all(
         frames,
         values,
         sources,
-        stats,
+        stats: std::mem::take(stats),
         wkt,
     })
 }
@@ -311,6 +336,7 @@ impl Opened {
     /// The reference system that the file gives, or else a `.prj` file beside it; a warning about that.
     fn crs(&self) -> (Option<Crs>, Option<String>) {
         match self.file.crs(&self.input) {
+            Some(crs) if crs.source == CrsSource::Comments => crs::fuller(crs, &self.input),
             Some(crs) => (Some(crs), None),
             None => crs::beside(&self.input),
         }
@@ -325,7 +351,7 @@ impl Opened {
 pub fn check_systems(inputs: &[PathBuf]) -> Result<()> {
     let mut systems = Systems::default();
     for path in expand(inputs)? {
-        let head = Input::open_head(&path, formats::LONG_HEAD);
+        let head = Input::open_head(&path, &formats::is_cloud, formats::LONG_HEAD);
         let opened = head.and_then(|input| Opened::new(input, &Layout::default()));
         if let Some(crs) = opened.ok().and_then(|opened| opened.crs().0) {
             systems.add(&path, crs);
@@ -367,13 +393,17 @@ impl IngestStats {
         self.skipped_by_crop += stats.skipped;
         let bounds = source.bounds();
         let taken = opened.file.taken();
+        let columns = opened.file.found();
+        let read = source.reads_colors().then_some(&source.tally);
+        let colors = depth_of(&columns, source.depth, read);
         self.files.push(FileStats {
             path: opened.input.path.clone(),
             format: opened.claims.format,
             bytes: opened.input.size,
-            columns: opened.file.found().into_iter().map(|c| c.name).collect(),
+            columns: columns.into_iter().map(|c| c.name).collect(),
             taken: taken.map(|(taken, _)| taken.to_owned()),
             guessed: taken.is_some_and(|(_, guessed)| guessed),
+            colors,
             claimed: opened.claims.points,
             points: stats.read,
             kept: stats.kept,
@@ -442,34 +472,5 @@ impl Spool {
     /// [`crate::Error::Degenerate`] if there are no points.
     pub fn choose_lattice(&self, refine: u32) -> Result<Lattice> {
         lattice::choose(&self.sources, &self.stats, refine)
-    }
-
-    /// The precision in which coordinates are to be written.
-    #[must_use]
-    pub fn source_precision(&self) -> CoordinateType {
-        let kept = || self.sources.iter().filter(|s| s.stats.any());
-        if kept().all(|s| s.native == Native::F32) {
-            return CoordinateType::F32;
-        }
-        let Ok(lattice) = self.choose_lattice(0) else {
-            return CoordinateType::F64;
-        };
-        let bounds = kept().filter_map(Source::whole_bounds);
-        let largest = bounds
-            .flat_map(|b| b.into_iter().flatten())
-            .fold(0.0, |m: f64, c| m.max(c.abs()));
-        enough_for(lattice.step, largest)
-    }
-}
-
-/// The precision needed for writing multiples of `step` up to `largest`.
-pub(crate) fn enough_for(step: f64, largest: f64) -> CoordinateType {
-    // Rounding to single precision moves a coordinate by at most 2^-24 of the largest power of two not above
-    // it; for zero this is zero.
-    let half_unit = largest.log2().floor().exp2() * 2f64.powi(-24);
-    if half_unit < step / 10.0 {
-        CoordinateType::F32
-    } else {
-        CoordinateType::F64
     }
 }

@@ -1,5 +1,6 @@
 //! The interface of input formats: detection and reading.
 
+use super::colors::Depth;
 use super::columns::Column;
 use super::crop::Nearby;
 use super::crs::Crs;
@@ -87,6 +88,8 @@ pub(super) enum Refusal {
     Foreign(&'static str),
     /// It is a text of numbers whose columns cannot be told; what was found.
     Columns(String),
+    /// It is this instead, with an advice.
+    Instead(&'static str, &'static str),
     /// It is not a point cloud, for this reason.
     Unknown(String),
 }
@@ -111,6 +114,11 @@ pub(super) trait PointFile {
     /// at hand.
     fn is_described(&self) -> bool {
         true
+    }
+
+    /// The scale of its colours, if the file says it.
+    fn color_depth(&self) -> Option<Depth> {
+        None
     }
 
     /// The columns of the file. A [`SourceWriter`] says which are wanted, by their numbers in this list. A file

@@ -3,7 +3,7 @@
 use super::Opened;
 use super::columns::{Attributes, Column, normal_columns};
 use super::format::Format;
-use super::formats::LONG_HEAD;
+use super::formats::{LONG_HEAD, is_cloud};
 use super::input::Input;
 use super::layout::Layout;
 use super::native::Native;
@@ -71,7 +71,7 @@ pub fn probe(path: &Path) -> Result<Probe> {
 /// # Errors
 /// See [`probe`].
 pub fn probe_as(path: &Path, layout: &Layout) -> Result<Probe> {
-    let opened = Opened::new(Input::open_head(path, LONG_HEAD)?, layout)?;
+    let opened = Opened::new(Input::open_head(path, &is_cloud, LONG_HEAD)?, layout)?;
     let has_scanners = opened.has_scanners();
     let Opened {
         input,

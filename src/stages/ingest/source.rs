@@ -1,6 +1,7 @@
 //! A source: the points of one input file in their native form.
 
-use super::columns::{Column, Span};
+use super::colors::{Depth, Tally};
+use super::columns::{COLORS, Column, Span};
 use super::native::Native;
 use super::number::NOT_FIXED;
 use super::stats::SourceStats;
@@ -18,6 +19,10 @@ pub(super) struct Source {
     /// The columns whose values are in the spool, and their spans.
     pub(super) columns: Vec<Column>,
     pub(super) spans: Vec<Span>,
+    /// The scale of its colours, if the file says it.
+    pub(super) depth: Option<Depth>,
+    /// Its points by their largest colour, if colours were read.
+    pub(super) tally: Tally,
 }
 
 impl Source {
@@ -34,6 +39,11 @@ impl Source {
             .fold(0.0, f64::max);
         let power = 10f64.powi(stats.decimals.min(9) as i32);
         (fixed && largest * power < (1u64 << 50) as f64).then_some(stats.decimals)
+    }
+
+    /// True if colours are among the values in the spool.
+    pub(super) fn reads_colors(&self) -> bool {
+        self.columns.iter().any(|c| COLORS.contains(&&*c.name))
     }
 
     /// Scale and offset of an axis, if the native values are integers or decimals.

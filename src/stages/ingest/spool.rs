@@ -1,6 +1,7 @@
 //! The writer of the spool: all points in their native form, in frames of one scratch file.
 
 use super::classes::Classes;
+use super::colors::{Tally, open_places};
 use super::columns::{Span, Wanted};
 use super::coordinate::Coordinate;
 use super::crop::Nearby;
@@ -11,17 +12,18 @@ use super::stats::SourceStats;
 use crate::error::Result;
 use crate::workspace::file::ScratchFile;
 use crate::workspace::{Unit, Workspace, lock};
-use outcrop_ply::real;
+use outcrop_ply::{Scalar, real};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Mutex};
 
-/// The values of one source or of a part of it: their frames, and the span of each column.
+/// The values of one source or of a part of it: their frames, the span of each column, and the colours.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(super) struct Values {
     pub(super) frames: Vec<Frame>,
     pub(super) spans: Vec<Span>,
+    pub(super) tally: Tally,
 }
 
 /// The result of a unit: its counts, its frames, and its values.
@@ -40,6 +42,8 @@ pub(super) struct SourceWriter<'a> {
     nearby: Option<(&'a Nearby<'a>, Native)>,
     /// The columns to read.
     pub(super) wanted: &'a Wanted,
+    /// Places of the colours whose scale is not known.
+    colors: Vec<(usize, Scalar)>,
     /// The section of the next unit.
     next: AtomicU32,
     stats: Mutex<SourceStats>,
@@ -66,6 +70,7 @@ impl<'a> SourceWriter<'a> {
             classes,
             nearby: None,
             wanted,
+            colors: open_places(&wanted.columns),
             next: first.into(),
             stats: Mutex::default(),
             frames: Mutex::default(),
@@ -95,7 +100,8 @@ impl<'a> SourceWriter<'a> {
     pub(super) fn sink<'u, T: Coordinate>(&'u self, unit: &'u Unit<'u>) -> Sink<'u, T> {
         let values = self.values.as_ref().map(|file| {
             let frames = FrameWriter::new(file, FRAME * self.wanted.bytes());
-            (frames, vec![Span::default(); self.wanted.columns.len()])
+            let spans = vec![Span::default(); self.wanted.columns.len()];
+            (frames, spans, Tally::default())
         });
         Sink {
             target: self,
@@ -163,6 +169,7 @@ impl<'a> SourceWriter<'a> {
             for (span, more) in all.1.spans.iter_mut().zip(&values.spans) {
                 span.merge(more);
             }
+            all.1.tally.merge(&values.tally);
         }
         (self.next.into_inner(), all.0, all.1)
     }
@@ -179,8 +186,8 @@ pub(super) struct Sink<'a, T: Coordinate> {
     unit: &'a Unit<'a>,
     frames: FrameWriter<'a>,
     points: Vec<[T; 3]>,
-    /// The values of the points, and the span of each column, if columns are wanted.
-    values: Option<(FrameWriter<'a>, Vec<Span>)>,
+    /// The values of the points, the span of each column, and the colours, if columns are wanted.
+    values: Option<(FrameWriter<'a>, Vec<Span>, Tally)>,
     /// Statistics so far; extents and kept points are added when a frame is full.
     pub(super) stats: SourceStats,
     reported: u64,
@@ -200,6 +207,9 @@ impl<T: Coordinate> Sink<'_, T> {
             self.stats.dropped += 1;
             return Ok(());
         }
+        if self.target.wanted.class.is_some() {
+            return self.push_of_class(point, values);
+        }
         if let Some((nearby, native)) = &self.target.nearby {
             let position = native.position(point.map(Into::into));
             if !nearby.takes(position) {
@@ -209,13 +219,44 @@ impl<T: Coordinate> Sink<'_, T> {
             }
         }
         self.points.push(point);
-        if let Some((frames, _)) = &mut self.values {
+        if let Some((frames, ..)) = &mut self.values {
             values(&mut frames.bytes);
             debug_assert_eq!(
                 frames.bytes.len() - HEADER,
                 self.points.len() * self.target.wanted.bytes()
             );
         }
+        if self.points.len() == FRAME {
+            self.flush()?;
+        }
+        Ok(())
+    }
+
+    /// Adds a finite point if its class is wanted, which is among its values; where it lies matters after that.
+    fn push_of_class(&mut self, point: [T; 3], values: impl FnOnce(&mut Vec<u8>)) -> Result<()> {
+        let (Some((frames, ..)), Some((at, scalar))) = (&mut self.values, self.target.wanted.class)
+        else {
+            return Ok(());
+        };
+        let row = frames.bytes.len();
+        values(&mut frames.bytes);
+        let class = real(scalar, &frames.bytes[row + at..], false);
+        let outside = self.target.nearby.as_ref().is_some_and(|(nearby, native)| {
+            let position = native.position(point.map(Into::into));
+            !nearby.takes(position)
+        });
+        let wanted = self.target.classes.wants_number(class);
+        if !wanted || outside {
+            frames.bytes.truncate(row);
+            if wanted {
+                self.stats.outside += 1;
+                self.stats.reach_point(point);
+            } else {
+                self.stats.unwanted += 1;
+            }
+            return Ok(());
+        }
+        self.points.push(point);
         if self.points.len() == FRAME {
             self.flush()?;
         }
@@ -264,7 +305,18 @@ impl<T: Coordinate> Sink<'_, T> {
         if let Some(frame) = self.frames.frames.last_mut() {
             frame.middle = middle;
         }
-        if let Some((frames, spans)) = &mut self.values {
+        if let Some((frames, spans, tally)) = &mut self.values {
+            let colors = &self.target.colors;
+            if !colors.is_empty() {
+                let each = self.target.wanted.bytes();
+                for row in frames.bytes[HEADER..].chunks_exact(each) {
+                    tally.add(
+                        colors
+                            .iter()
+                            .map(|(at, scalar)| real(*scalar, &row[*at..], false)),
+                    );
+                }
+            }
             let mut at = HEADER;
             for _ in 0..points {
                 for (span, column) in spans.iter_mut().zip(&self.target.wanted.columns) {
@@ -282,9 +334,13 @@ impl<T: Coordinate> Sink<'_, T> {
         self.flush()?;
         let frames = self.frames.finish(self.unit, section)?;
         let mut values = Values::default();
-        if let Some((writer, spans)) = self.values {
+        if let Some((writer, spans, tally)) = self.values {
             let frames = writer.finish(self.unit, section)?;
-            values = Values { frames, spans };
+            values = Values {
+                frames,
+                spans,
+                tally,
+            };
         }
         Ok((self.stats, frames, values))
     }

@@ -1,5 +1,6 @@
 //! Statistics of the input: counts and extents of each file and in total.
 
+use super::colors::Depth;
 use super::coordinate::Coordinate;
 use super::crs::Crs;
 use super::format::Format;
@@ -63,6 +64,8 @@ pub struct FileStats {
     pub taken: Option<String>,
     /// True if the file does not say so plainly.
     pub guessed: bool,
+    /// The scale of its colours, if it has any and the scale is known.
+    pub colors: Option<Depth>,
     /// Number of points given in the header; `None` for text.
     pub claimed: Option<u64>,
     /// Points in the file.

@@ -6,6 +6,7 @@ use super::columns::{MOST_ROW, row_bytes};
 use super::far::is_near;
 use super::frames::{FRAME, FrameBuffer, read_frame, read_values, values_of};
 use super::map::SourceMap;
+use super::native::Native;
 use super::source::Source;
 use crate::error::{Error, Result};
 use crate::geom::Point;
@@ -22,12 +23,20 @@ pub const VALUE_BUFFERS: u64 = READ_BUFFERS + (FRAME * 2 * MOST_ROW) as u64;
 
 /// The buffers of one thread.
 #[derive(Default)]
-struct Buffers {
-    frame: FrameBuffer,
+pub(super) struct Buffers {
+    pub(super) frame: FrameBuffer,
     wide: Vec<[i64; 3]>,
-    points: Vec<Point>,
+    pub(super) points: Vec<Point>,
     /// Numbers of the points in the frame, if some of its source are far and left out.
     near: Option<Vec<u32>>,
+}
+
+impl Buffers {
+    /// The number in the frame of a point.
+    pub(super) fn place(&self, point: usize) -> usize {
+        let near = self.near.as_ref();
+        near.map_or(point, |near| near[point] as usize)
+    }
 }
 
 /// The remaining frames; empty after a thread has failed.
@@ -61,6 +70,24 @@ impl Spool {
             workspace.check_cancel()?;
             self.read(&file, frame, &maps, lattice, &mut buffers)?;
             each(&buffers.points)?;
+        }
+        Ok(())
+    }
+
+    /// Streams all frames with their positions on `lattice`, and the type of their coordinates.
+    pub(super) fn for_each_frame(
+        &self,
+        workspace: &Workspace,
+        lattice: &Lattice,
+        mut each: impl FnMut(&Buffers, Native),
+    ) -> Result<()> {
+        let maps = self.maps(lattice)?;
+        let mut buffers = Buffers::default();
+        let file = workspace.files.open(&self.name, true)?;
+        for (frame, _) in self.frames() {
+            workspace.check_cancel()?;
+            self.read(&file, frame, &maps, lattice, &mut buffers)?;
+            each(&buffers, self.sources[buffers.frame.source].native);
         }
         Ok(())
     }

@@ -23,14 +23,16 @@ fn noise(bytes: usize) -> Vec<u8> {
 fn content(bytes: &[u8], workspace: &Workspace) -> Result<Option<Vec<u8>>> {
     let file = tempfile::NamedTempFile::new().unwrap();
     std::fs::write(file.path(), bytes).unwrap();
-    let content = Content::of(file.path(), workspace)?;
+    let content = Content::of(file.path(), &|_, _, _| true, workspace)?;
     let read = content.map(|content| {
         let bytes = std::fs::read(&content.path).unwrap();
         assert_eq!(bytes.len() as u64, content.bytes);
         bytes
     });
     if let Some(read) = &read {
-        let start = Beginning::of(file.path(), 100).unwrap().unwrap();
+        let start = Beginning::of(file.path(), &|_, _, _| true, 100)
+            .unwrap()
+            .unwrap();
         assert!(read.starts_with(&start.bytes) && start.bytes.len() >= read.len().min(100));
         assert!(start.likely as usize >= start.bytes.len());
     }
@@ -135,7 +137,9 @@ fn the_beginning_of_much_in_few_bytes_is_not_all() {
     for packed in [gzip(&content), zstd(&content)] {
         assert!(packed.len() < 16 << 10);
         std::fs::write(file.path(), packed).unwrap();
-        let start = Beginning::of(file.path(), 1 << 20).unwrap().unwrap();
+        let start = Beginning::of(file.path(), &|_, _, _| true, 1 << 20)
+            .unwrap()
+            .unwrap();
         assert!(start.likely as usize > start.bytes.len());
         assert!(start.bytes.len() <= 2 << 20);
     }

@@ -166,6 +166,38 @@ pub fn none(bench: &Bench) -> Vec<PathBuf> {
     vec![write(bench, "a.e57", &[]), write(bench, "b.e57", &[empty])]
 }
 
+/// Colours with other limits than those of 8 bits.
+pub fn limits(bench: &Bench) -> Vec<PathBuf> {
+    let colored = |most: i64| {
+        let mut scan = cartesian(&RecordDataType::F32, &points(20));
+        let names = [
+            RecordName::ColorRed,
+            RecordName::ColorGreen,
+            RecordName::ColorBlue,
+        ];
+        scan.fields.extend(names.map(|name| Record {
+            name,
+            data_type: RecordDataType::Integer { min: 0, max: most },
+        }));
+        let color = |i: usize| [i as i64, 0, most].map(RecordValue::Integer);
+        scan.rows
+            .iter_mut()
+            .enumerate()
+            .for_each(|(i, row)| row.extend(color(i)));
+        scan
+    };
+    let no_numbers = |xml: String| {
+        let limits = "<colorLimits type=\"Structure\"><colorRedMaximum type=\"Integer\">many</colorRedMaximum>\
+            </colorLimits><points ";
+        xml.replace("<points ", limits)
+    };
+    vec![
+        write(bench, "a.e57", &[colored(1023)]),
+        write(bench, "b.e57", &[colored(255), colored(4095)]),
+        edited(bench, "c.e57", &[colored(1023)], no_numbers),
+    ]
+}
+
 /// Points that are all the same take no bits.
 pub fn same(bench: &Bench) -> Vec<PathBuf> {
     let one = RecordDataType::Integer { min: 7, max: 7 };

@@ -1,6 +1,6 @@
 //! The kinds of files and their makers.
 
-use super::{compressed, e57, las, off, pcd, ply, ptx, text};
+use super::{archives, compressed, e57, las, off, pcd, ply, ptx, text};
 use crate::bench::Bench;
 use std::path::PathBuf;
 
@@ -85,6 +85,7 @@ pub const KINDS: &[(&str, Kind)] = &[
         las::bomb,
     ),
     ("E57 with one scan or several, and poses", e57::scans),
+    ("E57 with limits of colours", e57::limits),
     (
         "E57 with coordinates of every type, and spherical ones",
         e57::types,
@@ -111,6 +112,8 @@ pub const KINDS: &[(&str, Kind)] = &[
         "coordinates that are `float`, `double` or whole numbers",
         ply::types,
     ),
+    ("an origin and a system in comments", ply::origins),
+    ("Gaussian splats", ply::splats),
     (
         "lists among the properties, and elements before the vertices",
         ply::lists,
@@ -155,6 +158,10 @@ pub const KINDS: &[(&str, Kind)] = &[
         vec![b.write("a.ply", format!("\u{feff}{text}"))]
     }),
     ("PCD as text, binary, and compressed", pcd::bodies),
+    (
+        "types and bodies of PCD in lower and upper case",
+        pcd::other_case,
+    ),
     ("PCD with coordinates of every type", pcd::types),
     ("padding between the fields of PCD", pcd::padded),
     (
@@ -286,6 +293,33 @@ pub const KINDS: &[(&str, Kind)] = &[
     ("something else behind a frame", compressed::more),
     ("nothing that is compressed", compressed::nothing),
     ("compression in compression", compressed::twice),
+    ("a ZIP archive with one cloud", archives::one),
+    ("a ZIP archive with several clouds", archives::several),
+    ("a ZIP archive without a cloud", archives::none),
+    ("a ZIP archive that is damaged", archives::damaged),
+    (
+        "a member of a ZIP archive that is encrypted, or compressed by another method",
+        archives::unreadable,
+    ),
+    ("a ZIP archive with more than 1000 files", archives::many),
+    ("a pointer of Git LFS", |b| {
+        let pointer = "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n";
+        ["a.laz", "a.e57", "a.ply", "a.xyz", "a"]
+            .map(|name| b.write(name, pointer))
+            .into()
+    }),
+    (
+        "files of other programs, by their first bytes or names",
+        |b| {
+            let names = [
+                "rcp", "rcs", "fls", "fws", "zfs", "imp", "lgs", "pod", "rwp", "3dm", "dwg", "skp",
+            ];
+            let by_name = names.map(|end| b.write(&format!("a.{end}"), [1, 0, 2, 3]));
+            let glb = b.write("b.fls", b"glTF\x02\0\0\0");
+            let text = b.write("c.dxf", "0\nSECTION\n2\nHEADER\n");
+            by_name.into_iter().chain([glb, text]).collect()
+        },
+    ),
     ("an empty file", |b| {
         ["a.las", "a.laz", "a.ply", "a.xyz", "a"]
             .map(|name| b.write(name, ""))

@@ -1,5 +1,6 @@
 //! The outcomes in `docs/formats.md`, checked for each kind of file.
 
+mod archives;
 mod compressed;
 pub mod e57;
 mod kinds;

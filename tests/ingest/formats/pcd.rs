@@ -243,6 +243,26 @@ pub fn unknown(bench: &Bench) -> Vec<PathBuf> {
     ]
 }
 
+pub fn other_case(bench: &Bench) -> Vec<PathBuf> {
+    let lower = "FIELDS x y z rgb\nSIZE 4 8 4 4\nTYPE f i f u\nPOINTS 1\nDATA ";
+    let point = [
+        &1f32.to_le_bytes()[..],
+        &2i64.to_le_bytes(),
+        &3f32.to_le_bytes(),
+        &[0; 4],
+    ];
+    let binary = |head: String| [head.as_bytes(), &point.concat()].concat();
+    vec![
+        bench.write("a.pcd", format!("{lower}ascii\n1 2 3 0\n")),
+        bench.write("b.pcd", binary(format!("{lower}binary\n"))),
+        bench.write(
+            "c.pcd",
+            format!("{}ASCII\n1 2 3 0\n", lower.to_ascii_uppercase()),
+        ),
+        bench.write("d.pcd", binary(format!("{lower}Binary\n"))),
+    ]
+}
+
 pub fn endless(bench: &Bench) -> Vec<PathBuf> {
     let start = "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z\n";
     vec![

@@ -33,6 +33,31 @@ pub fn lists(bench: &Bench) -> Vec<PathBuf> {
     made(bench, &["double"], true)
 }
 
+/// An origin in comments, in all bodies.
+pub fn origins(bench: &Bench) -> Vec<PathBuf> {
+    let mut files = lists(bench);
+    files.extend(bodies(bench));
+    for path in &files {
+        let bytes = std::fs::read(path).unwrap();
+        let line = bytes.iter().position(|b| *b == b'\n').unwrap() + 1;
+        let (first, rest) = bytes.split_at(line);
+        let comments =
+            b"comment offsetx 5e5\ncomment offsety 4e6\ncomment offsetz 0\ncomment epsg 25832\n";
+        std::fs::write(path, [first, comments, rest].concat()).unwrap();
+    }
+    files
+}
+
+pub fn splats(bench: &Bench) -> Vec<PathBuf> {
+    let names = "f_dc_0 f_dc_1 f_dc_2 opacity scale_0 scale_1 scale_2 rot_0 rot_1 rot_2 rot_3";
+    let more: String = names
+        .split(' ')
+        .map(|n| format!("property float {n}\n"))
+        .collect();
+    let head = format!("ply\nformat ascii 1.0\nelement vertex 1\n{XYZ}{more}end_header\n");
+    vec![bench.write("a.ply", head + &"0.5 ".repeat(14) + "\n")]
+}
+
 /// A text file with this number of vertices in its header.
 pub fn text(count: &str, body: &str) -> String {
     format!("ply\nformat ascii 1.0\nelement vertex {count}\n{XYZ}end_header\n{body}")

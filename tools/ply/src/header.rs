@@ -15,6 +15,8 @@ pub struct Header {
     pub bytes: u64,
     /// The place of the coordinates, if comments give one.
     pub place: Place,
+    /// The text of all comments.
+    pub comments: Vec<String>,
 }
 
 /// A property of one number: its index among the element's properties, and its type.

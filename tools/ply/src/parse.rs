@@ -31,6 +31,7 @@ impl Header {
             elements: Vec::new(),
             bytes: 0,
             place: Place::default(),
+            comments: Vec::new(),
         };
         let mut encoding = None;
         loop {
@@ -57,6 +58,7 @@ impl Header {
         match words[..] {
             ["comment", ref words @ ..] => {
                 self.place.take(words);
+                self.comments.push(words.join(" "));
                 Ok(())
             }
             [] | ["ply" | "obj_info", ..] => Ok(()),

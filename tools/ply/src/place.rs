@@ -6,7 +6,7 @@ use crate::types::Scalar;
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Place {
     /// Comments `offsetx`, `offsety` and `offsetz`: what each coordinate is to be added to. Other programs
-    /// write and read them too.
+    /// write and read them too, also as `shift_x`, `shift_y` and `shift_z`.
     offset: [Option<f64>; 3],
     /// Comment `gridstep`: the coordinates were multiples of it before they were rounded to the type in the file.
     step: Option<f64>,
@@ -14,6 +14,9 @@ pub struct Place {
 
 /// Names of the comments.
 const OFFSETS: [&str; 3] = ["offsetx", "offsety", "offsetz"];
+
+/// Beginnings of such names, before the axis.
+const BEGINNINGS: [&str; 4] = ["offset", "offset_", "shift_", "shift"];
 const STEP: &str = "gridstep";
 
 impl Place {
@@ -45,7 +48,7 @@ impl Place {
         };
         if *name == STEP {
             self.step = Some(value).filter(|step| *step > 0.0);
-        } else if let Some(axis) = OFFSETS.iter().position(|offset| offset == name) {
+        } else if let Some(axis) = axis(name) {
             self.offset[axis] = Some(value);
         }
     }
@@ -73,6 +76,17 @@ impl Place {
             exact.filter(explains).unwrap_or(local[axis]) + origin[axis]
         })
     }
+}
+
+/// The axis of which a comment of this name gives the origin.
+fn axis(name: &str) -> Option<usize> {
+    let name = name.trim_end_matches([':', '=']).to_ascii_lowercase();
+    let (beginning, axis) = name.split_at_checked(name.len().checked_sub(1)?)?;
+    let known = BEGINNINGS.contains(&beginning);
+    ["x", "y", "z"]
+        .iter()
+        .position(|a| *a == axis)
+        .filter(|_| known)
 }
 
 #[cfg(test)]
@@ -124,6 +138,14 @@ mod tests {
             "gridstep -1",
         ]);
         assert_eq!((place.origin(), place.step), (Some([1.0, 2.0, 3.0]), None));
+        for other in ["shift_", "Shift", "offset_", "OFFSET"] {
+            let names = ["x", "y", "z"].map(|axis| format!("{other}{axis} 7"));
+            assert_eq!(read(&names).origin(), Some([7.0; 3]), "{other}");
+        }
+        assert_eq!(
+            lines(&["offsetx 1", "offsety 2", "offset 3"]).origin(),
+            None
+        );
     }
 
     #[test]

@@ -4,8 +4,10 @@ mod packets;
 mod pages;
 mod read;
 mod scan;
+mod shades;
 mod xml;
 
+use super::colors::Depth;
 use super::columns::{Column, NO_SCANNER, SCANNER};
 use super::crs::Crs;
 use super::format::Format;
@@ -17,7 +19,7 @@ use super::spool::SourceWriter;
 use crate::error::Result;
 use outcrop_ply::Scalar;
 use pages::PAGE;
-use scan::{Field, Kind, Name, Scan};
+use scan::{Kind, Name, Scan};
 use xml::Description;
 
 impl Format {
@@ -116,6 +118,8 @@ struct Scans {
     filled: Vec<Scan>,
     native: Native,
     columns: Vec<Column>,
+    /// The scale of the colours, if the file says it.
+    depth: Option<Depth>,
     system: String,
 }
 
@@ -127,7 +131,9 @@ impl Scans {
         for (number, scan) in (0..NO_SCANNER).zip(known) {
             scan.number = Some(number);
         }
+        let depth = shades::scale(&mut filled);
         Self {
+            depth,
             native: native(&filled),
             columns: columns(&filled),
             filled,
@@ -187,8 +193,8 @@ fn native(scans: &[Scan]) -> Native {
 /// The columns of all scans; of another type than in the first scan, they become doubles.
 fn columns(scans: &[Scan]) -> Vec<Column> {
     let mut all: Vec<Column> = Vec::new();
-    let found = scans.iter().flat_map(|scan| &scan.fields);
-    for column in found.filter_map(Field::column) {
+    let found = scans.iter().flat_map(Scan::columns);
+    for column in found {
         match all.iter_mut().find(|other| other.name == column.name) {
             Some(same) if same.scalar != column.scalar => same.scalar = Scalar::F64,
             Some(_) => {}
@@ -218,6 +224,10 @@ impl PointFile for Scans {
 
     fn columns(&self) -> Vec<Column> {
         self.columns.clone()
+    }
+
+    fn color_depth(&self) -> Option<Depth> {
+        self.depth
     }
 
     fn scanners(&self) -> Vec<[f64; 3]> {

@@ -6,6 +6,7 @@ use super::super::input::Input;
 use super::super::spool::{Sink, SourceWriter, sink_bytes};
 use super::packets::{self, BLOCK, Decoded, Records};
 use super::scan::{Field, Motion, Name, Scan};
+use super::shades;
 use crate::error::Result;
 use outcrop_ply::Scalar;
 
@@ -33,6 +34,8 @@ struct Value {
     from: Option<(usize, Option<usize>)>,
     /// The value of points without one.
     otherwise: f64,
+    /// The ends of the scale, if the value becomes one from 0 to 65535.
+    limits: Option<[f64; 2]>,
     scalar: Scalar,
 }
 
@@ -77,7 +80,9 @@ impl Plan {
             let is = |field: &Field| field.column().is_some_and(|c| c.name == column.name);
             let field = scan.fields.iter().position(is);
             let state = scan.state(&column.name);
+            let color = field.and_then(|field| shades::color(&scan.fields[field]));
             Value {
+                limits: scan.widened.zip(color).map(|(limits, color)| limits[color]),
                 from: field.map(|field| (take(field), state.map(&mut take))),
                 otherwise: match column.name == SCANNER {
                     true => f64::from(scan.scanner_number()),
@@ -139,7 +144,10 @@ impl Plan {
         let value = |column: &Value| {
             let valid = |state: &usize| values[*state][record] == 0.0;
             let from = column.from.filter(|(_, state)| state.iter().all(valid));
-            from.map_or(column.otherwise, |(part, _)| values[part][record])
+            let own = from.map_or(column.otherwise, |(part, _)| values[part][record]);
+            column
+                .limits
+                .map_or(own, |[low, high]| (own - low) / (high - low) * 65535.0)
         };
         let normal = self.normal.map(|columns| {
             let normal = columns.map(|number| value(&self.values[number]));

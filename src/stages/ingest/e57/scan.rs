@@ -1,6 +1,6 @@
 //! A scan of an E57 file, as its description says: the parts of a record, and the pose.
 
-use super::super::columns::{Column, NO_SCANNER, SCANNER};
+use super::super::columns::{CLASSIFICATION, Column, NO_SCANNER, SCANNER, usual_name};
 use outcrop_ply::Scalar;
 
 /// The part of a record.
@@ -130,7 +130,10 @@ impl Field {
         }
         let usual = COLUMNS.iter().find(|(standard, _)| *standard == &**name);
         // Names of extensions have a prefix and a colon.
-        let name = usual.map_or_else(|| name.replace(':', "_"), |(_, usual)| (*usual).to_owned());
+        let own = name.rsplit(':').next().unwrap_or(name);
+        let class = (usual_name(own) == CLASSIFICATION).then_some(CLASSIFICATION);
+        let known = usual.map(|(_, usual)| *usual).or(class);
+        let name = known.map_or_else(|| name.replace(':', "_"), str::to_owned);
         Some(Column::new(&name, self.kind.scalar())).filter(|column| column.name != SCANNER)
     }
 }
@@ -222,6 +225,9 @@ impl Motion {
     }
 }
 
+/// Lowest and highest number of each colour.
+pub(super) type Limits = [[f64; 2]; 3];
+
 /// A scan.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Scan {
@@ -233,6 +239,10 @@ pub(super) struct Scan {
     pub(super) fields: Vec<Field>,
     /// Its number among the scans with a scanner.
     pub(super) number: Option<u16>,
+    /// Lowest and highest number of each colour, as the description gives them.
+    pub(super) color_limits: [[Option<f64>; 2]; 3],
+    /// The same, if colours become numbers from 0 to 65535.
+    pub(super) widened: Option<Limits>,
 }
 
 impl Scan {

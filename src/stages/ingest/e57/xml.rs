@@ -72,6 +72,17 @@ impl Description {
     }
 }
 
+/// The number of a colour, and 0 for its lowest number or 1 for its highest, by the name of a limit.
+fn limit_of(name: &str) -> Option<(usize, usize)> {
+    let name = name.strip_prefix("color")?;
+    let ends = ["Minimum", "Maximum"].iter().enumerate();
+    let (end, color) = ends
+        .into_iter()
+        .find_map(|(n, end)| Some((n, name.strip_suffix(end)?)))?;
+    let colors = ["Red", "Green", "Blue"];
+    Some((colors.iter().position(|own| *own == color)?, end))
+}
+
 struct Parser<'a> {
     input: &'a Input,
     /// Offset of the description.
@@ -179,6 +190,19 @@ impl Parser<'_> {
         let text = std::mem::take(&mut self.text);
         match self.path()[..] {
             ["coordinateMetadata"] => self.found.system = text,
+            ["data3D", "vectorChild", "colorLimits", limit] => {
+                if let Some((color, end)) = limit_of(limit)
+                    && let Some(scan) = self.found.scans.last_mut()
+                {
+                    let zero = text.trim().is_empty();
+                    let value = if zero {
+                        Some(0.0)
+                    } else {
+                        text.trim().parse().ok()
+                    };
+                    scan.color_limits[color][end] = value.filter(|v: &f64| v.is_finite());
+                }
+            }
             ["data3D", "vectorChild", "pose", part, axis] => {
                 let (part, axis) = (part.to_owned(), axis.to_owned());
                 self.pose(&part, &axis, text.trim())?;

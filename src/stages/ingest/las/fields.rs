@@ -1,6 +1,6 @@
 //! The columns of a record: all fields but the position and the flags, and extra bytes that are described.
 
-use super::super::columns::{CLASSIFICATION, COLORS, Column, INTENSITY, Wanted};
+use super::super::columns::{AXES, CLASSIFICATION, COLORS, Column, INTENSITY, Wanted, extra};
 use super::extra::{Extra, Value};
 use super::{CLASS, FLAGS, Header};
 use laz::DecompressionSelection;
@@ -153,10 +153,11 @@ fn all(header: &Header) -> Vec<Field> {
             Layers::decompress_nir,
         ));
     }
-    for extra in &header.extra {
-        let mut field = Field::extra(extra);
-        if fields.iter().any(|other| other.name == field.name) {
-            field.name = format!("extra_{}", field.name).into();
+    for one in &header.extra {
+        let mut field = Field::extra(one);
+        let taken = |name: &str| AXES.contains(&name) || fields.iter().any(|f| f.name == name);
+        while taken(&field.name) {
+            field.name = extra(&field.name).into();
         }
         fields.push(field);
     }

@@ -17,9 +17,9 @@ pub(super) enum Number {
 }
 
 impl Number {
-    /// The type of a letter of `TYPE` and a number of `SIZE`.
+    /// The type of a letter of `TYPE`, in upper or lower case, and a number of `SIZE`.
     fn of(letter: &str, bytes: &str) -> Option<Self> {
-        Some(match (letter, bytes) {
+        Some(match (&*letter.to_ascii_uppercase(), bytes) {
             ("I", "1") => Self::Scalar(Scalar::I8),
             ("I", "2") => Self::Scalar(Scalar::I16),
             ("I", "4") => Self::Scalar(Scalar::I32),
@@ -201,12 +201,14 @@ impl Lines {
     }
 
     fn end(self, input: &Input, (number, data): (usize, &[String]), at: u64) -> Result<Header> {
-        let body = match data.first().map(String::as_str) {
+        let word = data.first().map(|word| word.to_ascii_lowercase());
+        let body = match word.as_deref() {
             Some("ascii") => Body::Text,
             Some("binary") => Body::Binary,
             Some("binary_compressed") => Body::Compressed,
-            other => {
-                let found = format!("DATA \"{}\"", other.unwrap_or_default().escape_debug());
+            _ => {
+                let other = data.first().map_or("", String::as_str);
+                let found = format!("DATA \"{}\"", other.escape_debug());
                 let expected = "ascii, binary or binary_compressed";
                 return Err(wrong(input, number, found, expected));
             }

@@ -160,7 +160,7 @@ mod tests {
     fn unpack(packed: &[u8], length: usize, part: usize) -> Result<Vec<u8>> {
         let file = tempfile::NamedTempFile::new().unwrap();
         std::fs::write(file.path(), packed).unwrap();
-        let input = Input::open_head(file.path(), 0).unwrap();
+        let input = Input::open_head(file.path(), &|_, _, _| false, 0).unwrap();
         let mut stream = Stream::new(&input, 0, packed.len() as u64);
         let mut out = vec![0; length];
         for (number, part) in out.chunks_mut(part).enumerate() {

@@ -4,9 +4,9 @@ use super::super::input::{Input, Range, STREAM_BUFFER};
 use super::super::number;
 use super::super::scalar::FromScalar;
 use super::super::spool::{Sink, SourceWriter, sink_bytes};
-use super::{Cloud, Vertex, position};
+use super::{Cloud, Taken, Vertex, position};
 use crate::error::{Error, Result};
-use outcrop_ply::{Property, Scalar};
+use outcrop_ply::Property;
 use std::io::{BufRead, BufReader};
 
 /// Longest accepted line, in bytes.
@@ -47,17 +47,34 @@ fn vertices<T: FromScalar>(
     }
     let columns = vertex.wanted(writer.wanted);
     let mut others = vec![f64::NAN; columns.len()];
+    // An origin with more decimals than the numbers of the points.
+    let moved = vertex.place.and_then(|place| place.origin());
+    sink.stats.decimals = moved.map_or(0, decimals_of);
     for number in 0..vertex.element.count {
         lines.next("vertex", number, vertex.element.count)?;
         let decimals = &mut sink.stats.decimals;
         let point = lines.point(vertex, number, decimals, &columns, &mut others)?;
+        let point = match moved {
+            None => point,
+            Some(_) => vertex.position(point.map(Into::into)).map(T::from_double),
+        };
         sink.push_with(point, |values| {
-            for (value, (_, scalar)) in others.iter().zip(&columns) {
-                scalar.put(*value, values);
+            for (value, taken) in others.iter().zip(&columns) {
+                taken.put(*value, values);
             }
         })?;
     }
     Ok(())
+}
+
+/// Decimals of the coordinates of an origin.
+fn decimals_of(origin: [f64; 3]) -> u32 {
+    let mut decimals = 0;
+    for coordinate in origin {
+        // Displayed without an exponent, and with no more digits than tell it from others.
+        number::parse(coordinate.to_string().as_bytes(), false, &mut decimals);
+    }
+    decimals
 }
 
 struct Lines<'a> {
@@ -113,7 +130,7 @@ impl Lines<'_> {
         vertex: &Vertex,
         number: u64,
         decimals: &mut u32,
-        columns: &[(usize, Scalar)],
+        columns: &[Taken],
         others: &mut [f64],
     ) -> Result<[T; 3]> {
         let mut point = [T::from_double(0.0); 3];
@@ -145,7 +162,7 @@ impl Lines<'_> {
                 };
                 point[axis] = value;
                 found += 1;
-            } else if let Some(at) = columns.iter().position(|c| c.0 == column) {
+            } else if let Some(at) = columns.iter().position(|c| c.field.0 == column) {
                 let mut none = 0;
                 others[at] = number::parse(word, false, &mut none).unwrap_or(f64::NAN);
             }

@@ -5,7 +5,7 @@ use super::super::scalar::FromScalar;
 use super::super::spool::{Sink, SourceWriter, sink_bytes};
 use super::{Cloud, Vertex, position};
 use crate::error::{Error, Result};
-use outcrop_ply::{Encoding, Numbers, real};
+use outcrop_ply::{Encoding, Field, Numbers, real};
 use std::io::BufReader;
 
 /// Bytes of records read at a time.
@@ -83,7 +83,12 @@ fn fixed<T: FromScalar>(
         .map(|(number, kind)| (vertex.element.bytes_before(number).unwrap_or(0), kind));
     let columns = vertex.wanted(writer.wanted).into_iter();
     let columns: Vec<_> = columns
-        .map(|(number, kind)| (vertex.element.bytes_before(number).unwrap_or(0), kind))
+        .map(|taken| {
+            (
+                vertex.element.bytes_before(taken.field.0).unwrap_or(0),
+                taken,
+            )
+        })
         .collect();
     let rows = (SLAB / bytes).max(1);
     let units = usize::try_from(count.div_ceil(rows)).unwrap_or(usize::MAX);
@@ -95,10 +100,11 @@ fn fixed<T: FromScalar>(
         let what = format!("vertices {first} to {}", first + rows - 1);
         let slab = input.window(start + first * bytes, (rows * bytes) as usize, &what)?;
         for record in slab.chunks_exact(bytes as usize) {
-            let point = places.map(|(at, kind)| T::from_double(real(kind, &record[at..], big)));
+            let local = places.map(|(at, kind)| real(kind, &record[at..], big));
+            let point = vertex.position(local).map(T::from_double);
             sink.push_with(point, |values| {
-                for (at, kind) in &columns {
-                    kind.put(real(*kind, &record[*at..], big), values);
+                for (at, taken) in &columns {
+                    taken.put(real(taken.field.1, &record[*at..], big), values);
                 }
             })?;
         }
@@ -117,17 +123,19 @@ fn one_by_one<T: FromScalar>(
     let count = vertex.element.count;
     let memory = sink_bytes::<T>() + STREAM_BUFFER as u64;
     let columns = vertex.wanted(writer.wanted);
+    let fields: Vec<Field> = columns.iter().map(|taken| taken.field).collect();
     writer.whole("PLY vertices", memory, |sink: &mut Sink<'_, T>| {
         let mut records = Records::new(input, encoding, start);
         let mut others = Vec::with_capacity(columns.len());
         for number in 0..count {
             let point = records
                 .numbers
-                .point_with(&vertex.element, &vertex.coordinates, &columns, &mut others)
+                .point_with(&vertex.element, &vertex.coordinates, &fields, &mut others)
                 .map_err(|e| records.error("vertex", number, count, e))?;
-            sink.push_with(point.map(T::from_double), |values| {
-                for (value, (_, scalar)) in others.iter().zip(&columns) {
-                    scalar.put(*value, values);
+            let point = vertex.position(point).map(T::from_double);
+            sink.push_with(point, |values| {
+                for (value, taken) in others.iter().zip(&columns) {
+                    taken.put(*value, values);
                 }
             })?;
         }

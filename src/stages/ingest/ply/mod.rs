@@ -2,15 +2,19 @@
 
 mod ascii;
 mod binary;
+mod crs;
+mod splat;
 
+use super::colors::Depth;
 use super::columns::{Column, Wanted};
+use super::crs::Crs;
 use super::format::Format;
 use super::input::{Input, Range};
 use super::native::Native;
 use super::point_format::{Claims, Head, PointFile, PointFormat, Refusal};
 use super::spool::SourceWriter;
 use crate::error::{Error, Result};
-use outcrop_ply::{Element, Encoding, Header, Property, Scalar};
+use outcrop_ply::{Element, Encoding, Field, Header, Place, Property, Scalar};
 use std::io::BufReader;
 
 impl Format {
@@ -83,13 +87,40 @@ struct Cloud {
     /// The elements before the vertices.
     before: Vec<Element>,
     vertex: Option<Vertex>,
+    /// The reference system, if comments give one.
+    crs: Option<Crs>,
 }
 
 /// The element of the points.
 struct Vertex {
     element: Element,
     /// Index and type of the properties x, y and z.
-    coordinates: [(usize, Scalar); 3],
+    coordinates: [Field; 3],
+    /// The place of the coordinates, if comments give one.
+    place: Option<Place>,
+    /// True if the vertices are Gaussian splats.
+    splats: bool,
+}
+
+/// A property that is a wanted column.
+#[derive(Debug, Clone, Copy)]
+struct Taken {
+    /// Its index, and its type.
+    field: Field,
+    /// True for the coefficient of a colour of splats.
+    coefficient: bool,
+}
+
+impl Taken {
+    /// Appends the value of the column; `value` is that of the property.
+    #[inline]
+    fn put(&self, value: f64, values: &mut Vec<u8>) {
+        let value = match self.coefficient {
+            true => splat::color(value),
+            false => value,
+        };
+        self.field.1.put(value, values);
+    }
 }
 
 impl Cloud {
@@ -98,13 +129,17 @@ impl Cloud {
             Some((at, element)) => Some((at, element.coordinates()?)),
             None => None,
         };
+        let place = header.place.origin().map(|_| header.place);
+        let crs = crs::of_comments(&header.comments);
         let mut before = header.elements;
         let vertex = vertex.map(|(at, coordinates)| {
             before.truncate(at + 1);
             let element = before.remove(at);
             Vertex {
+                splats: splat::is_splats(&element),
                 element,
                 coordinates,
+                place,
             }
         });
         Ok(Self {
@@ -112,12 +147,14 @@ impl Cloud {
             data: header.bytes,
             before,
             vertex,
+            crs,
         })
     }
 
-    /// The type in the spool: single precision if all coordinates have it.
+    /// The type in the spool: single precision if all coordinates have it, and none is moved.
     fn native(&self) -> Native {
-        let single = |v: &Vertex| v.coordinates.iter().all(|c| c.1 == Scalar::F32);
+        let single =
+            |v: &Vertex| v.place.is_none() && v.coordinates.iter().all(|c| c.1 == Scalar::F32);
         match self.vertex.as_ref().is_some_and(single) {
             true => Native::F32,
             false => Native::F64,
@@ -127,20 +164,42 @@ impl Cloud {
 
 impl Vertex {
     /// Index and type of the properties that are columns: all numbers but the coordinates.
-    fn columns(&self) -> Vec<(usize, Scalar)> {
+    fn columns(&self) -> Vec<Field> {
         let numbers = self.element.properties.iter().enumerate();
         let numbers = numbers.filter_map(|(at, (_, property))| match property {
             Property::One(scalar) => Some((at, *scalar)),
             Property::List { .. } => None,
         });
-        let is_other = |(at, _): &(usize, Scalar)| self.coordinates.iter().all(|c| c.0 != *at);
+        let is_other = |(at, _): &Field| self.coordinates.iter().all(|c| c.0 != *at);
         numbers.filter(is_other).collect()
     }
 
-    /// Index and type of the properties that are wanted columns, ascending.
-    fn wanted(&self, wanted: &Wanted) -> Vec<(usize, Scalar)> {
+    /// The properties that are wanted columns, ascending.
+    fn wanted(&self, wanted: &Wanted) -> Vec<Taken> {
         let columns = self.columns();
-        wanted.numbers.iter().map(|n| columns[*n]).collect()
+        let taken = |number: &usize| {
+            let field = columns[*number];
+            let color = splat::color_of(&self.element.properties[field.0].0);
+            let coefficient = self.splats && color.is_some();
+            Taken { field, coefficient }
+        };
+        wanted.numbers.iter().map(taken).collect()
+    }
+
+    /// The name of the column of a property.
+    fn name(&self, property: usize) -> &str {
+        let own = &self.element.properties[property].0;
+        let color = splat::color_of(own).filter(|_| self.splats);
+        color.unwrap_or(own)
+    }
+
+    /// The position of a point with these coordinates in the file.
+    #[inline]
+    fn position(&self, local: [f64; 3]) -> [f64; 3] {
+        match &self.place {
+            None => local,
+            Some(place) => place.position(local, self.coordinates.map(|c| c.1)),
+        }
     }
 }
 
@@ -164,11 +223,19 @@ impl PointFile for Cloud {
         let Some(vertex) = &self.vertex else {
             return Vec::new();
         };
-        let name = |at: usize| &vertex.element.properties[at].0;
         let columns = vertex.columns().into_iter();
         columns
-            .map(|(at, scalar)| Column::new(name(at), scalar))
+            .map(|(at, scalar)| Column::new(vertex.name(at), scalar))
             .collect()
+    }
+
+    fn crs(&self, _: &Input) -> Option<Crs> {
+        self.crs.clone()
+    }
+
+    fn color_depth(&self) -> Option<Depth> {
+        let splats = self.vertex.as_ref().is_some_and(|v| v.splats);
+        splats.then_some(Depth::One)
     }
 
     fn read(&self, input: &Input, target: &SourceWriter<'_>) -> Result<Vec<String>> {
@@ -182,7 +249,10 @@ impl PointFile for Cloud {
             (_, Native::F32) => binary::read::<f32>(input, self, vertex, target),
             (..) => binary::read::<f64>(input, self, vertex, target),
         }?;
-        Ok(Vec::new())
+        Ok(match vertex.splats {
+            true => vec![splat::NOTE.into()],
+            false => Vec::new(),
+        })
     }
 }
 

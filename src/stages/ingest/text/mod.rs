@@ -64,7 +64,9 @@ impl PointFormat for Text {
 
     fn open(&self, input: &Input, head: &Head) -> Result<Box<dyn PointFile>> {
         let wrong = |why| match why {
-            Refusal::Foreign(name) => input.error("format", name, self.names()),
+            Refusal::Foreign(name) | Refusal::Instead(name, _) => {
+                input.error("format", name, self.names())
+            }
             Refusal::Columns(why) | Refusal::Unknown(why) => {
                 input.error("format", why, self.names())
             }

@@ -1,0 +1,76 @@
+//! Points at one position of the lattice: duplicates, or different points that its steps do not tell apart.
+
+use super::Spool;
+use super::far::in_unit;
+use super::stream::Buffers;
+use crate::error::Result;
+use crate::geom::Point;
+use crate::geom::lattice::Lattice;
+use crate::workspace::Workspace;
+use rustc_hash::{FxBuildHasher, FxHashSet};
+use serde::{Deserialize, Serialize};
+use std::hash::BuildHasher;
+
+/// About how many positions are looked at.
+const SAMPLE: u64 = 1 << 16;
+
+/// Most different coordinates that are told apart.
+const MOST: usize = 1 << 18;
+
+/// Bytes of both sets, and of the buffers.
+const MEMORY: u64 = 48 << 20;
+
+/// Points are duplicates if at most one in this many of those at one position differs from the others.
+const ONE_IN: u64 = 10;
+
+/// Counts of a sample.
+#[derive(Debug, Default, Serialize, Deserialize)]
+struct Counts {
+    points: u64,
+    positions: u64,
+    coordinates: u64,
+}
+
+impl Spool {
+    /// True if most points at the position of another one have its coordinates, too. Reads the spool once.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`], [`crate::Error::Cancelled`].
+    pub fn has_duplicates(&self, lattice: &Lattice, workspace: &Workspace) -> Result<bool> {
+        let counts = workspace.once("points at one position", |_| {
+            let _held = workspace.reserve("ingest: points at one position", MEMORY)?;
+            self.count(lattice, workspace)
+        })?;
+        let folded = counts.points - counts.positions.min(counts.points);
+        let different = counts.coordinates.saturating_sub(counts.positions);
+        Ok(different.saturating_mul(ONE_IN) <= folded)
+    }
+
+    /// Counts all points at a sample of the positions.
+    fn count(&self, lattice: &Lattice, workspace: &Workspace) -> Result<Counts> {
+        let each = (self.points() / SAMPLE).max(1);
+        let is_sampled = |point: &Point| FxBuildHasher.hash_one(point) % each == 0;
+        let (mut positions, mut coordinates) = (FxHashSet::default(), FxHashSet::default());
+        let mut points = 0;
+        self.for_each_frame(workspace, lattice, |buffers: &Buffers, native| {
+            for (number, point) in buffers.points.iter().enumerate() {
+                if !is_sampled(point) {
+                    continue;
+                }
+                points += 1;
+                positions.insert(*point);
+                let place = buffers.place(number);
+                let own = in_unit(native, buffers.frame.native(native, place));
+                if coordinates.len() < MOST {
+                    // Zero has one sign.
+                    coordinates.insert(own.map(|c| (c + 0.0).to_bits()));
+                }
+            }
+        })?;
+        Ok(Counts {
+            points,
+            positions: positions.len() as u64,
+            coordinates: coordinates.len() as u64,
+        })
+    }
+}
