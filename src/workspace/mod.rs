@@ -26,6 +26,7 @@ mod run;
 pub(crate) mod steps;
 mod unit;
 mod units;
+mod wait;
 
 pub use file::{Compression, Storage};
 pub use files::Files;
