@@ -7,6 +7,7 @@ mod classes;
 mod columns;
 mod damage;
 mod far;
+mod folders;
 mod formats;
 mod lattices;
 mod normals;
@@ -16,6 +17,7 @@ mod recipe;
 mod regions;
 mod scan_columns;
 mod scans;
+mod systems;
 mod text_columns;
 mod text_grammar;
 
