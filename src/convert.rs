@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use crate::inspect::ply_mesh::{PlyMesh, SLICE, Sink};
 use crate::stages::export::{self, CoordinateType, Format, Mesh, VertexColumn};
 use crate::workspace::Workspace;
-use outcrop_ply::Scalar;
+use outcrop_ply::{Place, Scalar};
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::Path;
@@ -25,7 +25,7 @@ const HELD: [&str; 6] = ["nx", "ny", "nz", "red", "green", "blue"];
 pub fn to_glb(
     mesh: &Path,
     output: &Path,
-    comments: Vec<String>,
+    mut comments: Vec<String>,
     workspace: &Workspace,
 ) -> Result<()> {
     let format = export::format_of(output)?;
@@ -52,6 +52,11 @@ pub fn to_glb(
 
     let source = PlyMesh::open_any(mesh, workspace)?;
     let columns = held_columns(&source);
+    // Coordinates stay those of the mesh, and what is to be added to them is said.
+    if !comments.iter().any(|comment| comment.starts_with("offset")) {
+        let place = source.origin().map(|origin| Place::new(origin, None));
+        comments.extend(place.iter().flat_map(Place::comments));
+    }
     let about = Mesh {
         vertices: source.vertices(),
         triangles: source.faces(),
@@ -61,7 +66,6 @@ pub fn to_glb(
         },
         columns: columns.iter().map(|(_, column)| column.clone()).collect(),
         comments,
-        origin: source.origin(),
         bounds: (bounds.vertices > 0).then_some(bounds.corners),
         ..Mesh::default()
     };

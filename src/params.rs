@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 pub use crate::geom::region::{NoRegion, Region};
 use crate::method::METHOD;
 use crate::stages::ingest::{
-    Attributes, Classes, Crop, IngestStats, Layout, Selection, TextColumns,
+    Attributes, Classes, Crop, GivenCrs, IngestStats, Layout, Selection, TextColumns,
 };
 pub use crate::stages::normals::InputNormals;
 pub use crate::stages::smooth::Smoothing;
@@ -204,6 +204,8 @@ pub struct Params {
     pub input_normals: InputNormals,
     /// Take coordinates as they are if files give different reference systems, which is an error otherwise.
     pub ignore_crs: bool,
+    /// The reference system of the cloud, instead of what files say of it.
+    pub crs: Option<GivenCrs>,
     /// Origin of the coordinates in the mesh file.
     pub origin: Origin,
     /// Points per block, the unit of insertion; changes the result.
@@ -260,6 +262,7 @@ impl Default for Params {
             ignore_scanners: false,
             input_normals: InputNormals::Auto,
             ignore_crs: false,
+            crs: None,
             origin: Origin::None,
             block: METHOD.curve.block,
             division: Division::default(),
@@ -309,6 +312,7 @@ impl Params {
                 skip_lines: self.skip_lines,
             },
             depths: false,
+            crs: self.crs.clone(),
         }
     }
 

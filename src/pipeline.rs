@@ -21,14 +21,15 @@ use crate::params::Params;
 use crate::report::Report;
 use crate::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
 use crate::workspace::progress::{Cancel, Observer};
-use crate::workspace::{Storage, Workspace, limits};
+use crate::workspace::{Folder, Storage, Workspace, limits};
 use attempt::Alarm;
 pub use builder::Builder;
 use checks::{not_an_input, one_system, writable};
 pub(crate) use clock::Clock;
 pub(crate) use disk::Known;
 pub use shared::{
-    Advanced, Begun, MOST_SHARDS, Status, TaskState, Totals, Worked, planned_shards, status,
+    Advanced, Begun, MOST_SHARDS, Status, TaskState, Totals, Worked, planned_shards, shared_folder,
+    status,
 };
 use stages::Stages;
 pub use start::Start;
@@ -92,7 +93,21 @@ impl Reconstruction {
     /// # Errors
     /// [`crate::Error::NotResumable`], [`crate::Error::Locked`], [`crate::Error::Io`].
     pub fn resume(folder: impl AsRef<Path>) -> Result<Builder> {
-        builder::unfinished(folder.as_ref())
+        let folder = folder.as_ref();
+        builder::unfinished(folder, Folder::find(folder)?)
+    }
+
+    /// As [`Reconstruction::resume`]; waits some seconds for a process that still ends, and tells the observer.
+    ///
+    /// # Errors
+    /// See [`Reconstruction::resume`]; [`crate::Error::Cancelled`].
+    pub fn resume_when_free(
+        folder: impl AsRef<Path>,
+        observer: &dyn Observer,
+        cancel: &Cancel,
+    ) -> Result<Builder> {
+        let folder = folder.as_ref();
+        builder::unfinished(folder, Folder::find_when_free(folder, observer, cancel)?)
     }
 
     /// Path of the mesh, or of the tileset.

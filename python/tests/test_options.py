@@ -72,6 +72,7 @@ def test_values_become_words() -> None:
         "time_limit": 1.5,
         "report": ["a.json", "b.html"],
         "origin": "auto",
+        "crs": "EPSG:25832",
     }
     assert _run.words(options) == [
         "--memory=1073741824",
@@ -83,6 +84,7 @@ def test_values_become_words() -> None:
         "--report=a.json",
         "--report=b.html",
         "--origin=auto",
+        "--crs=EPSG:25832",
     ]
     with pytest.raises(TypeError):
         _run.words({"memory": object()})

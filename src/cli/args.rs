@@ -2,8 +2,9 @@
 
 mod job;
 
-use super::parse::{count, size, time};
+use super::parse::{count, size, system, time};
 use crate::pipeline::Start;
+use crate::stages::ingest::GivenCrs;
 use crate::workspace::mapped::Io;
 use crate::workspace::{Compression, Storage};
 use clap::{ArgAction, Args as ClapArgs};
@@ -157,6 +158,9 @@ pub struct Info {
     pub html: Option<PathBuf>,
     #[command(flatten)]
     pub points: Points,
+    /// Reference system of the cloud, as for reconstruct
+    #[arg(long, value_name = "EPSG:N|EPSG:N+M|FILE", value_parser = system)]
+    pub crs: Option<GivenCrs>,
     #[command(flatten, next_help_heading = "Limits")]
     pub limits: Limits,
 }
@@ -189,9 +193,12 @@ pub struct Tiles {
     /// The folder to write: tileset.json and tiles
     #[arg(long, short, value_name = "DIR")]
     pub output: PathBuf,
-    /// Place the tiles on the globe, by the reference system in MESH.prj
+    /// Place the tiles on the globe, by the reference system in the header of the mesh, or else in MESH.prj
     #[arg(long)]
     pub geo: bool,
+    /// Reference system of the mesh, if it names none or a wrong one, as for reconstruct
+    #[arg(long, value_name = "EPSG:N|EPSG:N+M|FILE", value_parser = system)]
+    pub crs: Option<GivenCrs>,
     /// Most triangles of a leaf
     #[arg(long, hide = true, default_value = "65536", value_parser = clap::value_parser!(u32).range(1..))]
     pub most_triangles: u32,

@@ -6,6 +6,7 @@ use crate::error::{Error, Result};
 use crate::inspect::{compare, info, verify};
 use crate::levels;
 use crate::page;
+use crate::params::Params;
 use crate::pipeline::{Builder, Reconstruction, Tiles, default_memory, default_threads};
 use crate::report::Report;
 use crate::workspace::Workspace;
@@ -58,7 +59,8 @@ pub fn reconstruct(
 
 /// Goes on with an unfinished run; `begins` is called when all checks are done.
 pub fn resume(args: &Resume, watch: Watch, begins: impl FnOnce(&Reconstruction)) -> Result<Made> {
-    let mut builder = Reconstruction::resume(&args.folder)?;
+    let (observer, cancel) = &watch;
+    let mut builder = Reconstruction::resume_when_free(&args.folder, &**observer, cancel)?;
     if let Some(memory) = args.memory {
         builder = builder.memory(memory);
     }
@@ -105,7 +107,10 @@ fn run(
 /// Describes a cloud.
 pub fn info(args: &Info, watch: Watch) -> Result<info::Info> {
     let workspace = workspace(&args.limits, watch)?;
-    let params = args.points.params();
+    let params = Params {
+        crs: args.crs.clone(),
+        ..args.points.params()
+    };
     let Some(path) = &args.html else {
         return info::info(&args.inputs, &params, &workspace);
     };
@@ -150,6 +155,7 @@ pub fn compare(args: &Compare, watch: Watch) -> Result<compare::Comparison> {
 pub fn tiles(args: &TilesArgs, (observer, cancel): Watch) -> Result<levels::TilesReport> {
     let options = levels::Options {
         geo: args.geo,
+        crs: args.crs.clone(),
         most_triangles: args.most_triangles,
     };
     let mut tiles = Tiles::new(&args.mesh, &args.output)

@@ -1,6 +1,7 @@
 //! Values of options.
 
 use crate::params::{NoRegion, Region};
+use crate::stages::ingest::GivenCrs;
 use std::io::Read;
 use std::time::Duration;
 
@@ -27,6 +28,34 @@ pub fn region(text: &str) -> Result<Region, String> {
     let content = String::from_utf8_lossy(&content);
     content.parse().map_err(|e: NoRegion| e.to_string())
 }
+
+/// A reference system: EPSG codes, or the name of a file with well-known text.
+pub fn system(text: &str) -> Result<GivenCrs, String> {
+    let wrong = match text.parse() {
+        Ok(given) => return Ok(given),
+        Err(wrong)
+            if text.contains('[')
+                || text
+                    .get(..5)
+                    .is_some_and(|t| t.eq_ignore_ascii_case("epsg:")) =>
+        {
+            return Err(wrong);
+        }
+        Err(wrong) => wrong,
+    };
+    // A point cloud given by mistake must not be read as a whole.
+    let read = std::fs::File::open(text).and_then(|file| {
+        let mut content = Vec::new();
+        file.take(LONGEST_SYSTEM + 1)
+            .read_to_end(&mut content)
+            .map(|_| content)
+    });
+    let content = read.map_err(|e| format!("{wrong}, nor a file that can be read ({e})"))?;
+    String::from_utf8_lossy(&content).parse()
+}
+
+/// Most bytes of a file with well-known text.
+const LONGEST_SYSTEM: u64 = 1 << 20;
 
 /// A time that is not zero.
 pub fn time(text: &str) -> Result<Duration, String> {

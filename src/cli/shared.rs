@@ -56,7 +56,7 @@ const PLAN: &str = "The run alternates between two commands:
 #[derive(Debug, ClapArgs)]
 #[command(after_help = WORK)]
 pub struct Work {
-    /// The folder of the run
+    /// The folder of the run, its mesh, or the folder that was given as --scratch
     #[arg(value_name = "FOLDER")]
     pub folder: PathBuf,
     /// The generation to work for; nothing is done if it is over [default: the newest]
@@ -96,7 +96,7 @@ pub struct Process {
 #[derive(Debug, ClapArgs)]
 #[command(after_help = ADVANCE)]
 pub struct Advance {
-    /// The folder of the run
+    /// The folder of the run, its mesh, or the folder that was given as --scratch
     #[arg(value_name = "FOLDER")]
     pub folder: PathBuf,
     #[command(flatten)]
@@ -116,7 +116,7 @@ const ADVANCE: &str =
 /// `outcrop status`
 #[derive(Debug, ClapArgs)]
 pub struct Status {
-    /// The folder of the run
+    /// The folder of the run, its mesh, or the folder that was given as --scratch
     #[arg(value_name = "FOLDER")]
     pub folder: PathBuf,
     /// Print JSON
@@ -131,7 +131,7 @@ pub struct Status {
 #[derive(Debug, ClapArgs)]
 #[command(after_help = SUBMIT)]
 pub struct Submit {
-    /// The folder of the run
+    /// The folder of the run, its mesh, or the folder that was given as --scratch
     #[arg(value_name = "FOLDER")]
     pub folder: PathBuf,
     /// Who runs the tasks
@@ -245,8 +245,9 @@ fn opened(folder: &std::path::Path, process: &Process, pictures: bool) -> Result
 /// Does the units of a shard.
 pub fn work(args: &Work) -> Result<bool> {
     let shard = shard::chosen(args)?;
+    let folder = pipeline::shared_folder(&args.folder)?;
     if let Some(count) = shard.count {
-        let planned = pipeline::planned_shards(&args.folder)?;
+        let planned = pipeline::planned_shards(&folder)?;
         if planned != count {
             return Err(Error::Parameter {
                 name: "--shard",
@@ -255,11 +256,11 @@ pub fn work(args: &Work) -> Result<bool> {
             });
         }
     }
-    let run = opened(&args.folder, &args.process, false)?;
+    let run = opened(&folder, &args.process, false)?;
     match run.work(args.generation, shard.number)? {
         Worked::Done | Worked::Superseded => Ok(true),
         Worked::TooEarly => Err(Error::NotYet {
-            path: args.folder.clone(),
+            path: folder,
             what: format!(
                 "generation {} has not begun",
                 args.generation.unwrap_or_default()
@@ -316,7 +317,8 @@ impl Display for Totals {
 /// Does the work between two generations.
 pub fn advance(args: &Advance) -> Result<bool> {
     let page = args.report.as_deref().is_some_and(is_page);
-    let run = opened(&args.folder, &args.process, page)?;
+    let folder = pipeline::shared_folder(&args.folder)?;
+    let run = opened(&folder, &args.process, page)?;
     let mut after = After {
         finished: true,
         generation: None,
@@ -341,7 +343,7 @@ pub fn advance(args: &Advance) -> Result<bool> {
         Advanced::Finished(None) => {}
         Advanced::Open(_) | Advanced::Superseded => {
             // Another process may have finished it meanwhile.
-            if let Ok(status) = pipeline::status(&args.folder) {
+            if let Ok(status) = pipeline::status(&folder) {
                 after = After {
                     finished: false,
                     generation: Some(status.generation),
@@ -353,7 +355,7 @@ pub fn advance(args: &Advance) -> Result<bool> {
         }
         Advanced::Missing(generation, shards) => {
             return Err(Error::NotYet {
-                path: args.folder.clone(),
+                path: folder,
                 what: format!("of generation {generation} {} missing", list(&shards)),
             });
         }

@@ -342,6 +342,15 @@ impl Info {
         line.trim_start_matches("colours ").to_owned()
     }
 
+    /// How many files in folders were left out; nothing without any.
+    fn not_read(&self) -> String {
+        match self.input.left_out.len() {
+            0 => String::new(),
+            1 => "1 file in a folder, which is no scan".into(),
+            count => format!("{count} files in folders, which are no scans"),
+        }
+    }
+
     /// The noise of the sample, and how many of its points are noisy.
     fn noise_line(&self) -> String {
         let Percentiles { p5, p50, p95 } = self.noise;
@@ -359,7 +368,7 @@ impl fmt::Display for Info {
             write!(f, "{path}: {}, {} points", file.format, file.points)?;
             // If it is not that of all.
             if let (None, Some(crs)) = (&self.input.crs, &file.crs) {
-                write!(f, ", {} ({})", crs.line(), crs.source)?;
+                write!(f, ", {}", crs.described())?;
             }
             writeln!(f)?;
             if let Some(taken) = &file.taken {
@@ -386,7 +395,7 @@ impl fmt::Display for Info {
             input.dropped_by_crop
         );
         let system = match &input.crs {
-            Some(crs) => format!("{} ({})", crs.line(), crs.source),
+            Some(crs) => crs.described(),
             None if input.files.iter().any(|file| file.crs.is_some()) => "different ones".into(),
             None => "not given".into(),
         };
@@ -409,6 +418,7 @@ impl fmt::Display for Info {
                 normals.map(NormalStats::to_string).unwrap_or_default(),
             ),
             ("system", system),
+            ("not read", self.not_read()),
             ("lowest", three(&self.min)),
             ("highest", three(&self.max)),
             (

@@ -3,7 +3,9 @@
 use crate::error::{Error, Result};
 use crate::workspace::Workspace;
 use crate::workspace::compressed::{Beginning, Content};
-use outcrop_ply::{FileError, FixedMesh, Header, MeshStream, Part, Scalar};
+use outcrop_ply::{FileError, FixedMesh, Header, MeshStream, Part, Scalar, System};
+use std::fs::File;
+use std::io::BufReader;
 use std::path::Path;
 
 pub use outcrop_ply::{NO_VERTEX, SLICE};
@@ -66,6 +68,26 @@ pub fn holds_faces(path: &Path) -> Result<bool> {
 /// True for the first bytes of a PLY file.
 fn is_ply(_: &Path, head: &[u8], _: bool) -> bool {
     head.starts_with(b"ply")
+}
+
+/// The reference system in the comments of a mesh; nothing of a file whose header cannot be read: its readers report
+/// the error.
+///
+/// # Errors
+/// [`Error::Io`].
+pub fn system(path: &Path) -> Result<System> {
+    let compressed = match Beginning::of(path, &is_ply, Header::LONGEST) {
+        Err(Error::Input { .. }) => return Ok(System::default()),
+        beginning => beginning?,
+    };
+    let header = match compressed {
+        Some(beginning) => Header::read(&mut &beginning.bytes[..]),
+        None => {
+            let file = File::open(path).map_err(|e| Error::io(path, "open", e))?;
+            Header::read(&mut BufReader::new(file))
+        }
+    };
+    Ok(header.map(|header| header.system).unwrap_or_default())
 }
 
 /// Extensions of meshes that the program writes and does not read.

@@ -23,6 +23,8 @@ pub(super) struct About {
     /// Well-known text or name of its reference system.
     pub crs: Option<String>,
     pub epsg: Option<u32>,
+    /// Metres in a unit of heights, if that is known.
+    pub height_unit: Option<f64>,
     /// The map from the local frame to the globe, by columns.
     pub transform: Option<[f64; 16]>,
 }
@@ -90,6 +92,7 @@ impl Maker<'_> {
                 "origin": intake.lattice.origin(),
                 "crs": about.crs,
                 "epsg": about.epsg,
+                "height_unit": about.height_unit,
                 "step": vec![intake.lattice.step; 3],
                 "exact": intake.lattice.exact,
                 "colors": intake.columns.has_colors(),

@@ -1,6 +1,7 @@
 //! The place of a mesh on the globe.
 
 use crate::error::{Error, Result};
+use crate::stages::ingest::{Crs, CrsKind};
 use proj4rs::Proj;
 use std::path::Path;
 
@@ -22,86 +23,166 @@ fn geocentric([longitude, latitude, height]: [f64; 3]) -> [f64; 3] {
 
 /// A reference system whose coordinates can be placed on the globe.
 pub(super) struct Globe {
-    system: Proj,
-    target: Proj,
+    plane: Plane,
     /// Metres in a unit of heights.
-    unit: f64,
+    height_unit: f64,
 }
 
+/// The first two coordinates of a system.
+enum Plane {
+    /// They are those of a projection or of the ellipsoid, times `scale`.
+    On {
+        system: Box<Proj>,
+        target: Box<Proj>,
+        scale: f64,
+    },
+    /// All three are lengths from the middle of the earth, in units of so many metres.
+    Geocentric(f64),
+}
+
+/// Columns of a matrix whose parallelepiped has less than this part of the volume of a box with their lengths are no
+/// axes.
+const LEAST_VOLUME: f64 = 1e-3;
+
+/// A unit of a system has at least so many metres on the globe; at a pole a degree of longitude has none.
+const LEAST_LENGTH: f64 = 1e-6;
+
 impl Globe {
-    /// The reference system with this code.
-    pub fn of(mesh: &Path, code: Option<u32>) -> Result<Self> {
+    /// That of a system.
+    pub fn of(mesh: &Path, crs: Option<&Crs>) -> Result<Self> {
         let refuse = |found: String| {
             let place = "reference system";
-            let expected = "one with an EPSG code that can be placed on the globe, in a .prj file beside the mesh";
+            let expected = "one that can be placed on the globe, with an EPSG code or geocentric, in the header of \
+                            the mesh, in a .prj file beside it, or by --crs";
             Error::input(mesh, place, found, expected)
         };
-        let code = code.ok_or_else(|| refuse("none with an EPSG code".into()))?;
+        let crs = crs.ok_or_else(|| refuse("none".into()))?;
+        let height_unit = crs.metres_of_heights();
+        if crs.kind == Some(CrsKind::Geocentric) {
+            return Ok(Self {
+                plane: Plane::Geocentric(crs.unit.unwrap_or(1.0)),
+                height_unit,
+            });
+        }
+        let code = crs
+            .horizontal
+            .ok_or_else(|| refuse(format!("{crs}, without an EPSG code")))?;
         let wrong = |e: proj4rs::errors::Error| refuse(format!("EPSG:{code} ({e})"));
         let short = u16::try_from(code).map_err(|_| refuse(format!("EPSG:{code}")))?;
         let system = Proj::from_epsg_code(short).map_err(wrong)?;
         let target =
             Proj::from_proj_string("+proj=longlat +datum=WGS84 +no_defs").map_err(wrong)?;
-        let unit = if system.is_latlong() {
-            1.0
-        } else {
-            system.to_meter()
+        // A text may give another unit than the code has.
+        let scale = match crs.unit {
+            Some(unit) if !system.is_latlong() => unit / system.to_meter(),
+            _ => 1.0,
         };
         Ok(Self {
-            system,
-            target,
-            unit,
+            plane: Plane::On {
+                system: Box::new(system),
+                target: Box::new(target),
+                // Numbers in files are rounded.
+                scale: if (scale - 1.0).abs() < 1e-9 {
+                    1.0
+                } else {
+                    scale
+                },
+            },
+            height_unit,
         })
     }
 
     /// Geocentric coordinates of a position.
     fn place(&self, position: [f64; 3]) -> Option<[f64; 3]> {
         let [x, y, z] = position;
-        let mut point = match self.system.is_latlong() {
-            true => (x.to_radians(), y.to_radians(), 0.0),
-            false => (x, y, 0.0),
+        let found = match &self.plane {
+            Plane::Geocentric(unit) => position.map(|c| c * unit),
+            Plane::On {
+                system,
+                target,
+                scale,
+            } => {
+                let mut point = match system.is_latlong() {
+                    true => (x.to_radians(), y.to_radians(), 0.0),
+                    false => (x * scale, y * scale, 0.0),
+                };
+                proj4rs::transform::transform(system, target, &mut point).ok()?;
+                geocentric([point.0, point.1, z * self.height_unit])
+            }
         };
-        proj4rs::transform::transform(&self.system, &self.target, &mut point).ok()?;
-        let found = geocentric([point.0, point.1, z * self.unit]);
         found.iter().all(|x| x.is_finite()).then_some(found)
+    }
+
+    /// Half of the length over which a column of the matrix is measured along an axis.
+    fn step(&self, axis: usize) -> f64 {
+        match &self.plane {
+            Plane::On { system, .. } if axis < 2 && system.is_latlong() => 1e-4,
+            Plane::On { system, scale, .. } if axis < 2 => 10.0 / (system.to_meter() * scale),
+            _ => 10.0 / self.height_unit,
+        }
     }
 
     /// The matrix, by columns, from coordinates less `origin` to geocentric ones: exact at `middle` and to first
     /// order around it.
     pub fn matrix(&self, mesh: &Path, origin: [f64; 3], middle: [f64; 3]) -> Result<[f64; 16]> {
-        let step = if self.system.is_latlong() {
-            1e-4
-        } else {
-            10.0 / self.unit
-        };
+        if let Plane::Geocentric(unit) = self.plane {
+            let axis = |k: usize| std::array::from_fn(|axis| if axis == k { unit } else { 0.0 });
+            return Ok(by_columns([0, 1, 2].map(axis), origin.map(|c| c * unit)));
+        }
         let moved = |axis: usize, by: f64| {
             let mut position = middle;
             position[axis] += by;
             self.place(position)
         };
         let column = |axis| {
+            let step = self.step(axis);
             let (a, b) = (moved(axis, -step)?, moved(axis, step)?);
             Some([0, 1, 2].map(|k| (b[k] - a[k]) / (2.0 * step)))
         };
         let all = || Some((self.place(middle)?, [column(0)?, column(1)?, column(2)?]));
-        let [x, y, z] = middle;
-        let (place, columns) = all().ok_or_else(|| {
-            let found = format!("coordinates {x} {y} {z}, which cannot be placed on the globe");
-            Error::input(mesh, "reference system", found, "coordinates in its range")
-        })?;
+        let (place, columns) = all()
+            .filter(|(_, columns)| is_regular(columns))
+            .ok_or_else(|| {
+                let [x, y, z] = middle;
+                let found = format!("coordinates {x} {y} {z}, which cannot be placed on the globe");
+                Error::input(mesh, "reference system", found, "coordinates in its range")
+            })?;
         let shift = [0, 1, 2].map(|k| {
             let along = (0..3).map(|axis| columns[axis][k] * (origin[axis] - middle[axis]));
             place[k] + along.sum::<f64>()
         });
-        let [[a, b, c], [d, e, f], [g, h, i]] = columns;
-        let [x, y, z] = shift;
-        Ok([a, b, c, 0.0, d, e, f, 0.0, g, h, i, 0.0, x, y, z, 1.0])
+        Ok(by_columns(columns, shift))
     }
+}
+
+/// A matrix of 4 by 4.
+fn by_columns([[a, b, c], [d, e, f], [g, h, i]]: [[f64; 3]; 3], [x, y, z]: [f64; 3]) -> [f64; 16] {
+    [a, b, c, 0.0, d, e, f, 0.0, g, h, i, 0.0, x, y, z, 1.0]
+}
+
+/// True if the columns are finite and can be axes.
+fn is_regular([a, b, c]: &[[f64; 3]; 3]) -> bool {
+    let length = |v: &[f64; 3]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let volume = a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0])
+        + a[2] * (b[0] * c[1] - b[1] * c[0]);
+    let whole = length(a) * length(b) * length(c);
+    let long = [a, b, c].iter().all(|v| length(v) >= LEAST_LENGTH);
+    long && whole.is_finite() && volume.abs() >= LEAST_VOLUME * whole
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The system with these codes.
+    fn crs(codes: &str) -> Crs {
+        let given: crate::stages::ingest::GivenCrs = codes.parse().unwrap();
+        given.crs()
+    }
+
+    fn globe(code: u32) -> Result<Globe> {
+        Globe::of(Path::new("mesh.ply"), Some(&crs(&format!("EPSG:{code}"))))
+    }
 
     fn near(a: [f64; 3], b: [f64; 3], by: f64) {
         assert!((0..3).all(|k| (a[k] - b[k]).abs() < by), "{a:?} {b:?}");
@@ -113,13 +194,12 @@ mod tests {
         near(geocentric([0.0; 3]), [EQUATOR, 0.0, 0.0], 1e-6);
         let pole = geocentric([0.0, std::f64::consts::FRAC_PI_2, 0.0]);
         near(pole, [0.0, 0.0, 6_356_752.314_245], 1e-5);
-        let mesh = Path::new("mesh.ply");
         // The middle of UTM zone 31 on the equator is 3 degrees east.
-        let utm = Globe::of(mesh, Some(32631)).unwrap();
+        let utm = globe(32631).unwrap();
         let want = geocentric([3f64.to_radians(), 0.0, 0.0]);
         near(utm.place([500_000.0, 0.0, 0.0]).unwrap(), want, 1e-3);
         // The CN Tower: 43° 38' 33.24" N, 79° 23' 13.7" W is 630 084 m east and 4 833 438 m north in zone 17.
-        let tower = Globe::of(mesh, Some(32617)).unwrap();
+        let tower = globe(32617).unwrap();
         let want = geocentric([
             -(79.0 + 23.0 / 60.0 + 13.7 / 3600.0f64).to_radians(),
             (43.0 + 38.0 / 60.0 + 33.24 / 3600.0f64).to_radians(),
@@ -130,19 +210,19 @@ mod tests {
             want,
             1.0,
         );
-        assert!(Globe::of(mesh, None).is_err() && Globe::of(mesh, Some(1)).is_err());
-        assert!(Globe::of(mesh, Some(1_000_000)).is_err());
+        assert!(Globe::of(Path::new("mesh.ply"), None).is_err());
+        assert!(globe(1).is_err() && globe(1_000_000).is_err());
     }
 
     #[test]
     fn the_matrix_is_true_around_the_middle() {
         let mesh = Path::new("mesh.ply");
-        let globe = Globe::of(mesh, Some(32617)).unwrap();
+        let utm = globe(32617).unwrap();
         let (origin, middle) = (
             [630_000.0, 4_833_000.0, 0.0],
             [630_500.0, 4_833_500.0, 50.0],
         );
-        let matrix = globe.matrix(mesh, origin, middle).unwrap();
+        let matrix = utm.matrix(mesh, origin, middle).unwrap();
         for by in [
             [0.0; 3],
             [100.0, 0.0, 0.0],
@@ -155,7 +235,44 @@ mod tests {
                 let along = (0..3).map(|axis| matrix[4 * axis + k] * local[axis]);
                 matrix[12 + k] + along.sum::<f64>()
             });
-            near(mapped, globe.place(position).unwrap(), 2e-3);
+            near(mapped, utm.place(position).unwrap(), 2e-3);
         }
+    }
+
+    #[test]
+    fn a_geocentric_system_is_the_globe_itself() {
+        let mesh = Path::new("mesh.ply");
+        let matrix = globe(4978)
+            .unwrap()
+            .matrix(mesh, [4e6, 7e5, 5e6], [4.1e6, 7.1e5, 5.1e6])
+            .unwrap();
+        let [x, y, z] = [4e6, 7e5, 5e6];
+        let identity = [
+            1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, x, y, z, 1.0,
+        ];
+        assert_eq!(matrix, identity);
+    }
+
+    #[test]
+    fn matrices_without_three_axes_are_refused() {
+        assert!(is_regular(&[
+            [1.0, 0.0, 0.0],
+            [0.0, 0.3, 0.0],
+            [0.0, 0.1, 1e5]
+        ]));
+        for columns in [
+            [[1.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 1.0]],
+            [[1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 0.0, 1.0]],
+            [[f64::NAN, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+            [[f64::INFINITY, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+        ] {
+            assert!(!is_regular(&columns), "{columns:?}");
+        }
+        // At a pole a step along a meridian is one, but all meridians meet.
+        let pole = globe(4326).unwrap();
+        assert!(
+            pole.matrix(Path::new("mesh.ply"), [0.0; 3], [9.0, 90.0, 0.0])
+                .is_err()
+        );
     }
 }

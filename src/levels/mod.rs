@@ -21,6 +21,7 @@ mod report;
 mod rows;
 mod shared;
 mod simplify;
+mod system;
 mod tree;
 
 pub use report::{Options, TilesReport};
@@ -28,7 +29,6 @@ pub use simplify::{Manner, Quadrics, Simplifier, Surface};
 
 use crate::error::{Error, Result};
 use crate::spill::Table;
-use crate::stages::ingest;
 use crate::workspace::Workspace;
 use folder::About;
 pub use folder::{NAME, check_folder, remove_unfinished};
@@ -49,28 +49,30 @@ pub fn tileset(
     options: &Options,
     workspace: &Workspace,
 ) -> Result<TilesReport> {
-    let (crs, warning) = ingest::of_prj(&ingest::prj_of(path));
-    if let Some(warning) = warning {
-        workspace.observer.warn(&warning);
-    }
-    let code = crs.as_ref().and_then(|crs| crs.horizontal);
+    let crs = system::of(path, options, workspace)?;
     // What cannot be placed is refused before the work.
     let globe = match options.geo {
-        true => Some(Globe::of(path, code)?),
+        true => Some(Globe::of(path, crs.as_ref())?),
         false => None,
     };
+    let known = crs.clone();
     let about = |origin: [f64; 3], high: [f64; 3]| {
         let middle = std::array::from_fn(|axis| (origin[axis] + high[axis]) / 2.0);
         let globe = globe.as_ref();
         let matrix = globe.map(|globe| globe.matrix(path, origin, middle));
         Ok(About {
             source: source.to_owned(),
-            epsg: code,
+            epsg: crs.as_ref().and_then(|crs| crs.horizontal),
+            height_unit: crs.as_ref().and_then(|crs| crs.height_unit),
             crs: crs.map(|crs| crs.wkt().map_or_else(|| crs.line(), str::to_owned)),
             transform: matrix.transpose()?,
         })
     };
-    make(path, folder, options, about, workspace)
+    let report = make(path, folder, options, about, workspace)?;
+    Ok(TilesReport {
+        crs: known.map(|crs| crs.without_texts()),
+        ..report
+    })
 }
 
 fn make(
@@ -142,5 +144,6 @@ fn make(
         root_error: root.error,
         step,
         exact: intake.lattice.exact,
+        crs: None,
     })
 }

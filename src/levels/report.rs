@@ -1,6 +1,7 @@
 //! Options of a tileset, and the report on it.
 
 use super::cells::MOST;
+use crate::stages::ingest::{Crs, GivenCrs};
 use serde::{Deserialize, Serialize};
 
 /// Options that decide the tileset.
@@ -9,6 +10,8 @@ use serde::{Deserialize, Serialize};
 pub struct Options {
     /// Place the tileset on the globe, by the reference system of the mesh.
     pub geo: bool,
+    /// The reference system of the mesh, instead of what it says of it.
+    pub crs: Option<GivenCrs>,
     /// Most triangles of a leaf, unless it cannot be divided: for tests.
     #[doc(hidden)]
     pub most_triangles: u32,
@@ -18,6 +21,7 @@ impl Default for Options {
     fn default() -> Self {
         Self {
             geo: false,
+            crs: None,
             most_triangles: MOST,
         }
     }
@@ -50,6 +54,8 @@ pub struct TilesReport {
     pub step: f64,
     /// True if all coordinates are multiples of the step.
     pub exact: bool,
+    /// The reference system of the mesh.
+    pub crs: Option<Crs>,
 }
 
 impl std::fmt::Display for TilesReport {
@@ -63,6 +69,9 @@ impl std::fmt::Display for TilesReport {
             self.levels,
             megabytes(self.bytes)
         )?;
+        if let Some(crs) = &self.crs {
+            writeln!(f, "system: {}", crs.described())?;
+        }
         write!(
             f,
             "coarsest tile: {} triangles, {:.2} MB, at most {:.6} from the mesh",

@@ -185,7 +185,7 @@ fn points(info: &Info) -> Markup {
         (
             "reference system",
             Some(html! {
-                @match &input.crs { Some(crs) => (clean(&crs.line())), None => "not given" }
+                @match &input.crs { Some(crs) => (clean(&crs.described())), None => "not given" }
             }),
         ),
         ("lowest corner", Some(html! { (position(info.min, step)) })),

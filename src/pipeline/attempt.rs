@@ -49,7 +49,10 @@ impl Reconstruction {
     pub(super) fn open(&self) -> Result<Workspace> {
         let manifest = Manifest::of(self)?;
         let bytes = manifest.to_bytes()?;
-        let found = Folder::find(&self.folder)?;
+        let found = match self.start {
+            Start::Resume => Folder::find_when_free(&self.folder, &*self.observer, &self.cancel)?,
+            Start::New | Start::Restart => Folder::find(&self.folder)?,
+        };
         let mut folder = match (found, self.start) {
             (Found::Nothing, _) => Folder::create(&self.folder, bytes)?,
             (Found::Run(folder), Start::Resume) => {

@@ -46,27 +46,91 @@ pub(super) fn path_beside(output: &Path, extension: &str) -> PathBuf {
     path.into()
 }
 
-/// Writes the files beside the mesh; an origin of an earlier mesh that is not true any more is deleted.
+/// Extensions of meshes: those of one name share the files beside them.
+const MESHES: [&str; 4] = ["ply", "obj", "stl", "glb"];
+
+/// Writes the files beside the mesh. Those of an earlier mesh of the name that are not true any more are deleted;
+/// returns warnings about them.
 pub(super) fn write(
     output: &Path,
     inputs: &[PathBuf],
     report: &Report,
     wkt: Option<&str>,
-) -> Result<()> {
-    write_origin(output, report)?;
-    let Some(wkt) = wkt else {
-        return Ok(());
-    };
+) -> Result<Vec<String>> {
+    let mut warnings = Vec::new();
+    warnings.extend(write_origin(output, report)?);
     let path = path_beside(output, "prj");
     // That of an input stays as it is.
     let of_input = ingest::expand(inputs)?.iter().any(|input| {
         let other = ingest::prj_of(input).canonicalize();
         other.is_ok_and(|other| path.canonicalize().is_ok_and(|path| path == other))
     });
-    match of_input {
-        true => Ok(()),
-        false => put(&path, format!("{wkt}\n").as_bytes()),
+    match wkt {
+        _ if of_input => {}
+        Some(wkt) => put(&path, format!("{wkt}\n").as_bytes())?,
+        None => warnings.extend(without_prj(output, &path, report)?),
     }
+    Ok(warnings)
+}
+
+/// Deletes a `.prj` file that an earlier mesh of the name left, for this one has none.
+fn without_prj(output: &Path, path: &Path, report: &Report) -> Result<Option<String>> {
+    let (Some(beside), _) = ingest::of_prj(path) else {
+        return Ok(None);
+    };
+    // It has no more than the codes of the same system.
+    if report
+        .input
+        .crs
+        .as_ref()
+        .is_some_and(|crs| beside.agrees(crs))
+    {
+        return Ok(None);
+    }
+    let names = match &report.input.crs {
+        Some(crs) => format!("gives {crs}"),
+        None => "names no reference system".into(),
+    };
+    let shown = path.display();
+    if let Some(other) = other_mesh(output) {
+        let other = other.display();
+        return Ok(Some(format!(
+            "{shown}: it gives {beside}, and stays for {other}; the mesh {names}"
+        )));
+    }
+    if !is_our_text(path) {
+        return Ok(Some(format!(
+            "{shown}: it gives {beside}, and stays, for it is not of outcrop; the mesh {names}"
+        )));
+    }
+    std::fs::remove_file(path).map_err(|e| Error::io(path, "delete", e))?;
+    Ok(Some(format!(
+        "{shown}: deleted, it was of an earlier mesh of this name, in {beside}; this one {names}"
+    )))
+}
+
+/// Another mesh to which the files beside this one may belong.
+fn other_mesh(output: &Path) -> Option<PathBuf> {
+    let names = MESHES.into_iter().flat_map(|extension| {
+        let plain = path_beside(output, extension);
+        let mut packed = plain.clone().into_os_string();
+        packed.push(".zst");
+        [plain, packed.into()]
+    });
+    let others = names.into_iter().filter(|path| path != output);
+    others.into_iter().find(|path| path.is_file())
+}
+
+/// True if a `.prj` file is as this program writes it: a text and one end of line.
+fn is_our_text(path: &Path) -> bool {
+    let read = std::fs::File::open(path).and_then(|file| {
+        let mut bytes = Vec::new();
+        file.take(LONGEST).read_to_end(&mut bytes).map(|_| bytes)
+    });
+    read.is_ok_and(|bytes| {
+        let text = bytes.strip_suffix(b"\n");
+        text.is_some_and(|text| text.trim_ascii() == text)
+    })
 }
 
 /// Removes a mesh and the files beside it; they do no harm if they cannot be deleted.
@@ -80,12 +144,21 @@ pub(super) fn remove(mesh: &Path) {
     }
 }
 
-fn write_origin(output: &Path, report: &Report) -> Result<()> {
+fn write_origin(output: &Path, report: &Report) -> Result<Option<String>> {
     let path = path_beside(output, "origin.json");
     let Some(origin) = report.origin else {
-        return match is_ours(&path) {
-            true => std::fs::remove_file(&path).map_err(|e| Error::io(&path, "delete", e)),
-            false => Ok(()),
+        return match mesh_of(&path) {
+            // It belongs to a mesh of another format, which is still there.
+            Some(mesh) if mesh != output && mesh.is_file() => Ok(Some(format!(
+                "{}: it stays for {}; the coordinates of this mesh are those of the cloud",
+                path.display(),
+                mesh.display()
+            ))),
+            Some(_) => {
+                std::fs::remove_file(&path).map_err(|e| Error::io(&path, "delete", e))?;
+                Ok(None)
+            }
+            None => Ok(None),
         };
     };
     let name = output.file_name().unwrap_or_default().to_string_lossy();
@@ -101,24 +174,21 @@ fn write_origin(output: &Path, report: &Report) -> Result<()> {
     };
     let json = serde_json::to_string_pretty(&content);
     let json = json.map_err(|e| Error::io(&path, "write JSON", e.into()))?;
-    put(&path, (json + "\n").as_bytes())
+    put(&path, (json + "\n").as_bytes())?;
+    Ok(None)
 }
 
-/// True if a file with an origin was written by this program, for an earlier mesh of the name.
-fn is_ours(path: &Path) -> bool {
-    let Ok(file) = std::fs::File::open(path) else {
-        return false;
-    };
+/// The mesh of which a file with an origin is, if this program wrote it.
+fn mesh_of(path: &Path) -> Option<PathBuf> {
+    let file = std::fs::File::open(path).ok()?;
     let mut bytes = Vec::new();
-    if file.take(LONGEST).read_to_end(&mut bytes).is_err() {
-        return false;
-    }
-    let value: Result<serde_json::Value, _> = serde_json::from_slice(&bytes);
-    value.is_ok_and(|value| {
-        value["made_by"]
-            .as_str()
-            .is_some_and(|by| by.starts_with(MADE_BY))
-    })
+    file.take(LONGEST).read_to_end(&mut bytes).ok()?;
+    let value: serde_json::Value = serde_json::from_slice(&bytes).ok()?;
+    let ours = value["made_by"].as_str()?.starts_with(MADE_BY);
+    let name = value["mesh"].as_str().unwrap_or_default();
+    // Only a name: what the file says must not lead elsewhere.
+    let name = Path::new(name).file_name().unwrap_or_default();
+    ours.then(|| path.with_file_name(name))
 }
 
 /// Writes a file under a temporary name, then renames it.

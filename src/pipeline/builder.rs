@@ -11,7 +11,7 @@ use crate::stages::export::check_name;
 use crate::stages::order::PAGE;
 use crate::workspace::memory::MemoryPool;
 use crate::workspace::progress::{Cancel, Observer};
-use crate::workspace::{Folder, Found, Storage};
+use crate::workspace::{Found, Storage};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
@@ -176,16 +176,16 @@ fn mesh_of(folder: &Path) -> PathBuf {
     folder.with_file_name(name)
 }
 
-/// The builder of the unfinished run in a scratch folder.
+/// The builder of the unfinished run that was found in a scratch folder.
 ///
 /// # Errors
-/// [`Error::NotResumable`], [`Error::Locked`], [`Error::Io`].
-pub(super) fn unfinished(folder: &Path) -> Result<Builder> {
+/// [`Error::NotResumable`].
+pub(super) fn unfinished(folder: &Path, found: Found) -> Result<Builder> {
     let not = |why: &str| Error::NotResumable {
         path: folder.to_path_buf(),
         why: why.to_owned(),
     };
-    let found = match Folder::find(folder)? {
+    let found = match found {
         Found::Run(found) => found,
         Found::Nothing => return Err(not("no unfinished run is here")),
         Found::Damaged(_) => {

@@ -110,7 +110,7 @@ pub(super) fn not_an_input(output: &Path, split: bool, inputs: &[PathBuf]) -> Re
 
 /// Checks that the inputs do not have different reference systems, as far as their headers tell.
 pub(super) fn one_system(params: &Params, inputs: &[PathBuf]) -> Result<()> {
-    match params.ignore_crs {
+    match params.ignore_crs || params.crs.is_some() {
         true => Ok(()),
         false => ingest::check_systems(inputs),
     }

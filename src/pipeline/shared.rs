@@ -15,8 +15,10 @@ use std::io::Read;
 use std::path::Path;
 use std::time::{Instant, SystemTime};
 
+mod find;
 mod status;
 
+pub use find::shared_folder;
 pub use status::{Begun, Status, TaskState, Totals, status};
 
 /// Largest number of shards: array jobs of Slurm end here by default.
@@ -110,6 +112,7 @@ impl Reconstruction {
             program: program()?,
         };
         SharedFolder::create(&self.folder, manifest, sharing)?;
+        find::note(&self.mesh, &self.folder)?;
         Ok(&self.folder)
     }
 
@@ -198,6 +201,7 @@ impl Reconstruction {
         let begin = Instant::now();
         let folder = SharedFolder::open(&self.folder)?;
         if folder.is_left_over() {
+            find::forget(&self.mesh);
             folder.remove();
             return Ok(Advanced::Finished(None));
         }
@@ -225,6 +229,7 @@ impl Reconstruction {
             Ok(workspace) => workspace,
             Err(Opened::Missing(shards)) => return Ok(Advanced::Missing(number, shards)),
             Err(_) => {
+                find::forget(&self.mesh);
                 folder.remove();
                 return Ok(Advanced::Finished(None));
             }
@@ -252,6 +257,7 @@ impl Reconstruction {
             (Ok(report), true) => {
                 let totals = Totals::of(&folder.read(next)?.took);
                 self.remove_unfinished();
+                find::forget(&self.mesh);
                 drop(workspace);
                 folder.remove();
                 Ok(Advanced::Finished(Some(Box::new((report, totals)))))

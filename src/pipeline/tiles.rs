@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// The version of what a resumed run reads.
-const FORMAT: &str = "tiles 1";
+const FORMAT: &str = "tiles 2";
 
 /// The making of a tileset.
 pub struct Tiles {
@@ -122,7 +122,14 @@ impl Tiles {
         let path = self.scratch_folder();
         let manifest = Manifest::of(self)?;
         let bytes = manifest.to_bytes(&path)?;
-        let folder = match (Folder::find(&path)?, self.resources.start) {
+        let Resources {
+            observer, cancel, ..
+        } = &self.resources;
+        let found = match self.resources.start {
+            Start::Resume => Folder::find_when_free(&path, &**observer, cancel)?,
+            Start::New | Start::Restart => Folder::find(&path)?,
+        };
+        let folder = match (found, self.resources.start) {
             (Found::Nothing, _) => Folder::create(&path, bytes)?,
             (Found::Run(folder), Start::Resume) => {
                 manifest.check(&folder.manifest, &path)?;

@@ -13,17 +13,20 @@ use std::ops::Range;
 /// A position farther from the box around all points than this number of its diagonals is no scanner's.
 const MOST_DIAGONALS: i128 = 100;
 
-/// A position that a surface faces has coordinates less than this from the offset, in steps.
+/// A position that a surface faces has coordinates less than this from the lowest corner of the cloud, in steps.
 pub const FARTHEST: f64 = (1u64 << 40) as f64;
 
-/// A position in lattice steps, rounded; none if it is too far for that.
+/// A position in lattice steps, rounded; none if it is too far from the cloud for that. The distance is that from the
+/// cloud, wherever the origin of coordinates is.
 #[must_use]
 pub fn on_lattice(position: [f64; 3], lattice: &Lattice) -> Option<[i64; 3]> {
-    let steps: [f64; 3] =
-        std::array::from_fn(|axis| (position[axis] - lattice.offset[axis]) / lattice.step);
+    let from_cloud = |axis: usize| {
+        let steps = (position[axis] - lattice.offset[axis]) / lattice.step;
+        steps.round() - lattice.base[axis] as f64
+    };
+    let steps = [0, 1, 2].map(from_cloud);
     let near = steps.iter().all(|x| x.abs() < FARTHEST);
-    // The base is less than 2^53.
-    near.then(|| std::array::from_fn(|axis| steps[axis].round() as i64 - lattice.base[axis]))
+    near.then(|| steps.map(|x| x as i64))
 }
 
 /// The position of a scanner in lattice steps, rounded; none if it is too far from all points, in `bounds`, to be
@@ -143,6 +146,32 @@ mod tests {
         assert_eq!(place([103.5, -1.5, 2500.5]), None);
         assert_eq!(place([1e300, 0.0, 0.0]), None);
         assert_eq!(place([f64::NAN, 0.0, 0.0]), None);
+    }
+
+    #[test]
+    fn the_offset_of_the_lattice_is_no_measure() {
+        // Fine steps far from the origin, as of a room in national coordinates.
+        for (exponent, base) in [
+            (-20, 5_300_000i64 << 20),
+            (-30, 691_000 << 30),
+            (-28, -(4_500_000 << 28)),
+        ] {
+            let lattice = Lattice {
+                step: 2f64.powi(exponent),
+                offset: [0.0; 3],
+                base: [base; 3],
+                exact: true,
+            };
+            let bounds = Aabb {
+                min: [0; 3],
+                max: [1 << 22; 3],
+            };
+            let low = base as f64 * lattice.step;
+            let inside = [low, low + 256.0 * lattice.step, low + lattice.step];
+            assert_eq!(place(inside, &lattice, bounds), Some([0, 256, 1]));
+            assert_eq!(place([0.0; 3], &lattice, bounds), None);
+            assert_eq!(on_lattice([low + 1e15; 3], &lattice), None);
+        }
     }
 
     #[test]

@@ -183,6 +183,12 @@ impl SharedFolder {
         Ok(new)
     }
 
+    /// True if a run that tasks share is at this path.
+    #[must_use]
+    pub fn is_at(path: &Path) -> bool {
+        is_shared(path)
+    }
+
     /// Opens the folder.
     ///
     /// # Errors

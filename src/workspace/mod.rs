@@ -26,6 +26,7 @@ mod run;
 pub(crate) mod steps;
 mod unit;
 mod units;
+mod wait;
 pub mod zip;
 
 pub use file::{Compression, Storage};

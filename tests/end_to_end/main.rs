@@ -21,6 +21,7 @@ mod report;
 mod scanners;
 mod scans;
 mod stop;
+mod systems;
 mod text;
 mod topology;
 mod util;

@@ -131,7 +131,12 @@ fn a_file_beside_may_give_the_system() {
         .unwrap()
         .stats()
         .clone();
-    assert_eq!(stats.warnings, [""; 0]);
+    assert_eq!(stats.warnings.len(), 1, "{:?}", stats.warnings);
+    assert!(
+        stats.warnings[0].contains("b.prj: it gives EPSG:32617, but "),
+        "{:?}",
+        stats.warnings
+    );
     let sources: Vec<_> = stats
         .files
         .iter()

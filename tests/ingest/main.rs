@@ -8,6 +8,7 @@ mod color_scales;
 mod columns;
 mod damage;
 mod far;
+mod folders;
 mod formats;
 mod lattices;
 mod normals;
@@ -18,6 +19,7 @@ mod recipe;
 mod regions;
 mod scan_columns;
 mod scans;
+mod systems;
 mod text_columns;
 mod text_grammar;
 

@@ -1,5 +1,6 @@
 //! Levels of detail: tilesets are read back and compared with their meshes.
 
+mod globe;
 mod meshes;
 mod resumed;
 mod tileset;

@@ -10,3 +10,4 @@ mod kills;
 mod refusals;
 mod run;
 mod stops;
+mod waits;

@@ -7,6 +7,7 @@ mod util;
 mod bytes;
 mod deploy;
 mod faults;
+mod names;
 mod refusals;
 mod run;
 mod status;

@@ -1,12 +1,12 @@
 //! The points, the mesh, and what decides it.
 
-use super::super::parse::region;
+use super::super::parse::{region, system};
 use crate::method::METHOD;
 use crate::params::{
     Facing, InputNormals, MaxWidth, Method, Origin, Params, Radius, Region, Smooth, Smoothing,
 };
 use crate::pipeline::{Builder, Reconstruction};
-use crate::stages::ingest::{Attributes, Classes, TextColumns};
+use crate::stages::ingest::{Attributes, Classes, GivenCrs, TextColumns};
 use clap::Args as ClapArgs;
 use std::path::PathBuf;
 
@@ -211,6 +211,10 @@ pub struct Coordinates {
     /// Take coordinates as they are if files give different reference systems; the mesh then names none
     #[arg(long)]
     pub ignore_crs: bool,
+    /// Reference system of the cloud, if files give none or a wrong one: EPSG codes of the plane and perhaps of
+    /// heights, or a file with well-known text; coordinates stay as they are
+    #[arg(long, value_name = "EPSG:N|EPSG:N+M|FILE", value_parser = system)]
+    pub crs: Option<GivenCrs>,
 }
 
 /// The points, the mesh, and what decides it.
@@ -298,6 +302,7 @@ impl Job {
             origin: self.coordinates.origin,
             keep_far: self.coordinates.keep_far,
             ignore_crs: self.coordinates.ignore_crs,
+            crs: self.coordinates.crs.clone(),
             facing: self.surface.facing,
             ignore_scanners: self.surface.ignore_scanners,
             input_normals: self.surface.input_normals.unwrap_or(usual.input_normals),

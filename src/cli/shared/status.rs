@@ -15,7 +15,7 @@ const EARLY: f64 = 5.0;
 
 /// Shows the state of a run.
 pub fn status(args: &Status) -> Result<bool> {
-    let status = pipeline::status(&args.folder)?;
+    let status = pipeline::status(&pipeline::shared_folder(&args.folder)?)?;
     if args.missing {
         // While damaged work is not open again, tasks cannot finish.
         let missing = match status.damaged {

@@ -21,6 +21,11 @@ const MORE: f64 = 0.25;
 
 /// Runs tasks.
 pub fn submit(args: &Submit) -> Result<bool> {
+    let args = &Submit {
+        folder: pipeline::shared_folder(&args.folder)?,
+        how: args.how.clone(),
+        ..*args
+    };
     match args.engine {
         Engine::Slurm if !args.how.within_allocation => slurm::Slurm::new(args)?.run(),
         Engine::Local | Engine::Slurm => local::Local::new(args)?.run(),

@@ -67,8 +67,7 @@ impl Stages<'_> {
         let place = self.report.origin.map(|origin| Place::new(origin, step));
         let mut comments = place.map_or_else(Vec::new, |place| place.comments());
         if let Some(crs) = &self.report.input.crs {
-            comments.extend(crs.horizontal.map(|code| format!("epsg {code}")));
-            comments.push(format!("crs {}", crs.label()));
+            comments.extend(crs.comments().comments());
         }
         comments
     }
@@ -112,7 +111,10 @@ impl Stages<'_> {
         };
         self.report.mesh = self.clock.stage("export", "blocks", items, write)?;
         columns.map_or(Ok(()), |columns| columns.release(workspace))?;
-        beside::write(&job.mesh, &job.inputs, &self.report, self.wkt.as_deref())
+        let wkt = self.wkt.as_deref();
+        let warnings = beside::write(&job.mesh, &job.inputs, &self.report, wkt)?;
+        warnings.into_iter().for_each(|warning| self.warn(warning));
+        Ok(())
     }
 
     /// Levels of detail of the mesh, if they are wanted.

@@ -16,6 +16,14 @@ pub struct Coordinates<'a> {
 }
 
 impl Coordinates<'_> {
+    /// The coordinates of a position, before they are rounded to the type in the file.
+    pub fn exact(&self, point: Point) -> [f64; 3] {
+        match &self.shift {
+            None => self.lattice.position(point),
+            Some(shift) => self.lattice.shifted(point, shift),
+        }
+    }
+
     /// The coordinates of a position.
     pub fn of(&self, point: Point) -> [f64; 3] {
         match (&self.shift, self.written) {

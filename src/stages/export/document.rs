@@ -15,7 +15,7 @@ pub const HEADS: u64 = 12 + 8;
 pub struct Document<'a> {
     /// The mesh.
     pub mesh: &'a Mesh,
-    /// The position from which steps are counted, in the coordinates of the cloud.
+    /// The position from which steps are counted, in the coordinates of the mesh.
     pub translation: [f64; 3],
     /// Length of a step.
     pub step: f64,

@@ -102,8 +102,6 @@ pub struct Mesh {
     pub columns: Vec<VertexColumn>,
     /// Comments for the header.
     pub comments: Vec<String>,
-    /// The position of the cloud that is the origin of the mesh, if it is not that of the cloud.
-    pub origin: Option<[f64; 3]>,
     /// Lowest and highest coordinates of the vertices, if the format wants them.
     pub bounds: Option<[[f64; 3]; 2]>,
     /// Decimals with which coordinates are written as text: exact for files with decimal coordinates, else to

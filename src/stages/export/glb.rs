@@ -1,7 +1,8 @@
 //! Binary glTF 2.0: a chunk of JSON and a chunk of vertices and indices.
 //!
 //! Positions are floats relative to a translation in the JSON, so that clouds far from their origin keep their
-//! precision. The axes in the buffer are those of the cloud, with z up; a node above turns them, since y is up
+//! precision. With an origin of the mesh's own, that is not added back: as in other formats, coordinates are those
+//! from it. The axes in the buffer are those of the cloud, with z up; a node above turns them, since y is up
 //! in glTF.
 
 use super::format::{
@@ -216,8 +217,6 @@ fn local(position: [f64; 3], shift: [f64; 3]) -> [f32; 3] {
 /// The content of the chunk of JSON.
 fn document(mesh: &Mesh, record: &Record) -> Value {
     let shift = shift(mesh);
-    let origin = mesh.origin.unwrap_or_default();
-    let translation = [0, 1, 2].map(|k| origin[k] + shift[k]);
     let vertices = mesh.vertices * record.bytes as u64;
     let indices = mesh.triangles * TRIANGLE;
     let bounds = mesh.bounds.unwrap_or_default();
@@ -257,7 +256,7 @@ fn document(mesh: &Mesh, record: &Record) -> Value {
         "scenes": [{ "nodes": [0] }],
         "nodes": [
             { "name": "y up", "matrix": Y_UP, "children": [1] },
-            { "name": "mesh", "mesh": 0, "translation": translation },
+            { "name": "mesh", "mesh": 0, "translation": shift },
         ],
         "meshes": [{
             "primitives": [{ "attributes": attributes, "indices": 1, "material": 0, "mode": 4 }],
@@ -292,7 +291,6 @@ mod tests {
             comments: vec!["EPSG:25832 \"x\"\n".into()],
             coordinates: CoordinateType::Double,
             bounds: Some([[500_000.25, 0.0, -3.0], [500_100.25, 40.0, 3.0]]),
-            origin: Some([1e6, 0.0, 0.0]),
             ..Mesh::default()
         }
     }
@@ -323,7 +321,7 @@ mod tests {
             assert_eq!(accessor("COLOR_0")["componentType"], SHORT);
             // Rounded to four units: a sixteenth of the size is 6.25.
             let translation = &document["nodes"][1]["translation"];
-            assert_eq!(*translation, json!([1_500_052.0, 20.0, 0.0]));
+            assert_eq!(*translation, json!([500_052.0, 20.0, 0.0]));
 
             let mut values = [red, vec![0; 2 * scalar.bytes()]].concat();
             values.extend([0f32, 0.0, 1.0].iter().flat_map(|x| x.to_le_bytes()));

@@ -195,7 +195,6 @@ impl ExportOptions<'_> {
                 .chain(of_points(self.columns).map(VertexColumn::from))
                 .collect(),
             comments: self.comments.clone(),
-            origin: self.origin.map(|shift| shift.origin),
             bounds: None,
             decimals: self.decimals,
             compress: self.compress,

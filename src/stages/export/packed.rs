@@ -45,7 +45,7 @@ pub(super) fn write_all<P: Parts>(writer: &Writer<'_, P>, workspace: &Workspace)
     }
     let document = Document {
         mesh: writer.file.mesh(),
-        translation: writer.coordinates.lattice.position(origin),
+        translation: writer.coordinates.exact(origin),
         step: writer.coordinates.lattice.step,
     };
     let room = document.most(count);

@@ -2,6 +2,8 @@
 
 use super::crs::Crs;
 use super::stats::FileStats;
+use super::systems::Mixed;
+
 /// A warning is given if one file's point spacing and box are both this many times those of another: it may
 /// be in another unit. A small piece of a survey has a small box but no smaller spacing.
 const LARGER: f64 = 100.0;
@@ -30,6 +32,35 @@ pub(super) fn without(files: &[FileStats], crs: &Crs) -> Option<String> {
          all",
         first.path.display()
     ))
+}
+
+/// A warning if files give another system than that which is given for them, or if nothing is known of that.
+pub(super) fn replaced(
+    files: &[FileStats],
+    common: &Result<Option<Crs>, Mixed>,
+    given: &Crs,
+) -> Option<String> {
+    let said = match common {
+        Err(mixed) => {
+            let [(first, system), (other, another)] = mixed.both();
+            format!(
+                "--crs: {given} is taken for all files, though {} gives {system} and {} gives {another}",
+                first.display(),
+                other.display()
+            )
+        }
+        Ok(Some(found)) if found.differs(given) || found.horizontal != given.horizontal => {
+            let gives = |file: &&FileStats| file.crs.is_some();
+            let first = files.iter().find(gives)?.path.display();
+            format!("--crs: {given} is taken instead of {found}, which {first} gives")
+        }
+        _ if given.kind.is_none() => format!(
+            "--crs: {given} is none of the systems that are known here, so its units are not, and tiles in it \
+             cannot be placed on the globe"
+        ),
+        _ => return None,
+    };
+    Some(said)
 }
 
 /// The box of a file.

@@ -1,11 +1,7 @@
 //! Reference systems: what files say of them, as far as needed to name and to compare them.
 
-use super::input::Input;
-use crate::workspace::compressed::plain_name;
+use super::kind::CrsKind;
 use serde::{Deserialize, Serialize};
-use std::fs::File;
-use std::io::Read;
-use std::path::{Path, PathBuf};
 
 /// Most bytes of a well-known text.
 pub(super) const LONGEST: usize = 1 << 20;
@@ -25,6 +21,8 @@ pub enum CrsSource {
     GeotiffKeys,
     /// Comments in the header of a PLY file.
     Comments,
+    /// The option `--crs`.
+    Given,
 }
 
 impl std::fmt::Display for CrsSource {
@@ -33,7 +31,8 @@ impl std::fmt::Display for CrsSource {
             Self::WellKnownText => "well-known text",
             Self::Prj => ".prj file",
             Self::GeotiffKeys => "GeoTIFF keys",
-            Self::Comments => "comments",
+            Self::Comments => "comments of the header",
+            Self::Given => "--crs",
         })
     }
 }
@@ -49,6 +48,12 @@ pub struct Crs {
     pub vertical: Option<u32>,
     /// Where it was found.
     pub source: CrsSource,
+    /// Its kind, if it is known.
+    pub kind: Option<CrsKind>,
+    /// Metres in a unit of the plane, if it is known and no angle.
+    pub unit: Option<f64>,
+    /// Metres in a unit of heights, if that is known.
+    pub height_unit: Option<f64>,
     /// The well-known text, if it was given by one; at most 1 MiB.
     #[serde(skip)]
     pub(super) wkt: Option<String>,
@@ -58,6 +63,26 @@ pub struct Crs {
 }
 
 impl Crs {
+    /// A system of which no more is known than this.
+    pub(super) fn named(
+        name: String,
+        horizontal: Option<u32>,
+        vertical: Option<u32>,
+        source: CrsSource,
+    ) -> Self {
+        Self {
+            name,
+            horizontal,
+            vertical,
+            source,
+            kind: None,
+            unit: None,
+            height_unit: None,
+            wkt: None,
+            normal: String::new(),
+        }
+    }
+
     /// True if the two systems are certainly different.
     pub(super) fn differs(&self, other: &Self) -> bool {
         match (self.horizontal, other.horizontal) {
@@ -74,9 +99,10 @@ impl Crs {
     /// The kind of the record: GeoTIFF keys, comments, or the first word of a well-known text.
     fn kind(&self) -> Option<&str> {
         match self.source {
-            CrsSource::GeotiffKeys => None,
-            CrsSource::Comments => Some("comments"),
-            CrsSource::WellKnownText | CrsSource::Prj => self.normal.split(['[', '(']).next(),
+            CrsSource::GeotiffKeys | CrsSource::Comments => None,
+            CrsSource::WellKnownText | CrsSource::Prj | CrsSource::Given => {
+                self.normal.split(['[', '(']).next()
+            }
         }
     }
 
@@ -88,7 +114,8 @@ impl Crs {
     }
 
     /// The same without the texts, and with a name of bounded length.
-    pub(super) fn without_texts(&self) -> Self {
+    #[must_use]
+    pub fn without_texts(&self) -> Self {
         Self {
             name: self.name.chars().take(LONGEST_NAME).collect(),
             wkt: None,
@@ -121,6 +148,15 @@ impl Crs {
         self.codes().unwrap_or_else(|| self.line())
     }
 
+    /// The same, with the units and where it was found.
+    #[must_use]
+    pub fn described(&self) -> String {
+        match self.units() {
+            units if units.is_empty() => format!("{} ({})", self.line(), self.source),
+            units => format!("{} ({}), {units}", self.line(), self.source),
+        }
+    }
+
     /// Codes and name on one line, at most 250 characters.
     #[must_use]
     pub fn line(&self) -> String {
@@ -144,69 +180,6 @@ impl Crs {
             (self.name.clone(), self.wkt.clone(), self.normal.clone()),
         )
     }
-}
-
-/// Path of the `.prj` file that belongs to an input.
-#[must_use]
-pub fn prj_of(input: &Path) -> PathBuf {
-    plain_name(input).with_extension("prj")
-}
-
-/// The reference system in the `.prj` file beside an input, if there is one; a warning if it cannot be used.
-pub(super) fn beside(input: &Input) -> (Option<Crs>, Option<String>) {
-    of_prj(&prj_of(&input.path))
-}
-
-/// The system of comments, or of the `.prj` file beside the input if that gives the same one as a text; a warning if
-/// it gives another one.
-pub(super) fn fuller(crs: Crs, input: &Input) -> (Option<Crs>, Option<String>) {
-    let (other, warning) = beside(input);
-    match other {
-        Some(other) if crs.horizontal.is_some() && other.horizontal == crs.horizontal => {
-            (Some(other), warning)
-        }
-        Some(other) if other.differs(&crs) => {
-            let prj = prj_of(&input.path);
-            let warning = format!(
-                "{}: its system is {other}, that in the header of {} is {crs}, which is taken",
-                prj.display(),
-                input.path.display()
-            );
-            (Some(crs), Some(warning))
-        }
-        _ => (Some(crs), warning),
-    }
-}
-
-/// The reference system in a `.prj` file, if there is one; a warning if it cannot be used.
-pub fn of_prj(path: &Path) -> (Option<Crs>, Option<String>) {
-    let Ok(file) = File::open(path) else {
-        return (None, None);
-    };
-    let not = |why: &str| {
-        let warning = format!(
-            "{}: {why}, no reference system is taken from it",
-            path.display()
-        );
-        (None, Some(warning))
-    };
-    let mut bytes = Vec::new();
-    if let Err(e) = file.take(LONGEST as u64 + 1).read_to_end(&mut bytes) {
-        return not(&e.to_string());
-    }
-    if bytes.len() > LONGEST {
-        return not("it is longer than 1 MiB");
-    }
-    let text = String::from_utf8_lossy(&bytes);
-    let text = text.trim_start_matches('\u{feff}').trim();
-    if !text.contains('[') {
-        return not("it is no well-known text");
-    }
-    let crs = Crs {
-        source: CrsSource::Prj,
-        ..super::las::well_known(text)
-    };
-    (Some(crs), None)
 }
 
 impl std::fmt::Display for Crs {

@@ -12,7 +12,7 @@ use super::ply::Ply;
 use super::point_format::{Head, PointFile, PointFormat, Refusal, has_extension};
 use super::ptx::Ptx;
 use super::text::Text;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer};
 use std::path::Path;
@@ -53,7 +53,7 @@ fn ask(head: &Head) -> Result<&'static dyn PointFormat, Refusal> {
 }
 
 /// The format of a file, and the bytes used for detection.
-fn find(
+pub(super) fn find(
     input: &Input,
     layout: &Layout,
 ) -> Result<(Head, Result<&'static dyn PointFormat, Refusal>)> {
@@ -107,28 +107,6 @@ pub(super) fn is_cloud(name: &Path, bytes: &[u8], whole: bool) -> bool {
         Err(Refusal::Columns(_)) => FORMATS.into_iter().any(named),
         Err(_) => false,
     }
-}
-
-/// True if a file in a folder is to be read as a point file.
-pub(super) fn is_points(path: &Path) -> Result<bool> {
-    let named = |format: &dyn PointFormat| has_extension(path, format.extensions());
-    // A file named like a point cloud but with other content is an error; it is not skipped.
-    if FORMATS.into_iter().any(|f| f.has_signature() && named(f)) {
-        return Ok(true);
-    }
-    let input = match Input::open_head(path, &is_cloud, LONG_HEAD) {
-        // A damaged archive of something else is skipped.
-        Err(Error::Input { .. }) => return Ok(FORMATS.into_iter().any(named)),
-        opened => opened?,
-    };
-    let (_, found) = find(&input, &Layout::default())?;
-    Ok(match found {
-        Ok(format) => format.has_signature() || named(format),
-        // A point cloud of an unsupported format must not be skipped silently.
-        Err(Refusal::Foreign(_) | Refusal::Instead(..)) => true,
-        Err(Refusal::Columns(_)) => FORMATS.into_iter().any(named),
-        Err(Refusal::Unknown(_)) => false,
-    })
 }
 
 impl<'de> Deserialize<'de> for Format {

@@ -14,6 +14,7 @@ mod carry;
 mod classes;
 mod colors;
 mod columns;
+mod comments;
 mod contain;
 mod coordinate;
 mod crop;
@@ -22,11 +23,14 @@ mod directions;
 mod e57;
 mod expand;
 mod far;
+mod folder;
 mod foreign;
 mod format;
 mod formats;
 mod frames;
+mod given;
 mod input;
+mod kind;
 mod las;
 mod lattice;
 mod layout;
@@ -41,6 +45,7 @@ mod pcd;
 mod ply;
 mod point_format;
 mod precision;
+mod prj;
 mod probe;
 mod ptx;
 mod ranks;
@@ -53,6 +58,8 @@ mod stream;
 mod systems;
 mod taken;
 mod text;
+mod units;
+mod wkt;
 
 pub use carry::{Attribute, Carried};
 pub use classes::Classes;
@@ -60,15 +67,18 @@ pub use colors::Depth;
 pub(crate) use colors::depths_shown;
 pub use columns::{Attributes, Column};
 pub use crop::Crop;
-pub use crs::{Crs, CrsSource, of_prj, prj_of};
+pub use crs::{Crs, CrsSource};
 pub use directions::{NORMAL_BYTES, direction};
 pub use expand::expand;
 pub use format::Format;
+pub use given::GivenCrs;
+pub use kind::CrsKind;
 pub use layout::{Layout, TextColumns};
 pub use precision::CoordinateType;
 pub(crate) use precision::enough_for;
+pub use prj::{of_prj, prj_of};
 pub use probe::{Probe, probe, probe_as};
-pub use stats::{FileStats, IngestStats};
+pub use stats::{FileStats, IngestStats, LeftOut};
 pub use stream::{READ_BUFFERS, VALUE_BUFFERS};
 pub use systems::Mixed;
 
@@ -106,6 +116,8 @@ pub struct Selection {
     pub layout: Layout,
     /// True if the colours are read whose scale only their numbers tell, for [`FileStats::colors`].
     pub depths: bool,
+    /// The reference system, whatever files say; `None` for theirs.
+    pub crs: Option<GivenCrs>,
 }
 
 /// All points of the inputs in one scratch file.
@@ -159,11 +171,17 @@ pub fn ingest_selected(
     selection: &Selection,
     workspace: &Workspace,
 ) -> Result<Spool> {
-    let paths = expand(inputs)?;
-    check_columns(&paths, selection)?;
+    let expanded = expand::expanded(inputs)?;
+    let paths = &expanded.files;
+    check_columns(paths, selection)?;
     let name = format!("ingest-{}.spool", workspace.number());
     let mut stats = IngestStats::default();
-    let spool = read_all(&paths, selection, &name, &mut stats, workspace);
+    let spool = read_all(paths, selection, &name, &mut stats, workspace).map(|mut spool| {
+        let said = expanded.warning();
+        spool.stats.warnings.splice(0..0, said);
+        spool.stats.left_out = expanded.left_out;
+        spool
+    });
     if let Err(Error::Input { .. } | Error::Parameter { .. }) = spool
         && !workspace.is_task()
     {
@@ -297,7 +315,7 @@ fn read_all(
     if let Some(crop) = crop.filter(|_| stats.kept == 0) {
         crop.check_met(&sources)?;
     }
-    let wkt = stats.compare(systems);
+    let wkt = stats.compare(systems, selection.crs.as_ref());
     Ok(Spool {
         name: name.to_owned(),
         frames,
@@ -335,11 +353,24 @@ impl Opened {
 
     /// The reference system that the file gives, or else a `.prj` file beside it; a warning about that.
     fn crs(&self) -> (Option<Crs>, Option<String>) {
-        match self.file.crs(&self.input) {
-            Some(crs) if crs.source == CrsSource::Comments => crs::fuller(crs, &self.input),
-            Some(crs) => (Some(crs), None),
-            None => crs::beside(&self.input),
+        let beside = prj::beside(&self.input);
+        let Some(own) = self.file.crs(&self.input) else {
+            return beside;
+        };
+        let same = |other: &Crs| own.horizontal.is_some() && other.horizontal == own.horizontal;
+        if own.source == CrsSource::Comments && beside.0.as_ref().is_some_and(same) {
+            // The same system, told as a text.
+            return beside;
         }
+        let other = beside.0.filter(|beside| beside.differs(&own));
+        let warning = other.map(|beside| {
+            format!(
+                "{}: it gives {beside}, but {} itself gives {own}, which is taken",
+                prj_of(&self.input.path).display(),
+                self.input.path.display()
+            )
+        });
+        (Some(own), warning)
     }
 }
 
@@ -364,21 +395,31 @@ pub fn check_systems(inputs: &[PathBuf]) -> Result<()> {
 }
 
 impl IngestStats {
-    /// Compares the files with each other; returns the well-known text of the system of all.
-    fn compare(&mut self, systems: Systems) -> Option<String> {
-        let (mut wkt, files) = (None, &self.files);
-        let warning = match systems.common() {
-            Ok(crs) => {
-                let crs = crs.as_ref();
-                wkt = crs.and_then(|crs| crs.wkt.clone());
-                self.crs = crs.map(Crs::without_texts);
-                crs.and_then(|crs| belong::without(files, crs))
+    /// Compares the files with each other; returns the well-known text of the system of all, which is `given` if
+    /// that is.
+    fn compare(&mut self, systems: Systems, given: Option<&GivenCrs>) -> Option<String> {
+        let (found, warning) = match (systems.common(), given) {
+            (common, Some(given)) => {
+                let given = given.crs();
+                let warning = belong::replaced(&self.files, &common, &given);
+                (Some(given), warning)
             }
-            Err(mixed) => Some(self.mixed.insert(mixed).warning()),
+            (Ok(crs), None) => {
+                let warning = crs
+                    .as_ref()
+                    .and_then(|crs| belong::without(&self.files, crs));
+                (crs, warning)
+            }
+            (Err(mixed), None) => (None, Some(self.mixed.insert(mixed).warning())),
         };
-        let places = belong::warnings(files);
-        self.warnings.extend(warning.into_iter().chain(places));
-        wkt
+        let units = found
+            .as_ref()
+            .and_then(|crs| units::warning(&self.files, crs));
+        let places = belong::warnings(&self.files);
+        let warnings = warning.into_iter().chain(units).chain(places);
+        self.warnings.extend(warnings);
+        self.crs = found.as_ref().map(Crs::without_texts);
+        found.and_then(|crs| crs.wkt)
     }
 
     fn add(&mut self, opened: &Opened, source: &Source, crs: Option<Crs>) {

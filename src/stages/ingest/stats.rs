@@ -39,6 +39,8 @@ pub struct IngestStats {
     pub mixed: Option<Mixed>,
     /// The counts of each file, in the order given.
     pub files: Vec<FileStats>,
+    /// Files in folders that were left out, since they are no scans.
+    pub left_out: Vec<LeftOut>,
     /// Warnings for the user, one line each.
     pub warnings: Vec<String>,
 }
@@ -46,6 +48,16 @@ pub struct IngestStats {
 /// Writes a path as text; bytes that are not UTF-8 are replaced.
 fn as_text<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.serialize_str(&path.to_string_lossy())
+}
+
+/// A file in a folder that is not read.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct LeftOut {
+    /// The file, or a folder with all in it.
+    #[serde(serialize_with = "as_text")]
+    pub path: PathBuf,
+    /// Why.
+    pub why: String,
 }
 
 /// Counts and extents of one input file.

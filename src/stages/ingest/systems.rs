@@ -25,6 +25,11 @@ impl Mixed {
         Error::input(other, "reference system", another, expected)
     }
 
+    /// The two files, and their systems.
+    pub(super) fn both(&self) -> [(&Path, &str); 2] {
+        [&self.first, &self.other].map(|(path, system)| (&**path, &**system))
+    }
+
     /// The warning for a cloud that may have several.
     pub(super) fn warning(&self) -> String {
         let ((first, system), (other, another)) = (&self.first, &self.other);

@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::place::Place;
+use crate::system::System;
 use crate::types::{Encoding, Property, Scalar};
 
 /// The header of a PLY file.
@@ -15,8 +16,8 @@ pub struct Header {
     pub bytes: u64,
     /// The place of the coordinates, if comments give one.
     pub place: Place,
-    /// The text of all comments.
-    pub comments: Vec<String>,
+    /// The reference system, as far as comments tell it.
+    pub system: System,
 }
 
 /// A property of one number: its index among the element's properties, and its type.

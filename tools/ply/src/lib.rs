@@ -13,6 +13,7 @@ mod numbers;
 mod parse;
 mod place;
 mod stream;
+mod system;
 mod types;
 
 pub use error::{Error, FileError, Result};
@@ -22,4 +23,5 @@ pub use mesh::Mesh;
 pub use numbers::{Numbers, real};
 pub use place::Place;
 pub use stream::{FixedMesh, MeshStream, NO_VERTEX, Part, SLICE};
+pub use system::System;
 pub use types::{Encoding, Property, Scalar};

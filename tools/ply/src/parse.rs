@@ -3,6 +3,7 @@
 use crate::error::{Error, Result};
 use crate::header::{Element, Header};
 use crate::place::Place;
+use crate::system::System;
 use crate::types::{Encoding, Property, Scalar};
 use std::io::BufRead;
 
@@ -31,7 +32,7 @@ impl Header {
             elements: Vec::new(),
             bytes: 0,
             place: Place::default(),
-            comments: Vec::new(),
+            system: System::default(),
         };
         let mut encoding = None;
         loop {
@@ -58,7 +59,7 @@ impl Header {
         match words[..] {
             ["comment", ref words @ ..] => {
                 self.place.take(words);
-                self.comments.push(words.join(" "));
+                self.system.take(words);
                 Ok(())
             }
             [] | ["ply" | "obj_info", ..] => Ok(()),

@@ -2,8 +2,10 @@
 //!
 //! Coordinates are read unchanged, so errors in the records are ignored.
 
-use super::super::crs::{Crs, CrsSource, LONGEST};
+use super::super::crs::{Crs, CrsSource};
 use super::super::input::Input;
+use super::super::kind::{CrsKind, length_of_code};
+use super::super::wkt::well_known;
 use super::Header;
 use super::vlr::Records;
 use las::Vlr;
@@ -22,8 +24,20 @@ const TEXTS: u16 = 34737;
 /// GeoTIFF keys that only describe a system.
 const CITATIONS: [u16; 4] = [1026, 2049, 3073, 4097];
 
-/// Deepest nesting accepted in well-known text.
-const DEEPEST: usize = 32;
+/// GeoTIFF keys of the kind of a system, and of the units of its plane (a code, or a length) and of its heights.
+const MODEL: u16 = 1024;
+const PLANE_UNIT: u16 = 3076;
+const PLANE_LENGTH: u16 = 3077;
+const HEIGHT_UNIT: u16 = 4099;
+
+/// The record with well-known text, and the names under which it stands: that of the standard, and that of the
+/// library libLAS.
+const TEXT: u16 = 2112;
+const STANDARD: &str = "LASF_Projection";
+const LIBLAS: &str = "liblas";
+
+/// What stands before a well-known text in a citation of the makers of ArcGIS.
+const IN_CITATION: &str = "ESRI PE String =";
 
 /// The reference system of a file, if it gives one.
 pub(super) fn read(input: &Input, header: &Header) -> Option<Crs> {
@@ -33,31 +47,74 @@ pub(super) fn read(input: &Input, header: &Header) -> Option<Crs> {
         Records::extended(input, evlr.start_of_first_evlr).take(most)
     });
     let records = std::iter::once(plain).chain(extended);
-    // The last record of a kind counts.
-    let records: BTreeMap<u16, Vlr> = records
+    let records = records
         .flat_map(|records| records.map_while(Result::ok))
-        .filter(|(_, r)| r.is_wkt_crs() || r.is_geotiff_crs() && r.data.len() <= LARGEST_KEYS)
-        .map(|(_, record)| (record.record_id, record))
-        .collect();
-    crs(records)
+        .map(|(_, record)| record);
+    from_records(records)
+}
+
+/// The system that records give. The last record of a kind counts, and that of the standard before others.
+fn from_records(records: impl Iterator<Item = Vlr>) -> Option<Crs> {
+    let (mut standard, mut liblas) = (BTreeMap::new(), None);
+    for record in records {
+        if named(&record, LIBLAS) && record.record_id == TEXT {
+            liblas = Some(record);
+        } else if named(&record, STANDARD) {
+            let keys = record.is_geotiff_crs() && record.data.len() <= LARGEST_KEYS;
+            let text = record.record_id == TEXT && !text_of(&record.data).is_empty();
+            if keys || text {
+                standard.insert(record.record_id, record);
+            }
+        }
+    }
+    if let (false, Some(record)) = (standard.contains_key(&TEXT), liblas) {
+        let text = text_of(&record.data);
+        if !text.is_empty() {
+            return Some(well_known(&text));
+        }
+    }
+    crs(standard)
+}
+
+/// True if a record has this user; writers differ in case and in what follows the name.
+fn named(record: &Vlr, user: &str) -> bool {
+    let name = record
+        .user_id
+        .trim_matches(|c: char| c == '\0' || c.is_whitespace());
+    name.eq_ignore_ascii_case(user)
+}
+
+/// The text of a record.
+fn text_of(data: &[u8]) -> String {
+    let text = String::from_utf8_lossy(data);
+    let text = text.trim_start_matches('\u{feff}');
+    // What follows a zero is no part of it.
+    let text = text
+        .trim_start_matches('\0')
+        .split('\0')
+        .next()
+        .unwrap_or_default();
+    text.trim().to_owned()
 }
 
 /// From well-known text if present: files of newer point formats may have outdated keys beside it.
 fn crs(mut records: BTreeMap<u16, Vlr>) -> Option<Crs> {
+    if let Some(record) = records.remove(&TEXT) {
+        return Some(well_known(&text_of(&record.data)));
+    }
     // Numbers and texts that are missing are no reason to refuse the codes.
     for record_id in [NUMBERS, TEXTS] {
         let record = records.entry(record_id).or_default();
-        (record.user_id, record.record_id) = ("LASF_Projection".into(), record_id);
+        record.record_id = record_id;
         record.data.resize(LARGEST_KEYS, 0);
+    }
+    for record in records.values_mut() {
+        record.user_id = STANDARD.into();
     }
     let mut builder = las::Builder::from((1, 4));
     builder.vlrs = records.into_values().collect();
     let header = builder.into_header().ok()?;
-    let text = String::from_utf8_lossy(header.get_wkt_crs_bytes().unwrap_or_default());
-    match text.trim_matches(|c: char| c == '\0' || c.is_whitespace()) {
-        "" => geotiff(header.get_geotiff_crs().ok()??),
-        text => Some(well_known(text)),
-    }
+    geotiff(header.get_geotiff_crs().ok()??)
 }
 
 fn geotiff(mut keys: GeoTiffCrs) -> Option<Crs> {
@@ -66,96 +123,52 @@ fn geotiff(mut keys: GeoTiffCrs) -> Option<Crs> {
     let projected = keys.get_projected_crs_geo_key_value();
     let horizontal = code(projected.or(keys.get_geodetic_crs_geo_key_value()));
     let vertical = code(keys.get_vertical_crs_geo_key_value());
-    let mut name = String::new();
+    let [model, plane, height] = [MODEL, PLANE_UNIT, HEIGHT_UNIT].map(|id| number(&keys, id));
+    let plane = match plane {
+        Some(code) => length_of_code(code as u32),
+        None => None,
+    };
+    let plane = plane.or(number(&keys, PLANE_LENGTH).filter(|x| *x > 0.0 && x.is_finite()));
+    let mut texts = Vec::new();
     keys.entries.retain(|entry| {
         let citation = CITATIONS.contains(&entry.id);
-        if let (true, true, GeoTiffData::String(text)) = (citation, name.is_empty(), &entry.data) {
-            name = text.trim_end_matches(['|', '\0', ' ']).to_owned();
+        if let (true, GeoTiffData::String(text)) = (citation, &entry.data) {
+            texts.push(text.trim_end_matches(['|', '\0', ' ']).to_owned());
         }
         !citation
     });
     keys.entries.sort_by_key(|entry| entry.id);
-    if name.is_empty() {
-        name = format!("{} keys without a name", keys.entries.len());
-    }
-    (!keys.entries.is_empty()).then(|| Crs {
-        horizontal,
-        vertical,
-        source: CrsSource::GeotiffKeys,
-        wkt: None,
-        normal: format!("{:?}", keys.entries),
-        name,
-    })
-}
-
-/// The system described by a well-known text, version 1 or 2.
-pub(in crate::stages::ingest) fn well_known(text: &str) -> Crs {
-    let mut crs = Crs {
-        horizontal: None,
-        vertical: None,
-        source: CrsSource::WellKnownText,
-        wkt: (text.len() <= LONGEST).then(|| text.to_owned()),
-        normal: String::with_capacity(text.len()),
-        name: String::new(),
+    let described = || {
+        let mut parts = texts.iter().filter_map(|text| text.split_once(IN_CITATION));
+        parts.find_map(|(_, text)| text.contains('[').then(|| well_known(text.trim())))
     };
-    let mut path: Vec<String> = Vec::new();
-    let mut word = String::new();
-    let mut arguments: Vec<String> = Vec::new();
-    let mut quoted = false;
-    for c in text.chars() {
-        if c == '"' {
-            quoted = !quoted;
-        }
-        if quoted || !c.is_whitespace() {
-            crs.normal.push(c);
-        }
-        match c {
-            _ if quoted || c == '"' => word.extend((c != '"').then_some(c)),
-            '[' | '(' => {
-                path.push(std::mem::take(&mut word).trim().to_ascii_uppercase());
-                arguments.clear();
-                if path.len() > DEEPEST {
-                    break;
-                }
-            }
-            ',' => arguments.push(std::mem::take(&mut word)),
-            ']' | ')' => {
-                arguments.push(std::mem::take(&mut word));
-                crs.close(&path, &arguments);
-                path.pop();
-                arguments.clear();
-            }
-            _ => word.push(c),
-        }
-        if crs.name.is_empty() && path.len() == 1 && c == ',' {
-            crs.name = arguments.first().cloned().unwrap_or_default();
-        }
+    if let (None, Some(crs)) = (horizontal, described()) {
+        return Some(crs);
     }
-    crs
+    let name = texts.into_iter().find(|text| !text.is_empty());
+    let name = name.unwrap_or_else(|| format!("{} keys without a name", keys.entries.len()));
+    let known = Crs {
+        kind: match model.map(|model| model as u32) {
+            Some(1) => Some(CrsKind::Projected),
+            Some(2) => Some(CrsKind::Geographic),
+            Some(3) => Some(CrsKind::Geocentric),
+            _ => None,
+        },
+        unit: plane,
+        height_unit: height.and_then(|code| length_of_code(code as u32)),
+        normal: format!("{:?}", keys.entries),
+        ..Crs::named(name, horizontal, vertical, CrsSource::GeotiffKeys)
+    };
+    (!keys.entries.is_empty()).then(|| known.completed())
 }
 
-impl Crs {
-    /// Takes the code of a system from a completed node of well-known text.
-    fn close(&mut self, path: &[String], arguments: &[String]) {
-        let path: Vec<&str> = path.iter().map(String::as_str).collect();
-        let of = match path[..] {
-            [of, "AUTHORITY" | "ID"] => of,
-            ["COMPD_CS" | "COMPOUNDCRS", of, "AUTHORITY" | "ID"] => of,
-            _ => return,
-        };
-        let [authority, code, ..] = arguments else {
-            return;
-        };
-        let code = code.trim().parse().ok();
-        if !authority.trim().eq_ignore_ascii_case("EPSG") || code.is_none() {
-            return;
-        }
-        match of {
-            "PROJCS" | "PROJCRS" | "PROJECTEDCRS" | "GEOGCS" | "GEOGCRS" | "GEOGRAPHICCRS"
-            | "GEOCCS" | "GEODCRS" => self.horizontal = code,
-            "VERT_CS" | "VERTCRS" | "VERTICALCRS" => self.vertical = code,
-            _ => {}
-        }
+/// The number that a key has.
+fn number(keys: &GeoTiffCrs, id: u16) -> Option<f64> {
+    let entry = keys.entries.iter().find(|entry| entry.id == id)?;
+    match &entry.data {
+        GeoTiffData::U16(number) => Some(f64::from(*number)),
+        GeoTiffData::Doubles(numbers) => numbers.first().copied(),
+        GeoTiffData::String(_) => None,
     }
 }
 
@@ -170,7 +183,7 @@ mod tests {
             data: data.to_vec(),
             ..Vlr::default()
         };
-        crs(records.iter().map(|r| (r.0, record(r))).collect())
+        from_records(records.iter().map(record))
     }
 
     fn keys(entries: &[[u16; 4]], texts: &str) -> Crs {

@@ -15,8 +15,6 @@ mod vlr;
 
 use header::Header;
 
-pub(super) use crs::well_known;
-
 /// Byte of a record with the withheld flag, in all point formats.
 const FLAGS: usize = 15;
 

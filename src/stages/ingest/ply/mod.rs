@@ -2,7 +2,6 @@
 
 mod ascii;
 mod binary;
-mod crs;
 mod splat;
 
 use super::colors::Depth;
@@ -130,7 +129,7 @@ impl Cloud {
             None => None,
         };
         let place = header.place.origin().map(|_| header.place);
-        let crs = crs::of_comments(&header.comments);
+        let crs = Crs::of_comments(&header.system);
         let mut before = header.elements;
         let vertex = vertex.map(|(at, coordinates)| {
             before.truncate(at + 1);

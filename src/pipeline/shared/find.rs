@@ -1,0 +1,96 @@
+//! The folder of a run that tasks share, by any name that a user has for it: its own, that of the mesh, or that of
+//! the folder for scratch files.
+
+use super::super::start::scratch_folder;
+use crate::error::{Error, Result};
+use crate::stages::export::folder_of;
+use crate::workspace::generations::SharedFolder;
+use std::ffi::{OsStr, OsString};
+use std::io::Read;
+use std::os::unix::ffi::{OsStrExt, OsStringExt};
+use std::path::{Path, PathBuf};
+
+/// What the names of scratch folders end with.
+const ENDING: &str = ".outcrop-scratch";
+
+/// Most bytes of a path in a file.
+const LONGEST: u64 = 16 << 10;
+
+/// The file beside a mesh with the path of the folder of its run, if that lies elsewhere.
+fn note_of(mesh: &Path) -> PathBuf {
+    let mut name = OsString::from(".");
+    name.push(mesh.file_name().unwrap_or_default());
+    name.push(".outcrop-run");
+    folder_of(mesh).join(name)
+}
+
+/// Notes beside the mesh where the folder of its run is, unless it is beside it too.
+pub(super) fn note(mesh: &Path, folder: &Path) -> Result<()> {
+    if folder == scratch_folder(mesh, None) {
+        forget(mesh);
+        return Ok(());
+    }
+    let path = note_of(mesh);
+    let whole = std::path::absolute(folder).map_err(|e| Error::io(folder, "find", e))?;
+    let bytes = [whole.as_os_str().as_bytes(), b"\n"].concat();
+    std::fs::write(&path, bytes).map_err(|e| Error::io(&path, "write", e))
+}
+
+/// Deletes the note; it does no harm if it cannot be deleted.
+pub(super) fn forget(mesh: &Path) {
+    let _ = std::fs::remove_file(note_of(mesh));
+}
+
+/// The folder that is noted beside a mesh.
+fn noted(mesh: &Path) -> Option<PathBuf> {
+    let file = std::fs::File::open(note_of(mesh)).ok()?;
+    let mut bytes = Vec::new();
+    file.take(LONGEST).read_to_end(&mut bytes).ok()?;
+    let path = bytes.strip_suffix(b"\n")?.to_vec();
+    Some(OsString::from_vec(path).into())
+}
+
+/// The folder of the run that `given` names: the folder itself, the mesh, or the folder that was given as
+/// `--scratch`, if there is one run in it.
+///
+/// # Errors
+/// [`Error::NotResumable`] if no run or several are there; [`Error::Io`].
+pub fn shared_folder(given: &Path) -> Result<PathBuf> {
+    let mut named = vec![given.to_path_buf()];
+    if given.file_name().is_some() {
+        named.push(scratch_folder(given, None));
+        named.extend(noted(given));
+    }
+    if let Some(found) = named.into_iter().find(|path| SharedFolder::is_at(path)) {
+        return Ok(found);
+    }
+    let not = |why: String| Error::NotResumable {
+        path: given.to_path_buf(),
+        why,
+    };
+    let none = || not("no run that tasks share is here; begin one with `outcrop plan`".into());
+    if given.is_file() {
+        return Err(none());
+    }
+    let name = given.file_name().map(OsStr::to_string_lossy);
+    if !given.is_dir() || name.is_some_and(|name| name.ends_with(ENDING)) {
+        // What opens it tells what it is.
+        return Ok(given.to_path_buf());
+    }
+    let entries = std::fs::read_dir(given).map_err(|e| Error::io(given, "list", e))?;
+    let folders = entries.flatten().map(|entry| entry.path());
+    let mut runs: Vec<PathBuf> = folders.filter(|path| SharedFolder::is_at(path)).collect();
+    runs.sort();
+    match &runs[..] {
+        [one] => Ok(one.clone()),
+        [] => Err(none()),
+        several => {
+            let names = several.iter().filter_map(|path| path.file_name());
+            let names: Vec<_> = names.map(OsStr::to_string_lossy).collect();
+            Err(not(format!(
+                "several runs are here: {}; name one of them, or its mesh",
+                names.join(", ")
+            )))
+        }
+    }
+}
