@@ -9,6 +9,7 @@
 //! the only cloud of a ZIP archive. Each format is a module that implements `PointFormat`, and an entry of the list in
 //! `formats.rs`.
 
+mod agree;
 mod belong;
 mod carry;
 mod classes;
@@ -395,33 +396,6 @@ pub fn check_systems(inputs: &[PathBuf]) -> Result<()> {
 }
 
 impl IngestStats {
-    /// Compares the files with each other; returns the well-known text of the system of all, which is `given` if
-    /// that is.
-    fn compare(&mut self, systems: Systems, given: Option<&GivenCrs>) -> Option<String> {
-        let (found, warning) = match (systems.common(), given) {
-            (common, Some(given)) => {
-                let given = given.crs();
-                let warning = belong::replaced(&self.files, &common, &given);
-                (Some(given), warning)
-            }
-            (Ok(crs), None) => {
-                let warning = crs
-                    .as_ref()
-                    .and_then(|crs| belong::without(&self.files, crs));
-                (crs, warning)
-            }
-            (Err(mixed), None) => (None, Some(self.mixed.insert(mixed).warning())),
-        };
-        let units = found
-            .as_ref()
-            .and_then(|crs| units::warning(&self.files, crs));
-        let places = belong::warnings(&self.files);
-        let warnings = warning.into_iter().chain(units).chain(places);
-        self.warnings.extend(warnings);
-        self.crs = found.as_ref().map(Crs::without_texts);
-        found.and_then(|crs| crs.wkt)
-    }
-
     fn add(&mut self, opened: &Opened, source: &Source, crs: Option<Crs>) {
         let stats = &source.stats;
         self.read += stats.read;
