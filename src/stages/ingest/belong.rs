@@ -128,6 +128,8 @@ mod tests {
             format: Format::LAS,
             bytes: 0,
             columns: Vec::new(),
+            taken: None,
+            guessed: false,
             claimed: None,
             points: kept,
             kept,
