@@ -229,7 +229,8 @@ impl Recipe {
         };
         match shift {
             Some(shift) => Some(named.map(|at| at + shift)),
-            None if self.header == Some("") || self.missing == 3 => None,
+            None if self.header == Some("") => None,
+            None if self.missing == 3 => self.without_names(false),
             // A comment may be prose, unless x, y and z stand side by side in it.
             None if [y, z] == [x + 1, x + 2] && names.len() >= 3 && self.is_plain() => None,
             None => self.without_names(false),

@@ -218,6 +218,11 @@ fn names_that_are_plain_are_no_guess() {
         ("c.asc", "//X Y Z Intensity\n1.5 10.25 100.5 7\n"),
         ("d.csv", "X[m];Y[m];Z[m];odd name\n1,5;10,25;100,5;7\n"),
         ("e.pts", "1\n1.5 10.25 100.5 -7 1 2 3\n"),
+        ("f.txt", "# X Y Z coordinates\n1.5 10.25 100.5\n"),
+        (
+            "g.txt",
+            "# the x y z of all points are in metres\n1.5 10.25 100.5\n",
+        ),
     ] {
         let (found, stats) = points(&bench, name, text, "none");
         assert_eq!(found, [[1.5, 10.25, 100.5]], "{name}");

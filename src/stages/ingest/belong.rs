@@ -162,6 +162,8 @@ mod tests {
             guessed: false,
             colors: None,
             columns: Vec::new(),
+            taken: None,
+            guessed: false,
             claimed: None,
             points: kept,
             kept,

@@ -173,7 +173,7 @@ mod tests {
             (
                 "# a\n\nCOFF # b\n# c\n1 0 0 # d\n1 2 3 255 0 7 9\n",
                 1,
-                31,
+                28,
                 "red green blue",
             ),
             (

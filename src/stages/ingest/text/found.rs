@@ -19,6 +19,13 @@ pub(super) struct Found {
     pub(super) guessed: bool,
 }
 
+/// Names that do not suit the columns.
+pub(super) struct Mismatch {
+    pub(super) why: String,
+    /// True if a comment may say something else.
+    pub(super) is_prose: bool,
+}
+
 /// What is known of a file without names.
 pub(super) struct Hint {
     /// Lines count the points.
@@ -61,12 +68,12 @@ impl Found {
         Self::of(axes, others, &shown, doubt.is_some(), doubt, table)
     }
 
-    /// The columns by their names. The error is none if the names may be prose.
+    /// The columns by their names.
     pub(super) fn named(
         names: &[String],
         axes: &Axes,
         table: &Table<'_>,
-    ) -> Result<Self, Option<String>> {
+    ) -> Result<Self, Mismatch> {
         let width = table.width;
         let first = axes.places.iter().all(|at| *at < 3);
         let numeric = |shift: usize| axes.places.iter().all(|at| table.is_numeric(at + shift));
@@ -88,12 +95,11 @@ impl Found {
                 format!("{} columns have names, lines have {width}", names.len())
             } else {
                 let together = axes.places.windows(2).all(|pair| pair[0] + 1 == pair[1]);
-                let near = (3..=width + 1).contains(&names.len());
-                let why = || {
-                    let (count, list) = (names.len(), listed(names));
-                    format!("{count} names for lines of {width} columns, {list}")
-                };
-                return Err((axes.plain && together && near || names.len() > width).then(why));
+                let (count, list) = (names.len(), listed(names));
+                return Err(Mismatch {
+                    why: format!("{count} names for lines of {width} columns, {list}"),
+                    is_prose: !axes.plain || !together || count > width,
+                });
             });
         }
         let place = axes.places.map(|at| at + shift);
@@ -128,7 +134,7 @@ impl Found {
         let color_at = match width {
             0..6 => None,
             6 if hint.counted => Some(3),
-            7 if hint.counted && !(colors(3) && !colors(4)) => Some(4),
+            7 if hint.counted && (colors(4) || !colors(3)) => Some(4),
             7 if hint.pts && colors(4) => Some(4),
             6 if hint.floats && table.in_unit(3..6) => Some(3),
             7.. if colors(3) && colors(4) => opaque().then_some(3),
@@ -144,10 +150,10 @@ impl Found {
             others.extend((at..).zip(COLORS.map(|name| Column::new(name, scalar))));
         }
         let taken = 3 + others.len();
-        let standard = taken == width
-            && (width == 3 || hint.counted && width != 6 || hint.counted && colors(3));
+        let plain = width == 3 || hint.counted && (width != 6 || colors(3));
+        let guessed = taken != width || !plain;
         let names = [String::new(), String::new(), String::new()];
-        Ok(Self::of([0, 1, 2], others, &names, !standard, None, table))
+        Ok(Self::of([0, 1, 2], others, &names, guessed, None, table))
     }
 
     fn of(

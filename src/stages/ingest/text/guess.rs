@@ -105,7 +105,9 @@ impl<'a> Style<'a> {
         let points = data.iter().map(|(.., line)| *line);
         let points: Vec<&[u8]> = points.filter(|l| !counted || count(l).is_none()).collect();
         let table = Table::of(&points, self.separator, self.decimal_comma);
-        if !self.is_plausible(&table, &points) {
+        let other = Table::of(&points, self.separator, true);
+        if !self.is_plausible(&table, &points) || !self.decimal_comma && other.needs_commas(&table)
+        {
             return Ok(None);
         }
         let Found {
@@ -169,14 +171,14 @@ impl<'a> Style<'a> {
         let mut refused = None;
         let header = header.filter(|line| line.iter().any(|b| b.is_ascii_alphabetic() || *b > 127));
         if let Some(line) = header {
-            match self.named(line, table) {
+            match self.named(line, table, false) {
                 Named::Found(found) => return Ok(found),
                 Named::Mismatch(why) => return Err(why),
                 Named::Unknown => {}
             }
         }
         for comment in comments(&self.text[..self.first_point(counted)]).take(MOST_COMMENTS) {
-            match self.named(comment, table) {
+            match self.named(comment, table, true) {
                 Named::Found(found) => return Ok(found),
                 Named::Mismatch(why) => refused = refused.or(Some(why)),
                 Named::Unknown => {}
@@ -209,7 +211,7 @@ impl<'a> Style<'a> {
     }
 
     /// The columns by the names in a line, which may be separated in another way than the numbers.
-    fn named(&self, line: &[u8], table: &Table<'_>) -> Named {
+    fn named(&self, line: &[u8], table: &Table<'_>, comment: bool) -> Named {
         let ways = [
             self.separator,
             Separator::Tab,
@@ -231,7 +233,8 @@ impl<'a> Style<'a> {
             };
             match Found::named(&names, &axes, table) {
                 Ok(found) => return Named::Found(found),
-                Err(why) => refused = refused.or(why),
+                Err(wrong) if comment && wrong.is_prose => {}
+                Err(wrong) => refused = refused.or(Some(wrong.why)),
             }
         }
         refused.map_or(Named::Unknown, Named::Mismatch)
@@ -374,7 +377,7 @@ mod tests {
         }
         for text in [
             "//X Y Z\n1 2 3 0 0 1\n",
-            "# X Y Z are in metres\n1 2 3 0 0 1\n",
+            "# X Y Z are all in metres\n1 2 3 0 0 1\n",
             "1 2 3 0 0 1\n",
         ] {
             assert_eq!(names(text), [""; 0], "{text:?}");

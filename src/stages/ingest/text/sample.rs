@@ -115,6 +115,14 @@ impl<'a> Table<'a> {
         self.cells(column).next().is_some() && self.cells(column).all(number)
     }
 
+    /// True if a column is one of numbers with decimal commas only, which `points` does not take for such, and
+    /// no cell has a point.
+    pub(super) fn needs_commas(&self, points: &Self) -> bool {
+        let dot = |cell: &&[u8]| cell.contains(&b'.') && points.number(cell).is_some();
+        (0..self.width).any(|at| self.is_numeric(at) && !points.is_numeric(at))
+            && !points.rows.iter().flatten().any(dot)
+    }
+
     /// True if some line has a word in the column that is no number.
     pub(super) fn has_words(&self, column: usize) -> bool {
         let word = |cell: &[u8]| !cell.is_empty() && self.number(cell).is_none();
