@@ -81,8 +81,8 @@ impl Content {
     /// The content of the file `path`; none if it is not compressed. Of an archive it is the member that is wanted.
     ///
     /// # Errors
-    /// [`Error::Input`] if it is damaged, or an archive in which not exactly one member is wanted; [`Error::Memory`] if it needs a window larger than the free part of
-    /// the budget; [`Error::Io`], [`Error::Disk`], [`Error::Cancelled`].
+    /// [`Error::Input`] if it is damaged, or an archive in which not exactly one member is wanted;
+    /// [`Error::Memory`] if it needs a window larger than the free part of the budget; [`Error::Io`], [`Error::Disk`], [`Error::Cancelled`].
     pub fn of(path: &Path, wanted: Wanted<'_>, workspace: &Workspace) -> Result<Option<Self>> {
         let Some((file, compression)) = opened(path)? else {
             return Ok(None);

@@ -70,7 +70,7 @@ pub struct Column {
 impl Column {
     /// The column that a file calls `name`.
     pub(super) fn new(name: &str, scalar: Scalar) -> Self {
-        let name = usual_name(name);
+        let name = column_name(name);
         Self { name, scalar }
     }
 
@@ -82,18 +82,24 @@ impl Column {
 }
 
 /// The name by which a column is known in all formats: in lower case, with `_` for spaces, which PLY has between
-/// words, and without the prefix that CloudCompare writes. What has the name of a coordinate is `extra_x`.
+/// words, and without the prefix that CloudCompare writes.
 pub(super) fn usual_name(name: &str) -> String {
     let lower = name.to_ascii_lowercase();
     let words = lower.split(|c: char| c.is_whitespace() || c.is_control());
     let words: Vec<&str> = words.filter(|word| !word.is_empty()).collect();
     let name = words.join("_");
     let name = name.strip_prefix("scalar_").unwrap_or(&name);
-    if AXES.contains(&name) {
-        return extra(name);
-    }
     let alias = ALIASES.iter().find(|(alias, _)| *alias == name);
     alias.map_or(name, |(_, usual)| usual).to_owned()
+}
+
+/// The name of a column that is no coordinate: the usual one, and `extra_x` for what has the name of a coordinate.
+fn column_name(name: &str) -> String {
+    let usual = usual_name(name);
+    match AXES.contains(&&*usual) {
+        true => extra(&usual),
+        false => usual,
+    }
 }
 
 /// The name of a column whose own is taken.
@@ -196,7 +202,7 @@ impl std::str::FromStr for Attributes {
             let color = ["color", "colour", "colors", "colours", "rgb"];
             let more = match color.contains(&&*word.to_ascii_lowercase()) {
                 true => COLORS.map(str::to_owned).to_vec(),
-                false => vec![usual_name(word)],
+                false => vec![column_name(word)],
             };
             for name in more {
                 if !names.contains(&name) {

@@ -49,7 +49,7 @@ impl Spool {
     /// Counts all points at a sample of the positions.
     fn count(&self, lattice: &Lattice, workspace: &Workspace) -> Result<Counts> {
         let each = (self.points() / SAMPLE).max(1);
-        let is_sampled = |point: &Point| FxBuildHasher.hash_one(point) % each == 0;
+        let is_sampled = |point: &Point| FxBuildHasher.hash_one(point).is_multiple_of(each);
         let (mut positions, mut coordinates) = (FxHashSet::default(), FxHashSet::default());
         let mut points = 0;
         self.for_each_frame(workspace, lattice, |buffers: &Buffers, native| {

@@ -28,7 +28,7 @@ pub(super) fn is_splats(element: &Element) -> bool {
             .map(|s| Some(Property::One(s)))
             .contains(&kind)
     };
-    COEFFICIENTS.iter().chain(&OTHERS).all(|name| real(name))
+    COEFFICIENTS.iter().chain(&OTHERS).all(real)
         && COLORS.iter().all(|name| kind(name).is_none())
 }
 
