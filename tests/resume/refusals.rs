@@ -84,9 +84,22 @@ fn two_runs_do_not_share_a_folder() {
     let file = std::fs::File::options().write(true).open(&lock).unwrap();
     file.lock().unwrap();
     let output = command.stderr(Stdio::piped()).output().unwrap();
-    refused(&output.into(), &["another run is at work"]);
-    let said = util::run(["resume".as_ref(), case.scratch.as_os_str()]);
-    refused(&said, &["another run is at work"]);
+    // Both wait for some seconds, say so, and are refused then.
+    let resumed = util::run(["resume".as_ref(), case.scratch.as_os_str()]);
+    for said in [output.into(), resumed] {
+        let said: Said = said;
+        assert_eq!(said.code, Some(2), "{said:?}");
+        let lines: Vec<&str> = said.err.lines().collect();
+        assert_eq!(lines.len(), 2, "{said:?}");
+        assert!(
+            lines[0].contains("waiting up to 10 s for it to end"),
+            "{said:?}"
+        );
+        assert!(
+            lines[1].contains("another run is at work here; wait for it"),
+            "{said:?}"
+        );
+    }
     refused(&again(&case, &["--restart"]), &["another run is at work"]);
     drop(file);
     assert_eq!(case.go_on("unlocked"), "");
