@@ -87,7 +87,7 @@ fn rooms_in_national_coordinates_face_their_scanners() {
         e57(&binary, to, &points);
         for cloud in [text, binary] {
             let mesh = bench.path("mesh.ply");
-            let report = run(&[cloud.clone()], &mesh, &Params::default());
+            let report = run(std::slice::from_ref(&cloud), &mesh, &Params::default());
             let shown = cloud.display();
             assert_eq!(report.scanners, [to], "{shown}");
             assert_eq!(report.warnings, [""; 0], "{shown}");

@@ -116,7 +116,7 @@ fn only_scans_of_a_folder_are_read_and_the_rest_is_told() {
         "LOCAL_CS[\"site\",UNIT[\"metre\",1]]",
     )
     .unwrap();
-    let spool = bench.read(&[folder.clone()]).unwrap();
+    let spool = bench.read(std::slice::from_ref(&folder)).unwrap();
     let (read, left_out) = told(&spool);
     assert_eq!(read, ["tile.las"]);
     let wanted: Vec<_> = others
@@ -178,7 +178,7 @@ fn scans_that_are_short_or_stand_for_themselves_are_read() {
     std::fs::write(short.join("a.txt"), lines(4)).unwrap();
     std::fs::write(short.join("b.csv"), "1,2,3\n").unwrap();
     assert_eq!(
-        expand(&[short.clone()]).unwrap(),
+        expand(std::slice::from_ref(&short)).unwrap(),
         [short.join("a.txt"), short.join("b.csv")]
     );
 }
