@@ -162,8 +162,6 @@ mod tests {
             guessed: false,
             colors: None,
             columns: Vec::new(),
-            taken: None,
-            guessed: false,
             claimed: None,
             points: kept,
             kept,
