@@ -28,8 +28,7 @@ pub(super) fn is_splats(element: &Element) -> bool {
             .map(|s| Some(Property::One(s)))
             .contains(&kind)
     };
-    COEFFICIENTS.iter().chain(&OTHERS).all(real)
-        && COLORS.iter().all(|name| kind(name).is_none())
+    COEFFICIENTS.iter().chain(&OTHERS).all(real) && COLORS.iter().all(|name| kind(name).is_none())
 }
 
 /// The colour of which a property of splats is the coefficient.
