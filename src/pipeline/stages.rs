@@ -226,6 +226,7 @@ impl<'a> Stages<'a> {
             spool.release(workspace)?;
         }
         enough(&store)?;
+        self.warn_of_left_out();
         self.known.points = store.len() as u64;
         self.known.text = Some(text);
         let mut columns = self.carried.columns.clone();
@@ -250,11 +251,15 @@ impl<'a> Stages<'a> {
     /// Warnings about the points that were read, before anything that may fail because of them.
     fn warn_of_input(&mut self) {
         let input = &self.report.input;
-        let left_out = input.dropped_non_finite;
         let warnings = [input.warnings.clone(), self.carried.warnings.clone()];
         for warning in warnings.concat() {
             self.warn(warning);
         }
+    }
+
+    /// Warnings about points that were left out; an error that there are too few left says so itself.
+    fn warn_of_left_out(&mut self) {
+        let left_out = self.report.input.dropped_non_finite;
         if left_out > 0 {
             self.warn(format!(
                 "{left_out} points left out: a coordinate is NaN or infinite"
@@ -277,12 +282,16 @@ impl<'a> Stages<'a> {
         }
         let step = lattice.step;
         self.warn(match spool.has_duplicates(lattice, self.workspace)? {
-            true => {
+            Some(true) => {
                 format!("{folded} points are duplicates of others: one at each position is kept")
             }
-            false => format!(
+            Some(false) => format!(
                 "{folded} points fell together: the cloud is so wide that positions had to \
                  be rounded to steps of {step}; are there outliers far away?"
+            ),
+            None => format!(
+                "{folded} points are at the positions of others, to steps of {step}: duplicates, or points that \
+                 fell together because others are far away; one at each position is kept"
             ),
         });
         Ok(())

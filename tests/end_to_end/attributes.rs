@@ -177,17 +177,17 @@ fn bytes_do_not_depend_on_how_it_was_run() {
     }
 }
 
-/// The displacements of the vertices of a mesh with only this column, in coordinates of single precision.
+/// The displacements of the vertices of a mesh with only this column, in coordinates of double precision.
 fn displacements(path: &Path) -> Vec<f32> {
     let bytes = std::fs::read(path).unwrap();
     let end = bytes.windows(11).position(|w| w == b"end_header\n");
     let (header, rows) = bytes.split_at(end.unwrap() + 11);
     let header = std::str::from_utf8(header).unwrap();
-    assert!(header.contains("float z\nproperty float displacement\nelement face"));
+    assert!(header.contains("double z\nproperty float displacement\nelement face"));
     let count = header.split("element vertex ").nth(1).unwrap();
     let count: usize = count.lines().next().unwrap().parse().unwrap();
-    let rows = rows.as_chunks::<16>().0.iter().take(count);
-    rows.map(|row| f32::from_le_bytes(row[12..].try_into().unwrap()))
+    let rows = rows.as_chunks::<28>().0.iter().take(count);
+    rows.map(|row| f32::from_le_bytes(row[24..].try_into().unwrap()))
         .collect()
 }
 

@@ -32,18 +32,24 @@ struct Counts {
 }
 
 impl Spool {
-    /// True if most points at the position of another one have its coordinates, too. Reads the spool once.
+    /// True if most points at the position of another one have its coordinates, too; none if the points of the
+    /// spool are deleted. Reads the spool once.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`], [`crate::Error::Cancelled`].
-    pub fn has_duplicates(&self, lattice: &Lattice, workspace: &Workspace) -> Result<bool> {
+    pub fn has_duplicates(&self, lattice: &Lattice, workspace: &Workspace) -> Result<Option<bool>> {
         let counts = workspace.once("points at one position", |_| {
+            if workspace.files.open(&self.name, true)?.is_gone() {
+                return Ok(None);
+            }
             let _held = workspace.reserve("ingest: points at one position", MEMORY)?;
-            self.count(lattice, workspace)
+            self.count(lattice, workspace).map(Some)
         })?;
-        let folded = counts.points - counts.positions.min(counts.points);
-        let different = counts.coordinates.saturating_sub(counts.positions);
-        Ok(different.saturating_mul(ONE_IN) <= folded)
+        Ok(counts.map(|counts| {
+            let folded = counts.points - counts.positions.min(counts.points);
+            let different = counts.coordinates.saturating_sub(counts.positions);
+            different.saturating_mul(ONE_IN) <= folded
+        }))
     }
 
     /// Counts all points at a sample of the positions.
