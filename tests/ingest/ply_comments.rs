@@ -137,7 +137,10 @@ fn comments_give_the_system() {
     let bench = Bench::new();
     let (label, source, said) = system(&bench, &["epsg 25832"], None);
     assert_eq!(label.as_deref(), Some("EPSG:25832"));
-    assert_eq!((source.as_deref(), said.len()), (Some("comments"), 0));
+    assert_eq!(
+        (source.as_deref(), said.len()),
+        (Some("comments of the header"), 0)
+    );
     let (label, ..) = system(&bench, &["epsg 25832", "crs EPSG:25832+7837"], None);
     assert_eq!(label.as_deref(), Some("EPSG:25832+7837"));
     let (label, ..) = system(&bench, &["crs Site north"], None);
@@ -153,7 +156,7 @@ fn a_text_beside_counts_if_it_is_the_same_system() {
     assert_eq!((source.as_deref(), said.len()), (Some(".prj file"), 0));
     let (label, source, said) = system(&bench, &["epsg 2994"], Some(UTM));
     assert_eq!(label.as_deref(), Some("EPSG:2994"));
-    assert_eq!(source.as_deref(), Some("comments"));
+    assert_eq!(source.as_deref(), Some("comments of the header"));
     assert!(
         said.len() == 1 && said[0].contains("EPSG:25832"),
         "{said:?}"

@@ -358,7 +358,10 @@ impl Opened {
         let Some(own) = self.file.crs(&self.input) else {
             return beside;
         };
-        let same = |other: &Crs| own.horizontal.is_some() && other.horizontal == own.horizontal;
+        let same = |other: &Crs| {
+            let heights = own.vertical.is_none() || other.vertical == own.vertical;
+            own.horizontal.is_some() && other.horizontal == own.horizontal && heights
+        };
         if own.source == CrsSource::Comments && beside.0.as_ref().is_some_and(same) {
             // The same system, told as a text.
             return beside;
