@@ -19,7 +19,8 @@ pub fn read(bytes: &[u8]) {
             let lattice = spool.choose_lattice(0).expect("points");
             let mut all: Vec<[i64; 3]> = Vec::new();
             let streamed = spool.for_each(&bench.workspace, &lattice, |points| {
-                let place = |p: &[i32; 3]| lattice.position(*p).map(|v| (v * 1000.0).round() as i64);
+                let place =
+                    |p: &[i32; 3]| lattice.position(*p).map(|v| (v * 1000.0).round() as i64);
                 all.extend(points.iter().map(place));
                 Ok(())
             });

@@ -37,7 +37,13 @@ pub fn write(folder: &Path) -> Result {
     scans::e57_files(&seeds)?;
     texts(&seeds)?;
     for number in 0..60u8 {
-        let bytes: Vec<u8> = (0..40u8).map(|at| number.wrapping_mul(41).wrapping_add(at.wrapping_mul(number | 7))).collect();
+        let bytes: Vec<u8> = (0..40u8)
+            .map(|at| {
+                number
+                    .wrapping_mul(41)
+                    .wrapping_add(at.wrapping_mul(number | 7))
+            })
+            .collect();
         seeds.put("dialect", &number.to_string(), bytes)?;
     }
     for (number, text) in REGIONS.iter().enumerate() {
