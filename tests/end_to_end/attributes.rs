@@ -198,7 +198,7 @@ fn displacement_tells_how_far_each_point_moved() {
         let cloud = Cloud::new(Kind::Bumpy).points(20_000);
         bench.cloud(&format!("{noise}.ply"), &cloud.noise(noise).seed(5))
     };
-    let (clean, noisy) = (cloud(0.0), cloud(0.5));
+    let (clean, noisy) = (cloud(0.0), cloud(5.0));
     let mesh = bench.path("mesh.ply");
     let run = |input: &Path, smooth| {
         let params = Params {

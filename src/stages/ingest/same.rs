@@ -39,7 +39,8 @@ impl Spool {
     /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`], [`crate::Error::Cancelled`].
     pub fn has_duplicates(&self, lattice: &Lattice, workspace: &Workspace) -> Result<Option<bool>> {
         let counts = workspace.once("points at one position", |_| {
-            if workspace.files.open(&self.name, true)?.is_gone() {
+            let file = workspace.files.open(&self.name, true)?;
+            if file.is_gone() || file.count() == 0 {
                 return Ok(None);
             }
             let _held = workspace.reserve("ingest: points at one position", MEMORY)?;
