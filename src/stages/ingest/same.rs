@@ -2,11 +2,12 @@
 
 use super::Spool;
 use super::far::in_unit;
-use super::stream::Buffers;
+use super::stream::{Buffers, READ_BUFFERS};
 use crate::error::Result;
 use crate::geom::Point;
 use crate::geom::lattice::Lattice;
 use crate::workspace::Workspace;
+use crate::workspace::memory::Reservation;
 use rustc_hash::{FxBuildHasher, FxHashSet};
 use serde::{Deserialize, Serialize};
 use std::hash::BuildHasher;
@@ -43,8 +44,8 @@ impl Spool {
             if file.is_gone() || file.count() == 0 {
                 return Ok(None);
             }
-            let _held = workspace.reserve("ingest: points at one position", MEMORY)?;
-            self.count(lattice, workspace).map(Some)
+            let mut held = workspace.promise("ingest: points at one position", MEMORY)?;
+            self.count(lattice, workspace, &mut held).map(Some)
         })?;
         Ok(counts.map(|counts| {
             let folded = counts.points - counts.positions.min(counts.points);
@@ -54,7 +55,12 @@ impl Spool {
     }
 
     /// Counts all points at a sample of the positions.
-    fn count(&self, lattice: &Lattice, workspace: &Workspace) -> Result<Counts> {
+    fn count(
+        &self,
+        lattice: &Lattice,
+        workspace: &Workspace,
+        held: &mut Reservation,
+    ) -> Result<Counts> {
         let each = (self.points() / SAMPLE).max(1);
         let is_sampled = |point: &Point| FxBuildHasher.hash_one(point).is_multiple_of(each);
         let (mut positions, mut coordinates) = (FxHashSet::default(), FxHashSet::default());
@@ -74,6 +80,9 @@ impl Spool {
                 }
             }
         })?;
+        let sets = positions.capacity() * size_of::<Point>()
+            + coordinates.capacity() * size_of::<[u64; 3]>();
+        held.set_held(sets as u64 + READ_BUFFERS);
         Ok(Counts {
             points,
             positions: positions.len() as u64,
