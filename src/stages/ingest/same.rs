@@ -79,6 +79,7 @@ impl Spool {
                     coordinates.insert(own.map(|c| (c + 0.0).to_bits()));
                 }
             }
+            Ok(())
         })?;
         let sets = positions.capacity() * size_of::<Point>()
             + coordinates.capacity() * size_of::<[u64; 3]>();

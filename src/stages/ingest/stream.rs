@@ -63,15 +63,7 @@ impl Spool {
         lattice: &Lattice,
         mut each: impl FnMut(&[Point]) -> Result<()>,
     ) -> Result<()> {
-        let maps = self.maps(lattice)?;
-        let mut buffers = Buffers::default();
-        let file = workspace.files.open(&self.name, true)?;
-        for (frame, _) in self.frames() {
-            workspace.check_cancel()?;
-            self.read(&file, frame, &maps, lattice, &mut buffers)?;
-            each(&buffers.points)?;
-        }
-        Ok(())
+        self.for_each_frame(workspace, lattice, |buffers, _| each(&buffers.points))
     }
 
     /// Streams all frames with their positions on `lattice`, and the type of their coordinates.
@@ -79,7 +71,7 @@ impl Spool {
         &self,
         workspace: &Workspace,
         lattice: &Lattice,
-        mut each: impl FnMut(&Buffers, Native),
+        mut each: impl FnMut(&Buffers, Native) -> Result<()>,
     ) -> Result<()> {
         let maps = self.maps(lattice)?;
         let mut buffers = Buffers::default();
@@ -87,7 +79,7 @@ impl Spool {
         for (frame, _) in self.frames() {
             workspace.check_cancel()?;
             self.read(&file, frame, &maps, lattice, &mut buffers)?;
-            each(&buffers, self.sources[buffers.frame.source].native);
+            each(&buffers, self.sources[buffers.frame.source].native)?;
         }
         Ok(())
     }

@@ -1,6 +1,6 @@
 //! ZIP archives.
 
-use super::{las, ply};
+use super::compressed::samples;
 use crate::bench::Bench;
 use rawzip::{CompressionMethod, ZipArchiveWriter};
 use std::io::Write;
@@ -44,10 +44,7 @@ pub fn zip(members: &[(&str, &[u8])], method: CompressionMethod) -> Vec<u8> {
 const METHODS: [CompressionMethod; 2] = [CompressionMethod::STORE, CompressionMethod::DEFLATE];
 
 pub fn one(bench: &Bench) -> Vec<PathBuf> {
-    let mut files = las::all(bench, &[2], 0..=1, "las");
-    files.extend(las::all(bench, &[2], 0..=1, "laz"));
-    files.extend(ply::bodies(bench));
-    files.push(bench.write("text.xyz", TEXT));
+    let files = samples(bench);
     let mut packed = Vec::new();
     for (number, path) in files.iter().enumerate() {
         let bytes = std::fs::read(path).unwrap();

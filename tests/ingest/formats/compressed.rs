@@ -22,11 +22,17 @@ fn zstd(bytes: &[u8]) -> Vec<u8> {
     encoder.finish().unwrap()
 }
 
-pub fn formats(bench: &Bench) -> Vec<PathBuf> {
+/// Files of several formats.
+pub fn samples(bench: &Bench) -> Vec<PathBuf> {
     let mut files = las::all(bench, &[2], 0..=1, "las");
     files.extend(las::all(bench, &[2], 0..=1, "laz"));
     files.extend(ply::bodies(bench));
     files.push(bench.write("text.xyz", TEXT));
+    files
+}
+
+pub fn formats(bench: &Bench) -> Vec<PathBuf> {
+    let files = samples(bench);
     let mut packed = Vec::new();
     for (number, path) in files.iter().enumerate() {
         let bytes = std::fs::read(path).unwrap();
