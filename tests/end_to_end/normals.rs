@@ -1,11 +1,10 @@
 //! Normals that points bring: directions for the disks, and the outer side.
 
+use crate::scanners::run;
 use crate::scanners::{Mesh, read};
 use crate::util::{self, Bench};
-use outcrop::Report;
 use outcrop::params::{InputNormals, Params};
 use std::fmt::Write;
-use std::path::{Path, PathBuf};
 
 /// A point with its true normal.
 type Oriented = ([f64; 3], [f64; 3]);
@@ -82,14 +81,6 @@ fn text(points: &[Oriented], change: Change, random: &mut Random) -> String {
         writeln!(text, "{x:.6} {y:.6} {z:.6} {a:.6} {b:.6} {c:.6}").unwrap();
     }
     text
-}
-
-fn run(inputs: &[PathBuf], mesh: &Path, params: &Params) -> Report {
-    util::builder(inputs, mesh, params)
-        .build()
-        .unwrap()
-        .run()
-        .unwrap()
 }
 
 fn with(input_normals: InputNormals) -> Params {

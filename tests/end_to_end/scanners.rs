@@ -98,9 +98,14 @@ pub fn room(center: [f64; 3], left_out: &[usize], seed: u64) -> Vec<[f64; 3]> {
 
 /// A scan as PTX. Its points are in the coordinates of the cloud.
 fn scan(scanner: [f64; 3], points: &[[f64; 3]]) -> String {
-    let [x, y, z] = scanner;
+    ptx(scanner, [0.0; 3], points)
+}
+
+/// A scan as PTX, whose matrix moves its points by `moved`.
+pub fn ptx(scanner: [f64; 3], moved: [f64; 3], points: &[[f64; 3]]) -> String {
+    let ([x, y, z], [a, b, c]) = (scanner, moved);
     let mut text = format!(
-        "1\n{}\n{x} {y} {z}\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n",
+        "1\n{}\n{x} {y} {z}\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n{a} {b} {c} 1\n",
         points.len()
     );
     for [x, y, z] in points {

@@ -1,29 +1,15 @@
 //! Reference systems that are given or told, files beside the mesh, and scanners far from the origin of coordinates.
 
-use crate::scanners::{facing, room, run};
+use crate::scanners::{facing, ptx, room, run};
 use crate::util::{self, Bench, Said};
 use e57::{E57Writer, Quaternion, Record, RecordValue, Transform, Translation};
 use outcrop::params::Params;
 use outcrop_cloudgen::{Cloud, Kind};
 use serde_json::Value;
 use std::ffi::OsStr;
-use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-/// A scan as PTX, of a scanner at `to`; its points are moved there by its matrix.
-fn ptx(to: [f64; 3], points: &[[f64; 3]]) -> String {
-    let [x, y, z] = to;
-    let mut text = format!(
-        "1\n{}\n{x} {y} {z}\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n{x} {y} {z} 1\n",
-        points.len()
-    );
-    for [x, y, z] in points {
-        writeln!(text, "{x:.3} {y:.3} {z:.3} 0.5").unwrap();
-    }
-    text
-}
-
-/// The same as E57.
+/// A scan as E57, of a scanner at `to`; its points are moved there by its pose.
 fn e57(path: &Path, to: [f64; 3], points: &[[f64; 3]]) {
     let fields = [
         Record::CARTESIAN_X_F64,
@@ -82,7 +68,7 @@ fn rooms_in_national_coordinates_face_their_scanners() {
     .into_iter()
     .enumerate()
     {
-        let text = bench.write(&format!("{number}.ptx"), ptx(to, &points));
+        let text = bench.write(&format!("{number}.ptx"), ptx(to, to, &points));
         let binary = bench.path(&format!("{number}.e57"));
         e57(&binary, to, &points);
         for cloud in [text, binary] {
