@@ -10,7 +10,7 @@ use std::io::Read;
 use std::os::unix::ffi::{OsStrExt, OsStringExt};
 use std::path::{Path, PathBuf};
 
-/// What the names of scratch folders end with.
+/// Ending of the names of scratch folders.
 const ENDING: &str = ".outcrop-scratch";
 
 /// Most bytes of a path in a file.

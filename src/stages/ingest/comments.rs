@@ -5,7 +5,7 @@ use super::given::codes;
 use outcrop_ply::System;
 
 impl Crs {
-    /// What the comments of a mesh tell of it.
+    /// The comments of a mesh that name this system.
     #[must_use]
     pub fn comments(&self) -> System {
         System {

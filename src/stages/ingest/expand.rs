@@ -78,7 +78,7 @@ fn told(left_out: &[LeftOut]) -> Option<String> {
     }
 }
 
-/// What was found in a folder.
+/// The scans in a folder, and the files that are left out.
 #[derive(Default)]
 struct Found {
     /// Scans, and their bytes.

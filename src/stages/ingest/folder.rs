@@ -64,7 +64,7 @@ const FEW: usize = 100;
 /// A short list with the extension of a scan is one, unless another file has so many times its bytes.
 const MANY: u64 = 10;
 
-/// What a file in a folder is.
+/// The verdict on a file in a folder.
 pub(super) enum Judged {
     /// A scan.
     Scan,

@@ -26,7 +26,7 @@ const HEAD: usize = 64 << 10;
 /// The same, for a file with a very long first line, or with many lines before the first point.
 pub(super) const LONG_HEAD: usize = 1 << 20;
 
-/// What is expected of a text whose columns cannot be told.
+/// The columns that are expected of a text whose own cannot be told, for the error.
 const COLUMNS: &str =
     "columns called x, y and z, or their names in order by --columns, like x,y,z,r,g,b,-";
 
