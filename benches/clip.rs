@@ -5,11 +5,11 @@ mod util;
 
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
-use outcrop::geom::clip::Cell;
-use outcrop::geom::clip::wrap::{MOST_NEIGHBORS, Site, TOGETHER, Wrapper};
-use outcrop::geom::plane::Normal;
-use outcrop::kernels::Level;
-use outcrop::stages::tiles::neighbors::Neighbors;
+use outcrop_geom::clip::Cell;
+use outcrop_geom::clip::wrap::{MOST_NEIGHBORS, Site, TOGETHER, Wrapper};
+use outcrop_geom::kernels::Level;
+use outcrop_geom::plane::Normal;
+use outcrop_stages::tiles::neighbors::Neighbors;
 
 const POINTS: usize = 20_000;
 

@@ -4,7 +4,7 @@ mod util;
 
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
-use outcrop::geom::hilbert::{Key, decode, encode};
+use outcrop_geom::hilbert::{Key, decode, encode};
 
 const POINTS: usize = 100_000;
 

@@ -22,7 +22,7 @@ fn main() {
 
 /// One thread, and all available ones.
 fn threads() -> Vec<usize> {
-    let mut counts = vec![1, outcrop::pipeline::default_threads()];
+    let mut counts = vec![1, outcrop::default_threads()];
     counts.dedup();
     counts
 }

@@ -4,9 +4,9 @@ mod util;
 
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
-use outcrop::geom::plane::{Moments, PLANES, planes};
-use outcrop::kernels::Level;
-use outcrop::stages::tiles::neighbors::Neighbors;
+use outcrop_geom::kernels::Level;
+use outcrop_geom::plane::{Moments, PLANES, planes};
+use outcrop_stages::tiles::neighbors::Neighbors;
 
 const POINTS: usize = 20_000;
 

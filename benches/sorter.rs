@@ -4,8 +4,8 @@ mod util;
 
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
-use outcrop::geom::hilbert::{Key, encode};
-use outcrop::spill::Sorter;
+use outcrop_disk::spill::Sorter;
+use outcrop_geom::hilbert::{Key, encode};
 
 const RECORDS: usize = 500_000;
 

@@ -4,7 +4,7 @@ mod util;
 
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
-use outcrop::spill::Table;
+use outcrop_disk::spill::Table;
 
 fn main() {
     divan::main();

@@ -4,9 +4,9 @@ mod util;
 
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
-use outcrop::kernels::Level;
-use outcrop::stages::tiles::Tile;
-use outcrop::stages::tiles::near::Search;
+use outcrop_geom::kernels::Level;
+use outcrop_stages::tiles::Tile;
+use outcrop_stages::tiles::near::Search;
 
 const POINTS: usize = 200_000;
 /// A tile in the middle of the cloud, of the pipeline's size.

@@ -1,9 +1,9 @@
 //! Meshes in another format than PLY, from the PLY file of a finished mesh.
 
-use crate::error::{Error, Result};
-use crate::inspect::ply_mesh::{PlyMesh, SLICE, Sink};
-use crate::stages::export::{self, CoordinateType, Format, Mesh, VertexColumn};
-use crate::workspace::Workspace;
+use outcrop_codecs::ply_mesh::{PlyMesh, SLICE, Sink};
+use outcrop_disk::error::{Error, Result};
+use outcrop_disk::workspace::Workspace;
+use outcrop_mesh_files::export::{self, CoordinateType, Format, Mesh, VertexColumn};
 use outcrop_ply::{Place, Scalar};
 use std::fs::File;
 use std::io::{BufWriter, Write};

@@ -63,43 +63,33 @@
 #[doc(hidden)]
 pub mod cli;
 pub mod convert;
-pub mod error;
 #[doc(hidden)]
-pub mod geom;
-mod histogram;
-pub mod inspect;
-#[doc(hidden)]
-pub mod kernels;
-pub mod levels;
-mod light;
-mod meshopt;
-mod method;
+pub mod info;
 pub mod page;
 pub mod params;
-mod picture;
-#[doc(hidden)]
-pub mod pipeline;
+mod pipeline;
 pub mod report;
-#[doc(hidden)]
-pub mod spill;
-#[doc(hidden)]
-pub mod stages;
-#[doc(hidden)]
-pub mod view;
-#[doc(hidden)]
-pub mod workspace;
+
+pub use outcrop_disk::error;
+pub use outcrop_levels as levels;
+
+/// Inspection of clouds and meshes without a reconstruction.
+pub mod inspect {
+    pub use crate::info;
+    pub use outcrop_inspect::{compare, verify};
+}
 
 #[doc(inline)]
 pub use cli::call;
 pub use error::{Error, Result};
+pub use outcrop_disk::workspace::Workspace;
+pub use outcrop_disk::workspace::memory::MemoryPool;
+pub use outcrop_disk::workspace::outlook::{Outlook, Planned, Position};
+pub use outcrop_disk::workspace::progress::{Cancel, Observer, Silent};
+pub use outcrop_points::Classes;
 pub use params::{
     Division, Facing, InputNormals, MaxWidth, Method, Origin, Params, Radius, Region, Smooth,
     Smoothing,
 };
 pub use pipeline::{Builder, Reconstruction, Start, Tiles, default_memory, default_threads};
 pub use report::{DiskEstimate, Report};
-pub use stages::ingest::Classes;
-pub use workspace::Workspace;
-pub use workspace::memory::MemoryPool;
-pub use workspace::outlook::{Outlook, Planned, Position};
-pub use workspace::progress::{Cancel, Observer, Silent};

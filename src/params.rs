@@ -3,17 +3,17 @@
 mod facing;
 mod smooth;
 
-use crate::error::{Error, Result};
-pub use crate::geom::region::{NoRegion, Region};
-use crate::method::METHOD;
-use crate::stages::ingest::{
+pub use facing::Facing;
+use outcrop_disk::error::{Error, Result};
+use outcrop_geom::method::METHOD;
+pub use outcrop_geom::region::{NoRegion, Region};
+use outcrop_points::{
     Attributes, Classes, Crop, GivenCrs, IngestStats, Layout, Selection, TextColumns,
 };
-pub use crate::stages::normals::InputNormals;
-pub use crate::stages::smooth::Smoothing;
-use crate::stages::spacing::{Limits, Width};
-pub use crate::stages::surface::evidence::Division;
-pub use facing::Facing;
+pub use outcrop_stages::normals::InputNormals;
+pub use outcrop_stages::smooth::Smoothing;
+use outcrop_stages::spacing::{Limits, Width};
+pub use outcrop_stages::surface::evidence::Division;
 pub use smooth::Smooth;
 
 /// Radius of the disks (paper, section 3.4).

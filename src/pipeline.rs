@@ -15,20 +15,19 @@ mod stages;
 mod start;
 mod tiles;
 
-use crate::error::Result;
-use crate::levels;
 use crate::params::Params;
 use crate::report::Report;
-use crate::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
-use crate::workspace::progress::{Cancel, Observer};
-use crate::workspace::{Folder, Storage, Workspace, limits};
 use attempt::Alarm;
 pub use builder::Builder;
 use checks::{not_an_input, one_system, writable};
 pub(crate) use clock::Clock;
 pub(crate) use disk::Known;
+use outcrop_disk::error::Result;
+use outcrop_disk::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
+use outcrop_disk::workspace::progress::{Cancel, Observer};
+use outcrop_disk::workspace::{Folder, Storage, Workspace, limits};
 pub use shared::{
-    Advanced, Begun, MOST_SHARDS, Status, TaskState, Totals, Worked, planned_shards, shared_folder,
+    Advanced, Begun, Status, TaskState, Totals, Worked, planned_shards, shared_folder,
     status,
 };
 use stages::Stages;
@@ -123,7 +122,9 @@ impl Reconstruction {
     /// run can be resumed, see [`Reconstruction::is_unfinished`].
     pub fn run(&self) -> Result<Report> {
         writable(&self.mesh)?;
-        self.tiles.as_deref().map_or(Ok(()), levels::check_folder)?;
+        self.tiles
+            .as_deref()
+            .map_or(Ok(()), outcrop_levels::check_folder)?;
         not_an_input(&self.mesh, self.params.split.is_some(), &self.inputs)?;
         one_system(&self.params, &self.inputs)?;
         let _alarm = self

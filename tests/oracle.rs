@@ -3,11 +3,11 @@
 
 mod reference;
 
-use outcrop::inspect::ply_mesh::{PlyMesh, Sink};
 use outcrop::{
     Division, Error, Facing, InputNormals, MaxWidth, Method, Params, Radius, Reconstruction,
     Report, Smooth, Smoothing,
 };
+use outcrop_codecs::ply_mesh::{PlyMesh, Sink};
 use reference::weighing::Weighing;
 use reference::{Counts, Given, Mesh, Settings, clouds, normals};
 use std::collections::BTreeMap;

@@ -3,22 +3,22 @@
 
 mod reference;
 
-use outcrop::inspect::ply_mesh::{PlyMesh, Sink};
-use outcrop::stages::attributes::StoredScanners;
-use outcrop::stages::blocks::Blocks;
-use outcrop::stages::cells::{CountedTriple, SentTriple};
-use outcrop::stages::export::{CoordinateType, ExportOptions, export};
-use outcrop::stages::located::Places;
-use outcrop::stages::order::{Orderer, PointStore, StoreWriter};
-use outcrop::stages::outside::{Outside, StoredExtremes, Told};
-use outcrop::stages::repair::{RepairOptions, repair};
-use outcrop::stages::scanners::Scanners;
-use outcrop::stages::stitch::{StitchOptions, stitch};
-use outcrop::stages::triples::Triples;
-use outcrop::workspace::Workspace;
-use outcrop::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
-use outcrop::workspace::progress::{Cancel, Silent};
-use outcrop::{Division, Error, spill};
+use outcrop::{Division, Error};
+use outcrop_codecs::ply_mesh::{PlyMesh, Sink};
+use outcrop_disk::workspace::Workspace;
+use outcrop_disk::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
+use outcrop_disk::workspace::progress::{Cancel, Silent};
+use outcrop_mesh_files::export::{CoordinateType, ExportOptions, export};
+use outcrop_stages::attributes::StoredScanners;
+use outcrop_stages::blocks::Blocks;
+use outcrop_stages::cells::{CountedTriple, SentTriple};
+use outcrop_stages::located::Places;
+use outcrop_stages::order::{Orderer, PointStore, StoreWriter};
+use outcrop_stages::outside::{Outside, StoredExtremes, Told};
+use outcrop_stages::repair::{RepairOptions, repair};
+use outcrop_stages::scanners::Scanners;
+use outcrop_stages::stitch::{StitchOptions, stitch};
+use outcrop_stages::triples::Triples;
 use reference::clouds::Random;
 use reference::outside::{Facing, Known};
 use reference::{Counts, Settings, cells, connect};
@@ -68,8 +68,8 @@ fn store_of(points: &[Point], workspace: &Workspace) -> PointStore {
 }
 
 fn tables(all: &BTreeMap<[u32; 3], u32>, blocks: Blocks, workspace: &Workspace) -> Triples {
-    let own = spill::Table::new("own", blocks.count());
-    let visiting = spill::Shuffle::new("visiting");
+    let own = outcrop_disk::spill::Table::new("own", blocks.count());
+    let visiting = outcrop_disk::spill::Shuffle::new("visiting");
     let unit = workspace.unit();
     for block in 0..blocks.count() as u32 {
         let first = all.iter().filter(|(t, _)| blocks.of(t[0]) == block);
@@ -162,7 +162,7 @@ fn pipeline(
         clip_ears: settings.robust,
     };
     let (repaired, mended) = repair(places, &stitched, blocks, options, workspace)?;
-    let lattice = outcrop::geom::lattice::Lattice {
+    let lattice = outcrop_geom::lattice::Lattice {
         step: 1.0,
         offset: [0.0; 3],
         base: [0; 3],
@@ -419,7 +419,7 @@ fn compare(
         // Cells never have three points on a line.
         all.retain(|t, _| {
             let [a, b, c] = t.map(|v| shape[v as usize]);
-            outcrop::geom::triangle::normal(a, b, c) != [0; 3]
+            outcrop_geom::triangle::normal(a, b, c) != [0; 3]
         });
         let settings = settings(seed);
         // Of every other cloud some or all points were seen by scanners.

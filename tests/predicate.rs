@@ -3,9 +3,9 @@
 
 mod reference;
 
-use outcrop::geom::clip::Cell;
-use outcrop::geom::predicate::{Neighbor, cuts_corner, turn};
-use outcrop::geom::{Point, sub};
+use outcrop_geom::clip::Cell;
+use outcrop_geom::predicate::{Neighbor, cuts_corner, turn};
+use outcrop_geom::{Point, sub};
 use reference::big::{Big, Big3, determinant, dot, vector};
 use reference::clouds::{self, Random};
 

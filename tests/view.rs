@@ -1,7 +1,7 @@
 //! `outcrop view`: a tileset over HTTP, to whom it may be shown and to whom not; the page in one file; the program.
 
 use outcrop::Error;
-use outcrop::view::{Server, write_html};
+use outcrop_view::{Server, write_html};
 use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::path::Path;

@@ -1,9 +1,9 @@
 //! Odd, old, empty and broken files: each has its expected outcome, without a panic.
 
-use outcrop::stages::ingest::{Spool, ingest};
-use outcrop::workspace::Workspace;
-use outcrop::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
-use outcrop::workspace::progress::{Cancel, Silent};
+use outcrop_disk::workspace::Workspace;
+use outcrop_disk::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
+use outcrop_disk::workspace::progress::{Cancel, Silent};
+use outcrop_points::{Spool, ingest};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

@@ -1,15 +1,15 @@
 //! The surface on which the kernels are measured, as the stages provide it.
 #![allow(dead_code, reason = "every bench uses a part of this")]
 
-use outcrop::geom::Point;
-use outcrop::stages::order::{Orderer, PAGE, PointStore};
-use outcrop::stages::tiles::Tile;
-use outcrop::stages::tiles::near::Search;
-use outcrop::stages::tiles::neighbors::Neighbors;
-use outcrop::workspace::Workspace;
-use outcrop::workspace::memory::MemoryPool;
-use outcrop::workspace::progress::{Cancel, Silent};
 use outcrop_cloudgen::{Cloud, Kind};
+use outcrop_disk::workspace::Workspace;
+use outcrop_disk::workspace::memory::MemoryPool;
+use outcrop_disk::workspace::progress::{Cancel, Silent};
+use outcrop_geom::Point;
+use outcrop_stages::order::{Orderer, PAGE, PointStore};
+use outcrop_stages::tiles::Tile;
+use outcrop_stages::tiles::near::Search;
+use outcrop_stages::tiles::neighbors::Neighbors;
 use std::sync::Arc;
 
 /// Neighbours of a plane, the pipeline's default.

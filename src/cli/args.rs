@@ -4,11 +4,11 @@ mod job;
 
 use super::parse::{count, size, system, time};
 use crate::pipeline::Start;
-use crate::stages::ingest::GivenCrs;
-use crate::workspace::mapped::Io;
-use crate::workspace::{Compression, Storage};
 use clap::{ArgAction, Args as ClapArgs};
 pub use job::{Job, Points};
+use outcrop_disk::workspace::mapped::Io;
+use outcrop_disk::workspace::{Compression, Storage};
+use outcrop_points::GivenCrs;
 use std::path::PathBuf;
 use std::time::Duration;
 

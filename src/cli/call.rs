@@ -23,15 +23,15 @@
 
 use super::command::{Args, Command};
 use super::{jobs, output};
-use crate::error::{Error, Result};
-use crate::inspect::compare::Comparison;
-use crate::inspect::info::Info;
-use crate::inspect::verify::Verdict;
-use crate::levels::TilesReport;
+use crate::info::Info;
 use crate::report::Report;
-use crate::workspace::progress::{Cancel, Observer};
 use clap::error::ErrorKind;
 use clap::{ArgAction, CommandFactory, Parser};
+use outcrop_disk::error::{Error, Result};
+use outcrop_disk::workspace::progress::{Cancel, Observer};
+use outcrop_inspect::compare::Comparison;
+use outcrop_inspect::verify::Verdict;
+use outcrop_levels::TilesReport;
 use std::ffi::OsString;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -194,7 +194,7 @@ pub fn options(command: &str) -> Vec<OptionOf> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::workspace::progress::Silent;
+    use outcrop_disk::workspace::progress::Silent;
 
     fn usage(words: &[&str]) -> String {
         match run(words, Arc::new(Silent), Cancel::new()) {

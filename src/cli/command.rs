@@ -3,9 +3,9 @@
 use super::args::{Compare, Demo, Info, Reconstruct, Resume, Tiles, Verify};
 use super::shared::{Advance, Plan, Status, Submit, Work};
 use super::view::View;
-use crate::method::method_version;
 use clap::{Parser, Subcommand};
 use clap_complete::Shell;
+use outcrop_geom::method::method_version;
 use std::path::PathBuf;
 
 /// Turns point clouds of any size into clean triangle meshes within a memory budget.

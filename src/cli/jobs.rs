@@ -2,16 +2,16 @@
 
 use super::args::{Compare, Ends, Info, Limits, Reconstruct, Resume, Tiles as TilesArgs, Verify};
 use super::output::{NewFile, is_page, report_text};
-use crate::error::{Error, Result};
-use crate::inspect::{compare, info, verify};
-use crate::levels;
+use crate::info;
 use crate::page;
 use crate::params::Params;
 use crate::pipeline::{Builder, Reconstruction, Tiles, default_memory, default_threads};
 use crate::report::Report;
-use crate::workspace::Workspace;
-use crate::workspace::memory::MemoryPool;
-use crate::workspace::progress::{Cancel, Observer};
+use outcrop_disk::error::{Error, Result};
+use outcrop_disk::workspace::Workspace;
+use outcrop_disk::workspace::memory::MemoryPool;
+use outcrop_disk::workspace::progress::{Cancel, Observer};
+use outcrop_inspect::{compare, verify};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -152,8 +152,8 @@ pub fn compare(args: &Compare, watch: Watch) -> Result<compare::Comparison> {
 }
 
 /// Makes levels of detail.
-pub fn tiles(args: &TilesArgs, (observer, cancel): Watch) -> Result<levels::TilesReport> {
-    let options = levels::Options {
+pub fn tiles(args: &TilesArgs, (observer, cancel): Watch) -> Result<outcrop_levels::TilesReport> {
+    let options = outcrop_levels::Options {
         geo: args.geo,
         crs: args.crs.clone(),
         most_triangles: args.most_triangles,

@@ -2,10 +2,10 @@
 
 use super::command::{Args, EXAMPLES, EXIT_CODES};
 use super::output::print;
-use crate::error::{Error, Result};
 use clap::{Command, CommandFactory};
 use clap_complete::Shell;
 use clap_mangen::roff::{Roff, bold, roman};
+use outcrop_disk::error::{Error, Result};
 use std::io;
 use std::path::Path;
 

@@ -14,8 +14,8 @@ mod stop;
 mod style;
 mod view;
 
-use crate::error::Error;
 use clap::Parser;
+use outcrop_disk::error::Error;
 use std::process::ExitCode;
 
 /// Exit code for a negative answer (`verify`).
@@ -31,7 +31,7 @@ const DAMAGED: u8 = 65;
 #[must_use]
 pub fn main() -> ExitCode {
     #[cfg(feature = "ablation")]
-    match crate::method::report() {
+    match outcrop_geom::method::report() {
         Ok(list) if list.is_empty() => {}
         Ok(list) => {
             print!("{list}");

@@ -1,10 +1,10 @@
 //! Output of the commands: text, JSON, reports.
 
 use super::style;
-use crate::error::{Error, Result};
 use crate::page;
 use crate::params::Smooth;
 use crate::report::Report;
+use outcrop_disk::error::{Error, Result};
 use serde::Serialize;
 use std::fmt::Display;
 use std::io::Write;

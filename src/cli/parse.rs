@@ -1,7 +1,7 @@
 //! Values of options.
 
 use crate::params::{NoRegion, Region};
-use crate::stages::ingest::GivenCrs;
+use outcrop_points::GivenCrs;
 use std::io::Read;
 use std::time::Duration;
 

@@ -1,11 +1,11 @@
 //! Progress on a terminal: stage, rate, time left, memory, one line for each stage; and one for the whole run.
 
-use crate::workspace::outlook::{Outlook, Planned, Position};
-use crate::workspace::progress::Observer;
-use crate::workspace::{limits, lock};
 use indicatif::{
     HumanCount, HumanDuration, MultiProgress, ProgressBar, ProgressState, ProgressStyle,
 };
+use outcrop_disk::workspace::outlook::{Outlook, Planned, Position};
+use outcrop_disk::workspace::progress::Observer;
+use outcrop_disk::workspace::{limits, lock};
 use std::fmt::Write;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};

@@ -4,9 +4,9 @@
 use super::args::Quiet;
 use super::progress::{Bars, Warnings};
 use crate::pipeline::Reconstruction;
-use crate::workspace::progress::{Cancel, Observer, Silent};
-use crate::workspace::{Folder, fault, lock};
 use crossbeam_channel::{Receiver, after, never, select, tick, unbounded};
+use outcrop_disk::workspace::progress::{Cancel, Observer, Silent};
+use outcrop_disk::workspace::{Folder, fault, lock};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 use std::io::IsTerminal;

@@ -1,6 +1,6 @@
 //! Formatting of numbers, and small helpers for messages.
 
-use crate::error::Error;
+use outcrop_disk::error::Error;
 
 /// 12345678 as `12 345 678`.
 pub fn grouped(number: u64) -> String {

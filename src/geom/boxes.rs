@@ -82,7 +82,7 @@ impl<S: RTreeNum> BoxTree<S> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geom::aabb::Aabb;
+    use crate::aabb::Aabb;
     use proptest::prelude::*;
 
     /// Boxes of all sizes, also single points, and at the ends of the lattice.

@@ -177,7 +177,7 @@ mod tests {
         for i in 1..1u32 << 15 {
             let p = decode([0, 0, i]);
             assert_eq!(
-                crate::geom::distance2(p, previous),
+                crate::distance2(p, previous),
                 1,
                 "between {previous:?} and {p:?}"
             );

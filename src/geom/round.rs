@@ -3,7 +3,7 @@
 /// The nearest integer, halves away from zero, as [`f64::round`]; clamped to the range of the integer.
 #[inline]
 #[must_use]
-pub(crate) fn rounded(x: f64) -> i64 {
+pub fn rounded(x: f64) -> i64 {
     let whole = x as i64;
     let rest = x - whole as f64;
     whole.saturating_add(i64::from(rest >= 0.5) - i64::from(rest <= -0.5))

@@ -6,9 +6,9 @@
 
 use super::intake::{BLOCK, Intake};
 use super::rows::{CellTriangle, PlacedTriangle};
-use crate::error::Result;
-use crate::spill::{Sorter, Table};
-use crate::workspace::{Unit, Workspace};
+use outcrop_disk::error::Result;
+use outcrop_disk::spill::{Sorter, Table};
+use outcrop_disk::workspace::{Unit, Workspace};
 use serde::{Deserialize, Serialize};
 
 /// Largest number of triangles of a cell, unless it cannot be divided.

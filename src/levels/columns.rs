@@ -1,6 +1,6 @@
 //! Values of vertices: from the columns of the file to the attributes of tiles.
 
-use crate::inspect::ply_mesh::PlyMesh;
+use outcrop_codecs::ply_mesh::PlyMesh;
 use outcrop_ply::Scalar;
 use serde::{Deserialize, Serialize};
 

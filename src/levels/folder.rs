@@ -2,8 +2,8 @@
 
 use super::make::Maker;
 use super::node::Bounds;
-use crate::error::{Error, Result};
-use crate::workspace::Workspace;
+use outcrop_disk::error::{Error, Result};
+use outcrop_disk::workspace::Workspace;
 use serde_json::{Value, json};
 use std::fs::File;
 use std::io::Write;

@@ -1,7 +1,7 @@
 //! The place of a mesh on the globe.
 
-use crate::error::{Error, Result};
-use crate::stages::ingest::{Crs, CrsKind};
+use outcrop_disk::error::{Error, Result};
+use outcrop_points::{Crs, CrsKind};
 use proj4rs::Proj;
 use std::path::Path;
 
@@ -176,7 +176,7 @@ mod tests {
 
     /// The system with these codes.
     fn crs(codes: &str) -> Crs {
-        let given: crate::stages::ingest::GivenCrs = codes.parse().unwrap();
+        let given: outcrop_points::GivenCrs = codes.parse().unwrap();
         given.crs()
     }
 

@@ -3,8 +3,9 @@
 use super::columns::Columns;
 use super::lattice::Lattice;
 use super::node::Node;
-use crate::error::{Error, Result};
-use crate::{light, meshopt};
+use outcrop_codecs::light;
+use outcrop_codecs::meshopt;
+use outcrop_disk::error::{Error, Result};
 use outcrop_ply::Scalar;
 use serde_json::{Value, json};
 use std::path::Path;

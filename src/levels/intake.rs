@@ -4,11 +4,11 @@
 use super::columns::Columns;
 use super::lattice::{Finder, LARGEST, Lattice};
 use super::rows::{BlockTriangle, LevelWord};
-use crate::error::{Error, Result};
-use crate::inspect::ply_mesh::{PlyMesh, Sink};
-use crate::spill::{Shuffle, Table};
-use crate::workspace::place::Place;
-use crate::workspace::{Unit, Workspace};
+use outcrop_codecs::ply_mesh::{PlyMesh, Sink};
+use outcrop_disk::error::{Error, Result};
+use outcrop_disk::spill::{Shuffle, Table};
+use outcrop_disk::workspace::place::Place;
+use outcrop_disk::workspace::{Unit, Workspace};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 

@@ -10,9 +10,9 @@ use super::rows::LevelWord;
 use super::shared::{Shared, boundary, bytes};
 use super::simplify::{Manner, Simplifier, Surface, failed};
 use super::tree::TreeNode;
-use crate::error::Result;
-use crate::spill::Table;
-use crate::workspace::{Unit, Workspace};
+use outcrop_disk::error::Result;
+use outcrop_disk::spill::Table;
+use outcrop_disk::workspace::{Unit, Workspace};
 use rustc_hash::FxHashMap;
 use serde::{Deserialize, Serialize};
 

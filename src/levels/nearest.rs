@@ -4,7 +4,7 @@
 //! only leaves are sorted, along the Z-order curve.
 
 use super::cells::key;
-use crate::inspect::compare::distance2;
+use outcrop_geom::distance::distance2;
 
 pub(super) type V3 = [f64; 3];
 

@@ -3,7 +3,7 @@
 use super::cells::Cell;
 use super::make::target;
 use super::tree::TreeNode;
-use crate::workspace::outlook::Planned;
+use outcrop_disk::workspace::outlook::Planned;
 
 /// The stages: their names, and microseconds that they take for each triangle on one thread (BENCHMARKS.md, "Levels of
 /// detail"). Reading and most of dividing have one thread.
@@ -39,7 +39,7 @@ pub(super) fn all(triangles: u64, threads: usize) -> Vec<Planned> {
 }
 
 /// All stages of the levels of detail of the mesh of so many points.
-pub(crate) fn of_points(points: u64, threads: usize) -> Vec<Planned> {
+pub fn of_points(points: u64, threads: usize) -> Vec<Planned> {
     all(OF_POINTS * points, threads)
 }
 

@@ -1,7 +1,7 @@
 //! Options of a tileset, and the report on it.
 
 use super::cells::MOST;
-use crate::stages::ingest::{Crs, GivenCrs};
+use outcrop_points::{Crs, GivenCrs};
 use serde::{Deserialize, Serialize};
 
 /// Options that decide the tileset.

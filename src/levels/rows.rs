@@ -1,6 +1,6 @@
 //! Rows of the scratch files.
 
-use crate::spill::row;
+use outcrop_disk::spill::row;
 
 row! {
     /// A word of the vertices, or of a node.

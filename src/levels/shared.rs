@@ -9,9 +9,9 @@ use super::rows::{
     CellEdge, CellTriangle, CellVertex, PartNormal, SeamEdge, SharedVertex, WholeNormal,
 };
 use super::tree::common_depth;
-use crate::error::Result;
-use crate::spill::{Inbox, Shuffle};
-use crate::workspace::{Unit, Workspace};
+use outcrop_disk::error::Result;
+use outcrop_disk::spill::{Inbox, Shuffle};
+use outcrop_disk::workspace::{Unit, Workspace};
 
 /// Bytes of memory for a triangle of a cell while its node is made.
 const EACH: u64 = 220;

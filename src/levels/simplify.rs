@@ -1,7 +1,7 @@
 //! Simplification, behind a trait so that the library can be changed.
 
-use crate::error::{Error, Result};
 use meshoptimizer_rs::{Positions, SimplifyOptions, SimplifySettings, VertexFlags};
+use outcrop_disk::error::{Error, Result};
 use std::path::Path;
 
 /// A mesh to simplify.

@@ -1,16 +1,16 @@
 //! The reference system of a mesh: that which is given, that of its header, or that of the `.prj` file beside it.
 
 use super::Options;
-use crate::error::Result;
-use crate::inspect::ply_mesh;
-use crate::stages::ingest::{self, Crs};
-use crate::workspace::Workspace;
+use outcrop_codecs::ply_mesh;
+use outcrop_disk::error::Result;
+use outcrop_disk::workspace::Workspace;
+use outcrop_points::Crs;
 use std::path::Path;
 
 /// The system of a mesh, with warnings where what is known of it does not agree.
 pub(super) fn of(path: &Path, options: &Options, workspace: &Workspace) -> Result<Option<Crs>> {
-    let prj = ingest::prj_of(path);
-    let (beside, warning) = ingest::of_prj(&prj);
+    let prj = outcrop_points::prj_of(path);
+    let (beside, warning) = outcrop_points::of_prj(&prj);
     let warn = |warning: String| workspace.observer.warn(&warning);
     warning.into_iter().for_each(warn);
     let header = Crs::of_comments(&ply_mesh::system(path)?);

@@ -1,8 +1,8 @@
 //! Charts as inline SVG.
 
 use super::words::{bytes, count, length, seconds};
-use crate::histogram::{Bin, Histogram};
 use maud::{Markup, html};
+use outcrop_draw::histogram::{Bin, Histogram};
 
 /// Width of charts in a column, in units of the drawing.
 const WIDTH: f64 = 460.0;

@@ -4,7 +4,7 @@ use super::charts::lengths;
 use super::report::{bounds, files};
 use super::sheet::{Advice, Sheet, advice, card, list, table, view};
 use super::words::{bytes, clean, count, counted, file_name, length, percent, position, seconds};
-use crate::inspect::info::{Illustration, Info, Percentiles};
+use crate::info::{Illustration, Info, Percentiles};
 use maud::{Markup, html};
 use std::path::PathBuf;
 

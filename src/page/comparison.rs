@@ -3,8 +3,8 @@
 use super::charts::lengths;
 use super::sheet::{Sheet, card, list, table, view};
 use super::words::{count, file_name, length, path};
-use crate::inspect::compare::{Comparison, Distances, Illustration, Kind, Side};
 use maud::{Markup, html};
+use outcrop_inspect::compare::{Comparison, Distances, Illustration, Kind, Side};
 
 /// Distances between two shapes as a page.
 #[must_use]

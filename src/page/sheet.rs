@@ -1,10 +1,10 @@
 //! The kit of all pages: the sheet, tables, cards and pictures.
 
 use super::words::{clean, length};
-use crate::picture::Picture;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
+use outcrop_draw::picture::Picture;
 
 const STYLE: &str = include_str!("style.css");
 

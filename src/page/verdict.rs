@@ -2,8 +2,8 @@
 
 use super::sheet::{Advice, Sheet, advice, card, key, list, table, view};
 use super::words::{clean, count, file_name, path, position};
-use crate::inspect::verify::{Illustration, Place, Verdict};
 use maud::{Markup, html};
+use outcrop_inspect::verify::{Illustration, Place, Verdict};
 use std::path::Path;
 
 /// Most places in the table.

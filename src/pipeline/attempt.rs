@@ -2,12 +2,11 @@
 
 use super::manifest::Manifest;
 use super::{Reconstruction, Start, beside};
-use crate::error::{Error, Result};
-use crate::levels;
-use crate::stages::export;
-use crate::workspace::progress::Cancel;
-use crate::workspace::{Folder, Found, Workspace, fault};
 use crossbeam_channel::{RecvTimeoutError, Sender, bounded};
+use outcrop_disk::error::{Error, Result};
+use outcrop_disk::workspace::progress::Cancel;
+use outcrop_disk::workspace::{Folder, Found, Workspace, fault};
+use outcrop_mesh_files::export;
 use std::path::Path;
 use std::time::Duration;
 
@@ -96,7 +95,7 @@ impl Reconstruction {
             // An unfinished mesh; if it cannot be deleted it does no harm.
             let _ = std::fs::remove_file(export::temporary(&self.mesh));
             if let Some(tiles) = &self.tiles {
-                levels::remove_unfinished(tiles);
+                outcrop_levels::remove_unfinished(tiles);
                 beside::remove(&self.mesh);
             }
             if self.params.split.is_some() {

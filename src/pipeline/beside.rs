@@ -4,10 +4,10 @@
 //! They are written when the mesh has its name, each under a temporary name first; a resumed run writes them
 //! again.
 
-use crate::error::{Error, Result};
 use crate::report::Report;
-use crate::stages::export::{folder_of, is_compressed};
-use crate::stages::ingest::{self, Crs};
+use outcrop_disk::error::{Error, Result};
+use outcrop_mesh_files::export::{folder_of, is_compressed};
+use outcrop_points::Crs;
 use serde::Serialize;
 use std::ffi::OsString;
 use std::io::ErrorKind::NotFound;
@@ -61,8 +61,8 @@ pub(super) fn write(
     warnings.extend(write_origin(output, report)?);
     let path = path_beside(output, "prj");
     // That of an input stays as it is.
-    let of_input = ingest::expand(inputs)?.iter().any(|input| {
-        let other = ingest::prj_of(input).canonicalize();
+    let of_input = outcrop_points::expand(inputs)?.iter().any(|input| {
+        let other = outcrop_points::prj_of(input).canonicalize();
         other.is_ok_and(|other| path.canonicalize().is_ok_and(|path| path == other))
     });
     match wkt {
@@ -75,7 +75,7 @@ pub(super) fn write(
 
 /// Deletes a `.prj` file that an earlier mesh of the name left, for this one has none.
 fn without_prj(output: &Path, path: &Path, report: &Report) -> Result<Option<String>> {
-    let (Some(beside), _) = ingest::of_prj(path) else {
+    let (Some(beside), _) = outcrop_points::of_prj(path) else {
         return Ok(None);
     };
     // It has no more than the codes of the same system.

@@ -4,14 +4,13 @@ use super::Reconstruction;
 use super::manifest::Manifest;
 use super::resources::{Resources, resource_setters};
 use super::start::{Start, scratch_folder};
-use crate::error::{Error, Result};
-use crate::levels;
 use crate::params::Params;
-use crate::stages::export::check_name;
-use crate::stages::order::PAGE;
-use crate::workspace::memory::MemoryPool;
-use crate::workspace::progress::{Cancel, Observer};
-use crate::workspace::{Found, Storage};
+use outcrop_disk::error::{Error, Result};
+use outcrop_disk::workspace::memory::MemoryPool;
+use outcrop_disk::workspace::progress::{Cancel, Observer};
+use outcrop_disk::workspace::{Found, Storage};
+use outcrop_mesh_files::export::check_name;
+use outcrop_stages::order::PAGE;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
@@ -145,7 +144,10 @@ impl Builder {
 
 /// The folder of the tileset, if the output is one.
 fn tiles(output: &Path, split: bool) -> Result<Option<PathBuf>> {
-    if output.file_name().is_none_or(|name| name != levels::NAME) {
+    if output
+        .file_name()
+        .is_none_or(|name| name != outcrop_levels::NAME)
+    {
         return Ok(None);
     }
     let refuse = |found: String, expected: &str| {

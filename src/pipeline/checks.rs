@@ -1,14 +1,14 @@
 //! Checks between the stages.
 
-use crate::error::{Error, Result};
-use crate::geom::lattice::Lattice;
 use crate::params::{Params, Radius};
 use crate::report::DiskEstimate;
-use crate::stages::cells::{CellStats, DiskRadius};
-use crate::stages::export::{folder_of, is_square_of};
-use crate::stages::ingest::{self, Classes};
-use crate::stages::order::StoredPoints;
-use crate::workspace::{Workspace, limits};
+use outcrop_disk::error::{Error, Result};
+use outcrop_disk::workspace::{Workspace, limits};
+use outcrop_geom::lattice::Lattice;
+use outcrop_mesh_files::export::{folder_of, is_square_of};
+use outcrop_points::Classes;
+use outcrop_stages::cells::{CellStats, DiskRadius};
+use outcrop_stages::order::StoredPoints;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
@@ -22,7 +22,7 @@ pub(super) fn disk_radius(radius: Radius, store: &StoredPoints, lattice: &Lattic
         Radius::Length(length) => DiskRadius::Steps((length / lattice.step).min(LARGEST_RADIUS)),
         Radius::Percent(percent) => {
             let bounds = store.bounds();
-            let diagonal = (crate::geom::distance2(bounds.min, bounds.max) as f64).sqrt();
+            let diagonal = (outcrop_geom::distance2(bounds.min, bounds.max) as f64).sqrt();
             DiskRadius::Steps((percent / 100.0 * diagonal).min(LARGEST_RADIUS))
         }
     }
@@ -77,7 +77,7 @@ pub(super) fn not_an_input(output: &Path, split: bool, inputs: &[PathBuf]) -> Re
     let absolute = |path: &Path| path.canonicalize().ok();
     let folder = absolute(folder_of(output));
     let several = folder.map(|folder| folder.join(output.file_name().unwrap_or_default()));
-    for input in ingest::expand(inputs)?.iter().filter(|_| split) {
+    for input in outcrop_points::expand(inputs)?.iter().filter(|_| split) {
         let taken = |input: PathBuf| is_square_of(several.as_deref()?, &input).then_some(input);
         if let Some(input) = absolute(input).and_then(taken) {
             return Err(Error::Parameter {
@@ -96,7 +96,7 @@ pub(super) fn not_an_input(output: &Path, split: bool, inputs: &[PathBuf]) -> Re
     let Ok(output) = output.canonicalize() else {
         return Ok(());
     };
-    for input in ingest::expand(inputs)? {
+    for input in outcrop_points::expand(inputs)? {
         if input.canonicalize().is_ok_and(|input| input == output) {
             return Err(Error::Parameter {
                 name: "--output",
@@ -112,7 +112,7 @@ pub(super) fn not_an_input(output: &Path, split: bool, inputs: &[PathBuf]) -> Re
 pub(super) fn one_system(params: &Params, inputs: &[PathBuf]) -> Result<()> {
     match params.ignore_crs || params.crs.is_some() {
         true => Ok(()),
-        false => ingest::check_systems(inputs),
+        false => outcrop_points::check_systems(inputs),
     }
 }
 

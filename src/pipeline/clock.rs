@@ -1,8 +1,8 @@
 //! Stages as steps of a run, with their time.
 
-use crate::error::Result;
 use crate::report::{PartReport, StageReport};
-use crate::workspace::Workspace;
+use outcrop_disk::error::Result;
+use outcrop_disk::workspace::Workspace;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;

@@ -9,14 +9,14 @@
 //! Unneeded files are not counted. They are deleted as soon as the deletion is synced
 //! (`workspace/keeper.rs`), within a moment.
 
-use crate::error::{Error, Result};
-use crate::geom::aabb::Aabb;
-use crate::geom::lattice::Lattice;
 use crate::params::{Method, Params, Smooth};
 use crate::report::DiskEstimate;
-use crate::stages::export::{self, CoordinateType, Mesh};
-use crate::stages::ingest::{self, Attributes, Column, Probe, Selection, Spool};
-use crate::stages::order::StoredPoints;
+use outcrop_disk::error::{Error, Result};
+use outcrop_geom::aabb::Aabb;
+use outcrop_geom::lattice::Lattice;
+use outcrop_mesh_files::export::{self, CoordinateType, Mesh};
+use outcrop_points::{Attributes, Column, Probe, Selection, Spool};
+use outcrop_stages::order::StoredPoints;
 use std::path::{Path, PathBuf};
 
 /// Bytes of a position that is not packed: in sorted runs, and in the spool if its source has integers or
@@ -50,7 +50,7 @@ const COMPRESSED: [f64; 2] = [0.55, 0.45];
 pub(crate) const SCANNER: u64 = 4;
 
 /// Bytes of a normal that a point brings.
-pub(crate) const NORMAL: u64 = ingest::NORMAL_BYTES as u64;
+pub(crate) const NORMAL: u64 = outcrop_points::NORMAL_BYTES as u64;
 
 /// Bytes that tell how far a point moved, if the mesh has them.
 pub(crate) fn displaced(attributes: &Attributes) -> u64 {
@@ -131,8 +131,8 @@ impl Known {
     pub fn from_headers(inputs: &[PathBuf], selection: &Selection) -> Option<Self> {
         let mut known = Self::default();
         let mut probes = Vec::new();
-        for path in ingest::expand(inputs).ok()? {
-            let probe = ingest::probe_as(&path, &selection.layout).ok()?;
+        for path in outcrop_points::expand(inputs).ok()? {
+            let probe = outcrop_points::probe_as(&path, &selection.layout).ok()?;
             let points = probe.points_likely;
             known.read += points;
             let values = probe.value_bytes(&selection.attributes);
@@ -300,7 +300,7 @@ fn double(probes: &[Probe]) -> Option<bool> {
             largest = largest.max(c.abs());
         }
     }
-    Some(ingest::enough_for(step, largest) == ingest::CoordinateType::F64)
+    Some(outcrop_points::enough_for(step, largest) == outcrop_points::CoordinateType::F64)
 }
 
 #[cfg(test)]

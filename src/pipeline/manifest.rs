@@ -2,10 +2,9 @@
 //! resumed only with the same ones.
 
 use super::{Builder, Reconstruction};
-use crate::error::{Error, Result};
 use crate::params::Params;
-use crate::stages::ingest;
-use crate::stages::surface::evidence::Division;
+use outcrop_disk::error::{Error, Result};
+use outcrop_stages::surface::evidence::Division;
 use serde::{Deserialize, Serialize};
 use std::ffi::OsString;
 use std::fs::File;
@@ -114,9 +113,9 @@ pub(super) struct Manifest {
 impl Manifest {
     /// Makes the manifest of a run; samples every input.
     pub fn of(job: &Reconstruction) -> Result<Self> {
-        let mut files = ingest::expand(&job.inputs)?;
+        let mut files = outcrop_points::expand(&job.inputs)?;
         // What they say is in the mesh.
-        let beside = files.iter().map(|file| ingest::prj_of(file));
+        let beside = files.iter().map(|file| outcrop_points::prj_of(file));
         let mut beside: Vec<PathBuf> = beside.filter(|path| path.is_file()).collect();
         beside.sort();
         beside.dedup();

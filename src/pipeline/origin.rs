@@ -1,10 +1,10 @@
 //! The origin of the mesh's coordinates (`--origin`): a lattice position, so that local coordinates are whole
 //! numbers of steps.
 
-use crate::error::{Error, Result};
-use crate::geom::aabb::Aabb;
-use crate::geom::lattice::{COORDINATE_LIMIT, Lattice, Shift};
-use crate::stages::ingest::{self, CoordinateType};
+use outcrop_disk::error::{Error, Result};
+use outcrop_geom::aabb::Aabb;
+use outcrop_geom::lattice::{COORDINATE_LIMIT, Lattice, Shift};
+use outcrop_points::CoordinateType;
 
 /// Units of automatic origins, if they are whole numbers of steps. Adjacent clouds are likely to have the same
 /// multiple of a large unit.
@@ -105,7 +105,7 @@ impl Steps<'_> {
     pub fn precision(&self, shift: &Shift, bounds: Aabb) -> CoordinateType {
         let corners = [bounds.min, bounds.max].map(|corner| self.lattice.shifted(corner, shift));
         let largest = corners.as_flattened().iter();
-        ingest::enough_for(self.coarse, largest.fold(0.0, |m, c| m.max(c.abs())))
+        outcrop_points::enough_for(self.coarse, largest.fold(0.0, |m, c| m.max(c.abs())))
     }
 }
 

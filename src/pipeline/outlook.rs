@@ -1,7 +1,7 @@
 //! Times of the stages of a run, for its progress.
 
 use crate::params::{Method, Params};
-use crate::workspace::outlook::Planned;
+use outcrop_disk::workspace::outlook::Planned;
 
 /// Microseconds that a stage takes for each point on one thread: 100 M points in 512 MiB (BENCHMARKS.md, "Large
 /// clouds in 1 GiB" and "Values of points"), of noisy stages between a clean surface and an outdoor scan.

@@ -1,8 +1,8 @@
 //! Resources of runs of all kinds, and the methods that set them.
 
 use super::{Start, default_memory, default_threads};
-use crate::workspace::Storage;
-use crate::workspace::progress::{Cancel, Observer, Silent};
+use outcrop_disk::workspace::Storage;
+use outcrop_disk::workspace::progress::{Cancel, Observer, Silent};
 use std::path::PathBuf;
 use std::sync::Arc;
 

@@ -1,15 +1,15 @@
 //! A run that tasks share, perhaps on several machines: its plan, the work of a task, and the work between
-//! two generations of tasks. [`crate::workspace::generations`] has the files.
+//! two generations of tasks. [`outcrop_disk::workspace::generations`] has the files.
 
 use super::checks::{all_are_kept, not_an_input, one_system, writable};
 use super::manifest::Manifest;
 use super::{Builder, Known, Reconstruction};
-use crate::error::{Error, Result};
 use crate::report::Report;
-use crate::stages::export;
-use crate::workspace::generations::{Generation, Opened, Resources, SharedFolder};
-use crate::workspace::journal::{Sharing, Took};
-use crate::workspace::{Workspace, limits};
+use outcrop_disk::error::{Error, Result};
+use outcrop_disk::workspace::generations::{Generation, Opened, Resources, SharedFolder};
+use outcrop_disk::workspace::journal::{Sharing, Took};
+use outcrop_disk::workspace::{Workspace, limits};
+use outcrop_mesh_files::export;
 use std::hash::{BuildHasher, Hasher};
 use std::io::Read;
 use std::path::Path;

@@ -1,6 +1,6 @@
 //! The place of scratch files, and the treatment of an unfinished run.
 
-use crate::stages::export;
+use outcrop_mesh_files::export;
 use std::path::{Path, PathBuf};
 
 /// Treatment of an unfinished run in the scratch folder.

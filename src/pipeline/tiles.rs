@@ -2,11 +2,11 @@
 
 use super::resources::{Resources, resource_setters};
 use super::{Start, start::scratch_folder};
-use crate::error::{Error, Result};
-use crate::levels::{self, Options, TilesReport};
-use crate::workspace::memory::MemoryPool;
-use crate::workspace::progress::{Cancel, Observer};
-use crate::workspace::{Folder, Found, Storage, Workspace, fault};
+use outcrop_disk::error::{Error, Result};
+use outcrop_disk::workspace::memory::MemoryPool;
+use outcrop_disk::workspace::progress::{Cancel, Observer};
+use outcrop_disk::workspace::{Folder, Found, Storage, Workspace, fault};
+use outcrop_levels::{Options, TilesReport};
 use serde::{Deserialize, Serialize};
 use std::fs::File;
 use std::os::unix::fs::{FileExt, MetadataExt};
@@ -161,14 +161,14 @@ impl Tiles {
     /// files; [`Error::Memory`] if the budget is too small; [`Error::Io`], [`Error::Disk`], [`Error::Corrupt`],
     /// [`Error::Cancelled`]; those of an unfinished run, as of [`crate::Reconstruction::run`].
     pub fn run(&self) -> Result<TilesReport> {
-        levels::check_folder(&self.folder)?;
+        outcrop_levels::check_folder(&self.folder)?;
         let workspace = self.open()?;
         let outcome = self.make(&workspace);
         let path = self.scratch_folder();
         let keep = outcome.as_ref().is_err_and(Error::can_resume) && Folder::has_progress(&path);
         if !keep {
             workspace.remove(outcome.is_ok());
-            levels::remove_unfinished(&self.folder);
+            outcrop_levels::remove_unfinished(&self.folder);
         }
         drop(workspace);
         fault::finish();
@@ -178,6 +178,6 @@ impl Tiles {
     fn make(&self, workspace: &Workspace) -> Result<TilesReport> {
         let source = self.mesh.file_name().unwrap_or_default();
         let source = source.to_string_lossy();
-        levels::tileset(&self.mesh, &source, &self.folder, &self.options, workspace)
+        outcrop_levels::tileset(&self.mesh, &source, &self.folder, &self.options, workspace)
     }
 }

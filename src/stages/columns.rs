@@ -4,14 +4,14 @@
 //! any closed body. At both ends of the columns along all three axes a body faces outwards, a room inwards. A
 //! column has a square base; there is about one for every 64 points.
 
-use crate::error::Result;
-use crate::geom::Point;
-use crate::method::METHOD;
-use crate::spill::{Id, Table};
-use crate::stages::blocks::Blocks;
-use crate::stages::order::PointStore;
-use crate::workspace::Unit;
-use crate::workspace::memory::bytes_of;
+use crate::blocks::Blocks;
+use crate::order::PointStore;
+use outcrop_disk::error::Result;
+use outcrop_disk::spill::{Id, Table};
+use outcrop_disk::workspace::Unit;
+use outcrop_disk::workspace::memory::bytes_of;
+use outcrop_geom::Point;
+use outcrop_geom::method::METHOD;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// One of the two directions along an axis.
@@ -111,8 +111,8 @@ impl Columns {
 /// points equally far the one with the smallest id.
 ///
 /// # Errors
-/// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
-/// [`crate::Error::Cancelled`].
+/// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`], [`outcrop_disk::error::Error::Memory`],
+/// [`outcrop_disk::error::Error::Cancelled`].
 pub fn extreme(
     store: &PointStore,
     direction: Direction,

@@ -1,8 +1,8 @@
 //! A number from 0 to 3 for each point of a range, four in a byte.
 
-use crate::error::Result;
-use crate::workspace::Workspace;
-use crate::workspace::memory::Reservation;
+use outcrop_disk::error::Result;
+use outcrop_disk::workspace::Workspace;
+use outcrop_disk::workspace::memory::Reservation;
 use std::ops::Range;
 
 /// Numbers in a byte.
@@ -23,7 +23,7 @@ impl HeldLevels {
     /// Reserves the memory under a name.
     ///
     /// # Errors
-    /// [`crate::Error::Memory`].
+    /// [`outcrop_disk::error::Error::Memory`].
     pub fn open(levels: Levels, name: &'static str, workspace: &Workspace) -> Result<Self> {
         let held = workspace.reserve(name, levels.bytes())?;
         Ok(Self {

@@ -6,10 +6,10 @@ use super::levels::Levels;
 use super::order::PointStore;
 use super::outside::Outside;
 use super::spacing::Density;
-use crate::error::Result;
-use crate::geom::Point;
-use crate::geom::triangle::on_a_line;
-use crate::workspace::memory::{bytes_of, table_bytes};
+use outcrop_disk::error::Result;
+use outcrop_disk::workspace::memory::{bytes_of, table_bytes};
+use outcrop_geom::Point;
+use outcrop_geom::triangle::on_a_line;
 use rustc_hash::FxHashMap;
 use std::ops::Range;
 
@@ -86,7 +86,7 @@ impl Located {
     /// Loads the positions of `block`, and of `vertices` in any order.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+    /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`].
     pub fn load(
         store: &PointStore,
         blocks: Blocks,
@@ -103,9 +103,10 @@ impl Located {
         Ok(located)
     }
 
-    /// Points by id, for tests.
-    #[cfg(test)]
-    pub(crate) fn of(points: &[Point]) -> Self {
+    /// Points by id, for unit tests.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn of(points: &[Point]) -> Self {
         Self {
             ids: 0..points.len() as u32,
             own: points.to_vec(),
@@ -116,7 +117,7 @@ impl Located {
     /// Adds the positions of those `vertices` that are not in the block.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+    /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`].
     pub fn add(&mut self, store: &PointStore, vertices: impl Iterator<Item = u32>) -> Result<()> {
         let count = self.ids.len() as u32;
         let is_far = |v: &u32| v.wrapping_sub(self.ids.start) >= count;

@@ -3,14 +3,14 @@
 
 use super::attributes::StoredNormals;
 use super::blocks::Blocks;
-use crate::error::Result;
-use crate::geom::plane::Normal;
-use crate::geom::{Point, sub};
-use crate::method::METHOD;
-use crate::stages::ingest::direction;
-use crate::stages::order::PointStore;
-use crate::workspace::memory::bytes_of;
-use crate::workspace::{Unit, Workspace};
+use crate::order::PointStore;
+use outcrop_disk::error::Result;
+use outcrop_disk::workspace::memory::bytes_of;
+use outcrop_disk::workspace::{Unit, Workspace};
+use outcrop_geom::method::METHOD;
+use outcrop_geom::plane::Normal;
+use outcrop_geom::{Point, sub};
+use outcrop_points::direction;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
@@ -75,7 +75,7 @@ impl<'a> Normals<'a> {
     /// The normals of a range of ids.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+    /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`].
     pub fn open(&self, unit: &Unit<'_>, ids: Range<u32>) -> Result<Given> {
         Ok(Given {
             ids: ids.clone(),
@@ -87,7 +87,7 @@ impl<'a> Normals<'a> {
     /// The normals of some ids, ascending, in their order: of neighbours anywhere in the cloud.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+    /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`].
     pub fn fetch(&self, unit: &Unit<'_>, ids: &[u32]) -> Result<Vec<Option<Normal>>> {
         let words = self.stored.open(unit, ids.iter().copied())?;
         Ok(words
@@ -245,7 +245,7 @@ impl Looked {
 /// Looks through the normals of all points.
 ///
 /// # Errors
-/// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`], [`crate::Error::Cancelled`].
+/// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`], [`outcrop_disk::error::Error::Memory`], [`outcrop_disk::error::Error::Cancelled`].
 pub fn look(
     normals: Normals<'_>,
     store: &PointStore,

@@ -6,11 +6,11 @@ use super::columns::{Direction, extreme};
 use super::normals::{Given, Normals, is_sample};
 use super::order::PointStore;
 use super::scanners::{Scanners, Seen};
-use crate::error::Result;
-use crate::geom::Point;
-use crate::spill::{Id, Table};
-use crate::workspace::memory::bytes_of;
-use crate::workspace::{Unit, Workspace};
+use outcrop_disk::error::Result;
+use outcrop_disk::spill::{Id, Table};
+use outcrop_disk::workspace::memory::bytes_of;
+use outcrop_disk::workspace::{Unit, Workspace};
+use outcrop_geom::Point;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
@@ -27,8 +27,8 @@ impl StoredExtremes {
     /// Finds them.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
-    /// [`crate::Error::Cancelled`].
+    /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`], [`outcrop_disk::error::Error::Memory`],
+    /// [`outcrop_disk::error::Error::Cancelled`].
     pub fn of(
         store: &PointStore,
         inward: bool,
@@ -46,7 +46,7 @@ impl StoredExtremes {
     /// Deletes the files.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], [`crate::Error::Disk`].
+    /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Disk`].
     pub fn release(&self, workspace: &Workspace) -> Result<()> {
         self.tables.iter().try_for_each(|t| t.release(workspace))
     }
@@ -179,7 +179,7 @@ impl<'a> Outside<'a> {
     /// Which side is out at the points of a block.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+    /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`].
     pub fn open(&self, unit: &Unit<'_>, blocks: Blocks, block: usize) -> Result<Known<'a>> {
         let ids = blocks.ids(block);
         Ok(match *self {

@@ -2,12 +2,12 @@
 //! of every surface that it saw.
 
 use super::attributes::StoredScanners;
-use crate::error::Result;
-use crate::geom::Point;
-use crate::geom::aabb::Aabb;
-use crate::geom::lattice::Lattice;
-use crate::workspace::Unit;
-use crate::workspace::memory::bytes_of;
+use outcrop_disk::error::Result;
+use outcrop_disk::workspace::Unit;
+use outcrop_disk::workspace::memory::bytes_of;
+use outcrop_geom::Point;
+use outcrop_geom::aabb::Aabb;
+use outcrop_geom::lattice::Lattice;
 use std::ops::Range;
 
 /// A position farther from the box around all points than this number of its diagonals is no scanner's.
@@ -77,7 +77,7 @@ impl<'a> Scanners<'a> {
     /// The scanners of the points of a block.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+    /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`].
     pub fn open(&self, unit: &Unit<'_>, ids: Range<u32>) -> Result<Seen<'a>> {
         Ok(Seen {
             first: ids.start,

@@ -1,14 +1,14 @@
 //! Local spacing by patch, and the limits of length that follow from it.
 
-use crate::error::Result;
-use crate::geom::Point;
-use crate::geom::distance2;
-use crate::geom::plane::{Moments, Normal};
-use crate::geom::triangle::area;
-use crate::method::METHOD;
-use crate::stages::levels::Levels;
-use crate::workspace::Workspace;
-use crate::workspace::memory::Reservation;
+use crate::levels::Levels;
+use outcrop_disk::error::Result;
+use outcrop_disk::workspace::Workspace;
+use outcrop_disk::workspace::memory::Reservation;
+use outcrop_geom::Point;
+use outcrop_geom::distance2;
+use outcrop_geom::method::METHOD;
+use outcrop_geom::plane::{Moments, Normal};
+use outcrop_geom::triangle::area;
 use serde::{Deserialize, Serialize};
 
 /// A limit of length.
@@ -132,7 +132,7 @@ impl StoredSpacings {
     /// Reserves memory for a number of points.
     ///
     /// # Errors
-    /// [`crate::Error::Memory`].
+    /// [`outcrop_disk::error::Error::Memory`].
     pub fn reserve(points: usize, workspace: &Workspace) -> Result<Reservation> {
         workspace.reserve("patch spacings", Self::new(points).bytes())
     }
@@ -144,7 +144,7 @@ impl StoredSpacings {
     /// The spacings with a reservation of their memory.
     ///
     /// # Errors
-    /// [`crate::Error::Memory`].
+    /// [`outcrop_disk::error::Error::Memory`].
     pub fn open(self, workspace: &Workspace) -> Result<Spacings> {
         let held = workspace.reserve("patch spacings", self.bytes())?;
         Ok(Spacings {
@@ -266,7 +266,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn spacings(usual2: Vec<u64>) -> Spacings {
-        let workspace = Workspace::for_tests(1);
+        let workspace = Workspace::for_tests(1).expect("a scratch folder");
         let mut stored = StoredSpacings::new(METHOD.curve.patch * usual2.len());
         stored.put(0, &usual2, 0);
         stored.open(&workspace).unwrap()

@@ -3,10 +3,10 @@
 use super::assets::{LICENCES, PAGE, SCRIPT, STYLE};
 use super::folder::{Folder, Opened};
 use super::tileset::{Tile, Tileset};
-use crate::error::{Error, Result};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use base64::write::EncoderWriter;
+use outcrop_disk::error::{Error, Result};
 use serde::Serialize;
 use std::cmp::Ordering;
 use std::collections::{BTreeSet, BinaryHeap};

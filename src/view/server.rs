@@ -3,7 +3,7 @@
 use super::connection::Site;
 use super::folder::Folder;
 use super::tileset::Tileset;
-use crate::error::{Error, Result};
+use outcrop_disk::error::{Error, Result};
 use std::collections::HashMap;
 use std::net::{Ipv4Addr, Shutdown, TcpListener, TcpStream};
 use std::path::Path;

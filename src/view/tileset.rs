@@ -1,6 +1,6 @@
 //! `tileset.json`: the tree of tiles.
 
-use crate::error::{Error, Result};
+use outcrop_disk::error::{Error, Result};
 use serde::de::{DeserializeOwned, IgnoredAny};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};

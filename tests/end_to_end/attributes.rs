@@ -2,11 +2,11 @@
 
 use crate::util::{self, Bench};
 use outcrop::params::Params;
-use outcrop::pipeline::Start;
-use outcrop::workspace::memory::MINIMUM_BUDGET;
-use outcrop::workspace::progress::{Cancel, Observer};
+use outcrop::Start;
 use outcrop::{Error, Smooth};
 use outcrop_cloudgen::{Cloud, Kind};
+use outcrop_disk::workspace::memory::MINIMUM_BUDGET;
+use outcrop_disk::workspace::progress::{Cancel, Observer};
 use std::collections::HashMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

@@ -2,9 +2,9 @@
 
 use crate::util::{self, Bench};
 use outcrop::params::Params;
-use outcrop::pipeline::Builder;
-use outcrop::workspace::memory::MINIMUM_BUDGET;
+use outcrop::Builder;
 use outcrop_cloudgen::{Cloud, Kind};
+use outcrop_disk::workspace::memory::MINIMUM_BUDGET;
 use std::fs::File;
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};

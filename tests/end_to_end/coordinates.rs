@@ -4,9 +4,9 @@ use crate::util::{self, Bench};
 use outcrop::inspect::compare::{Comparison, Options, compare};
 use outcrop::params::{Origin, Params};
 use outcrop::report::CoordinateType;
-use outcrop::workspace::Workspace;
-use outcrop::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
-use outcrop::workspace::progress::{Cancel, Silent};
+use outcrop_disk::workspace::Workspace;
+use outcrop_disk::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
+use outcrop_disk::workspace::progress::{Cancel, Silent};
 use outcrop_ply::{Header, Mesh};
 use serde_json::Value;
 use std::path::Path;
@@ -353,7 +353,7 @@ fn values_stay_with_their_points_when_others_are_left_out() {
     let write =
         |name: &str, lines: &[String]| bench.write(name, header(lines.len()) + &lines.concat());
     let params = Params {
-        attributes: outcrop::stages::ingest::Attributes::Auto,
+        attributes: outcrop_points::Attributes::Auto,
         ..Params::default()
     };
     let (near, alone) = (write("near.ply", &lines), bench.path("alone.ply"));

@@ -3,10 +3,10 @@
 
 use crate::util::{self, Bench};
 use outcrop::params::Params;
-use outcrop::workspace::mapped::Io;
-use outcrop::workspace::memory::MINIMUM_BUDGET;
-use outcrop::workspace::{Compression, Storage};
 use outcrop_cloudgen::{Cloud, Format, Kind, LasOptions};
+use outcrop_disk::workspace::mapped::Io;
+use outcrop_disk::workspace::memory::MINIMUM_BUDGET;
+use outcrop_disk::workspace::{Compression, Storage};
 use std::path::{Path, PathBuf};
 
 /// Settings that must not affect the mesh.

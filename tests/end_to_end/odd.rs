@@ -4,8 +4,8 @@
 use crate::util::{self, Bench};
 use outcrop::Error;
 use outcrop::params::{Method, Params, Radius, Smoothing};
-use outcrop::workspace::memory::MINIMUM_BUDGET;
 use outcrop_cloudgen::{Cloud, Kind, NoiseMode, Odd};
+use outcrop_disk::workspace::memory::MINIMUM_BUDGET;
 use proptest::prelude::*;
 use std::path::Path;
 

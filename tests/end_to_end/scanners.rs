@@ -2,8 +2,8 @@
 
 use crate::util::{self, Bench};
 use outcrop::Report;
-use outcrop::inspect::ply_mesh::{PlyMesh, Sink};
 use outcrop::params::Params;
+use outcrop_codecs::ply_mesh::{PlyMesh, Sink};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 

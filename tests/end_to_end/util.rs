@@ -3,12 +3,12 @@
 
 use outcrop::inspect::verify::{Verdict, verify};
 use outcrop::params::Params;
-use outcrop::pipeline::{Builder, Reconstruction};
+use outcrop::{Builder, Reconstruction};
 use outcrop::report::Report;
-use outcrop::workspace::Workspace;
-use outcrop::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
-use outcrop::workspace::progress::{Cancel, Silent};
 use outcrop_cloudgen::{Cloud, Format};
+use outcrop_disk::workspace::Workspace;
+use outcrop_disk::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
+use outcrop_disk::workspace::progress::{Cancel, Silent};
 use std::ffi::OsStr;
 use std::hash::Hasher;
 use std::path::{Path, PathBuf};

@@ -1,7 +1,7 @@
 //! Warnings about files that do not belong together.
 
 use crate::bench::{Bench, cloud, write_las};
-use outcrop::stages::ingest::{CrsSource, check_systems};
+use outcrop_points::{CrsSource, check_systems};
 use std::path::{Path, PathBuf};
 
 /// A file with these records of its reference system.

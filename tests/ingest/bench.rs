@@ -1,11 +1,11 @@
 //! Makes input files and reads them back.
 
 use outcrop::Error;
-use outcrop::geom::lattice::Lattice;
-use outcrop::stages::ingest::{Spool, ingest};
-use outcrop::workspace::Workspace;
-use outcrop::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
-use outcrop::workspace::progress::{Cancel, Silent};
+use outcrop_disk::workspace::Workspace;
+use outcrop_disk::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
+use outcrop_disk::workspace::progress::{Cancel, Silent};
+use outcrop_geom::lattice::Lattice;
+use outcrop_points::{Spool, ingest};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};

@@ -4,7 +4,7 @@ use crate::bench::Bench;
 use crate::columns::{read, rows};
 use crate::formats::e57::{Scan, cartesian, edited};
 use e57::{Record, RecordDataType, RecordName, RecordValue};
-use outcrop::stages::ingest::{Depth, Selection, ingest_selected};
+use outcrop_points::{Depth, Selection, ingest_selected};
 use proptest::prelude::*;
 use std::path::{Path, PathBuf};
 

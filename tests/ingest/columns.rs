@@ -2,8 +2,8 @@
 
 use super::bench::{Bench, cloud, write_las};
 use outcrop::Error;
-use outcrop::geom::Point;
-use outcrop::stages::ingest::{Attributes, Carried, Selection, Spool, ingest_selected, probe};
+use outcrop_geom::Point;
+use outcrop_points::{Attributes, Carried, Selection, Spool, ingest_selected, probe};
 use std::path::{Path, PathBuf};
 
 fn selection(list: &str) -> Selection {

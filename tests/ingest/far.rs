@@ -1,8 +1,8 @@
 //! Points far from all others do not coarsen the lattice.
 
 use crate::bench::{Bench, cloud, ply, positions, write_las};
-use outcrop::geom::lattice::Lattice;
-use outcrop::stages::ingest::Spool;
+use outcrop_geom::lattice::Lattice;
+use outcrop_points::Spool;
 use std::path::PathBuf;
 
 /// The files, read, without far points; their lattice and the positions on it.

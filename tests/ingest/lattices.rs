@@ -1,7 +1,7 @@
 //! One lattice for all files.
 
 use crate::bench::{Bench, cloud, ply, positions, write_las};
-use outcrop::stages::ingest::CoordinateType;
+use outcrop_points::CoordinateType;
 use std::path::PathBuf;
 
 #[test]

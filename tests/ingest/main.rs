@@ -25,7 +25,7 @@ mod text_grammar;
 
 use bench::{Bench, based, cloud, ply, positions, write_las};
 use outcrop::Error;
-use outcrop::stages::ingest::{CoordinateType, Format, expand, probe};
+use outcrop_points::{CoordinateType, Format, expand, probe};
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
@@ -181,7 +181,7 @@ fn reads_a_large_scan() {
         "{} points: decoded in {read:.2?}, streamed in {:.2?}, at most {} MiB resident; {lattice:?}",
         spool.points(),
         start.elapsed() - read,
-        outcrop::workspace::limits::peak_resident() >> 20
+        outcrop_disk::workspace::limits::peak_resident() >> 20
     );
     assert_eq!(spool.points(), 10_653_336);
 }

@@ -3,7 +3,7 @@
 use crate::bench::Bench;
 use crate::formats::e57::{cartesian, pose};
 use e57::{E57Writer, Extension, Record, RecordDataType, RecordName, RecordValue};
-use outcrop::stages::ingest::{Attributes, Selection, direction, ingest_selected, probe};
+use outcrop_points::{Attributes, Selection, direction, ingest_selected, probe};
 use std::path::{Path, PathBuf};
 
 /// The short forms of the normals of three points at 0, 1 and 2 on the x axis.

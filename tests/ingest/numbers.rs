@@ -2,7 +2,7 @@
 
 use crate::bench::{Bench, positions};
 use outcrop::Error;
-use outcrop::stages::ingest::Spool;
+use outcrop_points::Spool;
 use std::fs::File;
 use std::io::Write as _;
 use std::path::PathBuf;

@@ -1,7 +1,7 @@
 //! Comments of PLY clouds: the origin of the coordinates, and the reference system.
 
 use crate::bench::Bench;
-use outcrop::stages::ingest::Spool;
+use outcrop_points::Spool;
 use std::path::Path;
 
 /// Points in text or binary, with a list among the properties or not.

@@ -3,7 +3,7 @@
 use crate::bench::{Bench, cloud, write_las};
 use laz::{LasZipCompressor, LazItemRecordBuilder, LazVlrBuilder};
 use outcrop::Region;
-use outcrop::stages::ingest::{Classes, Crop, Selection, Spool, ingest, ingest_selected};
+use outcrop_points::{Classes, Crop, Selection, Spool, ingest, ingest_selected};
 use std::io::{Cursor, Seek, SeekFrom};
 use std::path::PathBuf;
 

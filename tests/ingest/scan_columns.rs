@@ -5,7 +5,7 @@ use crate::columns::{read, rows};
 use crate::formats::e57::{Scan, cartesian, scaled, write};
 use crate::formats::{pcd, ptx};
 use e57::{Record, RecordDataType, RecordName, RecordValue};
-use outcrop::stages::ingest::{Selection, ingest_selected, probe};
+use outcrop_points::{Selection, ingest_selected, probe};
 use std::path::Path;
 
 fn names(path: &Path) -> Vec<String> {

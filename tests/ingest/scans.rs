@@ -6,7 +6,7 @@ use crate::formats::e57::{
 };
 use crate::formats::{pcd, ptx};
 use e57::{CartesianCoordinate, E57Reader, RecordDataType};
-use outcrop::stages::ingest::{CoordinateType, Format, probe};
+use outcrop_points::{CoordinateType, Format, probe};
 use std::path::{Path, PathBuf};
 
 #[test]

@@ -1,7 +1,7 @@
 //! Reference systems of files: where they stand, their kinds, and their units.
 
 use crate::bench::Bench;
-use outcrop::stages::ingest::{Crs, CrsKind, CrsSource};
+use outcrop_points::{Crs, CrsKind, CrsSource};
 use proptest::prelude::*;
 use std::path::Path;
 

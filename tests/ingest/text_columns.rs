@@ -3,7 +3,7 @@
 use crate::bench::Bench;
 use crate::columns::rows;
 use outcrop::Error;
-use outcrop::stages::ingest::{Attributes, IngestStats, Layout, Selection, Spool, ingest_selected};
+use outcrop_points::{Attributes, IngestStats, Layout, Selection, Spool, ingest_selected};
 use std::path::PathBuf;
 
 /// Reads a file with these columns of its points.

@@ -5,7 +5,7 @@ use super::homes::Side;
 use super::outside::Known as Out;
 use super::surface::{Surface, Triangle, fans};
 use super::{Settings, Weighing};
-use outcrop::geom::Point;
+use outcrop_geom::Point;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The T3 after the orientation.

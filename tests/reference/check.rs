@@ -2,7 +2,7 @@
 
 use super::Mesh;
 use super::surface::{Surface, Triangle};
-use outcrop::geom::sub;
+use outcrop_geom::sub;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The shape of a mesh.

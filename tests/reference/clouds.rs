@@ -1,6 +1,6 @@
 //! Small clouds that are difficult in various ways, made from a kind, a size and a seed.
 
-use outcrop::geom::Point;
+use outcrop_geom::Point;
 
 /// A sequence of pseudo-random numbers (SplitMix64).
 #[derive(Debug, Clone)]

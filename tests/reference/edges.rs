@@ -1,9 +1,9 @@
 //! Smoothing that preserves edges (section 3.2).
 
 use super::cells::by_distance;
-use outcrop::geom::lattice::COORDINATE_LIMIT;
-use outcrop::geom::plane::{Normal, least_direction};
-use outcrop::geom::{Point, distance2, sub};
+use outcrop_geom::lattice::COORDINATE_LIMIT;
+use outcrop_geom::plane::{Normal, least_direction};
+use outcrop_geom::{Point, distance2, sub};
 
 type Vec3 = [f64; 3];
 

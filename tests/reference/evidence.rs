@@ -7,7 +7,7 @@ use super::outside::{Known as Out, extreme};
 use super::patches::{Block, cosine, unit_normal, weight};
 use super::surface::{Edge, Surface, Triangle, alike, edges};
 use super::{Settings, Weighing};
-use outcrop::geom::Point;
+use outcrop_geom::Point;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Input: the T3 before they are oriented.

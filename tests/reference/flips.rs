@@ -1,7 +1,7 @@
 //! Flips of edges (section 8.1); neighbours are found by a search through all triangles.
 
 use super::surface::{Surface, Triangle, edges};
-use outcrop::geom::Point;
+use outcrop_geom::Point;
 use std::collections::BTreeSet;
 
 /// Sum of bends around an edge below which it is flat enough.

@@ -6,7 +6,7 @@ use super::repair::{ClockwiseAngle, pinched, run};
 use super::spacing::Density;
 use super::surface::{Component, Edge, Surface, Triangle};
 use super::{Settings, mend};
-use outcrop::geom::{Point, distance2, sub};
+use outcrop_geom::{Point, distance2, sub};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Counts of the loops.

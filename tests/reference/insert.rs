@@ -4,7 +4,7 @@ use super::base::{Base, is_interior};
 use super::homes::{Homes, Side};
 use super::surface::{Surface, Triangle, alike, edges, fans, opposite};
 use super::{Rejected, Settings};
-use outcrop::geom::{Point, distance2, sub};
+use outcrop_geom::{Point, distance2, sub};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// A candidate; the order of the fields is the rank.

@@ -3,7 +3,7 @@
 #[path = "mod.rs"]
 mod reference;
 
-use outcrop::geom::Point;
+use outcrop_geom::Point;
 use reference::base::base;
 use reference::check::check;
 use reference::clouds::Random;

@@ -6,7 +6,7 @@ use super::holes::{Filling, Holes};
 use super::insert::normal;
 use super::narrow::left_out;
 use super::surface::Edge;
-use outcrop::geom::distance2;
+use outcrop_geom::distance2;
 use std::collections::BTreeSet;
 
 /// Longer loops stay open.

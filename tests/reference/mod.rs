@@ -2,7 +2,7 @@
 //! document.
 //!
 //! It is compared with the program, and shares with it only what the method leaves to floating point: planes
-//! and cells (`outcrop::geom`). Everything else is written as plainly as possible. Nothing is optimised; a
+//! and cells (`outcrop_geom`). Everything else is written as plainly as possible. Nothing is optimised; a
 //! few hundred points are a large cloud.
 
 // Each test that includes this module uses a part of it.
@@ -33,7 +33,7 @@ pub mod surface;
 pub mod weighing;
 
 use holes::Filling;
-use outcrop::geom::Point;
+use outcrop_geom::Point;
 use outside::{Facing, Known, Scanner};
 use spacing::Density;
 use std::collections::{BTreeMap, BTreeSet};

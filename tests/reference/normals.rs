@@ -2,8 +2,8 @@
 
 use super::outside::{Known, Scanner};
 use super::{Given, Settings};
-use outcrop::geom::plane::{Moments, Plane};
-use outcrop::geom::{Point, sub};
+use outcrop_geom::plane::{Moments, Plane};
+use outcrop_geom::{Point, sub};
 
 /// The short form of a normal.
 pub type Short = [i32; 3];

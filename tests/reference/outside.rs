@@ -2,7 +2,7 @@
 
 use super::patches::unit_normal;
 use super::surface::Triangle;
-use outcrop::geom::Point;
+use outcrop_geom::Point;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The place of a scanner on the lattice.

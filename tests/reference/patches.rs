@@ -6,7 +6,7 @@ use super::homes::{Homes, Side};
 use super::insert::normal;
 use super::outside::{Known, facing};
 use super::surface::{Edge, Surface, Triangle, alike, edges};
-use outcrop::geom::Point;
+use outcrop_geom::Point;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The unit normal of the run i → j → k.

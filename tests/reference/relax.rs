@@ -3,8 +3,8 @@
 use super::Settings;
 use super::cells::{by_distance, widened_plane};
 use super::edges::{heights2, offset};
-use outcrop::geom::lattice::COORDINATE_LIMIT;
-use outcrop::geom::{Point, distance2};
+use outcrop_geom::lattice::COORDINATE_LIMIT;
+use outcrop_geom::{Point, distance2};
 
 /// The result of relaxing.
 pub struct Relaxed {

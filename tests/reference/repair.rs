@@ -4,7 +4,7 @@ use super::big::{Big, Big3, cross, determinant, dot, plus, vector};
 use super::insert::normal;
 use super::outside::{Known, facing};
 use super::surface::{Component, Edge, Surface, Triangle, edges};
-use outcrop::geom::Point;
+use outcrop_geom::Point;
 use std::collections::BTreeSet;
 
 /// Wide enough for every product below: the largest has about 300 bits.

@@ -4,8 +4,8 @@ use super::Settings;
 use super::cells::by_distance;
 use super::insert::normal;
 use super::surface::Triangle;
-use outcrop::geom::plane::{Moments, Normal, Plane};
-use outcrop::geom::{Point, distance2};
+use outcrop_geom::plane::{Moments, Normal, Plane};
+use outcrop_geom::{Point, distance2};
 
 /// Ids in a patch, and patches in a region.
 const PATCH: usize = 256;

@@ -1,13 +1,13 @@
 //! The points, the mesh, and what decides it.
 
 use super::super::parse::{region, system};
-use crate::method::METHOD;
 use crate::params::{
     Facing, InputNormals, MaxWidth, Method, Origin, Params, Radius, Region, Smooth, Smoothing,
 };
 use crate::pipeline::{Builder, Reconstruction};
-use crate::stages::ingest::{Attributes, Classes, GivenCrs, TextColumns};
 use clap::Args as ClapArgs;
+use outcrop_geom::method::METHOD;
+use outcrop_points::{Attributes, Classes, GivenCrs, TextColumns};
 use std::path::PathBuf;
 
 /// Selection of points by class and region.

@@ -1,7 +1,7 @@
 //! The shard of a task: from the command line, or from the index of an array job.
 
 use super::Work;
-use crate::error::{Error, Result};
+use outcrop_disk::error::{Error, Result};
 use std::path::Path;
 use std::str::FromStr;
 

@@ -3,8 +3,8 @@
 use super::Status;
 use crate::cli::output::{print, show};
 use crate::cli::{stop, style};
-use crate::error::Result;
 use crate::pipeline::{self, Begun, TaskState};
+use outcrop_disk::error::Result;
 use std::fmt::{Display, Formatter};
 
 /// Most shards of one kind that are listed.

@@ -5,8 +5,8 @@ mod slurm;
 
 use super::super::{DAMAGED, stop};
 use super::{After, Engine, Submit};
-use crate::error::{Error, Result};
 use crate::pipeline::{self, Status};
+use outcrop_disk::error::{Error, Result};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 

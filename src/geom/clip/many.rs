@@ -7,9 +7,9 @@
 //! point, all corners are tested, as in a small cell.
 
 use super::{Cell, Nearest, RIM_CORNERS, RIM_ID, Side};
-use crate::geom::predicate::{Neighbor, turn};
 use crate::kernels::eight::Base;
 use crate::kernels::{Line, SLACK, bisectors};
+use crate::predicate::{Neighbor, turn};
 use std::cell::OnceCell;
 use std::collections::{BTreeMap, BinaryHeap};
 

@@ -99,7 +99,7 @@ proptest! {
         let mut expected = Vec::new();
         for (x, &a) in all.iter().enumerate() {
             for &b in &all[x + 1..] {
-                if crate::geom::predicate::turn(normal, a.difference, b.difference) == 0 {
+                if crate::predicate::turn(normal, a.difference, b.difference) == 0 {
                     continue;
                 }
                 let kept = all.iter().filter(|c| c.id != a.id && c.id != b.id)

@@ -1,7 +1,7 @@
 //! Conservative tests whether boxes and points can touch a cell.
 
 use super::{Cell, RIM_PLACES};
-use crate::geom::Point;
+use crate::Point;
 use crate::kernels::eight::Eight;
 use crate::kernels::{LANES, Place, bisectors_body, kernel, touching_body, touching_places_body};
 

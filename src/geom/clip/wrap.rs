@@ -11,13 +11,13 @@ mod hull;
 use super::lines::meet_columns;
 use super::touch::differences;
 use super::{RIM_DISTANCE, secure2};
-use crate::geom::Point;
-use crate::geom::plane::Normal;
+use crate::Point;
 use crate::kernels::eight::{Eight, loaded, stored};
 use crate::kernels::sixteen::Sixteen;
 use crate::kernels::{
     Frame, LANES, Level, LineGroup, Place, SLACK, bisectors_body, kernel, touching_places_body,
 };
+use crate::plane::Normal;
 use hull::hulls;
 
 /// Most points whose cells are computed together, one in each lane.

@@ -1,9 +1,9 @@
 //! Eigenvalues of a scatter matrix and the direction of least scatter, for one point or eight at a time.
 
 use super::{NORMAL_SCALE, Normal};
-use crate::geom::round::rounded;
 use crate::kernels::numbers::Numbers;
 use crate::method::METHOD;
+use crate::round::rounded;
 
 /// A scatter matrix that is not zero, divided by the largest of its diagonal, and its eigenvalues.
 #[derive(Debug, Clone, Copy)]

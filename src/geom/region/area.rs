@@ -1,7 +1,7 @@
 //! Tests of points against a region: inside, or not farther from it than a margin.
 
 use super::{MOST_CORNERS, NoRegion, Region, in_range};
-use crate::geom::boxes::BoxTree;
+use crate::boxes::BoxTree;
 use robust::{Coord, orient2d};
 
 /// A polygon: its rings, each a list of corners without a repetition of the first. A point is inside if a ray

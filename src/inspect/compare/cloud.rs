@@ -2,10 +2,10 @@
 
 use super::pages::PageWriter;
 use super::shape::{Items, Kind, Shape, side, unusable, usable};
-use crate::error::{Error, Result};
-use crate::stages::ingest::ingest;
-use crate::stages::order::order;
-use crate::workspace::Workspace;
+use outcrop_disk::error::{Error, Result};
+use outcrop_disk::workspace::Workspace;
+use outcrop_points::ingest;
+use outcrop_stages::order::order;
 use std::path::Path;
 
 /// Points per page of the store between ingest and the pages.

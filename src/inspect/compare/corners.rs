@@ -3,11 +3,11 @@
 
 use super::shape::Shape;
 use super::triangles::Reading;
-use super::vector::V3;
-use crate::error::Result;
-use crate::inspect::ply_mesh::Sink;
-use crate::spill::{LocalTable, Sorted, Sorter, row};
-use crate::workspace::memory::Reservation;
+use outcrop_codecs::ply_mesh::Sink;
+use outcrop_disk::error::Result;
+use outcrop_disk::spill::{LocalTable, Sorted, Sorter, row};
+use outcrop_disk::workspace::memory::Reservation;
+use outcrop_geom::vector::V3;
 
 /// Vertices per section of the positions.
 const SECTION: usize = 1 << 14;

@@ -2,12 +2,12 @@
 
 use super::pages::{Item, Pages};
 use super::shape::{Items, Shape};
-use super::vector::{Box3, V3, sub};
-use crate::error::Result;
-use crate::histogram::{Histogram, Tally};
-use crate::picture::{Canvas, OBLIQUE, Picture, TOP, canvas_bytes};
-use crate::workspace::Workspace;
-use crate::workspace::memory::Reservation;
+use outcrop_disk::error::Result;
+use outcrop_disk::workspace::Workspace;
+use outcrop_disk::workspace::memory::Reservation;
+use outcrop_draw::histogram::{Histogram, Tally};
+use outcrop_draw::picture::{Canvas, OBLIQUE, Picture, TOP, canvas_bytes};
+use outcrop_geom::vector::{Box3, V3, sub};
 use outcrop_raster::View;
 use rayon::prelude::*;
 
@@ -30,7 +30,7 @@ const DECADES: f64 = 8.0;
 const PARTS: f64 = (1u64 << 40) as f64;
 
 /// Pictures of a shape while they are drawn.
-pub(in crate::inspect) struct Sketch {
+pub(crate) struct Sketch {
     canvases: Vec<Canvas>,
     /// Subtracted from positions, so that they are small.
     middle: V3,

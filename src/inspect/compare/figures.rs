@@ -2,10 +2,10 @@
 
 use super::samples::Sample;
 use super::shape::{Kind, Side};
-use super::vector::V3;
-use crate::error::Result;
-use crate::spill::{Sorter, row};
-use crate::workspace::Workspace;
+use outcrop_disk::error::Result;
+use outcrop_disk::spill::{Sorter, row};
+use outcrop_disk::workspace::Workspace;
+use outcrop_geom::vector::V3;
 use serde::Serialize;
 use std::fmt;
 

@@ -4,10 +4,10 @@ use super::Options;
 use super::pages::{Item, Pages, Searcher};
 use super::samples::{self, Sample};
 use super::shape::{Items, Shape};
-use super::vector::V3;
-use crate::error::Result;
-use crate::workspace::memory::Reservation;
-use crate::workspace::{Workspace, lock};
+use outcrop_disk::error::Result;
+use outcrop_disk::workspace::memory::Reservation;
+use outcrop_disk::workspace::{Workspace, lock};
+use outcrop_geom::vector::V3;
 use rayon::prelude::*;
 use std::sync::Mutex;
 

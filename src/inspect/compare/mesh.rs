@@ -8,12 +8,12 @@ use super::Options;
 use super::corners::Joined;
 use super::shape::{Shape, usable};
 use super::triangles::{KeyedTriangle, Reading};
-use super::vector::{Box3, V3};
-use crate::error::Result;
-use crate::inspect::ply_mesh::{PlyMesh, Sink};
-use crate::spill::Sorter;
-use crate::workspace::Workspace;
-use crate::workspace::memory::Reservation;
+use outcrop_codecs::ply_mesh::{PlyMesh, Sink};
+use outcrop_disk::error::Result;
+use outcrop_disk::spill::Sorter;
+use outcrop_disk::workspace::Workspace;
+use outcrop_disk::workspace::memory::Reservation;
+use outcrop_geom::vector::{Box3, V3};
 use std::path::Path;
 
 /// Bytes of a vertex in memory, with a bit for its use.

@@ -26,22 +26,20 @@ mod samples;
 mod shape;
 #[cfg(test)]
 mod tests;
-mod triangle;
 mod triangles;
-mod vector;
 
 pub use drawing::Illustration;
 use figures::DistanceRow;
 pub use figures::{Comparison, Distances, Figures};
 pub use shape::{Kind, Side};
-pub(crate) use triangle::distance2;
 
-use crate::error::{Error, Result};
-use crate::inspect::ply_mesh::{PlyMesh, clearer, holds_faces};
-use crate::picture::Picture;
-use crate::workspace::Workspace;
 use drawing::{Drawing, Sketch};
 use figures::Sums;
+use outcrop_codecs::ply_mesh::{PlyMesh, clearer, holds_faces};
+use outcrop_disk::error::{Error, Result};
+use outcrop_disk::workspace::Workspace;
+use outcrop_draw::picture::Picture;
+use outcrop_geom::vector::Box3;
 use samples::Numbers;
 use shape::Shape;
 use std::path::Path;
@@ -94,7 +92,7 @@ pub fn compare(a: &Path, b: &Path, options: &Options, workspace: &Workspace) -> 
     measured(a, b, options, false, workspace).map(|(comparison, _)| comparison)
 }
 
-/// As [`compare`], with pictures and distributions for [`crate::page::comparison`].
+/// As [`compare`], with pictures and distributions for [`outcrop::page::comparison`].
 ///
 /// # Errors
 /// See [`compare`].
@@ -108,7 +106,7 @@ pub fn illustrated(
 }
 
 /// Pictures of a mesh with marks; faces that cannot be drawn are left out.
-pub(in crate::inspect) fn marked(
+pub(crate) fn marked(
     path: &Path,
     marks: &[[f64; 3]],
     workspace: &Workspace,
@@ -146,7 +144,7 @@ fn measured(
     let buffer = bytes.min(workspace.memory.available() / 8) + (1 << 20);
     let (sorter, _held) = triangles::sorter(workspace, "compare.distances", buffer)?;
     let (min, max) = (a.side.min, a.side.max);
-    let diagonal = vector::Box3 { min, max }.diagonal();
+    let diagonal = Box3 { min, max }.diagonal();
     let drawing = drawn.then(|| Drawing::of(&a, &b, diagonal, workspace));
     let mut drawing = drawing.transpose()?;
     let mut sums = [Sums::default(); 2];

@@ -4,13 +4,13 @@
 //! The size of a page depends only on the number of items. For more items pages grow, and not their number,
 //! so the tree stays small.
 
-use super::triangle;
-use super::vector::{Box3, V3, dot, sub};
-use crate::error::Result;
-use crate::geom::boxes::BoxTree;
-use crate::spill::{LocalTable, Row, Word};
-use crate::workspace::Workspace;
-use crate::workspace::memory::Reservation;
+use outcrop_disk::error::Result;
+use outcrop_disk::spill::{LocalTable, Row};
+use outcrop_disk::workspace::Workspace;
+use outcrop_disk::workspace::memory::Reservation;
+use outcrop_geom::boxes::BoxTree;
+use outcrop_geom::distance;
+use outcrop_geom::vector::{Box3, V3, dot, sub};
 use rustc_hash::FxHashMap;
 use std::cell::Cell;
 
@@ -43,14 +43,6 @@ pub(super) trait Item: Row {
     }
 }
 
-impl Row for V3 {
-    const PACKING: Option<&'static [Word]> = None;
-}
-
-impl Row for [V3; 3] {
-    const PACKING: Option<&'static [Word]> = None;
-}
-
 impl Item for V3 {
     fn bounds(&self) -> Box3 {
         Box3::of(&[*self])
@@ -68,7 +60,7 @@ impl Item for [V3; 3] {
     }
 
     fn distance2(&self, p: V3) -> f64 {
-        triangle::distance2(self, p)
+        distance::distance2(self, p)
     }
 
     fn is_beyond(&self, p: V3, limit: f64) -> bool {

@@ -4,11 +4,11 @@ use super::Options;
 use super::pages::Pages;
 use super::shape::{Items, Shape};
 use super::triangles::{area, sorter};
-use super::vector::{V3, add, scale, sub};
-use crate::error::Result;
-use crate::spill::row;
-use crate::workspace::Workspace;
 use oorandom::Rand64;
+use outcrop_disk::error::Result;
+use outcrop_disk::spill::row;
+use outcrop_disk::workspace::Workspace;
+use outcrop_geom::vector::{V3, add, scale, sub};
 
 /// Added to the seed, so that points on faces and vertices are chosen by independent numbers.
 const FACES: u128 = 1 << 64;

@@ -1,9 +1,9 @@
 //! One side of a comparison, as pages.
 
 use super::pages::Pages;
-use super::vector::{Box3, V3};
-use crate::error::Error;
-use crate::spill::LocalTable;
+use outcrop_disk::error::Error;
+use outcrop_disk::spill::LocalTable;
+use outcrop_geom::vector::{Box3, V3};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 

@@ -1,7 +1,7 @@
 use super::pages::{Item, PageWriter, Searcher};
-use super::triangle::distance2;
-use super::vector::{Box3, V3, add, dot, scale, sub};
-use crate::workspace::Workspace;
+use outcrop_disk::workspace::Workspace;
+use outcrop_geom::distance::distance2;
+use outcrop_geom::vector::{Box3, V3, add, dot, scale, sub};
 use proptest::prelude::*;
 
 /// Minimum of a convex function on `0..=1`.
@@ -49,7 +49,7 @@ fn check(triangle: &[V3; 3], p: V3) {
 /// Compares the nearest of `items` in pages with the least of all distances, from points that follow each
 /// other as samples do.
 fn check_nearest<T: Item + std::fmt::Debug>(items: &[T], from: &[V3]) {
-    let workspace = Workspace::for_tests(1);
+    let workspace = Workspace::for_tests(1).expect("a scratch folder");
     let mut writer = PageWriter::new(&workspace, "items", items.len() as u64).unwrap();
     items.iter().for_each(|item| writer.push(*item).unwrap());
     let pages = writer.finish().unwrap();

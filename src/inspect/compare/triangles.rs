@@ -4,12 +4,12 @@
 use super::Options;
 use super::pages::{PageWriter, Pages};
 use super::shape::{Items, Kind, Shape, side, unusable, usable};
-use super::vector::{Box3, V3, add, cross, dot, scale, sub};
-use crate::error::{Error, Result};
-use crate::spill::{LocalTable, Row, Sorter, row};
-use crate::workspace::Workspace;
-use crate::workspace::memory::Reservation;
 use oorandom::Rand64;
+use outcrop_disk::error::{Error, Result};
+use outcrop_disk::spill::{LocalTable, Row, Sorter, row};
+use outcrop_disk::workspace::Workspace;
+use outcrop_disk::workspace::memory::Reservation;
+use outcrop_geom::vector::{Box3, V3, add, cross, dot, scale, sub};
 use std::path::Path;
 
 row! {

@@ -8,9 +8,9 @@ use super::buckets::Buckets;
 use super::collinear::collinear;
 use super::plan::Plan;
 use super::positions::Positions;
-use crate::error::Result;
-use crate::spill::row;
-use crate::workspace::Workspace;
+use outcrop_disk::error::Result;
+use outcrop_disk::spill::row;
+use outcrop_disk::workspace::Workspace;
 
 row! {
     /// A triangle sent to the ranges of its middle and lowest corner.

@@ -4,11 +4,11 @@
 //! Only the place of a bucket's last block is kept, so memory does not grow with the number of rows. Rows
 //! are read in another order than they were written.
 
-use crate::error::Result;
-use crate::spill::Row;
-use crate::workspace::file::ScratchFile;
-use crate::workspace::place::Place;
-use crate::workspace::{Files, Workspace};
+use outcrop_disk::error::Result;
+use outcrop_disk::spill::Row;
+use outcrop_disk::workspace::file::ScratchFile;
+use outcrop_disk::workspace::place::Place;
+use outcrop_disk::workspace::{Files, Workspace};
 use std::sync::Arc;
 
 /// A block in the file, by its segment, offset and checksum. It is stored in front of the rows of the block

@@ -8,9 +8,9 @@
 use super::buckets::Buckets;
 use super::plan::Plan;
 use super::star;
-use crate::error::Result;
-use crate::spill::row;
-use crate::workspace::Workspace;
+use outcrop_disk::error::Result;
+use outcrop_disk::spill::row;
+use outcrop_disk::workspace::Workspace;
 
 /// Marks an unvisited vertex, or a component without outside neighbours.
 const NONE: u32 = u32::MAX;

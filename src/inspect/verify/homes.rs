@@ -4,9 +4,9 @@
 //! faces of a sample have there: its home. A vertex is shared if a face of another piece than its home has
 //! it. The triangles of all other vertices are in one piece.
 
-use crate::error::Result;
-use crate::inspect::ply_mesh::AnyPlace;
-use crate::workspace::{Workspace, lock};
+use outcrop_codecs::ply_mesh::AnyPlace;
+use outcrop_disk::error::Result;
+use outcrop_disk::workspace::{Workspace, lock};
 use std::ops::Range;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};

@@ -9,10 +9,10 @@ use super::plan::Plan;
 use super::positions::Positions;
 use super::star::Tally;
 use super::verdict::Verdict;
-use crate::error::Result;
-use crate::inspect::ply_mesh::{PlyMesh, Sink};
-use crate::workspace::Workspace;
-use crate::workspace::memory::Reservation;
+use outcrop_codecs::ply_mesh::{PlyMesh, Sink};
+use outcrop_disk::error::Result;
+use outcrop_disk::workspace::Workspace;
+use outcrop_disk::workspace::memory::Reservation;
 
 /// The mesh, ready for the sweep over the ranges.
 pub(super) struct Intake<'a> {

@@ -30,10 +30,10 @@ pub use bounds::Bounds;
 pub use places::{Illustration, Kind, Place};
 pub use verdict::Verdict;
 
-use super::ply_mesh::PlyMesh;
-use crate::error::Result;
-use crate::workspace::Workspace;
 use homes::Division;
+use outcrop_codecs::ply_mesh::PlyMesh;
+use outcrop_disk::error::Result;
+use outcrop_disk::workspace::Workspace;
 use places::Places;
 use plan::Plan;
 use std::path::Path;
@@ -51,10 +51,10 @@ pub struct Options {
 /// Checks the mesh file `mesh` (PLY) for every defect in [`Verdict`].
 ///
 /// # Errors
-/// [`crate::Error::Input`] if the file is not a readable PLY mesh; [`crate::Error::Io`],
-/// [`crate::Error::Corrupt`] from the scratch folder; [`crate::Error::Memory`] if the free part
+/// [`outcrop_disk::error::Error::Input`] if the file is not a readable PLY mesh; [`outcrop_disk::error::Error::Io`],
+/// [`outcrop_disk::error::Error::Corrupt`] from the scratch folder; [`outcrop_disk::error::Error::Memory`] if the free part
 /// of the budget is too small, or one vertex has more triangles than fit;
-/// [`crate::Error::Cancelled`].
+/// [`outcrop_disk::error::Error::Cancelled`].
 pub fn verify(mesh: &Path, workspace: &Workspace) -> Result<Verdict> {
     verify_with(mesh, &Options::default(), workspace)
 }
@@ -67,7 +67,7 @@ pub fn verify_with(mesh: &Path, options: &Options, workspace: &Workspace) -> Res
     examined(mesh, options, workspace).map(|(verdict, _)| verdict)
 }
 
-/// Like [`verify_with`], with pictures and the places of defects for [`crate::page::verdict`].
+/// Like [`verify_with`], with pictures and the places of defects for [`outcrop::page::verdict`].
 ///
 /// # Errors
 /// See [`verify`].

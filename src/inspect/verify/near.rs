@@ -9,9 +9,9 @@ use super::intake::Intake;
 use super::piece::Piece;
 use super::plan::Plan;
 use super::verdict::Verdict;
-use crate::error::Result;
-use crate::inspect::ply_mesh::{AnyPlace, PlyMesh};
-use crate::workspace::{Workspace, lock};
+use outcrop_codecs::ply_mesh::{AnyPlace, PlyMesh};
+use outcrop_disk::error::Result;
+use outcrop_disk::workspace::{Workspace, lock};
 use std::sync::Mutex;
 
 /// Fewest faces of a mesh that is read by pieces.

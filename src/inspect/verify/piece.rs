@@ -6,8 +6,8 @@ use super::collinear::collinear;
 use super::homes::{AT_A_TIME, AWAY, Division, Homes, Shared};
 use super::places::Kind;
 use super::star::{self, Inspector, NO_MORE, scratch_bytes};
-use crate::error::Result;
-use crate::inspect::ply_mesh::AnyPlace;
+use outcrop_codecs::ply_mesh::AnyPlace;
+use outcrop_disk::error::Result;
 
 /// Marks a vertex that is not in a graph.
 const NONE: u32 = u32::MAX;

@@ -1,11 +1,11 @@
 //! Places of defects: the vertices with the lowest numbers, for a picture.
 
 use super::verdict::Verdict;
-use crate::error::Result;
-use crate::inspect::compare::marked;
-use crate::inspect::ply_mesh::{PlyMesh, Sink};
-use crate::picture::Picture;
-use crate::workspace::Workspace;
+use crate::compare::marked;
+use outcrop_codecs::ply_mesh::{PlyMesh, Sink};
+use outcrop_disk::error::Result;
+use outcrop_disk::workspace::Workspace;
+use outcrop_draw::picture::Picture;
 use serde::Serialize;
 use std::path::Path;
 
@@ -175,7 +175,7 @@ pub(super) fn illustrate(
             places,
             reason: None,
         }),
-        Err(error @ crate::Error::Input { .. }) => Ok(Illustration {
+        Err(error @ outcrop_disk::error::Error::Input { .. }) => Ok(Illustration {
             places,
             reason: Some(error.to_string()),
             ..Illustration::default()

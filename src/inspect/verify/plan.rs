@@ -1,9 +1,9 @@
 //! Division of the free memory.
 
 use super::star;
-use crate::error::Result;
-use crate::workspace::Workspace;
-use crate::workspace::memory::Reservation;
+use outcrop_disk::error::Result;
+use outcrop_disk::workspace::Workspace;
+use outcrop_disk::workspace::memory::Reservation;
 
 /// Largest block that a bucket collects before it is written, in bytes.
 const LARGEST_BLOCK: u64 = 256 << 10;

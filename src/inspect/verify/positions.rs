@@ -2,9 +2,9 @@
 
 use super::buckets::Buckets;
 use super::plan::Plan;
-use crate::error::Result;
-use crate::spill::{LocalTable, row};
-use crate::workspace::Workspace;
+use outcrop_disk::error::Result;
+use outcrop_disk::spill::{LocalTable, row};
+use outcrop_disk::workspace::Workspace;
 
 row! {
     /// The position of a vertex.

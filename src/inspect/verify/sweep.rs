@@ -10,8 +10,8 @@ use super::places::Places;
 use super::plan::Plan;
 use super::star::{Inspector, Tally, scratch_bytes};
 use super::verdict::Verdict;
-use crate::error::Result;
-use crate::workspace::Workspace;
+use outcrop_disk::error::Result;
+use outcrop_disk::workspace::Workspace;
 
 /// The name of the memory for a star that is too large for the plan.
 const STAR: &str = "verify: star of one vertex";

@@ -1,10 +1,10 @@
 //! Unusual plans must not change a verdict.
 
 use super::*;
-use crate::error::Error;
-use crate::workspace::memory::MemoryPool;
-use crate::workspace::progress::{Cancel, Silent};
 use buckets::Buckets;
+use outcrop_disk::error::Error;
+use outcrop_disk::workspace::memory::MemoryPool;
+use outcrop_disk::workspace::progress::{Cancel, Silent};
 use outcrop_ply::{Encoding, Layout, Scalar};
 use proptest::prelude::*;
 use std::fmt::Write as _;
@@ -29,7 +29,7 @@ fn write(workspace: &Workspace, vertices: u32, faces: &[[u32; 3]]) -> std::path:
 
 #[test]
 fn no_plan_changes_the_verdict() {
-    let workspace = Workspace::for_tests(2);
+    let workspace = Workspace::for_tests(2).expect("a scratch folder");
     let options = Options::default();
     let faces = prop::collection::vec(prop::array::uniform3(0u32..40), 0..120);
     let plan = (0u32..7, 1usize..40, 1u64..200, 0usize..6, any::<bool>());
@@ -106,7 +106,7 @@ fn grid(keep: u64) -> Vec<[u32; 3]> {
 
 #[test]
 fn pieces_change_no_verdict() {
-    let workspace = Workspace::for_tests(2);
+    let workspace = Workspace::for_tests(2).expect("a scratch folder");
     let options = Options::default();
     let faces = (
         any::<u64>(),
@@ -152,7 +152,7 @@ fn pieces_change_no_verdict() {
 /// A mesh large enough to be read by pieces, in its order, in another, and with a face that is no triangle.
 #[test]
 fn large_meshes_are_read_by_pieces_if_their_order_allows() {
-    let workspace = Workspace::for_tests(2);
+    let workspace = Workspace::for_tests(2).expect("a scratch folder");
     let (rows, columns) = (1030u32, 1024u32);
     let id = |i: u32, j: u32| i * columns + j;
     let squares = (0..rows - 1).flat_map(|i| (0..columns - 1).map(move |j| (i, j)));
@@ -213,7 +213,7 @@ fn large_meshes_are_read_by_pieces_if_their_order_allows() {
 /// A fan around one vertex, larger than a range may be.
 #[test]
 fn large_stars() {
-    let workspace = Workspace::for_tests(2);
+    let workspace = Workspace::for_tests(2).expect("a scratch folder");
     let n = 30_000;
     let fan: Vec<_> = (0..n).map(|i| [n, i, (i + 1) % n]).collect();
     let path = write(&workspace, n + 1, &fan);
@@ -244,7 +244,7 @@ fn plans_fit_what_is_free() {
     ];
     for free in [64 << 20, 144 << 20, 1 << 30, 1 << 36] {
         let workspace = {
-            let memory = MemoryPool::new(free + crate::workspace::memory::OVERHEAD);
+            let memory = MemoryPool::new(free + outcrop_disk::workspace::memory::OVERHEAD);
             let Ok(memory) = memory else { continue };
             let parent = std::env::temp_dir();
             Workspace::new(&parent, memory, 2, Arc::new(Silent), Cancel::new()).unwrap()
@@ -270,7 +270,7 @@ fn plans_fit_what_is_free() {
 
 #[test]
 fn damage_to_a_bucket_is_found_and_named() {
-    let workspace = Workspace::for_tests(2);
+    let workspace = Workspace::for_tests(2).expect("a scratch folder");
     let mut buckets = Buckets::<[u32; 2]>::new(&workspace, "bucket", 3, 80).unwrap();
     for i in 0..1000u32 {
         buckets.push(i as usize % 3, [i, 7 * i]).unwrap();

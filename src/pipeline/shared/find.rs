@@ -2,9 +2,9 @@
 //! the folder for scratch files.
 
 use super::super::start::scratch_folder;
-use crate::error::{Error, Result};
-use crate::stages::export::folder_of;
-use crate::workspace::generations::SharedFolder;
+use outcrop_disk::error::{Error, Result};
+use outcrop_disk::workspace::generations::SharedFolder;
+use outcrop_mesh_files::export::folder_of;
 use std::ffi::{OsStr, OsString};
 use std::io::Read;
 use std::os::unix::ffi::{OsStrExt, OsStringExt};

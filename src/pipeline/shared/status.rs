@@ -1,9 +1,9 @@
 //! The state of a run that tasks share, for people and scripts.
 
-use crate::error::Result;
 use crate::pipeline::manifest::Manifest;
-use crate::workspace::generations::{Attempts, Generation, Shard, SharedFolder};
-use crate::workspace::journal::{OpenStep, Took};
+use outcrop_disk::error::Result;
+use outcrop_disk::workspace::generations::{Attempts, Generation, Shard, SharedFolder};
+use outcrop_disk::workspace::journal::{OpenStep, Took};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};

@@ -3,11 +3,11 @@
 use super::super::checks::not_a_line;
 use super::Stages;
 use super::values::Values;
-use crate::error::Result;
 use crate::params::Method;
-use crate::stages::cells::{CellOptions, CellTriples, DiskRadius, Widen, cells};
-use crate::stages::levels::HeldLevels;
-use crate::stages::located::Places;
+use outcrop_disk::error::Result;
+use outcrop_stages::cells::{CellOptions, CellTriples, DiskRadius, Widen, cells};
+use outcrop_stages::levels::HeldLevels;
+use outcrop_stages::located::Places;
 
 impl Stages<'_> {
     /// Computes the restricted Voronoi cells.

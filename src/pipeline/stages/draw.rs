@@ -2,15 +2,15 @@
 
 use super::Stages;
 use super::shape::Shape;
-use crate::error::{Error, Result};
-use crate::geom::lattice::Lattice;
 use crate::report::{Details, Drawn, Report};
-use crate::stages::cut::StoredPieces;
-use crate::stages::draw::{Finished, Subject, draw};
-use crate::stages::order::PointStore;
-use crate::stages::repair::Repaired;
-use crate::workspace::course::Course;
-use crate::workspace::limits;
+use outcrop_disk::error::{Error, Result};
+use outcrop_disk::workspace::course::Course;
+use outcrop_disk::workspace::limits;
+use outcrop_draw::mesh::{Finished, Subject, draw};
+use outcrop_geom::lattice::Lattice;
+use outcrop_mesh_files::cut::StoredPieces;
+use outcrop_stages::order::PointStore;
+use outcrop_stages::repair::Repaired;
 
 impl Stages<'_> {
     /// Draws the mesh, if pictures are wanted. What it reads is deleted with the folder: a run that was resumed

@@ -3,26 +3,24 @@
 use super::super::beside;
 use super::super::origin::Steps;
 use super::Stages;
-use crate::error::Result;
-use crate::geom::aabb::Aabb;
-use crate::geom::lattice::{Lattice, Shift};
-use crate::levels;
 use crate::params::Origin;
-use crate::stages::attributes::StoredColumns;
-use crate::stages::cut::StoredPieces;
-use crate::stages::export::{
+use outcrop_disk::error::Result;
+use outcrop_geom::aabb::Aabb;
+use outcrop_geom::lattice::{Lattice, Shift};
+use outcrop_mesh_files::cut::StoredPieces;
+use outcrop_mesh_files::export::{
     CoordinateType, ExportOptions, SplitOptions, export, export_cut, export_split,
 };
-use crate::stages::ingest;
-use crate::stages::order::PointStore;
-use crate::stages::repair::Repaired;
 use outcrop_ply::Place;
+use outcrop_stages::attributes::StoredColumns;
+use outcrop_stages::order::PointStore;
+use outcrop_stages::repair::Repaired;
 
 /// The type of coordinates in the mesh.
-pub(super) fn written(precision: ingest::CoordinateType) -> CoordinateType {
+pub(super) fn written(precision: outcrop_points::CoordinateType) -> CoordinateType {
     match precision {
-        ingest::CoordinateType::F32 => CoordinateType::Float,
-        ingest::CoordinateType::F64 => CoordinateType::Double,
+        outcrop_points::CoordinateType::F32 => CoordinateType::Float,
+        outcrop_points::CoordinateType::F64 => CoordinateType::Double,
     }
 }
 
@@ -126,8 +124,8 @@ impl Stages<'_> {
         workspace.trim();
         let source = job.inputs.first().and_then(|input| input.file_name());
         let source = source.unwrap_or_default().to_string_lossy();
-        let options = levels::Options::default();
-        let make = || levels::tileset(&job.mesh, &source, folder, &options, workspace);
+        let options = outcrop_levels::Options::default();
+        let make = || outcrop_levels::tileset(&job.mesh, &source, folder, &options, workspace);
         let triangles = self.report.mesh.triangles;
         self.report.tiles = Some(self.clock.stage("tiles", "triangles", triangles, make)?);
         Ok(())

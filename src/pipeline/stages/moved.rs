@@ -2,12 +2,12 @@
 
 use super::Stages;
 use super::values::Values;
-use crate::error::Result;
 use crate::params::{Method, Smooth};
-use crate::stages::attributes::displacement;
-use crate::stages::ingest::{Attribute, Column};
-use crate::stages::order::StoredPoints;
-use crate::stages::smooth::{Relaxed, Relaxing, relax, smooth};
+use outcrop_disk::error::Result;
+use outcrop_points::{Attribute, Column};
+use outcrop_stages::attributes::displacement;
+use outcrop_stages::order::StoredPoints;
+use outcrop_stages::smooth::{Relaxed, Relaxing, relax, smooth};
 
 impl Stages<'_> {
     /// Smooths the measured points, if requested or if they are noisy: returns the points of the mesh, and the

@@ -2,8 +2,7 @@
 
 use super::super::outlook;
 use super::Stages;
-use crate::levels;
-use crate::stages::export::is_compressed;
+use outcrop_mesh_files::export::is_compressed;
 
 impl Stages<'_> {
     /// Tells which stages are to come behind `after`, and how long they take for so many points.
@@ -15,7 +14,7 @@ impl Stages<'_> {
         let compressed = job.params.compress_glb || is_compressed(&job.mesh);
         let mut stages = outlook::plan(&job.params, points, job.threads, valued, compressed);
         if job.tiles.is_some() {
-            stages.extend(levels::outlook::of_points(points, job.threads));
+            stages.extend(outcrop_levels::outlook::of_points(points, job.threads));
         }
         let first = stages.iter().rposition(|stage| Some(stage.name) == after);
         job.observer.plan(&stages[first.map_or(0, |at| at + 1)..]);

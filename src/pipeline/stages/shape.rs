@@ -1,15 +1,15 @@
 //! The positions from which the surface is made.
 
 use super::Stages;
-use crate::error::Result;
-use crate::geom::lattice::Lattice;
 use crate::params::Method;
-use crate::stages::levels::HeldLevels;
-use crate::stages::located::Places;
-use crate::stages::order::PointStore;
-use crate::stages::outside::Outside;
-use crate::stages::smooth::Relaxed;
-use crate::stages::spacing::{Density, Spacings};
+use outcrop_disk::error::Result;
+use outcrop_geom::lattice::Lattice;
+use outcrop_stages::levels::HeldLevels;
+use outcrop_stages::located::Places;
+use outcrop_stages::order::PointStore;
+use outcrop_stages::outside::Outside;
+use outcrop_stages::smooth::Relaxed;
+use outcrop_stages::spacing::{Density, Spacings};
 
 /// The positions that decide which points are connected, if they are not those of the mesh, the local spacings,
 /// and the noise.

@@ -2,13 +2,13 @@
 
 use super::Stages;
 use super::values::Values;
-use crate::error::{Error, Result};
-use crate::geom::lattice::Lattice;
 use crate::params::Facing;
-use crate::stages::order::PointStore;
-use crate::stages::outside::{Outside, StoredExtremes};
-use crate::stages::scanners::{FARTHEST, on_lattice};
-use crate::workspace::Workspace;
+use outcrop_disk::error::{Error, Result};
+use outcrop_disk::workspace::Workspace;
+use outcrop_geom::lattice::Lattice;
+use outcrop_stages::order::PointStore;
+use outcrop_stages::outside::{Outside, StoredExtremes};
+use outcrop_stages::scanners::{FARTHEST, on_lattice};
 
 /// What tells which side is out.
 #[derive(Debug)]

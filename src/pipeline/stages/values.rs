@@ -1,19 +1,19 @@
 //! The stage of values by id: columns of the mesh, the scanners that saw the points, and their normals.
 
 use super::Stages;
-use crate::error::Result;
-use crate::geom::lattice::Lattice;
 use crate::params::{InputNormals, Method};
 use crate::report::NormalsReport;
-use crate::stages::attributes::{StoredAttributes, StoredColumns, attributes};
-use crate::stages::blocks::Blocks;
-use crate::stages::cells::{DiskStats, InputDirections};
-use crate::stages::ingest::{Carried, Spool};
-use crate::stages::normals::{Normals, look};
-use crate::stages::order::StoredPoints;
-use crate::stages::outside::Told;
-use crate::stages::scanners::{self, Scanners};
-use crate::workspace::Workspace;
+use outcrop_disk::error::Result;
+use outcrop_disk::workspace::Workspace;
+use outcrop_geom::lattice::Lattice;
+use outcrop_points::{Carried, Spool};
+use outcrop_stages::attributes::{StoredAttributes, StoredColumns, attributes};
+use outcrop_stages::blocks::Blocks;
+use outcrop_stages::cells::{DiskStats, InputDirections};
+use outcrop_stages::normals::{Normals, look};
+use outcrop_stages::order::StoredPoints;
+use outcrop_stages::outside::Told;
+use outcrop_stages::scanners::{self, Scanners};
 
 /// The values of the points.
 #[derive(Debug, Default)]

@@ -1,13 +1,13 @@
 //! Buckets: ranges of ids whose rows are put in order together.
 
 use super::rows::{Word, key, values};
-use crate::error::Result;
-use crate::geom::hilbert;
-use crate::spill::{Inbox, Row, Table};
-use crate::stages::blocks::Blocks;
-use crate::stages::order::PointStore;
-use crate::workspace::memory::bytes_of;
-use crate::workspace::{Unit, Workspace};
+use crate::blocks::Blocks;
+use crate::order::PointStore;
+use outcrop_disk::error::Result;
+use outcrop_disk::spill::{Inbox, Row, Table};
+use outcrop_disk::workspace::memory::bytes_of;
+use outcrop_disk::workspace::{Unit, Workspace};
+use outcrop_geom::hilbert;
 use std::ops::Range;
 
 /// A table of words by id, and the number of words of an id.
@@ -136,7 +136,7 @@ fn id_from(store: &PointStore, cut: hilbert::Key) -> Result<u32> {
     let below = |page: usize, points: &mut Vec<_>| {
         points.clear();
         store.read_pages(page..page + 1, points)?;
-        Ok::<_, crate::Error>(points.partition_point(|p| hilbert::encode(*p) < cut))
+        Ok::<_, outcrop_disk::error::Error>(points.partition_point(|p| hilbert::encode(*p) < cut))
     };
     let (mut low, mut high) = (0, store.pages());
     let mut points = Vec::new();

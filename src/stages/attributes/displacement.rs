@@ -1,19 +1,19 @@
 //! How far each point moved from where it was measured: a column of the mesh.
 
 use super::{StoredColumns, Words};
-use crate::error::Result;
-use crate::geom::distance2;
-use crate::spill::Table;
-use crate::stages::blocks::Blocks;
-use crate::stages::ingest::{Carried, Column};
-use crate::stages::order::PointStore;
-use crate::workspace::{Unit, Workspace};
+use crate::blocks::Blocks;
+use crate::order::PointStore;
+use outcrop_disk::error::Result;
+use outcrop_disk::spill::Table;
+use outcrop_disk::workspace::{Unit, Workspace};
+use outcrop_geom::distance2;
+use outcrop_points::{Carried, Column};
 
 /// The column with the distance of each point `after` smoothing from its place `before`, and the largest of them.
 /// A step of the lattice has the length `step`, in the cloud's unit.
 ///
 /// # Errors
-/// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`], [`crate::Error::Cancelled`].
+/// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`], [`outcrop_disk::error::Error::Memory`], [`outcrop_disk::error::Error::Cancelled`].
 pub fn displacement(
     [before, after]: [&PointStore; 2],
     step: f64,

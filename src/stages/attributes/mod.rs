@@ -10,17 +10,17 @@ mod buckets;
 mod displacement;
 mod rows;
 
-use crate::error::Result;
-use crate::geom::lattice::Lattice;
-use crate::method::METHOD;
-use crate::spill::{Row, Shuffle, Table, release};
-use crate::stages::blocks::Blocks;
-use crate::stages::ingest::{Carried, Column, Spool, VALUE_BUFFERS};
-use crate::stages::order::{Grouped, MOST_GROUPS, StoredPoints, cuts};
-use crate::workspace::memory::bytes_of;
-use crate::workspace::{Unit, Workspace};
+use crate::blocks::Blocks;
+use crate::order::{Grouped, MOST_GROUPS, StoredPoints, cuts};
 use buckets::Buckets;
 pub use displacement::displacement;
+use outcrop_disk::error::Result;
+use outcrop_disk::spill::{Row, Shuffle, Table, release};
+use outcrop_disk::workspace::memory::bytes_of;
+use outcrop_disk::workspace::{Unit, Workspace};
+use outcrop_geom::lattice::Lattice;
+use outcrop_geom::method::METHOD;
+use outcrop_points::{Carried, Column, Spool, VALUE_BUFFERS};
 use rows::{Row1, Row2, Row6, Row12, Row13, Row15, Word};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
@@ -115,7 +115,7 @@ impl StoredColumns {
     /// The values of ascending ids.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+    /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`].
     pub fn open(&self, unit: &Unit<'_>, ids: &[u32]) -> Result<Values<'_>> {
         let rows = |part: &Columns| part.words.open(unit, ids.iter().copied());
         let parts = self.parts.iter().map(|part| Ok((part, rows(part)?)));
@@ -127,7 +127,7 @@ impl StoredColumns {
     /// Deletes the files that no one needs any more.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], [`crate::Error::Disk`].
+    /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Disk`].
     pub fn release(&self, workspace: &Workspace) -> Result<()> {
         let mut parts = self.parts.iter();
         parts.try_for_each(|part| part.words.release(workspace))
@@ -182,7 +182,7 @@ impl StoredScanners {
     /// Stores the numbers of all ids.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], [`crate::Error::Disk`].
+    /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Disk`].
     pub fn new(numbers: &[u32], blocks: Blocks, unit: &Unit<'_>) -> Result<Self> {
         let table = Table::new("attributes.scanners", blocks.count());
         let ids = || (0..blocks.count()).map(|block| blocks.ids(block));
@@ -207,7 +207,7 @@ impl StoredScanners {
     /// The numbers of all ids of a block.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+    /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`].
     pub fn open(&self, unit: &Unit<'_>, ids: Range<u32>) -> Result<Vec<u32>> {
         self.words.open(unit, ids)
     }
@@ -229,10 +229,10 @@ impl StoredNormals {
     }
 
     /// The words of the normals of some ids, ascending: two for each, of
-    /// [`direction`](crate::stages::ingest::direction).
+    /// [`direction`](outcrop_points::direction).
     ///
     /// # Errors
-    /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+    /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`].
     pub fn open(&self, unit: &Unit<'_>, ids: impl IntoIterator<Item = u32>) -> Result<Vec<u32>> {
         self.words.open(unit, ids)
     }
@@ -252,7 +252,7 @@ pub struct StoredAttributes {
 /// Puts the columns, scanners and normals `carried` of a spool in the order of the ids of `store`, and deletes the spool.
 ///
 /// # Errors
-/// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`], [`crate::Error::Cancelled`].
+/// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`], [`outcrop_disk::error::Error::Memory`], [`outcrop_disk::error::Error::Cancelled`].
 pub fn attributes(
     spool: &Spool,
     lattice: &Lattice,

@@ -1,7 +1,7 @@
 //! Rows of this stage: the values of a point behind the key of its position.
 
-use crate::geom::{Point, hilbert};
-use crate::spill::{Row, row};
+use outcrop_disk::spill::{Row, row};
+use outcrop_geom::{Point, hilbert};
 
 /// Defines a row with values of some words.
 macro_rules! valued {

@@ -1,7 +1,7 @@
 use super::*;
-use crate::geom::Point;
-use crate::stages::ingest::{Selection, ingest_selected};
-use crate::stages::order::{Rewriter, order};
+use crate::order::{Rewriter, order};
+use outcrop_geom::Point;
+use outcrop_points::{Selection, ingest_selected};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
@@ -34,7 +34,7 @@ fn check<R: Row>(points: u32, side: u32, block: u32, page: usize, keep_all: bool
     let (text, least) = cloud(points, side, u64::from(points));
     let path = folder.path().join("cloud.ply");
     std::fs::write(&path, text).unwrap();
-    let workspace = Workspace::for_tests(2);
+    let workspace = Workspace::for_tests(2).expect("a scratch folder");
     let selection = Selection {
         attributes: "intensity,depth,serial".parse().unwrap(),
         ..Selection::default()

@@ -2,20 +2,20 @@
 //! 3.4).
 
 use super::directions::{Directions, DiskStats};
-use crate::error::Result;
-use crate::geom::Point;
-use crate::geom::aabb::Aabb;
-use crate::geom::clip::wrap::Wrapper;
-use crate::geom::clip::{Cell, Spheres};
-use crate::geom::plane::{Moments, Normal, Plane};
-use crate::kernels::Level;
-use crate::method::METHOD;
-use crate::stages::order::PointStore;
-use crate::stages::spacing::{Density, Standing};
-use crate::stages::tiles::near::{Query, Sums};
-use crate::stages::tiles::neighbors::Neighbors;
-use crate::stages::tiles::walk::{PageCache, Walk};
-use crate::stages::tiles::wanted::Wanted;
+use crate::order::PointStore;
+use crate::spacing::{Density, Standing};
+use crate::tiles::near::{Query, Sums};
+use crate::tiles::neighbors::Neighbors;
+use crate::tiles::walk::{PageCache, Walk};
+use crate::tiles::wanted::Wanted;
+use outcrop_disk::error::Result;
+use outcrop_geom::Point;
+use outcrop_geom::aabb::Aabb;
+use outcrop_geom::clip::wrap::Wrapper;
+use outcrop_geom::clip::{Cell, Spheres};
+use outcrop_geom::kernels::Level;
+use outcrop_geom::method::METHOD;
+use outcrop_geom::plane::{Moments, Normal, Plane};
 use std::cell::OnceCell;
 
 /// The radius of the disk.
@@ -288,7 +288,7 @@ impl<'a> CellMaker<'a> {
     /// Computes the cell of a point from the whole store.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+    /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`].
     pub fn from_store(
         &mut self,
         store: &PointStore,
@@ -352,7 +352,7 @@ pub fn fit_in_tile(query: &mut Query<'_>, neighbors: usize, widen: Widen) -> Res
 /// As [`fit_in_tile`], from the whole store.
 ///
 /// # Errors
-/// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+/// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`].
 pub fn fit_in_store(
     store: &PointStore,
     cache: &mut PageCache,
@@ -368,7 +368,7 @@ pub fn fit_in_store(
 /// As [`fit_in_store`], with the neighbours, nearest first: at least the `least` nearest.
 ///
 /// # Errors
-/// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+/// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`].
 pub fn fit_and_near_in_store(
     store: &PointStore,
     cache: &mut PageCache,
@@ -386,7 +386,7 @@ pub fn fit_and_near_in_store(
 /// The `count` nearest neighbours of a point, or all other points if there are fewer, from the whole store.
 ///
 /// # Errors
-/// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+/// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`].
 pub fn near_in_store(
     store: &PointStore,
     cache: &mut PageCache,

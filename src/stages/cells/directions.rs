@@ -1,8 +1,8 @@
 //! The directions of the disks of a tile whose points bring normals.
 
-use crate::geom::plane::{Moments, Normal};
-use crate::stages::normals::{Given, InputNormals, Normals};
-use crate::workspace::memory::bytes_of;
+use crate::normals::{Given, InputNormals, Normals};
+use outcrop_disk::workspace::memory::bytes_of;
+use outcrop_geom::plane::{Moments, Normal};
 use serde::{Deserialize, Serialize};
 
 /// The normals that points bring, and what is done with them.

@@ -1,17 +1,17 @@
 //! The planes and neighbours of the points of a tile, for stages other than this one.
 
 use super::cell::{Fit, Widen, fit_and_near_in_store, fit_in_store, fit_in_tile, near_in_store};
-use crate::error::Result;
-use crate::geom::Point;
-use crate::geom::plane::{Moments, PLANES, planes};
-use crate::kernels::Level;
-use crate::stages::order::PointStore;
-use crate::stages::tiles::Tile;
-use crate::stages::tiles::near::{Around, Query, Search, Sums};
-use crate::stages::tiles::neighbors::Neighbors;
-use crate::stages::tiles::walk::PageCache;
-use crate::workspace::Unit;
-use crate::workspace::memory::Holding;
+use crate::order::PointStore;
+use crate::tiles::Tile;
+use crate::tiles::near::{Around, Query, Search, Sums};
+use crate::tiles::neighbors::Neighbors;
+use crate::tiles::walk::PageCache;
+use outcrop_disk::error::Result;
+use outcrop_disk::workspace::Unit;
+use outcrop_disk::workspace::memory::Holding;
+use outcrop_geom::Point;
+use outcrop_geom::kernels::Level;
+use outcrop_geom::plane::{Moments, PLANES, planes};
 use std::cell::RefCell;
 use std::ops::Range;
 
@@ -19,7 +19,7 @@ use std::ops::Range;
 /// neighbours, or widened as for a cell.
 ///
 /// # Errors
-/// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+/// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`].
 pub fn each_plane(
     unit: &Unit<'_>,
     store: &PointStore,
@@ -178,7 +178,7 @@ fn each_sum(
 /// nearest, or all points if there are fewer.
 ///
 /// # Errors
-/// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+/// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`].
 pub fn each_neighborhood<T>(
     unit: &Unit<'_>,
     store: &PointStore,
@@ -195,7 +195,7 @@ pub fn each_neighborhood<T>(
 /// points if there are fewer, in order of id.
 ///
 /// # Errors
-/// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+/// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`].
 pub(crate) fn each_around(
     unit: &Unit<'_>,
     store: &PointStore,

@@ -1,7 +1,7 @@
 //! The distinct triples of the cells of a tile with their counts (paper, section 3.4).
 
 use super::{CountedTriple, SentTriple, TileRanges};
-use crate::workspace::memory::bytes_of;
+use outcrop_disk::workspace::memory::bytes_of;
 use std::ops::Range;
 
 /// Triples of the cells of one tile, and memory for sorting them.
@@ -111,7 +111,7 @@ impl TileTriples {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stages::blocks::Blocks;
+    use crate::blocks::Blocks;
     use proptest::prelude::*;
     use std::collections::BTreeMap;
 

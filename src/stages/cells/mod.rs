@@ -6,25 +6,25 @@ mod fits;
 mod fold;
 mod together;
 
-pub(crate) use cell::fit_in_tile;
+pub use cell::fit_in_tile;
 pub use cell::{CellMaker, DiskRadius, Fit, Outcome, Widen};
 pub use directions::{DiskStats, InputDirections};
 pub(crate) use fits::{Planes, each_around};
 pub use fits::{each_neighborhood, each_plane};
 
-use crate::error::Result;
-use crate::geom::Point;
-use crate::spill::{Id, Shuffle, Table, release, row};
-use crate::stages::blocks::Blocks;
-use crate::stages::levels::Levels;
-use crate::stages::order::PointStore;
-use crate::stages::spacing::Density;
-use crate::stages::tiles::Tile;
-use crate::stages::tiles::near::Search;
-use crate::stages::tiles::walk::PageCache;
-use crate::workspace::{Unit, Workspace};
+use crate::blocks::Blocks;
+use crate::levels::Levels;
+use crate::order::PointStore;
+use crate::spacing::Density;
+use crate::tiles::Tile;
+use crate::tiles::near::Search;
+use crate::tiles::walk::PageCache;
 use directions::Directions;
 use fold::TileTriples;
+use outcrop_disk::error::Result;
+use outcrop_disk::spill::{Id, Shuffle, Table, release, row};
+use outcrop_disk::workspace::{Unit, Workspace};
+use outcrop_geom::Point;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
@@ -163,11 +163,11 @@ pub struct CellOptions<'a> {
 }
 
 /// Computes all cells and collects their triples. Also returns how coarse points are, as
-/// [`coarseness`](crate::stages::spacing::coarseness), if any is coarse.
+/// [`coarseness`](crate::spacing::coarseness), if any is coarse.
 ///
 /// # Errors
-/// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
-/// [`crate::Error::Cancelled`].
+/// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`], [`outcrop_disk::error::Error::Memory`],
+/// [`outcrop_disk::error::Error::Cancelled`].
 pub fn cells(
     store: &PointStore,
     tiles: TileRanges,

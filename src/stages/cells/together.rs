@@ -1,10 +1,10 @@
 //! Cells of the points of a leaf, computed together from their nearest neighbours.
 
 use super::cell::{CellMaker, Fit, Outcome};
-use crate::geom::clip::wrap::{Site, TOGETHER};
-use crate::geom::plane::{Moments, PLANES, Plane, planes};
-use crate::kernels::Level;
-use crate::stages::tiles::near::{Group, Neighborhood};
+use crate::tiles::near::{Group, Neighborhood};
+use outcrop_geom::clip::wrap::{Site, TOGETHER};
+use outcrop_geom::kernels::Level;
+use outcrop_geom::plane::{Moments, PLANES, Plane, planes};
 
 impl CellMaker<'_> {
     /// Computes the cells of all members whose outlines are certified, by themselves or with farther points.

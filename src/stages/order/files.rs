@@ -1,13 +1,13 @@
 //! The files of an ordered store that is written: packed pages, and their index.
 
 use super::packed::{Packing, pack};
-use crate::error::Result;
-use crate::geom::Point;
-use crate::geom::aabb::Aabb;
-use crate::spill::{Table, row};
-use crate::workspace::file::ScratchFile;
-use crate::workspace::place::Place;
-use crate::workspace::{Unit, Workspace};
+use outcrop_disk::error::Result;
+use outcrop_disk::spill::{Table, row};
+use outcrop_disk::workspace::file::ScratchFile;
+use outcrop_disk::workspace::place::Place;
+use outcrop_disk::workspace::{Unit, Workspace};
+use outcrop_geom::Point;
+use outcrop_geom::aabb::Aabb;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 

@@ -14,12 +14,12 @@ pub use sample::{Grouped, MOST_GROUPS, cuts, sample_sort};
 pub use store::{PAGE, PointStore};
 pub use writer::{Position, StoreWriter};
 
-use crate::error::{Error, Result};
-use crate::geom::lattice::Lattice;
-use crate::geom::{Point, hilbert};
-use crate::spill::{Sorted, Sorter, row};
-use crate::stages::ingest::{READ_BUFFERS, Spool};
-use crate::workspace::Workspace;
+use outcrop_disk::error::{Error, Result};
+use outcrop_disk::spill::{Sorted, Sorter, row};
+use outcrop_disk::workspace::Workspace;
+use outcrop_geom::lattice::Lattice;
+use outcrop_geom::{Point, hilbert};
+use outcrop_points::{READ_BUFFERS, Spool};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::sync::atomic::{AtomicU64, Ordering};

@@ -5,9 +5,9 @@
 //! has all x, then all y, then all z. Where all differences of a page are multiples of a power of two, as
 //! those of a scan on a refined lattice are, their zero bits are left out.
 
-use crate::geom::Point;
-use crate::geom::aabb::Aabb;
 use bitpacking::{BitPacker, BitPacker8x};
+use outcrop_geom::Point;
+use outcrop_geom::aabb::Aabb;
 
 /// Points in a block.
 pub(super) const BLOCK: usize = BitPacker8x::BLOCK_LEN;

@@ -2,9 +2,9 @@
 
 use super::files::{StoreFiles, StoredPoints, WRITTEN};
 use super::store::PointStore;
-use crate::error::Result;
-use crate::geom::Point;
-use crate::workspace::{Unit, Workspace};
+use outcrop_disk::error::Result;
+use outcrop_disk::workspace::{Unit, Workspace};
+use outcrop_geom::Point;
 
 /// Writes a store of known length; several threads may write ranges of pages.
 #[derive(Debug)]
@@ -17,7 +17,7 @@ impl Rewriter {
     /// The scratch file `name`, with the length and page size of `store`.
     ///
     /// # Errors
-    /// [`crate::Error::Memory`].
+    /// [`outcrop_disk::error::Error::Memory`].
     pub fn of(store: &PointStore, workspace: &Workspace, name: &str) -> Result<Self> {
         Self::new(name, store.len(), store.page_size(), workspace)
     }
@@ -25,7 +25,7 @@ impl Rewriter {
     /// The scratch file `name` for `len` points in pages of `page`.
     ///
     /// # Errors
-    /// [`crate::Error::Memory`].
+    /// [`outcrop_disk::error::Error::Memory`].
     pub fn new(name: &str, len: usize, page: usize, workspace: &Workspace) -> Result<Self> {
         Ok(Self {
             files: StoreFiles::open(workspace, name, page)?,
@@ -36,7 +36,7 @@ impl Rewriter {
     /// Writes whole pages, starting with point `first`; the number of the first page is a multiple of 16.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], [`crate::Error::Disk`].
+    /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Disk`].
     pub fn put(&self, unit: &Unit<'_>, first: usize, points: &[Point]) -> Result<()> {
         let groups = points.chunks(WRITTEN * self.files.page);
         let written: Result<Vec<_>> = groups.map(|group| self.files.write(unit, group)).collect();
@@ -46,7 +46,7 @@ impl Rewriter {
     /// Returns the store; every page must have been written.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+    /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`].
     pub fn finish(self, workspace: &Workspace) -> Result<StoredPoints> {
         let pages = self.len.div_ceil(self.files.page);
         let bounds = self.files.bounds(&workspace.unit(), pages)?;

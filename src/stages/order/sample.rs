@@ -6,13 +6,13 @@
 
 use super::files::STEP;
 use super::{CurveKey, Position, Rewriter, StoredPoints};
-use crate::error::{Error, Result};
-use crate::geom::lattice::Lattice;
-use crate::geom::{Point, hilbert};
-use crate::spill::{Shuffle, Table, row};
-use crate::stages::ingest::{READ_BUFFERS, Spool};
-use crate::workspace::memory::bytes_of;
-use crate::workspace::{Unit, Workspace, lock};
+use outcrop_disk::error::{Error, Result};
+use outcrop_disk::spill::{Shuffle, Table, row};
+use outcrop_disk::workspace::memory::bytes_of;
+use outcrop_disk::workspace::{Unit, Workspace, lock};
+use outcrop_geom::lattice::Lattice;
+use outcrop_geom::{Point, hilbert};
+use outcrop_points::{READ_BUFFERS, Spool};
 use std::sync::Mutex;
 
 /// Points of a unit, and of a bucket: at most 75 MB are in memory for a unit.
@@ -318,8 +318,8 @@ fn sort_in_groups(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stages::ingest::ingest;
-    use crate::stages::order::order;
+    use crate::order::order;
+    use outcrop_points::ingest;
     use std::fmt::Write;
 
     /// Both sorts of a cloud in text, with pages of `page` points.
@@ -327,7 +327,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("cloud.xyz");
         std::fs::write(&path, text).unwrap();
-        let workspace = Workspace::for_tests(3);
+        let workspace = Workspace::for_tests(3).expect("a scratch folder");
         let spool = ingest(&[path], &workspace).unwrap();
         let lattice = spool.choose_lattice(0).unwrap();
         let sampled = sort_in_groups(&spool, &lattice, page, size, &workspace).unwrap();

@@ -2,14 +2,14 @@
 
 use super::files::{STEP, StoreFiles, StoredPoints, index_of};
 use super::packed::Packing;
-use crate::error::Result;
-use crate::geom::Point;
-use crate::geom::aabb::Aabb;
-use crate::geom::boxes::BoxTree;
-use crate::workspace::Workspace;
-use crate::workspace::file::ScratchFile;
-use crate::workspace::mapped::Mapping;
-use crate::workspace::memory::Reservation;
+use outcrop_disk::error::Result;
+use outcrop_disk::workspace::Workspace;
+use outcrop_disk::workspace::file::ScratchFile;
+use outcrop_disk::workspace::mapped::Mapping;
+use outcrop_disk::workspace::memory::Reservation;
+use outcrop_geom::Point;
+use outcrop_geom::aabb::Aabb;
+use outcrop_geom::boxes::BoxTree;
 use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::Arc;
@@ -44,7 +44,7 @@ impl StoredPoints {
     /// Opens the store: reads its index and builds the R\*-tree.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`].
+    /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`], [`outcrop_disk::error::Error::Memory`].
     pub fn open(&self, workspace: &Workspace) -> Result<PointStore> {
         let files = StoreFiles::open(workspace, &self.name, self.page)?;
         let (file, page) = (files.file.clone(), files.page);
@@ -98,7 +98,7 @@ impl StoredPoints {
     /// Deletes the files.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], [`crate::Error::Disk`].
+    /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Disk`].
     pub fn release(&self, workspace: &Workspace) -> Result<()> {
         workspace.files.release(&self.name)?;
         index_of(&self.name).release(workspace)
@@ -263,7 +263,7 @@ impl PointStore {
     /// Reads consecutive pages into columns, which are as long as the pages have points.
     ///
     /// # Errors
-    /// [`crate::Error::Io`]; [`crate::Error::Corrupt`] if a page does not match its checksum.
+    /// [`outcrop_disk::error::Error::Io`]; [`outcrop_disk::error::Error::Corrupt`] if a page does not match its checksum.
     pub fn read_columns(&self, pages: Range<usize>, columns: [&mut [i32]; 3]) -> Result<()> {
         let mut columns = columns;
         self.packed_pages(pages, |page, packing, bytes| {
@@ -331,15 +331,15 @@ impl PointStore {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::error::Error;
-    use crate::stages::order::Orderer;
-    use crate::workspace::Workspace;
+    use crate::order::Orderer;
+    use outcrop_disk::error::Error;
+    use outcrop_disk::workspace::Workspace;
 
     /// Found by fuzzing: the journal gives a number of points for a file that no longer exists, and a stage
     /// reads it nevertheless.
     #[test]
     fn a_store_whose_file_is_gone_is_not_read() {
-        let workspace = Workspace::for_tests(1);
+        let workspace = Workspace::for_tests(1).expect("a scratch folder");
         let orderer = Orderer::new(&workspace).unwrap();
         let points: Vec<Point> = (0..10).map(|k| [k, k * k, 1]).collect();
         orderer.push(&workspace, &points).unwrap();

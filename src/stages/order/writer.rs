@@ -1,12 +1,12 @@
 //! Writes the ordered store: in id order, or, with `rewrite`, in any order.
 
 use super::files::{STEP, StoreFiles, StoredPoints, WRITTEN, Written};
-use crate::error::Result;
-use crate::geom::Point;
-use crate::geom::aabb::Aabb;
-use crate::spill::{Table, row};
-use crate::workspace::steps::Step;
-use crate::workspace::{Unit, Workspace};
+use outcrop_disk::error::Result;
+use outcrop_disk::spill::{Table, row};
+use outcrop_disk::workspace::steps::Step;
+use outcrop_disk::workspace::{Unit, Workspace};
+use outcrop_geom::Point;
+use outcrop_geom::aabb::Aabb;
 use rayon::prelude::*;
 
 row! {
@@ -38,7 +38,7 @@ impl<'w> StoreWriter<'w> {
     /// [`StoreWriter::len`].
     ///
     /// # Errors
-    /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+    /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`].
     pub fn create(workspace: &'w Workspace, name: &str, page: usize) -> Result<Self> {
         let files = StoreFiles::open(workspace, name, page)?;
         // The end of the points may have cut the last group short; it is written again.
@@ -64,7 +64,7 @@ impl<'w> StoreWriter<'w> {
     /// The last point that an earlier attempt wrote.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+    /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`].
     pub fn last_found(&self) -> Result<Option<Point>> {
         let pages = self.len / self.files.page;
         let unit = self.workspace.unit();
@@ -74,8 +74,8 @@ impl<'w> StoreWriter<'w> {
     /// A whole store from the points of the sections, in their order.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
-    /// [`crate::Error::Cancelled`].
+    /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`], [`outcrop_disk::error::Error::Memory`],
+    /// [`outcrop_disk::error::Error::Cancelled`].
     pub fn gather(
         workspace: &Workspace,
         name: &str,
@@ -102,7 +102,7 @@ impl<'w> StoreWriter<'w> {
     /// Appends points, in id order.
     ///
     /// # Errors
-    /// [`crate::Error::Io`].
+    /// [`outcrop_disk::error::Error::Io`].
     pub fn push(&mut self, mut points: &[Point]) -> Result<()> {
         let (group, mut written) = (WRITTEN * self.files.page, Vec::new());
         while self.pending.len() + points.len() >= group {
@@ -119,7 +119,7 @@ impl<'w> StoreWriter<'w> {
     /// Appends the points of `items`, in id order, on all threads.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], [`crate::Error::Cancelled`].
+    /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Cancelled`].
     pub fn append<T: Sync>(
         &mut self,
         items: &[T],
@@ -173,7 +173,7 @@ impl<'w> StoreWriter<'w> {
     /// Ends the store.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], [`crate::Error::Disk`].
+    /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Disk`].
     pub fn finish(mut self) -> Result<StoredPoints> {
         self.flush()?;
         Ok(self.files.stored(self.len, self.bounds))

@@ -10,17 +10,17 @@
 
 mod spacing;
 
-use crate::error::Result;
-use crate::geom::Point;
-use crate::method::METHOD;
-use crate::spill::Table;
-use crate::stages::blocks::Blocks;
-use crate::stages::cells::{TileRanges, each_neighborhood};
-use crate::stages::order::{PointStore, Position, StoreWriter, StoredPoints};
-use crate::stages::tiles::Tile;
-use crate::stages::tiles::neighbors::Neighbors;
-use crate::stages::tiles::walk::PageCache;
-use crate::workspace::{Unit, Workspace};
+use crate::blocks::Blocks;
+use crate::cells::{TileRanges, each_neighborhood};
+use crate::order::{PointStore, Position, StoreWriter, StoredPoints};
+use crate::tiles::Tile;
+use crate::tiles::neighbors::Neighbors;
+use crate::tiles::walk::PageCache;
+use outcrop_disk::error::Result;
+use outcrop_disk::spill::Table;
+use outcrop_disk::workspace::{Unit, Workspace};
+use outcrop_geom::Point;
+use outcrop_geom::method::METHOD;
 use serde::{Deserialize, Serialize};
 use spacing::{SpacingCache, Spacings};
 use std::ops::Range;
@@ -49,8 +49,8 @@ pub struct OutlierOptions {
 /// input, unless no point is an outlier.
 ///
 /// # Errors
-/// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
-/// [`crate::Error::Cancelled`].
+/// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`], [`outcrop_disk::error::Error::Memory`],
+/// [`outcrop_disk::error::Error::Cancelled`].
 pub fn drop_outliers(
     mut stored: StoredPoints,
     options: OutlierOptions,

@@ -1,15 +1,15 @@
 //! The spacings of all points, in a file by tile.
 
-use crate::error::Result;
-use crate::method::METHOD;
-use crate::spill::{Table, release, row};
-use crate::stages::cells::{TileRanges, each_neighborhood};
-use crate::stages::order::PointStore;
-use crate::stages::tiles::Tile;
-use crate::stages::tiles::neighbors::Neighbors;
-use crate::stages::tiles::walk::PageCache;
-use crate::workspace::memory::Holding;
-use crate::workspace::{Unit, Workspace};
+use crate::cells::{TileRanges, each_neighborhood};
+use crate::order::PointStore;
+use crate::tiles::Tile;
+use crate::tiles::neighbors::Neighbors;
+use crate::tiles::walk::PageCache;
+use outcrop_disk::error::Result;
+use outcrop_disk::spill::{Table, release, row};
+use outcrop_disk::workspace::memory::Holding;
+use outcrop_disk::workspace::{Unit, Workspace};
+use outcrop_geom::method::METHOD;
 use rustc_hash::FxHashMap;
 use std::ops::Range;
 

@@ -1,7 +1,7 @@
 use super::*;
-use crate::geom::distance2;
-use crate::stages::order::Orderer;
+use crate::order::Orderer;
 use outcrop_cloudgen::{Cloud, Generator, Kind, Sampling};
+use outcrop_geom::distance2;
 
 /// Lattice steps in a unit, and the shift of a cloud's centre.
 const STEPS: f64 = 100_000.0;
@@ -17,7 +17,7 @@ fn coordinates(point: Point) -> [f64; 3] {
 }
 
 fn kept(points: &[Point], factor: f64, tile: u32, page: usize) -> (Vec<Point>, OutlierStats) {
-    let workspace = Workspace::for_tests(2);
+    let workspace = Workspace::for_tests(2).expect("a scratch folder");
     let orderer = Orderer::new(&workspace).unwrap();
     orderer.push(&workspace, points).unwrap();
     let (stored, _) = orderer.finish(&workspace, page).unwrap();
@@ -105,7 +105,7 @@ fn it_is_what_the_definition_says() {
         .outliers(0.05)
         .noise(4.0);
     let mut all = points(&cloud.generator().unwrap());
-    let workspace = Workspace::for_tests(2);
+    let workspace = Workspace::for_tests(2).expect("a scratch folder");
     let orderer = Orderer::new(&workspace).unwrap();
     orderer.push(&workspace, &all).unwrap();
     let (stored, _) = orderer.finish(&workspace, 256).unwrap();

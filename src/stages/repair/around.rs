@@ -1,12 +1,12 @@
 //! The triangles of the stitched surface that touch a block.
 
-use crate::error::Result;
-use crate::spill::{Inbox, Table};
-use crate::stages::blocks::Blocks;
-use crate::stages::stitch::Stitched;
-use crate::stages::surface::rows::{TriangleRow, TriangleTo};
-use crate::stages::surface::star::Triangle;
-use crate::workspace::{Unit, Workspace};
+use crate::blocks::Blocks;
+use crate::stitch::Stitched;
+use crate::surface::rows::{TriangleRow, TriangleTo};
+use crate::surface::star::Triangle;
+use outcrop_disk::error::Result;
+use outcrop_disk::spill::{Inbox, Table};
+use outcrop_disk::workspace::{Unit, Workspace};
 
 /// The stitched surface while it is read.
 pub struct Around<'a> {
@@ -19,7 +19,7 @@ impl<'a> Around<'a> {
     /// Opens the stitched surface.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`].
+    /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`], [`outcrop_disk::error::Error::Memory`].
     pub fn open(stitched: &'a Stitched, blocks: Blocks, workspace: &Workspace) -> Result<Self> {
         Ok(Self {
             interior: &stitched.interior,
@@ -36,7 +36,7 @@ impl<'a> Around<'a> {
     /// All triangles that touch a block, ascending.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+    /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`].
     pub fn load(&self, unit: &Unit<'_>, block: usize) -> Result<Vec<Triangle>> {
         let mut triangles: Vec<Triangle> = bytemuck::cast_vec(self.interior.get(unit, block)?);
         let removed = self.removed.get(unit, block)?;

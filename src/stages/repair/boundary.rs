@@ -7,10 +7,10 @@ use super::fill::{
     vector_area,
 };
 use super::parts::Part;
-use crate::geom::distance2;
-use crate::geom::triangle::{area, length};
-use crate::method::METHOD;
-use crate::stages::spacing::Density;
+use crate::spacing::Density;
+use outcrop_geom::distance2;
+use outcrop_geom::method::METHOD;
+use outcrop_geom::triangle::{area, length};
 use rustc_hash::FxHashSet;
 
 /// The rules for boundary loops.

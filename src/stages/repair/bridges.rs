@@ -2,7 +2,7 @@
 
 use super::ascending;
 use super::patch::Patch;
-use crate::stages::surface::star::{Link, Star, Triangle};
+use crate::surface::star::{Link, Star, Triangle};
 use std::ops::Range;
 
 /// Numbers, ascending, of the triangles that are bridges at a vertex of the block.

@@ -4,16 +4,16 @@
 use super::facing::{Fate, Sums, SumsRow, judge};
 use super::rows::SeenTriangle;
 use super::{RepairOptions, RepairStats, ascending};
-use crate::error::Result;
-use crate::geom::Point;
-use crate::spill::{Inbox, Table};
-use crate::stages::blocks::Blocks;
-use crate::stages::located::Places;
-use crate::stages::outside::Known;
-use crate::stages::surface::parity::{ParitySets, constraint};
-use crate::stages::surface::rows::TriangleTo;
-use crate::workspace::memory::{bytes_of, table_bytes};
-use crate::workspace::{Unit, lock};
+use crate::blocks::Blocks;
+use crate::located::Places;
+use crate::outside::Known;
+use crate::surface::parity::{ParitySets, constraint};
+use crate::surface::rows::TriangleTo;
+use outcrop_disk::error::Result;
+use outcrop_disk::spill::{Inbox, Table};
+use outcrop_disk::workspace::memory::{bytes_of, table_bytes};
+use outcrop_disk::workspace::{Unit, lock};
+use outcrop_geom::Point;
 use rustc_hash::FxHashMap;
 use std::sync::Mutex;
 

@@ -2,9 +2,9 @@
 //! as at doors and at the outline of a survey, ears would be longer than the spacing of the surface allows.
 
 use super::fill::{Corner, distance, edges, undirected};
-use crate::geom::Point;
-use crate::geom::triangle::{length, normal, on_a_line};
-use crate::method::METHOD;
+use outcrop_geom::Point;
+use outcrop_geom::method::METHOD;
+use outcrop_geom::triangle::{length, normal, on_a_line};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 

@@ -4,13 +4,13 @@
 //! at points which side is out, this decides; else volume or area.
 
 use super::RepairStats;
-use crate::geom::Point;
-use crate::geom::triangle::small_normal;
-use crate::method::METHOD;
-use crate::spill::row;
-use crate::stages::surface::evidence::facing;
-use crate::stages::surface::parity::signed;
-use crate::stages::surface::star::Triangle;
+use crate::surface::evidence::facing;
+use crate::surface::parity::signed;
+use crate::surface::star::Triangle;
+use outcrop_disk::spill::row;
+use outcrop_geom::Point;
+use outcrop_geom::method::METHOD;
+use outcrop_geom::triangle::small_normal;
 use serde::{Deserialize, Serialize};
 
 /// Exact sums over the triangles of a component.

@@ -9,12 +9,12 @@
 //! alone. Boundary edges, components and fans are preserved.
 
 use super::around::merge;
-use crate::geom::triangle::small_normal;
-use crate::geom::{Point, sub};
-use crate::method::METHOD;
-use crate::stages::surface::sides::{NONE, across, parts, side};
-use crate::stages::surface::star::Triangle;
-use crate::workspace::memory::bytes_of;
+use crate::surface::sides::{NONE, across, parts, side};
+use crate::surface::star::Triangle;
+use outcrop_disk::workspace::memory::bytes_of;
+use outcrop_geom::method::METHOD;
+use outcrop_geom::triangle::small_normal;
+use outcrop_geom::{Point, sub};
 use std::ops::Range;
 
 /// A triangle that may be changed, and its neighbours.

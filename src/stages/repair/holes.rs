@@ -7,13 +7,13 @@ use super::loops::Step;
 use super::rim::{BlockRim, FragmentRow, NumberingInput, RimCounts};
 use super::surface::StoredSurface;
 use super::{FilledTriangle, RepairStats, ascending, from_smallest};
-use crate::error::Result;
-use crate::spill::{Shuffle, Table};
-use crate::stages::blocks::Blocks;
-use crate::stages::located::Places;
-use crate::stages::surface::star::sorted;
-use crate::workspace::place::Place;
-use crate::workspace::{Unit, Workspace, lock};
+use crate::blocks::Blocks;
+use crate::located::Places;
+use crate::surface::star::sorted;
+use outcrop_disk::error::Result;
+use outcrop_disk::spill::{Shuffle, Table};
+use outcrop_disk::workspace::place::Place;
+use outcrop_disk::workspace::{Unit, Workspace, lock};
 use rustc_hash::FxHashMap;
 use serde::{Deserialize, Serialize};
 use std::sync::Mutex;
@@ -41,8 +41,8 @@ struct Found {
 /// is left.
 ///
 /// # Errors
-/// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
-/// [`crate::Error::Cancelled`].
+/// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`], [`outcrop_disk::error::Error::Memory`],
+/// [`outcrop_disk::error::Error::Cancelled`].
 pub fn fill(
     places: Places<'_>,
     surface: &StoredSurface,

@@ -1,9 +1,9 @@
 //! Boundary loops: the succession of boundary edges at the vertices of a block.
 
 use super::{OrientedTriangle, ascending};
-use crate::geom::triangle::{add, normal};
-use crate::geom::{Point, sub};
-use crate::stages::surface::star::{Link, Star, others};
+use crate::surface::star::{Link, Star, others};
+use outcrop_geom::triangle::{add, normal};
+use outcrop_geom::{Point, sub};
 
 /// One step of a boundary loop: the edge from `from` to `at` is followed by the edge from `at` to `to`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

@@ -25,13 +25,13 @@ mod tests;
 pub use rim::{NumberingInput, Vertices};
 pub use surface::{ComponentRun, StoredSurface, Surface};
 
-use crate::error::Result;
-use crate::spill::{Shuffle, release, row};
-use crate::stages::blocks::Blocks;
-use crate::stages::located::Places;
-use crate::stages::stitch::Stitched;
-use crate::workspace::Workspace;
+use crate::blocks::Blocks;
+use crate::located::Places;
+use crate::stitch::Stitched;
 use boundary::LoopRules;
+use outcrop_disk::error::Result;
+use outcrop_disk::spill::{Shuffle, release, row};
+use outcrop_disk::workspace::Workspace;
 use serde::{Deserialize, Serialize};
 
 /// An oriented triangle, starting with its smallest vertex.
@@ -169,8 +169,8 @@ adds!(
 /// Repairs and orients the surface.
 ///
 /// # Errors
-/// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
-/// [`crate::Error::Cancelled`].
+/// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`], [`outcrop_disk::error::Error::Memory`],
+/// [`outcrop_disk::error::Error::Cancelled`].
 pub fn repair(
     places: Places<'_>,
     stitched: &Stitched,

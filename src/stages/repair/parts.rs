@@ -1,7 +1,7 @@
 //! Partial fillings: triangles too wide for the surrounding surface are left out.
 
 use super::fill::Corner;
-use crate::stages::spacing::Density;
+use crate::spacing::Density;
 use rustc_hash::FxHashSet;
 
 /// The part of a filling that is kept.

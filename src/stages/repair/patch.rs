@@ -4,10 +4,10 @@
 //! No edge has more than two triangles and the surface is orientable, so the order of the edges does not
 //! matter.
 
-use crate::stages::surface::parity::ParitySets;
-use crate::stages::surface::sides::{pair_edges, parts};
-use crate::stages::surface::star::{EDGES, Triangle};
-use crate::workspace::memory::bytes_of;
+use crate::surface::parity::ParitySets;
+use crate::surface::sides::{pair_edges, parts};
+use crate::surface::star::{EDGES, Triangle};
+use outcrop_disk::workspace::memory::bytes_of;
 use std::ops::Range;
 
 /// Labels and boundary of the triangles that touch a block. Triangles with the same label are connected.

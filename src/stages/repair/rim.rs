@@ -5,13 +5,13 @@ use super::loops::{Step, neighbors, steps};
 use super::rows::RimBits;
 use super::surface::Surface;
 use super::{SurfaceTriangle, ascending};
-use crate::error::Result;
-use crate::spill::{Id, Table, release, row};
-use crate::stages::blocks::Blocks;
-use crate::stages::located::{Located, Places};
-use crate::stages::surface::star::Star;
-use crate::workspace::memory::{Reservation, bytes_of};
-use crate::workspace::{Unit, Workspace};
+use crate::blocks::Blocks;
+use crate::located::{Located, Places};
+use crate::surface::star::Star;
+use outcrop_disk::error::Result;
+use outcrop_disk::spill::{Id, Table, release, row};
+use outcrop_disk::workspace::memory::{Reservation, bytes_of};
+use outcrop_disk::workspace::{Unit, Workspace};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
@@ -110,7 +110,7 @@ impl NumberingInput {
     /// Reads which points are vertices.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`].
+    /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`], [`outcrop_disk::error::Error::Memory`].
     pub fn open(&self, workspace: &Workspace) -> Result<Vertices> {
         let (blocks, unit) = (self.blocks, workspace.unit());
         let (words, count) = (blocks.points().div_ceil(64) + 1, blocks.count());

@@ -1,7 +1,7 @@
 //! Rows exchanged between blocks to merge components.
 
-use crate::spill::row;
-use crate::stages::surface::star::Triangle;
+use crate::surface::star::Triangle;
+use outcrop_disk::spill::row;
 
 row! {
     /// The label of a crossing triangle in one block, sent to the block of its smallest vertex.

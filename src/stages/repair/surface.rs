@@ -11,18 +11,18 @@ use super::flips::Sheet;
 use super::patch::Patch;
 use super::rows::{LabelRun, RimBits, SeenTriangle};
 use super::{OrientedTriangle, RepairOptions, RepairStats, SurfaceTriangle, bridges};
-use crate::error::Result;
-use crate::geom::Point;
-use crate::spill::{Inbox, Shuffle, Table, release};
-use crate::stages::blocks::Blocks;
-use crate::stages::located::Places;
-use crate::stages::outside::Known;
-use crate::stages::stitch::Stitched;
-use crate::stages::surface::parity::constraint;
-use crate::stages::surface::rows::TriangleTo;
-use crate::stages::surface::star::Triangle;
-use crate::workspace::memory::{Reservation, bytes_of};
-use crate::workspace::{Unit, Workspace};
+use crate::blocks::Blocks;
+use crate::located::Places;
+use crate::outside::Known;
+use crate::stitch::Stitched;
+use crate::surface::parity::constraint;
+use crate::surface::rows::TriangleTo;
+use crate::surface::star::Triangle;
+use outcrop_disk::error::Result;
+use outcrop_disk::spill::{Inbox, Shuffle, Table, release};
+use outcrop_disk::workspace::memory::{Reservation, bytes_of};
+use outcrop_disk::workspace::{Unit, Workspace};
+use outcrop_geom::Point;
 use serde::{Deserialize, Serialize};
 
 /// The oriented surface, without small components and bridges.
@@ -73,7 +73,7 @@ impl StoredSurface {
     /// Opens the surface.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`].
+    /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`], [`outcrop_disk::error::Error::Memory`].
     pub fn open(&self, workspace: &Workspace) -> Result<Surface<'_>> {
         let (labels, blocks) = (self.labels.components.len(), self.labels.globals.len());
         Ok(Surface {
@@ -94,7 +94,7 @@ impl Surface<'_> {
     /// All triangles that touch a block, oriented, ascending by sorted ids; and their components.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+    /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`].
     pub fn load(
         &self,
         unit: &Unit<'_>,
@@ -156,7 +156,7 @@ impl Surface<'_> {
     /// The vertices of a block that have a boundary edge.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+    /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`].
     pub fn rims(&self, unit: &Unit<'_>, block: usize) -> Result<Vec<RimBits>> {
         self.stored.rims.get(unit, block)
     }
@@ -179,8 +179,8 @@ struct Build<'a> {
 /// Builds the surface.
 ///
 /// # Errors
-/// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
-/// [`crate::Error::Cancelled`].
+/// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`], [`outcrop_disk::error::Error::Memory`],
+/// [`outcrop_disk::error::Error::Cancelled`].
 pub fn build(
     places: Places<'_>,
     stitched: &Stitched,

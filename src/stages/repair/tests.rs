@@ -4,8 +4,8 @@ use super::boundary::LoopRules;
 use super::ear_clipping::zip;
 use super::fill::{Corner, Filling};
 use super::flips;
-use crate::geom::{Point, distance2};
-use crate::stages::surface::star::Triangle;
+use crate::surface::star::Triangle;
+use outcrop_geom::{Point, distance2};
 use proptest::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
@@ -101,7 +101,7 @@ impl Sheet {
 
     fn area(&self, t: [u32; 3]) -> f64 {
         let [a, b, c] = t.map(|v| self.points[v as usize]);
-        crate::geom::triangle::area([a, b, c])
+        outcrop_geom::triangle::area([a, b, c])
     }
 
     /// Mends the loop for which `which` is largest.

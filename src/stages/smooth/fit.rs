@@ -1,9 +1,9 @@
 //! Least-squares surfaces of first and second order, fitted for several points at a time.
 
-use crate::kernels::eight::{Eight, loaded, stored};
-use crate::kernels::numbers::Numbers;
-use crate::kernels::{LANES, SurfaceSums, kernel};
-use crate::method::METHOD;
+pub use outcrop_geom::kernels::eight::{Eight, loaded, stored};
+pub use outcrop_geom::kernels::numbers::Numbers;
+use outcrop_geom::kernels::{LANES, SurfaceSums, kernel};
+use outcrop_geom::method::METHOD;
 
 /// Unknowns of a plane over a frame.
 const PLANE: usize = 3;
@@ -168,7 +168,7 @@ impl Fit<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::kernels::Level;
+    use outcrop_geom::kernels::Level;
     use proptest::prelude::*;
 
     /// Sums over positions `u, v, h, w`.

@@ -8,14 +8,14 @@
 
 use super::fit::{Fit, TERMS, fits};
 use super::level::{frame, unit};
-use crate::geom::plane::{Normal, least_directions};
-use crate::kernels::eight::{Eight, loaded, stored};
-use crate::kernels::{
+use crate::tiles::near::Around;
+pub use outcrop_geom::kernels::eight::{Eight, loaded, stored};
+use outcrop_geom::kernels::{
     LANES, Level, SpreadSums, SurfaceSums, Weighted, drop_beyond, fade, kernel, square_weights,
     take_weighted, turn,
 };
-use crate::method::METHOD;
-use crate::stages::tiles::near::Around;
+use outcrop_geom::method::METHOD;
+use outcrop_geom::plane::{Normal, least_directions};
 
 /// Two directions along a plane, and its normal.
 type Frame = [[f64; 3]; 3];

@@ -4,11 +4,11 @@
 //! Sums run over the point and then its neighbours, nearest first, with `+ - * / sqrt` only. So the bits are
 //! the same on every machine and do not depend on how the neighbours were found.
 
-use crate::geom::plane::Normal;
-use crate::method::METHOD;
-use crate::stages::cells::Fit;
-use crate::stages::spacing::spacing2;
-use crate::stages::tiles::neighbors::Neighbors;
+use crate::cells::Fit;
+use crate::spacing::spacing2;
+use crate::tiles::neighbors::Neighbors;
+use outcrop_geom::method::METHOD;
+use outcrop_geom::plane::Normal;
 
 /// Unknowns of a surface of second order.
 const TERMS: usize = 6;

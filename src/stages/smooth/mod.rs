@@ -16,15 +16,15 @@ mod tests;
 pub use level::Gauge;
 pub use relax::{RelaxStats, Relaxed, relax};
 
-use crate::error::Result;
-use crate::geom::Point;
-use crate::geom::lattice::COORDINATE_LIMIT;
-use crate::geom::round::rounded;
-use crate::method::METHOD;
-use crate::stages::cells::{Fit, TileRanges, Widen, each_around, each_plane};
-use crate::stages::order::{PointStore, StoredPoints};
-use crate::workspace::{Unit, Workspace};
+use crate::cells::{Fit, TileRanges, Widen, each_around, each_plane};
+use crate::order::{PointStore, StoredPoints};
 use foot::{Feet, Foot};
+use outcrop_disk::error::Result;
+use outcrop_disk::workspace::{Unit, Workspace};
+use outcrop_geom::Point;
+use outcrop_geom::lattice::COORDINATE_LIMIT;
+use outcrop_geom::method::METHOD;
+use outcrop_geom::round::rounded;
 use pass::Pass;
 use std::ops::Range;
 
@@ -66,8 +66,8 @@ pub struct Relaxing {
 /// [`Smoothing::Edges`], to a surface through three times as many neighbours.
 ///
 /// # Errors
-/// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
-/// [`crate::Error::Cancelled`].
+/// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`], [`outcrop_disk::error::Error::Memory`],
+/// [`outcrop_disk::error::Error::Cancelled`].
 pub fn smooth(
     store: &PointStore,
     tiles: TileRanges,

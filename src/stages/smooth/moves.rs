@@ -1,7 +1,7 @@
 //! How far points moved: counts by length.
 
 use super::RelaxStats;
-use crate::geom::{Point, distance2};
+use outcrop_geom::{Point, distance2};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 

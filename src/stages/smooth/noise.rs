@@ -3,16 +3,16 @@
 
 use super::Relaxing;
 use super::level::Gauge;
-use crate::error::Result;
-use crate::method::METHOD;
-use crate::stages::cells::{Planes, Widen};
-use crate::stages::levels::Levels;
-use crate::stages::order::PointStore;
-use crate::stages::spacing::StoredSpacings;
-use crate::stages::tiles::Tile;
-use crate::stages::tiles::walk::PageCache;
-use crate::workspace::memory::bytes_of;
-use crate::workspace::{Unit, Workspace};
+use crate::cells::{Planes, Widen};
+use crate::levels::Levels;
+use crate::order::PointStore;
+use crate::spacing::StoredSpacings;
+use crate::tiles::Tile;
+use crate::tiles::walk::PageCache;
+use outcrop_disk::error::Result;
+use outcrop_disk::workspace::memory::bytes_of;
+use outcrop_disk::workspace::{Unit, Workspace};
+use outcrop_geom::method::METHOD;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 

@@ -1,14 +1,14 @@
 //! A pass over all points that moves some of them: same ids, same pages, other positions.
 
-use crate::error::Result;
-use crate::geom::Point;
-use crate::method::METHOD;
-use crate::stages::cells::TileRanges;
-use crate::stages::order::{PointStore, Rewriter, StoredPoints};
-use crate::stages::tiles::Tile;
-use crate::stages::tiles::walk::PageCache;
-use crate::workspace::memory::bytes_of;
-use crate::workspace::{Unit, Workspace};
+use crate::cells::TileRanges;
+use crate::order::{PointStore, Rewriter, StoredPoints};
+use crate::tiles::Tile;
+use crate::tiles::walk::PageCache;
+use outcrop_disk::error::Result;
+use outcrop_disk::workspace::memory::bytes_of;
+use outcrop_disk::workspace::{Unit, Workspace};
+use outcrop_geom::Point;
+use outcrop_geom::method::METHOD;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::ops::Range;

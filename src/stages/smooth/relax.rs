@@ -10,16 +10,16 @@ use super::moves::Moves;
 use super::noise::{Found, look};
 use super::pass::Pass;
 use super::{Relaxing, moved};
-use crate::error::Result;
-use crate::geom::Point;
-use crate::method::METHOD;
-use crate::stages::cells::{TileRanges, each_around};
-use crate::stages::levels::Levels;
-use crate::stages::order::{PointStore, StoredPoints};
-use crate::stages::spacing::{StoredSpacings, spacing2};
-use crate::stages::tiles::near::Around;
-use crate::workspace::memory::bytes_of;
-use crate::workspace::{Unit, Workspace};
+use crate::cells::{TileRanges, each_around};
+use crate::levels::Levels;
+use crate::order::{PointStore, StoredPoints};
+use crate::spacing::{StoredSpacings, spacing2};
+use crate::tiles::near::Around;
+use outcrop_disk::error::Result;
+use outcrop_disk::workspace::memory::bytes_of;
+use outcrop_disk::workspace::{Unit, Workspace};
+use outcrop_geom::Point;
+use outcrop_geom::method::METHOD;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
@@ -241,8 +241,8 @@ impl Round<'_> {
 /// Measures the local spacings, and smooths the points that are noisy.
 ///
 /// # Errors
-/// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
-/// [`crate::Error::Cancelled`].
+/// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`], [`outcrop_disk::error::Error::Memory`],
+/// [`outcrop_disk::error::Error::Cancelled`].
 pub fn relax(
     store: &PointStore,
     tiles: TileRanges,

@@ -1,8 +1,8 @@
 //! Tests of relaxing and smoothing on planes, edges and spheres.
 
 use super::*;
-use crate::stages::blocks::Blocks;
-use crate::stages::order::Orderer;
+use crate::blocks::Blocks;
+use crate::order::Orderer;
 
 /// A square sheet of `side * side` points, a hundred steps apart, with height `high`.
 fn sheet(side: i32, high: impl Fn(i32, i32) -> i32) -> Vec<Point> {
@@ -46,7 +46,7 @@ fn relaxed_as(
     tile: u32,
     page: usize,
 ) -> (Vec<Point>, RelaxStats) {
-    let workspace = &Workspace::for_tests(2);
+    let workspace = &Workspace::for_tests(2).expect("a scratch folder");
     let (store, tiles) = ordered(points, tile, page, workspace);
     let relaxed = relax(&store, tiles, relaxing, workspace).unwrap();
     let shape = relaxed.store.map(|shape| shape.open(workspace).unwrap());
@@ -141,7 +141,7 @@ fn only_noisy_points_move_and_tiles_do_not_matter() {
 #[test]
 fn regions_are_divided_anyhow() {
     let in_order = |points: &[Point]| {
-        let workspace = &Workspace::for_tests(2);
+        let workspace = &Workspace::for_tests(2).expect("a scratch folder");
         let (store, _) = ordered(points, 1, 256, workspace);
         store.slice(0..store.len()).unwrap()
     };
@@ -183,7 +183,7 @@ fn smoothed(
     tile: u32,
     page: usize,
 ) -> (Vec<Point>, Vec<Point>) {
-    let workspace = &Workspace::for_tests(2);
+    let workspace = &Workspace::for_tests(2).expect("a scratch folder");
     let (store, tiles) = ordered(points, tile, page, workspace);
     let after = smooth(&store, tiles, 12, smoothing, 1, workspace).unwrap();
     let after = after.open(workspace).unwrap();

@@ -7,10 +7,10 @@ use super::interior::{block_bytes, insert};
 use super::stats::InsertStats;
 use super::surroundings::Surroundings;
 use super::{Insertion, Stitched};
-use crate::error::Result;
-use crate::spill::Shuffle;
-use crate::stages::surface::rows::{LabelledTo, TriangleTo};
-use crate::workspace::Unit;
+use crate::surface::rows::{LabelledTo, TriangleTo};
+use outcrop_disk::error::Result;
+use outcrop_disk::spill::Shuffle;
+use outcrop_disk::workspace::Unit;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
@@ -29,7 +29,7 @@ impl<'a> Across<'a> {
     /// Starts the pass before its first block.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], [`crate::Error::Memory`].
+    /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Memory`].
     pub fn new(insertion: Insertion<'a>) -> Result<Self> {
         let (workspace, all) = (insertion.workspace, 0..insertion.blocks.count());
         let pass = Pass::new(insertion)?;
@@ -47,8 +47,8 @@ impl<'a> Across<'a> {
     /// were cut. Meanwhile the pass advances.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
-    /// [`crate::Error::Cancelled`].
+    /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`], [`outcrop_disk::error::Error::Memory`],
+    /// [`outcrop_disk::error::Error::Cancelled`].
     pub fn insert_inside(&self, insertion: Insertion<'_>) -> Result<(InsertStats, u64)> {
         let order = &self.order;
         let mut all = InsertStats {
@@ -130,7 +130,7 @@ impl<'a> Pass<'a> {
     /// Starts the pass before its first block.
     ///
     /// # Errors
-    /// [`crate::Error::Memory`].
+    /// [`outcrop_disk::error::Error::Memory`].
     pub fn new(insertion: Insertion<'a>) -> Result<Self> {
         let (spans, count) = (&insertion.base.spans, insertion.blocks.count());
         let mut order: Vec<u32> = (0..count as u32).collect();
@@ -151,8 +151,8 @@ impl<'a> Pass<'a> {
     /// in the available memory). A turn that needs more waits for the next call.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
-    /// [`crate::Error::Cancelled`].
+    /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`], [`outcrop_disk::error::Error::Memory`],
+    /// [`outcrop_disk::error::Error::Cancelled`].
     fn advance(
         &mut self,
         unit: &Unit<'_>,
@@ -221,7 +221,7 @@ impl<'a> Pass<'a> {
     /// Ends the pass after all turns.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], [`crate::Error::Disk`], [`crate::Error::Corrupt`].
+    /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Disk`], [`outcrop_disk::error::Error::Corrupt`].
     pub fn finish(self, unit: &Unit<'_>) -> Result<(Stitched, InsertStats)> {
         let stitched = Stitched {
             interior: self.mesh.insertion.interior.mesh.clone(),

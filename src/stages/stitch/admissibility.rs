@@ -1,9 +1,9 @@
 //! The tests of a T12 triangle (paper, section 3.5): the combinatorial tests I to III and the geometric test.
 //! Test IV needs the components and is in [`super::insertion`].
 
-use crate::geom::Point;
-use crate::geom::triangle::normal;
-use crate::stages::surface::star::{EDGES, Triangle, opposed, others};
+use crate::surface::star::{EDGES, Triangle, opposed, others};
+use outcrop_geom::Point;
+use outcrop_geom::triangle::normal;
 use rustc_hash::FxHashMap;
 
 /// The mesh around the vertices of a triangle.

@@ -2,20 +2,20 @@
 //! first part).
 
 use super::BaseStats;
-use crate::error::Result;
-use crate::kernels::{Level, MOST_EDGES, is_one_fan};
-use crate::spill::{Id, Inbox, Shuffle, Table, release};
-use crate::stages::blocks::Blocks;
-use crate::stages::cells::{CountedTriple, SentTriple};
-use crate::stages::columns::{Direction, extreme};
-use crate::stages::located::{Located, Places};
-use crate::stages::surface::evidence::{Division, Evidence, UP, Witness};
-use crate::stages::surface::orient::{BlockTriangles, Oriented, orient_inside};
-use crate::stages::surface::rows::TriangleTo;
-use crate::stages::surface::star::{Link, Star, Triangle, has, others};
-use crate::stages::triples::Triples;
-use crate::workspace::memory::bytes_of;
-use crate::workspace::{Unit, Workspace};
+use crate::blocks::Blocks;
+use crate::cells::{CountedTriple, SentTriple};
+use crate::columns::{Direction, extreme};
+use crate::located::{Located, Places};
+use crate::surface::evidence::{Division, Evidence, UP, Witness};
+use crate::surface::orient::{BlockTriangles, Oriented, orient_inside};
+use crate::surface::rows::TriangleTo;
+use crate::surface::star::{Link, Star, Triangle, has, others};
+use crate::triples::Triples;
+use outcrop_disk::error::Result;
+use outcrop_disk::spill::{Id, Inbox, Shuffle, Table, release};
+use outcrop_disk::workspace::memory::bytes_of;
+use outcrop_disk::workspace::{Unit, Workspace};
+use outcrop_geom::kernels::{Level, MOST_EDGES, is_one_fan};
 use serde::{Deserialize, Serialize};
 
 /// The base, and the candidates for insertion.
@@ -44,8 +44,8 @@ release!(Base: surface, candidates, crossing, sent_flags);
 /// `triples.own` is deleted.
 ///
 /// # Errors
-/// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
-/// [`crate::Error::Cancelled`].
+/// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`], [`outcrop_disk::error::Error::Memory`],
+/// [`outcrop_disk::error::Error::Cancelled`].
 pub(super) fn base(
     places: Places<'_>,
     triples: &Triples,

@@ -5,11 +5,11 @@
 //! block, and in the whole mesh only if the pass across blocks confirms it. A *local* component lies in this
 //! block alone, so merging it with another one is final.
 
-use crate::spill::row;
-use crate::stages::surface::orient::OrientedSurface;
-use crate::stages::surface::parity::{OrientationConstraint, ParitySets, constraint, word};
-use crate::stages::surface::star::Triangle;
-use crate::workspace::memory::bytes_of;
+use crate::surface::orient::OrientedSurface;
+use crate::surface::parity::{OrientationConstraint, ParitySets, constraint, word};
+use crate::surface::star::Triangle;
+use outcrop_disk::spill::row;
+use outcrop_disk::workspace::memory::bytes_of;
 use rustc_hash::FxHashMap;
 
 /// Stands for a missing global label.

@@ -1,9 +1,9 @@
 //! Rows that one turn of the pass across blocks sends to later ones.
 
-use crate::error::Result;
-use crate::spill::{Row, Table};
-use crate::workspace::place::Place;
-use crate::workspace::{Unit, Workspace};
+use outcrop_disk::error::Result;
+use outcrop_disk::spill::{Row, Table};
+use outcrop_disk::workspace::place::Place;
+use outcrop_disk::workspace::{Unit, Workspace};
 
 /// Rows for numbered receivers, on disk, in the parts in which they were sent. They are not kept if the run
 /// is interrupted.
@@ -29,7 +29,7 @@ impl<R: Row> Deferred<R> {
     /// Sends rows.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], [`crate::Error::Disk`].
+    /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Disk`].
     pub fn send(&mut self, unit: &Unit<'_>, to: u32, rows: &[R]) -> Result<()> {
         if !rows.is_empty() {
             self.of[to as usize].push(self.parts.append(unit, rows)?);
@@ -47,7 +47,7 @@ impl<R: Row> Deferred<R> {
     /// All rows for a receiver, in the order of sending.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+    /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`].
     pub fn get(&self, unit: &Unit<'_>, to: usize) -> Result<Vec<R>> {
         let mut all = Vec::with_capacity(self.rows(to));
         let mut rows = Vec::new();
@@ -67,7 +67,7 @@ impl<R: Row> Deferred<R> {
     /// Deletes the file.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], [`crate::Error::Disk`].
+    /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Disk`].
     pub fn release(&self, workspace: &Workspace) -> Result<()> {
         self.parts.release(workspace)
     }
@@ -79,7 +79,7 @@ mod tests {
 
     #[test]
     fn what_was_sent_comes_in_order() {
-        let workspace = Workspace::for_tests(1);
+        let workspace = Workspace::for_tests(1).expect("a scratch folder");
         let unit = workspace.unit();
         let mut deferred = Deferred::new("deferred", 3);
         for i in 0..90u32 {

@@ -4,10 +4,10 @@
 
 use super::admissibility::{Neighborhood, Refusal, examine};
 use super::stats::InsertStats;
-use crate::geom::{Point, distance2};
-use crate::spill::row;
-use crate::stages::surface::parity::{OrientationConstraint, ParitySets};
-use crate::stages::surface::star::Triangle;
+use crate::surface::parity::{OrientationConstraint, ParitySets};
+use crate::surface::star::Triangle;
+use outcrop_disk::spill::row;
+use outcrop_geom::{Point, distance2};
 
 /// The mesh around candidates, which grows as they are inserted.
 pub trait Mesh: Neighborhood {

@@ -7,16 +7,16 @@ use super::base::Base;
 use super::components::{BaseComponents, BlockComponents, Merge};
 use super::insertion::{Candidate, CandidateRow, Mesh, insert_candidates};
 use super::stats::InsertStats;
-use crate::error::Result;
-use crate::geom::Point;
-use crate::spill::{Table, release, row};
-use crate::stages::cells::CountedTriple;
-use crate::stages::located::Located;
-use crate::stages::surface::parity::{OrientationConstraint, ParitySets};
-use crate::stages::surface::rows::{LabelledTo, LabelledTriangle, TriangleRow, TriangleTo};
-use crate::stages::surface::star::{ByVertex, Triangle, others};
-use crate::workspace::Unit;
-use crate::workspace::memory::{Holding, bytes_of};
+use crate::cells::CountedTriple;
+use crate::located::Located;
+use crate::surface::parity::{OrientationConstraint, ParitySets};
+use crate::surface::rows::{LabelledTo, LabelledTriangle, TriangleRow, TriangleTo};
+use crate::surface::star::{ByVertex, Triangle, others};
+use outcrop_disk::error::Result;
+use outcrop_disk::spill::{Table, release, row};
+use outcrop_disk::workspace::Unit;
+use outcrop_disk::workspace::memory::{Holding, bytes_of};
+use outcrop_geom::Point;
 use std::ops::Range;
 
 row! {
@@ -87,7 +87,7 @@ pub(super) fn block_bytes(insertion: Insertion<'_>, block: usize) -> u64 {
 /// cut.
 ///
 /// # Errors
-/// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+/// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`].
 pub(super) fn insert(
     insertion: Insertion<'_>,
     block: usize,

@@ -20,17 +20,17 @@ mod surroundings;
 
 pub use stats::{BaseStats, InsertStats};
 
-use crate::error::Result;
-use crate::spill::{Shuffle, Table, release};
-use crate::stages::blocks::Blocks;
-use crate::stages::located::Places;
-use crate::stages::surface::evidence::Division;
-use crate::stages::surface::rows::{TriangleRow, TriangleTo};
-use crate::stages::triples::Triples;
-use crate::workspace::Workspace;
+use crate::blocks::Blocks;
+use crate::located::Places;
+use crate::surface::evidence::Division;
+use crate::surface::rows::{TriangleRow, TriangleTo};
+use crate::triples::Triples;
 use across::Across;
 use base::Base;
 use interior::Interior;
+use outcrop_disk::error::Result;
+use outcrop_disk::spill::{Shuffle, Table, release};
+use outcrop_disk::workspace::Workspace;
 use serde::{Deserialize, Serialize};
 
 /// The manifold mesh; triangles by ascending ids, orientable but not yet oriented.
@@ -69,8 +69,8 @@ struct Insertion<'a> {
 /// Extracts the manifold, and deletes the files of `triples`.
 ///
 /// # Errors
-/// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
-/// [`crate::Error::Cancelled`].
+/// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`], [`outcrop_disk::error::Error::Memory`],
+/// [`outcrop_disk::error::Error::Cancelled`].
 pub fn stitch(
     places: Places<'_>,
     triples: &Triples,

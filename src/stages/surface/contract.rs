@@ -7,8 +7,8 @@
 //! decomposition of image and mesh graphs by lifted multicuts*, ICCV 2015, for signed instead of cut edges).
 
 use super::parity::{ParitySets, signed};
-use crate::method::METHOD;
-use crate::workspace::memory::{bytes_of, table_bytes};
+use outcrop_disk::workspace::memory::{bytes_of, table_bytes};
+use outcrop_geom::method::METHOD;
 use rustc_hash::FxHashMap;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;

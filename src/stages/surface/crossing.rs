@@ -6,18 +6,18 @@ use super::parity::{ParitySets, word};
 use super::rows::{LabelledTo, Relation, TriangleTo, interior_constraints};
 use super::settle::settle;
 use super::star::Triangle;
-use crate::error::Result;
-use crate::spill::{Inbox, Shuffle};
-use crate::stages::blocks::Blocks;
-use crate::workspace::Unit;
+use crate::blocks::Blocks;
+use outcrop_disk::error::Result;
+use outcrop_disk::spill::{Inbox, Shuffle};
+use outcrop_disk::workspace::Unit;
 
 impl OrientedInside {
     /// The second part of [`orient_inside`]: orients the crossing triangles, ascending, given by the block of
     /// their smallest vertex, without those in `removed`.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
-    /// [`crate::Error::Cancelled`].
+    /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`], [`outcrop_disk::error::Error::Memory`],
+    /// [`outcrop_disk::error::Error::Cancelled`].
     pub fn join(
         &self,
         name: &str,

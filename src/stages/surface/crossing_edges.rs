@@ -2,10 +2,10 @@
 
 use super::parity::{OrientationConstraint, constraint};
 use super::star::{EDGES, Triangle, opposed};
-use crate::error::Result;
-use crate::stages::blocks::Blocks;
-use crate::workspace::Workspace;
-use crate::workspace::memory::{Reservation, table_bytes};
+use crate::blocks::Blocks;
+use outcrop_disk::error::Result;
+use outcrop_disk::workspace::Workspace;
+use outcrop_disk::workspace::memory::{Reservation, table_bytes};
 use rustc_hash::FxHashMap;
 
 /// Estimated bytes of an edge: its place in a hash table, which exists twice while it grows, and its list.
@@ -77,11 +77,11 @@ impl CrossingEdges {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::error::Error;
+    use outcrop_disk::error::Error;
 
     #[test]
     fn takes_no_more_than_is_reserved() {
-        let workspace = Workspace::for_tests(1);
+        let workspace = Workspace::for_tests(1).expect("a scratch folder");
         let pool = &workspace.memory;
         let mut edges = CrossingEdges::new(&workspace).unwrap();
         let blocks = Blocks::new(1000, 10);

@@ -4,10 +4,10 @@
 //! the least weight: a few edges at the foot of a wall rather than a kilometre of meadow.
 
 use super::star::Triangle;
-use crate::geom::triangle::small_normal;
-use crate::method::METHOD;
-use crate::stages::located::Located;
-use crate::workspace::memory::bytes_of;
+use crate::located::Located;
+use outcrop_disk::workspace::memory::bytes_of;
+use outcrop_geom::method::METHOD;
+use outcrop_geom::triangle::small_normal;
 
 /// The division of a base into patches and clusters for its orientation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -160,7 +160,7 @@ pub fn weight(cosine: f64) -> i64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stages::located::Located;
+    use crate::located::Located;
     use proptest::prelude::*;
 
     proptest! {

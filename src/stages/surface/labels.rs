@@ -5,8 +5,8 @@ use super::parity::{ParitySets, signed, word};
 use super::patches::SharedEdge;
 use super::rows::{LabelledTriangle, PairSum, Relation, Seam, Upward, words};
 use super::star::{EDGES, EdgesUp, Triangle, opposed};
-use crate::stages::blocks::Blocks;
-use crate::workspace::memory::bytes_of;
+use crate::blocks::Blocks;
+use outcrop_disk::workspace::memory::bytes_of;
 
 /// The labels of a block; the rows are described at [`super::orient::OrientedSurface`] and
 /// [`super::orient::Weighed`].

@@ -9,11 +9,11 @@ use super::rows::{
 };
 use super::star::Triangle;
 use super::weigh::weigh_block;
-use crate::error::Result;
-use crate::spill::{Inbox, Shuffle, Table, release};
-use crate::stages::blocks::Blocks;
-use crate::workspace::memory::{Reservation, bytes_of};
-use crate::workspace::{Unit, Workspace};
+use crate::blocks::Blocks;
+use outcrop_disk::error::Result;
+use outcrop_disk::spill::{Inbox, Shuffle, Table, release};
+use outcrop_disk::workspace::memory::{Reservation, bytes_of};
+use outcrop_disk::workspace::{Unit, Workspace};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::ops::Deref;
@@ -126,8 +126,8 @@ type Done<T> = ((u32, u32), (u64, usize), T);
 /// the memory for that; `each` receives the additional results of each block.
 ///
 /// # Errors
-/// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
-/// [`crate::Error::Cancelled`].
+/// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`], [`outcrop_disk::error::Error::Memory`],
+/// [`outcrop_disk::error::Error::Cancelled`].
 pub fn orient_inside<T: Serialize + DeserializeOwned + Send>(
     name: &str,
     around: impl Fn(&Unit<'_>) -> Result<BlockTriangles<T>> + Sync,
@@ -203,7 +203,7 @@ impl OrientedSurface {
     /// Opens it for reading.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`].
+    /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`], [`outcrop_disk::error::Error::Memory`].
     pub fn open(self, workspace: &Workspace, blocks: Blocks) -> Result<Oriented> {
         Ok(Oriented {
             crossing: self.sent.open(workspace, blocks.count())?,
@@ -216,7 +216,7 @@ impl OrientedSurface {
     /// the number of the latter.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+    /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`].
     pub fn inside(&self, unit: &Unit<'_>, block: usize) -> Result<(Vec<LabelledTriangle>, u64)> {
         let mut interior = self.interior.get(unit, block)?;
         let Some(seams) = &self.seams else {

@@ -4,7 +4,7 @@ use super::evidence::{Evidence, LongNormal};
 use super::parity::ParitySets;
 use super::sides::{NONE, across, parts};
 use super::star::{EDGES, Triangle};
-use crate::workspace::memory::bytes_of;
+use outcrop_disk::workspace::memory::bytes_of;
 use std::ops::Range;
 
 /// An edge between two triangles inside a block.

@@ -2,7 +2,7 @@
 
 use super::parity::{OrientationConstraint, constraint};
 use super::star::Triangle;
-use crate::spill::row;
+use outcrop_disk::spill::row;
 
 row! {
     /// A triangle.

@@ -8,11 +8,11 @@ use super::orient::{OrientedSurface, Weighed};
 use super::parity::{OrientationConstraint, signed, word};
 use super::rows::{Relation, interior_constraints, sum};
 use super::star::Triangle;
-use crate::error::Result;
-use crate::method::METHOD;
-use crate::spill::Inbox;
-use crate::stages::blocks::Blocks;
-use crate::workspace::Unit;
+use crate::blocks::Blocks;
+use outcrop_disk::error::Result;
+use outcrop_disk::spill::Inbox;
+use outcrop_disk::workspace::Unit;
+use outcrop_geom::method::METHOD;
 
 /// Decides the relative orientations of global labels. `crossing` returns the crossing triangles of a block
 /// with their normals.

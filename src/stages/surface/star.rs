@@ -1,6 +1,6 @@
 //! The triangles around the vertices and edges of a block.
 
-use crate::workspace::memory::bytes_of;
+use outcrop_disk::workspace::memory::bytes_of;
 use std::ops::Range;
 
 /// A triangle as ascending ids.

@@ -7,9 +7,9 @@ use super::labels::{Connections, OrientedBlock, adjacent, number_labels};
 use super::parity::signed;
 use super::patches::Patches;
 use super::star::{EdgesUp, Triangle};
-use crate::method::METHOD;
-use crate::stages::blocks::Blocks;
-use crate::workspace::memory::bytes_of;
+use crate::blocks::Blocks;
+use outcrop_disk::workspace::memory::bytes_of;
+use outcrop_geom::method::METHOD;
 use std::ops::Range;
 
 /// Orients a block by evidence.

@@ -1,8 +1,8 @@
 //! The grid of cells for thinning.
 
-use crate::geom::Point;
-use crate::geom::lattice::Lattice;
-use crate::spill::row;
+use outcrop_disk::spill::row;
+use outcrop_geom::Point;
+use outcrop_geom::lattice::Lattice;
 use serde::{Deserialize, Serialize};
 
 /// Cubic cells of one size, with a corner at the origin of the input's coordinates.

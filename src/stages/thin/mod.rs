@@ -10,12 +10,12 @@ mod grid;
 pub use grid::Grid;
 use grid::InCell;
 
-use crate::error::Result;
-use crate::geom::Point;
-use crate::geom::lattice::Lattice;
-use crate::spill::{SortedRuns, Sorter, release};
-use crate::stages::ingest::{READ_BUFFERS, Spool};
-use crate::workspace::Workspace;
+use outcrop_disk::error::Result;
+use outcrop_disk::spill::{SortedRuns, Sorter, release};
+use outcrop_disk::workspace::Workspace;
+use outcrop_geom::Point;
+use outcrop_geom::lattice::Lattice;
+use outcrop_points::{READ_BUFFERS, Spool};
 use serde::{Deserialize, Serialize};
 
 /// Points passed on at a time.
@@ -52,8 +52,8 @@ release!(Thinned: sorted);
 /// Sorts the points of a spool by the cells of `grid`.
 ///
 /// # Errors
-/// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
-/// [`crate::Error::Cancelled`].
+/// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`], [`outcrop_disk::error::Error::Memory`],
+/// [`outcrop_disk::error::Error::Cancelled`].
 pub fn thin(
     spool: &Spool,
     lattice: &Lattice,
@@ -103,7 +103,7 @@ impl Thinned {
     /// so far. Starts at `from` with the counts `stats`, as passed to `each` in an earlier call.
     ///
     /// # Errors
-    /// Errors of `each`, [`crate::Error::Io`], [`crate::Error::Corrupt`].
+    /// Errors of `each`, [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`].
     pub fn for_each(
         &self,
         workspace: &Workspace,

@@ -1,5 +1,5 @@
 use super::*;
-use crate::geom::lattice::Lattice;
+use outcrop_geom::lattice::Lattice;
 use proptest::prelude::*;
 use std::collections::BTreeMap;
 
@@ -14,7 +14,7 @@ fn lattice(step: f64, base: [i64; 3]) -> Lattice {
 
 /// The points kept, from points in the given order, with a sort buffer of `buffer` bytes.
 fn thinned(grid: &Grid, points: &[Point], buffer: u64) -> (Vec<Point>, LeftOut) {
-    let workspace = Workspace::for_tests(2);
+    let workspace = Workspace::for_tests(2).expect("a scratch folder");
     let sorter = Sorter::new(&workspace, "thin", buffer);
     for &point in points {
         sorter.push(&[grid.in_cell(point)]).unwrap();

@@ -1,13 +1,13 @@
 //! The points that may be neighbours of a query, in columns.
 
 use super::{LEAVES, OwnPage, Tile};
-use crate::geom::Point;
-use crate::geom::aabb::Aabb;
-use crate::kernels::{
+use outcrop_disk::workspace::memory::bytes_of;
+use outcrop_geom::Point;
+use outcrop_geom::aabb::Aabb;
+use outcrop_geom::kernels::{
     BLOCK, CoveredBoxes, Level, Pick, SearchBox, first_bits, kernel, near_boxes, point_box_body,
     take_boxes,
 };
-use crate::workspace::memory::bytes_of;
 
 /// Upper bound on the relative error of approximate squared distances, with a margin.
 pub(super) const APPROXIMATE: f64 = 1.0 / (1 << 20) as f64;

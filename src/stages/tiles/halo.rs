@@ -3,9 +3,9 @@
 
 use super::MOST_HALO;
 use super::candidates::within;
-use crate::geom::aabb::Aabb;
-use crate::kernels::{BLOCK, CoveredBoxes, Level, near_boxes};
-use crate::stages::order::PointStore;
+use crate::order::PointStore;
+use outcrop_geom::aabb::Aabb;
+use outcrop_geom::kernels::{BLOCK, CoveredBoxes, Level, near_boxes};
 
 /// Most pages within the reach of a page; a reach that touches more is shortened.
 const MOST_NEAR: usize = 96;

@@ -12,12 +12,12 @@ mod points;
 pub mod walk;
 pub mod wanted;
 
-use crate::error::Result;
-use crate::geom::aabb::Aabb;
-use crate::kernels::{BLOCK, Boxes};
-use crate::stages::order::PointStore;
-use crate::workspace::memory::bytes_of;
+use crate::order::PointStore;
 use halo::{Reach, halo};
+use outcrop_disk::error::Result;
+use outcrop_disk::workspace::memory::bytes_of;
+use outcrop_geom::aabb::Aabb;
+use outcrop_geom::kernels::{BLOCK, Boxes};
 use points::Points;
 use std::ops::Range;
 
@@ -80,7 +80,7 @@ impl Tile {
     /// Loads the tile of the points `ids`.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+    /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`].
     pub fn load(store: &PointStore, ids: Range<usize>) -> Result<Self> {
         Self::load_some(store, ids, |_| true)
     }
@@ -89,7 +89,7 @@ impl Tile {
     /// cannot be queried.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+    /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`].
     pub fn load_some(
         store: &PointStore,
         ids: Range<usize>,

@@ -8,10 +8,10 @@ use super::candidates::{APPROXIMATE, Candidates, Columns, PageLeaves, above};
 use super::neighbors::Neighbors;
 use super::wanted::Wanted;
 use super::{OwnPage, Tile};
-use crate::geom::aabb::Aabb;
-use crate::geom::{Point, distance2};
-use crate::kernels::{BLOCK, Level};
-use crate::workspace::memory::bytes_of;
+use outcrop_disk::workspace::memory::bytes_of;
+use outcrop_geom::aabb::Aabb;
+use outcrop_geom::kernels::{BLOCK, Level};
+use outcrop_geom::{Point, distance2};
 use std::ops::Range;
 
 mod around;

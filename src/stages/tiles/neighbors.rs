@@ -1,10 +1,10 @@
 //! The neighbours of one point in columns, nearest first.
 
 use super::Near;
-use crate::geom::clip::Nearest;
-use crate::geom::plane::Moments;
-use crate::kernels::{Level, MOST_SUMMED, SUMMED_LIMIT2, second_moments};
-use crate::workspace::memory::bytes_of;
+use outcrop_disk::workspace::memory::bytes_of;
+use outcrop_geom::clip::Nearest;
+use outcrop_geom::kernels::{Level, MOST_SUMMED, SUMMED_LIMIT2, second_moments};
+use outcrop_geom::plane::Moments;
 
 /// Sums over the nearest neighbours of a point.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]

@@ -1,10 +1,10 @@
 //! The points of a tile in columns.
 
-use crate::error::Result;
-use crate::geom::Point;
-use crate::geom::aabb::Aabb;
-use crate::kernels::BLOCK;
-use crate::workspace::memory::bytes_of;
+use outcrop_disk::error::Result;
+use outcrop_disk::workspace::memory::bytes_of;
+use outcrop_geom::Point;
+use outcrop_geom::aabb::Aabb;
+use outcrop_geom::kernels::BLOCK;
 use std::ops::Range;
 
 /// Points in columns that are a block longer than the number of points, so that a whole block can be read

@@ -5,16 +5,16 @@ use super::neighbors::Neighbors;
 use super::walk::{PageCache, Walk};
 use super::wanted::Wanted;
 use super::*;
-use crate::geom::plane::Moments;
-use crate::geom::{Point, distance2};
-use crate::kernels::Level;
-use crate::stages::order::Orderer;
-use crate::workspace::Workspace;
+use crate::order::Orderer;
+use outcrop_disk::workspace::Workspace;
+use outcrop_geom::kernels::Level;
+use outcrop_geom::plane::Moments;
+use outcrop_geom::{Point, distance2};
 use proptest::prelude::*;
 
 /// The store of a cloud in pages of `page` points, its workspace, and its points by id.
 fn ordered(cloud: &[Point], page: usize) -> (Workspace, PointStore, Vec<Point>) {
-    let workspace = Workspace::for_tests(1);
+    let workspace = Workspace::for_tests(1).expect("a scratch folder");
     let orderer = Orderer::new(&workspace).unwrap();
     orderer.push(&workspace, cloud).unwrap();
     let (stored, _) = orderer.finish(&workspace, page).unwrap();
@@ -108,7 +108,7 @@ fn check(points: &[Point], tile: &Tile, k: usize, search: &mut Search) {
             }
             for near in query.near().iter() {
                 let there = points[near.id as usize];
-                assert_eq!(near.difference, crate::geom::sub(there, point));
+                assert_eq!(near.difference, outcrop_geom::sub(there, point));
             }
             if query.extend_to(2 * k) {
                 assert!(query.near().len() >= 2 * k);
@@ -141,7 +141,7 @@ fn check(points: &[Point], tile: &Tile, k: usize, search: &mut Search) {
 fn sums_over(points: &[Point], point: Point, nearest: &[(u64, u32)]) -> near::Sums {
     let mut moments = Moments::default();
     for (_, near) in nearest {
-        moments.add(crate::geom::sub(points[*near as usize], point));
+        moments.add(outcrop_geom::sub(points[*near as usize], point));
     }
     near::Sums {
         moments,
@@ -198,7 +198,7 @@ fn check_groups(points: &[Point], tile: &Tile, k: usize, search: &mut Search) ->
                 for (place, id) in ids.iter().enumerate() {
                     let difference = [x[place], y[place], z[place]].map(i64::from);
                     let at = points[*id as usize];
-                    assert_eq!(difference, crate::geom::sub(at, member.point));
+                    assert_eq!(difference, outcrop_geom::sub(at, member.point));
                 }
                 assert!(
                     [x, y, z]

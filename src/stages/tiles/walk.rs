@@ -4,10 +4,10 @@
 use super::Near;
 use super::neighbors::Neighbors;
 use super::wanted::{All, Wanted};
-use crate::error::Result;
-use crate::geom::{Point, distance2, sub};
-use crate::stages::order::PointStore;
-use crate::workspace::memory::bytes_of;
+use crate::order::PointStore;
+use outcrop_disk::error::Result;
+use outcrop_disk::workspace::memory::bytes_of;
+use outcrop_geom::{Point, distance2, sub};
 use rustc_hash::FxHashMap;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -125,7 +125,7 @@ impl<'a> Walk<'a> {
     /// The next neighbour in the order of (distance, id); `None` if there are no more.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+    /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`].
     pub fn advance(&mut self) -> Result<Option<Near>> {
         if self.ready.is_empty() {
             self.fill(u64::MAX, &All)?;
@@ -138,7 +138,7 @@ impl<'a> Walk<'a> {
     /// wanted once are not offered again.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], [`crate::Error::Corrupt`].
+    /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`].
     pub fn list_where(
         &mut self,
         within2: u64,

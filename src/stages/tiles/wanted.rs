@@ -1,6 +1,6 @@
 //! An additional condition on the points that a search returns.
 
-use crate::geom::aabb::Aabb;
+use outcrop_geom::aabb::Aabb;
 
 /// Selects the points that matter to a query. It may let others pass.
 pub trait Wanted {

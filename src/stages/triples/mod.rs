@@ -1,11 +1,11 @@
 //! Distinct triples with their counts, by block: the sums over the cells of all tiles (paper, 3.4).
 
-use crate::error::Result;
-use crate::spill::{Shuffle, Table};
-use crate::stages::blocks::Blocks;
-use crate::stages::cells::{CellTriples, CountedTriple, SentTriple};
-use crate::workspace::memory::{Reservation, bytes_of};
-use crate::workspace::{Unit, Workspace};
+use crate::blocks::Blocks;
+use crate::cells::{CellTriples, CountedTriple, SentTriple};
+use outcrop_disk::error::Result;
+use outcrop_disk::spill::{Shuffle, Table};
+use outcrop_disk::workspace::memory::{Reservation, bytes_of};
+use outcrop_disk::workspace::{Unit, Workspace};
 use serde::{Deserialize, Serialize};
 
 /// All triples with their counts, ascending.
@@ -35,8 +35,8 @@ pub struct TripleStats {
 /// Adds up the counts of all tiles.
 ///
 /// # Errors
-/// [`crate::Error::Io`], [`crate::Error::Corrupt`], [`crate::Error::Memory`],
-/// [`crate::Error::Cancelled`].
+/// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`], [`outcrop_disk::error::Error::Memory`],
+/// [`outcrop_disk::error::Error::Cancelled`].
 pub fn triples(
     cells: &CellTriples,
     blocks: Blocks,

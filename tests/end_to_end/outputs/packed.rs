@@ -6,9 +6,9 @@ use meshoptimizer_rs::Workspace;
 use meshoptimizer_rs::codec::{decode_filter_exp, decode_index_buffer, decode_vertex_buffer};
 use outcrop::Error;
 use outcrop::params::Params;
-use outcrop::pipeline::Start;
-use outcrop::workspace::memory::MINIMUM_BUDGET;
+use outcrop::Start;
 use outcrop_cloudgen::{Cloud, Kind};
+use outcrop_disk::workspace::memory::MINIMUM_BUDGET;
 use outcrop_ply::{Header, Property, Scalar};
 use serde_json::Value;
 use std::fmt::Write as _;
@@ -327,7 +327,7 @@ fn only_glb_can_be_compressed_so() {
         assert!(said.err.contains("--compress-glb"), "{said:?}");
         assert_eq!(said.err.lines().count(), 1, "{said:?}");
     }
-    let built = outcrop::pipeline::Reconstruction::builder()
+    let built = outcrop::Reconstruction::builder()
         .input(&input)
         .output(bench.path("mesh.stl"))
         .params(params(true))

@@ -2,7 +2,7 @@
 
 use crate::{Bench, check_error};
 use outcrop::Error;
-use outcrop::stages::ingest::{Spool, ingest, probe};
+use outcrop_points::{Spool, ingest, probe};
 
 /// Reads a file of this extension, and streams its points on their lattice.
 pub fn read(extension: &str, bytes: &[u8]) {

@@ -2,7 +2,7 @@
 
 use crate::{Bench, check_error, cloud};
 use outcrop::inspect::info::info;
-use outcrop::stages::ingest::{expand, ingest_selected, probe};
+use outcrop_points::{expand, ingest_selected, probe};
 use outcrop::{Classes, Error, Params, Region};
 
 /// Separator between two files.

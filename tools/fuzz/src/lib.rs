@@ -13,9 +13,9 @@ pub mod scratch;
 pub mod seeds;
 
 use outcrop::Error;
-use outcrop::workspace::Workspace;
-use outcrop::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
-use outcrop::workspace::progress::{Cancel, Silent};
+use outcrop_disk::workspace::Workspace;
+use outcrop_disk::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
+use outcrop_disk::workspace::progress::{Cancel, Silent};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 

@@ -2,7 +2,7 @@
 
 use crate::{Bench, check_error};
 use outcrop::inspect::compare::{self, compare};
-use outcrop::inspect::ply_mesh::holds_faces;
+use outcrop_codecs::ply_mesh::holds_faces;
 use outcrop::inspect::verify::{Options, verify_with};
 
 /// Largest file that is also compared with itself.

@@ -1,7 +1,7 @@
 //! Damage to the files of a stopped run: it is found, and the mesh is the same.
 
 use crate::Bench;
-use outcrop::workspace::memory::MINIMUM_BUDGET;
+use outcrop_disk::workspace::memory::MINIMUM_BUDGET;
 use outcrop::{Cancel, Observer, Params, Reconstruction, Start};
 use outcrop_cloudgen::{Cloud, Format, Kind};
 use std::fs::DirBuilder;

@@ -5,13 +5,13 @@
 //! allocation.
 
 use crate::Bench;
-use outcrop::geom::lattice::Lattice;
-use outcrop::spill::{Row, Shuffle, SortedRuns, Table};
-use outcrop::stages::ingest::{IngestStats, Spool};
-use outcrop::stages::order::{Position, StoredPoints};
-use outcrop::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
-use outcrop::workspace::progress::{Cancel, Silent};
-use outcrop::workspace::{Folder, Found, Workspace};
+use outcrop_geom::lattice::Lattice;
+use outcrop_disk::spill::{Row, Shuffle, SortedRuns, Table};
+use outcrop_points::{IngestStats, Spool};
+use outcrop_stages::order::{Position, StoredPoints};
+use outcrop_disk::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
+use outcrop_disk::workspace::progress::{Cancel, Silent};
+use outcrop_disk::workspace::{Folder, Found, Workspace};
 use serde::de::DeserializeOwned;
 use std::fs::DirBuilder;
 use std::os::unix::fs::DirBuilderExt;

@@ -5,7 +5,7 @@ use crate::{Limits, read};
 use clap::Args;
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use outcrop::inspect::compare;
-use outcrop::workspace::Workspace;
+use outcrop_disk::workspace::Workspace;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::num::NonZero;

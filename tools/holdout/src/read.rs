@@ -1,8 +1,8 @@
 //! Scans of any format as distinct, finite points in a fixed order.
 
 use crate::error::Result;
-use outcrop::stages::ingest::ingest;
-use outcrop::workspace::Workspace;
+use outcrop_disk::workspace::Workspace;
+use outcrop_points::ingest;
 use std::path::Path;
 
 /// All distinct points with finite coordinates, sorted by coordinates.

@@ -1,8 +1,8 @@
 //! Other methods for normals, for comparison.
 
-use outcrop::geom::plane::{Moments, Plane, least_direction};
-use outcrop::kernels::Level;
-use outcrop::stages::tiles::neighbors::Neighbors;
+use outcrop_geom::kernels::Level;
+use outcrop_geom::plane::{Moments, Plane, least_direction};
+use outcrop_stages::tiles::neighbors::Neighbors;
 
 /// A method for normals.
 pub(crate) struct Candidate {

@@ -11,8 +11,8 @@ mod world;
 
 use clap::Parser;
 use error::Result;
-use outcrop::stages::cells::Widen;
 use outcrop_cloudgen::Kind;
+use outcrop_stages::cells::Widen;
 use std::io::Write;
 use std::process::ExitCode;
 

@@ -4,8 +4,8 @@ use crate::Arguments;
 use crate::error::Result;
 use crate::world::World;
 use outcrop::params::Smoothing;
-use outcrop::stages::smooth::smooth;
 use outcrop_cloudgen::Kind;
+use outcrop_stages::smooth::smooth;
 
 /// Cosine of the angle between the normals of neighbours at an edge: 30°.
 const EDGE: f64 = 0.866;

@@ -3,18 +3,18 @@
 use crate::Arguments;
 use crate::candidates::Candidate;
 use crate::error::Result;
-use outcrop::geom::Point;
 use outcrop::params::Params;
-use outcrop::stages::blocks::Blocks;
-use outcrop::stages::cells::{TileRanges, Widen};
-use outcrop::stages::cells::{each_neighborhood, each_plane};
-use outcrop::stages::order::{Orderer, PAGE, PointStore};
-use outcrop::stages::smooth::{Relaxing, relax};
-use outcrop::stages::tiles::neighbors::Neighbors;
-use outcrop::workspace::Workspace;
-use outcrop::workspace::memory::MemoryPool;
-use outcrop::workspace::progress::{Cancel, Silent};
 use outcrop_cloudgen::{Cloud, Generator, Kind};
+use outcrop_disk::workspace::Workspace;
+use outcrop_disk::workspace::memory::MemoryPool;
+use outcrop_disk::workspace::progress::{Cancel, Silent};
+use outcrop_geom::Point;
+use outcrop_stages::blocks::Blocks;
+use outcrop_stages::cells::{TileRanges, Widen};
+use outcrop_stages::cells::{each_neighborhood, each_plane};
+use outcrop_stages::order::{Orderer, PAGE, PointStore};
+use outcrop_stages::smooth::{Relaxing, relax};
+use outcrop_stages::tiles::neighbors::Neighbors;
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -92,8 +92,8 @@ impl World {
             normals.entry(place).or_insert(sample.normal);
         }
         let points: Vec<Point> = normals.keys().copied().collect();
-        let pool = MemoryPool::new(outcrop::pipeline::default_memory())?;
-        let threads = outcrop::pipeline::default_threads();
+        let pool = MemoryPool::new(outcrop::default_memory())?;
+        let threads = outcrop::default_threads();
         let folder = std::env::temp_dir();
         let workspace = Workspace::new(&folder, pool, threads, Arc::new(Silent), Cancel::new())?;
         let orderer = Orderer::new(&workspace)?;

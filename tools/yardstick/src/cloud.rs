@@ -1,10 +1,9 @@
 //! The cloud of a measurement, and its points in the form for the k-d tree.
 
 use crate::Result;
-use outcrop::stages::ingest;
-use outcrop::stages::order::{self, PointStore};
-use outcrop::workspace::Workspace;
 use outcrop_cloudgen::{Cloud, Format, Kind};
+use outcrop_disk::workspace::Workspace;
+use outcrop_stages::order::{self, PointStore};
 use std::path::{Path, PathBuf};
 
 /// A generated cloud: a uniform sample of a surface.
@@ -62,7 +61,7 @@ impl Sample {
 /// The distinct points of a cloud along the Hilbert curve, by the pipeline's own ingest and order; and the
 /// length of a lattice step.
 pub fn ordered(cloud: &Path, workspace: &Workspace) -> Result<(PointStore, f64)> {
-    let spool = ingest::ingest(&[cloud.to_owned()], workspace)?;
+    let spool = outcrop_points::ingest(&[cloud.to_owned()], workspace)?;
     let lattice = spool.choose_lattice(0)?;
     let orderer = order::Orderer::new(workspace)?;
     spool.for_each(workspace, &lattice, |points| {

@@ -2,7 +2,7 @@
 
 use crate::{Result, cpu};
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
-use outcrop::workspace::Workspace;
+use outcrop_disk::workspace::Workspace;
 use rayon::prelude::*;
 use std::num::NonZero;
 use std::time::Instant;

@@ -1,10 +1,10 @@
 //! A measurement: pairs of K and pipeline, medians.
 
 use crate::{Result, Run, cloud, knn, neighbors, pipeline, show};
-use outcrop::pipeline::{default_memory, default_threads};
-use outcrop::workspace::memory::MemoryPool;
-use outcrop::workspace::progress::{Cancel, Silent};
-use outcrop::workspace::{Workspace, limits};
+use outcrop::{default_memory, default_threads};
+use outcrop_disk::workspace::memory::MemoryPool;
+use outcrop_disk::workspace::progress::{Cancel, Silent};
+use outcrop_disk::workspace::{Workspace, limits};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::path::Path;

@@ -1,11 +1,11 @@
 //! The pipeline's own neighbour search alone: the 30 nearest of all points, exact, with ties by id.
 
 use crate::Result;
-use outcrop::stages::order::PointStore;
-use outcrop::stages::tiles::Tile;
-use outcrop::stages::tiles::near::Search;
-use outcrop::stages::tiles::walk::{PageCache, Walk};
-use outcrop::workspace::Workspace;
+use outcrop_disk::workspace::Workspace;
+use outcrop_stages::order::PointStore;
+use outcrop_stages::tiles::Tile;
+use outcrop_stages::tiles::near::Search;
+use outcrop_stages::tiles::walk::{PageCache, Walk};
 use std::ops::Range;
 use std::sync::Mutex;
 use std::time::Instant;

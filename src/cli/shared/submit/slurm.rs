@@ -4,9 +4,9 @@ use super::super::Submit;
 use super::{advance, advance_command, mebibytes, program, state};
 use crate::cli::output::print;
 use crate::cli::{stop, style};
-use crate::error::{Error, Result};
 use crate::pipeline::{Status, TaskState};
-use crate::workspace::make_folder;
+use outcrop_disk::error::{Error, Result};
+use outcrop_disk::workspace::make_folder;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 

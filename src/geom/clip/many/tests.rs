@@ -1,7 +1,7 @@
 //! Tests: a cell of many corners equals the cell found by testing all corners.
 
 use super::*;
-use crate::geom::plane::Normal;
+use crate::plane::Normal;
 use proptest::prelude::*;
 use std::f64::consts::TAU;
 

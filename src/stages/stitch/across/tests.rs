@@ -3,13 +3,13 @@
 use super::super::base::base;
 use super::super::interior::Interior;
 use super::*;
-use crate::geom::Point;
-use crate::stages::blocks::Blocks;
-use crate::stages::cells::{CellOptions, DiskRadius, TileRanges, Widen, cells};
-use crate::stages::located::Places;
-use crate::stages::order::Orderer;
-use crate::stages::triples::triples;
-use crate::workspace::Workspace;
+use crate::blocks::Blocks;
+use crate::cells::{CellOptions, DiskRadius, TileRanges, Widen, cells};
+use crate::located::Places;
+use crate::order::Orderer;
+use crate::triples::triples;
+use outcrop_disk::workspace::Workspace;
+use outcrop_geom::Point;
 
 /// Points in a row of the sheet, and in a block.
 const SIDE: i32 = 50;
@@ -36,7 +36,7 @@ struct Left {
 /// Takes the pass over the sheet. If `starved`, each turn is first tried without memory, and then with more
 /// and more. Returns the result, the number of turns, and how often one was abandoned.
 fn across(starved: bool) -> (Left, [usize; 2]) {
-    let workspace = &Workspace::for_tests(1);
+    let workspace = &Workspace::for_tests(1).expect("a scratch folder");
     let orderer = Orderer::new(workspace).unwrap();
     orderer.push(workspace, &sheet()).unwrap();
     let stored = orderer.finish(workspace, 64).unwrap().0;
@@ -58,7 +58,7 @@ fn across(starved: bool) -> (Left, [usize; 2]) {
         density: None,
         outside: None,
     };
-    let division = Some(crate::Division::default());
+    let division = Some(crate::surface::evidence::Division::default());
     let (base, _) = base(places, &triples, blocks, division, workspace).unwrap();
     let interior = Interior::new(blocks.count());
     let unit = &workspace.unit();

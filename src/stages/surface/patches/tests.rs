@@ -3,9 +3,9 @@
 use super::super::evidence::{Division, cosine, weight};
 use super::super::star::opposed;
 use super::*;
-use crate::geom::Point;
-use crate::method::METHOD;
-use crate::stages::located::Located;
+use crate::located::Located;
+use outcrop_geom::Point;
+use outcrop_geom::method::METHOD;
 use proptest::prelude::*;
 
 /// The triangles of a closed band, `wide` points long and three points high, with a twist or without, in the

@@ -4,7 +4,7 @@ use super::super::evidence::Division;
 use super::super::parity::ParitySets;
 use super::super::patches::tests::{band, evidence, inner_edges, points};
 use super::*;
-use crate::geom::Point;
+use outcrop_geom::Point;
 use proptest::prelude::*;
 
 /// Orients triangles in one block, with points at `places`.

@@ -2,10 +2,10 @@
 
 use super::sums::{Unknown, divided_body};
 use super::{OwnPage, Search};
-use crate::geom::{Point, distance2};
-use crate::kernels::{BLOCK, Pick, kernel};
-use crate::stages::tiles::Tile;
-use crate::stages::tiles::neighbors::Neighbors;
+use crate::tiles::Tile;
+use crate::tiles::neighbors::Neighbors;
+use outcrop_geom::kernels::{BLOCK, Pick, kernel};
+use outcrop_geom::{Point, distance2};
 
 /// A point and its nearest neighbours, in order of id, in columns that end with zeros to whole groups of
 /// eight.

@@ -2,11 +2,11 @@
 
 use super::sums::{Unknown, certain_body, divided_body};
 use super::{APPROXIMATE, OwnPage, Query, Search, Sums};
-use crate::geom::clip::wrap::{MOST_NEIGHBORS, TOGETHER};
-use crate::geom::plane::Moments;
-use crate::geom::{Point, distance2};
-use crate::kernels::{BLOCK, Pick, SUMMED_LIMIT2, kernel, second_moments_body};
-use crate::stages::tiles::Tile;
+use crate::tiles::Tile;
+use outcrop_geom::clip::wrap::{MOST_NEIGHBORS, TOGETHER};
+use outcrop_geom::kernels::{BLOCK, Pick, SUMMED_LIMIT2, kernel, second_moments_body};
+use outcrop_geom::plane::Moments;
+use outcrop_geom::{Point, distance2};
 use std::ops::Range;
 
 /// Factor, in squared distance, by which a leaf's candidates are gathered farther for members with too few.

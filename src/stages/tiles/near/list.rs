@@ -1,14 +1,14 @@
 //! The sorted list of a query's nearest neighbours.
 
 use super::{APPROXIMATE, CORRECTIONS, Search, above};
-use crate::geom::{Point, distance2, sub};
-use crate::kernels::{
+use crate::tiles::Near;
+use crate::tiles::candidates::Columns;
+use crate::tiles::neighbors::Neighbors;
+use outcrop_geom::kernels::{
     BLOCK, Pick, RANKED, SHORT_RANKED, count_body, distances_body, first_bits, kernel, pick_body,
     ranks_body, short_ranks_body,
 };
-use crate::stages::tiles::Near;
-use crate::stages::tiles::candidates::Columns;
-use crate::stages::tiles::neighbors::Neighbors;
+use outcrop_geom::{Point, distance2, sub};
 use std::ops::RangeInclusive;
 
 /// Up to this number, keys are sorted by counting.

@@ -3,11 +3,11 @@
 
 use super::list::{likely_body, pick_enough_body};
 use super::{APPROXIMATE, OwnPage, Query, Search, above};
-use crate::geom::Point;
-use crate::geom::plane::Moments;
-use crate::kernels::{BLOCK, MOST_SUMMED, Pick, SUMMED_LIMIT2, distances_body, kernel};
-use crate::stages::tiles::Tile;
-use crate::stages::tiles::neighbors::Sums;
+use crate::tiles::Tile;
+use crate::tiles::neighbors::Sums;
+use outcrop_geom::Point;
+use outcrop_geom::kernels::{BLOCK, MOST_SUMMED, Pick, SUMMED_LIMIT2, distances_body, kernel};
+use outcrop_geom::plane::Moments;
 
 /// Most corrections of the limit that separates the nearest from the others.
 const DIVISIONS: usize = 16;

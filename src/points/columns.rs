@@ -1,0 +1,428 @@
+//! Columns of input files: values that points have beside their positions, such as colours.
+
+use outcrop_disk::error::{Error, Result};
+use outcrop_ply::Scalar;
+use serde::{Deserialize, Serialize};
+
+/// The colour of a point.
+pub(super) const COLORS: [&str; 3] = ["red", "green", "blue"];
+
+/// The coordinates, which are no columns.
+pub(super) const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// The strength of the echo.
+pub(super) const INTENSITY: &str = "intensity";
+
+/// The class of a point, as in LAS.
+pub(super) const CLASSIFICATION: &str = "classification";
+
+/// The scanner that saw a point, in files that give positions of scanners: its number in
+/// [`PointFile::scanners`](super::point_format::PointFile::scanners), or [`NO_SCANNER`].
+pub(super) const SCANNER: &str = "scanner";
+
+/// Of points whose scanner is unknown.
+pub(super) const NO_SCANNER: u16 = u16::MAX;
+
+/// How far a point moved from where it was measured, in the cloud's unit: of the mesh, not of a file.
+pub(super) const DISPLACEMENT: &str = "displacement";
+
+/// Other names of columns, in lower case.
+const ALIASES: [(&str, &str); 12] = [
+    ("r", "red"),
+    ("g", "green"),
+    ("b", "blue"),
+    ("diffuse_red", "red"),
+    ("diffuse_green", "green"),
+    ("diffuse_blue", "blue"),
+    ("class", CLASSIFICATION),
+    ("reflectance", INTENSITY),
+    ("gpstime", "gps_time"),
+    ("pointsourceid", "point_source"),
+    ("point_source_id", "point_source"),
+    ("returnnumber", "return_number"),
+];
+
+/// Names of the columns of a normal, as they are known in all formats: of PLY and CloudCompare, of PCD, of the
+/// extension of E57, and of LAS, the last of three numbers in one.
+const NORMALS: [[&str; 3]; 5] = [
+    ["nx", "ny", "nz"],
+    ["normal_x", "normal_y", "normal_z"],
+    ["nor_normalx", "nor_normaly", "nor_normalz"],
+    ["normalx", "normaly", "normalz"],
+    ["normal0", "normal1", "normal2"],
+];
+
+/// Most bytes of all columns of a point that are wanted for the mesh.
+pub(super) const MOST_BYTES: usize = 48;
+
+/// Most bytes of a point's row: these, the number of its scanner, its normal, its class, and colours.
+pub(super) const MOST_ROW: usize = MOST_BYTES + size_of::<u32>() + 7 * size_of::<f64>();
+
+/// A column of a file.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Column {
+    /// Its name, in lower case.
+    pub name: String,
+    /// Type of its values.
+    pub scalar: Scalar,
+}
+
+impl Column {
+    /// The column that a file calls `name`.
+    pub(super) fn new(name: &str, scalar: Scalar) -> Self {
+        let name = column_name(name);
+        Self { name, scalar }
+    }
+
+    /// How far a point moved from where it was measured.
+    #[must_use]
+    pub fn displacement() -> Self {
+        Self::new(DISPLACEMENT, Scalar::F32)
+    }
+}
+
+/// The name by which a column is known in all formats: in lower case, with `_` for spaces, which PLY has between
+/// words, and without the prefix that CloudCompare writes.
+pub(super) fn usual_name(name: &str) -> String {
+    let lower = name.to_ascii_lowercase();
+    let words = lower.split(|c: char| c.is_whitespace() || c.is_control());
+    let words: Vec<&str> = words.filter(|word| !word.is_empty()).collect();
+    let name = words.join("_");
+    let name = name.strip_prefix("scalar_").unwrap_or(&name);
+    let alias = ALIASES.iter().find(|(alias, _)| *alias == name);
+    alias.map_or(name, |(_, usual)| usual).to_owned()
+}
+
+/// The name of a column that is no coordinate: the usual one, and `extra_x` for what has the name of a coordinate.
+fn column_name(name: &str) -> String {
+    let usual = usual_name(name);
+    match AXES.contains(&&*usual) {
+        true => extra(&usual),
+        false => usual,
+    }
+}
+
+/// The name of a column whose own is taken.
+pub(super) fn extra(name: &str) -> String {
+    format!("extra_{name}")
+}
+
+/// Columns that the mesh keeps.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Attributes {
+    /// None.
+    #[default]
+    None,
+    /// Colours, intensity and classification, each if it is not the same at all points.
+    Auto,
+    /// The columns with these names.
+    List(Vec<String>),
+}
+
+impl Attributes {
+    /// True if the mesh tells how far each point moved.
+    #[must_use]
+    pub fn has_displacement(&self) -> bool {
+        matches!(self, Self::List(names) if names.iter().any(|name| name == DISPLACEMENT))
+    }
+
+    /// True for the column `name` of a file.
+    pub(super) fn wants(&self, name: &str) -> bool {
+        match self {
+            _ if name == DISPLACEMENT => false,
+            Self::None => false,
+            Self::Auto => COLORS.contains(&name) || name == INTENSITY || name == CLASSIFICATION,
+            Self::List(names) => names.iter().any(|n| n == name),
+        }
+    }
+
+    /// Numbers of the wanted columns among those of a file. Of columns with the same name the first counts.
+    pub(super) fn of(&self, columns: &[Column]) -> Vec<usize> {
+        let first = |at: usize| columns[..at].iter().all(|c| c.name != columns[at].name);
+        let wanted = |at: &usize| self.wants(&columns[*at].name) && first(*at);
+        (0..columns.len()).filter(wanted).collect()
+    }
+
+    /// The names of columns of files, in the order of the mesh.
+    pub(super) fn names(&self) -> Vec<&str> {
+        match self {
+            Self::None => Vec::new(),
+            Self::Auto => [&COLORS[..], &[INTENSITY, CLASSIFICATION]].concat(),
+            Self::List(names) => {
+                let names = names.iter().map(String::as_str);
+                names.filter(|name| *name != DISPLACEMENT).collect()
+            }
+        }
+    }
+
+    /// # Errors
+    /// [`Error::Parameter`] if a listed column is in none of the files, whose columns are `present`.
+    pub(super) fn check(&self, present: &[Column]) -> Result<()> {
+        let Self::List(_) = self else {
+            return Ok(());
+        };
+        let names = self.names();
+        let missing = |name: &&&str| present.iter().all(|c| c.name != **name);
+        let Some(name) = names.iter().find(missing) else {
+            return Ok(());
+        };
+        let mut known: Vec<&str> = present.iter().map(|c| &*c.name).collect();
+        known.sort_unstable();
+        known.dedup();
+        let expected = match known.is_empty() {
+            true => "none: the points have no columns".to_owned(),
+            false => format!("columns of the points: {}", known.join(", ")),
+        };
+        Err(Error::Parameter {
+            name: "--attributes",
+            found: name.escape_debug().to_string(),
+            expected,
+        })
+    }
+}
+
+impl std::str::FromStr for Attributes {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text.trim() {
+            "none" => return Ok(Self::None),
+            "auto" => return Ok(Self::Auto),
+            _ => {}
+        }
+        let mut names: Vec<String> = Vec::new();
+        for word in text.split(',') {
+            let word = word.trim();
+            if word.is_empty() {
+                return Err(format!(
+                    "{text:?} is not auto, none, or a list of columns like color,intensity"
+                ));
+            }
+            let color = ["color", "colour", "colors", "colours", "rgb"];
+            let more = match color.contains(&&*word.to_ascii_lowercase()) {
+                true => COLORS.map(str::to_owned).to_vec(),
+                false => vec![column_name(word)],
+            };
+            for name in more {
+                if !names.contains(&name) {
+                    names.push(name);
+                }
+            }
+        }
+        Ok(Self::List(names))
+    }
+}
+
+/// The wanted columns of one file, as its reader sees them.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Wanted {
+    /// Numbers of the columns in the file's list, ascending.
+    pub(super) numbers: Vec<usize>,
+    /// The columns.
+    pub(super) columns: Vec<Column>,
+    /// Byte and type of the class in a row, if points are left out by it.
+    pub(super) class: Option<(usize, Scalar)>,
+}
+
+/// What is read beside the columns for the mesh.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Also {
+    /// The column of scanners.
+    pub(super) scanners: bool,
+    /// Those of normals.
+    pub(super) normals: bool,
+    /// That of classes, for leaving out points.
+    pub(super) classes: bool,
+    /// Colours whose scale only their numbers tell.
+    pub(super) depths: bool,
+}
+
+impl Wanted {
+    /// Of a file with these columns.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] if those for the mesh take more than [`MOST_BYTES`].
+    pub(super) fn of(attributes: &Attributes, columns: &[Column], also: Also) -> Result<Self> {
+        let mut numbers = attributes.of(columns);
+        let bytes: usize = numbers.iter().map(|n| columns[*n].scalar.bytes()).sum();
+        let number = |name: &str| columns.iter().position(|c| c.name == name);
+        numbers.extend(number(SCANNER).filter(|_| also.scanners));
+        let normal = normal_columns(columns).filter(|_| also.normals);
+        numbers.extend(normal.into_iter().flatten());
+        numbers.extend(number(CLASSIFICATION).filter(|_| also.classes));
+        let colors = COLORS.iter().filter_map(|name| number(name));
+        numbers.extend(colors.filter(|_| also.depths));
+        numbers.sort_unstable();
+        numbers.dedup();
+        let columns: Vec<Column> = numbers.iter().map(|n| columns[*n].clone()).collect();
+        let class = columns.iter().position(|c| c.name == CLASSIFICATION);
+        let class = class.filter(|_| also.classes);
+        let class = class.map(|n| (row_bytes(&columns[..n]), columns[n].scalar));
+        if bytes > MOST_BYTES {
+            return Err(Error::Parameter {
+                name: "--attributes",
+                found: format!("columns of {bytes} bytes for each point"),
+                expected: format!("at most {MOST_BYTES}"),
+            });
+        }
+        Ok(Self {
+            numbers,
+            columns,
+            class,
+        })
+    }
+
+    /// The columns as they are, when the points were read: those that none of them has have no name.
+    pub(super) fn found(&self, found: &[Column]) -> Vec<Column> {
+        let mut columns = self.columns.clone();
+        let absent = |column: &&mut Column| found.iter().all(|f| f.name != column.name);
+        columns
+            .iter_mut()
+            .filter(absent)
+            .for_each(|c| c.name.clear());
+        columns
+    }
+
+    /// True if no column is wanted.
+    pub(super) fn is_empty(&self) -> bool {
+        self.columns.is_empty()
+    }
+
+    /// Bytes of the values of a point.
+    pub(super) fn bytes(&self) -> usize {
+        row_bytes(&self.columns)
+    }
+}
+
+/// Numbers of the columns of a normal; of several with the same name the first counts.
+pub(super) fn normal_columns(columns: &[Column]) -> Option<[usize; 3]> {
+    let number = |name: &str| columns.iter().position(|c| c.name == name);
+    NORMALS.iter().find_map(|names| {
+        let [x, y, z] = names.map(number);
+        Some([x?, y?, z?])
+    })
+}
+
+/// Bytes of the values of a point.
+pub(super) fn row_bytes(columns: &[Column]) -> usize {
+    columns.iter().map(|c| c.scalar.bytes()).sum()
+}
+
+/// Smallest and largest value of a column; merging is commutative.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub(super) struct Span {
+    pub(super) min: f64,
+    pub(super) max: f64,
+}
+
+impl Default for Span {
+    fn default() -> Self {
+        Self {
+            min: f64::INFINITY,
+            max: f64::NEG_INFINITY,
+        }
+    }
+}
+
+impl Span {
+    /// Widens the span; NaN has no effect.
+    #[inline]
+    pub(super) fn add(&mut self, value: f64) {
+        self.min = self.min.min(value);
+        self.max = self.max.max(value);
+    }
+
+    pub(super) fn merge(&mut self, other: &Self) {
+        self.min = self.min.min(other.min);
+        self.max = self.max.max(other.max);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn normals_have_many_names() {
+        let columns = |names: &[&str]| -> Vec<Column> {
+            let columns = names.iter().map(|name| Column::new(name, Scalar::F32));
+            columns.collect()
+        };
+        for (names, expected) in [
+            (&["red", "NX", "Ny", "nz"][..], Some([1, 2, 3])),
+            (&["normal_z", "normal_x", "normal_y"], Some([1, 2, 0])),
+            (
+                &["nor_normalX", "nor_normalY", "nor_normalZ"],
+                Some([0, 1, 2]),
+            ),
+            (&["NormalX", "NormalY", "NormalZ", "nx"], Some([0, 1, 2])),
+            (&["scalar_Nx", "scalar_Ny", "scalar_Nz"], Some([0, 1, 2])),
+            (&["nx", "ny", "normalz"], None),
+            (&[], None),
+        ] {
+            assert_eq!(normal_columns(&columns(names)), expected, "{names:?}");
+        }
+    }
+
+    #[test]
+    fn lists_are_parsed() {
+        let list = |names: &[&str]| {
+            Ok(Attributes::List(
+                names.iter().map(|n| (*n).to_owned()).collect(),
+            ))
+        };
+        assert_eq!("none".parse(), Ok(Attributes::None));
+        assert_eq!(" auto".parse(), Ok(Attributes::Auto));
+        assert_eq!(
+            "Colour, class,red".parse(),
+            list(&["red", "green", "blue", "classification"])
+        );
+        assert_eq!("scalar_Intensity".parse(), list(&["intensity"]));
+        for wrong in ["", ",", "color,,intensity"] {
+            assert!(wrong.parse::<Attributes>().is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn of_two_columns_of_a_name_the_first_counts() {
+        let columns = ["red", "x2", "Red", "intensity"].map(|n| Column::new(n, Scalar::U8));
+        assert_eq!(Attributes::Auto.of(&columns), [0, 3]);
+        let wanted = Attributes::List(vec!["x2".into(), "y2".into()]);
+        assert_eq!(wanted.of(&columns), [1]);
+        assert!(wanted.check(&columns).is_err());
+        assert!(Attributes::Auto.check(&[]).is_ok());
+    }
+
+    #[test]
+    fn rows_are_not_wider_than_allowed() {
+        let columns: Vec<Column> = (0..9)
+            .map(|n| Column::new(&n.to_string(), Scalar::F64))
+            .collect();
+        let list = |n: usize| Attributes::List((0..n).map(|n| n.to_string()).collect());
+        assert_eq!(
+            Wanted::of(&list(6), &columns, Also::default())
+                .unwrap()
+                .bytes(),
+            48
+        );
+        assert!(Wanted::of(&list(7), &columns, Also::default()).is_err());
+    }
+
+    #[test]
+    fn scanners_are_wanted_beside_others() {
+        let columns = ["intensity", SCANNER, "red"].map(|n| Column::new(n, Scalar::U16));
+        let numbers = |attributes: &Attributes, scanners| {
+            let also = Also {
+                scanners,
+                ..Also::default()
+            };
+            Wanted::of(attributes, &columns, also).unwrap().numbers
+        };
+        assert_eq!(numbers(&Attributes::None, true), [1]);
+        assert_eq!(numbers(&Attributes::Auto, true), [0, 1, 2]);
+        assert_eq!(numbers(&Attributes::Auto, false), [0, 2]);
+        let listed = Attributes::List(vec![SCANNER.into()]);
+        assert_eq!(numbers(&listed, true), numbers(&listed, false));
+    }
+}

@@ -1,0 +1,494 @@
+//! Reads the input formats and converts points to lattice positions.
+//!
+//! [`ingest`] decodes every input once into a [`Spool`]: one scratch file with all points in their native
+//! precision, and exact statistics of each file. [`Spool::choose_lattice`] then finds a common lattice, and
+//! [`Spool::for_each`] streams the points as positions on it.
+//!
+//! Formats are detected by content: LAS 1.0 to 1.4 with point formats 0 to 10, LAZ (COPC included), E57,
+//! PLY, PCD, PTX, OFF, and text with one point in a line; any of them may be compressed with gzip or Zstandard, or
+//! the only cloud of a ZIP archive. Each format is a module that implements `PointFormat`, and an entry of the list in
+//! `formats.rs`.
+
+mod agree;
+mod belong;
+mod carry;
+mod classes;
+mod colors;
+mod columns;
+mod comments;
+mod contain;
+mod coordinate;
+mod crop;
+mod crs;
+mod directions;
+mod e57;
+mod expand;
+mod far;
+mod folder;
+mod foreign;
+mod format;
+mod formats;
+mod frames;
+mod given;
+mod input;
+mod kind;
+mod las;
+mod lattice;
+mod layout;
+mod lines;
+mod map;
+mod middle;
+mod native;
+mod normals;
+mod number;
+mod off;
+mod pcd;
+mod ply;
+mod point_format;
+mod precision;
+mod prj;
+mod probe;
+mod ptx;
+mod ranks;
+mod same;
+mod scalar;
+mod source;
+mod spool;
+mod stats;
+mod stream;
+mod systems;
+mod taken;
+mod text;
+mod units;
+mod wkt;
+
+pub use carry::{Attribute, Carried};
+pub use classes::Classes;
+pub use colors::Depth;
+pub use colors::depths_shown;
+pub use columns::{Attributes, Column};
+pub use crop::Crop;
+pub use crs::{Crs, CrsSource};
+pub use directions::{NORMAL_BYTES, direction};
+pub use expand::expand;
+pub use format::Format;
+pub use given::GivenCrs;
+pub use kind::CrsKind;
+pub use layout::{Layout, TextColumns};
+pub use precision::CoordinateType;
+pub use precision::enough_for;
+pub use prj::{of_prj, prj_of};
+pub use probe::{Probe, probe, probe_as};
+pub use stats::{FileStats, IngestStats, LeftOut};
+pub use stream::{READ_BUFFERS, VALUE_BUFFERS};
+pub use systems::Mixed;
+
+use colors::depth_of;
+use columns::{Also, SCANNER, Wanted, row_bytes};
+use crop::Nearby;
+use frames::{Frame, values_of};
+use input::Input;
+use outcrop_disk::error::{Error, Result};
+use outcrop_disk::workspace::Workspace;
+use outcrop_geom::lattice::Lattice;
+use outcrop_ply::Scalar;
+use point_format::{Claims, PointFile};
+use serde::{Deserialize, Serialize};
+use source::Source;
+use spool::SourceWriter;
+use std::path::PathBuf;
+use systems::Systems;
+use taken::Taken;
+
+/// The points that are read.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Selection {
+    /// Those of these classes.
+    pub classes: Classes,
+    /// Those in this region; `None` for all.
+    pub crop: Option<Crop>,
+    /// Columns of the points.
+    pub attributes: Attributes,
+    /// True if the scanners of the points are read, from files that give their positions.
+    pub scanners: bool,
+    /// True if the normals of the points are read, from files that have any.
+    pub normals: bool,
+    /// How text files are read.
+    pub layout: Layout,
+    /// True if the colours are read whose scale only their numbers tell, for [`FileStats::colors`].
+    pub depths: bool,
+    /// The reference system, whatever files say; `None` for theirs.
+    pub crs: Option<GivenCrs>,
+}
+
+/// All points of the inputs in one scratch file.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Spool {
+    name: String,
+    frames: Vec<Frame>,
+    /// The frames of values, if columns are wanted: one for each of `frames`, without points for sources that have
+    /// none of the columns.
+    values: Vec<Frame>,
+    sources: Vec<Source>,
+    stats: IngestStats,
+    /// The well-known text of the reference system, at most 1 MiB.
+    wkt: Option<String>,
+}
+
+/// Decodes all inputs, which may be files and folders, into a spool.
+///
+/// Progress is reported to the observer; the caller begins and ends the stage. Memory is reserved for each
+/// unit of work, a few MiB for each thread.
+///
+/// # Errors
+/// [`outcrop_disk::error::Error::Input`] for a file that is not what it claims to be; [`outcrop_disk::error::Error::Io`],
+/// [`outcrop_disk::error::Error::Disk`], [`outcrop_disk::error::Error::Memory`], [`outcrop_disk::error::Error::Cancelled`].
+pub fn ingest(inputs: &[PathBuf], workspace: &Workspace) -> Result<Spool> {
+    ingest_selected(inputs, &Selection::default(), workspace)
+}
+
+/// As [`ingest`], but reads only points of the wanted classes.
+///
+/// # Errors
+/// See [`ingest`].
+pub fn ingest_classes(
+    inputs: &[PathBuf],
+    classes: &Classes,
+    workspace: &Workspace,
+) -> Result<Spool> {
+    let selection = Selection {
+        classes: classes.clone(),
+        ..Selection::default()
+    };
+    ingest_selected(inputs, &selection, workspace)
+}
+
+/// As [`ingest`], but reads only what is selected.
+///
+/// # Errors
+/// See [`ingest`]; [`outcrop_disk::error::Error::Parameter`] for columns that no file has.
+pub fn ingest_selected(
+    inputs: &[PathBuf],
+    selection: &Selection,
+    workspace: &Workspace,
+) -> Result<Spool> {
+    let expanded = expand::expanded(inputs)?;
+    let paths = &expanded.files;
+    check_columns(paths, selection)?;
+    let name = format!("ingest-{}.spool", workspace.number());
+    let mut stats = IngestStats::default();
+    let spool = read_all(paths, selection, &name, &mut stats, workspace).map(|mut spool| {
+        let said = expanded.warning();
+        spool.stats.warnings.splice(0..0, said);
+        spool.stats.left_out = expanded.left_out;
+        spool
+    });
+    if let Err(Error::Input { .. } | Error::Parameter { .. }) = spool
+        && !workspace.is_task()
+    {
+        // They may explain the error.
+        let warnings = stats.warnings.iter();
+        warnings.for_each(|w| workspace.observer.warn(w));
+    }
+    if spool.is_err() && !workspace.is_resumable() {
+        workspace.files.release(&name)?;
+        workspace.files.release(&values_of(&name))?;
+    }
+    spool
+}
+
+/// Refuses columns that are in none of the files.
+fn check_columns(paths: &[PathBuf], selection: &Selection) -> Result<()> {
+    let attributes = &selection.attributes;
+    if !matches!(attributes, Attributes::List(_)) {
+        return Ok(());
+    }
+    let mut present = Vec::new();
+    for path in paths {
+        let probe = probe_as(path, &selection.layout)?;
+        if !probe.is_described {
+            // Checked when all files were read.
+            return Ok(());
+        }
+        present.extend(probe.columns);
+    }
+    attributes.check(&present)
+}
+
+/// Decodes all inputs into the spool `name`.
+fn read_all(
+    paths: &[PathBuf],
+    selection: &Selection,
+    name: &str,
+    stats: &mut IngestStats,
+    workspace: &Workspace,
+) -> Result<Spool> {
+    let classes = &selection.classes;
+    let crop = selection.crop.as_ref();
+    let nearby = crop.map(|crop| Nearby::of(crop, workspace));
+    let nearby = nearby.transpose()?;
+    let (mut section, mut frames, mut values) = (0, Vec::new(), Vec::new());
+    let mut sources = Vec::new();
+    let mut systems = Systems::default();
+    let mut shared = false;
+    let mut present = Vec::new();
+    let mut taken = Taken::default();
+    for path in paths {
+        workspace.check_cancel()?;
+        let opened = Opened::new(
+            Input::open(path, &formats::is_cloud, workspace)?,
+            &selection.layout,
+        )?;
+        let number = sources.len() as u32;
+        let scanners = selection.scanners && opened.has_scanners();
+        let columns = opened.file.columns();
+        let depth = opened.file.color_depth();
+        let also = Also {
+            scanners,
+            normals: selection.normals,
+            classes: *classes != Classes::All && !opened.claims.classes,
+            depths: selection.depths && depth_of(&columns, depth, None).is_none(),
+        };
+        let wanted = Wanted::of(&selection.attributes, &columns, also)?;
+        let has_classes = opened.claims.classes || wanted.class.is_some();
+        let target = SourceWriter::new(workspace, name, section, number, classes, &wanted)?
+            .within(nearby.as_ref(), opened.claims.native);
+        let outside =
+            |nearby: &Nearby<'_>| opened.file.lies_outside(&opened.input, nearby, workspace);
+        let mut warnings = if let Some(bounds) = nearby.as_ref().and_then(outside) {
+            target.skip(opened.claims.likely_points, bounds);
+            Vec::new()
+        } else {
+            match opened.file.read(&opened.input, &target) {
+                // Tasks read all files at the same time.
+                Err(Error::Shared) => {
+                    shared = true;
+                    Vec::new()
+                }
+                other => other?,
+            }
+        };
+        if *classes != Classes::All && !has_classes {
+            warnings.push("its points have no class, all of them are kept".to_owned());
+        }
+        let found = opened.file.found();
+        let columns = wanted.found(&found);
+        present.extend(found);
+        taken.add(&opened);
+        let read = target.stats();
+        let (next, more, more_values) = target.end();
+        section = next;
+        frames.extend(more);
+        if !more_values.frames.is_empty() {
+            // Frames without values come before.
+            values.resize(frames.len() - more_values.frames.len(), Frame::default());
+            values.extend(more_values.frames);
+        }
+        let source = Source {
+            native: opened.claims.native,
+            stats: read,
+            text: opened.claims.text,
+            cut: false,
+            columns,
+            spans: more_values.spans,
+            depth,
+            tally: more_values.tally,
+        };
+        let shown = |w: String| format!("{}: {w}", path.display());
+        stats.warnings.extend(warnings.into_iter().map(shown));
+        let (crs, unusable) = opened.crs();
+        stats.warnings.extend(unusable);
+        stats.add(&opened, &source, crs.as_ref().map(Crs::without_texts));
+        if let Some(crs) = crs {
+            systems.add(path, crs);
+        }
+        sources.push(source);
+    }
+    if shared {
+        return Err(Error::Shared);
+    }
+    if !values.is_empty() {
+        values.resize(frames.len(), Frame::default());
+    }
+    selection.attributes.check(&present)?;
+    taken.check(&selection.layout)?;
+    stats.warnings.extend(taken.warnings());
+    if let Some(crop) = crop.filter(|_| stats.kept == 0) {
+        crop.check_met(&sources)?;
+    }
+    let wkt = stats.compare(systems, selection.crs.as_ref());
+    Ok(Spool {
+        name: name.to_owned(),
+        frames,
+        values,
+        sources,
+        stats: std::mem::take(stats),
+        wkt,
+    })
+}
+
+/// An input file with its header.
+struct Opened {
+    input: Input,
+    file: Box<dyn PointFile>,
+    claims: Claims,
+}
+
+impl Opened {
+    fn new(input: Input, layout: &Layout) -> Result<Self> {
+        let file = formats::open(&input, layout)?;
+        let claims = file.claims(&input);
+        Ok(Self {
+            input,
+            file,
+            claims,
+        })
+    }
+
+    /// True if the file tells where the scanners were, and which of them saw a point.
+    fn has_scanners(&self) -> bool {
+        let columns = self.file.columns();
+        let scanner = columns.iter().find(|c| c.name == SCANNER);
+        scanner.is_some_and(|c| c.scalar == Scalar::U16) && !self.file.scanners().is_empty()
+    }
+
+    /// The reference system that the file gives, or else a `.prj` file beside it; a warning about that.
+    fn crs(&self) -> (Option<Crs>, Option<String>) {
+        let beside = prj::beside(&self.input);
+        let Some(own) = self.file.crs(&self.input) else {
+            return beside;
+        };
+        let same = |other: &Crs| {
+            let heights = own.vertical.is_none() || other.vertical == own.vertical;
+            own.horizontal.is_some() && other.horizontal == own.horizontal && heights
+        };
+        if own.source == CrsSource::Comments && beside.0.as_ref().is_some_and(same) {
+            // The same system, told as a text.
+            return beside;
+        }
+        let other = beside.0.filter(|beside| beside.differs(&own));
+        let warning = other.map(|beside| {
+            format!(
+                "{}: it gives {beside}, but {} itself gives {own}, which is taken",
+                prj_of(&self.input.path).display(),
+                self.input.path.display()
+            )
+        });
+        (Some(own), warning)
+    }
+}
+
+/// Checks that the headers of all files give one reference system. Files that cannot be read are passed over:
+/// their error comes when they are read.
+///
+/// # Errors
+/// [`Error::Input`] with two files whose systems are different.
+pub fn check_systems(inputs: &[PathBuf]) -> Result<()> {
+    let mut systems = Systems::default();
+    for path in expand(inputs)? {
+        let head = Input::open_head(&path, &formats::is_cloud, formats::LONG_HEAD);
+        let opened = head.and_then(|input| Opened::new(input, &Layout::default()));
+        if let Some(crs) = opened.ok().and_then(|opened| opened.crs().0) {
+            systems.add(&path, crs);
+        }
+    }
+    match systems.common() {
+        Ok(_) => Ok(()),
+        Err(mixed) => Err(mixed.refused()),
+    }
+}
+
+impl IngestStats {
+    fn add(&mut self, opened: &Opened, source: &Source, crs: Option<Crs>) {
+        let stats = &source.stats;
+        self.read += stats.read;
+        self.kept += stats.kept;
+        self.dropped_non_finite += stats.dropped;
+        self.withheld += stats.withheld;
+        self.invalid += stats.invalid;
+        self.dropped_by_class += stats.unwanted;
+        self.dropped_by_crop += stats.outside;
+        self.skipped_by_crop += stats.skipped;
+        let bounds = source.bounds();
+        let taken = opened.file.taken();
+        let columns = opened.file.found();
+        let read = source.reads_colors().then_some(&source.tally);
+        let colors = depth_of(&columns, source.depth, read);
+        self.files.push(FileStats {
+            path: opened.input.path.clone(),
+            format: opened.claims.format,
+            bytes: opened.input.size,
+            columns: columns.into_iter().map(|c| c.name).collect(),
+            taken: taken.map(|(taken, _)| taken.to_owned()),
+            guessed: taken.is_some_and(|(_, guessed)| guessed),
+            colors,
+            claimed: opened.claims.points,
+            points: stats.read,
+            kept: stats.kept,
+            dropped_non_finite: stats.dropped,
+            withheld: stats.withheld,
+            invalid: stats.invalid,
+            dropped_by_class: stats.unwanted,
+            dropped_by_crop: stats.outside,
+            skipped_by_crop: stats.skipped,
+            dropped_far: 0,
+            min: bounds.map(|b| b[0]),
+            max: bounds.map(|b| b[1]),
+            scanners: opened.file.scanners(),
+            crs,
+        });
+    }
+}
+
+impl Spool {
+    /// Counts and extents of the input.
+    #[must_use]
+    pub fn stats(&self) -> &IngestStats {
+        &self.stats
+    }
+
+    /// The well-known text of the reference system, if it was given by one; at most 1 MiB.
+    #[must_use]
+    pub fn wkt(&self) -> Option<&str> {
+        self.wkt.as_deref()
+    }
+
+    /// Deletes the scratch files.
+    ///
+    /// # Errors
+    /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Disk`].
+    pub fn release(&self, workspace: &Workspace) -> Result<()> {
+        if self.has_values() {
+            workspace.files.release(&values_of(&self.name))?;
+        }
+        workspace.files.release(&self.name)
+    }
+
+    /// Approximate bytes of the points in the spool.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        let point = |source: &Source| source.native.point_bytes() + row_bytes(&source.columns);
+        let bytes = |source: &Source| source.stats.kept * point(source) as u64;
+        self.sources.iter().map(bytes).sum()
+    }
+
+    /// Number of points in the spool.
+    #[must_use]
+    pub fn points(&self) -> u64 {
+        self.stats.kept
+    }
+
+    /// Chooses one lattice for the whole cloud, with the same step along all axes, independent of the order
+    /// of the files.
+    ///
+    /// For LAS scales and fixed decimals it has the largest common step, for floating-point values the
+    /// largest power of two of which all are multiples. If the cloud would span 2^30 steps or more, the step
+    /// is enlarged and `exact` is false. The step is then halved up to `refine` times, as long as the cloud
+    /// fits.
+    ///
+    /// # Errors
+    /// [`outcrop_disk::error::Error::Degenerate`] if there are no points.
+    pub fn choose_lattice(&self, refine: u32) -> Result<Lattice> {
+        lattice::choose(&self.sources, &self.stats, refine)
+    }
+}
