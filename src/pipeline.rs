@@ -27,8 +27,7 @@ use outcrop_disk::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
 use outcrop_disk::workspace::progress::{Cancel, Observer};
 use outcrop_disk::workspace::{Folder, Storage, Workspace, limits};
 pub use shared::{
-    Advanced, Begun, Status, TaskState, Totals, Worked, planned_shards, shared_folder,
-    status,
+    Advanced, Begun, Status, TaskState, Totals, Worked, planned_shards, shared_folder, status,
 };
 use stages::Stages;
 pub use start::Start;

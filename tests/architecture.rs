@@ -1,74 +1,41 @@
-//! The map of ARCHITECTURE.md, checked by the `use` lines of `src`: the permitted imports of each folder, no
-//! circle of imports, rows with named fields, and files of limited length.
+//! The map of ARCHITECTURE.md, checked by the paths in `src`: the permitted imports of each room inside a crate (the
+//! manifests hold those between crates), no circle of imports, rows with named fields, and files of limited length.
 
 mod source;
 
 use source::modules;
 use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
 
-/// Each part of the program, and the parts whose items it may use, besides `error`. A part is a folder of
-/// `src`, a folder or file of `src/stages`, or a file of `src`.
+/// Each room, and the rooms of the same crate whose items it may use. A room is a folder or file of a crate with
+/// several steps, or of the program.
 const MAY_USE: &[(&str, &str)] = &[
-    (
-        "cli",
-        "inspect levels method page params pipeline report stages/ingest view workspace",
-    ),
-    ("convert", "inspect stages/export workspace"),
-    ("error", ""),
-    ("geom", "kernels method"),
-    ("histogram", ""),
-    (
-        "inspect",
-        "geom histogram method params picture pipeline spill stages/attributes stages/blocks stages/cells stages/ingest \
-         stages/normals stages/order stages/smooth stages/tiles \
-         workspace",
-    ),
-    ("kernels", ""),
-    (
-        "levels",
-        "inspect light meshopt spill stages/ingest workspace",
-    ),
-    ("light", ""),
-    ("meshopt", ""),
-    ("method", ""),
-    (
-        "params",
-        "geom method stages/ingest stages/normals stages/smooth stages/spacing stages/surface",
-    ),
-    ("page", "histogram inspect picture report"),
-    ("picture", ""),
-    (
-        "pipeline",
-        "geom levels method params report stages/* workspace",
-    ),
-    (
-        "report",
-        "histogram levels params picture stages/* workspace",
-    ),
-    ("spill", "workspace"),
-    (
-        "stages/attributes",
-        "stages/blocks stages/ingest stages/order",
-    ),
+    ("cli", "info page params pipeline report"),
+    ("convert", ""),
+    ("info", "params pipeline"),
+    ("page", "info report"),
+    ("params", ""),
+    ("pipeline", "params report"),
+    ("report", "params"),
+    ("disk/error", ""),
+    ("disk/spill", "disk/error disk/workspace"),
+    ("disk/workspace", "disk/error"),
+    ("draw/cloud", "draw/histogram draw/picture"),
+    ("draw/histogram", ""),
+    ("draw/mesh", "draw/histogram draw/picture"),
+    ("draw/picture", ""),
+    ("geom", "geom/kernels geom/method"),
+    ("geom/kernels", ""),
+    ("geom/method", ""),
+    ("mesh_files/cut", ""),
+    ("mesh_files/export", "mesh_files/cut"),
+    ("stages/attributes", "stages/blocks stages/order"),
     ("stages/blocks", ""),
-    ("stages/columns", "stages/blocks stages/order"),
     (
         "stages/cells",
-        "kernels stages/blocks stages/levels stages/normals stages/order stages/spacing stages/tiles",
+        "stages/blocks stages/levels stages/normals stages/order stages/spacing stages/tiles",
     ),
-    (
-        "stages/cut",
-        "stages/blocks stages/located stages/order stages/repair stages/surface",
-    ),
-    (
-        "stages/draw",
-        "histogram picture stages/blocks stages/cut stages/located stages/order stages/repair stages/spacing",
-    ),
-    (
-        "stages/export",
-        "light meshopt stages/attributes stages/blocks stages/cut stages/ingest stages/order stages/repair stages/surface",
-    ),
-    ("stages/ingest", ""),
+    ("stages/columns", "stages/blocks stages/order"),
     ("stages/levels", ""),
     (
         "stages/located",
@@ -76,9 +43,9 @@ const MAY_USE: &[(&str, &str)] = &[
     ),
     (
         "stages/normals",
-        "stages/attributes stages/blocks stages/ingest stages/order",
+        "stages/attributes stages/blocks stages/order",
     ),
-    ("stages/order", "stages/ingest"),
+    ("stages/order", ""),
     (
         "stages/outliers",
         "stages/blocks stages/cells stages/order stages/tiles",
@@ -91,26 +58,21 @@ const MAY_USE: &[(&str, &str)] = &[
         "stages/repair",
         "stages/blocks stages/located stages/order stages/outside stages/spacing stages/stitch stages/surface",
     ),
+    ("stages/scanners", "stages/attributes"),
     (
         "stages/smooth",
-        "kernels stages/cells stages/levels stages/order stages/spacing stages/tiles",
+        "stages/cells stages/levels stages/order stages/spacing stages/tiles",
     ),
-    ("stages/scanners", "stages/attributes"),
     ("stages/spacing", "stages/levels"),
     (
         "stages/stitch",
-        "kernels stages/blocks stages/cells stages/columns stages/located stages/surface stages/triples",
+        "stages/blocks stages/cells stages/columns stages/located stages/surface stages/triples",
     ),
     ("stages/surface", "stages/blocks stages/located"),
-    ("stages/thin", "stages/ingest"),
-    ("stages/tiles", "kernels stages/order"),
+    ("stages/thin", ""),
+    ("stages/tiles", "stages/order"),
     ("stages/triples", "stages/blocks stages/cells"),
-    ("view", ""),
-    ("workspace", ""),
 ];
-
-/// Every stage may use these.
-const COMMON: &str = "error geom method spill workspace";
 
 /// Largest number of lines of a file, without its tests.
 const MOST_LINES: usize = 500;
@@ -137,25 +99,55 @@ fn expand(path: &str) -> Vec<String> {
         .collect()
 }
 
-/// The modules that a module imports from, by its `use` lines.
+/// The folder of the crate to which a module belongs; `None` for the program.
+fn crate_of(module: &str) -> Option<&str> {
+    let first = module.split('/').next()?;
+    let manifest = format!("{}/src/{first}/Cargo.toml", env!("CARGO_MANIFEST_DIR"));
+    Path::new(&manifest).exists().then_some(first)
+}
+
+/// The paths in a text that begin with `crate`, `super`, `self` or a crate of the program, those of `use` with
+/// braces included.
+fn paths(text: &str) -> Vec<&str> {
+    let word = |c: char| c.is_alphanumeric() || c == '_';
+    let mut found = Vec::new();
+    let mut from = 0;
+    while let Some(length) = text[from..].find(word) {
+        let start = from + length;
+        let rest = &text[start..];
+        let first = rest.find(|c| !word(c)).unwrap_or(rest.len());
+        let root = ["crate", "super", "self"].contains(&&rest[..first])
+            || rest[..first].starts_with("outcrop_");
+        let mut length = rest.find(|c| !word(c) && c != ':').unwrap_or(rest.len());
+        if root && rest[..length].ends_with("::") && rest[length..].starts_with('{') {
+            let mut depth = 0;
+            let closing = rest[length..].find(|c| {
+                depth += i32::from(c == '{') - i32::from(c == '}');
+                depth == 0
+            });
+            length += closing.expect("a closing brace") + 1;
+        }
+        if root && rest[first..length].starts_with("::") {
+            found.push(&rest[..length]);
+        }
+        from = start + length;
+    }
+    found
+}
+
+/// The modules that a module imports from, by the paths in its text.
 fn imports(module: &str, text: &str, all: &BTreeMap<String, String>) -> BTreeSet<String> {
     let mut found = BTreeSet::new();
-    for line in text.split("use ").skip(1) {
-        let Some((path, _)) = line.split_once(';') else {
-            continue;
-        };
-        if !["crate::", "super::", "self::"]
-            .iter()
-            .any(|start| path.starts_with(start))
-        {
-            continue;
-        }
+    for path in paths(text) {
         let path = path.split_whitespace().collect::<Vec<_>>().join(" ");
         for path in expand(&path) {
             let mut at: Vec<&str> = module.split('/').collect();
             for (number, part) in path.split("::").enumerate() {
                 match part.trim() {
-                    "crate" if number == 0 => at.clear(),
+                    "crate" if number == 0 => at = crate_of(module).into_iter().collect(),
+                    part if number == 0 && part.starts_with("outcrop_") => {
+                        at = vec![&part["outcrop_".len()..]];
+                    }
                     "self" => {}
                     "super" => drop(at.pop()),
                     part => {
@@ -176,9 +168,13 @@ fn imports(module: &str, text: &str, all: &BTreeMap<String, String>) -> BTreeSet
     found
 }
 
+/// The room of a module: the crate, or, in a crate with several rooms, its folder or file there.
 fn room(module: &str) -> String {
-    let depth = 1 + usize::from(module.starts_with("stages/"));
-    module.split('/').take(depth).collect::<Vec<_>>().join("/")
+    let inside = MAY_USE.iter().map(|(room, _)| *room);
+    let holds = |room: &&str| module == *room || module.starts_with(&format!("{room}/"));
+    let room = inside.filter(holds).max_by_key(|room| room.len());
+    let first = module.split('/').next().unwrap_or_default();
+    room.unwrap_or(first).to_owned()
 }
 
 fn graph() -> BTreeMap<String, BTreeSet<String>> {
@@ -190,10 +186,10 @@ fn graph() -> BTreeMap<String, BTreeSet<String>> {
 }
 
 #[test]
-fn use_lines_are_read() {
-    let paths = expand("crate::a::{b, c::{D, self}, e::F as G}");
+fn paths_are_read() {
+    let expanded = expand("crate::a::{b, c::{D, self}, e::F as G}");
     assert_eq!(
-        paths,
+        expanded,
         [
             "crate::a::b",
             "crate::a::c::D",
@@ -203,7 +199,10 @@ fn use_lines_are_read() {
     );
     let graph = graph();
     assert!(graph["pipeline/stages"].contains("stages/repair"));
-    assert!(graph["spill/table"].contains("workspace/place"));
+    assert!(graph["disk/spill/table"].contains("disk/workspace/place"));
+    // A path without a `use` line.
+    let text = "fn f() -> super::b::C { outcrop_d::e(crate::g::h) }";
+    assert_eq!(paths(text), ["super::b::C", "outcrop_d::e", "crate::g::h"]);
 }
 
 #[test]
@@ -212,18 +211,16 @@ fn no_room_knows_more_than_the_map_says() {
     let mut wrong = Vec::new();
     for (module, targets) in graph() {
         let from = room(&module);
-        if from == "stages" {
+        let Some(allowed) = rules.get(from.as_str()) else {
+            let alone = crate_of(&module) == Some(from.as_str());
+            assert!(alone, "{from} is not on the map");
             continue;
-        }
-        let allowed = rules.get(from.as_str());
-        let allowed = allowed.unwrap_or_else(|| panic!("{from} is not on the map"));
-        let stage = from.starts_with("stages/");
-        let common = COMMON.split(' ').filter(|_| stage);
-        let allowed: BTreeSet<&str> = allowed.split(' ').chain(common).collect();
+        };
+        let allowed: BTreeSet<&str> = allowed.split(' ').collect();
         for target in targets {
             let to = room(&target);
-            let any = to.starts_with("stages/") && allowed.contains("stages/*");
-            if to != from && to != "error" && !any && !allowed.contains(to.as_str()) {
+            let same = crate_of(&target) == crate_of(&module);
+            if same && to != from && !allowed.contains(to.as_str()) {
                 wrong.push(format!("{module} uses {target}"));
             }
         }
@@ -291,7 +288,7 @@ fn no_stage_reads_records_by_position() {
 fn no_state_is_hidden_in_threads() {
     let found = modules().into_iter().filter(|(module, text)| {
         // The hook of panics has no other way to know who asks.
-        module != "stages/ingest/contain" && text.contains("thread_local!")
+        module != "points/contain" && text.contains("thread_local!")
     });
     assert_eq!(found.map(|(module, _)| module).collect::<Vec<_>>(), [""; 0]);
 }
@@ -306,13 +303,13 @@ fn only_kernels_are_tied_to_a_processor() {
         "asm!",
     ];
     let found = modules().into_iter().filter(|(module, text)| {
-        !module.starts_with("kernels") && tied.iter().any(|word| text.contains(word))
+        !module.starts_with("geom/kernels") && tied.iter().any(|word| text.contains(word))
     });
     assert_eq!(found.map(|(module, _)| module).collect::<Vec<_>>(), [""; 0]);
     // Of the kernels every use is for x86-64 only: what else there is, is for every processor.
     let kernels = modules()
         .into_iter()
-        .filter(|(m, _)| m.starts_with("kernels"));
+        .filter(|(m, _)| m.starts_with("geom/kernels"));
     let mut uses = 0;
     for (module, text) in kernels {
         uses += text.matches("target_arch = \"x86_64\"").count();

@@ -1,6 +1,7 @@
 //! Reading of the mesh: vertices into parts that can be read one by one, triangles to the blocks of their
 //! smallest vertices.
 
+use super::outlook::all;
 use super::columns::Columns;
 use super::lattice::{Finder, LARGEST, Lattice};
 use super::rows::{BlockTriangle, LevelWord};
@@ -54,7 +55,7 @@ pub(super) fn read(path: &Path, workspace: &Workspace) -> Result<Intake> {
         let _held = workspace.reserve("levels: reading", bytes(&columns, mesh.vertices()))?;
         let total = mesh.vertices() + mesh.faces();
         if !workspace.is_shared() {
-            let stages = super::outlook::all(mesh.faces(), workspace.threads);
+            let stages = all(mesh.faces(), workspace.threads);
             workspace.observer.plan(&stages);
         }
         workspace

@@ -17,6 +17,7 @@ mod make;
 mod nearest;
 mod node;
 pub mod outlook;
+mod remaining;
 mod report;
 mod rows;
 mod shared;
@@ -107,7 +108,7 @@ fn make(
     observer.end();
     let nodes = tree::build(&cells.cells);
     let (most, threads) = (options.most_triangles, workspace.threads);
-    plan(&outlook::of_tree(&cells.cells, &nodes, most, threads));
+    plan(&remaining::of_tree(&cells.cells, &nodes, most, threads));
     let bounds = make::bounds(&nodes, &shared.bounds);
     let low_bits = make::low_bits(&nodes, &bounds);
     let mut maker = Maker {

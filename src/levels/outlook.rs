@@ -1,8 +1,5 @@
 //! Times of the stages of a tileset, for the progress.
 
-use super::cells::Cell;
-use super::make::target;
-use super::tree::TreeNode;
 use outcrop_disk::workspace::outlook::Planned;
 
 /// The stages: their names, and microseconds that they take for each triangle on one thread (BENCHMARKS.md, "Levels of
@@ -10,9 +7,9 @@ use outcrop_disk::workspace::outlook::Planned;
 const READ: (&str, f64) = ("read mesh", 0.15);
 const DIVIDE: (&str, f64) = ("divide", 0.25);
 const SHARE: (&str, f64) = ("share", 0.25);
-const LEAVES: (&str, f64) = ("leaves", 0.4);
-const LEVEL: (&str, f64) = ("level", 0.55);
-const WRITE: (&str, f64) = ("write", 0.02);
+pub(super) const LEAVES: (&str, f64) = ("leaves", 0.4);
+pub(super) const LEVEL: (&str, f64) = ("level", 0.55);
+pub(super) const WRITE: (&str, f64) = ("write", 0.02);
 
 /// Triangles of the children of all tiles for each triangle of the mesh, before they are known.
 const ABOVE: f64 = 1.3;
@@ -20,7 +17,8 @@ const ABOVE: f64 = 1.3;
 /// Triangles for each point of a cloud, about.
 const OF_POINTS: u64 = 2;
 
-fn planned((name, each): (&'static str, f64), triangles: f64, threads: usize) -> Planned {
+/// A stage, with the time that it takes.
+pub(super) fn planned((name, each): (&'static str, f64), triangles: f64, threads: usize) -> Planned {
     let seconds = each * 1e-6 * triangles / threads.max(1) as f64;
     Planned { name, seconds }
 }
@@ -41,67 +39,4 @@ pub(super) fn all(triangles: u64, threads: usize) -> Vec<Planned> {
 /// All stages of the levels of detail of the mesh of so many points.
 pub fn of_points(points: u64, threads: usize) -> Vec<Planned> {
     all(OF_POINTS * points, threads)
-}
-
-/// The stages that follow when the tree is known: the leaves, each level, and the files.
-pub(super) fn of_tree(
-    cells: &[Cell],
-    nodes: &[TreeNode],
-    most: u32,
-    threads: usize,
-) -> Vec<Planned> {
-    let last = nodes.last().map_or(0, |root| root.level);
-    let mut joined = vec![0usize; last as usize + 1];
-    let mut triangles: Vec<usize> = Vec::with_capacity(nodes.len());
-    for (number, node) in nodes.iter().enumerate() {
-        let children = node.children.iter().map(|child| triangles[*child]);
-        let count = children.sum();
-        joined[node.level as usize] += count;
-        let own = cells.get(number).map(|cell| cell.triangles as usize);
-        triangles.push(own.unwrap_or_else(|| target(count, most)));
-    }
-    joined[0] = cells.iter().map(|cell| cell.triangles as usize).sum();
-    let write = planned(WRITE, joined[0] as f64, threads);
-    let levels = joined.into_iter().enumerate();
-    let levels = levels.map(|(level, count)| {
-        let stage = if level == 0 { LEAVES } else { LEVEL };
-        planned(stage, count as f64, threads)
-    });
-    levels.chain([write]).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn each_level_is_planned_by_the_triangles_of_its_children() {
-        let cells = [40_000, 60_000, 50_000].map(|triangles| Cell {
-            key: 0,
-            depth: 1,
-            triangles,
-        });
-        let node = |level, children: &[usize]| TreeNode {
-            depth: 0,
-            level,
-            children: children.to_vec(),
-        };
-        let nodes = [
-            node(0, &[]),
-            node(0, &[]),
-            node(0, &[]),
-            node(1, &[0, 1]),
-            node(2, &[3, 2]),
-        ];
-        let stages = of_tree(&cells, &nodes, 65_536, 2);
-        let names: Vec<_> = stages.iter().map(|stage| stage.name).collect();
-        assert_eq!(names, ["leaves", "level", "level", "write"]);
-        let joined = [150_000.0, 100_000.0, 50_000.0 + 16_666.0, 150_000.0];
-        for (stage, (joined, each)) in stages
-            .iter()
-            .zip(joined.into_iter().zip([0.4, 0.55, 0.55, 0.02]))
-        {
-            assert!((stage.seconds - joined * each * 1e-6 / 2.0).abs() < 1e-6);
-        }
-    }
 }

@@ -1,8 +1,8 @@
 //! Values of points at the vertices of the mesh: the right ones, in the same bytes whatever the run.
 
 use crate::util::{self, Bench};
-use outcrop::params::Params;
 use outcrop::Start;
+use outcrop::params::Params;
 use outcrop::{Error, Smooth};
 use outcrop_cloudgen::{Cloud, Kind};
 use outcrop_disk::workspace::memory::MINIMUM_BUDGET;

@@ -1,8 +1,8 @@
 //! Compressed meshes and clouds.
 
 use crate::util::{self, Bench};
-use outcrop::params::Params;
 use outcrop::Builder;
+use outcrop::params::Params;
 use outcrop_cloudgen::{Cloud, Kind};
 use outcrop_disk::workspace::memory::MINIMUM_BUDGET;
 use std::fs::File;

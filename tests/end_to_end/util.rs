@@ -3,8 +3,8 @@
 
 use outcrop::inspect::verify::{Verdict, verify};
 use outcrop::params::Params;
-use outcrop::{Builder, Reconstruction};
 use outcrop::report::Report;
+use outcrop::{Builder, Reconstruction};
 use outcrop_cloudgen::{Cloud, Format};
 use outcrop_disk::workspace::Workspace;
 use outcrop_disk::workspace::memory::{MINIMUM_BUDGET, MemoryPool};

@@ -15,10 +15,14 @@ pub fn modules() -> BTreeMap<String, String> {
             let name = path.file_stem().unwrap().to_str().unwrap();
             if path.is_dir() {
                 walk(&path, all);
-            } else if !name.contains("tests") && !["main", "lib"].contains(&name) {
+            } else if path.extension().is_some_and(|e| e == "rs") && !name.contains("tests") {
                 let relative = path.strip_prefix(source()).unwrap().with_extension("");
                 let relative = relative.to_str().unwrap();
+                if ["main", "lib"].contains(&relative) {
+                    continue;
+                }
                 let module = relative.strip_suffix("/mod").unwrap_or(relative);
+                let module = module.strip_suffix("/lib").unwrap_or(module);
                 let text = std::fs::read_to_string(&path).unwrap();
                 let text = text.split("#[cfg(test)]\nmod tests {").next().unwrap();
                 let lines = text.lines().map(|line| line.split("//").next().unwrap());

@@ -5,6 +5,7 @@
 mod tests;
 
 use super::file::ScratchFile;
+pub use super::names::plain_name;
 use super::zip::{Archive, Wanted, is_archive};
 use super::{Files, Workspace};
 use crate::error::{Error, Result};
@@ -51,19 +52,6 @@ impl Compression {
             _ if is_archive(head) => Some(Self::Zip),
             _ => window(head).map(|_| Self::Zstandard),
         })
-    }
-}
-
-/// The name of a file without the extension of its compression.
-#[must_use]
-pub fn plain_name(path: &Path) -> PathBuf {
-    let extension = path.extension().unwrap_or_default();
-    match ["gz", "zst", "zip"]
-        .iter()
-        .any(|e| extension.eq_ignore_ascii_case(e))
-    {
-        true => path.with_extension(""),
-        false => path.to_path_buf(),
     }
 }
 

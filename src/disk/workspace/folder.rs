@@ -5,6 +5,7 @@ use super::fault::{self, Event};
 use super::history::History;
 use super::journal::{self, Journal, Record};
 use super::keeper::Keeper;
+use super::listing::{LOCK, MANIFEST, OURS, data, is_ours, listing};
 use super::memory::MemoryPool;
 use super::open::{failed_write, open_existing, options};
 use super::progress::{Cancel, Observer};
@@ -17,14 +18,8 @@ use std::os::unix::fs::{DirBuilderExt, FileExt, MetadataExt};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-const LOCK: &str = "lock";
-const MANIFEST: &str = "manifest";
-
 /// Upper bound of the bytes that a journal and its first record have in addition to the manifest.
 const FIRST_RECORD: u64 = 64;
-
-/// Files of the folder that are not data.
-const OURS: [&str; 3] = [LOCK, MANIFEST, journal::NAME];
 
 /// A locked scratch folder.
 #[derive(Debug)]
@@ -368,11 +363,6 @@ fn workers(path: &Path) -> Result<Vec<u32>> {
     Ok(all)
 }
 
-/// True if a file of this name is not data.
-fn is_ours(name: &str) -> bool {
-    OURS.contains(&name) || journal::worker(name).is_some()
-}
-
 /// The folder with the generations of a run that tasks share.
 pub(super) const GENERATIONS: &str = "generations";
 
@@ -401,24 +391,6 @@ pub(super) fn is_private(path: &Path) -> Result<bool> {
 
 fn path_bytes(path: &Path) -> Option<u64> {
     path.symlink_metadata().ok().map(|meta| meta.len())
-}
-
-/// Names of the data files in the folder.
-pub(super) fn data(path: &Path) -> Result<Vec<String>> {
-    let mut names = listing(path)?;
-    names.retain(|name| !is_ours(name));
-    Ok(names)
-}
-
-fn listing(path: &Path) -> Result<Vec<String>> {
-    let io = |e| Error::io(path, "list", e);
-    let mut names = Vec::new();
-    for entry in std::fs::read_dir(path).map_err(io)? {
-        let entry = entry.map_err(io)?;
-        // A name that is not UTF-8 is not one of this program's.
-        names.extend(entry.file_name().into_string());
-    }
-    Ok(names)
 }
 
 /// Locks a folder until the process ends.

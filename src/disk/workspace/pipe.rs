@@ -80,7 +80,10 @@ mod tests {
 
     #[test]
     fn a_slow_taker_holds_the_makers_back() {
-        let (workspace, made) = (Workspace::for_tests(3).expect("a scratch folder"), AtomicUsize::new(0));
+        let (workspace, made) = (
+            Workspace::for_tests(3).expect("a scratch folder"),
+            AtomicUsize::new(0),
+        );
         let make = |part| {
             made.fetch_add(1, Ordering::SeqCst);
             Ok(part)

@@ -1,6 +1,7 @@
 //! Recovery: all parts of files that are still needed are read and checked, and damaged ones are made again,
 //! with as little work as possible.
 
+use super::names::{OUTPUT, square_path, temporary};
 use super::history::{History, Needed, Remedy};
 use super::open::open_existing;
 use super::progress::{Cancel, Observer};
@@ -13,39 +14,6 @@ use std::path::{Path, PathBuf};
 
 /// Bytes checked at a time.
 const CHUNK: usize = 1 << 20;
-
-/// The name of the mesh file in the journal; it is not in the scratch folder.
-pub const OUTPUT: &str = "output";
-
-/// The name in the journal of the mesh of a square, of several that a run writes; `square` is part of the name of
-/// its file too.
-#[must_use]
-pub fn output_of(square: &str) -> String {
-    format!("{OUTPUT}:{square}")
-}
-
-/// The path of the mesh of a square, beside `output`: its name is added before the extension.
-#[must_use]
-pub fn square_path(output: &Path, square: &str) -> PathBuf {
-    let plain = super::compressed::plain_name(output);
-    let mut name = plain.file_stem().unwrap_or_default().to_os_string();
-    name.push(format!("_{square}"));
-    let compressed = output.extension().filter(|_| plain != output);
-    for extension in plain.extension().into_iter().chain(compressed) {
-        name.push(".");
-        name.push(extension);
-    }
-    output.with_file_name(name)
-}
-
-/// The temporary name of a mesh, in the same folder as the final one.
-#[must_use]
-pub fn temporary(output: &Path) -> PathBuf {
-    let mut name = std::ffi::OsString::from(".");
-    name.push(output.file_name().unwrap_or_default());
-    name.push(".outcrop-part");
-    output.with_file_name(name)
-}
 
 /// True for the name of a mesh in the journal.
 fn is_output(file: &str) -> bool {

@@ -6,6 +6,7 @@
 use super::history::History;
 use super::journal::{self, Journal, OpenStep, Record};
 use super::keeper::{Keeper, Leaving};
+use super::listing::data;
 use super::lock;
 use super::memory::Reservation;
 use super::place::{Place, Put};
@@ -308,7 +309,7 @@ impl ResumableRun {
     /// # Errors
     /// [`crate::error::Error::Io`], [`crate::error::Error::Disk`].
     pub fn retire(&self) -> Result<()> {
-        let names = super::folder::data(&self.folder)?.into_iter();
+        let names = data(&self.folder)?.into_iter();
         let files: BTreeSet<String> = names
             .filter_map(|n| Some(n.rsplit_once('.')?.0.to_owned()))
             .collect();

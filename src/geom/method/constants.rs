@@ -72,9 +72,9 @@ macro_rules! constants {
 pub(super) use constants;
 
 #[cfg(any(test, feature = "ablation"))]
-pub(crate) use list::{Halved, text};
-#[cfg(any(test, feature = "ablation"))]
 pub use list::Entry;
+#[cfg(any(test, feature = "ablation"))]
+pub(crate) use list::{Halved, text};
 
 #[cfg(any(test, feature = "ablation"))]
 mod list {

@@ -6,6 +6,7 @@ mod crs;
 mod extra;
 mod fields;
 mod gps;
+mod head;
 mod header;
 mod laz;
 mod plain;

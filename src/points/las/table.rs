@@ -3,6 +3,7 @@
 use super::super::contain::contain;
 use super::super::input::{Input, u32_at, u64_at};
 use super::Header;
+use super::head::LayerHead;
 use super::vlr::Laszip;
 use laz::laszip::ChunkTable;
 use outcrop_disk::error::Result;
@@ -131,7 +132,7 @@ pub(super) fn walk(
     let mut memory = workspace.reserve("LAZ chunk table", 0)?;
     while points < header.claimed && at + least <= input.bytes {
         workspace.check_cancel()?;
-        let head = super::chunks::LayerHead::read(input, header, laszip, at)?;
+        let head = LayerHead::read(input, header, laszip, at)?;
         chunks.push(Chunk {
             at,
             bytes: head.bytes,

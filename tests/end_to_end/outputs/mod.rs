@@ -4,9 +4,9 @@ mod packed;
 mod read;
 
 use crate::util::{self, Bench};
+use outcrop::Reconstruction;
 use outcrop::error::Error;
 use outcrop::params::Params;
-use outcrop::Reconstruction;
 use outcrop::report::Report;
 use outcrop_cloudgen::{Cloud, Kind};
 use outcrop_disk::workspace::memory::MINIMUM_BUDGET;

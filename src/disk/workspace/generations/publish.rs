@@ -4,7 +4,7 @@ use super::{GENERATIONS, MANIFEST, SharedFolder, Took};
 use crate::error::{Error, Result};
 use crate::workspace::Workspace;
 use crate::workspace::fault::{self, Event};
-use crate::workspace::folder::data;
+use crate::workspace::listing::data;
 use crate::workspace::journal::{Failure, OpenStep, Record};
 use crate::workspace::open::open_existing;
 use crate::workspace::run::ResumableRun;
