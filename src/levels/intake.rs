@@ -1,9 +1,9 @@
 //! Reading of the mesh: vertices into parts that can be read one by one, triangles to the blocks of their
 //! smallest vertices.
 
-use super::outlook::all;
 use super::columns::Columns;
 use super::lattice::{Finder, LARGEST, Lattice};
+use super::outlook::all;
 use super::rows::{BlockTriangle, LevelWord};
 use outcrop_codecs::ply_mesh::{PlyMesh, Sink};
 use outcrop_disk::error::{Error, Result};

@@ -18,7 +18,11 @@ const ABOVE: f64 = 1.3;
 const OF_POINTS: u64 = 2;
 
 /// A stage, with the time that it takes.
-pub(super) fn planned((name, each): (&'static str, f64), triangles: f64, threads: usize) -> Planned {
+pub(super) fn planned(
+    (name, each): (&'static str, f64),
+    triangles: f64,
+    threads: usize,
+) -> Planned {
     let seconds = each * 1e-6 * triangles / threads.max(1) as f64;
     Planned { name, seconds }
 }

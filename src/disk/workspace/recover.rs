@@ -1,8 +1,8 @@
 //! Recovery: all parts of files that are still needed are read and checked, and damaged ones are made again,
 //! with as little work as possible.
 
-use super::names::{OUTPUT, square_path, temporary};
 use super::history::{History, Needed, Remedy};
+use super::names::{OUTPUT, square_path, temporary};
 use super::open::open_existing;
 use super::progress::{Cancel, Observer};
 use crate::error::Result;

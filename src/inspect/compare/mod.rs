@@ -92,7 +92,7 @@ pub fn compare(a: &Path, b: &Path, options: &Options, workspace: &Workspace) -> 
     measured(a, b, options, false, workspace).map(|(comparison, _)| comparison)
 }
 
-/// As [`compare`], with pictures and distributions for [`outcrop::page::comparison`].
+/// As [`compare`], with pictures and distributions for `outcrop::page::comparison`.
 ///
 /// # Errors
 /// See [`compare`].

@@ -67,7 +67,7 @@ pub fn verify_with(mesh: &Path, options: &Options, workspace: &Workspace) -> Res
     examined(mesh, options, workspace).map(|(verdict, _)| verdict)
 }
 
-/// Like [`verify_with`], with pictures and the places of defects for [`outcrop::page::verdict`].
+/// Like [`verify_with`], with pictures and the places of defects for `outcrop::page::verdict`.
 ///
 /// # Errors
 /// See [`verify`].

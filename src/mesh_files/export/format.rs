@@ -26,7 +26,7 @@ pub const MADE_BY: &str = concat!(
 /// The positions of the corners of a triangle.
 pub type Positions = [[f64; 3]; 3];
 
-/// A mesh format; [`FORMATS`](super::formats::FORMATS) lists all of them. Records have fixed sizes, so slices of the
+/// A mesh format; `FORMATS` lists all of them. Records have fixed sizes, so slices of the
 /// file can be written in any order at known offsets.
 pub trait MeshFormat: Sync {
     /// Its name, for messages.

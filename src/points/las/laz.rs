@@ -3,8 +3,8 @@
 use super::super::input::{Input, STREAM_BUFFER};
 use super::super::spool::{Sink, SourceWriter, sink_bytes};
 use super::chunks::Decoder;
-use super::head::LayerHead;
 use super::fields::Fields;
+use super::head::LayerHead;
 use super::table::{self, Chunk, Table};
 use super::vlr::{self, Laszip};
 use super::{Header, Record, skip};

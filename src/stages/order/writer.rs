@@ -35,7 +35,7 @@ pub struct StoreWriter<'w> {
 
 impl<'w> StoreWriter<'w> {
     /// Opens the scratch file `name`. It contains the points that an earlier attempt of the run wrote; see
-    /// [`StoreWriter::len`].
+    /// `len`.
     ///
     /// # Errors
     /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`].

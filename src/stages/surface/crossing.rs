@@ -12,7 +12,7 @@ use outcrop_disk::spill::{Inbox, Shuffle};
 use outcrop_disk::workspace::Unit;
 
 impl OrientedInside {
-    /// The second part of [`orient_inside`]: orients the crossing triangles, ascending, given by the block of
+    /// The second part of `orient_inside`: orients the crossing triangles, ascending, given by the block of
     /// their smallest vertex, without those in `removed`.
     ///
     /// # Errors
