@@ -313,7 +313,8 @@ fn it_ends_with_its_connections() {
     // If somebody answers, it is the server of another test, which got the port and knows another secret.
     if let Ok(mut other) = TcpStream::connect(("127.0.0.1", port)) {
         let (_, target) = page.split_once(&port.to_string()).unwrap();
-        let head = format!("GET {target} HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nConnection: close\r\n\r\n");
+        let head =
+            format!("GET {target} HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nConnection: close\r\n\r\n");
         other.write_all(head.as_bytes()).unwrap();
         let mut answer = String::new();
         let _ = other.read_to_string(&mut answer);
