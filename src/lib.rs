@@ -57,8 +57,8 @@
 //!
 //! [`call`] runs the commands of the program inside another one.
 //!
-//! These items are the interface. The hidden modules are public only for the project's own tests, benches and
-//! tools, and change without notice; `ARCHITECTURE.md` has their map.
+//! These items are the interface. The crates of which the program consists (`outcrop-geom`, `outcrop-disk`,
+//! `outcrop-points`, `outcrop-stages` and others) change without notice; `ARCHITECTURE.md` has their map.
 
 #[doc(hidden)]
 pub mod cli;
