@@ -72,6 +72,7 @@ pub mod report;
 
 pub use outcrop_disk::error;
 pub use outcrop_levels as levels;
+pub use outcrop_view as view;
 
 /// Inspection of clouds and meshes without a reconstruction.
 pub mod inspect {

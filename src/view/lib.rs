@@ -4,13 +4,13 @@
 //! program (`tools/viewer`); nothing is fetched from anywhere else.
 //!
 //! ```no_run
-//! use outcrop::view::Server;
+//! use outcrop_view::Server;
 //!
 //! let server = Server::start("mesh-tiles".as_ref(), None)?;
 //! println!("open {}", server.url());
 //! // Later; dropping it does the same.
 //! server.stop();
-//! # Ok::<(), outcrop::Error>(())
+//! # Ok::<(), outcrop_disk::Error>(())
 //! ```
 
 mod assets;

@@ -2,8 +2,8 @@
 
 use crate::{Bench, check_error};
 use outcrop::inspect::compare::{self, compare};
-use outcrop_codecs::ply_mesh::holds_faces;
 use outcrop::inspect::verify::{Options, verify_with};
+use outcrop_codecs::ply_mesh::holds_faces;
 
 /// Largest file that is also compared with itself.
 const SMALL: usize = 16 << 10;

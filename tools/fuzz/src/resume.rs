@@ -1,9 +1,9 @@
 //! Damage to the files of a stopped run: it is found, and the mesh is the same.
 
 use crate::Bench;
-use outcrop_disk::workspace::memory::MINIMUM_BUDGET;
 use outcrop::{Cancel, Observer, Params, Reconstruction, Start};
 use outcrop_cloudgen::{Cloud, Format, Kind};
+use outcrop_disk::workspace::memory::MINIMUM_BUDGET;
 use std::fs::DirBuilder;
 use std::os::unix::fs::DirBuilderExt;
 use std::path::PathBuf;

@@ -5,13 +5,13 @@
 //! allocation.
 
 use crate::Bench;
-use outcrop_geom::lattice::Lattice;
 use outcrop_disk::spill::{Row, Shuffle, SortedRuns, Table};
-use outcrop_points::{IngestStats, Spool};
-use outcrop_stages::order::{Position, StoredPoints};
 use outcrop_disk::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
 use outcrop_disk::workspace::progress::{Cancel, Silent};
 use outcrop_disk::workspace::{Folder, Found, Workspace};
+use outcrop_geom::lattice::Lattice;
+use outcrop_points::{IngestStats, Spool};
+use outcrop_stages::order::{Position, StoredPoints};
 use serde::de::DeserializeOwned;
 use std::fs::DirBuilder;
 use std::os::unix::fs::DirBuilderExt;
