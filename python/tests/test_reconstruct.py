@@ -245,7 +245,7 @@ def test_columns_of_text_are_named(points: Points, tmp_path: Path) -> None:
     known = outcrop.info(path, columns="-,y,x,z", skip_lines=2)
     assert known["points"] == len(np.unique(points, axis=0))
     assert known["min"] == pytest.approx(points.min(axis=0).tolist()) and len(mesh.vertices) > 0
-    with pytest.raises(outcrop.OutcropError, match="columns"):
+    with pytest.raises(outcrop.Error, match="columns"):
         outcrop.info(path, skip_lines=2)
-    with pytest.raises(outcrop.OutcropError, match="columns"):
+    with pytest.raises(outcrop.Error, match="columns"):
         outcrop.reconstruct(points, columns="x,y,z")
