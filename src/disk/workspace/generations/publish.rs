@@ -109,11 +109,9 @@ impl SharedFolder {
             if self.is_left_over() {
                 let _ = std::fs::remove_file(self.path.join(MANIFEST));
                 let _ = std::fs::remove_dir(self.path.join(GENERATIONS));
-                if std::fs::remove_dir(&self.path).is_ok() {
-                    return;
-                }
             }
-            if !self.path.exists() {
+            // It fails unless the folder is empty, as when a late process has put a file there meanwhile.
+            if std::fs::remove_dir(&self.path).is_ok() || !self.path.exists() {
                 return;
             }
             std::thread::sleep(REMOVAL_PAUSE);
