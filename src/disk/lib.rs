@@ -1,5 +1,5 @@
-//! What a run has on disk and in memory: the scratch folder, the journal, budgets, units of work, and rows that
-//! are packed, sorted and checked. Nothing here knows points or triangles.
+//! The scratch folder of a run and its journal, the memory budget in bytes, units of work on all threads, and
+//! packed, sorted and checksummed rows on disk. Nothing here knows points or triangles.
 
 pub mod error;
 pub mod spill;
