@@ -253,7 +253,7 @@ impl Default for Params {
             min_component: None,
             keep_all: false,
             max_edge: MaxWidth::Spacings(METHOD.admissibility.edge),
-            max_fill: MaxWidth::Spacings(METHOD.filling.width),
+            max_fill: MaxWidth::Spacings(METHOD.admissibility.edge),
             repair: true,
             keep_far: false,
             normals: false,

@@ -20,7 +20,7 @@ pub fn smooth(points: &[Point], k: usize) -> Vec<Point> {
 }
 
 fn moved(points: &[Point], i: usize, k: usize) -> Point {
-    let Some((offset, _)) = offset(points, i, 3 * k) else {
+    let Some((offset, _)) = offset(points, i, 2 * k) else {
         return points[i];
     };
     std::array::from_fn(|axis| {

@@ -37,7 +37,7 @@ fn level(points: &[Point], i: usize, k: usize) -> (u8, bool) {
     let reach2 = distance2(points[i], points[others[k.min(others.len()) - 1]]);
     let spacing2 = std::f64::consts::PI * reach2 as f64 / k as f64;
     let above = |limit: f64| left / 3.0 > limit * limit * spacing2;
-    let level = [0.02, 0.075, 0.15]
+    let level = [0.02, 0.1, 0.2]
         .into_iter()
         .take_while(|limit| above(*limit))
         .count();
@@ -61,7 +61,7 @@ fn levels(points: &[Point], k: usize) -> Vec<u8> {
 /// The number of rounds in which a point moves.
 fn rounds(points: &[Point], levels: &[u8], i: usize, k: usize) -> u8 {
     let mut around = by_distance(points, i);
-    around.truncate(3 * k);
+    around.truncate(2 * k);
     around.push(i);
     let below = |limit: u8| around.iter().filter(|&&j| levels[j] < limit).count();
     (1..=3)
@@ -77,7 +77,7 @@ fn moved(points: &[Point], i: usize, k: usize, rounds: u8) -> Point {
         let last = others[..count.min(others.len())].last();
         last.map_or(0, |&j| distance2(points[i], points[j]))
     };
-    let mut count = 3 * k;
+    let mut count = 2 * k;
     let Some((mut offset, mean2)) = offset(points, i, count) else {
         return points[i];
     };

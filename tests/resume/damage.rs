@@ -139,6 +139,30 @@ fn fails(case: &Case, fault: &str, reason: &str) {
 }
 
 #[test]
+fn a_file_that_cannot_be_synced_ends_the_run_and_loses_nothing() {
+    let case = Case::new(ROBUST);
+    let mut ended = 0;
+    // Files of an earlier attempt are synced before others are deleted.
+    for (turn, record) in (1..=case.events["record"]).step_by(23).enumerate() {
+        case.clear();
+        case.killed(&format!("recorded:{record}"));
+        let fault = format!("sync:{}", 1 + turn % 3);
+        let said = case.attempt(&fault, &["--threads", "2", "--resume"]).said;
+        if said.code == Some(0) {
+            continue;
+        }
+        ended += 1;
+        assert_eq!(said.code, Some(2), "{fault}: {said:?}");
+        assert!(said.err.contains("cannot sync: "), "{fault}: {said:?}");
+        assert!(said.err.contains("mesh.ply"), "{fault}: {said:?}");
+        assert!(!case.mesh.exists());
+        let said = util::run(["resume".as_ref(), case.scratch.as_os_str()]);
+        case.check(&said, &fault);
+    }
+    assert!(ended > 3, "{ended}");
+}
+
+#[test]
 fn a_full_or_broken_disk_is_told_and_survived() {
     let case = Case::new(ROBUST);
     let writes = case.events["write"];

@@ -21,6 +21,8 @@ pub enum Event {
     Torn,
     /// After a record was appended.
     Recorded,
+    /// A sync of a file or of the folder.
+    Sync,
     /// After files were synced.
     Synced,
     /// Before the output is renamed.
@@ -35,11 +37,12 @@ pub enum Event {
     Published,
 }
 
-const NAMES: [&str; 10] = [
+const NAMES: [&str; 11] = [
     "write",
     "record",
     "torn",
     "recorded",
+    "sync",
     "synced",
     "rename",
     "renamed",
@@ -56,6 +59,8 @@ enum Plan {
     /// Have this number of MiB resident for some seconds before a finished journal is published.
     Hold(u64),
     Fail(rustix::io::Errno, u64),
+    /// From this sync on all fail.
+    Unsynced(u64),
     /// A format of meshes with a limit holds this number of bytes.
     Most(u64),
     Count(std::path::PathBuf),
@@ -78,6 +83,7 @@ fn read() -> Option<Plan> {
         "full" => Some(Plan::Fail(rustix::io::Errno::NOSPC, number)),
         "hold" => Some(Plan::Hold(number)),
         "most" => Some(Plan::Most(number)),
+        "sync" => Some(Plan::Unsynced(number)),
         "eio" => Some(Plan::Fail(rustix::io::Errno::IO, number)),
         _ => NAMES
             .iter()
@@ -144,6 +150,24 @@ pub fn write() -> io::Result<()> {
         // From then on every write fails, as on a disk that is full or removed.
         Plan::Fail(error, at) if SEEN[Event::Write as usize].load(Ordering::Relaxed) >= *at => {
             Err((*error).into())
+        }
+        _ => Ok(()),
+    }
+}
+
+/// An event before a sync, which may fail.
+///
+/// # Errors
+/// The injected error.
+pub fn sync() -> io::Result<()> {
+    let Some(plan) = plan() else {
+        return Ok(());
+    };
+    point(Event::Sync);
+    match plan {
+        // From then on every sync fails, as on a disk that is removed.
+        Plan::Unsynced(at) if SEEN[Event::Sync as usize].load(Ordering::Relaxed) >= *at => {
+            Err(rustix::io::Errno::IO.into())
         }
         _ => Ok(()),
     }

@@ -279,8 +279,7 @@ impl Folder {
         let next = first.checked_add(threads as u32 + 1);
         let next = next.ok_or_else(|| not_resumable(&self.path, "it had too many attempts"))?;
         journal.append(Record::Attempt(next))?;
-        let keeper = File::open(&self.path)
-            .and_then(|folder| Keeper::start(journal.file(), folder, io.clone()))
+        let keeper = Keeper::start(journal.file(), &self.path, io.clone())
             .map_err(|e| Error::io(&self.path, "start a thread for", e))?;
         Ok(ResumableRun::new(
             self.path,

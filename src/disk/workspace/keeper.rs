@@ -2,16 +2,19 @@
 //! unneeded files once that is safe.
 //!
 //! A killed process needs no sync, since written data are in the system's cache. No other thread waits for
-//! this one, so a loss of power costs at most a few seconds of work.
+//! this one, so a loss of power costs at most a few seconds of work. If something cannot be synced, no file is
+//! deleted any more, and the run ends ([`Keeper::check`]): a resumed run finds what it began with.
 
 use super::fault::{self, Event};
 use super::open::open_existing;
 use super::{IoCounters, lock};
+use crate::error::{Error, Result};
 use crossbeam_channel::{Receiver, Sender, TryRecvError, after, select, unbounded};
 use std::fs::File;
-use std::path::PathBuf;
+use std::io;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU8, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, OnceLock};
 use std::time::Duration;
 
 /// Time between two rounds of syncing, if no file waits to be deleted. A file that waits triggers a round at
@@ -50,15 +53,32 @@ impl Kept {
     }
 
     /// Syncs the data, unless nobody needs them.
-    fn sync(&self) {
+    fn sync(&self) -> io::Result<()> {
         // Of this and `Keeper::delete`, one sees what the other did: a file is deleted at once or synced.
-        if self.add(SYNCED) & UNNEEDED == 0 {
-            self.state.fetch_and(!DIRTY, Ordering::AcqRel);
-            // Unsynced data are found by their checksums when the run is resumed.
-            let _ = open_existing(&self.path).and_then(|file| file.sync_data());
+        if self.add(SYNCED) & UNNEEDED != 0 {
+            return Ok(());
+        }
+        self.state.fetch_and(!DIRTY, Ordering::AcqRel);
+        match open_existing(&self.path) {
+            // Whoever deleted it does not need it, and a resumed run that does finds that it is missing.
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+            file => sync(|| file?.sync_data()),
         }
     }
 }
+
+/// Syncs with `all`. On a file system that has no syncing, this is no error.
+fn sync(all: impl FnOnce() -> io::Result<()>) -> io::Result<()> {
+    use io::ErrorKind::{InvalidInput, Unsupported};
+    fault::sync()?;
+    match all() {
+        Err(error) if matches!(error.kind(), InvalidInput | Unsupported) => Ok(()),
+        done => done,
+    }
+}
+
+/// The first thing that could not be synced, and the system's reason.
+type Failed = OnceLock<(PathBuf, io::Error)>;
 
 /// A file to delete, and the scratch bytes that its deletion frees.
 #[derive(Debug)]
@@ -87,15 +107,18 @@ enum Message {
 /// The thread's end of the channel, and what it knows.
 struct Rounds {
     messages: Receiver<Message>,
+    /// The scratch folder, and its path.
     folder: File,
+    path: PathBuf,
     io: Arc<IoCounters>,
+    failed: Arc<Failed>,
     deleting: Arc<Mutex<()>>,
     journals: Vec<Arc<File>>,
     dirty: Vec<Arc<Kept>>,
     leaving: Vec<Leaving>,
 }
 
-/// The run is over.
+/// The run is over, or it has to end.
 struct Over;
 
 impl Rounds {
@@ -105,6 +128,14 @@ impl Rounds {
             Message::Dirty(file) => self.dirty.push(file),
             Message::Leaving(files) => self.leaving.extend(files),
         }
+    }
+
+    /// Notes what could not be synced: `path`, or something in that folder.
+    fn synced(&self, path: &Path, done: io::Result<()>) -> Result<(), Over> {
+        done.map_err(|error| {
+            let _ = self.failed.set((path.to_path_buf(), error));
+            Over
+        })
     }
 
     /// Takes all messages that are there.
@@ -137,12 +168,12 @@ impl Rounds {
         for file in std::mem::take(&mut self.dirty) {
             // The end of the run does not wait for more than one sync, and nobody waits for that.
             self.take_all()?;
-            file.sync();
+            self.synced(&file.path, file.sync())?;
         }
         // Syncs the names of new files.
-        let _ = self.folder.sync_all();
+        self.synced(&self.path, sync(|| self.folder.sync_all()))?;
         for journal in &self.journals {
-            let _ = journal.sync_data();
+            self.synced(&self.path, sync(|| journal.sync_data()))?;
         }
         fault::point(Event::Synced);
         let deleting = self.deleting.clone();
@@ -161,6 +192,7 @@ pub struct Keeper {
     /// Not bounded, since nobody must wait: one message for each unsynced, leaving or journal file.
     messages: Option<Sender<Message>>,
     io: Arc<IoCounters>,
+    failed: Arc<Failed>,
     /// Locked while the thread deletes a file.
     deleting: Arc<Mutex<()>>,
 }
@@ -170,22 +202,25 @@ impl Keeper {
     ///
     /// # Errors
     /// Errors of the system.
-    pub fn start(journal: Arc<File>, folder: File, io: Arc<IoCounters>) -> std::io::Result<Self> {
+    pub fn start(journal: Arc<File>, folder: &Path, io: Arc<IoCounters>) -> io::Result<Self> {
         Self::every(ROUND, journal, folder, io)
     }
 
     fn every(
         time: Duration,
         journal: Arc<File>,
-        folder: File,
+        folder: &Path,
         io: Arc<IoCounters>,
-    ) -> std::io::Result<Self> {
+    ) -> io::Result<Self> {
         let (sender, messages) = unbounded();
         let deleting: Arc<Mutex<()>> = Arc::default();
+        let failed: Arc<Failed> = Arc::default();
         let rounds = Rounds {
             messages,
-            folder,
+            folder: File::open(folder)?,
+            path: folder.to_path_buf(),
             io: io.clone(),
+            failed: failed.clone(),
             deleting: deleting.clone(),
             journals: vec![journal],
             dirty: Vec::new(),
@@ -196,12 +231,26 @@ impl Keeper {
         Ok(Self {
             messages: Some(sender),
             io,
+            failed,
             deleting,
         })
     }
 
+    /// Fails if something could not be synced.
+    ///
+    /// # Errors
+    /// [`Error::Io`] with the file, or with the folder for its names and journals.
+    pub fn check(&self) -> Result<()> {
+        let Some((path, error)) = self.failed.get() else {
+            return Ok(());
+        };
+        let again = error.raw_os_error().map(io::Error::from_raw_os_error);
+        let again = again.unwrap_or_else(|| io::Error::new(error.kind(), error.to_string()));
+        Err(Error::io(path, "sync", again))
+    }
+
     fn send(&self, message: Message) {
-        // The thread is there until the sender is dropped.
+        // The thread is there until the sender is dropped, or until something could not be synced.
         let _ = self.messages.as_ref().map(|thread| thread.send(message));
     }
 
@@ -219,13 +268,18 @@ impl Keeper {
 
     /// Deletes files; the journal already records their deletion. A file that was never synced would not
     /// survive a loss of power anyway, so it is deleted at once, which frees its space even during a sync.
-    pub fn delete(&self, files: impl Iterator<Item = Leaving>) {
+    ///
+    /// # Errors
+    /// [`Error::Io`] if something could not be synced: all files are kept then.
+    pub fn delete(&self, files: impl Iterator<Item = Leaving>) -> Result<()> {
+        self.check()?;
         let synced = |file: &Leaving| file.0.add(UNNEEDED) & SYNCED != 0;
         let (leaving, fresh): (Vec<_>, Vec<_>) = files.partition(synced);
         if !leaving.is_empty() {
             self.send(Message::Leaving(leaving));
         }
         fresh.iter().for_each(|file| file.delete(&self.io));
+        Ok(())
     }
 }
 
@@ -243,7 +297,7 @@ mod tests {
 
     fn keeper(folder: &std::path::Path, round: Duration) -> (Keeper, Arc<IoCounters>) {
         let (io, journal) = (Arc::new(IoCounters::default()), folder.join("journal"));
-        let (journal, folder) = (File::create(journal).unwrap(), File::open(folder).unwrap());
+        let journal = File::create(journal).unwrap();
         let keeper = Keeper::every(round, Arc::new(journal), folder, io.clone());
         (keeper.unwrap(), io)
     }
@@ -263,12 +317,37 @@ mod tests {
     const NEVER: Duration = Duration::from_secs(1 << 20);
 
     #[test]
+    fn after_something_could_not_be_synced_no_file_is_deleted() {
+        let folder = tempfile::tempdir().unwrap();
+        let (keeper, _) = keeper(folder.path(), NEVER);
+        let kept = file(folder.path());
+        keeper.check().unwrap();
+        // A path that cannot be a file.
+        let lost = Arc::new(Kept::new(folder.path().join("journal/lost")));
+        keeper.sync_later(&lost);
+        keeper
+            .delete([Leaving(kept.clone(), 0)].into_iter())
+            .unwrap();
+        wait_until(|| keeper.check().is_err());
+        let said = keeper.check().unwrap_err().to_string();
+        let expected = format!("{}: cannot sync: ", lost.path.display());
+        assert!(said.starts_with(&expected), "{said}");
+        let fresh = Arc::new(Kept::new(folder.path().join("journal")));
+        fresh.made();
+        assert!(keeper.delete([Leaving(fresh, 0)].into_iter()).is_err());
+        drop(keeper);
+        assert!(kept.path.exists() && folder.path().join("journal").exists());
+    }
+
+    #[test]
     fn a_file_that_may_have_been_synced_goes_without_waiting_for_a_round() {
         let folder = tempfile::tempdir().unwrap();
         let (keeper, io) = keeper(folder.path(), NEVER);
         let file = file(folder.path());
         io.grow_scratch(7);
-        keeper.delete([Leaving(file.clone(), 7)].into_iter());
+        keeper
+            .delete([Leaving(file.clone(), 7)].into_iter())
+            .unwrap();
         wait_until(|| !file.path.exists() && io.scratch() == 0);
     }
 
@@ -286,7 +365,9 @@ mod tests {
                 wait_until(|| file.state.load(Ordering::Acquire) == SYNCED);
             }
             let deleting = lock(&keeper.deleting);
-            keeper.delete([Leaving(file.clone(), 0)].into_iter());
+            keeper
+                .delete([Leaving(file.clone(), 0)].into_iter())
+                .unwrap();
             assert_eq!(file.path.exists(), synced);
             drop(deleting);
             wait_until(|| !file.path.exists());
@@ -299,7 +380,9 @@ mod tests {
             let folder = tempfile::tempdir().unwrap();
             let (keeper, _) = keeper(folder.path(), NEVER);
             let file = file(folder.path());
-            keeper.delete([Leaving(file.clone(), 0)].into_iter());
+            keeper
+                .delete([Leaving(file.clone(), 0)].into_iter())
+                .unwrap();
             drop(keeper);
             File::create(&file.path).unwrap();
             std::thread::sleep(Duration::from_micros(200));

@@ -253,6 +253,7 @@ impl ResumableRun {
         puts: Vec<Put>,
         payload: Vec<u8>,
     ) -> Result<()> {
+        self.keeper.check()?;
         let record = Record::Unit {
             step: step.to_owned(),
             unit,
@@ -281,6 +282,7 @@ impl ResumableRun {
     /// # Errors
     /// [`crate::error::Error::Io`], [`crate::error::Error::Disk`].
     pub fn end(&self, step: &str, units: u64, files: BTreeSet<String>) -> Result<()> {
+        self.keeper.check()?;
         let mut files = files;
         match self.history.ended(step) {
             Some(known) if known.is_superset(&files) => return Ok(()),
@@ -323,15 +325,14 @@ impl ResumableRun {
     /// # Errors
     /// [`crate::error::Error::Io`], [`crate::error::Error::Disk`].
     pub fn delete(&self, name: &str, leaving: impl Iterator<Item = Leaving>) -> Result<()> {
+        self.keeper.check()?;
         self.journal.append(Record::Deleted(name.to_owned()))?;
         if self.is_shared() {
             let mut made = lock(&self.made);
             let (own, others): (Vec<_>, Vec<_>) = leaving.partition(|l| made.remove(&l.0.path));
             lock(&self.leaving).extend(others);
-            self.keeper.delete(own.into_iter());
-            return Ok(());
+            return self.keeper.delete(own.into_iter());
         }
-        self.keeper.delete(leaving);
-        Ok(())
+        self.keeper.delete(leaving)
     }
 }

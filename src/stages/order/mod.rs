@@ -1,6 +1,7 @@
 //! Sorts points along the Hilbert curve, on disk, and removes duplicates; the rank of a point is its id (not
 //! in the paper). This makes all later stages independent of memory and threads.
 
+mod bits;
 mod files;
 mod packed;
 mod rewrite;

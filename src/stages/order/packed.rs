@@ -5,12 +5,9 @@
 //! has all x, then all y, then all z. Where all differences of a page are multiples of a power of two, as
 //! those of a scan on a refined lattice are, their zero bits are left out.
 
-use bitpacking::{BitPacker, BitPacker8x};
+use super::bits::{self, BLOCK};
 use outcrop_geom::Point;
 use outcrop_geom::aabb::Aabb;
-
-/// Points in a block.
-pub(super) const BLOCK: usize = BitPacker8x::BLOCK_LEN;
 
 /// The layout of a packed page.
 #[derive(Debug, Clone, Copy)]
@@ -40,14 +37,13 @@ impl Packing {
 
     /// Bytes of a page of `points` points.
     pub fn bytes(&self, points: usize) -> usize {
-        let bits: usize = self.bits.iter().map(|bits| usize::from(*bits)).sum();
-        points.div_ceil(BLOCK) * bits * BLOCK / 8
+        let block: usize = self.bits.iter().map(|bits| bits::size(*bits)).sum();
+        points.div_ceil(BLOCK) * block
     }
 
     /// Writes the points of a page in columns, each as long as there are points; `bytes` must have the length
     /// of the page.
     pub fn unpack(&self, mut bytes: &[u8], columns: [&mut [i32]; 3]) {
-        let packer = BitPacker8x::new();
         let mut values = [0; BLOCK];
         let [x, y, z] = columns;
         let blocks = x
@@ -56,8 +52,8 @@ impl Packing {
             .zip(z.chunks_mut(BLOCK));
         for ((x, y), z) in blocks {
             for (axis, column) in [x, y, z].into_iter().enumerate() {
-                let (block, rest) = bytes.split_at(usize::from(self.bits[axis]) * BLOCK / 8);
-                packer.decompress(block, &mut values, self.bits[axis]);
+                let (block, rest) = bytes.split_at(bits::size(self.bits[axis]));
+                bits::unpack(block, self.bits[axis], &mut values);
                 for (to, value) in column.iter_mut().zip(&values) {
                     *to = self.min[axis].wrapping_add((value << self.shift).cast_signed());
                 }
@@ -76,9 +72,9 @@ pub(super) fn pack(page: &[Point], bytes: &mut Vec<u8>) -> (Aabb, u8) {
     // A single position has differences of zero, and no bits at any shift.
     let shift = page.iter().fold(0, all).trailing_zeros().min(31) as u8;
     let packing = Packing::of(&bounds, shift);
-    let packer = BitPacker8x::new();
-    let mut to = bytes.len();
-    bytes.resize(to + packing.bytes(page.len()), 0);
+    let start = bytes.len();
+    bytes.resize(start + packing.bytes(page.len()), 0);
+    let mut left = &mut bytes[start..];
     for block in page.chunks(BLOCK) {
         let mut values = [[0; BLOCK]; 3];
         let [x, y, z] = &mut values;
@@ -88,7 +84,9 @@ pub(super) fn pack(page: &[Point], bytes: &mut Vec<u8>) -> (Aabb, u8) {
             *z = difference(point, 2) >> shift;
         }
         for (values, bits) in values.iter().zip(packing.bits) {
-            to += packer.compress(values, &mut bytes[to..], bits);
+            let (to, rest) = left.split_at_mut(bits::size(bits));
+            bits::pack(values, bits, to);
+            left = rest;
         }
     }
     (bounds, shift)

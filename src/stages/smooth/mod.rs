@@ -63,7 +63,7 @@ pub struct Relaxing {
 }
 
 /// One round of smoothing: every point moves to the plane of its `neighbors` nearest, or, with
-/// [`Smoothing::Edges`], to a surface through three times as many neighbours.
+/// [`Smoothing::Edges`], to a surface through twice as many neighbours.
 ///
 /// # Errors
 /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`], [`outcrop_disk::error::Error::Memory`],

@@ -87,8 +87,7 @@ impl SharedFolder {
             why: "it had too many attempts".into(),
         })?;
         let held = memory.reserve("history", generation.history.bytes())?;
-        let keeper = File::open(&self.path)
-            .and_then(|folder| Keeper::start(journal.file(), folder, io.clone()))
+        let keeper = Keeper::start(journal.file(), &self.path, io.clone())
             .map_err(|e| Error::io(&path, "start a thread for", e))?;
         Ok(ResumableRun::new(
             self.path.clone(),
