@@ -33,7 +33,7 @@ fn ordered(
 /// Positions after smoothing of the noisy points with tiles and pages of these sizes, and the counts.
 fn relaxed(points: &[Point], rounds: u32, tile: u32, page: usize) -> (Vec<Point>, RelaxStats) {
     let relaxing = Relaxing {
-        neighbors: 12,
+        neighbors: 18,
         rounds,
         step: 1.0,
     };
@@ -176,7 +176,7 @@ fn outliers_stay() {
     }
 }
 
-/// Positions before and after a round of smoothing with 12 neighbours.
+/// Positions before and after a round of smoothing with 18 neighbours.
 fn smoothed(
     points: &[Point],
     smoothing: Smoothing,
@@ -185,7 +185,7 @@ fn smoothed(
 ) -> (Vec<Point>, Vec<Point>) {
     let workspace = &Workspace::for_tests(2).expect("a scratch folder");
     let (store, tiles) = ordered(points, tile, page, workspace);
-    let after = smooth(&store, tiles, 12, smoothing, 1, workspace).unwrap();
+    let after = smooth(&store, tiles, 18, smoothing, 1, workspace).unwrap();
     let after = after.open(workspace).unwrap();
     let all = |store: &PointStore| store.slice(0..store.len()).unwrap();
     (all(&store), all(&after))
