@@ -5,9 +5,6 @@
 //! and cells (`outcrop_geom`). Everything else is written as plainly as possible. Nothing is optimised; a
 //! few hundred points are a large cloud.
 
-// Each test that includes this module uses a part of it.
-#![allow(dead_code)]
-
 pub mod base;
 pub mod big;
 pub mod cells;

@@ -1,13 +1,11 @@
 //! The exact corner test of `geom::predicate` against power diagrams with real, tiny weights, and the clipped
 //! cells of `geom::clip` against all corners that no neighbour cuts off.
 
-mod reference;
-
+use crate::reference::big::{Big, Big3, determinant, dot, vector};
+use crate::reference::clouds::{self, Random};
 use outcrop_geom::clip::Cell;
 use outcrop_geom::predicate::{Neighbor, cuts_corner, turn};
 use outcrop_geom::{Point, sub};
-use reference::big::{Big, Big3, determinant, dot, vector};
-use reference::clouds::{self, Random};
 
 /// The numbers below need 2100 bits.
 type Wide = Big<40>;

@@ -1,8 +1,9 @@
 //! Stitching, repair and export of arbitrary triples equal the reference: triples that cells never have reach
 //! the code for edges with many triangles and for vertices by excess.
 
-mod reference;
-
+use crate::reference::clouds::Random;
+use crate::reference::outside::{Facing, Known};
+use crate::reference::{Counts, Settings, cells, connect};
 use outcrop::{Division, Error};
 use outcrop_codecs::ply_mesh::{PlyMesh, Sink};
 use outcrop_disk::workspace::Workspace;
@@ -19,9 +20,6 @@ use outcrop_stages::repair::{RepairOptions, repair};
 use outcrop_stages::scanners::Scanners;
 use outcrop_stages::stitch::{StitchOptions, stitch};
 use outcrop_stages::triples::Triples;
-use reference::clouds::Random;
-use reference::outside::{Facing, Known};
-use reference::{Counts, Settings, cells, connect};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 

@@ -1,13 +1,10 @@
 //! Tests of the reference implementation itself.
 
-#[path = "mod.rs"]
-mod reference;
-
+use crate::reference::base::base;
+use crate::reference::check::check;
+use crate::reference::clouds::Random;
+use crate::reference::{Mesh, Radius, Settings, cells, clouds, from_triples, narrow, reconstruct};
 use outcrop_geom::Point;
-use reference::base::base;
-use reference::check::check;
-use reference::clouds::Random;
-use reference::{Mesh, Radius, Settings, cells, clouds, from_triples, narrow, reconstruct};
 use std::collections::BTreeSet;
 
 fn kind(name: &str) -> usize {

@@ -1,15 +1,14 @@
 //! The pipeline's mesh equals the reference's, triangle for triangle, on many small difficult clouds, for
 //! every block size, tile size, page size and number of threads.
 
-mod reference;
-
+use crate::reference;
+use crate::reference::weighing::Weighing;
+use crate::reference::{Counts, Given, Mesh, Settings, clouds, normals};
 use outcrop::{
     Division, Error, Facing, InputNormals, MaxWidth, Method, Params, Radius, Reconstruction,
     Report, Smooth, Smoothing,
 };
 use outcrop_codecs::ply_mesh::{PlyMesh, Sink};
-use reference::weighing::Weighing;
-use reference::{Counts, Given, Mesh, Settings, clouds, normals};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -594,7 +593,7 @@ fn robust() {
     ];
     let all = parts.iter().chain(&mended).all(|n| *n > 0);
     assert!(reached.rounds == 3 && all, "parts not reached: {reached:?}");
-    // The remaining cases are reached with other triples, see `oracle_stitch.rs`, and by bands.
+    // The remaining cases are reached with other triples, see `stitch.rs`, and by bands.
     let but = [
         "folded",
         "faced",
