@@ -109,7 +109,7 @@ constants! {
         /// Halvings of the lattice step before points move, so that rounding does not undo the movement.
         halvings: u32 = 10, "times";
         /// Neighbours for a curved surface: it has more unknowns than a plane and needs more points. With 3, each
-        /// round takes half as long again, and fine details go: of a part with thin fins a hundredth more is lost.
+        /// round takes a quarter longer, and fine details go: of a part with thin fins a hundredth more is lost.
         neighbors: usize = 2, "times those of a plane", [1, 3];
         /// Squared distance at which weights vanish.
         reach2: f64 = 1.1, "squared distances of the last neighbour", [1.05, 1.4];
