@@ -466,6 +466,16 @@ fn varied(seed: u64) -> Settings {
     }
 }
 
+/// As [`varied`], with small blocks, patches and clusters, too.
+fn divided(seed: u64) -> Settings {
+    Settings {
+        block: [4, 9, 25, 1000, 60][seed as usize / 4 % 5],
+        patch: [4, 9, 16, 256][seed as usize / 8 % 4],
+        cluster: [2, 7, 40, 1024, 15][seed as usize / 3 % 5],
+        ..varied(seed)
+    }
+}
+
 #[test]
 fn arbitrary_triples() {
     let reached = compare(0..400, false, varied, |_| 200, |p, _| p);
@@ -477,9 +487,6 @@ fn arbitrary_triples() {
 #[test]
 fn arbitrary_triples_that_face_a_side() {
     let settings = |seed: u64| Settings {
-        block: [4, 9, 25, 1000, 60][seed as usize / 4 % 5],
-        patch: [4, 9, 16, 256][seed as usize / 8 % 4],
-        cluster: [2, 7, 40, 1024, 15][seed as usize / 3 % 5],
         robust: !seed.is_multiple_of(9),
         facing: [
             Facing::In,
@@ -487,7 +494,7 @@ fn arbitrary_triples_that_face_a_side() {
             Facing::At([0, 1000, 300]),
             Facing::At([-1, 1 << 40, -90_000]),
         ][seed as usize / 2 % 4],
-        ..varied(seed)
+        ..divided(seed)
     };
     let side = |seed: u64| [200, 40][seed as usize % 2];
     let reached = compare(1000..1300, true, settings, side, |p, _| p);
@@ -497,11 +504,8 @@ fn arbitrary_triples_that_face_a_side() {
 #[test]
 fn arbitrary_triples_the_robust_way() {
     let settings = |seed: u64| Settings {
-        block: [4, 9, 25, 1000, 60][seed as usize / 4 % 5],
-        patch: [4, 9, 16, 256][seed as usize / 8 % 4],
-        cluster: [2, 7, 40, 1024, 15][seed as usize / 3 % 5],
         robust: true,
-        ..varied(seed)
+        ..divided(seed)
     };
     // Some long bands are one patch, and the largest sheets consist of large patches.
     let settings = |seed: u64| match (seed % 16, seed % LARGE) {
