@@ -79,10 +79,8 @@ constants! {
     }
     /// Outliers, which are dropped on request.
     outliers: Outliers {
-        /// Neighbours whose mean distance is the spacing of a point.
-        nearest: usize = 8, "points";
         /// Neighbours whose median spacing is the reference: so many that most are on the surface, while the
-        /// nearest neighbours of an outlier can be outliers too.
+        /// nearest neighbours of an outlier can be outliers too. A spacing is that of `noise.nearest`.
         around: usize = 64, "points";
         /// Most rounds. Another round finds outliers for which even the reference consists of outliers.
         rounds: u32 = 4, "rounds";
@@ -137,10 +135,13 @@ constants! {
     }
     /// Noise: which points are smoothed, and how often.
     noise: Noise {
-        /// Nearest neighbours whose heights over a surface of second order are the noise at a point. So few
-        /// that they lie on one sheet of a plate 1.5 spacings thick; with 12, a tenth of the points of such a
-        /// plate seem noisy.
+        /// Nearest neighbours whose heights over a surface of second order are the noise at a point, and whose
+        /// mean distance is the spacing by which outliers are told. So few that they lie on one sheet of a plate
+        /// 1.5 spacings thick; with 12, a tenth of the points of such a plate seem noisy.
         nearest: usize = 8, "points", [7, 12];
+        /// Noise is measured at one point in this number, and is that of the points behind it in the order of the
+        /// ids. At every point, an aerial scan takes a twelfth longer.
+        every: usize = 4, "ids", [1, 8];
         /// A point is clean if its noise is at most this. A region is examined if there is twice as much in a
         /// sampled run: a clean scan of a face has 0.031 at one point of 120 000, a scan with noise of a quarter
         /// of the spacing less than 0.083 at one point of 20. With 0.035 a carved lion has a sixth more boundary.

@@ -7,6 +7,17 @@ use std::ops::{Add, Div, Mul, Sub};
 
 /// Eight numbers.
 pub trait Eight: Numbers {
+    /// Those of the numbers that one register holds. Where a loop has more sums than there are registers, it
+    /// takes one part after the other.
+    type Part: Numbers;
+    /// Number of parts: 1 or 2.
+    const PARTS: usize;
+    /// Loads a part from memory.
+    fn load_part(from: &[f64; 8], part: usize) -> Self::Part;
+    /// Stores a part to memory.
+    fn store_part(from: Self::Part, part: usize, to: &mut [f64; 8]);
+    /// The eight numbers of the first and the last part.
+    fn of_parts(first: Self::Part, last: Self::Part) -> Self;
     /// Loads from memory.
     fn load(from: &[f64; 8]) -> Self;
     /// Converts integers, exactly.
@@ -131,6 +142,24 @@ impl Numbers for Base {
 }
 
 impl Eight for Base {
+    type Part = Self;
+    const PARTS: usize = 1;
+
+    #[inline(always)]
+    fn load_part(from: &[f64; 8], _: usize) -> Self {
+        Self::load(from)
+    }
+
+    #[inline(always)]
+    fn store_part(from: Self, _: usize, to: &mut [f64; 8]) {
+        from.store(to);
+    }
+
+    #[inline(always)]
+    fn of_parts(first: Self, _: Self) -> Self {
+        first
+    }
+
     #[inline(always)]
     fn load(from: &[f64; 8]) -> Self {
         Self(*from)
@@ -155,292 +184,4 @@ pub use wide::{Avx2, Avx512};
     unsafe_code,
     reason = "instructions that were looked for; unaligned loads and stores"
 )]
-mod wide {
-    use super::{Eight, Numbers};
-    use std::arch::x86_64::*;
-    use std::ops::{Add, Div, Mul, Sub};
-
-    /// Two registers of 256 bits.
-    #[derive(Debug, Clone, Copy)]
-    pub struct Avx2(pub __m256d, pub __m256d);
-
-    /// A register of 512 bits.
-    #[derive(Debug, Clone, Copy)]
-    pub struct Avx512(pub __m512d);
-
-    // SAFETY (all of both types): they are named only by the versions of a kernel that are compiled for these
-    // instructions, and those are called only after `Level` found the instructions on the machine. Loads and
-    // stores stay within an array of eight and need no alignment.
-    operators! { Avx2:
-        Add add(a, b) = {
-            // SAFETY: see above.
-            unsafe { Self(_mm256_add_pd(a.0, b.0), _mm256_add_pd(a.1, b.1)) }
-        };
-        Sub sub(a, b) = {
-            // SAFETY: see above.
-            unsafe { Self(_mm256_sub_pd(a.0, b.0), _mm256_sub_pd(a.1, b.1)) }
-        };
-        Mul mul(a, b) = {
-            // SAFETY: see above.
-            unsafe { Self(_mm256_mul_pd(a.0, b.0), _mm256_mul_pd(a.1, b.1)) }
-        };
-        Div div(a, b) = {
-            // SAFETY: see above.
-            unsafe { Self(_mm256_div_pd(a.0, b.0), _mm256_div_pd(a.1, b.1)) }
-        };
-    }
-
-    impl Numbers for Avx2 {
-        const ALL: u64 = 0xff;
-
-        #[inline(always)]
-        fn splat(x: f64) -> Self {
-            // SAFETY: see above.
-            unsafe { Self(_mm256_set1_pd(x), _mm256_set1_pd(x)) }
-        }
-
-        #[inline(always)]
-        fn sqrt(self) -> Self {
-            // SAFETY: see above.
-            unsafe { Self(_mm256_sqrt_pd(self.0), _mm256_sqrt_pd(self.1)) }
-        }
-
-        #[inline(always)]
-        fn abs(self) -> Self {
-            // SAFETY: see above.
-            unsafe {
-                let sign = _mm256_set1_pd(-0.0);
-                Self(
-                    _mm256_andnot_pd(sign, self.0),
-                    _mm256_andnot_pd(sign, self.1),
-                )
-            }
-        }
-
-        #[inline(always)]
-        fn greater(self, other: Self) -> u64 {
-            // SAFETY: see above.
-            unsafe {
-                let low = _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_GT_OQ>(self.0, other.0));
-                let high = _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_GT_OQ>(self.1, other.1));
-                (low | high << 4) as u64
-            }
-        }
-
-        #[inline(always)]
-        fn larger(self, other: Self) -> Self {
-            // SAFETY: see above. The instruction returns its second operand unless the first is greater.
-            unsafe {
-                Self(
-                    _mm256_max_pd(self.0, other.0),
-                    _mm256_max_pd(self.1, other.1),
-                )
-            }
-        }
-
-        #[inline(always)]
-        fn choose<const N: usize>(bits: u64, first: [Self; N], second: [Self; N]) -> [Self; N] {
-            // SAFETY: see above.
-            unsafe {
-                let all = _mm256_set1_epi64x(bits as i64);
-                let (low, high) = (
-                    _mm256_setr_epi64x(1, 2, 4, 8),
-                    _mm256_setr_epi64x(16, 32, 64, 128),
-                );
-                let mask =
-                    |at| _mm256_castsi256_pd(_mm256_cmpeq_epi64(_mm256_and_si256(all, at), at));
-                let (low, high) = (mask(low), mask(high));
-                let mut chosen = second;
-                for (chosen, first) in chosen.iter_mut().zip(first) {
-                    chosen.0 = _mm256_blendv_pd(chosen.0, first.0, low);
-                    chosen.1 = _mm256_blendv_pd(chosen.1, first.1, high);
-                }
-                chosen
-            }
-        }
-    }
-
-    impl Eight for Avx2 {
-        #[inline(always)]
-        fn load(from: &[f64; 8]) -> Self {
-            // SAFETY: see above.
-            unsafe {
-                let p = from.as_ptr();
-                Self(_mm256_loadu_pd(p), _mm256_loadu_pd(p.add(4)))
-            }
-        }
-
-        #[inline(always)]
-        fn convert(from: &[i32; 8]) -> Self {
-            // SAFETY: see above.
-            unsafe {
-                let p = from.as_ptr().cast::<__m128i>();
-                let (low, high) = (_mm_loadu_si128(p), _mm_loadu_si128(p.add(1)));
-                Self(_mm256_cvtepi32_pd(low), _mm256_cvtepi32_pd(high))
-            }
-        }
-
-        #[inline(always)]
-        fn store(self, to: &mut [f64; 8]) {
-            // SAFETY: see above.
-            unsafe {
-                let p = to.as_mut_ptr();
-                _mm256_storeu_pd(p, self.0);
-                _mm256_storeu_pd(p.add(4), self.1);
-            }
-        }
-
-        #[inline(always)]
-        fn put(to: &mut [f64; 8], k: usize, x: f64) {
-            let (half, k) = (k / 4 % 2, (k % 4) as i64);
-            // SAFETY: see above; a half is four numbers.
-            unsafe {
-                let to = to.as_mut_ptr().add(4 * half);
-                let places = _mm256_setr_epi64x(0, 1, 2, 3);
-                let at = _mm256_cmpeq_epi64(places, _mm256_set1_epi64x(k));
-                let put = _mm256_blendv_pd(
-                    _mm256_loadu_pd(to),
-                    _mm256_set1_pd(x),
-                    _mm256_castsi256_pd(at),
-                );
-                _mm256_storeu_pd(to, put);
-            }
-        }
-
-        #[inline(always)]
-        fn largest(self) -> f64 {
-            // SAFETY: see above.
-            unsafe {
-                let four = _mm256_max_pd(self.0, self.1);
-                let (low, high) = (
-                    _mm256_castpd256_pd128(four),
-                    _mm256_extractf128_pd::<1>(four),
-                );
-                let two = _mm_max_pd(low, high);
-                _mm_cvtsd_f64(_mm_max_sd(two, _mm_unpackhi_pd(two, two)))
-            }
-        }
-
-        #[inline(always)]
-        fn total(self) -> f64 {
-            // SAFETY: see above.
-            unsafe { total(_mm256_add_pd(self.0, self.1)) }
-        }
-    }
-
-    /// The sum of four numbers: (a0 + a2) + (a1 + a3).
-    #[inline(always)]
-    fn total(four: __m256d) -> f64 {
-        // SAFETY: see above.
-        unsafe {
-            let (low, high) = (
-                _mm256_castpd256_pd128(four),
-                _mm256_extractf128_pd::<1>(four),
-            );
-            let two = _mm_add_pd(low, high);
-            _mm_cvtsd_f64(_mm_add_sd(two, _mm_unpackhi_pd(two, two)))
-        }
-    }
-
-    operators! { Avx512:
-        // SAFETY: see above.
-        Add add(a, b) = unsafe { Self(_mm512_add_pd(a.0, b.0)) };
-        // SAFETY: see above.
-        Sub sub(a, b) = unsafe { Self(_mm512_sub_pd(a.0, b.0)) };
-        // SAFETY: see above.
-        Mul mul(a, b) = unsafe { Self(_mm512_mul_pd(a.0, b.0)) };
-        // SAFETY: see above.
-        Div div(a, b) = unsafe { Self(_mm512_div_pd(a.0, b.0)) };
-    }
-
-    impl Numbers for Avx512 {
-        const ALL: u64 = 0xff;
-
-        #[inline(always)]
-        fn splat(x: f64) -> Self {
-            // SAFETY: see above.
-            unsafe { Self(_mm512_set1_pd(x)) }
-        }
-
-        #[inline(always)]
-        fn sqrt(self) -> Self {
-            // SAFETY: see above.
-            unsafe { Self(_mm512_sqrt_pd(self.0)) }
-        }
-
-        #[inline(always)]
-        fn abs(self) -> Self {
-            // SAFETY: see above.
-            unsafe { Self(_mm512_abs_pd(self.0)) }
-        }
-
-        #[inline(always)]
-        fn greater(self, other: Self) -> u64 {
-            // SAFETY: see above.
-            unsafe { u64::from(_mm512_cmp_pd_mask::<_CMP_GT_OQ>(self.0, other.0)) }
-        }
-
-        #[inline(always)]
-        fn larger(self, other: Self) -> Self {
-            // SAFETY: see above. The instruction returns its second operand unless the first is greater.
-            unsafe { Self(_mm512_max_pd(self.0, other.0)) }
-        }
-
-        #[inline(always)]
-        fn choose<const N: usize>(bits: u64, first: [Self; N], second: [Self; N]) -> [Self; N] {
-            // SAFETY: see above.
-            unsafe {
-                let mut chosen = second;
-                for (chosen, first) in chosen.iter_mut().zip(first) {
-                    chosen.0 = _mm512_mask_blend_pd(bits as u8, chosen.0, first.0);
-                }
-                chosen
-            }
-        }
-    }
-
-    impl Eight for Avx512 {
-        #[inline(always)]
-        fn load(from: &[f64; 8]) -> Self {
-            // SAFETY: see above.
-            unsafe { Self(_mm512_loadu_pd(from.as_ptr())) }
-        }
-
-        #[inline(always)]
-        fn convert(from: &[i32; 8]) -> Self {
-            // SAFETY: see above.
-            unsafe { Self(_mm512_cvtepi32_pd(_mm256_loadu_si256(from.as_ptr().cast()))) }
-        }
-
-        #[inline(always)]
-        fn store(self, to: &mut [f64; 8]) {
-            // SAFETY: see above.
-            unsafe { _mm512_storeu_pd(to.as_mut_ptr(), self.0) }
-        }
-
-        #[inline(always)]
-        fn put(to: &mut [f64; 8], k: usize, x: f64) {
-            // SAFETY: see above.
-            unsafe {
-                let at = 1u8 << (k % 8);
-                let put = _mm512_mask_mov_pd(_mm512_loadu_pd(to.as_ptr()), at, _mm512_set1_pd(x));
-                _mm512_storeu_pd(to.as_mut_ptr(), put);
-            }
-        }
-
-        #[inline(always)]
-        fn largest(self) -> f64 {
-            // SAFETY: see above.
-            unsafe { _mm512_reduce_max_pd(self.0) }
-        }
-
-        #[inline(always)]
-        fn total(self) -> f64 {
-            // SAFETY: see above.
-            unsafe {
-                let low = _mm512_castpd512_pd256(self.0);
-                total(_mm256_add_pd(low, _mm512_extractf64x4_pd::<1>(self.0)))
-            }
-        }
-    }
-}
+mod wide;

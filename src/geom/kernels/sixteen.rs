@@ -147,7 +147,8 @@ mod wide {
         fn rounded(low: Self, high: Self) -> [__m256; 2] {
             // SAFETY: see above.
             unsafe {
-                let round = |x: Self| _mm256_set_m128(_mm256_cvtpd_ps(x.1), _mm256_cvtpd_ps(x.0));
+                let round =
+                    |x: Self| _mm256_set_m128(_mm256_cvtpd_ps(x.1.0), _mm256_cvtpd_ps(x.0.0));
                 [round(low), round(high)]
             }
         }

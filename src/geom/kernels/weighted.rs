@@ -7,6 +7,7 @@
 use super::corners::LANES;
 use super::eight::Eight;
 use super::kernel;
+use super::numbers::Numbers;
 use super::pick::first_bits;
 
 /// Positions of one group.
@@ -43,17 +44,22 @@ impl Weighted {
     }
 }
 
-/// Adds the parts of each sum and writes the totals to a lane. (A function passed to `map` would not be
+/// Adds the eight parts of each sum and writes the totals to a lane. (A function passed to `map` would not be
 /// compiled for the level.)
 #[inline(always)]
-fn put_totals<F: Eight, const N: usize>(sums: [F; N], to: &mut LaneSums<N>, lane: usize) {
-    for (to, parts) in to.iter_mut().zip(sums) {
-        to[lane] = parts.total();
+fn put_totals<F: Eight, const N: usize>(
+    first: [F::Part; N],
+    last: [F::Part; N],
+    to: &mut LaneSums<N>,
+    lane: usize,
+) {
+    for ((to, first), last) in to.iter_mut().zip(first).zip(last) {
+        to[lane] = F::of_parts(first, last).total();
     }
 }
 
 #[inline(always)]
-fn splat<F: Eight, const N: usize>(from: &[f64; N]) -> [F; N] {
+fn splat<F: Numbers, const N: usize>(from: &[f64; N]) -> [F; N] {
     let mut to = [F::splat(0.0); N];
     for (to, x) in to.iter_mut().zip(from) {
         *to = F::splat(*x);
@@ -84,7 +90,6 @@ fn take_body<F: Eight>(
     lane: usize,
 ) {
     all.reset(count);
-    let mut s = [F::splat(0.0); 10];
     let [x, y, z] = columns.map(|column| column.as_chunks::<GROUP>().0);
     let [to_x, to_y, to_z] = &mut all.at;
     let to = to_x.iter_mut().zip(to_y).zip(to_z).zip(&mut all.near);
@@ -102,6 +107,24 @@ fn take_body<F: Eight>(
         y.store(to_y);
         z.store(to_z);
         w.store(near);
+    }
+    let first = spread_sums::<F>(all, 0);
+    let last = if F::PARTS > 1 {
+        spread_sums::<F>(all, 1)
+    } else {
+        first
+    };
+    put_totals::<F, 10>(first, last, sums, lane);
+}
+
+/// The sums with weights by distance over one part of each group.
+#[inline(always)]
+fn spread_sums<F: Eight>(all: &Weighted, part: usize) -> [F::Part; 10] {
+    let mut s = [F::Part::splat(0.0); 10];
+    let [x, y, z] = &all.at;
+    for (((x, y), z), w) in x.iter().zip(y).zip(z).zip(&all.near) {
+        let (x, y) = (F::load_part(x, part), F::load_part(y, part));
+        let (z, w) = (F::load_part(z, part), F::load_part(w, part));
         let [wx, wy, wz] = [w * x, w * y, w * z];
         let terms = [
             w,
@@ -117,11 +140,11 @@ fn take_body<F: Eight>(
         ];
         add(&mut s, terms);
     }
-    put_totals(s, sums, lane);
+    s
 }
 
 #[inline(always)]
-fn add<F: Eight, const N: usize>(sums: &mut [F; N], terms: [F; N]) {
+fn add<F: Numbers, const N: usize>(sums: &mut [F; N], terms: [F; N]) {
     for (sum, term) in sums.iter_mut().zip(terms) {
         *sum = *sum + term;
     }
@@ -129,7 +152,7 @@ fn add<F: Eight, const N: usize>(sums: &mut [F; N], terms: [F; N]) {
 
 /// The terms of a group of positions in the sums of a surface.
 #[inline(always)]
-fn surface_terms<F: Eight>(u: F, v: F, h: F, w: F) -> [F; 23] {
+fn surface_terms<F: Numbers>(u: F, v: F, h: F, w: F) -> [F; 23] {
     let [wu, wv, wh] = [w * u, w * v, w * h];
     let [wuu, wuv, wvv] = [wu * u, wu * v, wv * v];
     let [wuuu, wuuv, wuvv, wvvv] = [wuu * u, wuu * v, wvv * u, wvv * v];
@@ -205,23 +228,41 @@ impl<F> Weigh<F> for Same {
 /// Writes the sums with weights from a column to a lane.
 #[inline(always)]
 fn put_surface_sums<F: Eight>(
-    [u, v, h]: &[Vec<[f64; GROUP]>; 3],
+    at: &[Vec<[f64; GROUP]>; 3],
     weights: &[[f64; GROUP]],
-    weigh: &impl Weigh<F>,
+    weigh: &impl Weigh<F::Part>,
     sums: &mut SurfaceSums,
     lane: usize,
 ) {
-    let mut s = [F::splat(0.0); 23];
+    let first = surface_sums::<F>(at, weights, weigh, 0);
+    let last = if F::PARTS > 1 {
+        surface_sums::<F>(at, weights, weigh, 1)
+    } else {
+        first
+    };
+    put_totals::<F, 23>(first, last, sums, lane);
+}
+
+/// The sums over one part of each group.
+#[inline(always)]
+fn surface_sums<F: Eight>(
+    [u, v, h]: &[Vec<[f64; GROUP]>; 3],
+    weights: &[[f64; GROUP]],
+    weigh: &impl Weigh<F::Part>,
+    part: usize,
+) -> [F::Part; 23] {
+    let mut s = [F::Part::splat(0.0); 23];
     for (((u, v), h), w) in u.iter().zip(v).zip(h).zip(weights) {
-        let [u, v, h, w] = [F::load(u), F::load(v), F::load(h), F::load(w)];
+        let (u, v) = (F::load_part(u, part), F::load_part(v, part));
+        let (h, w) = (F::load_part(h, part), F::load_part(w, part));
         add(&mut s, surface_terms(u, v, h, weigh.weigh(u, v, h, w)));
     }
-    put_totals(s, sums, lane);
+    s
 }
 
 /// The height over the surface `c[0] + c[1] u + c[2] v + c[3] uu + c[4] uv + c[5] vv`.
 #[inline(always)]
-fn over<F: Eight>(c: &[F; 6], u: F, v: F, h: F) -> F {
+fn over<F: Numbers>(c: &[F; 6], u: F, v: F, h: F) -> F {
     h - (c[0] + u * (c[1] + c[3] * u + c[4] * v) + v * (c[2] + c[5] * v))
 }
 
@@ -275,7 +316,7 @@ fn square_body<F: Eight>(all: &Weighted, sums: &mut SurfaceSums, lane: usize) {
 
 struct Square;
 
-impl<F: Eight> Weigh<F> for Square {
+impl<F: Numbers> Weigh<F> for Square {
     #[inline(always)]
     fn weigh(&self, _: F, _: F, _: F, w: F) -> F {
         w * w
@@ -302,7 +343,7 @@ fn fade_body<F: Eight>(
     sums: &mut SurfaceSums,
     lane: usize,
 ) {
-    let (surface, part) = (splat(surface), F::splat(1.0 / limit));
+    let (surface, part) = (splat(surface), F::Part::splat(1.0 / limit));
     let fade = Fade { surface, part };
     put_surface_sums::<F>(&all.at, &all.near, &fade, sums, lane);
 }
@@ -313,7 +354,7 @@ struct Fade<F> {
     part: F,
 }
 
-impl<F: Eight> Weigh<F> for Fade<F> {
+impl<F: Numbers> Weigh<F> for Fade<F> {
     #[inline(always)]
     fn weigh(&self, u: F, v: F, h: F, w: F) -> F {
         let off = over(&self.surface, u, v, h);
@@ -323,91 +364,4 @@ impl<F: Eight> Weigh<F> for Fade<F> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::super::Level;
-    use super::*;
-    use proptest::prelude::*;
-
-    /// All that the kernels of a level compute.
-    fn all_of(level: Level, columns: [&[i32]; 3], count: usize) -> Vec<f64> {
-        let mut all = Weighted::default();
-        let mut spread = [[0.0; LANES]; 10];
-        take_weighted(
-            level,
-            &mut all,
-            columns,
-            count,
-            1.0 / 2000.0,
-            &mut spread,
-            LANE,
-        );
-        let mut found = lane(&spread);
-        let mut sums = [[0.0; LANES]; 23];
-        let frame = [[0.6, 0.8, 0.0], [0.0, 0.0, 1.0], [0.8, -0.6, 0.0]];
-        turn(level, &mut all, &frame, &mut sums, LANE);
-        found.extend(lane(&sums));
-        let surface = [0.1, 0.2, -0.1, 0.3, 0.1, -0.2];
-        let dropped = drop_beyond(level, &mut all, &surface, 0.1, &mut sums, LANE);
-        found.push(f64::from(u8::from(dropped)));
-        found.extend(lane(&sums));
-        square_weights(level, &all, &mut sums, LANE);
-        found.extend(lane(&sums));
-        fade(level, &all, &surface, 0.2, &mut sums, LANE);
-        found.extend(lane(&sums));
-        // The other lanes are left alone.
-        let others = spread.iter().chain(&sums).flat_map(|of| &of[..LANE]);
-        assert!(others.copied().all(|sum| sum == 0.0));
-        found
-    }
-
-    const LANE: usize = 5;
-
-    fn lane<const N: usize>(sums: &LaneSums<N>) -> Vec<f64> {
-        sums.iter().map(|of| of[LANE]).collect()
-    }
-
-    proptest! {
-        #[test]
-        fn every_level_gives_the_same_sums(
-            points in prop::collection::vec(prop::array::uniform3(-1000i32..1000), 1..60),
-        ) {
-            let whole = points.len().next_multiple_of(GROUP);
-            let column = |axis: usize| {
-                let mut all: Vec<i32> = points.iter().map(|p| p[axis]).collect();
-                all.resize(whole, 0);
-                all
-            };
-            let (x, y, z) = (column(0), column(1), column(2));
-            let expected = all_of(Level::BASE, [&x, &y, &z], points.len());
-            for level in Level::all() {
-                prop_assert_eq!(&all_of(level, [&x, &y, &z], points.len()), &expected);
-            }
-            // Against plain sums.
-            let at = |p: &[i32; 3]| p.map(|c| f64::from(c) / 2000.0);
-            let near = |p: &[i32; 3]| 1.0 - at(p).iter().map(|c| c * c).sum::<f64>();
-            let close = |found: f64, sum: f64| (found - sum).abs() < 1e-9;
-            let weights: f64 = points.iter().map(near).sum();
-            let xy: f64 = points.iter().map(|p| near(p) * at(p)[0] * at(p)[1]).sum();
-            prop_assert!(close(expected[0], weights) && close(expected[7], xy));
-            let turned = |p: &[i32; 3]| {
-                let [x, y, z] = at(p);
-                [0.6 * x + 0.8 * y, z, 0.8 * x - 0.6 * y]
-            };
-            let uuvv = points.iter().map(|p| near(p) * (turned(p)[0] * turned(p)[1]).powi(2)).sum();
-            let huv = points.iter().map(|p| near(p) * turned(p).iter().product::<f64>()).sum();
-            prop_assert!(close(expected[10 + 12], uuvv) && close(expected[10 + 19], huv));
-            let over = |p: &[i32; 3]| {
-                let [u, v, h] = turned(p);
-                h - (0.1 + 0.2 * u - 0.1 * v + 0.3 * u * u + 0.1 * u * v - 0.2 * v * v)
-            };
-            let kept = points.iter().filter(|p| over(p).powi(2) <= 0.1);
-            prop_assert!(close(expected[34], kept.map(near).sum()));
-            prop_assert!(close(expected[57], points.iter().map(|p| near(p).powi(2)).sum()));
-            let faded = points.iter().map(|p| {
-                let rest = (1.0 - over(p).powi(2) / 0.2).max(0.0);
-                near(p).powi(2) * rest * rest
-            });
-            prop_assert!(close(expected[80], faded.sum()));
-        }
-    }
-}
+mod tests;

@@ -57,7 +57,7 @@ pub fn drop_outliers(
     workspace: &Workspace,
 ) -> Result<(StoredPoints, OutlierStats)> {
     let mut stats = OutlierStats::default();
-    while stats.rounds < METHOD.outliers.rounds && stored.len() > METHOD.outliers.nearest {
+    while stats.rounds < METHOD.outliers.rounds && stored.len() > METHOD.noise.nearest {
         stats.rounds += 1;
         let store = stored.open(workspace)?;
         let kept = round(&store, options, stats.rounds, workspace)?;

@@ -57,7 +57,7 @@ impl Spacings {
 
 fn one_tile(unit: &Unit<'_>, store: &PointStore, ids: Range<usize>) -> Result<Vec<Spacing>> {
     let mut spacings = vec![Spacing::default(); ids.len()];
-    let count = METHOD.outliers.nearest;
+    let count = METHOD.noise.nearest;
     let of = |_, near: &Neighbors| mean(&near.columns().distances2[..count]);
     each_neighborhood(unit, store, ids.clone(), count, of, |id, _, spacing| {
         spacings[id - ids.start] = *spacing;
@@ -68,7 +68,7 @@ fn one_tile(unit: &Unit<'_>, store: &PointStore, ids: Range<usize>) -> Result<Ve
 /// Mean of the distances, summed nearest first so that rounding is reproducible.
 fn mean(distances2: &[u64]) -> Spacing {
     let sum: f64 = distances2.iter().map(|&d2| (d2 as f64).sqrt()).sum();
-    let bits = ((sum / METHOD.outliers.nearest as f64) as f32).to_bits();
+    let bits = ((sum / METHOD.noise.nearest as f64) as f32).to_bits();
     Spacing { bits }
 }
 

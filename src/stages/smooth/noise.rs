@@ -120,21 +120,25 @@ fn look_at(
     let region2 = lower_quartile(usual2.clone());
     let noisy = is_noisy(&samples);
     let mut levels = Levels::new(if noisy { ids.len() } else { 0 });
+    let put = |levels: &mut Levels, id: usize, level: u8| {
+        let last = (id + METHOD.noise.every).min(ids.end);
+        (id..last).for_each(|id| levels.set(id - ids.start, level));
+    };
     if noisy {
-        for sample in &samples {
-            levels.set(sample.id as usize - ids.start, sample.level);
+        let measured = |sample: &&Sample| is_measured(sample.id as usize);
+        for sample in samples.iter().filter(measured) {
+            put(&mut levels, sample.id as usize, sample.level);
         }
     }
     drop((samples, held));
     let _held = unit.hold(levels.bytes());
     if noisy {
-        let mut put = |id: usize, level: u8| levels.set(id - ids.start, level);
         planes.each_fit(
             Widen::OnBands,
             METHOD.noise.nearest,
-            |id| !is_sampled(id),
+            |id| is_measured(id) && !is_sampled(id),
             |_, fit, near| gauge.level(near, fit, relaxing.neighbors).0,
-            |id, _, level| put(id, *level),
+            |id, _, level| put(&mut levels, id, *level),
         )?;
     }
     Ok(Seen {
@@ -146,6 +150,11 @@ fn look_at(
 
 fn is_sampled(id: usize) -> bool {
     (id / METHOD.curve.run).is_multiple_of(METHOD.curve.sample)
+}
+
+/// True if the noise of this point is also that of those behind it.
+fn is_measured(id: usize) -> bool {
+    id.is_multiple_of(METHOD.noise.every)
 }
 
 /// True if there is a run in which fewer than one in ten samples have no plain noise. Edges and details beside
