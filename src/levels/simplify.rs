@@ -107,7 +107,7 @@ fn checked(surface: Surface<'_>, indices: Vec<u32>) -> Result<Vec<[u32; 3]>> {
             .iter()
             .any(|v| *v as usize >= count)
     {
-        let error = std::io::Error::other("the simplified mesh has corners that are none");
+        let error = std::io::Error::other("the simplifier returned a corner that does not exist");
         return Err(Error::io(Path::new("tile"), "simplify", error));
     }
     Ok(triangles.to_vec())

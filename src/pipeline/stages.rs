@@ -286,12 +286,12 @@ impl<'a> Stages<'a> {
                 format!("{folded} points are duplicates of others: one at each position is kept")
             }
             Some(false) => format!(
-                "{folded} points fell together: the cloud is so wide that positions had to \
+                "{folded} points were merged by rounding: the cloud is so wide that positions had to \
                  be rounded to steps of {step}; are there outliers far away?"
             ),
             None => format!(
                 "{folded} points are at the positions of others, to steps of {step}: duplicates, or points that \
-                 fell together because others are far away; one at each position is kept"
+                 rounding merged because others are far away; one at each position is kept"
             ),
         });
         Ok(())

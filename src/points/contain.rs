@@ -32,7 +32,7 @@ pub(super) fn contain<T>(work: impl FnOnce() -> T) -> Result<T, String> {
             .map(ToString::to_string)
             .or_else(|| panic.downcast_ref::<String>().cloned());
         format!(
-            "data that no decoder can follow ({})",
+            "corrupt data (decoder: {})",
             text.unwrap_or_default().lines().next().unwrap_or_default()
         )
     })

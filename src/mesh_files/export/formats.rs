@@ -94,7 +94,7 @@ pub fn left_out(output: &Path, mesh: &Mesh, largest: f64) -> Result<Vec<String>>
     if !lost.is_empty() {
         let (name, lost) = (format.name(), lost.join(", "));
         warnings.push(format!(
-            "{name} has no {lost} for vertices: left out; .ply has"
+            "{name} cannot store {lost} at vertices: left out; .ply keeps them"
         ));
     }
     if mesh.coordinates == CoordinateType::Double && !format.holds_doubles() {

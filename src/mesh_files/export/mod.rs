@@ -278,5 +278,5 @@ fn in_order<P: Parts>(
     Ok(())
 }
 
-const NO_TRIANGLES: &str = "no three cells agree on one that belongs to a component large enough; \
+const NO_TRIANGLES: &str = "every component is too small, or no three cells agree on a triangle; \
     try a larger --radius, --smooth 2 for noisy scans, or a smaller --min-component";
