@@ -87,7 +87,7 @@ pub use outcrop_disk::workspace::Workspace;
 pub use outcrop_disk::workspace::memory::MemoryPool;
 pub use outcrop_disk::workspace::outlook::{Outlook, Planned, Position};
 pub use outcrop_disk::workspace::progress::{Cancel, Observer, Silent};
-pub use outcrop_points::Classes;
+pub use outcrop_points::{Classes, hide_caught_panics};
 pub use params::{
     Division, Facing, InputNormals, MaxWidth, Method, Origin, Params, Radius, Region, Smooth,
     Smoothing,

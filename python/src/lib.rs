@@ -19,6 +19,7 @@ mod _outcrop {
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        outcrop::hide_caught_panics();
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }

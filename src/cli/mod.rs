@@ -42,6 +42,7 @@ pub fn main() -> ExitCode {
             return ExitCode::from(FAILED);
         }
     }
+    outcrop_points::hide_caught_panics();
     let args = command::Args::parse();
     match commands::run(args.command) {
         Ok(true) => ExitCode::SUCCESS,

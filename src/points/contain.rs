@@ -1,4 +1,4 @@
-//! Catches panics of third-party decoders, and suppresses their messages.
+//! Catches panics of third-party decoders.
 
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook};
@@ -10,11 +10,9 @@ thread_local! {
 
 static HOOK: Once = Once::new();
 
-/// Runs `work` and converts a panic to its message. `work` must not leave state behind that is used after a
-/// panic.
-///
-/// The panic hook of the process is wrapped once, so that caught panics print nothing.
-pub(super) fn contain<T>(work: impl FnOnce() -> T) -> Result<T, String> {
+/// From now on, panics of third-party decoders, which are caught, print nothing: wraps the panic hook of the
+/// process, once. For programs; readers leave the hook alone.
+pub fn hide_caught_panics() {
     HOOK.call_once(|| {
         let before = take_hook();
         set_hook(Box::new(move |info| {
@@ -23,6 +21,11 @@ pub(super) fn contain<T>(work: impl FnOnce() -> T) -> Result<T, String> {
             }
         }));
     });
+}
+
+/// Runs `work` and converts a panic to its message. `work` must not leave state behind that is used after a
+/// panic.
+pub(super) fn contain<T>(work: impl FnOnce() -> T) -> Result<T, String> {
     CONTAINED.set(true);
     let result = catch_unwind(AssertUnwindSafe(work));
     CONTAINED.set(false);

@@ -67,6 +67,7 @@ pub use classes::Classes;
 pub use colors::Depth;
 pub use colors::depths_shown;
 pub use columns::{Attributes, Column};
+pub use contain::hide_caught_panics;
 pub use crop::Crop;
 pub use crs::{Crs, CrsSource};
 pub use directions::{NORMAL_BYTES, direction};

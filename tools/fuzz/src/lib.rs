@@ -38,6 +38,8 @@ impl Bench {
     pub fn get() -> &'static Self {
         static BENCH: OnceLock<Bench> = OnceLock::new();
         BENCH.get_or_init(|| {
+            // libFuzzer's hook ends the process at every panic that it sees.
+            outcrop::hide_caught_panics();
             let folder = tempfile::tempdir().expect("a folder for files");
             let memory = MemoryPool::new(MINIMUM_BUDGET).expect("the least budget");
             let scratch = folder.path().join("scratch");
