@@ -58,9 +58,8 @@ enum Plan {
     Freeze,
     /// Have this number of MiB resident for some seconds before a finished journal is published.
     Hold(u64),
-    Fail(rustix::io::Errno, u64),
-    /// From this sync on all fail.
-    Unsynced(u64),
+    /// From this event of a kind on, all of that kind fail, as on a disk that is full or removed.
+    Fail(Event, rustix::io::Errno, u64),
     /// A format of meshes with a limit holds this number of bytes.
     Most(u64),
     Count(std::path::PathBuf),
@@ -80,11 +79,11 @@ fn read() -> Option<Plan> {
     }
     let number = rest.parse().ok()?;
     match kind {
-        "full" => Some(Plan::Fail(rustix::io::Errno::NOSPC, number)),
+        "full" => Some(Plan::Fail(Event::Write, rustix::io::Errno::NOSPC, number)),
         "hold" => Some(Plan::Hold(number)),
         "most" => Some(Plan::Most(number)),
-        "sync" => Some(Plan::Unsynced(number)),
-        "eio" => Some(Plan::Fail(rustix::io::Errno::IO, number)),
+        "sync" => Some(Plan::Fail(Event::Sync, rustix::io::Errno::IO, number)),
+        "eio" => Some(Plan::Fail(Event::Write, rustix::io::Errno::IO, number)),
         _ => NAMES
             .iter()
             .position(|name| *name == kind)
@@ -137,37 +136,17 @@ fn hold(bytes: u64) {
     std::hint::black_box(&held);
 }
 
-/// An event before a write: the write may fail, or the program may end.
+/// An event before something that may fail, a write or a sync: it fails, or the program ends.
 ///
 /// # Errors
 /// The injected error.
-pub fn write() -> io::Result<()> {
-    let Some(plan) = plan() else {
-        return Ok(());
-    };
-    point(Event::Write);
-    match plan {
-        // From then on every write fails, as on a disk that is full or removed.
-        Plan::Fail(error, at) if SEEN[Event::Write as usize].load(Ordering::Relaxed) >= *at => {
+pub fn fallible(event: Event) -> io::Result<()> {
+    point(event);
+    match plan() {
+        Some(Plan::Fail(kind, error, at))
+            if *kind == event && SEEN[event as usize].load(Ordering::Relaxed) >= *at =>
+        {
             Err((*error).into())
-        }
-        _ => Ok(()),
-    }
-}
-
-/// An event before a sync, which may fail.
-///
-/// # Errors
-/// The injected error.
-pub fn sync() -> io::Result<()> {
-    let Some(plan) = plan() else {
-        return Ok(());
-    };
-    point(Event::Sync);
-    match plan {
-        // From then on every sync fails, as on a disk that is removed.
-        Plan::Unsynced(at) if SEEN[Event::Sync as usize].load(Ordering::Relaxed) >= *at => {
-            Err(rustix::io::Errno::IO.into())
         }
         _ => Ok(()),
     }

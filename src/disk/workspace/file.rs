@@ -3,7 +3,7 @@
 //! A file consists of segments `NAME.0`, `NAME.1` …, each written by one thread of one attempt at the run.
 //! Its numbered sections are contiguous parts of segments.
 
-use super::fault;
+use super::fault::{self, Event};
 use super::keeper::{Kept, Leaving};
 use super::mapped::{Io, Mapping};
 use super::memory::{MemoryPool, Reservation};
@@ -302,7 +302,7 @@ impl ScratchFile {
         let length = bytes.len() as u64;
         place.offset = segment.end.fetch_add(length, Ordering::Relaxed);
         self.shared.io.grow_scratch(length);
-        fault::write()
+        fault::fallible(Event::Write)
             .and_then(|()| file.write_all_at(bytes, place.offset))
             .map_err(|e| failed_write(&segment.kept.path, bytes.len(), self.shared.more(), e))?;
         self.shared.io.add_written(length);

@@ -174,7 +174,7 @@ impl<'a> MeshFile<'a> {
         // The size of a compressed mesh is unknown.
         let compressed = self.mesh.compress || is_compressed(&self.output);
         let length = if compressed { 0 } else { bytes };
-        let room = fault::write().and_then(|()| file.set_len(length));
+        let room = fault::fallible(Event::Write).and_then(|()| file.set_len(length));
         room.map_err(|e| match failed_write(&self.output, 0, bytes, e) {
             Error::Io { source, .. } => Error::io(&self.output, "make room for the mesh", source),
             full => full,
@@ -244,7 +244,7 @@ impl<'a> MeshFile<'a> {
             return Err(Error::io(&self.temporary, "open", gone));
         };
         self.workspace.io.add_written(bytes.len() as u64);
-        fault::write()
+        fault::fallible(Event::Write)
             .and_then(|()| file.write_all_at(bytes, offset))
             .map_err(|e| failed_write(&self.output, bytes.len(), 0, e))
     }
