@@ -63,6 +63,8 @@
 #[doc(hidden)]
 pub mod cli;
 pub mod convert;
+#[cfg(feature = "faults")]
+mod faults;
 #[doc(hidden)]
 pub mod info;
 pub mod page;

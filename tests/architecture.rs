@@ -10,8 +10,9 @@ use std::path::Path;
 /// Each room, and the rooms of the same crate whose items it may use. A room is a folder or file of a crate with
 /// several steps, or of the program.
 const MAY_USE: &[(&str, &str)] = &[
-    ("cli", "info page params pipeline report"),
+    ("cli", "faults info page params pipeline report"),
     ("convert", ""),
+    ("faults", ""),
     ("info", "params pipeline"),
     ("page", "info report"),
     ("params", ""),

@@ -42,6 +42,11 @@ pub fn main() -> ExitCode {
             return ExitCode::from(FAILED);
         }
     }
+    #[cfg(feature = "faults")]
+    if let Err(why) = crate::faults::install() {
+        eprintln!("outcrop: {why}");
+        return ExitCode::from(FAILED);
+    }
     outcrop_points::hide_caught_panics();
     let args = command::Args::parse();
     match commands::run(args.command) {
