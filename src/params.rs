@@ -394,45 +394,45 @@ impl Params {
             })
         };
         if let Some(Err(why)) = self.crop.as_ref().map(Region::check) {
-            return error("--crop", why.found, &why.expected);
+            return error("crop", why.found, &why.expected);
         }
         if let Some(margin) = self.crop_margin
             && !(margin >= 0.0 && margin.is_finite())
         {
-            return error("--crop-margin", margin.to_string(), "a length, or 0");
+            return error("crop_margin", margin.to_string(), "a length, or 0");
         }
         if let Some(side) = self.split
             && !(side > 0.0 && side.is_finite())
         {
-            return error("--split", side.to_string(), "a positive length");
+            return error("split", side.to_string(), "a positive length");
         }
         if let Some(side) = self.thin
             && !(side > 0.0 && side.is_finite())
         {
-            return error("--thin", side.to_string(), "a positive length");
+            return error("thin", side.to_string(), "a positive length");
         }
         if let Some(factor) = self.drop_outliers
             && !(factor >= 1.0 && factor.is_finite())
         {
-            return error("--drop-outliers", factor.to_string(), "1 or more");
+            return error("drop_outliers", factor.to_string(), "1 or more");
         }
         if let (true, Attributes::List(names)) = (self.normals, &self.attributes)
             && let Some(name) = names.iter().find(|n| ["nx", "ny", "nz"].contains(&&***n))
         {
-            let expected = "other columns: with --normals these are the mesh's own";
-            return error("--attributes", name.clone(), expected);
+            let expected = "other columns: the mesh has normals of its own";
+            return error("attributes", name.clone(), expected);
         }
         if !(3..=MAX_NEIGHBORS).contains(&self.neighbors) {
-            return error("--neighbors", self.neighbors.to_string(), "3 to 255");
+            return error("neighbors", self.neighbors.to_string(), "3 to 255");
         }
         if !(self.max_angle > 0.0 && self.max_angle <= 180.0) {
             return error(
-                "--max-angle",
+                "max_angle",
                 self.max_angle.to_string(),
                 "more than 0, up to 180",
             );
         }
-        let widths = [("--max-edge", self.max_edge), ("--max-fill", self.max_fill)];
+        let widths = [("max_edge", self.max_edge), ("max_fill", self.max_fill)];
         for (name, width) in widths {
             if let MaxWidth::Spacings(x) | MaxWidth::Length(x) = width
                 && !(x > 0.0 && x.is_finite())
@@ -443,31 +443,31 @@ impl Params {
         if let Origin::At(at) = self.origin
             && !at.iter().all(|c| c.is_finite())
         {
-            return error("--origin", format!("{at:?}"), "finite coordinates");
+            return error("origin", format!("{at:?}"), "finite coordinates");
         }
         if let Facing::At(at) = self.facing
             && !at.iter().all(|c| c.is_finite())
         {
-            return error("--facing", format!("{at:?}"), "finite coordinates");
+            return error("facing", format!("{at:?}"), "finite coordinates");
         }
         if self.smooth.rounds() > 100 {
-            return error("--smooth", self.smooth.to_string(), "auto, or 0 to 100");
+            return error("smooth", self.smooth.to_string(), "auto, or 0 to 100");
         }
         if self.relax > 100 {
-            return error("--relax", self.relax.to_string(), "0 to 100");
+            return error("relax", self.relax.to_string(), "0 to 100");
         }
         if self.max_hole_edges > 10_000 {
             return error(
-                "--max-hole-edges",
+                "max_hole_edges",
                 self.max_hole_edges.to_string(),
                 "0 to 10000",
             );
         }
         match self.radius {
             Radius::Percent(x) | Radius::Length(x) if !(x > 0.0 && x.is_finite()) => {
-                error("--radius", x.to_string(), "a positive number")
+                error("radius", x.to_string(), "a positive number")
             }
-            _ if self.block == 0 => error("block", "0".into(), "at least 1"),
+            _ if self.block == 0 => error("block_points", "0".into(), "at least 1"),
             _ => Ok(()),
         }
     }

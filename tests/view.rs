@@ -350,7 +350,7 @@ fn one_file_holds_what_fits() {
     let refused = write_html(&bench.mesh(), &page, 1000)
         .unwrap_err()
         .to_string();
-    assert!(refused.starts_with("--html-limit: 1000 bytes"), "{refused}");
+    assert!(refused.starts_with("html_limit: 1000 bytes"), "{refused}");
     assert_eq!(
         std::fs::metadata(&page).unwrap().len(),
         least.bytes,

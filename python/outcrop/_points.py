@@ -136,14 +136,14 @@ def written(cloud: Cloud, output: str, scratch: Optional[str], resume: bool, res
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            why = "another run is at work here; wait for it, or choose another scratch="
+            why = "another run is at work here; wait for it, or choose another scratch"
             raise ScratchError(f"{place}: {why}") from None
         try:
             if restart or not os.path.isdir(folder):
                 with named(place, "write the points"):
                     cloud.write(file)
             elif not resume:
-                why = "an unfinished run is here already; resume=True goes on with it, restart=True begins again"
+                why = "an unfinished run is here already; resume=True goes on with it, or restart=True begins again"
                 raise ScratchError(f"{folder}: {why}")
             elif not cloud.is_in(file):
                 raise ScratchError(f"{folder}: cannot go on: the points were other ones; restart=True begins again")

@@ -3,6 +3,7 @@
 use crate::progress::{Progress, Stage};
 use outcrop::call::{self, CallError};
 use outcrop::convert;
+use outcrop::error::Setting;
 use outcrop::inspect::verify;
 use outcrop::{Cancel, Error, MemoryPool, Result, Workspace, default_memory, default_threads};
 use pyo3::exceptions::PyOSError;
@@ -197,12 +198,37 @@ fn draw(mesh: &Path, shared: &Shared) -> Result<Vec<u8>> {
     Ok(first.map(|picture| picture.png).unwrap_or_default())
 }
 
+/// An option as a keyword.
+fn keyword(setting: &Setting) -> String {
+    match setting {
+        Setting::Option(name) => (*name).to_owned(),
+        Setting::Flag(name) => format!("{name}=True"),
+        Setting::Value(name, value) if value.parse::<f64>().is_ok() => format!("{name}={value}"),
+        Setting::Value(name, value) => format!("{name}={value:?}"),
+    }
+}
+
+/// A reason with its options as keywords.
+fn reworded(why: &str, options: &[String]) -> String {
+    options.iter().fold(why.to_owned(), |why, option| {
+        let name = option.trim_start_matches('-');
+        let name = name.split([' ', '=', '[']).next().unwrap_or(name);
+        let name = name.replace('-', "_");
+        why.replace(&format!("'{option}'"), &name)
+            .replace(option, &name)
+    })
+}
+
 /// The description of an error.
 fn failure(error: &CallError) -> Failure {
-    let message = error.to_string();
-    let CallError::Run(error) = error else {
-        return ("parameter", message, false, None);
+    let error = match error {
+        CallError::Run(error) => error,
+        CallError::Usage { why, options } => {
+            return ("parameter", reworded(why, options), false, None);
+        }
+        other => return ("parameter", other.to_string(), false, None),
     };
+    let message = error.told(keyword);
     let number = match error {
         Error::Io { source, .. } => source.raw_os_error(),
         _ => None,

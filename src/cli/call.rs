@@ -25,7 +25,7 @@ use super::command::{Args, Command};
 use super::{jobs, output};
 use crate::info::Info;
 use crate::report::Report;
-use clap::error::ErrorKind;
+use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{ArgAction, CommandFactory, Parser};
 use outcrop_disk::error::{Error, Result};
 use outcrop_disk::workspace::progress::{Cancel, Observer};
@@ -90,8 +90,13 @@ impl Answer {
 #[non_exhaustive]
 pub enum CallError {
     /// The words are no command line, or one of a command that only the program has.
-    #[error("{0}")]
-    Usage(String),
+    #[error("{why}")]
+    Usage {
+        /// The reason, in the words of the command line.
+        why: String,
+        /// The options in the reason, as they stand there, such as `--threads <N>`.
+        options: Vec<String>,
+    },
     /// The command failed.
     #[error(transparent)]
     Run(#[from] Error),
@@ -108,10 +113,16 @@ impl CallError {
             error.kind(),
             ErrorKind::DisplayHelp | ErrorKind::DisplayVersion
         );
-        Self::Usage(match asked {
+        let options = match error.get(ContextKind::InvalidArg) {
+            Some(ContextValue::String(option)) => vec![option.clone()],
+            Some(ContextValue::Strings(options)) => options.clone(),
+            _ => Vec::new(),
+        };
+        let why = match asked {
             true => "help and version are for the command line".to_owned(),
             false => lines.join(" "),
-        })
+        };
+        Self::Usage { why, options }
     }
 }
 
@@ -142,7 +153,10 @@ pub fn run<W: Into<OsString>>(
         Command::Tiles(args) => Answer::Tiles(Box::new(jobs::tiles(&args, watch)?)),
         _ => {
             let why = "this command is for the command line only";
-            return Err(CallError::Usage(why.into()));
+            return Err(CallError::Usage {
+                why: why.into(),
+                options: Vec::new(),
+            });
         }
     })
 }
@@ -198,7 +212,10 @@ mod tests {
 
     fn usage(words: &[&str]) -> String {
         match run(words, Arc::new(Silent), Cancel::new()) {
-            Err(CallError::Usage(why)) => why,
+            Err(CallError::Usage { why, options }) => {
+                assert!(options.iter().all(|option| why.contains(option)), "{why}");
+                why
+            }
             other => panic!("{other:?}"),
         }
     }
@@ -213,6 +230,11 @@ mod tests {
         let why = usage(&["reconstruct", "a.xyz"]);
         assert!(why.contains("--output <MESH.ply>"), "{why}");
         assert!(!why.contains('\n') && !why.contains("Usage"), "{why}");
+        let absent = run(["reconstruct", "a.xyz"], Arc::new(Silent), Cancel::new());
+        let Err(CallError::Usage { options, .. }) = absent else {
+            panic!("{absent:?}")
+        };
+        assert_eq!(options, ["--output <MESH.ply>"]);
         assert!(usage(&["--help"]).contains("command line"));
         assert!(usage(&["view", "a.ply"]).contains("command line only"));
     }

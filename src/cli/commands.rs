@@ -2,6 +2,7 @@
 
 use super::args::{Compare, Demo, Info, Quiet, Reconstruct, Resume, Tiles, Verify};
 use super::command::Command;
+use super::ended::Ended;
 use super::jobs::{self, memory, threads};
 use super::output::{print, show, summary, write_report};
 use super::{manual, shared, stop, style, view};
@@ -15,9 +16,11 @@ use std::io::IsTerminal;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Runs a command; `false` for a negative answer.
-pub fn run(command: Command) -> Result<bool> {
-    match command {
+/// Runs a command.
+pub fn run(command: Command) -> Result<Ended> {
+    let yes = match command {
+        Command::Work(args) => return shared::work(&args),
+        Command::Advance(args) => return shared::advance(&args),
         Command::Reconstruct(args) => reconstruct(&args),
         Command::Resume(args) => resume(&args),
         Command::Info(args) => info(&args),
@@ -27,13 +30,15 @@ pub fn run(command: Command) -> Result<bool> {
         Command::View(args) => view::run(&args),
         Command::Demo(args) => demo(&args),
         Command::Plan(args) => shared::plan(&args),
-        Command::Work(args) => shared::work(&args),
-        Command::Advance(args) => shared::advance(&args),
         Command::Status(args) => shared::status(&args),
         Command::Submit(args) => shared::submit(&args),
         Command::Completions { shell } => manual::completions(shell),
         Command::Man { folder } => manual::man(&folder),
-    }
+    }?;
+    Ok(match yes {
+        true => Ended::Yes,
+        false => Ended::No,
+    })
 }
 
 fn reconstruct(args: &Reconstruct) -> Result<bool> {

@@ -4,6 +4,7 @@ mod args;
 pub mod call;
 mod command;
 mod commands;
+mod ended;
 mod jobs;
 mod manual;
 mod output;
@@ -15,6 +16,7 @@ mod style;
 mod view;
 
 use clap::Parser;
+use ended::Ended;
 use outcrop_disk::error::Error;
 use std::process::ExitCode;
 
@@ -50,8 +52,19 @@ pub fn main() -> ExitCode {
     outcrop_points::hide_caught_panics();
     let args = command::Args::parse();
     match commands::run(args.command) {
-        Ok(true) => ExitCode::SUCCESS,
-        Ok(false) => ExitCode::from(NO),
+        Ok(Ended::Yes) => ExitCode::SUCCESS,
+        Ok(Ended::No) => ExitCode::from(NO),
+        Ok(Ended::TooEarly(what)) => {
+            eprintln!("outcrop: {what}; try again later");
+            ExitCode::from(stop::TIME_IS_UP)
+        }
+        Ok(Ended::Damaged(error)) => {
+            let error = output::told(&error);
+            eprintln!(
+                "outcrop: {error}; `outcrop advance` finds what is damaged and has it made again"
+            );
+            ExitCode::from(DAMAGED)
+        }
         Err(error) => {
             // A closed pipe (`| head`) is no error.
             if !style::is_broken_pipe(&error) {
@@ -60,13 +73,11 @@ pub fn main() -> ExitCode {
                     let other = stop::quoted(&path.with_extension("ply"));
                     hint.push_str(&format!(" --output {other}"));
                 }
-                eprintln!("outcrop: {error}{hint}");
+                eprintln!("outcrop: {}{hint}", output::told(&error));
             }
             ExitCode::from(match error {
                 Error::Cancelled => stop::code(false),
                 Error::TimeLimit => stop::code(true),
-                Error::NotYet { .. } => stop::TIME_IS_UP,
-                Error::Damaged { .. } => DAMAGED,
                 _ => FAILED,
             })
         }

@@ -4,11 +4,28 @@ use super::style;
 use crate::page;
 use crate::params::Smooth;
 use crate::report::Report;
-use outcrop_disk::error::{Error, Result};
+use outcrop_disk::error::{Error, Result, Setting};
 use serde::Serialize;
 use std::fmt::Display;
 use std::io::Write;
 use std::path::Path;
+
+/// An error with what helps, options as on the command line.
+pub fn told(error: &Error) -> String {
+    error.told(|setting| match setting {
+        Setting::Option(name) | Setting::Flag(name) => dashed(name),
+        Setting::Value(name, value) => format!("{} {value}", dashed(name)),
+    })
+}
+
+/// The option of this name; a name of something else as it is.
+fn dashed(name: &str) -> String {
+    let is_option = name.bytes().all(|c| c.is_ascii_lowercase() || c == b'_');
+    match is_option {
+        true => format!("--{}", name.replace('_', "-")),
+        false => name.to_owned(),
+    }
+}
 
 pub fn print(text: &str) -> Result<()> {
     let mut out = std::io::stdout().lock();

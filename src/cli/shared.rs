@@ -8,6 +8,7 @@ pub use status::status;
 pub use submit::submit;
 
 use super::args::{Job, Quiet, Storing};
+use super::ended::Ended;
 use super::output::{is_page, json, print, summary, write_report};
 use super::parse::size;
 use super::{stop, style};
@@ -243,7 +244,7 @@ fn opened(folder: &std::path::Path, process: &Process, pictures: bool) -> Result
 }
 
 /// Does the units of a shard.
-pub fn work(args: &Work) -> Result<bool> {
+pub fn work(args: &Work) -> Result<Ended> {
     let shard = shard::chosen(args)?;
     let folder = pipeline::shared_folder(&args.folder)?;
     if let Some(count) = shard.count {
@@ -257,16 +258,15 @@ pub fn work(args: &Work) -> Result<bool> {
         }
     }
     let run = opened(&folder, &args.process, false)?;
-    match run.work(args.generation, shard.number)? {
-        Worked::Done | Worked::Superseded => Ok(true),
-        Worked::TooEarly => Err(Error::NotYet {
-            path: folder,
-            what: format!(
-                "generation {} has not begun",
-                args.generation.unwrap_or_default()
-            ),
-        }),
-    }
+    Ok(match run.work(args.generation, shard.number)? {
+        Worked::Done | Worked::Superseded => Ended::Yes,
+        Worked::TooEarly => Ended::TooEarly(format!(
+            "{}: generation {} has not begun",
+            folder.display(),
+            args.generation.unwrap_or_default()
+        )),
+        Worked::Damaged(error) => Ended::Damaged(error),
+    })
 }
 
 /// The state after the work between two generations.
@@ -315,7 +315,7 @@ impl Display for Totals {
 }
 
 /// Does the work between two generations.
-pub fn advance(args: &Advance) -> Result<bool> {
+pub fn advance(args: &Advance) -> Result<Ended> {
     let page = args.report.as_deref().is_some_and(is_page);
     let folder = pipeline::shared_folder(&args.folder)?;
     let run = opened(&folder, &args.process, page)?;
@@ -354,17 +354,19 @@ pub fn advance(args: &Advance) -> Result<bool> {
             }
         }
         Advanced::Missing(generation, shards) => {
-            return Err(Error::NotYet {
-                path: folder,
-                what: format!("of generation {generation} {} missing", list(&shards)),
-            });
+            return Ok(Ended::TooEarly(format!(
+                "{}: of generation {generation} {} missing",
+                folder.display(),
+                list(&shards)
+            )));
         }
+        Advanced::Damaged(error) => return Ok(Ended::Damaged(error)),
     }
     match args.json {
         true => print(&json(&after)?)?,
         false => print(&after.to_string())?,
     }
-    Ok(true)
+    Ok(Ended::Yes)
 }
 
 /// Shards as text.

@@ -1,4 +1,9 @@
-//! The error type of the library. A variant has what was found and what was expected.
+//! The error type of the library. A variant has what was found and what was expected. What helps is data
+//! ([`Error::remedies`]): the command line and Python name options each in their own way.
+
+mod remedy;
+
+pub use remedy::{Remedy, Setting};
 
 use std::path::{Path, PathBuf};
 
@@ -30,6 +35,8 @@ pub enum Error {
         found: String,
         /// The expected content.
         expected: String,
+        /// What helps.
+        remedies: Vec<Remedy>,
     },
     /// The cloud has too few distinct points for a triangle.
     #[error(
@@ -52,7 +59,7 @@ pub enum Error {
         bounds: String,
     },
     /// A mesh exceeds a limit of its format.
-    #[error("{path}: {format} holds at most {most} {unit}, this mesh has {found}; {advice}", path = path.display(), advice = too_large(*finished))]
+    #[error("{path}: {format} holds at most {most} {unit}, this mesh has {found}{}", if *finished { "; the surface is finished" } else { "" }, path = path.display())]
     TooLarge {
         /// Path of the mesh.
         path: PathBuf,
@@ -70,13 +77,15 @@ pub enum Error {
     /// The cells gave no triangle.
     #[error("the cloud yields no triangle: {why}")]
     NoTriangles {
-        /// The reason, and the parameter to change.
+        /// The reason.
         why: String,
+        /// What helps.
+        remedies: Vec<Remedy>,
     },
     /// A parameter is out of range.
     #[error("{name}: {found} is not valid, expected {expected}")]
     Parameter {
-        /// Name as on the command line.
+        /// Its name, in lower case with `_` between words.
         name: &'static str,
         /// The given value.
         found: String,
@@ -84,7 +93,7 @@ pub enum Error {
         expected: String,
     },
     /// The memory budget is too small.
-    #[error("memory budget of {budget} bytes is too small: {what} needs {needed} bytes ({needed_mib} MiB); give at least --memory {needed_mib}MiB", needed_mib = needed.div_ceil(1 << 20))]
+    #[error("memory budget of {budget} bytes is too small: {what} needs {needed} bytes ({needed_mib} MiB)", needed_mib = needed.div_ceil(1 << 20))]
     Memory {
         /// The failed reservation, with the current holders.
         what: String,
@@ -124,19 +133,19 @@ pub enum Error {
         limit: u64,
     },
     /// Another process uses the scratch folder.
-    #[error("{path}: another run is at work here; wait for it, or choose another --scratch", path = path.display())]
+    #[error("{path}: another run is at work here", path = path.display())]
     Locked {
         /// The scratch folder.
         path: PathBuf,
     },
     /// There is an unfinished run in the scratch folder.
-    #[error("{path}: an unfinished run is here already; --resume goes on with it, --restart begins again", path = path.display())]
+    #[error("{path}: an unfinished run is here already", path = path.display())]
     Unfinished {
         /// The scratch folder.
         path: PathBuf,
     },
     /// The unfinished run has other inputs or parameters.
-    #[error("{path}: cannot go on: {what} was {was}, now it is {now}; --restart begins again", path = path.display())]
+    #[error("{path}: cannot go on: {what} was {was}, now it is {now}", path = path.display())]
     Mismatch {
         /// The scratch folder.
         path: PathBuf,
@@ -154,24 +163,13 @@ pub enum Error {
         path: PathBuf,
         /// The reason.
         why: String,
+        /// What helps.
+        remedies: Vec<Remedy>,
     },
-    /// Something else has to be done before.
-    #[error("{path}: {what}; try again later", path = path.display())]
-    NotYet {
-        /// The folder of the run.
-        path: PathBuf,
-        /// The missing part.
-        what: String,
-    },
-    /// A task found that the work of others is damaged.
-    #[error("{source}; `outcrop advance` finds what is damaged and has it made again")]
-    Damaged {
-        /// The damage that was found.
-        source: Box<Error>,
-    },
-    /// The rest of the run's units are for tasks.
+    /// No error: the way in which a process of a run that tasks share leaves the stages. No run returns it.
+    #[doc(hidden)]
     #[error("the next units of work are for tasks")]
-    Shared,
+    Left(Left),
     /// The time limit is reached.
     #[error("stopped: the time limit is reached")]
     TimeLimit,
@@ -180,13 +178,9 @@ pub enum Error {
     Cancelled,
 }
 
-/// Advice for a mesh that is too large for its format.
-fn too_large(finished: bool) -> &'static str {
-    match finished {
-        true => "the surface is finished, and .ply and .obj can hold it",
-        false => "write .ply or .obj, or a smaller mesh (--thin, --split)",
-    }
-}
+/// The rest of the run's units are for tasks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Left(());
 
 impl Error {
     /// True if a run that ended with this error can be resumed once the cause is removed.
@@ -197,7 +191,7 @@ impl Error {
             | Error::Memory { .. }
             | Error::Disk { .. }
             | Error::Corrupt { .. }
-            | Error::Shared
+            | Error::Left(_)
             | Error::TimeLimit
             | Error::Cancelled => true,
             Error::TooLarge { finished, .. } => *finished,
@@ -210,8 +204,6 @@ impl Error {
             | Error::Locked { .. }
             | Error::Unfinished { .. }
             | Error::Mismatch { .. }
-            | Error::NotYet { .. }
-            | Error::Damaged { .. }
             | Error::NotResumable { .. } => false,
         }
     }
@@ -222,6 +214,30 @@ impl Error {
             path: path.as_ref().to_path_buf(),
             action: action.into(),
             source,
+        }
+    }
+
+    /// Leaves the stages, because the next units of work are for tasks.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn left() -> Self {
+        Error::Left(Left(()))
+    }
+
+    /// An [`Error::NotResumable`].
+    pub fn not_resumable(path: impl AsRef<Path>, why: impl Into<String>) -> Self {
+        Error::NotResumable {
+            path: path.as_ref().to_path_buf(),
+            why: why.into(),
+            remedies: Vec::new(),
+        }
+    }
+
+    /// An [`Error::NoTriangles`].
+    pub fn no_triangles(why: impl Into<String>) -> Self {
+        Error::NoTriangles {
+            why: why.into(),
+            remedies: Vec::new(),
         }
     }
 
@@ -249,6 +265,7 @@ impl Error {
             place: place.into(),
             found: found.into(),
             expected: expected.into(),
+            remedies: Vec::new(),
         }
     }
 }

@@ -180,7 +180,7 @@ pub fn remove_unfinished(folder: &Path) {
 pub fn check_folder(folder: &Path) -> Result<()> {
     let refuse = |found: &str| {
         Err(Error::Parameter {
-            name: "--output",
+            name: "output",
             found: format!("{} ({found})", folder.display()),
             expected: "a new or empty folder, or one with a tileset of outcrop".into(),
         })

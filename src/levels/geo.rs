@@ -1,6 +1,6 @@
 //! The place of a mesh on the globe.
 
-use outcrop_disk::error::{Error, Result};
+use outcrop_disk::error::{Error, Remedy, Result, Setting};
 use outcrop_points::{Crs, CrsKind};
 use proj4rs::Proj;
 use std::path::Path;
@@ -53,8 +53,9 @@ impl Globe {
         let refuse = |found: String| {
             let place = "reference system";
             let expected = "one that can be placed on the globe, with an EPSG code or geocentric, in the header of \
-                            the mesh, in a .prj file beside it, or by --crs";
-            Error::input(mesh, place, found, expected)
+                            the mesh or in a .prj file beside it";
+            let given = Remedy::Give(Setting::Option("crs"), "gives one");
+            Error::input(mesh, place, found, expected).with(given)
         };
         let crs = crs.ok_or_else(|| refuse("none".into()))?;
         let height_unit = crs.metres_of_heights();

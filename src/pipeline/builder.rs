@@ -5,7 +5,7 @@ use super::manifest::Manifest;
 use super::resources::{Resources, resource_setters};
 use super::start::{Start, scratch_folder};
 use crate::params::Params;
-use outcrop_disk::error::{Error, Result};
+use outcrop_disk::error::{Error, Remedy, Result, Setting};
 use outcrop_disk::workspace::memory::MemoryPool;
 use outcrop_disk::workspace::progress::{Cancel, Observer};
 use outcrop_disk::workspace::{Found, Storage};
@@ -107,7 +107,7 @@ impl Builder {
             return missing("INPUT", "at least one file or folder");
         }
         if self.output.as_os_str().is_empty() {
-            return missing("--output", "the path of the mesh");
+            return missing("output", "the path of the mesh");
         }
         let tiles = tiles(&self.output, self.params.split.is_some())?;
         let mesh = tiles.as_deref().map(mesh_of);
@@ -152,7 +152,7 @@ fn tiles(output: &Path, split: bool) -> Result<Option<PathBuf>> {
     }
     let refuse = |found: String, expected: &str| {
         Err(Error::Parameter {
-            name: "--output",
+            name: "output",
             found,
             expected: expected.into(),
         })
@@ -161,7 +161,7 @@ fn tiles(output: &Path, split: bool) -> Result<Option<PathBuf>> {
         .parent()
         .filter(|folder| folder.file_name().is_some());
     match folder {
-        _ if split => refuse("a tileset, with --split".into(), "one of both"),
+        _ if split => refuse("a tileset of a mesh in squares".into(), "one of both"),
         Some(folder) => Ok(Some(folder.to_path_buf())),
         None => refuse(
             output.display().to_string(),
@@ -183,17 +183,13 @@ fn mesh_of(folder: &Path) -> PathBuf {
 /// # Errors
 /// [`Error::NotResumable`].
 pub(super) fn unfinished(folder: &Path, found: Found) -> Result<Builder> {
-    let not = |why: &str| Error::NotResumable {
-        path: folder.to_path_buf(),
-        why: why.to_owned(),
-    };
+    let not = |why: &str| Error::not_resumable(folder, why);
     let found = match found {
         Found::Run(found) => found,
         Found::Nothing => return Err(not("no unfinished run is here")),
         Found::Damaged(_) => {
-            return Err(not(
-                "its manifest is damaged; run `outcrop reconstruct` again, with --restart",
-            ));
+            let restart = Remedy::Give(Setting::Flag("restart"), "begins again");
+            return Err(not("its manifest is damaged").with(restart));
         }
     };
     let manifest = Manifest::from_bytes(folder, &found.manifest)?;

@@ -81,7 +81,7 @@ pub(super) fn not_an_input(output: &Path, split: bool, inputs: &[PathBuf]) -> Re
         let taken = |input: PathBuf| is_square_of(several.as_deref()?, &input).then_some(input);
         if let Some(input) = absolute(input).and_then(taken) {
             return Err(Error::Parameter {
-                name: "--output",
+                name: "output",
                 found: format!(
                     "a name from which that of the input {} can be made",
                     input.display()
@@ -99,7 +99,7 @@ pub(super) fn not_an_input(output: &Path, split: bool, inputs: &[PathBuf]) -> Re
     for input in outcrop_points::expand(inputs)? {
         if input.canonicalize().is_ok_and(|input| input == output) {
             return Err(Error::Parameter {
-                name: "--output",
+                name: "output",
                 found: format!("{} (an input)", output.display()),
                 expected: "another file".into(),
             });

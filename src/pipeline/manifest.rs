@@ -152,10 +152,7 @@ impl Manifest {
     }
 
     pub fn from_bytes(folder: &Path, bytes: &[u8]) -> Result<Self> {
-        let not = |why: String| Error::NotResumable {
-            path: folder.to_path_buf(),
-            why,
-        };
+        let not = |why: String| Error::not_resumable(folder, why);
         let value: serde_json::Value = serde_json::from_slice(bytes)
             .map_err(|e| not(format!("its manifest cannot be read: {e}")))?;
         if value["format"] != FORMAT {

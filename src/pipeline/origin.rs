@@ -92,7 +92,7 @@ impl Steps<'_> {
     /// [`Error::Parameter`] if it is too far from the cloud.
     pub fn given(&self, to: [f64; 3]) -> Result<Shift> {
         self.shift(to).ok_or_else(|| Error::Parameter {
-            name: "--origin",
+            name: "origin",
             found: format!("{},{},{}", to[0], to[1], to[2]),
             expected: format!(
                 "a position within 2^52 steps of {} of the cloud",
@@ -204,7 +204,7 @@ mod tests {
         assert!(shift.origin[1].is_sign_positive());
         for far in [1e20, -1e300, f64::MAX] {
             let error = steps.given([0.0, far, 0.0]).unwrap_err().to_string();
-            assert!(error.starts_with("--origin: "), "{error}");
+            assert!(error.starts_with("origin: "), "{error}");
         }
     }
 }

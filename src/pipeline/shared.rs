@@ -25,7 +25,7 @@ pub use status::{Begun, Status, TaskState, Totals, status};
 pub const MOST_SHARDS: u32 = 1000;
 
 /// The result of a task.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug)]
 pub enum Worked {
     /// Its work is finished.
     Done,
@@ -33,6 +33,8 @@ pub enum Worked {
     Superseded,
     /// Its generation has not begun.
     TooEarly,
+    /// The work of others is damaged, as this error tells: the work between two generations repairs it.
+    Damaged(Error),
 }
 
 /// The result of the work between two generations.
@@ -44,6 +46,8 @@ pub enum Advanced {
     Missing(u64, Vec<u32>),
     /// Another process was faster.
     Superseded,
+    /// The work of others is damaged, as this error tells: the same work, done again, repairs it.
+    Damaged(Error),
     /// The mesh is finished; the report is missing if it was finished before.
     Finished(Option<Box<(Report, Totals)>>),
 }
@@ -82,14 +86,14 @@ impl Reconstruction {
     pub fn plan(&self, shards: u32) -> Result<&Path> {
         if shards == 0 || shards > MOST_SHARDS {
             return Err(Error::Parameter {
-                name: "--shards",
+                name: "shards",
                 found: shards.to_string(),
                 expected: format!("1 to {MOST_SHARDS}"),
             });
         }
         if self.tiles.is_some() {
             return Err(Error::Parameter {
-                name: "--output",
+                name: "output",
                 found: self.output().display().to_string(),
                 expected: "a mesh; `outcrop tiles` makes levels of detail of it afterwards".into(),
             });
@@ -151,7 +155,7 @@ impl Reconstruction {
         let outcome = self.try_work(&folder, number, shard, begin);
         // Whatever fails after a generation is over is no error.
         match outcome {
-            Err(_) if is_over(&folder, number) => Ok(Worked::Superseded),
+            Err(_) | Ok(Worked::Damaged(_)) if is_over(&folder, number) => Ok(Worked::Superseded),
             outcome => outcome,
         }
     }
@@ -166,7 +170,7 @@ impl Reconstruction {
         let now = self.generation(folder, number)?;
         if shard >= now.sharing.shards {
             return Err(Error::Parameter {
-                name: "--shard",
+                name: "shard",
                 found: shard.to_string(),
                 expected: format!("0 to {}", now.sharing.shards - 1),
             });
@@ -176,21 +180,22 @@ impl Reconstruction {
             return Ok(Worked::Done);
         };
         let outcome = match self.reconstruct(&workspace) {
-            Err(Error::Shared) => {
+            Err(Error::Left(_)) => {
                 let took = took(&workspace, Some(shard), begin);
-                folder.end_task(&workspace, (number, shard), took)
+                let first = folder.end_task(&workspace, (number, shard), took);
+                first.map(|first| match first {
+                    true => Worked::Done,
+                    false => Worked::Superseded,
+                })
             }
-            Err(e) => Err(workspace.note_failure(e)),
+            Err(e) => workspace.note_failure(e).map(Worked::Damaged),
             // A task ends with its units, which are not finished in this generation.
-            Ok(_) => Ok(false),
+            Ok(_) => Ok(Worked::Superseded),
         };
-        if !matches!(outcome, Ok(true)) {
+        if !matches!(outcome, Ok(Worked::Done)) {
             folder.withdraw(&workspace);
         }
-        Ok(match outcome? {
-            true => Worked::Done,
-            false => Worked::Superseded,
-        })
+        outcome
     }
 
     /// Does the work between the newest generation and the next, if all its shards are finished.
@@ -207,7 +212,9 @@ impl Reconstruction {
         }
         let number = folder.newest()?;
         match self.try_advance(&folder, number, begin) {
-            Err(_) if is_over(&folder, number) => Ok(Advanced::Superseded),
+            Err(_) | Ok(Advanced::Damaged(_)) if is_over(&folder, number) => {
+                Ok(Advanced::Superseded)
+            }
             outcome => outcome,
         }
     }
@@ -234,16 +241,17 @@ impl Reconstruction {
                 return Ok(Advanced::Finished(None));
             }
         };
+        // The report of a finished mesh; none at the next units of tasks.
         let outcome = match self.reconstruct(&workspace) {
-            Err(e) if !matches!(e, Error::Shared) => Err(workspace.note_failure(e)),
-            outcome => outcome,
+            Ok(report) => Ok(Some(report)),
+            Err(Error::Left(_)) => Ok(None),
+            Err(e) => Err(workspace.note_failure(e).map(Advanced::Damaged)),
         };
         let next = number + 1;
-        let finished = outcome.is_ok();
         let published = match &outcome {
-            Ok(_) | Err(Error::Shared) => {
+            Ok(report) => {
                 let took = took(&workspace, None, begin);
-                folder.end_next(&workspace, next, took, finished)
+                folder.end_next(&workspace, next, took, report.is_some())
             }
             Err(_) => Ok(false),
         };
@@ -254,7 +262,10 @@ impl Reconstruction {
             }
         }
         match (outcome, published?) {
-            (Ok(report), true) => {
+            (Err(failed), _) => failed,
+            (Ok(_), false) => Ok(Advanced::Superseded),
+            (Ok(None), true) => Ok(Advanced::Open(next)),
+            (Ok(Some(report)), true) => {
                 let totals = Totals::of(&folder.read(next)?.took);
                 self.remove_unfinished();
                 find::forget(&self.mesh);
@@ -262,9 +273,6 @@ impl Reconstruction {
                 folder.remove();
                 Ok(Advanced::Finished(Some(Box::new((report, totals)))))
             }
-            (Err(Error::Shared), true) => Ok(Advanced::Open(next)),
-            (Ok(_) | Err(Error::Shared), false) => Ok(Advanced::Superseded),
-            (Err(e), _) => Err(e),
         }
     }
 

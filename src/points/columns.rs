@@ -175,7 +175,7 @@ impl Attributes {
             false => format!("columns of the points: {}", known.join(", ")),
         };
         Err(Error::Parameter {
-            name: "--attributes",
+            name: "attributes",
             found: name.escape_debug().to_string(),
             expected,
         })
@@ -261,7 +261,7 @@ impl Wanted {
         let class = class.map(|n| (row_bytes(&columns[..n]), columns[n].scalar));
         if bytes > MOST_BYTES {
             return Err(Error::Parameter {
-                name: "--attributes",
+                name: "attributes",
                 found: format!("columns of {bytes} bytes for each point"),
                 expected: format!("at most {MOST_BYTES}"),
             });

@@ -12,7 +12,7 @@ use super::ply::Ply;
 use super::point_format::{Head, PointFile, PointFormat, Refusal, has_extension};
 use super::ptx::Ptx;
 use super::text::Text;
-use outcrop_disk::error::Result;
+use outcrop_disk::error::{Remedy, Result, Setting};
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer};
 use std::path::Path;
@@ -27,8 +27,10 @@ const HEAD: usize = 64 << 10;
 pub(super) const LONG_HEAD: usize = 1 << 20;
 
 /// The columns that are expected of a text whose own cannot be told, for the error.
-const COLUMNS: &str =
-    "columns called x, y and z, or their names in order by --columns, like x,y,z,r,g,b,-";
+const COLUMNS: &str = "columns called x, y and z";
+
+/// An example of their names.
+const NAMES: &str = "x,y,z,r,g,b,-";
 
 /// Names of all formats, for messages.
 pub(super) fn readable() -> String {
@@ -79,7 +81,11 @@ pub(super) fn open(input: &Input, layout: &Layout) -> Result<Box<dyn PointFile>>
         Ok(format) => return format.open(input, &head),
         Err(Refusal::Foreign(name)) => (format!("{name}, which is not read"), "convert it first"),
         Err(Refusal::Instead(what, advice)) => (what.to_owned(), advice),
-        Err(Refusal::Columns(found)) => return Err(input.error("columns", found, COLUMNS)),
+        Err(Refusal::Columns(found)) => {
+            let columns = Setting::Value("columns", NAMES.to_owned());
+            let remedy = Remedy::Give(columns, "names such columns in order");
+            return Err(input.error("columns", found, COLUMNS).with(remedy));
+        }
         Err(Refusal::Unknown(why)) => match foreign::known(&head) {
             Some(known) => (format!("{}, which is not read", known.what), known.advice),
             None => (why, ""),

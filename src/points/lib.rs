@@ -262,7 +262,7 @@ fn read_all(
         } else {
             match opened.file.read(&opened.input, &target) {
                 // Tasks read all files at the same time.
-                Err(Error::Shared) => {
+                Err(Error::Left(_)) => {
                     shared = true;
                     Vec::new()
                 }
@@ -306,7 +306,7 @@ fn read_all(
         sources.push(source);
     }
     if shared {
-        return Err(Error::Shared);
+        return Err(Error::left());
     }
     if !values.is_empty() {
         values.resize(frames.len(), Frame::default());

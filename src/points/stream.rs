@@ -199,7 +199,7 @@ impl Spool {
             }
             let map = SourceMap::new(source, lattice.step, lattice.offset);
             map.map(Some).ok_or_else(|| Error::Parameter {
-                name: "lattice",
+                name: "the lattice",
                 found: format!("a step of {}", lattice.step),
                 expected: "a lattice chosen for this spool".into(),
             })

@@ -1,7 +1,7 @@
 //! The reference systems of several files, and whether they are one.
 
 use super::crs::Crs;
-use outcrop_disk::error::{Error, Result};
+use outcrop_disk::error::{Error, Remedy, Result, Setting};
 use std::path::{Path, PathBuf};
 
 /// Two files with different reference systems.
@@ -18,11 +18,10 @@ impl Mixed {
     #[must_use]
     pub fn refused(&self) -> Error {
         let ((first, system), (other, another)) = (&self.first, &self.other);
-        let expected = format!(
-            "{system}, that of {}; --ignore-crs takes coordinates as they are",
-            first.display()
-        );
+        let expected = format!("{system}, that of {}", first.display());
+        let flag = Setting::Flag("ignore_crs");
         Error::input(other, "reference system", another, expected)
+            .with(Remedy::Give(flag, "takes coordinates as they are"))
     }
 
     /// The two files, and their systems.

@@ -44,8 +44,8 @@ impl Taken {
     pub(super) fn check(&self, layout: &Layout) -> Result<()> {
         let (name, found) = match &layout.columns {
             _ if self.texts || layout.is_default() => return Ok(()),
-            Some(columns) => ("--columns", columns.to_string()),
-            None => ("--skip-lines", layout.skip_lines.to_string()),
+            Some(columns) => ("columns", columns.to_string()),
+            None => ("skip_lines", layout.skip_lines.to_string()),
         };
         Err(Error::Parameter {
             name,

@@ -169,7 +169,7 @@ impl<'a> Choice<'a> {
         self.bytes += self.cost(root)?;
         if self.bytes > limit {
             return Err(Error::Parameter {
-                name: "--html-limit",
+                name: "html_limit",
                 found: format!("{limit} bytes"),
                 expected: format!("at least {} for the page and the coarsest tile", self.bytes),
             });

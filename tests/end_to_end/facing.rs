@@ -176,7 +176,7 @@ fn far_positions_are_refused() {
         .map_err(|error| error.to_string())
     };
     let error = run(Facing::At([1e300, 0.0, -2.0])).unwrap_err();
-    assert!(error.starts_with("--facing: 1e300,0.0,-2.0 "), "{error}");
+    assert!(error.starts_with("facing: 1e300,0.0,-2.0 "), "{error}");
     let error = run(Facing::At([0.0, f64::NAN, 0.0])).unwrap_err();
     assert!(error.contains("finite coordinates"), "{error}");
     assert_eq!(run(Facing::At([1e3, 0.0, -2.0])), Ok(()));

@@ -172,42 +172,42 @@ fn a_builder_refuses_what_cannot_work() {
             neighbors: 2,
             ..default()
         })),
-        "--neighbors"
+        "neighbors"
     );
     assert_eq!(
         parameter(with(Params {
             max_angle: 0.0,
             ..default()
         })),
-        "--max-angle"
+        "max_angle"
     );
     assert_eq!(
         parameter(with(Params {
             max_angle: f64::NAN,
             ..default()
         })),
-        "--max-angle"
+        "max_angle"
     );
     assert_eq!(
         parameter(with(Params {
             smooth: outcrop::Smooth::Rounds(101),
             ..default()
         })),
-        "--smooth"
+        "smooth"
     );
     assert_eq!(
         parameter(with(Params {
             radius: Radius::Length(-1.0),
             ..default()
         })),
-        "--radius"
+        "radius"
     );
     assert_eq!(
         parameter(with(Params {
             max_hole_edges: 1 << 20,
             ..default()
         })),
-        "--max-hole-edges"
+        "max_hole_edges"
     );
     assert_eq!(
         parameter(Reconstruction::builder().output("mesh.ply").build().err()),
@@ -215,7 +215,7 @@ fn a_builder_refuses_what_cannot_work() {
     );
     assert_eq!(
         parameter(Reconstruction::builder().input("a.las").build().err()),
-        "--output"
+        "output"
     );
     let low = Reconstruction::builder()
         .input("a.las")
@@ -256,6 +256,11 @@ fn errors_of_a_run_are_typed() {
     };
     let error = outcome(small(&bench), &strict);
     assert!(matches!(error, Error::NoTriangles { .. }), "{error:?}");
+    let helps = outcrop::error::Remedy::Smaller("min_component");
+    assert!(
+        error.remedies().contains(&helps) && !error.to_string().contains("--"),
+        "{error:?}"
+    );
     assert!(!mesh.exists());
 }
 

@@ -1,6 +1,7 @@
 //! Warnings about files that do not belong together.
 
 use crate::bench::{Bench, cloud, write_las};
+use outcrop_disk::error::{Remedy, Setting};
 use outcrop_points::{CrsSource, check_systems};
 use std::path::{Path, PathBuf};
 
@@ -106,12 +107,14 @@ fn files_of_two_reference_systems_are_told_apart() {
         let stats = bench.read(&files).unwrap().stats().clone();
         assert_eq!(stats.crs, None);
         let refused = format!(
-            "{}: reference system: found EPSG:32617, expected EPSG:26917, that of {}; --ignore-crs \
-             takes coordinates as they are",
+            "{}: reference system: found EPSG:32617, expected EPSG:26917, that of {}",
             other.display(),
             utm.display()
         );
-        assert_eq!(stats.mixed.unwrap().refused().to_string(), refused);
+        let error = stats.mixed.unwrap().refused();
+        assert_eq!(error.to_string(), refused);
+        let ignored = Remedy::Give(Setting::Flag("ignore_crs"), "takes coordinates as they are");
+        assert_eq!(error.remedies(), [ignored]);
         assert_eq!(check_systems(&files).unwrap_err().to_string(), refused);
     }
 }

@@ -386,7 +386,6 @@ fn columns_that_cannot_be_told_are_listed() {
             said.contains(": columns: found ") && said.contains(listed),
             "{said}"
         );
-        assert!(said.contains("--columns"), "{said}");
     }
 }
 
@@ -456,14 +455,14 @@ fn the_caller_names_columns_and_passes_over_lines() {
         "{said}"
     );
     let said = error("i.csv", "1,2,3\n", layout("-,x,y,z", 0));
-    assert!(said.contains("--columns -,x,y,z"), "{said}");
+    assert!(said.contains("the given -,x,y,z has"), "{said}");
     let said = error("j.csv", "1,2,3\n", layout("x,y,z", 9));
     assert!(said.contains("fewer than 9 lines"), "{said}");
     let ply = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n\
         property float z\nend_header\n1 2 3\n";
     let said = error("k.ply", ply, layout("x,y,z", 0));
     assert!(
-        said.contains("--columns") && said.contains("a text file among the inputs"),
+        said.starts_with("columns: ") && said.contains("a text file among the inputs"),
         "{said}"
     );
 }

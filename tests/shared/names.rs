@@ -100,7 +100,7 @@ fn several_runs_in_a_folder_are_listed() {
     assert_eq!(said.code, Some(2));
     assert!(
         said.err
-            .contains("no run that tasks share is here; begin one with"),
+            .contains("no run that tasks share is here; run `outcrop plan` to begin one"),
         "{}",
         said.err
     );

@@ -50,13 +50,11 @@ fn state(folder: &Path) -> Result<Status> {
                     stop::quoted(&folder)
                 ),
             };
-            Err(Error::NotResumable {
-                path: folder,
-                why: format!(
-                    "shard {shard} of generation {} failed {} times; {why}",
-                    status.generation, begun.attempts
-                ),
-            })
+            let why = format!(
+                "shard {shard} of generation {} failed {} times; {why}",
+                status.generation, begun.attempts
+            );
+            Err(Error::not_resumable(folder, why))
         }
         None => Ok(status),
     }

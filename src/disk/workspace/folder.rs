@@ -11,7 +11,7 @@ use super::open::{failed_write, open_existing, options};
 use super::progress::{Cancel, Observer};
 use super::recover::{Whereabouts, recover};
 use super::run::{ResumableRun, Role};
-use crate::error::{Error, Result};
+use crate::error::{Error, Remedy, Result};
 use std::collections::HashSet;
 use std::fs::File;
 use std::os::unix::fs::{DirBuilderExt, FileExt, MetadataExt};
@@ -50,13 +50,6 @@ pub enum Found {
     Damaged(Folder),
 }
 
-fn not_resumable(path: &Path, why: &str) -> Error {
-    Error::NotResumable {
-        path: path.to_path_buf(),
-        why: why.to_owned(),
-    }
-}
-
 /// A manifest with its checksum.
 pub(super) fn sealed(manifest: &[u8]) -> Vec<u8> {
     let seal = format!("\n{:08x}\n", crc32fast::hash(manifest));
@@ -83,11 +76,14 @@ impl Folder {
             return Ok(Found::Nothing);
         }
         if is_shared(path) {
-            let why = "tasks share the run here; `outcrop submit` goes on with it";
-            return Err(not_resumable(path, why));
+            let submit = Remedy::Command("submit", "to go on with it");
+            return Err(Error::not_resumable(path, "tasks share the run here").with(submit));
         }
         if !names.iter().any(|name| is_ours(name)) {
-            return Err(not_resumable(path, "it is not a scratch folder of outcrop"));
+            return Err(Error::not_resumable(
+                path,
+                "it is not a scratch folder of outcrop",
+            ));
         }
         Self::locked(path, Vec::new())?.read()
     }
@@ -277,7 +273,8 @@ impl Folder {
             next.max(n.saturating_add(1))
         });
         let next = first.checked_add(threads as u32 + 1);
-        let next = next.ok_or_else(|| not_resumable(&self.path, "it had too many attempts"))?;
+        let next =
+            next.ok_or_else(|| Error::not_resumable(&self.path, "it had too many attempts"))?;
         journal.append(Record::Attempt(next))?;
         let keeper = Keeper::start(journal.file(), &self.path, io.clone())
             .map_err(|e| Error::io(&self.path, "start a thread for", e))?;
@@ -378,12 +375,12 @@ pub(super) fn is_private(path: &Path) -> Result<bool> {
         Err(e) => return Err(Error::io(path, "look at", e)),
     };
     if !meta.is_dir() {
-        return Err(not_resumable(path, "it is not a folder"));
+        return Err(Error::not_resumable(path, "it is not a folder"));
     }
     let own = rustix::process::geteuid().as_raw();
     if meta.uid() != own || meta.mode() & 0o077 != 0 {
         let why = "it is open to other users, so what is in it cannot be trusted";
-        return Err(not_resumable(path, why));
+        return Err(Error::not_resumable(path, why));
     }
     Ok(true)
 }

@@ -17,7 +17,7 @@ use super::journal::{self, Journal, OpenStep, Record, Sharing, Took};
 use super::memory::MemoryPool;
 use super::open::{failed_write, open_existing, options};
 use super::run::ResumableRun;
-use crate::error::{Error, Result};
+use crate::error::{Error, Remedy, Result};
 use publish::{link, sync};
 use std::io::ErrorKind;
 use std::ops::Range;
@@ -152,10 +152,9 @@ impl SharedFolder {
         }
         let folder = std::fs::DirBuilder::new().mode(0o700).create(path);
         folder.map_err(|e| match e.kind() {
-            ErrorKind::AlreadyExists => Error::NotResumable {
-                path: path.into(),
-                why: "it exists already; remove it, or choose another --scratch".into(),
-            },
+            ErrorKind::AlreadyExists => Error::not_resumable(path, "it exists already")
+                .with(Remedy::Remove)
+                .with(Remedy::Another("scratch")),
             _ => Error::io(path, "make the folder", e),
         })?;
         for name in [GENERATIONS, TASKS] {
@@ -194,14 +193,10 @@ impl SharedFolder {
     /// # Errors
     /// [`Error::NotResumable`], [`Error::Io`].
     pub fn open(path: &Path) -> Result<Self> {
-        let not = |why: &str| Error::NotResumable {
-            path: path.to_path_buf(),
-            why: why.into(),
-        };
+        let not = |why: &str| Error::not_resumable(path, why);
         if !is_private(path)? || !is_shared(path) {
-            return Err(not(
-                "no run that tasks share is here; begin one with `outcrop plan`",
-            ));
+            let plan = Remedy::Command("plan", "to begin one");
+            return Err(not("no run that tasks share is here").with(plan));
         }
         let file = path.join(MANIFEST);
         let bytes = open_existing(&file).and_then(|file| {
@@ -247,10 +242,10 @@ impl SharedFolder {
         let folder = self.path.join(GENERATIONS);
         let names = std::fs::read_dir(&folder).map_err(|e| Error::io(&folder, "list", e))?;
         let numbers = names.filter_map(|name| name.ok()?.file_name().to_str()?.parse().ok());
-        numbers.max().ok_or_else(|| Error::NotResumable {
-            path: self.path.clone(),
-            why: "its first generation is missing; remove it and plan again".into(),
-        })
+        let missing = "its first generation is missing; remove it and plan again";
+        numbers
+            .max()
+            .ok_or_else(|| Error::not_resumable(&self.path, missing))
     }
 
     /// True if a generation has begun, also if a list of the folder does not show it yet.

@@ -166,7 +166,7 @@ impl Workspace {
             Ok(usage)
         })?;
         if shared.is_some() {
-            return Err(Error::Shared);
+            return Err(Error::left());
         }
         run.end(&step, count as u64, std::mem::take(&mut *lock(&files)))
     }

@@ -132,7 +132,7 @@ fn measured(
     let Options { samples, seed } = *options;
     if samples == 0 {
         return Err(Error::Parameter {
-            name: "--samples",
+            name: "samples",
             found: "0".into(),
             expected: "1 or more".into(),
         });

@@ -16,7 +16,7 @@ pub use grid::{Grid, Square};
 pub use pieces::{Pieces, StoredPieces, Tile};
 
 use divide::Divided;
-use outcrop_disk::error::{Error, Result};
+use outcrop_disk::error::{Error, Remedy, Result};
 use outcrop_disk::spill::{Inbox, Shuffle, Table, row};
 use outcrop_disk::workspace::memory::{Reservation, bytes_of};
 use outcrop_disk::workspace::{Unit, Workspace};
@@ -177,11 +177,11 @@ pub fn cut(
 }
 
 fn nothing_left(region: Option<&Region>, outside: u64) -> Error {
-    let why = match region {
-        Some(region) => format!(
-            "all {outside} of the points around it have a corner outside {region}; try a larger --crop"
-        ),
-        None => "the cells agree on none".into(),
-    };
-    Error::NoTriangles { why }
+    match region {
+        Some(region) => Error::no_triangles(format!(
+            "all {outside} of the points around it have a corner outside {region}"
+        ))
+        .with(Remedy::Larger("crop")),
+        None => Error::no_triangles("the cells agree on none"),
+    }
 }

@@ -112,7 +112,7 @@ impl StoredPieces {
         }
         if tiles.len() > MOST_SQUARES {
             return Err(Error::Parameter {
-                name: "--split",
+                name: "split",
                 found: format!("a side that gives {} squares", tiles.len()),
                 expected: format!("one that gives at most {MOST_SQUARES} meshes"),
             });

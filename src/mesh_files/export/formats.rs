@@ -23,7 +23,7 @@ pub fn format_of(output: &Path) -> Result<&'static dyn MeshFormat> {
     let mut formats = FORMATS.into_iter();
     let named = formats.find(|format| format.extensions().iter().any(is));
     named.ok_or_else(|| Error::Parameter {
-        name: "--output",
+        name: "output",
         found: output.display().to_string(),
         expected: format!("a name that ends with {}", known_names()),
     })
@@ -49,7 +49,7 @@ pub fn check_name(output: &Path, compress: bool) -> Result<()> {
     let format = format_of(output)?;
     if compress && (!format.has_compression() || is_compressed(output)) {
         return Err(Error::Parameter {
-            name: "--compress-glb",
+            name: "compress_glb",
             found: output.display().to_string(),
             expected: "a mesh that ends with .glb".into(),
         });

@@ -38,7 +38,7 @@ use crate::cut::StoredPieces;
 use coordinates::Coordinates;
 use file::{HEADER, MeshFile};
 use format::MeshFormat;
-use outcrop_disk::error::{Error, Result};
+use outcrop_disk::error::{Error, Remedy, Result, Setting};
 use outcrop_disk::workspace::{Unit, Workspace};
 use outcrop_geom::Point;
 use outcrop_geom::lattice::{Lattice, Shift};
@@ -132,9 +132,7 @@ pub fn export(
     };
     let stats = parts.stats();
     if stats.triangles == 0 {
-        return Err(Error::NoTriangles {
-            why: NO_TRIANGLES.into(),
-        });
+        return Err(no_triangles());
     }
     let (format, mut mesh) = options.mesh(&stats)?;
     let mut bounds = None;
@@ -169,9 +167,7 @@ pub fn export_cut(
 ) -> Result<MeshStats> {
     let pieces = &stored.open(workspace)?;
     let [tile] = pieces.tiles() else {
-        return Err(Error::NoTriangles {
-            why: NO_TRIANGLES.into(),
-        });
+        return Err(no_triangles());
     };
     let parts = OfTile { pieces, tile };
     let (_, mut mesh) = options.mesh(&parts.stats())?;
@@ -278,5 +274,11 @@ fn in_order<P: Parts>(
     Ok(())
 }
 
-const NO_TRIANGLES: &str = "every component is too small, or no three cells agree on a triangle; \
-    try a larger --radius, --smooth 2 for noisy scans, or a smaller --min-component";
+fn no_triangles() -> Error {
+    let why = "every component is too small, or no three cells agree on a triangle";
+    let smooth = Setting::Value("smooth", "2".to_owned());
+    Error::no_triangles(why)
+        .with(Remedy::Larger("radius"))
+        .with(Remedy::Give(smooth, "helps with noisy scans"))
+        .with(Remedy::Smaller("min_component"))
+}

@@ -7,7 +7,7 @@ use super::file::{MeshFile, folder_of, temporary, temporary_of};
 use super::formats::{check_size, format_of};
 use super::parts::{OfTile, Parts};
 use super::write::Writer;
-use super::{ExportOptions, MeshStats, NO_TRIANGLES, in_order};
+use super::{ExportOptions, MeshStats, in_order, no_triangles};
 use crate::cut::{Pieces, Square, StoredPieces, Tile};
 use outcrop_disk::error::{Error, Result};
 use outcrop_disk::workspace::fault::{self, Event};
@@ -123,9 +123,7 @@ pub fn export_split(
     };
     let stats = split_up.check()?;
     if stats.triangles == 0 {
-        return Err(Error::NoTriangles {
-            why: NO_TRIANGLES.into(),
-        });
+        return Err(no_triangles());
     }
     // Of an earlier run whose scratch folder was deleted.
     workspace.once("squares", |_| {

@@ -2,7 +2,7 @@
 //! the folder for scratch files.
 
 use super::super::start::scratch_folder;
-use outcrop_disk::error::{Error, Result};
+use outcrop_disk::error::{Error, Remedy, Result};
 use outcrop_disk::workspace::generations::SharedFolder;
 use outcrop_mesh_files::export::folder_of;
 use std::ffi::{OsStr, OsString};
@@ -64,11 +64,11 @@ pub fn shared_folder(given: &Path) -> Result<PathBuf> {
     if let Some(found) = named.into_iter().find(|path| SharedFolder::is_at(path)) {
         return Ok(found);
     }
-    let not = |why: String| Error::NotResumable {
-        path: given.to_path_buf(),
-        why,
+    let not = |why: String| Error::not_resumable(given, why);
+    let none = || {
+        let plan = Remedy::Command("plan", "to begin one");
+        not("no run that tasks share is here".into()).with(plan)
     };
-    let none = || not("no run that tasks share is here; begin one with `outcrop plan`".into());
     if given.is_file() {
         return Err(none());
     }

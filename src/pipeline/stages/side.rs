@@ -73,7 +73,7 @@ fn faced(position: [f64; 3], lattice: &Lattice) -> Result<[i64; 3]> {
     on_lattice(position, lattice).ok_or_else(|| {
         let [x, y, z] = position;
         Error::Parameter {
-            name: "--facing",
+            name: "facing",
             found: format!("{x:?},{y:?},{z:?}"),
             expected: format!("a position less than {:.0} away", FARTHEST * lattice.step),
         }

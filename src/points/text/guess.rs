@@ -131,7 +131,7 @@ impl<'a> Style<'a> {
         }
         match &self.head.layout.columns {
             Some(given) => Err(format!(
-                "{} columns in \"{}\", and no numbers where --columns {given} has x, y and z",
+                "{} columns in \"{}\", and no numbers where the given {given} has x, y and z",
                 table.rows[0].len(),
                 shown(points[0].trim_ascii()),
             )),

@@ -55,10 +55,8 @@ impl SharedFolder {
                 Err(e) => return Err(e),
             }
         }
-        Err(Error::NotResumable {
-            path: self.path.clone(),
-            why: format!("{TRIES} attempts at the same work failed; look at their messages"),
-        })
+        let why = format!("{TRIES} attempts at the same work failed; look at their messages");
+        Err(Error::not_resumable(&self.path, why))
     }
 
     pub(super) fn run(
@@ -77,15 +75,13 @@ impl SharedFolder {
         let limit = generation.sharing.threads as usize;
         if threads > limit {
             return Err(Error::Parameter {
-                name: "--threads",
+                name: "threads",
                 found: threads.to_string(),
-                expected: format!("at most {limit}, as planned with --task-threads"),
+                expected: format!("at most {limit}, as planned"),
             });
         }
-        let first = first.ok_or_else(|| Error::NotResumable {
-            path: self.path.clone(),
-            why: "it had too many attempts".into(),
-        })?;
+        let many = || Error::not_resumable(&self.path, "it had too many attempts");
+        let first = first.ok_or_else(many)?;
         let held = memory.reserve("history", generation.history.bytes())?;
         let keeper = Keeper::start(journal.file(), &self.path, io.clone())
             .map_err(|e| Error::io(&path, "start a thread for", e))?;

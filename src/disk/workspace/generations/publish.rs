@@ -169,10 +169,14 @@ impl Workspace {
     }
 
     /// Notes in the journal of this process why it failed, for those who ask for the state of the run. An
-    /// error that tells of damaged scratch files becomes [`Error::Damaged`].
-    #[must_use]
-    pub fn note_failure(&self, error: Error) -> Error {
-        let Some(run) = self.run() else { return error };
+    /// error that tells of damaged scratch files, the work of others, is returned as a value.
+    ///
+    /// # Errors
+    /// Any other error.
+    pub fn note_failure(&self, error: Error) -> Result<Error> {
+        let Some(run) = self.run() else {
+            return Err(error);
+        };
         let damage = match &error {
             Error::Corrupt { path, .. } => path.starts_with(&self.folder),
             Error::Io { path, source, .. } => {
@@ -190,10 +194,8 @@ impl Workspace {
             .journal()
             .append(Record::Failed(Failure { why, damage }));
         match damage {
-            true => Error::Damaged {
-                source: Box::new(error),
-            },
-            false => error,
+            true => Ok(error),
+            false => Err(error),
         }
     }
 
