@@ -140,30 +140,32 @@ impl Reconstruction {
         let mut stages = Stages::begin(self, workspace)?;
         let (spool, lattice) = stages.ingest()?;
         let points = stages.order(&spool, &lattice)?;
-        let points = stages.without_outliers(points)?;
-        let mut values = stages.values(&spool, &lattice, &points)?;
-        let radius = stages.radius(&points, &lattice);
-        let (points, relaxed) = stages.moved(points, &mut values)?;
+        let divided = stages.without_outliers(points)?;
+        let (blocks, tiles) = (divided.blocks, divided.tiles);
+        let mut values = stages.values(&spool, &lattice, &divided)?;
+        let radius = stages.radius(&divided.points, &lattice);
+        let (points, relaxed) = stages.moved(divided, &mut values)?;
         let store = points.open(workspace)?;
         let shape = stages.open_shape(relaxed)?;
-        let side = stages.side(shape.or(&store), &lattice)?;
+        let side = stages.side(shape.or(&store), blocks, &lattice)?;
         let places = stages.places(&store, &shape, side.outside(&values), &lattice);
-        let (seen, coarse) = stages.cells(places, radius, &values)?;
+        let (seen, coarse) = stages.cells(places, radius, &values, tiles)?;
         let places = places.with_coarse(coarse.as_deref());
-        let triples = stages.triples(&seen)?;
-        let stitched = stages.stitch(places, &triples)?;
-        let repaired = stages.repair(places, &stitched)?;
+        let triples = stages.triples(&seen, blocks)?;
+        let stitched = stages.stitch(places, triples, blocks)?;
+        let repaired = stages.repair(places, stitched, blocks)?;
         values.release_told(workspace)?;
         side.release(workspace)?;
-        let pieces = stages.cut(&store, &repaired, &lattice)?;
+        let pieces = stages.cut(&store, &repaired, blocks, &lattice)?;
         stages.export(
             &store,
             values.columns(),
             &repaired,
             pieces.as_ref(),
+            blocks,
             &lattice,
         )?;
-        stages.draw(&store, &shape, &repaired, pieces.as_ref(), &lattice)?;
+        stages.draw(&store, &shape, &repaired, pieces.as_ref(), blocks, &lattice)?;
         stages.levels()?;
         Ok(stages.report())
     }

@@ -35,6 +35,24 @@ use outcrop_stages::thin::{Grid, LeftOut, thin};
 use outcrop_stages::triples::{Triples, triples};
 use std::time::Instant;
 
+/// The points that the surface is made of, and their division.
+pub(super) struct Divided {
+    pub points: StoredPoints,
+    pub blocks: Blocks,
+    pub tiles: TileRanges,
+}
+
+impl Divided {
+    fn new(points: StoredPoints, job: &Reconstruction) -> Self {
+        let blocks = Blocks::new(points.len(), job.params.block);
+        Self {
+            points,
+            blocks,
+            tiles: TileRanges::new(blocks, job.tile_points),
+        }
+    }
+}
+
 /// The stages of one run.
 pub(super) struct Stages<'a> {
     job: &'a Reconstruction,
@@ -297,12 +315,12 @@ impl<'a> Stages<'a> {
         Ok(())
     }
 
-    /// Drops outliers, if requested.
-    pub fn without_outliers(&mut self, store: StoredPoints) -> Result<StoredPoints> {
+    /// Drops outliers, if requested; the points that stay are divided.
+    pub fn without_outliers(&mut self, store: StoredPoints) -> Result<Divided> {
         let (job, workspace) = (self.job, self.workspace);
         let Some(factor) = job.params.drop_outliers else {
             self.report.points = store.len() as u64;
-            return Ok(store);
+            return Ok(Divided::new(store, job));
         };
         let options = OutlierOptions {
             factor,
@@ -315,7 +333,7 @@ impl<'a> Stages<'a> {
         enough(&store)?;
         self.report.outliers = stats;
         self.report.points = store.len() as u64;
-        Ok(store)
+        Ok(Divided::new(store, job))
     }
 
     /// The radius of the disks; a percentage refers to the points before smoothing.
@@ -328,17 +346,9 @@ impl<'a> Stages<'a> {
         radius
     }
 
-    fn blocks(&self) -> Blocks {
-        Blocks::new(self.report.points as usize, self.job.params.block)
-    }
-
-    fn tiles(&self) -> TileRanges {
-        TileRanges::new(self.blocks(), self.job.tile_points)
-    }
-
     /// Adds up the number of cells of each triple.
-    pub fn triples(&mut self, seen: &CellTriples) -> Result<Triples> {
-        let (workspace, blocks) = (self.workspace, self.blocks());
+    pub fn triples(&mut self, seen: &CellTriples, blocks: Blocks) -> Result<Triples> {
+        let workspace = self.workspace;
         workspace.trim();
         let (all, stats) = self
             .clock
@@ -349,8 +359,13 @@ impl<'a> Stages<'a> {
     }
 
     /// Makes an oriented manifold from the triples.
-    pub fn stitch(&mut self, places: Places<'_>, triples: &Triples) -> Result<Stitched> {
-        let (params, workspace, blocks) = (&self.job.params, self.workspace, self.blocks());
+    pub fn stitch(
+        &mut self,
+        places: Places<'_>,
+        triples: Triples,
+        blocks: Blocks,
+    ) -> Result<Stitched> {
+        let (params, workspace) = (&self.job.params, self.workspace);
         let options = StitchOptions {
             cos_max_angle: params.cos_max_angle(),
             weigh: (params.method == Method::Robust).then_some(params.division),
@@ -365,9 +380,14 @@ impl<'a> Stages<'a> {
     }
 
     /// Removes bridges and small components, and fills holes.
-    pub fn repair(&mut self, places: Places<'_>, stitched: &Stitched) -> Result<Repaired> {
-        let (params, workspace, blocks) = (&self.job.params, self.workspace, self.blocks());
-        let points = self.report.points;
+    pub fn repair(
+        &mut self,
+        places: Places<'_>,
+        stitched: Stitched,
+        blocks: Blocks,
+    ) -> Result<Repaired> {
+        let (params, workspace) = (&self.job.params, self.workspace);
+        let points = blocks.points() as u64;
         let robust = params.method == Method::Robust;
         let options = RepairOptions {
             repair: params.repair,
@@ -392,9 +412,10 @@ impl<'a> Stages<'a> {
         &mut self,
         store: &PointStore,
         repaired: &Repaired,
+        blocks: Blocks,
         lattice: &Lattice,
     ) -> Result<Option<StoredPieces>> {
-        let (params, workspace, blocks) = (&self.job.params, self.workspace, self.blocks());
+        let (params, workspace) = (&self.job.params, self.workspace);
         let options = CutOptions {
             region: params.crop.as_ref(),
             side: params.split,

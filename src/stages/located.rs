@@ -25,9 +25,28 @@ pub struct Places<'a> {
     pub density: Option<Density<'a>>,
     /// What tells which side is out; nothing if the highest points, which face up, are all there is.
     pub outside: Option<Outside<'a>>,
+    /// True if points were relaxed.
+    differ: bool,
 }
 
 impl<'a> Places<'a> {
+    /// The positions in the file, and those that decide the connectivity, if these are others.
+    #[must_use]
+    pub fn new(
+        file: &'a PointStore,
+        shape: Option<&'a PointStore>,
+        density: Option<Density<'a>>,
+        outside: Option<Outside<'a>>,
+    ) -> Self {
+        Self {
+            shape: shape.unwrap_or(file),
+            file,
+            density,
+            outside,
+            differ: shape.is_some(),
+        }
+    }
+
     /// With how coarse points are.
     #[must_use]
     pub fn with_coarse(self, coarse: Option<&'a Levels>) -> Self {
@@ -41,7 +60,7 @@ impl<'a> Places<'a> {
     /// True if the positions in the file differ from those that decide the connectivity.
     #[must_use]
     pub fn differ(&self) -> bool {
-        !std::ptr::eq(self.shape, self.file)
+        self.differ
     }
 
     /// True if there is noise at a point.

@@ -130,18 +130,14 @@ fn pipeline(
             normals: None,
         })
     };
-    let places = Places {
-        shape: lie,
-        file: &store,
-        density: None,
-        outside: match (settings.facing, &extremes) {
-            (_, Some(extremes)) => Some(Outside::Extremes(extremes)),
-            (Facing::At(place), _) => Some(Outside::Position(place)),
-            _ => stored
-                .as_ref()
-                .and_then(|(stored, places)| seen((stored, *places))),
-        },
+    let outside = match (settings.facing, &extremes) {
+        (_, Some(extremes)) => Some(Outside::Extremes(extremes)),
+        (Facing::At(place), _) => Some(Outside::Position(place)),
+        _ => stored
+            .as_ref()
+            .and_then(|(stored, places)| seen((stored, *places))),
     };
+    let places = Places::new(&store, moved.as_ref(), None, outside);
     let division = Division {
         patch: settings.patch,
         cluster: settings.cluster as u64,
@@ -150,7 +146,7 @@ fn pipeline(
         cos_max_angle: settings.cos_max_angle,
         weigh: settings.robust.then_some(division),
     };
-    let (stitched, base, inserted) = stitch(places, &triples, blocks, extraction, workspace)?;
+    let (stitched, base, inserted) = stitch(places, triples, blocks, extraction, workspace)?;
     let options = RepairOptions {
         repair: settings.repair,
         min_component: settings.min_component as u64,
@@ -159,7 +155,7 @@ fn pipeline(
         flip: settings.robust,
         clip_ears: settings.robust,
     };
-    let (repaired, mended) = repair(places, &stitched, blocks, options, workspace)?;
+    let (repaired, mended) = repair(places, stitched, blocks, options, workspace)?;
     let lattice = outcrop_geom::lattice::Lattice {
         step: 1.0,
         offset: [0.0; 3],

@@ -5,7 +5,7 @@ use super::Stages;
 use super::values::Values;
 use crate::params::Method;
 use outcrop_disk::error::Result;
-use outcrop_stages::cells::{CellOptions, CellTriples, DiskRadius, Widen, cells};
+use outcrop_stages::cells::{CellOptions, CellTriples, DiskRadius, TileRanges, Widen, cells};
 use outcrop_stages::levels::HeldLevels;
 use outcrop_stages::located::Places;
 
@@ -16,9 +16,10 @@ impl Stages<'_> {
         places: Places<'_>,
         radius: DiskRadius,
         values: &Values,
+        tiles: TileRanges,
     ) -> Result<(CellTriples, Option<HeldLevels>)> {
-        let (params, workspace, tiles) = (&self.job.params, self.workspace, self.tiles());
-        let points = self.report.points;
+        let (params, workspace) = (&self.job.params, self.workspace);
+        let points = places.file.len() as u64;
         let options = CellOptions {
             neighbors: params.neighbors,
             radius,

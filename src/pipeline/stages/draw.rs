@@ -9,6 +9,7 @@ use outcrop_disk::workspace::limits;
 use outcrop_draw::mesh::{Finished, Subject, draw};
 use outcrop_geom::lattice::Lattice;
 use outcrop_mesh_files::cut::StoredPieces;
+use outcrop_stages::blocks::Blocks;
 use outcrop_stages::order::PointStore;
 use outcrop_stages::repair::Repaired;
 
@@ -21,12 +22,13 @@ impl Stages<'_> {
         shape: &Shape,
         repaired: &Repaired,
         pieces: Option<&StoredPieces>,
+        blocks: Blocks,
         lattice: &Lattice,
     ) -> Result<()> {
         if !self.job.pictures {
             return Ok(());
         }
-        let (workspace, blocks) = (self.workspace, self.blocks());
+        let workspace = self.workspace;
         let neighbors = self.job.params.neighbors;
         let (finished, items) = match pieces {
             Some(pieces) => (Finished::Cut(pieces), pieces.count()),

@@ -13,6 +13,7 @@ use outcrop_mesh_files::export::{
 };
 use outcrop_ply::Place;
 use outcrop_stages::attributes::StoredColumns;
+use outcrop_stages::blocks::Blocks;
 use outcrop_stages::order::PointStore;
 use outcrop_stages::repair::Repaired;
 
@@ -77,9 +78,10 @@ impl Stages<'_> {
         columns: Option<&StoredColumns>,
         repaired: &Repaired,
         pieces: Option<&StoredPieces>,
+        blocks: Blocks,
         lattice: &Lattice,
     ) -> Result<()> {
-        let (job, workspace, blocks) = (self.job, self.workspace, self.blocks());
+        let (job, workspace) = (self.job, self.workspace);
         let (shift, coordinates) = self.shift(store.bounds(), lattice)?;
         self.report.coordinates = coordinates;
         self.report.origin = shift.map(|shift| shift.origin);

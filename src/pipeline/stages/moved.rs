@@ -1,11 +1,13 @@
 //! Stages that move points: rounds of smoothing, and the smoothing of noisy points; and how far they moved.
 
-use super::Stages;
 use super::values::Values;
+use super::{Divided, Stages};
 use crate::params::{Method, Smooth};
 use outcrop_disk::error::Result;
 use outcrop_points::{Attribute, Column};
-use outcrop_stages::attributes::displacement;
+use outcrop_stages::attributes::{StoredColumns, displacement};
+use outcrop_stages::blocks::Blocks;
+use outcrop_stages::cells::TileRanges;
 use outcrop_stages::order::StoredPoints;
 use outcrop_stages::smooth::{Relaxed, Relaxing, relax, smooth};
 
@@ -14,28 +16,34 @@ impl Stages<'_> {
     /// positions that decide how they are connected. If the mesh tells how far points moved, `values` will.
     pub fn moved(
         &mut self,
-        measured: StoredPoints,
+        divided: Divided,
         values: &mut Values,
     ) -> Result<(StoredPoints, Option<Relaxed>)> {
+        let Divided {
+            points: measured,
+            blocks,
+            tiles,
+        } = divided;
         let keeps = self.job.params.attributes.has_displacement();
         let before = keeps.then(|| measured.clone());
-        let points = self.smooth(measured, keeps)?;
-        let (points, relaxed) = self.relax(points, keeps)?;
+        let points = self.smooth(measured, tiles, keeps)?;
+        let (points, relaxed) = self.relax(points, tiles, keeps)?;
         if let Some(before) = before {
-            self.displacement(&before, &points, values)?;
+            let columns = self.displacement(&before, &points, blocks)?;
+            values.append(columns);
         }
         Ok((points, relaxed))
     }
 
-    /// Notes in `values` how far the points moved.
+    /// How far the points moved, as a column.
     fn displacement(
         &mut self,
         before: &StoredPoints,
         after: &StoredPoints,
-        values: &mut Values,
-    ) -> Result<()> {
-        let (workspace, blocks) = (self.workspace, self.blocks());
-        let (points, step) = (self.report.points, self.report.lattice.step);
+        blocks: Blocks,
+    ) -> Result<StoredColumns> {
+        let workspace = self.workspace;
+        let (points, step) = (after.len() as u64, self.report.lattice.step);
         let (columns, largest) = self.clock.stage("displacement", "points", points, || {
             let stores = [before.open(workspace)?, after.open(workspace)?];
             displacement([&stores[0], &stores[1]], step, blocks, workspace)
@@ -43,7 +51,6 @@ impl Stages<'_> {
         if before != after {
             before.release(workspace)?;
         }
-        values.append(columns);
         let Column { name, scalar } = Column::displacement();
         self.report.attributes.push(Attribute {
             name,
@@ -51,14 +58,19 @@ impl Stages<'_> {
             range: [0.0, largest],
             files_without: 0,
         });
-        Ok(())
+        Ok(columns)
     }
 
     /// Smooths the points, if requested. The files of the measured points stay if `keeps`.
-    fn smooth(&mut self, mut store: StoredPoints, keeps: bool) -> Result<StoredPoints> {
-        let (params, workspace, tiles) = (&self.job.params, self.workspace, self.tiles());
+    fn smooth(
+        &mut self,
+        mut store: StoredPoints,
+        tiles: TileRanges,
+        keeps: bool,
+    ) -> Result<StoredPoints> {
+        let (params, workspace) = (&self.job.params, self.workspace);
         workspace.trim();
-        let points = self.report.points;
+        let points = store.len() as u64;
         for round in 1..=params.smooth.rounds() {
             let step = format!("smooth {round}");
             let next = self.clock.round("smooth", &step, "points", points, || {
@@ -79,9 +91,11 @@ impl Stages<'_> {
     fn relax(
         &mut self,
         points: StoredPoints,
+        tiles: TileRanges,
         keeps: bool,
     ) -> Result<(StoredPoints, Option<Relaxed>)> {
-        let (params, workspace, tiles) = (&self.job.params, self.workspace, self.tiles());
+        let (params, workspace) = (&self.job.params, self.workspace);
+        let count = points.len() as u64;
         let options = Relaxing {
             neighbors: params.neighbors,
             rounds: params.relax,
@@ -89,7 +103,7 @@ impl Stages<'_> {
         };
         let mut relaxed = None;
         if params.relax > 0 || params.method == Method::Robust {
-            let items = self.report.points * u64::from(params.relax + 1);
+            let items = count * u64::from(params.relax + 1);
             relaxed = Some(self.clock.stage("relax", "points", items, || {
                 relax(&points.open(workspace)?, tiles, options, workspace)
             })?);
@@ -105,7 +119,7 @@ impl Stages<'_> {
             None => points,
         };
         self.report.relax = relaxed.as_ref().map(|r| r.stats);
-        self.known.points = self.report.points;
+        self.known.points = count;
         self.known.moved = relaxed.as_ref().map(|r| r.store.is_some());
         self.check_room()?;
         Ok((points, relaxed))

@@ -55,17 +55,13 @@ impl Stages<'_> {
         let params = &self.job.params;
         let spacings = shape.spacings.as_ref();
         let robust = spacings.filter(|_| params.method == Method::Robust);
-        Places {
-            shape: shape.or(store),
-            file: store,
-            outside,
-            density: robust.map(|spacings| Density {
-                spacings,
-                noise: shape.noise.as_deref(),
-                coarse: None,
-                neighbors: params.neighbors,
-                limits: params.limits(lattice.step),
-            }),
-        }
+        let density = robust.map(|spacings| Density {
+            spacings,
+            noise: shape.noise.as_deref(),
+            coarse: None,
+            neighbors: params.neighbors,
+            limits: params.limits(lattice.step),
+        });
+        Places::new(store, shape.store.as_ref(), density, outside)
     }
 }

@@ -6,6 +6,7 @@ use crate::params::Facing;
 use outcrop_disk::error::{Error, Result};
 use outcrop_disk::workspace::Workspace;
 use outcrop_geom::lattice::Lattice;
+use outcrop_stages::blocks::Blocks;
 use outcrop_stages::order::PointStore;
 use outcrop_stages::outside::{Outside, StoredExtremes};
 use outcrop_stages::scanners::{FARTHEST, on_lattice};
@@ -53,7 +54,7 @@ impl Stages<'_> {
     }
 
     /// What tells which side is out, of the positions that decide the connectivity.
-    pub fn side(&mut self, shape: &PointStore, lattice: &Lattice) -> Result<Side> {
+    pub fn side(&mut self, shape: &PointStore, blocks: Blocks, lattice: &Lattice) -> Result<Side> {
         let inward = match self.job.params.facing {
             Facing::Auto => return Ok(Side::Told),
             Facing::Up => return Ok(Side::Up),
@@ -61,7 +62,7 @@ impl Stages<'_> {
             Facing::Out => false,
             Facing::In => true,
         };
-        let (workspace, blocks) = (self.workspace, self.blocks());
+        let workspace = self.workspace;
         let find = || StoredExtremes::of(shape, inward, blocks, workspace);
         let stored = self.clock.stage("facing", "points", 0, find)?;
         Ok(Side::Extremes(stored))

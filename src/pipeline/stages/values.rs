@@ -1,6 +1,6 @@
 //! The stage of values by id: columns of the mesh, the scanners that saw the points, and their normals.
 
-use super::Stages;
+use super::{Divided, Stages};
 use crate::params::{InputNormals, Method};
 use crate::report::NormalsReport;
 use outcrop_disk::error::Result;
@@ -11,7 +11,6 @@ use outcrop_stages::attributes::{StoredAttributes, StoredColumns, attributes};
 use outcrop_stages::blocks::Blocks;
 use outcrop_stages::cells::{DiskStats, InputDirections};
 use outcrop_stages::normals::{Normals, look};
-use outcrop_stages::order::StoredPoints;
 use outcrop_stages::outside::Told;
 use outcrop_stages::scanners::{self, Scanners};
 
@@ -89,8 +88,9 @@ impl Stages<'_> {
         &mut self,
         spool: &Spool,
         lattice: &Lattice,
-        store: &StoredPoints,
+        divided: &Divided,
     ) -> Result<Values> {
+        let (store, blocks) = (&divided.points, divided.blocks);
         if self.carried.is_empty() {
             return Ok(Values::default());
         }
@@ -110,7 +110,7 @@ impl Stages<'_> {
         if self.report.scanners.is_empty() {
             self.carried.drop_scanners();
         }
-        let (workspace, blocks, carried) = (self.workspace, self.blocks(), &self.carried);
+        let (workspace, carried) = (self.workspace, &self.carried);
         let names = spool.normal_names().filter(|_| carried.has_normals());
         if carried.is_empty() {
             spool.release(workspace)?;

@@ -166,19 +166,19 @@ adds!(
     holes_outline, holes_too_long, holes_not_filled, hole_triangles
 );
 
-/// Repairs and orients the surface.
+/// Repairs and orients the surface. Deletes the files of `stitched` on the way: nobody else has them.
 ///
 /// # Errors
 /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`], [`outcrop_disk::error::Error::Memory`],
 /// [`outcrop_disk::error::Error::Cancelled`].
 pub fn repair(
     places: Places<'_>,
-    stitched: &Stitched,
+    stitched: Stitched,
     blocks: Blocks,
     options: RepairOptions,
     workspace: &Workspace,
 ) -> Result<(Repaired, RepairStats)> {
-    let (surface, mut stats) = surface::build(places, stitched, blocks, options, workspace)?;
+    let (surface, mut stats) = surface::build(places, &stitched, blocks, options, workspace)?;
     let limit = options.filling(places);
     let (filled, numbering) = holes::fill(places, &surface, limit, blocks, &mut stats, workspace)?;
     let repaired = Repaired {

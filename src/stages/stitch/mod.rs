@@ -66,19 +66,19 @@ struct Insertion<'a> {
     workspace: &'a Workspace,
 }
 
-/// Extracts the manifold, and deletes the files of `triples`.
+/// Extracts the manifold. Deletes the files of `triples` on the way: nobody else has them.
 ///
 /// # Errors
 /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`], [`outcrop_disk::error::Error::Memory`],
 /// [`outcrop_disk::error::Error::Cancelled`].
 pub fn stitch(
     places: Places<'_>,
-    triples: &Triples,
+    triples: Triples,
     blocks: Blocks,
     options: StitchOptions,
     workspace: &Workspace,
 ) -> Result<(Stitched, BaseStats, InsertStats)> {
-    let (base, mut counts) = base::base(places, triples, blocks, options.weigh, workspace)?;
+    let (base, mut counts) = base::base(places, &triples, blocks, options.weigh, workspace)?;
     let interior = Interior::new(blocks.count());
     // The pass across blocks is short, and starts from the beginning when the run is resumed.
     let (stitched, inserted, cut) = workspace.once("insert", |unit| {

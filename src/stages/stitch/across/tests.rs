@@ -52,12 +52,7 @@ fn across(starved: bool) -> (Left, [usize; 2]) {
     };
     let seen = cells(&store, tiles, options, workspace).unwrap().0;
     let triples = triples(&seen, blocks, workspace).unwrap().0;
-    let places = Places {
-        shape: &store,
-        file: &store,
-        density: None,
-        outside: None,
-    };
+    let places = Places::new(&store, None, None, None);
     let division = Some(crate::surface::evidence::Division::default());
     let (base, _) = base(places, &triples, blocks, division, workspace).unwrap();
     let interior = Interior::new(blocks.count());
