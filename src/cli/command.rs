@@ -10,19 +10,21 @@ use std::path::PathBuf;
 
 /// Turns point clouds of any size into clean triangle meshes within a memory budget.
 #[derive(Debug, Parser)]
-#[command(version, long_version = VERSION, about, long_about = LONG_ABOUT, max_term_width = 100, after_help = after_help())]
+#[command(version, long_version = version(), about, long_about = LONG_ABOUT, max_term_width = 100, after_help = after_help())]
 pub struct Args {
     #[command(subcommand)]
     pub command: Command,
 }
 
-/// The versions of the program and of its method.
-const VERSION: &str = concat!(
-    env!("CARGO_PKG_VERSION"),
-    " (method ",
-    method_version!(),
-    ")"
-);
+/// The versions of the program and of its method, and the build.
+fn version() -> String {
+    format!(
+        "{} (method {}, commit {})",
+        env!("CARGO_PKG_VERSION"),
+        method_version!(),
+        env!("OUTCROP_COMMIT"),
+    )
+}
 
 const LONG_ABOUT: &str = "Turns point clouds of any size into clean triangle meshes, inside the \
 memory you give it.

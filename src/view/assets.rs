@@ -15,28 +15,28 @@ pub struct Asset {
 pub const PAGE: Asset = Asset {
     name: "",
     kind: "text/html; charset=utf-8",
-    bytes: include_bytes!("../../tools/viewer/dist/index.html"),
+    bytes: include_bytes!("dist/index.html"),
 };
 
 /// The program of the page.
 pub const SCRIPT: Asset = Asset {
     name: "viewer.js",
     kind: "text/javascript; charset=utf-8",
-    bytes: include_bytes!("../../tools/viewer/dist/viewer.js"),
+    bytes: include_bytes!("dist/viewer.js"),
 };
 
 /// The look of the page.
 pub const STYLE: Asset = Asset {
     name: "viewer.css",
     kind: "text/css; charset=utf-8",
-    bytes: include_bytes!("../../tools/viewer/dist/viewer.css"),
+    bytes: include_bytes!("dist/viewer.css"),
 };
 
 /// Licences of what the program of the page contains.
 pub const LICENCES: Asset = Asset {
     name: "THIRD-PARTY.txt",
     kind: "text/plain; charset=utf-8",
-    bytes: include_bytes!("../../tools/viewer/dist/THIRD-PARTY.txt"),
+    bytes: include_bytes!("dist/THIRD-PARTY.txt"),
 };
 
 /// All files of the page.

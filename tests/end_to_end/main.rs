@@ -2,6 +2,7 @@
 
 mod attributes;
 mod bad_input;
+mod built;
 mod cli;
 mod compressed;
 mod coordinates;
