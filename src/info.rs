@@ -1,12 +1,15 @@
 //! Description of a cloud, and estimates for a run on it.
 
+#[cfg(feature = "pages")]
+mod drawing;
+
 use crate::params::Params;
 use crate::pipeline::Known;
+#[cfg(feature = "pages")]
+pub use drawing::{Illustration, illustrated};
 use outcrop_disk::error::Result;
 use outcrop_disk::workspace::Workspace;
 use outcrop_disk::workspace::memory::MINIMUM_BUDGET;
-use outcrop_draw::cloud;
-pub use outcrop_draw::cloud::Illustration;
 use outcrop_draw::histogram::Tally;
 use outcrop_geom::aabb::Aabb;
 use outcrop_geom::lattice::Lattice;
@@ -89,27 +92,30 @@ pub struct Info {
 /// # Errors
 /// As for a reconstruction, but a cloud that is too small for a surface is no error.
 pub fn info(inputs: &[PathBuf], params: &Params, workspace: &Workspace) -> Result<Info> {
-    described(inputs, params, false, workspace).map(|(info, _)| info)
+    described(inputs, params, None, workspace)
 }
 
-/// As [`info`], with pictures and counts for [`crate::page::cloud`].
-///
-/// # Errors
-/// See [`info`].
-pub fn illustrated(
-    inputs: &[PathBuf],
-    params: &Params,
-    workspace: &Workspace,
-) -> Result<(Info, Illustration)> {
-    described(inputs, params, true, workspace)
+/// Draws the cloud while it is described.
+trait Sketch {
+    /// Counts what the spool tells.
+    fn count(&mut self, spool: &Spool, lattice: &Lattice, workspace: &Workspace) -> Result<()>;
+
+    /// Draws the points; `spacings` are squared distances to the nearest point.
+    fn draw(
+        &mut self,
+        store: &PointStore,
+        lattice: &Lattice,
+        spacings: &Tally,
+        workspace: &Workspace,
+    ) -> Result<()>;
 }
 
 fn described(
     inputs: &[PathBuf],
     params: &Params,
-    drawn: bool,
+    mut sketch: Option<&mut dyn Sketch>,
     workspace: &Workspace,
-) -> Result<(Info, Illustration)> {
+) -> Result<Info> {
     let start = Instant::now();
     let observer = &workspace.observer;
     observer.begin("ingest", "points", 0);
@@ -122,10 +128,10 @@ fn described(
     let selection = Selection {
         scanners: false,
         depths: true,
-        attributes: match drawn {
+        attributes: match sketch {
             // A list would have to be of columns that are there.
-            true => Attributes::Auto,
-            false => Attributes::None,
+            Some(_) => Attributes::Auto,
+            None => Attributes::None,
         },
         ..params.selection()
     };
@@ -135,10 +141,9 @@ fn described(
     let input = spool.stats().clone();
     input.warnings.iter().for_each(|w| observer.warn(w));
     let lattice = spool.choose_lattice(0)?;
-    let classes = match drawn {
-        true => cloud::classes(&spool, &lattice, workspace)?,
-        false => Vec::new(),
-    };
+    if let Some(sketch) = &mut sketch {
+        sketch.count(&spool, &lattice, workspace)?;
+    }
     let double = spool.source_precision() == CoordinateType::F64;
     let spool_bytes = spool.bytes();
     observer.begin("order", "points", input.kept);
@@ -148,13 +153,9 @@ fn described(
     let read = start.elapsed().as_secs_f64();
     let sample = sample(&store, workspace)?;
     let Aabb { min, max } = store.bounds();
-    let illustration = match drawn {
-        true => Illustration {
-            classes,
-            ..Illustration::of(&store, &lattice, &sample.tally, workspace)?
-        },
-        false => Illustration::default(),
-    };
+    if let Some(sketch) = sketch {
+        sketch.draw(&store, &lattice, &sample.tally, workspace)?;
+    }
     let normals = normals(&spool, &lattice, (&stored, &store), workspace)?;
     stored.release(workspace)?;
     let points = store.len() as u64;
@@ -172,7 +173,7 @@ fn described(
         text: None,
     };
     let disk = known.estimate(&Params::default(), Path::new("mesh.ply"));
-    let info = Info {
+    Ok(Info {
         normals,
         duplicates,
         points,
@@ -189,8 +190,7 @@ fn described(
         output_bytes: disk.output,
         seconds: read + cells / workspace.threads as f64 * (1.0 + OTHER_STAGES),
         input,
-    };
-    Ok((info, illustration))
+    })
 }
 
 /// What is known about the normals of the points, if they were read and a file has any.

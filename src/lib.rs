@@ -57,6 +57,9 @@
 //!
 //! [`call`] runs the commands of the program inside another one.
 //!
+//! `levels`, `page`, `view`, `Tiles` and the pictures need the features `levels`, `pages` and `view`, which are on by
+//! default, like `e57` and `demo`.
+//!
 //! These items are the interface. The crates of which the program consists (`outcrop-geom`, `outcrop-disk`,
 //! `outcrop-points`, `outcrop-stages` and others) change without notice; `ARCHITECTURE.md` has their map.
 
@@ -65,15 +68,19 @@ pub mod cli;
 pub mod convert;
 #[cfg(feature = "faults")]
 mod faults;
+mod features;
 #[doc(hidden)]
 pub mod info;
+#[cfg(feature = "pages")]
 pub mod page;
 pub mod params;
 mod pipeline;
 pub mod report;
 
 pub use outcrop_disk::error;
+#[cfg(feature = "levels")]
 pub use outcrop_levels as levels;
+#[cfg(feature = "view")]
 pub use outcrop_view as view;
 
 /// Inspection of clouds and meshes without a reconstruction.
@@ -94,5 +101,7 @@ pub use params::{
     Division, Facing, InputNormals, MaxWidth, Method, Origin, Params, Radius, Region, Smooth,
     Smoothing,
 };
-pub use pipeline::{Builder, Reconstruction, Start, Tiles, default_memory, default_threads};
+#[cfg(feature = "levels")]
+pub use pipeline::Tiles;
+pub use pipeline::{Builder, Reconstruction, Start, default_memory, default_threads};
 pub use report::{DiskEstimate, Report};

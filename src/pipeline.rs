@@ -6,6 +6,7 @@ mod builder;
 mod checks;
 mod clock;
 mod disk;
+mod levels;
 mod manifest;
 mod origin;
 mod outlook;
@@ -13,6 +14,7 @@ mod resources;
 mod shared;
 mod stages;
 mod start;
+#[cfg(feature = "levels")]
 mod tiles;
 
 use crate::params::Params;
@@ -34,6 +36,7 @@ pub use start::Start;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
+#[cfg(feature = "levels")]
 pub use tiles::Tiles;
 
 /// A reconstruction that is ready to run, made by [`Reconstruction::builder`].
@@ -121,9 +124,7 @@ impl Reconstruction {
     /// run can be resumed, see [`Reconstruction::is_unfinished`].
     pub fn run(&self) -> Result<Report> {
         writable(&self.mesh)?;
-        self.tiles
-            .as_deref()
-            .map_or(Ok(()), outcrop_levels::check_folder)?;
+        self.tiles.as_deref().map_or(Ok(()), levels::check_folder)?;
         not_an_input(&self.mesh, self.params.split.is_some(), &self.inputs)?;
         one_system(&self.params, &self.inputs)?;
         let _alarm = self

@@ -4,9 +4,12 @@ use crate::params::Params;
 pub use histogram::{Bin, Histogram};
 pub use outcrop_disk::workspace::course::Sample;
 use outcrop_draw::histogram;
+#[cfg(feature = "pages")]
 pub use outcrop_draw::mesh::Drawn;
-use outcrop_draw::picture;
-use outcrop_levels::TilesReport;
+#[cfg(feature = "pages")]
+pub use outcrop_draw::picture::Picture;
+#[cfg(feature = "levels")]
+pub use outcrop_levels::TilesReport;
 pub use outcrop_mesh_files::cut::CutStats;
 pub use outcrop_mesh_files::export::{CoordinateType, MeshStats};
 pub use outcrop_points::{Attribute, IngestStats};
@@ -18,9 +21,20 @@ pub use outcrop_stages::smooth::RelaxStats;
 pub use outcrop_stages::stitch::{BaseStats, InsertStats};
 pub use outcrop_stages::thin::ThinStats;
 pub use outcrop_stages::triples::TripleStats;
-pub use picture::Picture;
 use serde::Serialize;
 use std::collections::BTreeMap;
+
+/// The levels of detail of a build that makes none.
+#[cfg(not(feature = "levels"))]
+#[derive(Debug, Clone, Serialize, serde::Deserialize)]
+pub enum TilesReport {}
+
+#[cfg(not(feature = "levels"))]
+impl std::fmt::Display for TilesReport {
+    fn fmt(&self, _: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match *self {}
+    }
+}
 
 /// All counts and measurements of a run. Keys are stable; new ones may be added.
 #[derive(Debug, Clone, Default, Serialize)]
@@ -110,6 +124,7 @@ pub struct Report {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub details: Option<Details>,
     /// The pictures, if they were asked for.
+    #[cfg(feature = "pages")]
     #[serde(skip)]
     pub pictures: Vec<Picture>,
 }

@@ -10,13 +10,14 @@ use std::path::Path;
 /// Each room, and the rooms of the same crate whose items it may use. A room is a folder or file of a crate with
 /// several steps, or of the program.
 const MAY_USE: &[(&str, &str)] = &[
-    ("cli", "faults info page params pipeline report"),
+    ("cli", "faults features info page params pipeline report"),
     ("convert", ""),
     ("faults", ""),
+    ("features", ""),
     ("info", "params pipeline"),
     ("page", "info report"),
     ("params", ""),
-    ("pipeline", "params report"),
+    ("pipeline", "features params report"),
     ("report", "params"),
     ("disk/error", ""),
     ("disk/spill", "disk/error disk/workspace"),

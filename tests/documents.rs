@@ -14,8 +14,9 @@ const SHORT: [(&str, usize); 2] = [("README.md", 200), ("ARCHITECTURE.md", 200)]
 const WIDTH: usize = 110;
 
 /// Options that documents give to other programs: cargo, scripts and tools.
-const OTHERS: [&str; 8] = [
+const OTHERS: [&str; 9] = [
     "--address",
+    "--draft",
     "--format",
     "--fraction",
     "--kind",

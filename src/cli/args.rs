@@ -236,6 +236,36 @@ pub struct Compare {
     pub limits: Limits,
 }
 
+/// `outcrop view`
+#[derive(Debug, ClapArgs)]
+#[command(
+    after_help = "The page is served to browsers on this machine only, until Ctrl-C. Nothing is fetched from elsewhere."
+)]
+pub struct View {
+    /// A folder that `outcrop tiles` made, or a mesh (PLY), of which levels of detail are made first
+    #[arg(value_name = "DIR|MESH.ply")]
+    pub mesh: PathBuf,
+    /// Port of the server [default: a free one]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub port: Option<u16>,
+    /// Only print the address, open no browser
+    #[arg(long)]
+    pub no_browser: bool,
+    /// Write one page that shows the coarser levels without a server, for sending, instead of serving
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["port", "no_browser"])]
+    pub html: Option<PathBuf>,
+    /// Largest size of that page
+    #[arg(long, value_name = "SIZE", default_value = "20MB", requires = "html", value_parser = size)]
+    pub html_limit: u64,
+    /// Keep the levels of detail of a mesh for the next time [without a folder: MESH-tiles beside the mesh]
+    #[arg(long, value_name = "DIR", num_args = 0..=1, require_equals = true)]
+    pub keep: Option<Option<PathBuf>>,
+    #[command(flatten)]
+    pub limits: Limits,
+    #[command(flatten)]
+    pub again: Again,
+}
+
 /// `outcrop demo`
 #[derive(Debug, ClapArgs)]
 pub struct Demo {

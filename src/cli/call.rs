@@ -24,14 +24,13 @@
 use super::command::{Args, Command};
 use super::{jobs, output};
 use crate::info::Info;
-use crate::report::Report;
+use crate::report::{Report, TilesReport};
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{ArgAction, CommandFactory, Parser};
 use outcrop_disk::error::{Error, Result};
 use outcrop_disk::workspace::progress::{Cancel, Observer};
 use outcrop_inspect::compare::Comparison;
 use outcrop_inspect::verify::Verdict;
-use outcrop_levels::TilesReport;
 use std::ffi::OsString;
 use std::path::PathBuf;
 use std::sync::Arc;

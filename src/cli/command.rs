@@ -1,8 +1,8 @@
 //! The commands and their help.
 
-use super::args::{Compare, Demo, Info, Reconstruct, Resume, Tiles, Verify};
+use super::args::{Compare, Demo, Info, Reconstruct, Resume, Tiles, Verify, View};
 use super::shared::{Advance, Plan, Status, Submit, Work};
-use super::view::View;
+use crate::features;
 use clap::{Parser, Subcommand};
 use clap_complete::Shell;
 use outcrop_geom::method::method_version;
@@ -16,13 +16,14 @@ pub struct Args {
     pub command: Command,
 }
 
-/// The versions of the program and of its method, and the build.
+/// The versions of the program and of its method, the commit, and the features.
 fn version() -> String {
     format!(
-        "{} (method {}, commit {})",
+        "{} (method {}, commit {}, {})",
         env!("CARGO_PKG_VERSION"),
         method_version!(),
         env!("OUTCROP_COMMIT"),
+        features::built(),
     )
 }
 

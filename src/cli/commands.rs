@@ -1,20 +1,17 @@
 //! The commands of the program: their work, and what they print.
 
-use super::args::{Compare, Demo, Info, Quiet, Reconstruct, Resume, Tiles, Verify};
+use super::args::{Compare, Info, Quiet, Reconstruct, Resume, Tiles, Verify};
 use super::command::Command;
+#[cfg(feature = "demo")]
+use super::demo;
 use super::ended::Ended;
-use super::jobs::{self, memory, threads};
-use super::output::{print, show, summary, write_report};
-use super::{manual, shared, stop, style, view};
-use crate::pipeline::{Reconstruction, Start};
-use outcrop_disk::error::{Error, Result};
-use outcrop_disk::workspace::Workspace;
-use outcrop_disk::workspace::memory::MemoryPool;
-use outcrop_disk::workspace::progress::{Cancel, Silent};
-use outcrop_inspect::verify;
+use super::jobs;
+use super::output::{print, show, summary};
+#[cfg(feature = "view")]
+use super::view;
+use super::{manual, shared, stop};
+use outcrop_disk::error::Result;
 use std::io::IsTerminal;
-use std::path::Path;
-use std::sync::Arc;
 
 /// Runs a command.
 pub fn run(command: Command) -> Result<Ended> {
@@ -28,7 +25,7 @@ pub fn run(command: Command) -> Result<Ended> {
         Command::Compare(args) => measure(&args),
         Command::Tiles(args) => tiles(&args),
         Command::View(args) => view::run(&args),
-        Command::Demo(args) => demo(&args),
+        Command::Demo(args) => demo::run(&args),
         Command::Plan(args) => shared::plan(&args),
         Command::Status(args) => shared::status(&args),
         Command::Submit(args) => shared::submit(&args),
@@ -89,50 +86,22 @@ fn tiles(args: &Tiles) -> Result<bool> {
     Ok(true)
 }
 
-fn demo(args: &Demo) -> Result<bool> {
-    use outcrop_cloudgen::{Cloud, Format, Kind};
-    let folder = &args.folder;
-    std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, "make the folder", e))?;
-    let cloud = folder.join("bumpy.laz");
-    let format = Format::from_path(&cloud).map_err(|e| generator_error(&cloud, &e))?;
-    print(&format!(
-        "making {} points on a closed surface",
-        style::grouped(args.points)
-    ))?;
-    Cloud::new(Kind::Bumpy)
-        .points(args.points)
-        .write(&cloud, format)
-        .map_err(|e| generator_error(&cloud, &e))?;
-    let mesh = folder.join("bumpy.ply");
-    let (observer, cancel) = stop::watched(args.limits.quiet);
-    let report = Reconstruction::builder()
-        .input(&cloud)
-        .output(&mesh)
-        .threads(threads(&args.limits))
-        .memory(memory(&args.limits))
-        .observer(observer)
-        .start(Start::Restart)
-        .cancel(cancel)
-        .build()?
-        .run()?;
-    let path = folder.join("report.json");
-    write_report(&path, &report, &mesh)?;
-    print(&summary(&report, &mesh))?;
-    let memory = MemoryPool::new(memory(&args.limits))?;
-    let threads = threads(&args.limits);
-    let workspace = Workspace::new(folder, memory, threads, Arc::new(Silent), Cancel::new())?;
-    let verdict = verify::verify(&mesh, &workspace)?;
-    print(&verdict.to_string())?;
-    print(&format!(
-        "the cloud is {}, the mesh {} (open it in MeshLab, CloudCompare or Blender), the report {}",
-        cloud.display(),
-        mesh.display(),
-        path.display()
-    ))?;
-    Ok(verdict.manifold)
+#[cfg(not(feature = "demo"))]
+mod demo {
+    use super::super::args::Demo;
+    use outcrop_disk::error::Result;
+
+    pub fn run(_: &Demo) -> Result<bool> {
+        Err(crate::features::DEMO.missing())
+    }
 }
 
-fn generator_error(path: &Path, error: &outcrop_cloudgen::Error) -> Error {
-    let error = std::io::Error::other(error.to_string());
-    Error::io(path, "make the demo cloud", error)
+#[cfg(not(feature = "view"))]
+mod view {
+    use super::super::args::View;
+    use outcrop_disk::error::Result;
+
+    pub fn run(_: &View) -> Result<bool> {
+        Err(crate::features::VIEW.missing())
+    }
 }

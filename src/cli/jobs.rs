@@ -2,11 +2,15 @@
 
 use super::args::{Compare, Ends, Info, Limits, Reconstruct, Resume, Tiles as TilesArgs, Verify};
 use super::output::{NewFile, is_page, report_text};
+use super::pages;
+#[cfg(not(feature = "levels"))]
+use crate::features::LEVELS;
 use crate::info;
-use crate::page;
 use crate::params::Params;
-use crate::pipeline::{Builder, Reconstruction, Tiles, default_memory, default_threads};
-use crate::report::Report;
+#[cfg(feature = "levels")]
+use crate::pipeline::Tiles;
+use crate::pipeline::{Builder, Reconstruction, default_memory, default_threads};
+use crate::report::{Report, TilesReport};
 use outcrop_disk::error::{Error, Result};
 use outcrop_disk::workspace::Workspace;
 use outcrop_disk::workspace::memory::MemoryPool;
@@ -115,9 +119,7 @@ pub fn info(args: &Info, watch: Watch) -> Result<info::Info> {
         return info::info(&args.inputs, &params, &workspace);
     };
     let page = NewFile::page(path)?;
-    let (info, drawn) = info::illustrated(&args.inputs, &params, &workspace)?;
-    page.write(&page::cloud(&args.inputs, &info, &drawn))?;
-    Ok(info)
+    pages::info(page, &args.inputs, &params, &workspace)
 }
 
 /// Checks a mesh.
@@ -131,9 +133,7 @@ pub fn verify(args: &Verify, watch: Watch) -> Result<verify::Verdict> {
         return verify::verify_with(&args.mesh, &options, &workspace);
     };
     let page = NewFile::page(path)?;
-    let (verdict, drawn) = verify::illustrated(&args.mesh, &options, &workspace)?;
-    page.write(&page::verdict(&args.mesh, &verdict, &drawn))?;
-    Ok(verdict)
+    pages::verify(page, &args.mesh, &options, &workspace)
 }
 
 /// Measures the distance between two shapes.
@@ -146,13 +146,12 @@ pub fn compare(args: &Compare, watch: Watch) -> Result<compare::Comparison> {
         return compare::compare(a, b, &options, &workspace);
     };
     let page = NewFile::page(path)?;
-    let (comparison, drawn) = compare::illustrated(a, b, &options, &workspace)?;
-    page.write(&page::comparison(&comparison, &drawn))?;
-    Ok(comparison)
+    pages::compare(page, [a, b], &options, &workspace)
 }
 
 /// Makes levels of detail.
-pub fn tiles(args: &TilesArgs, (observer, cancel): Watch) -> Result<outcrop_levels::TilesReport> {
+#[cfg(feature = "levels")]
+pub fn tiles(args: &TilesArgs, (observer, cancel): Watch) -> Result<TilesReport> {
     let options = outcrop_levels::Options {
         geo: args.geo,
         crs: args.crs.clone(),
@@ -170,4 +169,9 @@ pub fn tiles(args: &TilesArgs, (observer, cancel): Watch) -> Result<outcrop_leve
         tiles = tiles.scratch(scratch);
     }
     tiles.run()
+}
+
+#[cfg(not(feature = "levels"))]
+pub fn tiles(_: &TilesArgs, _: Watch) -> Result<TilesReport> {
+    Err(LEVELS.missing())
 }

@@ -4,15 +4,19 @@ mod args;
 pub mod call;
 mod command;
 mod commands;
+#[cfg(feature = "demo")]
+mod demo;
 mod ended;
 mod jobs;
 mod manual;
 mod output;
+mod pages;
 mod parse;
 mod progress;
 mod shared;
 mod stop;
 mod style;
+#[cfg(feature = "view")]
 mod view;
 
 use clap::Parser;

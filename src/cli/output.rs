@@ -1,7 +1,7 @@
 //! Output of the commands: text, JSON, reports.
 
-use super::style;
-use crate::page;
+use super::{pages, style};
+use crate::features::PAGES;
 use crate::params::Smooth;
 use crate::report::Report;
 use outcrop_disk::error::{Error, Result, Setting};
@@ -56,10 +56,10 @@ pub fn is_page(path: &Path) -> bool {
 
 /// The report of a run, whose mesh is `mesh`, in the format that its name says.
 pub fn report_text(path: &Path, report: &Report, mesh: &Path) -> Result<String> {
-    Ok(match is_page(path) {
-        true => page::report(report, mesh),
-        false => json(report)? + "\n",
-    })
+    match is_page(path) {
+        true => pages::report(report, mesh),
+        false => Ok(json(report)? + "\n"),
+    }
 }
 
 /// Writes the report of a run.
@@ -83,6 +83,7 @@ impl<'a> NewFile<'a> {
 
     /// The same for a page, which has to be named so: nothing else is overwritten by mistake.
     pub fn page(path: &'a Path) -> Result<Self> {
+        PAGES.require()?;
         if !is_page(path) {
             return Err(Error::Parameter {
                 name: "--html",

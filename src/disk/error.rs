@@ -166,6 +166,16 @@ pub enum Error {
         /// What helps.
         remedies: Vec<Remedy>,
     },
+    /// A part of the program that was left out of this build is needed.
+    #[error("{}this outcrop was built without {what}: build it with --features {feature}", place(path.as_deref()))]
+    NotBuilt {
+        /// The file that needs it, if it is a file.
+        path: Option<PathBuf>,
+        /// The part.
+        what: &'static str,
+        /// The feature of the build that has it.
+        feature: &'static str,
+    },
     /// No error: the way in which a process of a run that tasks share leaves the stages. No run returns it.
     #[doc(hidden)]
     #[error("the next units of work are for tasks")]
@@ -181,6 +191,11 @@ pub enum Error {
 /// The rest of the run's units are for tasks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Left(());
+
+/// The file at the beginning of a message, if there is one.
+fn place(path: Option<&Path>) -> String {
+    path.map_or_else(String::new, |path| format!("{}: ", path.display()))
+}
 
 impl Error {
     /// True if a run that ended with this error can be resumed once the cause is removed.
@@ -204,6 +219,7 @@ impl Error {
             | Error::Locked { .. }
             | Error::Unfinished { .. }
             | Error::Mismatch { .. }
+            | Error::NotBuilt { .. }
             | Error::NotResumable { .. } => false,
         }
     }

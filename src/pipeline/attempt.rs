@@ -1,7 +1,7 @@
 //! One attempt at a run: its beginning, its time limit, and the removal of its scratch files.
 
 use super::manifest::Manifest;
-use super::{Reconstruction, Start, beside};
+use super::{Reconstruction, Start, beside, levels};
 use crossbeam_channel::{RecvTimeoutError, Sender, bounded};
 use outcrop_disk::error::{Error, Result};
 use outcrop_disk::workspace::progress::Cancel;
@@ -95,7 +95,7 @@ impl Reconstruction {
             // An unfinished mesh; if it cannot be deleted it does no harm.
             let _ = std::fs::remove_file(export::temporary(&self.mesh));
             if let Some(tiles) = &self.tiles {
-                outcrop_levels::remove_unfinished(tiles);
+                levels::remove_unfinished(tiles);
                 beside::remove(&self.mesh);
             }
             if self.params.split.is_some() {

@@ -1,9 +1,10 @@
 //! The builder of a reconstruction, with all checks before it begins.
 
-use super::Reconstruction;
 use super::manifest::Manifest;
 use super::resources::{Resources, resource_setters};
 use super::start::{Start, scratch_folder};
+use super::{Reconstruction, levels};
+use crate::features::PAGES;
 use crate::params::Params;
 use outcrop_disk::error::{Error, Remedy, Result, Setting};
 use outcrop_disk::workspace::memory::MemoryPool;
@@ -77,7 +78,7 @@ impl Builder {
     }
 
     /// The report has pictures, distributions, and the course of memory and disk: [`Report::pictures`](crate::Report::pictures) and
-    /// [`Report::details`](crate::Report::details), for [`crate::page::report`].
+    /// [`Report::details`](crate::Report::details), for `outcrop::page::report`.
     #[must_use]
     pub fn pictures(mut self, wanted: bool) -> Self {
         self.pictures = wanted;
@@ -93,7 +94,7 @@ impl Builder {
     /// Checks everything that can be checked in advance.
     ///
     /// # Errors
-    /// [`Error::Parameter`], [`Error::Memory`].
+    /// [`Error::Parameter`], [`Error::Memory`], [`Error::NotBuilt`].
     pub fn build(mut self) -> Result<Reconstruction> {
         self.params.check()?;
         let missing = |name, expected: &str| {
@@ -103,13 +104,16 @@ impl Builder {
                 expected: expected.into(),
             })
         };
+        if self.pictures {
+            PAGES.require()?;
+        }
         if self.inputs.is_empty() {
             return missing("INPUT", "at least one file or folder");
         }
         if self.output.as_os_str().is_empty() {
             return missing("output", "the path of the mesh");
         }
-        let tiles = tiles(&self.output, self.params.split.is_some())?;
+        let tiles = levels::folder(&self.output, self.params.split.is_some())?;
         let mesh = tiles.as_deref().map(mesh_of);
         let named = mesh.as_deref().unwrap_or(&self.output);
         if self.folder.is_some() && check_name(named, true).is_err() {
@@ -139,34 +143,6 @@ impl Builder {
             time_limit: self.time_limit,
             pictures: self.pictures,
         })
-    }
-}
-
-/// The folder of the tileset, if the output is one.
-fn tiles(output: &Path, split: bool) -> Result<Option<PathBuf>> {
-    if output
-        .file_name()
-        .is_none_or(|name| name != outcrop_levels::NAME)
-    {
-        return Ok(None);
-    }
-    let refuse = |found: String, expected: &str| {
-        Err(Error::Parameter {
-            name: "output",
-            found,
-            expected: expected.into(),
-        })
-    };
-    let folder = output
-        .parent()
-        .filter(|folder| folder.file_name().is_some());
-    match folder {
-        _ if split => refuse("a tileset of a mesh in squares".into(), "one of both"),
-        Some(folder) => Ok(Some(folder.to_path_buf())),
-        None => refuse(
-            output.display().to_string(),
-            "DIR/tileset.json, with the name of a folder",
-        ),
     }
 }
 

@@ -1,5 +1,6 @@
 //! Pictures of shapes: meshes as surfaces, samples in the colours of their distances.
 
+use super::Witness;
 use super::pages::{Item, Pages};
 use super::shape::{Items, Shape};
 use outcrop_disk::error::Result;
@@ -133,6 +134,15 @@ pub(super) struct Drawing {
     diagonal: f64,
 }
 
+impl Witness for Drawing {
+    fn take(&mut self, way: usize, p: V3, distance: f64) {
+        self.sketches[way].sample(p, distance, self.diagonal);
+        if self.diagonal > 0.0 {
+            self.tallies[way].add((distance / self.diagonal * PARTS) as u64);
+        }
+    }
+}
+
 impl Drawing {
     pub(super) fn of(a: &Shape, b: &Shape, diagonal: f64, workspace: &Workspace) -> Result<Self> {
         Ok(Self {
@@ -140,14 +150,6 @@ impl Drawing {
             tallies: Default::default(),
             diagonal,
         })
-    }
-
-    /// Takes a sample of a side.
-    pub(super) fn take(&mut self, way: usize, p: V3, distance: f64) {
-        self.sketches[way].sample(p, distance, self.diagonal);
-        if self.diagonal > 0.0 {
-            self.tallies[way].add((distance / self.diagonal * PARTS) as u64);
-        }
     }
 
     pub(super) fn finish(self, top: f64, workspace: &Workspace) -> Result<Illustration> {

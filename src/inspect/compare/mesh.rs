@@ -68,6 +68,7 @@ fn read_with(
 
 /// Reads a mesh without the faces that cannot be drawn: those that are no triangles, or have corners that do not
 /// exist or are not finite.
+#[cfg(feature = "pictures")]
 pub(super) fn read_sound(
     mesh: PlyMesh,
     path: &Path,

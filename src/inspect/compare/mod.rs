@@ -17,6 +17,7 @@
 
 mod cloud;
 mod corners;
+#[cfg(feature = "pictures")]
 mod drawing;
 mod figures;
 mod measure;
@@ -28,16 +29,19 @@ mod shape;
 mod tests;
 mod triangles;
 
+#[cfg(feature = "pictures")]
 pub use drawing::Illustration;
 use figures::DistanceRow;
 pub use figures::{Comparison, Distances, Figures};
 pub use shape::{Kind, Side};
 
+#[cfg(feature = "pictures")]
 use drawing::{Drawing, Sketch};
 use figures::Sums;
 use outcrop_codecs::ply_mesh::{PlyMesh, clearer, holds_faces};
 use outcrop_disk::error::{Error, Result};
 use outcrop_disk::workspace::Workspace;
+#[cfg(feature = "pictures")]
 use outcrop_draw::picture::Picture;
 use outcrop_geom::vector::Box3;
 use samples::Numbers;
@@ -89,23 +93,38 @@ fn read_side(
 /// [`Error::Parameter`] without samples; [`Error::Io`], [`Error::Corrupt`] from the scratch folder;
 /// [`Error::Memory`] if the free part of the budget is too small; [`Error::Cancelled`].
 pub fn compare(a: &Path, b: &Path, options: &Options, workspace: &Workspace) -> Result<Comparison> {
-    measured(a, b, options, false, workspace).map(|(comparison, _)| comparison)
+    measured(a, b, options, workspace, |_, _, _| Ok(())).map(|(comparison, ())| comparison)
 }
 
 /// As [`compare`], with pictures and distributions for `outcrop::page::comparison`.
 ///
 /// # Errors
 /// See [`compare`].
+#[cfg(feature = "pictures")]
 pub fn illustrated(
     a: &Path,
     b: &Path,
     options: &Options,
     workspace: &Workspace,
 ) -> Result<(Comparison, Illustration)> {
-    measured(a, b, options, true, workspace)
+    let draw = |a: &Shape, b: &Shape, diagonal: f64| Drawing::of(a, b, diagonal, workspace);
+    let (comparison, drawing) = measured(a, b, options, workspace, draw)?;
+    let illustration = drawing.finish(comparison.symmetric.figures.p99, workspace)?;
+    Ok((comparison, illustration))
+}
+
+/// Sees each distance between the two sides.
+trait Witness {
+    /// Takes a distance from the first side (0) or the second (1), and the position where it was measured.
+    fn take(&mut self, way: usize, position: [f64; 3], distance: f64);
+}
+
+impl Witness for () {
+    fn take(&mut self, _: usize, _: [f64; 3], _: f64) {}
 }
 
 /// Pictures of a mesh with marks; faces that cannot be drawn are left out.
+#[cfg(feature = "pictures")]
 pub(crate) fn marked(
     path: &Path,
     marks: &[[f64; 3]],
@@ -122,13 +141,14 @@ pub(crate) fn marked(
     sketch.pictures("Mesh", (0.0, 0.0), workspace)
 }
 
-fn measured(
+/// Measures, and shows each distance to the witness that `begin` makes of both sides and their diagonal.
+fn measured<W: Witness>(
     a: &Path,
     b: &Path,
     options: &Options,
-    drawn: bool,
     workspace: &Workspace,
-) -> Result<(Comparison, Illustration)> {
+    begin: impl FnOnce(&Shape, &Shape, f64) -> Result<W>,
+) -> Result<(Comparison, W)> {
     let Options { samples, seed } = *options;
     if samples == 0 {
         return Err(Error::Parameter {
@@ -145,15 +165,12 @@ fn measured(
     let (sorter, _held) = triangles::sorter(workspace, "compare.distances", buffer)?;
     let (min, max) = (a.side.min, a.side.max);
     let diagonal = Box3 { min, max }.diagonal();
-    let drawing = drawn.then(|| Drawing::of(&a, &b, diagonal, workspace));
-    let mut drawing = drawing.transpose()?;
+    let mut witness = begin(&a, &b, diagonal)?;
     let mut sums = [Sums::default(); 2];
     for (way, (from, to)) in [(&a, &b), (&b, &a)].into_iter().enumerate() {
         measure::distances(from, to, options, workspace, |sample, distance| {
             sums[way].add(&sample, distance);
-            if let Some(drawing) = &mut drawing {
-                drawing.take(way, sample.position, distance);
-            }
+            witness.take(way, sample.position, distance);
             if sample.counts {
                 sorter.push(&[DistanceRow::new(distance, way)])?;
             }
@@ -173,9 +190,7 @@ fn measured(
         most_samples: samples,
         seed,
     };
-    let top = comparison.symmetric.figures.p99;
-    let illustration = drawing.map(|drawing| drawing.finish(top, workspace));
-    Ok((comparison, illustration.transpose()?.unwrap_or_default()))
+    Ok((comparison, witness))
 }
 
 /// A point of a cloud and its distance to a shape.

@@ -21,6 +21,7 @@ const LEAST: u64 = 64;
 const MOST_PAGES: u64 = 1 << 17;
 
 /// Pages that one thread takes at a time.
+#[cfg(feature = "pictures")]
 const RUN: usize = 256;
 
 /// Items that share a box within a page.
@@ -107,6 +108,7 @@ impl<T: Item> Pages<T> {
     }
 
     /// Calls `each` with the first items of at most `most` pages.
+    #[cfg(feature = "pictures")]
     pub(super) fn some(&self, most: usize, mut each: impl FnMut(&T)) -> Result<()> {
         let mut items = Vec::new();
         for page in (0..self.count()).step_by(self.count().div_ceil(most).max(1)) {
@@ -117,6 +119,7 @@ impl<T: Item> Pages<T> {
     }
 
     /// Calls `each` with the items of every page, on all threads.
+    #[cfg(feature = "pictures")]
     pub(super) fn visit(&self, workspace: &Workspace, each: impl Fn(&[T]) + Sync) -> Result<()> {
         let (runs, bytes) = (self.count().div_ceil(RUN), self.page_bytes());
         workspace.for_each_unit(

@@ -13,6 +13,8 @@ mod buckets;
 mod collinear;
 mod contract;
 mod corners;
+#[cfg(feature = "pictures")]
+mod drawing;
 mod homes;
 mod intake;
 mod near;
@@ -27,7 +29,9 @@ mod tests;
 mod verdict;
 
 pub use bounds::Bounds;
-pub use places::{Illustration, Kind, Place};
+#[cfg(feature = "pictures")]
+pub use drawing::{Illustration, Place};
+pub use places::Kind;
 pub use verdict::Verdict;
 
 use homes::Division;
@@ -71,13 +75,14 @@ pub fn verify_with(mesh: &Path, options: &Options, workspace: &Workspace) -> Res
 ///
 /// # Errors
 /// See [`verify`].
+#[cfg(feature = "pictures")]
 pub fn illustrated(
     mesh: &Path,
     options: &Options,
     workspace: &Workspace,
 ) -> Result<(Verdict, Illustration)> {
     let (verdict, places) = examined(mesh, options, workspace)?;
-    let illustration = places::illustrate(mesh, places, &verdict, workspace)?;
+    let illustration = drawing::illustrate(mesh, places, &verdict, workspace)?;
     Ok((verdict, illustration))
 }
 

@@ -2,10 +2,15 @@
 
 use super::Stages;
 use super::shape::Shape;
-use crate::report::{Details, Drawn, Report};
-use outcrop_disk::error::{Error, Result};
+use crate::report::Report;
+#[cfg(feature = "pages")]
+use crate::report::{Details, Drawn};
+#[cfg(feature = "pages")]
+use outcrop_disk::error::Error;
+use outcrop_disk::error::Result;
 use outcrop_disk::workspace::course::Course;
 use outcrop_disk::workspace::limits;
+#[cfg(feature = "pages")]
 use outcrop_draw::mesh::{Finished, Subject, draw};
 use outcrop_geom::lattice::Lattice;
 use outcrop_mesh_files::cut::StoredPieces;
@@ -16,6 +21,7 @@ use outcrop_stages::repair::Repaired;
 impl Stages<'_> {
     /// Draws the mesh, if pictures are wanted. What it reads is deleted with the folder: a run that was resumed
     /// may want pictures when all else is finished.
+    #[cfg(feature = "pages")]
     pub fn draw(
         &mut self,
         store: &PointStore,
@@ -68,6 +74,19 @@ impl Stages<'_> {
             spacings,
             ..Details::default()
         });
+        Ok(())
+    }
+
+    /// Draws nothing: a build without pages refuses pictures before the run.
+    #[cfg(not(feature = "pages"))]
+    pub fn draw(
+        &mut self,
+        _: &PointStore,
+        _: &Shape,
+        _: &Repaired,
+        _: Option<&StoredPieces>,
+        _: &Lattice,
+    ) -> Result<()> {
         Ok(())
     }
 

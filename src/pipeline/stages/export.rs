@@ -1,7 +1,7 @@
 //! The last stage: the mesh file, the origin of its coordinates, and what is beside it.
 
-use super::super::beside;
 use super::super::origin::Steps;
+use super::super::{beside, levels};
 use super::Stages;
 use crate::params::Origin;
 use outcrop_disk::error::Result;
@@ -126,8 +126,7 @@ impl Stages<'_> {
         workspace.trim();
         let source = job.inputs.first().and_then(|input| input.file_name());
         let source = source.unwrap_or_default().to_string_lossy();
-        let options = outcrop_levels::Options::default();
-        let make = || outcrop_levels::tileset(&job.mesh, &source, folder, &options, workspace);
+        let make = || levels::make(&job.mesh, &source, folder, workspace);
         let triangles = self.report.mesh.triangles;
         self.report.tiles = Some(self.clock.stage("tiles", "triangles", triangles, make)?);
         Ok(())

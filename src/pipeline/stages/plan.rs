@@ -1,6 +1,6 @@
 //! The stages that are to come, for the progress.
 
-use super::super::outlook;
+use super::super::{levels, outlook};
 use super::Stages;
 use outcrop_mesh_files::export::is_compressed;
 
@@ -14,7 +14,7 @@ impl Stages<'_> {
         let compressed = job.params.compress_glb || is_compressed(&job.mesh);
         let mut stages = outlook::plan(&job.params, points, job.threads, valued, compressed);
         if job.tiles.is_some() {
-            stages.extend(outcrop_levels::outlook::of_points(points, job.threads));
+            stages.extend(levels::outlook(points, job.threads));
         }
         let first = stages.iter().rposition(|stage| Some(stage.name) == after);
         job.observer.plan(&stages[first.map_or(0, |at| at + 1)..]);
