@@ -14,13 +14,15 @@ const SHORT: [(&str, usize); 2] = [("README.md", 200), ("ARCHITECTURE.md", 200)]
 const WIDTH: usize = 110;
 
 /// Options that documents give to other programs: cargo, scripts and tools.
-const OTHERS: [&str; 9] = [
+const OTHERS: [&str; 11] = [
     "--address",
     "--draft",
+    "--features",
     "--format",
     "--fraction",
     "--kind",
     "--large",
+    "--no-default-features",
     "--seconds",
     "--strict",
     "--tried",
