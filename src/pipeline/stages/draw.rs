@@ -85,6 +85,7 @@ impl Stages<'_> {
         _: &Shape,
         _: &Repaired,
         _: Option<&StoredPieces>,
+        _: Blocks,
         _: &Lattice,
     ) -> Result<()> {
         Ok(())
