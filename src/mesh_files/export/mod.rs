@@ -279,6 +279,6 @@ fn no_triangles() -> Error {
     let smooth = Setting::Value("smooth", "2".to_owned());
     Error::no_triangles(why)
         .with(Remedy::Larger("radius"))
-        .with(Remedy::Give(smooth, "helps with noisy scans"))
+        .with(Remedy::Give(smooth, "for noisy scans"))
         .with(Remedy::Smaller("min_component"))
 }
