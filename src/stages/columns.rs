@@ -5,9 +5,10 @@
 //! column has a square base; there is about one for every 64 points.
 
 use crate::blocks::Blocks;
+use crate::ids::Id;
 use crate::order::PointStore;
 use outcrop_disk::error::Result;
-use outcrop_disk::spill::{Id, Table};
+use outcrop_disk::spill::Table;
 use outcrop_disk::workspace::Unit;
 use outcrop_disk::workspace::memory::bytes_of;
 use outcrop_geom::Point;
@@ -128,10 +129,10 @@ pub fn extreme(
     let bytes = |block: usize| 12 * blocks.ids(block).len() as u64;
     unit.for_each_unit("columns: block", blocks.count(), bytes, |unit| {
         let ids = blocks.ids(unit.number());
-        let points = store.slice(ids.start as usize..ids.end as usize)?;
+        let points = store.slice(ids.indices())?;
         let _held = unit.hold(bytes_of(&points));
-        for (id, p) in ids.zip(&points) {
-            let place = u64::from(direction.place(*p)) << 32 | u64::from(!id);
+        for (id, p) in ids.iter().zip(&points) {
+            let place = u64::from(direction.place(*p)) << 32 | u64::from(!id.get());
             let farthest = &farthest[columns.at(*p)];
             // Most points are not.
             if place > farthest.load(Ordering::Relaxed) {
@@ -142,14 +143,13 @@ pub fn extreme(
     })?;
     let places = farthest.iter().map(|place| place.load(Ordering::Relaxed));
     let places = places.filter(|place| *place != 0);
-    let mut ids: Vec<u32> = places.map(|place| !(place as u32)).collect();
+    let mut ids: Vec<Id> = places.map(|place| Id::new(!(place as u32))).collect();
     drop((farthest, reserved));
     let _held = unit.reserve("columns", bytes_of(&ids))?;
     ids.sort_unstable();
     let sections = Table::new(direction.table(), blocks.count());
     for part in ids.chunk_by(|a, b| blocks.of(*a) == blocks.of(*b)) {
-        let block = blocks.of(part[0]) as usize;
-        sections.put(unit, block, bytemuck::cast_slice(part))?;
+        sections.put(unit, blocks.of(part[0]).index(), part)?;
     }
     Ok(sections)
 }

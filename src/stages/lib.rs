@@ -12,6 +12,8 @@ macro_rules! adds {
     };
 }
 
+pub mod ids;
+
 pub mod order;
 
 pub mod tiles;

@@ -2,6 +2,7 @@
 
 use super::blocks::Blocks;
 use super::cells::CountedTriple;
+use super::ids::{Id, Ids, Triangle};
 use super::levels::Levels;
 use super::order::PointStore;
 use super::outside::Outside;
@@ -11,7 +12,6 @@ use outcrop_disk::workspace::memory::{bytes_of, table_bytes};
 use outcrop_geom::Point;
 use outcrop_geom::triangle::on_a_line;
 use rustc_hash::FxHashMap;
-use std::ops::Range;
 
 /// The two positions of every id: those that decide the connectivity, and those that are written to the file.
 /// They are the same store unless points were relaxed.
@@ -65,7 +65,7 @@ impl<'a> Places<'a> {
 
     /// True if there is noise at a point.
     #[must_use]
-    pub fn is_noisy(&self, id: u32) -> bool {
+    pub fn is_noisy(&self, id: Id) -> bool {
         self.density.is_some_and(|density| density.is_noisy(id))
     }
 
@@ -77,7 +77,7 @@ impl<'a> Places<'a> {
 
     /// Returns a test of triangles with the positions of their corners in the file: true if the corners are
     /// collinear or a side is too long.
-    pub fn unfit(&self) -> impl Fn([u32; 3], [Point; 3]) -> bool + Copy {
+    pub fn unfit(&self) -> impl Fn(Triangle, [Point; 3]) -> bool + Copy {
         let differ = self.differ();
         let is_long = self.density.map(Density::is_long);
         // Without relaxing, cells see no three collinear points.
@@ -96,9 +96,9 @@ impl<'a> Places<'a> {
 /// Positions of the vertices of a block and of some others.
 #[derive(Debug, Default)]
 pub struct Located {
-    ids: Range<u32>,
+    ids: Ids,
     own: Vec<Point>,
-    foreign: FxHashMap<u32, Point>,
+    foreign: FxHashMap<Id, Point>,
 }
 
 impl Located {
@@ -110,11 +110,11 @@ impl Located {
         store: &PointStore,
         blocks: Blocks,
         block: usize,
-        vertices: impl Iterator<Item = u32>,
+        vertices: impl Iterator<Item = Id>,
     ) -> Result<Self> {
         let ids = blocks.ids(block);
         let mut located = Self {
-            own: store.slice(ids.start as usize..ids.end as usize)?,
+            own: store.slice(ids.indices())?,
             ids,
             foreign: FxHashMap::default(),
         };
@@ -127,7 +127,7 @@ impl Located {
     #[must_use]
     pub fn of(points: &[Point]) -> Self {
         Self {
-            ids: 0..points.len() as u32,
+            ids: Ids::at(&(0..points.len())),
             own: points.to_vec(),
             foreign: FxHashMap::default(),
         }
@@ -137,10 +137,9 @@ impl Located {
     ///
     /// # Errors
     /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`].
-    pub fn add(&mut self, store: &PointStore, vertices: impl Iterator<Item = u32>) -> Result<()> {
-        let count = self.ids.len() as u32;
-        let is_far = |v: &u32| v.wrapping_sub(self.ids.start) >= count;
-        let mut far: Vec<u32> = vertices.filter(is_far).collect();
+    pub fn add(&mut self, store: &PointStore, vertices: impl Iterator<Item = Id>) -> Result<()> {
+        let is_far = |v: &Id| self.ids.find(*v) >= self.ids.len();
+        let mut far: Vec<Id> = vertices.filter(is_far).collect();
         far.sort_unstable();
         far.dedup();
         let mut points = Vec::with_capacity(far.len());
@@ -164,8 +163,8 @@ impl Located {
     /// The position of a vertex that was loaded.
     #[must_use]
     #[inline(always)]
-    pub fn at(&self, v: u32) -> Point {
-        match self.own.get(v.wrapping_sub(self.ids.start) as usize) {
+    pub fn at(&self, v: Id) -> Point {
+        match self.own.get(self.ids.find(v)) {
             Some(point) => *point,
             None => self.foreign(v),
         }
@@ -174,13 +173,13 @@ impl Located {
     /// The positions of the corners of a triangle.
     #[must_use]
     #[inline(always)]
-    pub fn corners(&self, [a, b, c]: [u32; 3]) -> [Point; 3] {
+    pub fn corners(&self, [a, b, c]: Triangle) -> [Point; 3] {
         [self.at(a), self.at(b), self.at(c)]
     }
 
     #[cold]
     #[inline(never)]
-    fn foreign(&self, v: u32) -> Point {
+    fn foreign(&self, v: Id) -> Point {
         self.foreign[&v]
     }
 }

@@ -3,6 +3,7 @@
 
 use super::attributes::StoredNormals;
 use super::blocks::Blocks;
+use super::ids::{Id, Ids};
 use crate::order::PointStore;
 use outcrop_disk::error::Result;
 use outcrop_disk::workspace::memory::bytes_of;
@@ -12,7 +13,6 @@ use outcrop_geom::plane::Normal;
 use outcrop_geom::{Point, sub};
 use outcrop_points::direction;
 use serde::{Deserialize, Serialize};
-use std::ops::Range;
 
 /// What is done with the normals of the input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -76,11 +76,11 @@ impl<'a> Normals<'a> {
     ///
     /// # Errors
     /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`].
-    pub fn open(&self, unit: &Unit<'_>, ids: Range<u32>) -> Result<Given> {
+    pub fn open(&self, unit: &Unit<'_>, ids: Ids) -> Result<Given> {
         Ok(Given {
-            ids: ids.clone(),
+            ids: ids,
             blocks: self.blocks,
-            words: self.stored.open(unit, ids)?,
+            words: self.stored.open(unit, ids.iter())?,
         })
     }
 
@@ -88,7 +88,7 @@ impl<'a> Normals<'a> {
     ///
     /// # Errors
     /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`].
-    pub fn fetch(&self, unit: &Unit<'_>, ids: &[u32]) -> Result<Vec<Option<Normal>>> {
+    pub fn fetch(&self, unit: &Unit<'_>, ids: &[Id]) -> Result<Vec<Option<Normal>>> {
         let words = self.stored.open(unit, ids.iter().copied())?;
         Ok(words
             .as_chunks()
@@ -122,7 +122,7 @@ fn is_beside(normal: Normal, d: [i64; 3]) -> bool {
 /// The normals of consecutive points.
 #[derive(Debug)]
 pub struct Given {
-    ids: Range<u32>,
+    ids: Ids,
     blocks: Blocks,
     words: Vec<u32>,
 }
@@ -136,21 +136,20 @@ impl Given {
 
     /// The ids.
     #[must_use]
-    pub fn ids(&self) -> Range<u32> {
-        self.ids.clone()
+    pub fn ids(&self) -> Ids {
+        self.ids
     }
 
     /// The normal of a point, about as long as that of a plane.
     #[must_use]
     #[inline]
-    pub fn of(&self, id: u32) -> Option<Normal> {
-        let number = id.checked_sub(self.ids.start)? as usize;
-        normal(*self.words.as_chunks().0.get(number)?)
+    pub fn of(&self, id: Id) -> Option<Normal> {
+        normal(*self.words.as_chunks().0.get(self.ids.find(id))?)
     }
 
     /// The normal of a point as a unit vector.
     #[must_use]
-    pub fn unit(&self, id: u32) -> Option<[f64; 3]> {
+    pub fn unit(&self, id: Id) -> Option<[f64; 3]> {
         let n = self.of(id)?.map(f64::from);
         let length = (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]).sqrt();
         Some(n.map(|x| x / length))
@@ -159,12 +158,15 @@ impl Given {
     /// True if a point has a normal, and most points beside it agree with its side: those behind it on the curve, of
     /// its run in its block, that have a normal and are not on another sheet. `at` has their positions.
     #[must_use]
-    pub fn agrees(&self, id: u32, at: impl Fn(u32) -> Point) -> bool {
+    pub fn agrees(&self, id: Id, at: impl Fn(Id) -> Point) -> bool {
         let Some(own) = self.of(id) else { return false };
-        let end = self.blocks.ids(self.blocks.of(id) as usize).end;
-        let run = id + 1..id.saturating_add(METHOD.curve.run as u32).min(end);
+        let end = self.blocks.ids(self.blocks.of(id).index()).end;
+        let run = Ids {
+            start: id.behind(1),
+            end: id.behind(METHOD.curve.run as u32).min(end),
+        };
         let (mut others, mut against) = (0, 0);
-        for other in run {
+        for other in run.iter() {
             if let Some(normal) = self.of(other)
                 && is_beside(own, sub(at(other), at(id)))
             {
@@ -178,8 +180,8 @@ impl Given {
 
 /// True for the points at which sides are examined: one of each number of points on the curve.
 #[must_use]
-pub fn is_sample(id: u32) -> bool {
-    u64::from(id).is_multiple_of(METHOD.orientation.column)
+pub fn is_sample(id: Id) -> bool {
+    u64::from(id.get()).is_multiple_of(METHOD.orientation.column)
 }
 
 /// What is known about the normals of a cloud.
@@ -222,9 +224,9 @@ struct Looked {
 
 impl Looked {
     fn of(given: &Given, points: &[Point]) -> Self {
-        let at = |id: u32| points[(id - given.ids.start) as usize];
+        let at = |id: Id| points[given.ids.place(id)];
         let mut looked = Self::default();
-        for id in given.ids() {
+        for id in given.ids().iter() {
             let normal = given.of(id);
             looked.missing += u64::from(normal.is_none());
             if let Some([_, _, z]) = normal.filter(|_| is_sample(id)) {
@@ -259,7 +261,7 @@ pub fn look(
     };
     let work = |unit: &Unit<'_>| {
         let ids = blocks.ids(unit.number());
-        let points = store.slice(ids.start as usize..ids.end as usize)?;
+        let points = store.slice(ids.indices())?;
         let given = normals.open(unit, ids)?;
         let _held = unit.hold(given.bytes() + bytes_of(&points));
         Ok(Looked::of(&given, &points))
@@ -295,7 +297,7 @@ mod tests {
             None => [u32::MAX, u32::MAX << 16],
         };
         Given {
-            ids: 0..normals.len() as u32,
+            ids: Ids::at(&(0..normals.len())),
             blocks: Blocks::new(normals.len(), block),
             words: normals.iter().flat_map(words).collect(),
         }
@@ -305,14 +307,14 @@ mod tests {
     const DOWN: Option<[i32; 3]> = Some([0, 0, -32767]);
 
     /// Places on a plane, four in a row.
-    fn flat(id: u32) -> Point {
-        [id as i32 % 4, id as i32 / 4, 0].map(|x| 10 * x)
+    fn flat(id: Id) -> Point {
+        [id.get() as i32 % 4, id.get() as i32 / 4, 0].map(|x| 10 * x)
     }
 
     #[test]
     fn a_quarter_may_disagree() {
         let mut all = vec![UP; 128];
-        let agrees = |all: &[_], block, id| given(all, block).agrees(id, flat);
+        let agrees = |all: &[_], block, id| given(all, block).agrees(Id::new(id), flat);
         assert!(agrees(&all, 100, 64));
         // Three of fifteen, and behind the run.
         (all[65], all[70], all[79], all[80]) = (DOWN, DOWN, DOWN, DOWN);
@@ -323,9 +325,9 @@ mod tests {
         all[65] = None;
         assert!(agrees(&all, 1000, 64) && !agrees(&all, 1000, 65));
         assert!(!agrees(&vec![UP; 128], 70, 64) && agrees(&vec![UP; 128], 71, 64));
-        assert_eq!(given(&all, 1000).of(71), Some([32767 << 9, 0, 0]));
-        assert_eq!(given(&all, 1000).unit(70), Some([0.0, 0.0, -1.0]));
-        assert_eq!(given(&all, 1000).of(128), None);
+        assert_eq!(given(&all, 1000).of(Id::new(71)), Some([32767 << 9, 0, 0]));
+        assert_eq!(given(&all, 1000).unit(Id::new(70)), Some([0.0, 0.0, -1.0]));
+        assert_eq!(given(&all, 1000).of(Id::new(128)), None);
     }
 
     #[test]
@@ -333,12 +335,12 @@ mod tests {
         let normals: Vec<_> = (0..128)
             .map(|id| if id % 2 == 0 { UP } else { DOWN })
             .collect();
-        let sheets = |id: u32| {
-            let [x, y, _] = flat(id / 2);
-            [x, y, 20 - 40 * (id as i32 % 2)]
+        let sheets = |id: Id| {
+            let [x, y, _] = flat(Id::new(id.get() / 2));
+            [x, y, 20 - 40 * (id.get() as i32 % 2)]
         };
         let given = given(&normals, 1000);
-        assert!(given.agrees(64, sheets) && !given.agrees(64, flat));
+        assert!(given.agrees(Id::new(64), sheets) && !given.agrees(Id::new(64), flat));
         for (d, beside) in [
             ([4000, 0, 1032], true),
             ([4000, 0, 1033], false),
@@ -364,7 +366,7 @@ mod tests {
         assert!(!Looked::default().oriented());
         let mut all = vec![UP; 300];
         (all[0], all[5], all[128]) = (None, None, DOWN);
-        let points: Vec<Point> = (0..300).map(flat).collect();
+        let points: Vec<Point> = (0..300).map(|id| flat(Id::new(id))).collect();
         let found = Looked::of(&given(&all, 100), &points);
         assert_eq!(
             (found.missing, found.sampled, found.agreeing, found.down),

@@ -3,16 +3,16 @@
 
 use super::blocks::Blocks;
 use super::columns::{Direction, extreme};
+use super::ids::{Id, Ids};
 use super::normals::{Given, Normals, is_sample};
 use super::order::PointStore;
 use super::scanners::{Scanners, Seen};
 use outcrop_disk::error::Result;
-use outcrop_disk::spill::{Id, Table};
+use outcrop_disk::spill::Table;
 use outcrop_disk::workspace::memory::bytes_of;
 use outcrop_disk::workspace::{Unit, Workspace};
 use outcrop_geom::Point;
 use serde::{Deserialize, Serialize};
-use std::ops::Range;
 
 /// The points at the ends of columns along the three axes.
 #[derive(Debug, Serialize, Deserialize)]
@@ -52,12 +52,11 @@ impl StoredExtremes {
     }
 
     /// The directions in which each point of a block is extreme, one bit each.
-    fn open(&self, unit: &Unit<'_>, block: usize, ids: &Range<u32>) -> Result<Vec<u8>> {
+    fn open(&self, unit: &Unit<'_>, block: usize, ids: Ids) -> Result<Vec<u8>> {
         let mut directions = vec![0; ids.len()];
         for (bit, table) in self.tables.iter().enumerate() {
-            let extreme: Vec<u32> = bytemuck::cast_vec(table.get(unit, block)?);
-            for id in extreme {
-                directions[(id - ids.start) as usize] |= 1 << bit;
+            for id in table.get(unit, block)? {
+                directions[ids.place(id)] |= 1 << bit;
             }
         }
         Ok(directions)
@@ -96,8 +95,8 @@ impl<'a> Told<'a> {
         normals + self.scanners.map_or(0, |scanners| scanners.bytes(ids))
     }
 
-    fn open(&self, unit: &Unit<'_>, ids: Range<u32>) -> Result<Heard<'a>> {
-        let normals = self.normals.map(|n| n.open(unit, ids.clone()));
+    fn open(&self, unit: &Unit<'_>, ids: Ids) -> Result<Heard<'a>> {
+        let normals = self.normals.map(|n| n.open(unit, ids));
         let scanners = self.scanners.map(|s| s.open(unit, ids));
         Ok(Heard {
             normals: normals.transpose()?,
@@ -119,22 +118,22 @@ impl Heard<'_> {
         normals + self.scanners.as_ref().map_or(0, Seen::bytes)
     }
 
-    fn normal(&self, id: u32) -> Option<[f64; 3]> {
+    fn normal(&self, id: Id) -> Option<[f64; 3]> {
         self.normals.as_ref()?.unit(id)
     }
 
-    fn has(&self, id: u32) -> bool {
+    fn has(&self, id: Id) -> bool {
         let seen = || self.scanners.as_ref().is_some_and(|seen| seen.has(id));
         self.normal(id).is_some() || seen()
     }
 
-    fn toward(&self, id: u32, from: Point) -> Option<[f64; 3]> {
+    fn toward(&self, id: Id, from: Point) -> Option<[f64; 3]> {
         let seen = || self.scanners.as_ref()?.toward(id, from);
         self.normal(id).or_else(seen)
     }
 
     /// True if a point has no normal, or one that agrees with those around it.
-    fn is_sure(&self, id: u32, at: impl Fn(u32) -> Point) -> bool {
+    fn is_sure(&self, id: Id, at: impl Fn(Id) -> Point) -> bool {
         let agrees = |given: &Given| given.of(id).is_none() || given.agrees(id, at);
         self.normals.as_ref().is_none_or(agrees)
     }
@@ -186,8 +185,8 @@ impl<'a> Outside<'a> {
             Self::Told(told) => Known::Heard(told.open(unit, ids)?),
             Self::Position(place) => Known::Position(place),
             Self::Extremes(stored) => Known::Extremes {
-                directions: stored.open(unit, block, &ids)?,
-                first: ids.start,
+                directions: stored.open(unit, block, ids)?,
+                ids,
                 stored,
             },
         })
@@ -203,8 +202,8 @@ pub enum Known<'a> {
     Position([i64; 3]),
     /// The points at the ends of columns.
     Extremes {
-        /// The id of the first point.
-        first: u32,
+        /// The ids of the block.
+        ids: Ids,
         /// The directions in which each point is extreme.
         directions: Vec<u8>,
         /// All of them.
@@ -225,7 +224,7 @@ impl Known<'_> {
 
     /// True if a point of the block does not face up even where it is the highest.
     #[must_use]
-    pub fn has(&self, id: u32) -> bool {
+    pub fn has(&self, id: Id) -> bool {
         match self {
             Self::Heard(heard) => heard.has(id),
             Self::Position(_) | Self::Extremes { .. } => true,
@@ -235,7 +234,7 @@ impl Known<'_> {
     /// As [`Known::toward`], for witnesses only: points at the ends of columns are few, of others one for a number of
     /// points is enough, and its normal must agree with those around it. `at` has the positions of the block.
     #[must_use]
-    pub fn witness(&self, id: u32, at: impl Fn(u32) -> Point) -> Option<[f64; 3]> {
+    pub fn witness(&self, id: Id, at: impl Fn(Id) -> Point) -> Option<[f64; 3]> {
         let is_one = match self {
             Self::Heard(heard) => is_sample(id) && heard.is_sure(id, &at),
             Self::Position(_) => is_sample(id),
@@ -246,16 +245,16 @@ impl Known<'_> {
 
     /// The unit vector out of the surface at a point of the block, at `from`; none if that is not known.
     #[must_use]
-    pub fn toward(&self, id: u32, from: Point) -> Option<[f64; 3]> {
+    pub fn toward(&self, id: Id, from: Point) -> Option<[f64; 3]> {
         match self {
             Self::Heard(heard) => heard.toward(id, from),
             Self::Position(place) => super::scanners::toward(*place, from),
             Self::Extremes {
-                first,
+                ids,
                 directions,
                 stored,
             } => {
-                let directions = directions.get((id - first) as usize)?;
+                let directions = directions.get(ids.place(id))?;
                 stored.toward(*directions)
             }
         }

@@ -2,13 +2,13 @@
 //! of every surface that it saw.
 
 use super::attributes::StoredScanners;
+use super::ids::{Id, Ids};
 use outcrop_disk::error::Result;
 use outcrop_disk::workspace::Unit;
 use outcrop_disk::workspace::memory::bytes_of;
 use outcrop_geom::Point;
 use outcrop_geom::aabb::Aabb;
 use outcrop_geom::lattice::Lattice;
-use std::ops::Range;
 
 /// A position farther from the box around all points than this number of its diagonals is no scanner's.
 const MOST_DIAGONALS: i128 = 100;
@@ -78,9 +78,9 @@ impl<'a> Scanners<'a> {
     ///
     /// # Errors
     /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`].
-    pub fn open(&self, unit: &Unit<'_>, ids: Range<u32>) -> Result<Seen<'a>> {
+    pub fn open(&self, unit: &Unit<'_>, ids: Ids) -> Result<Seen<'a>> {
         Ok(Seen {
-            first: ids.start,
+            ids,
             numbers: self.stored.open(unit, ids)?,
             places: self.places,
         })
@@ -90,7 +90,7 @@ impl<'a> Scanners<'a> {
 /// The scanners of the points of a block.
 #[derive(Debug)]
 pub struct Seen<'a> {
-    first: u32,
+    ids: Ids,
     numbers: Vec<u32>,
     places: &'a [Option<[i64; 3]>],
 }
@@ -103,21 +103,21 @@ impl Seen<'_> {
     }
 
     /// The place of the scanner that saw a point of the block.
-    fn of(&self, id: u32) -> Option<[i64; 3]> {
-        let number = self.numbers.get((id - self.first) as usize)?;
+    fn of(&self, id: Id) -> Option<[i64; 3]> {
+        let number = self.numbers.get(self.ids.place(id))?;
         let place = self.places.get(number.checked_sub(1)? as usize);
         place.copied().flatten()
     }
 
     /// True if the scanner that saw a point of the block is known.
     #[must_use]
-    pub fn has(&self, id: u32) -> bool {
+    pub fn has(&self, id: Id) -> bool {
         self.of(id).is_some()
     }
 
     /// The unit vector from a point of the block, at `from`, to the scanner that saw it.
     #[must_use]
-    pub fn toward(&self, id: u32, from: Point) -> Option<[f64; 3]> {
+    pub fn toward(&self, id: Id, from: Point) -> Option<[f64; 3]> {
         toward(self.of(id)?, from)
     }
 }
@@ -178,16 +178,17 @@ mod tests {
     fn vectors_have_unit_length() {
         let places = [Some([4, -3, 12]), None];
         let seen = Seen {
-            first: 5,
+            ids: Ids::of(5..10),
             numbers: vec![1, 2, 0, 3, 1],
             places: &places,
         };
         let vector = [4.0 / 13.0, -3.0 / 13.0, 12.0 / 13.0];
-        assert_eq!(seen.toward(5, [0; 3]), Some(vector));
-        assert_eq!(seen.toward(9, [4, -3, 0]), Some([0.0, 0.0, 1.0]));
+        let seen = |id, from| seen.toward(Id::new(id), from);
+        assert_eq!(seen(5, [0; 3]), Some(vector));
+        assert_eq!(seen(9, [4, -3, 0]), Some([0.0, 0.0, 1.0]));
         for unknown in [6, 7, 8] {
-            assert_eq!(seen.toward(unknown, [0; 3]), None);
+            assert_eq!(seen(unknown, [0; 3]), None);
         }
-        assert_eq!(seen.toward(5, [4, -3, 12]), None);
+        assert_eq!(seen(5, [4, -3, 12]), None);
     }
 }

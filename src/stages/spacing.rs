@@ -1,5 +1,6 @@
 //! Local spacing by patch, and the limits of length that follow from it.
 
+use crate::ids::{Id, Triangle};
 use crate::levels::Levels;
 use outcrop_disk::error::Result;
 use outcrop_disk::workspace::Workspace;
@@ -156,8 +157,8 @@ impl StoredSpacings {
     /// The squared distance that the nearest neighbours of a point usually reach.
     #[must_use]
     #[inline(always)]
-    pub fn usual2(&self, id: u32) -> u64 {
-        self.usual2[id as usize / METHOD.curve.patch]
+    pub fn usual2(&self, id: Id) -> u64 {
+        self.usual2[id.index() / METHOD.curve.patch]
     }
 }
 
@@ -165,15 +166,15 @@ impl Spacings {
     /// See [`StoredSpacings::usual2`].
     #[must_use]
     #[inline(always)]
-    pub fn usual2(&self, id: u32) -> u64 {
+    pub fn usual2(&self, id: Id) -> u64 {
         self.stored.usual2(id)
     }
 }
 
 impl Density<'_> {
     /// The squared reach of neighbours that is usual for a point: that of its patch, or more for a coarse point.
-    fn reach2(&self, id: u32) -> u64 {
-        let level = self.coarse.map_or(0, |coarse| coarse.get(id as usize));
+    fn reach2(&self, id: Id) -> u64 {
+        let level = self.coarse.map_or(0, |coarse| coarse.get(id.index()));
         let usual2 = self.spacings.usual2(id);
         usual2.saturating_mul(COARSER[usize::from(level)])
     }
@@ -181,9 +182,9 @@ impl Density<'_> {
     /// How a point with the plane `normal` through its neighbours lies to them. The last of its `k` nearest is
     /// at the squared distance `last2`.
     #[must_use]
-    pub fn standing(&self, id: u32, last2: u64, moments: &Moments, normal: Normal) -> Standing {
+    pub fn standing(&self, id: Id, last2: u64, moments: &Moments, normal: Normal) -> Standing {
         let coarseness = coarseness(last2, self.spacings.usual2(id));
-        let region2 = self.spacings.stored.regions2[id as usize / METHOD.curve.block as usize];
+        let region2 = self.spacings.stored.regions2[id.index() / METHOD.curve.block as usize];
         let far = self.limits.off_surface && is_far(last2, region2);
         if far && (moments.fill_space(normal) || moments.is_beside(normal, last2)) {
             Standing::Off
@@ -194,26 +195,26 @@ impl Density<'_> {
         }
     }
 
-    fn noise_at(&self, id: u32) -> u8 {
-        self.noise.map_or(0, |noise| noise.get(id as usize))
+    fn noise_at(&self, id: Id) -> u8 {
+        self.noise.map_or(0, |noise| noise.get(id.index()))
     }
 
     /// True if there is noise at a point.
     #[must_use]
-    pub fn is_noisy(&self, id: u32) -> bool {
+    pub fn is_noisy(&self, id: Id) -> bool {
         self.noise_at(id) > 0
     }
 
     /// Returns a test of triangles: true if a side is longer than the limit at both of its ends.
-    pub fn is_long(self) -> impl Fn([u32; 3], [Point; 3]) -> bool + Copy {
+    pub fn is_long(self) -> impl Fn(Triangle, [Point; 3]) -> bool + Copy {
         let (density, width) = (self, self.limits.edge);
         let sure = self.surely_within(width);
         #[inline(always)]
-        move |t: [u32; 3], at: [Point; 3]| {
+        move |t: Triangle, at: [Point; 3]| {
             // The square of the third side is at most twice the sum of the squares of the other two.
             let two = distance2(at[0], at[1]) as f64 + distance2(at[0], at[2]) as f64;
             // Coarse points have larger limits.
-            let usual2 = |v: u32| density.spacings.usual2(v);
+            let usual2 = |v: Id| density.spacings.usual2(v);
             let least = usual2(t[0]).min(usual2(t[1])).min(usual2(t[2]));
             2.0 * two > sure * least as f64 && density.exceeds(width, t, at)
         }
@@ -231,7 +232,7 @@ impl Density<'_> {
     /// True if a triangle is too wide to fill a hole: it has a side much longer than the limit at both of its
     /// ends, or a larger area than an equilateral triangle with sides of the limit.
     #[must_use]
-    pub fn is_wide(&self, t: [u32; 3], at: [Point; 3]) -> bool {
+    pub fn is_wide(&self, t: Triangle, at: [Point; 3]) -> bool {
         let width = self.limits.fill;
         let most = |usual2: u64| 0.25 * 3f64.sqrt() * self.square(width, usual2);
         let usual2 = t.map(|v| self.reach2(v));
@@ -250,7 +251,7 @@ impl Density<'_> {
     }
 
     #[cold]
-    fn exceeds(&self, width: Width, t: [u32; 3], at: [Point; 3]) -> bool {
+    fn exceeds(&self, width: Width, t: Triangle, at: [Point; 3]) -> bool {
         let long = |(a, b): (usize, usize)| {
             let usual2 = self.reach2(t[a]).max(self.reach2(t[b]));
             distance2(at[a], at[b]) as f64 > self.square(width, usual2)
@@ -284,7 +285,7 @@ mod tests {
             let edge = if steps { Width::Steps(limit) } else { Width::Spacings(limit) };
             let limits = Limits { off_surface: true, edge, fill: Width::Any };
             let density = Density { spacings: &spacings, noise: None, coarse: None, neighbors: 30, limits };
-            let t = [0, 1, 2].map(|patch| patch * METHOD.curve.patch as u32 + 7);
+            let t = [0, 1, 2].map(|patch| Id::at(patch * METHOD.curve.patch + 7));
             prop_assert_eq!(density.is_long()(t, at), density.exceeds(edge, t, at));
         }
     }

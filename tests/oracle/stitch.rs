@@ -12,14 +12,15 @@ use outcrop_disk::workspace::progress::{Cancel, Silent};
 use outcrop_mesh_files::export::{CoordinateType, ExportOptions, export};
 use outcrop_stages::attributes::StoredScanners;
 use outcrop_stages::blocks::Blocks;
-use outcrop_stages::cells::{CountedTriple, SentTriple};
+use outcrop_stages::cells::CountedTriple;
+use outcrop_stages::ids::{Block, triangle};
 use outcrop_stages::located::Places;
 use outcrop_stages::order::{Orderer, PointStore, StoreWriter};
 use outcrop_stages::outside::{Outside, StoredExtremes, Told};
 use outcrop_stages::repair::{RepairOptions, repair};
 use outcrop_stages::scanners::Scanners;
 use outcrop_stages::stitch::{StitchOptions, stitch};
-use outcrop_stages::triples::Triples;
+use outcrop_stages::triples::{Triples, VisitingTriple};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -69,22 +70,15 @@ fn tables(all: &BTreeMap<[u32; 3], u32>, blocks: Blocks, workspace: &Workspace) 
     let own = outcrop_disk::spill::Table::new("own", blocks.count());
     let visiting = outcrop_disk::spill::Shuffle::new("visiting");
     let unit = workspace.unit();
-    for block in 0..blocks.count() as u32 {
-        let first = all.iter().filter(|(t, _)| blocks.of(t[0]) == block);
-        let first = first.map(|(&triple, &count)| CountedTriple { triple, count });
-        own.put(&unit, block as usize, &first.collect::<Vec<_>>())
-            .unwrap();
-        let visits = all
-            .iter()
-            .filter(|(t, _)| blocks.visited(**t).any(|b| b == block));
-        let visits = visits.map(|(&triple, &count)| SentTriple {
-            to: block,
-            triple,
-            count,
-        });
-        visiting
-            .send(&unit, block as usize, visits.collect())
-            .unwrap();
+    let all = || all.iter().map(|(t, &count)| (triangle(*t), count));
+    for block in 0..blocks.count() {
+        let to = Block::at(block);
+        let first = all().filter(|(t, _)| blocks.of(t[0]) == to);
+        let first = first.map(|(triple, count)| CountedTriple { triple, count });
+        own.put(&unit, block, &first.collect::<Vec<_>>()).unwrap();
+        let visits = all().filter(|(t, _)| blocks.visited(*t).any(|b| b == to));
+        let visits = visits.map(|(triple, count)| VisitingTriple { to, triple, count });
+        visiting.send(&unit, block, visits.collect()).unwrap();
     }
     Triples { own, visiting }
 }

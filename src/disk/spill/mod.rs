@@ -18,7 +18,7 @@ mod table;
 pub use local::LocalTable;
 pub use release::release;
 pub use row::row;
-pub use row::{Id, Row, Word};
+pub use row::{Row, Word};
 pub use shuffle::{Inbox, Shuffle};
 pub use sorter::{Sorted, SortedRuns, Sorter};
 pub use table::Table;

@@ -106,12 +106,3 @@ macro_rules! __row {
     };
 }
 pub use __row as row;
-
-row! {
-    /// An id in a list of ids.
-    pub struct Id {
-        /// The id of a point.
-        id: u32,
-    }
-    packed Above
-}

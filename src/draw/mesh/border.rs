@@ -6,12 +6,13 @@ use outcrop_disk::error::Result;
 use outcrop_disk::spill::{LocalTable, Sorted, row};
 use outcrop_disk::workspace::Workspace;
 use outcrop_geom::Point;
+use outcrop_stages::ids::Id;
 
 row! {
     /// An edge that has one triangle in a part.
     pub struct BorderEdge {
         /// Ids of its ends, ascending.
-        ends: [u32; 2],
+        ends: [Id; 2],
         /// Their positions.
         at: [[i32; 3]; 2],
     }
@@ -29,8 +30,8 @@ pub(super) const BATCH: usize = 4096;
 
 /// Mixes the bits of an id, so that sums over different sets of ids differ.
 #[inline]
-fn mix(id: u32) -> u64 {
-    let mut x = (u64::from(id) + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+fn mix(id: Id) -> u64 {
+    let mut x = (u64::from(id.get()) + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     x ^ (x >> 27)
 }
@@ -38,7 +39,7 @@ fn mix(id: u32) -> u64 {
 /// The edges of a part with one triangle in it. In a closed fan every neighbour follows one triangle and precedes
 /// another, so the difference of both sums is zero; edges between two such vertices need not be looked at.
 pub(super) fn of_part(part: &Part) -> Vec<BorderEdge> {
-    let own = |v: u32| v.wrapping_sub(part.ids.start) as usize;
+    let own = |v: Id| part.ids.find(v);
     let mut sums = vec![0u64; part.ids.len()];
     for t in &part.triangles {
         let mixed = t.map(mix);
@@ -49,8 +50,8 @@ pub(super) fn of_part(part: &Part) -> Vec<BorderEdge> {
             }
         }
     }
-    let is_open = |v: u32| sums.get(own(v)).is_none_or(|sum| *sum != 0);
-    let mut found: Vec<[u32; 2]> = Vec::new();
+    let is_open = |v: Id| sums.get(own(v)).is_none_or(|sum| *sum != 0);
+    let mut found: Vec<[Id; 2]> = Vec::new();
     for t in &part.triangles {
         let open = t.map(is_open);
         for k in 0..3 {
@@ -62,7 +63,7 @@ pub(super) fn of_part(part: &Part) -> Vec<BorderEdge> {
     }
     found.sort_unstable();
     let once = found.chunk_by(|a, b| a == b).filter(|same| same.len() == 1);
-    let edge = |ends: [u32; 2]| BorderEdge {
+    let edge = |ends: [Id; 2]| BorderEdge {
         ends,
         at: ends.map(|v| part.at.at(v)),
     };
@@ -136,16 +137,16 @@ impl Boundary {
 /// The number of edges of each loop. Loops that meet at a vertex count as one.
 fn loops(edges: &LocalTable<BorderEdge>, workspace: &Workspace) -> Result<Tally> {
     let _held = workspace.reserve("draw: loops", edges.total() * OF_EDGE)?;
-    let mut all: Vec<[u32; 2]> = Vec::with_capacity(edges.total() as usize);
+    let mut all: Vec<[Id; 2]> = Vec::with_capacity(edges.total() as usize);
     let mut rows = Vec::new();
     for section in 0..edges.count() {
         edges.get_into(section, &mut rows)?;
         all.extend(rows.iter().map(|row| row.ends));
     }
-    let mut ids: Vec<u32> = all.iter().flatten().copied().collect();
+    let mut ids: Vec<Id> = all.iter().flatten().copied().collect();
     ids.sort_unstable();
     ids.dedup();
-    let place = |v: u32| ids.partition_point(|id| *id < v);
+    let place = |v: Id| ids.partition_point(|id| *id < v);
     let mut parents: Vec<u32> = (0..ids.len() as u32).collect();
     let root = |parents: &mut Vec<u32>, mut v: usize| {
         while parents[v] as usize != v {

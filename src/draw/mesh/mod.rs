@@ -21,6 +21,7 @@ use outcrop_geom::method::METHOD;
 use outcrop_geom::{Point, distance2};
 use outcrop_raster::{Vec3, View};
 use outcrop_stages::blocks::Blocks;
+use outcrop_stages::ids::Id;
 use outcrop_stages::order::PointStore;
 use outcrop_stages::spacing::{Spacings, spacing2};
 use rayon::prelude::*;
@@ -221,8 +222,8 @@ impl Drawing<'_> {
         self.each_part(|unit, part| {
             paint(unit, part, canvases);
             if let (Some(map), Source::Whole { used, .. }) = (&map, self.source) {
-                for (id, p) in part.ids.clone().zip(part.at.own()) {
-                    let is_used = used.used[id as usize / 64] >> (id % 64) & 1 == 1;
+                for (id, p) in part.ids.indices().zip(part.at.own()) {
+                    let is_used = used.used[id / 64] >> (id % 64) & 1 == 1;
                     map.add(position(*p), !is_used);
                 }
             }
@@ -268,7 +269,7 @@ impl Drawing<'_> {
         drawn.spacings = self.subject.spacings.and_then(|(spacings, neighbors)| {
             let mut tally = Tally::default();
             for first in (0..self.subject.store.len()).step_by(METHOD.curve.patch) {
-                tally.add(spacing2(spacings.usual2(first as u32), neighbors) as u64);
+                tally.add(spacing2(spacings.usual2(Id::at(first)), neighbors) as u64);
             }
             tally.histogram(BARS, length)
         });
@@ -279,7 +280,6 @@ impl Drawing<'_> {
 /// Draws the triangles of a part. Most triangles of a large mesh lie between the centres of pixels, which the cells
 /// of their corners tell.
 fn paint(unit: &Unit<'_>, part: &Part, canvases: &[Canvas]) {
-    let first = part.ids.start;
     let mut own: Vec<u32> = Vec::with_capacity(part.at.own().len());
     let _held = unit.hold(4 * part.at.own().len() as u64);
     for canvas in canvases {
@@ -287,7 +287,7 @@ fn paint(unit: &Unit<'_>, part: &Part, canvases: &[Canvas]) {
         own.clear();
         own.extend(part.at.own().iter().map(cell));
         for t in &part.triangles {
-            let cells = t.map(|v| match own.get(v.wrapping_sub(first) as usize) {
+            let cells = t.map(|v| match own.get(part.ids.find(v)) {
                 Some(cell) => *cell,
                 None => cell(&part.at.at(v)),
             });

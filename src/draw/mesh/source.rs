@@ -6,10 +6,10 @@ use outcrop_disk::workspace::memory::bytes_of;
 use outcrop_disk::workspace::{Unit, Workspace};
 use outcrop_mesh_files::cut::{Pieces, StoredPieces};
 use outcrop_stages::blocks::Blocks;
+use outcrop_stages::ids::{Ids, Triangle};
 use outcrop_stages::located::Located;
 use outcrop_stages::order::PointStore;
 use outcrop_stages::repair::{ComponentRun, FilledTriangle, Repaired, Surface, Vertices};
-use std::ops::Range;
 
 /// The finished surface, as it is stored.
 #[derive(Debug, Clone, Copy)]
@@ -33,9 +33,9 @@ pub(super) enum Source<'a> {
 /// The triangles of a part, with the positions of their corners.
 pub(super) struct Part {
     /// Ids of the block.
-    pub ids: Range<u32>,
+    pub ids: Ids,
     /// Oriented triangles whose smallest vertex is in the block.
-    pub triangles: Vec<[u32; 3]>,
+    pub triangles: Vec<Triangle>,
     /// The components of the first triangles; the others fill holes, or components are not known.
     pub runs: Vec<ComponentRun>,
     /// Positions of all corners, and of all points of the block.
@@ -112,7 +112,7 @@ impl<'a> Source<'a> {
         let Some(first) = triangles.first().copied() else {
             return Ok(None);
         };
-        let block = blocks.of(first[0].min(first[1]).min(first[2])) as usize;
+        let block = blocks.of(first[0].min(first[1]).min(first[2])).index();
         let corners = triangles.iter().flatten().copied();
         Ok(Some(Part {
             ids: blocks.ids(block),

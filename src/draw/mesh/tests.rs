@@ -6,6 +6,7 @@ use outcrop_disk::spill::Sorter;
 use outcrop_disk::workspace::Workspace;
 use outcrop_geom::{Point, distance2};
 use outcrop_stages::blocks::Blocks;
+use outcrop_stages::ids::{Id, Triangle, triangle};
 use outcrop_stages::located::Located;
 use proptest::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
@@ -14,20 +15,20 @@ use std::collections::{BTreeMap, BTreeSet};
 const SIDE: u32 = 14;
 
 /// The triangles of a grid whose points have shuffled ids, without those that are left out.
-fn grid(order: &[u32], out: &BTreeSet<usize>) -> Vec<[u32; 3]> {
+fn grid(order: &[u32], out: &BTreeSet<usize>) -> Vec<Triangle> {
     let id = |x: u32, y: u32| order[(y * SIDE + x) as usize];
     let cells = (0..SIDE - 1).flat_map(|y| (0..SIDE - 1).map(move |x| (x, y)));
     let both = cells.flat_map(|(x, y)| {
         let [a, b, c, d] = [(x, y), (x + 1, y), (x + 1, y + 1), (x, y + 1)].map(|(x, y)| id(x, y));
-        [[a, b, c], [a, c, d]]
+        [[a, b, c], [a, c, d]].map(triangle)
     });
     let left = both.enumerate().filter(|(n, _)| !out.contains(n));
     left.map(|(_, t)| t).collect()
 }
 
 /// Edges with one triangle.
-fn once(triangles: &[[u32; 3]]) -> BTreeSet<[u32; 2]> {
-    let mut counts: BTreeMap<[u32; 2], usize> = BTreeMap::new();
+fn once(triangles: &[Triangle]) -> BTreeSet<[Id; 2]> {
+    let mut counts: BTreeMap<[Id; 2], usize> = BTreeMap::new();
     for [a, b, c] in triangles {
         for (a, b) in [(a, b), (b, c), (c, a)] {
             *counts.entry([*a.min(b), *a.max(b)]).or_default() += 1;
@@ -38,13 +39,13 @@ fn once(triangles: &[[u32; 3]]) -> BTreeSet<[u32; 2]> {
 }
 
 /// Numbers of edges of the connected parts of some edges.
-fn connected(edges: &BTreeSet<[u32; 2]>) -> Vec<u64> {
+fn connected(edges: &BTreeSet<[Id; 2]>) -> Vec<u64> {
     let mut left = edges.clone();
     let mut sizes = Vec::new();
     while let Some(first) = left.pop_first() {
         let (mut reached, mut size) = (BTreeSet::from(first), 1);
         loop {
-            let near = |e: &&[u32; 2]| e.iter().any(|v| reached.contains(v));
+            let near = |e: &&[Id; 2]| e.iter().any(|v| reached.contains(v));
             let Some(edge) = left.iter().find(near).copied() else {
                 break;
             };
@@ -73,7 +74,7 @@ proptest! {
         // A small buffer, so that edges go to disk.
         let sorter: Sorter<BorderEdge> = Sorter::new(&workspace, "draw.edges", 2000);
         for number in 0..blocks.count() {
-            let own = |t: &&[u32; 3]| blocks.of(*t.iter().min().unwrap()) as usize == number;
+            let own = |t: &&Triangle| blocks.of(*t.iter().min().unwrap()).index() == number;
             let part = Part {
                 ids: blocks.ids(number),
                 triangles: triangles.iter().filter(own).copied().collect(),
@@ -86,7 +87,7 @@ proptest! {
         let mut found = BTreeSet::new();
         let mut lengths = 0;
         boundary.for_each(|edge| {
-            assert_eq!(edge.at, edge.ends.map(|v| points[v as usize]));
+            assert_eq!(edge.at, edge.ends.map(|v| points[v.index()]));
             lengths += u64::from(distance2(edge.at[0], edge.at[1]) > 0);
             assert!(found.insert(edge.ends));
         }).unwrap();

@@ -9,6 +9,7 @@ use outcrop_disk::workspace::memory::bytes_of;
 use outcrop_geom::Point;
 use outcrop_geom::triangle::{add, direction, normal};
 use outcrop_stages::blocks::Blocks;
+use outcrop_stages::ids::{Id, Ids};
 use outcrop_stages::located::Located;
 use outcrop_stages::repair::OrientedTriangle;
 use outcrop_stages::surface::star::{Link, Star, sorted};
@@ -35,7 +36,7 @@ row! {
 
 /// The triangles that touch a block, by square.
 pub struct Divided {
-    ids: Range<u32>,
+    ids: Ids,
     /// By square, then ascending by sorted ids.
     triangles: Vec<OrientedTriangle>,
     /// For each corner of each triangle the number of its vertex among those that its square has in the block:
@@ -51,9 +52,9 @@ pub struct Divide {
     part: Part,
     triangles: Range<usize>,
     /// Ids of its vertices in the block, ascending.
-    vertices: Vec<u32>,
+    vertices: Vec<Id>,
     /// Ids of its copies.
-    copies: Vec<u32>,
+    copies: Vec<Id>,
     /// Normals of vertices and copies, if wanted.
     normals: [Vec<Normal>; 2],
 }
@@ -70,9 +71,9 @@ impl Divided {
         let vertices = triangles.iter().flatten().copied();
         let points = Located::load(source.store, source.blocks, block, vertices)?;
         let _held = unit.hold(bytes_of(&triangles) + bytes_of(&filled) + points.bytes());
-        let whole = source.normals.then(|| Fans::of(ids.clone(), &triangles));
+        let whole = source.normals.then(|| Fans::of(ids, &triangles));
         let _fans = unit.hold(whole.as_ref().map_or(0, Fans::bytes));
-        let outside = source.leave_out(&mut triangles, &points, ids.clone());
+        let outside = source.leave_out(&mut triangles, &points, ids);
         let mut squares: Vec<(Square, u32)> = Vec::new();
         if let Some(grid) = &source.grid {
             let of = |t: &OrientedTriangle| grid.of(points.corners(*t));
@@ -109,9 +110,9 @@ impl Divided {
         points: &Located,
         whole: Option<&Fans>,
     ) {
-        let own = |v: &u32| self.ids.contains(v);
+        let own = |v: &Id| self.ids.contains(v);
         let triangles = &self.triangles[range.clone()];
-        let mut corners: Vec<(u32, u32)> = Vec::with_capacity(3 * triangles.len());
+        let mut corners: Vec<(Id, u32)> = Vec::with_capacity(3 * triangles.len());
         for (t, number) in triangles.iter().zip(0..) {
             corners.extend(t.iter().filter(|v| own(v)).map(|v| (*v, number)));
         }
@@ -230,7 +231,7 @@ impl Divide {
     }
 
     /// Ids of its vertices in the block, ascending.
-    pub fn vertices(&self) -> &[u32] {
+    pub fn vertices(&self) -> &[Id] {
         &self.vertices
     }
 
@@ -240,7 +241,7 @@ impl Divide {
     }
 
     /// Ids of its copies of pinched vertices in the block.
-    pub fn copies(&self) -> &[u32] {
+    pub fn copies(&self) -> &[Id] {
         &self.copies
     }
 }
@@ -252,7 +253,7 @@ struct Fans {
 }
 
 impl Fans {
-    fn of(ids: Range<u32>, triangles: &[OrientedTriangle]) -> Self {
+    fn of(ids: Ids, triangles: &[OrientedTriangle]) -> Self {
         Self {
             star: Star::of(ids, triangles),
             triangles: triangles.to_vec(),
@@ -265,7 +266,7 @@ impl Fans {
 
     /// The normal of the fan around a vertex that has a triangle: the sum of those of its triangles, weighed by
     /// their areas.
-    fn normal(&self, v: u32, triangle: OrientedTriangle, points: &Located) -> Normal {
+    fn normal(&self, v: Id, triangle: OrientedTriangle, points: &Located) -> Normal {
         let star = self.star.at(v).iter().map(|n| self.triangles[*n as usize]);
         let mut link = Link::default();
         link.set(v, star.clone());
@@ -287,16 +288,11 @@ impl Fans {
 impl Source<'_> {
     /// Removes the triangles with a corner outside the region; returns the number of those whose smallest vertex
     /// is in the block with the ids `ids`.
-    fn leave_out(
-        &self,
-        triangles: &mut Vec<OrientedTriangle>,
-        points: &Located,
-        ids: Range<u32>,
-    ) -> u64 {
+    fn leave_out(&self, triangles: &mut Vec<OrientedTriangle>, points: &Located, ids: Ids) -> u64 {
         let Some(area) = &self.area else { return 0 };
-        let inside = |v: u32| area.contains(self.lattice.position(points.at(v)));
-        let own: Vec<bool> = ids.clone().map(inside).collect();
-        let is_inside = |v: &u32| match own.get(v.wrapping_sub(ids.start) as usize) {
+        let inside = |v: Id| area.contains(self.lattice.position(points.at(v)));
+        let own: Vec<bool> = ids.iter().map(inside).collect();
+        let is_inside = |v: &Id| match own.get(ids.find(*v)) {
             Some(inside) => *inside,
             None => inside(*v),
         };

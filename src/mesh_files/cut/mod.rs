@@ -23,6 +23,7 @@ use outcrop_disk::workspace::{Unit, Workspace};
 use outcrop_geom::lattice::Lattice;
 use outcrop_geom::region::{Area, Region};
 use outcrop_stages::blocks::Blocks;
+use outcrop_stages::ids::{Block, Id, Triangle};
 use outcrop_stages::order::PointStore;
 use outcrop_stages::repair::{FilledTriangle, Repaired, Surface};
 use serde::{Deserialize, Serialize};
@@ -31,11 +32,11 @@ row! {
     /// The number of a vertex of a triangle, sent to the block of the triangle's smallest vertex.
     pub struct FarCorner {
         /// The block of the smallest vertex.
-        to: u32,
+        to: Block,
         /// Ids of the triangle, ascending.
-        triangle: [u32; 3],
+        triangle: Triangle,
         /// The vertex.
-        vertex: u32,
+        vertex: Id,
         /// Its number in its piece, as in `Divided`.
         number: u32,
     }
@@ -48,7 +49,7 @@ row! {
         /// Numbers in the triangle's orientation.
         corners: [u32; 3],
         /// Ids of the same vertices.
-        ids: [u32; 3],
+        ids: Triangle,
     }
     packed Above Left Left Above Left Left
 }

@@ -4,11 +4,12 @@ use super::divide::{Divided, Part};
 use super::grid::Square;
 use super::{Face, FarCorner, Normal};
 use outcrop_disk::error::{Error, Result};
-use outcrop_disk::spill::{Id, Table, release};
+use outcrop_disk::spill::{Table, release};
 use outcrop_disk::workspace::memory::Reservation;
 use outcrop_disk::workspace::{Unit, Workspace};
 use outcrop_geom::Point;
 use outcrop_stages::blocks::Blocks;
+use outcrop_stages::ids::{Block, Id, Triangle};
 use outcrop_stages::surface::star::sorted;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
@@ -20,7 +21,7 @@ const MOST_SQUARES: usize = 100_000;
 #[derive(Debug, Clone)]
 struct Piece {
     part: Part,
-    block: u32,
+    block: Block,
     /// First numbers of its vertices, copies and triangles in the file of the square.
     firsts: [u64; 3],
 }
@@ -100,7 +101,7 @@ impl StoredPieces {
             self.parts.get_into(&unit, block, &mut parts)?;
             pieces.extend(parts.iter().map(|part| Piece {
                 part: *part,
-                block: block as u32,
+                block: Block::at(block),
                 firsts: [0; 3],
             }));
         }
@@ -214,7 +215,7 @@ impl Pieces {
         self.stored.normals.get(unit, piece)
     }
 
-    fn find(&self, square: Square, block: u32) -> Option<usize> {
+    fn find(&self, square: Square, block: Block) -> Option<usize> {
         let key = |p: &Piece| (p.part.square, p.block);
         self.pieces.binary_search_by_key(&(square, block), key).ok()
     }
@@ -227,10 +228,10 @@ impl Pieces {
         far: &[FarCorner],
         blocks: Blocks,
     ) -> Result<()> {
-        let block = unit.number() as u32;
+        let block = Block::at(unit.number());
         for part in divided.squares() {
             let square = part.square();
-            let number = |v: u32, number: u32| {
+            let number = |v: Id, number: u32| {
                 let piece = &self.pieces[self.find(square, blocks.of(v))?];
                 let first = piece.firsts[number as usize & 1];
                 Some((first + u64::from(number >> 1)) as u32)
@@ -250,11 +251,8 @@ impl Pieces {
             let Some(piece) = self.find(square, block) else {
                 continue;
             };
-            let rows = |ids: &[u32]| ids.iter().map(|id| Id { id: *id }).collect::<Vec<_>>();
-            self.stored
-                .vertices
-                .put(unit, piece, &rows(part.vertices()))?;
-            self.stored.copies.put(unit, piece, &rows(part.copies()))?;
+            self.stored.vertices.put(unit, piece, part.vertices())?;
+            self.stored.copies.put(unit, piece, part.copies())?;
             self.stored.faces.put(unit, piece, &faces)?;
             let normals = part.normals();
             if !normals.is_empty() {
@@ -266,7 +264,8 @@ impl Pieces {
 }
 
 /// The error for a number that no block sent: possible only in scratch files that were changed.
-fn missing(unit: &Unit<'_>, triangle: [u32; 3], vertex: u32) -> Error {
+fn missing(unit: &Unit<'_>, triangle: Triangle, vertex: Id) -> Error {
+    let (vertex, triangle) = (vertex.get(), triangle.map(Id::get));
     Error::Corrupt {
         path: unit.path("cut.far"),
         offset: 0,

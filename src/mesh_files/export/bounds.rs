@@ -4,6 +4,7 @@ use super::number::Numbering;
 use outcrop_disk::error::Result;
 use outcrop_disk::workspace::Workspace;
 use outcrop_geom::Point;
+use outcrop_stages::ids::Id;
 use outcrop_stages::order::PointStore;
 
 /// The lowest and the highest coordinates of the points that are vertices, along each axis. Pages are read in
@@ -21,7 +22,7 @@ pub fn bounds(
         let _held = workspace.reserve("export: bounds", list as u64)?;
         let is_used = |page: &u32| {
             let ids = store.page_ids(*page as usize);
-            numbering.vertex(ids.start as u32) < numbering.vertex(ids.end as u32)
+            numbering.vertex(Id::at(ids.start)) < numbering.vertex(Id::at(ids.end))
         };
         let mut pages: Vec<u32> = (0..store.pages() as u32).filter(is_used).collect();
         let mut found = [[i32::MAX; 3], [i32::MIN; 3]];
@@ -59,7 +60,7 @@ fn add(
     points.clear();
     store.read_pages(page..page + 1, points)?;
     for (id, point) in store.page_ids(page).zip(&*points) {
-        if numbering.used(id as u32) {
+        if numbering.used(Id::at(id)) {
             for (axis, x) in point.iter().enumerate() {
                 found[0][axis] = found[0][axis].min(*x);
                 found[1][axis] = found[1][axis].max(*x);

@@ -3,15 +3,15 @@
 use outcrop_disk::error::Result;
 use outcrop_disk::workspace::memory::bytes_of;
 use outcrop_geom::Point;
+use outcrop_stages::ids::{Id, Ids, Triangle};
 use outcrop_stages::order::PointStore;
-use std::ops::Range;
 
 /// Positions of the points of a block, and of the points of other blocks that are corners of its triangles.
 pub struct Corners {
-    ids: Range<u32>,
+    ids: Ids,
     own: Vec<Point>,
     /// Ids of the others, ascending.
-    others: Vec<u32>,
+    others: Vec<Id>,
     positions: Vec<Point>,
 }
 
@@ -25,8 +25,8 @@ impl Corners {
     /// Reads the positions for `triangles`; the ids of the block are `ids`.
     pub fn load<'a>(
         store: &PointStore,
-        ids: Range<u32>,
-        triangles: impl Iterator<Item = &'a [u32; 3]> + Clone,
+        ids: Ids,
+        triangles: impl Iterator<Item = &'a Triangle> + Clone,
     ) -> Result<Self> {
         let others = triangles.flatten().filter(|v| !ids.contains(v));
         let mut list = Vec::with_capacity(others.clone().count());
@@ -36,7 +36,7 @@ impl Corners {
         let mut positions = Vec::with_capacity(list.len());
         store.fetch(&list, &mut positions)?;
         Ok(Self {
-            own: store.slice(ids.start as usize..ids.end as usize)?,
+            own: store.slice(ids.indices())?,
             ids,
             others: list,
             positions,
@@ -50,8 +50,8 @@ impl Corners {
 
     /// The position of a corner.
     #[inline]
-    pub fn at(&self, v: u32) -> Point {
-        let own = self.own.get(v.wrapping_sub(self.ids.start) as usize);
+    pub fn at(&self, v: Id) -> Point {
+        let own = self.own.get(self.ids.find(v));
         own.copied().unwrap_or_else(|| {
             // All corners of the triangles are in the list.
             let found = self.others.binary_search(&v);

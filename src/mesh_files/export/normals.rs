@@ -6,12 +6,13 @@
 use super::corners::Corners;
 use super::number::{Split, split_block};
 use outcrop_disk::error::Result;
-use outcrop_disk::spill::{Id, Inbox, Table};
+use outcrop_disk::spill::{Inbox, Table};
 use outcrop_disk::workspace::Unit;
 use outcrop_disk::workspace::memory::bytes_of;
 use outcrop_geom::Point;
 use outcrop_geom::triangle::direction as unit_vector;
 use outcrop_stages::blocks::Blocks;
+use outcrop_stages::ids::{Id, Triangle};
 use outcrop_stages::order::PointStore;
 use outcrop_stages::repair::{FilledTriangle, Surface};
 use outcrop_stages::surface::star::sorted;
@@ -55,11 +56,11 @@ impl Normals {
         let filled = from.filled.get(unit, block)?;
         triangles.extend(filled.iter().map(|f| f.triangle));
         drop(filled);
-        let corners = Corners::load(from.store, ids.clone(), triangles.iter())?;
+        let corners = Corners::load(from.store, ids, triangles.iter())?;
         let mut sums = vec![Sum::default(); ids.len()];
         let lists = bytes_of(&triangles) + corners.bytes() + bytes_of(&sums);
         let mut held = unit.hold(lists);
-        let own = |v: u32| v.wrapping_sub(ids.start) as usize;
+        let own = |v: Id| ids.find(v);
         for &t in &triangles {
             let area = doubled_area(t.map(|v| corners.at(v)));
             for v in t {
@@ -71,10 +72,7 @@ impl Normals {
         let mut copies = Vec::new();
         let pinches = from.pinches.get(unit, block)?;
         if !pinches.is_empty() {
-            let at_pinch = |t: &[u32; 3]| {
-                let is = |v: &u32| pinches.binary_search_by_key(v, |p| p.id).is_ok();
-                t.iter().any(is)
-            };
+            let at_pinch = |t: &Triangle| t.iter().any(|v| pinches.binary_search(v).is_ok());
             triangles.retain(at_pinch);
             triangles.sort_unstable_by_key(|t| sorted(*t));
             held.set(lists + 24 * triangles.len() as u64 + 8 * ids.len() as u64);

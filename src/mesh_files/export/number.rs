@@ -2,10 +2,11 @@
 
 use super::MeshStats;
 use outcrop_disk::error::{Error, Result};
-use outcrop_disk::spill::{Id, Inbox, Shuffle, Table, release, row};
+use outcrop_disk::spill::{Inbox, Shuffle, Table, release, row};
 use outcrop_disk::workspace::memory::Reservation;
 use outcrop_disk::workspace::{Unit, Workspace};
 use outcrop_stages::blocks::Blocks;
+use outcrop_stages::ids::{Block, Id};
 use outcrop_stages::repair::{FilledTriangle, NumberingInput, Vertices};
 use outcrop_stages::surface::star::{Link, Star, Triangle, sorted};
 use serde::{Deserialize, Serialize};
@@ -35,13 +36,13 @@ row! {
     /// A corner of a triangle that uses a copy of its pinched vertex.
     pub struct Split {
         /// Block of the triangle.
-        to: u32,
+        to: Block,
         /// Ids of the triangle, ascending.
-        triangle: [u32; 3],
+        triangle: Triangle,
         /// The pinched vertex.
-        vertex: u32,
+        vertex: Id,
         /// The block of this vertex.
-        block: u32,
+        block: Block,
         /// Number of the copy within that block.
         copy: u32,
     }
@@ -57,14 +58,16 @@ struct Firsts {
 
 impl Numbering {
     /// True if a point is a vertex.
-    pub fn used(&self, v: u32) -> bool {
-        self.vertices.used[v as usize / 64] >> (v % 64) & 1 == 1
+    pub fn used(&self, v: Id) -> bool {
+        let v = v.index();
+        self.vertices.used[v / 64] >> (v % 64) & 1 == 1
     }
 
     /// The number of a point if it is a vertex, else that of the next point that is one.
-    pub fn vertex(&self, v: u32) -> u32 {
-        let below = self.vertices.used[v as usize / 64] & ((1 << (v % 64)) - 1);
-        self.rank[v as usize / 64] + below.count_ones()
+    pub fn vertex(&self, v: Id) -> u32 {
+        let v = v.index();
+        let below = self.vertices.used[v / 64] & ((1 << (v % 64)) - 1);
+        self.rank[v / 64] + below.count_ones()
     }
 
     /// Number of the first copy in a block.
@@ -178,7 +181,7 @@ fn split(
 /// Copies the pinched vertices of a block; returns the copies, and the corners that use them.
 pub fn split_block(
     pinches: &[Id],
-    triangles: &[[u32; 3]],
+    triangles: &[Triangle],
     blocks: Blocks,
     block: usize,
 ) -> (Vec<Id>, Vec<Split>) {
@@ -186,7 +189,7 @@ pub fn split_block(
     let mut link = Link::default();
     let mut copies = Vec::new();
     let mut splits = Vec::new();
-    for &Id { id: v } in pinches {
+    for &v in pinches {
         let at = star.at(v);
         // Triangles ascend, so fans are numbered by their smallest triangles.
         link.set(v, at.iter().map(|&n| triangles[n as usize]));
@@ -198,12 +201,12 @@ pub fn split_block(
                     to: blocks.of(t[0]),
                     triangle: t,
                     vertex: v,
-                    block: block as u32,
+                    block: Block::at(block),
                     copy,
                 });
             }
         }
-        copies.extend((1..link.groups()).map(|_| Id { id: v }));
+        copies.extend((1..link.groups()).map(|_| v));
     }
     (copies, splits)
 }

@@ -7,13 +7,13 @@ use super::normals::{Normals, Sources};
 use super::number::Numbering;
 use crate::cut::{Face, Normal, Pieces, Tile};
 use outcrop_disk::error::Result;
-use outcrop_disk::spill::{Id, Inbox, Table};
+use outcrop_disk::spill::{Inbox, Table};
 use outcrop_disk::workspace::memory::bytes_of;
 use outcrop_disk::workspace::{Unit, Workspace};
 use outcrop_stages::blocks::Blocks;
+use outcrop_stages::ids::{Id, Ids, Triangle};
 use outcrop_stages::order::PointStore;
 use outcrop_stages::repair::{FilledTriangle, Surface};
-use std::ops::Range;
 
 /// The parts of a mesh. In the file the vertices of all parts come first, then the copies of pinched vertices
 /// of all parts, then their triangles.
@@ -31,7 +31,7 @@ pub trait Parts: Sync {
     fn sizes(&self, workspace: &Workspace, part: usize) -> [u64; 2];
 
     /// Ids of the points that are the part's vertices, ascending; or of its copies, likewise.
-    fn vertices(&self, unit: &Unit<'_>, part: usize, copies: bool) -> Result<Vec<u32>>;
+    fn vertices(&self, unit: &Unit<'_>, part: usize, copies: bool) -> Result<Vec<Id>>;
 
     /// Bytes of memory for the normals of a part of these sizes.
     fn normals_estimate(points: u64, triangles: u64) -> u64;
@@ -42,7 +42,7 @@ pub trait Parts: Sync {
         unit: &Unit<'_>,
         part: usize,
         copies: bool,
-        ids: &[u32],
+        ids: &[Id],
     ) -> Result<Vec<[f32; 3]>>;
 
     /// The normals of a part's vertices, then of its copies, from scratch.
@@ -55,7 +55,7 @@ pub trait Parts: Sync {
 /// The triangles of a part.
 pub enum Loaded<'a> {
     /// Of a block, with its ids.
-    Block(Faces<'a>, Range<u32>),
+    Block(Faces<'a>, Ids),
     /// Of a piece.
     Piece(Vec<Face>),
 }
@@ -70,7 +70,7 @@ impl Loaded<'_> {
     }
 
     /// Passes on all triangles: the numbers of their vertices in the file, and their ids.
-    pub fn for_each(&self, mut put: impl FnMut([u32; 3], [u32; 3])) {
+    pub fn for_each(&self, mut put: impl FnMut([u32; 3], Triangle)) {
         match self {
             Self::Block(faces, _) => faces.for_each(put),
             Self::Piece(faces) => faces.iter().for_each(|f| put(f.corners, f.ids)),
@@ -80,8 +80,10 @@ impl Loaded<'_> {
     /// The positions of the corners.
     pub fn corners(&self, store: &PointStore) -> Result<Corners> {
         match self {
-            Self::Block(faces, ids) => Corners::load(store, ids.clone(), faces.ids()),
-            Self::Piece(faces) => Corners::load(store, 0..0, faces.iter().map(|f| &f.ids)),
+            Self::Block(faces, ids) => Corners::load(store, *ids, faces.ids()),
+            Self::Piece(faces) => {
+                Corners::load(store, Ids::default(), faces.iter().map(|f| &f.ids))
+            }
         }
     }
 }
@@ -109,7 +111,7 @@ type Both = (Vec<[f32; 3]>, Vec<[f32; 3]>);
 
 impl Whole<'_> {
     /// The normals of these vertices of a block, and of all its copies.
-    pub fn both_normals(&self, unit: &Unit<'_>, block: usize, ids: &[u32]) -> Result<Both> {
+    pub fn both_normals(&self, unit: &Unit<'_>, block: usize, ids: &[Id]) -> Result<Both> {
         let sources = Sources {
             store: self.store,
             surface: &self.surface,
@@ -119,8 +121,8 @@ impl Whole<'_> {
         };
         let normals = Normals::of(unit, &sources, block)?;
         let _held = unit.hold(normals.bytes());
-        let first = self.blocks.ids(block).start;
-        let own = |v: &u32| normals.points[(v - first) as usize];
+        let block = self.blocks.ids(block);
+        let own = |v: &Id| normals.points[block.place(*v)];
         Ok((ids.iter().map(own).collect(), normals.copies))
     }
 }
@@ -146,13 +148,12 @@ impl Parts for Whole<'_> {
         [self.blocks.ids(block).len() as u64, records as u64]
     }
 
-    fn vertices(&self, unit: &Unit<'_>, block: usize, copies: bool) -> Result<Vec<u32>> {
+    fn vertices(&self, unit: &Unit<'_>, block: usize, copies: bool) -> Result<Vec<Id>> {
         if copies {
-            let copies = self.numbering.copies.get(unit, block)?;
-            return Ok(bytemuck::cast_vec(copies));
+            return self.numbering.copies.get(unit, block);
         }
         let ids = self.blocks.ids(block);
-        Ok(ids.filter(|v| self.numbering.used(*v)).collect())
+        Ok(ids.iter().filter(|v| self.numbering.used(*v)).collect())
     }
 
     fn normals_estimate(points: u64, triangles: u64) -> u64 {
@@ -164,7 +165,7 @@ impl Parts for Whole<'_> {
         unit: &Unit<'_>,
         block: usize,
         copies: bool,
-        ids: &[u32],
+        ids: &[Id],
     ) -> Result<Vec<[f32; 3]>> {
         let own = if copies { &[] } else { ids };
         let (own, of_copies) = self.both_normals(unit, block, own)?;
@@ -179,7 +180,7 @@ impl Parts for Whole<'_> {
         let ids = self.blocks.ids(block);
         let numbering = &self.numbering;
         let (surface, filled) = (&self.surface, &self.filled);
-        let faces = Faces::load(unit, block, surface, filled, numbering, ids.clone())?;
+        let faces = Faces::load(unit, block, surface, filled, numbering, ids)?;
         Ok(Loaded::Block(faces, ids))
     }
 }
@@ -220,9 +221,9 @@ impl Parts for OfTile<'_> {
         [4 * (vertices + copies), faces]
     }
 
-    fn vertices(&self, unit: &Unit<'_>, part: usize, copies: bool) -> Result<Vec<u32>> {
+    fn vertices(&self, unit: &Unit<'_>, part: usize, copies: bool) -> Result<Vec<Id>> {
         let piece = self.tile.pieces.start + part;
-        Ok(bytemuck::cast_vec(self.pieces.ids(unit, piece, copies)?))
+        self.pieces.ids(unit, piece, copies)
     }
 
     fn normals_estimate(points: u64, _: u64) -> u64 {
@@ -234,7 +235,7 @@ impl Parts for OfTile<'_> {
         unit: &Unit<'_>,
         part: usize,
         copies: bool,
-        ids: &[u32],
+        ids: &[Id],
     ) -> Result<Vec<[f32; 3]>> {
         let mut all = self.stored_normals(unit, part)?;
         let first = all.len().saturating_sub(ids.len());

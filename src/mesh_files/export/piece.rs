@@ -10,6 +10,7 @@ use outcrop_disk::error::Result;
 use outcrop_disk::workspace::Unit;
 use outcrop_disk::workspace::memory::bytes_of;
 use outcrop_geom::Point;
+use outcrop_stages::ids::Id;
 
 /// Views of the buffer that a piece may have: positions, normals, colours, triangles.
 pub const VIEWS: usize = 4;
@@ -38,7 +39,7 @@ pub struct Piece {
 }
 
 /// A vertex of a piece: the id of its point, and its number in the mesh, by which copies differ.
-type Vertex = (u32, u32);
+type Vertex = (Id, u32);
 
 /// Bytes of memory for a piece of at most so many vertices and triangles, beside the triangles as they are read.
 pub fn estimate(vertices: u64, triangles: u64, mesh: &Mesh) -> u64 {
@@ -67,7 +68,7 @@ pub fn compress<P: Parts>(
     let _corners = unit.hold(bytes_of(&corners));
     let (known, triangles, order) = number(&corners);
     drop(corners);
-    let ids: Vec<u32> = known.iter().map(|(id, _)| *id).collect();
+    let ids: Vec<Id> = known.iter().map(|(id, _)| *id).collect();
     let mut points = Vec::with_capacity(ids.len());
     writer.store.fetch(&ids, &mut points)?;
     let step = |at: &u32| [0, 1, 2].map(|k| points[*at as usize][k] - origin[k]);
@@ -167,7 +168,7 @@ fn normals<P: Parts>(
 fn colours<P: Parts>(
     writer: &Writer<'_, P>,
     unit: &Unit<'_>,
-    ids: &[u32],
+    ids: &[Id],
     order: &[u32],
 ) -> Result<Vec<u8>> {
     let mesh = writer.file.mesh();
@@ -207,7 +208,7 @@ mod tests {
 
     #[test]
     fn vertices_are_numbered_as_they_are_used_and_copies_stay_apart() {
-        let vertex = |id: u32, number: u32| (id, number);
+        let vertex = |id: u32, number: u32| (Id::new(id), number);
         let (a, b, c, copy) = (vertex(5, 0), vertex(9, 1), vertex(7, 2), vertex(9, 3));
         let (known, triangles, order) = number(&[[b, c, a], [a, c, copy]]);
         assert_eq!(known, [a, c, b, copy]);

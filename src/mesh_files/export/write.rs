@@ -9,6 +9,7 @@ use outcrop_disk::workspace::memory::bytes_of;
 use outcrop_disk::workspace::{Unit, Workspace};
 use outcrop_geom::Point;
 use outcrop_stages::attributes::StoredColumns;
+use outcrop_stages::ids::{Id, Ids};
 use outcrop_stages::order::PointStore;
 
 /// Writes the parts of a mesh: of each its vertices, its copies of vertices, and its triangles. In the file the
@@ -127,19 +128,22 @@ impl<P: Parts> Writer<'_, P> {
     fn vertices(
         &self,
         unit: &Unit<'_>,
-        ids: &[u32],
+        ids: &[Id],
         normals: Option<Vec<[f32; 3]>>,
         bytes: &mut Vec<u8>,
     ) -> Result<()> {
         let [Some(first), Some(last)] = [ids.first(), ids.last()] else {
             return Ok(());
         };
-        let range = *first as usize..*last as usize + 1;
+        let range = Ids {
+            start: *first,
+            end: last.behind(1),
+        };
         let mut points: Vec<Point> = Vec::with_capacity(ids.len());
         // Where many points of a range are wanted, it is read at once.
         if range.len() / 4 <= ids.len() {
-            let all = self.store.slice(range)?;
-            points.extend(ids.iter().map(|id| all[(id - first) as usize]));
+            let all = self.store.slice(range.indices())?;
+            points.extend(ids.iter().map(|id| all[range.place(*id)]));
         } else {
             self.store.fetch(ids, &mut points)?;
         }
@@ -156,7 +160,7 @@ impl<P: Parts> Writer<'_, P> {
     pub fn values(
         &self,
         unit: &Unit<'_>,
-        ids: &[u32],
+        ids: &[Id],
         normals: Option<&[[f32; 3]]>,
     ) -> Result<Vec<u8>> {
         let columns = self.columns.as_ref();

@@ -2,6 +2,7 @@
 
 use super::rows::{Word, key, values};
 use crate::blocks::Blocks;
+use crate::ids::Id;
 use crate::order::PointStore;
 use outcrop_disk::error::Result;
 use outcrop_disk::spill::{Inbox, Row, Table};
@@ -17,9 +18,9 @@ pub type Part = (Table<Word>, usize);
 pub struct Buckets<'a> {
     store: &'a PointStore,
     /// The first id of each bucket, and the number of ids.
-    starts: Vec<u32>,
+    starts: Vec<Id>,
     /// The first id of each section, and the number of ids: those of blocks and of buckets.
-    sections: Vec<u32>,
+    sections: Vec<Id>,
 }
 
 impl<'a> Buckets<'a> {
@@ -31,16 +32,16 @@ impl<'a> Buckets<'a> {
         workspace: &Workspace,
     ) -> Result<Self> {
         let starts = workspace.once("attributes: cuts", |unit| {
-            let mut starts = vec![0];
+            let mut starts = vec![Id::default()];
             for cut in cuts {
                 unit.check_cancel()?;
                 starts.push(id_from(store, *cut)?);
             }
-            starts.push(store.len() as u32);
+            starts.push(Id::at(store.len()));
             Ok(starts)
         })?;
         let blocks = (0..blocks.count()).map(|block| blocks.ids(block).start);
-        let mut sections: Vec<u32> = starts.iter().copied().chain(blocks).collect();
+        let mut sections: Vec<Id> = starts.iter().copied().chain(blocks).collect();
         sections.sort_unstable();
         sections.dedup();
         Ok(Self {
@@ -56,14 +57,14 @@ impl<'a> Buckets<'a> {
     }
 
     /// The first id of each section.
-    pub fn sections(&self) -> Vec<u32> {
+    pub fn sections(&self) -> Vec<Id> {
         let all = self.sections.len() - 1;
         self.sections[..all].to_vec()
     }
 
     /// The numbers of the sections of a bucket.
     fn of(&self, bucket: usize) -> Range<usize> {
-        let section = |id: u32| self.sections.partition_point(|start| *start < id);
+        let section = |id: Id| self.sections.partition_point(|start| *start < id);
         section(self.starts[bucket])..section(self.starts[bucket + 1])
     }
 
@@ -90,7 +91,7 @@ impl<'a> Buckets<'a> {
             let mut left = rows.iter().peekable();
             for section in self.of(bucket) {
                 unit.check_cancel()?;
-                let ids = self.sections[section] as usize..self.sections[section + 1] as usize;
+                let ids = self.sections[section].index()..self.sections[section + 1].index();
                 let points = self.store.slice(ids)?;
                 let count = points.len();
                 let mut column = vec![Word::default(); count * words];
@@ -119,8 +120,8 @@ impl<'a> Buckets<'a> {
             let rows = inbox.rows(bucket) * size_of::<R>();
             let largest = self
                 .of(bucket)
-                .map(|s| self.sections[s + 1] - self.sections[s]);
-            let ids = largest.max().unwrap_or(0) as usize;
+                .map(|s| self.sections[s + 1].index() - self.sections[s].index());
+            let ids = largest.max().unwrap_or(0);
             // The rows, half of them while they are sorted, and the packed ones.
             (rows * 5 / 2 + ids * (24 + 12 * words)) as u64 + (1 << 20)
         };
@@ -132,7 +133,7 @@ impl<'a> Buckets<'a> {
 }
 
 /// The first id whose key is not below `cut`.
-fn id_from(store: &PointStore, cut: hilbert::Key) -> Result<u32> {
+fn id_from(store: &PointStore, cut: hilbert::Key) -> Result<Id> {
     let below = |page: usize, points: &mut Vec<_>| {
         points.clear();
         store.read_pages(page..page + 1, points)?;
@@ -150,8 +151,8 @@ fn id_from(store: &PointStore, cut: hilbert::Key) -> Result<u32> {
         }
     }
     if low == store.pages() {
-        return Ok(store.len() as u32);
+        return Ok(Id::at(store.len()));
     }
     let inside = below(low, &mut points)?;
-    Ok((store.page_ids(low).start + inside) as u32)
+    Ok(Id::at(store.page_ids(low).start + inside))
 }

@@ -23,8 +23,7 @@ pub fn displacement(
     let column = Column::displacement();
     let table = Table::new("displacement", blocks.count());
     let work = |unit: &Unit<'_>| {
-        let ids = blocks.ids(unit.number());
-        let ids = ids.start as usize..ids.end as usize;
+        let ids = blocks.ids(unit.number()).indices();
         let (before, after) = (before.slice(ids.clone())?, after.slice(ids)?);
         let mut largest2 = 0;
         let words: Vec<u32> = before

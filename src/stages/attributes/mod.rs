@@ -11,6 +11,7 @@ mod displacement;
 mod rows;
 
 use crate::blocks::Blocks;
+use crate::ids::{Id, Ids};
 use crate::order::{Grouped, MOST_GROUPS, StoredPoints, cuts};
 use buckets::Buckets;
 pub use displacement::displacement;
@@ -23,7 +24,6 @@ use outcrop_geom::method::METHOD;
 use outcrop_points::{Carried, Column, Spool, VALUE_BUFFERS};
 use rows::{Row1, Row2, Row6, Row12, Row13, Row15, Word};
 use serde::{Deserialize, Serialize};
-use std::ops::Range;
 
 /// Bytes of memory for the rows of a unit that reads, and about those of a bucket: a third of the smallest budget.
 const ROWS: u64 = 64 << 20;
@@ -39,7 +39,7 @@ struct Words {
     /// Sections: the values of consecutive ids, word by word.
     table: Table<Word>,
     /// The first id of each section.
-    starts: Vec<u32>,
+    starts: Vec<Id>,
 }
 
 release!(Words: table);
@@ -48,28 +48,32 @@ impl Words {
     /// Bytes of memory for `ids` ids while they are read: their words, and the words of a whole section as they are
     /// on disk and as rows.
     fn bytes(&self, ids: usize) -> u64 {
-        let sections = self.starts.windows(2).map(|pair| pair[1] - pair[0]);
+        let sections = self
+            .starts
+            .windows(2)
+            .map(|pair| pair[1].index() - pair[0].index());
         // The last one ends with a block, too.
-        let section = sections.max().unwrap_or(METHOD.curve.block) as usize;
+        let section = sections.max().unwrap_or(METHOD.curve.block as usize);
         ((ids + 2 * section) * self.words * 4) as u64
     }
 
     /// The words of the ids of a block, id by id.
-    fn open(&self, unit: &Unit<'_>, ids: impl IntoIterator<Item = u32>) -> Result<Vec<u32>> {
+    fn open(&self, unit: &Unit<'_>, ids: impl IntoIterator<Item = Id>) -> Result<Vec<u32>> {
         let mut rows = Vec::new();
         let mut section = Vec::new();
         // The ids of the section that is loaded.
-        let mut loaded = 0..0;
+        let mut loaded = Ids::default();
         for id in ids {
             if !loaded.contains(&id) {
                 let next = self.starts.partition_point(|start| *start <= id);
-                let end = self.starts.get(next).copied().unwrap_or(u32::MAX);
+                let end = self.starts.get(next).copied().unwrap_or(Id::NONE);
                 let number = next.saturating_sub(1);
                 self.table.get_into(unit, number, &mut section)?;
-                loaded = self.starts.get(number).copied().unwrap_or_default()..end;
+                let start = self.starts.get(number).copied().unwrap_or_default();
+                loaded = Ids { start, end };
             }
             let count = section.len() / self.words;
-            let at = (id - loaded.start) as usize;
+            let at = loaded.place(id);
             let word = |word: usize| section.get(word * count + at).filter(|_| at < count);
             rows.extend((0..self.words).map(|w| word(w).map_or(0, |word| word.word)));
         }
@@ -116,7 +120,7 @@ impl StoredColumns {
     ///
     /// # Errors
     /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`].
-    pub fn open(&self, unit: &Unit<'_>, ids: &[u32]) -> Result<Values<'_>> {
+    pub fn open(&self, unit: &Unit<'_>, ids: &[Id]) -> Result<Values<'_>> {
         let rows = |part: &Columns| part.words.open(unit, ids.iter().copied());
         let parts = self.parts.iter().map(|part| Ok((part, rows(part)?)));
         Ok(Values {
@@ -187,7 +191,7 @@ impl StoredScanners {
         let table = Table::new("attributes.scanners", blocks.count());
         let ids = || (0..blocks.count()).map(|block| blocks.ids(block));
         for (block, ids) in ids().enumerate() {
-            let own = &numbers[ids.start as usize..ids.end as usize];
+            let own = &numbers[ids.indices()];
             table.put(unit, block, bytemuck::cast_slice(own))?;
         }
         let words = Words {
@@ -208,8 +212,8 @@ impl StoredScanners {
     ///
     /// # Errors
     /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`].
-    pub fn open(&self, unit: &Unit<'_>, ids: Range<u32>) -> Result<Vec<u32>> {
-        self.words.open(unit, ids)
+    pub fn open(&self, unit: &Unit<'_>, ids: Ids) -> Result<Vec<u32>> {
+        self.words.open(unit, ids.iter())
     }
 }
 
@@ -233,7 +237,7 @@ impl StoredNormals {
     ///
     /// # Errors
     /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`].
-    pub fn open(&self, unit: &Unit<'_>, ids: impl IntoIterator<Item = u32>) -> Result<Vec<u32>> {
+    pub fn open(&self, unit: &Unit<'_>, ids: impl IntoIterator<Item = Id>) -> Result<Vec<u32>> {
         self.words.open(unit, ids)
     }
 }

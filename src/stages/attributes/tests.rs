@@ -68,7 +68,8 @@ fn check<R: Row>(points: u32, side: u32, block: u32, page: usize, keep_all: bool
     let mut seen = 0;
     // All ids of a block, and some of them that do not begin with a section.
     for (block, few) in (0..blocks.count()).flat_map(|block| [(block, 0), (block, 1), (block, 2)]) {
-        let ids: Vec<u32> = blocks.ids(block).skip(few).step_by(1 + few).collect();
+        let ids = blocks.ids(block);
+        let ids: Vec<_> = ids.iter().skip(few).step_by(1 + few).collect();
         let values = columns.open(&workspace.unit(), &ids).unwrap();
         let mut places = Vec::new();
         opened.fetch(&ids, &mut places).unwrap();

@@ -2,6 +2,7 @@
 //! 3.4).
 
 use super::directions::{Directions, DiskStats};
+use crate::ids::Id;
 use crate::order::PointStore;
 use crate::spacing::{Density, Standing};
 use crate::tiles::near::{Query, Sums};
@@ -176,7 +177,7 @@ pub struct CellMaker<'a> {
     /// If given, points off the surface get no cell.
     density: Option<Density<'a>>,
     /// The points that are coarser than their patch, with their numbers.
-    pub(super) coarse: Vec<(u32, u8)>,
+    pub(super) coarse: Vec<(Id, u8)>,
     /// The normals of the points, if they bring any.
     directions: Option<Directions>,
     pub(super) cell: Cell,
@@ -218,7 +219,7 @@ impl<'a> CellMaker<'a> {
     /// The normal and the radius of a point's disk, or the reason why it has none.
     pub(super) fn disk(
         &mut self,
-        id: u32,
+        id: Id,
         fit: &Fit,
     ) -> std::result::Result<(Normal, f64), Outcome> {
         let estimated = fit.plane.normal;
@@ -244,9 +245,9 @@ impl<'a> CellMaker<'a> {
     }
 
     /// Starts the cell of a point, or returns the reason why it has none.
-    fn start(&mut self, id: u32, fit: &Fit) -> std::result::Result<(), Outcome> {
+    fn start(&mut self, id: Id, fit: &Fit) -> std::result::Result<(), Outcome> {
         let (normal, radius) = self.disk(id, fit)?;
-        self.cell.start(id, normal, radius);
+        self.cell.start(id.get(), normal, radius);
         Ok(())
     }
 
@@ -263,7 +264,7 @@ impl<'a> CellMaker<'a> {
         let Some(fit) = fit_from(query, self.neighbors, self.widen)? else {
             return Ok(Outcome::Uncertain);
         };
-        if let Err(outcome) = self.start(query.id(), &fit) {
+        if let Err(outcome) = self.start(Id::new(query.id()), &fit) {
             return Ok(outcome);
         }
         Ok(self.clip(query, each))
@@ -293,11 +294,14 @@ impl<'a> CellMaker<'a> {
         &mut self,
         store: &PointStore,
         cache: &mut PageCache,
-        id: u32,
+        id: Id,
         point: Point,
         each: impl FnMut(u32, u32),
     ) -> Result<Outcome> {
-        let mut source = (Walk::new(store, cache, id, point), Neighbors::default());
+        let mut source = (
+            Walk::new(store, cache, id.get(), point),
+            Neighbors::default(),
+        );
         let Some(fit) = fit_from(&mut source, self.neighbors, self.widen)? else {
             return Ok(Outcome::Uncertain);
         };

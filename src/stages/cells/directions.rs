@@ -1,5 +1,6 @@
 //! The directions of the disks of a tile whose points bring normals.
 
+use crate::ids::Id;
 use crate::normals::{Given, InputNormals, Normals};
 use outcrop_disk::workspace::memory::bytes_of;
 use outcrop_geom::plane::{Moments, Normal};
@@ -68,7 +69,7 @@ impl Directions {
     /// last of them has this squared distance.
     pub(super) fn choose(
         &mut self,
-        id: u32,
+        id: Id,
         estimated: Option<Normal>,
         (moments, last2): (&Moments, u64),
     ) -> Option<Normal> {
@@ -78,7 +79,7 @@ impl Directions {
         };
         let suits = |estimated| self.always || moments.suits(estimated, given);
         let used = estimated.is_none_or(suits);
-        let number = (id - self.given.ids().start) as usize;
+        let number = self.given.ids().find(id);
         if let Some(mark) = self.marks.get_mut(number) {
             *mark = if used { USED } else { DISAGREEING };
         }

@@ -1,6 +1,7 @@
 //! The distinct triples of the cells of a tile with their counts (paper, section 3.4).
 
 use super::{CountedTriple, SentTriple, TileRanges};
+use crate::ids::{Id, Triangle};
 use outcrop_disk::workspace::memory::bytes_of;
 use std::ops::Range;
 
@@ -12,7 +13,7 @@ pub(super) struct TileTriples {
     here: Vec<(u32, u32, u32)>,
     /// The number of triples in `here` for each smallest vertex.
     begins: Vec<u32>,
-    elsewhere: Vec<[u32; 3]>,
+    elsewhere: Vec<Triangle>,
 }
 
 /// Counted triples of this tile and those sent to other tiles, both ascending.
@@ -53,15 +54,15 @@ impl TileTriples {
 
     /// Adds the triple of `a` and `b` in the cell of `v`.
     #[inline]
-    pub fn see(&mut self, v: u32, a: u32, b: u32) {
-        let (low, high) = (a.min(b), a.max(b));
+    pub fn see(&mut self, v: Id, [a, b]: [u32; 2]) {
+        let (v, low, high) = (v.get(), a.min(b), a.max(b));
         let [i, j, k] = [v.min(low), v.max(low).min(high), v.max(high)];
         let rank = (i as usize).wrapping_sub(self.ids.start);
         if rank < self.ids.len() {
             self.begins[rank + 1] += 1;
             self.here.push((rank as u32, j, k));
         } else {
-            self.elsewhere.push([i, j, k]);
+            self.elsewhere.push([i, j, k].map(Id::new));
         }
     }
 
@@ -89,7 +90,7 @@ impl TileTriples {
             for group in pairs.chunk_by(|a, b| a == b) {
                 let (j, k) = ((group[0] >> 32) as u32, group[0] as u32);
                 kept.push(CountedTriple {
-                    triple: [i, j, k],
+                    triple: [i, j, k].map(Id::new),
                     count: group.len() as u32,
                 });
             }
@@ -123,17 +124,17 @@ mod tests {
             let tiles = TileRanges::new(Blocks::new(60, 30), 20);
             let ids = tiles.ids(1);
             let mut here = TileTriples::new(ids.clone());
-            let mut counts: BTreeMap<[u32; 3], u32> = BTreeMap::new();
+            let mut counts: BTreeMap<Triangle, u32> = BTreeMap::new();
             for triple in &seen {
                 let t: Vec<u32> = triple.iter().copied().collect();
-                here.see(t[0], t[1], t[2]);
-                let mut t = [t[0], t[1], t[2]];
+                here.see(Id::new(t[0]), [t[1], t[2]]);
+                let mut t = [t[0], t[1], t[2]].map(Id::new);
                 t.sort_unstable();
                 *counts.entry(t).or_default() += 1;
             }
             prop_assert_eq!(here.len(), seen.len());
             let (kept, sent) = here.fold(&tiles);
-            let mine = |t: &[u32; 3]| ids.contains(&(t[0] as usize));
+            let mine = |t: &Triangle| ids.contains(&t[0].index());
             let expected: Vec<_> = counts.iter().filter(|(t, _)| mine(t))
                 .map(|(&triple, &count)| CountedTriple { triple, count }).collect();
             prop_assert_eq!(kept, expected);

@@ -13,6 +13,7 @@ pub(crate) use fits::{Planes, each_around};
 pub use fits::{each_neighborhood, each_plane};
 
 use crate::blocks::Blocks;
+use crate::ids::{Id, Ids, TileNumber, Triangle, Width};
 use crate::levels::Levels;
 use crate::order::PointStore;
 use crate::spacing::Density;
@@ -22,7 +23,7 @@ use crate::tiles::walk::PageCache;
 use directions::Directions;
 use fold::TileTriples;
 use outcrop_disk::error::Result;
-use outcrop_disk::spill::{Id, Shuffle, Table, release, row};
+use outcrop_disk::spill::{Shuffle, Table, release, row};
 use outcrop_disk::workspace::{Unit, Workspace};
 use outcrop_geom::Point;
 use serde::{Deserialize, Serialize};
@@ -32,7 +33,7 @@ row! {
     /// A triple of ids, ascending, and the number of cells that see it.
     pub struct CountedTriple {
         /// Ids, ascending.
-        triple: [u32; 3],
+        triple: Triangle,
         /// Cells, 1 to 3.
         count: u32,
     }
@@ -40,12 +41,12 @@ row! {
 }
 
 row! {
-    /// A counted triple that is sent to a tile or a block.
+    /// A counted triple that is sent to a tile.
     pub struct SentTriple {
-        /// Number of the tile or block.
-        to: u32,
+        /// Number of the tile.
+        to: TileNumber,
         /// Ids, ascending.
-        triple: [u32; 3],
+        triple: Triangle,
         /// Cells, 1 to 3.
         count: u32,
     }
@@ -84,7 +85,7 @@ pub struct CellStats {
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub struct TileRanges {
     blocks: Blocks,
-    block: u32,
+    block: Width,
     size: u32,
     per_block: u32,
 }
@@ -93,7 +94,7 @@ impl TileRanges {
     /// Divides each block into tiles of at most `size` points.
     #[must_use]
     pub fn new(blocks: Blocks, size: u32) -> Self {
-        let block = blocks.ids(0).end.max(1);
+        let block = blocks.ids(0).end.get().max(1);
         let size = size.clamp(1, block);
         Self {
             blocks,
@@ -113,21 +114,22 @@ impl TileRanges {
     #[must_use]
     pub fn count(&self) -> usize {
         let last = self.blocks.points().checked_sub(1);
-        last.map_or(0, |last| self.of(last as u32) as usize + 1)
+        last.map_or(0, |last| self.of(Id::at(last)).index() + 1)
     }
 
     /// The tile of an id.
     #[must_use]
-    pub fn of(&self, id: u32) -> u32 {
-        self.blocks.of(id) * self.per_block + id % self.block / self.size
+    pub fn of(&self, id: Id) -> TileNumber {
+        let inside = id.get() % self.block / self.size;
+        TileNumber::new(self.blocks.of(id).get() * self.per_block + inside)
     }
 
     /// The ids of a tile.
     #[must_use]
     pub fn ids(&self, tile: usize) -> Range<usize> {
         let block = self.blocks.ids(tile / self.per_block as usize);
-        let start = block.start + tile as u32 % self.per_block * self.size;
-        start as usize..(start.saturating_add(self.size)).min(block.end) as usize
+        let start = block.start.behind(tile as u32 % self.per_block * self.size);
+        start.index()..start.behind(self.size).min(block.end).index()
     }
 
     /// The tiles of a block.
@@ -248,10 +250,10 @@ pub fn cells(
 type Noted = (CellStats, DiskStats, Levels);
 
 /// The numbers of the coarse points among `ids`, by place; empty if there is none.
-fn by_place(coarse: &[(u32, u8)], ids: &Range<usize>) -> Levels {
+fn by_place(coarse: &[(Id, u8)], ids: &Range<usize>) -> Levels {
     let mut levels = Levels::new(if coarse.is_empty() { 0 } else { ids.len() });
     for (id, level) in coarse {
-        levels.set(*id as usize - ids.start, *level);
+        levels.set(id.index() - ids.start, *level);
     }
     levels
 }
@@ -271,7 +273,7 @@ fn maker<'a>(
     } = options;
     let mut maker = CellMaker::new(neighbors, radius, widen, density);
     if let Some(InputDirections { normals, wanted }) = directions {
-        let given = normals.open(unit, ids.start as u32..ids.end as u32)?;
+        let given = normals.open(unit, Ids::at(ids))?;
         maker.set_directions(Directions::new(given, wanted));
     }
     Ok(maker)
@@ -288,27 +290,27 @@ fn one_tile(
     let mut held = unit.hold(tile.bytes() + seen.bytes());
     unit.give_back(tile.spare());
     let mut search = Search::default();
-    let mut uncertain: Vec<(u32, Point)> = Vec::new();
+    let mut uncertain: Vec<(Id, Point)> = Vec::new();
     let mut no_plane = 0;
     let mut off = Vec::new();
     let mut failed = None;
     let mut searching = unit.hold(0);
     let grown = |bytes| searching.set(bytes);
     tile.for_each_group(maker.neighbors, &mut search, grown, |group| {
-        let outcomes = maker.from_group(group, |id, a, b| seen.see(id, a, b));
+        let outcomes = maker.from_group(group, |id, a, b| seen.see(Id::new(id), [a, b]));
         for (number, (member, outcome)) in group.members().iter().zip(outcomes).enumerate() {
-            let id = member.id;
+            let id = Id::new(member.id);
             let outcome = match outcome {
                 Some(outcome) => Ok(outcome),
                 None => match group.query(number) {
                     None => Ok(Outcome::Uncertain),
-                    Some(mut query) => maker.from_tile(&mut query, |a, b| seen.see(id, a, b)),
+                    Some(mut query) => maker.from_tile(&mut query, |a, b| seen.see(id, [a, b])),
                 },
             };
             match outcome {
                 Ok(Outcome::Complete) => {}
                 Ok(Outcome::NoPlane) => no_plane += 1,
-                Ok(Outcome::OffSurface) => off.push(Id { id }),
+                Ok(Outcome::OffSurface) => off.push(id),
                 Ok(Outcome::Uncertain) => uncertain.push((id, member.point)),
                 Err(error) => failed = Some(error),
             }
@@ -322,10 +324,10 @@ fn one_tile(
     drop((tile, search, searching));
     let mut cache = PageCache::default();
     for &(id, point) in &uncertain {
-        let each = |a, b| seen.see(id, a, b);
+        let each = |a, b| seen.see(id, [a, b]);
         match maker.from_store(store, &mut cache, id, point, each)? {
             Outcome::NoPlane => no_plane += 1,
-            Outcome::OffSurface => off.push(Id { id }),
+            Outcome::OffSurface => off.push(id),
             Outcome::Complete | Outcome::Uncertain => {}
         }
         held.set(cache.bytes() + seen.bytes());

@@ -1,6 +1,7 @@
 //! Cells of the points of a leaf, computed together from their nearest neighbours.
 
 use super::cell::{CellMaker, Fit, Outcome};
+use crate::ids::Id;
 use crate::tiles::near::{Group, Neighborhood};
 use outcrop_geom::clip::wrap::{Site, TOGETHER};
 use outcrop_geom::kernels::Level;
@@ -59,7 +60,7 @@ impl CellMaker<'_> {
             if !self.widen.is_enough(&fit.plane) {
                 continue;
             }
-            match self.disk(member.id, &fit) {
+            match self.disk(Id::new(member.id), &fit) {
                 Err(outcome) => outcomes[place] = Some(outcome),
                 Ok((normal, radius)) => {
                     places.push(place);

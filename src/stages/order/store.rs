@@ -2,6 +2,7 @@
 
 use super::files::{STEP, StoreFiles, StoredPoints, index_of};
 use super::packed::Packing;
+use crate::ids::Id;
 use outcrop_disk::error::Result;
 use outcrop_disk::workspace::Workspace;
 use outcrop_disk::workspace::file::ScratchFile;
@@ -295,17 +296,17 @@ impl PointStore {
     ///
     /// # Errors
     /// See [`PointStore::read_pages`].
-    pub fn fetch(&self, ids: &[u32], points: &mut Vec<Point>) -> Result<()> {
+    pub fn fetch(&self, ids: &[Id], points: &mut Vec<Point>) -> Result<()> {
         let mut buffer = Vec::new();
         let mut loaded = usize::MAX;
         for &id in ids {
-            let page = id as usize / self.page;
+            let page = id.index() / self.page;
             if page != loaded {
                 buffer.clear();
                 self.read_pages(page..page + 1, &mut buffer)?;
                 loaded = page;
             }
-            points.push(buffer[id as usize % self.page]);
+            points.push(buffer[id.index() % self.page]);
         }
         Ok(())
     }
@@ -351,6 +352,6 @@ mod tests {
         for range in [0..1, 5..store.len] {
             assert!(matches!(store.slice(range), Err(Error::Corrupt { .. })));
         }
-        assert!(store.fetch(&[3], &mut Vec::new()).is_err());
+        assert!(store.fetch(&[Id::new(3)], &mut Vec::new()).is_err());
     }
 }

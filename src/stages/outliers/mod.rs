@@ -12,6 +12,7 @@ mod spacing;
 
 use crate::blocks::Blocks;
 use crate::cells::{TileRanges, each_neighborhood};
+use crate::ids::Id;
 use crate::order::{PointStore, Position, StoreWriter, StoredPoints};
 use crate::tiles::Tile;
 use crate::tiles::neighbors::Neighbors;
@@ -117,8 +118,8 @@ fn one_tile(
     let mut kept = vec![None; ids.len()];
     let mut failed = Ok(());
     let of = |id, near: &Neighbors| {
-        let around = near.columns().ids[..count].iter().copied();
-        let out = spacings.stand_out(id, around, factor);
+        let around = near.columns().ids[..count].iter();
+        let out = spacings.stand_out(Id::new(id), around.map(|id| Id::new(*id)), factor);
         out.unwrap_or_else(|error| {
             failed = Err(error);
             false

@@ -1,6 +1,7 @@
 //! The spacings of all points, in a file by tile.
 
 use crate::cells::{TileRanges, each_neighborhood};
+use crate::ids::{Id, TileNumber};
 use crate::order::PointStore;
 use crate::tiles::Tile;
 use crate::tiles::neighbors::Neighbors;
@@ -77,7 +78,7 @@ fn mean(distances2: &[u64]) -> Spacing {
 pub(super) struct SpacingCache<'a> {
     unit: &'a Unit<'a>,
     spacings: &'a Spacings,
-    sections: FxHashMap<u32, Vec<Spacing>>,
+    sections: FxHashMap<TileNumber, Vec<Spacing>>,
     held: usize,
     around: Vec<u32>,
     taken: Holding<'a>,
@@ -103,10 +104,10 @@ impl<'a> SpacingCache<'a> {
 
     /// The bits of the spacing of a point. Spacings are not negative, so their bits are ordered like their
     /// values.
-    fn get(&mut self, id: u32) -> Result<u32> {
+    fn get(&mut self, id: Id) -> Result<u32> {
         let tiles = &self.spacings.tiles;
         let tile = tiles.of(id);
-        let place = id as usize - tiles.ids(tile as usize).start;
+        let place = id.index() - tiles.ids(tile.index()).start;
         if let Some(section) = self.sections.get(&tile) {
             return Ok(section[place].bits);
         }
@@ -115,7 +116,7 @@ impl<'a> SpacingCache<'a> {
             self.sections.clear();
             self.held = 0;
         }
-        let section = self.spacings.sections.get(self.unit, tile as usize)?;
+        let section = self.spacings.sections.get(self.unit, tile.index())?;
         let found = section[place].bits;
         self.held += section.len();
         self.taken.set(4 * self.held as u64);
@@ -126,8 +127,8 @@ impl<'a> SpacingCache<'a> {
     /// True if the spacing of a point is larger than `factor` times the median of the spacings `around` it.
     pub(super) fn stand_out(
         &mut self,
-        id: u32,
-        around: impl Iterator<Item = u32>,
+        id: Id,
+        around: impl Iterator<Item = Id>,
         factor: f64,
     ) -> Result<bool> {
         let mut found = std::mem::take(&mut self.around);

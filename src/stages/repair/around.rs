@@ -1,6 +1,7 @@
 //! The triangles of the stitched surface that touch a block.
 
 use crate::blocks::Blocks;
+use crate::ids::Block;
 use crate::stitch::Stitched;
 use crate::surface::rows::{TriangleRow, TriangleTo};
 use crate::surface::star::Triangle;
@@ -42,7 +43,7 @@ impl<'a> Around<'a> {
         let removed = self.removed.get(unit, block)?;
         if !removed.is_empty() {
             let gone = |&triangle: &Triangle| {
-                let to = block as u32;
+                let to = Block::at(block);
                 removed.binary_search(&TriangleTo { to, triangle })
             };
             triangles.retain(|t| gone(t).is_err());
@@ -60,7 +61,7 @@ pub fn merge(
 ) {
     let (mut from, mut to) = (into.len(), into.len() + more.len());
     into.reserve_exact(more.len());
-    into.resize(to, [0; 3]);
+    into.resize(to, Triangle::default());
     for t in more.rev() {
         while from > 0 && into[from - 1] > t {
             from -= 1;
@@ -75,14 +76,17 @@ pub fn merge(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ids::triangle;
     use proptest::prelude::*;
 
     proptest! {
         #[test]
         fn merging_is_sorting(
-            mut a in prop::collection::vec([0u32..9, 0u32..9, 0u32..9], 0..40),
-            mut b in prop::collection::vec([0u32..9, 0u32..9, 0u32..9], 0..40),
+            a in prop::collection::vec([0u32..9, 0u32..9, 0u32..9], 0..40),
+            b in prop::collection::vec([0u32..9, 0u32..9, 0u32..9], 0..40),
         ) {
+            let [mut a, mut b]: [Vec<Triangle>; 2] =
+                [a, b].map(|all| all.into_iter().map(triangle).collect());
             a.sort_unstable();
             b.sort_unstable();
             let mut want = [a.clone(), b.clone()].concat();

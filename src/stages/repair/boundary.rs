@@ -7,6 +7,7 @@ use super::fill::{
     vector_area,
 };
 use super::parts::Part;
+use crate::ids::{Id, Triangle};
 use crate::spacing::Density;
 use outcrop_geom::distance2;
 use outcrop_geom::method::METHOD;
@@ -51,7 +52,7 @@ impl LoopRules<'_> {
         corners: &[Corner],
         sure: usize,
         found: &Width,
-        edge: impl Fn(u32, u32) -> bool,
+        edge: impl Fn(Id, Id) -> bool,
     ) -> Option<Part> {
         let triangles = triangulate(corners, sure, edge).ok()?;
         if found.is_spanned(corners, &triangles) {
@@ -69,7 +70,7 @@ impl LoopRules<'_> {
     }
 
     /// Fills or closes the loop of `corners` by the rules; `edge(a, b)` is true if the mesh has that edge.
-    pub fn close(&self, mut corners: Vec<Corner>, edge: impl Fn(u32, u32) -> bool) -> Filling {
+    pub fn close(&self, mut corners: Vec<Corner>, edge: impl Fn(Id, Id) -> bool) -> Filling {
         if !self.clip_ears {
             return fill(corners, 0, edge);
         }
@@ -97,7 +98,7 @@ impl LoopRules<'_> {
         let mut open = left.len();
         if !triangles.is_empty() && !left.is_empty() && fillable(&left) {
             let new = edges_of(&triangles);
-            let taken = |a: u32, b: u32| edge(a, b) || new.contains(&undirected(a, b));
+            let taken = |a: Id, b: Id| edge(a, b) || new.contains(&undirected(a, b));
             begin_at_smallest(&mut left);
             if let Some(part) = self.filled(&left, METHOD.filling.sure, &found, taken) {
                 triangles.extend(ids(&left, &part.triangles));
@@ -112,8 +113,8 @@ impl LoopRules<'_> {
     }
 }
 
-fn edges_of(triangles: &[[u32; 3]]) -> FxHashSet<(u32, u32)> {
-    let edges = |&[a, b, c]: &[u32; 3]| [undirected(a, b), undirected(b, c), undirected(c, a)];
+fn edges_of(triangles: &[Triangle]) -> FxHashSet<(Id, Id)> {
+    let edges = |&[a, b, c]: &Triangle| [undirected(a, b), undirected(b, c), undirected(c, a)];
     triangles.iter().flat_map(edges).collect()
 }
 

@@ -2,17 +2,17 @@
 
 use super::ascending;
 use super::patch::Patch;
+use crate::ids::{Id, Ids};
 use crate::surface::star::{Link, Star, Triangle};
-use std::ops::Range;
 
 /// Numbers, ascending, of the triangles that are bridges at a vertex of the block.
 ///
 /// A bridge has two boundary edges, so it is adjacent to at most one triangle. Removing it leaves the rest
 /// connected as before, and the component of that triangle was open before.
 #[must_use]
-pub fn find(ids: Range<u32>, triangles: &[Triangle], patch: &Patch) -> Vec<u32> {
+pub fn find(ids: Ids, triangles: &[Triangle], patch: &Patch) -> Vec<u32> {
     // Every open fan has two boundary edges, and a closed fan is the only fan of its vertex.
-    let several = |v: u32| ids.contains(&v) && patch.rims[(v - ids.start) as usize] >= 4;
+    let several = |v: Id| ids.contains(&v) && patch.rims[ids.place(v)] >= 4;
     let near: Vec<u32> = (0..triangles.len() as u32)
         .filter(|&n| triangles[n as usize].into_iter().any(several))
         .collect();
@@ -20,10 +20,10 @@ pub fn find(ids: Range<u32>, triangles: &[Triangle], patch: &Patch) -> Vec<u32> 
         return Vec::new();
     }
     let these: Vec<Triangle> = near.iter().map(|&n| triangles[n as usize]).collect();
-    let star = Star::of(ids.clone(), &these);
+    let star = Star::of(ids, &these);
     let mut link = Link::default();
     let mut found = Vec::new();
-    for v in ids.clone().filter(|v| several(*v)) {
+    for v in ids.iter().filter(|v| several(*v)) {
         let at = star.at(v);
         link.set(v, at.iter().map(|&n| these[n as usize]));
         // A fan of one triangle has both its edges at v on the boundary. If there is no larger fan, the first

@@ -32,7 +32,7 @@ pub(super) fn join(
         for same in all.chunk_by(|a, b| a.triangle == b.triangle) {
             let global = |s: &SeenTriangle| {
                 let (label, flip) = constraint(s.label_flip);
-                (globals[s.block as usize].0 + label, flip)
+                (globals[s.block.index()].0 + label, flip)
             };
             let (first, flip) = global(&same[0]);
             for (label, other) in same[1..].iter().map(global) {
@@ -129,7 +129,7 @@ impl Parts<'_> {
                 continue;
             }
             let (label, flip) = constraint(first.label_flip);
-            let label = self.globals[first.block as usize].0 + label;
+            let label = self.globals[first.block.index()].0 + label;
             let (root, turned) = self.sets.look(label);
             // The positions of all corners were fetched.
             let corners = triangle.map(|v| points[ids.partition_point(|id| *id < v)]);

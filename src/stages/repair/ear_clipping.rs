@@ -2,6 +2,7 @@
 //! as at doors and at the outline of a survey, ears would be longer than the spacing of the surface allows.
 
 use super::fill::{Corner, distance, edges, undirected};
+use crate::ids::{Id, Triangle};
 use outcrop_geom::Point;
 use outcrop_geom::method::METHOD;
 use outcrop_geom::triangle::{length, normal, on_a_line};
@@ -11,7 +12,7 @@ use std::collections::BinaryHeap;
 /// A loop after ear clipping.
 pub struct Clipped {
     /// The ears, as oriented triangles.
-    pub triangles: Vec<[u32; 3]>,
+    pub triangles: Vec<Triangle>,
     /// The remaining corners in order; none if the loop is closed.
     pub left: Vec<Corner>,
 }
@@ -29,13 +30,13 @@ struct EarClipper<E> {
     age: Vec<u32>,
     count: usize,
     edge: E,
-    chords: rustc_hash::FxHashSet<(u32, u32)>,
+    chords: rustc_hash::FxHashSet<(Id, Id)>,
     heap: BinaryHeap<Ear>,
-    out: Vec<[u32; 3]>,
+    out: Vec<Triangle>,
 }
 
 /// Clips ears of the loop of `corners`; `edge(a, b)` is true if the mesh has that edge.
-pub fn zip(corners: Vec<Corner>, edge: impl Fn(u32, u32) -> bool) -> Clipped {
+pub fn zip(corners: Vec<Corner>, edge: impl Fn(Id, Id) -> bool) -> Clipped {
     let n = corners.len();
     let mut clipper = EarClipper {
         spacing: spacing(&corners),
@@ -80,7 +81,7 @@ fn spacing(corners: &[Corner]) -> Vec<f64> {
     (0..n).map(mean).collect()
 }
 
-impl<E: Fn(u32, u32) -> bool> EarClipper<E> {
+impl<E: Fn(Id, Id) -> bool> EarClipper<E> {
     /// Enters the ear at a corner if it may be closed.
     fn consider(&mut self, x: usize) {
         if let Some(sharpness) = self.ear(x) {

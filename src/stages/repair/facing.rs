@@ -272,6 +272,7 @@ pub fn judge(sums: &Sums, [least, if_noisy]: [u64; 2], stats: &mut RepairStats) 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ids::triangle;
 
     /// A floor that faces up, seen from a side of it.
     #[test]
@@ -284,7 +285,7 @@ mod tests {
             for flip in [false, true] {
                 let mut sums = Sums::default();
                 sums.open();
-                sums.add([1, 2, 3], floor, flip, toward);
+                sums.add(triangle([1, 2, 3]), floor, flip, toward);
                 assert_eq!(sums.seen.abs(), 12);
                 assert_eq!(sums.faces_wrong_way(), wrong ^ flip);
             }
@@ -292,7 +293,7 @@ mod tests {
         // A scanner beside it says nothing.
         let mut sums = Sums::default();
         sums.open();
-        sums.add([1, 2, 3], floor, true, Some([1.0, 0.0, 0.0]));
+        sums.add(triangle([1, 2, 3]), floor, true, Some([1.0, 0.0, 0.0]));
         assert_eq!((sums.seen, sums.faces_wrong_way()), (0, true));
     }
 
@@ -301,9 +302,9 @@ mod tests {
         let far = (1 << 30) - 1;
         let mut sums = Sums::default();
         let corners = [[0, far, 7], [far, 0, 0], [4, 2, far]];
-        sums.add([3, 5, 9], corners, true, Some([0.0, 0.0, 1.0]));
+        sums.add(triangle([3, 5, 9]), corners, true, Some([0.0, 0.0, 1.0]));
         let corners = [[far, far, 0], [0, far, 9], [far, 5, 0]];
-        sums.add([4, 5, 9], corners, false, Some([-0.8, 0.0, 0.6]));
+        sums.add(triangle([4, 5, 9]), corners, false, Some([-0.8, 0.0, 0.6]));
         assert!(sums.seen != 0);
         sums.open();
         sums.note_noise();

@@ -1,5 +1,6 @@
 //! Filling a hole by splitting its boundary loop (paper, section 3.6).
 
+use crate::ids::{Id, Triangle};
 use outcrop_geom::method::METHOD;
 use outcrop_geom::triangle::{add, length, normal, on_a_line};
 use outcrop_geom::{Point, distance2};
@@ -8,7 +9,7 @@ use outcrop_geom::{Point, distance2};
 #[derive(Debug, Clone, Copy)]
 pub struct Corner {
     /// Its id.
-    pub id: u32,
+    pub id: Id,
     /// Its position.
     pub at: Point,
     /// Position of the third vertex of the triangle at the edge from the previous corner.
@@ -23,11 +24,11 @@ pub struct Corner {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Filling {
     /// One oriented triangle fills the loop: a triangle that no cell saw, not a hole.
-    Gap([u32; 3]),
+    Gap(Triangle),
     /// Filled completely, by these oriented triangles.
-    Filled(Vec<[u32; 3]>),
+    Filled(Vec<Triangle>),
     /// Closed in part, by these oriented triangles; and the number of open edges left.
-    Clipped(Vec<[u32; 3]>, usize),
+    Clipped(Vec<Triangle>, usize),
     /// The loop is an outline: it goes around a piece of surface and not around a hole.
     Outline,
     /// No valid triangulation was found.
@@ -37,7 +38,7 @@ pub enum Filling {
 /// Triangulates the hole inside `corners`; `edge(a, b)` is true if the mesh has that edge.
 ///
 /// Loops of more than `sure` edges are first tested for being an outline.
-pub fn fill(mut corners: Vec<Corner>, sure: usize, edge: impl Fn(u32, u32) -> bool) -> Filling {
+pub fn fill(mut corners: Vec<Corner>, sure: usize, edge: impl Fn(Id, Id) -> bool) -> Filling {
     begin_at_smallest(&mut corners);
     match triangulate(&corners, sure, edge) {
         Ok(triangles) => Filling::Filled(ids(&corners, &triangles)),
@@ -46,7 +47,7 @@ pub fn fill(mut corners: Vec<Corner>, sure: usize, edge: impl Fn(u32, u32) -> bo
 }
 
 /// The ids of the corners of triangles.
-pub fn ids(corners: &[Corner], triangles: &[[usize; 3]]) -> Vec<[u32; 3]> {
+pub fn ids(corners: &[Corner], triangles: &[[usize; 3]]) -> Vec<Triangle> {
     let of = |t: &[usize; 3]| t.map(|x| corners[x].id);
     triangles.iter().map(of).collect()
 }
@@ -55,7 +56,7 @@ pub fn ids(corners: &[Corner], triangles: &[[usize; 3]]) -> Vec<[u32; 3]> {
 pub fn triangulate(
     corners: &[Corner],
     sure: usize,
-    edge: impl Fn(u32, u32) -> bool,
+    edge: impl Fn(Id, Id) -> bool,
 ) -> Result<Vec<[usize; 3]>, Filling> {
     let n = corners.len();
     if goes_around_a_triangle(corners) || n > sure && is_outline(corners) {
@@ -91,7 +92,7 @@ pub fn edges(corners: &[Corner]) -> impl Iterator<Item = (&Corner, &Corner)> + C
 }
 
 /// An edge as a key that does not depend on its direction.
-pub fn undirected(a: u32, b: u32) -> (u32, u32) {
+pub fn undirected(a: Id, b: Id) -> (Id, Id) {
     (a.min(b), a.max(b))
 }
 
@@ -132,11 +133,11 @@ pub fn is_outline(corners: &[Corner]) -> bool {
 struct Splitter<'a, E> {
     corners: &'a [Corner],
     edge: E,
-    chords: Vec<(u32, u32)>,
+    chords: Vec<(Id, Id)>,
     out: Vec<[usize; 3]>,
 }
 
-impl<E: Fn(u32, u32) -> bool> Splitter<'_, E> {
+impl<E: Fn(Id, Id) -> bool> Splitter<'_, E> {
     /// Splits the loop until only triangles are left; false if no valid chord is left.
     fn split(&mut self, ring: &[usize]) -> bool {
         // An explicit stack: a long thin hole is split as often as it has edges.

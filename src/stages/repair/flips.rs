@@ -9,13 +9,13 @@
 //! alone. Boundary edges, components and fans are preserved.
 
 use super::around::merge;
+use crate::ids::{Id, Ids};
 use crate::surface::sides::{NONE, across, parts, side};
 use crate::surface::star::Triangle;
 use outcrop_disk::workspace::memory::bytes_of;
 use outcrop_geom::method::METHOD;
 use outcrop_geom::triangle::small_normal;
 use outcrop_geom::{Point, sub};
-use std::ops::Range;
 
 /// A triangle that may be changed, and its neighbours.
 #[derive(Debug, Clone, Copy)]
@@ -32,8 +32,8 @@ struct Slot {
 
 /// The triangles of a block that may be changed.
 pub struct Sheet<'a> {
-    /// The first vertex of the block.
-    first: u32,
+    /// The ids of the block.
+    ids: Ids,
     points: &'a [Point],
     /// Their numbers among all triangles of the block.
     numbers: Vec<u32>,
@@ -57,38 +57,36 @@ struct Flip {
 impl<'a> Sheet<'a> {
     /// From the ascending `triangles` that touch the vertices `ids`. `points` are the positions in the file,
     /// `shape` those that decide the connectivity. Triangles none of whose points were moved are kept.
-    pub fn of(
-        ids: Range<u32>,
-        triangles: &[Triangle],
-        points: &'a [Point],
-        shape: &[Point],
-    ) -> Self {
+    pub fn of(ids: Ids, triangles: &[Triangle], points: &'a [Point], shape: &[Point]) -> Self {
         let moved: Vec<bool> = points.iter().zip(shape).map(|(p, s)| p != s).collect();
         let inside = |t: &Triangle| ids.contains(&t[0]) && ids.contains(&t[2]);
-        let moved = |t: &Triangle| t.iter().any(|v| moved[(v - ids.start) as usize]);
+        let moved = |t: &Triangle| t.iter().any(|v| moved[ids.place(*v)]);
         let mut fixed = vec![false; ids.len()];
         let mut numbers = Vec::new();
-        // With corners by index in the block.
+        // With corners by index in the block, as if the block were the cloud.
         let mut these: Vec<Triangle> = Vec::new();
         for (number, t) in triangles.iter().enumerate() {
             if inside(t) && moved(t) {
                 numbers.push(number as u32);
-                these.push(t.map(|v| v - ids.start));
+                these.push(t.map(|v| Id::at(ids.place(v))));
             } else {
                 for v in t.iter().filter(|v| ids.contains(v)) {
-                    fixed[(v - ids.start) as usize] = true;
+                    fixed[ids.place(*v)] = true;
                 }
             }
         }
-        let across = across(0..points.len() as u32, &these);
-        let slot = |(t, across): (&Triangle, &[u32; 3])| Slot {
-            corners: *t,
-            across: *across,
-            normal: unit(normal(points, *t)),
-            bends: [0.0; 3],
+        let across = across(Ids::at(&(0..points.len())), &these);
+        let slot = |(t, across): (&Triangle, &[u32; 3])| {
+            let corners = t.map(|v| v.index() as u32);
+            Slot {
+                corners,
+                across: *across,
+                normal: unit(normal(points, corners)),
+                bends: [0.0; 3],
+            }
         };
         let mut sheet = Self {
-            first: ids.start,
+            ids,
             points,
             numbers,
             slots: these.iter().zip(&across).map(slot).collect(),
@@ -385,7 +383,7 @@ impl<'a> Sheet<'a> {
         let mut new: Vec<Triangle> = Vec::new();
         let mut gone = Vec::new();
         for (number, _) in self.flipped.iter().enumerate().filter(|(_, f)| **f) {
-            let mut t = self.slots[number].corners.map(|v| v + self.first);
+            let mut t = self.slots[number].corners.map(|v| self.ids.id(v as usize));
             t.sort_unstable();
             new.push(t);
             gone.push(self.numbers[number]);

@@ -8,6 +8,7 @@ use super::rim::{BlockRim, FragmentRow, NumberingInput, RimCounts};
 use super::surface::StoredSurface;
 use super::{FilledTriangle, RepairStats, ascending, from_smallest};
 use crate::blocks::Blocks;
+use crate::ids::{Id, Triangle};
 use crate::located::Places;
 use crate::surface::star::sorted;
 use outcrop_disk::error::Result;
@@ -21,8 +22,8 @@ use std::sync::Mutex;
 /// Part of a loop inside one block: it enters at `start` (from, at) and leaves at `end` (at, to).
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct Fragment {
-    start: (u32, u32),
-    end: (u32, u32),
+    start: (Id, Id),
+    end: (Id, Id),
     steps: usize,
     /// Its stored steps; `None` if the fragment alone exceeds the longest loop.
     kept: Option<Place>,
@@ -165,7 +166,7 @@ struct Settled {
     stats: RepairStats,
     /// Number of edges of the holes that were filled.
     edges: u64,
-    triangles: Vec<[u32; 3]>,
+    triangles: Vec<Triangle>,
 }
 
 impl Settled {
@@ -194,7 +195,7 @@ impl Settled {
     }
 }
 
-fn addressed(triangles: &[[u32; 3]], blocks: Blocks) -> Vec<FilledTriangle> {
+fn addressed(triangles: &[Triangle], blocks: Blocks) -> Vec<FilledTriangle> {
     let mut sent = Vec::with_capacity(triangles.len());
     for &triangle in triangles {
         let to = |to| FilledTriangle { to, triangle };
@@ -207,7 +208,7 @@ fn addressed(triangles: &[[u32; 3]], blocks: Blocks) -> Vec<FilledTriangle> {
 /// Chains fragments into loops; every fragment belongs to one.
 fn link_up(fragments: &[Fragment]) -> Vec<Vec<usize>> {
     let starts = fragments.iter().map(|f| f.start);
-    let by_start: FxHashMap<(u32, u32), usize> = starts.zip(0..).collect();
+    let by_start: FxHashMap<(Id, Id), usize> = starts.zip(0..).collect();
     let mut seen = vec![false; fragments.len()];
     let mut loops = Vec::new();
     for first in 0..fragments.len() {
@@ -278,8 +279,8 @@ impl Fragments<'_> {
     ) -> Result<Filling> {
         let places = self.places;
         let mut rows = Vec::new();
-        let mut parts: Vec<(u32, u32, bool)> = Vec::new();
-        let mut edges: FxHashMap<u32, Vec<u32>> = FxHashMap::default();
+        let mut parts: Vec<(Id, Id, bool)> = Vec::new();
+        let mut edges: FxHashMap<Id, Vec<Id>> = FxHashMap::default();
         for &f in ring {
             let Some(place) = self.fragments[f].kept else {
                 return Ok(Filling::Impossible);
@@ -298,9 +299,9 @@ impl Fragments<'_> {
         if places.differ() {
             places.file.fetch(&ids, &mut in_file)?;
         }
-        let rank = |v: u32| ids.partition_point(|x| *x < v);
-        let at = |v: u32| points[rank(v)];
-        let corner = |&(id, apex, pinched): &(u32, u32, bool)| Corner {
+        let rank = |v: Id| ids.partition_point(|x| *x < v);
+        let at = |v: Id| points[rank(v)];
+        let corner = |&(id, apex, pinched): &(Id, Id, bool)| Corner {
             id,
             at: at(id),
             apex: at(apex),

@@ -1,21 +1,25 @@
 //! Boundary loops: the succession of boundary edges at the vertices of a block.
 
 use super::{OrientedTriangle, ascending};
+use crate::ids::Id;
 use crate::surface::star::{Link, Star, others};
 use outcrop_geom::triangle::{add, normal};
 use outcrop_geom::{Point, sub};
+
+/// A triangle and its component.
+pub type InComponent = (OrientedTriangle, u32);
 
 /// One step of a boundary loop: the edge from `from` to `at` is followed by the edge from `at` to `to`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Step {
     /// The previous vertex.
-    pub from: u32,
+    pub from: Id,
     /// The vertex, which is in the block.
-    pub at: u32,
+    pub at: Id,
     /// The next vertex.
-    pub to: u32,
+    pub to: Id,
     /// The third vertex of the triangle at the edge `from`, `at`.
-    pub apex: u32,
+    pub apex: Id,
     /// True if `at` has several fans.
     pub pinched: bool,
 }
@@ -23,9 +27,9 @@ pub struct Step {
 /// An open fan around a vertex.
 #[derive(Debug, Clone, Copy)]
 struct Fan {
-    start: u32,
-    end: u32,
-    apex: u32,
+    start: Id,
+    end: Id,
+    apex: Id,
     component: u32,
     normal: [i128; 3],
 }
@@ -33,11 +37,11 @@ struct Fan {
 /// The steps at those of `vertices` that have a boundary edge, ascending by (`from`, `at`). Calls `pinch`
 /// with every vertex that has several fans.
 pub fn steps(
-    vertices: impl Iterator<Item = u32>,
+    vertices: impl Iterator<Item = Id>,
     star: &Star,
-    triangles: &[[u32; 4]],
-    position: impl Fn(u32) -> Point,
-    mut pinch: impl FnMut(u32),
+    triangles: &[InComponent],
+    position: impl Fn(Id) -> Point,
+    mut pinch: impl FnMut(Id),
 ) -> Vec<Step> {
     let mut link = Link::default();
     let mut all = Vec::new();
@@ -85,13 +89,13 @@ enum Ends {
     /// None: the vertex has no triangle, or a closed fan.
     None,
     /// One fan.
-    One { start: u32, apex: u32, end: u32 },
+    One { start: Id, apex: Id, end: Id },
     /// Several fans.
     More,
 }
 
 /// From the oriented edges opposite to the vertex.
-fn ends(edges: impl Iterator<Item = [u32; 2]> + Clone) -> Ends {
+fn ends(edges: impl Iterator<Item = [Id; 2]> + Clone) -> Ends {
     let mut starts = edges
         .clone()
         .filter(|[a, _]| edges.clone().all(|[_, b]| b != *a));
@@ -101,18 +105,18 @@ fn ends(edges: impl Iterator<Item = [u32; 2]> + Clone) -> Ends {
     if starts.next().is_some() {
         return Ends::More;
     }
-    let last = |&[_, b]: &[u32; 2]| edges.clone().all(|[a, _]| a != b);
+    let last = |&[_, b]: &[Id; 2]| edges.clone().all(|[a, _]| a != b);
     // A fan with a start has an end.
     let end = edges.clone().find(last).map_or(start, |[_, b]| b);
     Ends::One { start, apex, end }
 }
 
-fn ids(t: &[u32; 4]) -> OrientedTriangle {
-    [t[0], t[1], t[2]]
+fn ids(t: &InComponent) -> OrientedTriangle {
+    t.0
 }
 
 /// The other two vertices of an oriented triangle, in their order after `v`.
-fn after(t: OrientedTriangle, v: u32) -> [u32; 2] {
+fn after(t: OrientedTriangle, v: Id) -> [Id; 2] {
     match t {
         [at, a, b] | [b, at, a] if at == v => [a, b],
         [a, b, _] => [a, b],
@@ -120,9 +124,9 @@ fn after(t: OrientedTriangle, v: u32) -> [u32; 2] {
 }
 
 fn fan<'a>(
-    v: u32,
-    members: impl Iterator<Item = &'a [u32; 4]> + Clone,
-    position: &impl Fn(u32) -> Point,
+    v: Id,
+    members: impl Iterator<Item = &'a InComponent> + Clone,
+    position: &impl Fn(Id) -> Point,
 ) -> Option<Fan> {
     let edges = members.clone().map(|t| after(ids(t), v));
     let Ends::One { start, apex, end } = ends(edges.clone()) else {
@@ -137,20 +141,15 @@ fn fan<'a>(
         start,
         end,
         apex,
-        component: members.clone().next()?[3],
+        component: members.clone().next()?.1,
         normal: sum,
     })
 }
 
 /// Matches incoming and outgoing boundary edges of the fans of each component across the gaps between them.
-fn pair_up(
-    v: u32,
-    fans: &[Fan],
-    position: &impl Fn(u32) -> Point,
-    put: &mut impl FnMut(&Fan, &Fan),
-) {
+fn pair_up(v: Id, fans: &[Fan], position: &impl Fn(Id) -> Point, put: &mut impl FnMut(&Fan, &Fan)) {
     let own = position(v);
-    let away = |x: u32| sub(position(x), own).map(|c| c as f64);
+    let away = |x: Id| sub(position(x), own).map(|c| c as f64);
     let mut pairs = Vec::new();
     for (x, a) in fans.iter().enumerate() {
         let mut axis = [0i128; 3];
@@ -223,7 +222,7 @@ fn clockwise(axis: [f64; 3], s: [f64; 3], e: [f64; 3]) -> u64 {
 }
 
 /// The one-ring of a vertex: all vertices connected to it by an edge.
-pub fn neighbors(star: &Star, triangles: &[[u32; 4]], v: u32) -> Vec<u32> {
+pub fn neighbors(star: &Star, triangles: &[InComponent], v: Id) -> Vec<Id> {
     let around = star.at(v).iter();
     ascending(around.flat_map(|&n| others(ids(&triangles[n as usize]), v)))
 }

@@ -26,6 +26,7 @@ pub use rim::{NumberingInput, Vertices};
 pub use surface::{ComponentRun, StoredSurface, Surface};
 
 use crate::blocks::Blocks;
+use crate::ids::{Block, Triangle};
 use crate::located::Places;
 use crate::stitch::Stitched;
 use boundary::LoopRules;
@@ -35,11 +36,11 @@ use outcrop_disk::workspace::Workspace;
 use serde::{Deserialize, Serialize};
 
 /// An oriented triangle, starting with its smallest vertex.
-pub type OrientedTriangle = [u32; 3];
+pub type OrientedTriangle = Triangle;
 
 /// Rotates an oriented triangle so that it starts with its smallest vertex.
 #[must_use]
-pub fn from_smallest([a, b, c]: [u32; 3]) -> OrientedTriangle {
+pub fn from_smallest([a, b, c]: Triangle) -> OrientedTriangle {
     if a < b && a < c {
         [a, b, c]
     } else if b < c {
@@ -70,7 +71,7 @@ row! {
     /// An oriented triangle that fills a hole, once for each block that it touches.
     pub struct FilledTriangle {
         /// Number of the block.
-        to: u32,
+        to: Block,
         /// Ids in the triangle's orientation, starting with the smallest.
         triangle: OrientedTriangle,
     }

@@ -4,11 +4,11 @@
 //! No edge has more than two triangles and the surface is orientable, so the order of the edges does not
 //! matter.
 
+use crate::ids::{Id, Ids};
 use crate::surface::parity::ParitySets;
 use crate::surface::sides::{pair_edges, parts};
 use crate::surface::star::{EDGES, Triangle};
 use outcrop_disk::workspace::memory::bytes_of;
-use std::ops::Range;
 
 /// Labels and boundary of the triangles that touch a block. Triangles with the same label are connected.
 #[derive(Debug)]
@@ -65,7 +65,7 @@ impl Labels {
 }
 
 struct Builder<'a> {
-    ids: Range<u32>,
+    ids: Ids,
     triangles: &'a [Triangle],
     labels: Labels,
     open: Vec<bool>,
@@ -75,7 +75,7 @@ struct Builder<'a> {
 impl Patch {
     /// Builds the patch of all `triangles` that touch the vertices `ids`, given in ascending order.
     #[must_use]
-    pub fn of(ids: Range<u32>, triangles: &[Triangle]) -> Self {
+    pub fn of(ids: Ids, triangles: &[Triangle]) -> Self {
         let mut builder = Builder {
             labels: Labels {
                 words: vec![NONE; triangles.len()],
@@ -125,12 +125,12 @@ impl Builder<'_> {
                 *rim = rim.saturating_add(1);
             }
         };
-        pair_edges(self.ids.clone(), self.triangles, pair, lone);
+        pair_edges(self.ids, self.triangles, pair, lone);
     }
 
     /// Processes the edges with one end in the block.
     fn across(&mut self) {
-        let mut edges: Vec<(u32, u32, u32, bool)> = Vec::new();
+        let mut edges: Vec<(Id, Id, u32, bool)> = Vec::new();
         for (number, t) in self.triangles.iter().enumerate() {
             if self.ids.contains(&t[0]) && self.ids.contains(&t[2]) {
                 continue;
@@ -152,7 +152,7 @@ impl Builder<'_> {
                 _ => {
                     self.open[number as usize] = true;
                     let own = if self.ids.contains(&low) { low } else { high };
-                    let rim = &mut self.rims[(own - self.ids.start) as usize];
+                    let rim = &mut self.rims[self.ids.place(own)];
                     *rim = rim.saturating_add(1);
                     rest = &rest[1..];
                 }
@@ -200,12 +200,13 @@ impl Builder<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ids::triangle;
 
     #[test]
     fn a_strip_across_a_border() {
         // 0-1-2, 1-2-3, 2-3-4 and, separate, 5-6-7; the block ends at 6.
-        let triangles = [[0, 1, 2], [1, 2, 3], [2, 3, 4], [5, 6, 7]];
-        let patch = Patch::of(0..6, &triangles);
+        let triangles = [[0, 1, 2], [1, 2, 3], [2, 3, 4], [5, 6, 7]].map(triangle);
+        let patch = Patch::of(Ids::of(0..6), &triangles);
         assert_eq!((patch.labels, patch.global), (2, 1));
         let labels: Vec<u32> = patch.words.iter().map(|w| w >> 1).collect();
         assert_eq!(labels, [1, 1, 1, 0]);
@@ -219,11 +220,11 @@ mod tests {
 
     #[test]
     fn a_closed_surface_has_no_rim() {
-        let tetrahedron = [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]];
-        for ids in [0..4, 0..2, 1..3, 3..4] {
+        let tetrahedron = [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]].map(triangle);
+        for ids in [0..4, 0..2, 1..3, 3..4].map(Ids::of) {
             let touches = |t: &Triangle| t.iter().any(|v| ids.contains(v));
             let triangles: Vec<Triangle> = tetrahedron.into_iter().filter(touches).collect();
-            let patch = Patch::of(ids.clone(), &triangles);
+            let patch = Patch::of(ids, &triangles);
             assert_eq!(patch.labels, 1);
             assert_eq!(patch.open, vec![false; triangles.len()]);
             assert_eq!(patch.rims, vec![0; ids.len()]);

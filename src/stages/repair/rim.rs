@@ -1,19 +1,19 @@
 //! The boundary of the surface in a block: triangles, steps of boundary loops and pinched vertices.
 
 use super::fill::Corner;
-use super::loops::{Step, neighbors, steps};
+use super::loops::{InComponent, Step, neighbors, steps};
 use super::rows::RimBits;
 use super::surface::Surface;
 use super::{SurfaceTriangle, ascending};
 use crate::blocks::Blocks;
+use crate::ids::{Id, Ids};
 use crate::located::{Located, Places};
 use crate::surface::star::Star;
 use outcrop_disk::error::Result;
-use outcrop_disk::spill::{Id, Table, release, row};
+use outcrop_disk::spill::{Table, release, row};
 use outcrop_disk::workspace::memory::{Reservation, bytes_of};
 use outcrop_disk::workspace::{Unit, Workspace};
 use serde::{Deserialize, Serialize};
-use std::ops::Range;
 
 row! {
     /// 64 bits, one for each point: set if it is a vertex of the mesh.
@@ -30,13 +30,13 @@ row! {
     /// A step of a boundary loop that leaves its block, repeated for each vertex of its one-ring.
     pub struct FragmentRow {
         /// The vertex.
-        id: u32,
+        id: Id,
         /// The vertex opposite the boundary edge.
-        apex: u32,
+        apex: Id,
         /// 1 if the vertex has several fans.
         pinched: u32,
         /// A vertex of its one-ring.
-        neighbor: u32,
+        neighbor: Id,
     }
     packed Above Above Above Above
 }
@@ -118,7 +118,7 @@ impl NumberingInput {
         let mut used = vec![0u64; words];
         for block in 0..count {
             let ids = blocks.ids(block);
-            let (first, shift) = (ids.start as usize / 64, ids.start % 64);
+            let (first, shift) = (ids.start.index() / 64, ids.start.index() % 64);
             let bits = self.bits.get(&unit, block)?.into_iter();
             for (n, UsedBits { low, high }) in bits.enumerate() {
                 let word = u64::from(high) << 32 | u64::from(low);
@@ -134,13 +134,13 @@ impl NumberingInput {
 
 /// The boundary of the surface in a block.
 pub struct BlockRim {
-    ids: Range<u32>,
+    ids: Ids,
     /// One bit for each vertex of the block, set if it has a triangle.
     used: Vec<u64>,
     /// Number of triangles whose smallest vertex is in the block.
     faces: u32,
     /// All triangles at vertices with a boundary edge, each with its component.
-    triangles: Vec<[u32; 4]>,
+    triangles: Vec<InComponent>,
     star: Star,
     shape: Located,
     /// Positions in the file, if they differ from the shape.
@@ -165,27 +165,27 @@ impl BlockRim {
             used: vec![0; ids.len().div_ceil(64)],
             faces: 0,
             triangles: Vec::new(),
-            star: Star::of(ids.start..ids.start, &[]),
+            star: Star::of(Ids::default(), &[]),
             shape: Located::default(),
             file: None,
             steps: Vec::new(),
             pinches: Vec::new(),
-            ids: ids.clone(),
+            ids: ids,
         };
         rim.pick(unit, surface, &rims)?;
         if rim.triangles.is_empty() {
             return Ok(rim);
         }
-        let plain = || rim.triangles.iter().map(|t| [t[0], t[1], t[2]]);
-        rim.star = Star::of(ids.clone(), &plain().collect::<Vec<_>>());
+        let plain = || rim.triangles.iter().map(|t| t.0);
+        rim.star = Star::of(ids, &plain().collect::<Vec<_>>());
         let load = |store| Located::load(store, blocks, block, plain().flatten());
         rim.shape = load(places.shape)?;
         rim.file = places.differ().then(|| load(places.file)).transpose()?;
-        let on_rim = |v: &u32| bit(&rims, v - ids.start);
+        let on_rim = |v: &Id| bit(&rims, ids.place(*v));
         let mut pinches = Vec::new();
         let position = |v| rim.shape.at(v);
-        let pinch = |id| pinches.push(Id { id });
-        let vertices = ids.clone().filter(on_rim);
+        let pinch = |id| pinches.push(id);
+        let vertices = ids.iter().filter(on_rim);
         rim.steps = steps(vertices, &rim.star, &rim.triangles, position, pinch);
         rim.pinches = pinches;
         Ok(rim)
@@ -202,7 +202,7 @@ impl BlockRim {
     fn pick(&mut self, unit: &Unit<'_>, surface: &Surface<'_>, rims: &[RimBits]) -> Result<()> {
         let (triangles, runs) = surface.load(unit, unit.number())?;
         let mut held = unit.hold(bytes_of(&triangles) + bytes_of(&runs));
-        let size = self.ids.len() as u32;
+        let size = self.ids.len();
         let mut rest = &triangles[..];
         for run in runs {
             let (these, later) = rest.split_at(run.count);
@@ -210,15 +210,15 @@ impl BlockRim {
             for t in these {
                 let mut at_rim = false;
                 for v in t {
-                    let local = v.wrapping_sub(self.ids.start);
+                    let local = self.ids.find(*v);
                     if local < size {
-                        self.used[local as usize / 64] |= 1 << (local % 64);
+                        self.used[local / 64] |= 1 << (local % 64);
                         at_rim |= bit(rims, local);
                     }
                 }
-                self.faces += u32::from(t[0].wrapping_sub(self.ids.start) < size);
+                self.faces += u32::from(self.ids.find(t[0]) < size);
                 if at_rim {
-                    self.triangles.push([t[0], t[1], t[2], run.component]);
+                    self.triangles.push((*t, run.component));
                 }
             }
         }
@@ -238,20 +238,19 @@ impl BlockRim {
     }
 
     /// True if the mesh has the edge from `a`, which must be a vertex of a step, to `b`.
-    pub fn has_edge(&self, a: u32, b: u32) -> bool {
+    pub fn has_edge(&self, a: Id, b: Id) -> bool {
         self.star
             .at(a)
             .iter()
-            .any(|&n| self.triangles[n as usize][..3].contains(&b))
+            .any(|&n| self.triangles[n as usize].0.contains(&b))
     }
 
     /// All triangles at pinched vertices, ascending by sorted ids.
     pub fn pinched(&self) -> Vec<SurfaceTriangle> {
-        let at = |v: &Id| self.star.at(v.id).iter().copied();
+        let at = |v: &Id| self.star.at(*v).iter().copied();
         let numbers = ascending(self.pinches.iter().flat_map(at));
-        let row = |n: u32| {
-            let [a, b, c, _] = self.triangles[n as usize];
-            SurfaceTriangle { corners: [a, b, c] }
+        let row = |n: u32| SurfaceTriangle {
+            corners: self.triangles[n as usize].0,
         };
         numbers.into_iter().map(row).collect()
     }
@@ -301,6 +300,6 @@ impl BlockRim {
     }
 }
 
-fn bit(words: &[RimBits], local: u32) -> bool {
-    words[local as usize / 32].bits >> (local % 32) & 1 == 1
+fn bit(words: &[RimBits], local: usize) -> bool {
+    words[local / 32].bits >> (local % 32) & 1 == 1
 }

@@ -1,5 +1,6 @@
 //! Rows exchanged between blocks to merge components.
 
+use crate::ids::Block;
 use crate::surface::star::Triangle;
 use outcrop_disk::spill::row;
 
@@ -7,11 +8,11 @@ row! {
     /// The label of a crossing triangle in one block, sent to the block of its smallest vertex.
     pub struct SeenTriangle {
         /// Block of the smallest vertex.
-        to: u32,
+        to: Block,
         /// Ids, ascending.
         triangle: Triangle,
         /// The block of the label.
-        block: u32,
+        block: Block,
         /// `label << 1 | flip`: its label in that block, and 1 if it is turned against its ascending ids
         /// there.
         label_flip: u32,

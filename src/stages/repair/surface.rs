@@ -12,6 +12,7 @@ use super::patch::Patch;
 use super::rows::{LabelRun, RimBits, SeenTriangle};
 use super::{OrientedTriangle, RepairOptions, RepairStats, SurfaceTriangle, bridges};
 use crate::blocks::Blocks;
+use crate::ids::Block;
 use crate::located::Places;
 use crate::outside::Known;
 use crate::stitch::Stitched;
@@ -110,7 +111,7 @@ impl Surface<'_> {
         let bridges = self.bridges.get(unit, block)?;
         let is_bridge = |[i, a, b]: OrientedTriangle| {
             let key = TriangleTo {
-                to: block as u32,
+                to: Block::at(block),
                 triangle: [i, a.min(b), a.max(b)],
             };
             !bridges.is_empty() && bridges.binary_search(&key).is_ok()
@@ -290,22 +291,22 @@ impl Build<'_> {
         let block = unit.number();
         let ids = self.blocks.ids(block);
         let mut triangles = around.load(unit, block)?;
-        let range = ids.start as usize..ids.end as usize;
+        let range = ids.indices();
         let shape = self.places.shape.slice(range.clone())?;
         let lists = bytes_of(&triangles) + bytes_of(&shape);
         let mut held = unit.hold(lists);
         let mut stats = RepairStats::default();
         if self.options.repair && self.options.flip && self.places.differ() {
             let points = self.places.file.slice(range)?;
-            let sheet = Sheet::of(ids.clone(), &triangles, &points, &shape);
+            let sheet = Sheet::of(ids, &triangles, &points, &shape);
             held.set(lists + bytes_of(&points) + sheet.bytes());
             stats.edges_flipped = sheet.flip(&mut triangles);
         }
         held.set(lists + Patch::estimate(triangles.len(), ids.len()));
-        let patch = Patch::of(ids.clone(), &triangles);
+        let patch = Patch::of(ids, &triangles);
         held.set(lists + patch.bytes());
         let bridges = if self.options.repair {
-            bridges::find(ids.clone(), &triangles, &patch)
+            bridges::find(ids, &triangles, &patch)
         } else {
             Vec::new()
         };
@@ -358,7 +359,7 @@ impl Build<'_> {
                 continue;
             }
             if ids.contains(&t[0]) && ids.contains(&t[2]) {
-                let corners = t.map(|v| points[(v - ids.start) as usize]);
+                let corners = t.map(|v| points[ids.place(v)]);
                 let toward = known.and_then(|known| known.toward(t[0], corners[0]));
                 sum.add(*t, corners, flip, toward);
                 if self.places.is_noisy(t[0]) {
@@ -390,7 +391,7 @@ impl Build<'_> {
             seen.push(SeenTriangle {
                 to: owner,
                 triangle: t,
-                block: block as u32,
+                block: Block::at(block),
                 label_flip: patch.words[number],
             });
             if bridges.binary_search(&(number as u32)).is_ok() {

@@ -4,26 +4,25 @@ use super::boundary::LoopRules;
 use super::ear_clipping::zip;
 use super::fill::{Corner, Filling};
 use super::flips;
-use crate::surface::star::Triangle;
+use crate::ids::{Id, Ids, Triangle, triangle};
 use outcrop_geom::{Point, distance2};
 use proptest::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
-use std::ops::Range;
 
 /// A surface near a plane, with oriented triangles.
 #[derive(Debug, Clone)]
 struct Sheet {
     points: Vec<Point>,
-    triangles: Vec<[u32; 3]>,
+    triangles: Vec<Triangle>,
 }
 
-type HalfEdges = BTreeMap<(u32, u32), u32>;
+type HalfEdges = BTreeMap<(Id, Id), Id>;
 
-fn around([a, b, c]: [u32; 3]) -> [(u32, u32, u32); 3] {
+fn around([a, b, c]: Triangle) -> [(Id, Id, Id); 3] {
     [(a, b, c), (b, c, a), (c, a, b)]
 }
 
-fn sorted(mut t: [u32; 3]) -> [u32; 3] {
+fn sorted(mut t: Triangle) -> Triangle {
     t.sort_unstable();
     t
 }
@@ -44,7 +43,7 @@ impl Sheet {
         let halves = |(x, y): (i32, i32)| {
             let a = (y * wide + x) as u32;
             let w = wide as u32;
-            [[a, a + 1, a + w], [a + 1, a + w + 1, a + w]]
+            [[a, a + 1, a + w], [a + 1, a + w + 1, a + w]].map(triangle)
         };
         Self {
             points: (0..wide * high).map(place).collect(),
@@ -66,11 +65,11 @@ impl Sheet {
         let open = edges
             .iter()
             .filter(|((a, b), _)| !edges.contains_key(&(*b, *a)));
-        let mut next: BTreeMap<u32, Vec<(u32, u32)>> = BTreeMap::new();
+        let mut next: BTreeMap<Id, Vec<(Id, Id)>> = BTreeMap::new();
         for (&(a, b), &apex) in open {
             next.entry(b).or_default().push((a, apex));
         }
-        let pinched = |v: u32| next[&v].len() > 1;
+        let pinched = |v: Id| next[&v].len() > 1;
         let mut seen = BTreeSet::new();
         let mut loops = Vec::new();
         for &first in next.keys() {
@@ -80,9 +79,9 @@ impl Sheet {
                 let (to, apex) = next[&v][0];
                 ring.push(Corner {
                     id: to,
-                    at: self.points[to as usize],
-                    apex: self.points[apex as usize],
-                    file: self.points[to as usize],
+                    at: self.points[to.index()],
+                    apex: self.points[apex.index()],
+                    file: self.points[to.index()],
                     pinched: pinched(to),
                 });
                 v = to;
@@ -94,13 +93,13 @@ impl Sheet {
         loops
     }
 
-    fn has_edge(&self) -> impl Fn(u32, u32) -> bool + use<> {
+    fn has_edge(&self) -> impl Fn(Id, Id) -> bool + use<> {
         let edges = self.half_edges();
         move |a, b| edges.contains_key(&(a, b)) || edges.contains_key(&(b, a))
     }
 
-    fn area(&self, t: [u32; 3]) -> f64 {
-        let [a, b, c] = t.map(|v| self.points[v as usize]);
+    fn area(&self, t: Triangle) -> f64 {
+        let [a, b, c] = t.map(|v| self.points[v.index()]);
         outcrop_geom::triangle::area([a, b, c])
     }
 
@@ -130,7 +129,7 @@ fn torn() -> impl Strategy<Value = Sheet> {
 }
 
 /// Adds `sign` for each edge of a closed path.
-fn count(edges: &mut BTreeMap<(u32, u32), i32>, way: &[u32], sign: i32) {
+fn count(edges: &mut BTreeMap<(Id, Id), i32>, way: &[Id], sign: i32) {
     for (k, &a) in way.iter().enumerate() {
         let b = way[(k + 1) % way.len()];
         *edges.entry((a.min(b), a.max(b))).or_default() += if a < b { sign } else { -sign };
@@ -141,9 +140,9 @@ proptest! {
     #[test]
     fn clipping_closes_a_part_of_the_loop_and_leaves_the_rest(sheet in torn()) {
         for ring in sheet.loops() {
-            let ids: Vec<u32> = ring.iter().map(|c| c.id).collect();
+            let ids: Vec<Id> = ring.iter().map(|c| c.id).collect();
             let clipped = zip(ring, sheet.has_edge());
-            let left: Vec<u32> = clipped.left.iter().map(|c| c.id).collect();
+            let left: Vec<Id> = clipped.left.iter().map(|c| c.id).collect();
 
             let mut chain = BTreeMap::new();
             count(&mut chain, &ids, 1);
@@ -153,7 +152,7 @@ proptest! {
 
             let mut edges = sheet.half_edges();
             for (a, b, c) in clipped.triangles.iter().flat_map(|t| around(*t)) {
-                prop_assert!(edges.insert((a, b), c).is_none(), "two triangles run from {a} to {b}");
+                prop_assert!(edges.insert((a, b), c).is_none(), "two triangles run from {a:?} to {b:?}");
             }
             let all = sheet.triangles.iter().chain(&clipped.triangles);
             let mut different = BTreeSet::new();
@@ -210,8 +209,8 @@ fn the_ends_of_a_slit_tube_stay_open() {
             return 0.0;
         };
         let edges = new.iter().flat_map(|t| around(*t));
-        let length = |(a, b, _): (u32, u32, u32)| {
-            let [a, b] = [a, b].map(|v| tube.points[v as usize]);
+        let length = |(a, b, _): (Id, Id, Id)| {
+            let [a, b] = [a, b].map(|v| tube.points[v.index()]);
             (distance2(a, b) as f64).sqrt()
         };
         edges.map(length).fold(0.0, f64::max)
@@ -235,7 +234,9 @@ fn the_outline_of_a_disk_stays_open() {
         let middle = count as u32;
         let sheet = Sheet {
             points: (0..count).map(at).chain([[1000, 1000, 2000]]).collect(),
-            triangles: (0..middle).map(|k| [middle, k, (k + 1) % middle]).collect(),
+            triangles: (0..middle)
+                .map(|k| triangle([middle, k, (k + 1) % middle]))
+                .collect(),
         };
         let (mended, edges) = sheet.close(Vec::len);
         assert_eq!(mended, Filling::Clipped(Vec::new(), edges));
@@ -246,7 +247,7 @@ fn the_outline_of_a_disk_stays_open() {
 fn the_outline_of_a_lone_triangle_stays_open() {
     let sheet = Sheet {
         points: vec![[0, 0, 0], [9, 0, 0], [0, 9, 1]],
-        triangles: vec![[0, 1, 2]],
+        triangles: vec![triangle([0, 1, 2])],
     };
     let (mended, _) = sheet.close(Vec::len);
     assert_eq!(mended, Filling::Clipped(Vec::new(), 3));
@@ -301,13 +302,13 @@ fn valley(across: bool) -> (Vec<Point>, Vec<Triangle>) {
         true => [[a, a + 1, a + 6], [a + 1, a + 6, a + 7]],
         false => [[a, a + 1, a + 7], [a, a + 6, a + 7]],
     };
-    let mut triangles: Vec<Triangle> = squares.flat_map(halves).collect();
+    let mut triangles: Vec<Triangle> = squares.flat_map(halves).map(triangle).collect();
     triangles.sort_unstable();
     ((0..36).map(point).collect(), triangles)
 }
 
 /// Flips edges of `triangles`, and returns the number of flips.
-fn flip(ids: Range<u32>, triangles: &mut Vec<Triangle>, points: &[Point], shape: &[Point]) -> u64 {
+fn flip(ids: Ids, triangles: &mut Vec<Triangle>, points: &[Point], shape: &[Point]) -> u64 {
     flips::Sheet::of(ids, triangles, points, shape).flip(triangles)
 }
 
@@ -320,13 +321,22 @@ fn lifted(points: &[Point]) -> Vec<Point> {
 fn edges_across_a_valley_are_flipped() {
     let (points, mut triangles) = valley(true);
     let still = triangles.clone();
-    assert_eq!(flip(0..36, &mut triangles, &points, &points), 0);
+    assert_eq!(flip(Ids::of(0..36), &mut triangles, &points, &points), 0);
     assert_eq!(triangles, still, "nothing was moved");
     // The squares at the two ends are at the boundary.
-    assert_eq!(flip(0..36, &mut triangles, &points, &lifted(&points)), 3);
+    assert_eq!(
+        flip(Ids::of(0..36), &mut triangles, &points, &lifted(&points)),
+        3
+    );
     for a in [7, 14, 21] {
-        assert!(triangles.contains(&[a, a + 1, a + 7]), "{triangles:?}");
-        assert!(triangles.contains(&[a, a + 6, a + 7]), "{triangles:?}");
+        assert!(
+            triangles.contains(&triangle([a, a + 1, a + 7])),
+            "{triangles:?}"
+        );
+        assert!(
+            triangles.contains(&triangle([a, a + 6, a + 7])),
+            "{triangles:?}"
+        );
     }
     assert!(triangles.is_sorted());
     assert_eq!(triangles.len(), still.len());
@@ -336,7 +346,10 @@ fn edges_across_a_valley_are_flipped() {
 fn what_bends_no_more_than_it_must_stays() {
     let (points, mut triangles) = valley(false);
     let still = triangles.clone();
-    assert_eq!(flip(0..36, &mut triangles, &points, &lifted(&points)), 0);
+    assert_eq!(
+        flip(Ids::of(0..36), &mut triangles, &points, &lifted(&points)),
+        0
+    );
     assert_eq!(triangles, still);
 }
 
@@ -344,12 +357,12 @@ fn what_bends_no_more_than_it_must_stays() {
 #[test]
 fn what_reaches_out_of_the_block_is_not_flipped() {
     let (points, all) = valley(true);
-    for ids in [0..14u32, 15..36] {
+    for ids in [0..14, 15..36].map(Ids::of) {
         let touches = |t: &&Triangle| t.iter().any(|v| ids.contains(v));
         let mut triangles: Vec<Triangle> = all.iter().filter(touches).copied().collect();
-        let own = &points[ids.start as usize..ids.end as usize];
+        let own = &points[ids.indices()];
         let before = triangles.clone();
-        flip(ids.clone(), &mut triangles, own, &lifted(own));
+        flip(ids, &mut triangles, own, &lifted(own));
         let crossing = |t: &&Triangle| !t.iter().all(|v| ids.contains(v));
         assert!(
             before
@@ -357,6 +370,8 @@ fn what_reaches_out_of_the_block_is_not_flipped() {
                 .filter(crossing)
                 .eq(triangles.iter().filter(crossing))
         );
-        assert!(triangles.contains(&[14, 15, 20]) == before.contains(&[14, 15, 20]));
+        assert!(
+            triangles.contains(&triangle([14, 15, 20])) == before.contains(&triangle([14, 15, 20]))
+        );
     }
 }

@@ -7,6 +7,7 @@ use super::interior::{block_bytes, insert};
 use super::stats::InsertStats;
 use super::surroundings::Surroundings;
 use super::{Insertion, Stitched};
+use crate::ids::Block;
 use crate::surface::rows::{LabelledTo, TriangleTo};
 use outcrop_disk::error::Result;
 use outcrop_disk::spill::Shuffle;
@@ -18,7 +19,7 @@ use std::sync::{Mutex, PoisonError};
 /// finished a block advances it as far as the finished blocks allow.
 pub struct Across<'a> {
     /// The blocks in the order in which the pass needs them.
-    order: Vec<u32>,
+    order: Vec<Block>,
     done: Vec<AtomicBool>,
     /// Most bytes for one turn: the part of the budget that the blocks in progress cannot need.
     spare: u64,
@@ -58,7 +59,7 @@ impl<'a> Across<'a> {
         let mut all_cut = 0;
         let work = |unit: &Unit<'_>| {
             let block = order[unit.number()];
-            let found = insert(insertion, block as usize, unit)?;
+            let found = insert(insertion, block.index(), unit)?;
             unit.advance(1);
             self.finished(block);
             // A task has no blocks but its own.
@@ -67,7 +68,7 @@ impl<'a> Across<'a> {
             }
             Ok(found)
         };
-        let bytes = |unit: usize| block_bytes(insertion, order[unit] as usize);
+        let bytes = |unit: usize| block_bytes(insertion, order[unit].index());
         let each = |unit: usize, (counts, cut): (InsertStats, u64)| {
             // The block may have been finished in an earlier attempt.
             self.finished(order[unit]);
@@ -92,13 +93,13 @@ impl<'a> Across<'a> {
     }
 
     /// Records that a block is finished.
-    fn finished(&self, block: u32) {
-        self.done[block as usize].store(true, Ordering::Release);
+    fn finished(&self, block: Block) {
+        self.done[block.index()].store(true, Ordering::Release);
     }
 
     /// Advances as far as the finished blocks allow. A thread calls this at the end of its `unit`.
     fn go_on(&self, unit: &Unit<'_>) -> Result<()> {
-        let ready = |block: u32| self.done[block as usize].load(Ordering::Acquire);
+        let ready = |block: Block| self.done[block.index()].load(Ordering::Acquire);
         match self.pass.try_lock() {
             Ok(mut pass) => pass.advance(unit, ready, Some(self.spare)),
             // Another thread is advancing the pass.
@@ -113,7 +114,7 @@ struct Pass<'a> {
     mesh: Surroundings<'a>,
     /// The blocks in the order in which turns need them: by the first turn with a candidate at one of their
     /// vertices.
-    order: Vec<u32>,
+    order: Vec<Block>,
     /// Candidates that wait for the turn of a later block.
     waiting: Deferred<CandidateRow>,
     counts: InsertStats,
@@ -133,8 +134,8 @@ impl<'a> Pass<'a> {
     /// [`outcrop_disk::error::Error::Memory`].
     pub fn new(insertion: Insertion<'a>) -> Result<Self> {
         let (spans, count) = (&insertion.base.spans, insertion.blocks.count());
-        let mut order: Vec<u32> = (0..count as u32).collect();
-        order.sort_by_key(|block| spans[*block as usize].0);
+        let mut order: Vec<Block> = (0..count).map(Block::at).collect();
+        order.sort_by_key(|block| spans[block.index()].0);
         Ok(Self {
             mesh: Surroundings::new(insertion)?,
             order,
@@ -156,14 +157,14 @@ impl<'a> Pass<'a> {
     fn advance(
         &mut self,
         unit: &Unit<'_>,
-        ready: impl Fn(u32) -> bool,
+        ready: impl Fn(Block) -> bool,
         most: Option<u64>,
     ) -> Result<()> {
         while self.group < self.mesh.insertion.blocks.count() {
             unit.check_cancel()?;
             let spans = &self.mesh.insertion.base.spans;
             while let Some(&block) = self.order.get(self.ready)
-                && spans[block as usize].0 as usize <= self.group
+                && spans[block.index()].0.index() <= self.group
             {
                 if !ready(block) {
                     return Ok(());
@@ -192,7 +193,7 @@ impl<'a> Pass<'a> {
         }
         let gone = self.mesh.confirm_merges(unit, group)?;
         self.counts.merges_reverted += gone.len() as u64;
-        self.removed.send(unit, group as u32, &gone)?;
+        self.removed.send(unit, group, &gone)?;
         // Consists of ascending runs, which this sort merges.
         tried.sort();
         let (angle, counts) = (self.mesh.insertion.cos_max_angle, &mut self.counts);
@@ -201,7 +202,7 @@ impl<'a> Pass<'a> {
         let mut waiting = Vec::new();
         for candidate in tried {
             let of = candidate.ids.map(|v| blocks.of(v));
-            match of.into_iter().find(|b| *b > group as u32) {
+            match of.into_iter().find(|b| *b > Block::at(group)) {
                 Some(next) => waiting.push((next, candidate.row())),
                 None => self.counts.unconnected += 1,
             }
@@ -209,12 +210,12 @@ impl<'a> Pass<'a> {
         waiting.sort_unstable();
         for part in waiting.chunk_by(|a, b| a.0 == b.0) {
             let rows: Vec<_> = part.iter().map(|(_, row)| *row).collect();
-            self.waiting.send(unit, part[0].0, &rows)?;
+            self.waiting.send(unit, part[0].0.index(), &rows)?;
         }
         let spans = &self.mesh.insertion.base.spans;
-        let later = |block: u32| spans[block as usize].1 > group as u32;
+        let later = |block: Block| spans[block.index()].1 > Block::at(group);
         let added = self.mesh.end(unit, later)?;
-        self.added.send(unit, group as u32, &added)?;
+        self.added.send(unit, group, &added)?;
         Ok(true)
     }
 

@@ -1,6 +1,7 @@
 //! The tests of a T12 triangle (paper, section 3.5): the combinatorial tests I to III and the geometric test.
 //! Test IV needs the components and is in [`super::insertion`].
 
+use crate::ids::{Id, Width};
 use crate::surface::star::{EDGES, Triangle, opposed, others};
 use outcrop_geom::Point;
 use outcrop_geom::triangle::normal;
@@ -9,13 +10,13 @@ use rustc_hash::FxHashMap;
 /// The mesh around the vertices of a triangle.
 pub trait Neighborhood {
     /// The star of `v`: for each of its triangles the number and the other two vertices, ascending.
-    fn star(&self, v: u32) -> impl Iterator<Item = (u32, [u32; 2])>;
+    fn star(&self, v: Id) -> impl Iterator<Item = (u32, [Id; 2])>;
     /// The number of triangles at `v`.
-    fn count(&self, v: u32) -> usize;
+    fn count(&self, v: Id) -> usize;
     /// The position of a vertex of a triangle of the mesh or of a candidate.
-    fn position(&self, v: u32) -> Point;
+    fn position(&self, v: Id) -> Point;
     /// The position of `v`, a vertex of the triangle `number` of the mesh.
-    fn position_in(&self, _number: u32, v: u32) -> Point {
+    fn position_in(&self, _number: u32, v: Id) -> Point {
         self.position(v)
     }
 }
@@ -49,7 +50,7 @@ pub fn examine(
     t: Triangle,
     mesh: &impl Neighborhood,
     cos_max_angle: f64,
-    link: &mut Vec<[u32; 2]>,
+    link: &mut Vec<[Id; 2]>,
 ) -> Result<[Option<Adjacent>; 3], Refusal> {
     let (counts, found) = at_edges(t, mesh, HUB);
     let mut connected = (0..3).filter(|&edge| counts[edge] > 0);
@@ -89,11 +90,11 @@ fn at_edges(
     t: Triangle,
     mesh: &impl Neighborhood,
     hub: usize,
-) -> ([usize; 3], [Option<(u32, u32)>; 3]) {
-    let mut found: [Option<(u32, u32)>; 3] = [None; 3];
+) -> ([usize; 3], [Option<(u32, Id)>; 3]) {
+    let mut found: [Option<(u32, Id)>; 3] = [None; 3];
     let mut counts = [0usize; 3];
     // Counts triangle `number` at one end of an edge, with the other vertices `a` and `b`, if one is `end`.
-    let mut see = |edge: usize, number: u32, [a, b]: [u32; 2], end: u32| {
+    let mut see = |edge: usize, number: u32, [a, b]: [Id; 2], end: Id| {
         if a == end || b == end {
             counts[edge] += 1;
             found[edge] = Some((number, if a == end { b } else { a }));
@@ -124,7 +125,7 @@ fn at_edges(
 
 /// True if `t`, both of whose edges at `v` have one triangle, would give the link of `v` a cycle and another
 /// component.
-fn makes_excess(t: Triangle, v: u32, mesh: &impl Neighborhood, link: &mut Vec<[u32; 2]>) -> bool {
+fn makes_excess(t: Triangle, v: Id, mesh: &impl Neighborhood, link: &mut Vec<[Id; 2]>) -> bool {
     link.clear();
     link.extend(mesh.star(v).map(|(_, other)| other));
     let [from, goal] = others(t, v);
@@ -135,29 +136,28 @@ fn makes_excess(t: Triangle, v: u32, mesh: &impl Neighborhood, link: &mut Vec<[u
     while node != goal {
         let next = link.iter().position(|e| e[0] == node || e[1] == node);
         let Some(next) = next else { return false };
-        let [a, b] = link.swap_remove(next);
-        node ^= a ^ b;
+        node = node.other(link.swap_remove(next));
     }
     !link.is_empty()
 }
 
 /// True if the path that starts at the end node `from` leads to `goal` and does not contain the whole link.
-fn closes_part(link: &[[u32; 2]], from: u32, goal: u32) -> bool {
+fn closes_part(link: &[[Id; 2]], from: Id, goal: Id) -> bool {
     // Nodes have at most two edges; the XOR of their other ends gives the next node from either side.
-    let mut beside: FxHashMap<u32, (u32, u32)> = FxHashMap::default();
+    let mut beside: FxHashMap<Id, (Width, u32)> = FxHashMap::default();
     for [a, b] in link {
         for (node, other) in [(a, b), (b, a)] {
             let (both, count) = beside.entry(*node).or_default();
-            *both ^= other;
+            *both ^= other.get();
             *count += 1;
         }
     }
-    let (mut before, mut node) = (0, from);
+    let (mut before, mut node) = (Id::default(), from);
     for length in 0..link.len() {
         match beside.get(&node) {
             _ if node == goal => return true,
             Some((both, count)) if length == 0 || *count > 1 => {
-                (before, node) = (node, both ^ before);
+                (before, node) = (node, Id::new(both ^ before.get()));
             }
             // Another end node.
             _ => return false,
@@ -179,6 +179,7 @@ fn angle_fits([a, b, c]: [Point; 3], far: Point, cos_max_angle: f64) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ids::triangle;
     use proptest::prelude::*;
 
     /// Triangles by vertex; `looks` counts the triangles visited.
@@ -188,7 +189,7 @@ mod tests {
     }
 
     impl Neighborhood for Mesh {
-        fn star(&self, v: u32) -> impl Iterator<Item = (u32, [u32; 2])> {
+        fn star(&self, v: Id) -> impl Iterator<Item = (u32, [Id; 2])> {
             let at = (0..)
                 .zip(&self.triangles)
                 .filter(move |(_, t)| t.contains(&v));
@@ -198,12 +199,13 @@ mod tests {
             })
         }
 
-        fn count(&self, v: u32) -> usize {
+        fn count(&self, v: Id) -> usize {
             self.triangles.iter().filter(|t| t.contains(&v)).count()
         }
 
-        fn position(&self, v: u32) -> Point {
-            [v as i32, (v * v % 7) as i32, 0]
+        fn position(&self, v: Id) -> Point {
+            let v = v.get() as i32;
+            [v, v * v % 7, 0]
         }
     }
 
@@ -215,7 +217,7 @@ mod tests {
         ) {
             let triangle = |t: &std::collections::BTreeSet<u32>| -> Triangle {
                 let t: Vec<u32> = t.iter().copied().collect();
-                [t[0], t[1], t[2]]
+                triangle([t[0], t[1], t[2]])
             };
             let triangles = triangles.iter().map(triangle).collect();
             let mesh = Mesh { triangles, looks: 0.into() };
@@ -233,14 +235,14 @@ mod tests {
             pick in any::<prop::sample::Index>(),
             with_other in any::<prop::sample::Index>(),
         ) {
-            let (mut link, mut ends, mut next) = (Vec::new(), Vec::new(), 0);
+            let (mut link, mut ends, mut next) = (Vec::new(), Vec::new(), 0u32);
             for &(length, cycle) in &lengths {
                 let length = if cycle { length + 2 } else { length };
-                link.extend((next..next + length).map(|k| [k, k + 1]));
+                link.extend((next..next + length).map(|k| [k, k + 1].map(Id::new)));
                 if cycle {
-                    link.push([next, next + length]);
+                    link.push([next, next + length].map(Id::new));
                 } else {
-                    ends.push((next, next + length));
+                    ends.push((Id::new(next), Id::new(next + length)));
                 }
                 next += length + 1;
             }
@@ -259,14 +261,14 @@ mod tests {
     /// The many triangles around a hub are not visited for every candidate there.
     #[test]
     fn a_hub_is_not_gone_through() {
-        let triangles = (1..1000).map(|k| [0, k, k + 1]).collect();
+        let triangles = (1..1000).map(|k| triangle([0, k, k + 1])).collect();
         let mesh = Mesh {
             triangles,
             looks: 0.into(),
         };
         let mut link = Vec::new();
         for t in [[0, 1000, 1001], [0, 500, 2000], [0, 1, 3000]] {
-            let _ = examine(t, &mesh, -1.0, &mut link);
+            let _ = examine(triangle(t), &mesh, -1.0, &mut link);
         }
         assert!(mesh.looks.get() < 20, "{}", mesh.looks.get());
     }

@@ -3,16 +3,17 @@
 
 use super::BaseStats;
 use crate::blocks::Blocks;
-use crate::cells::{CountedTriple, SentTriple};
+use crate::cells::CountedTriple;
 use crate::columns::{Direction, extreme};
+use crate::ids::{Block, Id};
 use crate::located::{Located, Places};
 use crate::surface::evidence::{Division, Evidence, UP, Witness};
 use crate::surface::orient::{BlockTriangles, Oriented, orient_inside};
 use crate::surface::rows::TriangleTo;
 use crate::surface::star::{Link, Star, Triangle, has, others};
-use crate::triples::Triples;
+use crate::triples::{Triples, VisitingTriple};
 use outcrop_disk::error::Result;
-use outcrop_disk::spill::{Id, Inbox, Shuffle, Table, release};
+use outcrop_disk::spill::{Inbox, Shuffle, Table, release};
 use outcrop_disk::workspace::memory::bytes_of;
 use outcrop_disk::workspace::{Unit, Workspace};
 use outcrop_geom::kernels::{Level, MOST_EDGES, is_one_fan};
@@ -28,12 +29,12 @@ pub(super) struct Base {
     /// All crossing triples by the block of their smallest vertex.
     pub crossing: Table<CountedTriple>,
     /// Crossing triples by the blocks of their other vertices.
-    pub visiting: Inbox<SentTriple>,
+    pub visiting: Inbox<VisitingTriple>,
     /// Crossing T3 triangles that are flagged, by the block of their smallest vertex.
     pub flags: Inbox<TriangleTo>,
     sent_flags: Shuffle<TriangleTo>,
     /// For each block, the first and the last block touched by a triple of it.
-    pub spans: Vec<(u32, u32)>,
+    pub spans: Vec<(Block, Block)>,
     /// Interior candidates left out because their points are collinear in the file.
     pub flat_candidates: u64,
 }
@@ -82,7 +83,7 @@ pub(super) fn base(
     let around = |unit: &Unit<'_>| look.block(unit);
     let name = "stitch.base";
     let mut all = Found::default();
-    let mut spans = vec![(0, 0); count];
+    let mut spans = vec![<(Block, Block)>::default(); count];
     let each = |block: usize, found: Found| {
         spans[block] = found.span;
         all.flagged += found.flagged;
@@ -127,7 +128,7 @@ pub(super) fn base(
 /// The single pass over the triples.
 struct Look<'a> {
     own: &'a Table<CountedTriple>,
-    visiting: &'a Inbox<SentTriple>,
+    visiting: &'a Inbox<VisitingTriple>,
     places: Places<'a>,
     /// The division of blocks and the highest points of columns, as far as they count, if the base is oriented by
     /// evidence.
@@ -147,7 +148,7 @@ struct Found {
     flat: u64,
     flat_candidates: u64,
     /// The first and the last block touched by a triple of the block.
-    span: (u32, u32),
+    span: (Block, Block),
 }
 
 impl Look<'_> {
@@ -166,7 +167,7 @@ impl Look<'_> {
         held.set(lists + of_located + star.bytes());
         let mut flagged = Vec::new();
         let mut refusing = Refusing::default();
-        for v in self.blocks.ids(block) {
+        for v in self.blocks.ids(block).iter() {
             refusing.at(v, &star, &triangles, &mut flagged);
         }
         drop(star);
@@ -225,7 +226,7 @@ impl Look<'_> {
         let places = located.map_or_else(load, Ok)?;
         let candidates: Vec<Triangle> = candidates.iter().map(|c| c.triple).collect();
         let highest = highest.as_ref().map(|table| table.get(unit, block));
-        let highest = bytemuck::cast_vec(highest.transpose()?.unwrap_or_default());
+        let highest = highest.transpose()?.unwrap_or_default();
         Ok(Evidence {
             division: *division,
             witnesses: self.witnesses(unit, &highest, &places)?,
@@ -236,32 +237,27 @@ impl Look<'_> {
 
     /// The vertices of the block at which it is known to which side the surface faces: up at those of the `highest`
     /// of columns of which nothing else is known.
-    fn witnesses(
-        &self,
-        unit: &Unit<'_>,
-        highest: &[u32],
-        places: &Located,
-    ) -> Result<Vec<Witness>> {
-        let up = |&vertex: &u32| Witness { vertex, toward: UP };
+    fn witnesses(&self, unit: &Unit<'_>, highest: &[Id], places: &Located) -> Result<Vec<Witness>> {
+        let up = |&vertex: &Id| Witness { vertex, toward: UP };
         let Some(outside) = self.places.outside else {
             return Ok(highest.iter().map(up).collect());
         };
         let ids = self.blocks.ids(unit.number());
         let known = outside.open(unit, self.blocks, unit.number())?;
         let _held = unit.hold(outside.bytes(ids.len()));
-        let facing = |vertex: u32| {
+        let facing = |vertex: Id| {
             let toward = known.witness(vertex, |id| places.at(id))?;
             Some(Witness { vertex, toward })
         };
         let unseen = highest.iter().filter(|v| !known.has(**v));
         let mut all: Vec<Witness> = unseen.map(up).collect();
-        all.extend(ids.filter_map(facing));
+        all.extend(ids.iter().filter_map(facing));
         all.sort_unstable_by_key(|w| w.vertex);
         Ok(all)
     }
 
     /// The vertices of the triangles that are not interior to the block.
-    fn foreign(&self, block: usize, triangles: &[Triangle]) -> impl Iterator<Item = u32> {
+    fn foreign(&self, block: usize, triangles: &[Triangle]) -> impl Iterator<Item = Id> {
         let ids = self.blocks.ids(block);
         let crosses = move |t: &&Triangle| t[0] < ids.start || t[2] >= ids.end;
         triangles.iter().filter(crosses).flatten().copied()
@@ -282,7 +278,7 @@ impl Look<'_> {
             let mut t3 = 0;
             triangles.retain(|t| {
                 let flat = unfit(*t, file.corners(*t));
-                t3 += u64::from(flat && self.blocks.of(t[0]) == block as u32);
+                t3 += u64::from(flat && self.blocks.of(t[0]) == Block::at(block));
                 !flat
             });
             found.flat = t3;
@@ -307,7 +303,7 @@ impl Look<'_> {
         let mut triangles = Vec::with_capacity(t3);
         let mut candidates = Vec::new();
         let mut crossing = Vec::new();
-        let mut span = (block as u32, block as u32);
+        let mut span = (Block::at(block), Block::at(block));
         // Visiting triples have their smallest vertex in a lower block, so they come first.
         for visitor in &visiting {
             let [first, _, last] = visitor.triple.map(|v| self.blocks.of(v));
@@ -349,13 +345,13 @@ struct Refusing {
 impl Refusing {
     /// Appends the triangles around `v` that it flags: at edges with more than two triangles, and beside a
     /// closed fan.
-    fn at(&mut self, v: u32, star: &Star, triangles: &[Triangle], flagged: &mut Vec<u32>) {
+    fn at(&mut self, v: Id, star: &Star, triangles: &[Triangle], flagged: &mut Vec<u32>) {
         let around = star.at(v);
         if one_fan(self.level, v, around, triangles) {
             return;
         }
         let triangle = |n: &u32| triangles[*n as usize];
-        let degree = |node: u32| around.iter().filter(|n| has(triangle(n), node)).count();
+        let degree = |node: Id| around.iter().filter(|n| has(triangle(n), node)).count();
         let crowded = |n: &u32| others(triangle(n), v).map(degree).iter().any(|d| *d > 2);
         self.kept.clear();
         for n in around {
@@ -382,15 +378,15 @@ impl Refusing {
 
 /// True if the link of `v` is one path, one cycle, or empty: then nothing is flagged. False if this could not
 /// be established by the fast test.
-fn one_fan(level: Level, v: u32, around: &[u32], triangles: &[Triangle]) -> bool {
+fn one_fan(level: Level, v: Id, around: &[u32], triangles: &[Triangle]) -> bool {
     if around.len() > MOST_EDGES {
         return false;
     }
     // No edge ends at `v` itself.
-    let mut ends = [[v; MOST_EDGES]; 2];
+    let mut ends = [[v.get(); MOST_EDGES]; 2];
     let [low, high] = &mut ends;
     for ((low, high), &n) in low.iter_mut().zip(high).zip(around) {
-        [*low, *high] = others(triangles[n as usize], v);
+        [*low, *high] = others(triangles[n as usize], v).map(Id::get);
     }
     is_one_fan(level, &ends, around.len())
 }

@@ -30,9 +30,9 @@ impl<R: Row> Deferred<R> {
     ///
     /// # Errors
     /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Disk`].
-    pub fn send(&mut self, unit: &Unit<'_>, to: u32, rows: &[R]) -> Result<()> {
+    pub fn send(&mut self, unit: &Unit<'_>, to: usize, rows: &[R]) -> Result<()> {
         if !rows.is_empty() {
-            self.of[to as usize].push(self.parts.append(unit, rows)?);
+            self.of[to].push(self.parts.append(unit, rows)?);
             self.count += 1;
         }
         Ok(())
@@ -84,7 +84,7 @@ mod tests {
         let mut deferred = Deferred::new("deferred", 3);
         for i in 0..90u32 {
             let records: Vec<_> = (0..i % 4).map(|k| [i, k]).collect();
-            deferred.send(&unit, i % 3, &records).unwrap();
+            deferred.send(&unit, i as usize % 3, &records).unwrap();
         }
         for to in 0..3u32 {
             let sent = (0..90).filter(|i| i % 3 == to);

@@ -4,6 +4,7 @@
 
 use super::admissibility::{Neighborhood, Refusal, examine};
 use super::stats::InsertStats;
+use crate::ids::Id;
 use crate::surface::parity::{OrientationConstraint, ParitySets};
 use crate::surface::star::Triangle;
 use outcrop_disk::spill::row;
@@ -12,7 +13,7 @@ use outcrop_geom::{Point, distance2};
 /// The mesh around candidates, which grows as they are inserted.
 pub trait Mesh: Neighborhood {
     /// Time of the last insertion of a triangle at a vertex of a candidate; 0 if there was none.
-    fn changed(&self, v: u32) -> u32;
+    fn changed(&self, v: Id) -> u32;
     /// The component of a triangle of the mesh, and true if the triangle is turned against it.
     fn component(&mut self, number: u32) -> OrientationConstraint;
     /// The merged components, for test IV.

@@ -8,6 +8,7 @@ use super::components::{BaseComponents, BlockComponents, Merge};
 use super::insertion::{Candidate, CandidateRow, Mesh, insert_candidates};
 use super::stats::InsertStats;
 use crate::cells::CountedTriple;
+use crate::ids::{Block, Id, Ids};
 use crate::located::Located;
 use crate::surface::parity::{OrientationConstraint, ParitySets};
 use crate::surface::rows::{LabelledTo, LabelledTriangle, TriangleRow, TriangleTo};
@@ -17,7 +18,6 @@ use outcrop_disk::spill::{Table, release, row};
 use outcrop_disk::workspace::Unit;
 use outcrop_disk::workspace::memory::{Holding, bytes_of};
 use outcrop_geom::Point;
-use std::ops::Range;
 
 row! {
     /// A triangle and its component.
@@ -34,7 +34,7 @@ row! {
     /// A vertex and its position.
     pub struct VertexAt {
         /// The vertex.
-        id: u32,
+        id: Id,
         /// Its position.
         position: Point,
     }
@@ -117,7 +117,7 @@ const OPEN: u8 = 2;
 fn marks(
     base: &Base,
     crossing: &[LabelledTo],
-    ids: &Range<u32>,
+    ids: &Ids,
     block: usize,
     unit: &Unit<'_>,
 ) -> Result<Vec<u8>> {
@@ -126,7 +126,7 @@ fn marks(
         let in_base = || crossing.binary_search_by_key(&t, |c| c.triangle);
         let open = count < 3 || in_base().is_err();
         for v in t.into_iter().filter(|v| ids.contains(v)) {
-            marks[(v - ids.start) as usize] |= if open { CROSSING | OPEN } else { CROSSING };
+            marks[ids.place(v)] |= if open { CROSSING | OPEN } else { CROSSING };
         }
     };
     for t in &base.visiting.get(unit, block)? {
@@ -141,12 +141,12 @@ fn marks(
 /// The mesh around a block during insertion.
 #[derive(Default)]
 struct BlockWork {
-    ids: Range<u32>,
+    ids: Ids,
     /// The interior triangles of the base.
     mesh: Vec<Triangle>,
     /// For each vertex of a candidate (*active* vertices), the number and the other two vertices, ascending,
     /// of each triangle there.
-    stars: ByVertex<(u32, [u32; 2])>,
+    stars: ByVertex<(u32, [Id; 2])>,
     /// For each vertex of the block, the time of the last insertion there.
     changed: Vec<u32>,
     /// The interior triangles of the base that touch a candidate or a crossing triple, then those of the
@@ -167,22 +167,22 @@ struct BlockWork {
 }
 
 impl Neighborhood for BlockWork {
-    fn star(&self, v: u32) -> impl Iterator<Item = (u32, [u32; 2])> {
+    fn star(&self, v: Id) -> impl Iterator<Item = (u32, [Id; 2])> {
         self.stars.at(v).iter().copied()
     }
 
-    fn count(&self, v: u32) -> usize {
+    fn count(&self, v: Id) -> usize {
         self.stars.at(v).len()
     }
 
-    fn position(&self, v: u32) -> Point {
+    fn position(&self, v: Id) -> Point {
         self.located.at(v)
     }
 }
 
 impl Mesh for BlockWork {
-    fn changed(&self, v: u32) -> u32 {
-        self.changed[(v - self.ids.start) as usize]
+    fn changed(&self, v: Id) -> u32 {
+        self.changed[self.ids.place(v)]
     }
 
     fn component(&mut self, number: u32) -> OrientationConstraint {
@@ -197,7 +197,7 @@ impl Mesh for BlockWork {
         self.components.insert(t, constraints);
         self.enter(t);
         for v in t {
-            self.changed[(v - self.ids.start) as usize] = now;
+            self.changed[self.ids.place(v)] = now;
         }
     }
 }
@@ -220,7 +220,7 @@ impl BlockWork {
         candidates.sort_unstable();
         let mut active = vec![false; ids.len()];
         for v in candidates.iter().flat_map(|c| c.ids) {
-            active[(v - ids.start) as usize] = true;
+            active[ids.place(v)] = true;
         }
         let (interior, cut) = base.surface.inside(unit, block)?;
         let crossing = base.surface.crossing.get(unit, block)?;
@@ -228,8 +228,8 @@ impl BlockWork {
         let inside = interior.iter().map(|t| t.triangle);
         let across = crossing.iter().map(|t| t.triangle);
         let all = inside.chain(across).chain(candidates.iter().map(|c| c.ids));
-        let is_active = |v: &u32| active.get(v.wrapping_sub(ids.start) as usize) == Some(&true);
-        let stars = ByVertex::with_room(ids.clone(), all.flatten().filter(is_active));
+        let is_active = |v: &Id| active.get(ids.find(*v)) == Some(&true);
+        let stars = ByVertex::with_room(ids, all.flatten().filter(is_active));
         let mut work = Self {
             mesh: Vec::with_capacity(interior.len()),
             stars,
@@ -270,12 +270,12 @@ impl BlockWork {
         let flags = base.flags.get(unit, block)?;
         let mut candidates = base.crossing.get(unit, block)?;
         candidates.retain(|candidate| {
-            let (to, triangle) = (block as u32, candidate.triple);
+            let (to, triangle) = (Block::at(block), candidate.triple);
             candidate.count < 3 || flags.binary_search(&TriangleTo { to, triangle }).is_ok()
         });
         let open = candidates.iter().flat_map(|c| c.triple);
         let in_base = self.triangles[self.interior_base..].iter().flatten();
-        let all: Vec<u32> = open.chain(in_base.copied()).collect();
+        let all: Vec<Id> = open.chain(in_base.copied()).collect();
         self.located.add(places.shape, all.iter().copied())?;
         if places.limit_triangles() {
             let moved = places
@@ -306,7 +306,7 @@ impl BlockWork {
         let mut of = Vec::new();
         for t in interior {
             self.mesh.push(t.triangle);
-            let slots = t.triangle.map(|v| (v - self.ids.start) as usize);
+            let slots = t.triangle.map(|v| self.ids.place(v));
             if slots.iter().any(|&v| active[v] || self.marks[v] != 0) {
                 of.push(components.interior(t.label_flip));
                 self.enter(t.triangle);
@@ -339,7 +339,7 @@ impl BlockWork {
         held: &mut Holding<'_>,
         unit: &Unit<'_>,
     ) -> Result<()> {
-        let slot = |v: u32| (v - self.ids.start) as usize;
+        let slot = |v: Id| self.ids.place(v);
         let mut context: Vec<bool> = self.marks.iter().map(|m| m & OPEN != 0).collect();
         let mut ranked = std::mem::take(&mut self.crossing_candidates);
         for candidate in undecided {
@@ -377,7 +377,7 @@ impl BlockWork {
         let mut around = Vec::new();
         for number in (0..self.interior_base).chain(self.base..self.triangles.len()) {
             let triangle = self.triangles[number];
-            let mut slots = triangle.iter().map(|v| (v - self.ids.start) as usize);
+            let mut slots = triangle.iter().map(|v| self.ids.place(*v));
             if slots.any(|v| context[v]) {
                 let component = self.components.reference(number as u32);
                 around.push(TriangleIn {
@@ -391,12 +391,12 @@ impl BlockWork {
 
     /// The vertices whose positions crossing candidates may need.
     fn located(&self, context: &[bool], around: &[TriangleIn]) -> Vec<VertexAt> {
-        let in_context = |v: &u32| self.ids.contains(v) && context[(v - self.ids.start) as usize];
+        let in_context = |v: &Id| self.ids.contains(v) && context[self.ids.place(*v)];
         let crossing = self.triangles[self.interior_base..self.base].iter();
         let touching = crossing.filter(|t| t.iter().any(in_context));
-        let mut ids: Vec<u32> = touching.flatten().copied().collect();
+        let mut ids: Vec<Id> = touching.flatten().copied().collect();
         ids.extend(around.iter().flat_map(|t| t.triangle));
-        ids.extend(self.ids.clone().filter(in_context));
+        ids.extend(self.ids.iter().filter(in_context));
         ids.sort_unstable();
         ids.dedup();
         let at = |id| VertexAt {

@@ -6,6 +6,7 @@ use super::components::NOTHING;
 use super::deferred::Deferred;
 use super::insertion::{Candidate, Mesh};
 use super::interior::{TriangleIn, VertexAt};
+use crate::ids::{Block, Id, Ids};
 use crate::surface::parity::{OrientationConstraint, ParitySets, constraint, word};
 use crate::surface::rows::{LabelledTo, TriangleTo};
 use crate::surface::star::{Triangle, others};
@@ -15,7 +16,6 @@ use outcrop_disk::workspace::Unit;
 use outcrop_disk::workspace::memory::{Holding, Reservation, bytes_of, table_bytes};
 use outcrop_geom::Point;
 use rustc_hash::FxHashMap;
-use std::ops::Range;
 
 /// The star of a candidate's vertex.
 #[derive(Default)]
@@ -50,10 +50,10 @@ pub struct Surroundings<'a> {
     /// The merged labels of the whole mesh.
     sets: ParitySets,
     /// Labels of the local components used so far, by block and number.
-    locals: FxHashMap<(u32, u32), u32>,
+    locals: FxHashMap<(Block, u32), u32>,
     /// The triangles at vertices of candidates.
     triangles: Vec<Change>,
-    stars: FxHashMap<u32, VertexStar>,
+    stars: FxHashMap<Id, VertexStar>,
     /// Triangles inserted in this turn.
     inserted: Vec<u32>,
     pub changes: Deferred<Change>,
@@ -63,7 +63,7 @@ pub struct Surroundings<'a> {
 }
 
 impl Neighborhood for Surroundings<'_> {
-    fn star(&self, v: u32) -> impl Iterator<Item = (u32, [u32; 2])> {
+    fn star(&self, v: Id) -> impl Iterator<Item = (u32, [Id; 2])> {
         let numbers = self.stars.get(&v).map(|star| star.triangles.iter());
         numbers
             .into_iter()
@@ -71,22 +71,22 @@ impl Neighborhood for Surroundings<'_> {
             .map(move |&n| (n, others(self.triangles[n as usize].triangle, v)))
     }
 
-    fn count(&self, v: u32) -> usize {
+    fn count(&self, v: Id) -> usize {
         self.stars.get(&v).map_or(0, |star| star.triangles.len())
     }
 
-    fn position(&self, v: u32) -> Point {
+    fn position(&self, v: Id) -> Point {
         self.stars[&v].position
     }
 
-    fn position_in(&self, number: u32, v: u32) -> Point {
+    fn position_in(&self, number: u32, v: Id) -> Point {
         let t = &self.triangles[number as usize];
         t.at[t.triangle.iter().position(|w| *w == v).unwrap_or(0)]
     }
 }
 
 impl Mesh for Surroundings<'_> {
-    fn changed(&self, v: u32) -> u32 {
+    fn changed(&self, v: Id) -> u32 {
         self.stars.get(&v).map_or(0, |star| star.changed)
     }
 
@@ -129,7 +129,7 @@ impl Found {
 
 /// The positions that a block wrote.
 struct Positions {
-    ids: Range<u32>,
+    ids: Ids,
     /// Vertices, ascending.
     vertices: Vec<VertexAt>,
     /// Indices in `vertices` of the block's own vertices, which are the great majority.
@@ -137,11 +137,11 @@ struct Positions {
 }
 
 impl Positions {
-    fn new(ids: Range<u32>, vertices: Vec<VertexAt>) -> Self {
+    fn new(ids: Ids, vertices: Vec<VertexAt>) -> Self {
         let mut places = vec![0u32; ids.len()];
         for (place, vertex) in (0..).zip(&vertices) {
             if ids.contains(&vertex.id) {
-                places[(vertex.id - ids.start) as usize] = place;
+                places[ids.place(vertex.id)] = place;
             }
         }
         Self {
@@ -151,9 +151,9 @@ impl Positions {
         }
     }
 
-    fn at(&self, v: u32) -> Point {
+    fn at(&self, v: Id) -> Point {
         let place = if self.ids.contains(&v) {
-            self.places[(v - self.ids.start) as usize] as usize
+            self.places[self.ids.place(v)] as usize
         } else {
             self.vertices.partition_point(|vertex| vertex.id < v)
         };
@@ -185,7 +185,7 @@ impl<'a> Surroundings<'a> {
         most: Option<u64>,
         held: &mut Option<Holding<'_>>,
     ) -> Result<bool> {
-        let mut wanted: Vec<u32> = tried.iter().flat_map(|c| c.ids).collect();
+        let mut wanted: Vec<Id> = tried.iter().flat_map(|c| c.ids).collect();
         wanted.sort_unstable();
         wanted.dedup();
         let lists = bytes_of(&wanted) + size_of_val(tried) as u64;
@@ -217,7 +217,7 @@ impl<'a> Surroundings<'a> {
     fn load(
         &mut self,
         unit: &Unit<'_>,
-        wanted: &[u32],
+        wanted: &[Id],
         lists: u64,
         most: Option<u64>,
         held: &mut Option<Holding<'_>>,
@@ -229,7 +229,7 @@ impl<'a> Surroundings<'a> {
             ..
         } = self.insertion;
         let block = blocks.of(wanted[0]);
-        let section = block as usize;
+        let section = block.index();
         let files = [
             (interior.vertices.rows(unit, section)?, 16),
             (interior.context.rows(unit, section)?, 16),
@@ -261,10 +261,10 @@ impl<'a> Surroundings<'a> {
     }
 
     /// Reads the current triangles of a block at the vertices `wanted`.
-    fn find(&self, unit: &Unit<'_>, wanted: &[u32], block: usize) -> Result<Found> {
+    fn find(&self, unit: &Unit<'_>, wanted: &[Id], block: usize) -> Result<Found> {
         let ids = self.insertion.blocks.ids(block);
         let mut is_wanted = vec![false; ids.len()];
-        let here = |v: u32| v.wrapping_sub(ids.start) as usize;
+        let here = |v: Id| ids.find(v);
         wanted.iter().for_each(|v| is_wanted[here(*v)] = true);
         let touches = |t: Triangle| {
             let mut at = t.iter().map(|v| is_wanted.get(here(*v)));
@@ -294,7 +294,7 @@ impl<'a> Surroundings<'a> {
     }
 
     /// Adds the triangles found in a block.
-    fn enter_all(&mut self, found: &Found, positions: &Positions, block: u32) {
+    fn enter_all(&mut self, found: &Found, positions: &Positions, block: Block) {
         self.triangles.reserve(found.count());
         let located = |triangle: Triangle, label_flip: u32| Change {
             triangle,
@@ -321,7 +321,7 @@ impl<'a> Surroundings<'a> {
     }
 
     /// Adds a triangle to the stars of candidates' vertices in `block`.
-    fn enter(&mut self, entry: Change, block: u32) {
+    fn enter(&mut self, entry: Change, block: Block) {
         let number = self.triangles.len() as u32;
         self.triangles.push(entry);
         for v in entry.triangle {
@@ -356,7 +356,11 @@ impl<'a> Surroundings<'a> {
 
     /// Ends the turn of a block. Returns the triangles that it inserted, once for each block that they touch.
     /// They are recorded for blocks that have a later turn, as given by `later`.
-    pub fn end(&mut self, unit: &Unit<'_>, later: impl Fn(u32) -> bool) -> Result<Vec<TriangleTo>> {
+    pub fn end(
+        &mut self,
+        unit: &Unit<'_>,
+        later: impl Fn(Block) -> bool,
+    ) -> Result<Vec<TriangleTo>> {
         let mut sent = Vec::with_capacity(2 * self.inserted.len());
         for &number in &self.inserted {
             let t = self.triangles[number as usize].triangle;
@@ -368,9 +372,9 @@ impl<'a> Surroundings<'a> {
         let entry = |number: u32| self.triangles[number as usize];
         for part in sent.chunk_by(|a, b| a.0 == b.0).filter(|p| later(p[0].0)) {
             let rows: Vec<_> = part.iter().map(|(_, n)| entry(*n)).collect();
-            self.changes.send(unit, part[0].0, &rows)?;
+            self.changes.send(unit, part[0].0.index(), &rows)?;
         }
-        let with_block = |&(to, number): &(u32, u32)| TriangleTo {
+        let with_block = |&(to, number): &(Block, u32)| TriangleTo {
             to,
             triangle: entry(number).triangle,
         };
@@ -388,7 +392,7 @@ impl<'a> Surroundings<'a> {
             let words = merge.constraints.into_iter().filter(|w| *w != NOTHING);
             let constraints: Vec<OrientationConstraint> = words.map(constraint).collect();
             if !self.sets.merge(&constraints) {
-                let to = block as u32;
+                let to = Block::at(block);
                 gone.push(TriangleTo { to, triangle });
                 noted.push(Change {
                     triangle,
@@ -398,7 +402,7 @@ impl<'a> Surroundings<'a> {
                 self.take_out(triangle);
             }
         }
-        self.changes.send(unit, block as u32, &noted)?;
+        self.changes.send(unit, block, &noted)?;
         Ok(gone)
     }
 

@@ -7,6 +7,7 @@ use super::rows::{LabelledTo, Relation, TriangleTo, interior_constraints};
 use super::settle::settle;
 use super::star::Triangle;
 use crate::blocks::Blocks;
+use crate::ids::Block;
 use outcrop_disk::error::Result;
 use outcrop_disk::spill::{Inbox, Shuffle};
 use outcrop_disk::workspace::Unit;
@@ -69,7 +70,7 @@ impl OrientedInside {
 
 /// True if a triangle is not in `removed`, the triangles removed from the block, ascending.
 fn is_present(block: usize, t: &Triangle, removed: &[TriangleTo]) -> bool {
-    let (to, triangle) = (block as u32, *t);
+    let (to, triangle) = (Block::at(block), *t);
     let key = TriangleTo { to, triangle };
     removed.binary_search(&key).is_err()
 }

@@ -3,6 +3,7 @@
 use super::parity::{OrientationConstraint, constraint};
 use super::star::{EDGES, Triangle, opposed};
 use crate::blocks::Blocks;
+use crate::ids::{Block, Id};
 use outcrop_disk::error::Result;
 use outcrop_disk::workspace::Workspace;
 use outcrop_disk::workspace::memory::{Reservation, table_bytes};
@@ -20,7 +21,7 @@ type Entry = (Triangle, u32, [f32; 3]);
 /// The triangles so far at edges that later triangles may share. Crossing triangles are few and scattered, so
 /// their edges are in a hash table. Edges that no later triangle can share are removed block by block.
 pub(super) struct CrossingEdges {
-    edges: FxHashMap<(u32, u32), Vec<Entry>>,
+    edges: FxHashMap<(Id, Id), Vec<Entry>>,
     reserved: Reservation,
 }
 
@@ -70,13 +71,14 @@ impl CrossingEdges {
         self.reserved.set_held(table_bytes(&self.edges) + lists);
         // The smallest vertex of a triangle is at most the lower vertex of its edge.
         self.edges
-            .retain(|(low, _), _| blocks.of(*low) > group as u32);
+            .retain(|(low, _), _| blocks.of(*low) > Block::at(group));
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ids::triangle;
     use outcrop_disk::error::Error;
 
     #[test]
@@ -88,7 +90,7 @@ mod tests {
         for group in 0..90u32 {
             let first = group * 10;
             let new: Vec<Triangle> = (10..19)
-                .map(|n| [first, first + n, first + n + 10])
+                .map(|n| triangle([first, first + n, first + n + 10]))
                 .collect();
             edges.make_room(new.len()).unwrap();
             for t in new {
@@ -96,7 +98,7 @@ mod tests {
                 assert!(edges.adjacent(t).any(|(found, ..)| found == (group, true)));
             }
             edges.end(group as usize, blocks);
-            let kept = edges.edges.keys().all(|(low, _)| *low >= first + 10);
+            let kept = edges.edges.keys().all(|(low, _)| low.get() >= first + 10);
             assert!(kept && edges.edges.len() == 9);
         }
         assert!(pool.held_at_peak()["stitch: edges"] <= edges.reserved.bytes());

@@ -4,6 +4,7 @@
 //! the least weight: a few edges at the foot of a wall rather than a kilometre of meadow.
 
 use super::star::Triangle;
+use crate::ids::Id;
 use crate::located::Located;
 use outcrop_disk::workspace::memory::bytes_of;
 use outcrop_geom::method::METHOD;
@@ -45,7 +46,7 @@ pub struct Evidence {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Witness {
     /// Its id.
-    pub vertex: u32,
+    pub vertex: Id,
     /// A unit vector to that side: up, or to the scanner that saw the point.
     pub toward: [f64; 3],
 }
@@ -160,7 +161,7 @@ pub fn weight(cosine: f64) -> i64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::located::Located;
+    use crate::ids::triangle;
     use proptest::prelude::*;
 
     proptest! {
@@ -174,6 +175,7 @@ mod tests {
             let points = points.map(|p| p.map(|x| x >> shift));
             let evidence = Evidence { places: Located::of(&points), ..Evidence::default() };
             for [t, other] in [[[0, 1, 2], [1, 2, 3]], [[0, 1, 2], [0, 1, 3]], [[0, 1, 3], [0, 1, 3]]] {
+                let [t, other] = [t, other].map(triangle);
                 let cosine = cosine(evidence.normal(t), evidence.normal(other), flip);
                 let [t, other] = [t, other].map(|t| evidence.long_normal(t));
                 prop_assert_eq!(t.is_flat(other, flip), cosine > METHOD.orientation.flat);

@@ -6,6 +6,7 @@ use super::patches::SharedEdge;
 use super::rows::{LabelledTriangle, PairSum, Relation, Seam, Upward, words};
 use super::star::{EDGES, EdgesUp, Triangle, opposed};
 use crate::blocks::Blocks;
+use crate::ids::{Block, Ids};
 use outcrop_disk::workspace::memory::bytes_of;
 
 /// The labels of a block; the rows are described at [`super::orient::OrientedSurface`] and
@@ -40,7 +41,7 @@ pub(super) fn orient_block(
     block: usize,
 ) -> OrientedBlock {
     let ids = blocks.ids(block);
-    let mut edges = EdgesUp::with_room_for(ids.clone(), inner.iter());
+    let mut edges = EdgesUp::with_room_for(ids, inner.iter());
     let mut sets = ParitySets::new(inner.len());
     let mut kept = Vec::with_capacity(inner.len());
     let mut constraints = Vec::new();
@@ -124,7 +125,7 @@ pub(super) fn number_labels(
         sent.push(Relation {
             to: blocks.of(c[0]),
             triangle: c,
-            block: block as u32,
+            block: Block::at(block),
             label_flip: word((label, flip ^ turned)),
             weight: weight as u32,
         });
@@ -176,7 +177,7 @@ pub(super) fn adjacent(
     t: Triangle,
     edges: &EdgesUp,
     triangles: &[Triangle],
-    ids: &std::ops::Range<u32>,
+    ids: &Ids,
     mut each: impl FnMut(u32, bool),
 ) {
     for (a, b, ..) in EDGES {

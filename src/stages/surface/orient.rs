@@ -10,6 +10,7 @@ use super::rows::{
 use super::star::Triangle;
 use super::weigh::weigh_block;
 use crate::blocks::Blocks;
+use crate::ids::Block;
 use outcrop_disk::error::Result;
 use outcrop_disk::spill::{Inbox, Shuffle, Table, release};
 use outcrop_disk::workspace::memory::{Reservation, bytes_of};
@@ -161,7 +162,7 @@ pub fn orient_inside<T: Serialize + DeserializeOwned + Send>(
         let _done = unit.hold(done.bytes());
         interior.put(unit, block, &done.interior)?;
         relations.send(unit, block, done.relations)?;
-        let mine = |t: &Triangle| blocks.of(t[0]) == block as u32;
+        let mine = |t: &Triangle| blocks.of(t[0]) == Block::at(block);
         let mine: Vec<Triangle> = crossing.iter().copied().filter(mine).collect();
         first.put(unit, block, bytemuck::cast_slice(&mine))?;
         if let (Some(weighed), Some(evidence)) = (&weighed, &evidence) {

@@ -4,6 +4,7 @@ use super::evidence::{Evidence, LongNormal};
 use super::parity::ParitySets;
 use super::sides::{NONE, across, parts};
 use super::star::{EDGES, Triangle};
+use crate::ids::Ids;
 use outcrop_disk::workspace::memory::bytes_of;
 use std::ops::Range;
 
@@ -38,7 +39,7 @@ impl Patches {
     /// Joins the interior `triangles` of the block of `ids`, ascending, across their flat edges, if their
     /// smallest ids are in the same run of `patch` ids.
     #[must_use]
-    pub fn of(ids: Range<u32>, triangles: &[Triangle], evidence: &Evidence, patch: u32) -> Self {
+    pub fn of(ids: Ids, triangles: &[Triangle], evidence: &Evidence, patch: u32) -> Self {
         let across = across(ids, triangles);
         let mut sets = ParitySets::new(triangles.len());
         let mut runs = Runs {
@@ -51,8 +52,8 @@ impl Patches {
         };
         let mut first = 0;
         while let Some(t) = triangles.get(first) {
-            let end = (u64::from(t[0] / patch) + 1) * u64::from(patch);
-            let count = triangles[first..].partition_point(|t| u64::from(t[0]) < end);
+            let end = (t[0].index() / patch as usize + 1) * patch as usize;
+            let count = triangles[first..].partition_point(|t| t[0].index() < end);
             runs.join(first..first + count, &mut sets);
             first += count;
         }

@@ -2,6 +2,7 @@
 
 use super::parity::{OrientationConstraint, constraint};
 use super::star::Triangle;
+use crate::ids::Block;
 use outcrop_disk::spill::row;
 
 row! {
@@ -17,7 +18,7 @@ row! {
     /// A triangle sent to a block.
     pub struct TriangleTo {
         /// Number of the block.
-        to: u32,
+        to: Block,
         /// Ids, ascending.
         triangle: Triangle,
     }
@@ -40,7 +41,7 @@ row! {
     /// A labelled triangle sent to a block.
     pub struct LabelledTo {
         /// Number of the block.
-        to: u32,
+        to: Block,
         /// Ids, ascending.
         triangle: Triangle,
         /// See [`LabelledTriangle`].
@@ -53,11 +54,11 @@ row! {
     /// The constraint of an interior triangle of a block on a crossing triangle.
     pub struct Relation {
         /// Block of the smallest vertex of the crossing triangle.
-        to: u32,
+        to: Block,
         /// The crossing triangle.
         triangle: Triangle,
         /// Block of the interior triangle.
-        block: u32,
+        block: Block,
         /// `label << 1 | flip`: its label, and 1 if the crossing triangle is turned against the label.
         label_flip: u32,
         /// Weight of the common edge.
@@ -128,14 +129,14 @@ pub(super) fn interior_constraints(
     block: usize,
     t: Triangle,
 ) -> impl Iterator<Item = (OrientationConstraint, i64)> {
-    let key = (block as u32, t);
+    let key = (Block::at(block), t);
     let start = relations.partition_point(|r| (r.to, r.triangle) < key);
     relations[start..]
         .iter()
         .take_while(move |r| (r.to, r.triangle) == key)
         .map(|r| {
             let (label, flip) = constraint(r.label_flip);
-            let first = globals[r.block as usize].0;
+            let first = globals[r.block.index()].0;
             ((first + label, flip), i64::from(r.weight))
         })
 }

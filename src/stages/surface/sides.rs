@@ -1,7 +1,7 @@
 //! Pairs of triangles that share an edge inside a block.
 
 use super::star::{ByVertex, Triangle};
-use std::ops::Range;
+use crate::ids::{Id, Ids};
 
 /// Stands for an edge without a second triangle inside the block.
 pub const NONE: u32 = u32::MAX;
@@ -27,30 +27,30 @@ pub fn parts(side: u32) -> (usize, usize) {
 /// Nothing is sorted or hashed: the triangles around a lower end mark the upper ends.
 #[inline]
 pub fn pair_edges(
-    ids: Range<u32>,
+    ids: Ids,
     triangles: &[Triangle],
     mut pair: impl FnMut(u32, u32),
     mut lone: impl FnMut(u32, [u32; 2]),
 ) {
-    let (start, size) = (ids.start, ids.len() as u32);
-    let local = |v: u32| v.wrapping_sub(start);
+    let size = ids.len() as u32;
+    let local = |v: Id| ids.find(v) as u32;
     let inside = |t: &Triangle| local(t[1]) < size && local(t[2]) < size;
     // By their middle vertices, the triangles whose upper edge is inside the block.
     let middles = triangles.iter().filter(|t| inside(t)).map(|t| t[1]);
-    let mut upper = ByVertex::with_room(ids.clone(), middles);
+    let mut upper = ByVertex::with_room(ids, middles);
     for (number, t) in (0..).zip(triangles).filter(|(_, t)| inside(t)) {
         upper.push(t[1], number);
     }
     // For each vertex, the last lower end from which an edge to it was found, plus one, and the side of this
     // edge.
     let mut seen = vec![(0u32, NONE); size as usize];
-    let mut next = triangles.partition_point(|t| t[0] < start) as u32;
+    let mut next = triangles.partition_point(|t| t[0] < ids.start) as u32;
     for v in 0..size {
         let first = next;
         let own = triangles[next as usize..].iter();
         next += own.take_while(|t| local(t[0]) == v).count() as u32;
         let own = first..next;
-        let upper = upper.at(v + start);
+        let upper = upper.at(ids.id(v as usize));
         // The place of a corner in the block: the upper end of an edge from `v`.
         let end = |number: u32, corner: usize| local(triangles[number as usize][corner]);
         let mut single = 0;
@@ -97,7 +97,7 @@ pub fn pair_edges(
 /// corner, the [`side`] of the adjacent triangle, or [`NONE`]. For traversals from triangle to triangle. No
 /// edge may have more than two triangles.
 #[must_use]
-pub fn across(ids: Range<u32>, triangles: &[Triangle]) -> Vec<[u32; 3]> {
+pub fn across(ids: Ids, triangles: &[Triangle]) -> Vec<[u32; 3]> {
     let mut across = vec![[NONE; 3]; triangles.len()];
     let pair = |a, b| {
         for (this, other) in [(a, b), (b, a)] {
@@ -112,6 +112,7 @@ pub fn across(ids: Range<u32>, triangles: &[Triangle]) -> Vec<[u32; 3]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ids::triangle;
     use proptest::prelude::*;
     use std::collections::BTreeMap;
 
@@ -121,9 +122,9 @@ mod tests {
             some in prop::collection::btree_set(prop::array::uniform3(5u32..25), 0..60),
         ) {
             // At most two triangles at an edge.
-            let mut behind: BTreeMap<[u32; 2], Vec<Triangle>> = BTreeMap::new();
+            let mut behind: BTreeMap<[Id; 2], Vec<Triangle>> = BTreeMap::new();
             let mut triangles: Vec<Triangle> = Vec::new();
-            for mut t in some {
+            for mut t in some.into_iter().map(triangle) {
                 t.sort_unstable();
                 let edges = [[t[1], t[2]], [t[0], t[2]], [t[0], t[1]]];
                 let free = edges.iter().all(|e| behind.get(e).is_none_or(|b| b.len() < 2));
@@ -133,7 +134,7 @@ mod tests {
                 }
             }
             triangles.sort_unstable();
-            for (t, across) in triangles.iter().zip(across(5..25, &triangles)) {
+            for (t, across) in triangles.iter().zip(across(Ids::of(5..25), &triangles)) {
                 let edges = [[t[1], t[2]], [t[0], t[2]], [t[0], t[1]]];
                 for (edge, side) in edges.iter().zip(across) {
                     let other = behind[edge].iter().find(|u| *u != t);

@@ -1,10 +1,9 @@
 //! The triangles around the vertices and edges of a block.
 
+pub use crate::ids::Triangle;
+use crate::ids::{Id, Ids};
+use bytemuck::{Zeroable, zeroed_vec};
 use outcrop_disk::workspace::memory::bytes_of;
-use std::ops::Range;
-
-/// A triangle as ascending ids.
-pub type Triangle = [u32; 3];
 
 /// The three edges of a triangle as positions of its vertices: first, second, opposite vertex, and true if
 /// the edge runs from low to high in the orientation `0 → 1 → 2`.
@@ -14,30 +13,30 @@ pub const EDGES: [(usize, usize, usize, bool); 3] =
 /// True if two triangles with ascending ids that share the edge `low < high` need opposite flips to be
 /// oriented alike.
 #[must_use]
-pub fn opposed(t: Triangle, u: Triangle, low: u32, high: u32) -> bool {
+pub fn opposed(t: Triangle, u: Triangle, low: Id, high: Id) -> bool {
     runs_up(t, low, high) == runs_up(u, low, high)
 }
 
-fn runs_up(t: Triangle, low: u32, high: u32) -> bool {
+fn runs_up(t: Triangle, low: Id, high: Id) -> bool {
     !(t[0] == low && t[2] == high)
 }
 
 /// The ascending ids of an oriented triangle that starts with its smallest vertex.
 #[must_use]
-pub fn sorted([i, a, b]: [u32; 3]) -> Triangle {
+pub fn sorted([i, a, b]: Triangle) -> Triangle {
     if a < b { [i, a, b] } else { [i, b, a] }
 }
 
 /// The other two vertices of a triangle at `v`, in ascending order.
 #[must_use]
 #[inline]
-pub fn others([a, b, c]: Triangle, v: u32) -> [u32; 2] {
+pub fn others([a, b, c]: Triangle, v: Id) -> [Id; 2] {
     [if a == v { b } else { a }, if c == v { b } else { c }]
 }
 
 /// True if `v` is a vertex of `t`.
 #[must_use]
-pub fn has(t: Triangle, v: u32) -> bool {
+pub fn has(t: Triangle, v: Id) -> bool {
     t[0] == v || t[1] == v || t[2] == v
 }
 
@@ -46,7 +45,7 @@ pub fn has(t: Triangle, v: u32) -> bool {
 /// around a vertex.
 #[derive(Debug, Default)]
 pub struct ByVertex<T> {
-    ids: Range<u32>,
+    ids: Ids,
     /// Index of the first entry of each vertex.
     start: Vec<u32>,
     /// Index after the last entry of each vertex.
@@ -54,13 +53,13 @@ pub struct ByVertex<T> {
     list: Vec<T>,
 }
 
-impl<T: Copy + Default> ByVertex<T> {
+impl<T: Copy + Zeroable> ByVertex<T> {
     /// Empty lists for the vertices `ids`, each with room for as many entries as it occurs in `vertices`.
-    pub fn with_room(ids: Range<u32>, vertices: impl Iterator<Item = u32>) -> Self {
+    pub fn with_room(ids: Ids, vertices: impl Iterator<Item = Id>) -> Self {
         let mut start = vec![0u32; ids.len() + 1];
         let behind = &mut start[1..];
         vertices.for_each(|v| {
-            if let Some(room) = behind.get_mut(v.wrapping_sub(ids.start) as usize) {
+            if let Some(room) = behind.get_mut(ids.find(v)) {
                 *room += 1;
             }
         });
@@ -68,7 +67,7 @@ impl<T: Copy + Default> ByVertex<T> {
             start[v + 1] += start[v];
         }
         let end = start[..ids.len()].to_vec();
-        let list = vec![T::default(); start[ids.len()] as usize];
+        let list = zeroed_vec(start[ids.len()] as usize);
         Self {
             ids,
             start,
@@ -85,8 +84,8 @@ impl<T: Copy + Default> ByVertex<T> {
 
     /// Appends an entry to the list of `v`; ignored if `v` is not in the block or its list is full.
     #[inline]
-    pub fn push(&mut self, v: u32, entry: T) {
-        let v = v.wrapping_sub(self.ids.start) as usize;
+    pub fn push(&mut self, v: Id, entry: T) {
+        let v = self.ids.find(v);
         if let Some(end) = self.end.get_mut(v)
             && *end < self.start[v + 1]
         {
@@ -98,8 +97,8 @@ impl<T: Copy + Default> ByVertex<T> {
     /// The entries of a vertex of the block, in the order of insertion.
     #[must_use]
     #[inline]
-    pub fn at(&self, v: u32) -> &[T] {
-        let v = (v - self.ids.start) as usize;
+    pub fn at(&self, v: Id) -> &[T] {
+        let v = self.ids.place(v);
         &self.list[self.start[v] as usize..self.end[v] as usize]
     }
 }
@@ -110,7 +109,7 @@ pub type Star = ByVertex<u32>;
 impl Star {
     /// The stars of the vertices `ids`, with all `triangles` numbered in their order.
     #[must_use]
-    pub fn of(ids: Range<u32>, triangles: &[Triangle]) -> Self {
+    pub fn of(ids: Ids, triangles: &[Triangle]) -> Self {
         let mut star = Self::with_room(ids, triangles.iter().flatten().copied());
         for (number, t) in (0..).zip(triangles) {
             t.iter().for_each(|v| star.push(*v, number));
@@ -121,15 +120,12 @@ impl Star {
 
 /// For each vertex of a block, the edges to higher vertices: the higher vertex and the number of a triangle
 /// there. Used to find the neighbours of a triangle.
-pub type EdgesUp = ByVertex<(u32, u32)>;
+pub type EdgesUp = ByVertex<(Id, u32)>;
 
 impl EdgesUp {
     /// No edges, with room for those of `triangles`.
     #[must_use]
-    pub fn with_room_for<'a>(
-        ids: Range<u32>,
-        triangles: impl Iterator<Item = &'a Triangle>,
-    ) -> Self {
+    pub fn with_room_for<'a>(ids: Ids, triangles: impl Iterator<Item = &'a Triangle>) -> Self {
         // Two edges start at the lowest vertex, one at the middle one.
         Self::with_room(ids, triangles.flat_map(|t| [t[0], t[0], t[1]]))
     }
@@ -143,7 +139,7 @@ impl EdgesUp {
 
     /// Numbers of the triangles at the edge `low < high`, in order of insertion; none if `low` is
     /// not in the block.
-    pub fn at_edge(&self, low: u32, high: u32) -> impl Iterator<Item = u32> + '_ {
+    pub fn at_edge(&self, low: Id, high: Id) -> impl Iterator<Item = u32> + '_ {
         let edges = if self.ids.contains(&low) {
             self.at(low)
         } else {
@@ -160,7 +156,7 @@ impl EdgesUp {
 /// vertex. Only for links whose nodes have at most two edges. The memory is reused for each vertex.
 #[derive(Debug, Default)]
 pub struct Link {
-    edges: Vec<[u32; 2]>,
+    edges: Vec<[Id; 2]>,
     group: Vec<usize>,
     /// For each component, true if it is a closed cycle.
     closed: Vec<bool>,
@@ -168,7 +164,7 @@ pub struct Link {
 
 impl Link {
     /// Reads the triangles around `v`.
-    pub fn set(&mut self, v: u32, triangles: impl Iterator<Item = Triangle>) {
+    pub fn set(&mut self, v: Id, triangles: impl Iterator<Item = Triangle>) {
         self.edges.clear();
         self.edges.extend(triangles.map(|t| others(t, v)));
         self.group.clear();
@@ -189,7 +185,7 @@ impl Link {
     }
 
     /// Walks from node `from` along edges without a component; true if it ends at `goal`.
-    fn follow(&mut self, from: u32, goal: u32, number: usize) -> bool {
+    fn follow(&mut self, from: Id, goal: Id, number: usize) -> bool {
         let mut node = from;
         while node != goal {
             let is_next =
@@ -198,8 +194,7 @@ impl Link {
                 return false;
             };
             self.group[edge] = number;
-            let [a, b] = self.edges[edge];
-            node ^= a ^ b;
+            node = node.other(self.edges[edge]);
         }
         true
     }

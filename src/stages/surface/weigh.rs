@@ -8,9 +8,9 @@ use super::parity::signed;
 use super::patches::Patches;
 use super::star::{EdgesUp, Triangle};
 use crate::blocks::Blocks;
+use crate::ids::{Id, Ids};
 use outcrop_disk::workspace::memory::bytes_of;
 use outcrop_geom::method::METHOD;
-use std::ops::Range;
 
 /// Orients a block by evidence.
 pub(super) fn weigh_block(
@@ -23,7 +23,7 @@ pub(super) fn weigh_block(
     let ids = blocks.ids(block);
     let division = evidence.division;
     let mut weigher = Weigher {
-        patches: Patches::of(ids.clone(), inner, evidence, division.patch),
+        patches: Patches::of(ids, inner, evidence, division.patch),
         graph: Graph::default(),
         inner,
         evidence,
@@ -61,7 +61,7 @@ struct Weigher<'a> {
     graph: Graph,
     inner: &'a [Triangle],
     evidence: &'a Evidence,
-    ids: Range<u32>,
+    ids: Ids,
     /// Most bytes that the patches and the lists for their connections took.
     most: u64,
 }
@@ -89,10 +89,10 @@ impl Weigher<'_> {
         let witnesses = &self.evidence.witnesses;
         let mut known = vec![false; self.ids.len()];
         for w in witnesses {
-            known[(w.vertex - self.ids.start) as usize] = true;
+            known[self.ids.place(w.vertex)] = true;
         }
         for (number, t) in (0..).zip(self.inner) {
-            let known = t.map(|v| known[(v - self.ids.start) as usize]);
+            let known = t.map(|v| known[self.ids.place(v)]);
             if known.contains(&true) {
                 let normal = self.evidence.normal(*t);
                 let all = t.iter().zip(known).filter(|(_, known)| *known);
@@ -140,15 +140,15 @@ impl Weigher<'_> {
         let inner = self.inner;
         let mut seen = vec![false; self.ids.len()];
         for v in others.flatten().filter(|v| self.ids.contains(v)) {
-            seen[(v - self.ids.start) as usize] = true;
+            seen[self.ids.place(*v)] = true;
         }
-        let place = |v: u32| (v - self.ids.start) as usize;
+        let place = |v: Id| self.ids.place(v);
         // True if an edge of the triangle joins two of their vertices.
         let beside = |t: &Triangle| t.iter().filter(|v| seen[place(**v)]).count() > 1;
         let some = (0..).zip(inner).filter(|(_, t)| beside(t));
         let numbers: Vec<u32> = some.map(|(number, _)| number).collect();
         let triangle = |n: &u32| &inner[*n as usize];
-        let mut edges = EdgesUp::with_room_for(self.ids.clone(), numbers.iter().map(triangle));
+        let mut edges = EdgesUp::with_room_for(self.ids, numbers.iter().map(triangle));
         for number in &numbers {
             edges.add(*triangle(number), *number);
         }

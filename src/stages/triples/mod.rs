@@ -2,11 +2,25 @@
 
 use crate::blocks::Blocks;
 use crate::cells::{CellTriples, CountedTriple, SentTriple};
+use crate::ids::{Block, Id, Triangle};
 use outcrop_disk::error::Result;
-use outcrop_disk::spill::{Shuffle, Table};
+use outcrop_disk::spill::{Shuffle, Table, row};
 use outcrop_disk::workspace::memory::{Reservation, bytes_of};
 use outcrop_disk::workspace::{Unit, Workspace};
 use serde::{Deserialize, Serialize};
+
+row! {
+    /// A crossing triple that is sent to a block of its other vertices.
+    pub struct VisitingTriple {
+        /// Number of the block.
+        to: Block,
+        /// Ids, ascending.
+        triple: Triangle,
+        /// Cells, 1 to 3.
+        count: u32,
+    }
+    packed Above Above Rising Rising Above
+}
 
 /// All triples with their counts, ascending.
 #[derive(Debug, Serialize, Deserialize)]
@@ -14,7 +28,7 @@ pub struct Triples {
     /// Triples by the block of their smallest vertex.
     pub own: Table<CountedTriple>,
     /// Crossing triples, sent to each other block that contains one of their vertices.
-    pub visiting: Shuffle<SentTriple>,
+    pub visiting: Shuffle<VisitingTriple>,
 }
 
 /// Distinct triples by count.
@@ -47,13 +61,13 @@ pub fn triples(
     let inbox = cells.sent.open(workspace, cells.tiles.count())?;
     let count: u64 = cells.off.total(workspace)?;
     let _off = workspace.reserve("off the surface", 4 * count)?;
-    let mut off: Vec<u32> = Vec::with_capacity(count as usize);
+    let mut off: Vec<Id> = Vec::with_capacity(count as usize);
     let unit = workspace.unit();
     for tile in 0..cells.off.count() {
-        off.extend(cells.off.get(&unit, tile)?.into_iter().map(|off| off.id));
+        off.extend(cells.off.get(&unit, tile)?);
     }
     let runs = Runs::of(&off, blocks.points(), workspace)?;
-    let is_off = |v: &u32| runs.contain(*v) && off.binary_search(v).is_ok();
+    let is_off = |v: &Id| runs.contain(*v) && off.binary_search(v).is_ok();
     let bytes = |block: usize| {
         let tiles = cells.tiles.of_block(block);
         tiles
@@ -78,7 +92,7 @@ pub fn triples(
         for &CountedTriple { triple, count } in &all {
             local[(count - 1) as usize] += 1;
             let visited = blocks.visited(triple);
-            sent.extend(visited.map(|to| SentTriple { to, triple, count }));
+            sent.extend(visited.map(|to| VisitingTriple { to, triple, count }));
             local[3] += u64::from(blocks.crossing(triple));
         }
         held.set(bytes_of(&all) + bytes_of(&sent));
@@ -114,22 +128,22 @@ impl Runs {
     /// Binary logarithm of the number of ids in a run.
     const SHIFT: u32 = 7;
 
-    fn of(off: &[u32], points: usize, workspace: &Workspace) -> Result<Self> {
+    fn of(off: &[Id], points: usize, workspace: &Workspace) -> Result<Self> {
         let words = (points >> Self::SHIFT) / 64 + 1;
         let mut runs = Self {
             _held: workspace.reserve("off the surface", 8 * words as u64)?,
             words: vec![0; words],
         };
         for id in off {
-            let run = id >> Self::SHIFT;
-            runs.words[run as usize / 64] |= 1 << (run % 64);
+            let run = id.index() >> Self::SHIFT;
+            runs.words[run / 64] |= 1 << (run % 64);
         }
         Ok(runs)
     }
 
-    fn contain(&self, id: u32) -> bool {
-        let run = id >> Self::SHIFT;
-        self.words[run as usize / 64] >> (run % 64) & 1 == 1
+    fn contain(&self, id: Id) -> bool {
+        let run = id.index() >> Self::SHIFT;
+        self.words[run / 64] >> (run % 64) & 1 == 1
     }
 }
 

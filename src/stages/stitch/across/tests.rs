@@ -73,7 +73,7 @@ fn across(starved: bool) -> (Left, [usize; 2]) {
     while pass.group < blocks.count() {
         let group = pass.group;
         // Not beyond this turn.
-        let ready = |block: u32| base.spans[block as usize].0 as usize <= group;
+        let ready = |block: crate::ids::Block| base.spans[block.index()].0.index() <= group;
         let mut most = starved.then_some(0);
         let free = workspace.memory.available();
         loop {

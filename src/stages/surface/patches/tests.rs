@@ -3,6 +3,7 @@
 use super::super::evidence::{Division, cosine, weight};
 use super::super::star::opposed;
 use super::*;
+use crate::ids::{Id, triangle};
 use crate::located::Located;
 use outcrop_geom::Point;
 use outcrop_geom::method::METHOD;
@@ -23,7 +24,7 @@ pub(in super::super) fn band(
     let squares = (0..wide).flat_map(|x| [(x, 0), (x, 1)]);
     let halves = squares.flat_map(|(x, y)| {
         let [a, b, c, d] = [at(x, y), at(x, y + 1), at(x + 1, y), at(x + 1, y + 1)];
-        [[a, b, c], [b, c, d]]
+        [triangle([a, b, c]), triangle([b, c, d])]
     });
     let mut all: Vec<Triangle> = halves.collect();
     all.iter_mut().for_each(|t| t.sort_unstable());
@@ -37,10 +38,7 @@ pub(in super::super) fn band(
 }
 
 /// The edges between two triangles: the earlier and the later one, and true if one must be turned.
-pub(in super::super) fn inner_edges(
-    ids: Range<u32>,
-    triangles: &[Triangle],
-) -> Vec<(usize, usize, bool)> {
+pub(in super::super) fn inner_edges(ids: Ids, triangles: &[Triangle]) -> Vec<(usize, usize, bool)> {
     let mut edges = Vec::new();
     for (n, sides) in across(ids, triangles).into_iter().enumerate() {
         for (a, b, opposite, _) in EDGES {
@@ -86,15 +84,15 @@ proptest! {
     ) {
         let triangles = band(9, twist, &names, &gone);
         let evidence = evidence(&places, Division { patch, cluster: 0 });
-        let ids = 0..places.len() as u32;
-        let mut patches = Patches::of(ids.clone(), &triangles, &evidence, patch);
+        let ids = Ids::of(0..places.len() as u32);
+        let mut patches = Patches::of(ids, &triangles, &evidence, patch);
         let mut shared = patches.shared.clone();
         for (n, m, flip) in inner_edges(ids, &triangles) {
             let (t, other) = (triangles[n], triangles[m]);
             let cosine = cosine(evidence.normal(t), evidence.normal(other), flip);
             let weight = weight(cosine) as u8;
             let one = patches.of[n] == patches.of[m];
-            let near = t[0] / patch == other[0] / patch;
+            let near = t[0].get() / patch == other[0].get() / patch;
             prop_assert!(one || !near || cosine <= METHOD.orientation.flat, "{:?} {:?}", t, other);
             prop_assert!(!one || near);
             if !one || patches.sets.relation(n as u32, m as u32) != Some(flip) {
@@ -135,12 +133,12 @@ fn a_patch_ends_at_a_fold_and_where_its_run_ends() {
         .collect();
     for (patch, firsts) in [(30, vec![0, 12]), (18, vec![0, 12, 18])] {
         let evidence = evidence(&places, Division { patch, cluster: 0 });
-        let patches = Patches::of(0..30, &triangles, &evidence, patch);
-        let found: Vec<u32> = patches
+        let patches = Patches::of(Ids::of(0..30), &triangles, &evidence, patch);
+        let found: Vec<Id> = patches
             .roots
             .iter()
             .map(|(root, _)| triangles[*root as usize][0])
             .collect();
-        assert_eq!(found, firsts);
+        assert_eq!(found, firsts.into_iter().map(Id::new).collect::<Vec<_>>());
     }
 }

@@ -4,6 +4,7 @@ use super::super::evidence::Division;
 use super::super::parity::ParitySets;
 use super::super::patches::tests::{band, evidence, inner_edges, points};
 use super::*;
+use crate::ids::triangle;
 use outcrop_geom::Point;
 use proptest::prelude::*;
 
@@ -13,10 +14,10 @@ fn oriented(
     places: &[Point],
     division: Division,
 ) -> (ParitySets, Vec<bool>) {
-    let ids = 0..places.len() as u32;
+    let ids = Ids::of(0..places.len() as u32);
     let evidence = &evidence(places, division);
     let mut weigher = Weigher {
-        patches: Patches::of(ids.clone(), triangles, evidence, division.patch),
+        patches: Patches::of(ids, triangles, evidence, division.patch),
         graph: Graph::default(),
         inner: triangles,
         evidence,
@@ -44,7 +45,7 @@ proptest! {
         let division = Division { patch, cluster: 1000 };
         let (mut sets, dead) = oriented(&triangles, &places, division);
         let mut contradicted = vec![false; triangles.len()];
-        for (n, m, flip) in inner_edges(0..27, &triangles) {
+        for (n, m, flip) in inner_edges(Ids::of(0..27), &triangles) {
             let fits = sets.relation(n as u32, m as u32) == Some(flip);
             prop_assert!(fits || dead[n] || dead[m], "{} and {} are left and contradict", n, m);
             contradicted[m] |= !fits;
@@ -80,7 +81,7 @@ fn the_surface_is_cut_where_it_is_folded() {
         let removed: Vec<Triangle> = removed.map(|n| triangles[n]).collect();
         assert!(!removed.is_empty());
         for t in removed {
-            let along = t.map(|v| v / 3);
+            let along = t.map(|v| v.get() / 3);
             assert!(along.contains(&4) || along.contains(&5), "{t:?}");
         }
     }
@@ -102,7 +103,8 @@ fn a_removed_triangle_removes_no_others() {
         [4, 8, 11],
         [6, 8, 10],
         [8, 10, 11],
-    ];
+    ]
+    .map(triangle);
     let places = [
         [0, 5, 2],
         [0, 3, 4],

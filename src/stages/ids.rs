@@ -1,0 +1,183 @@
+//! Numbers that name things, with a type for each kind, so that none is taken for another.
+//!
+//! The width of ids stands here once. On disk and in a list each type is the plain number.
+
+use outcrop_disk::spill::{Row, Word};
+use serde::{Deserialize, Serialize};
+use std::ops::Range;
+
+/// The width of ids.
+pub type Width = u32;
+
+/// Defines a type of numbers.
+macro_rules! number {
+    ($(#[$meta:meta])* $name:ident: $width:ty) => {
+        $(#[$meta])*
+        #[derive(
+            Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
+            bytemuck::Pod, bytemuck::Zeroable,
+        )]
+        #[serde(transparent)]
+        #[repr(transparent)]
+        pub struct $name($width);
+
+        impl $name {
+            /// With this number.
+            #[must_use]
+            #[inline(always)]
+            pub const fn new(number: $width) -> Self {
+                Self(number)
+            }
+
+            /// With an index in a list as number.
+            #[must_use]
+            #[inline(always)]
+            pub const fn at(index: usize) -> Self {
+                Self(index as $width)
+            }
+
+            /// The number.
+            #[must_use]
+            #[inline(always)]
+            pub const fn get(self) -> $width {
+                self.0
+            }
+
+            /// The number as an index in a list.
+            #[must_use]
+            #[inline(always)]
+            pub const fn index(self) -> usize {
+                self.0 as usize
+            }
+        }
+    };
+}
+
+number! {
+    /// The id of a point: its rank on the curve.
+    Id: Width
+}
+
+number! {
+    /// The number of a block.
+    Block: u32
+}
+
+number! {
+    /// The number of a tile.
+    TileNumber: u32
+}
+
+/// An id in a list of ids.
+impl Row for Id {
+    const PACKING: Option<&'static [Word]> = Some(&[Word::Above]);
+}
+
+/// Three ids; ascending, unless something else is said.
+pub type Triangle = [Id; 3];
+
+impl Id {
+    /// An id that no point has; larger than all others.
+    pub const NONE: Self = Self(Width::MAX);
+
+    /// The id that comes so many places behind, or the largest number.
+    #[must_use]
+    pub const fn behind(self, places: Width) -> Self {
+        Self(self.0.saturating_add(places))
+    }
+
+    /// Of two ids, one of which is this, the other.
+    #[must_use]
+    #[inline(always)]
+    pub const fn other(self, [a, b]: [Self; 2]) -> Self {
+        Self(self.0 ^ a.0 ^ b.0)
+    }
+}
+
+/// A triangle or triple of these ids.
+#[must_use]
+pub fn triangle(ids: [Width; 3]) -> Triangle {
+    ids.map(Id)
+}
+
+/// Consecutive ids.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Ids {
+    /// The first one.
+    pub start: Id,
+    /// The one behind the last.
+    pub end: Id,
+}
+
+impl Ids {
+    /// From numbers.
+    #[must_use]
+    pub const fn of(numbers: Range<Width>) -> Self {
+        Self {
+            start: Id(numbers.start),
+            end: Id(numbers.end),
+        }
+    }
+
+    /// From indices in a list of all points.
+    #[must_use]
+    pub const fn at(indices: &Range<usize>) -> Self {
+        Self {
+            start: Id::at(indices.start),
+            end: Id::at(indices.end),
+        }
+    }
+
+    /// Number of ids.
+    #[must_use]
+    #[inline(always)]
+    pub const fn len(&self) -> usize {
+        self.end.0.saturating_sub(self.start.0) as usize
+    }
+
+    /// True if there is none.
+    #[must_use]
+    pub const fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// True if an id is one of them.
+    #[must_use]
+    #[inline(always)]
+    pub fn contains(&self, id: &Id) -> bool {
+        self.start <= *id && *id < self.end
+    }
+
+    /// The place of one of them, from 0.
+    #[must_use]
+    #[inline(always)]
+    pub const fn place(&self, id: Id) -> usize {
+        (id.0 - self.start.0) as usize
+    }
+
+    /// The place of one of them, from 0; of any other id a number that is no place.
+    #[must_use]
+    #[inline(always)]
+    pub const fn find(&self, id: Id) -> usize {
+        id.0.wrapping_sub(self.start.0) as usize
+    }
+
+    /// The id at a place.
+    #[must_use]
+    #[inline(always)]
+    pub const fn id(&self, place: usize) -> Id {
+        Id(self.start.0 + place as Width)
+    }
+
+    /// All of them, ascending.
+    #[inline(always)]
+    pub fn iter(&self) -> impl DoubleEndedIterator<Item = Id> + ExactSizeIterator + Clone + use<> {
+        (self.start.0..self.end.0).map(Id)
+    }
+
+    /// Their indices in a list of all points.
+    #[must_use]
+    pub const fn indices(&self) -> Range<usize> {
+        self.start.index()..self.end.index()
+    }
+}
